@@ -1,0 +1,229 @@
+/* gait.h - libgait: track walking people in calibrated video, in fixed memory, with the same bits on every run.
+ *
+ * Units: metres, radians, seconds, pixels; a name ending in utime is microseconds (as in LCM).  Matrices are
+ * row-major.  World: right-handed, z up, ground z = 0.  Image row 0 is the top; pixel centres are at integers.
+ * Memory: the library never allocates.  Ask gait_*_bytes(), give gait_*_init() that many bytes aligned to
+ * GAIT_ALIGN; they must outlive the object and not move.  There is nothing to free.
+ * Threads: a gait_model is immutable and may be shared; any other object takes one call at a time.
+ * Results depend on input, configuration and seed - not on threads, addresses, time or CPU features.
+ * Every function returning gait_status gives GAIT_OK or a negative error and then leaves its outputs alone. */
+#ifndef GAIT_H
+#define GAIT_H
+#include <stddef.h>
+#include <stdint.h>
+
+#define GAIT_VERSION_MAJOR 0
+#define GAIT_VERSION_MINOR 1
+#define GAIT_VERSION_PATCH 0
+#define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
+#define GAIT_ABI 1          /* SONAME; bumped by any incompatible change below, struct layout included */
+#define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
+#define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
+
+#define GAIT_ALIGN 64
+#define GAIT_MAX_JOINTS 32     /* points of the skeleton whose positions are reported */
+#define GAIT_MAX_ANGLES 32     /* joint angles */
+#define GAIT_MAX_COMPONENTS 16 /* principal components of the cyclic model */
+#define GAIT_MAX_CAMERAS 4
+
+#if defined(__GNUC__)
+#define GAIT_API __attribute__((visibility("default")))
+#else
+#define GAIT_API
+#endif
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- status: 0 success, negative error.  Values never change meaning. -------------------------------- */
+typedef enum gait_status {
+    GAIT_OK          = 0,
+    GAIT_ERR_ARG     = -1, /* null pointer, non-finite number, value outside its documented range */
+    GAIT_ERR_STRUCT  = -2, /* struct_size unset or unknown: call gait_*_default() first */
+    GAIT_ERR_MEMORY  = -3, /* mem too small or not aligned to GAIT_ALIGN */
+    GAIT_ERR_LIMIT   = -4, /* exceeds a GAIT_MAX_* of this build */
+    GAIT_ERR_MAGIC   = -5, /* not a libgait blob or snapshot */
+    GAIT_ERR_VERSION = -6, /* format major or snapshot layout is not the one this build reads */
+    GAIT_ERR_CORRUPT = -7, /* checksum, bounds or cross-reference check failed */
+    GAIT_ERR_STATE   = -8, /* call out of order: step before start, time running backwards */
+    GAIT_ERR_NUMERIC = -9  /* every weight zero or not a number */
+} gait_status;
+
+typedef struct gait_error { /* optional detail, written on failure only; there is no global "last error" */
+    int32_t status;         /* the gait_status returned */
+    int32_t index;          /* camera, section or parameter concerned; -1 if none */
+    char    text[120];      /* one line, NUL-terminated */
+} gait_error;
+
+typedef struct gait_abi_field { /* one row per struct (field NULL) and per field */
+    const char *type, *field;
+    uint32_t    offset, size;   /* bytes */
+} gait_abi_field;
+
+GAIT_API const char           *gait_status_name(gait_status s);  /* "GAIT_ERR_CORRUPT"; never NULL */
+GAIT_API uint32_t              gait_version(void);               /* of the library that is loaded */
+GAIT_API uint32_t              gait_abi(void);
+GAIT_API const gait_abi_field *gait_abi_fields(uint32_t *count); /* bindings check themselves on import */
+
+/* ---- plain data -------------------------------------------------------------------------------------- */
+enum { GAIT_GREY8 = 1, GAIT_RGB8 = 2, GAIT_BGR8 = 3 };
+typedef struct gait_image { /* borrowed view */
+    const uint8_t *data;    /* NULL: no image */
+    int32_t width, height;  /* pixels */
+    int32_t stride;         /* bytes per row */
+    int32_t format;         /* GAIT_GREY8, GAIT_RGB8 or GAIT_BGR8 */
+} gait_image;
+
+typedef struct gait_camera { /* u = fx X/Z + cx, v = fy Y/Z + cy with (X,Y,Z) = R p + t */
+    int32_t width, height;   /* pixels */
+    float   fx, fy, cx, cy;  /* pixels */
+    float   R[9], t[3];      /* world to camera; metres */
+    float   distortion[5];   /* k1 k2 p1 p2 k3 (OpenCV); applied to the incoming frame */
+} gait_camera;
+
+typedef struct gait_state {          /* one hypothesis: everything that places and poses a walker */
+    float phase;                     /* [0, 1) of the stride; 0 = right heel strike */
+    float stride_hz;                 /* strides per second */
+    float stature;                   /* metres */
+    float heading;                   /* walking direction about world z, radians; 0 = along +x */
+    float pitch, roll;               /* tilt of the pelvis beyond the model's own, radians */
+    float pelvis[3];                 /* pelvis joint, metres, world */
+    float coef[GAIT_MAX_COMPONENTS]; /* principal-component scores, in standard deviations; unused are 0 */
+} gait_state;
+
+typedef struct gait_pose {
+    float joint[GAIT_MAX_JOINTS][3]; /* metres, world; order of gait_model_joint_name() */
+    float angle[GAIT_MAX_ANGLES];    /* radians; order of gait_model_angle_name() */
+} gait_pose;
+
+/* ---- tasks: where the library finds threads ---------------------------------------------------------- */
+typedef void gait_task_fn(void *ctx, int32_t task);
+typedef struct gait_tasks {
+    /* Call fn(ctx, i) exactly once for each i in [0, count), in any order, on any threads; return when all
+     * have returned.  NULL: the calling thread does the work. */
+    void (*run)(void *user, gait_task_fn *fn, void *ctx, int32_t count);
+    void *user;
+} gait_tasks;
+
+/* ---- model: immutable view of a blob, used where it lies ---------------------------------------------- */
+typedef struct gait_model gait_model;
+typedef struct gait_model_info {
+    int32_t  joints, angles;   /* reported points and joint angles */
+    int32_t  components;       /* of the cyclic model */
+    int32_t  phases;           /* samples per stride of its curves */
+    int32_t  limbs;            /* drawn body parts */
+    int32_t  reserved;
+    float    stride_hz;        /* mean of the training set, strides per second */
+    float    stride_hz_sd;     /* between subjects */
+    float    stride_length;    /* mean, as a fraction of stature */
+    float    stride_length_sd; /* between subjects */
+    uint64_t digest;           /* of the blob; snapshots carry it */
+} gait_model_info;
+
+/* The blob must be aligned to GAIT_ALIGN and outlive the model. */
+GAIT_API gait_status gait_model_bytes(const void *blob, size_t blob_bytes, size_t *bytes, gait_error *err);
+GAIT_API gait_status gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
+                                     gait_model **out, gait_error *err);
+GAIT_API gait_status gait_model_get_info(const gait_model *m, gait_model_info *out);
+GAIT_API const char *gait_model_joint_name(const gait_model *m, int32_t joint); /* NULL out of range */
+GAIT_API const char *gait_model_angle_name(const gait_model *m, int32_t angle); /* NULL out of range */
+GAIT_API const char *gait_model_limb_name(const gait_model *m, int32_t limb);   /* NULL out of range */
+/* Pose of one hypothesis: curves (Ormoneit 2000, eq. 3), then forward kinematics. */
+GAIT_API gait_status gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out);
+/* Height of the pelvis over the ground that the model predicts for s (s->pelvis is not read), metres. */
+GAIT_API gait_status gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out);
+
+/* ---- render: limbs with depth order ------------------------------------------------------------------- */
+/* Draw a hypothesis: every pixel of ids (width x height of the camera, ids_stride bytes per row) becomes 0 or
+ * limb index + 1, nearest limb in front (ideal pinhole image, distortion not applied). */
+GAIT_API gait_status gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
+                                 int32_t ids_stride);
+
+/* ---- tracker (Ormoneit et al. 2000) ------------------------------------------------------------------- */
+typedef struct gait_tracker gait_tracker;
+enum { GAIT_MODE_DEFAULT = 0, GAIT_MODE_PAPER = 1 };
+#define GAIT_TERM_TEXTURE    0x1u /* previous frame's texture moved by each particle, eqs. 10-13 */
+#define GAIT_TERM_SILHOUETTE 0x2u /* foreground both ways; needs a background plate */
+#define GAIT_TERM_EDGES      0x4u /* image gradient along the limbs' outlines */
+#define GAIT_TERM_TEMPLATE   0x8u /* running appearance of each limb */
+
+typedef struct gait_tracker_config {
+    uint32_t struct_size;      /* set by gait_tracker_default() */
+    int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
+    uint64_t seed;             /* default 1 */
+    int32_t  particles;        /* [16, 1 << 20]; default 1000 (paper mode 10000) */
+    int32_t  components;       /* [0, the model's]; default -1: all */
+    int32_t  tasks;            /* pieces per step [1, 256], sizes the scratch; default 16 */
+    int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
+    uint32_t terms;            /* GAIT_TERM_* in use */
+    float    term_weight[4];   /* nats per unit cost of texture, silhouette, edges, template */
+    float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
+    float    girth;            /* limb radii against the model's (clothes) [0.5, 2] */
+    float    resample_ess;     /* resample below this fraction of particles [0, 1] */
+    float    max_dt;           /* longest accepted interval, seconds; default 0.5 */
+    /* Dynamics (eqs. 5-9): standard deviations per sqrt(second) unless said otherwise. */
+    float    phase_noise;      /* strides */
+    float    rate_noise;       /* fraction of the model's mean stride_hz */
+    float    rate_noise_start; /* the same while settling */
+    float    settle_time;      /* seconds after start with rate_noise_start */
+    float    forward_noise, lateral_noise, vertical_noise; /* metres */
+    float    heading_noise, tilt_noise;                    /* radians */
+    float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds */
+    float    coef_noise;       /* score standard deviations */
+    float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
+    float    stature_noise;    /* fraction of stature, while settling */
+    gait_camera camera[GAIT_MAX_CAMERAS];
+    gait_tasks exec;           /* default { NULL, NULL } */
+} gait_tracker_config;
+
+typedef struct gait_frame {
+    int64_t    utime;                   /* capture time; must increase */
+    gait_image image[GAIT_MAX_CAMERAS]; /* data NULL: that camera missed this frame */
+} gait_frame;
+
+enum { GAIT_STATUS_INIT = 0, GAIT_STATUS_TRACKING = 1, GAIT_STATUS_AMBIGUOUS = 2, GAIT_STATUS_LOST = 3 };
+#define GAIT_EST_RESAMPLED  0x1u
+#define GAIT_EST_NO_IMAGE   0x2u /* prediction only */
+#define GAIT_EST_DEGENERATE 0x4u /* effective sample size below 2 */
+typedef struct gait_estimate {
+    int64_t    utime;
+    uint64_t   frame;       /* steps since start */
+    double     log_evidence; /* log p(frame | past), up to the terms' common constant */
+    gait_state mean;        /* of the dominant mode: circular in phase and heading */
+    gait_state sd;          /* over all particles, field by field; circular for phase and heading */
+    gait_state best;        /* heaviest particle */
+    gait_pose  pose;        /* joints: posterior mean over all particles; angles: dominant mode */
+    float      joint_sd[GAIT_MAX_JOINTS][3]; /* posterior standard deviation, metres */
+    float      ess;         /* effective sample size after weighting */
+    float      phase_r;     /* resultant length of the phase, [0, 1]: 1 = certain */
+    float      mode_mass;   /* weight of the dominant mode, [0, 1] */
+    float      speed;       /* metres per second along the ground */
+    int32_t    status;      /* GAIT_STATUS_* */
+    uint32_t   flags;       /* GAIT_EST_* */
+} gait_estimate;
+
+GAIT_API void        gait_tracker_default(gait_tracker_config *cfg, int32_t mode);
+GAIT_API gait_status gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
+                                        gait_error *err);
+GAIT_API gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
+                                       const gait_tracker_config *cfg, gait_tracker **out, gait_error *err);
+/* Empty scene of one camera, as captured (distorted).  Borrowed: its pixels must stay until replaced or the
+ * tracker is done.  plate NULL: none; the silhouette term is then silent. */
+GAIT_API gait_status gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate);
+/* Broad prior: phase uniform, stride rate and stature of the population, heading unknown, pelvis at the origin. */
+GAIT_API gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd);
+/* Draw the particles from independent normals; a phase or heading whose sd is >= a half turn is uniform. */
+GAIT_API gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
+                                        gait_error *err);
+/* One frame: resample, predict, weigh, estimate.  The first frame after start at the same utime is not moved. */
+GAIT_API gait_status gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out, gait_error *err);
+/* Copy up to cap particles with normalised weights; returns how many there are, or a negative status. */
+GAIT_API int32_t     gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap);
+GAIT_API uint64_t    gait_tracker_digest(const gait_tracker *t); /* hash of the whole state, for replay */
+GAIT_API gait_status gait_tracker_save(const gait_tracker *t, void *mem, size_t cap, size_t *bytes); /* mem NULL: size */
+GAIT_API gait_status gait_tracker_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
