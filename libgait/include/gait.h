@@ -200,6 +200,7 @@ typedef struct gait_estimate {
     float      speed;       /* metres per second along the ground */
     int32_t    status;      /* GAIT_STATUS_* */
     uint32_t   flags;       /* GAIT_EST_* */
+    uint32_t   reserved;
 } gait_estimate;
 
 GAIT_API void        gait_tracker_default(gait_tracker_config *cfg, int32_t mode);
