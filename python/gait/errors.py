@@ -1,0 +1,39 @@
+"""Exceptions of the package: what a user can mend, and what the C library refused."""
+
+from __future__ import annotations
+
+
+class UserError(Exception):
+    """Bad input: one line naming the file, the field and the remedy.  Commands print it and exit 1."""
+
+
+class LibraryError(UserError):
+    """libgait could not be loaded, or the file found is of another version or layout than this package."""
+
+
+class GaitError(Exception):
+    """A C call failed.
+
+    Attributes
+    ----------
+    status : int
+        The negative ``gait_status``.
+    name : str
+        Its name, such as ``"GAIT_ERR_CORRUPT"``.
+    text : str
+        One line of detail.
+    index : int
+        Camera, section or parameter concerned; -1 if none.
+    """
+
+    def __init__(self, status: int, name: str, text: str = "", index: int = -1) -> None:
+        super().__init__(f"{name}: {text}" if text else name)
+        self.status, self.name, self.text, self.index = int(status), name, text, index
+
+
+class GaitArgumentError(GaitError, ValueError):
+    """``GAIT_ERR_ARG``: not finite or outside the documented range."""
+
+
+class GaitLimitError(GaitError, ValueError):
+    """``GAIT_ERR_LIMIT``: more joints, cameras or components than the library was built for."""
