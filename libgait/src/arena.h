@@ -1,0 +1,20 @@
+/* arena.h - place arrays in caller memory; the same layout code counts the bytes and carves them.
+ *
+ *   arena a = { .base = NULL };               counting pass: every TAKE gives NULL, a.used is the size needed
+ *   arena a = { .base = mem, .cap = bytes };  placing pass; mem aligned to GAIT_ALIGN
+ * After the layout function, a.overflow tells that a size overflowed or cap was too small. */
+#ifndef GAIT_ARENA_H
+#define GAIT_ARENA_H
+#include "base.h"
+
+typedef struct arena {
+    unsigned char *base; /* NULL: count only */
+    size_t cap, used;    /* bytes */
+    int overflow;        /* set for good by the first block that did not fit */
+} arena;
+
+/* count elements of elem bytes, aligned to GAIT_ALIGN, not cleared.  NULL when counting or on overflow. */
+void *arena_take(arena *a, size_t elem, size_t count);
+
+#define TAKE(a, T, n) ((T *)arena_take((a), sizeof(T), (size_t)(n)))
+#endif

@@ -1,0 +1,31 @@
+/* camera.h - pinhole projection and lens distortion; conventions of gait_camera in gait.h. */
+#ifndef GAIT_CAMERA_H
+#define GAIT_CAMERA_H
+#include "base.h"
+
+#define CAMERA_NEAR 0.05f /* metres: nothing nearer is projected */
+
+/* Size and focal lengths positive, all numbers finite, R orthonormal to 1e-3 with det R > 0. */
+bool camera_valid(const gait_camera *c);
+
+/* Some distortion coefficient is not 0. */
+bool camera_distorted(const gait_camera *c);
+
+/* Ideal pixel (u, v) to the pixel of the captured image (OpenCV's k1 k2 p1 p2 k3). */
+void camera_distort(const gait_camera *c, float u, float v, float *ud, float *vd);
+
+/* World point to ideal pixel; returns its depth Z.  uv is left alone when Z <= CAMERA_NEAR. */
+static inline float camera_project(const gait_camera *c, const float p[3], float uv[2])
+{
+    const float *const R = c->R;
+    float const x = R[0] * p[0] + R[1] * p[1] + R[2] * p[2] + c->t[0];
+    float const y = R[3] * p[0] + R[4] * p[1] + R[5] * p[2] + c->t[1];
+    float const z = R[6] * p[0] + R[7] * p[1] + R[8] * p[2] + c->t[2];
+    if (z > CAMERA_NEAR) {
+        float const inv = 1.0f / z;
+        uv[0] = c->fx * (x * inv) + c->cx;
+        uv[1] = c->fy * (y * inv) + c->cy;
+    }
+    return z;
+}
+#endif

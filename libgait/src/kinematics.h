@@ -1,0 +1,45 @@
+/* kinematics.h - curves and forward kinematics of BLOCK bodies at once (structure of arrays, one lane a body).
+ * Frames and signs: doc/model-format.md.  Lane results do not depend on the other lanes. */
+#ifndef GAIT_KINEMATICS_H
+#define GAIT_KINEMATICS_H
+#include "model.h"
+
+enum { BLOCK = 16, KIN_MAX_FRAMES = MODEL_MAX_FRAMES };
+
+typedef struct kin_input {
+    float phase[BLOCK];                     /* cycles; wrapped to [0, 1) */
+    float stature[BLOCK];                   /* metres */
+    float heading[BLOCK];                   /* radians */
+    float pitch[BLOCK], roll[BLOCK];        /* radians, added to the model's own */
+    float pelvis[3][BLOCK];                 /* metres, world */
+    float coef[GAIT_MAX_COMPONENTS][BLOCK]; /* score standard deviations */
+} kin_input;
+
+typedef struct kin_channels {
+    float v[GAIT_MAX_ANGLES + 8][BLOCK]; /* radians or statures; order of gait_model.channel_name */
+} kin_channels;
+
+typedef struct kin_body {
+    float R[KIN_MAX_FRAMES][9][BLOCK]; /* frame to world, row-major */
+    float o[KIN_MAX_FRAMES][3][BLOCK]; /* origin of the frame, metres, world */
+    float scale[BLOCK];                /* stature: metres per model length */
+} kin_body;
+
+/* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. (2000),
+ * linear between samples, wrapping. */
+void kin_curves(const gait_model *m, const float phase[BLOCK], const float coef[][BLOCK], int32_t components,
+                kin_channels *out);
+
+/* Place every frame in the world. */
+void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, kin_body *out);
+
+/* The reported points, metres, world: P x 3 x BLOCK. */
+void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK]);
+
+/* One body: curves, kinematics, points and angles; unused entries of out are 0.
+ * GAIT_ERR_ARG, and out left alone, when a number in s is not finite or the stature is not positive. */
+gait_status model_pose_state(const gait_model *m, const gait_state *s, gait_pose *out);
+
+/* Height of the pelvis over the ground that the curves give for s, metres; errors as above. */
+gait_status model_pelvis_height(const gait_model *m, const gait_state *s, float *out);
+#endif
