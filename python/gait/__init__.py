@@ -1,0 +1,1 @@
+"""Learn how people walk from motion capture and track them in calibrated video."""
