@@ -1,4 +1,4 @@
-# libgait - `make help` lists the targets; settings that stay go into Makefile.local.
+# libgait: `make help` lists the targets.  Settings that stay (CC=clang, PREFIX=...) go into Makefile.local.
 MAKEFLAGS += -r
 .SUFFIXES:
 .DELETE_ON_ERROR:
@@ -6,21 +6,62 @@ MAKEFLAGS += -r
 
 -include Makefile.local
 
+config ?= release
 PYTHON ?= python3
+PREFIX ?= /usr/local
+LIBDIR ?= $(PREFIX)/lib
+INCLUDEDIR ?= $(PREFIX)/include
 
-# ---- Python environment ------------------------------------------------------------------------------------
 VENV  := .venv
 READY := $(VENV)/.ready
+SITE  := $(VENV)/site
+PY    := $(VENV)/bin/python
+B     := build/$(config)
+BIN   := $(if $(filter release,$(config)),build/bin,$(B)/bin)
+HEADER := libgait/include/gait.h
+define_of = $(shell awk '$$2 == "$(1)" { print $$3 }' $(HEADER))
+ABI     := $(call define_of,GAIT_ABI)
+VERSION := $(call define_of,GAIT_VERSION_MAJOR).$(call define_of,GAIT_VERSION_MINOR).$(call define_of,GAIT_VERSION_PATCH)
 
-.PHONY: help setup
+# Eigen's headers; another copy: make lib EIGEN=/usr/include/eigen3
+EIGEN ?= $(SITE)/cmeel.prefix/include/eigen3
+
+# ---- flags ---------------------------------------------------------------------------------------------------
+# Same bits everywhere: baseline instruction set, no fused multiply-add, no -ffast-math, Eigen not vectorised.
+OPT_release  := -O3 -DNDEBUG
+OPT_debug    := -O0
+OPT_sanitize := -O1 -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+OPT ?= $(OPT_$(config))
+ifeq ($(OPT),)
+$(error unknown config=$(config): use release, debug or sanitize)
+endif
+WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)
+CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
+COMMON := $(OPT) -g -MMD -MP -ffp-contract=off
+LIBGAIT := $(COMMON) -fPIC -fvisibility=hidden -fstack-usage -Wframe-larger-than=16384 -Ilibgait/include
+EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_NO_IO
+NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
+
+OBJ := $(patsubst libgait/src/%,$(B)/src/%.o,$(sort $(wildcard libgait/src/*.c libgait/src/*.cpp)))
+UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_*.c)))
+TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
+LIBS := $(B)/libgait.so $(B)/libgait.a
+
+.PHONY: help setup lib tools test check unit python-test demo model bench eval asan golden-check lint format \
+        install uninstall clean
+
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z][a-z-]*:.*## /{printf "  %-14s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
+	@echo 'make test     build and test everything'
+	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@echo; echo 'config=release|debug|sanitize (now $(config)), werror=1: warnings are errors'
 
+# ---- python environment --------------------------------------------------------------------------------------
 setup: $(READY) ## make .venv with the pinned packages (once; later builds work offline)
 
 # The stamp comes last: without it the environment is made anew, with it only changed pins are fetched.
 $(READY): python/requirements.txt python/requirements-dev.txt python/pyproject.toml
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "setup: needs Python >= 3.10, set PYTHON=")'
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "setup: needs Python >= 3.10: set PYTHON=")'
 	@$(PYTHON) -c 'import venv, ensurepip' || \
 	    { echo 'setup: $(PYTHON) cannot make environments: install python3-venv or set PYTHON=' >&2; exit 1; }
 	$(PYTHON) -m venv $$(test -f $@ || echo --clear) $(VENV)
@@ -28,5 +69,133 @@ $(READY): python/requirements.txt python/requirements-dev.txt python/pyproject.t
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check $(patsubst %,-r %,$(filter %.txt,$^))
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
 	    --config-settings editable_mode=compat -e python
-	@$(VENV)/bin/python -c 'import lcm' || { echo 'setup: LCM needs libglib-2.0.so.0: install libglib2.0-0' >&2; exit 1; }
+	@ln -sfn "$$(cd $(VENV) && echo lib/python3.*/site-packages)" $(SITE)
+	@$(PY) -c 'import lcm' || { echo 'setup: LCM needs libglib-2.0.so.0: install libglib2.0-0' >&2; exit 1; }
 	@touch $@
+
+# say CC file: one line a command, or with V=1 the command itself
+say = $(if $(V),,@echo '  $(1)' && )
+
+# ---- library -------------------------------------------------------------------------------------------------
+lib: $(LIBS) ## libgait.so and libgait.a in build/<config>
+
+# Linked by the C compiler: a C++ runtime dependency would not link.
+$(B)/libgait.so: $(OBJ)
+	$(call say,LD   $@)$(CC) $(OPT) -shared -Wl,--no-undefined -Wl,-soname,$(@F).$(ABI) $(LDFLAGS) -o $@.tmp $(OBJ) -lm
+	@mv $@.tmp $@.$(ABI)
+	@ln -sf $(@F).$(ABI) $@
+
+# One object whose internal names are local, so that nothing unprefixed meets the user's own names.
+$(B)/libgait.a: $(OBJ)
+	$(call say,AR   $@)$(CC) -r -nostdlib -o $(B)/libgait.o $(OBJ)
+	@objcopy --localize-hidden $(B)/libgait.o
+	@rm -f $@
+	@$(AR) rcs $@ $(B)/libgait.o
+
+$(B)/src/%.c.o: libgait/src/%.c Makefile | $(B)/src/
+	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(CFLAGS) -c $< -o $@
+
+$(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
+	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) $(NO_RUNTIME) $(EIGEN_FLAGS) $(WARN) $(CXXFLAGS) -c $< -o $@
+
+%/:
+	@mkdir -p $@
+.PRECIOUS: %/
+
+# ---- LCM tools -----------------------------------------------------------------------------------------------
+LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
+LCM_CFLAGS := -isystem $(SITE)/include -isystem build/lcm
+LCM_LIBS = -L$(SITE)/lib -llcm -Wl,-rpath,'$$ORIGIN/$(shell realpath -m --relative-to=$(BIN) $(SITE)/lib)'
+
+tools: $(TOOLS) build/lcm/.stamp ## LCM programs in build/bin, LCM types in build/lcm
+
+build/lcm/.stamp: $(LCM_TYPES) | $(READY) build/lcm/python/
+	$(call say,LCM  lcm_types)$(VENV)/bin/lcm-gen -c --c-cpath build/lcm --c-hpath build/lcm -p --ppath build/lcm/python $(LCM_TYPES)
+	@touch $@
+
+$(B)/libgaitmsg.a: build/lcm/.stamp | $(B)/lcm/
+	$(call say,AR   $@)for f in $(LCM_TYPES:lcm_types/%.lcm=%); do \
+	    $(CC) $(OPT) -g $(LCM_CFLAGS) -c build/lcm/$$f.c -o $(B)/lcm/$$f.o || exit 1; done
+	@rm -f $@
+	@$(AR) rcs $@ $(LCM_TYPES:lcm_types/%.lcm=$(B)/lcm/%.o)
+
+TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/common/*.c)))
+$(BIN)/%: $(B)/tools/%.c.o $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
+	$(call say,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) -lm
+
+$(B)/tools/%.c.o: tools/%.c Makefile build/lcm/.stamp | $(B)/tools/common/
+	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
+	    $(CFLAGS) -c $< -o $@
+
+# ---- tests ---------------------------------------------------------------------------------------------------
+test: setup lib tools check unit python-test ## everything below that can fail
+
+check: lib ## symbols, heap, globals, layers, stack, headers, hygiene
+	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
+
+unit: $(UNIT) ## C tests
+	@tests/unit/run.sh $(UNIT)
+
+# Against the objects, so that internal functions can be called.
+$(B)/unit/%: tests/unit/%.c $(OBJ) Makefile | $(B)/unit/
+	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -Ilibgait/src $(CFLAGS) \
+	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
+
+python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
+	@$(PY) -m pytest -q -c python/pyproject.toml --rootdir . tests/python $(ARGS)
+
+asan: ## C tests under the address and undefined-behaviour sanitizers
+	@$(MAKE) --no-print-directory config=sanitize unit
+
+golden-check: ## the tracker's digest is the same at -O0, -O2 and -O3, with every compiler found
+	@tests/check/golden.sh
+
+# ---- work ----------------------------------------------------------------------------------------------------
+pass = $(foreach v,VIDEO CAMERA INIT BACKGROUND HEIGHT START STOP,$(if $($(v)),--$(shell echo $(v) | tr A-Z a-z) '$($(v))'))
+
+demo: setup lib tools ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIGHT START STOP)
+	@$(VENV)/bin/gait demo $(pass) $(ARGS)
+
+MOCAP ?= ../shared/data/mocap/cmu_walk
+model: setup lib ## learn the default model from MOCAP=
+	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
+
+bench: setup lib ## time a step
+	@$(PY) tests/bench/bench.py $(ARGS)
+
+eval: setup lib ## errors on the clips of ../shared/data
+	@$(PY) tests/bench/eval.py $(ARGS)
+
+# ---- style ---------------------------------------------------------------------------------------------------
+C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tools/*.[ch] tools/common/*.[ch]))
+have = command -v $(1) >/dev/null || { echo 'lint: $(1) is not installed, skipped'; exit 0; };
+
+lint: setup ## clang-format, clang-tidy, ruff, mypy: what is installed
+	@$(call have,clang-format) clang-format --dry-run -Werror $(C_FILES)
+	@$(call have,clang-tidy) clang-tidy --quiet $(filter libgait/src/%.c,$(C_FILES)) -- -std=c11 -Ilibgait/include
+	@$(VENV)/bin/ruff check --config python/pyproject.toml python tests
+	@$(VENV)/bin/ruff format --check --config python/pyproject.toml python tests
+	@$(VENV)/bin/mypy --config-file python/pyproject.toml python/gait
+
+format: setup ## rewrite in the house style
+	@$(call have,clang-format) clang-format -i $(C_FILES)
+	@$(VENV)/bin/ruff format --config python/pyproject.toml python tests
+
+# ---- installation --------------------------------------------------------------------------------------------
+install: lib ## DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=
+	install -d $(DESTDIR)$(LIBDIR)/pkgconfig $(DESTDIR)$(INCLUDEDIR)
+	install -m 755 $(B)/libgait.so.$(ABI) $(DESTDIR)$(LIBDIR)/
+	ln -sf libgait.so.$(ABI) $(DESTDIR)$(LIBDIR)/libgait.so
+	install -m 644 $(B)/libgait.a $(DESTDIR)$(LIBDIR)/
+	install -m 644 $(HEADER) $(DESTDIR)$(INCLUDEDIR)/
+	sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
+	    libgait/gait.pc.in > $(DESTDIR)$(LIBDIR)/pkgconfig/gait.pc
+
+uninstall: ## remove what install put there
+	rm -f $(addprefix $(DESTDIR)$(LIBDIR)/,libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc) \
+	    $(DESTDIR)$(INCLUDEDIR)/gait.h
+
+clean: ## remove build/ (not .venv)
+	rm -rf build
+
+-include $(wildcard $(B)/src/*.d $(B)/unit/*.d $(B)/tools/*.d $(B)/tools/common/*.d)
