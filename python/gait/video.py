@@ -27,7 +27,7 @@ _CONTAINERS = (".mp4", ".mkv", ".mov")
 class Frame(NamedTuple):
     """One frame of a video."""
 
-    index: int
+    number: int
     """Position in the file, from 0."""
     time: float
     """Presentation time since the first frame of the file, seconds."""
@@ -77,7 +77,7 @@ class Video:
         pixels = "gray" if grey else "bgr24"
         for index, time, frame in self._decode(stop):
             if index >= start:
-                yield Frame(index, time, _upright(frame.to_ndarray(format=pixels), frame.rotation))
+                yield Frame(index, time, _upright(frame, pixels))
 
     def _probe(self) -> None:
         """Read the first frame for the size, the stream's header or its packets for count and rate."""
@@ -88,7 +88,7 @@ class Video:
             self.fps = float(stream.average_rate or stream.guessed_rate or 30)
             self.count = stream.frames or sum(1 for p in container.demux(stream) if p.pts is not None)
         for _, _, frame in self._decode(1):
-            self.height, self.width = _upright(frame.to_ndarray(format="gray"), frame.rotation).shape
+            self.height, self.width = _upright(frame, "gray").shape
             return
         raise UserError(f"{self.path}: holds no frame that can be decoded; convert it with ffmpeg first")
 
@@ -117,9 +117,10 @@ class Video:
         return UserError(f"{self.path}: cannot be read as video ({reason}); give a file that ffmpeg plays")
 
 
-def _upright(image: Image, rotation: int) -> Image:
-    """Turn a decoded picture counter-clockwise by the container's `rotation` in degrees."""
-    return np.ascontiguousarray(np.rot90(image, rotation // 90)) if rotation % 360 else image
+def _upright(frame: av.VideoFrame, pixels: str) -> Image:
+    """Picture in the pixel format asked for, turned counter-clockwise as the container says."""
+    image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
+    return np.ascontiguousarray(np.rot90(image, frame.rotation // 90)) if frame.rotation % 360 else image
 
 
 class VideoWriter:
@@ -164,7 +165,8 @@ class VideoWriter:
         if self._stream is None:
             self._stream = self._open(width + width % 2, height + height % 2)
         if height % 2 or width % 2:
-            image = cv2.copyMakeBorder(image, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
+            edges = ((0, height % 2), (0, width % 2), (0, 0))[: image.ndim]
+            image = np.pad(image, edges, mode="edge")
         if image.shape[:2] != (self._stream.height, self._stream.width):
             raise ValueError(f"{self.path}: frame of {width}x{height} in a video of another size")
         pixels = "gray" if image.ndim == 2 else "bgr24"
@@ -172,7 +174,9 @@ class VideoWriter:
         self._container.mux(self._stream.encode(frame))
 
     def _open(self, width: int, height: int) -> av.VideoStream:
-        stream = self._container.add_stream("libx264", rate=self._rate, options={"crf": str(self._crf)})
+        stream: av.VideoStream = self._container.add_stream(
+            "libx264", rate=self._rate, options={"crf": str(self._crf)}
+        )
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         return stream
 
@@ -180,16 +184,16 @@ class VideoWriter:
 def median_plate(video: Video, samples: int = 40, progress: Callable[[int], None] | None = None) -> Image:
     """Empty scene as the temporal median of `samples` frames spread evenly over the clip, BGR.
 
-    Right where every pixel shows the background in more than half of the samples: a static camera and a person
-    who walks through.  `progress` is called with the index of each frame decoded.
+    Right where every pixel shows the background in more than half of the samples: a static camera and a
+    person who walks through.  `progress` is called with the index of each frame decoded.
     """
     wanted = set(np.linspace(0, video.count - 1, min(samples, video.count)).round().astype(int).tolist())
     picked = []
     for frame in video.frames():
-        if frame.index in wanted:
+        if frame.number in wanted:
             picked.append(frame.image)
         if progress is not None:
-            progress(frame.index)
+            progress(frame.number)
     plate = np.empty_like(picked[0])
     for row in range(plate.shape[0]):  # row by row: a median of the whole stack would need it twice in memory
         plate[row] = np.median([image[row] for image in picked], axis=0)
@@ -200,18 +204,16 @@ def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:
     """Read the empty scene from an image file, BGR, and check its (width, height)."""
     if not Path(path).is_file():
         raise UserError(f"{path}: no such background image; give an image file, auto or none")
-    plate = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    plate = cv2.imread(str(path), cv2.IMREAD_COLOR_BGR)
     if plate is None:
         raise UserError(f"{path}: cannot be read as an image; give a PNG or JPEG of the empty scene")
     height, width = plate.shape[:2]
     if (width, height) != tuple(size):
-        raise UserError(f"{path}: background is {width}x{height}, the video {size[0]}x{size[1]}; take both alike")
-    return plate
+        raise UserError(f"{path}: is {width}x{height}, the video {size[0]}x{size[1]}; take both alike")
+    return np.asarray(plate, np.uint8)
 
 
-def background(
-    choice: str, video: Video, progress: Callable[[int], None] | None = None
-) -> Image | None:
+def background(choice: str, video: Video, progress: Callable[[int], None] | None = None) -> Image | None:
     """Plate by the word of the ``--background`` option: ``auto`` (median), ``none`` or an image file."""
     if choice == "none":
         return None

@@ -1,0 +1,7 @@
+"""``python -m gait`` is the ``gait`` command."""
+
+import sys
+
+from gait.cli import main
+
+sys.exit(main())

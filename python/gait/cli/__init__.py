@@ -1,0 +1,83 @@
+"""The ``gait`` command.
+
+Each sub-command is a module here with ``NAME``, ``HELP``, ``add_arguments(parser)`` and ``run(args) -> int``.  Its
+docstring is the text of ``--help``.  Every command gets ``--quiet``, and ``--json`` unless it says ``JSON = False``.
+Figures go to stdout, words and progress to stderr; exit codes are 0 ok, 1 failed, 2 usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from gait.errors import GaitError, UserError
+
+COMMANDS = {
+    "learn": "learn",
+    "info": "info",
+    "track": "track",
+    "eval": "evaluate",
+    "render": "render",
+    "simulate": "simulate",
+    "capture": "capture",
+    "record": "record",
+    "demo": "demo",
+    "report": "report",
+}
+"""Command to its module, in the order of ``gait --help``."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    args = _parser(words).parse_args(words)
+    try:
+        return int(args.run(args))
+    except (UserError, GaitError) as exc:
+        return _failed(args.command, str(exc))
+    except BrokenPipeError:  # the reader of our output has left, which is its right
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as exc:
+        return _failed(args.command, f"{exc.filename or 'file'}: {exc.strerror or exc}")
+    except KeyboardInterrupt:
+        return _failed(args.command, "interrupted")
+
+
+def _failed(command: str, text: str) -> int:
+    print(f"gait {command}: {' '.join(text.split())}", file=sys.stderr)
+    return 1
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """Parser of the command named first in `words` (so that only its imports cost time), else of all."""
+    parser = argparse.ArgumentParser(
+        prog="gait",
+        description="Learn how people walk from motion capture and track them in calibrated video.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name in words[:1] if words and words[0] in COMMANDS else COMMANDS:
+        module = import_module(f"gait.cli.{COMMANDS[name]}")
+        sub = commands.add_parser(
+            module.NAME,
+            help=module.HELP,
+            description=module.__doc__ or module.HELP,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(sub)
+        if getattr(module, "JSON", True):
+            _offer(sub, "--json", "print the figures as JSON")
+        _offer(sub, "--quiet", "no words and no progress on stderr")
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def _offer(parser: argparse.ArgumentParser, option: str, text: str) -> None:
+    """Add a switch that every command has, unless the command words it itself."""
+    with contextlib.suppress(argparse.ArgumentError):
+        parser.add_argument(option, action="store_true", help=text)

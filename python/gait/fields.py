@@ -1,0 +1,108 @@
+"""Checked access to the keys of small input files: every fault is one line naming file, key and remedy."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.errors import UserError
+
+
+class Fields:
+    """A mapping read from a file that knows what to say about itself.
+
+    Parameters
+    ----------
+    where : str
+        Name of the file (and table) for messages.
+    data : mapping
+    """
+
+    def __init__(self, where: str, data: Mapping[str, Any]) -> None:
+        self.where, self._data = where, data
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._data
+
+    def fail(self, key: str, what: str, remedy: str) -> UserError:
+        """Make (not raise) the error of `key`."""
+        return UserError(f"{self.where}: {key} {what}; {remedy}")
+
+    def get(self, key: str, remedy: str) -> Any:
+        """Raw value of a key that must be there."""
+        if key not in self._data:
+            raise self.fail(key, "is missing", remedy)
+        return self._data[key]
+
+    def number(self, key: str, low: float, high: float, remedy: str) -> float:
+        """Finite number in [low, high]."""
+        value = self.get(key, remedy)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fail(key, "is not a number", remedy)
+        if not np.isfinite(value):
+            raise self.fail(key, "is not finite", remedy)
+        if not low <= value <= high:
+            raise self.fail(key, f"is {value:g}, outside [{low:g}, {high:g}]", remedy)
+        return float(value)
+
+    def integer(self, key: str, low: int, high: int, remedy: str) -> int:
+        """Whole number in [low, high]; 640.0 counts as whole."""
+        value = self.number(key, low, high, remedy)
+        if value != int(value):
+            raise self.fail(key, f"is {value:g}, not a whole number", remedy)
+        return int(value)
+
+    def array(self, key: str, shape: Sequence[int], remedy: str) -> NDArray[np.float64]:
+        """Finite numbers of exactly this shape; a column or row matrix counts as a vector."""
+        value = self.get(key, remedy)
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise self.fail(key, "is not an array of numbers", remedy) from None
+        if len(shape) == 1 and array.ndim == 2 and 1 in array.shape:
+            array = array.ravel()
+        if array.shape != tuple(shape):
+            wanted, found = "x".join(map(str, shape)), "x".join(map(str, array.shape)) or "one number"
+            raise self.fail(key, f"has shape {found}, not {wanted}", remedy)
+        if not np.isfinite(array).all():
+            raise self.fail(key, "is not finite", remedy)
+        return array
+
+    def only(self, known: Sequence[str]) -> None:
+        """Refuse keys that nobody reads: most are misspelt."""
+        for key in self._data:
+            if key not in known:
+                raise self.fail(key, "is not a known key", f"use {' '.join(known)}")
+
+    def table(self, key: str, remedy: str) -> Fields:
+        """Return the mapping under `key`, empty if absent."""
+        value = self._data.get(key, {})
+        if not isinstance(value, Mapping):
+            raise self.fail(key, "is not a table of keys", remedy)
+        return Fields(f"{self.where}: {key}", value)
+
+
+def read_json(path: str | os.PathLike[str], what: str) -> Fields:
+    """Read a JSON object.
+
+    Parameters
+    ----------
+    path : path
+    what : str
+        What the file is, for messages: ``"camera"``.
+    """
+    if not Path(path).is_file():
+        raise UserError(f"{path}: no such {what} file")
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as exc:
+        raise UserError(f"{path}: not valid JSON ({exc}); mend it or write the {what} anew") from None
+    if not isinstance(data, dict):
+        raise UserError(f"{path}: holds no JSON object; the {what} is an object of keys in braces")
+    return Fields(str(path), data)
