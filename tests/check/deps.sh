@@ -1,0 +1,10 @@
+#!/bin/sh
+# deps.sh LIBRARY: needs libc and libm only, and of those only functions whose result is exact on every system.
+libs='libc\.so\.6|libm\.so\.6|libc\.musl-.*|ld-linux.*'
+text='mem(cpy|set|move|cmp|chr)|str(len|cmp|ncmp|chr|rchr|nlen)|vsnprintf'
+exact='(sqrt|floor|ceil|trunc|rint|nearbyint|fabs|fmod|ldexp|frexp|scalbn)f?'
+frame='__cxa_finalize|_ITM_(de)?registerTMCloneTable|__gmon_start__|__stack_chk_fail|__assert_fail|__(memcpy|memset|memmove|vsnprintf)_chk'
+needed=$(readelf -d "$1" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | grep -vE "^($libs)\$")
+[ -z "$needed" ] || { printf 'depends on:\n%s\n' "$needed"; exit 1; }
+calls=$(nm -D -u "$1" | awk '{ sub("@.*", "", $2); print $2 }' | grep -vE "^($text|$exact|$frame)\$")
+[ -z "$calls" ] || { printf 'calls outside the list of this script:\n%s\n' "$calls"; exit 1; }

@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+"""layers.py LAYERS FOLDER: each source includes only its own header and modules that LAYERS lists before its own."""
+
+import re
+import sys
+from pathlib import Path
+
+PUBLIC = {"gait.h"}
+SYSTEM = {
+    "assert.h", "float.h", "limits.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h", "stdint.h", "stdio.h",
+    "string.h", "sanitizer/asan_interface.h",
+}  # fmt: skip
+
+
+def read_layers(path: Path) -> dict[str, int]:
+    """Module name to its place, bottom first."""
+    lines = (line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines())
+    names = [line for line in lines if line]
+    order = {name: i for i, name in enumerate(names)}
+    if len(order) != len(names):
+        raise SystemExit(f"{path}: a module is listed twice")
+    return order
+
+
+def faults(source: Path, order: dict[str, int]) -> list[str]:
+    """What is wrong with the includes of one file."""
+    module = source.stem
+    if module not in order:
+        return [f"{source}: module {module} is not in LAYERS"]
+    found = []
+    text = source.read_text(encoding="utf-8")
+    for kind, name in re.findall(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', text, re.M):
+        if kind == "<":
+            if name not in SYSTEM and not (name.startswith("Eigen/") and source.suffix == ".cpp"):
+                found.append(f"{source}: <{name}> is not for the library")
+        elif name not in PUBLIC and order.get(Path(name).stem, len(order)) > order[module]:
+            found.append(f'{source}: "{name}" is not below {module} in LAYERS')
+    return found
+
+
+def main() -> int:
+    layers, folder = map(Path, sys.argv[1:])
+    order = read_layers(layers)
+    sources = sorted(p for p in folder.iterdir() if p.suffix in {".c", ".cpp", ".h"})
+    found = [f for source in sources for f in faults(source, order)]
+    found += [f"{layers}: no source of {m}" for m in order if m not in {s.stem for s in sources}]
+    print("\n".join(found), end="\n" if found else "")
+    return bool(found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

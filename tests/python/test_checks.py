@@ -1,0 +1,211 @@
+"""Every check of tests/check passes on a clean example and fails on a planted fault."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CHECK = ROOT / "tests" / "check"
+CC = os.environ.get("CC", "cc")
+CLEAN = "int gait_twice(int x); int gait_twice(int x) { return x + x; }\n"
+
+
+def run(script: str, *args: object) -> subprocess.CompletedProcess[str]:
+    """Run a check as make does."""
+    command = [sys.executable] if script.endswith(".py") else ["sh"]
+    return subprocess.run([*command, CHECK / script, *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+def fails(done: subprocess.CompletedProcess[str], *words: str) -> bool:
+    """The check refused and its output holds the words."""
+    return done.returncode == 1 and all(w in done.stdout + done.stderr for w in words)
+
+
+def build(tmp_path: Path, code: str, *options: str, suffix: str = ".c", out: str = "a.o") -> Path:
+    """Compile a text to an object, or to what the options say."""
+    source, target = tmp_path / f"a{suffix}", tmp_path / out
+    source.write_text(code)
+    subprocess.run([CC, "-O0", *(options or ("-c",)), source, "-o", target], check=True)
+    return target
+
+
+def shared(tmp_path: Path, code: str, *libs: str) -> Path:
+    """A shared library of a text."""
+    return build(tmp_path, code, "-shared", "-fPIC", "-Wl,--no-as-needed", *libs, out="liba.so")
+
+
+@pytest.mark.parametrize(
+    ("call", "suffix"),
+    [
+        ("#include <stdlib.h>\nvoid *f(void) { return malloc(9); }", ".c"),
+        ("#include <stdlib.h>\nvoid f(void *p) { free(p); }", ".c"),
+        ("#include <string.h>\nchar *f(const char *s) { return strdup(s); }", ".c"),
+        ("int *f() { return new int; }", ".cpp"),
+        ("void f(int *p) { delete[] p; }", ".cpp"),
+    ],
+)
+def test_no_heap_sees_an_allocator(tmp_path, call, suffix):
+    assert run("no_heap.sh", build(tmp_path, CLEAN)).returncode == 0
+    assert fails(run("no_heap.sh", build(tmp_path, call, suffix=suffix)), "heap")
+
+
+def test_deps_sees_a_library_and_an_inexact_function(tmp_path):
+    assert run("deps.sh", shared(tmp_path, CLEAN)).returncode == 0
+    assert fails(run("deps.sh", shared(tmp_path, CLEAN, "-lpthread", "-lstdc++")), "libstdc++")
+    sine = "double sin(double); double f(double x) { return sin(x); }"
+    assert fails(run("deps.sh", shared(tmp_path, sine, "-lm")), "sin")
+
+
+@pytest.mark.parametrize(
+    "code", ["int hits;", "int hits = 3;", "int f(void) { static int n; return ++n; }", "_Thread_local int hits;"]
+)
+def test_static_init_sees_a_writable_global(tmp_path, code):
+    table = CLEAN + 'const char *const names[] = {"a", "b"};'
+    assert run("static_init.sh", build(tmp_path, table, "-c", "-fPIC")).returncode == 0
+    assert fails(run("static_init.sh", build(tmp_path, code)), "a.o")
+
+
+def test_static_init_sees_a_constructor(tmp_path):
+    code = "int g(); const int hits = g();"
+    assert fails(run("static_init.sh", build(tmp_path, code, suffix=".cpp")), "a.o")
+
+
+def library_pair(tmp_path: Path, code: str) -> tuple[Path, Path]:
+    """A shared and a static library of the same text."""
+    obj, archive = build(tmp_path, code, "-c", "-fPIC", "-fvisibility=hidden"), tmp_path / "liba.a"
+    library = build(tmp_path, code, "-shared", "-fPIC", "-fvisibility=hidden", out="liba.so")
+    subprocess.run(["ar", "rcs", archive, obj], check=True)
+    return library, archive
+
+
+def test_symbols_sees_what_is_missing_or_unprefixed(tmp_path):
+    header = tmp_path / "a.h"
+    header.write_text("#define GAIT_API\n/* GAIT_API int gait_not(int); */\nGAIT_API int\ngait_twice(int x);\n")
+    visible = '__attribute__((visibility("default"))) '
+    clean = f"{visible}int gait_twice(int x) {{ return x + x; }}\n"
+    assert run("symbols.py", header, *library_pair(tmp_path, clean)).returncode == 0
+    extra = clean + visible + "int helper(int x) { return x; }\n"
+    assert fails(run("symbols.py", header, *library_pair(tmp_path, extra)), "not declared: helper")
+    assert fails(run("symbols.py", header, *library_pair(tmp_path, "int x(void);")), "not defined: gait_twice")
+    leak = clean + "int helper(int x) { return x; }\n"
+    assert fails(run("symbols.py", header, *library_pair(tmp_path, leak)), "liba.a", "helper")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "struct gait_a { char c; double d; };\n",
+        "int gait_f();\n",
+        "size_t gait_f(void);\n",
+        "void gait_f(int class);\n",
+    ],
+)
+def test_headers_sees_padding_old_declarations_and_missing_includes(tmp_path, code):
+    header = tmp_path / "a.h"
+    header.write_text("#ifndef A_H\n#define A_H\n#include <stdint.h>\nint32_t gait_g(int32_t x);\n#endif\n")
+    assert run("headers.sh", header).returncode == 0
+    header.write_text(code)
+    assert run("headers.sh", header).returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("low.c", '#include "high.h"\n', '"high.h" is not below low'),
+        ("high.c", '#include "nothing.h"\n', '"nothing.h" is not below high'),
+        ("high.c", "#include <stdlib.h>\n", "<stdlib.h> is not for the library"),
+        ("other.c", '#include "low.h"\n', "other is not in LAYERS"),
+    ],
+)
+def test_layers_sees_an_upward_include(tmp_path, name, text, words):
+    layers, src = tmp_path / "LAYERS", tmp_path / "src"
+    src.mkdir()
+    layers.write_text("# comment\nlow\nhigh\n")
+    (src / "low.h").write_text("#include <stdint.h>\n")
+    (src / "high.c").write_text('#include "high.h"\n#include "low.h"\n#include "gait.h"\n')
+    (src / "high.h").write_text("")
+    assert run("layers.py", layers, src).returncode == 0
+    (src / name).write_text(text)
+    assert fails(run("layers.py", layers, src), words)
+
+
+def test_layers_sees_a_module_without_source(tmp_path):
+    (tmp_path / "LAYERS").write_text("ghost\n")
+    (tmp_path / "src").mkdir()
+    assert fails(run("layers.py", tmp_path / "LAYERS", tmp_path / "src"), "no source of ghost")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "void g(char *); void f(void) { char b[20000]; g(b); }",
+        "void g(char *); void f(int n) { char b[n]; g(b); }",
+    ],
+)
+def test_stack_sees_a_large_frame_and_a_variable_one(tmp_path, code):
+    build(tmp_path, CLEAN, "-c", "-fstack-usage")
+    assert run("stack.py", 16384, tmp_path / "a.su").returncode == 0
+    build(tmp_path, code, "-c", "-fstack-usage")
+    assert fails(run("stack.py", 16384, tmp_path / "a.su"), "bytes of stack")
+    assert fails(run("stack.py", 16384), "was the library built")
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A git checkout that passes."""
+    for name, text in {
+        "libgait/include/gait.h": "".join(f"#define GAIT_VERSION_{p} 1\n" for p in ("MAJOR", "MINOR", "PATCH")),
+        "python/pyproject.toml": 'version = "1.1.1" # of gait.h\n',
+        "libgait/src/a.c": "int gait_a;\n",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    subprocess.run(["git", "-C", tmp_path, "add", "."], check=True)
+    assert run("hygiene.py", tmp_path).returncode == 0
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("build/a.c", b"int x;\n", "made by the build"),
+        ("python/gait/a.so", b"x", "made by the build"),
+        ("clip.mp4", b"x", "data"),
+        ("tests/truth.csv", b"frame,time\n", "data"),
+        ("a.bin", b"a\0b", "binary"),
+        ("large.txt", b"x\n" * 200_000, "over 300000"),
+        ("long.c", b"int x;\n" * 401, "401 lines"),
+        ("lcm_types/a.h", b"/* THIS IS AN AUTOMATICALLY" + b" GENERATED FILE */\n", "generated"),
+        ("a.md", b"look into /ho" + b"me/alice/gait\n", "a.md:1: path"),
+        ("a.py", b"x = 1 \n", "blank at the end"),
+        ("b.py", b"x = 1", "no newline"),
+        ("python/pyproject.toml", b'version = "1.1.2"\n', "gait.h has 1.1.1"),
+    ],
+)
+def test_hygiene_sees_what_does_not_belong(checkout, name, content, words):
+    (checkout / name).parent.mkdir(parents=True, exist_ok=True)
+    (checkout / name).write_bytes(content)
+    subprocess.run(["git", "-C", checkout, "add", "-f", name], check=True)
+    assert fails(run("hygiene.py", checkout), words)
+
+
+@pytest.mark.parametrize(
+    ("script", "want"),
+    [
+        ("echo 'a  3 passed, 0 failed'", (0, "3 passed, 0 failed")),
+        ("echo 'a  3 passed, 2 failed'; exit 1", (1, "3 passed, 2 failed")),
+        ("echo 'a  3 passed, 0 failed'; kill -SEGV $$", (1, "3 passed, 1 failed")),
+        ("kill -ABRT $$", (1, "0 passed, 1 failed")),
+        ("exit 0", (1, "0 passed, 1 failed")),
+    ],
+)
+def test_unit_runner_counts_a_crash_and_a_silent_exit(tmp_path, script, want):
+    test = tmp_path / "test_a"
+    test.write_text(f"#!/bin/sh\n{script}\n")
+    test.chmod(0o755)
+    done = subprocess.run([ROOT / "tests/unit/run.sh", test], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (want[0], f"C tests: {want[1]}")
