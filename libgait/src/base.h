@@ -21,7 +21,7 @@
 
 _Static_assert(CHAR_BIT == 8 && sizeof(float) == 4 && sizeof(double) == 8, "IEEE 754 binary32 and binary64");
 _Static_assert(FLT_RADIX == 2 && FLT_MANT_DIG == 24 && DBL_MANT_DIG == 53, "IEEE 754 binary32 and binary64");
-_Static_assert(FLT_EVAL_METHOD == 0, "float arithmetic must round to float: excess precision breaks determinism");
+_Static_assert(FLT_EVAL_METHOD == 0, "excess precision breaks determinism");
 
 /* Branch-free in a loop over lanes.  A NaN in the first argument gives the second. */
 static inline float f_min(float a, float b)

@@ -1,5 +1,5 @@
-/* fmath.h - float functions with the same bits on every compiler and CPU: polynomials after Moshier's Cephes, IEEE
- * + - * / and sqrt only, no table, no branch (a loop over lanes vectorises), no undefined conversion.
+/* fmath.h - float functions with the same bits on every compiler and CPU: polynomials after Moshier's Cephes,
+ * IEEE + - * / and sqrt only, no table, no branch (a loop over lanes vectorises), no undefined conversion.
  * Needs round to nearest, -ffp-contract=off and no -ffast-math.  Errors are the measured maxima of
  * tests/unit/test_fmath.c against double libm. */
 #ifndef GAIT_FMATH_H
@@ -39,7 +39,7 @@ static inline float m_sqrt(float x)
     return sqrtf(x);
 }
 
-/* Exact for |x| < 2^23; beyond, where every float is an integer, x itself.  NaN gives a finite number. */
+/* Exact: beyond 2^23 every float is an integer.  NaN stays NaN. */
 static inline float m_floor(float x)
 {
     float const y = f_clamp(x, -8388608.0f, 8388607.0f);
@@ -54,14 +54,14 @@ static inline float m_round(float x)
     return (x + magic) - magic;
 }
 
-/* x modulo 1 in [0, 1): exact but for the last rounding of a negative x. */
+/* x modulo 1 in [0, 1): exact but for the last rounding of a negative x.  NaN gives 0. */
 static inline float m_wrap1(float x)
 {
     float const f = x - m_floor(x);
     return m_select(m_less(f, 1.0f), f, 0.0f); /* -1e-9 would round to 1 */
 }
 
-/* x modulo 2 pi in [-pi, pi] (ends rounded to float); absolute error < 3e-7 + 1e-7 |x| / 1000 for |x| < 8192. */
+/* x modulo 2 pi in [-pi, pi] (ends rounded to float); absolute error < 3e-7 for |x| < 8192, no use beyond. */
 static inline float m_wrap_pi(float x)
 {
     float const k = m_round(f_clamp(x, -8192.0f, 8192.0f) * (1.0f / TWO_PI_F));
@@ -86,13 +86,14 @@ static inline float m_exp(float x)
     return m_select(m_less(-87.3f, x), p * scale, 0.0f);
 }
 
-/* Absolute error < 1e-7 + 1e-7 |log x|.  Zero, negative, denormal and NaN: log(FLT_MIN); infinity: log(FLT_MAX). */
+/* Absolute error < 1e-7 + 1e-7 |log x|.  Below FLT_MIN and for NaN: log(FLT_MIN); above FLT_MAX: its log. */
 static inline float m_log(float x)
 {
     uint32_t const sqrt_half = 0x3f3504f3u;
     uint32_t const u = m_bits(f_clamp(x, FLT_MIN, FLT_MAX)) - sqrt_half + (127u << 23);
     float const e = (float)((int32_t)(u >> 23) - 127);
-    float const f = m_from_bits((u & 0x7fffffu) + sqrt_half) - 1.0f; /* x = 2^e (1 + f), sqrt(1/2) <= 1 + f < sqrt(2) */
+    /* x = 2^e (1 + f), 1 + f in [0.71, 1.42) */
+    float const f = m_from_bits((u & 0x7fffffu) + sqrt_half) - 1.0f;
     float const z = f * f;
     float p = 7.0376836292e-2f;
     p = p * f - 1.1514610310e-1f;
@@ -115,8 +116,8 @@ static inline void m_sincos(float x, float *s, float *c)
     float const r = ((y - k * 1.5703125f) - k * 4.837512969970703125e-4f) - k * 7.54978995489188216e-8f;
     float const z = r * r;
     float const sn = ((-1.9515295891e-4f * z + 8.3321608736e-3f) * z - 1.6666654611e-1f) * z * r + r;
-    float const cs = ((2.443315711809948e-5f * z - 1.388731625493765e-3f) * z + 4.166664568298827e-2f) * (z * z) -
-                     0.5f * z + 1.0f;
+    float const cp = (2.443315711809948e-5f * z - 1.388731625493765e-3f) * z + 4.166664568298827e-2f;
+    float const cs = cp * (z * z) - 0.5f * z + 1.0f;
     uint32_t const q = (uint32_t)(int32_t)k; /* quadrant, modulo 4 */
     uint32_t const swap = 0u - (q & 1u);
     *s = m_from_bits(m_bits(m_select(swap, cs, sn)) ^ ((q & 2u) << 30));
@@ -142,11 +143,13 @@ static inline float m_atan2(float y, float x)
 {
     float const ax = fabsf(x), ay = fabsf(y);
     float const lo = f_min(ax, ay), hi = f_max(f_max(ax, ay), FLT_MIN);
-    uint32_t const fold = m_less(0.41421356f * hi, lo); /* over 22.5 degrees: atan t = pi/4 + atan((t - 1)/(t + 1)) */
+    /* over 22.5 degrees: atan t = pi/4 + atan((t - 1)/(t + 1)) */
+    uint32_t const fold = m_less(0.41421356f * hi, lo);
     float const t = m_select(fold, lo - hi, lo) / m_select(fold, lo + hi, hi);
     float const z = t * t;
-    float a = (((8.05374449538e-2f * z - 1.38776856032e-1f) * z + 1.99777106478e-1f) * z - 3.33329491539e-1f) * z * t +
-              t + m_select(fold, 0.25f * PI_F, 0.0f);
+    float p = (8.05374449538e-2f * z - 1.38776856032e-1f) * z + 1.99777106478e-1f;
+    p = p * z - 3.33329491539e-1f;
+    float a = p * z * t + t + m_select(fold, 0.25f * PI_F, 0.0f);
     a = m_select(m_less(ax, ay), 0.5f * PI_F - a, a);
     a = m_select(m_less(x, 0.0f), PI_F - a, a);
     return m_from_bits(m_bits(a) | (m_bits(y) & 0x80000000u));
@@ -159,14 +162,14 @@ static inline float m_asin(float x)
     uint32_t const fold = m_less(0.5f, a); /* asin a = pi/2 - 2 asin sqrt((1 - a)/2) */
     float const z = m_select(fold, 0.5f * (1.0f - a), a * a);
     float const t = m_select(fold, m_sqrt(z), a);
-    float const p = ((((4.2163199048e-2f * z + 2.4181311049e-2f) * z + 4.5470025998e-2f) * z + 7.4953002686e-2f) * z +
-                     1.6666752422e-1f) * z * t + t;
+    float p = (4.2163199048e-2f * z + 2.4181311049e-2f) * z + 4.5470025998e-2f;
+    p = ((p * z + 7.4953002686e-2f) * z + 1.6666752422e-1f) * z * t + t;
     return m_from_bits(m_bits(m_select(fold, 0.5f * PI_F - 2.0f * p, p)) | (m_bits(x) & 0x80000000u));
 }
 
 /* Relative error < 1e-15.  Below -708 and for NaN: 0; above 709: exp(709). */
 double m_exp64(double x);
 
-/* Relative error < 1e-15.  Zero, negative, denormal and NaN: log(DBL_MIN); infinity: log(DBL_MAX). */
+/* Relative error < 1e-15.  Below DBL_MIN and for NaN: log(DBL_MIN); above DBL_MAX: its log. */
 double m_log64(double x);
 #endif

@@ -1,4 +1,4 @@
-/* kinematics.h - curves and forward kinematics of BLOCK bodies at once (structure of arrays, one lane a body).
+/* kinematics.h - curves and forward kinematics of BLOCK bodies at once: structure of arrays, one lane a body.
  * Frames and signs: doc/model-format.md.  Lane results do not depend on the other lanes. */
 #ifndef GAIT_KINEMATICS_H
 #define GAIT_KINEMATICS_H
@@ -26,7 +26,7 @@ typedef struct kin_body {
 } kin_body;
 
 /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. (2000),
- * linear between samples, wrapping. */
+ * linear between samples, wrapping.  (Strict C wants coef from a const kin_input.) */
 void kin_curves(const gait_model *m, const float phase[BLOCK], const float coef[][BLOCK], int32_t components,
                 kin_channels *out);
 

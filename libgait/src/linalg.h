@@ -1,4 +1,4 @@
-/* linalg.h - C interface to the few dense problems that Eigen solves (fixed sizes, no heap, no exceptions). */
+/* linalg.h - C interface to the dense problems that Eigen solves (fixed sizes, no heap, no exceptions). */
 #ifndef GAIT_LINALG_H
 #define GAIT_LINALG_H
 #ifdef __cplusplus

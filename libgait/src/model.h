@@ -6,6 +6,7 @@
 enum {
     MODEL_MAX_FRAMES = 24,
     MODEL_MAX_LIMBS = 32,
+    MODEL_MIN_PHASES = 8,
     MODEL_MAX_PHASES = 4096,
     MODEL_ROOT_CHANNELS = 6,
     MODEL_MAX_CHANNELS = GAIT_MAX_ANGLES + MODEL_ROOT_CHANNELS
@@ -13,7 +14,7 @@ enum {
 /* Channels of the root, counted from root_channel. */
 enum { ROOT_FORWARD, ROOT_SWAY, ROOT_HEIGHT, ROOT_ROLL, ROOT_PITCH, ROOT_YAW };
 enum { LIMB_CONE = 0, LIMB_ELLIPSOID = 1 };
-enum { FRAME_INFO = 8, LIMB_INFO = 2, LIMB_SHAPE = 10, MODEL_NAME = 32 };
+enum { FRAME_INFO = 8, FRAME_ROTATIONS = 3, LIMB_INFO = 2, LIMB_SHAPE = 10, MODEL_NAME = 32 };
 
 struct gait_model {
     int32_t frames, points, limbs, angles;

@@ -1,0 +1,43 @@
+#include "fmath.h"
+
+#define LN2_HI 6.93147180369123816490e-01 /* 33 bits: its product with an exponent is exact */
+#define LN2_LO 1.90821492927058770002e-10
+
+static double from_bits64(uint64_t u)
+{
+    double x;
+    memcpy(&x, &u, sizeof x);
+    return x;
+}
+
+double m_exp64(double x)
+{
+    if (!(x > -708.0))
+        return 0.0;
+    double const y = x < 709.0 ? x : 709.0;
+    double const magic = 6755399441055744.0; /* 1.5 * 2^52 */
+    double const k = (y * 1.44269504088896340736 + magic) - magic;
+    double const r = (y - k * LN2_HI) - k * LN2_LO;
+    /* Taylor series: |r| <= ln(2)/2, so the first term left out is below 5e-18. */
+    double p = 1.0;
+    for (int n = 13; n > 0; n--)
+        p = p * r / n + 1.0;
+    return p * from_bits64((uint64_t)((int32_t)k + 1023) << 52); /* k in [-1021, 1023] */
+}
+
+double m_log64(double x)
+{
+    double const y = x > DBL_MIN ? (x < DBL_MAX ? x : DBL_MAX) : DBL_MIN;
+    uint64_t const sqrt_half = UINT64_C(0x3fe6a09e667f3bcd), mantissa = (UINT64_C(1) << 52) - 1;
+    uint64_t bits;
+    memcpy(&bits, &y, sizeof bits);
+    bits += (UINT64_C(1023) << 52) - sqrt_half;
+    double const k = (double)((int32_t)(bits >> 52) - 1023);
+    double const f = from_bits64((bits & mantissa) + sqrt_half) - 1.0;
+    /* log(1 + f) = 2 atanh(s) = f - f^2/2 + s (f^2/2 + R), |s| < 0.172 */
+    double const s = f / (2.0 + f), z = s * s, half = 0.5 * f * f;
+    double r = 0.0;
+    for (int n = 21; n >= 3; n -= 2)
+        r = r * z + 2.0 / n;
+    return k * LN2_HI - ((half - (s * (half + r * z) + k * LN2_LO)) - f);
+}
