@@ -59,13 +59,12 @@ help: ## list the targets
 # ---- python environment --------------------------------------------------------------------------------------
 setup: $(READY) ## make .venv with the pinned packages (once; later builds work offline)
 
-# The stamp comes last: without it the environment is made anew, with it only changed pins are fetched.
+# The stamp comes last: without it the environment is made anew, with an old one only changed pins are fetched.
 $(READY): python/requirements.txt python/requirements-dev.txt python/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "setup: needs Python >= 3.10: set PYTHON=")'
 	@$(PYTHON) -c 'import venv, ensurepip' || \
 	    { echo 'setup: $(PYTHON) cannot make environments: install python3-venv or set PYTHON=' >&2; exit 1; }
 	$(PYTHON) -m venv $$(test -f $@ || echo --clear) $(VENV)
-	@rm -f $@
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check $(patsubst %,-r %,$(filter %.txt,$^))
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
 	    --config-settings editable_mode=compat -e python
@@ -168,17 +167,18 @@ eval: setup lib ## errors on the clips of ../shared/data
 
 # ---- style ---------------------------------------------------------------------------------------------------
 C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tools/*.[ch] tools/common/*.[ch]))
-have = command -v $(1) >/dev/null || { echo 'lint: $(1) is not installed, skipped'; exit 0; };
-
-lint: setup ## clang-format, clang-tidy, ruff, mypy: what is installed
-	@$(call have,clang-format) clang-format --dry-run -Werror $(C_FILES)
-	@$(call have,clang-tidy) clang-tidy --quiet $(filter libgait/src/%.c,$(C_FILES)) -- -std=c11 -Ilibgait/include
-	@$(VENV)/bin/ruff check --config python/pyproject.toml python tests
-	@$(VENV)/bin/ruff format --check --config python/pyproject.toml python tests
-	@$(VENV)/bin/mypy --config-file python/pyproject.toml python/gait
+lint: export PATH := $(abspath $(VENV)/bin):$(PATH)
+lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed
+	@clang-format --dry-run -Werror $(C_FILES)
+	@ruff check --quiet --config python/pyproject.toml python tests
+	@ruff format --quiet --check --config python/pyproject.toml python tests
+	@mypy --no-error-summary --config-file python/pyproject.toml python/gait
+	@if command -v clang-tidy >/dev/null; then \
+	    clang-tidy --quiet $(filter libgait/src/%.c,$(C_FILES)) -- -std=c11 -Ilibgait/include; \
+	else echo 'lint: no clang-tidy, skipped' >&2; fi
 
 format: setup ## rewrite in the house style
-	@$(call have,clang-format) clang-format -i $(C_FILES)
+	@$(VENV)/bin/clang-format -i $(C_FILES)
 	@$(VENV)/bin/ruff format --config python/pyproject.toml python tests
 
 # ---- installation --------------------------------------------------------------------------------------------
