@@ -1,0 +1,118 @@
+"""The whole of learning: sequences to mean curves, components and statistics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.errors import UserError
+from gait.learn import align, cycles, fpca, retarget
+from gait.learn.sequence import Sequence
+from gait.skeleton import ANGLES, CHANNELS, ROOTS, SIDES, Proportions, default_skeleton, points
+
+Floats = npt.NDArray[np.float64]
+
+SAMPLES = 128
+DEFAULT_COMPONENTS = 5
+#: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as much as
+#: the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per radian).
+ROOT_SCALE = {"root_forward": 1.0, "root_sway": 3.3, "root_height": 3.3}
+
+
+@dataclass
+class Learned:
+    """Everything that `gait learn` knows about a set of sequences.
+
+    Attributes
+    ----------
+    sequences : list of Sequence
+    subjects : list of str
+        Sorted names; `subject_index` (n,) gives each sequence's.
+    proportions : Proportions
+    alignment : align.Alignment
+        Offsets with phase 0 at the right heel strike.
+    cycles : cycles.Cycles
+        Rows of the analysis, channels in their own units.
+    components : fpca.Components
+        In scaled units; `scale` (M,) turns channels into them.
+    held_out : (n,)
+        Error on held-out blocks for 0, 1 ... components, scaled units; empty unless chosen automatically.
+    """
+
+    sequences: list[Sequence]
+    subjects: list[str]
+    subject_index: npt.NDArray[np.intp]
+    proportions: Proportions
+    alignment: align.Alignment
+    cycles: cycles.Cycles
+    components: fpca.Components
+    scale: Floats
+    held_out: Floats
+
+    @property
+    def curves(self) -> Floats:
+        """CURV: mean, then components times their standard deviation, (1 + q, T, M), own units."""
+        c = self.components
+        return np.concatenate([c.mean[None], c.curves * c.sd[:, None, None]]) / self.scale
+
+    @property
+    def residuals(self) -> Floats:
+        """Data minus reconstruction, own units; NaN where not observed, (R, T, M)."""
+        model = self.components.reconstruct() / self.scale
+        return np.where(self.cycles.mask, self.cycles.values - model, np.nan)
+
+    @property
+    def row_subject(self) -> npt.NDArray[np.intp]:
+        """Subject index of each row of the analysis."""
+        return self.subject_index[self.cycles.sequence]
+
+
+def channel_scale() -> Floats:
+    """Scale (M,) of the channels in the components."""
+    return np.array([ROOT_SCALE.get(name, 1.0) for name in CHANNELS])
+
+
+def fit(sequences: list[Sequence], components: int | str = DEFAULT_COMPONENTS, seed: int = 1) -> Learned:
+    """Learn the cyclic model of prepared sequences.
+
+    Raises
+    ------
+    UserError
+        If there are too few cycles for the components asked for.
+    """
+    subjects = sorted({s.subject for s in sequences})
+    index = np.array([subjects.index(s.subject) for s in sequences])
+    proportions = _mean_body(sequences, index, len(subjects))
+    signals = [s.channels for s in sequences]
+    periods = np.array([s.period.frames for s in sequences])
+    alignment = align.align([z[:, : len(ANGLES)] for z in signals], periods)
+    start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
+    alignment.offsets = (alignment.offsets + start * periods) % periods
+    rows = cycles.slice_cycles(signals, periods, alignment.offsets, SAMPLES)
+    wanted = fpca.LARGEST if components == "auto" else int(components)
+    if len(rows.values) <= wanted + 1:
+        raise UserError(f"{len(rows.values)} cycles are too few for {wanted} components; add recordings")
+    scale = channel_scale()
+    scaled, held_out = rows.values * scale, np.zeros(0)
+    if components == "auto":
+        wanted, held_out = fpca.choose(scaled, rows.mask, np.random.default_rng(seed))
+    model = fpca.fit(scaled, rows.mask, wanted)
+    return Learned(sequences, subjects, index, proportions, alignment, rows, model, scale, held_out)
+
+
+def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int) -> Proportions:
+    """Generic proportions in which every subject counts once."""
+    picked = [sequences[int(np.flatnonzero(index == i)[0])].measures for i in range(subjects)]
+    return retarget.mean_proportions(picked)
+
+
+def heel_strike(curve: Floats, proportions: Proportions) -> float:
+    """Phase at which the right heel is farthest ahead of the pelvis in a mean curve (n, M)."""
+    sections = default_skeleton(proportions).sections()
+    joints = default_skeleton(proportions).points
+    forward = points(sections, curve)[:, joints.index("r_heel"), 0]
+    n, top = len(forward), int(np.argmax(forward))
+    left, peak, right = forward[[top - 1, top, (top + 1) % n]]
+    return float((top + 0.5 * (left - right) / (left - 2 * peak + right)) / n)

@@ -1,0 +1,140 @@
+"""A learned model as the sections of a blob (libgait/doc/model-format.md)."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait import blob
+from gait.learn.fit import Learned
+from gait.skeleton import ANGLES, CHANNELS, default_skeleton
+
+Floats = npt.NDArray[np.float64]
+
+GENERATOR = "gait learn 0.1.0"
+ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not this training set
+CMU = (
+    "The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "The database was created with funding from NSF EIA-0196217."
+)
+
+
+def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array]:
+    """All sections of the blob, META first."""
+    curves = learned.curves
+    return {
+        "META": np.frombuffer(json.dumps(meta(learned, activity, seed), separators=(",", ":")).encode(), np.uint8),
+        "CHNM": blob.pack_names(CHANNELS),
+        "CURV": curves.astype(np.float32),
+        "CHST": channel_statistics(learned).astype(np.float32),
+        "SCST": score_statistics(learned).astype(np.float32),
+        "GAIT": gait_statistics(learned).astype(np.float32),
+        **default_skeleton(learned.proportions).sections(),
+    }
+
+
+def channel_statistics(learned: Learned) -> Floats:
+    """CHST (M, 4): residual sd, least and largest value, sd over subjects of the mean residual."""
+    residual, values = learned.residuals, np.where(learned.cycles.mask, learned.cycles.values, np.nan)
+    sd = np.sqrt(np.nanmean(residual**2, axis=(0, 1)))
+    offsets = _means(residual, learned.row_subject, len(learned.subjects))
+    static = offsets.std(axis=0, ddof=1) if len(offsets) > 1 else np.zeros(len(sd))
+    return np.stack([sd, np.nanmin(values, axis=(0, 1)), np.nanmax(values, axis=(0, 1)), static], axis=1)
+
+
+def _means(rows: Floats, group: npt.NDArray[np.intp], groups: int) -> Floats:
+    """Mean over the rows and phases of each group, (groups, M)."""
+    return np.array([np.nanmean(rows[group == g], axis=(0, 1)) for g in range(groups)])
+
+
+def score_statistics(learned: Learned) -> Floats:
+    """SCST (q, 3): singular-value sd, then between- and within-subject sd relative to it (one-way ANOVA)."""
+    c = learned.components
+    between, within = anova(c.scores / c.sd, learned.row_subject)
+    return np.stack([c.sd, between, within], axis=1)
+
+
+def anova(values: Floats, group: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Between- and within-group standard deviations of columns (n, k), unequal group sizes allowed.
+
+    With one group the between part is 0; with one member each, the within part.
+    """
+    labels, counts = np.unique(group, return_counts=True)
+    n, k = len(values), len(labels)
+    means = np.array([values[group == g].mean(axis=0) for g in labels])
+    grand = values.mean(axis=0)
+    inside = sum(((values[group == g] - m) ** 2).sum(axis=0) for g, m in zip(labels, means, strict=True))
+    within = inside / max(n - k, 1)
+    if k < 2:
+        return np.zeros(values.shape[1]), np.sqrt(within)
+    mean_square = (counts[:, None] * (means - grand) ** 2).sum(axis=0) / (k - 1)
+    size = (n - (counts**2).sum() / n) / (k - 1)
+    return np.sqrt(np.maximum(mean_square - within, 0) / size), np.sqrt(within)
+
+
+def gait_statistics(learned: Learned) -> Floats:
+    """GAIT (8,): stride rate, stride length, sample rate and stature of the training set."""
+    rates = np.array([s.body.fps / s.period.frames for s in learned.sequences])
+    column = CHANNELS.index("root_forward")
+    lengths = np.array([np.nanmean(s.channels[:, column]) for s in learned.sequences])
+    fps = float(np.median([s.body.fps for s in learned.sequences]))
+    rate, length = (_by_subject(v, learned.subject_index) for v in (rates, lengths))
+    return np.array([*rate, stride_variation(learned), *length, fps, *ADULT_STATURE])
+
+
+def _by_subject(values: Floats, group: npt.NDArray[np.intp]) -> tuple[float, float]:
+    """Mean and sd of the subjects' means; the sd over sequences if there is one subject only."""
+    means = np.array([values[group == g].mean() for g in np.unique(group)])
+    spread = means if len(means) > 1 else values
+    return float(means.mean()), float(spread.std(ddof=1)) if len(spread) > 1 else 0.0
+
+
+def stride_variation(learned: Learned) -> float:
+    """Coefficient of variation of the stride time within a sequence, pooled."""
+    parts = [s.strides / s.strides.mean() for s in learned.sequences if len(s.strides) > 1]
+    squares = sum(float(np.sum((p - 1) ** 2)) for p in parts)
+    return float(np.sqrt(squares / max(sum(len(p) - 1 for p in parts), 1)))
+
+
+def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
+    """META: what people and tools may want to know; degrees, metres, seconds."""
+    c = learned.components
+    statures = [
+        np.mean([s.measures.stature for s in learned.sequences if s.subject == name]) for name in learned.subjects
+    ]
+    return {
+        "activity": activity,
+        "generator": GENERATOR,
+        "seed": seed,
+        "acknowledgement": CMU,
+        "subjects": learned.subjects,
+        "statures_m": _rounded(statures, 3),
+        "sequences": {"columns": list(SEQUENCE_COLUMNS), "rows": sequence_table(learned)},
+        "cycles": len(c.scores),
+        "missing": round(float(1 - learned.cycles.mask.mean()), 3),
+        "variance_explained": _rounded(np.cumsum(c.spectrum)[:10], 3),
+        "residual_deg": _rounded(np.degrees(channel_statistics(learned)[: len(ANGLES), 0]), 1),
+        "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
+    }
+
+
+SEQUENCE_COLUMNS = ("name", "period_s", "cycles", "snr", "sharpness", "residual_deg")
+
+
+def sequence_table(learned: Learned) -> list[list[Any]]:
+    """One row of SEQUENCE_COLUMNS per sequence; snr is the best sum over the angles, residual the rms of all."""
+    residuals, table = learned.residuals[:, :, : len(ANGLES)], []
+    for i, s in enumerate(learned.sequences):
+        own = residuals[learned.cycles.sequence == i]
+        rms = float(np.degrees(np.sqrt(np.nanmean(own**2)))) if own.size else float("nan")
+        peak = round(float(np.nanmax(s.period.scores)))
+        row = [round(s.period.frames / s.body.fps, 3), round(s.cycles, 1), peak, round(s.period.sharpness)]
+        table.append([s.name, *row, round(rms, 1) if own.size else None])
+    return table
+
+
+def _rounded(values: Any, digits: int) -> list[float]:
+    return [round(float(v), digits) for v in values]

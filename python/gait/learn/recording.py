@@ -1,0 +1,54 @@
+"""One recorded sequence, whatever file it came from: bones with positions and orientations, z up, metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+Y_UP = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # x left, y up, z forward (ASF, BVH) to x forward, y left, z up
+
+
+@dataclass
+class Recording:
+    """Bones of a moving skeleton.
+
+    Attributes
+    ----------
+    name : str
+        Last part of the file's name, without suffix.
+    source : Path
+        The file.
+    fps : float
+        Frames per second.
+    bones : list of str
+        B names as in the file.
+    start, end : (T, B, 3)
+        Where each bone begins and ends, metres, world with z up; NaN where missing.
+    rotation : (T, B, 3, 3)
+        Turns a vector of the rest pose into the world.
+    rest_start, rest_end : (B, 3)
+        The rest pose, metres, axes as above.
+    hinges : dict of str to (3,)
+        Axis of bones with a single rotation, in the rest pose; flexion positive as the file has it.
+    """
+
+    name: str
+    source: Path
+    fps: float
+    bones: list[str]
+    start: Floats
+    end: Floats
+    rotation: Floats
+    rest_start: Floats
+    rest_end: Floats
+    hinges: dict[str, Floats] = field(default_factory=dict)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames T."""
+        return len(self.start)

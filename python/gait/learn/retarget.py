@@ -1,0 +1,166 @@
+"""Joints of a body to the 24 angles of the default skeleton and to the body's own proportions.
+
+Every limb's frame has z against the limb and y along its hinge; angles are exact decompositions of the frames
+of neighbours (model-format.md), continuous in time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.learn.body import Body
+from gait.learn.rotations import decompose_yxz, decompose_zyx, frame_from, unit
+from gait.skeleton import ANGLES, SIDES, Proportions
+
+Floats = npt.NDArray[np.float64]
+
+HEAD = 0.141  # neck to head top, statures: files end the head's bone at different heights
+BALL = 0.0235  # centre of the ball of the foot over the ground in stance, statures
+STANCE_SHARE = 0.15  # share of frames in which a foot moves least: it is flat on the ground then
+
+
+@dataclass(frozen=True)
+class Measures:
+    """A body's own size, metres, of the same meaning as `gait.skeleton.Proportions` times the stature."""
+
+    stature: float
+    hip: Floats  #: (2, 3) left and right, in the pelvis frame
+    shoulder: Floats  #: (2, 3) left and right, in the torso frame
+    neck: float
+    upper_arm: Floats  #: (2,) and so on
+    forearm: Floats
+    thigh: Floats
+    shank: Floats
+    foot: Floats  #: (2,) ankle to ball
+    slope: Floats  #: (2,) of the line ankle to ball below the sole's direction, radians
+    sole: float  #: ankle over the ground in stance
+
+
+def stance(body: Body, side: str) -> npt.NDArray[np.intp]:
+    """Frames in which the foot of a side lies flat: ankle and ball both move least."""
+    speed = sum(
+        np.linalg.norm(np.gradient(body.joints[f"{side}_{joint}"], axis=0), axis=1) for joint in ("ankle", "toe")
+    )
+    order = np.argsort(np.where(np.isfinite(speed), speed, np.inf), kind="stable")
+    return order[: max(3, int(STANCE_SHARE * np.isfinite(speed).sum()))]
+
+
+def measure(body: Body) -> Measures:
+    """Lengths of a body whose floor is level (any height)."""
+    j = body.joints
+
+    def distances(upper: str, lower: str) -> Floats:
+        return np.array([_distance(j[f"{s}_{upper}"], j[f"{s}_{lower}"]) for s in SIDES])
+
+    torso = torso_frames(body)
+    flat = {s: stance(body, s) for s in SIDES}
+    rise = np.array([np.nanmedian((j[f"{s}_ankle"] - j[f"{s}_toe"])[flat[s], 2]) for s in SIDES])
+    foot, neck = distances("ankle", "toe"), _distance(j["pelvis"], j["neck"])
+    thigh, shank = distances("hip", "knee"), distances("knee", "ankle")
+    stature = float(rise.mean() + thigh.mean() + shank.mean() + neck) / (1 - HEAD - BALL)
+    return Measures(
+        stature=stature,
+        hip=np.array([_in_frame(body.pelvis, j[f"{s}_hip"] - j["pelvis"]) for s in SIDES]),
+        shoulder=np.array([_in_frame(torso, j[f"{s}_shoulder"] - j["pelvis"]) for s in SIDES]),
+        neck=neck,
+        upper_arm=distances("shoulder", "elbow"),
+        forearm=distances("elbow", "wrist"),
+        thigh=thigh,
+        shank=shank,
+        foot=foot,
+        slope=np.arcsin(np.clip(rise / foot, -1, 1)),
+        sole=float(rise.mean()) + BALL * stature,
+    )
+
+
+def _distance(a: Floats, b: Floats) -> float:
+    return float(np.nanmean(np.linalg.norm(a - b, axis=1)))
+
+
+def _in_frame(frames: Floats, vectors: Floats) -> Floats:
+    """Mean of vectors (T, 3) seen in frames (T, 3, 3)."""
+    return np.asarray(np.nanmean(np.einsum("tji,tj->ti", frames, vectors), axis=0))
+
+
+def torso_frames(body: Body) -> Floats:
+    """Torso axes (T, 3, 3): up from the pelvis to the neck, left from shoulder to shoulder."""
+    j = body.joints
+    return frame_from(j["neck"] - j["pelvis"], j["l_shoulder"] - j["r_shoulder"])
+
+
+def angles(body: Body, measures: Measures) -> Floats:
+    """Angles (T, 24) in the order of `gait.skeleton.ANGLES`, radians; NaN where a joint is missing."""
+    j, result = body.joints, {}
+    torso = torso_frames(body)
+    head = frame_from(j["head"] - j["neck"], body.lateral["head"])
+    for name, child, parent in (("torso", torso, body.pelvis), ("neck", head, torso)):
+        turns = decompose_zyx(np.swapaxes(parent, 1, 2) @ child)
+        result |= {f"{name}_{axis}": turns[:, k] for k, axis in enumerate("zyx")}
+    for i, s in enumerate(SIDES):
+        chains = (("shoulder", "elbow", "wrist", torso, -1.0), ("hip", "knee", "ankle", body.pelvis, 1.0))
+        for first, second, third, parent, sense in chains:
+            hinge = body.lateral[f"{s}_{second}"]
+            upper = frame_from(j[f"{s}_{first}"] - j[f"{s}_{second}"], hinge)
+            turns = decompose_yxz(np.swapaxes(parent, 1, 2) @ upper) * ((-1, 1, -1) if s == "l" else (-1, -1, 1))
+            result |= {f"{s}_{first}_{n}": turns[:, k] for k, n in enumerate(("flexion", "abduction", "rotation"))}
+            lower = j[f"{s}_{second}"] - j[f"{s}_{third}"]
+            result[f"{s}_{second}_flexion"] = sense * _about_y(upper, lower)
+        shank = frame_from(j[f"{s}_knee"] - j[f"{s}_ankle"], body.lateral[f"{s}_knee"])
+        sole = _about_y(shank, j[f"{s}_toe"] - j[f"{s}_ankle"])
+        result[f"{s}_ankle_flexion"] = np.pi / 2 - sole + measures.slope[i]
+    table = np.stack([result[name] for name in ANGLES], axis=1)
+    return unwrap(table)
+
+
+def _about_y(frames: Floats, vectors: Floats) -> Floats:
+    """Angle (T,) about the frames' y axis from their z axis to vectors, in (-pi, pi]."""
+    local = np.einsum("tji,tj->ti", frames, unit(vectors))
+    return np.asarray(np.arctan2(local[:, 0], local[:, 2]))
+
+
+def unwrap(table: Floats) -> Floats:
+    """Remove turns in time, column by column, across gaps; then bring the mean within half a turn."""
+    result = table.copy()
+    for column in result.T:
+        seen = np.isfinite(column)
+        if seen.any():
+            column[seen] = np.unwrap(column[seen])
+            column -= 2 * np.pi * np.round(np.mean(column[seen]) / (2 * np.pi))
+    return result
+
+
+def own_proportions(m: Measures) -> Proportions:
+    """A body's own proportions, symmetric."""
+    return mean_proportions([m])
+
+
+def mean_proportions(bodies: list[Measures]) -> Proportions:
+    """Generic proportions: means over bodies, each divided by its stature; left and right made symmetric."""
+
+    def mean(value: object) -> float:
+        return float(np.mean([np.mean(value(m)) / m.stature for m in bodies]))  # type: ignore[operator]
+
+    def offset(points: str) -> tuple[float, float, float]:
+        both = np.mean([getattr(m, points) / m.stature for m in bodies], axis=0)
+        middle = (both[0] + both[1] * (1, -1, 1)) / 2
+        return float(middle[0]), float(middle[1]), float(middle[2])
+
+    foot, slope, sole = mean(lambda m: m.foot), mean(lambda m: m.slope * m.stature), mean(lambda m: m.sole)
+    toe = (foot * np.cos(slope), 0.0, -foot * np.sin(slope))
+    generic = Proportions()
+    return Proportions(
+        hip=(0.0, offset("hip")[1], 0.0),
+        shoulder=offset("shoulder"),
+        neck=mean(lambda m: m.neck),
+        head=HEAD,
+        upper_arm=mean(lambda m: m.upper_arm),
+        forearm=mean(lambda m: m.forearm),
+        thigh=mean(lambda m: m.thigh),
+        shank=mean(lambda m: m.shank),
+        toe=(float(toe[0]), 0.0, float(toe[2])),
+        heel=(generic.heel[0], 0.0, generic.heel[2] + generic.sole - sole),
+        sole=sole,
+    )

@@ -1,0 +1,118 @@
+"""Motion of the pelvis over the ground: level floor, heading, and the six root channels of model-format.md."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.learn.body import Body
+from gait.learn.retarget import BALL, Measures, stance
+from gait.learn.rotations import decompose_zyx
+from gait.skeleton import SIDES, axis_rotation
+
+Floats = npt.NDArray[np.float64]
+
+HARMONICS = 4  # of the pelvis's path within a stride
+STANDING = 0.2  # mean speed, m/s, below which the pelvis and not the path gives the heading
+
+
+def level(body: Body) -> tuple[Body, float]:
+    """Turn a sequence so that the floor under the feet is level along the path.
+
+    Returns the turned body and the slope removed, radians.  Captures may have a sloping floor; it is the line
+    through the balls of the feet in stance.
+    """
+    path = body.joints["pelvis"]
+    seen = np.flatnonzero(np.isfinite(path[:, 0]))
+    way = path[seen[-1], :2] - path[seen[0], :2]
+    distance = float(np.linalg.norm(way))
+    if distance < 1.0:
+        return body, 0.0
+    way = way / distance
+    contacts = np.concatenate([body.joints[f"{s}_toe"][stance(body, s)] for s in SIDES])
+    contacts = contacts[np.isfinite(contacts).all(axis=1)]
+    design = np.stack([np.ones(len(contacts)), contacts[:, :2] @ way], axis=1)
+    slope = float(np.arctan(_robust_line(design, contacts[:, 2])[1]))
+    turn = _about(np.array([-way[1], way[0], 0.0]), slope)
+    joints = {name: points @ turn.T for name, points in body.joints.items()}
+    lateral = {name: axes @ turn.T for name, axes in body.lateral.items()}
+    return replace(body, joints=joints, pelvis=turn @ body.pelvis, lateral=lateral), slope
+
+
+def _robust_line(design: Floats, values: Floats) -> Floats:
+    """Least-squares line, twice refitted without the points farther than twice the median error."""
+    keep = np.ones(len(values), bool)
+    line = np.zeros(2)
+    for _ in range(3):
+        line, *_ = np.linalg.lstsq(design[keep], values[keep], rcond=None)
+        error = np.abs(values - design @ line)
+        keep = error <= max(2 * float(np.median(error)), 1e-4)
+    return line
+
+
+def _about(axis: Floats, angle: float) -> Floats:
+    """Rotation (3, 3) about a horizontal unit axis."""
+    base = axis_rotation(2, float(np.arctan2(axis[1], axis[0])))
+    return np.asarray(base @ axis_rotation(0, angle) @ base.T)
+
+
+def channels(body: Body, measures: Measures, period: float) -> tuple[Floats, Floats]:
+    """Root channels of a level sequence.
+
+    Parameters
+    ----------
+    period : float
+        Frames per stride.
+
+    Returns
+    -------
+    channels : (T, 6)
+        root_forward ... root_yaw: statures per stride, statures, statures, radians.
+    heading : (T,)
+        Direction of travel, radians.
+    """
+    path, frames = body.joints["pelvis"], body.frames
+    floor = np.nanmedian([np.nanmedian(body.joints[f"{s}_toe"][stance(body, s), 2]) for s in SIDES])
+    ground = float(floor) - BALL * measures.stature
+    smooth, velocity, fitted = _smooth_path(path[:, :2], period)
+    speed = np.linalg.norm(smooth[-1] - smooth[0]) / frames * body.fps
+    yaw = np.unwrap(np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0]))
+    heading = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])) if speed > STANDING else _mean_over(yaw, period)
+    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    result = np.empty((frames, 6))
+    result[:, 0] = np.sum(np.gradient(fitted, axis=0) * along, axis=1) * period / measures.stature
+    result[:, 1] = np.sum((path[:, :2] - smooth) * across, axis=1) / measures.stature
+    result[:, 2] = (path[:, 2] - ground) / measures.stature
+    turns = decompose_zyx(axis_rotation(2, -heading) @ body.pelvis)
+    result[:, 3:] = turns[:, ::-1]
+    return result, heading
+
+
+def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+    """Split the path (T, 2) into a slow polynomial and a motion within the stride.
+
+    Returns the polynomial, its derivative per frame, and polynomial plus stride motion, all (T, 2).
+    """
+    frames = len(path)
+    t = (np.arange(frames) - frames / 2) / period
+    degree = 2 if frames < 4 * period else 5
+    angle = 2 * np.pi * np.outer(t, np.arange(1, HARMONICS + 1))
+    powers = np.vander(t, degree + 1, increasing=True)
+    design = np.concatenate([powers, np.cos(angle), np.sin(angle)], axis=1)
+    seen = np.isfinite(path[:, 0])
+    weights, *_ = np.linalg.lstsq(design[seen], path[seen], rcond=None)
+    slow = weights[: degree + 1]
+    derivative = np.vander(t, degree, increasing=True) @ (slow[1:] * np.arange(1, degree + 1)[:, None]) / period
+    return powers @ slow, derivative, design @ weights
+
+
+def _mean_over(values: Floats, period: float) -> Floats:
+    """Mean (T,) over one stride about each frame, shorter at the ends; NaN left out."""
+    seen = np.isfinite(values)
+    width = max(1, round(period))
+    window = np.ones(width)
+    total = np.convolve(np.where(seen, values, 0), window, "same")
+    return np.asarray(total / np.maximum(np.convolve(seen, window, "same"), 1))

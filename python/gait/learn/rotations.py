@@ -1,0 +1,94 @@
+"""Rotation matrices of whole sequences: composition from file angles, decomposition into the model's angles.
+
+Arrays are (T, 3, 3); NaN marks missing frames and stays NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.skeleton import axis_rotation
+
+Floats = npt.NDArray[np.float64]
+
+GIMBAL = 0.05  # cosine of the middle angle below which the outer two are not told apart
+
+
+def from_angles(angles: Floats, axes: Sequence[int]) -> Floats:
+    """Product Rot(axes[0], angles[..., 0]) Rot(axes[1], ...) ..., the first outermost.  Radians."""
+    result = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
+    for k, axis in enumerate(axes):
+        result = result @ axis_rotation(axis, angles[..., k])
+    return result
+
+
+def frame_from(z: Floats, y: Floats) -> Floats:
+    """Frames (T, 3, 3) whose z axis is along `z` and whose y axis is as near to `y` as possible; columns x y z."""
+    z = unit(z)
+    x = unit(np.cross(y, z))
+    return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+def unit(v: Floats) -> Floats:
+    """Vectors (..., 3) scaled to length 1; NaN where the length is 0."""
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    return v / np.where(length > 0, length, np.nan)
+
+
+def rotation_vectors(r: Floats) -> Floats:
+    """Axis times angle (T, 3) of rotations below half a turn."""
+    twist = np.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1)
+    sine = np.linalg.norm(twist, axis=-1) / 2
+    angle = np.arctan2(sine, (np.trace(r, axis1=-2, axis2=-1) - 1) / 2)
+    return twist * (angle / np.where(sine > 1e-12, 2 * sine, 1))[..., None]
+
+
+def decompose_yxz(r: Floats) -> Floats:
+    """Angles (T, 3) with R = Ry(a) Rx(b) Rz(c), continuous in time."""
+    b = np.arcsin(np.clip(-r[:, 1, 2], -1, 1))
+    outer = np.stack([np.arctan2(r[:, 0, 2], r[:, 2, 2]), b, np.arctan2(r[:, 1, 0], r[:, 1, 1])], axis=1)
+    return _continuous(outer, lambda t, a: np.arctan2(*_inner(axis_rotation(1, -a) @ r[t])))
+
+
+def decompose_zyx(r: Floats) -> Floats:
+    """Angles (T, 3) with R = Rz(a) Ry(b) Rx(c), continuous in time."""
+    b = np.arcsin(np.clip(-r[:, 2, 0], -1, 1))
+    outer = np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), b, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
+
+    def last(t: int, a: float) -> float:
+        rest = axis_rotation(2, -a) @ r[t]
+        return float(np.arctan2(-rest[1, 2], rest[1, 1]))
+
+    return _continuous(outer, last)
+
+
+def _inner(rest: Floats) -> tuple[float, float]:
+    """Sine and cosine of c in Rx(b) Rz(c)."""
+    return -rest[0, 1], rest[0, 0]
+
+
+def _continuous(angles: Floats, last: object) -> Floats:
+    """Choose in each frame the branch nearest to the frame before; hold the outer angle in gimbal lock.
+
+    (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation; near |b| = 90 degrees only a +- c is known.
+    """
+    result = angles.copy()
+    previous: Floats | None = None
+    for t in np.flatnonzero(np.isfinite(angles).all(axis=1)):
+        now = angles[t]
+        if previous is not None:
+            if np.cos(now[1]) < GIMBAL:
+                now = np.array([previous[0], now[1], last(t, previous[0])])  # type: ignore[operator]
+            other = np.array([now[0] + np.pi, np.pi - now[1], now[2] + np.pi])
+            options = [_nearest_turn(option, previous) for option in (now, other)]
+            now = min(options, key=lambda option: float(np.sum((option - previous) ** 2)))
+        result[t] = previous = now
+    return result
+
+
+def _nearest_turn(angles: Floats, previous: Floats) -> Floats:
+    """Add whole turns so that the angles are nearest to the previous ones."""
+    return angles - 2 * np.pi * np.round((angles - previous) / (2 * np.pi))

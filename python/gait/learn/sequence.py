@@ -1,0 +1,122 @@
+"""One learning sequence: a recording read, levelled, retargeted and timed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.errors import UserError
+from gait.learn import mocap_asf, mocap_bvh, period, retarget, root
+from gait.learn.body import Body, body
+from gait.learn.recording import Recording
+from gait.skeleton import SIDES
+
+Floats = npt.NDArray[np.float64]
+
+READERS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
+LEAST_CYCLES = 1.5
+
+
+@dataclass
+class Sequence:
+    """A recording as the learner uses it.
+
+    Attributes
+    ----------
+    name, subject : str
+    source : Path
+    body : Body
+        With a level floor.
+    measures : retarget.Measures
+    channels : (T, 30)
+        Angles and root channels, radians and statures.
+    heading : (T,)
+    period : period.Period
+    slope : float
+        Of the floor that was removed, radians.
+    strides : (n,)
+        Durations of the single strides between forward extremes of either ankle, seconds.
+    """
+
+    name: str
+    subject: str
+    source: Path
+    body: Body
+    measures: retarget.Measures
+    channels: Floats
+    heading: Floats
+    period: period.Period
+    slope: float
+    strides: Floats
+
+    @property
+    def cycles(self) -> float:
+        """How many cycles the recording holds."""
+        return len(self.channels) / self.period.frames
+
+
+def subject_of(path: Path) -> str:
+    """The part of the file's stem before '_', else the folder."""
+    return path.stem.split("_")[0] if "_" in path.stem else path.parent.name
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a motion file by its suffix."""
+    return READERS[path.suffix.lower()](path)
+
+
+def load(path: Path, mode: str = "refined") -> Sequence:
+    """Read and prepare one file.
+
+    Raises
+    ------
+    UserError
+        If the file is malformed, or the motion is not cyclic or too short.
+    """
+    levelled, slope = root.level(body(read_recording(path)))
+    measures = retarget.measure(levelled)
+    angles = retarget.angles(levelled, measures)
+    found = period.find(angles, levelled.fps, mode)
+    if not found.cyclic:
+        raise UserError(f"{path}: no cycle found (sharpness {found.sharpness:.1f}); leave it out of the sources")
+    if len(angles) < LEAST_CYCLES * found.frames:
+        raise UserError(f"{path}: {len(angles) / found.frames:.1f} cycles, at least {LEAST_CYCLES} are needed")
+    channels, heading = root.channels(levelled, measures, found.frames)
+    return Sequence(
+        name=path.stem,
+        subject=subject_of(path),
+        source=path,
+        body=levelled,
+        measures=measures,
+        channels=np.concatenate([angles, channels], axis=1),
+        heading=heading,
+        period=found,
+        slope=slope,
+        strides=_strides(levelled, heading, found.frames),
+    )
+
+
+def _strides(walker: Body, heading: Floats, frames: float) -> Floats:
+    """Times between successive forward extremes of each ankle about the pelvis, seconds."""
+    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    durations = [np.zeros(0)]
+    for s in SIDES:
+        forward = np.sum((walker.joints[f"{s}_ankle"] - walker.joints["pelvis"])[:, :2] * along, axis=1)
+        durations.append(np.diff(_peaks(forward, frames)) / walker.fps)
+    return np.concatenate(durations)
+
+
+def _peaks(signal: Floats, frames: float) -> Floats:
+    """Sub-frame times of maxima that are the largest within 0.4 period on both sides."""
+    reach = int(0.4 * frames)
+    times = []
+    for t in range(reach, len(signal) - reach):
+        window = signal[t - reach : t + reach + 1]
+        if np.isfinite(window).all() and np.argmax(window) == reach:
+            left, top, right = signal[t - 1 : t + 2]
+            bend = left - 2 * top + right
+            times.append(t + (0.5 * (left - right) / bend if bend < 0 else 0.0))
+    return np.array(times)

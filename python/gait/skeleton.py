@@ -1,0 +1,298 @@
+"""The default skeleton as data, and forward kinematics in numpy (the twin of the C library's).
+
+Frames, rotations and signs are those of libgait/doc/model-format.md.  Lengths are fractions of stature, angles
+radians; body axes x forward, y left, z up.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait import blob as blobs
+
+Floats = npt.NDArray[np.float64]
+
+SIDES = ("l", "r")
+_BALL = ("flexion", "abduction", "rotation")
+PAPER_ANGLES = (
+    [f"neck_{axis}" for axis in "xyz"]
+    + [f"{s}_shoulder_{a}" for s in SIDES for a in _BALL]
+    + [f"{s}_elbow_flexion" for s in SIDES]
+    + [f"{s}_hip_{a}" for s in SIDES for a in _BALL]
+    + [f"{s}_knee_flexion" for s in SIDES]
+)
+ANGLES = PAPER_ANGLES + [f"torso_{axis}" for axis in "xyz"] + [f"{s}_ankle_flexion" for s in SIDES]
+ROOTS = [f"root_{name}" for name in ("forward", "sway", "height", "roll", "pitch", "yaw")]
+CHANNELS = ANGLES + ROOTS
+EVAL15 = ["pelvis", "neck", "head_top"] + [
+    f"{s}_{j}" for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for s in SIDES
+]
+JOINTS = EVAL15 + [f"{s}_{j}" for j in ("toe", "heel") for s in SIDES]
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """Generic body, fractions of stature; the right side mirrors the left.
+
+    Vectors are in body axes with all angles 0.  The defaults are the means of eight walking subjects (CMU).
+    """
+
+    hip: tuple[float, float, float] = (0.0, 0.055, 0.0)  #: left hip from the pelvis joint, in the pelvis
+    shoulder: tuple[float, float, float] = (0.0, 0.107, 0.283)  #: left shoulder, in the torso
+    neck: float = 0.320  #: pelvis joint to neck joint
+    head: float = 0.143  #: neck joint to the top of the head
+    upper_arm: float = 0.168
+    forearm: float = 0.155  #: elbow to wrist
+    thigh: float = 0.240
+    shank: float = 0.250
+    toe: tuple[float, float, float] = (0.069, 0.0, -0.0235)  #: ball of the foot from the ankle
+    heel: tuple[float, float, float] = (-0.035, 0.0, -0.034)  #: heel from the ankle
+    sole: float = 0.047  #: ankle over the sole
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Frames, points and limbs in the form the blob stores.
+
+    Attributes
+    ----------
+    frames : list of str
+        F names, parents first.
+    links : int32 (F, 8)
+        Rows of FRMI: parent, number of rotations, then (signed axis, channel) pairs.
+    origins : float (F, 3)
+        In the parent frame.
+    points, point_frames, point_positions
+        P names, their frames (P,) and positions (P, 3).
+    limbs, limb_frames, limb_shapes
+        L names, rows of LIMI (L, 2), rows of LIMF (L, 10).
+    """
+
+    frames: list[str] = field(default_factory=list)
+    links: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 8), np.int32))
+    origins: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    points: list[str] = field(default_factory=list)
+    point_frames: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
+    point_positions: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    limbs: list[str] = field(default_factory=list)
+    limb_frames: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    limb_shapes: Floats = field(default_factory=lambda: np.zeros((0, 10)))
+
+    def sections(self) -> dict[str, blobs.Array]:
+        """The sections FRNM ... LIMF of a blob."""
+        return {
+            "FRNM": blobs.pack_names(self.frames),
+            "FRMI": self.links,
+            "FRMF": self.origins.astype(np.float32),
+            "PTNM": blobs.pack_names(self.points),
+            "PTNI": self.point_frames,
+            "PTNF": self.point_positions.astype(np.float32),
+            "LBNM": blobs.pack_names(self.limbs),
+            "LIMI": self.limb_frames,
+            "LIMF": self.limb_shapes.astype(np.float32),
+        }
+
+
+def default_skeleton(p: Proportions | None = None) -> Skeleton:
+    """The default skeleton with generic or given proportions."""
+    body = p or Proportions()
+    frames, links, origins = _frames(body)
+    points = _points(body)
+    limbs = _limbs(body)
+    index = {name: i for i, name in enumerate(frames)}
+    return Skeleton(
+        frames=frames,
+        links=links,
+        origins=origins,
+        points=JOINTS,
+        point_frames=np.array([index[points[j][0]] for j in JOINTS], np.int32),
+        point_positions=np.array([points[j][1] for j in JOINTS], float),
+        limbs=list(limbs),
+        limb_frames=np.array([[index[frame], shape] for frame, shape, _ in limbs.values()], np.int32),
+        limb_shapes=np.array([numbers for _, _, numbers in limbs.values()], float),
+    )
+
+
+def _mirror(v: tuple[float, float, float], side: str) -> tuple[float, float, float]:
+    return v if side == "l" else (v[0], -v[1], v[2])
+
+
+def _frames(p: Proportions) -> tuple[list[str], npt.NDArray[np.int32], Floats]:
+    """Frame names, FRMI rows and origins."""
+    rows: list[tuple[str, str, tuple[float, float, float], list[tuple[int, str]]]] = [
+        ("pelvis", "", (0, 0, 0), [(3, "root_yaw"), (2, "root_pitch"), (1, "root_roll")]),
+        ("torso", "pelvis", (0, 0, 0), [(3, "torso_z"), (2, "torso_y"), (1, "torso_x")]),
+        ("head", "torso", (0, 0, p.neck), [(3, "neck_z"), (2, "neck_y"), (1, "neck_x")]),
+    ]
+    for s in SIDES:
+        sign = 1 if s == "l" else -1
+        ball = [(-2, "flexion"), (sign, "abduction"), (-3 * sign, "rotation")]
+        rows += [
+            (f"{s}_upper_arm", "torso", _mirror(p.shoulder, s), [(a, f"{s}_shoulder_{n}") for a, n in ball]),
+            (f"{s}_forearm", f"{s}_upper_arm", (0, 0, -p.upper_arm), [(-2, f"{s}_elbow_flexion")]),
+            (f"{s}_thigh", "pelvis", _mirror(p.hip, s), [(a, f"{s}_hip_{n}") for a, n in ball]),
+            (f"{s}_shank", f"{s}_thigh", (0, 0, -p.thigh), [(2, f"{s}_knee_flexion")]),
+            (f"{s}_foot", f"{s}_shank", (0, 0, -p.shank), [(-2, f"{s}_ankle_flexion")]),
+        ]
+    names = [row[0] for row in rows]
+    links = np.zeros((len(rows), 8), np.int32)
+    for i, (_, parent, _, rotations) in enumerate(rows):
+        links[i, :2] = (names.index(parent) if parent else -1), len(rotations)
+        for k, (axis, channel) in enumerate(rotations):
+            links[i, 2 + 2 * k : 4 + 2 * k] = axis, CHANNELS.index(channel)
+    return names, links, np.array([row[2] for row in rows], float)
+
+
+def _points(p: Proportions) -> dict[str, tuple[str, tuple[float, float, float]]]:
+    """Joint name to its frame and position there."""
+    zero = (0.0, 0.0, 0.0)
+    points: dict[str, tuple[str, tuple[float, float, float]]] = {
+        "pelvis": ("pelvis", zero),
+        "neck": ("head", zero),
+        "head_top": ("head", (0.0, 0.0, p.head)),
+    }
+    for s in SIDES:
+        points |= {
+            f"{s}_shoulder": (f"{s}_upper_arm", zero),
+            f"{s}_elbow": (f"{s}_forearm", zero),
+            f"{s}_wrist": (f"{s}_forearm", (0.0, 0.0, -p.forearm)),
+            f"{s}_hip": (f"{s}_thigh", zero),
+            f"{s}_knee": (f"{s}_shank", zero),
+            f"{s}_ankle": (f"{s}_foot", zero),
+            f"{s}_toe": (f"{s}_foot", _mirror(p.toe, s)),
+            f"{s}_heel": (f"{s}_foot", _mirror(p.heel, s)),
+        }
+    return points
+
+
+CLOTHED = 1.05  # clothes over the anatomical radius
+CONE, ELLIPSOID = 0, 1
+
+
+def _limbs(p: Proportions) -> dict[str, tuple[str, int, list[float]]]:
+    """Limb name to frame, shape and LIMF row; anatomical radii at a stature of 1.75 m, clothed."""
+
+    def limb(
+        frame: str, shape: int, start: tuple[float, ...], end: tuple[float, ...], radii_mm: tuple[float, ...]
+    ) -> tuple[str, int, list[float]]:
+        return frame, shape, [*start, *end, *(CLOTHED * r / 1750 for r in radii_mm)]
+
+    top = p.shoulder[2] + 0.015
+    limbs = {
+        "torso": limb("torso", CONE, (0, 0, 0.06), (0, 0, top), (140, 105, 165, 105)),
+        "pelvis": limb("pelvis", CONE, (0, 0, -0.045), (0, 0, 0.075), (155, 115, 140, 105)),
+        "head": limb("head", ELLIPSOID, (0.012, 0, p.head - 0.135), (0.012, 0, p.head), (78, 95, 78, 95)),
+    }
+    heel, ball = (p.heel[0] + 0.012, 0.0, 0.024 - p.sole), (p.toe[0] + 0.02, 0.0, 0.02 - p.sole)
+    for s in SIDES:
+        hand = -p.forearm - 0.075
+        limbs |= {
+            f"{s}_upper_arm": limb(f"{s}_upper_arm", CONE, (0, 0, 0), (0, 0, -p.upper_arm), (50, 50, 40, 40)),
+            f"{s}_forearm": limb(f"{s}_forearm", CONE, (0, 0, 0), (0, 0, hand), (40, 40, 27, 33)),
+            f"{s}_thigh": limb(f"{s}_thigh", CONE, (0, 0, 0), (0, 0, -p.thigh), (85, 85, 62, 62)),
+            f"{s}_shank": limb(f"{s}_shank", CONE, (0, 0, 0), (0, 0, -p.shank), (60, 60, 40, 42)),
+            f"{s}_foot": limb(f"{s}_foot", CONE, heel, ball, (37, 40, 44, 33)),
+        }
+    return limbs
+
+
+def pose(
+    model: Mapping[str, Any] | str | os.PathLike[str],
+    phase: npt.ArrayLike,
+    coef: npt.ArrayLike,
+    stature: npt.ArrayLike,
+    heading: npt.ArrayLike,
+    pitch: npt.ArrayLike,
+    roll: npt.ArrayLike,
+    pelvis: npt.ArrayLike,
+) -> tuple[Floats, Floats]:
+    """Joints of N hypotheses: curves (Ormoneit 2000, eq. 3), then forward kinematics.
+
+    Parameters
+    ----------
+    model : mapping or path
+        Sections of a blob as `gait.blob.read` returns them, or its file.
+    phase, stature, heading, pitch, roll : (N,) or scalar
+        Strides, metres, radians.
+    coef : (N, k) or (k,)
+        Scores in standard deviations, k <= q; the rest are 0.
+    pelvis : (N, 3) or (3,)
+        Pelvis joint in the world, metres.
+
+    Returns
+    -------
+    joints : (N, P, 3)
+        Metres, world.
+    angles : (N, A)
+        Radians.
+    """
+    sections = model if isinstance(model, Mapping) else blobs.read(model)
+    coef = np.atleast_2d(np.asarray(coef, float))
+    scalars = [np.atleast_1d(np.asarray(v, float)) for v in (phase, stature, heading, pitch, roll)]
+    n = np.broadcast_shapes(*(v.shape for v in scalars), coef.shape[:1], np.atleast_2d(pelvis).shape[:1])[0]
+    phase, stature, heading, pitch, roll = (np.broadcast_to(v, n) for v in scalars)
+    channels = curves(sections, phase, np.broadcast_to(coef, (n, coef.shape[1])))
+    angles = channels.copy()
+    angles[:, _root_columns(sections)] += np.stack([heading, pitch, roll], axis=1)
+    positions = points(sections, angles) * stature[:, None, None] + np.asarray(pelvis, float).reshape(-1, 1, 3)
+    return positions, channels[:, : channels.shape[1] - len(ROOTS)]
+
+
+def curves(sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLike) -> Floats:
+    """Channel values (N, M) at phases (N,) for scores (N, k): mean + sum of c_k comp_k, linear between samples."""
+    table = np.asarray(sections["CURV"], float)
+    phase, coef = np.asarray(phase, float), np.asarray(coef, float)
+    samples = table.shape[1]
+    at = (phase - np.floor(phase)) * samples
+    low = at.astype(int) % samples
+    weight = (at - np.floor(at))[:, None]
+    weights = np.concatenate([np.ones((len(phase), 1)), coef], axis=1)
+    used = table[: weights.shape[1]]
+    ends = [np.einsum("nk,knm->nm", weights, used[:, i]) for i in (low, (low + 1) % samples)]
+    return ends[0] * (1 - weight) + ends[1] * weight
+
+
+def points(sections: Mapping[str, Any], channels: Floats) -> Floats:
+    """Points (N, P, 3) relative to frame 0's origin in statures, for channel values (N, M)."""
+    rotations, origins = frames(sections, channels)
+    frame = np.asarray(sections["PTNI"])
+    local = np.asarray(sections["PTNF"], float)
+    return origins[:, frame] + np.einsum("npij,pj->npi", rotations[:, frame], local)
+
+
+def frames(sections: Mapping[str, Any], channels: Floats) -> tuple[Floats, Floats]:
+    """Rotations (N, F, 3, 3) and origins (N, F, 3) of all frames, frame 0 at the origin, in statures."""
+    links, offsets = np.asarray(sections["FRMI"]), np.asarray(sections["FRMF"], float)
+    n = len(channels)
+    rotations, origins = np.empty((n, len(links), 3, 3)), np.empty((n, len(links), 3))
+    for i, link in enumerate(links):
+        parent = int(link[0])
+        rotation = np.broadcast_to(np.eye(3), (n, 3, 3)) if parent < 0 else rotations[:, parent]
+        origins[:, i] = 0 if parent < 0 else origins[:, parent] + rotation @ offsets[i]
+        for axis, channel in link[2 : 2 + 2 * link[1]].reshape(-1, 2):
+            rotation = rotation @ axis_rotation(abs(axis) - 1, np.sign(axis) * channels[:, channel])
+        rotations[:, i] = rotation
+    return rotations, origins
+
+
+def axis_rotation(axis: int, angle: npt.ArrayLike) -> Floats:
+    """Rotations (..., 3, 3) by angles (...) about axis 0 = x, 1 = y, 2 = z."""
+    angle = np.asarray(angle, float)
+    c, s = np.cos(angle), np.sin(angle)
+    matrix = np.zeros((*angle.shape, 3, 3))
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    matrix[..., axis, axis] = 1
+    matrix[..., u, u] = matrix[..., v, v] = c
+    matrix[..., u, v], matrix[..., v, u] = -s, s
+    return matrix
+
+
+def _root_columns(sections: Mapping[str, Any]) -> list[int]:
+    names = blobs.unpack_names(sections["CHNM"])
+    return [names.index(f"root_{name}") for name in ("yaw", "pitch", "roll")]
