@@ -1,8 +1,8 @@
 """The ``gait`` command.
 
-Each sub-command is a module here with ``NAME``, ``HELP``, ``add_arguments(parser)`` and ``run(args) -> int``.  Its
-docstring is the text of ``--help``.  Every command gets ``--quiet``, and ``--json`` unless it says ``JSON = False``.
-Figures go to stdout, words and progress to stderr; exit codes are 0 ok, 1 failed, 2 usage.
+Each sub-command is a module here with ``NAME``, ``HELP``, ``add_arguments(parser)`` and ``run(args) -> int``.
+Its docstring is the text of ``--help``.  Every command gets ``--quiet``, and ``--json`` unless it says
+``JSON = False``.  Figures go to stdout, words and progress to stderr; exit codes are 0 ok, 1 failed, 2 usage.
 """
 
 from __future__ import annotations

@@ -1,0 +1,328 @@
+"""The C interface in ctypes: structures, enumerations and one table of functions.
+
+Mirrors libgait/include/gait.h; `verify` compares every size and offset with those of the compiled library.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import (
+    POINTER,
+    c_char,
+    c_char_p,
+    c_double,
+    c_float,
+    c_int32,
+    c_int64,
+    c_size_t,
+    c_uint8,
+    c_uint32,
+    c_uint64,
+    c_void_p,
+)
+from enum import IntEnum, IntFlag
+from typing import Any
+
+ABI = 1
+ALIGN = 64
+MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_CAMERAS = 32, 32, 16, 4
+
+
+class Status(IntEnum):
+    """Outcome of a call, ``gait_status``."""
+
+    OK = 0
+    ARG = -1
+    STRUCT = -2
+    MEMORY = -3
+    LIMIT = -4
+    MAGIC = -5
+    VERSION = -6
+    CORRUPT = -7
+    STATE = -8
+    NUMERIC = -9
+
+
+class PixelFormat(IntEnum):
+    """Layout of an image, ``GAIT_GREY8`` and so on."""
+
+    GREY8 = 1
+    RGB8 = 2
+    BGR8 = 3
+
+
+class Mode(IntEnum):
+    """Set of defaults: the product's, or the paper's own likelihood and dynamics."""
+
+    DEFAULT = 0
+    PAPER = 1
+
+
+class Term(IntFlag):
+    """Terms of the likelihood."""
+
+    TEXTURE = 1
+    SILHOUETTE = 2
+    EDGES = 4
+    TEMPLATE = 8
+
+
+class TrackStatus(IntEnum):
+    """What an estimate is worth."""
+
+    INIT = 0
+    TRACKING = 1
+    AMBIGUOUS = 2
+    LOST = 3
+
+
+class Flag(IntFlag):
+    """What happened in a step."""
+
+    RESAMPLED = 1
+    NO_IMAGE = 2
+    DEGENERATE = 4
+
+
+class Error(ctypes.Structure):
+    """``gait_error``."""
+
+    _fields_ = [("status", c_int32), ("index", c_int32), ("text", c_char * 120)]
+
+
+class AbiField(ctypes.Structure):
+    """``gait_abi_field``."""
+
+    _fields_ = [("type", c_char_p), ("field", c_char_p), ("offset", c_uint32), ("size", c_uint32)]
+
+
+class ImageView(ctypes.Structure):
+    """``gait_image``."""
+
+    _fields_ = [
+        ("data", c_void_p),
+        ("width", c_int32),
+        ("height", c_int32),
+        ("stride", c_int32),
+        ("format", c_int32),
+    ]
+
+
+class CameraC(ctypes.Structure):
+    """``gait_camera``."""
+
+    _fields_ = [
+        ("width", c_int32),
+        ("height", c_int32),
+        ("fx", c_float),
+        ("fy", c_float),
+        ("cx", c_float),
+        ("cy", c_float),
+        ("R", c_float * 9),
+        ("t", c_float * 3),
+        ("distortion", c_float * 5),
+    ]
+
+
+class StateC(ctypes.Structure):
+    """``gait_state``."""
+
+    _fields_ = [
+        ("phase", c_float),
+        ("stride_hz", c_float),
+        ("stature", c_float),
+        ("heading", c_float),
+        ("pitch", c_float),
+        ("roll", c_float),
+        ("pelvis", c_float * 3),
+        ("coef", c_float * MAX_COMPONENTS),
+    ]
+
+
+class PoseC(ctypes.Structure):
+    """``gait_pose``."""
+
+    _fields_ = [("joint", c_float * 3 * MAX_JOINTS), ("angle", c_float * MAX_ANGLES)]
+
+
+TaskFn = ctypes.CFUNCTYPE(None, c_void_p, c_int32)
+RunFn = ctypes.CFUNCTYPE(None, c_void_p, TaskFn, c_void_p, c_int32)
+
+
+class Tasks(ctypes.Structure):
+    """``gait_tasks``."""
+
+    _fields_ = [("run", RunFn), ("user", c_void_p)]
+
+
+class ModelInfoC(ctypes.Structure):
+    """``gait_model_info``."""
+
+    _fields_ = [
+        ("joints", c_int32),
+        ("angles", c_int32),
+        ("components", c_int32),
+        ("phases", c_int32),
+        ("limbs", c_int32),
+        ("reserved", c_int32),
+        ("stride_hz", c_float),
+        ("stride_hz_sd", c_float),
+        ("stride_length", c_float),
+        ("stride_length_sd", c_float),
+        ("digest", c_uint64),
+    ]
+
+
+class TrackerConfigC(ctypes.Structure):
+    """``gait_tracker_config``."""
+
+    _fields_ = [
+        ("struct_size", c_uint32),
+        ("mode", c_int32),
+        ("seed", c_uint64),
+        ("particles", c_int32),
+        ("components", c_int32),
+        ("tasks", c_int32),
+        ("cameras", c_int32),
+        ("terms", c_uint32),
+        ("term_weight", c_float * 4),
+        ("missed_weight", c_float),
+        ("girth", c_float),
+        ("resample_ess", c_float),
+        ("max_dt", c_float),
+        ("phase_noise", c_float),
+        ("rate_noise", c_float),
+        ("rate_noise_start", c_float),
+        ("settle_time", c_float),
+        ("forward_noise", c_float),
+        ("lateral_noise", c_float),
+        ("vertical_noise", c_float),
+        ("heading_noise", c_float),
+        ("tilt_noise", c_float),
+        ("tilt_time", c_float),
+        ("coef_noise", c_float),
+        ("coef_time", c_float),
+        ("stature_noise", c_float),
+        ("camera", CameraC * MAX_CAMERAS),
+        ("exec", Tasks),
+    ]
+
+
+class FrameC(ctypes.Structure):
+    """``gait_frame``."""
+
+    _fields_ = [("utime", c_int64), ("image", ImageView * MAX_CAMERAS)]
+
+
+class EstimateC(ctypes.Structure):
+    """``gait_estimate``."""
+
+    _fields_ = [
+        ("utime", c_int64),
+        ("frame", c_uint64),
+        ("log_evidence", c_double),
+        ("mean", StateC),
+        ("sd", StateC),
+        ("best", StateC),
+        ("pose", PoseC),
+        ("joint_sd", c_float * 3 * MAX_JOINTS),
+        ("ess", c_float),
+        ("phase_r", c_float),
+        ("mode_mass", c_float),
+        ("speed", c_float),
+        ("status", c_int32),
+        ("flags", c_uint32),
+        ("reserved", c_uint32),
+    ]
+
+
+STRUCTS: dict[str, type[ctypes.Structure]] = {
+    "gait_error": Error,
+    "gait_image": ImageView,
+    "gait_camera": CameraC,
+    "gait_state": StateC,
+    "gait_pose": PoseC,
+    "gait_tasks": Tasks,
+    "gait_model_info": ModelInfoC,
+    "gait_tracker_config": TrackerConfigC,
+    "gait_frame": FrameC,
+    "gait_estimate": EstimateC,
+}
+
+_STATUS, _HANDLE, _ERR = c_int32, c_void_p, POINTER(Error)
+_SIZE, _STATE = POINTER(c_size_t), POINTER(StateC)
+
+FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
+    ("gait_status_name", [_STATUS], c_char_p),
+    ("gait_version", [], c_uint32),
+    ("gait_abi", [], c_uint32),
+    ("gait_abi_fields", [POINTER(c_uint32)], POINTER(AbiField)),
+    ("gait_model_bytes", [c_void_p, c_size_t, _SIZE, _ERR], _STATUS),
+    ("gait_model_init", [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(_HANDLE), _ERR], _STATUS),
+    ("gait_model_get_info", [_HANDLE, POINTER(ModelInfoC)], _STATUS),
+    ("gait_model_joint_name", [_HANDLE, c_int32], c_char_p),
+    ("gait_model_angle_name", [_HANDLE, c_int32], c_char_p),
+    ("gait_model_limb_name", [_HANDLE, c_int32], c_char_p),
+    ("gait_model_pose", [_HANDLE, _STATE, POINTER(PoseC)], _STATUS),
+    ("gait_model_pelvis_height", [_HANDLE, _STATE, POINTER(c_float)], _STATUS),
+    ("gait_render", [_HANDLE, POINTER(CameraC), _STATE, POINTER(c_uint8), c_int32], _STATUS),
+    ("gait_tracker_default", [POINTER(TrackerConfigC), c_int32], None),
+    ("gait_tracker_bytes", [_HANDLE, POINTER(TrackerConfigC), _SIZE, _ERR], _STATUS),
+    (
+        "gait_tracker_init",
+        [c_void_p, c_size_t, _HANDLE, POINTER(TrackerConfigC), POINTER(_HANDLE), _ERR],
+        _STATUS,
+    ),
+    ("gait_tracker_set_background", [_HANDLE, c_int32, POINTER(ImageView)], _STATUS),
+    ("gait_tracker_prior", [_HANDLE, _STATE, _STATE], _STATUS),
+    ("gait_tracker_start", [_HANDLE, _STATE, _STATE, c_int64, _ERR], _STATUS),
+    ("gait_tracker_step", [_HANDLE, POINTER(FrameC), POINTER(EstimateC), _ERR], _STATUS),
+    ("gait_tracker_particles", [_HANDLE, _STATE, POINTER(c_float), c_int32], c_int32),
+    ("gait_tracker_digest", [_HANDLE], c_uint64),
+    ("gait_tracker_save", [_HANDLE, c_void_p, c_size_t, _SIZE], _STATUS),
+    ("gait_tracker_restore", [_HANDLE, c_void_p, c_size_t, _ERR], _STATUS),
+)
+"""Every C function: name, argument types, result type."""
+
+
+def declare(library: ctypes.CDLL) -> None:
+    """Give every function its types.
+
+    Raises
+    ------
+    AttributeError
+        If the library lacks one.
+    """
+    for name, arguments, result in FUNCTIONS:
+        function = getattr(library, name)
+        function.argtypes, function.restype = arguments, result
+
+
+def layout() -> dict[tuple[str, str], tuple[int, int]]:
+    """Offset and size in bytes by (struct, field); the field "" is the struct itself."""
+    rows = {}
+    for name, struct in STRUCTS.items():
+        rows[name, ""] = (0, ctypes.sizeof(struct))
+        for field, *_ in struct._fields_:
+            at = getattr(struct, field)
+            rows[name, field] = (at.offset, at.size)
+    return rows
+
+
+def verify(library: ctypes.CDLL) -> list[str]:
+    """Compare the layout compiled into the library with `layout`; return one line per difference."""
+    count = c_uint32()
+    rows = library.gait_abi_fields(ctypes.byref(count))
+    theirs = {
+        (row.type.decode(), (row.field or b"").decode()): (row.offset, row.size)
+        for row in rows[: count.value]
+    }
+    ours = layout()
+    faults = []
+    for key in sorted(ours.keys() | theirs.keys()):
+        if ours.get(key) != theirs.get(key):
+            here, there = ours.get(key, "nothing"), theirs.get(key, "nothing")
+            faults.append(
+                f"{'.'.join(filter(None, key))}: (offset, size) {here} here, {there} in the library"
+            )
+    return faults

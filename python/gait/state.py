@@ -1,0 +1,69 @@
+"""One hypothesis of a walker in numpy clothes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait import _abi
+
+Array = NDArray[np.float64]
+SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
+
+
+@dataclass
+class State:
+    """Everything that places and poses a walker; also used for the standard deviations of those values.
+
+    Attributes
+    ----------
+    phase : float
+        [0, 1) of the stride, 0 = right heel strike.
+    stride_hz : float
+        Strides (two steps) per second.
+    stature : float
+        Metres.
+    heading : float
+        Walking direction about world z, radians; 0 = along +x.
+    pitch, roll : float
+        Tilt of the pelvis beyond the model's own, radians.
+    pelvis : ndarray of shape (3,)
+        Pelvis joint in the world, metres.
+    coef : ndarray of shape (q,)
+        Principal-component scores in standard deviations; missing ones are 0.
+    """
+
+    phase: float = 0.0
+    stride_hz: float = 0.9
+    stature: float = 1.75
+    heading: float = 0.0
+    pitch: float = 0.0
+    roll: float = 0.0
+    pelvis: Array = field(default_factory=lambda: np.zeros(3))
+    coef: Array = field(default_factory=lambda: np.zeros(0))
+
+    @staticmethod
+    def from_c(c: _abi.StateC, components: int) -> State:
+        """Copy a ``gait_state``, keeping `components` scores."""
+        scalars = {name: float(getattr(c, name)) for name in SCALARS}
+        return State(**scalars, pelvis=np.array(c.pelvis, float), coef=np.array(c.coef[:components], float))
+
+    def to_c(self) -> _abi.StateC:
+        """Make a ``gait_state``.
+
+        Raises
+        ------
+        ValueError
+            If `pelvis` is not of 3 numbers or `coef` has more than the library can hold.
+        """
+        pelvis: Sequence[float] = np.asarray(self.pelvis, float).tolist()
+        coef: Sequence[float] = np.asarray(self.coef, float).tolist()
+        if len(pelvis) != 3 or len(coef) > _abi.MAX_COMPONENTS:
+            raise ValueError(f"state: pelvis has 3 numbers and coef at most {_abi.MAX_COMPONENTS}")
+        c = _abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
+        c.pelvis[:] = pelvis
+        c.coef[: len(coef)] = coef
+        return c

@@ -1,0 +1,334 @@
+"""Track a walker through frames: a particle filter over the states of a walking model (Ormoneit 2000)."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait import _abi
+from gait._abi import Flag, Mode, Term, TrackStatus
+from gait._lib import aligned, check, library
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.model import Model, camera_c, pose_arrays
+from gait.state import Array, State
+from gait.tasks import PythonTasks, Runner, TaskSource, threads
+from gait.video import Image
+
+
+@dataclass(frozen=True)
+class TrackerConfig:
+    """Settings of a tracker, each documented in ``gait.h``; `default` fills them from the C library."""
+
+    mode: Mode
+    seed: int
+    particles: int
+    components: int
+    tasks: int
+    terms: Term
+    term_weight: tuple[float, ...]
+    missed_weight: float
+    girth: float
+    resample_ess: float
+    max_dt: float
+    phase_noise: float
+    rate_noise: float
+    rate_noise_start: float
+    settle_time: float
+    forward_noise: float
+    lateral_noise: float
+    vertical_noise: float
+    heading_noise: float
+    tilt_noise: float
+    tilt_time: float
+    coef_noise: float
+    coef_time: float
+    stature_noise: float
+
+    @staticmethod
+    def default(mode: Mode | int = Mode.DEFAULT, **changes: Any) -> TrackerConfig:
+        """Defaults of the library for `mode`, with `changes`.
+
+        Raises
+        ------
+        TypeError
+            If a change names no setting.
+        """
+        c = _abi.TrackerConfigC()
+        library().gait_tracker_default(ctypes.byref(c), int(mode))
+        values = {item.name: getattr(c, item.name) for item in fields(TrackerConfig)}
+        values["term_weight"] = tuple(c.term_weight)
+        return TrackerConfig(**(values | {"mode": Mode(c.mode), "terms": Term(c.terms)} | changes))
+
+    def to_c(self) -> _abi.TrackerConfigC:
+        """Make a ``gait_tracker_config`` without cameras and tasks."""
+        c = _abi.TrackerConfigC()
+        library().gait_tracker_default(ctypes.byref(c), int(self.mode))
+        for item in fields(self):
+            if item.name != "term_weight":
+                setattr(c, item.name, getattr(self, item.name))
+        if len(self.term_weight) != len(c.term_weight):
+            raise ValueError(f"term_weight: give {len(c.term_weight)} numbers")
+        c.term_weight[:] = self.term_weight
+        return c
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the tracker believes after a frame.
+
+    Attributes
+    ----------
+    utime : int
+        Capture time, microseconds.
+    frame : int
+        Steps since start.
+    status : TrackStatus
+    flags : Flag
+    log_evidence : float
+        log p(frame | past), up to a constant.
+    ess : float
+        Effective number of particles.
+    phase_r : float
+        How sure the phase is, [0, 1].
+    mode_mass : float
+        Weight of the dominant mode, [0, 1].
+    speed : float
+        Metres per second along the ground.
+    mean, sd, best : State
+        Of the dominant mode; standard deviation over all particles; heaviest particle.
+    joints : ndarray of shape (P, 3)
+        Posterior mean of the joints in the world, metres.
+    joint_sd : ndarray of shape (P, 3)
+        Posterior standard deviation, metres.
+    angles : ndarray of shape (A,)
+        Radians, of the dominant mode.
+    joint_names : tuple of str
+        Names of the P joints.
+    """
+
+    utime: int
+    frame: int
+    status: TrackStatus
+    flags: Flag
+    log_evidence: float
+    ess: float
+    phase_r: float
+    mode_mass: float
+    speed: float
+    mean: State
+    sd: State
+    best: State
+    joints: Array
+    joint_sd: Array
+    angles: Array
+    joint_names: tuple[str, ...]
+
+    def joint(self, name: str) -> Array:
+        """Place of one joint in the world, shape (3,), metres."""
+        return np.asarray(self.joints[self.joint_names.index(name)])
+
+    @staticmethod
+    def from_c(c: _abi.EstimateC, model: Model) -> Estimate:
+        """Copy a ``gait_estimate``."""
+        info = model.info
+        joints, angles = pose_arrays(c.pose, info.joints, info.angles)
+        return Estimate(
+            utime=c.utime,
+            frame=c.frame,
+            status=TrackStatus(c.status),
+            flags=Flag(c.flags),
+            log_evidence=c.log_evidence,
+            ess=c.ess,
+            phase_r=c.phase_r,
+            mode_mass=c.mode_mass,
+            speed=c.speed,
+            mean=State.from_c(c.mean, info.components),
+            sd=State.from_c(c.sd, info.components),
+            best=State.from_c(c.best, info.components),
+            joints=joints,
+            joint_sd=np.array(c.joint_sd, float)[: info.joints],
+            angles=angles,
+            joint_names=model.joint_names,
+        )
+
+
+class Tracker:
+    """Particle filter in memory of fixed size.
+
+    Parameters
+    ----------
+    model : Model
+    cameras : Camera or sequence of Camera
+    config : TrackerConfig, optional
+        The library's defaults if left out.
+    background : image, or sequence of image or None, optional
+        Empty scene as each camera sees it.
+    tasks : int, callable or TaskSource
+        Number of threads; or a callable that runs tasks (see `gait.tasks.Runner`); or a pool.
+
+    Attributes
+    ----------
+    memory_bytes : int
+        All the memory the filter uses, particles and scratch together.
+    step_seconds : float
+        Time that the last `step` spent in the C library.
+
+    Notes
+    -----
+    Same input, configuration and seed give the same bits, whatever `tasks` is.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        cameras: Camera | Sequence[Camera],
+        config: TrackerConfig | None = None,
+        *,
+        background: Image | Sequence[Image | None] | None = None,
+        tasks: int | Runner | TaskSource = 1,
+    ) -> None:
+        self._lib = library()
+        self.model = model
+        self.cameras = [cameras] if isinstance(cameras, Camera) else list(cameras)
+        self.config = config or TrackerConfig.default()
+        self._tasks = _task_source(tasks)
+        self._error = _abi.Error()
+        c = self._c_config()
+        size, handle = ctypes.c_size_t(), ctypes.c_void_p()
+        settings, err = ctypes.byref(c), ctypes.byref(self._error)
+        self._check(self._lib.gait_tracker_bytes(model.handle, settings, ctypes.byref(size), err))
+        self.memory_bytes = size.value
+        self._memory = aligned(size.value)
+        where = (self._memory.ctypes.data, size.value)
+        self._check(self._lib.gait_tracker_init(*where, model.handle, settings, ctypes.byref(handle), err))
+        self._handle = handle
+        self._plates: dict[int, Image] = {}
+        self.step_seconds = 0.0
+        for i, plate in enumerate(_per_camera(background)):
+            self.set_background(plate, i)
+
+    def set_background(self, plate: Image | None, camera: int = 0) -> None:
+        """Give the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None takes it away."""
+        view = None
+        if plate is not None:
+            plate = np.ascontiguousarray(plate)
+            view = ctypes.byref(_image_view(plate, self.cameras[camera], "background"))
+        check(self._lib.gait_tracker_set_background(self._handle, camera, view))
+        if plate is None:
+            self._plates.pop(camera, None)
+        else:
+            self._plates[camera] = plate  # the library borrows the pixels
+
+    def start(self, mean: State, sd: State, utime: int = 0) -> None:
+        """Draw the particles from independent normals.
+
+        Parameters
+        ----------
+        mean, sd : State
+            A phase or heading whose sd is a half turn or more is uniform.
+        utime : int
+            Time of the first frame, microseconds.
+        """
+        means, sds = ctypes.byref(mean.to_c()), ctypes.byref(sd.to_c())
+        err = ctypes.byref(self._error)
+        self._check(self._lib.gait_tracker_start(self._handle, means, sds, utime, err))
+
+    def step(self, frames: Image | Sequence[Image | None] | None, utime: int) -> Estimate:
+        """Take in one frame and estimate.
+
+        Parameters
+        ----------
+        frames : image, or sequence of image or None
+            (h, w) grey or (h, w, 3) BGR uint8 of each camera; None where a camera missed this frame.
+        utime : int
+            Capture time, microseconds; must increase.
+        """
+        images = [None if image is None else np.ascontiguousarray(image) for image in _per_camera(frames)]
+        if len(images) > len(self.cameras):
+            raise ValueError(f"{len(images)} images for {len(self.cameras)} cameras")
+        frame = _abi.FrameC(utime=utime)
+        for i, image in enumerate(images):
+            if image is not None:
+                frame.image[i] = _image_view(image, self.cameras[i], "frame")
+        out = _abi.EstimateC()
+        arguments = (ctypes.byref(frame), ctypes.byref(out), ctypes.byref(self._error))
+        begun = time.perf_counter()
+        status = self._lib.gait_tracker_step(self._handle, *arguments)
+        self.step_seconds = time.perf_counter() - begun
+        self._check(status)
+        return Estimate.from_c(out, self.model)
+
+    def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
+        """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
+        count = self.config.particles
+        states = (_abi.StateC * count)()
+        weights = np.zeros(count, np.float32)
+        pointer = weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float))
+        check(self._lib.gait_tracker_particles(self._handle, states, pointer, count))
+        return np.ctypeslib.as_array(states), weights
+
+    def digest(self) -> int:
+        """Hash of the whole state: equal after equal input, whatever the threads or the machine."""
+        return int(self._lib.gait_tracker_digest(self._handle))
+
+    def save(self) -> bytes:
+        """Copy of the whole state, for `restore` into a tracker of the same model and configuration."""
+        size = ctypes.c_size_t()
+        check(self._lib.gait_tracker_save(self._handle, None, 0, ctypes.byref(size)))
+        room = aligned(size.value)
+        check(self._lib.gait_tracker_save(self._handle, room.ctypes.data, size.value, ctypes.byref(size)))
+        return room[: size.value].tobytes()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Take over a state from `save`; a failure leaves this one as it was."""
+        room = aligned(len(snapshot))
+        room[:] = np.frombuffer(snapshot, np.uint8)
+        err = ctypes.byref(self._error)
+        self._check(self._lib.gait_tracker_restore(self._handle, room.ctypes.data, len(snapshot), err))
+
+    def _check(self, status: int) -> None:
+        """Raise what happened in a callback, else what the status means."""
+        if self._tasks is not None:
+            self._tasks.reraise()
+        check(status, self._error)
+
+    def _c_config(self) -> _abi.TrackerConfigC:
+        c = self.config.to_c()
+        if not 1 <= len(self.cameras) <= _abi.MAX_CAMERAS:
+            raise UserError(f"cameras: {len(self.cameras)} given; use 1 to {_abi.MAX_CAMERAS}")
+        c.cameras = len(self.cameras)
+        for i, camera in enumerate(self.cameras):
+            c.camera[i] = camera_c(camera)
+        if self._tasks is not None:
+            c.exec = self._tasks.struct
+        return c
+
+
+def _task_source(tasks: int | Runner | TaskSource) -> TaskSource | None:
+    if isinstance(tasks, int):
+        return threads(tasks)
+    return PythonTasks(tasks) if callable(tasks) else tasks
+
+
+def _per_camera(images: Image | Sequence[Image | None] | None) -> list[Image | None]:
+    if images is None:
+        return [None]
+    return [images] if isinstance(images, np.ndarray) else list(images)
+
+
+def _image_view(image: Image, camera: Camera, what: str) -> _abi.ImageView:
+    """View of a contiguous picture that must fit the camera."""
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
+        raise ValueError(f"{what}: {image.dtype} {image.shape}; give uint8 (h, w) grey or (h, w, 3) BGR")
+    height, width = image.shape[:2]
+    if (width, height) != camera.size:
+        raise ValueError(f"{what}: {width}x{height}, the camera is {camera.width}x{camera.height}")
+    form = _abi.PixelFormat.GREY8 if image.ndim == 2 else _abi.PixelFormat.BGR8
+    return _abi.ImageView(image.ctypes.data, width, height, image.strides[0], form)
