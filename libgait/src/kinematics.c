@@ -144,11 +144,9 @@ static bool state_usable(const gait_state *s)
     return f_finite(place, 9) && f_finite(s->coef, GAIT_MAX_COMPONENTS) && s->stature > 0.0f;
 }
 
-gait_status model_pose_state(const gait_model *m, const gait_state *s, gait_pose *out)
+/* Curves of one body into channel, then its frames. */
+static void place_state(const gait_model *m, const gait_state *s, float *channel, float *R, float *o)
 {
-    if (!state_usable(s))
-        return GAIT_ERR_ARG;
-    float channel[MODEL_MAX_CHANNELS], R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
     bodies const b = {.channel = channel,
                       .heading = &s->heading,
                       .pitch = &s->pitch,
@@ -159,6 +157,23 @@ gait_status model_pose_state(const gait_model *m, const gait_state *s, gait_pose
                       .o = o};
     curves_at(m, s->phase, s->coef, 1, m->components, channel);
     place_frames(m, &b, 1);
+}
+
+gait_status model_place_state(const gait_model *m, const gait_state *s, float *R, float *o)
+{
+    float channel[MODEL_MAX_CHANNELS];
+    if (!state_usable(s))
+        return GAIT_ERR_ARG;
+    place_state(m, s, channel, R, o);
+    return GAIT_OK;
+}
+
+gait_status model_pose_state(const gait_model *m, const gait_state *s, gait_pose *out)
+{
+    float channel[MODEL_MAX_CHANNELS], R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
+    if (!state_usable(s))
+        return GAIT_ERR_ARG;
+    place_state(m, s, channel, R, o);
     memset(out, 0, sizeof *out);
     for (int32_t i = 0; i < m->points; i++) {
         int32_t const f = m->point_frame[i];

@@ -36,6 +36,9 @@ void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, 
 /* The reported points, metres, world: P x 3 x BLOCK. */
 void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK]);
 
+/* Frames of one body in the world: R (F x 9) and o (F x 3); errors as below. */
+gait_status model_place_state(const gait_model *m, const gait_state *s, float *R, float *o);
+
 /* One body: curves, kinematics, points and angles; unused entries of out are 0.
  * GAIT_ERR_ARG, and out left alone, when a number in s is not finite or the stature is not positive. */
 gait_status model_pose_state(const gait_model *m, const gait_state *s, gait_pose *out);

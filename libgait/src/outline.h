@@ -1,0 +1,43 @@
+/* outline.h - limbs as convex polygons in one camera's working image. */
+#ifndef GAIT_OUTLINE_H
+#define GAIT_OUTLINE_H
+#include "kinematics.h"
+#include "rast.h"
+#include "view.h"
+
+typedef struct limb_geometry { /* one body part in its frame, statures */
+    float   start[3], end[3];
+    float   lateral[3], sagittal[3]; /* unit vectors across the limb; radii a along the first, b along the second */
+    float   a0, b0, a1, b1;
+    int32_t frame, shape;            /* shape: LIMB_CONE or LIMB_ELLIPSOID */
+} limb_geometry;
+
+/* All limbs of the model with radii multiplied by girth; out holds MODEL_MAX_LIMBS. */
+void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out);
+
+/* One limb in the working image.  Cones: vertices 0-1 and 3-2 are the two sides, 4 in all; ellipsoids: 8 around. */
+typedef struct limb_polygon {
+    float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES]; /* working pixels */
+    float depth;                                      /* metres, of the limb's middle; 0: behind the camera */
+    float facing;                                     /* cosine of the angle between limb and image plane (R16) */
+} limb_polygon;
+
+typedef struct outline_block { /* the same for BLOCK bodies */
+    float x[MODEL_MAX_LIMBS][RAST_MAX_VERTICES][BLOCK];
+    float y[MODEL_MAX_LIMBS][RAST_MAX_VERTICES][BLOCK];
+    float depth[MODEL_MAX_LIMBS][BLOCK];
+    float facing[MODEL_MAX_LIMBS][BLOCK];
+} outline_block;
+
+static inline int32_t outline_vertices(const limb_geometry *g)
+{
+    return g->shape == LIMB_ELLIPSOID ? 8 : 4;
+}
+
+/* R, o, scale: the limb's frame in the world and metres per stature. */
+void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale, const gait_camera *cam,
+                  const view_map *map, limb_polygon *out);
+
+void outline_project(const limb_geometry *limbs, int32_t count, const kin_body *body, const gait_camera *cam,
+                     const view_map *map, outline_block *out);
+#endif

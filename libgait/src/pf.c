@@ -1,0 +1,120 @@
+#include "pf.h"
+#include "fmath.h"
+#include "rng.h"
+
+pf pf_layout(arena *a, int32_t n)
+{
+    pf p = { .n = n };
+    p.log_weight = TAKE(a, double, n);
+    p.weight = TAKE(a, double, n);
+    p.parent = TAKE(a, int32_t, n);
+    p.ticket = TAKE(a, uint64_t, n);
+    return p;
+}
+
+void pf_uniform(pf *p)
+{
+    double const w = 1.0 / (double)p->n, lw = -m_log64((double)p->n);
+    for (int32_t i = 0; i < p->n; i++) {
+        p->weight[i] = w;
+        p->log_weight[i] = lw;
+    }
+}
+
+void pf_keep(pf *p)
+{
+    for (int32_t i = 0; i < p->n; i++)
+        p->parent[i] = i;
+}
+
+double pf_ess(const pf *p)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < p->n; i++)
+        sum += p->weight[i] * p->weight[i];
+    return 1.0 / sum;
+}
+
+pf_summary pf_reweigh(pf *p, const float *ll)
+{
+    double const none = -1e300;
+    pf_summary   s = { .best = 0 };
+    double       top = none, sum = 0.0;
+    for (int32_t i = 0; i < p->n; i++) {
+        double const l = p->log_weight[i] + (double)ll[i];
+        /* The comparison is false for NaN and for infinities of either sign. */
+        bool const finite = l > none && l < -none;
+        p->ticket[i] = finite;
+        if (finite && l > top) {
+            top = l;
+            s.best = i;
+        }
+    }
+    if (!(top > none)) {
+        s.degenerate = true;
+        s.ess = pf_ess(p);
+        return s;
+    }
+    for (int32_t i = 0; i < p->n; i++) {
+        p->log_weight[i] = p->ticket[i] ? p->log_weight[i] + (double)ll[i] - top : none;
+        p->weight[i] = p->ticket[i] ? m_exp64(p->log_weight[i]) : 0.0;
+        sum += p->weight[i];
+    }
+    double const log_sum = m_log64(sum);
+    for (int32_t i = 0; i < p->n; i++) {
+        p->weight[i] /= sum;
+        p->log_weight[i] -= log_sum;
+    }
+    s.log_evidence = top + log_sum;
+    s.ess = pf_ess(p);
+    return s;
+}
+
+/* Integer weights, so that sums are exact in any order; returns their total. */
+static uint64_t make_tickets(pf *p)
+{
+    double   top = 0.0;
+    uint64_t total = 0;
+    for (int32_t i = 0; i < p->n; i++)
+        top = p->weight[i] > top ? p->weight[i] : top;
+    for (int32_t i = 0; i < p->n; i++) {
+        total += (uint64_t)(p->weight[i] / top * 2147483648.0);
+        p->ticket[i] = total;
+    }
+    return total;
+}
+
+void pf_resample_systematic(pf *p, uint32_t u)
+{
+    uint64_t const n = (uint64_t)p->n, total = make_tickets(p), step = total / n, rest = total % n;
+    uint64_t const start = (uint64_t)u * step >> 32;
+    int32_t        from = 0;
+    for (uint64_t i = 0; i < n; i++) {
+        uint64_t const at = start + i * step + i * rest / n; /* floor(i total / n) without 128 bits */
+        while (p->ticket[from] <= at)
+            from++;
+        p->parent[i] = from;
+    }
+    pf_uniform(p);
+}
+
+void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t frame)
+{
+    uint64_t const total = make_tickets(p);
+    for (int32_t i = 0; i < p->n; i++) {
+        uint32_t r[4];
+        rng_bits(seed, stream, frame, (uint32_t)i, 0, r);
+        /* total < 2^52 and r < 2^64: the bias of the remainder is below 2^-12 of a ticket. */
+        uint64_t const at = ((uint64_t)r[0] << 32 | r[1]) % total;
+        int32_t        low = 0, high = p->n - 1;
+        while (low < high) {
+            int32_t const mid = low + (high - low) / 2;
+            if (p->ticket[mid] > at)
+                high = mid;
+            else
+                low = mid + 1;
+        }
+        p->parent[i] = low;
+    }
+    pf_uniform(p);
+}

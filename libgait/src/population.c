@@ -1,0 +1,144 @@
+#include "population.h"
+#include "fmath.h"
+
+population population_layout(arena *a, int32_t n, int32_t components)
+{
+    population p = { .n = n, .components = components };
+    p.value = TAKE(a, float, (size_t)(F_COEF + components) * (size_t)n);
+    return p;
+}
+
+float root_channel(const gait_model *m, int32_t c, float phase, const float *coef, int32_t components)
+{
+    float const x = m_wrap1(phase) * (float)m->phases;
+    int32_t const j = i_min((int32_t)x, m->phases - 1), next = j + 1 < m->phases ? j + 1 : 0;
+    float const   t = x - (float)j;
+    size_t const  stride = (size_t)m->phases * (size_t)m->channels;
+    const float  *curve = m->curves + m->root_channel + c;
+    float         sum = 0.0f;
+    for (int32_t k = 0; k <= components; k++, curve += stride) {
+        float const a = curve[j * m->channels], b = curve[next * m->channels], v = a + t * (b - a);
+        sum += k == 0 ? v : coef[k - 1] * v;
+    }
+    return sum;
+}
+
+body_rule body_rule_init(const gait_model *m, int32_t components, bool plain_root)
+{
+    body_rule r = { .model = m, .components = components, .plain_root = plain_root };
+    for (int32_t j = 0; j < m->phases; j++)
+        r.mean_height += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
+    return r;
+}
+
+walker walker_get(const population *p, int32_t i)
+{
+    walker w = { { 0 } };
+    for (int32_t f = 0; f < F_COEF + p->components; f++)
+        w.f[f] = field(p, f)[i];
+    return w;
+}
+
+void walker_put(population *p, int32_t i, const walker *w)
+{
+    for (int32_t f = 0; f < F_COEF + p->components; f++)
+        field(p, f)[i] = w->f[f];
+}
+
+/* Sway to the left and height of the pelvis over the track, metres. */
+static void pelvis_offset(const body_rule *r, const walker *w, float *sway, float *height)
+{
+    float const H = w->f[F_STATURE];
+    *sway = r->plain_root ? 0.0f : H * root_channel(r->model, ROOT_SWAY, w->f[F_PHASE], w->f + F_COEF, r->components);
+    *height = H * (r->plain_root ? r->mean_height
+                                 : root_channel(r->model, ROOT_HEIGHT, w->f[F_PHASE], w->f + F_COEF, r->components));
+}
+
+gait_state walker_state(const body_rule *r, const walker *w)
+{
+    gait_state s = { .phase = w->f[F_PHASE], .stride_hz = w->f[F_RATE], .stature = w->f[F_STATURE],
+                     .heading = w->f[F_HEADING], .pitch = w->f[F_PITCH], .roll = w->f[F_ROLL] };
+    float sway, height, sn, cs;
+    pelvis_offset(r, w, &sway, &height);
+    m_sincos(s.heading, &sn, &cs);
+    s.pelvis[0] = w->f[F_X] - sway * sn;
+    s.pelvis[1] = w->f[F_Y] + sway * cs;
+    s.pelvis[2] = w->f[F_Z] + height;
+    for (int32_t k = 0; k < r->components; k++)
+        s.coef[k] = w->f[F_COEF + k];
+    return s;
+}
+
+walker walker_from_state(const body_rule *r, const gait_state *s)
+{
+    walker w = { { 0 } };
+    float  sway, height, sn, cs;
+    w.f[F_PHASE] = m_wrap1(s->phase);
+    w.f[F_RATE] = s->stride_hz;
+    w.f[F_STATURE] = s->stature;
+    w.f[F_HEADING] = s->heading;
+    w.f[F_PITCH] = s->pitch;
+    w.f[F_ROLL] = s->roll;
+    for (int32_t k = 0; k < r->components; k++)
+        w.f[F_COEF + k] = s->coef[k];
+    pelvis_offset(r, &w, &sway, &height);
+    m_sincos(s->heading, &sn, &cs);
+    w.f[F_X] = s->pelvis[0] + sway * sn;
+    w.f[F_Y] = s->pelvis[1] - sway * cs;
+    w.f[F_Z] = s->pelvis[2] - height;
+    return w;
+}
+
+/* Fields in the lanes of a block to bodies. */
+static void bodies(const body_rule *r, kin_input *in, kin_body *out)
+{
+    kin_channels ch;
+    kin_curves(r->model, in->phase, (const float(*)[BLOCK])in->coef, r->components, &ch);
+    float *const root = ch.v[r->model->root_channel];
+    for (int32_t i = 0; r->plain_root && i < BLOCK; i++) {
+        for (int32_t c = ROOT_SWAY; c <= ROOT_YAW; c++)
+            root[c * BLOCK + i] = 0.0f;
+        root[ROOT_HEIGHT * BLOCK + i] = r->mean_height;
+    }
+    for (int32_t i = 0; i < BLOCK; i++) {
+        float sn, cs;
+        float const sway = in->stature[i] * root[ROOT_SWAY * BLOCK + i];
+        m_sincos(in->heading[i], &sn, &cs);
+        in->pelvis[0][i] -= sway * sn;
+        in->pelvis[1][i] += sway * cs;
+        in->pelvis[2][i] += in->stature[i] * root[ROOT_HEIGHT * BLOCK + i];
+    }
+    kin_pose(r->model, &ch, in, out);
+}
+
+static void lane_put(kin_input *in, int32_t lane, const walker *w, int32_t components)
+{
+    in->phase[lane] = w->f[F_PHASE];
+    in->stature[lane] = w->f[F_STATURE];
+    in->heading[lane] = w->f[F_HEADING];
+    in->pitch[lane] = w->f[F_PITCH];
+    in->roll[lane] = w->f[F_ROLL];
+    in->pelvis[0][lane] = w->f[F_X];
+    in->pelvis[1][lane] = w->f[F_Y];
+    in->pelvis[2][lane] = w->f[F_Z];
+    for (int32_t k = 0; k < components; k++)
+        in->coef[k][lane] = w->f[F_COEF + k];
+}
+
+void population_bodies(const body_rule *r, const population *p, int32_t begin, kin_body *out)
+{
+    kin_input in;
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        walker const w = walker_get(p, i_min(begin + lane, p->n - 1));
+        lane_put(&in, lane, &w, r->components);
+    }
+    bodies(r, &in, out);
+}
+
+void walker_body(const body_rule *r, const walker *w, kin_body *out)
+{
+    kin_input in;
+    for (int32_t lane = 0; lane < BLOCK; lane++)
+        lane_put(&in, lane, w, r->components);
+    bodies(r, &in, out);
+}

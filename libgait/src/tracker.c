@@ -1,0 +1,224 @@
+#include "tracker.h"
+#include "estimate.h"
+#include "fmath.h"
+#include "rng.h"
+#include "weigh.h"
+#include <string.h>
+
+/* Texture samples are kept where a term compares them with those of the ancestor or the template. */
+static bool wants_texture(const gait_tracker_config *cfg)
+{
+    return (cfg->terms & (GAIT_TERM_TEXTURE | GAIT_TERM_TEMPLATE)) != 0;
+}
+
+/* The mutable state first and in one stretch: saving, restoring and hashing copy it whole. */
+static void layout_state(arena *a, gait_tracker *t)
+{
+    int32_t const n = t->cfg.particles, cameras = t->cfg.cameras;
+    size_t const  samples = (size_t)t->model->limbs * LIKE_SAMPLES;
+    t->core = TAKE(a, tracker_core, 1);
+    for (int32_t g = 0; g < 2; g++) {
+        t->gen[g].people = population_layout(a, n, t->cfg.components);
+        if (wants_texture(&t->cfg))
+            t->gen[g].texture = TAKE(a, int8_t, (size_t)n * (size_t)cameras * samples);
+    }
+    t->filter = pf_layout(a, n);
+    t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
+    for (int32_t c = 0; c < cameras && wants_texture(&t->cfg); c++)
+        t->template[c] = TAKE(a, int16_t, samples);
+    t->state_end = TAKE(a, unsigned char, 1);
+}
+
+static void layout_work(arena *a, gait_tracker *t)
+{
+    int32_t const n = t->cfg.particles;
+    size_t const  samples = (size_t)t->model->limbs * LIKE_SAMPLES;
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        t->camera[c].seen = features_layout(a);
+        if (t->cfg.terms & GAIT_TERM_SILHOUETTE)
+            t->camera[c].plate = view_planes_layout(a, 3);
+    }
+    t->like = TAKE(a, like_setup, 1);
+    t->ll = TAKE(a, float, n);
+    t->mode = TAKE(a, uint8_t, n);
+    if (wants_texture(&t->cfg))
+        t->seen = TAKE(a, int8_t, (size_t)t->cfg.cameras * samples);
+    t->scratch = features_scratch_layout(a);
+    t->work = TAKE(a, weigh_scratch, t->cfg.tasks);
+}
+
+gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg)
+{
+    gait_tracker *const self = TAKE(a, gait_tracker, 1);
+    gait_tracker        t = { .model = m, .cfg = *cfg };
+    if (t.cfg.components < 0)
+        t.cfg.components = m->components;
+    layout_state(a, &t);
+    layout_work(a, &t);
+    if (!self || a->overflow)
+        return NULL;
+    t.rule = body_rule_init(m, t.cfg.components, cfg->mode == GAIT_MODE_PAPER);
+    like_setup_init(t.like, m, &t.cfg);
+    *self = t;
+    return self;
+}
+
+void tracker_clear(gait_tracker *t)
+{
+    memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core) + 1);
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        t->camera[c].plate_stale = true;
+        if (t->template[c])
+            template_clear(t->template[c], t->model->limbs);
+    }
+    pf_uniform(&t->filter);
+    pf_keep(&t->filter);
+    t->core->ess = (double)t->cfg.particles;
+}
+
+dynamics tracker_dynamics(const gait_tracker *t)
+{
+    return (dynamics){ .cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed };
+}
+
+void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime)
+{
+    dynamics const d = tracker_dynamics(t);
+    tracker_clear(t);
+    t->core->started = 1;
+    t->core->utime = t->core->start_utime = utime;
+    for (int32_t i = 0; i < t->cfg.particles; i++) {
+        walker const w = dynamics_draw(&d, mean, sd, i);
+        walker_put(&t->gen[0].people, i, &w);
+    }
+}
+
+/* Ancestors of the next generation. */
+static bool resample(gait_tracker *t, uint32_t frame)
+{
+    pf *const f = &t->filter;
+    pf_keep(f);
+    if (t->core->ess >= (double)t->cfg.resample_ess * (double)t->cfg.particles && t->cfg.resample_ess < 1.0f)
+        return false;
+    if (t->cfg.mode == GAIT_MODE_PAPER) {
+        pf_resample_multinomial(f, t->cfg.seed, STREAM_RESAMPLE, frame);
+    } else {
+        uint32_t r[4];
+        rng_bits(t->cfg.seed, STREAM_RESAMPLE, frame, 0, 0, r);
+        pf_resample_systematic(f, r[0]);
+    }
+    return true;
+}
+
+typedef struct move_job {
+    gait_tracker *t;
+    dynamics      d;
+    float         dt, age;
+    uint32_t      frame;
+} move_job;
+
+static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    const move_job *const j = ctx;
+    const generation *const from = &j->t->gen[1 - j->t->core->current];
+    generation *const to = &j->t->gen[j->t->core->current];
+    (void)task;
+    for (int32_t i = begin; i < end; i++) {
+        walker w = walker_get(&from->people, j->t->filter.parent[i]);
+        if (j->dt > 0.0f)
+            w = dynamics_move(&j->d, &w, j->dt, j->age, j->frame, i);
+        walker_put(&to->people, i, &w);
+    }
+}
+
+/* Move every particle from its ancestor into the other generation, which becomes the current one. */
+static void predict(gait_tracker *t, float dt, uint32_t frame)
+{
+    move_job j = { .t = t, .d = tracker_dynamics(t), .dt = dt, .frame = frame };
+    j.age = 1e-6f * (float)(t->core->utime - t->core->start_utime);
+    t->core->current = 1 - t->core->current;
+    task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
+}
+
+/* Do the images support the estimate?  Edges near their chance level or a silhouette mostly wrong say no. */
+static bool supported(const gait_tracker *t, const float terms[LIKE_TERMS])
+{
+    float const least_edges = -0.80f, least_silhouette = -1.2f; /* per camera, unweighted */
+    int32_t     cameras = 0;
+    bool        plate = false;
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        cameras += t->camera[c].seen.seen;
+        plate |= t->camera[c].seen.has_fg;
+    }
+    float const n = (float)i_max(cameras, 1);
+    if ((t->cfg.terms & GAIT_TERM_EDGES) && terms[2] < least_edges * n)
+        return false;
+    return !((t->cfg.terms & GAIT_TERM_SILHOUETTE) && plate && terms[1] < least_silhouette * n);
+}
+
+static int32_t judge(gait_tracker *t, bool degenerate, const gait_estimate *e, float dt, float age)
+{
+    float const patience = 0.33f, acquire = 1.0f; /* seconds */
+    float const frames = dt > 0.0f ? patience / dt : 1.0f;
+    if (degenerate || (float)t->core->fading > frames)
+        return GAIT_STATUS_LOST;
+    if (e->mode_mass < 0.7f)
+        return age < acquire ? GAIT_STATUS_INIT : GAIT_STATUS_AMBIGUOUS;
+    return GAIT_STATUS_TRACKING;
+}
+
+/* Weigh the particles by the frame and fill in the estimate. */
+static void observe(gait_tracker *t, float dt, gait_estimate *out)
+{
+    float const age = 1e-6f * (float)(t->core->utime - t->core->start_utime);
+    float       terms[LIKE_TERMS];
+    weigh_particles(t);
+    pf_summary const s = pf_reweigh(&t->filter, t->ll);
+    t->core->ess = s.ess;
+    t->core->textured = wants_texture(&t->cfg);
+    out->log_evidence = s.log_evidence;
+    out->flags |= s.degenerate || s.ess < 2.0 ? GAIT_EST_DEGENERATE : 0;
+    walker const mean = estimate_fill(t, s.best, out);
+    weigh_walker(t, &mean, terms);
+    t->core->fading = supported(t, terms) ? 0 : t->core->fading + 1;
+    out->status = judge(t, s.degenerate, out, dt, age);
+    for (int32_t c = 0; c < t->cfg.cameras && out->status == GAIT_STATUS_TRACKING; c++)
+        if (t->camera[c].seen.seen && t->template[c])
+            template_update(t->template[c], t->model->limbs, t->seen + (size_t)c * (size_t)t->model->limbs * LIKE_SAMPLES);
+}
+
+/* No camera saw anything: the prediction is the estimate. */
+static void coast(gait_tracker *t, gait_estimate *out)
+{
+    int32_t best = 0;
+    for (int32_t i = 0; i < t->cfg.particles; i++) {
+        t->ll[i] = 0.0f;
+        best = t->filter.weight[i] > t->filter.weight[best] ? i : best;
+    }
+    weigh_particles(t); /* for the joints */
+    t->core->textured = 0;
+    estimate_fill(t, best, out);
+    out->flags |= GAIT_EST_NO_IMAGE;
+    out->status = GAIT_STATUS_LOST;
+}
+
+gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
+{
+    tracker_core *const core = t->core;
+    float const dt = 1e-6f * (float)(frame->utime - core->utime);
+    gait_estimate e = { .utime = frame->utime, .frame = core->frame };
+    uint32_t const counter = (uint32_t)core->frame;
+    bool const resampled = core->frame > 0 && resample(t, counter);
+    core->utime = frame->utime;
+    predict(t, dt, counter);
+    walker const place = estimate_place(&t->gen[core->current].people, t->filter.weight);
+    if (weigh_look(t, frame, &place) > 0)
+        observe(t, dt, &e);
+    else
+        coast(t, &e);
+    e.flags |= resampled ? GAIT_EST_RESAMPLED : 0;
+    e.ess = (float)core->ess;
+    core->frame++;
+    *out = e;
+    return GAIT_OK;
+}

@@ -1,0 +1,108 @@
+#include "weigh.h"
+#include "camera.h"
+
+/* Aim one camera's region at the walker; false if the walker is behind it. */
+static bool aim(gait_tracker *t, int32_t c, const walker *w)
+{
+    const gait_camera *const cam = &t->cfg.camera[c];
+    float const H = w->f[F_STATURE], middle[3] = { w->f[F_X], w->f[F_Y], w->f[F_Z] + 0.52f * H };
+    float       uv[2];
+    float const depth = camera_project(cam, middle, uv);
+    if (!(depth > 0.1f))
+        return false;
+    float const tall = H * f_max(cam->fx, cam->fy) / depth;
+    if (view_follow(&t->core->map[c], uv, tall))
+        t->camera[c].plate_stale = true;
+    return true;
+}
+
+int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted)
+{
+    int32_t count = 0;
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        camera_state *const s = &t->camera[c];
+        gait_image    im = frame->image[c];
+        if (!aim(t, c, predicted))
+            im.data = NULL;
+        s->seen.map = t->core->map[c];
+        bool const plate = s->background.data && im.data && (s->background.format == GAIT_GREY8) == (im.format == GAIT_GREY8);
+        if (plate && s->plate_stale) {
+            view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
+            s->plate_stale = false;
+        }
+        features_compute(&s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL, t->like->paper, &t->scratch);
+        count += s->seen.seen;
+    }
+    return count;
+}
+
+/* One body of a block in one camera, ready for the terms. */
+static like_body look_at(const gait_tracker *t, int32_t c, int32_t lane, weigh_scratch *w, int8_t *seen)
+{
+    like_body b = { .setup = t->like, .features = &t->camera[c].seen, .outline = &w->outline, .lane = lane,
+                    .layers = &w->layers, .seen = seen, .template = t->template[c] };
+    layers_draw(&w->outline, t->like->geometry, t->like->limbs, lane, &w->layers);
+    if (seen)
+        like_sample(t->like, b.features, &t->cfg.camera[c], &w->body, lane, &w->layers, seen);
+    return b;
+}
+
+/* Surface samples of particle i in camera c. */
+static int8_t *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c)
+{
+    size_t const stride = (size_t)t->like->limbs * LIKE_SAMPLES;
+    return g->texture ? g->texture + ((size_t)i * (size_t)t->cfg.cameras + (size_t)c) * stride : NULL;
+}
+
+static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scratch *w)
+{
+    const generation *const now = &t->gen[t->core->current], *const then = &t->gen[1 - t->core->current];
+    int32_t const n = t->cfg.particles;
+    population_bodies(&t->rule, &now->people, begin, &w->body);
+    kin_points(t->model, &w->body, w->points);
+    for (int32_t p = 0; p < t->model->points; p++)
+        for (int32_t k = 0; k < 3; k++)
+            for (int32_t lane = 0; lane < lanes; lane++)
+                t->joint[(size_t)(3 * p + k) * (size_t)n + (size_t)(begin + lane)] = w->points[p][k][lane];
+    for (int32_t lane = 0; lane < lanes; lane++)
+        t->ll[begin + lane] = 0.0f;
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        if (!t->camera[c].seen.seen)
+            continue;
+        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map, &w->outline);
+        for (int32_t lane = 0; lane < lanes; lane++) {
+            int32_t const i = begin + lane;
+            like_body b = look_at(t, c, lane, w, texture_of(t, now, i, c));
+            b.ancestor = t->core->textured ? texture_of(t, then, t->filter.parent[i], c) : NULL;
+            t->ll[i] += like_evaluate(&b);
+        }
+    }
+}
+
+static void weigh_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    gait_tracker *const t = ctx;
+    for (int32_t i = begin; i < end; i += BLOCK)
+        weigh_block(t, i, i_min(BLOCK, end - i), &t->work[task]);
+}
+
+void weigh_particles(gait_tracker *t)
+{
+    task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, weigh_range, t);
+}
+
+void weigh_walker(gait_tracker *t, const walker *person, float terms[LIKE_TERMS])
+{
+    weigh_scratch *const w = &t->work[0];
+    for (int32_t k = 0; k < LIKE_TERMS; k++)
+        terms[k] = 0.0f;
+    walker_body(&t->rule, person, &w->body);
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        if (!t->camera[c].seen.seen)
+            continue;
+        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map, &w->outline);
+        int8_t *const seen = t->seen ? t->seen + (size_t)c * (size_t)t->like->limbs * LIKE_SAMPLES : NULL;
+        like_body const b = look_at(t, c, 0, w, seen);
+        like_terms(&b, terms);
+    }
+}
