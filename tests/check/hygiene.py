@@ -7,7 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-BINARY = ["libgait/doc/*.jpg", "libgait/doc/*.png", "python/gait/data/*.gait", "tests/golden/*", "tests/fuzz/corpus/*"]
+BINARY = [
+    "libgait/doc/*.jpg",
+    "libgait/doc/*.png",
+    "python/gait/data/*.gait",
+    "tests/golden/*",
+    "tests/fuzz/corpus/*",
+]
 TABLES = ["tests/bench/results/*.csv", "tests/golden/*"]
 DATA = re.compile(r"\.(csv|npz|npy|amc|asf|bvh|c3d|trc|mp4|avi|webm|log|pgm|ppm)$", re.I)
 BUILT = re.compile(r"(^|/)(build|\.venv|__pycache__|[^/]+\.egg-info)/|\.(o|so|a|d|pyc|su)$")
@@ -57,9 +63,10 @@ def version_faults(root: Path) -> list[str]:
     header = (root / "libgait/include/gait.h").read_text(encoding="utf-8")
     parts = [re.search(rf"define GAIT_VERSION_{p} (\d+)", header) for p in ("MAJOR", "MINOR", "PATCH")]
     version = ".".join(p.group(1) for p in parts if p)
-    project = re.search(r'^version = "(.*?)"', (root / "python/pyproject.toml").read_text(encoding="utf-8"), re.M)
-    have = project.group(1) if project else "none"
-    return [] if have == version else [f"python/pyproject.toml: version {have}, gait.h has {version}"]
+    module = root / "python/gait/_version.py"
+    package = re.search(r'^__version__ = "(.*?)"', module.read_text(encoding="utf-8"), re.M)
+    have = package.group(1) if package else "none"
+    return [] if have == version else [f"python/gait/_version.py: version {have}, gait.h has {version}"]
 
 
 def main() -> int:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""layers.py LAYERS FOLDER: each source includes only its own header and modules that LAYERS lists before its own."""
+"""layers.py LAYERS FOLDER: each source includes only its own header and modules listed before its own."""
 
 import re
 import sys

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""symbols.py HEADER LIBRARY ARCHIVE: both define, for others to link with, exactly what HEADER marks GAIT_API."""
+"""symbols.py HEADER LIBRARY ARCHIVE: both define for others exactly what HEADER marks GAIT_API."""
 
 import re
 import subprocess
@@ -15,7 +15,9 @@ def declared(header: str) -> set[str]:
 
 def defined(path: str, *options: str) -> set[str]:
     """Global symbols that a library defines."""
-    out = subprocess.run(["nm", "--defined-only", *options, path], check=True, capture_output=True, text=True).stdout
+    out = subprocess.run(
+        ["nm", "--defined-only", *options, path], check=True, capture_output=True, text=True
+    ).stdout
     rows = [line.split() for line in out.splitlines()]
     return {row[2].split("@")[0] for row in rows if len(row) == 3}
 
@@ -28,7 +30,10 @@ def main() -> int:
         return 1
     failed = False
     for path, have in ((library, defined(library, "-D")), (archive, defined(archive, "-g"))):
-        for what, names in (("declared but not defined", want - have), ("defined but not declared", have - want)):
+        for what, names in (
+            ("declared but not defined", want - have),
+            ("defined but not declared", have - want),
+        ):
             if names:
                 print(f"{path}: {what}: {' '.join(sorted(names))}")
                 failed = True

@@ -16,7 +16,9 @@ CLEAN = "int gait_twice(int x); int gait_twice(int x) { return x + x; }\n"
 def run(script: str, *args: object) -> subprocess.CompletedProcess[str]:
     """Run a check as make does."""
     command = [sys.executable] if script.endswith(".py") else ["sh"]
-    return subprocess.run([*command, CHECK / script, *map(str, args)], capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        [*command, CHECK / script, *map(str, args)], capture_output=True, text=True, timeout=120
+    )
 
 
 def fails(done: subprocess.CompletedProcess[str], *words: str) -> bool:
@@ -60,7 +62,8 @@ def test_deps_sees_a_library_and_an_inexact_function(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "code", ["int hits;", "int hits = 3;", "int f(void) { static int n; return ++n; }", "_Thread_local int hits;"]
+    "code",
+    ["int hits;", "int hits = 3;", "int f(void) { static int n; return ++n; }", "_Thread_local int hits;"],
 )
 def test_static_init_sees_a_writable_global(tmp_path, code):
     table = CLEAN + 'const char *const names[] = {"a", "b"};'
@@ -83,13 +86,17 @@ def library_pair(tmp_path: Path, code: str) -> tuple[Path, Path]:
 
 def test_symbols_sees_what_is_missing_or_unprefixed(tmp_path):
     header = tmp_path / "a.h"
-    header.write_text("#define GAIT_API\n/* GAIT_API int gait_not(int); */\nGAIT_API int\ngait_twice(int x);\n")
+    header.write_text(
+        "#define GAIT_API\n/* GAIT_API int gait_not(int); */\nGAIT_API int\ngait_twice(int x);\n"
+    )
     visible = '__attribute__((visibility("default"))) '
     clean = f"{visible}int gait_twice(int x) {{ return x + x; }}\n"
     assert run("symbols.py", header, *library_pair(tmp_path, clean)).returncode == 0
     extra = clean + visible + "int helper(int x) { return x; }\n"
     assert fails(run("symbols.py", header, *library_pair(tmp_path, extra)), "not declared: helper")
-    assert fails(run("symbols.py", header, *library_pair(tmp_path, "int x(void);")), "not defined: gait_twice")
+    assert fails(
+        run("symbols.py", header, *library_pair(tmp_path, "int x(void);")), "not defined: gait_twice"
+    )
     leak = clean + "int helper(int x) { return x; }\n"
     assert fails(run("symbols.py", header, *library_pair(tmp_path, leak)), "liba.a", "helper")
 
@@ -157,8 +164,10 @@ def test_stack_sees_a_large_frame_and_a_variable_one(tmp_path, code):
 def checkout(tmp_path):
     """A git checkout that passes."""
     for name, text in {
-        "libgait/include/gait.h": "".join(f"#define GAIT_VERSION_{p} 1\n" for p in ("MAJOR", "MINOR", "PATCH")),
-        "python/pyproject.toml": 'version = "1.1.1" # of gait.h\n',
+        "libgait/include/gait.h": "".join(
+            f"#define GAIT_VERSION_{p} 1\n" for p in ("MAJOR", "MINOR", "PATCH")
+        ),
+        "python/gait/_version.py": '__version__ = "1.1.1"\n',
         "libgait/src/a.c": "int gait_a;\n",
     }.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -183,7 +192,7 @@ def checkout(tmp_path):
         ("a.md", b"look into /ho" + b"me/alice/gait\n", "a.md:1: path"),
         ("a.py", b"x = 1 \n", "blank at the end"),
         ("b.py", b"x = 1", "no newline"),
-        ("python/pyproject.toml", b'version = "1.1.2"\n', "gait.h has 1.1.1"),
+        ("python/gait/_version.py", b'__version__ = "1.1.2"\n', "gait.h has 1.1.1"),
     ],
 )
 def test_hygiene_sees_what_does_not_belong(checkout, name, content, words):

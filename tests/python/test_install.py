@@ -1,0 +1,54 @@
+"""`make install` puts a library there that programs can be built against, and `make uninstall` removes it."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = """#include <gait.h>
+int main(void) { return gait_version() == GAIT_VERSION && gait_abi() == GAIT_ABI ? 0 : 1; }
+"""
+
+
+def make(target: str, destdir: Path) -> None:
+    """Run an installation target of the Makefile."""
+    command = ["make", "-s", target, f"DESTDIR={destdir}", "PREFIX=/opt/gait"]
+    env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE")}
+    subprocess.run(command, cwd=ROOT, env=env, check=True, stdout=subprocess.DEVNULL, timeout=300)
+
+
+@pytest.fixture
+def installed(tmp_path):
+    """Folder that stands for / with the library installed in /opt/gait."""
+    make("install", tmp_path)
+    return tmp_path
+
+
+def test_install_puts_everything_and_uninstall_removes_it(installed):
+    names = {str(p.relative_to(installed / "opt/gait")) for p in installed.rglob("*") if not p.is_dir()}
+    assert names == {"lib/libgait.so", "lib/libgait.so.1", "lib/libgait.a", "lib/pkgconfig/gait.pc", "include/gait.h"}
+    make("uninstall", installed)
+    assert not [p for p in installed.rglob("*") if not p.is_dir()]
+
+
+@pytest.mark.parametrize("linked", [[], ["-static-libgcc", "-Wl,-Bstatic", "-lgait", "-Wl,-Bdynamic", "-lm"]])
+def test_a_program_builds_and_runs_against_the_installed_library(installed, tmp_path, linked):
+    if not shutil.which("pkg-config"):
+        pytest.skip("pkg-config is not installed")
+    (tmp_path / "a.c").write_text(PROGRAM)
+    env = {
+        "PATH": "/usr/bin:/bin",
+        "PKG_CONFIG_PATH": str(installed / "opt/gait/lib/pkgconfig"),
+        "PKG_CONFIG_SYSROOT_DIR": str(installed),
+        "LD_LIBRARY_PATH": str(installed / "opt/gait/lib"),
+    }
+    flags = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", "gait"], env=env, check=True, capture_output=True, text=True
+    ).stdout.split()
+    if linked:
+        flags = [f for f in flags if f != "-lgait"] + linked
+    subprocess.run(["cc", tmp_path / "a.c", "-o", tmp_path / "a", *flags], check=True)
+    assert subprocess.run([tmp_path / "a"], env=env).returncode == 0
