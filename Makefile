@@ -70,7 +70,10 @@ $(READY): python/requirements.txt python/requirements-dev.txt python/pyproject.t
 	    --config-settings editable_mode=compat -e python
 	@ln -sfn "$$(cd $(VENV) && echo lib/python3.*/site-packages)" $(SITE)
 	@$(PY) -c 'import lcm' || { echo 'setup: LCM needs libglib-2.0.so.0: install libglib2.0-0' >&2; exit 1; }
-	@touch $@
+	@pwd -P > $@
+
+# An environment does not survive being moved.
+MOVED := $(shell test ! -f $(READY) || test "$$(cat $(READY))" = "$$(pwd -P)" || rm $(READY))
 
 # say CC file: one line a command, or with V=1 the command itself
 say = $(if $(V),,@echo '  $(1)' && )
