@@ -1,0 +1,102 @@
+#include "convert.h"
+
+#include "camera_file.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { MAX_PIXELS = 1 << 14 };
+_Static_assert(sizeof((gaitmsg_state_t *)0)->coef == sizeof((gait_state *)0)->coef,
+               "state_t holds every component");
+
+void convert_state(const gait_state *in, int32_t components, gaitmsg_state_t *out)
+{
+    out->phase = in->phase;
+    out->stride_hz = in->stride_hz;
+    out->stature = in->stature;
+    out->heading = in->heading;
+    out->pitch = in->pitch;
+    out->roll = in->roll;
+    memcpy(out->pelvis, in->pelvis, sizeof out->pelvis);
+    out->ncoef = components;
+    memcpy(out->coef, in->coef, sizeof out->coef);
+}
+
+static float known(float value, float unknown)
+{
+    return isnan(value) ? unknown : value;
+}
+
+bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
+                           message *why)
+{
+    if (in->ncoef < 0 || in->ncoef > GAIT_MAX_COMPONENTS)
+        return message_set(why, "state with ncoef %d; give 0 to %d", in->ncoef, GAIT_MAX_COMPONENTS);
+    *out = *unknown;
+    out->phase = known(in->phase, unknown->phase);
+    out->stride_hz = known(in->stride_hz, unknown->stride_hz);
+    out->stature = known(in->stature, unknown->stature);
+    out->heading = known(in->heading, unknown->heading);
+    out->pitch = known(in->pitch, unknown->pitch);
+    out->roll = known(in->roll, unknown->roll);
+    for (int i = 0; i < 3; i++)
+        out->pelvis[i] = known(in->pelvis[i], unknown->pelvis[i]);
+    for (int i = 0; i < in->ncoef; i++)
+        out->coef[i] = known(in->coef[i], unknown->coef[i]);
+    return true;
+}
+
+bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why)
+{
+    gait_camera c = {.width = in->width, .height = in->height};
+    double const scalars[] = {in->fx, in->fy, in->cx, in->cy};
+    float *const to[] = {&c.fx, &c.fy, &c.cx, &c.cy};
+    for (int i = 0; i < 4; i++)
+        *to[i] = (float)scalars[i];
+    for (int i = 0; i < 9; i++)
+        c.R[i] = (float)in->R[i];
+    for (int i = 0; i < 3; i++)
+        c.t[i] = (float)in->t[i];
+    for (int i = 0; i < 5; i++)
+        c.distortion[i] = (float)in->distortion[i];
+    if (c.width < 1 || c.height < 1 || c.width > MAX_PIXELS || c.height > MAX_PIXELS)
+        return message_set(why, "camera message with a size of %dx%d; send 1 to %d", c.width, c.height,
+                           MAX_PIXELS);
+    if (!(c.fx > 0) || !(c.fy > 0))
+        return message_set(why, "camera message with focal lengths %g and %g; send pixels", in->fx, in->fy);
+    if (!camera_rotation_ok(&c))
+        return message_set(why, "camera message whose R is not a rotation; send orthogonal rows of length 1");
+    *out = c;
+    return true;
+}
+
+void convert_estimate(const gait_model *model, const gait_model_info *info, const gait_estimate *in,
+                      estimate_message *out)
+{
+    gaitmsg_estimate_t *const m = &out->msg;
+    m->utime = in->utime;
+    m->step = (int64_t)in->frame;
+    m->status = (int8_t)in->status;
+    m->flags = (int32_t)in->flags;
+    m->model_digest = (int64_t)info->digest;
+    m->log_evidence = in->log_evidence;
+    convert_state(&in->mean, info->components, &m->mean);
+    convert_state(&in->sd, info->components, &m->sd);
+    convert_state(&in->best, info->components, &m->best);
+    m->ess = in->ess;
+    m->phase_r = in->phase_r;
+    m->mode_mass = in->mode_mass;
+    m->speed = in->speed;
+    m->njoints = info->joints;
+    m->joints = out->joint;
+    for (int32_t j = 0; j < info->joints; j++) {
+        out->joint[j].name =
+            (char *)gait_model_joint_name(model, j); /* LCM's strings lack const; read only */
+        memcpy(out->joint[j].position, in->pose.joint[j], sizeof out->joint[j].position);
+        memcpy(out->joint[j].sd, in->joint_sd[j], sizeof out->joint[j].sd);
+    }
+    m->nangles = info->angles;
+    m->angles = out->angle;
+    for (int32_t a = 0; a < info->angles; a++)
+        out->angle[a] = (gaitmsg_angle_t){(char *)gait_model_angle_name(model, a), in->pose.angle[a]};
+}

@@ -1,0 +1,66 @@
+#include "fields.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+bool fields_open(fields *f, const char *path, const char *what, message *why)
+{
+    message bad;
+    f->path = path;
+    f->doc = (json_doc){0};
+    if (!file_read(path, what, &f->bytes, why))
+        return false;
+    const char *const text = (const char *)f->bytes.data;
+    if (strlen(text) != f->bytes.size)
+        return message_set(why, "%s: not valid JSON (a zero byte in it); write the %s anew", path, what);
+    if (!json_parse(&f->doc, f->node, FIELDS_NODES, text, &bad))
+        return message_set(why, "%s: not valid JSON (%s); mend it or write the %s anew", path, bad.text,
+                           what);
+    if (f->node[0].type != JSON_OBJECT)
+        return message_set(why, "%s: holds no JSON object; the %s is an object of keys in braces", path,
+                           what);
+    return true;
+}
+
+void fields_close(fields *f)
+{
+    free(f->bytes.data);
+    f->bytes = (file_bytes){0};
+}
+
+int fields_find(const fields *f, int object, const char *key)
+{
+    return json_find(&f->doc, object, key);
+}
+
+bool fields_numbers(const fields *f, int object, const char *key, double *out, int count, double low,
+                    double high, const char *remedy, message *why)
+{
+    int const value = fields_find(f, object, key);
+    if (value < 0)
+        return message_set(why, "%s: %s is missing; %s", f->path, key, remedy);
+    int const found = json_numbers(&f->doc, value, out, count);
+    if (found < 0)
+        return message_set(why, "%s: %s is not made of numbers; %s", f->path, key, remedy);
+    if (found != count)
+        return message_set(why, "%s: %s has %d numbers, not %d; %s", f->path, key, found, count, remedy);
+    for (int i = 0; i < count; i++)
+        if (out[i] < low || out[i] > high)
+            return message_set(why, "%s: %s is %g, outside [%g, %g]; %s", f->path, key, out[i], low, high,
+                               remedy);
+    return true;
+}
+
+bool fields_only(const fields *f, int object, const char *const *known, int count, message *why)
+{
+    for (int i = object + 1; i < f->node[object].next; i = f->node[i + 1].next) {
+        bool found = false;
+        for (int k = 0; k < count && !found; k++)
+            found = strlen(known[k]) == f->node[i].length &&
+                    memcmp(known[k], f->node[i].text, f->node[i].length) == 0;
+        if (!found)
+            return message_set(why, "%s: line %d: %.*s is not a known key; correct or remove it", f->path,
+                               f->node[i].line, (int)f->node[i].length, f->node[i].text);
+    }
+    return true;
+}

@@ -1,0 +1,68 @@
+#include "link.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define ROUTE_REMEDY "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
+
+/* liblcm writes pages about a missing route to stderr; one line of ours says as much. */
+static int mute(void)
+{
+    fflush(stderr);
+    int const saved = dup(STDERR_FILENO), null = open("/dev/null", O_WRONLY);
+    if (saved >= 0 && null >= 0)
+        dup2(null, STDERR_FILENO);
+    if (null >= 0)
+        close(null);
+    return saved;
+}
+
+static void unmute(int saved)
+{
+    if (saved < 0)
+        return;
+    fflush(stderr);
+    dup2(saved, STDERR_FILENO);
+    close(saved);
+}
+
+const char *link_url(const char *url)
+{
+    const char *const environment = getenv("LCM_DEFAULT_URL");
+    if (url && *url)
+        return url;
+    return environment && *environment ? environment : LINK_DEFAULT_URL;
+}
+
+bool link_is_log(const char *url)
+{
+    return strncmp(url, "file://", 7) == 0;
+}
+
+lcm_t *link_open(const char *url, message *why)
+{
+    int const saved = mute();
+    lcm_t *const lcm = lcm_create(url);
+    unmute(saved);
+    if (!lcm && link_is_log(url))
+        message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", url);
+    else if (!lcm)
+        message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
+    return lcm;
+}
+
+lcm_subscription_t *link_subscribe(lcm_t *lcm, const char *channel, lcm_msg_handler_t fn, void *user,
+                                   int capacity, message *why)
+{
+    int const saved = mute();
+    lcm_subscription_t *const s = lcm_subscribe(lcm, channel, fn, user);
+    unmute(saved);
+    if (s)
+        lcm_subscription_set_queue_capacity(s, capacity);
+    else
+        message_set(why, "cannot receive %s; " ROUTE_REMEDY, channel);
+    return s;
+}

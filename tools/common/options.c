@@ -1,0 +1,167 @@
+#include "options.h"
+
+#include "file.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool set_number(const option *o, const char *text, message *why)
+{
+    char *end;
+    errno = 0;
+    double const value = strtod(text, &end);
+    bool const whole = o->kind != OPTION_INT || value == (double)(int32_t)value;
+    if (end == text || *end || !(value >= o->low && value <= o->high) || !whole)
+        return message_set(why, "--%s %s: give a %snumber from %g to %g", o->name, text,
+                           o->kind == OPTION_INT ? "whole " : "", o->low, o->high);
+    if (o->kind == OPTION_INT)
+        *(int32_t *)o->value = (int32_t)value;
+    else
+        *(float *)o->value = (float)value;
+    return true;
+}
+
+static bool set_u64(const option *o, const char *text, message *why)
+{
+    char *end;
+    errno = 0;
+    uint64_t const value = strtoull(text, &end, 10);
+    if (end == text || *end || errno || strchr(text, '-'))
+        return message_set(why, "--%s %s: give a whole number from 0 to %" PRIu64, o->name, text, UINT64_MAX);
+    *(uint64_t *)o->value = value;
+    return true;
+}
+
+static bool set_flag(const option *o, const char *text, message *why)
+{
+    bool const yes = !text || strcmp(text, "yes") == 0;
+    if (!yes && strcmp(text, "no") != 0)
+        return message_set(why, "--%s %s: give yes or no", o->name, text);
+    *(bool *)o->value = yes;
+    return true;
+}
+
+static bool set_text(const option *o, const char *text, message *why)
+{
+    if (!*text || strlen(text) >= OPTION_TEXT)
+        return message_set(why, "--%s: give a value of 1 to %d characters", o->name, OPTION_TEXT - 1);
+    strcpy(o->value, text);
+    return true;
+}
+
+static bool set(const option *o, const char *text, message *why)
+{
+    if (o->kind == OPTION_FLAG)
+        return set_flag(o, text, why);
+    if (!text)
+        return message_set(why, "--%s: needs a value %s", o->name, o->metavar);
+    if (o->kind == OPTION_TEXTUAL)
+        return set_text(o, text, why);
+    return o->kind == OPTION_U64 ? set_u64(o, text, why) : set_number(o, text, why);
+}
+
+static const option *find(const option *table, int count, const char *name, size_t length)
+{
+    for (int i = 0; i < count; i++)
+        if (strlen(table[i].name) == length && memcmp(table[i].name, name, length) == 0)
+            return &table[i];
+    return NULL;
+}
+
+static const option *find_letter(const option *table, int count, char letter)
+{
+    for (int i = 0; i < count; i++)
+        if (table[i].letter && table[i].letter == letter)
+            return &table[i];
+    return NULL;
+}
+
+/* The option an argument names, and its value when that is attached by "=". */
+static const option *recognise(const option *table, int count, const char *arg, const char **attached)
+{
+    *attached = NULL;
+    if (arg[0] == '-' && arg[1] == '-') {
+        const char *const equals = strchr(arg, '=');
+        *attached = equals ? equals + 1 : NULL;
+        return find(table, count, arg + 2, equals ? (size_t)(equals - arg - 2) : strlen(arg + 2));
+    }
+    return arg[0] == '-' && arg[1] && !arg[2] ? find_letter(table, count, arg[1]) : NULL;
+}
+
+option_result options_parse(const option *table, int count, int argc, char **argv, message *why)
+{
+    for (int i = 1; i < argc; i++) {
+        const char *value;
+        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0)
+            return OPTION_HELP;
+        const option *const o = recognise(table, count, argv[i], &value);
+        if (!o) {
+            message_set(why, "unknown argument %s; --help lists the options", argv[i]);
+            return OPTION_BAD;
+        }
+        if (!value && o->kind != OPTION_FLAG && i + 1 < argc)
+            value = argv[++i];
+        if (!set(o, value, why))
+            return OPTION_BAD;
+    }
+    return OPTION_OK;
+}
+
+static char *trim(char *s)
+{
+    s += strspn(s, " \t\r");
+    for (char *end = s + strlen(s); end > s && strchr(" \t\r", end[-1]);)
+        *--end = '\0';
+    return s;
+}
+
+/* Apply one line of the file, which is cut up. */
+static bool apply_line(const option *table, int count, char *line, message *why)
+{
+    line[strcspn(line, "#")] = '\0';
+    line = trim(line);
+    if (!*line)
+        return true;
+    char *const equals = strchr(line, '=');
+    if (!equals)
+        return message_set(why, "'%s' is not of the form name = value", line);
+    *equals = '\0';
+    const char *const name = trim(line);
+    const option *const o = find(table, count, name, strlen(name));
+    return o ? set(o, trim(equals + 1), why) : message_set(why, "unknown option %s; --help lists them", name);
+}
+
+bool options_file(const option *table, int count, const char *path, message *why)
+{
+    file_bytes bytes;
+    message bad;
+    bool ok = true;
+    if (!file_read(path, "configuration", &bytes, why))
+        return false;
+    char *line = (char *)bytes.data;
+    for (int number = 1; ok && line; number++) {
+        char *const end = strchr(line, '\n');
+        if (end)
+            *end = '\0';
+        ok = apply_line(table, count, line, &bad) ||
+             message_set(why, "%.100s: line %d: %.120s", path, number, bad.text);
+        line = end ? end + 1 : NULL;
+    }
+    free(bytes.data);
+    return ok;
+}
+
+void options_help(const option *table, int count)
+{
+    for (int i = 0; i < count; i++) {
+        const option *const o = &table[i];
+        char letter[8] = "";
+        if (o->letter)
+            snprintf(letter, sizeof letter, "-%c, ", o->letter);
+        printf("  %s--%s %s\n        %s\n", letter, o->name, o->metavar, o->help);
+    }
+    printf("  -h, --help\n        show this text\n");
+}

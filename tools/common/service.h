@@ -1,0 +1,59 @@
+/* service.h - the tracker as a service: messages in, messages out, whatever carries them. */
+#ifndef TOOLS_SERVICE_H
+#define TOOLS_SERVICE_H
+#include "arming.h"
+#include "convert.h"
+#include "gaitmsg_command_t.h"
+#include "gaitmsg_particles_t.h"
+#include "gaitmsg_status_t.h"
+#include "histogram.h"
+#include "tracking.h"
+
+#include <lcm/lcm.h>
+
+/* Since the program's start or the last RESET. */
+typedef struct service_counts {
+    int64_t frames, dropped, rejected;
+    histogram step, latency; /* microseconds */
+} service_counts;
+
+typedef struct service {
+    tracking track;
+    lcm_t *out; /* where messages go; NULL: nowhere */
+    int threads;
+    bool has_init;
+    init_state init; /* of --init FILE */
+    arming start;
+    int8_t state; /* GAITMSG_STATUS_T_* */
+    bool news;    /* the state has changed since the last status */
+    int64_t command_id;
+    service_counts counts;
+    int64_t dropped_before;  /* value of counts.dropped at START */
+    int64_t last_frame;      /* number of the last frame that came; -1: none */
+    int64_t last_utime;      /* capture time of the last frame tracked, or of the start */
+    bool stepped;            /* a frame was tracked since START */
+    message text, complaint; /* what the status says; the last line on stderr */
+    estimate_message estimate;
+    uint8_t *particles; /* encoded particles_t; NULL: not sent */
+    size_t particles_bytes;
+    gait_state *hypothesis; /* [particles] */
+    gaitmsg_particles_t cloud;
+} service;
+
+/* `track` is open.  With `particles` the memory for GAIT_PARTICLES is taken now. */
+bool service_open(service *s, lcm_t *out, int threads, const init_state *init, bool particles, message *why);
+void service_close(service *s);
+
+bool service_set_camera(service *s, const gait_camera *camera, message *why);
+void service_camera(service *s, const gaitmsg_camera_t *msg);
+void service_background(service *s, const image_view *v);
+void service_command(service *s, const gaitmsg_command_t *msg);
+/* One frame, received at `receive_utime`; not the `newest`: another waits behind it, this one is dropped. */
+void service_frame(service *s, const image_view *v, bool newest, int64_t receive_utime);
+/* Say in the status, and once on stderr, what is wrong with the input. */
+void service_complain(service *s, const message *why);
+void service_send_status(service *s);
+uint64_t service_digest(const service *s); /* 0 before the camera is known */
+/* Wall clock, microseconds since the Unix epoch. */
+int64_t service_now(void);
+#endif

@@ -1,0 +1,52 @@
+#include "tracker_options.h"
+
+#include <math.h>
+#include <string.h>
+
+#define FIELD(f) offsetof(gait_tracker_config, f)
+
+static const struct {
+    const char *name;
+    size_t offset;
+    double low, high;
+    const char *help;
+} fields[TRACKER_OPTIONS] = {
+    {"texture-weight", FIELD(term_weight[0]), 0, 1e6, "nats per unit cost of the previous frame's texture"},
+    {"silhouette-weight", FIELD(term_weight[1]), 0, 1e6, "nats per unit cost of the silhouette"},
+    {"edges-weight", FIELD(term_weight[2]), 0, 1e6, "nats per unit cost of the edges"},
+    {"template-weight", FIELD(term_weight[3]), 0, 1e6, "nats per unit cost of the running template"},
+    {"missed-weight", FIELD(missed_weight), 0, 1, "foreground outside the limbs against background inside"},
+    {"girth", FIELD(girth), 0.5, 2, "limb radii against the model's (clothes)"},
+    {"resample-ess", FIELD(resample_ess), 0, 1, "resample below this fraction of the particles"},
+    {"max-dt", FIELD(max_dt), 1e-3, 1e3, "longest pause between frames, seconds"},
+    {"phase-noise", FIELD(phase_noise), 0, 1e3, "strides per sqrt(second)"},
+    {"rate-noise", FIELD(rate_noise), 0, 1e3, "fraction of the mean stride rate per sqrt(second)"},
+    {"rate-noise-start", FIELD(rate_noise_start), 0, 1e3, "the same while settling"},
+    {"settle-time", FIELD(settle_time), 0, 1e3, "seconds after the start with rate-noise-start"},
+    {"forward-noise", FIELD(forward_noise), 0, 1e3, "metres per sqrt(second)"},
+    {"lateral-noise", FIELD(lateral_noise), 0, 1e3, "metres per sqrt(second)"},
+    {"vertical-noise", FIELD(vertical_noise), 0, 1e3, "metres per sqrt(second)"},
+    {"heading-noise", FIELD(heading_noise), 0, 1e3, "radians per sqrt(second)"},
+    {"tilt-noise", FIELD(tilt_noise), 0, 1e3, "radians per sqrt(second)"},
+    {"tilt-time", FIELD(tilt_time), 0, 1e6, "seconds in which tilt and height return to the model's"},
+    {"coef-noise", FIELD(coef_noise), 0, 1e3, "score standard deviations per sqrt(second)"},
+    {"coef-time", FIELD(coef_time), 0, 1e6, "seconds in which the scores return to the mean; 0: never"},
+    {"stature-noise", FIELD(stature_noise), 0, 1e3, "fraction of stature per sqrt(second), while settling"},
+};
+
+void tracker_options_table(tracker_values *values, option *table)
+{
+    for (int i = 0; i < TRACKER_OPTIONS; i++) {
+        values->value[i] = NAN;
+        table[i] =
+            (option){fields[i].name, 0, "X", fields[i].help, OPTION_FLOAT, &values->value[i], fields[i].low,
+                     fields[i].high};
+    }
+}
+
+void tracker_options_apply(const tracker_values *values, gait_tracker_config *config)
+{
+    for (int i = 0; i < TRACKER_OPTIONS; i++)
+        if (!isnan(values->value[i]))
+            memcpy((char *)config + fields[i].offset, &values->value[i], sizeof values->value[i]);
+}

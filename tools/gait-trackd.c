@@ -1,0 +1,218 @@
+/* gait-trackd - frames in, estimates out, over LCM.  `gait-trackd --help` is the manual. */
+#include "common/camera_file.h"
+#include "common/link.h"
+#include "common/pnm.h"
+#include "common/pool.h"
+#include "common/receiver.h"
+#include "common/tracker_options.h"
+
+#include <inttypes.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static struct settings {
+    char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
+    char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
+    int32_t stream, particles, components, threads, tasks;
+    uint64_t seed;
+    bool particles_channel, quiet;
+    tracker_values tracker;
+} settings = {.mode = "default", .init = "auto", .components = -1, .threads = 1, .tasks = 16, .seed = 1};
+
+#define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
+#define INT(field, low, high) OPTION_INT, &settings.field, low, high
+#define FLAG(field)           OPTION_FLAG, &settings.field, 0, 0
+
+static const option own_options[] = {
+    {"model", 'm', "FILE", "model blob (.gait), from `gait learn`; needed", TEXT(model)},
+    {"camera", 0, "FILE",
+     "camera JSON; without it the camera comes over GAIT_CAMERA_<i> from `gait capture`,\n"
+     "        which also reads OpenCV YAML/XML and TOML",
+     TEXT(camera)},
+    {"background", 0, "FILE", "empty scene, PGM or PPM; without it GAIT_BACKGROUND_<i>", TEXT(background)},
+    {"init", 0, "FILE|auto", "where the walker is at one frame (JSON); auto: wait for START on GAIT_COMMAND",
+     TEXT(init)},
+    {"url", 0, "URL",
+     "LCM to listen on, default $LCM_DEFAULT_URL or " LINK_DEFAULT_URL ";\n"
+     "        file://LOG?speed=0 plays a log without loss and ends with it",
+     TEXT(url)},
+    {"out", 0, "URL", "LCM to publish on, default --url; for a log: nowhere, or file://NEW?mode=w",
+     TEXT(out)},
+    {"config", 0, "FILE", "lines `name = value` with the long names of these options; the command line wins",
+     TEXT(config)},
+    {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 99)},
+    {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
+    {"particles", 'n', "N", "hypotheses; default 1000, paper mode 10000", INT(particles, 16, 1 << 20)},
+    {"components", 0, "Q", "principal components in use; default all of the model's",
+     INT(components, 0, GAIT_MAX_COMPONENTS)},
+    {"seed", 0, "N", "of the random numbers, default 1", OPTION_U64, &settings.seed, 0, 0},
+    {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, POOL_MAX)},
+    {"tasks", 0, "N", "pieces of a step for the threads, default 16; results do not depend on it",
+     INT(tasks, 1, 256)},
+    {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
+    {"quiet", 'q', "", "no summary at the end", FLAG(quiet)},
+};
+enum { OWN = sizeof own_options / sizeof *own_options, OPTIONS = OWN + TRACKER_OPTIONS };
+
+static volatile sig_atomic_t quit;
+
+static void on_signal(int number)
+{
+    (void)number;
+    quit = 1;
+}
+
+/* Block the signals that end us, in every thread LCM will start; `unblocked` is the mask to wait with. */
+static void set_signals(sigset_t *unblocked)
+{
+    struct sigaction const action = {.sa_handler = on_signal};
+    sigset_t block;
+    sigemptyset(&block);
+    sigaddset(&block, SIGINT);
+    sigaddset(&block, SIGTERM);
+    sigprocmask(SIG_BLOCK, &block, unblocked);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+static void help(const option *table)
+{
+    printf(
+        "usage: gait-trackd -m MODEL.gait [--camera CAMERA.json] [--init INIT.json|auto] [options]\n\n"
+        "Track a walking person: frames come over LCM (GAIT_IMAGE_<i>), estimates go out (GAIT_ESTIMATE,\n"
+        "GAIT_STATUS once a second).  Live, the newest frame wins and the others are counted as dropped.\n"
+        "Commands START, STOP and RESET come over GAIT_COMMAND.  SIGINT or SIGTERM end the program with a\n"
+        "summary.  Exit codes: 0 ok, 1 failed, 2 usage.\n\n");
+    options_help(table, OPTIONS);
+}
+
+/* Command line over configuration file over defaults. */
+static option_result read_settings(int argc, char **argv, const option *table, message *why)
+{
+    option_result result = options_parse(table, OPTIONS, argc, argv, why);
+    if (result == OPTION_OK && settings.config[0])
+        result = options_file(table, OPTIONS, settings.config, why)
+                     ? options_parse(table, OPTIONS, argc, argv, why)
+                     : OPTION_BAD;
+    if (result != OPTION_OK)
+        return result;
+    bool const ok =
+        (settings.model[0] || message_set(why, "--model FILE is needed; `gait learn` makes one")) &&
+        (strcmp(settings.mode, "paper") == 0 || strcmp(settings.mode, "default") == 0 ||
+         message_set(why, "--mode %.100s: give default or paper", settings.mode)) &&
+        (!settings.background[0] || settings.camera[0] ||
+         message_set(why, "--background needs --camera, or leave both to `gait capture`"));
+    return ok ? OPTION_OK : OPTION_BAD;
+}
+
+static void make_config(pool *threads, gait_tracker_config *c)
+{
+    gait_tracker_default(c, strcmp(settings.mode, "paper") == 0 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT);
+    c->particles = settings.particles ? settings.particles : c->particles;
+    c->components = settings.components;
+    c->seed = settings.seed;
+    c->tasks = settings.tasks;
+    c->exec = pool_tasks(threads);
+    tracker_options_apply(&settings.tracker, c);
+}
+
+static bool read_background(service *s, message *why)
+{
+    file_bytes bytes;
+    gait_image plate;
+    if (!settings.background[0])
+        return true;
+    if (!pnm_read(settings.background, &bytes, &plate, why))
+        return false;
+    message bad;
+    bool const ok = tracking_set_background(&s->track, &plate, &bad) ||
+                    message_set(why, "%.100s: %.140s", settings.background, bad.text);
+    free(bytes.data);
+    return ok;
+}
+
+/* Model, start, camera and empty scene, as far as the command line gives them. */
+static bool load(service *s, pool *threads, lcm_t *out, message *why)
+{
+    gait_tracker_config config;
+    gait_camera camera;
+    init_state init;
+    bool const has_init = strcmp(settings.init, "auto") != 0;
+    make_config(threads, &config);
+    if (!tracking_open(&s->track, settings.model, &config, why))
+        return false;
+    init = (init_state){.frame = -1, .mean = s->track.prior_mean, .sd = s->track.prior_sd};
+    if (has_init && !init_file_read(settings.init, &init, why))
+        return false;
+    if (!service_open(s, out, settings.threads, has_init ? &init : NULL, settings.particles_channel, why))
+        return false;
+    if (settings.camera[0] &&
+        (!camera_file_read(settings.camera, &camera, why) || !service_set_camera(s, &camera, why)))
+        return false;
+    return read_background(s, why);
+}
+
+static void print_summary(const service *s, bool live)
+{
+    const service_counts *const c = &s->counts;
+    printf("frames %" PRId64 " dropped %" PRId64 " rejected %" PRId64, c->frames, c->dropped, c->rejected);
+    printf(" step_ms median %.2f p99 %.2f max %.2f", histogram_quantile(&c->step, 0.5) / 1e3,
+           histogram_quantile(&c->step, 0.99) / 1e3, c->step.largest / 1e3);
+    if (live)
+        printf(" latency_ms median %.2f p99 %.2f", histogram_quantile(&c->latency, 0.5) / 1e3,
+               histogram_quantile(&c->latency, 0.99) / 1e3);
+    printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
+}
+
+/* Everything between the settings and the exit code. */
+static bool serve(service *s, pool *threads, const sigset_t *unblocked, message *why)
+{
+    const char *const url = link_url(settings.url);
+    bool const log = link_is_log(url);
+    const char *const to = settings.out[0] ? settings.out : log ? NULL : url;
+    receiver r = {0};
+    lcm_t *const out = to ? link_open(to, why) : NULL;
+    bool const ok = (!to || out) && load(s, threads, out, why) &&
+                    receiver_open(&r, s, url, settings.stream, why) &&
+                    receiver_run(&r, &quit, unblocked, why);
+    if (ok) {
+        service_send_status(s);
+        if (!settings.quiet)
+            print_summary(s, !log);
+    }
+    receiver_close(&r);
+    if (out)
+        lcm_destroy(out);
+    return ok;
+}
+
+int main(int argc, char **argv)
+{
+    static service s;
+    static pool threads;
+    option table[OPTIONS];
+    sigset_t unblocked;
+    message why;
+    memcpy(table, own_options, sizeof own_options);
+    tracker_options_table(&settings.tracker, table + OWN);
+    option_result const result = read_settings(argc, argv, table, &why);
+    if (result == OPTION_HELP)
+        help(table);
+    if (result == OPTION_BAD)
+        fprintf(stderr, "gait-trackd: %s\n", why.text);
+    if (result != OPTION_OK)
+        return result == OPTION_HELP ? 0 : 2;
+    set_signals(&unblocked);
+    bool ok = pool_start(&threads, settings.threads, &why);
+    if (ok) {
+        ok = serve(&s, &threads, &unblocked, &why);
+        pool_stop(&threads);
+        service_close(&s);
+    }
+    if (!ok)
+        fprintf(stderr, "gait-trackd: %s\n", why.text);
+    return ok ? 0 : 1;
+}
