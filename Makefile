@@ -102,12 +102,12 @@ $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%
 
 %/:
 	@mkdir -p $@
-.PRECIOUS: %/
+.PRECIOUS: %/ %.c.o %.cpp.o
 
 # ---- LCM tools -----------------------------------------------------------------------------------------------
 LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
 LCM_CFLAGS := -isystem $(SITE)/include -isystem build/lcm
-LCM_LIBS = -L$(SITE)/lib -llcm -Wl,-rpath,'$$ORIGIN/$(shell realpath -m --relative-to=$(BIN) $(SITE)/lib)'
+LCM_LIBS = -L$(SITE)/lib -llcm -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(BIN) $(SITE)/lib)'
 
 tools: $(TOOLS) build/lcm/.stamp ## LCM programs in build/bin, LCM types in build/lcm
 

@@ -22,19 +22,25 @@ def read_layers(path: Path) -> dict[str, int]:
     return order
 
 
+def place(order: dict[str, int], name: str) -> int | None:
+    """Layer of a file: that of its own name if listed (a header below its source), else of its module."""
+    return order.get(name, order.get(Path(name).stem))
+
+
 def faults(source: Path, order: dict[str, int]) -> list[str]:
     """What is wrong with the includes of one file."""
-    module = source.stem
-    if module not in order:
-        return [f"{source}: module {module} is not in LAYERS"]
+    own = place(order, source.name)
+    if own is None:
+        return [f"{source}: module {source.stem} is not in LAYERS"]
     found = []
     text = source.read_text(encoding="utf-8")
     for kind, name in re.findall(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', text, re.M):
+        below = place(order, name)
         if kind == "<":
             if name not in SYSTEM and not (name.startswith("Eigen/") and source.suffix == ".cpp"):
                 found.append(f"{source}: <{name}> is not for the library")
-        elif name not in PUBLIC and order.get(Path(name).stem, len(order)) > order[module]:
-            found.append(f'{source}: "{name}" is not below {module} in LAYERS')
+        elif name not in PUBLIC and (below is None or below > own):
+            found.append(f'{source}: "{name}" is not below {source.name} in LAYERS')
     return found
 
 
@@ -43,7 +49,8 @@ def main() -> int:
     order = read_layers(layers)
     sources = sorted(p for p in folder.iterdir() if p.suffix in {".c", ".cpp", ".h"})
     found = [f for source in sources for f in faults(source, order)]
-    found += [f"{layers}: no source of {m}" for m in order if m not in {s.stem for s in sources}]
+    names = {s.stem for s in sources} | {s.name for s in sources}
+    found += [f"{layers}: no source of {m}" for m in order if m not in names]
     print("\n".join(found), end="\n" if found else "")
     return bool(found)
 

@@ -121,8 +121,8 @@ def test_headers_sees_padding_old_declarations_and_missing_includes(tmp_path, co
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("low.c", '#include "high.h"\n', '"high.h" is not below low'),
-        ("high.c", '#include "nothing.h"\n', '"nothing.h" is not below high'),
+        ("low.c", '#include "high.h"\n', '"high.h" is not below low.c'),
+        ("high.c", '#include "nothing.h"\n', '"nothing.h" is not below high.c'),
         ("high.c", "#include <stdlib.h>\n", "<stdlib.h> is not for the library"),
         ("other.c", '#include "low.h"\n', "other is not in LAYERS"),
     ],
@@ -137,6 +137,18 @@ def test_layers_sees_an_upward_include(tmp_path, name, text, words):
     assert run("layers.py", layers, src).returncode == 0
     (src / name).write_text(text)
     assert fails(run("layers.py", layers, src), words)
+
+
+def test_layers_lets_a_header_lie_lower_than_its_source(tmp_path):
+    layers, src = tmp_path / "LAYERS", tmp_path / "src"
+    src.mkdir()
+    layers.write_text("top.h\nlow\ntop\n")
+    (src / "top.h").write_text("")
+    (src / "low.h").write_text('#include "top.h"\n')
+    (src / "top.c").write_text('#include "low.h"\n')
+    assert run("layers.py", layers, src).returncode == 0
+    (src / "top.h").write_text('#include "low.h"\n')
+    assert fails(run("layers.py", layers, src), '"low.h" is not below top.h')
 
 
 def test_layers_sees_a_module_without_source(tmp_path):
