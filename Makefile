@@ -162,14 +162,20 @@ MOCAP ?= ../shared/data/mocap/cmu_walk
 model: setup lib ## learn the default model from MOCAP=
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 
-bench: setup lib ## time a step
-	@$(PY) tests/bench/bench.py $(ARGS)
+BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file histogram message options pool)
+$(B)/bench/step: tests/bench/step.c $(BENCH_PARTS) $(B)/libgait.a Makefile | $(B)/bench/
+	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread \
+	    -Ilibgait/include -Itools $(CFLAGS) $(LDFLAGS) -o $@ $< $(BENCH_PARTS) $(B)/libgait.a -lm
+
+bench: $(B)/bench/step ## time a step by particles and threads (ARGS='-n 1000 -t 1,2,4')
+	@$< $(ARGS)
 
 eval: setup lib ## errors on the clips of ../shared/data
 	@$(PY) tests/bench/eval.py $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------
-C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tools/*.[ch] tools/common/*.[ch]))
+C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.c tools/*.[ch] \
+           tools/common/*.[ch]))
 lint: export PATH := $(abspath $(VENV)/bin):$(PATH)
 lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed
 	@clang-format --dry-run -Werror $(C_FILES)
@@ -201,4 +207,4 @@ uninstall: ## remove what install put there
 clean: ## remove build/ (not .venv)
 	rm -rf build
 
--include $(wildcard $(B)/src/*.d $(B)/unit/*.d $(B)/tools/*.d $(B)/tools/common/*.d)
+-include $(wildcard $(B)/src/*.d $(B)/unit/*.d $(B)/bench/*.d $(B)/tools/*.d $(B)/tools/common/*.d)
