@@ -144,8 +144,7 @@ static bool load(service *s, pool *threads, lcm_t *out, message *why)
     make_config(threads, &config);
     if (!tracking_open(&s->track, settings.model, &config, why))
         return false;
-    init = (init_state){.frame = -1, .mean = s->track.prior_mean, .sd = s->track.prior_sd};
-    if (has_init && !init_file_read(settings.init, &init, why))
+    if (has_init && !init_file_read(settings.init, s->track.model, &init, why))
         return false;
     if (!service_open(s, out, settings.threads, has_init ? &init : NULL, settings.particles_channel, why))
         return false;

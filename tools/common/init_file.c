@@ -4,93 +4,118 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
-/* What the file may say; sd is taken where it gives a value but no standard deviation. */
+/* Numbers of the file beside the pelvis; sd is taken where it gives a value but no standard deviation. */
 static const struct {
     const char *key, *remedy;
     size_t offset;
-    int count;
     double low, high, sd;
-} quantities[] = {
-    {"pelvis", "give [x, y, z] in metres", offsetof(gait_state, pelvis), 3, -1e5, 1e5, 0.05},
-    {"heading_rad", "give radians, 0 along +x", offsetof(gait_state, heading), 1, -1e3, 1e3, 0.1},
-    {"phase", "give strides, 0 at right heel strike", offsetof(gait_state, phase), 1, -1e3, 1e3, 0.05},
-    {"stride_hz", "give strides per second", offsetof(gait_state, stride_hz), 1, 0.05, 10, 0.05},
-    {"stature_m", "give metres", offsetof(gait_state, stature), 1, 0.3, 3, 0.03},
+} scalars[] = {
+    {"heading_rad", "give the walking direction about z in radians, 0 = along +x",
+     offsetof(gait_state, heading), -7, 7, 0.1},
+    {"phase", "give the phase of the stride from 0 (right heel strike) to 1", offsetof(gait_state, phase), 0,
+     1, 0.05},
+    {"stride_hz", "give strides (two steps) per second, about 0.9", offsetof(gait_state, stride_hz), 0.1, 4,
+     0.05},
+    {"stature_m", "give the person's height in metres", offsetof(gait_state, stature), 0.5, 2.5, 0.03},
 };
+/* "sd" may hold the first five. */
 static const char *const known[] = {"pelvis",    "heading_rad", "phase", "stride_hz",
                                     "stature_m", "frame",       "sd"};
 
-enum { QUANTITIES = sizeof quantities / sizeof *quantities, KNOWN = sizeof known / sizeof *known };
+enum { SCALARS = sizeof scalars / sizeof *scalars, KNOWN = sizeof known / sizeof *known };
+static const double PELVIS_SD = 0.05, MAX_SD = 10, FAR = 1e5;
 
-/* One or `count` standard deviations of quantity q; `deviation` is the object of them, or -1. */
-static bool read_sd(const fields *f, int deviation, int q, double out[3], message *why)
+static void put(gait_state *s, size_t offset, double value)
 {
-    const char *const remedy = "give one standard deviation, or one for each number";
-    int const count = quantities[q].count;
-    int const value = deviation < 0 ? -1 : fields_find(f, deviation, quantities[q].key);
-    int const found = value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
-    out[0] = quantities[q].sd;
-    if (value >= 0 && !fields_numbers(f, deviation, quantities[q].key, out, found == count ? count : 1, 0,
-                                      1e5, remedy, why))
-        return false;
-    for (int i = 1; i < count && found != count; i++)
-        out[i] = out[0];
-    return true;
+    float const narrow = (float)value;
+    memcpy((char *)s + offset, &narrow, sizeof narrow);
 }
 
-static bool read_quantity(const fields *f, int deviation, int q, init_state *io, message *why)
+/* `spread`: the object of standard deviations, or -1. */
+static bool read_scalar(const fields *f, int spread, int k, init_state *io, message *why)
 {
-    double mean[3], sd[3];
-    float *to_mean = (float *)(void *)((char *)&io->mean + quantities[q].offset);
-    float *to_sd = (float *)(void *)((char *)&io->sd + quantities[q].offset);
-    const char *key = quantities[q].key;
-    if (fields_find(f, 0, key) < 0) {
-        if (deviation >= 0 && fields_find(f, deviation, key) >= 0)
-            return message_set(why, "%s: sd has %s but there is no %s; give both or neither", f->path, key,
-                               key);
-        return true;
+    const char *const key = scalars[k].key;
+    double value;
+    if (fields_find(f, 0, key) >= 0) {
+        if (!fields_numbers(f, 0, key, &value, 1, scalars[k].low, scalars[k].high, scalars[k].remedy, why))
+            return false;
+        put(&io->mean, scalars[k].offset, value);
+        put(&io->sd, scalars[k].offset, scalars[k].sd);
     }
-    if (!fields_numbers(f, 0, key, mean, quantities[q].count, quantities[q].low, quantities[q].high,
-                        quantities[q].remedy, why) ||
-        !read_sd(f, deviation, q, sd, why))
-        return false;
-    if (quantities[q].offset == offsetof(gait_state, phase))
-        mean[0] -= floor(mean[0]);
-    for (int i = 0; i < quantities[q].count; i++) {
-        to_mean[i] = (float)mean[i];
-        to_sd[i] = (float)sd[i];
+    if (spread >= 0 && fields_find(f, spread, key) >= 0) {
+        if (!fields_numbers(f, spread, key, &value, 1, 0, MAX_SD, "give a standard deviation, not negative",
+                            why))
+            return false;
+        put(&io->sd, scalars[k].offset, value);
     }
     return true;
 }
 
-static bool parse(const fields *f, init_state *io, message *why)
+/* How many numbers a key holds; 0 if it is absent. */
+static int count_of(const fields *f, int object, const char *key)
 {
-    int const deviation = fields_find(f, 0, "sd");
+    int const value = object < 0 ? -1 : fields_find(f, object, key);
+    return value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
+}
+
+/* Two numbers get the model's height over ground, which depends on the rest of the state. */
+static bool read_pelvis(const fields *f, int spread, const gait_model *model, init_state *io, message *why)
+{
+    const char *const place = "give x and y (and z if known) of the pelvis in metres";
+    int const known_axes = count_of(f, 0, "pelvis") == 3 ? 3 : 2, sds = count_of(f, spread, "pelvis");
+    double value[3];
+    if (fields_find(f, 0, "pelvis") >= 0) {
+        if (!fields_numbers(f, 0, "pelvis", value, known_axes, -FAR, FAR, place, why))
+            return false;
+        for (int i = 0; i < 3; i++) {
+            io->mean.pelvis[i] = i < known_axes ? (float)value[i] : io->mean.pelvis[i];
+            io->sd.pelvis[i] = (float)PELVIS_SD;
+        }
+    }
+    if (known_axes == 2 && gait_model_pelvis_height(model, &io->mean, &io->mean.pelvis[2]) != GAIT_OK)
+        return message_set(why, "%s: the model gives no height for the pelvis; give z too", f->path);
+    if (sds != 0) {
+        if (!fields_numbers(f, spread, "pelvis", value, sds == 3 ? 3 : 1, 0, MAX_SD,
+                            "give one number or three, metres", why))
+            return false;
+        for (int i = 0; i < 3; i++)
+            io->sd.pelvis[i] = (float)value[sds == 3 ? i : 0];
+    }
+    return true;
+}
+
+static bool parse(const fields *f, const gait_model *model, init_state *io, message *why)
+{
+    int const spread = fields_find(f, 0, "sd");
     double frame = -1;
     if (!fields_only(f, 0, known, KNOWN, why))
         return false;
-    if (deviation >= 0 && f->node[deviation].type != JSON_OBJECT)
-        return message_set(why, "%s: sd is not an object; give the standard deviations by name", f->path);
-    if (deviation >= 0 && !fields_only(f, deviation, known, QUANTITIES, why))
+    if (spread >= 0 && f->node[spread].type != JSON_OBJECT)
+        return message_set(why, "%s: sd is not an object; give standard deviations by key", f->path);
+    if (spread >= 0 && !fields_only(f, spread, known, SCALARS + 1, why))
         return false;
-    for (int q = 0; q < QUANTITIES; q++)
-        if (!read_quantity(f, deviation, q, io, why))
-            return false;
     if (fields_find(f, 0, "frame") >= 0 &&
-        !fields_numbers(f, 0, "frame", &frame, 1, 0, 1e12, "give the number of a frame, from 0", why))
+        !fields_numbers(f, 0, "frame", &frame, 1, 0, 1u << 31, "give the frame number, from 0", why))
         return false;
+    for (int k = 0; k < SCALARS; k++)
+        if (!read_scalar(f, spread, k, io, why))
+            return false;
+    io->mean.phase -= floorf(io->mean.phase);
     io->frame = (int64_t)frame;
-    return true;
+    return read_pelvis(f, spread, model, io, why);
 }
 
-bool init_file_read(const char *path, init_state *io, message *why)
+bool init_file_read(const char *path, const gait_model *model, init_state *out, message *why)
 {
     fields f;
-    init_state state = *io;
-    bool const ok = fields_open(&f, path, "init", why) && parse(&f, &state, why);
+    init_state state = {.frame = -1};
+    if (gait_tracker_prior(model, &state.mean, &state.sd) != GAIT_OK)
+        return message_set(why, "%s: the model has no prior", path);
+    bool const ok = fields_open(&f, path, "init", why) && parse(&f, model, &state, why);
     fields_close(&f);
     if (ok)
-        *io = state;
+        *out = state;
     return ok;
 }

@@ -1,4 +1,4 @@
-/* init_file.h - where the walker is at one frame, by the project's init JSON. */
+/* init_file.h - where the walker is at one frame, by the project's init JSON; same rules as gait/initial.py. */
 #ifndef TOOLS_INIT_FILE_H
 #define TOOLS_INIT_FILE_H
 #include "gait.h"
@@ -9,6 +9,6 @@ typedef struct init_state {
     gait_state mean, sd;
 } init_state;
 
-/* On entry `io` holds the model's prior, which stays wherever the file has no key. */
-bool init_file_read(const char *path, init_state *io, message *why);
+/* What the file does not say comes from the model's prior, the height of the pelvis from the model itself. */
+bool init_file_read(const char *path, const gait_model *model, init_state *out, message *why);
 #endif

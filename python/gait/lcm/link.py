@@ -1,0 +1,96 @@
+"""Connections to LCM: the URL in force, and one line instead of pages when there is no multicast route."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from gait.errors import UserError
+
+try:
+    import lcm
+except ImportError as exc:  # its own fallbacks hide the reason: liblcm needs the system's GLib
+    raise UserError(f"lcm: cannot be loaded ({exc}); install libglib2.0-0 and the lcm wheel") from None
+
+DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
+"""Room for the receiver is part of the URL: with the system's default a colour stream loses 9 of 10 messages."""
+
+ROUTE_REMEDY = "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
+_RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
+_RMEM_ENOUGH = 1 << 20
+
+
+def lcm_url(url: str | None = None) -> str:
+    """Return `url` if given, else ``LCM_DEFAULT_URL`` of the environment, else `DEFAULT_URL`."""
+    return url or os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL
+
+
+def open_lcm(url: str | None = None) -> lcm.LCM:
+    """Connect.
+
+    Raises
+    ------
+    UserError
+        If LCM refuses, with the remedy: a missing multicast route, or a log that cannot be opened.
+    """
+    wanted = lcm_url(url)
+    try:
+        with muted_stderr():
+            return lcm.LCM(wanted)
+    except RuntimeError:
+        if is_log(wanted):
+            raise UserError(f"{wanted}: cannot open this log; give file:///PATH?speed=0 (mode=w to write)") from None
+        raise UserError(f"{wanted}: cannot open LCM; {ROUTE_REMEDY}") from None
+
+
+def is_log(url: str) -> bool:
+    """Is it a log file, which loses nothing?"""
+    return url.startswith("file://")
+
+
+def private_url() -> str:
+    """Make a multicast URL with a port that nobody on this machine uses: a network of one's own."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        port = probe.getsockname()[1]
+    return DEFAULT_URL.replace(":7667", f":{port}")
+
+
+def multicast_works() -> bool:
+    """Can LCM open its default network here?"""
+    try:
+        open_lcm(DEFAULT_URL)
+    except UserError:
+        return False
+    return True
+
+
+def buffer_warning(url: str) -> str | None:
+    """One line if the kernel will not grant the receive buffer that `url` asks for."""
+    if not url.startswith("udpm://") or not _RMEM_MAX.is_file():
+        return None
+    granted = int(_RMEM_MAX.read_text(encoding="ascii"))
+    if granted >= _RMEM_ENOUGH:
+        return None
+    return (
+        f"the kernel grants {granted} bytes to a receiver, too few for a colour stream: "
+        f"sysctl -w net.core.rmem_max=4194304 (as root), or send --jpeg 90 or --grey"
+    )
+
+
+@contextlib.contextmanager
+def muted_stderr() -> Iterator[None]:
+    """Silence file descriptor 2: liblcm writes pages there about a missing route."""
+    sys.stderr.flush()
+    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)

@@ -1,0 +1,186 @@
+"""Between the objects of this package and the messages of ``gaitmsg``."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+
+from gait._abi import MAX_COMPONENTS, Flag, TrackStatus
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.lcm.types import gaitmsg
+from gait.state import SCALARS, State
+from gait.tracker import Estimate
+from gait.video import Image
+
+_FRAME_KEY = "frame"
+_UNKNOWN = math.nan
+
+
+def now() -> int:
+    """Wall clock, microseconds since the Unix epoch."""
+    return time.time_ns() // 1000
+
+
+def decode(kind: Any, data: bytes, channel: str) -> Any:
+    """Decode a message of a ``gaitmsg`` class.
+
+    Raises
+    ------
+    UserError
+        If the bytes are of another type, or of another version of it.
+    """
+    try:
+        return kind.decode(data)
+    except (ValueError, IndexError, UnicodeDecodeError, MemoryError) as exc:
+        raise UserError(f"{channel}: not a gaitmsg.{kind.__name__} of this version ({exc})") from None
+    except Exception as exc:  # struct.error has no public base of its own
+        raise UserError(f"{channel}: damaged gaitmsg.{kind.__name__} ({exc})") from None
+
+
+def image_message(image: Image, utime: int, frame: int, jpeg: int | None = None) -> Any:
+    """Make an ``image_t``.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (h, w) grey or (h, w, 3) BGR
+    utime : int
+        Capture time, microseconds.
+    frame : int
+        Running number at the source; negative: none.
+    jpeg : int, optional
+        Compress with this quality, 1 to 100.
+    """
+    kind = gaitmsg.image_t
+    message = kind()
+    message.utime = utime
+    message.height, message.width = image.shape[:2]
+    if jpeg is None:
+        pixels = np.ascontiguousarray(image)
+        message.pixelformat = kind.PIXEL_FORMAT_GRAY if image.ndim == 2 else kind.PIXEL_FORMAT_BGR
+        message.row_stride = pixels.strides[0]
+        message.data = pixels.tobytes()
+    else:
+        message.pixelformat, message.row_stride = kind.PIXEL_FORMAT_MJPEG, 0
+        message.data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, jpeg])[1].tobytes()
+    message.size = len(message.data)
+    if frame >= 0:
+        entry = gaitmsg.image_metadata_t()
+        entry.key, entry.value, entry.n = _FRAME_KEY, frame.to_bytes(8, "big"), 8
+        message.metadata, message.nmetadata = [entry], 1
+    return message
+
+
+def frame_number(message: Any) -> int:
+    """Running number of an ``image_t`` at its source; -1 if it does not count."""
+    for entry in message.metadata:
+        if entry.key == _FRAME_KEY and entry.n == 8:
+            return int.from_bytes(entry.value, "big", signed=True)
+    return -1
+
+
+def picture(message: Any) -> Image:
+    """Pixels of an ``image_t``: (h, w) grey or (h, w, 3) BGR.
+
+    Raises
+    ------
+    UserError
+        If the format is not one of package ``gaitmsg`` or the data are short.
+    """
+    kind = type(message)
+    if message.pixelformat == kind.PIXEL_FORMAT_MJPEG:
+        image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
+        if image is None:
+            raise UserError("image: JPEG frame cannot be decoded")
+        return image
+    channels = {kind.PIXEL_FORMAT_GRAY: 1, kind.PIXEL_FORMAT_RGB: 3, kind.PIXEL_FORMAT_BGR: 3}
+    depth = channels.get(message.pixelformat)
+    if depth is None:
+        raise UserError(f"image: pixelformat 0x{message.pixelformat:08x} is not grey, RGB, BGR or JPEG")
+    row = message.width * depth
+    if message.row_stride < row or len(message.data) < message.row_stride * message.height:
+        raise UserError("image: row_stride or size too small for its width and height")
+    rows = np.frombuffer(message.data, np.uint8, message.row_stride * message.height)
+    image = rows.reshape(message.height, message.row_stride)[:, :row]
+    if depth == 1:
+        return np.ascontiguousarray(image)
+    image = image.reshape(message.height, message.width, 3)
+    return np.ascontiguousarray(image[..., ::-1] if message.pixelformat == kind.PIXEL_FORMAT_RGB else image)
+
+
+def camera_message(camera: Camera, utime: int) -> Any:
+    """Make a ``camera_t``."""
+    message = gaitmsg.camera_t()
+    message.utime = utime
+    for name in ("width", "height", "fx", "fy", "cx", "cy"):
+        setattr(message, name, getattr(camera, name))
+    message.R = np.asarray(camera.R, float).ravel().tolist()
+    message.t = np.asarray(camera.t, float).tolist()
+    message.distortion = np.asarray(camera.distortion, float).tolist()
+    return message
+
+
+def camera_of(message: Any) -> Camera:
+    """Read a ``camera_t``."""
+    plain = {name: getattr(message, name) for name in ("width", "height", "fx", "fy", "cx", "cy")}
+    turn = np.reshape(message.R, (3, 3)).astype(float)
+    return Camera(**plain, R=turn, t=np.array(message.t, float), distortion=np.array(message.distortion, float))
+
+
+def state_message(values: State | Mapping[str, Any]) -> Any:
+    """Make a ``state_t`` from a `State`, or from some of its fields: the others are unknown (not a number)."""
+    known = vars(values) if isinstance(values, State) else values
+    message = gaitmsg.state_t()
+    for name in SCALARS:
+        setattr(message, name, float(known.get(name, _UNKNOWN)))
+    message.pelvis = [float(x) for x in known.get("pelvis", [_UNKNOWN] * 3)]
+    coef = [float(x) for x in known.get("coef", [])]
+    message.ncoef = len(coef)
+    message.coef = coef + [0.0] * (MAX_COMPONENTS - len(coef))
+    return message
+
+
+def state_of(message: Any) -> State:
+    """Read a ``state_t``."""
+    scalars = {name: float(getattr(message, name)) for name in SCALARS}
+    return State(**scalars, pelvis=np.array(message.pelvis), coef=np.array(message.coef[: message.ncoef]))
+
+
+def command_message(
+    command: int,
+    utime: int = 0,
+    mean: State | Mapping[str, Any] | None = None,
+    sd: State | Mapping[str, Any] | None = None,
+) -> Any:
+    """Make a ``command_t`` with an id of its own; `mean` and `sd` are those of START."""
+    message = gaitmsg.command_t()
+    message.utime, message.command, message.id = utime, command, time.monotonic_ns()
+    message.mean, message.sd = state_message(mean or {}), state_message(sd or {})
+    return message
+
+
+def estimate_of(message: Any) -> Estimate:
+    """Read an ``estimate_t``."""
+    return Estimate(
+        utime=message.utime,
+        frame=message.step,
+        status=TrackStatus(message.status),
+        flags=Flag(message.flags),
+        log_evidence=message.log_evidence,
+        ess=message.ess,
+        phase_r=message.phase_r,
+        mode_mass=message.mode_mass,
+        speed=message.speed,
+        mean=state_of(message.mean),
+        sd=state_of(message.sd),
+        best=state_of(message.best),
+        joints=np.array([joint.position for joint in message.joints], float).reshape(-1, 3),
+        joint_sd=np.array([joint.sd for joint in message.joints], float).reshape(-1, 3),
+        angles=np.array([angle.angle for angle in message.angles], float),
+        joint_names=tuple(joint.name for joint in message.joints),
+    )
