@@ -115,23 +115,22 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
         "sequences": {"columns": list(SEQUENCE_COLUMNS), "rows": sequence_table(learned)},
         "cycles": len(c.scores),
         "missing": round(float(1 - learned.cycles.mask.mean()), 3),
-        "variance_explained": _rounded(np.cumsum(c.spectrum)[:10], 3),
+        "variance_explained": _rounded(np.cumsum(c.spectrum)[:8], 3),
         "residual_deg": _rounded(np.degrees(channel_statistics(learned)[: len(ANGLES), 0]), 1),
         "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
     }
 
 
-SEQUENCE_COLUMNS = ("name", "period_s", "cycles", "snr", "sharpness", "residual_deg")
+SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")
 
 
 def sequence_table(learned: Learned) -> list[list[Any]]:
-    """One row of SEQUENCE_COLUMNS per sequence; snr is the best sum over the angles, residual the rms of all."""
+    """One row of SEQUENCE_COLUMNS per sequence; sharpness is peak over median SNR, residual the rms of all angles."""
     residuals, table = learned.residuals[:, :, : len(ANGLES)], []
     for i, s in enumerate(learned.sequences):
         own = residuals[learned.cycles.sequence == i]
         rms = float(np.degrees(np.sqrt(np.nanmean(own**2)))) if own.size else float("nan")
-        peak = round(float(np.nanmax(s.period.scores)))
-        row = [round(s.period.frames / s.body.fps, 3), round(s.cycles, 1), peak, round(s.period.sharpness)]
+        row = [round(1000 * s.period.frames / s.body.fps), round(s.cycles, 1), round(s.period.sharpness)]
         table.append([s.name, *row, round(rms, 1) if own.size else None])
     return table
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from gait.learn.body import Body
 from gait.learn.retarget import BALL, Measures, stance
-from gait.learn.rotations import decompose_zyx
+from gait.learn.rotations import decompose_zyx, frame_from, unit
 from gait.skeleton import SIDES, axis_rotation
 
 Floats = npt.NDArray[np.float64]
@@ -39,6 +39,18 @@ def level(body: Body) -> tuple[Body, float]:
     joints = {name: points @ turn.T for name, points in body.joints.items()}
     lateral = {name: axes @ turn.T for name, axes in body.lateral.items()}
     return replace(body, joints=joints, pelvis=turn @ body.pelvis, lateral=lateral), slope
+
+
+def align_pelvis(body: Body) -> Body:
+    """Give the pelvis axes a meaning that does not depend on where markers sat.
+
+    The left axis becomes the line between the hips, and the forward axis is level on average: a file's pelvis
+    may be pitched by a constant that only its skeleton's calibration knows.
+    """
+    line = unit(np.nanmean(np.einsum("tji,tj->ti", body.pelvis, body.joints["l_hip"] - body.joints["r_hip"]), axis=0))
+    turned = body.pelvis @ frame_from(np.array([0.0, 0, 1]), line, exact="y")
+    pitch = np.nanmean(np.arcsin(np.clip(-turned[:, 2, 0], -1, 1)))
+    return replace(body, pelvis=turned @ axis_rotation(1, -pitch))
 
 
 def _robust_line(design: Floats, values: Floats) -> Floats:

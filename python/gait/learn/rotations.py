@@ -25,11 +25,17 @@ def from_angles(angles: Floats, axes: Sequence[int]) -> Floats:
     return result
 
 
-def frame_from(z: Floats, y: Floats) -> Floats:
-    """Frames (T, 3, 3) whose z axis is along `z` and whose y axis is as near to `y` as possible; columns x y z."""
-    z = unit(z)
+def frame_from(z: Floats, y: Floats, exact: str = "z") -> Floats:
+    """Frames (..., 3, 3), axes as columns, with one axis along its vector and the other as near as possible.
+
+    `exact` names the axis, "z" or "y", that lies exactly along its vector.
+    """
     x = unit(np.cross(y, z))
-    return np.stack([x, np.cross(z, x), z], axis=-1)
+    if exact == "z":
+        z = unit(z)
+        return np.stack([x, np.cross(z, x), z], axis=-1)
+    y = unit(y)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
 def unit(v: Floats) -> Floats:

@@ -77,6 +77,7 @@ def load(path: Path, mode: str = "refined") -> Sequence:
         If the file is malformed, or the motion is not cyclic or too short.
     """
     levelled, slope = root.level(body(read_recording(path)))
+    levelled = root.align_pelvis(levelled)
     measures = retarget.measure(levelled)
     angles = retarget.angles(levelled, measures)
     found = period.find(angles, levelled.fps, mode)
