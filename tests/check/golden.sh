@@ -1,19 +1,24 @@
 #!/bin/sh
 # The digests that test_tracker prints are the same at every optimisation level and with every compiler found.
 cd "$(dirname "$0")/../.." || exit 1
+release=$(sed -n 's/^OPT_release *:= *//p' Makefile)
 want='' failed=0 runs=0
+compare() { # CC CXX CONFIG OPT
+    test=build/$3/unit/test_tracker
+    ${MAKE:-make} -s config="$3" OPT="$4" CC="$1" CXX="$2" "$test" >/dev/null || exit 1
+    have=$("$test" | sed -n 's/^digest //p')
+    [ -n "$have" ] || { echo "golden: $test printed no digest" >&2; exit 1; }
+    echo "golden: $1 $4:" $have
+    want=${want:-$have} runs=$((runs + 1))
+    [ "$have" = "$want" ] || failed=$((failed + 1))
+}
 for compiler in gcc:g++ clang:clang++; do
     cc=${compiler%:*} cxx=${compiler#*:}
     command -v "$cc" >/dev/null && command -v "$cxx" >/dev/null || { echo "golden: no $cc, skipped"; continue; }
-    for level in O0 O2 O3; do
-        config=det-$cc-$level test=build/det-$cc-$level/unit/test_tracker
-        ${MAKE:-make} -s config="$config" OPT="-$level" CC="$cc" CXX="$cxx" "$test" >/dev/null || exit 1
-        have=$("$test" | sed -n 's/^digest //p')
-        [ -n "$have" ] || { echo "golden: $test printed no digest" >&2; exit 1; }
-        echo "golden: $cc -$level" $have
-        want=${want:-$have} runs=$((runs + 1))
-        [ "$have" = "$want" ] || failed=$((failed + 1))
+    for level in 0 2 3; do
+        compare "$cc" "$cxx" "det-$cc-O$level" "-O$level"
     done
+    compare "$cc" "$cxx" "det-$cc-release" "$release"
 done
 echo "golden: $((runs - failed)) passed, $failed failed"
 [ "$failed" -eq 0 ] && [ "$runs" -gt 1 ]
