@@ -1,0 +1,44 @@
+"""Rotation matrices for arrays of angles, right-handed, acting on column vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def about(axis: int, angle: ArrayLike) -> Array:
+    """Return rotations (..., 3, 3) by `angle` radians (...) about axis 0 = x, 1 = y, 2 = z."""
+    angle = np.asarray(angle, np.float64)
+    out = np.zeros((*angle.shape, 3, 3))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out[..., axis, axis] = 1
+    out[..., i, i] = out[..., j, j] = np.cos(angle)
+    out[..., j, i] = np.sin(angle)
+    out[..., i, j] = -np.sin(angle)
+    return out
+
+
+def euler(yaw: ArrayLike, pitch: ArrayLike, roll: ArrayLike) -> Array:
+    """Return Rz(yaw) Ry(pitch) Rx(roll): turn left, lean forward, left side up."""
+    return about(2, yaw) @ about(1, pitch) @ about(0, roll)
+
+
+def limb(flexion: ArrayLike, abduction: ArrayLike, rotation: ArrayLike, sign: float) -> Array:
+    """Return a ball joint's rotation from clinical angles; `sign` is +1 on the left, -1 on the right."""
+    return (
+        about(1, -np.asarray(flexion))
+        @ about(0, sign * np.asarray(abduction))
+        @ about(2, -sign * np.asarray(rotation))
+    )
+
+
+def apply(rotation: Array, vector: ArrayLike) -> Array:
+    """Turn vectors (..., 3) by rotations (..., 3, 3)."""
+    return np.einsum("...ij,...j->...i", rotation, np.asarray(vector, np.float64))
+
+
+def unit(vector: Array) -> Array:
+    """Scale vectors (..., 3) to length 1."""
+    return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
