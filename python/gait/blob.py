@@ -96,6 +96,12 @@ def checksum(blob: bytes) -> int:
     return zlib.crc32(blob[CRC_OFFSET + 4 :], zlib.crc32(bytes(4), zlib.crc32(blob[:CRC_OFFSET])))
 
 
+def stored_checksum(path: str | os.PathLike[str]) -> int:
+    """CRC-32 that a blob's header states."""
+    with open(path, "rb") as file:
+        return int(HEADER.unpack(file.read(HEADER.size))[5])
+
+
 def write(path: str | os.PathLike[str], sections: Mapping[str, Array]) -> bytes:
     """Write a blob whole or not at all; return its bytes."""
     blob = encode(sections)

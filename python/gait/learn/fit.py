@@ -16,6 +16,7 @@ Floats = npt.NDArray[np.float64]
 
 SAMPLES = 128
 DEFAULT_COMPONENTS = 5
+MOST_COMPONENTS = 16  # the library reads no more
 #: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as much as
 #: the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per radian).
 ROOT_SCALE = {"root_forward": 1.0, "root_sway": 3.3, "root_height": 3.3}

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn.recording import Y_UP, Recording
+from gait.learn.recording import Y_UP, Recording, mask_zero_runs
 from gait.learn.rotations import from_angles
 
 Floats = npt.NDArray[np.float64]
@@ -60,8 +60,7 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
     skeleton = read_skeleton(find_skeleton(path))
     values = read_motion(path, skeleton)
     if zero_runs:
-        for columns in values.values():
-            columns[zero_run_mask(columns)] = np.nan
+        values = {name: mask_zero_runs(columns) for name, columns in values.items()}
     return assemble(path, skeleton, values, fps or FPS)
 
 
@@ -74,18 +73,6 @@ def find_skeleton(path: Path) -> Path:
     if len(candidates) == 1:
         return candidates[0]
     raise UserError(f"{path}: no skeleton {path.stem.rsplit('_', 1)[0]}.asf beside it; put the .asf in that folder")
-
-
-def zero_run_mask(columns: Floats, run: int = 3) -> npt.NDArray[np.bool_]:
-    """Rows (T,) within runs of at least `run` rows that are exactly 0 in all columns; none if all rows are."""
-    zero = (columns == 0).all(axis=1)
-    if zero.all():
-        return np.zeros_like(zero)
-    edges = np.diff(np.concatenate([[0], zero.astype(int), [0]]))
-    mask = np.zeros_like(zero)
-    for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-        mask[begin:end] = end - begin >= run
-    return mask
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:

@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gait import blob
+from gait._version import __version__
 from gait.learn.fit import Learned
 from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 
-GENERATOR = "gait learn 0.1.0"
+GENERATOR = f"gait {__version__}"
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not this training set
 CMU = (
     "The data used in this project was obtained from mocap.cs.cmu.edu. "

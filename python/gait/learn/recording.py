@@ -52,3 +52,19 @@ class Recording:
     def frames(self) -> int:
         """Number of frames T."""
         return len(self.start)
+
+
+def mask_zero_runs(columns: Floats, run: int = 3) -> Floats:
+    """Copy of a bone's values (T, k) with NaN in runs of at least `run` rows that are exactly 0 in all columns.
+
+    Mocap writes 0 for what was occluded; a bone that is 0 in all rows is fixed and not missing.
+    """
+    zero = (columns == 0).all(axis=1)
+    result = columns.astype(float)
+    if zero.all():
+        return result
+    edges = np.diff(np.concatenate([[0], zero.astype(int), [0]]))
+    for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        if end - begin >= run:
+            result[begin:end] = np.nan
+    return result

@@ -1,0 +1,84 @@
+"""Print what a model holds: source, sizes, statistics, checksum and the acknowledgement it must be shown with."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gait import blob
+
+NAME = "info"
+HELP = "what a model holds"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("model", metavar="M.gait", help="a model of gait learn")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read and print."""
+    sections = blob.read(args.model)
+    summary = describe(sections, os.path.getsize(args.model), blob.stored_checksum(args.model))
+    print(json.dumps(summary) if args.json else text(args.model, summary))
+    return 0
+
+
+def describe(sections: Mapping[str, Any], size: int, crc: int) -> dict[str, Any]:
+    """Figures of a model; a section that is absent gives no entry."""
+    result: dict[str, Any] = {
+        "bytes": size,
+        "crc32": f"{crc:08x}",
+        "sections": {tag: list(array.shape) for tag, array in sections.items()},
+    }
+    for key, tag in (("channels", "CHNM"), ("frames", "FRNM"), ("joints", "PTNM"), ("limbs", "LBNM")):
+        if tag in sections:
+            result[key] = blob.unpack_names(sections[tag])
+    if "CURV" in sections:
+        result |= {"components": len(sections["CURV"]) - 1, "phases": sections["CURV"].shape[1]}
+    if "GAIT" in sections:
+        names = ("stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps")
+        names += ("stature_m", "stature_sd_m")
+        result["gait"] = dict(zip(names, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
+    if "SCST" in sections:
+        result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
+    if "META" in sections:
+        result["meta"] = json.loads(sections["META"].tobytes().decode())
+    return result
+
+
+def text(name: str, s: Mapping[str, Any]) -> str:
+    """Lay the figures out for people."""
+    meta, gait = s.get("meta", {}), s.get("gait", {})
+    lines = [f"{name}: {s['bytes']} bytes, checksum {s['crc32']}"]
+    if "generator" in meta:
+        lines.append(f"{meta.get('activity')} by {meta['generator']}, seed {meta.get('seed')}")
+    if "components" in s:
+        counts = ", ".join(f"{len(s[key])} {key}" for key in ("channels", "frames", "joints", "limbs") if key in s)
+        lines.append(f"{s['components']} components, {s['phases']} phases, {counts}")
+    if gait:
+        lines.append(
+            "{stride_hz:.3f} +- {stride_hz_sd:.3f} strides/s, stride {stride_length:.3f} +- {stride_length_sd:.3f} "
+            "statures, stride time varies by {stride_time_cv:.1%}".format(**gait)
+        )
+    if "sequences" in meta:
+        lines += sequence_lines(meta["sequences"]["rows"])
+    if "variance_explained" in meta:
+        lines.append("variance explained: " + " ".join(f"{v:.3f}" for v in meta["variance_explained"]))
+    if "acknowledgement" in meta:
+        lines.append(meta["acknowledgement"])
+    return "\n".join(lines)
+
+
+def sequence_lines(rows: list[list[Any]]) -> list[str]:
+    """Table of sequences: rows of gait.learn.model.SEQUENCE_COLUMNS."""
+    lines = [f"{'sequence':12}{'period':>9}{'cycles':>8}{'sharpness':>11}{'residual':>10}"]
+    for name, period, cycles, sharpness, residual in rows:
+        rest = "-" if residual is None else f"{residual:.1f} deg"
+        lines.append(f"{name:12}{period:>6} ms{cycles:>8.1f}{sharpness:>11.0f}{rest:>10}")
+    return lines
