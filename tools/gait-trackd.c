@@ -42,7 +42,7 @@ static const option own_options[] = {
      TEXT(out)},
     {"config", 0, "FILE", "lines `name = value` with the long names of these options; the command line wins",
      TEXT(config)},
-    {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 99)},
+    {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
     {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
     {"particles", 'n', "N", "hypotheses; default 1000, paper mode 10000", INT(particles, 16, 1 << 20)},
     {"components", 0, "Q", "principal components in use; default all of the model's",
@@ -146,7 +146,8 @@ static bool load(service *s, pool *threads, lcm_t *out, message *why)
         return false;
     if (has_init && !init_file_read(settings.init, s->track.model, &init, why))
         return false;
-    if (!service_open(s, out, settings.threads, has_init ? &init : NULL, settings.particles_channel, why))
+    if (!service_open(s, out, settings.stream, settings.threads, has_init ? &init : NULL,
+                      settings.particles_channel, why))
         return false;
     if (settings.camera[0] &&
         (!camera_file_read(settings.camera, &camera, why) || !service_set_camera(s, &camera, why)))
@@ -174,8 +175,7 @@ static bool serve(service *s, pool *threads, const sigset_t *unblocked, message 
     const char *const to = settings.out[0] ? settings.out : log ? NULL : url;
     receiver r = {0};
     lcm_t *const out = to ? link_open(to, why) : NULL;
-    bool const ok = (!to || out) && load(s, threads, out, why) &&
-                    receiver_open(&r, s, url, settings.stream, why) &&
+    bool const ok = (!to || out) && load(s, threads, out, why) && receiver_open(&r, s, url, why) &&
                     receiver_run(&r, &quit, unblocked, why);
     if (ok) {
         service_send_status(s);

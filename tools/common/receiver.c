@@ -69,8 +69,9 @@ static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *use
         service_command(r->service, &msg);
 }
 
-static bool subscribe(receiver *r, int camera, message *why)
+static bool subscribe(receiver *r, message *why)
 {
+    int const camera = r->service->stream;
     char name[3][32];
     snprintf(name[0], sizeof name[0], "GAIT_IMAGE_%d", camera);
     snprintf(name[1], sizeof name[1], "GAIT_CAMERA_%d", camera);
@@ -81,14 +82,14 @@ static bool subscribe(receiver *r, int camera, message *why)
            link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why);
 }
 
-bool receiver_open(receiver *r, service *s, const char *url, int camera, message *why)
+bool receiver_open(receiver *r, service *s, const char *url, message *why)
 {
     *r = (receiver){.service = s, .log = link_is_log(url)};
     r->images = link_open(url, why);
     if (!r->images)
         return false;
     r->others = r->log ? r->images : link_open(url, why);
-    return r->others && subscribe(r, camera, why);
+    return r->others && subscribe(r, why);
 }
 
 void receiver_close(receiver *r)

@@ -14,8 +14,8 @@ typedef struct receiver {
     bool log;
 } receiver;
 
-/* Connect to camera `camera` of `url` and subscribe. */
-bool receiver_open(receiver *r, service *s, const char *url, int camera, message *why);
+/* Connect to `url` and subscribe. */
+bool receiver_open(receiver *r, service *s, const char *url, message *why);
 void receiver_close(receiver *r);
 /* Serve until *quit is set by a signal, or the log ends.  Signals must be blocked; `unblocked` is the mask to wait
  * with. */

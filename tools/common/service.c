@@ -83,9 +83,11 @@ static bool open_particles(service *s, message *why)
            message_set(why, "not enough memory for --particles-channel with %zu particles", n);
 }
 
-bool service_open(service *s, lcm_t *out, int threads, const init_state *init, bool particles, message *why)
+bool service_open(service *s, lcm_t *out, int stream, int threads, const init_state *init, bool particles,
+                  message *why)
 {
     s->out = out;
+    s->stream = stream;
     s->threads = threads;
     s->has_init = init != NULL;
     if (init)

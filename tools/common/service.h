@@ -21,6 +21,7 @@ typedef struct service {
     tracking track;
     lcm_t *out; /* where messages go; NULL: nowhere */
     int threads;
+    int stream; /* number of the camera, [0, 30] */
     bool has_init;
     init_state init; /* of --init FILE */
     arming start;
@@ -41,7 +42,8 @@ typedef struct service {
 } service;
 
 /* `track` is open.  With `particles` the memory for GAIT_PARTICLES is taken now. */
-bool service_open(service *s, lcm_t *out, int threads, const init_state *init, bool particles, message *why);
+bool service_open(service *s, lcm_t *out, int stream, int threads, const init_state *init, bool particles,
+                  message *why);
 void service_close(service *s);
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why);

@@ -52,7 +52,7 @@ void service_send_status(service *s)
         .model_digest = (int64_t)s->track.info.digest,
         .tracker_digest = (int64_t)service_digest(s),
         .state = s->state,
-        .background_mask = s->track.background.data != NULL,
+        .background_mask = s->track.background.data ? 1 << s->stream : 0,
         .command_id = s->command_id,
         .frames = s->counts.frames,
         .dropped = s->counts.dropped,

@@ -10,7 +10,7 @@ static const struct {
     size_t offset;
     double low, high;
     const char *help;
-} fields[TRACKER_OPTIONS] = {
+} fields[] = {
     {"texture-weight", FIELD(term_weight[0]), 0, 1e6, "nats per unit cost of the previous frame's texture"},
     {"silhouette-weight", FIELD(term_weight[1]), 0, 1e6, "nats per unit cost of the silhouette"},
     {"edges-weight", FIELD(term_weight[2]), 0, 1e6, "nats per unit cost of the edges"},
@@ -23,6 +23,8 @@ static const struct {
     {"rate-noise", FIELD(rate_noise), 0, 1e3, "fraction of the mean stride rate per sqrt(second)"},
     {"rate-noise-start", FIELD(rate_noise_start), 0, 1e3, "the same while settling"},
     {"settle-time", FIELD(settle_time), 0, 1e3, "seconds after the start with rate-noise-start"},
+    {"rate-time", FIELD(rate_time), 0, 1e3,
+     "time constant of the rate's return to the population's, seconds"},
     {"forward-noise", FIELD(forward_noise), 0, 1e3, "metres per sqrt(second)"},
     {"lateral-noise", FIELD(lateral_noise), 0, 1e3, "metres per sqrt(second)"},
     {"vertical-noise", FIELD(vertical_noise), 0, 1e3, "metres per sqrt(second)"},
@@ -33,6 +35,8 @@ static const struct {
     {"coef-time", FIELD(coef_time), 0, 1e6, "seconds in which the scores return to the mean; 0: never"},
     {"stature-noise", FIELD(stature_noise), 0, 1e3, "fraction of stature per sqrt(second), while settling"},
 };
+
+_Static_assert(sizeof fields / sizeof *fields == TRACKER_OPTIONS, "every field has a value");
 
 void tracker_options_table(tracker_values *values, option *table)
 {

@@ -17,7 +17,7 @@ except ImportError as exc:  # its own fallbacks hide the reason: liblcm needs th
     raise UserError(f"lcm: cannot be loaded ({exc}); install libglib2.0-0 and the lcm wheel") from None
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
-"""Room for the receiver is part of the URL: with the system's default a colour stream loses 9 of 10 messages."""
+"""Room for the receiver is part of the URL: the system's default loses 9 of 10 colour frames."""
 
 ROUTE_REMEDY = "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
 _RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
@@ -43,12 +43,14 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
             return lcm.LCM(wanted)
     except RuntimeError:
         if is_log(wanted):
-            raise UserError(f"{wanted}: cannot open this log; give file:///PATH?speed=0 (mode=w to write)") from None
+            raise UserError(
+                f"{wanted}: cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
+            ) from None
         raise UserError(f"{wanted}: cannot open LCM; {ROUTE_REMEDY}") from None
 
 
 def is_log(url: str) -> bool:
-    """Is it a log file, which loses nothing?"""
+    """Tell a log file, which loses nothing, from a network."""
     return url.startswith("file://")
 
 
@@ -61,7 +63,7 @@ def private_url() -> str:
 
 
 def multicast_works() -> bool:
-    """Can LCM open its default network here?"""
+    """Try whether LCM can open its default network here."""
     try:
         open_lcm(DEFAULT_URL)
     except UserError:

@@ -77,7 +77,7 @@ def image_message(image: Image, utime: int, frame: int, jpeg: int | None = None)
 
 
 def frame_number(message: Any) -> int:
-    """Running number of an ``image_t`` at its source; -1 if it does not count."""
+    """Return the running number of an ``image_t`` at its source; -1 if it does not count."""
     for entry in message.metadata:
         if entry.key == _FRAME_KEY and entry.n == 8:
             return int.from_bytes(entry.value, "big", signed=True)
@@ -97,7 +97,7 @@ def picture(message: Any) -> Image:
         image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
         if image is None:
             raise UserError("image: JPEG frame cannot be decoded")
-        return image
+        return np.asarray(image, np.uint8)
     channels = {kind.PIXEL_FORMAT_GRAY: 1, kind.PIXEL_FORMAT_RGB: 3, kind.PIXEL_FORMAT_BGR: 3}
     depth = channels.get(message.pixelformat)
     if depth is None:
@@ -129,11 +129,13 @@ def camera_of(message: Any) -> Camera:
     """Read a ``camera_t``."""
     plain = {name: getattr(message, name) for name in ("width", "height", "fx", "fy", "cx", "cy")}
     turn = np.reshape(message.R, (3, 3)).astype(float)
-    return Camera(**plain, R=turn, t=np.array(message.t, float), distortion=np.array(message.distortion, float))
+    return Camera(
+        **plain, R=turn, t=np.array(message.t, float), distortion=np.array(message.distortion, float)
+    )
 
 
 def state_message(values: State | Mapping[str, Any]) -> Any:
-    """Make a ``state_t`` from a `State`, or from some of its fields: the others are unknown (not a number)."""
+    """Make a ``state_t`` from a `State`, or from some of its fields: the others are NaN, unknown."""
     known = vars(values) if isinstance(values, State) else values
     message = gaitmsg.state_t()
     for name in SCALARS:

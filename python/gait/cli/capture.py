@@ -1,0 +1,133 @@
+"""Send the frames of a video file or of a camera over LCM, as a camera in the field would.
+
+A file is sent at the rate at which it was taken, with the capture times it would have had, beginning now.
+The number of each frame goes along, so that a receiver can count what it missed.  Calibration and empty scene
+are announced at the start and every two seconds.  With --init the tracker gets a START for the right frame.
+
+--wait makes sure that a tracker listens: the stream begins when gait-trackd has confirmed camera, empty scene
+and START.  Without it the stream begins at once.
+
+--url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd plays without loss.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import sys
+
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.initial import Start
+from gait.lcm.capture import Publisher, Setup
+from gait.lcm.link import buffer_warning, lcm_url
+from gait.lcm.pacing import Pacer, parse_rate
+from gait.lcm.source import DeviceSource, FileSource, is_device
+from gait.model import Model
+from gait.progress import progress
+from gait.video import background, read_plate
+
+NAME = "capture"
+HELP = "send the frames of a video or a camera over LCM"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument(
+        "source", metavar="VIDEO|DEVICE", help="file that FFmpeg reads, or camera: 0, /dev/video0"
+    )
+    parser.add_argument(
+        "--camera", metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name, to announce"
+    )
+    parser.add_argument(
+        "--background", default="none", metavar="PNG|auto|none", help="empty scene to announce (none)"
+    )
+    parser.add_argument("--init", metavar="INIT.json|auto", help="first state, sent as START (none)")
+    parser.add_argument(
+        "-m", "--model", metavar="M.gait", help="whose prior fills what --init leaves open (the shipped one)"
+    )
+    parser.add_argument(
+        "--height", type=float, metavar="M", help="the person's stature in metres, for --init"
+    )
+    parser.add_argument("--start", type=int, default=0, metavar="F", help="first frame to send, from 0 (0)")
+    parser.add_argument("--stop", type=int, metavar="F", help="first frame not to send")
+    parser.add_argument("--rate", default="true", metavar="true|max|HZ", help="speed of sending (true)")
+    parser.add_argument("--jpeg", type=int, metavar="Q", help="compress frames with this quality, 1 to 100")
+    parser.add_argument("--grey", action="store_true", help="send grey frames")
+    parser.add_argument("--loop", action="store_true", help="repeat the file until interrupted")
+    parser.add_argument("--stream", type=int, default=0, metavar="I", help="number of the camera (0)")
+    parser.add_argument(
+        "--wait", type=float, default=0.0, metavar="S", help="for a tracker, at most S seconds (0)"
+    )
+    parser.add_argument("--url", metavar="URL", help="LCM (LCM_DEFAULT_URL or multicast on this machine)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Send and report."""
+    if args.jpeg is not None and not 1 <= args.jpeg <= 100:
+        raise UserError(f"--jpeg {args.jpeg}: give a quality from 1 to 100")
+    url, rate = lcm_url(args.url), parse_rate(args.rate)
+    source = _source(args)
+    publisher = Publisher(url, _setup(args, source))
+    warning = buffer_warning(url)
+    if warning and not args.quiet:
+        print(f"gait capture: {warning}", file=sys.stderr)
+    if args.wait > 0:
+        publisher.meet(args.wait)
+    pacer = publisher.begin(source, float("inf") if source.live else rate, args.wait)
+    total = None if isinstance(source, DeviceSource) or args.loop else (args.stop or source.video.count)
+    interrupt = contextlib.suppress(KeyboardInterrupt)  # the way to end a camera or a loop
+    with progress("sending", total, args.quiet) as update, interrupt:
+        publisher.send(source.frames(), pacer, update)
+    _report(args, publisher, pacer)
+    return 0
+
+
+def _source(args: argparse.Namespace) -> FileSource | DeviceSource:
+    if not is_device(args.source):
+        return FileSource(args.source, args.start, args.stop, grey=args.grey, loop=args.loop)
+    if args.start or args.stop is not None or args.loop or args.rate != "true" or args.background == "auto":
+        raise UserError(
+            f"{args.source}: is a camera: --start --stop --loop --rate and --background auto are for files"
+        )
+    return DeviceSource(args.source, grey=args.grey)
+
+
+def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup:
+    setup = Setup(stream=args.stream, jpeg=args.jpeg)
+    if args.camera:
+        setup.camera = Camera.read(args.camera, source.size)
+    if isinstance(source, DeviceSource):
+        setup.plate = None if args.background == "none" else read_plate(args.background, source.size)
+    else:
+        with progress("background", source.video.count, args.quiet) as update:
+            setup.plate = background(args.background, source.video, update)
+    if args.init:
+        setup.start = _start(args, source, setup)
+        if isinstance(source, FileSource):
+            setup.start_time = source.time_of(setup.start.frame)
+        if setup.start.frame < args.start:
+            raise UserError(
+                f"{args.init}: frame {setup.start.frame} comes before --start {args.start}; begin earlier"
+            )
+    return setup
+
+
+def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: Setup) -> Start:
+    model = Model(args.model)
+    if args.init != "auto":
+        return Start.read(args.init, model, height=args.height)
+    if isinstance(source, DeviceSource) or setup.camera is None:
+        raise UserError("--init auto: needs a video file and --camera; give an init file")
+    from gait.autostart import find_start  # slow to load, and only needed here
+
+    return find_start(source.video, setup.camera, setup.plate, model, height=args.height)
+
+
+def _report(args: argparse.Namespace, publisher: Publisher, pacer: Pacer) -> None:
+    late = round(pacer.late * 1000, 2)
+    if args.json:
+        print(json.dumps({"frames": publisher.sent, "late_ms": late}))
+    elif not args.quiet:
+        print(f"{publisher.sent} frames sent, at most {late:g} ms late")

@@ -1,0 +1,163 @@
+"""Send frames, calibration, empty scene and start to a tracker."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.initial import Start
+from gait.lcm.link import is_log, open_lcm
+from gait.lcm.messages import camera_message, command_message, decode, image_message
+from gait.lcm.pacing import Pacer
+from gait.lcm.source import DeviceSource, FileSource
+from gait.lcm.types import gaitmsg
+from gait.video import Frame, Image
+
+ANNOUNCE = 2.0  # seconds of video between two announcements of camera and empty scene
+_ASK = 0.5  # seconds until a question to the tracker is repeated
+_LEAD = 0.5  # seconds from START to the first frame, in which the tracker can confirm
+
+
+@dataclass
+class Setup:
+    """What is sent beside the frames.
+
+    Attributes
+    ----------
+    stream : int
+        Number of the camera.
+    camera : Camera or None
+    plate : image or None
+        Empty scene.
+    start : Start or None
+        First state of the walker.
+    start_time : float
+        Video time of `start`, seconds.
+    jpeg : int or None
+        Quality of compressed frames.
+    """
+
+    stream: int = 0
+    camera: Camera | None = None
+    plate: Image | None = None
+    start: Start | None = None
+    start_time: float = 0.0
+    jpeg: int | None = None
+
+
+class Publisher:
+    """One stream of frames on ``GAIT_IMAGE_<i>`` and what belongs to it.
+
+    Attributes
+    ----------
+    sent : int
+        Frames sent.
+    """
+
+    def __init__(self, url: str, setup: Setup) -> None:
+        self._setup, self._lcm = setup, open_lcm(url)
+        self._log = is_log(url)
+        self._status: Any = None
+        self._announced = -ANNOUNCE
+        self.sent = 0
+        if not self._log:
+            self._lcm.subscribe("GAIT_STATUS", self._on_status).set_queue_capacity(8)
+
+    def meet(self, patience: float) -> None:
+        """Announce until a tracker has said that it knows camera and empty scene.
+
+        Raises
+        ------
+        UserError
+            If none has after `patience` seconds.
+        """
+        self._ask(patience, lambda: self.announce(0), self._is_ready, "knows the camera")
+
+    def begin(self, source: FileSource | DeviceSource, rate: float | None, patience: float) -> Pacer:
+        """Send START and return the clock of the stream, whose first frame is due from then on.
+
+        With `patience` > 0 START is repeated, each time for a later stream, until a tracker confirms it.  The
+        START of a file is for one capture time; that of a live camera is for the frame that comes next.
+        """
+        if self._setup.start is None or patience <= 0 or self._log:
+            pacer = Pacer(rate, source.first)
+            if self._setup.start is not None:
+                self._send_start(0 if source.live else pacer.utime(self._setup.start_time))
+            return pacer
+        deadline = time.monotonic() + patience
+        while time.monotonic() < deadline:
+            pacer = Pacer(rate, source.first, 0.0 if source.live else _LEAD)
+            asked = self._send_start(0 if source.live else pacer.utime(self._setup.start_time))
+            if self._listen(0.8 * _LEAD, partial(_confirms, asked)):
+                return pacer
+        raise UserError(
+            f"no tracker confirmed START within {patience:g} s; is gait-trackd running on this URL?"
+        )
+
+    def send(self, frames: Iterable[Frame], pacer: Pacer, done: Callable[[int], None]) -> None:
+        """Send each frame when it is due; `done` is told the number of each."""
+        channel, jpeg = f"GAIT_IMAGE_{self._setup.stream}", self._setup.jpeg
+        for frame in frames:
+            if frame.time - self._announced >= ANNOUNCE:
+                self._announced = frame.time
+                self.announce(pacer.utime(frame.time))
+            data = image_message(frame.image, pacer.utime(frame.time), frame.number, jpeg).encode()
+            pacer.wait(frame.time)
+            self._lcm.publish(channel, data)
+            self.sent += 1
+            done(frame.number)
+
+    def announce(self, utime: int) -> None:
+        """Send calibration and empty scene, as far as they are known."""
+        stream, setup = self._setup.stream, self._setup
+        if setup.camera is not None:
+            self._lcm.publish(f"GAIT_CAMERA_{stream}", camera_message(setup.camera, utime).encode())
+        if setup.plate is not None:
+            self._lcm.publish(f"GAIT_BACKGROUND_{stream}", image_message(setup.plate, utime, -1).encode())
+
+    def _send_start(self, utime: int) -> int:
+        """Send START for capture time `utime`; return its id."""
+        start = self._setup.start
+        assert start is not None
+        command = command_message(gaitmsg.command_t.START, utime, start.mean, start.sd)
+        if self._log:
+            self.announce(utime)  # in a log the camera must come before what depends on it
+        self._lcm.publish("GAIT_COMMAND", command.encode())
+        return int(command.id)
+
+    def _is_ready(self, status: Any) -> bool:
+        plate = self._setup.plate is None or bool(status.background_mask >> self._setup.stream & 1)
+        return plate and status.state != gaitmsg.status_t.WAITING
+
+    def _ask(
+        self, patience: float, question: Callable[[], None], answered: Callable[[Any], bool], what: str
+    ) -> None:
+        deadline = time.monotonic() + patience
+        while time.monotonic() < deadline:
+            question()
+            if self._listen(_ASK, answered):
+                return
+        heard = f"; it says: {self._status.text}" if self._status else "; none was heard"
+        raise UserError(
+            f"no tracker {what} after {patience:g} s{heard}; start gait-trackd on the same URL first"
+        )
+
+    def _listen(self, seconds: float, wanted: Callable[[Any], bool]) -> bool:
+        """Wait for a status that is `wanted`."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0:
+            if self._lcm.handle_timeout(max(1, round(left * 1000))) > 0 and wanted(self._status):
+                return True
+        return False
+
+    def _on_status(self, channel: str, data: bytes) -> None:
+        self._status = decode(gaitmsg.status_t, data, channel)
+
+
+def _confirms(command_id: int, status: Any) -> bool:
+    return bool(status.command_id == command_id)

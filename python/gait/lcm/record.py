@@ -1,0 +1,187 @@
+"""Collect a tracker's estimates from LCM into a track file, with what it took to get them."""
+
+from __future__ import annotations
+
+import csv
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gait.errors import UserError
+from gait.files import replacing
+from gait.lcm.link import is_log, open_lcm
+from gait.lcm.messages import decode, estimate_of, now
+from gait.lcm.types import gaitmsg
+from gait.trackfile import TrackWriter
+from gait.video import Frame
+
+TIMING_COLUMNS = ("frame", "utime", "status", "step_ms", "reach_ms", "latency_ms", "dropped")
+_NO_IMAGE = np.empty((0, 0), np.uint8)
+_TURN_MS = 100  # longest wait before looking whether to stop
+_QUEUE = 1000  # estimates that may wait for the disk
+
+
+@dataclass
+class Figures:
+    """What was seen on the way: one entry per estimate, milliseconds."""
+
+    step: list[float] = field(default_factory=list)
+    latency: list[float] = field(default_factory=list)
+    utime: list[int] = field(default_factory=list)
+    last: Any = None
+    lost: int = 0
+
+    def add(self, message: Any, arrived: int) -> None:
+        """Take in one estimate."""
+        if self.last is not None and message.step > self.last.step + 1:
+            self.lost += message.step - self.last.step - 1
+        self.last = message
+        self.step.append(message.step_us / 1e3)
+        self.latency.append((arrived - message.utime) / 1e3)
+        self.utime.append(message.utime)
+
+    def summary(self, live: bool) -> dict[str, Any]:
+        """Figures as ``gait record --json`` prints them; latency means something only for a `live` stream."""
+        span = (self.utime[-1] - self.utime[0]) / 1e6 if len(self.utime) > 1 else 0.0
+        last = self.last
+        return {
+            "frames": len(self.utime),
+            "dropped": last.dropped if last else 0,
+            "lost": self.lost,
+            "fps": (len(self.utime) - 1) / span if span > 0 else None,
+            "step_ms": spread(self.step),
+            "latency_ms": spread(self.latency) if live else None,
+            "model_digest": _hex(last.model_digest) if last else None,
+            "digest": _hex(last.tracker_digest) if last else None,
+        }
+
+
+class Recorder:
+    """Write estimates as they come.
+
+    Parameters
+    ----------
+    url : str
+    output : str
+        Track file, as ``gait track`` writes it.
+    timing : str, optional
+        CSV of `TIMING_COLUMNS`: time of a step, from capture to the tracker (reach), to here (latency).
+
+    Attributes
+    ----------
+    figures : Figures
+    stop : bool
+        Set it to end `run` in good order.
+    """
+
+    def __init__(self, url: str, output: str, timing: str | None = None) -> None:
+        self._lcm, self._live = open_lcm(url), not is_log(url)
+        self._output, self._timing = output, timing
+        self._waiting: list[tuple[Any, int]] = []
+        self._writer: TrackWriter | None = None
+        self._rows: Any = None
+        self._origin = 0
+        self._last = 0.0
+        self.figures = Figures()
+        self.stop = False
+        self._lcm.subscribe("GAIT_ESTIMATE", self._on_estimate).set_queue_capacity(_QUEUE)
+
+    def run(
+        self, frames: int | None = None, idle: float | None = None, patience: float | None = None
+    ) -> None:
+        """Record until `frames` have come, none has for `idle` seconds, the log ends, or `stop` is set.
+
+        Raises
+        ------
+        UserError
+            If nothing came at all, within `patience` seconds where that is given; no file is written then.
+        """
+        begun = time.monotonic()
+        with ExitStack() as self._stack:
+            while not self.stop and self._handle():
+                count, clock = len(self.figures.utime), time.monotonic()
+                quiet = idle is not None and clock - self._last > idle
+                late = patience is not None and clock - begun > patience
+                if (frames is not None and count >= frames) or (quiet if count else late):
+                    break
+            self._flush()
+            if not self.figures.utime:
+                raise UserError(
+                    "GAIT_ESTIMATE: no estimate was received; is gait-trackd tracking on this URL?"
+                )
+
+    def summary(self) -> dict[str, Any]:
+        """Figures of the recording."""
+        return self.figures.summary(self._live)
+
+    def _handle(self) -> bool:
+        """Wait for a message; False at the end of a log."""
+        try:
+            self._lcm.handle_timeout(_TURN_MS)
+        except OSError:
+            if self._live:
+                raise
+            return False
+        return True
+
+    def _on_estimate(self, channel: str, data: bytes) -> None:
+        arrived = now()
+        message = decode(gaitmsg.estimate_t, data, channel)
+        previous = self.figures.last
+        if previous is not None and _number(message) <= _number(previous):
+            self.stop = True  # another stream has begun: one file holds one
+            return
+        self.figures.add(message, arrived)
+        self._last = time.monotonic()
+        self._waiting.append((message, arrived))
+        if self._writer is not None or len(self._waiting) == 2:
+            self._flush()
+
+    def _flush(self) -> None:
+        """Write what waits; the first two rows wait for each other, because together they date frame 0."""
+        if self._waiting and self._writer is None:
+            self._open()
+        for message, arrived in self._waiting:
+            assert self._writer is not None
+            seconds = (message.utime - self._origin) / 1e6
+            self._writer.write(Frame(_number(message), seconds, _NO_IMAGE), estimate_of(message))
+            if self._rows is not None:
+                reach, latency = ((t - message.utime) / 1e3 for t in (message.receive_utime, arrived))
+                times = (f"{t:.3f}" for t in (message.step_us / 1e3, reach, latency))
+                self._rows.writerow(
+                    [_number(message), message.utime, message.status, *times, message.dropped]
+                )
+        self._waiting.clear()
+
+    def _open(self) -> None:
+        first, last = self._waiting[0][0], self._waiting[-1][0]
+        interval = (last.utime - first.utime) / max(1, _number(last) - _number(first))
+        self._origin = first.utime - round(interval * _number(first))
+        joints = tuple(joint.name for joint in first.joints)
+        angles = tuple(angle.name for angle in first.angles)
+        self._writer = self._stack.enter_context(TrackWriter(self._output, first.mean.ncoef, joints, angles))
+        if self._timing is not None:
+            path = self._stack.enter_context(replacing(self._timing))
+            file = self._stack.enter_context(path.open("w", newline="", encoding="utf-8"))
+            self._rows = csv.writer(file, lineterminator="\n")
+            self._rows.writerow(TIMING_COLUMNS)
+
+
+def spread(values: list[float]) -> dict[str, float] | None:
+    """Median, 99th percentile and maximum."""
+    if not values:
+        return None
+    median, p99 = np.percentile(values, [50, 99])
+    return {"median": float(median), "p99": float(p99), "max": float(max(values))}
+
+
+def _number(message: Any) -> int:
+    """Frame number of an estimate: the source's, else the count of steps."""
+    return int(message.frame if message.frame >= 0 else message.step)
+
+
+def _hex(digest: int) -> str:
+    return f"{digest & (1 << 64) - 1:016x}"
