@@ -1,0 +1,140 @@
+"""What README.md tells people to type works."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import gait
+
+ROOT = Path(__file__).resolve().parents[2]
+BIN = ROOT / ".venv" / "bin"
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+ENV = {k: v for k, v in os.environ.items() if not k.startswith("MAKE")} | {
+    "PATH": f"{BIN}:{os.environ['PATH']}"
+}
+
+
+def blocks(language: str) -> list[str]:
+    """Fenced blocks of one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", TEXT, re.M | re.S)
+
+
+def commands(program: str) -> list[str]:
+    """Shell commands that begin with the program."""
+    lines = "".join(blocks("sh")).replace("\\\n", " ").splitlines()
+    return [line.split("#")[0].strip() for line in lines if re.match(rf"{re.escape(program)}\b", line)]
+
+
+def run(*command: object, **options: object) -> subprocess.CompletedProcess[str]:
+    """Run and show what it said if it fails."""
+    done = subprocess.run(
+        [*map(str, command)], capture_output=True, text=True, env=ENV, timeout=300, **options
+    )
+    assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+    return done
+
+
+@pytest.mark.parametrize("command", commands("make"))
+def test_make_targets_exist(command):
+    run(*command.split(), "--dry-run", cwd=ROOT)
+    target = command.split()[1]
+    assert f" {target} " in run("make", "help", cwd=ROOT).stdout
+
+
+@pytest.mark.parametrize("command", [*commands("gait"), *commands("build/bin/gait-trackd")])
+def test_options_exist(command):
+    words = command.split()
+    program = words[:2] if words[0] == "gait" else words[:1]
+    text = run(*program, "--help", cwd=ROOT).stdout
+    options = [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]
+    assert [o for o in options if not re.search(rf"(^|[\s,\[]){re.escape(o)}\b", text, re.M)] == []
+
+
+def test_every_command_is_named():
+    text = run("gait", "--help").stdout
+    names = re.findall(r"^    (\w+)  ", text, re.M)
+    assert names
+    assert [n for n in names if f"`gait {n}`" not in TEXT] == []
+
+
+def test_every_file_and_folder_named_is_there():
+    links = re.findall(r"\]\(([^)#:]+)\)", TEXT)
+    assert links
+    assert [p for p in links if not (ROOT / p).exists()] == []
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """Folder in which the commands of "From a video to a track" were run."""
+    folder = tmp_path_factory.mktemp("readme")
+    (block,) = (b for b in blocks("sh") if "gait simulate" in b)
+    run("sh", "-e", "-c", block, cwd=folder)
+    return folder
+
+
+def test_the_commands_track_the_clip(walk):
+    rows = (walk / "track.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) > 30
+    assert rows[0].startswith("frame,time,status,phase")
+
+
+def test_the_python_example_follows_the_walker(walk):
+    (code,) = blocks("python")
+    done = run(BIN / "python", "-c", code, cwd=walk)
+    places = [float(line.split()[1]) for line in done.stdout.splitlines()]
+    assert len(places) > 30
+    assert max(places) - min(places) > 1.0
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory):
+    """The C example, built against the library."""
+    folder = tmp_path_factory.mktemp("example")
+    (code,) = blocks("c")
+    (folder / "example.c").write_text(code, encoding="utf-8")
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{ROOT}/libgait/include"]
+    library = ROOT / "build/release/libgait.a"
+    run("cc", *flags, folder / "example.c", library, "-lm", "-o", folder / "example")
+    return folder / "example"
+
+
+def drawn_walk(frames: int) -> tuple[bytes, list[float]]:
+    """Grey frames of the scene that the example describes, and the true x of the pelvis."""
+    model = gait.Model()
+    rotation = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
+    camera = gait.Camera(640, 480, 800.0, 800.0, 320.0, 240.0, rotation, np.array([0, 1.4, 8]))
+    rng = np.random.default_rng(1)
+    plate = cv2.resize(rng.integers(40, 200, (96, 128)).astype(np.uint8), (640, 480))
+    cloth = cv2.resize(rng.integers(0, 40, (160, 213)).astype(np.uint8), (640, 480))
+    walker, _ = model.prior()
+    walker.phase, walker.pelvis[0] = 0.3, -1.0
+    pictures, places = [], []
+    for _ in range(frames):
+        walker.pelvis[2] = model.pelvis_height(walker)
+        ids = model.render(camera, walker)
+        pictures.append(np.where(ids > 0, 30 + ids * 12 % 160 + cloth, plate).astype(np.uint8).tobytes())
+        places.append(float(walker.pelvis[0]))
+        walker.phase = (walker.phase + walker.stride_hz / 30) % 1
+        walker.pelvis[0] += walker.stature * walker.stride_hz * model.info.stride_length / 30
+    return b"".join(pictures), places
+
+
+def test_the_c_example_follows_a_drawn_walker(example):
+    pictures, places = drawn_walk(60)
+    shipped = ROOT / "python/gait/data/walk.gait"
+    done = subprocess.run([example, shipped], input=pictures, capture_output=True, timeout=300)
+    assert done.returncode == 0, done.stdout
+    found = [float(line.split()[0]) for line in done.stdout.decode().splitlines()]
+    assert len(found) == 60
+    assert np.abs(np.array(found) - places)[30:].max() < 0.15
+
+
+def test_the_c_example_refuses_a_file_that_is_no_model(example):
+    done = subprocess.run([example, ROOT / "README.md"], input=b"", capture_output=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stdout.strip()
