@@ -204,7 +204,7 @@ static inline void toy_curves(float *curve, int phases, int components)
 typedef struct toy_file {
     unsigned char *at;
     size_t used;
-    uint32_t sections;
+    uint32_t sections, room; /* written, announced */
 } toy_file;
 
 static inline void toy_put(unsigned char *p, uint64_t v, int bytes)
@@ -226,10 +226,31 @@ static inline uint32_t toy_crc(const unsigned char *p, size_t n)
 }
 
 /* Make the checksum of a blob right after its bytes were changed. */
-static inline void toy_seal(unsigned char *blob, size_t bytes)
+static inline void toy_seal(unsigned char *b, size_t bytes)
 {
-    toy_put(blob + 20, 0, 4);
-    toy_put(blob + 20, toy_crc(blob, bytes), 4);
+    toy_put(b + 20, 0, 4);
+    toy_put(b + 20, toy_crc(b, bytes), 4);
+}
+
+/* Start a blob of so many sections in buf, TOY_BYTES of which are cleared. */
+static inline toy_file toy_begin(unsigned char *buf, uint32_t sections)
+{
+    memset(buf, 0, TOY_BYTES);
+    return (toy_file){.at = buf, .used = (64 + 48 * (size_t)sections + 63) / 64 * 64, .room = sections};
+}
+
+/* Write the header; returns the size of the blob. */
+static inline size_t toy_finish(toy_file *f)
+{
+    if (f->sections != f->room)
+        abort();
+    memcpy(f->at, "GAITMDL\n", 8);
+    toy_put(f->at + 8, 1, 2);
+    toy_put(f->at + 12, 64, 4);
+    toy_put(f->at + 16, f->sections, 4);
+    toy_put(f->at + 24, f->used, 8);
+    toy_seal(f->at, f->used);
+    return f->used;
 }
 
 /* Append a section: type 1 = u8, 2 = i32, 3 = f32; unused dimensions 1. */
@@ -244,7 +265,7 @@ static inline void toy_section(toy_file *f, const char *tag, uint32_t type, uint
         toy_put(e + 4 + 4 * i, field[i], 4);
     toy_put(e + 32, f->used, 8);
     toy_put(e + 40, bytes, 8);
-    if (f->used + bytes + 63 > TOY_BYTES)
+    if (f->used + bytes + 63 > TOY_BYTES || f->sections > f->room)
         abort();
     memcpy(f->at + f->used, data, bytes);
     f->used = (f->used + bytes + 63) & ~(size_t)63;
@@ -359,22 +380,13 @@ static inline void toy_put_curves(toy_file *f, int phases, int components)
 static inline size_t toy_write(unsigned char *buf, int phases, int components)
 {
     static const char meta[] = "{\"activity\":\"walk\",\"generator\":\"tests/unit/toy_model.h\"}";
-    toy_file f = {.at = buf, .used = (64 + 48 * TOY_SECTIONS + 63) / 64 * 64};
-    memset(buf, 0, TOY_BYTES);
+    toy_file f = toy_begin(buf, TOY_SECTIONS);
     toy_section(&f, "META", 1, 1, sizeof meta - 1, 1, 1, meta);
     toy_put_curves(&f, phases, components);
     toy_put_skeleton(&f);
     toy_put_points(&f);
     toy_put_limbs(&f);
-    if (f.sections != TOY_SECTIONS)
-        abort();
-    memcpy(buf, "GAITMDL\n", 8);
-    toy_put(buf + 8, 1, 2);
-    toy_put(buf + 12, 64, 4);
-    toy_put(buf + 16, f.sections, 4);
-    toy_put(buf + 24, f.used, 8);
-    toy_seal(buf, f.used);
-    return f.used;
+    return toy_finish(&f);
 }
 
 /* The standard blob in static memory, aligned to GAIT_ALIGN. */
@@ -395,8 +407,8 @@ static inline const gait_model *toy_model(void)
     static gait_model *model;
     gait_error err = {0};
     size_t bytes;
-    const void *const blob = toy_model_blob(&bytes);
-    if (!model && gait_model_init(mem, sizeof mem, blob, bytes, &model, &err) != GAIT_OK) {
+    const void *const data = toy_model_blob(&bytes);
+    if (!model && gait_model_init(mem, sizeof mem, data, bytes, &model, &err) != GAIT_OK) {
         fprintf(stderr, "toy model refused: %s\n", err.text);
         abort();
     }
