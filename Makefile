@@ -2,6 +2,7 @@
 MAKEFLAGS += -r
 .SUFFIXES:
 .DELETE_ON_ERROR:
+.SECONDARY:
 .DEFAULT_GOAL := help
 
 -include Makefile.local
@@ -103,7 +104,6 @@ $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%
 
 %/:
 	@mkdir -p $@
-.PRECIOUS: %/ %.c.o %.cpp.o
 
 # ---- LCM tools -----------------------------------------------------------------------------------------------
 LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
