@@ -39,7 +39,7 @@ static void test_two_passes(void)
 static void test_overflow(void)
 {
     static const size_t elem[] = {2, SIZE_MAX, SIZE_MAX, 64, 1};
-    static const size_t count[] = {SIZE_MAX / 2 + 1, SIZE_MAX, 1, SIZE_MAX / 64, SIZE_MAX - 10};
+    static const size_t count[] = {SIZE_MAX / 2 + 1, SIZE_MAX, 1, SIZE_MAX / 64 + 1, SIZE_MAX - 10};
     for (size_t i = 0; i < sizeof elem / sizeof *elem; i++) {
         arena a = {.base = NULL};
         CHECK(!arena_take(&a, elem[i], count[i]) && a.overflow);
