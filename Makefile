@@ -141,7 +141,7 @@ unit: $(UNIT) ## C tests
 
 # Against the objects, so that internal functions can be called.
 $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile | $(B)/unit/
-	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -Ilibgait/src $(CFLAGS) \
+	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -iquote libgait/src $(CFLAGS) \
 	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
 
 python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
