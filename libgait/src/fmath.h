@@ -34,11 +34,6 @@ static inline uint32_t m_less(float a, float b)
     return 0u - (uint32_t)(a < b);
 }
 
-static inline float m_sqrt(float x)
-{
-    return sqrtf(x);
-}
-
 /* Exact: beyond 2^23 every float is an integer.  NaN stays NaN. */
 static inline float m_floor(float x)
 {
@@ -126,20 +121,6 @@ static inline void m_sincos(float x, float *s, float *c)
     *c = m_from_bits(m_bits(m_select(swap, sn, cs)) ^ (((q + 1u) & 2u) << 30));
 }
 
-static inline float m_sin(float x)
-{
-    float s, c;
-    m_sincos(x, &s, &c);
-    return s;
-}
-
-static inline float m_cos(float x)
-{
-    float s, c;
-    m_sincos(x, &s, &c);
-    return c;
-}
-
 /* Absolute error < 3e-7; in [-pi, pi]; 0 for y = x = 0.  Arguments finite and below 1e37. */
 static inline float m_atan2(float y, float x)
 {
@@ -163,7 +144,7 @@ static inline float m_asin(float x)
     float const a = f_min(fabsf(x), 1.0f);
     uint32_t const fold = m_less(0.5f, a); /* asin a = pi/2 - 2 asin sqrt((1 - a)/2) */
     float const z = m_select(fold, 0.5f * (1.0f - a), a * a);
-    float const t = m_select(fold, m_sqrt(z), a);
+    float const t = m_select(fold, sqrtf(z), a);
     float p = (4.2163199048e-2f * z + 2.4181311049e-2f) * z + 4.5470025998e-2f;
     p = ((p * z + 7.4953002686e-2f) * z + 1.6666752422e-1f) * z * t + t;
     return m_from_bits(m_bits(m_select(fold, 0.5f * PI_F - 2.0f * p, p)) | (m_bits(x) & 0x80000000u));

@@ -45,7 +45,7 @@ void rng_normal4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index,
     for (int i = 0; i < 4; i += 2) {
         /* All 32 bits in (0, 1]: with 24 the tail would end at 5.8. */
         float const u = ((float)bits[i] + 1.0f) * 0x1p-32f;
-        float const radius = m_sqrt(-2.0f * m_log(u));
+        float const radius = sqrtf(-2.0f * m_log(u));
         float s, c;
         m_sincos(TWO_PI_F * unit(bits[i + 1]), &s, &c);
         out[i] = radius * c;

@@ -55,8 +55,6 @@ static void test_sincos(void)
         double const f = (double)(float)x;
         m_sincos((float)x, &s, &c);
         meet(&both, fmax(fabs((double)s - sin(f)), fabs((double)c - cos(f))), f);
-        if (m_sin((float)x) != s || m_cos((float)x) != c)
-            CHECK(!"m_sin and m_cos agree with m_sincos");
     }
     settle("sincos", both, 1e-7);
 }
@@ -94,7 +92,8 @@ static void test_wrap(void)
         if (!(y >= 0.0f && y < 1.0f && fabs((double)y - ((double)f - floor((double)f))) < 6e-8))
             CHECK_NEAR(y, (double)f - floor((double)f), 6e-8);
     }
-    CHECK(m_wrap1(-1e-9f) == 0.0f && m_wrap1(1.0f) == 0.0f && m_wrap1(-0.25f) == 0.75f && m_wrap1(-3.0f) == 0.0f);
+    CHECK(m_wrap1(-1e-9f) == 0.0f && m_wrap1(1.0f) == 0.0f);
+    CHECK(m_wrap1(-0.25f) == 0.75f && m_wrap1(-3.0f) == 0.0f);
 }
 
 static void test_floor(void)
@@ -112,17 +111,18 @@ static void test_floor(void)
 static void test_extremes(void)
 {
     float const inf = HUGE_VALF, nan = nanf("");
-    static const float large[] = {1e9f, -1e9f, FLT_MAX};
+    float const large[] = {1e9f, -1e9f, FLT_MAX, inf, nan};
     CHECK(m_exp(-87.4f) == 0.0f && m_exp(-inf) == 0.0f && m_exp(nan) == 0.0f);
     CHECK(m_exp(inf) == m_exp(88.0f) && m_exp(0.0f) == 1.0f);
     CHECK(m_log(0.0f) == m_log(FLT_MIN) && m_log(-1.0f) == m_log(FLT_MIN) && m_log(nan) == m_log(FLT_MIN));
     CHECK(m_log(inf) == m_log(FLT_MAX) && m_log(1.0f) == 0.0f);
-    for (int i = 0; i < 3; i++)
-        CHECK(fabsf(m_sin(large[i])) <= 1.0f && fabsf(m_cos(large[i])) <= 1.0f);
-    CHECK(fabsf(m_sin(nan)) <= 1.0f && fabsf(m_cos(inf)) <= 1.0f);
+    for (int i = 0; i < 5; i++) {
+        float s = 2.0f, c = 2.0f;
+        m_sincos(large[i], &s, &c);
+        CHECK(fabsf(s) <= 1.0f && fabsf(c) <= 1.0f);
+    }
     CHECK(m_wrap1(nan) == 0.0f && m_wrap1(3e9f) == 0.0f && isnan(m_floor(nan)));
     CHECK(m_asin(2.0f) == 0.5f * PI_F && m_asin(-7.0f) == -0.5f * PI_F);
-    CHECK(m_sqrt(9.0f) == 3.0f);
 }
 
 static void test_double(void)
@@ -152,7 +152,9 @@ static void test_bits(void)
     uint64_t h = 0;
     for (int i = -2000; i <= 2000; i++) {
         float const x = (float)i * 0.0371f;
-        float const y[] = {m_exp(x), m_log(fabsf(x)), m_sin(x), m_cos(x), m_atan2(x, 1.3f - x), m_asin(x / 75.0f)};
+        float s, c;
+        m_sincos(x, &s, &c);
+        float const y[] = {m_exp(x), m_log(fabsf(x)), s, c, m_atan2(x, 1.3f - x), m_asin(x / 75.0f)};
         for (int k = 0; k < 6; k++)
             h = (h ^ m_bits(y[k])) * UINT64_C(0x100000001b3);
         double const z[] = {m_exp64((double)x), m_log64(1.0 + (double)fabsf(x))};
