@@ -34,13 +34,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--patience", type=float, metavar="S", help="fail if none has come at all after S seconds"
     )
-    parser.add_argument("--timing", metavar="T.csv", help="also write the times of every frame")
+    parser.add_argument(
+        "--log", metavar="E.log", help="also write the messages to an LCM log, for gait report"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Record and report."""
     url = lcm_url(args.url)
-    recorder = Recorder(url, args.output, args.timing)
+    recorder = Recorder(url, args.output, args.log)
 
     def stop(number: int, frame: Any) -> None:
         recorder.stop = True

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from typing import Any
 
+import lcm
 import numpy as np
 
 from gait.errors import UserError
@@ -18,7 +18,6 @@ from gait.lcm.types import gaitmsg
 from gait.trackfile import TrackWriter
 from gait.video import Frame
 
-TIMING_COLUMNS = ("frame", "utime", "status", "step_ms", "reach_ms", "latency_ms", "dropped")
 _NO_IMAGE = np.empty((0, 0), np.uint8)
 _TURN_MS = 100  # longest wait before looking whether to stop
 _QUEUE = 1000  # estimates that may wait for the disk
@@ -67,8 +66,8 @@ class Recorder:
     url : str
     output : str
         Track file, as ``gait track`` writes it.
-    timing : str, optional
-        CSV of `TIMING_COLUMNS`: time of a step, from capture to the tracker (reach), to here (latency).
+    log : str, optional
+        LCM log of the messages themselves, each with the time it arrived here; `gait.lcm.results` reads it.
 
     Attributes
     ----------
@@ -77,12 +76,12 @@ class Recorder:
         Set it to end `run` in good order.
     """
 
-    def __init__(self, url: str, output: str, timing: str | None = None) -> None:
+    def __init__(self, url: str, output: str, log: str | None = None) -> None:
         self._lcm, self._live = open_lcm(url), not is_log(url)
-        self._output, self._timing = output, timing
-        self._waiting: list[tuple[Any, int]] = []
+        self._output, self._path = output, log
+        self._waiting: list[Any] = []
         self._writer: TrackWriter | None = None
-        self._rows: Any = None
+        self._log: Any = None
         self._origin = 0
         self._last = 0.0
         self.figures = Figures()
@@ -101,6 +100,11 @@ class Recorder:
         """
         begun = time.monotonic()
         with ExitStack() as self._stack:
+            if self._path is not None:
+                temporary = self._stack.enter_context(replacing(self._path))
+                self._log = self._stack.enter_context(
+                    closing(lcm.EventLog(str(temporary), "w", overwrite=True))
+                )
             while not self.stop and self._handle():
                 count, clock = len(self.figures.utime), time.monotonic()
                 quiet = idle is not None and clock - self._last > idle
@@ -135,8 +139,10 @@ class Recorder:
             self.stop = True  # another stream has begun: one file holds one
             return
         self.figures.add(message, arrived)
+        if self._log is not None:
+            self._log.write_event(arrived, channel, data)
         self._last = time.monotonic()
-        self._waiting.append((message, arrived))
+        self._waiting.append(message)
         if self._writer is not None or len(self._waiting) == 2:
             self._flush()
 
@@ -144,30 +150,19 @@ class Recorder:
         """Write what waits; the first two rows wait for each other, because together they date frame 0."""
         if self._waiting and self._writer is None:
             self._open()
-        for message, arrived in self._waiting:
+        for message in self._waiting:
             assert self._writer is not None
             seconds = (message.utime - self._origin) / 1e6
             self._writer.write(Frame(_number(message), seconds, _NO_IMAGE), estimate_of(message))
-            if self._rows is not None:
-                reach, latency = ((t - message.utime) / 1e3 for t in (message.receive_utime, arrived))
-                times = (f"{t:.3f}" for t in (message.step_us / 1e3, reach, latency))
-                self._rows.writerow(
-                    [_number(message), message.utime, message.status, *times, message.dropped]
-                )
         self._waiting.clear()
 
     def _open(self) -> None:
-        first, last = self._waiting[0][0], self._waiting[-1][0]
+        first, last = self._waiting[0], self._waiting[-1]
         interval = (last.utime - first.utime) / max(1, _number(last) - _number(first))
         self._origin = first.utime - round(interval * _number(first))
         joints = tuple(joint.name for joint in first.joints)
         angles = tuple(angle.name for angle in first.angles)
         self._writer = self._stack.enter_context(TrackWriter(self._output, first.mean.ncoef, joints, angles))
-        if self._timing is not None:
-            path = self._stack.enter_context(replacing(self._timing))
-            file = self._stack.enter_context(path.open("w", newline="", encoding="utf-8"))
-            self._rows = csv.writer(file, lineterminator="\n")
-            self._rows.writerow(TIMING_COLUMNS)
 
 
 def spread(values: list[float]) -> dict[str, float] | None:
