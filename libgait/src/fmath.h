@@ -56,7 +56,7 @@ static inline float m_wrap1(float x)
     return m_select(m_less(f, 1.0f), f, 0.0f); /* -1e-9 would round to 1 */
 }
 
-/* x modulo 2 pi in [-pi, pi] (ends rounded to float); absolute error < 3e-7 for |x| <= 8192, no use beyond. */
+/* x modulo 2 pi in [-pi, pi] (rounded to float); absolute error < 3e-7 for |x| <= 8192, no use beyond. */
 static inline float m_wrap_pi(float x)
 {
     float const k = m_round(f_clamp(x, -8192.0f, 8192.0f) * (1.0f / TWO_PI_F));
