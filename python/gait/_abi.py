@@ -194,6 +194,7 @@ class TrackerConfigC(ctypes.Structure):
         ("rate_noise", c_float),
         ("rate_noise_start", c_float),
         ("settle_time", c_float),
+        ("rate_time", c_float),
         ("forward_noise", c_float),
         ("lateral_noise", c_float),
         ("vertical_noise", c_float),

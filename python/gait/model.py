@@ -77,7 +77,7 @@ class Model:
 
     def __init__(self, source: str | os.PathLike[str] | bytes | None = None) -> None:
         self._lib = library()
-        blob = source if isinstance(source, bytes) else _read(source)
+        blob = source if isinstance(source, bytes) else read_blob(source)
         self._blob = aligned(len(blob))
         self._blob[:] = np.frombuffer(blob, np.uint8)
         size, error, handle = ctypes.c_size_t(), _abi.Error(), ctypes.c_void_p()
@@ -148,7 +148,7 @@ def camera_c(camera: Camera) -> _abi.CameraC:
     return c
 
 
-def _read(path: str | os.PathLike[str] | None) -> bytes:
+def read_blob(path: str | os.PathLike[str] | None) -> bytes:
     """Bytes of a blob file, or of the package's own."""
     if path is None:
         shipped = resources.files("gait") / "data" / "walk.gait"

@@ -41,6 +41,7 @@ class TrackerConfig:
     rate_noise: float
     rate_noise_start: float
     settle_time: float
+    rate_time: float
     forward_noise: float
     lateral_noise: float
     vertical_noise: float

@@ -1,0 +1,78 @@
+"""Compare a track with the truth.
+
+Prints, over the frames that both have: the 3-D error of 15 joints in mm, as they are (abs) and with
+the hip midpoints laid on each other (root); the share of frames lost; the error of the phase,
+half-cycle flips counted apart; the distance in the picture; how often the 50 % and 90 % intervals hold
+the truth; and the same for two baselines that look at no image: the mean pose at the true place
+(static) and the mean cycle running free from the true start (free).
+
+Heel strikes come from meta.json beside the truth, else from the truth itself: where a heel is furthest
+ahead of the pelvis.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from gait import blob
+from gait.camera import Camera
+from gait.evaluate import Measures, evaluate
+from gait.events import Strikes, strikes_by_zeni, strikes_from_meta
+from gait.model import read_blob
+from gait.trackfile import Joints, read_track, read_truth
+
+NAME = "eval"
+HELP = "errors of a track against the truth"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("track", metavar="OUT.csv", help="what gait track wrote")
+    parser.add_argument("--truth", required=True, metavar="TRUTH.csv", help="frame, time and <joint>_x _y _z")
+    parser.add_argument(
+        "--camera", metavar="CAM", help="for the error in pixels (camera.json beside the truth)"
+    )
+    parser.add_argument("-m", "--model", metavar="M.gait", help="for the baselines (the shipped model)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read, compare, print."""
+    truth = read_truth(args.truth)
+    beside = Path(args.truth).parent
+    camera = args.camera or (beside / "camera.json" if (beside / "camera.json").is_file() else None)
+    measures = evaluate(
+        read_track(args.track),
+        truth,
+        strikes=_strikes(truth, beside / "meta.json"),
+        model=blob.decode(read_blob(args.model), str(args.model)),
+        camera=Camera.read(str(camera)) if camera else None,
+    )
+    print(json.dumps(measures) if args.json else text(measures))
+    return 0
+
+
+def _strikes(truth: Joints, meta: Path) -> Strikes:
+    known = strikes_from_meta(meta) if meta.is_file() else None
+    return known or strikes_by_zeni(truth)
+
+
+def text(m: Measures) -> str:
+    """Lay the measures out for people."""
+    lines = [f"{'':14}{'median':>9}{'mean':>9}{'p90':>9}"]
+    for label, part in (("", m), ("static ", m["static"]), ("free ", m["free"])):
+        if part is not None:
+            lines += [_row(f"{label}{key} mm", part[key], ".1f") for key in ("abs", "root")]
+    if m["px"] is not None:
+        lines.append(_row("px", m["px"], ".2f"))
+    if m["phase"] is not None:
+        lines.append(_row("phase cycles", m["phase"], ".4f"))
+        lines.append(f"phase bias {m['phase']['bias']:+.4f}, flipped {m['phase']['flips']:.1%} of the frames")
+    covered = ", ".join(f"{share:.0%} in the {level} % intervals" for level, share in m["coverage"].items())
+    return "\n".join([*lines, f"coverage: {covered}", f"lost {m['lost']:.1%} of {m['frames']} frames"])
+
+
+def _row(label: str, values: dict[str, Any], form: str) -> str:
+    return f"{label:14}" + "".join(f"{values[key]:>9{form}}" for key in ("median", "mean", "p90"))

@@ -1,0 +1,210 @@
+"""Track a walking person in a video file.
+
+The start comes from --init: a JSON file that says where the person is and in which phase, or auto.
+auto compares a second of frames with the background, takes the person-sized blob and puts its foot
+point on the ground: this gives place, stature and heading, but not the phase, nor which leg is which.
+It needs a background and one person in full view, feet included; a strict side view may start with
+left and right exchanged, and a long shadow misplaces the start.  A JSON start is always better.
+
+Writes one row per frame to OUT.csv: see interfaces.md, section 3.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from gait._abi import Mode, TrackStatus
+from gait.autostart import find_start
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.files import require_writable
+from gait.initial import Start
+from gait.model import Model
+from gait.overlay import Overlay
+from gait.progress import progress
+from gait.tracker import Estimate, Tracker, TrackerConfig
+from gait.trackfile import TrackWriter
+from gait.trc import write_trc
+from gait.video import Frame, Image, Video, VideoWriter, background
+
+Sink = Callable[[Frame, Estimate], None]
+
+NAME = "track"
+HELP = "track a walking person in a video file"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("video", metavar="VIDEO", help="any file that FFmpeg reads")
+    parser.add_argument(
+        "--camera", required=True, metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name"
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="OUT.csv", help="the track")
+    parser.add_argument("-m", "--model", metavar="M.gait", help="walking model (the shipped one)")
+    parser.add_argument("--init", default="auto", metavar="INIT.json|auto", help="first state (auto)")
+    parser.add_argument(
+        "--background",
+        default="auto",
+        metavar="PNG|auto|none",
+        help="empty scene: an image, the median of the clip, or none (auto)",
+    )
+    parser.add_argument("--height", type=float, metavar="M", help="the person's stature in metres")
+    parser.add_argument("--particles", type=int, metavar="N", help="hypotheses (1000, paper mode 10000)")
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the random numbers (1)")
+    parser.add_argument(
+        "--threads", type=_positive, default=1, metavar="T", help="does not change the result (1)"
+    )
+    parser.add_argument("--start", type=_count, metavar="F", help="first frame to use, from 0")
+    parser.add_argument("--stop", type=_count, metavar="F", help="first frame not to use")
+    parser.add_argument(
+        "--mode", choices=[m.name.lower() for m in Mode], default="default", help="set of settings"
+    )
+    parser.add_argument("--overlay", metavar="O.mp4", help="also draw the estimate into the video")
+    parser.add_argument("--trc", metavar="O.trc", help="also write the joints for OpenSim (y up)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Track and report."""
+    for path in filter(None, (args.output, args.overlay, args.trc)):
+        require_writable(path)
+    video = Video(args.video)
+    camera = Camera.read(args.camera, video.size)
+    model = Model(args.model)
+    with progress("background", video.count, args.quiet) as update:
+        plate = background(args.background, video, update)
+    start = _start(args, video, camera, plate, model)
+    config = TrackerConfig.default(Mode[args.mode.upper()], **_given(args))
+    tracker = Tracker(model, camera, config, background=plate, tasks=args.threads)
+    results = _track(args, video, tracker, start)
+    if args.trc:
+        write_trc(args.trc, model.joint_names, np.array(results.times), np.array(results.joints), video.fps)
+    summary = results.summary(args.threads)
+    print(json.dumps(summary) if args.json else _text(summary))
+    return 0
+
+
+def _given(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings that the command line changes."""
+    return {"seed": args.seed} | ({} if args.particles is None else {"particles": args.particles})
+
+
+def _start(
+    args: argparse.Namespace, video: Video, camera: Camera, plate: Image | None, model: Model
+) -> Start:
+    """First state by --init, --start and --height."""
+    if args.init != "auto":
+        return Start.read(args.init, model, frame=args.start, height=args.height)
+    if plate is None:
+        raise UserError("--init auto: needs a background to see the person against; give --init FILE.json")
+    start = find_start(video, camera, plate, model, first=args.start or 0, stop=args.stop, height=args.height)
+    if not args.quiet:
+        at, turn, unsure = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
+        print(
+            f"start found at frame {start.frame}: x {at.pelvis[0]:.2f} y {at.pelvis[1]:.2f} m, "
+            f"stature {at.stature:.2f} m, heading {turn:.0f} +- {unsure:.0f} deg",
+            file=sys.stderr,
+        )
+    return start
+
+
+class _Results:
+    """What the report at the end needs from each step."""
+
+    def __init__(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+        self._steps: list[float] = []
+        self._statuses: list[TrackStatus] = []
+        self._begun = time.perf_counter()
+        self.times: list[float] = []
+        self.joints: list[np.ndarray[Any, Any]] = []
+
+    def add(self, frame: Frame, estimate: Estimate) -> None:
+        self._steps.append(1000 * self._tracker.step_seconds)
+        self._statuses.append(estimate.status)
+        self._wall = time.perf_counter() - self._begun
+        self.times.append(frame.time)
+        self.joints.append(estimate.joints)
+
+    def summary(self, threads: int) -> dict[str, Any]:
+        """Return the figures of ``--json``; step_ms is the time inside gait_tracker_step alone."""
+        steps, tracker = self._steps, self._tracker
+        return {
+            "frames": len(steps),
+            "particles": tracker.config.particles,
+            "threads": threads,
+            "step_ms": {
+                "median": float(np.median(steps)),
+                "p99": float(np.percentile(steps, 99)),
+                "max": max(steps),
+            },
+            "wall_fps": len(steps) / self._wall,
+            "lost": self._statuses.count(TrackStatus.LOST),
+            "ambiguous": self._statuses.count(TrackStatus.AMBIGUOUS),
+            "memory_bytes": tracker.memory_bytes,
+            "digest": f"{tracker.digest():016x}",
+        }
+
+
+def _track(args: argparse.Namespace, video: Video, tracker: Tracker, start: Start) -> _Results:
+    """Run the tracker over the frames into all outputs, which appear together at the end."""
+    model, results = tracker.model, _Results(tracker)
+    stop = video.count if args.stop is None else min(args.stop, video.count)
+    with ExitStack() as stack:
+        rows = TrackWriter(args.output, model.info.components, model.joint_names, model.angle_names)
+        sinks: list[Sink] = [results.add, stack.enter_context(rows).write]
+        if args.overlay:
+            film = stack.enter_context(VideoWriter(args.overlay, video.fps))
+            overlay = Overlay(model, tracker.cameras[0])
+            sinks.append(
+                lambda frame, estimate: film.write(overlay.draw(frame.image, estimate, frame.number))
+            )
+        update = stack.enter_context(progress("tracking", stop - start.frame, args.quiet))
+        _steps(video.frames(start.frame, stop), tracker, start, sinks, update)
+        if not results.times:
+            raise UserError(f"{video.path}: no frame from {start.frame} up to {stop}; it has {video.count}")
+    return results
+
+
+def _steps(
+    frames: Iterable[Frame], tracker: Tracker, start: Start, sinks: list[Sink], update: Callable[[int], None]
+) -> None:
+    """Step through the frames and hand each estimate on."""
+    for done, frame in enumerate(frames):
+        if done == 0:
+            tracker.start(start.mean, start.sd, frame.utime)
+        estimate = tracker.step(frame.image, frame.utime)
+        for sink in sinks:
+            sink(frame, estimate)
+        update(done + 1)
+
+
+def _text(summary: dict[str, Any]) -> str:
+    step = summary["step_ms"]
+    return (
+        f"{summary['frames']} frames, {summary['lost']} lost, {summary['ambiguous']} ambiguous\n"
+        f"{summary['particles']} particles, {summary['threads']} threads, {summary['memory_bytes']} bytes\n"
+        f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "
+        f"{summary['wall_fps']:.1f} frames/s in all\ndigest {summary['digest']}"
+    )
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError("must not be negative")
+    return value
