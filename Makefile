@@ -32,7 +32,7 @@ EIGEN ?= $(SITE)/cmeel.prefix/include/eigen3
 # Ignoring errno and traps changes no value (make golden-check) and lets loops over lanes become vector code.
 OPT_release  := -O3 -DNDEBUG -fno-math-errno -fno-trapping-math
 OPT_debug    := -O0
-OPT_sanitize := -O1 -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+OPT_sanitize := -O1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
 OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug or sanitize)
