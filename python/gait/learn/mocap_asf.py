@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -180,7 +181,7 @@ def _linked(bones: list[Bone], lines: list[tuple[int, list[str]]], path: Path) -
 def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
     """Read an .amc file: bone name to (T, dof) in the file's units; bones without motion have no entry."""
     moving = {bone.name: bone for bone in skeleton.bones if bone.dof}
-    rows: dict[str, list[Floats]] = {name: [] for name in moving}
+    rows: dict[str, list[list[float]]] = {name: [] for name in moving}
     frame, first, line = 0, 0, 0
     for line, words in _lines(path):
         if words[0].startswith(":"):
@@ -196,14 +197,25 @@ def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
         elif len(rows[words[0]]) != frame - 1:
             raise UserError(f"{path}:{line}: bone {words[0]!r} out of place in frame {frame}; restore the file")
         else:
-            rows[words[0]].append(_numbers(words[1:], path, line, len(moving[words[0]].dof)))
+            rows[words[0]].append(_row(words[1:], path, line, len(moving[words[0]].dof)))
     _check_frame(rows, frame, path, line)
     if frame < 2:
         raise UserError(f"{path}: {frame} frames; a recording of a few seconds is needed")
     return {name: np.array(values) for name, values in rows.items() if values}
 
 
-def _check_frame(rows: dict[str, list[Floats]], frame: int, path: Path, line: int) -> None:
+def _row(words: list[str], path: Path, line: int, count: int) -> list[float]:
+    """A line's finite numbers; like `_numbers`, but quick for the many lines of a motion."""
+    try:
+        values = list(map(float, words))
+    except ValueError:
+        values = []
+    if len(values) != count or not isfinite(sum(values)):
+        return list(_numbers(words, path, line, count))
+    return values
+
+
+def _check_frame(rows: dict[str, list[list[float]]], frame: int, path: Path, line: int) -> None:
     """Every bone that moved in frame 1, and the root, must move in every frame."""
     lacking = [name for name, values in rows.items() if len(values) != frame and (values or name == "root")]
     if lacking:

@@ -25,16 +25,20 @@ CMU = (
 
 def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array]:
     """All sections of the blob, META first."""
-    curves = learned.curves
     return {
         "META": np.frombuffer(json.dumps(meta(learned, activity, seed), separators=(",", ":")).encode(), np.uint8),
         "CHNM": blob.pack_names(CHANNELS),
-        "CURV": curves.astype(np.float32),
-        "CHST": channel_statistics(learned).astype(np.float32),
-        "SCST": score_statistics(learned).astype(np.float32),
-        "GAIT": gait_statistics(learned).astype(np.float32),
+        "CURV": _stored(learned.curves),
+        "CHST": _stored(channel_statistics(learned)),
+        "SCST": _stored(score_statistics(learned)),
+        "GAIT": _stored(gait_statistics(learned)),
         **default_skeleton(learned.proportions).sections(),
     }
+
+
+def _stored(values: Floats) -> npt.NDArray[np.float32]:
+    """Rounded to a millionth, so that the last bits of another machine's algebra do not show."""
+    return np.round(values, 6).astype(np.float32)
 
 
 def channel_statistics(learned: Learned) -> Floats:

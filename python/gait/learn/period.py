@@ -46,33 +46,43 @@ class Period:
     cyclic: bool
 
 
-def snr_literal(signals: Floats, period: int) -> Floats:
-    """Signal-to-noise ratio (A,) of folding at a whole number of frames (R1-R3); NaN if too few observations."""
-    return _anova(signals, np.arange(len(signals)) % period, period)
+class Folder:
+    """Signals prepared for folding at many periods.
 
+    Parameters
+    ----------
+    signals : (T, A)
+        NaN where missing.
+    """
 
-def snr_binned(signals: Floats, period: float, bins: int = BINS) -> Floats:
-    """Signal-to-noise ratio (A,) with a fixed number of phase bins (R4)."""
-    phase = np.arange(len(signals)) / period % 1.0
-    return _anova(signals, np.minimum((bins * phase).astype(int), bins - 1), bins)
+    def __init__(self, signals: Floats) -> None:
+        seen = np.isfinite(signals)
+        self.total = seen.sum(axis=0)
+        mean = np.where(seen, signals, 0).sum(axis=0) / np.maximum(self.total, 1)
+        values = np.where(seen, signals - mean, 0)
+        self.squares = (values**2).sum(axis=0)
+        self.stacked = np.concatenate([values, seen.astype(float)], axis=1)
 
+    def literal(self, period: int) -> Floats:
+        """Signal-to-noise ratio (A,) of folding at a whole number of frames (R1-R3); NaN if too few observations."""
+        return self._anova(np.arange(len(self.stacked)) % period)
 
-def _anova(signals: Floats, group: npt.NDArray[np.intp], groups: int) -> Floats:
-    """Unbalanced one-way F per column: mean square between groups over mean square within."""
-    seen = np.isfinite(signals)
-    total = seen.sum(axis=0)
-    mean = np.where(seen, signals, 0).sum(axis=0) / np.maximum(total, 1)
-    values = np.where(seen, signals - mean, 0)
-    member = np.zeros((groups, len(signals)))
-    member[group, np.arange(len(signals))] = 1
-    counts, sums = member @ seen, member @ values
-    effective = (counts > 0).sum(axis=0)
-    between = (sums**2 / np.maximum(counts, 1)).sum(axis=0)
-    within = (values**2).sum(axis=0) - between
-    valid = (total - effective >= effective) & (effective > 1) & (within > 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        score = between / (effective - 1) / (within / (total - effective))
-    return np.where(valid, score, np.nan)
+    def binned(self, period: float, bins: int = BINS) -> Floats:
+        """Signal-to-noise ratio (A,) with a fixed number of phase bins (R4)."""
+        phase = np.arange(len(self.stacked)) / period % 1.0
+        return self._anova(np.minimum((bins * phase).astype(int), bins - 1))
+
+    def _anova(self, group: npt.NDArray[np.intp]) -> Floats:
+        """Unbalanced one-way F per column: mean square between groups over mean square within."""
+        order = np.argsort(group, kind="stable")
+        starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+        sums, counts = np.split(np.add.reduceat(self.stacked[order], starts), 2, axis=1)
+        groups = (counts > 0).sum(axis=0)
+        between = (sums**2 / np.maximum(counts, 1)).sum(axis=0)
+        within = self.squares - between
+        valid = (self.total - groups >= groups) & (groups > 1) & (within > 0)
+        score = between / np.maximum(groups - 1, 1) * (self.total - groups) / np.where(within > 0, within, 1)
+        return np.where(valid, score, np.nan)
 
 
 def patterns(signals: Floats) -> list[tuple[npt.NDArray[np.bool_], Floats]]:
@@ -101,8 +111,8 @@ def harmonic_f(
         x, count = design[rows], int(rows.sum())
         if count <= terms + 1:
             continue
-        projected = x.T @ values
-        explained = (projected * np.linalg.lstsq(x.T @ x, projected, rcond=1e-12)[0]).sum(axis=0)
+        projected, gram = x.T @ values, x.T @ x
+        explained = (projected * np.linalg.solve(gram + 1e-9 * count * np.eye(terms), projected)).sum(axis=0)
         total = (values**2).sum(axis=0)
         rest = np.maximum(total - explained, 1e-9 * total)
         score += float(np.sum(explained / (terms - 1) / (rest / (count - terms))))
@@ -122,16 +132,16 @@ def find(signals: Floats, fps: float, mode: str = "refined", bounds: tuple[float
     literal = mode == "literal"
     low, high = bounds or ((50.0, 250.0) if literal else (SECONDS[0] * fps, SECONDS[1] * fps))
     candidates = np.arange(np.ceil(low), high + 0.1, 1.0 if literal else 0.5)
+    folder, longest = Folder(moving), len(signals) / CYCLES
     if literal:
-        scores = np.array([_total(snr_literal(moving, int(p))) for p in candidates])
+        scores = np.array([_total(folder.literal(int(p))) for p in candidates])
     else:
-        longest = len(signals) / CYCLES
-        scores = np.array([_total(snr_binned(moving, p)) if p <= longest else np.nan for p in candidates])
-    if not moving.shape[1] or np.isnan(scores).all():
+        scores = np.array([_total(folder.binned(p)) if p <= longest else np.nan for p in candidates])
+    if np.isnan(scores).all():
         return Period(float("nan"), candidates, scores, 0.0, False)
     best = float(candidates[np.nanargmax(scores)])
     if not literal:
-        best = _refine(moving, _divisor(candidates, scores, best))
+        best = _divisor(folder, moving, _refine(moving, best), low)
     sharpness = float(np.nanmax(scores) / np.nanmedian(scores))
     return Period(best, candidates, scores, sharpness, sharpness >= CYCLIC)
 
@@ -146,22 +156,26 @@ def _moving(signals: Floats) -> npt.NDArray[np.bool_]:
 def _total(scores: Floats) -> float:
     """Sum over the valid columns, scaled up to all of them; NaN if half or more are invalid."""
     valid = np.isfinite(scores)
-    return float(scores[valid].sum() * len(scores) / valid.sum()) if 2 * valid.sum() > len(scores) else float("nan")
+    return float(scores[valid].mean() * len(scores)) if 2 * valid.sum() > len(scores) else float("nan")
 
 
-def _divisor(candidates: Floats, scores: Floats, best: float) -> float:
-    """The smallest period best/5 ... best/2 whose score nearby comes near the best one's, else the best."""
+def _divisor(folder: Folder, signals: Floats, best: float, low: float) -> float:
+    """The smallest of best/5 ... best/2, refined, whose score comes near the best one's, else the best."""
+    goal = DIVISOR_SHARE * _total(folder.binned(best))
     for divisor in DIVISORS:
-        near = np.abs(candidates - best / divisor) <= 1.0
-        if near.any() and np.nanmax(np.append(scores[near], -np.inf)) >= DIVISOR_SHARE * np.nanmax(scores):
-            return float(candidates[near][np.nanargmax(scores[near])])
+        if best / divisor >= low and _total(folder.binned(best / divisor)) >= goal:
+            return _refine(signals, best / divisor)
     return best
 
 
 def _refine(signals: Floats, period: float) -> float:
-    """Maximise the harmonic F on +-1 frame in steps of 0.05, then +-0.1 in steps of 0.005."""
+    """Maximise the harmonic F: +-1 frame in steps of 0.1, +-0.1 in steps of 0.02, then a parabola."""
     groups = patterns(signals)
-    for width, step in ((1.0, 0.05), (0.1, 0.005)):
-        grid = period + np.arange(-width, width + step / 2, step)
-        period = float(grid[np.argmax([harmonic_f(groups, p) for p in grid])])
-    return period
+    for width, step in ((1.0, 0.1), (0.1, 0.02)):
+        grid = period + step * np.arange(-round(width / step), round(width / step) + 1)
+        score = np.array([harmonic_f(groups, p) for p in grid])
+        top = int(np.clip(np.argmax(score), 1, len(grid) - 2))
+        period = float(grid[top])
+    left, middle, right = score[top - 1 : top + 2]
+    bend = left - 2 * middle + right
+    return period + (float(np.clip(0.5 * (left - right) / bend, -1, 1)) * step if bend < 0 else 0.0)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.learn.body import Body
-from gait.learn.rotations import decompose_yxz, decompose_zyx, frame_from, unit
+from gait.learn.rotations import decompose_yxz, decompose_zyx, frame_from, unit, unwrap
 from gait.skeleton import ANGLES, SIDES, Proportions
 
 Floats = npt.NDArray[np.float64]
@@ -112,7 +112,7 @@ def angles(body: Body, measures: Measures) -> Floats:
         sole = _about_y(shank, j[f"{s}_toe"] - j[f"{s}_ankle"])
         result[f"{s}_ankle_flexion"] = np.pi / 2 - sole + measures.slope[i]
     table = np.stack([result[name] for name in ANGLES], axis=1)
-    return unwrap(table)
+    return _centred(table)
 
 
 def _about_y(frames: Floats, vectors: Floats) -> Floats:
@@ -121,13 +121,12 @@ def _about_y(frames: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.arctan2(local[:, 0], local[:, 2]))
 
 
-def unwrap(table: Floats) -> Floats:
-    """Remove turns in time, column by column, across gaps; then bring the mean within half a turn."""
-    result = table.copy()
+def _centred(table: Floats) -> Floats:
+    """Without jumps of a whole turn, each column's mean within half a turn."""
+    result = unwrap(table)
     for column in result.T:
         seen = np.isfinite(column)
         if seen.any():
-            column[seen] = np.unwrap(column[seen])
             column -= 2 * np.pi * np.round(np.mean(column[seen]) / (2 * np.pi))
     return result
 

@@ -5,7 +5,7 @@ Arrays are (T, 3, 3); NaN marks missing frames and stays NaN.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from gait.skeleton import axis_rotation
 Floats = npt.NDArray[np.float64]
 
 GIMBAL = 0.05  # cosine of the middle angle below which the outer two are not told apart
+CLEAR = 0.3  # cosine above which the branches cannot be confused
 
 
 def from_angles(angles: Floats, axes: Sequence[int]) -> Floats:
@@ -56,7 +57,12 @@ def decompose_yxz(r: Floats) -> Floats:
     """Angles (T, 3) with R = Ry(a) Rx(b) Rz(c), continuous in time."""
     b = np.arcsin(np.clip(-r[:, 1, 2], -1, 1))
     outer = np.stack([np.arctan2(r[:, 0, 2], r[:, 2, 2]), b, np.arctan2(r[:, 1, 0], r[:, 1, 1])], axis=1)
-    return _continuous(outer, lambda t, a: np.arctan2(*_inner(axis_rotation(1, -a) @ r[t])))
+
+    def last(t: int, a: float) -> float:
+        rest = axis_rotation(1, -a) @ r[t]
+        return float(np.arctan2(-rest[0, 1], rest[0, 0]))
+
+    return _continuous(outer, last)
 
 
 def decompose_zyx(r: Floats) -> Floats:
@@ -71,23 +77,29 @@ def decompose_zyx(r: Floats) -> Floats:
     return _continuous(outer, last)
 
 
-def _inner(rest: Floats) -> tuple[float, float]:
-    """Sine and cosine of c in Rx(b) Rz(c)."""
-    return -rest[0, 1], rest[0, 0]
+def unwrap(table: Floats) -> Floats:
+    """Copy without the jumps of a whole turn in time, column by column, across gaps."""
+    result = table.copy()
+    for column in result.T:
+        seen = np.isfinite(column)
+        column[seen] = np.unwrap(column[seen])
+    return result
 
 
-def _continuous(angles: Floats, last: object) -> Floats:
+def _continuous(angles: Floats, last: Callable[[int, float], float]) -> Floats:
     """Choose in each frame the branch nearest to the frame before; hold the outer angle in gimbal lock.
 
     (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation; near |b| = 90 degrees only a +- c is known.
     """
+    if not np.any(np.cos(angles[:, 1]) < CLEAR):
+        return unwrap(angles)
     result = angles.copy()
     previous: Floats | None = None
     for t in np.flatnonzero(np.isfinite(angles).all(axis=1)):
         now = angles[t]
         if previous is not None:
             if np.cos(now[1]) < GIMBAL:
-                now = np.array([previous[0], now[1], last(t, previous[0])])  # type: ignore[operator]
+                now = np.array([previous[0], now[1], last(t, float(previous[0]))])
             other = np.array([now[0] + np.pi, np.pi - now[1], now[2] + np.pi])
             options = [_nearest_turn(option, previous) for option in (now, other)]
             now = min(options, key=lambda option: float(np.sum((option - previous) ** 2)))
