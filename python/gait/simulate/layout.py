@@ -166,7 +166,7 @@ def _glass(rng: np.random.Generator) -> paint.Paint:
 
 def _poster(rng: np.random.Generator) -> paint.Paint:
     """Return a printed sheet: blocks of strong colour."""
-    colours = linear(rng.uniform(30, 235, (4, 3)))
+    colours = linear(rng.uniform(50, 215, (4, 1)) + rng.uniform(-35, 35, (4, 3)))
     cuts = np.sort(rng.uniform(1.25, 1.95, 3))
 
     def sheet(u: paint.Plane, v: paint.Plane) -> paint.Plane:
@@ -198,7 +198,7 @@ def _furnish(layout: Layout, left: float, right: float, far: float, clutter: boo
         kind = rng.choice(["bush", "box", "planter"])
         wide, high = rng.uniform(0.25, 0.55), rng.uniform(0.3, 0.9)
         if kind != "bush":
-            tint = np.clip(1 + 0.25 * rng.standard_normal(3), 0.4, 1.5)
+            tint = np.clip(1 + 0.3 * rng.uniform(-1, 1) + 0.08 * rng.standard_normal(3), 0.4, 1.5)
             finish = str(rng.choice(["planks", "plaster", "louvres"]))
             high = min(high, 0.45) if kind == "planter" else high
             low, top = np.array([x - wide, y - 0.22, 0]), np.array([x + wide, y + 0.22, high])

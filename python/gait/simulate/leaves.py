@@ -16,17 +16,20 @@ _LEAVES_PER_M2 = 1100
 _LEAF = 0.045  # metres
 
 
-def draw_bush(ambient: Image, direct: Image, camera: Camera, bush: Bush, sun: Array, rng: np.random.Generator) -> None:
-    """Paint one bush into both layers of light; whatever is there is behind it."""
+def draw_bush(
+    ambient: Image, direct: Image, behind: Image, camera: Camera, bush: Bush, sun: Array, rng: np.random.Generator
+) -> None:
+    """Paint one bush into both layers of light where it is nearer than the depths `behind`."""
     area = np.pi * bush.radii[0] * bush.radii[2]
     count = int(min(_LEAVES_PER_M2 * area, 5000)) + 60
     out = rng.standard_normal((count, 3))
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     lump = 1 + 0.22 * np.sin(5 * out @ rng.standard_normal((3, 3)) + rng.uniform(0, 6, 3)).sum(1) / 1.7
     place = bush.centre + out * bush.radii * (lump * rng.uniform(0.55, 1.0, count) ** 0.4)[:, None]
-    keep = place[:, 2] > 0.02
-    place, out = place[keep], out[keep]
     uv, depth = camera.project(place), camera.depth(place)
+    pixel = np.clip(np.nan_to_num(uv).round().astype(int), 0, [camera.width - 1, camera.height - 1])
+    keep = (place[:, 2] > 0.02) & (depth > 0.5) & (depth < behind[pixel[:, 1], pixel[:, 0]])
+    uv, depth, out = uv[keep], depth[keep], out[keep]
     order = np.argsort(-depth)
     size = _LEAF * camera.fx / depth
     shade = np.clip(0.55 + 0.45 * out[:, 2] + 0.15 * rng.standard_normal(len(out)), 0.15, 1.2)

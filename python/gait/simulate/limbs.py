@@ -35,8 +35,8 @@ def _arm(side: str, sign: float, body: Anatomy, look: Look) -> list[Part]:
     shoulder = rest[f"{side}_shoulder"]
     s, e, w = (rest[f"{side}_{name}"][2] for name in ("shoulder", "elbow", "wrist"))
     chain = [f"{side}_{bone}" for bone in ("upper_arm", "forearm", "hand")]
-    cap = [(s + 3.8 * cm, 0, 0.3, 0.3), (s + 3.3 * cm, 0, 2.3, 2.2), (s + 1.9 * cm, 0, 4.2, 3.9)]
-    upper = [(s - 1.5 * cm, 0, 5.3, 4.8), (s - 6 * cm, 0, 5.4, 4.9), (s - 15 * cm, 0, 4.9, 4.6)]
+    cap = [(s + 2.9 * cm, 0, 0.3, 0.3), (s + 2.5 * cm, 0, 2.4, 2.3), (s + 1.1 * cm, 0, 4.3, 4.0)]
+    upper = [(s - 2.0 * cm, 0, 5.4, 4.8), (s - 6 * cm, 0, 5.4, 4.9), (s - 15 * cm, 0, 4.9, 4.6)]
     lower = [
         (e + 3 * cm, 0, 4.6, 4.4), (e, -0.2, 4.5, 4.3), (e - 6 * cm, 0, 4.6, 4.3),
         (e - 15 * cm, 0, 4.0, 3.7), (w + 4 * cm, 0, 3.6, 3.3), (w + 0.5 * cm, 0, 3.6, 3.3),
@@ -48,8 +48,8 @@ def _arm(side: str, sign: float, body: Anatomy, look: Look) -> list[Part]:
         (e - 15 * cm, 0, 3.4, 3.0), (w + 3 * cm, 0, 2.8, 2.2), (w - 1 * cm, 0, 2.8, 2.0),
     ]  # fmt: skip
     parts = [
-        loft(_down(shoulder, sleeve, cm, look.limbs, 2.1), 34 if look.long_sleeves else 18, 16, TOP, X, -Y),
-        loft(_down(shoulder, skin[5:] if look.long_sleeves else skin, cm, look.limbs, 2), 26, 14, SKIN, X, -Y),
+        loft(_down(shoulder, sleeve, cm, look.limbs, 2.1), 34 if look.long_sleeves else 18, 16, TOP, -X, Y),
+        loft(_down(shoulder, skin[5:] if look.long_sleeves else skin, cm, look.limbs, 2), 26, 14, SKIN, -X, Y),
     ]
     for part in parts:
         part.bind_chain(chain, body, -Z, 7 * cm)
@@ -80,14 +80,14 @@ def _leg(side: str, sign: float, body: Anatomy, look: Look) -> list[Part]:
     hip = rest[f"{side}_hip"]
     h, k, a = (rest[f"{side}_{name}"][2] for name in ("hip", "knee", "ankle"))
     rows = [
-        (h + 6 * cm, -0.6, 7.6, 6.0), (h + 1 * cm, -0.4, 9.2, 8.2), (h - 5 * cm, -0.1, 9.5, 8.7),
+        (h + 3 * cm, -0.8, 4.6, 4.4), (h - 0.5 * cm, -0.5, 8.0, 7.2), (h - 5 * cm, -0.2, 9.1, 8.3),
         (h - 14 * cm, 0.3, 8.6, 8.0), (h - 27 * cm, 0.5, 7.3, 7.0), (k + 5 * cm, 0.5, 6.4, 6.2), (k, 0.4, 6.2, 6.0),
         (k - 6 * cm, -0.4, 6.1, 5.9), (k - 13 * cm, -1.1, 6.3, 5.9), (a + 14 * cm, -0.8, 5.4, 5.2),
         (a + 5 * cm, -0.4, 4.9, 4.7), (a - 1.0 * cm, 0, 5.3, 5.1),
     ]  # fmt: skip
     widen = np.interp([z for z, *_ in rows], [a, k, h], [0.7 + 1.4 * loose, 0.3 + 0.8 * loose, 0.2 + 0.3 * loose])
     rows = [(z, x, d + more, w + more) for (z, x, d, w), more in zip(rows, widen, strict=True)]
-    trouser = loft(_down(hip, rows, cm, look.limbs, 2.15), 46, 22, LEGS, X, -Y)
+    trouser = loft(_down(hip, rows, cm, look.limbs, 2.15), 46, 22, LEGS, -X, Y)
     trouser.bind_chain(["pelvis", f"{side}_thigh", f"{side}_shank"], body, -Z, 12 * cm)
     sock = [(a + 7 * cm, -0.3, 4.2, 3.8), (a, -0.2, 4.2, 3.7), (a - 3 * cm, -0.2, 4.0, 3.6)]
     ankle = loft(_down(hip, sock, cm, 1.0, 2), 8, 14, SOCK, X, -Y)

@@ -125,7 +125,8 @@ def asphalt(rng: np.random.Generator) -> Paint:
     noise, colour = Noise(rng), linear((118, 118, 120)) * rng.uniform(0.75, 1.25)
 
     def paint(u: Plane, v: Plane) -> Plane:
-        tone = 1 + 0.16 * noise(u, v, 0.9) + 0.14 * noise(u, v, 8.0) + 0.10 * (noise(u, v, 23.0) > 1.0)
+        speckle = 0.22 * noise(u, v, 0.35) + 0.06 * noise(u, v, 1.7)
+        tone = 1 + speckle + 0.06 * noise(u, v, 9.0) - 0.12 * (noise(u, v, 23.0) > 1.0)
         return (np.clip(tone, 0.3, 1.7)[..., None] * colour).astype(np.float32)
 
     return paint

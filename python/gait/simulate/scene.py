@@ -78,11 +78,14 @@ class _Caster:
         depth = np.where(depth > 0.05, depth, np.inf).astype(np.float32)
         return depth, self.ray * np.minimum(depth, 1e4)[..., None] + self.origin.astype(np.float32)
 
-    def put(self, hit: NDArray[np.bool_], depth: Image, albedo: Image, facing: float, sky: Image | float = 1.0) -> None:
-        """Keep a surface where it is nearer than what is there."""
-        hit = hit & (depth < self.depth)
-        self.depth[hit], self.albedo[hit], self.facing[hit] = depth[hit], albedo[hit], facing
-        self.open[hit] = sky[hit] if isinstance(sky, np.ndarray) else sky
+    def put(
+        self, hit: NDArray[np.bool_], depth: Image, albedo: Image, facing: float, sky: Image | float = 1.0,
+        box: tuple[slice, slice] = (slice(None), slice(None)),
+    ) -> None:  # fmt: skip
+        """Keep a surface, given in the window `box`, where it is nearer than what is there."""
+        hit = hit & (depth < self.depth[box])
+        self.depth[box][hit], self.albedo[box][hit], self.facing[box][hit] = depth[hit], albedo[hit], facing
+        self.open[box][hit] = sky[hit] if isinstance(sky, np.ndarray) else sky
 
 
 def build_scene(camera: Camera, layout: Layout, rng: np.random.Generator) -> Scene:
@@ -101,7 +104,7 @@ def build_scene(camera: Camera, layout: Layout, rng: np.random.Generator) -> Sce
     bare = ~np.isfinite(cast.depth)
     ambient[bare], direct[bare] = cast.albedo[bare], 0
     for bush in layout.bushes:
-        draw_bush(ambient, direct, cast.camera, bush, sun, rng)
+        draw_bush(ambient, direct, cast.depth, cast.camera, bush, sun, rng)
     front = np.zeros(cast.depth.shape, np.float32)
     if layout.pole is not None:
         front = _paint_pole(ambient, direct, cast, layout.pole, sun)
@@ -143,7 +146,8 @@ def _paint_wall(cast: _Caster, layout: Layout, rng: np.random.Generator) -> None
     for panel in layout.panels:
         inside = (u > panel.left) & (u < panel.right) & (v > panel.low) & (v < panel.high)
         if inside.any():
-            colour[inside] = panel.paint(rng)(u, v)[inside]
+            box = _bounds(inside)
+            colour[box][inside[box]] = panel.paint(rng)(u[box], v[box])[inside[box]]
     foot = 1 - 0.4 * np.exp(-np.maximum(v, 0) / 0.4)
     hit = np.isfinite(depth) & (v >= 0) & (v < layout.wall_height)
     cast.put(hit, depth, colour, float(-layout.to_sun[1]), foot.astype(np.float32))
@@ -160,9 +164,16 @@ def _paint_block(cast: _Caster, block: Block, sun: Array, rng: np.random.Generat
             inside &= (at[..., k] > block.low[k]) & (at[..., k] < block.high[k])
         if not inside.any():
             continue
-        rise = 1 if axis == 2 else 2
-        colour = finish(np.ascontiguousarray(at[..., other]), np.ascontiguousarray(at[..., rise]))
-        cast.put(inside, depth, (colour * block.tint).astype(np.float32), float(sun[axis] * (1 if upper else -1)))
+        rise, box = 1 if axis == 2 else 2, _bounds(inside)
+        colour = finish(at[..., other][box], at[..., rise][box])
+        facing = float(sun[axis] * (1 if upper else -1))
+        cast.put(inside[box], depth[box], (colour * block.tint).astype(np.float32), facing, 1.0, box)
+
+
+def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
+    """Return the smallest window that holds all of a mask."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
 def _sunlit(position: Image, layout: Layout) -> Image:

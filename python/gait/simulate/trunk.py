@@ -11,7 +11,7 @@ from gait.simulate.wardrobe import FACE, HAIR, LEGS, SKIN, TOP, Look
 
 X, Y, Z = np.eye(3)
 
-# height over the pelvis joint, forward shift, depth, width, exponent, share of the hips' and shoulders' girth
+# height over the pelvis joint, forward shift, depth, width, exponent, share of the hips' girth and of the shoulders'
 _TOP = (
     (2, -0.4, 12.3, 17.2, 2.4, 1, 0), (10, 0.3, 11.3, 15.2, 2.4, 0.5, 0), (18, 0.5, 11.6, 15.6, 2.4, 0, 0.3),
     (27, 0.6, 12.3, 16.6, 2.4, 0, 0.8), (34, 0.2, 11.9, 17.2, 2.3, 0, 1), (40, -0.5, 10.4, 17.6, 2.2, 0, 1),
@@ -24,7 +24,7 @@ _SEAT = (
     (12, 0.2, 10.0, 14.0),
 )  # fmt: skip
 # height over the neck joint, forward shift, depth, width
-_NECK = ((-2.5, -0.8, 6.0, 6.6), (1, -0.1, 5.4, 5.4), (4, 0.5, 5.3, 5.2), (8, 0.7, 5.6, 5.4), (11, 0.4, 5.0, 5.0))
+_NECK = ((-2.5, 0.4, 4.6, 5.2), (1, 0.1, 4.9, 5.0), (4, 0.5, 5.3, 5.2), (8, 0.7, 5.6, 5.4), (11, 0.4, 5.0, 5.0))
 _HEAD = (
     (4.4, 4.6, 2.2, 2.2), (5.2, 4.1, 5.0, 3.9), (7.2, 3.0, 7.1, 5.3), (10.5, 2.2, 8.4, 6.5), (14.2, 1.7, 9.2, 7.2),
     (18, 1.3, 9.6, 7.5), (21.5, 1.0, 9.4, 7.4), (24.3, 0.8, 8.0, 6.3), (26.2, 0.7, 5.2, 4.2), (27.0, 0.7, 2.0, 1.7),
@@ -47,20 +47,26 @@ def _top(body: Anatomy, look: Look, cm: float) -> Part:
     """Return the shirt or jacket from its hem to the collar, stretched to this person's trunk."""
     tall = body["neck_up"] / (52.9 * cm)
     hem = 100 * look.hem
-    rows = [(-hem, -0.6, 13.6, 18.6, 2.3, 1, 0), (-hem / 2, -0.6, 13.2, 18.0, 2.3, 1, 0), *_TOP]
+    rows = [(-hem, -0.2, 14.0, 18.9, 2.3, 1, 0), (-hem / 2, -0.4, 13.4, 18.3, 2.3, 1, 0), *_TOP]
+    broad = body["shoulder_half"] / (17.7 * cm)
+    thigh = 9.2 * look.limbs + look.loose
+    wide = body["hip_half"] / cm + 0.9 * thigh
     stations = []
     for z, x, d, w, n, low, high in rows:
-        girth = look.trunk * (1 + low * (look.hips - 1)) * (1 + high * (look.shoulders - 1))
-        girth = 1 + (girth - 1) * (0.35 if z > 46 else 1)
-        stations.append((x * cm, 0, z * cm * (tall if z > 0 else 1), d * cm * girth, w * cm * girth, n))
-    part = loft(stations, 44, 36, TOP, X, Y)
+        girth = look.trunk * (1 + low * (look.hips - 1))
+        d, w = d * girth, w * (girth + high * (broad - girth))
+        if z < 5:  # the hem hangs outside the moving thighs
+            room = np.interp(z, (0, 5), (1, 0.4))
+            d, w = max(d, thigh + 4.5 * room), max(w, wide + 1.5 * room)
+        stations.append((x * cm, 0, z * cm * (tall if z > 0 else 1), d * cm, w * cm, n))
+    part = loft(stations, 44, 36, TOP, -X, -Y)
     return part.bind_chain(["pelvis", "torso"], body, Z, 16 * cm)
 
 
 def _seat(body: Anatomy, look: Look, cm: float) -> Part:
-    girth = 0.96 * look.trunk * look.hips
+    girth = 0.94 * look.trunk * look.hips
     stations = [(x * cm, 0, z * cm, d * cm * girth, w * cm * girth, 2.3) for z, x, d, w in _SEAT]
-    return loft(stations, 16, 30, LEGS, X, Y).bind_chain(["pelvis", "torso"], body, Z, 16 * cm)
+    return loft(stations, 16, 30, LEGS, -X, -Y).bind_chain(["pelvis", "torso"], body, Z, 16 * cm)
 
 
 def _head(body: Anatomy, cm: float) -> list[Part]:

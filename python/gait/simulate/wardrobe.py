@@ -28,7 +28,7 @@ class Look:
 
     Attributes
     ----------
-    trunk, limbs, hips, shoulders : float
+    trunk, limbs, hips : float
         Girth factors, 1 = average.
     long_sleeves, long_hair : bool
     hem : float
@@ -46,7 +46,6 @@ class Look:
     trunk: float
     limbs: float
     hips: float
-    shoulders: float
     long_sleeves: bool
     long_hair: bool
     hem: float
@@ -73,7 +72,7 @@ def draw_look(rng: np.random.Generator) -> Look:
     tiles[FACE] = _face(skin, hair, rng)
     spans = np.full(8, CLOTH_TILE)
     spans[FACE] = 1.0
-    bounds = {"trunk": 0.11, "limbs": 0.12, "hips": 0.06, "shoulders": 0.05}
+    bounds = {"trunk": 0.11, "limbs": 0.12, "hips": 0.06}
     girths = {name: float(1 + rng.uniform(-half, half)) for name, half in bounds.items()}
     return Look(
         **girths, long_sleeves=bool(rng.uniform() < 0.65), long_hair=bool(rng.uniform() < 0.4),

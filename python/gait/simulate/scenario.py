@@ -1,0 +1,107 @@
+"""What to simulate: the options of a clip, their limits, and named presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait.errors import UserError
+from gait.simulate.views import DIRECTIONS, VIEWS
+
+GENERATOR = "generator"
+
+# option: smallest and largest value
+_LIMITS = {
+    "frames": (2, 100_000), "fps": (5.0, 240.0), "stature": (1.2, 2.2), "speed": (0.3, 2.5), "stride_hz": (0.4, 1.6),
+    "distance": (1.0, 100.0), "camera_height": (0.2, 20.0), "seed": (0, 2**31 - 1), "flicker": (0.0, 50.0),
+    "noise": (0.0, 64.0),
+}  # fmt: skip
+_SIZE = (64, 4096)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Options of `gait simulate`; None lets the seed decide.
+
+    Attributes
+    ----------
+    view, direction : str
+        One of `VIEWS`; ``lr`` walks to the right of the picture, ``rl`` to the left.
+    frames : int
+    fps : float
+        Frames per second.
+    size : (int, int)
+        Width and height, even, pixels.
+    stature : float, optional
+        Metres, shoes on.
+    speed, stride_hz : float, optional
+        Metres per second, strides (two steps) per second; one implies the other.
+    distance, camera_height : float, optional
+        Of the camera from the middle of the path, horizontally, and over the ground, metres.
+    seed : int
+        Of everything random: body, clothes, gait, scene, noise.
+    pole, clutter : bool
+        A pole before the path; a stronger background.
+    flicker : float
+        Standard deviation of the exposure, per cent.
+    noise : float
+        Standard deviation of the sensor noise, grey levels.
+    gait : str
+        ``generator`` or the name of a ``.gait`` model whose curves are walked.
+    """
+
+    view: str = "side"
+    direction: str = "lr"
+    frames: int = 120
+    fps: float = 30.0
+    size: tuple[int, int] = (640, 480)
+    stature: float | None = None
+    speed: float | None = None
+    stride_hz: float | None = None
+    distance: float | None = None
+    camera_height: float | None = None
+    seed: int = 1
+    pole: bool = False
+    clutter: bool = False
+    flicker: float = 0.0
+    noise: float = 2.0
+    gait: str = GENERATOR
+
+    def __post_init__(self) -> None:
+        """Check every option; the message names it as on the command line."""
+        if self.view not in VIEWS:
+            raise UserError(f"--view {self.view}: unknown; use one of {' '.join(VIEWS)}")
+        if self.direction not in DIRECTIONS:
+            raise UserError(f"--direction {self.direction}: unknown; use lr or rl")
+        for name, (low, high) in _LIMITS.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise UserError(f"--{name.replace('_', '-')} {value:g}: give a value from {low:g} to {high:g}")
+        for pixels in self.size:
+            if not _SIZE[0] <= pixels <= _SIZE[1] or pixels % 2:
+                width, height = self.size
+                raise UserError(f"--size {width}x{height}: give even numbers from {_SIZE[0]} to {_SIZE[1]}")
+
+    def stream(self, name: str, *more: int) -> np.random.Generator:
+        """Return random numbers of their own for one purpose, so that one option does not change the others."""
+        return np.random.default_rng([self.seed, *name.encode(), *more])
+
+
+PRESETS: dict[str, Scenario] = {
+    "demo": Scenario(seed=7),
+    "side": Scenario(direction="rl", seed=11, flicker=1.0),
+    "oblique": Scenario(view="oblique", frames=110, seed=12),
+    "toward": Scenario(view="toward", frames=150, seed=13),
+    "pole": Scenario(view="oblique", frames=120, seed=14, pole=True, clutter=True),
+}
+"""Scenarios for the demo and for evaluation; README of each is its meta.json.
+
+========  =============================================================
+demo      side view, left to right: what ``make demo`` shows
+side      side view, right to left, the exposure flickers by 1 %
+oblique   45 degrees, coming nearer
+toward    5 s straight towards the camera
+pole      45 degrees, a pole hides the walker, strong background
+========  =============================================================
+"""
