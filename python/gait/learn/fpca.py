@@ -63,7 +63,12 @@ def fourier_basis(samples: int, harmonics: int = HARMONICS) -> Floats:
 
 
 def fit(
-    values: Floats, mask: Mask, components: int, harmonics: int = HARMONICS, start: Floats | None = None
+    values: Floats,
+    mask: Mask,
+    components: int,
+    harmonics: int = HARMONICS,
+    start: Floats | None = None,
+    tolerance: float = TOLERANCE,
 ) -> Components:
     """Mean curves, components and scores by alternating the SVD and the filling of missing entries.
 
@@ -73,6 +78,8 @@ def fit(
         Data and where they are observed.
     start : (T, M), optional
         Starting value of missing entries; by default the column mean of the observed rows.
+    tolerance : float
+        Relative decrease of the error at which to stop.
     """
     rows, samples, channels = values.shape
     basis = fourier_basis(samples, harmonics)
@@ -87,11 +94,11 @@ def fit(
         model = _decode(mean + scores @ right[:components], basis, channels)
         rmse.append(float(np.sqrt(np.mean((values - model)[mask] ** 2))))
         filled = np.where(mask, values, model)
-        if complete or (len(rmse) > 1 and rmse[-2] - rmse[-1] <= TOLERANCE * rmse[-2]):
+        if complete or (len(rmse) > 1 and rmse[-2] - rmse[-1] <= tolerance * rmse[-2]):
             break
     curves = _decode(right[:components], basis, channels)
-    peak = np.abs(curves).reshape(len(curves), -1).argmax(axis=1)
-    sign = np.sign(curves.reshape(len(curves), -1)[np.arange(len(curves)), peak])
+    flat = curves.reshape(len(curves), samples * channels)
+    sign = np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(axis=1)])
     return Components(
         mean=_decode(mean[None], basis, channels)[0],
         curves=curves * sign[:, None, None],
