@@ -52,6 +52,28 @@ class Camera:
 
         return read_camera(path, size)
 
+    @staticmethod
+    def looking(place: ArrayLike, target: ArrayLike, size: tuple[int, int], focal: float) -> Camera:
+        """Make a camera at `place` with `target` in the middle and a level horizon.
+
+        Parameters
+        ----------
+        place, target : array_like of shape (3,)
+            World, metres; not one above the other.
+        size : (int, int)
+            Width and height, pixels.
+        focal : float
+            Pixels.
+        """
+        eye = np.asarray(place, np.float64)
+        ahead = np.asarray(target, np.float64) - eye
+        ahead /= np.linalg.norm(ahead)
+        right = np.cross(ahead, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        R = np.stack([right, np.cross(ahead, right), ahead])
+        width, height = size
+        return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, R, -R @ eye)
+
     @property
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""

@@ -35,6 +35,7 @@ BONES = (
     *((f"{s}_heel", f"{s}_toe") for s in "lr"),
 )
 ENDS = ("l_wrist", "r_wrist", "l_ankle", "r_ankle")
+_DARK: Colour = (30, 30, 30)
 _FILL = 0.28  # opacity of the body
 _ELLIPSE = 2.146  # standard deviations of the 90 % ellipse of a normal in the plane
 _SUBPIXEL = 4  # bits of fraction in OpenCV's drawing coordinates
@@ -94,18 +95,23 @@ class Overlay:
 
     def skeleton(self, canvas: Image, joints: Array) -> None:
         """Draw bones and joints (P, 3) in place; what is behind the camera is left out."""
-        uv = dict(zip(self.model.joint_names, self.camera.project(joints), strict=True))
         size = self._size(joints[self.model.joint_names.index("pelvis")])
         thick = max(1, round(2 * size))
-        for dark in (True, False):  # a dark seam under every line keeps it readable on any clothes
-            for a, b in BONES:
-                if np.isfinite([uv[a], uv[b]]).all():
-                    colour = (30, 30, 30) if dark else _brighter(side_colour(b))
-                    _line(canvas, [uv[a], uv[b]], colour, thick + (2 if dark else 0))
-        for name, at in uv.items():
+        self.sticks(
+            canvas, joints, thick + max(1, round(size)), _DARK
+        )  # a dark seam keeps lines readable on any clothes
+        self.sticks(canvas, joints, thick)
+        for name, at in zip(self.model.joint_names, self.camera.project(joints), strict=True):
             if np.isfinite(at).all():
-                _dot(canvas, at, 3.6 * size, (30, 30, 30))
+                _dot(canvas, at, 3.6 * size, _DARK)
                 _dot(canvas, at, 2.4 * size, _brighter(side_colour(name)))
+
+    def sticks(self, canvas: Image, joints: Array, thick: int, colour: Colour | None = None) -> None:
+        """Draw bones as lines of `thick` pixels in place, in one colour or that of their side."""
+        uv = dict(zip(self.model.joint_names, self.camera.project(joints), strict=True))
+        for a, b in BONES:
+            if np.isfinite([uv[a], uv[b]]).all():
+                _line(canvas, [uv[a], uv[b]], colour or _brighter(side_colour(b)), thick)
 
     def _ellipses(self, canvas: Image, estimate: Estimate) -> None:
         """Draw the 90 % ellipse of wrists and ankles from the axis-wise deviations."""
@@ -158,5 +164,5 @@ def _dot(canvas: Image, at: Array, radius: float, colour: Colour) -> None:
 
 def _ellipse(canvas: Image, at: Array, radii: Array, angle: float, colour: Colour, thick: int) -> None:
     axes = _fixed(np.maximum(radii, 1.0))
-    cv2.ellipse(canvas, _fixed(at), axes, angle, 0, 360, (30, 30, 30), thick + 2, cv2.LINE_AA, _SUBPIXEL)
+    cv2.ellipse(canvas, _fixed(at), axes, angle, 0, 360, _DARK, thick + 2, cv2.LINE_AA, _SUBPIXEL)
     cv2.ellipse(canvas, _fixed(at), axes, angle, 0, 360, colour, thick, cv2.LINE_AA, _SUBPIXEL)

@@ -1,0 +1,89 @@
+"""Draw a pose of a walking model, or what the model has learned.
+
+Without --strip: one walker, at --phase or in the state of --state, seen by --camera or by a built-in one.
+With --strip: a sheet with the mean cycle and each principal component at -2, 0 and +2 standard deviations
+over eight phases, from the right side.
+
+The JSON of --state may hold phase, stride_hz, stature, heading, pitch, roll (radians), pelvis [x, y, z]
+and coef [c1, c2, ...]; what it leaves out is the average walker on the ground at the origin.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import cv2
+import numpy as np
+
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.fields import Fields, read_json
+from gait.files import replacing, require_writable
+from gait.model import Model
+from gait.state import SCALARS, State
+from gait.strip import draw_room, draw_strip, room_camera
+
+NAME = "render"
+HELP = "draw a pose or a model"
+JSON = False
+
+_RANGES = {"phase": (0.0, 1.0), "stride_hz": (0.1, 4.0), "stature": (0.5, 2.5)}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("-m", "--model", metavar="M.gait", help="walking model (the shipped one)")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT.png", help="the picture")
+    parser.add_argument(
+        "--camera", metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name (built-in view)"
+    )
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--phase", type=float, metavar="P", help="of the stride, 0 = right heel strike (0)")
+    what.add_argument("--state", metavar="JSON", help="file with the whole state")
+    what.add_argument("--strip", action="store_true", help="sheet of all components")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw and write."""
+    require_writable(args.output)
+    model = Model(args.model)
+    if args.strip:
+        if args.camera:
+            raise UserError("--camera: --strip has its own view; leave one of them out")
+        picture = draw_strip(model)
+    else:
+        state = _state(args, model)
+        camera = Camera.read(args.camera) if args.camera else room_camera(state)
+        picture = draw_room(model, state, camera)
+    with replacing(args.output) as temporary:
+        try:
+            cv2.imwrite(str(temporary), picture)
+        except cv2.error:
+            raise UserError(f"{args.output}: unknown image suffix; use .png or .jpg") from None
+    return 0
+
+
+def _state(args: argparse.Namespace, model: Model) -> State:
+    """Walker of --phase or --state; on the ground at the origin unless placed."""
+    state = State(stride_hz=model.info.stride_hz)
+    if args.phase is not None:
+        if not 0 <= args.phase <= 1:
+            raise UserError(f"--phase {args.phase:g}: give a share of the stride from 0 to 1")
+        state.phase = args.phase % 1.0
+    fields = read_json(args.state, "state") if args.state else Fields("state", {})
+    fields.only((*SCALARS, "pelvis", "coef"))
+    for name in SCALARS:
+        if name in fields:
+            low, high = _RANGES.get(name, (-7.0, 7.0))
+            setattr(state, name, fields.number(name, low, high, "see gait render --help"))
+    if "coef" in fields:
+        count = np.size(fields.get("coef", ""))
+        if count > model.info.components:
+            raise fields.fail(
+                "coef", f"has {count} scores", f"the model has {model.info.components} components"
+            )
+        state.coef = fields.array("coef", (count,), "give a list of scores in standard deviations")
+    state.pelvis[2] = model.pelvis_height(state)
+    if "pelvis" in fields:
+        state.pelvis = fields.array("pelvis", (3,), "give x, y, z in metres")
+    return state
