@@ -32,7 +32,7 @@ bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown,
 {
     if (in->ncoef < 0 || in->ncoef > GAIT_MAX_COMPONENTS)
         return message_set(why, "state with ncoef %d; give 0 to %d", in->ncoef, GAIT_MAX_COMPONENTS);
-    *out = *unknown;
+    *out = (gait_state){0};
     out->phase = known(in->phase, unknown->phase);
     out->stride_hz = known(in->stride_hz, unknown->stride_hz);
     out->stature = known(in->stature, unknown->stature);

@@ -15,7 +15,7 @@ typedef struct estimate_message {
 } estimate_message;
 
 void convert_state(const gait_state *in, int32_t components, gaitmsg_state_t *out);
-/* Fields that are not numbers, and components beyond the message's ncoef, become those of `unknown`. */
+/* Fields that are not numbers become those of `unknown`; components beyond the message's ncoef are 0. */
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
 bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why);

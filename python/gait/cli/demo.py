@@ -1,8 +1,8 @@
 """Track a clip as in the field: capture, tracker and recorder are processes that talk over LCM.
 
-gait capture streams the clip at its true frame rate, gait-trackd tracks it, gait record collects the estimates.
-Writes track.csv, estimates.log, overlay.mp4 and report.html, and prints the error against the truth (where it
-is known), frame rate, latency from capture to the received estimate, and frames dropped.
+gait capture streams the clip at its true frame rate, gait-trackd tracks it, gait record collects the
+estimates.  Writes track.csv, estimates.log, overlay.mp4 and report.html; prints the error against the truth
+(where it is known), frame rate, latency from capture to the received estimate, and frames dropped.
 
 Without VIDEO a walker is rendered, with truth.  With it, camera.json, init.json, background.png and truth.csv
 beside the video are used unless given.  Where this machine has no multicast route the same processes work one
@@ -107,7 +107,7 @@ def _clip(args: argparse.Namespace, out: Path, session: Session) -> Clip:
     if args.video is None:
         folder = out / "clip"
         _say(args, "rendering a clip")
-        session.start("gait simulate", [*_gait("simulate"), "-o", str(folder)]).result(600.0)
+        session.start("gait simulate", [*_gait("simulate"), str(folder)]).result(600.0)
         args.video = str(folder / "video.mp4")
     beside = Path(args.video).parent
     camera = args.camera or _beside(beside / "camera.json")

@@ -63,7 +63,7 @@ class Publisher:
         self._setup, self._lcm = setup, open_lcm(url)
         self._log = is_log(url)
         self._status: Any = None
-        self._announced = -ANNOUNCE
+        self._announced = 0.0
         self.sent = 0
         if not self._log:
             self._lcm.subscribe("GAIT_STATUS", self._on_status).set_queue_capacity(8)
@@ -79,13 +79,15 @@ class Publisher:
         self._ask(patience, lambda: self.announce(0), self._is_ready, "knows the camera")
 
     def begin(self, source: FileSource | DeviceSource, rate: float | None, patience: float) -> Pacer:
-        """Send START and return the clock of the stream, whose first frame is due from then on.
+        """Announce, send START and return the clock of the stream, whose first frame is due from then on.
 
         With `patience` > 0 START is repeated, each time for a later stream, until a tracker confirms it.  The
         START of a file is for one capture time; that of a live camera is for the frame that comes next.
         """
+        self._announced = source.first
         if self._setup.start is None or patience <= 0 or self._log:
             pacer = Pacer(rate, source.first)
+            self.announce(pacer.utime(source.first))
             if self._setup.start is not None:
                 self._send_start(0 if source.live else pacer.utime(self._setup.start_time))
             return pacer
@@ -125,8 +127,6 @@ class Publisher:
         start = self._setup.start
         assert start is not None
         command = command_message(gaitmsg.command_t.START, utime, start.mean, start.sd)
-        if self._log:
-            self.announce(utime)  # in a log the camera must come before what depends on it
         self._lcm.publish("GAIT_COMMAND", command.encode())
         return int(command.id)
 

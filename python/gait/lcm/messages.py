@@ -141,7 +141,7 @@ def state_message(values: State | Mapping[str, Any]) -> Any:
     for name in SCALARS:
         setattr(message, name, float(known.get(name, _UNKNOWN)))
     message.pelvis = [float(x) for x in known.get("pelvis", [_UNKNOWN] * 3)]
-    coef = [float(x) for x in known.get("coef", [])]
+    coef = [float(x) for x in known.get("coef", [_UNKNOWN] * MAX_COMPONENTS)]
     message.ncoef = len(coef)
     message.coef = coef + [0.0] * (MAX_COMPONENTS - len(coef))
     return message

@@ -1,0 +1,286 @@
+"""What the LCM tests share: a small clip, logs of messages, and gait-trackd as a process."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import lcm
+import numpy as np
+import pytest
+
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.lcm.link import open_lcm, private_url
+from gait.lcm.messages import camera_message, command_message, image_message
+from gait.lcm.types import gaitmsg
+from gait.model import Model
+from gait.state import State
+
+ROOT = Path(__file__).resolve().parents[2]
+TRACKD = ROOT / "build" / "bin" / "gait-trackd"
+MODEL = ROOT / "python" / "gait" / "data" / "walk.gait"
+PYTHON = ROOT / ".venv" / "bin" / "python"
+FPS = 30
+PATIENCE = 20.0  # seconds for anything that should come at once
+PARTICLES = 64
+
+CAMERA = Camera(
+    width=160,
+    height=120,
+    fx=140.0,
+    fy=140.0,
+    cx=79.5,
+    cy=59.5,
+    R=np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    t=np.array([0.0, 1.0, 4.0]),
+)
+SD = State(phase=0.02, stride_hz=0.02, stature=0.02, heading=0.05, pelvis=np.full(3, 0.03))
+
+
+@cache
+def model() -> Model:
+    return Model(MODEL)
+
+
+def walker(frame: int) -> State:
+    """The walker of the clip: 1.2 m/s along x, one stride a second."""
+    mean, _ = model().prior()
+    state = replace(mean, phase=(0.1 + frame / FPS) % 1.0, stride_hz=1.0, stature=1.75, heading=0.0)
+    state.pelvis = np.array([-0.5 + 1.2 * frame / FPS, 0.0, 0.0])
+    state.pelvis[2] = model().pelvis_height(state)
+    return state
+
+
+@cache
+def plate() -> np.ndarray:
+    noise = np.random.default_rng(1).normal(120, 12, (CAMERA.height, CAMERA.width, 3))
+    return noise.clip(0, 255).astype(np.uint8)
+
+
+@cache
+def picture(frame: int) -> np.ndarray:
+    """One frame: the model's own limbs in flat colours over a noisy plate."""
+    ids = model().render(CAMERA, walker(frame))
+    colours = np.random.default_rng(2).integers(0, 255, (256, 3), np.uint8)
+    return np.where(ids[..., None] > 0, colours[ids], plate())
+
+
+def utime(frame: int) -> int:
+    """Capture time in logs."""
+    return 1_000_000 + round(frame * 1e6 / FPS)
+
+
+def start(frame: int = 0, at: int | None = None, sd: State = SD) -> Any:
+    """START for a frame of the clip."""
+    return command_message(gaitmsg.command_t.START, utime(frame) if at is None else at, walker(frame), sd)
+
+
+def frame_message(frame: int, **changes: Any) -> Any:
+    message = image_message(picture(frame), utime(frame), frame)
+    for name, value in changes.items():
+        setattr(message, name, value)
+    return message
+
+
+Event = tuple[str, Any]
+"""Channel, and a message or its bytes."""
+
+
+def opening(first: int = 0) -> list[Event]:
+    """What comes before the frames: camera, empty scene, START."""
+    return [
+        ("GAIT_CAMERA_0", camera_message(CAMERA, utime(first))),
+        ("GAIT_BACKGROUND_0", image_message(plate(), utime(first), -1)),
+        ("GAIT_COMMAND", start(first)),
+    ]
+
+
+def frames(first: int, stop: int) -> list[Event]:
+    return [("GAIT_IMAGE_0", frame_message(i)) for i in range(first, stop)]
+
+
+def write_log(path: Path, events: Sequence[Event]) -> Path:
+    log = lcm.EventLog(str(path), "w", overwrite=True)
+    for i, (channel, message) in enumerate(events):
+        data = message if isinstance(message, bytes) else message.encode()
+        log.write_event(i, channel, data)
+    log.close()
+    return path
+
+
+def read_log(path: Path, channel: str, kind: Any) -> list[Any]:
+    return [kind.decode(e.data) for e in lcm.EventLog(str(path), "r") if e.channel == channel]
+
+
+SUMMARY = re.compile(r"frames (\d+) dropped (\d+) rejected (\d+) .*digest ([0-9a-f]{16})")
+
+
+@dataclass
+class Outcome:
+    """How gait-trackd ended."""
+
+    code: int
+    printed: str
+    words: str
+    estimates: list[Any] = field(default_factory=list)
+    particles: list[Any] = field(default_factory=list)
+
+    def _part(self, i: int) -> str:
+        found = SUMMARY.search(self.printed)
+        assert found, f"no summary: {self.printed!r} {self.words!r}"
+        return found.group(i)
+
+    @property
+    def frames(self) -> int:
+        return int(self._part(1))
+
+    @property
+    def dropped(self) -> int:
+        return int(self._part(2))
+
+    @property
+    def rejected(self) -> int:
+        return int(self._part(3))
+
+    @property
+    def digest(self) -> str:
+        return self._part(4)
+
+
+def command(*options: object) -> list[str]:
+    return [str(TRACKD), "-m", str(MODEL), "-n", str(PARTICLES), *map(str, options)]
+
+
+def run(*words: object) -> Outcome:
+    """Run gait-trackd to its end with exactly these arguments."""
+    done = subprocess.run(
+        [str(TRACKD), *map(str, words)], capture_output=True, text=True, timeout=120, check=False
+    )
+    return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+def play(log: Path, *options: object) -> Outcome:
+    """Track a log; the estimates come from what gait-trackd publishes."""
+    out = log.with_suffix(".out")
+    out.unlink(missing_ok=True)
+    outcome = run(*command("--url", f"file://{log}?speed=0", "--out", f"file://{out}?mode=w", *options)[1:])
+    assert outcome.code == 0, outcome.words
+    outcome.estimates = read_log(out, "GAIT_ESTIMATE", gaitmsg.estimate_t)
+    outcome.particles = read_log(out, "GAIT_PARTICLES", gaitmsg.particles_t)
+    return outcome
+
+
+class Listener:
+    """Collects what a tracker publishes, and sends to it."""
+
+    def __init__(self, url: str) -> None:
+        self._lcm = open_lcm(url)
+        self.estimates: list[Any] = []
+        self.statuses: list[Any] = []
+        self._keep("GAIT_ESTIMATE", gaitmsg.estimate_t, self.estimates)
+        self._keep("GAIT_STATUS", gaitmsg.status_t, self.statuses)
+
+    def _keep(self, channel: str, kind: Any, into: list[Any]) -> None:
+        subscription = self._lcm.subscribe(channel, lambda _, data: into.append(kind.decode(data)))
+        subscription.set_queue_capacity(1000)
+
+    def send(self, events: Sequence[Event]) -> None:
+        for channel, message in events:
+            self._lcm.publish(channel, message.encode())
+
+    def until(self, condition: Callable[[], bool], what: str, seconds: float = PATIENCE) -> None:
+        """Take in messages until the condition holds; fail if it does not in time."""
+        deadline = time.monotonic() + seconds
+        while not condition():
+            left = deadline - time.monotonic()
+            assert left > 0, f"{what} did not come; last status: {self.last and self.last.text!r}"
+            self._lcm.handle_timeout(max(1, round(1000 * left)))
+
+    @property
+    def last(self) -> Any:
+        return self.statuses[-1] if self.statuses else None
+
+    def ask(self, events: Sequence[Event], condition: Callable[[Any], bool], what: str) -> None:
+        """Send again and again until a status, newer than the first sending, shows the effect."""
+        self.statuses.clear()
+        deadline = time.monotonic() + PATIENCE
+        while not any(condition(s) for s in self.statuses):
+            assert time.monotonic() < deadline, f"{what} did not come; last status: {self.last}"
+            self.send(events)
+            self._lcm.handle_timeout(200)
+
+
+@contextmanager
+def daemon(url: str, *options: object) -> Iterator[tuple[Listener, Callable[[], Outcome]]]:
+    """gait-trackd on a network; yields a listener and a function that ends it in good order."""
+    listener = Listener(url)
+    process = subprocess.Popen(
+        command("--url", url, *options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+    def finish() -> Outcome:
+        process.send_signal(signal.SIGINT)
+        printed, words = process.communicate(timeout=PATIENCE)
+        return Outcome(process.returncode, printed, words)
+
+    try:
+        listener.until(lambda: bool(listener.statuses), "a first status")
+        yield listener, finish
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def gait(*words: object, timeout: float = 120) -> subprocess.CompletedProcess[str]:
+    """Run a sub-command of gait."""
+    return subprocess.run(
+        [str(PYTHON), "-m", "gait", *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+
+
+@cache
+def _multicast_fault() -> str | None:
+    """Why messages do not get through here, or None: sends one to itself."""
+    url = private_url()
+    try:
+        link = open_lcm(url)
+        got: list[bytes] = []
+        link.subscribe("SELF", lambda _, data: got.append(data))
+    except (UserError, OSError, RuntimeError) as exc:
+        return str(exc)
+    link.publish("SELF", b"x")
+    return None if link.handle_timeout(3000) > 0 and got else "a message to oneself does not arrive"
+
+
+def need_multicast() -> None:
+    """Skip a test where this machine has no multicast."""
+    fault = _multicast_fault()
+    if fault:
+        pytest.skip(f"no multicast: {fault}")
+
+
+def without_network(*words: str) -> subprocess.CompletedProcess[str]:
+    """Run a command in an empty network namespace; skip where that is not allowed."""
+    unshare = ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "--map-root-user", "--net"]
+    try:
+        allowed = subprocess.run([*unshare, "true"], capture_output=True, timeout=20, check=False).returncode == 0
+    except FileNotFoundError:
+        allowed = False
+    if not allowed:
+        pytest.skip("no network namespaces here (unshare --net)")
+    return subprocess.run([*unshare, *words], capture_output=True, text=True, timeout=60, check=False)
+
