@@ -166,12 +166,14 @@ typedef struct gait_tracker_config {
     float    rate_noise;       /* fraction of the model's mean stride_hz */
     float    rate_noise_start; /* the same while settling */
     float    settle_time;      /* seconds after start with rate_noise_start */
+    float    rate_time;        /* time constant of the rate's return to the population's, seconds; 0: never */
     float    forward_noise, lateral_noise, vertical_noise; /* metres */
     float    heading_noise, tilt_noise;                    /* radians */
     float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds */
     float    coef_noise;       /* score standard deviations */
     float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
     float    stature_noise;    /* fraction of stature, while settling */
+    uint32_t reserved;
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;

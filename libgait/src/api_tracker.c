@@ -18,7 +18,8 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
                        : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
         .term_weight = { 1.0f, 40.0f, 60.0f, 10.0f }, .missed_weight = 0.4f, .girth = 1.05f,
         .resample_ess = paper ? 1.0f : 0.5f, .max_dt = 0.5f,
-        .phase_noise = 0.0164f, .rate_noise = 0.055f, .rate_noise_start = 0.164f, .settle_time = 1.0f,
+        .phase_noise = 0.0164f, .rate_noise = 0.02f, .rate_noise_start = 0.055f, .settle_time = 1.0f,
+        .rate_time = 8.0f,
         .forward_noise = 0.022f, .lateral_noise = 0.0164f, .vertical_noise = 0.0096f,
         .heading_noise = 0.044f, .tilt_noise = 0.033f, .tilt_time = 1.1f,
         .coef_noise = 0.33f, .coef_time = 18.0f, .stature_noise = 0.005f,
@@ -30,7 +31,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->vertical_noise = 0.022f;
         cfg->heading_noise = 0.11f;
         cfg->tilt_noise = 0.055f;
-        cfg->tilt_time = cfg->coef_time = 0.0f;
+        cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
         cfg->stature_noise = 0.0f;
         cfg->girth = 1.0f;
     }
@@ -51,6 +52,7 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(term_weight[3], 0.0f, 1e6f),    RANGE(missed_weight, 0.0f, 1.0f),  RANGE(girth, 0.5f, 2.0f),
         RANGE(resample_ess, 0.0f, 1.0f),      RANGE(max_dt, 1e-3f, 10.0f),       RANGE(phase_noise, 0.0f, 10.0f),
         RANGE(rate_noise, 0.0f, 10.0f),       RANGE(rate_noise_start, 0.0f, 10.0f), RANGE(settle_time, 0.0f, 1e6f),
+        RANGE(rate_time, 0.0f, 1e6f),
         RANGE(forward_noise, 0.0f, 100.0f),   RANGE(lateral_noise, 0.0f, 100.0f), RANGE(vertical_noise, 0.0f, 100.0f),
         RANGE(heading_noise, 0.0f, 100.0f),   RANGE(tilt_noise, 0.0f, 100.0f),   RANGE(tilt_time, 0.0f, 1e6f),
         RANGE(coef_noise, 0.0f, 100.0f),      RANGE(coef_time, 0.0f, 1e6f),      RANGE(stature_noise, 0.0f, 1.0f),

@@ -66,7 +66,8 @@ walker dynamics_move(const dynamics *d, const walker *from, float dt, float age,
     float const turn = from->f[F_RATE] * dt + c->phase_noise * root_dt * n[0];
     float const rate_sd = (settling ? c->rate_noise_start : c->rate_noise) * m->stride_hz;
     w.f[F_PHASE] = m_wrap1(from->f[F_PHASE] + turn);
-    w.f[F_RATE] = reflect(from->f[F_RATE] + rate_sd * root_dt * n[1], RATE_MIN, RATE_MAX);
+    w.f[F_RATE] = m->stride_hz + relax(from->f[F_RATE] - m->stride_hz, dt, c->rate_time, rate_sd, n[1]);
+    w.f[F_RATE] = reflect(w.f[F_RATE], RATE_MIN, RATE_MAX);
 
     /* eq. 8: forward along the previous heading, by the stride's own speed profile unless in paper mode */
     float const speed = d->rule.plain_root ? m->stride_length

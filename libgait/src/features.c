@@ -95,7 +95,7 @@ static int32_t cell_difference(const view_planes *im, const view_planes *plate, 
 
 void features_foreground(features *f, const view_planes *im, const view_planes *plate)
 {
-    int32_t const half = 3 * 14 * 14; /* squared difference at which a cell is as likely foreground as not */
+    int32_t const half = 3 * 9 * 9; /* squared difference at which a cell is as likely foreground as not */
     int32_t const gain = exposure_gain(im, plate);
     memset(f->fg, 0, FG_PLANES * sizeof *f->fg);
     f->fg_total = 0;

@@ -25,7 +25,8 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
         if (!aim(t, c, predicted))
             im.data = NULL;
         s->seen.map = t->core->map[c];
-        bool const plate = s->background.data && im.data && (s->background.format == GAIT_GREY8) == (im.format == GAIT_GREY8);
+        bool const plate = s->plate.channel[0] && s->background.data && im.data &&
+                           (s->background.format == GAIT_GREY8) == (im.format == GAIT_GREY8);
         if (plate && s->plate_stale) {
             view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
             s->plate_stale = false;

@@ -204,6 +204,7 @@ class TrackerConfigC(ctypes.Structure):
         ("coef_noise", c_float),
         ("coef_time", c_float),
         ("stature_noise", c_float),
+        ("reserved", c_uint32),
         ("camera", CameraC * MAX_CAMERAS),
         ("exec", Tasks),
     ]
