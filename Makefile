@@ -49,7 +49,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test check unit python-test demo model bench eval asan golden-check lint format \
+.PHONY: help setup lib tools test check unit python-test demo model bench eval asan fuzz fuzz-run golden-check lint format \
         install uninstall clean
 
 help: ## list the targets
@@ -150,6 +150,18 @@ python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
 asan: ## C tests under the address and undefined-behaviour sanitizers
 	@$(MAKE) --no-print-directory config=sanitize unit
 
+# The plain program needs no libFuzzer; with clang: -fsanitize=fuzzer instead of standalone.c's main.
+FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
+$(B)/fuzz/%: tests/fuzz/%.c tests/fuzz/standalone.c tests/fuzz/fuzz.h $(B)/libgait.a Makefile | $(B)/fuzz/
+	$(call say,CC   $<)$(CC) -std=c11 $(OPT) -g -ffp-contract=off $(CWARN) -Ilibgait/include $(CFLAGS) $(LDFLAGS) \
+	    -o $@ $(filter %.c %.a,$^) -lm
+
+fuzz-run: $(FUZZ)
+	@for f in $^; do $$f python/gait/data/walk.gait $(or $(COUNT),500) $(SEED) || exit 1; done
+
+fuzz: ## damaged models and snapshots under the sanitizers (COUNT=500 SEED=0)
+	@$(MAKE) --no-print-directory config=sanitize fuzz-run
+
 golden-check: ## the tracker's digest is the same at -O0, -O2 and -O3, with every compiler found
 	@tests/check/golden.sh
 
@@ -175,7 +187,7 @@ eval: setup lib ## errors on the clips of ../shared/data
 	@$(PY) tests/bench/eval.py $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------
-C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.c tools/*.[ch] \
+C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.c tests/fuzz/*.[ch] tools/*.[ch] \
            tools/common/*.[ch]))
 lint: export PATH := $(abspath $(VENV)/bin):$(PATH)
 lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed

@@ -1,0 +1,38 @@
+/* fuzz_snapshot.c - a damaged snapshot is refused, or else the tracker goes on from it. */
+#include "fuzz.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { BODY_AT = 48, HASH_AT = 40, MODEL_ROOM = 1 << 20 };
+
+static gait_tracker *tracker;
+
+void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size)
+{
+    static _Alignas(GAIT_ALIGN) uint8_t room[MODEL_ROOM];
+    static void *copy, *memory;
+    gait_model *model = NULL;
+    gait_state mean, sd;
+    if (gait_model_init(room, sizeof room, fuzz_aligned(blob, blob_size, &copy), blob_size, &model, NULL) !=
+            GAIT_OK ||
+        gait_tracker_prior(model, &mean, &sd) != GAIT_OK || !(tracker = fuzz_tracker(model, &memory)))
+        abort();
+    fuzz_steps(tracker, &mean, &sd, 0, 3);
+    if (gait_tracker_save(tracker, out, cap, size) != GAIT_OK)
+        abort();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    void *memory = NULL;
+    uint8_t *const copy = fuzz_aligned(data, size, &memory);
+    if (size > BODY_AT) {
+        uint64_t const hash = fuzz_fnv1a(copy + BODY_AT, size - BODY_AT);
+        memcpy(copy + HASH_AT, &hash, sizeof hash);
+    }
+    if (gait_tracker_restore(tracker, copy, size, NULL) == GAIT_OK)
+        fuzz_steps(tracker, NULL, NULL, 200000, 2);
+    free(memory);
+    return 0;
+}
