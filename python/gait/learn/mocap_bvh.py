@@ -205,10 +205,12 @@ def _split(joint: Joint, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _upright(rest: Floats) -> tuple[Floats, float]:
-    """Rotation to z up and metres per unit, from the longest extent of the rest pose above and below the root."""
-    points = rest.reshape(-1, 3) - rest[0, 0]
-    extent = np.ptp(points, axis=0)
-    height = extent[1:].max()
-    turn = np.eye(3) if extent[2] > extent[1] else Y_UP
-    scales = np.array(UNITS) * max(float(height), 1e-9)
-    return turn, UNITS[int(np.argmin(np.abs(np.log(scales / HEIGHT))))]
+    """Rotation to z up and metres per unit, from the rest pose.
+
+    Up is y or z, whichever axis is less like its mirror image about the root; lengths along it give the unit.
+    """
+    points = np.sort(rest.reshape(-1, 3) - rest[0, 0], axis=0)
+    lopsided = np.abs(points + points[::-1]).mean(axis=0)
+    up = 1 if lopsided[1] >= lopsided[2] else 2
+    scales = np.array(UNITS) * max(float(np.ptp(points[:, up])), 1e-9)
+    return Y_UP if up == 1 else np.eye(3), UNITS[int(np.argmin(np.abs(np.log(scales / HEIGHT))))]

@@ -58,11 +58,11 @@ def decompose_yxz(r: Floats) -> Floats:
     b = np.arcsin(np.clip(-r[:, 1, 2], -1, 1))
     outer = np.stack([np.arctan2(r[:, 0, 2], r[:, 2, 2]), b, np.arctan2(r[:, 1, 0], r[:, 1, 1])], axis=1)
 
-    def last(t: int, a: float) -> float:
+    def inner(t: int, a: float) -> list[float]:
         rest = axis_rotation(1, -a) @ r[t]
-        return float(np.arctan2(-rest[0, 1], rest[0, 0]))
+        return [a, np.arctan2(-rest[1, 2], rest[2, 2]), np.arctan2(-rest[0, 1], rest[0, 0])]
 
-    return _continuous(outer, last)
+    return _continuous(outer, inner)
 
 
 def decompose_zyx(r: Floats) -> Floats:
@@ -70,11 +70,11 @@ def decompose_zyx(r: Floats) -> Floats:
     b = np.arcsin(np.clip(-r[:, 2, 0], -1, 1))
     outer = np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), b, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
 
-    def last(t: int, a: float) -> float:
+    def inner(t: int, a: float) -> list[float]:
         rest = axis_rotation(2, -a) @ r[t]
-        return float(np.arctan2(-rest[1, 2], rest[1, 1]))
+        return [a, np.arctan2(-rest[2, 0], rest[0, 0]), np.arctan2(-rest[1, 2], rest[1, 1])]
 
-    return _continuous(outer, last)
+    return _continuous(outer, inner)
 
 
 def unwrap(table: Floats) -> Floats:
@@ -86,7 +86,7 @@ def unwrap(table: Floats) -> Floats:
     return result
 
 
-def _continuous(angles: Floats, last: Callable[[int, float], float]) -> Floats:
+def _continuous(angles: Floats, inner: Callable[[int, float], list[float]]) -> Floats:
     """Choose in each frame the branch nearest to the frame before; hold the outer angle in gimbal lock.
 
     (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation; near |b| = 90 degrees only a +- c is known.
@@ -99,7 +99,7 @@ def _continuous(angles: Floats, last: Callable[[int, float], float]) -> Floats:
         now = angles[t]
         if previous is not None:
             if np.cos(now[1]) < GIMBAL:
-                now = np.array([previous[0], now[1], last(t, float(previous[0]))])
+                now = np.array(inner(t, float(previous[0])))
             other = np.array([now[0] + np.pi, np.pi - now[1], now[2] + np.pi])
             options = [_nearest_turn(option, previous) for option in (now, other)]
             now = min(options, key=lambda option: float(np.sum((option - previous) ** 2)))

@@ -1,0 +1,185 @@
+"""Readers of ASF/AMC and BVH: geometry, equality of the two, and messages for malformed files."""
+
+from pathlib import Path
+
+import mocap_files as files
+import numpy as np
+import pytest
+
+from gait.errors import UserError
+from gait.learn import body, mocap_asf, mocap_bvh, recording, retarget, root
+
+DATA = Path(__file__).parents[2] / "../shared/data/mocap"
+CGSPEED = {
+    "root": "Hips", "lfemur": "LeftUpLeg", "ltibia": "LeftLeg", "lfoot": "LeftFoot", "lhumerus": "LeftArm",
+    "lradius": "LeftForeArm", "lhand": "LeftHand", "rfemur": "RightUpLeg", "rtibia": "RightLeg",
+    "rfoot": "RightFoot", "rhumerus": "RightArm", "rradius": "RightForeArm", "rhand": "RightHand",
+    "lowerback": "Spine", "lowerneck": "Neck", "upperneck": "Neck1", "head": "Head",
+}  # fmt: skip
+MIXAMO = {k: f"mixamorig:{v}" for k, v in CGSPEED.items()} | {"upperneck": "mixamorig:Neck", "lowerneck": "chest"}
+POSER = {
+    "root": "hip", "lfemur": "lThigh", "ltibia": "lShin", "lfoot": "lFoot", "lhumerus": "lShldr",
+    "lradius": "lForeArm", "lhand": "lHand", "rfemur": "rThigh", "rtibia": "rShin", "rfoot": "rFoot",
+    "rhumerus": "rShldr", "rradius": "rForeArm", "rhand": "rHand", "upperneck": "neck", "lowerneck": "chest",
+}  # fmt: skip
+
+
+@pytest.fixture
+def amc(tmp_path):
+    return files.write_toy(tmp_path / "77", frames=130)
+
+
+def angles(rec):
+    walker, _ = root.level(body.body(rec))
+    return retarget.angles(walker, retarget.measure(walker))
+
+
+def test_rest_pose_is_upright_and_faces_x(amc):
+    rec = mocap_asf.read(amc)
+    rest = {name: (a, b) for name, a, b in zip(rec.bones, rec.rest_start, rec.rest_end, strict=True)}
+    assert rest["lfemur"][0][1] == pytest.approx(2.5 * 0.66 * 0.0254 / 0.45)  # left is +y
+    assert rest["head"][1][2] > 0.4 and rest["lfoot"][1][0] > 0.1
+    assert rest["lradius"][1][1] > rest["lradius"][0][1]
+
+
+def test_bones_keep_their_lengths_and_join(amc):
+    rec = mocap_asf.read(amc)
+    length = np.linalg.norm(rec.end - rec.start, axis=2)
+    assert length == pytest.approx(np.broadcast_to(length[0], length.shape))
+    thigh, shank = rec.bones.index("lfemur"), rec.bones.index("ltibia")
+    assert length[0, thigh] == pytest.approx(7.4 * 0.0254 / 0.45, rel=1e-3)
+    assert rec.end[:, thigh] == pytest.approx(rec.start[:, shank])
+    assert rec.rotation @ np.swapaxes(rec.rotation, 2, 3) == pytest.approx(
+        np.broadcast_to(np.eye(3), rec.rotation.shape), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("rename", [None, CGSPEED, MIXAMO, POSER], ids=["cmu", "cgspeed", "mixamo", "poser"])
+def test_bvh_gives_the_angles_of_the_amc_it_was_made_from(amc, rename):
+    path = amc.with_suffix(".bvh")
+    path.write_text(files.bvh_from_amc(amc, rename, unit=0.01))
+    first, second = mocap_asf.read(amc), mocap_bvh.read(path)
+    assert second.fps == pytest.approx(first.fps, rel=1e-4)
+    thigh = second.bones.index((rename or {}).get("lfemur", "lfemur"))
+    assert second.start[:, thigh] == pytest.approx(first.start[:, first.bones.index("lfemur")], abs=1e-4)
+    assert np.degrees(angles(second)) == pytest.approx(np.degrees(angles(first)), abs=0.02)
+
+
+def test_bvh_of_a_real_walk(tmp_path):
+    source = DATA / "cmu_walk/35/35_01.amc"
+    if not source.is_file():
+        pytest.skip(f"{source} is absent: the learning data are not part of the repository")
+    path = tmp_path / "35_01.bvh"
+    path.write_text(files.bvh_from_amc(source, CGSPEED))
+    assert np.degrees(angles(mocap_bvh.read(path))) == pytest.approx(
+        np.degrees(angles(mocap_asf.read(source))), abs=0.05
+    )
+
+
+def test_z_up_bvh_is_recognised(amc, tmp_path):
+    """The same motion with its axes turned (x, y, z) -> (z, x, y) in the file."""
+    text = files.bvh_from_amc(amc, unit=1.0)
+    lines = []
+    for line in text.splitlines():
+        words = line.split()
+        if words[:1] == ["OFFSET"]:
+            words = ["OFFSET", words[3], words[1], words[2]]
+        elif words[:1] == ["CHANNELS"]:
+            turn = {"X": "Y", "Y": "Z", "Z": "X"}
+            words = [turn[w[0]] + w[1:] if w[0] in turn else w for w in words]
+        lines.append(" ".join(words))
+    path = tmp_path / "z.bvh"
+    path.write_text("\n".join(lines) + "\n")
+    assert angles(mocap_bvh.read(path)) == pytest.approx(angles(mocap_asf.read(amc)), abs=1e-4)
+
+
+def test_runs_of_zeros_are_missing_and_fixed_bones_are_not():
+    columns = np.ones((12, 2))
+    columns[2:5] = 0
+    columns[7:9] = 0
+    columns[10, 0] = 0
+    missing = np.isnan(recording.mask_zero_runs(columns)).all(axis=1)
+    assert list(np.flatnonzero(missing)) == [2, 3, 4]
+    assert not np.isnan(recording.mask_zero_runs(np.zeros((9, 1)))).any()
+
+
+def test_missing_rotations_make_missing_angles_only_below_them(amc):
+    lines = amc.read_text().splitlines()
+    frame = 0
+    for i, line in enumerate(lines):
+        frame = int(line) if line.isdigit() else frame
+        if 40 <= frame < 50 and line.startswith("lhumerus"):
+            lines[i] = "lhumerus 0 0 0"
+    amc.write_text("\n".join(lines) + "\n")
+    table = angles(mocap_asf.read(amc, zero_runs=True))
+    gaps = {n: np.flatnonzero(np.isnan(c)) for n, c in zip(retarget.ANGLES, table.T, strict=True)}
+    assert all(list(gap) in ([], list(range(39, 49))) for gap in gaps.values())
+    assert len(gaps["l_shoulder_flexion"]) == 10 and not len(gaps["r_knee_flexion"])
+
+
+@pytest.mark.parametrize(
+    ("change", "line", "words"),
+    [
+        (lambda s: s.replace("ltibia", "lshin", 1), r":\d+", "does not move"),
+        (lambda s: s.replace("rtibia ", "rtibia x", 1), r":\d+", "not numbers"),
+        (lambda s: s.replace("rtibia ", "rtibia 1 ", 1), r":\d+", "2 numbers where 1"),
+        (lambda s: s.replace("rtibia ", "rtibia nan #", 1), r":\d+", "finite"),
+        (lambda s: s.replace("\n3\n", "\n5\n", 1), r":\d+", "frame 5 follows 2"),
+        (lambda s: s[: s.index("\n7\n") - 60], r":\d+", "frame 6 lacks"),
+        (lambda s: "", "", "0 frames"),
+        (lambda s: s[: s.index("\n2\n") + 1], "", "1 frames"),
+    ],
+)
+def test_malformed_amc_is_named_with_its_line(amc, change, line, words):
+    amc.write_text(change(amc.read_text()))
+    with pytest.raises(UserError, match=f"77_01.amc{line}: .*{words}"):
+        mocap_asf.read(amc)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: s.replace(":hierarchy", ":hier"), "no section :hierarchy"),
+        (lambda s: s.replace("length 7.4", "length long", 1), r":\d+: 'long' is not numbers"),
+        (lambda s: s.replace("lfemur ltibia", "lfemur ltibbia"), r":\d+: bone 'ltibbia' is not in"),
+        (lambda s: s.replace("TX TY TZ", "TX TY"), "order"),
+        (lambda s: s.replace("direction 1 0 0", "direction 1 0", 1), r":\d+: .* numbers where 3"),
+    ],
+)
+def test_malformed_asf_is_named(amc, change, words):
+    asf = amc.with_name("77.asf")
+    asf.write_text(change(asf.read_text()))
+    with pytest.raises(UserError, match=f"77.asf.*{words}"):
+        mocap_asf.read(amc)
+
+
+def test_skeleton_beside_the_motion_is_found(amc, tmp_path):
+    amc.with_name("77.asf").unlink()
+    with pytest.raises(UserError, match=r"no skeleton 77\.asf beside it"):
+        mocap_asf.read(amc)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: s.replace("HIERARCHY", "HIER"), r":1: 'HIER' where HIERARCHY"),
+        (lambda s: s.replace("OFFSET 0", "OFFSET a0", 1), r":\d+: 'a0\.\d+' where a number"),
+        (lambda s: s.replace("Zrotation", "Wrotation", 1), r":\d+: channel 'Wrotation'"),
+        (lambda s: s[: s.index("MOTION")], r":\d+: the file ends too early"),
+        (lambda s: s.replace("Frames: 130", "Frames: 131"), "130 rows where 131 frames"),
+        (lambda s: s.replace("Frame Time: 0.0", "Frame Time: -0.0"), r":\d+: .*frames of -0"),
+        (lambda s: s[: s.rindex(" ")] + "\n", r":\d+: \d+ words where \d+ numbers"),
+    ],
+)
+def test_malformed_bvh_is_named(amc, change, words):
+    path = amc.with_suffix(".bvh")
+    path.write_text(change(files.bvh_from_amc(amc)))
+    with pytest.raises(UserError, match=f"77_01.bvh.*{words}"):
+        mocap_bvh.read(path)
+
+
+def test_a_skeleton_without_legs_is_refused_by_name(amc):
+    path = amc.with_suffix(".bvh")
+    path.write_text(files.bvh_from_amc(amc, {"lfemur": "tentacle"}))
+    with pytest.raises(UserError, match="no bone for 'l_thigh'"):
+        body.body(mocap_bvh.read(path))
