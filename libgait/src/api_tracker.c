@@ -12,17 +12,34 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
     if (!cfg)
         return;
     *cfg = (gait_tracker_config){
-        .struct_size = sizeof *cfg, .mode = mode, .seed = 1, .particles = paper ? 10000 : 1000, .components = -1,
-        .tasks = 8, .cameras = 1,
+        .struct_size = sizeof *cfg,
+        .mode = mode,
+        .seed = 1,
+        .particles = paper ? 10000 : 1000,
+        .components = -1,
+        .tasks = 8,
+        .cameras = 1,
         .terms = paper ? GAIT_TERM_TEXTURE
                        : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
-        .term_weight = { 1.0f, 40.0f, 60.0f, 10.0f }, .missed_weight = 0.4f, .girth = 1.05f,
-        .resample_ess = paper ? 1.0f : 0.5f, .max_dt = 0.5f,
-        .phase_noise = 0.0164f, .rate_noise = 0.02f, .rate_noise_start = 0.055f, .settle_time = 1.0f,
+        .term_weight = {1.0f, 40.0f, 60.0f, 10.0f},
+        .missed_weight = 0.4f,
+        .girth = 1.05f,
+        .resample_ess = paper ? 1.0f : 0.5f,
+        .max_dt = 0.5f,
+        .phase_noise = 0.0164f,
+        .rate_noise = 0.02f,
+        .rate_noise_start = 0.055f,
+        .settle_time = 1.0f,
         .rate_time = 8.0f,
-        .forward_noise = 0.022f, .lateral_noise = 0.0164f, .vertical_noise = 0.0096f,
-        .heading_noise = 0.044f, .tilt_noise = 0.033f, .tilt_time = 1.1f,
-        .coef_noise = 0.33f, .coef_time = 18.0f, .stature_noise = 0.005f,
+        .forward_noise = 0.022f,
+        .lateral_noise = 0.0164f,
+        .vertical_noise = 0.0096f,
+        .heading_noise = 0.044f,
+        .tilt_noise = 0.033f,
+        .tilt_time = 1.1f,
+        .coef_noise = 0.33f,
+        .coef_time = 18.0f,
+        .stature_noise = 0.005f,
     };
     if (paper) { /* random walks of eqs. 5-9 (spec 1.4), rates that the papers left open */
         cfg->phase_noise = 0.022f;
@@ -39,30 +56,33 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
 
 typedef struct range { /* one float of the configuration */
     const char *name;
-    size_t      offset;
-    float       low, high;
+    size_t offset;
+    float low, high;
 } range;
 
-#define RANGE(member, low, high) { #member, offsetof(gait_tracker_config, member), low, high }
+#define RANGE(member, low, high) {#member, offsetof(gait_tracker_config, member), low, high}
 
 static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err)
 {
     static const range RANGES[] = {
-        RANGE(term_weight[0], 0.0f, 1e6f),    RANGE(term_weight[1], 0.0f, 1e6f), RANGE(term_weight[2], 0.0f, 1e6f),
-        RANGE(term_weight[3], 0.0f, 1e6f),    RANGE(missed_weight, 0.0f, 1.0f),  RANGE(girth, 0.5f, 2.0f),
-        RANGE(resample_ess, 0.0f, 1.0f),      RANGE(max_dt, 1e-3f, 10.0f),       RANGE(phase_noise, 0.0f, 10.0f),
-        RANGE(rate_noise, 0.0f, 10.0f),       RANGE(rate_noise_start, 0.0f, 10.0f), RANGE(settle_time, 0.0f, 1e6f),
-        RANGE(rate_time, 0.0f, 1e6f),
-        RANGE(forward_noise, 0.0f, 100.0f),   RANGE(lateral_noise, 0.0f, 100.0f), RANGE(vertical_noise, 0.0f, 100.0f),
-        RANGE(heading_noise, 0.0f, 100.0f),   RANGE(tilt_noise, 0.0f, 100.0f),   RANGE(tilt_time, 0.0f, 1e6f),
-        RANGE(coef_noise, 0.0f, 100.0f),      RANGE(coef_time, 0.0f, 1e6f),      RANGE(stature_noise, 0.0f, 1.0f),
+        RANGE(term_weight[0], 0.0f, 1e6f),    RANGE(term_weight[1], 0.0f, 1e6f),
+        RANGE(term_weight[2], 0.0f, 1e6f),    RANGE(term_weight[3], 0.0f, 1e6f),
+        RANGE(missed_weight, 0.0f, 1.0f),     RANGE(girth, 0.5f, 2.0f),
+        RANGE(resample_ess, 0.0f, 1.0f),      RANGE(max_dt, 1e-3f, 10.0f),
+        RANGE(phase_noise, 0.0f, 10.0f),      RANGE(rate_noise, 0.0f, 10.0f),
+        RANGE(rate_noise_start, 0.0f, 10.0f), RANGE(settle_time, 0.0f, 1e6f),
+        RANGE(rate_time, 0.0f, 1e6f),         RANGE(forward_noise, 0.0f, 100.0f),
+        RANGE(lateral_noise, 0.0f, 100.0f),   RANGE(vertical_noise, 0.0f, 100.0f),
+        RANGE(heading_noise, 0.0f, 100.0f),   RANGE(tilt_noise, 0.0f, 100.0f),
+        RANGE(tilt_time, 0.0f, 1e6f),         RANGE(coef_noise, 0.0f, 100.0f),
+        RANGE(coef_time, 0.0f, 1e6f),         RANGE(stature_noise, 0.0f, 1.0f),
     };
     for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
         float v;
         memcpy(&v, (const char *)cfg + RANGES[k].offset, sizeof v);
         if (!(v >= RANGES[k].low && v <= RANGES[k].high)) /* also false for NaN */
-            return base_fail(err, GAIT_ERR_ARG, (int)k, "config %s = %g is outside [%g, %g]", RANGES[k].name, (double)v,
-                             (double)RANGES[k].low, (double)RANGES[k].high);
+            return base_fail(err, GAIT_ERR_ARG, (int)k, "config %s = %g is outside [%g, %g]", RANGES[k].name,
+                             (double)v, (double)RANGES[k].low, (double)RANGES[k].high);
     }
     return GAIT_OK;
 }
@@ -77,28 +97,33 @@ static gait_status check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->mode != GAIT_MODE_DEFAULT && cfg->mode != GAIT_MODE_PAPER)
         return base_fail(err, GAIT_ERR_ARG, -1, "config mode %d is not a GAIT_MODE_*", (int)cfg->mode);
     if (cfg->particles < 16 || cfg->particles > 1 << 20)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config particles = %d is outside [16, 1048576]", (int)cfg->particles);
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config particles = %d is outside [16, 1048576]",
+                         (int)cfg->particles);
     if (cfg->components < -1 || cfg->components > m->components)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d", (int)cfg->components,
-                         (int)m->components);
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d",
+                         (int)cfg->components, (int)m->components);
     if (cfg->tasks < 1 || cfg->tasks > 256)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config tasks = %d is outside [1, 256]", (int)cfg->tasks);
     if (cfg->cameras < 1 || cfg->cameras > GAIT_MAX_CAMERAS)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config cameras = %d is outside [1, %d]", (int)cfg->cameras,
                          GAIT_MAX_CAMERAS);
     if (cfg->terms == 0 || (cfg->terms & ~known) != 0)
-        return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*", (unsigned)cfg->terms);
+        return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
+                         (unsigned)cfg->terms);
     for (int32_t c = 0; c < cfg->cameras; c++)
         if (!camera_valid(&cfg->camera[c]))
-            return base_fail(err, GAIT_ERR_ARG, c,
-                             "camera %d: size and focal lengths must be positive, R a rotation, all numbers finite", (int)c);
+            return base_fail(
+                err, GAIT_ERR_ARG, c,
+                "camera %d: size and focal lengths must be positive, R a rotation, all numbers finite",
+                (int)c);
     return check_numbers(cfg, err);
 }
 
-gait_status gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes, gait_error *err)
+gait_status gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
+                               gait_error *err)
 {
     gait_status const s = check_config(m, cfg, err);
-    arena a = { .cap = SIZE_MAX };
+    arena a = {.cap = SIZE_MAX};
     if (s != GAIT_OK)
         return s;
     if (!bytes)
@@ -110,18 +135,19 @@ gait_status gait_tracker_bytes(const gait_model *m, const gait_tracker_config *c
     return GAIT_OK;
 }
 
-gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_tracker_config *cfg,
-                                       gait_tracker **out, gait_error *err)
+gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
+                              const gait_tracker_config *cfg, gait_tracker **out, gait_error *err)
 {
     size_t need = 0;
     gait_status const s = gait_tracker_bytes(m, cfg, &need, err);
-    arena a = { .base = mem, .cap = mem_bytes };
+    arena a = {.base = mem, .cap = mem_bytes};
     if (s != GAIT_OK)
         return s;
     if (!mem || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "mem or out is NULL");
     if ((uintptr_t)mem % GAIT_ALIGN != 0 || mem_bytes < need)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "need %zu bytes aligned to %d, got %zu", need, GAIT_ALIGN, mem_bytes);
+        return base_fail(err, GAIT_ERR_MEMORY, -1, "need %zu bytes aligned to %d, got %zu", need, GAIT_ALIGN,
+                         mem_bytes);
     gait_tracker *const t = tracker_layout(&a, m, cfg);
     tracker_clear(t);
     *out = t;
@@ -133,9 +159,10 @@ gait_status gait_tracker_set_background(gait_tracker *t, int32_t camera, const g
     if (!t || camera < 0 || camera >= t->cfg.cameras)
         return GAIT_ERR_ARG;
     camera_state *const s = &t->camera[camera];
-    if (plate && plate->data && !image_valid(plate, t->cfg.camera[camera].width, t->cfg.camera[camera].height))
+    if (plate && plate->data &&
+        !image_valid(plate, t->cfg.camera[camera].width, t->cfg.camera[camera].height))
         return GAIT_ERR_ARG;
-    s->background = plate ? *plate : (gait_image){ 0 };
+    s->background = plate ? *plate : (gait_image){0};
     s->plate_stale = true;
     return GAIT_OK;
 }
@@ -144,9 +171,14 @@ gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
 {
     if (!m || !mean || !sd)
         return GAIT_ERR_ARG;
-    *mean = (gait_state){ .stride_hz = m->stride_hz, .stature = m->stature_mean };
-    *sd = (gait_state){ .phase = 0.5f, .stride_hz = m->stride_hz_sd, .stature = m->stature_sd, .heading = PI_F,
-                        .pitch = 0.02f, .roll = 0.02f, .pelvis = { 1.0f, 1.0f, 0.1f } };
+    *mean = (gait_state){.stride_hz = m->stride_hz, .stature = m->stature_mean};
+    *sd = (gait_state){.phase = 0.5f,
+                       .stride_hz = m->stride_hz_sd,
+                       .stature = m->stature_sd,
+                       .heading = PI_F,
+                       .pitch = 0.02f,
+                       .roll = 0.02f,
+                       .pelvis = {1.0f, 1.0f, 0.1f}};
     for (int32_t k = 0; k < m->components; k++)
         sd->coef[k] = 1.0f;
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2]);
@@ -170,7 +202,7 @@ static bool state_nonnegative(const gait_state *s)
 }
 
 gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
-                                        gait_error *err)
+                               gait_error *err)
 {
     if (!t || !mean || !sd)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker, mean or sd is NULL");
@@ -179,7 +211,8 @@ gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const ga
     if (!state_nonnegative(sd))
         return base_fail(err, GAIT_ERR_ARG, -1, "start: a standard deviation is negative");
     if (!(mean->stride_hz > 0.0f) || !(mean->stature > 0.2f && mean->stature < 3.0f))
-        return base_fail(err, GAIT_ERR_ARG, -1, "start: stride_hz must be positive and stature within 0.2 .. 3 m");
+        return base_fail(err, GAIT_ERR_ARG, -1,
+                         "start: stride_hz must be positive and stature within 0.2 .. 3 m");
     tracker_start(t, mean, sd, utime);
     return GAIT_OK;
 }
@@ -190,14 +223,16 @@ static gait_status check_frame(const gait_tracker *t, const gait_frame *frame, g
     if (dt < 0 || (dt == 0 && t->core->frame > 0))
         return base_fail(err, GAIT_ERR_STATE, -1, "frame is not newer than the one before");
     if ((double)dt > 1e6 * (double)t->cfg.max_dt)
-        return base_fail(err, GAIT_ERR_STATE, -1, "%.3f s since the last frame, max_dt is %.3f s: start again",
-                         1e-6 * (double)dt, (double)t->cfg.max_dt);
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "%.3f s since the last frame, max_dt is %.3f s: start again", 1e-6 * (double)dt,
+                         (double)t->cfg.max_dt);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         const gait_image *const im = &frame->image[c];
         const gait_camera *const cam = &t->cfg.camera[c];
         if (im->data && !image_valid(im, cam->width, cam->height))
-            return base_fail(err, GAIT_ERR_ARG, c, "image of camera %d is %d x %d stride %d, the camera is %d x %d", (int)c,
-                             (int)im->width, (int)im->height, (int)im->stride, (int)cam->width, (int)cam->height);
+            return base_fail(
+                err, GAIT_ERR_ARG, c, "image of camera %d is %d x %d stride %d, the camera is %d x %d",
+                (int)c, (int)im->width, (int)im->height, (int)im->stride, (int)cam->width, (int)cam->height);
     }
     return GAIT_OK;
 }
@@ -250,10 +285,11 @@ gait_status gait_tracker_restore(gait_tracker *t, const void *mem, size_t bytes,
     return snapshot_restore(t, mem, bytes, err);
 }
 
-gait_status gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids, int32_t ids_stride)
+gait_status gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
+                        int32_t ids_stride)
 {
-    if (!m || !cam || !s || !ids || !camera_valid(cam) || cam->width > RAST_LIMIT || cam->height > RAST_LIMIT ||
-        ids_stride < cam->width)
+    if (!m || !cam || !s || !ids || !camera_valid(cam) || cam->width > RAST_LIMIT ||
+        cam->height > RAST_LIMIT || ids_stride < cam->width)
         return GAIT_ERR_ARG;
     return render_limbs(m, cam, s, ids, ids_stride);
 }

@@ -23,8 +23,8 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
 {
     float const level_sd = 0.03f; /* metres: how far the ground may be from z = 0 */
     int32_t const q = d->rule.components;
-    float       n[NORMALS], u[4];
-    gait_state  s = *mean;
+    float n[NORMALS], u[4];
+    gait_state s = *mean;
     normals(d, STREAM_START, 0, i, 9 + q, n);
     rng_uniform4(d->seed, STREAM_START, 1, (uint32_t)i, 0, u);
     s.phase = sd->phase >= 0.5f ? u[0] : m_wrap1(mean->phase + sd->phase * n[0]);
@@ -39,7 +39,8 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
         s.coef[k] += sd->coef[k] * n[9 + k];
     walker w = walker_from_state(&d->rule, &s);
     /* The given height of the pelvis and the ground at z = 0 are two measurements of one level. */
-    float const var = sd->pelvis[2] * sd->pelvis[2], trust = level_sd * level_sd / (level_sd * level_sd + var);
+    float const var = sd->pelvis[2] * sd->pelvis[2],
+                trust = level_sd * level_sd / (level_sd * level_sd + var);
     w.f[F_Z] = trust * w.f[F_Z] + __builtin_sqrtf(trust) * sd->pelvis[2] * n[8];
     return w;
 }
@@ -56,10 +57,10 @@ walker dynamics_move(const dynamics *d, const walker *from, float dt, float age,
     const gait_tracker_config *const c = d->cfg;
     const gait_model *const m = d->rule.model;
     int32_t const q = d->rule.components;
-    float const   root_dt = __builtin_sqrtf(dt);
-    bool const    settling = age < c->settle_time;
-    float         n[NORMALS], sn, cs;
-    walker        w = *from;
+    float const root_dt = __builtin_sqrtf(dt);
+    bool const settling = age < c->settle_time;
+    float n[NORMALS], sn, cs;
+    walker w = *from;
     normals(d, STREAM_MOVE, frame, i, 9 + q, n);
 
     /* eqs. 6 and 7: phase advances by the previous rate; the rate diffuses */

@@ -8,8 +8,8 @@ enum { STREAM_START = 1, STREAM_MOVE = 2, STREAM_RESAMPLE = 3 };
 
 typedef struct dynamics {
     const gait_tracker_config *cfg;
-    body_rule                  rule;
-    uint64_t                   seed;
+    body_rule rule;
+    uint64_t seed;
 } dynamics;
 
 /* Particle i of the prior: independent normals about mean (gait_tracker_start). */

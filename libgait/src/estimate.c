@@ -5,8 +5,8 @@
 
 walker estimate_place(const population *p, const double *weight)
 {
-    static const int32_t FIELDS[] = { F_X, F_Y, F_Z, F_STATURE };
-    walker w = { { 0 } };
+    static const int32_t FIELDS[] = {F_X, F_Y, F_Z, F_STATURE};
+    walker w = {{0}};
     for (size_t k = 0; k < sizeof FIELDS / sizeof *FIELDS; k++) {
         const float *const v = field(p, FIELDS[k]);
         double sum = 0.0;
@@ -23,7 +23,7 @@ typedef struct circular { /* resultant of unit vectors */
 
 static circular resultant(const float *angle, float turn, const double *weight, const uint8_t *use, int32_t n)
 {
-    circular r = { 0.0, 0.0 };
+    circular r = {0.0, 0.0};
     for (int32_t i = 0; i < n; i++) {
         float sn, cs;
         if (use && !use[i])
@@ -60,8 +60,8 @@ static double dominant_mode(const population *p, const double *weight, int32_t b
     return mass;
 }
 
-static void mean_and_sd(const float *v, const double *weight, const uint8_t *use, double mass, int32_t n, float *mean,
-                        float *sd)
+static void mean_and_sd(const float *v, const double *weight, const uint8_t *use, double mass, int32_t n,
+                        float *mean, float *sd)
 {
     double sum = 0.0, all = 0.0, square = 0.0;
     for (int32_t i = 0; i < n; i++) {
@@ -79,8 +79,8 @@ static void mean_and_sd(const float *v, const double *weight, const uint8_t *use
 /* Chordal mean of Rz(heading) Ry(pitch) Rx(roll) over the mode, back as the three angles. */
 static void mean_rotation(const population *p, const double *weight, const uint8_t *use, walker *w)
 {
-    double qq[16] = { 0 };
-    float  q[4];
+    double qq[16] = {0};
+    float q[4];
     for (int32_t i = 0; i < p->n; i++) {
         float sh, ch, sp, cp, sr, cr;
         if (!use[i])
@@ -88,8 +88,8 @@ static void mean_rotation(const population *p, const double *weight, const uint8
         m_sincos(0.5f * field(p, F_HEADING)[i], &sh, &ch);
         m_sincos(0.5f * field(p, F_PITCH)[i], &sp, &cp);
         m_sincos(0.5f * field(p, F_ROLL)[i], &sr, &cr);
-        float const v[4] = { ch * cp * cr + sh * sp * sr, ch * cp * sr - sh * sp * cr, ch * sp * cr + sh * cp * sr,
-                             sh * cp * cr - ch * sp * sr };
+        float const v[4] = {ch * cp * cr + sh * sp * sr, ch * cp * sr - sh * sp * cr,
+                            ch * sp * cr + sh * cp * sr, sh * cp * cr - ch * sp * sr};
         for (int32_t a = 0; a < 4; a++)
             for (int32_t b = 0; b < 4; b++)
                 qq[4 * a + b] += weight[i] * (double)(v[a] * v[b]);
@@ -130,10 +130,15 @@ static float ground_speed(const gait_tracker *t, const walker *w)
 }
 
 /* Deviation of the pelvis: its joint is point 0 of every model. */
-static void spread(const gait_tracker *t, const walker *sd, float phase_sd, float heading_sd, gait_estimate *out)
+static void spread(const gait_tracker *t, const walker *sd, float phase_sd, float heading_sd,
+                   gait_estimate *out)
 {
-    out->sd = (gait_state){ .phase = phase_sd, .stride_hz = sd->f[F_RATE], .stature = sd->f[F_STATURE],
-                            .heading = heading_sd, .pitch = sd->f[F_PITCH], .roll = sd->f[F_ROLL] };
+    out->sd = (gait_state){.phase = phase_sd,
+                           .stride_hz = sd->f[F_RATE],
+                           .stature = sd->f[F_STATURE],
+                           .heading = heading_sd,
+                           .pitch = sd->f[F_PITCH],
+                           .roll = sd->f[F_ROLL]};
     for (int32_t k = 0; k < 3; k++)
         out->sd.pelvis[k] = out->joint_sd[0][k];
     for (int32_t k = 0; k < t->rule.components; k++)
@@ -145,8 +150,8 @@ walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
     const population *const p = &t->gen[t->core->current].people;
     const double *const weight = t->filter.weight;
     uint8_t *const use = t->mode;
-    double const   mass = dominant_mode(p, weight, best, use);
-    walker         mean, sd;
+    double const mass = dominant_mode(p, weight, best, use);
+    walker mean, sd;
     for (int32_t f = 0; f < F_COEF + p->components; f++)
         mean_and_sd(field(p, f), weight, use, mass, p->n, &mean.f[f], &sd.f[f]);
     circular const phase = resultant(field(p, F_PHASE), TWO_PI_F, weight, NULL, p->n);
@@ -157,7 +162,7 @@ walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
     spread(t, &sd, resultant_sd(phase) / TWO_PI_F,
            resultant_sd(resultant(field(p, F_HEADING), 1.0f, weight, NULL, p->n)), out);
     walker const heaviest = walker_get(p, best);
-    gait_pose    pose;
+    gait_pose pose;
     out->mean = walker_state(&t->rule, &mean);
     out->best = walker_state(&t->rule, &heaviest);
     if (model_pose_state(t->model, &out->mean, &pose) == GAIT_OK)

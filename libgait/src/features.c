@@ -4,11 +4,11 @@
 
 features features_layout(arena *a)
 {
-    features f = { 0 };
+    features f = {0};
     f.edge = TAKE(a, edge_cell, VIEW_PIXELS);
     f.surface = TAKE(a, int8_t, VIEW_PIXELS);
-    f.fg = (uint64_t(*)[RAST_SIZE][RAST_WORDS])arena_take(a, sizeof *f.fg, FG_PLANES);
-    f.inside = (uint64_t(*)[RAST_WORDS])arena_take(a, sizeof *f.inside, RAST_SIZE);
+    f.fg = (uint64_t (*)[RAST_SIZE][RAST_WORDS])arena_take(a, sizeof *f.fg, FG_PLANES);
+    f.inside = (uint64_t (*)[RAST_WORDS])arena_take(a, sizeof *f.inside, RAST_SIZE);
     return f;
 }
 
@@ -178,7 +178,8 @@ void features_edges(const uint8_t *grey, edge_cell *out, features_scratch *s)
         xx[i] = (int16_t)s->sum[i];
     soften(yy, s->sum, s->tmp);
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
-        out[i] = (edge_cell){ .trace = (int8_t)((xx[i] + s->sum[i]) / 8), .xx_yy = (int8_t)((xx[i] - s->sum[i]) / 8) };
+        out[i] = (edge_cell){.trace = (int8_t)((xx[i] + s->sum[i]) / 8),
+                             .xx_yy = (int8_t)((xx[i] - s->sum[i]) / 8)};
     soften(xy, s->sum, s->tmp);
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
         out[i].xy2 = (int8_t)(s->sum[i] / 4);
@@ -205,8 +206,8 @@ void features_contrast(const uint8_t *grey, int8_t *out, features_scratch *s)
     }
 }
 
-void features_compute(features *f, const gait_camera *cam, const gait_image *im, const view_planes *plate, bool raw,
-                      features_scratch *s)
+void features_compute(features *f, const gait_camera *cam, const gait_image *im, const view_planes *plate,
+                      bool raw, features_scratch *s)
 {
     f->seen = im->data != NULL;
     f->has_fg = false;

@@ -16,7 +16,8 @@ int32_t layers_order(const outline_block *outline, int32_t limbs, int32_t lane, 
     return n;
 }
 
-void layers_polygon(const outline_block *outline, int32_t limb, int32_t vertices, int32_t lane, float *x, float *y)
+void layers_polygon(const outline_block *outline, int32_t limb, int32_t vertices, int32_t lane, float *x,
+                    float *y)
 {
     for (int32_t k = 0; k < vertices; k++) {
         x[k] = 0.5f * outline->x[limb][k][lane] - 0.25f; /* centre of cell c is working pixel 2 c + 1/2 */
@@ -24,9 +25,10 @@ void layers_polygon(const outline_block *outline, int32_t limb, int32_t vertices
     }
 }
 
-void layers_draw(const outline_block *outline, const limb_geometry *limbs, int32_t count, int32_t lane, layers *out)
+void layers_draw(const outline_block *outline, const limb_geometry *limbs, int32_t count, int32_t lane,
+                 layers *out)
 {
-    int32_t       order[MODEL_MAX_LIMBS];
+    int32_t order[MODEL_MAX_LIMBS];
     int32_t const drawn = layers_order(outline, count, lane, order);
     memset(out->whole.row, 0, sizeof out->whole.row);
     out->whole.first = RAST_SIZE;
@@ -35,8 +37,8 @@ void layers_draw(const outline_block *outline, const limb_geometry *limbs, int32
         out->visible[l].first = out->visible[l].last = 0;
     for (int32_t k = 0; k < drawn; k++) {
         int32_t const l = order[k], n = outline_vertices(&limbs[l]);
-        float         x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES];
-        rast_spans    spans;
+        float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES];
+        rast_spans spans;
         rast_mask *const mask = &out->visible[l];
         layers_polygon(outline, l, n, lane, x, y);
         rast_convex(x, y, n, 0, RAST_SIZE, &spans);

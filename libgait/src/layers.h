@@ -12,9 +12,11 @@ typedef struct layers {
 int32_t layers_order(const outline_block *outline, int32_t limbs, int32_t lane, int32_t *order);
 
 /* Polygon of one limb of one lane in grid cells (two working pixels each). */
-void layers_polygon(const outline_block *outline, int32_t limb, int32_t vertices, int32_t lane, float *x, float *y);
+void layers_polygon(const outline_block *outline, int32_t limb, int32_t vertices, int32_t lane, float *x,
+                    float *y);
 
-void layers_draw(const outline_block *outline, const limb_geometry *limbs, int32_t count, int32_t lane, layers *out);
+void layers_draw(const outline_block *outline, const limb_geometry *limbs, int32_t count, int32_t lane,
+                 layers *out);
 
 /* Is the limb visible at this working pixel? */
 static inline bool layers_visible(const rast_mask *mask, float wx, float wy)

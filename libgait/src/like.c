@@ -2,7 +2,8 @@
 #include "camera.h"
 #include "fmath.h"
 
-static const like_term *const TERMS[LIKE_TERMS] = { &like_texture, &like_silhouette, &like_edges, &like_template };
+static const like_term *const TERMS[LIKE_TERMS] = {&like_texture, &like_silhouette, &like_edges,
+                                                   &like_template};
 
 /* Points on rings at the middles of equal parts of the limb, with outward normals. */
 static void surface_init(const limb_geometry *g, like_surface *out)
@@ -10,8 +11,8 @@ static void surface_init(const limb_geometry *g, like_surface *out)
     for (int32_t r = 0; r < LIKE_ROWS; r++)
         for (int32_t a = 0; a < LIKE_AZIMUTHS; a++) {
             int32_t const i = r * LIKE_AZIMUTHS + a;
-            float const   z = ((float)r + 0.5f) / (float)LIKE_ROWS;
-            float         s, c, ra = g->a0 + (g->a1 - g->a0) * z, rb = g->b0 + (g->b1 - g->b0) * z, bulge = 0.0f;
+            float const z = ((float)r + 0.5f) / (float)LIKE_ROWS;
+            float s, c, ra = g->a0 + (g->a1 - g->a0) * z, rb = g->b0 + (g->b1 - g->b0) * z, bulge = 0.0f;
             m_sincos(TWO_PI_F * ((float)a + 0.5f * (float)(r & 1)) / (float)LIKE_AZIMUTHS, &s, &c);
             if (g->shape == LIMB_ELLIPSOID) {
                 bulge = 2.0f * z - 1.0f;
@@ -62,28 +63,32 @@ static int8_t surface_at(const int8_t *map, float x, float y)
     int32_t const v = i_clamp((int32_t)(y * 256.0f), 0, (VIEW_SIZE - 1) * 256 - 1);
     const int8_t *const p = map + (v >> 8) * VIEW_SIZE + (u >> 8);
     int32_t const fx = u & 255, fy = v & 255;
-    int32_t const top = p[0] * (256 - fx) + p[1] * fx, low = p[VIEW_SIZE] * (256 - fx) + p[VIEW_SIZE + 1] * fx;
+    int32_t const top = p[0] * (256 - fx) + p[1] * fx,
+                  low = p[VIEW_SIZE] * (256 - fx) + p[VIEW_SIZE + 1] * fx;
     return (int8_t)((top * (256 - fy) + low * fy) / 65536);
 }
 
-typedef struct sample_set { /* surface points of one limb in the camera */
+typedef struct sample_set {                 /* surface points of one limb in the camera */
     float x[LIKE_SAMPLES], y[LIKE_SAMPLES]; /* working pixels */
     float front[LIKE_SAMPLES];              /* > 0: faces the camera well enough */
 } sample_set;
 
 /* Rotation of frame f into the camera and position of its origin there. */
-static void frame_to_camera(const kin_body *body, int32_t f, int32_t lane, const gait_camera *cam, float M[9], float t[3])
+static void frame_to_camera(const kin_body *body, int32_t f, int32_t lane, const gait_camera *cam, float M[9],
+                            float t[3])
 {
     for (int32_t r = 0; r < 3; r++) {
         const float *const c = cam->R + 3 * r;
         for (int32_t k = 0; k < 3; k++)
-            M[3 * r + k] = c[0] * body->R[f][k][lane] + c[1] * body->R[f][3 + k][lane] + c[2] * body->R[f][6 + k][lane];
-        t[r] = c[0] * body->o[f][0][lane] + c[1] * body->o[f][1][lane] + c[2] * body->o[f][2][lane] + cam->t[r];
+            M[3 * r + k] =
+                c[0] * body->R[f][k][lane] + c[1] * body->R[f][3 + k][lane] + c[2] * body->R[f][6 + k][lane];
+        t[r] =
+            c[0] * body->o[f][0][lane] + c[1] * body->o[f][1][lane] + c[2] * body->o[f][2][lane] + cam->t[r];
     }
 }
 
-static void place_samples(const like_surface *s, const float M[9], const float t[3], float scale, const gait_camera *cam,
-                          const view_map *map, sample_set *out)
+static void place_samples(const like_surface *s, const float M[9], const float t[3], float scale,
+                          const gait_camera *cam, const view_map *map, sample_set *out)
 {
     float const min_facing = 0.2f; /* |n.v| below which a point grazes the outline */
     for (int32_t i = 0; i < LIKE_SAMPLES; i++) {
@@ -101,13 +106,13 @@ static void place_samples(const like_surface *s, const float M[9], const float t
     }
 }
 
-void like_sample(const like_setup *s, const features *f, const gait_camera *cam, const kin_body *body, int32_t lane,
-                 const layers *drawn, int8_t *seen)
+void like_sample(const like_setup *s, const features *f, const gait_camera *cam, const kin_body *body,
+                 int32_t lane, const layers *drawn, int8_t *seen)
 {
     for (int32_t l = 0; l < s->limbs; l++, seen += LIKE_SAMPLES) {
         const rast_mask *const mask = &drawn->visible[l];
         sample_set set;
-        float      M[9], t[3];
+        float M[9], t[3];
         frame_to_camera(body, s->geometry[l].frame, lane, cam, M, t);
         place_samples(&s->surface[l], M, t, body->scale[lane], cam, &f->map, &set);
         for (int32_t i = 0; i < LIKE_SAMPLES; i++) {

@@ -1,7 +1,10 @@
 /* Image gradient along the visible outlines of the limbs, normal to them (prototype.md 5.3). */
 #include "like.h"
 
-enum { SIDE_POINTS = 10, RIM_POINTS = 3 }; /* along each side of a cone; along each side of an ellipsoid's octagon */
+enum {
+    SIDE_POINTS = 10,
+    RIM_POINTS = 3
+}; /* along each side of a cone; along each side of an ellipsoid's octagon */
 
 typedef struct tally {
     int32_t response; /* sum of 64 x EDGE_ONE per point */
@@ -9,8 +12,8 @@ typedef struct tally {
 } tally;
 
 /* n points along the side from (x0, y0) to (x1, y1); (mx, my) is inside the limb. */
-static void side(const features *f, const rast_mask *mask, float x0, float y0, float x1, float y1, float mx, float my,
-                 int32_t n, tally *t)
+static void side(const features *f, const rast_mask *mask, float x0, float y0, float x1, float y1, float mx,
+                 float my, int32_t n, tally *t)
 {
     float const dx = x1 - x0, dy = y1 - y0, len2 = dx * dx + dy * dy;
     if (!(len2 > 1.0f))
@@ -44,7 +47,8 @@ static void cone(const like_body *b, int32_t l, tally *t)
     /* The point inside moves along with the sample: interpolate the axis. */
     for (int32_t k = 0; k < 2; k++) {
         int32_t const from = k ? 3 : 0, to = k ? 2 : 1, over = k ? 0 : 3, far = k ? 1 : 2;
-        float const   mx = 0.25f * (x[from] + x[to] + x[over] + x[far]), my = 0.25f * (y[from] + y[to] + y[over] + y[far]);
+        float const mx = 0.25f * (x[from] + x[to] + x[over] + x[far]),
+                    my = 0.25f * (y[from] + y[to] + y[over] + y[far]);
         side(b->features, &b->layers->visible[l], x[from], y[from], x[to], y[to], mx, my, SIDE_POINTS, t);
     }
 }
@@ -53,18 +57,18 @@ static void ellipsoid(const like_body *b, int32_t l, tally *t)
 {
     const outline_block *const o = b->outline;
     int32_t const i = b->lane;
-    float const   mx = 0.5f * (o->x[l][0][i] + o->x[l][4][i]), my = 0.5f * (o->y[l][0][i] + o->y[l][4][i]);
+    float const mx = 0.5f * (o->x[l][0][i] + o->x[l][4][i]), my = 0.5f * (o->y[l][0][i] + o->y[l][4][i]);
     for (int32_t k = 0; k < 8; k++) {
         int32_t const n = (k + 1) & 7;
-        side(b->features, &b->layers->visible[l], o->x[l][k][i], o->y[l][k][i], o->x[l][n][i], o->y[l][n][i], mx, my,
-             RIM_POINTS, t);
+        side(b->features, &b->layers->visible[l], o->x[l][k][i], o->y[l][k][i], o->x[l][n][i], o->y[l][n][i],
+             mx, my, RIM_POINTS, t);
     }
 }
 
 static float log_likelihood(const like_body *b)
 {
     int32_t const enough = 20; /* points below which the outline counts as unseen */
-    tally t = { 0, 0 };
+    tally t = {0, 0};
     for (int32_t l = 0; l < b->setup->limbs; l++) {
         if (!(b->outline->depth[l][b->lane] > 0.0f))
             continue;
@@ -78,4 +82,4 @@ static float log_likelihood(const like_body *b)
     return (float)t.response / (float)(t.points * 2 * 64 * EDGE_ONE) - 1.0f;
 }
 
-const like_term like_edges = { "edges", GAIT_TERM_EDGES, log_likelihood };
+const like_term like_edges = {"edges", GAIT_TERM_EDGES, log_likelihood};

@@ -4,7 +4,7 @@
 /* Area of the body (in FG_ONE per cell) and the foreground under it, over cells that the camera sees. */
 static void count(const like_body *b, int32_t *area, int32_t *covered)
 {
-    const features *const  f = b->features;
+    const features *const f = b->features;
     const rast_mask *const whole = &b->layers->whole;
     int32_t a = 0, c = 0;
     for (int32_t y = whole->first; y < whole->last; y++)
@@ -24,7 +24,7 @@ static float log_likelihood(const like_body *b)
 {
     /* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */
     float const typical = 0.16f * (float)(VIEW_PERSON / 2) * (float)(VIEW_PERSON / 2) * (float)FG_ONE;
-    int32_t     area, covered;
+    int32_t area, covered;
     if (!b->features->has_fg)
         return 0.0f;
     count(b, &area, &covered);
@@ -32,4 +32,4 @@ static float log_likelihood(const like_body *b)
     return -((float)(area - covered) + b->setup->missed_weight * missed) / typical;
 }
 
-const like_term like_silhouette = { "silhouette", GAIT_TERM_SILHOUETTE, log_likelihood };
+const like_term like_silhouette = {"silhouette", GAIT_TERM_SILHOUETTE, log_likelihood};

@@ -13,7 +13,8 @@ void template_update(int16_t *template, int32_t limbs, const int8_t *seen)
         if (seen[i] == TEXTURE_HIDDEN)
             continue;
         int32_t const now = seen[i] * TEMPLATE_ONE;
-        template[i] = (int16_t)(template[i] == TEMPLATE_EMPTY ? now : template[i] + (now - template[i]) / slow);
+        template[i] =
+            (int16_t)(template[i] == TEMPLATE_EMPTY ? now : template[i] + (now - template[i]) / slow);
     }
 }
 
@@ -35,4 +36,4 @@ static float log_likelihood(const like_body *b)
     return both < enough ? unknown : -(float)sum / (float)(both * LIKE_COST_ONE);
 }
 
-const like_term like_template = { "template", GAIT_TERM_TEMPLATE, log_likelihood };
+const like_term like_template = {"template", GAIT_TERM_TEMPLATE, log_likelihood};

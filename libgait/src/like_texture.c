@@ -21,9 +21,10 @@ static float mixture(float q, float log_visible, float log_occluded)
 /* Robust, contrast-normalised form: mean Student-t cost. */
 static float limb_robust(const like_body *b, int32_t l)
 {
-    float const   log_occluded = -1.6f; /* as bad as a typical mismatch */
-    int32_t       cost;
-    int32_t const both = like_compare(b->setup, b->seen + l * LIKE_SAMPLES, b->ancestor + l * LIKE_SAMPLES, &cost);
+    float const log_occluded = -1.6f; /* as bad as a typical mismatch */
+    int32_t cost;
+    int32_t const both =
+        like_compare(b->setup, b->seen + l * LIKE_SAMPLES, b->ancestor + l * LIKE_SAMPLES, &cost);
     if (both < FEW)
         return log_occluded;
     float const mean = (float)cost / (float)(both * LIKE_COST_ONE);
@@ -61,4 +62,4 @@ static float log_likelihood(const like_body *b)
     return sum;
 }
 
-const like_term like_texture = { "texture", GAIT_TERM_TEXTURE, log_likelihood };
+const like_term like_texture = {"texture", GAIT_TERM_TEXTURE, log_likelihood};

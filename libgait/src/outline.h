@@ -6,10 +6,11 @@
 #include "view.h"
 
 typedef struct limb_geometry { /* one body part in its frame, statures */
-    float   start[3], end[3];
-    float   lateral[3], sagittal[3]; /* unit vectors across the limb; radii a along the first, b along the second */
-    float   a0, b0, a1, b1;
-    int32_t frame, shape;            /* shape: LIMB_CONE or LIMB_ELLIPSOID */
+    float start[3], end[3];
+    float lateral[3],
+        sagittal[3]; /* unit vectors across the limb; radii a along the first, b along the second */
+    float a0, b0, a1, b1;
+    int32_t frame, shape; /* shape: LIMB_CONE or LIMB_ELLIPSOID */
 } limb_geometry;
 
 /* All limbs of the model with radii multiplied by girth; out holds MODEL_MAX_LIMBS. */
@@ -19,7 +20,7 @@ void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out);
 typedef struct limb_polygon {
     float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES]; /* working pixels */
     float depth;                                      /* metres, of the limb's middle; 0: behind the camera */
-    float facing;                                     /* cosine of the angle between limb and image plane (R16) */
+    float facing; /* cosine of the angle between limb and image plane (R16) */
 } limb_polygon;
 
 typedef struct outline_block { /* the same for BLOCK bodies */
@@ -35,8 +36,8 @@ static inline int32_t outline_vertices(const limb_geometry *g)
 }
 
 /* R, o, scale: the limb's frame in the world and metres per stature. */
-void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale, const gait_camera *cam,
-                  const view_map *map, limb_polygon *out);
+void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale,
+                  const gait_camera *cam, const view_map *map, limb_polygon *out);
 
 void outline_project(const limb_geometry *limbs, int32_t count, const kin_body *body, const gait_camera *cam,
                      const view_map *map, outline_block *out);

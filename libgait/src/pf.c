@@ -4,7 +4,7 @@
 
 pf pf_layout(arena *a, int32_t n)
 {
-    pf p = { .n = n };
+    pf p = {.n = n};
     p.log_weight = TAKE(a, double, n);
     p.weight = TAKE(a, double, n);
     p.parent = TAKE(a, int32_t, n);
@@ -38,8 +38,8 @@ double pf_ess(const pf *p)
 pf_summary pf_reweigh(pf *p, const float *ll)
 {
     double const none = -1e300;
-    pf_summary   s = { .best = 0 };
-    double       top = none, sum = 0.0;
+    pf_summary s = {.best = 0};
+    double top = none, sum = 0.0;
     for (int32_t i = 0; i < p->n; i++) {
         double const l = p->log_weight[i] + (double)ll[i];
         /* The comparison is false for NaN and for infinities of either sign. */
@@ -73,7 +73,7 @@ pf_summary pf_reweigh(pf *p, const float *ll)
 /* Integer weights, so that sums are exact in any order; returns their total. */
 static uint64_t make_tickets(pf *p)
 {
-    double   top = 0.0;
+    double top = 0.0;
     uint64_t total = 0;
     for (int32_t i = 0; i < p->n; i++)
         top = p->weight[i] > top ? p->weight[i] : top;
@@ -88,7 +88,7 @@ void pf_resample_systematic(pf *p, uint32_t u)
 {
     uint64_t const n = (uint64_t)p->n, total = make_tickets(p), step = total / n, rest = total % n;
     uint64_t const start = (uint64_t)u * step >> 32;
-    int32_t        from = 0;
+    int32_t from = 0;
     for (uint64_t i = 0; i < n; i++) {
         uint64_t const at = start + i * step + i * rest / n; /* floor(i total / n) without 128 bits */
         while (p->ticket[from] <= at)
@@ -106,7 +106,7 @@ void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t fra
         rng_bits(seed, stream, frame, (uint32_t)i, 0, r);
         /* total < 2^52 and r < 2^64: the bias of the remainder is below 2^-12 of a ticket. */
         uint64_t const at = ((uint64_t)r[0] << 32 | r[1]) % total;
-        int32_t        low = 0, high = p->n - 1;
+        int32_t low = 0, high = p->n - 1;
         while (low < high) {
             int32_t const mid = low + (high - low) / 2;
             if (p->ticket[mid] > at)

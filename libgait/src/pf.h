@@ -4,21 +4,21 @@
 #include "arena.h"
 
 typedef struct pf {
-    int32_t   n;
-    double   *log_weight; /* n, normalised: sum of exp is 1 */
-    double   *weight;     /* n */
-    int32_t  *parent;     /* n: ancestor indices of the last resampling, ascending if systematic */
-    uint64_t *ticket;     /* n: running sum of integer weights */
+    int32_t n;
+    double *log_weight; /* n, normalised: sum of exp is 1 */
+    double *weight;     /* n */
+    int32_t *parent;    /* n: ancestor indices of the last resampling, ascending if systematic */
+    uint64_t *ticket;   /* n: running sum of integer weights */
 } pf;
 
 typedef struct pf_summary {
-    double  log_evidence; /* log sum w exp(ll): p(observation | past) */
-    double  ess;          /* effective sample size, 1 / sum w^2 */
-    int32_t best;         /* first particle of the largest weight */
-    bool    degenerate;   /* no particle had a finite likelihood: the weights were left alone */
+    double log_evidence; /* log sum w exp(ll): p(observation | past) */
+    double ess;          /* effective sample size, 1 / sum w^2 */
+    int32_t best;        /* first particle of the largest weight */
+    bool degenerate;     /* no particle had a finite likelihood: the weights were left alone */
 } pf_summary;
 
-pf   pf_layout(arena *a, int32_t n);
+pf pf_layout(arena *a, int32_t n);
 void pf_uniform(pf *p);
 
 /* Multiply the weights by exp(ll) and normalise; a NaN counts as impossible. */

@@ -3,7 +3,7 @@
 
 population population_layout(arena *a, int32_t n, int32_t components)
 {
-    population p = { .n = n, .components = components };
+    population p = {.n = n, .components = components};
     p.value = TAKE(a, float, (size_t)(F_COEF + components) * (size_t)n);
     return p;
 }
@@ -12,10 +12,10 @@ float root_channel(const gait_model *m, int32_t c, float phase, const float *coe
 {
     float const x = m_wrap1(phase) * (float)m->phases;
     int32_t const j = i_min((int32_t)x, m->phases - 1), next = j + 1 < m->phases ? j + 1 : 0;
-    float const   t = x - (float)j;
-    size_t const  stride = (size_t)m->phases * (size_t)m->channels;
-    const float  *curve = m->curves + m->root_channel + c;
-    float         sum = 0.0f;
+    float const t = x - (float)j;
+    size_t const stride = (size_t)m->phases * (size_t)m->channels;
+    const float *curve = m->curves + m->root_channel + c;
+    float sum = 0.0f;
     for (int32_t k = 0; k <= components; k++, curve += stride) {
         float const a = curve[j * m->channels], b = curve[next * m->channels], v = a + t * (b - a);
         sum += k == 0 ? v : coef[k - 1] * v;
@@ -25,7 +25,7 @@ float root_channel(const gait_model *m, int32_t c, float phase, const float *coe
 
 body_rule body_rule_init(const gait_model *m, int32_t components, bool plain_root)
 {
-    body_rule r = { .model = m, .components = components, .plain_root = plain_root };
+    body_rule r = {.model = m, .components = components, .plain_root = plain_root};
     for (int32_t j = 0; j < m->phases; j++)
         r.mean_height += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
     return r;
@@ -33,7 +33,7 @@ body_rule body_rule_init(const gait_model *m, int32_t components, bool plain_roo
 
 walker walker_get(const population *p, int32_t i)
 {
-    walker w = { { 0 } };
+    walker w = {{0}};
     for (int32_t f = 0; f < F_COEF + p->components; f++)
         w.f[f] = field(p, f)[i];
     return w;
@@ -49,15 +49,22 @@ void walker_put(population *p, int32_t i, const walker *w)
 static void pelvis_offset(const body_rule *r, const walker *w, float *sway, float *height)
 {
     float const H = w->f[F_STATURE];
-    *sway = r->plain_root ? 0.0f : H * root_channel(r->model, ROOT_SWAY, w->f[F_PHASE], w->f + F_COEF, r->components);
-    *height = H * (r->plain_root ? r->mean_height
-                                 : root_channel(r->model, ROOT_HEIGHT, w->f[F_PHASE], w->f + F_COEF, r->components));
+    *sway = r->plain_root
+                ? 0.0f
+                : H * root_channel(r->model, ROOT_SWAY, w->f[F_PHASE], w->f + F_COEF, r->components);
+    *height = H * (r->plain_root
+                       ? r->mean_height
+                       : root_channel(r->model, ROOT_HEIGHT, w->f[F_PHASE], w->f + F_COEF, r->components));
 }
 
 gait_state walker_state(const body_rule *r, const walker *w)
 {
-    gait_state s = { .phase = w->f[F_PHASE], .stride_hz = w->f[F_RATE], .stature = w->f[F_STATURE],
-                     .heading = w->f[F_HEADING], .pitch = w->f[F_PITCH], .roll = w->f[F_ROLL] };
+    gait_state s = {.phase = w->f[F_PHASE],
+                    .stride_hz = w->f[F_RATE],
+                    .stature = w->f[F_STATURE],
+                    .heading = w->f[F_HEADING],
+                    .pitch = w->f[F_PITCH],
+                    .roll = w->f[F_ROLL]};
     float sway, height, sn, cs;
     pelvis_offset(r, w, &sway, &height);
     m_sincos(s.heading, &sn, &cs);
@@ -71,8 +78,8 @@ gait_state walker_state(const body_rule *r, const walker *w)
 
 walker walker_from_state(const body_rule *r, const gait_state *s)
 {
-    walker w = { { 0 } };
-    float  sway, height, sn, cs;
+    walker w = {{0}};
+    float sway, height, sn, cs;
     w.f[F_PHASE] = m_wrap1(s->phase);
     w.f[F_RATE] = s->stride_hz;
     w.f[F_STATURE] = s->stature;
@@ -93,7 +100,7 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
 static void bodies(const body_rule *r, kin_input *in, kin_body *out)
 {
     kin_channels ch;
-    kin_curves(r->model, in->phase, (const float(*)[BLOCK])in->coef, r->components, &ch);
+    kin_curves(r->model, in->phase, (const float (*)[BLOCK])in->coef, r->components, &ch);
     float *const root = ch.v[r->model->root_channel];
     for (int32_t i = 0; r->plain_root && i < BLOCK; i++) {
         for (int32_t c = ROOT_SWAY; c <= ROOT_YAW; c++)

@@ -5,11 +5,23 @@
 
 /* One float array per field.  (X, Y) is the smooth track over the ground and Z the ground's height under the walker;
  * the pelvis follows by the model's sway and height (ROOT_*). */
-enum { F_PHASE, F_RATE, F_X, F_Y, F_Z, F_HEADING, F_PITCH, F_ROLL, F_STATURE, F_COEF, F_MAX = F_COEF + GAIT_MAX_COMPONENTS };
+enum {
+    F_PHASE,
+    F_RATE,
+    F_X,
+    F_Y,
+    F_Z,
+    F_HEADING,
+    F_PITCH,
+    F_ROLL,
+    F_STATURE,
+    F_COEF,
+    F_MAX = F_COEF + GAIT_MAX_COMPONENTS
+};
 
 typedef struct population {
     int32_t n, components;
-    float  *value; /* (F_COEF + components) x n */
+    float *value; /* (F_COEF + components) x n */
 } population;
 
 static inline float *field(const population *p, int32_t f)
@@ -22,9 +34,9 @@ population population_layout(arena *a, int32_t n, int32_t components);
 /* Constants that turn fields into bodies. */
 typedef struct body_rule {
     const gait_model *model;
-    int32_t           components;
-    bool              plain_root;  /* paper: no root motion within the stride, pelvis at its mean height */
-    float             mean_height; /* statures */
+    int32_t components;
+    bool plain_root;   /* paper: no root motion within the stride, pelvis at its mean height */
+    float mean_height; /* statures */
 } body_rule;
 
 body_rule body_rule_init(const gait_model *m, int32_t components, bool plain_root);
@@ -34,11 +46,11 @@ typedef struct walker {
     float f[F_MAX];
 } walker;
 
-walker     walker_get(const population *p, int32_t i);
-void       walker_put(population *p, int32_t i, const walker *w);
+walker walker_get(const population *p, int32_t i);
+void walker_put(population *p, int32_t i, const walker *w);
 gait_state walker_state(const body_rule *r, const walker *w);
 /* Ground track and level from a state whose pelvis is given. */
-walker     walker_from_state(const body_rule *r, const gait_state *s);
+walker walker_from_state(const body_rule *r, const gait_state *s);
 
 /* Bodies of particles begin .. begin + BLOCK - 1; lanes beyond n repeat the last particle. */
 void population_bodies(const body_rule *r, const population *p, int32_t begin, kin_body *out);

@@ -18,16 +18,17 @@ static int32_t ceil_div(int32_t a, int32_t b)
 }
 
 /* Column of the first pixel centre at or right of the edge, for each row the edge crosses. */
-static void walk_edge(int32_t x0, int32_t y0, int32_t x1, int32_t y1, int32_t top, int16_t *bound, int32_t width)
+static void walk_edge(int32_t x0, int32_t y0, int32_t x1, int32_t y1, int32_t top, int16_t *bound,
+                      int32_t width)
 {
     int32_t const first = i_max(ceil_div(y0, SUB), top);
     int32_t const last = i_min(ceil_div(y1, SUB), top + RAST_SIZE);
     if (first >= last)
         return;
-    int64_t const slope = ((int64_t)(x1 - x0) * 65536) / (y1 - y0);          /* 16.16 sub-pixels per sub-row */
-    int64_t       x = (int64_t)x0 * 65536 + slope * (first * SUB - y0);
+    int64_t const slope = ((int64_t)(x1 - x0) * 65536) / (y1 - y0); /* 16.16 sub-pixels per sub-row */
+    int64_t x = (int64_t)x0 * 65536 + slope * (first * SUB - y0);
     for (int32_t y = first; y < last; y++, x += slope * SUB) {
-        int64_t const column = (x + (int64_t)SUB * 65536 - 1) >> 24;         /* ceiling; >> floors */
+        int64_t const column = (x + (int64_t)SUB * 65536 - 1) >> 24; /* ceiling; >> floors */
         bound[y - top] = (int16_t)(column < 0 ? 0 : column > width ? width : column);
     }
 }

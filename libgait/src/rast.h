@@ -19,7 +19,7 @@ typedef struct rast_spans { /* rows first <= y < last; each covers begin[y - top
 } rast_spans;
 
 typedef struct rast_mask { /* bit x of row y; rows outside [first, last) are not written */
-    int32_t  first, last;
+    int32_t first, last;
     uint64_t row[RAST_SIZE][RAST_WORDS];
 } rast_mask;
 

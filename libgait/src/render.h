@@ -4,5 +4,6 @@
 #include "outline.h"
 
 /* Errors as model_pose_state. */
-gait_status render_limbs(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids, int32_t stride);
+gait_status render_limbs(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
+                         int32_t stride);
 #endif

@@ -3,8 +3,8 @@
 #define GAIT_SNAPSHOT_H
 #include "tracker.h"
 
-size_t      snapshot_bytes(const gait_tracker *t);
-void        snapshot_save(const gait_tracker *t, void *mem);
+size_t snapshot_bytes(const gait_tracker *t);
+void snapshot_save(const gait_tracker *t, void *mem);
 gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err);
-uint64_t    snapshot_digest(const gait_tracker *t);
+uint64_t snapshot_digest(const gait_tracker *t);
 #endif

@@ -15,12 +15,12 @@ static bool wants_texture(const gait_tracker_config *cfg)
 static void layout_state(arena *a, gait_tracker *t)
 {
     int32_t const n = t->cfg.particles, cameras = t->cfg.cameras;
-    size_t const  samples = (size_t)t->model->limbs * LIKE_SAMPLES;
+    size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
     t->core = TAKE(a, tracker_core, 1);
     for (int32_t g = 0; g < 2; g++) {
         t->gen[g].people = population_layout(a, n, t->cfg.components);
         if (wants_texture(&t->cfg))
-            t->gen[g].texture = TAKE(a, int8_t, (size_t)n * (size_t)cameras * samples);
+            t->gen[g].texture = TAKE(a, int8_t, (size_t)n *(size_t)cameras *samples);
     }
     t->filter = pf_layout(a, n);
     t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
@@ -32,7 +32,7 @@ static void layout_state(arena *a, gait_tracker *t)
 static void layout_work(arena *a, gait_tracker *t)
 {
     int32_t const n = t->cfg.particles;
-    size_t const  samples = (size_t)t->model->limbs * LIKE_SAMPLES;
+    size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         t->camera[c].seen = features_layout(a);
         if (t->cfg.terms & GAIT_TERM_SILHOUETTE)
@@ -42,7 +42,7 @@ static void layout_work(arena *a, gait_tracker *t)
     t->ll = TAKE(a, float, n);
     t->mode = TAKE(a, uint8_t, n);
     if (wants_texture(&t->cfg))
-        t->seen = TAKE(a, int8_t, (size_t)t->cfg.cameras * samples);
+        t->seen = TAKE(a, int8_t, (size_t)t->cfg.cameras *samples);
     t->scratch = features_scratch_layout(a);
     t->work = TAKE(a, weigh_scratch, t->cfg.tasks);
 }
@@ -50,7 +50,7 @@ static void layout_work(arena *a, gait_tracker *t)
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg)
 {
     gait_tracker *const self = TAKE(a, gait_tracker, 1);
-    gait_tracker        t = { .model = m, .cfg = *cfg };
+    gait_tracker t = {.model = m, .cfg = *cfg};
     if (t.cfg.components < 0)
         t.cfg.components = m->components;
     layout_state(a, &t);
@@ -78,7 +78,7 @@ void tracker_clear(gait_tracker *t)
 
 dynamics tracker_dynamics(const gait_tracker *t)
 {
-    return (dynamics){ .cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed };
+    return (dynamics){.cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed};
 }
 
 void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime)
@@ -112,9 +112,9 @@ static bool resample(gait_tracker *t, uint32_t frame)
 
 typedef struct move_job {
     gait_tracker *t;
-    dynamics      d;
-    float         dt, age;
-    uint32_t      frame;
+    dynamics d;
+    float dt, age;
+    uint32_t frame;
 } move_job;
 
 static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
@@ -134,7 +134,7 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 /* Move every particle from its ancestor into the other generation, which becomes the current one. */
 static void predict(gait_tracker *t, float dt, uint32_t frame)
 {
-    move_job j = { .t = t, .d = tracker_dynamics(t), .dt = dt, .frame = frame };
+    move_job j = {.t = t, .d = tracker_dynamics(t), .dt = dt, .frame = frame};
     j.age = 1e-6f * (float)(t->core->utime - t->core->start_utime);
     t->core->current = 1 - t->core->current;
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
@@ -144,8 +144,8 @@ static void predict(gait_tracker *t, float dt, uint32_t frame)
 static bool supported(const gait_tracker *t, const float terms[LIKE_TERMS])
 {
     float const least_edges = -0.80f, least_silhouette = -1.2f; /* per camera, unweighted */
-    int32_t     cameras = 0;
-    bool        plate = false;
+    int32_t cameras = 0;
+    bool plate = false;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         cameras += t->camera[c].seen.seen;
         plate |= t->camera[c].seen.has_fg;
@@ -171,7 +171,7 @@ static int32_t judge(gait_tracker *t, bool degenerate, const gait_estimate *e, f
 static void observe(gait_tracker *t, float dt, gait_estimate *out)
 {
     float const age = 1e-6f * (float)(t->core->utime - t->core->start_utime);
-    float       terms[LIKE_TERMS];
+    float terms[LIKE_TERMS];
     weigh_particles(t);
     pf_summary const s = pf_reweigh(&t->filter, t->ll);
     t->core->ess = s.ess;
@@ -184,7 +184,8 @@ static void observe(gait_tracker *t, float dt, gait_estimate *out)
     out->status = judge(t, s.degenerate, out, dt, age);
     for (int32_t c = 0; c < t->cfg.cameras && out->status == GAIT_STATUS_TRACKING; c++)
         if (t->camera[c].seen.seen && t->template[c])
-            template_update(t->template[c], t->model->limbs, t->seen + (size_t)c * (size_t)t->model->limbs * LIKE_SAMPLES);
+            template_update(t->template[c], t->model->limbs,
+                            t->seen + (size_t)c * (size_t)t->model->limbs * LIKE_SAMPLES);
 }
 
 /* No camera saw anything: the prediction is the estimate. */
@@ -206,7 +207,7 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
 {
     tracker_core *const core = t->core;
     float const dt = 1e-6f * (float)(frame->utime - core->utime);
-    gait_estimate e = { .utime = frame->utime, .frame = core->frame };
+    gait_estimate e = {.utime = frame->utime, .frame = core->frame};
     uint32_t const counter = (uint32_t)core->frame;
     bool const resampled = core->frame > 0 && resample(t, counter);
     core->utime = frame->utime;

@@ -7,59 +7,59 @@
 #include "task.h"
 
 typedef struct tracker_core { /* small mutable state; saved and hashed with the arrays that follow it */
-    int64_t  utime, start_utime;
-    uint64_t frame;             /* steps since start */
-    int32_t  started;
-    int32_t  current;           /* which of the two generations holds the particles */
-    int32_t  textured;          /* that generation carries surface samples of the previous frame */
-    int32_t  fading;            /* consecutive frames without support from the images */
-    double   ess;
+    int64_t utime, start_utime;
+    uint64_t frame; /* steps since start */
+    int32_t started;
+    int32_t current;  /* which of the two generations holds the particles */
+    int32_t textured; /* that generation carries surface samples of the previous frame */
+    int32_t fading;   /* consecutive frames without support from the images */
+    double ess;
     view_map map[GAIT_MAX_CAMERAS];
 } tracker_core;
 
 typedef struct generation {
     population people;
-    int8_t    *texture;         /* n x cameras x limbs x LIKE_SAMPLES, or NULL */
+    int8_t *texture; /* n x cameras x limbs x LIKE_SAMPLES, or NULL */
 } generation;
 
 typedef struct camera_state {
-    features    seen;
-    view_planes plate;          /* background resampled to the region */
-    gait_image  background;     /* borrowed; data NULL: none */
-    bool        plate_stale;
+    features seen;
+    view_planes plate;     /* background resampled to the region */
+    gait_image background; /* borrowed; data NULL: none */
+    bool plate_stale;
 } camera_state;
 
-typedef struct weigh_scratch {  /* one per task */
-    kin_body      body;
+typedef struct weigh_scratch { /* one per task */
+    kin_body body;
     outline_block outline;
-    layers        layers;
-    float         points[GAIT_MAX_JOINTS][3][BLOCK];
+    layers layers;
+    float points[GAIT_MAX_JOINTS][3][BLOCK];
 } weigh_scratch;
 
 struct gait_tracker {
-    const gait_model   *model;
+    const gait_model *model;
     gait_tracker_config cfg;
-    body_rule           rule;
-    like_setup         *like;
+    body_rule rule;
+    like_setup *like;
     /* Mutable state: one stretch of memory from core to state_end. */
     tracker_core *core;
-    generation    gen[2];
-    pf            filter;
-    float        *joint;        /* P x 3 x n, metres: of the current generation */
-    int16_t      *template[GAIT_MAX_CAMERAS];
+    generation gen[2];
+    pf filter;
+    float *joint; /* P x 3 x n, metres: of the current generation */
+    int16_t *template[GAIT_MAX_CAMERAS];
     unsigned char *state_end;
     /* Recomputed in every step. */
-    camera_state      camera[GAIT_MAX_CAMERAS];
-    float            *ll;       /* n */
-    uint8_t          *mode;     /* n: particle belongs to the dominant mode */
-    int8_t           *seen;     /* cameras x limbs x LIKE_SAMPLES: surface of the estimate */
-    features_scratch  scratch;
-    weigh_scratch    *work;     /* tasks */
+    camera_state camera[GAIT_MAX_CAMERAS];
+    float *ll;     /* n */
+    uint8_t *mode; /* n: particle belongs to the dominant mode */
+    int8_t *seen;  /* cameras x limbs x LIKE_SAMPLES: surface of the estimate */
+    features_scratch scratch;
+    weigh_scratch *work; /* tasks */
 };
 
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg);
-void          tracker_clear(gait_tracker *t);
-dynamics      tracker_dynamics(const gait_tracker *t);
-void          tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime);
-gait_status   tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out);
+void tracker_clear(gait_tracker *t);
+dynamics tracker_dynamics(const gait_tracker *t);
+void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime);
+gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out);
 #endif

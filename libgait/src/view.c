@@ -7,7 +7,7 @@ enum { FRACTION = 256 }; /* fixed-point steps of a source pixel */
 
 view_planes view_planes_layout(arena *a, int32_t channels)
 {
-    view_planes p = { .channels = channels };
+    view_planes p = {.channels = channels};
     for (int32_t c = 0; c < channels; c++)
         p.channel[c] = TAKE(a, uint8_t, VIEW_PIXELS);
     return p;
@@ -34,7 +34,7 @@ bool view_follow(view_map *map, const float uv[2], float tall)
 static void source_row(const view_map *map, const gait_camera *cam, int32_t j, int32_t *su, int32_t *sv)
 {
     float const inv = 1.0f / map->scale, limit = 30000.0f;
-    bool const  bent = camera_distorted(cam);
+    bool const bent = camera_distorted(cam);
     float const v = map->v0 + (float)j * inv;
     for (int32_t i = 0; i < VIEW_SIZE; i++) {
         float u = map->u0 + (float)i * inv, w = v;
@@ -53,7 +53,8 @@ static int32_t box_side(const view_map *map)
 
 static uint8_t tap_bilinear(const gait_image *im, int32_t step, int32_t c, int32_t su, int32_t sv)
 {
-    int32_t const u = i_clamp(su, 0, (im->width - 1) * FRACTION), v = i_clamp(sv, 0, (im->height - 1) * FRACTION);
+    int32_t const u = i_clamp(su, 0, (im->width - 1) * FRACTION),
+                  v = i_clamp(sv, 0, (im->height - 1) * FRACTION);
     int32_t const x = u >> 8, y = v >> 8, fx = u & 255, fy = v & 255;
     int32_t const right = x + 1 < im->width ? step : 0;
     const uint8_t *const p = im->data + (size_t)y * (size_t)im->stride + (size_t)(x * step + c);
@@ -68,7 +69,7 @@ static uint8_t tap_box(const gait_image *im, int32_t step, int32_t c, int32_t su
     int32_t const x = i_clamp((su + offset) >> 8, 0, i_max(im->width - side, 0));
     int32_t const y = i_clamp((sv + offset) >> 8, 0, i_max(im->height - side, 0));
     int32_t const nx = i_min(side, im->width), ny = i_min(side, im->height);
-    int32_t       sum = 0;
+    int32_t sum = 0;
     for (int32_t j = 0; j < ny; j++) {
         const uint8_t *const row = im->data + (size_t)(y + j) * (size_t)im->stride + (size_t)(x * step + c);
         for (int32_t i = 0; i < nx; i++)
@@ -80,7 +81,7 @@ static uint8_t tap_box(const gait_image *im, int32_t step, int32_t c, int32_t su
 void view_sample(const view_map *map, const gait_camera *cam, const gait_image *im, view_planes *out)
 {
     int32_t const step = im->format == GAIT_GREY8 ? 1 : 3, side = box_side(map);
-    int32_t       su[VIEW_SIZE], sv[VIEW_SIZE];
+    int32_t su[VIEW_SIZE], sv[VIEW_SIZE];
     out->channels = step;
     for (int32_t j = 0; j < VIEW_SIZE; j++) {
         source_row(map, cam, j, su, sv);
@@ -113,7 +114,8 @@ void view_inside(const view_map *map, const gait_camera *cam, uint64_t (*inside)
 
 void view_grey(const view_planes *in, int32_t format, uint8_t *grey)
 {
-    const uint8_t *const r = in->channel[format == GAIT_BGR8 ? 2 : 0], *const b = in->channel[format == GAIT_BGR8 ? 0 : 2];
+    const uint8_t *const r = in->channel[format == GAIT_BGR8 ? 2 : 0],
+                         *const b = in->channel[format == GAIT_BGR8 ? 0 : 2];
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
         grey[i] = in->channels == 1 ? in->channel[0][i]
                                     : (uint8_t)((77 * r[i] + 150 * in->channel[1][i] + 29 * b[i] + 128) >> 8);

@@ -17,7 +17,7 @@ typedef struct view_map { /* working = (pixel - origin) * scale, ideal (undistor
 
 typedef struct view_planes { /* resampled colour planes; grey frames fill the first only */
     uint8_t *channel[3];     /* VIEW_PIXELS each */
-    int32_t  channels;
+    int32_t channels;
 } view_planes;
 
 /* Centre and size the region on a person whose middle is at pixel uv and who is `tall` pixels high.  Returns false

@@ -5,8 +5,8 @@
 static bool aim(gait_tracker *t, int32_t c, const walker *w)
 {
     const gait_camera *const cam = &t->cfg.camera[c];
-    float const H = w->f[F_STATURE], middle[3] = { w->f[F_X], w->f[F_Y], w->f[F_Z] + 0.52f * H };
-    float       uv[2];
+    float const H = w->f[F_STATURE], middle[3] = {w->f[F_X], w->f[F_Y], w->f[F_Z] + 0.52f * H};
+    float uv[2];
     float const depth = camera_project(cam, middle, uv);
     if (!(depth > 0.1f))
         return false;
@@ -21,7 +21,7 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
     int32_t count = 0;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         camera_state *const s = &t->camera[c];
-        gait_image    im = frame->image[c];
+        gait_image im = frame->image[c];
         if (!aim(t, c, predicted))
             im.data = NULL;
         s->seen.map = t->core->map[c];
@@ -31,7 +31,8 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
             view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
             s->plate_stale = false;
         }
-        features_compute(&s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL, t->like->paper, &t->scratch);
+        features_compute(&s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL, t->like->paper,
+                         &t->scratch);
         count += s->seen.seen;
     }
     return count;
@@ -40,8 +41,13 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
 /* One body of a block in one camera, ready for the terms. */
 static like_body look_at(const gait_tracker *t, int32_t c, int32_t lane, weigh_scratch *w, int8_t *seen)
 {
-    like_body b = { .setup = t->like, .features = &t->camera[c].seen, .outline = &w->outline, .lane = lane,
-                    .layers = &w->layers, .seen = seen, .template = t->template[c] };
+    like_body b = {.setup = t->like,
+                   .features = &t->camera[c].seen,
+                   .outline = &w->outline,
+                   .lane = lane,
+                   .layers = &w->layers,
+                   .seen = seen,
+                   .template = t->template[c]};
     layers_draw(&w->outline, t->like->geometry, t->like->limbs, lane, &w->layers);
     if (seen)
         like_sample(t->like, b.features, &t->cfg.camera[c], &w->body, lane, &w->layers, seen);
@@ -70,7 +76,8 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;
-        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map, &w->outline);
+        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c],
+                        &t->camera[c].seen.map, &w->outline);
         for (int32_t lane = 0; lane < lanes; lane++) {
             int32_t const i = begin + lane;
             like_body b = look_at(t, c, lane, w, texture_of(t, now, i, c));
@@ -101,7 +108,8 @@ void weigh_walker(gait_tracker *t, const walker *person, float terms[LIKE_TERMS]
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;
-        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map, &w->outline);
+        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c],
+                        &t->camera[c].seen.map, &w->outline);
         int8_t *const seen = t->seen ? t->seen + (size_t)c * (size_t)t->like->limbs * LIKE_SAMPLES : NULL;
         like_body const b = look_at(t, c, 0, w, seen);
         like_terms(&b, terms);
