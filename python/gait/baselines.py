@@ -49,7 +49,7 @@ def free_run(model: dict[str, Any], truth: Joints, strikes: Strikes, first: int)
     advance = (truth.frame - truth.frame[first]) * (cycles[1] - cycles[0])
     size = stature(model, truth)
     joints = _poses(model, cycles[0] + advance, size)
-    joints += size * _root_path(model, cycles[0] + advance)[:, None]
+    joints += size * root_path(model, cycles[0] + advance)[:, None]
     joints = np.einsum("ij,npj->npi", _turns(truth)[first], joints)
     return np.asarray(joints - joints[first, _HIPS].mean(axis=0) + _hip_midpoint(truth)[first])
 
@@ -71,7 +71,7 @@ def _poses(model: dict[str, Any], phase: Array, size: float) -> Array:
     return joints[:, [names.index(name) for name in EVAL15]]
 
 
-def _root_path(model: dict[str, Any], cycles: Array) -> Array:
+def root_path(model: dict[str, Any], cycles: Array) -> Array:
     """Pelvis (n, 3) of the mean cycle in statures against phase in strides, wherever it began."""
     names = unpack_names(model["CHNM"])
     columns = [names.index(f"root_{name}") for name in ("forward", "sway", "height")]

@@ -97,7 +97,7 @@ def _file_storage(path: str) -> Fields:
     broken = UserError(f"{path}: not an OpenCV FileStorage file; write it with cv2.FileStorage")
     try:
         storage = cv2.FileStorage(path, cv2.FILE_STORAGE_READ)
-    except cv2.error:
+    except (cv2.error, SystemError):  # the constructor's binding wraps the one in the other
         raise broken from None
     if not storage.isOpened():
         raise broken

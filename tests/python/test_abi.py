@@ -1,0 +1,127 @@
+"""The handshake between Python and the library: it passes, and every kind of slip is caught."""
+
+import ctypes
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from gait import LibraryError, _abi, _lib
+
+HEADER = (Path(__file__).resolve().parents[2] / "libgait/include/gait.h").read_text()
+REAL = _lib.library()
+
+
+def rows():
+    """Copy of the library's table as (type, field, offset, size)."""
+    count = ctypes.c_uint32()
+    table = REAL.gait_abi_fields(ctypes.byref(count))
+    return [(r.type, r.field, r.offset, r.size) for r in table[: count.value]]
+
+
+def library_saying(table):
+    """Stand-in for a library whose table is `table`."""
+    array = (_abi.AbiField * len(table))(*table)
+
+    def fields(count):
+        count._obj.value = len(table)
+        return ctypes.cast(array, ctypes.POINTER(_abi.AbiField))
+
+    return SimpleNamespace(gait_abi_fields=fields)
+
+
+def test_layout_of_the_real_library_matches():
+    assert _abi.verify(REAL) == []
+    assert len(rows()) > 80
+
+
+@pytest.mark.parametrize("column, name", [(2, "offset"), (3, "size")])
+def test_a_wrong_offset_or_size_is_caught_in_every_row(column, name):
+    for i, row in enumerate(rows()):
+        wrong = list(row)
+        wrong[column] += 4
+        table = rows()
+        table[i] = tuple(wrong)
+        faults = _abi.verify(library_saying(table))
+        assert len(faults) == 1, name
+        assert row[0].decode() in faults[0] and (row[1] or b"").decode() in faults[0]
+
+
+def test_a_missing_or_additional_field_is_caught():
+    table = rows()
+    assert len(_abi.verify(library_saying(table[:-1]))) == 1
+    assert "news" in _abi.verify(library_saying([*table, (b"gait_state", b"news", 0, 4)]))[0]
+
+
+def test_every_public_function_is_declared():
+    public = set(re.findall(r"GAIT_API[^;(]*?\b(gait_\w+)\(", HEADER))
+    assert public == {name for name, _, _ in _abi.FUNCTIONS}
+
+
+def test_enumerations_and_limits_equal_the_header():
+    values = {name: int(value, 0) for name, value in re.findall(r"\b(GAIT_\w+)\s*=?\s+(-?\w+?)u?\b", HEADER) if
+              re.fullmatch(r"-?(0x[0-9a-fA-F]+|\d+)", value)}  # fmt: skip
+    ours = {f"GAIT_ERR_{s.name}": s for s in _abi.Status if s} | {"GAIT_OK": _abi.Status.OK}
+    ours |= {f"GAIT_{p.name}": p for p in _abi.PixelFormat}
+    ours |= {f"GAIT_MODE_{m.name}": m for m in _abi.Mode}
+    ours |= {f"GAIT_TERM_{t.name}": t for t in _abi.Term}
+    ours |= {f"GAIT_STATUS_{s.name}": s for s in _abi.TrackStatus}
+    ours |= {f"GAIT_EST_{f.name}": f for f in _abi.Flag}
+    ours |= {"GAIT_ABI": _abi.ABI, "GAIT_ALIGN": _abi.ALIGN, "GAIT_MAX_JOINTS": _abi.MAX_JOINTS}
+    ours |= {"GAIT_MAX_ANGLES": _abi.MAX_ANGLES, "GAIT_MAX_CAMERAS": _abi.MAX_CAMERAS}
+    ours |= {"GAIT_MAX_COMPONENTS": _abi.MAX_COMPONENTS}
+    assert {name: values.get(name) for name in ours} == ours
+    families = r"GAIT_(ERR|MODE|TERM|STATUS|EST)_\w+"
+    assert {name for name in values if re.fullmatch(families, name)} <= ours.keys()
+
+
+def test_missing_library_lists_every_candidate_with_its_reason(monkeypatch, tmp_path):
+    text = tmp_path / "libgait.so"
+    text.write_text("no library")
+    monkeypatch.setattr(_lib, "candidates", lambda: iter([str(tmp_path / "none.so"), str(text)]))
+    with pytest.raises(LibraryError) as caught:
+        _lib.library.__wrapped__()
+    words = str(caught.value)
+    assert "none.so: no such file" in words and f"{text}: " in words and "make lib" in words
+    assert "\n" not in words
+
+
+def test_environment_names_the_only_candidate(monkeypatch):
+    monkeypatch.setenv("GAIT_LIBRARY", "/nowhere/libgait.so")
+    assert list(_lib.candidates()) == ["/nowhere/libgait.so"]
+
+
+def test_another_library_is_refused():
+    path = next(p for p in _lib.candidates() if Path(p).is_file())
+    with pytest.raises(LibraryError, match="not this version of libgait"):
+        _lib.open_library("libc.so.6")
+    assert _lib.open_library(path)
+
+
+@pytest.mark.parametrize(
+    "where, name, value, words",
+    [
+        (_abi, "ABI", 99, "ABI 1, this package needs 99"),
+        (_lib, "__version__", "9.9.9", "this package is 9.9.9"),
+    ],
+)
+def test_version_and_abi_mismatch_name_the_file(monkeypatch, where, name, value, words):
+    path = next(p for p in _lib.candidates() if Path(p).is_file())
+    monkeypatch.setattr(where, name, value)
+    with pytest.raises(LibraryError, match=re.escape(path) + ".*" + re.escape(words)):
+        _lib.open_library(path)
+
+
+def test_statuses_become_exceptions_with_name_and_index():
+    error = _abi.Error(status=-1, index=3, text=b"fx is not positive")
+    with pytest.raises(ValueError, match="GAIT_ERR_ARG: cam.json: fx is not positive") as caught:
+        _lib.check(-1, error, "cam.json")
+    assert (caught.value.status, caught.value.name, caught.value.index) == (-1, "GAIT_ERR_ARG", 3)
+    assert _lib.check(0) == 0
+
+
+@pytest.mark.parametrize("size", [1, 64, 1000])
+def test_memory_is_aligned(size):
+    memory = _lib.aligned(size)
+    assert memory.ctypes.data % _abi.ALIGN == 0 and memory.nbytes == size

@@ -1,0 +1,261 @@
+"""Tracker through Python: configuration, order of calls, callbacks, replay and what it makes of a drawn walk."""
+
+import ctypes
+import gc
+import weakref
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from drawn_walker import FPS, camera, clip, wall
+
+from gait import (
+    Flag,
+    GaitArgumentError,
+    GaitError,
+    Mode,
+    Model,
+    State,
+    Tracker,
+    TrackerConfig,
+    UserError,
+    _abi,
+    blob,
+)
+from gait.model import read_blob
+
+MODEL = Model()
+FRAMES, TRUE = clip(MODEL, blob.decode(read_blob(None)), 14)
+VIEW, PLATE = camera(), wall()
+SMALL = TrackerConfig.default(particles=200)
+
+
+def spread():
+    """Small uncertainty about a known first state."""
+    sd = State(phase=0.03, stride_hz=0.03, stature=0.02, heading=0.1, pitch=0.02, roll=0.02)
+    sd.pelvis = np.full(3, 0.03)
+    sd.coef = np.full(MODEL.info.components, 0.3)
+    return sd
+
+
+def started(config=SMALL, **options):
+    tracker = Tracker(MODEL, VIEW, config, background=PLATE, **options)
+    tracker.start(TRUE[0], spread(), 0)
+    return tracker
+
+
+def utime(i):
+    return round(1e6 * i / FPS)
+
+
+def run(tracker, first=0, last=len(FRAMES)):
+    return [tracker.step(FRAMES[i], utime(i)) for i in range(first, last)]
+
+
+def test_the_dataclass_has_the_settings_of_the_c_struct():
+    ours = [item.name for item in fields(TrackerConfig)]
+    theirs = [name for name, *_ in _abi.TrackerConfigC._fields_]
+    assert ours == [n for n in theirs if n not in ("struct_size", "cameras", "reserved", "camera", "exec")]
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_defaults_come_from_the_library_and_survive_the_way_there(mode):
+    c = _abi.TrackerConfigC()
+    _abi_library().gait_tracker_default(ctypes.byref(c), mode)
+    back = TrackerConfig.default(mode).to_c()
+    for name, *_ in c._fields_[:-2]:
+        assert list(np.ravel(getattr(back, name))) == list(np.ravel(getattr(c, name))), name
+
+
+def _abi_library():
+    from gait._lib import library
+
+    return library()
+
+
+def test_changes_reach_the_library_and_unknown_ones_fail():
+    c = TrackerConfig.default(particles=77, girth=1.25, term_weight=(1.0, 2.0, 3.0, 4.0)).to_c()
+    assert (c.particles, c.girth, list(c.term_weight)) == (77, 1.25, [1, 2, 3, 4])
+    with pytest.raises(TypeError, match="particels"):
+        TrackerConfig.default(particels=77)
+    with pytest.raises(ValueError, match="term_weight: give 4"):
+        replace(SMALL, term_weight=(1.0,)).to_c()
+
+
+def test_a_drawn_walk_is_followed():
+    last = run(started(replace(SMALL, particles=600)))[-1]
+    truth, _ = MODEL.pose(TRUE[-1])
+    assert np.linalg.norm(last.joints - truth, axis=1).mean() < 0.06
+    assert abs((last.mean.phase - TRUE[-1].phase + 0.5) % 1 - 0.5) < 0.03
+    assert last.frame == len(FRAMES) - 1 and last.utime == utime(len(FRAMES) - 1)
+    assert np.array_equal(last.joint("r_knee"), last.joints[MODEL.joint_names.index("r_knee")])
+    assert last.speed == pytest.approx(1.3, abs=0.35) and not last.flags & Flag.NO_IMAGE
+
+
+def test_grey_frames_serve_too():
+    tracker = Tracker(MODEL, VIEW, SMALL, background=PLATE.mean(axis=2).astype(np.uint8))
+    tracker.start(TRUE[0], spread(), 0)
+    for i, frame in enumerate(FRAMES):
+        last = tracker.step(frame.mean(axis=2).astype(np.uint8), utime(i))
+    assert np.linalg.norm(last.mean.pelvis - TRUE[-1].pelvis) < 0.12
+
+
+@pytest.mark.parametrize("missing", [None, [None]])
+def test_a_missed_frame_is_predicted_and_widens(missing):
+    tracker = started()
+    before = run(tracker, 0, 6)[-1]
+    after = tracker.step(missing, utime(9))
+    assert after.flags & Flag.NO_IMAGE
+    assert after.joint_sd.mean() > before.joint_sd.mean()
+
+
+def test_threads_and_any_task_order_give_the_same_bits():
+    def backwards(task, count):
+        for i in reversed(range(count)):
+            task(i)
+
+    digests = set()
+    for tasks in (1, 2, 3, backwards):
+        tracker = started(tasks=tasks)
+        run(tracker, 0, 5)
+        digests.add(tracker.digest())
+    assert len(digests) == 1
+
+
+def test_an_exception_in_a_task_runner_is_raised_after_the_call():
+    fail = []
+
+    def runner(task, count):
+        if fail:
+            raise KeyError(fail.pop())
+        for i in range(count):
+            task(i)
+
+    tracker, calm = started(tasks=runner), started()
+    fail.append("lost wire")
+    with pytest.raises(KeyError, match="lost wire"):
+        tracker.step(FRAMES[0], 0)
+    calm.step(FRAMES[0], 0)
+    run(tracker, 1, 4), run(calm, 1, 4)
+    assert tracker.digest() == calm.digest()  # the tasks it left were done all the same
+
+
+def test_a_runner_that_forgets_tasks_is_told():
+    with pytest.raises(RuntimeError, match="tasks not called"):
+        started(tasks=lambda task, count: task(0)).step(FRAMES[0], 0)
+
+
+def test_save_and_restore_continue_to_the_same_digest():
+    tracker = started()
+    run(tracker, 0, 5)
+    saved, at_save = tracker.save(), tracker.digest()
+    run(tracker, 5, 9)
+    end = tracker.digest()
+    other = Tracker(MODEL, VIEW, SMALL, background=PLATE)
+    other.restore(saved)
+    assert other.digest() == at_save != end
+    run(other, 5, 9)
+    assert other.digest() == end
+
+
+@pytest.mark.parametrize("spoil", [lambda s: s[:-1], lambda s: s[:100], lambda s: b"x" + s[1:]])
+def test_a_bad_snapshot_is_refused_and_changes_nothing(spoil):
+    tracker = started()
+    run(tracker, 0, 3)
+    before = tracker.digest()
+    with pytest.raises(GaitError):
+        tracker.restore(spoil(tracker.save()))
+    assert tracker.digest() == before
+
+
+def test_seeds_differ():
+    one, two = started(), started(replace(SMALL, seed=2))
+    run(one, 0, 3), run(two, 0, 3)
+    assert one.digest() != two.digest()
+
+
+def test_particles_carry_weights():
+    tracker = started()
+    estimate = run(tracker, 0, 3)[-1]
+    states, weights = tracker.particles()
+    assert states.shape == weights.shape == (200,) and weights.sum() == pytest.approx(1, abs=1e-4)
+    assert states["pelvis"].shape == (200, 3) and states["coef"].shape == (200, 16)
+    best = states[np.argmax(weights)]
+    assert best["stature"] == pytest.approx(estimate.best.stature, abs=1e-5)
+    assert 1 / np.square(weights, dtype=float).sum() == pytest.approx(estimate.ess, rel=0.01)
+
+
+def test_model_and_plate_live_as_long_as_the_tracker():
+    model, plate = Model(), wall(1)
+    held = [weakref.ref(model), weakref.ref(plate)]
+    tracker = Tracker(model, VIEW, SMALL, background=plate)
+    del model, plate
+    gc.collect()
+    assert all(ref() is not None for ref in held)
+    tracker.set_background(None)
+    gc.collect()
+    assert held[1]() is None and held[0]() is not None
+
+
+def test_memory_is_fixed_and_grows_with_particles():
+    small, large = Tracker(MODEL, VIEW, SMALL), Tracker(MODEL, VIEW, replace(SMALL, particles=2000))
+    assert 0 < small.memory_bytes < large.memory_bytes
+
+
+def test_calls_out_of_order_are_refused():
+    tracker = Tracker(MODEL, VIEW, SMALL)
+    with pytest.raises(GaitError) as caught:
+        tracker.step(FRAMES[0], 0)
+    assert caught.value.name == "GAIT_ERR_STATE"
+    tracker.start(TRUE[0], spread(), 0)
+    tracker.step(FRAMES[0], 0)
+    tracker.step(FRAMES[1], 33333)
+    with pytest.raises(GaitError) as caught:
+        tracker.step(FRAMES[1], 33333)
+    assert caught.value.name == "GAIT_ERR_STATE"
+
+
+@pytest.mark.parametrize(
+    "frame, words",
+    [
+        (FRAMES[0][:-1], "320x239, the camera is 320x240"),
+        (FRAMES[0].astype(float), "give uint8"),
+        (FRAMES[0][..., :2], "give uint8"),
+        ([FRAMES[0], FRAMES[0]], "2 images for 1 cameras"),
+    ],
+)
+def test_frames_that_do_not_fit_are_refused(frame, words):
+    with pytest.raises(ValueError, match=words):
+        started().step(frame, 0)
+
+
+@pytest.mark.parametrize("field, value", [("phase", np.nan), ("stature", np.inf), ("stride_hz", -np.inf)])
+def test_a_start_that_is_not_finite_is_refused(field, value):
+    tracker = Tracker(MODEL, VIEW, SMALL)
+    with pytest.raises(GaitArgumentError):
+        tracker.start(replace(TRUE[0], **{field: value}), spread(), 0)
+
+
+@pytest.mark.parametrize(
+    "change", [{"particles": 3}, {"girth": float("nan")}, {"tasks": 0}, {"components": 99}]
+)
+def test_settings_out_of_range_are_refused(change):
+    with pytest.raises(ValueError, match="GAIT_ERR"):
+        Tracker(MODEL, VIEW, replace(SMALL, **change))
+
+
+def test_number_of_cameras_and_threads_is_checked():
+    with pytest.raises(UserError, match="0 given"):
+        Tracker(MODEL, [], SMALL)
+    with pytest.raises(ValueError, match="threads"):
+        Tracker(MODEL, VIEW, SMALL, tasks=0)
+
+
+def test_two_cameras_are_better_than_one():
+    side = camera(place=(-5.0, 0.01, 1.5))
+    second, _ = clip(MODEL, blob.decode(read_blob(None)), len(FRAMES), view=side)
+    both = Tracker(MODEL, [VIEW, side], SMALL, background=[PLATE, PLATE])
+    both.start(TRUE[0], spread(), 0)
+    for i, pair in enumerate(zip(FRAMES, second, strict=True)):
+        last = both.step(list(pair), utime(i))
+    assert np.linalg.norm(last.mean.pelvis - TRUE[-1].pelvis) < 0.06

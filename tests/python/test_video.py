@@ -1,0 +1,153 @@
+"""Video in and out, plates, and files that are not what they should be."""
+
+import wave
+
+import cv2
+import numpy as np
+import pytest
+from drawn_walker import clip, wall, write
+
+from gait import Model, UserError, Video, VideoWriter, background, blob
+from gait.model import read_blob
+from gait.video import median_plate
+
+
+def pattern(i, width=64, height=48):
+    """Smooth picture with a bright bar whose place tells the frame."""
+    image = np.full((height, width, 3), 60, np.uint8)
+    image[:, 4 * i : 4 * i + 4] = (200, 180, 220)
+    return image
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    path = tmp_path_factory.mktemp("video") / "bars.mp4"
+    with VideoWriter(path, 25, crf=2) as writer:
+        for i in range(12):
+            writer.write(pattern(i))
+    return path
+
+
+def test_what_was_written_is_read_back(film):
+    video = Video(film)
+    assert (video.size, video.count, video.fps) == ((64, 48), 12, 25)
+    frames = list(video.frames())
+    assert [f.number for f in frames] == list(range(12))
+    assert [f.utime for f in frames] == [40000 * i for i in range(12)]
+    for frame in frames:
+        assert frame.image.shape == (48, 64, 3) and frame.image.dtype == np.uint8
+        assert np.abs(frame.image.astype(int) - pattern(frame.number)).mean() < 6
+        assert frame.image[:, :, 2].mean(axis=0).argmax() // 4 == frame.number
+
+
+def test_a_part_is_the_same_as_that_part_of_the_whole(film):
+    video = Video(film)
+    whole, part = list(video.frames()), list(video.frames(3, 7))
+    assert [f.number for f in part] == [3, 4, 5, 6]
+    for frame in part:
+        assert frame.time == whole[frame.number].time
+        np.testing.assert_array_equal(frame.image, whole[frame.number].image)
+
+
+def test_grey(film):
+    grey = next(Video(film).frames(grey=True)).image
+    assert grey.shape == (48, 64)
+    colour = next(Video(film).frames()).image
+    assert np.abs(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY).astype(int) - grey).mean() < 4
+
+
+@pytest.mark.parametrize("shape", [(47, 63, 3), (47, 64), (48, 63)])
+def test_odd_sizes_and_grey_are_accepted(shape, tmp_path):
+    with VideoWriter(tmp_path / "odd.mkv", 30) as writer:
+        writer.write(np.full(shape, 100, np.uint8))
+    assert Video(tmp_path / "odd.mkv").size == (64, 48)
+
+
+def test_an_error_leaves_no_file_and_not_the_old_one_changed(tmp_path):
+    path = tmp_path / "out.mp4"
+    path.write_bytes(b"old")
+    with pytest.raises(RuntimeError), VideoWriter(path, 30) as writer:
+        writer.write(pattern(0))
+        raise RuntimeError
+    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_frames_of_another_size_are_refused(tmp_path):
+    with (
+        pytest.raises(ValueError, match="32x24 in a video of another size"),
+        VideoWriter(tmp_path / "out.mp4", 30) as writer,
+    ):
+        writer.write(pattern(0))
+        writer.write(pattern(0, 32, 24))
+
+
+@pytest.mark.parametrize("name, words", [("o.avi", "unknown video suffix"), ("no/o.mp4", "does not exist")])
+def test_places_that_cannot_be_written(name, words, tmp_path):
+    with pytest.raises(UserError, match=words), VideoWriter(tmp_path / name, 30):
+        pass
+
+
+@pytest.mark.parametrize("content", [b"", b"not a video at all" * 100])
+def test_unreadable_video_is_one_clear_line(content, tmp_path):
+    path = tmp_path / "broken.mp4"
+    path.write_bytes(content)
+    with pytest.raises(UserError, match="broken.mp4: cannot be read as video .*; give a file") as caught:
+        Video(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_cut_off_video_is_told(film, tmp_path):
+    path = tmp_path / "cut.mp4"
+    path.write_bytes(film.read_bytes()[:200])
+    with pytest.raises(UserError, match="cut.mp4: "):
+        list(Video(path).frames())
+
+
+def test_missing_video(tmp_path):
+    with pytest.raises(UserError, match="none.mp4: no such video file"):
+        Video(tmp_path / "none.mp4")
+
+
+def test_sound_alone_is_no_video(tmp_path):
+    path = tmp_path / "tone.wav"
+    with wave.open(str(path), "wb") as sound:
+        sound.setparams((1, 2, 8000, 0, "NONE", ""))
+        sound.writeframes(bytes(1600))
+    with pytest.raises(UserError, match="tone.wav: holds no video stream"):
+        Video(path)
+
+
+def test_median_plate_removes_a_walker(tmp_path):
+    # the walk crosses the picture, so that every pixel is free most of the time
+    pictures, _ = clip(Model(), blob.decode(read_blob(None)), 60, start=(-1.6, 0.0))
+    write(tmp_path / "walk.mp4", pictures)
+    seen = []
+    plate = median_plate(Video(tmp_path / "walk.mp4"), samples=21, progress=seen.append)
+    assert seen == list(range(60))
+    off, with_walker = (
+        np.abs(picture.mean(axis=2) - wall().mean(axis=2)) for picture in (plate, pictures[30])
+    )
+    assert np.percentile(off, 99) < 10
+    assert np.percentile(with_walker, 99) > 40  # so the walker would have been seen
+
+
+def test_background_option(film, tmp_path):
+    video = Video(film)
+    assert background("none", video) is None
+    plate = background("auto", video)
+    assert plate.shape == (48, 64, 3) and abs(int(np.median(plate)) - 60) < 6
+    cv2.imwrite(str(tmp_path / "plate.png"), pattern(0))
+    np.testing.assert_array_equal(background(str(tmp_path / "plate.png"), video), pattern(0))
+
+
+def test_plates_that_do_not_fit(film, tmp_path):
+    video = Video(film)
+    cv2.imwrite(str(tmp_path / "small.png"), pattern(0, 32, 24))
+    (tmp_path / "text.png").write_text("no picture")
+    for name, words in [
+        ("small.png", "small.png: is 32x24, the video 64x48"),
+        ("text.png", "text.png: cannot be read as an image"),
+        ("none.png", "none.png: no such background image"),
+    ]:
+        with pytest.raises(UserError, match=words):
+            background(str(tmp_path / name), video)
