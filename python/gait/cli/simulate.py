@@ -48,7 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--flicker", type=float, metavar="PCT", help="sd of the exposure, per cent")
     parser.add_argument("--noise", type=float, metavar="SIGMA", help="sensor noise, grey levels")
     parser.add_argument(
-        "--gait", "--model", metavar=f"M.gait|{GENERATOR}", help="walk the curves of a model, or a normative gait"
+        "--gait",
+        "--model",
+        metavar=f"M.gait|{GENERATOR}",
+        help="walk the curves of a model, or a normative gait",
     )
 
 
@@ -83,8 +86,9 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
 def _text(summary: dict[str, Any], folder: str) -> str:
     low, middle, high = summary["person_px"]
     return (
-        f"{folder}: {summary['frames']} frames, {summary['view']} view, a person of {summary['stature_m']:.2f} m and "
-        f"{middle} ({low}-{high}) pixels at {summary['speed_m_s']:.2f} m/s, {summary['stride_hz']:.2f} strides/s"
+        f"{folder}: {summary['frames']} frames, {summary['view']} view, a person of "
+        f"{summary['stature_m']:.2f} m and {middle} ({low}-{high}) pixels at "
+        f"{summary['speed_m_s']:.2f} m/s, {summary['stride_hz']:.2f} strides/s"
     )
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from gait.simulate.arrays import Array
 
 SIDES = ("l", "r")
 
@@ -18,7 +17,11 @@ for _s in SIDES:
     PARENTS |= {f"{_s}_upper_arm": "torso", f"{_s}_forearm": f"{_s}_upper_arm", f"{_s}_hand": f"{_s}_forearm"}
     PARENTS |= {f"{_s}_thigh": "pelvis", f"{_s}_shank": f"{_s}_thigh", f"{_s}_foot": f"{_s}_shank"}
     PARENTS |= {f"{_s}_toes": f"{_s}_foot"}
-    JOINT_OF |= {f"{_s}_upper_arm": f"{_s}_shoulder", f"{_s}_forearm": f"{_s}_elbow", f"{_s}_hand": f"{_s}_wrist"}
+    JOINT_OF |= {
+        f"{_s}_upper_arm": f"{_s}_shoulder",
+        f"{_s}_forearm": f"{_s}_elbow",
+        f"{_s}_hand": f"{_s}_wrist",
+    }
     JOINT_OF |= {f"{_s}_thigh": f"{_s}_hip", f"{_s}_shank": f"{_s}_knee", f"{_s}_foot": f"{_s}_ankle"}
     JOINT_OF |= {f"{_s}_toes": f"{_s}_toe"}
 BONES = tuple(PARENTS)
@@ -56,8 +59,8 @@ class Anatomy:
     lengths : dict of float
         Keys of the proportions table, metres.
     rest : dict of ndarray of shape (3,)
-        Joints and reported points in the rest pose (limbs hang, feet forward; x forward, y left, z up) relative to
-        the pelvis joint, metres.
+        Joints and reported points in the rest pose (limbs hang, feet forward; x forward, y left, z up)
+        relative to the pelvis joint, metres.
     """
 
     stature: float
@@ -75,7 +78,9 @@ class Anatomy:
 
 def draw_anatomy(stature: float, rng: np.random.Generator) -> Anatomy:
     """Draw a person of `stature` metres: every proportion varies by about 4 % (standard deviation)."""
-    share = {key: value * float(1 + 0.04 * np.clip(rng.standard_normal(), -2, 2)) for key, value in _MEAN.items()}
+    share = {
+        key: value * float(1 + 0.04 * np.clip(rng.standard_normal(), -2, 2)) for key, value in _MEAN.items()
+    }
     upright = sum(share[key] for key in _UPRIGHT)
     for key in _UPRIGHT:
         share[key] /= upright

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait import blob
 from gait.errors import UserError
+from gait.simulate.arrays import Array
 from gait.simulate.curves import NAMES, Curves, fit_series, stride_modes
-
-Array = NDArray[np.float64]
 
 _ROOT = {"pelvis_yaw": "root_yaw", "pelvis_pitch": "root_pitch", "pelvis_roll": "root_roll"}
 _NEEDED = tuple(f"{side}_{name}" for side in "lr" for name in ("hip_flexion", "knee_flexion"))
@@ -26,7 +24,9 @@ def curves_of_model(path: str, rng: np.random.Generator) -> Curves:
     sections = blob.read(path)
     for tag in ("CHNM", "CURV", "SCST"):
         if tag not in sections:
-            raise UserError(f"{path}: section {tag} is missing, not a cyclic model; learn one with gait learn")
+            raise UserError(
+                f"{path}: section {tag} is missing, not a cyclic model; learn one with gait learn"
+            )
     names = blob.unpack_names(sections["CHNM"])
     lacking = [name for name in _NEEDED if name not in names]
     if lacking:

@@ -1,7 +1,7 @@
-"""Joint angles over the walking cycle: a normative table with a personal style, or the curves of a model blob.
+"""Joint angles over the walking cycle: a normative table with a personal style.
 
-The table is written from textbook gait curves (clinical signs, degrees, phase 0 = right heel strike) and owes nothing
-to the motion capture that models are learned from.
+The table is written from textbook gait curves (clinical signs, degrees, phase 0 = right heel strike) and owes
+nothing to the motion capture that models are learned from.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from gait.simulate.arrays import Array
 
 HARMONICS = 5
 _KINDS = 1 + 2 * HARMONICS
@@ -40,7 +40,13 @@ _MIDDLE = {
     "neck_x": (0, (0.4, -1.2), (0, 0)),
 }
 NAMES = tuple(_MIDDLE) + tuple(f"{side}_{name}" for side in "lr" for name in _LIMBS)
-_CALM = {"pelvis_yaw": 0.35, "pelvis_pitch": 0.25, "pelvis_roll": 0.25, "hip_flexion": 0.6, "knee_flexion": 0.5}
+_CALM = {
+    "pelvis_yaw": 0.35,
+    "pelvis_pitch": 0.25,
+    "pelvis_roll": 0.25,
+    "hip_flexion": 0.6,
+    "knee_flexion": 0.5,
+}
 _CALM |= {"hip_abduction": 0.4, "hip_rotation": 0.6}
 
 
@@ -74,7 +80,7 @@ class Curves:
 
 
 def normative(rng: np.random.Generator) -> Curves:
-    """Return the table's gait with the style of one person: offsets and smooth deviations of about 2 degrees."""
+    """Return the table's gait in one person's style: offsets and smooth deviations of about 2 degrees."""
     middle = {name: _series(*row) for name, row in _MIDDLE.items()}
     limbs = {name: _interpolate(row) for name, row in _LIMBS.items()}
     arm_swing = float(rng.uniform(0.75, 1.25))
@@ -91,8 +97,8 @@ def normative(rng: np.random.Generator) -> Curves:
 
 def stride_modes(rng: np.random.Generator, count: int = 2) -> Array:
     """Return random directions in which strides differ, about 1 degree rms for a unit score."""
-    draw = [[_calm(name[2:] if name[1] == "_" else name) * _smooth(rng, (0.7, 0.8, 0.4, 0.2)) for name in NAMES]
-            for _ in range(count)]  # fmt: skip
+    kinds = [name[2:] if name[1] == "_" else name for name in NAMES]
+    draw = [[_calm(kind) * _smooth(rng, (0.7, 0.8, 0.4, 0.2)) for kind in kinds] for _ in range(count)]
     return np.radians(np.array(draw))
 
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from gait.simulate.anatomy import Anatomy
-
-Array = NDArray[np.float64]
+from gait.simulate.arrays import Array
 
 TOE_OFF = 0.625  # share of the cycle
 
 # pitch of the foot, degrees, toes up positive
 _PITCH_PHASE = (0, 0.03, 0.065, 0.10, 0.34, 0.43, 0.50, 0.56, 0.61, 0.66, 0.71, 0.77, 0.83, 0.88, 0.93, 0.97)
 _PITCH_DEG = (20, 13, 4, 0, 0, -5, -15, -34, -56, -67, -60, -38, -11, 8, 18, 20.5)
-# how far the toes bend up against the foot, as a share of its downward pitch: flat on the ground, then rolling off
+# bend of the toes against the foot, as a share of its downward pitch: flat on the ground, then rolling off
 _BEND_PHASE = (0, 0.50, 0.56, 0.60, 0.625, 0.66, 0.70, 0.75, 0.85)
 _BEND_SHARE = (1, 1, 0.88, 0.67, 0.55, 0.38, 0.20, 0.05, 0)
 
@@ -50,9 +48,9 @@ def smoothstep(x: Array, low: float, high: float) -> Array:
 
 
 def rolling_ankle(pitch: Array, bend: Array, body: Anatomy) -> tuple[Array, Array]:
-    """Return the ankle of a planted foot, forward and up of the ground under the ankle of the flat foot, metres.
+    """Return the ankle of a planted foot, forward and up of the ground under the flat foot's ankle, metres.
 
-    The foot turns about its heel while the toes are up, then about its ball, and last about the tip of the toes.
+    The foot turns about its heel while the toes are up, then about its ball, last about the tip of the toes.
     """
     c, s = np.cos(pitch), np.sin(pitch)
     toes = body["toe_forward"] - body["ball_forward"]
@@ -131,8 +129,10 @@ def _swing(ankle: Array, free: Array, first: int, last: int, step: float) -> Non
 
 
 def lift_swing(ankle: Array, pitch: Array, bend: Array, phase: Array, body: Anatomy) -> Array:
-    """Raise a swinging foot (T, 3) smoothly where heel, ball or toe tip would come within 12 mm of the ground."""
-    sole = np.min([point_height(ankle[:, 2], pitch, bend, name, body) for name in ("heel", "ball", "tip")], axis=0)
+    """Raise a swinging foot (T, 3) smoothly where its sole would come within 12 mm of the ground."""
+    sole = np.min(
+        [point_height(ankle[:, 2], pitch, bend, name, body) for name in ("heel", "ball", "tip")], axis=0
+    )
     p = phase % 1.0
     window = smoothstep(p, TOE_OFF, TOE_OFF + 0.10) * (1 - smoothstep(p, 0.92, 1.0))
     lack = np.maximum(0.012 - sole, 0) * window

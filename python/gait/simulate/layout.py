@@ -6,14 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait.camera import Camera
 from gait.simulate import paint
+from gait.simulate.arrays import Array, Floats
 from gait.simulate.wardrobe import linear
-
-Array = NDArray[np.float64]
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -25,7 +22,7 @@ class Block:
     finish: str
     tint: Array
 
-    def distance(self, at: Image) -> Image:
+    def distance(self, at: Floats) -> Floats:
         """Return the horizontal distance of places (h, w, 3) from the box, metres."""
         dx = np.maximum(self.low[0] - at[..., 0], at[..., 0] - self.high[0])
         dy = np.maximum(self.low[1] - at[..., 1], at[..., 1] - self.high[1])
@@ -97,7 +94,7 @@ def draw_layout(camera: Camera, ground: Array, clutter: bool, pole: bool, rng: n
     if tall:
         layout.panels = _panels(left, right, clutter, rng)
     else:
-        layout.bushes += _hedge(left, right, wall_y + 1.2, layout.wall_height, rng)
+        layout.bushes += _hedge(left, right, wall_y + 0.6, layout.wall_height, rng)
     _furnish(layout, left, right, float(ground[:, 1].max()), clutter, rng)
     if pole:
         layout.pole = _pole(camera, ground, rng)
@@ -142,8 +139,12 @@ def _window(left: float, wide: float, sill: float, tall: float, shutters: bool) 
             top = sill + tall * (0.62 if level == 0 else 1)
             out.append(Panel(x + gap, x + half - gap, z + gap, top - gap, _glass))
     if shutters:
-        out.append(Panel(left - 0.1 - 0.45 * wide, left - 0.1, sill - 0.05, sill + tall + 0.05, paint.louvres))
-        out.append(Panel(left + wide + 0.1, left + 0.1 + 1.45 * wide, sill - 0.05, sill + tall + 0.05, paint.louvres))
+        out.append(
+            Panel(left - 0.1 - 0.45 * wide, left - 0.1, sill - 0.05, sill + tall + 0.05, paint.louvres)
+        )
+        out.append(
+            Panel(left + wide + 0.1, left + 0.1 + 1.45 * wide, sill - 0.05, sill + tall + 0.05, paint.louvres)
+        )
     return out
 
 
@@ -157,7 +158,7 @@ def _glass(rng: np.random.Generator) -> paint.Paint:
     slope, offset = rng.uniform(0.4, 1.2), rng.uniform(0, 3)
     dark, bright = linear((52, 60, 66)), linear((122, 138, 150))
 
-    def flat(u: paint.Plane, v: paint.Plane) -> paint.Plane:
+    def flat(u: Floats, v: Floats) -> Floats:
         share = np.clip(0.5 + 0.5 * np.sin(2.2 * (v + slope * u) + offset), 0, 1)[..., None] ** 2
         return (dark + share * (bright - dark)).astype(np.float32)
 
@@ -169,7 +170,7 @@ def _poster(rng: np.random.Generator) -> paint.Paint:
     colours = linear(rng.uniform(50, 215, (4, 1)) + rng.uniform(-35, 35, (4, 3)))
     cuts = np.sort(rng.uniform(1.25, 1.95, 3))
 
-    def sheet(u: paint.Plane, v: paint.Plane) -> paint.Plane:
+    def sheet(u: Floats, v: Floats) -> Floats:
         return colours[np.searchsorted(cuts, v)].astype(np.float32)
 
     return sheet
@@ -181,12 +182,20 @@ def _hedge(left: float, right: float, y: float, low: float, rng: np.random.Gener
     while x < right:
         size = rng.uniform(0.9, 1.7)
         colour = linear((rng.uniform(70, 100), rng.uniform(98, 122), rng.uniform(50, 70)))
-        out.append(Bush(np.array([x, y + rng.uniform(0, 2), low + rng.uniform(-0.2, 0.9)]), np.full(3, size), colour))
+        out.append(
+            Bush(
+                np.array([x, y + 1.3 * size + rng.uniform(0, 1), low + rng.uniform(0, 1.0)]),
+                np.full(3, size),
+                colour,
+            )
+        )
         x += rng.uniform(0.9, 2.4)
     return out
 
 
-def _furnish(layout: Layout, left: float, right: float, far: float, clutter: bool, rng: np.random.Generator) -> None:
+def _furnish(
+    layout: Layout, left: float, right: float, far: float, clutter: bool, rng: np.random.Generator
+) -> None:
     """Put boxes and bushes between path and wall."""
     room = layout.wall_y - far
     slots = np.linspace(left, right, 11 if clutter else 6)

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from gait.camera import Camera
+from gait.simulate.arrays import Array, Floats
 from gait.simulate.layout import Bush
+from gait.simulate.paint import AMBIENT, SUN
 
-Array = NDArray[np.float64]
-Image = NDArray[np.float32]
-
-_LEAVES_PER_M2 = 1100
+_LEAVES_PER_M2 = 1600
 _LEAF = 0.045  # metres
 
 
 def draw_bush(
-    ambient: Image, direct: Image, behind: Image, camera: Camera, bush: Bush, sun: Array, rng: np.random.Generator
+    ambient: Floats,
+    direct: Floats,
+    behind: Floats,
+    camera: Camera,
+    bush: Bush,
+    sun: Array,
+    rng: np.random.Generator,
 ) -> None:
     """Paint one bush into both layers of light where it is nearer than the depths `behind`."""
     area = np.pi * bush.radii[0] * bush.radii[2]
@@ -39,6 +43,6 @@ def draw_bush(
     for i in order:
         centre = (round(float(uv[i, 0]) * 16), round(float(uv[i, 1]) * 16))
         axes = (max(round(size[i] * 16), 8), max(round(size[i] * slim[i] * 16), 8))
-        for layer, light in ((ambient, 0.46 * shade[i]), (direct, 0.72 * lit[i])):
+        for layer, light in ((ambient, AMBIENT * shade[i]), (direct, SUN * lit[i])):
             colour = tuple(float(c) for c in bush.colour * light)
             cv2.ellipse(layer, centre, axes, tilt[i], 0, 360, colour, -1, cv2.LINE_8, 4)

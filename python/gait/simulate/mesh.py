@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from gait.simulate.anatomy import BONE_INDEX, BONES, JOINT_OF, Anatomy
-
-Array = NDArray[np.float64]
+from gait.simulate.arrays import Array, Floats, Ints
 
 
 @dataclass
@@ -33,10 +32,10 @@ class Part:
     """
 
     vertices: Array
-    faces: NDArray[np.int32]
+    faces: Ints
     uv: Array
     material: int
-    bones: NDArray[np.int32]
+    bones: Ints
     blend: Array
 
     def bind(self, first: str, second: str | None = None, blend: ArrayLike = 0.0) -> Part:
@@ -47,7 +46,7 @@ class Part:
         return self
 
     def bind_chain(self, bones: list[str], body: Anatomy, direction: ArrayLike, width: float) -> Part:
-        """Bind along a limb: each vertex to the bone it lies beside, blended over `width` metres about each joint.
+        """Bind along a limb: each vertex to the bone beside it, blended over `width` metres about each joint.
 
         `direction` (3,) points from the trunk outwards along the limb at rest.
         """
@@ -95,7 +94,9 @@ def loft(
     c, s = np.cos(angle), np.sin(angle)
     out_x = rows[:, 3:4] * np.sign(c) * np.abs(c) ** power
     out_y = rows[:, 4:5] * np.sign(s) * np.abs(s) ** power
-    vertices = rows[:, None, :3] + out_x[..., None] * np.asarray(x_axis) + out_y[..., None] * np.asarray(y_axis)
+    vertices = (
+        rows[:, None, :3] + out_x[..., None] * np.asarray(x_axis) + out_y[..., None] * np.asarray(y_axis)
+    )
     girth = np.pi * (rows[:, 3] + rows[:, 4]).max()
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1))])
     uv = np.stack(np.broadcast_arrays(girth * angle[None] / (2 * np.pi), length[:, None]), axis=-1)
@@ -106,7 +107,7 @@ def loft(
     return part
 
 
-def grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
+def grid_faces(rows: int, columns: int) -> Ints:
     """Return two triangles per cell of a grid of vertices stored row by row."""
     at = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     a, b, c, d = at[:-1, :-1], at[:-1, 1:], at[1:, :-1], at[1:, 1:]
@@ -118,16 +119,16 @@ def grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
 class Mesh:
     """All parts of a figure as flat arrays, with what is needed to pose them."""
 
-    rest: NDArray[np.float32]  # (n, 3) relative to the joint of the second bone
-    normals: NDArray[np.float32]  # (n, 3)
-    uv: NDArray[np.float32]  # (n, 2)
-    faces: NDArray[np.int32]  # (m, 3)
-    material: NDArray[np.int32]  # (m,)
-    ring: NDArray[np.int32]  # (n,) row of `pairs`
-    pairs: NDArray[np.int32]  # (r, 2) bones
-    shares: NDArray[np.float64]  # (r,) share of the second bone
+    rest: Floats  # (n, 3) relative to the joint of the second bone
+    normals: Floats  # (n, 3)
+    uv: Floats  # (n, 2)
+    faces: Ints  # (m, 3)
+    material: Ints  # (m,)
+    ring: Ints  # (n,) row of `pairs`
+    pairs: Ints  # (r, 2) bones
+    shares: Array  # (r,) share of the second bone
 
-    def pose(self, origins: Array, turns: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def pose(self, origins: Array, turns: Array) -> tuple[Floats, Floats]:
         """Return vertices (n, 3) relative to the pelvis and normals (n, 3) for bones (b, 3), (b, 3, 3).
 
         The rotation is blended, not the positions, so that a bent knee keeps its girth.
@@ -156,7 +157,9 @@ def merge(parts: list[Part], body: Anatomy) -> Mesh:
     starts = np.cumsum([0] + [len(part.vertices) for part in parts])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
     material = np.concatenate([np.full(len(part.faces), part.material, np.int32) for part in parts])
-    keys, ring = np.unique(np.column_stack([bones, np.round(blend * 100)]).astype(np.int64), axis=0, return_inverse=True)
+    keys, ring = np.unique(
+        np.column_stack([bones, np.round(blend * 100)]).astype(np.int64), axis=0, return_inverse=True
+    )
     return Mesh(
         (vertices - joints[bones[:, 1]]).astype(np.float32),
         vertex_normals(vertices, faces).astype(np.float32),
@@ -166,7 +169,7 @@ def merge(parts: list[Part], body: Anatomy) -> Mesh:
     )  # fmt: skip
 
 
-def vertex_normals(vertices: Array, faces: NDArray[np.int32]) -> Array:
+def vertex_normals(vertices: Array, faces: Ints) -> Array:
     """Return unit normals (n, 3), averaged over coincident vertices so that seams do not show."""
     corner = vertices[faces]
     flat = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])

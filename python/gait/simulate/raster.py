@@ -5,12 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
-Ints = NDArray[np.int32]
-
-_MAX_SIDE = 4096.0  # a triangle wider than this in pixels is a mistake of the caller
+from gait.simulate.arrays import Floats, Ints
 
 
 class Hits(NamedTuple):
@@ -46,19 +42,24 @@ def rasterise(xy: Floats, nearness: Floats, faces: Ints, width: int, height: int
     width, height : int
         Of the picture, pixels.
     """
-    corner = xy[faces]
-    ab, ac = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    low, high = np.ceil(corner.min(1)), np.floor(corner.max(1))
-    low = np.maximum(low, 0)
-    high = np.minimum(high, [width - 1, height - 1])
+    a, b, c = (xy[faces[:, k]] for k in range(3))
+    area = _cross(b - a, c - a)
+    front = np.flatnonzero(area < -1e-9)
+    a, b, c, area = a[front], b[front], c[front], area[front]
+    low = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0).astype(np.int32)
+    edge = np.array([width - 1, height - 1], np.float32)
+    high = np.floor(np.minimum(np.maximum(np.maximum(a, b), c), edge)).astype(np.int32)
     size = high - low + 1
-    seen = np.flatnonzero((area < -1e-9) & (size > 0).all(1) & (size < _MAX_SIDE).all(1))
-    if not len(seen):
-        empty = np.zeros(0, np.int32)
-        return Hits(empty, empty, empty, np.zeros((0, 3), np.float32))
-    x, y, which = _candidates(low[seen].astype(np.int32), size[seen].astype(np.int32))
-    return _resolve(x, y, seen[which], corner, area, nearness[faces], width)
+    seen = np.flatnonzero((size[:, 0] > 0) & (size[:, 1] > 0))
+    x, y, which = _candidates(low[seen], size[seen])
+    which = seen[which]
+    weights = _weights(a, (b - a) / area[:, None], (c - a) / area[:, None], x, y, which)
+    inside = np.flatnonzero(weights.min(0) >= 0)
+    return _nearest(x[inside], y[inside], front[which[inside]], weights[:, inside], nearness, faces, width)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _candidates(low: Ints, size: Ints) -> tuple[Ints, Ints, Ints]:
@@ -72,21 +73,20 @@ def _candidates(low: Ints, size: Ints) -> tuple[Ints, Ints, Ints]:
     return low[which, 0] + (local - row * wide), low[which, 1] + row, which
 
 
-def _resolve(x: Ints, y: Ints, face: Ints, corner: Floats, area: Floats, near: Floats, width: int) -> Hits:
-    """Keep the candidates inside their triangle, then the nearest of each pixel."""
-    a = corner[:, 0]
-    ab, ac = corner[:, 1] - a, corner[:, 2] - a
-    scale = 1 / area
-    px, py = x - a[face, 0], y - a[face, 1]
-    w1 = (px * (ac[:, 1] * scale)[face] - py * (ac[:, 0] * scale)[face]).astype(np.float32)
-    w2 = (py * (ab[:, 0] * scale)[face] - px * (ab[:, 1] * scale)[face]).astype(np.float32)
-    inside = np.flatnonzero((w1 >= 0) & (w2 >= 0) & (w1 + w2 <= 1))
-    x, y, face, w1, w2 = x[inside], y[inside], face[inside], w1[inside], w2[inside]
-    w0 = 1 - w1 - w2
-    depth = w0 * near[face, 0] + w1 * near[face, 1] + w2 * near[face, 2]
-    pixel = y.astype(np.int64) * width + x
+def _weights(a: Floats, ab: Floats, ac: Floats, x: Ints, y: Ints, which: Ints) -> Floats:
+    """Return the barycentric weights (3, n) of pixels in triangles `which`; edges are given over the area."""
+    px, py = x - a[which, 0], y - a[which, 1]
+    second = px * ac[which, 1] - py * ac[which, 0]
+    third = py * ab[which, 0] - px * ab[which, 1]
+    return np.stack([1 - second - third, second, third])
+
+
+def _nearest(
+    x: Ints, y: Ints, face: Ints, weights: Floats, nearness: Floats, faces: Ints, width: int
+) -> Hits:
+    """Keep the nearest candidate of each pixel."""
+    depth = np.einsum("kn,nk->n", weights, nearness[faces[face]])
+    pixel = y * np.int32(width) + x
     order = np.lexsort((depth, pixel))
-    last = np.flatnonzero(np.diff(pixel[order], append=-1))
-    keep = order[last]
-    weights = np.stack([w0[keep], w1[keep], w2[keep]], axis=1)
-    return Hits(y[keep], x[keep], face[keep].astype(np.int32), weights)
+    last = order[np.flatnonzero(np.diff(pixel[order], append=-1))]
+    return Hits(y[last], x[last], face[last].astype(np.int32), np.ascontiguousarray(weights[:, last].T))

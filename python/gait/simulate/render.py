@@ -6,18 +6,16 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from gait.camera import Camera
+from gait.simulate.arrays import Floats, Ints, Picture
 from gait.simulate.mesh import Mesh
+from gait.simulate.paint import AMBIENT, SUN
 from gait.simulate.raster import rasterise
-from gait.simulate.scene import AMBIENT, SUN, Scene
+from gait.simulate.scene import Scene
 from gait.simulate.shadow import Contact, SunView
 from gait.simulate.walk import Walk
 from gait.simulate.wardrobe import FACE, LEGS, SIZE, TOP, Look
-
-Floats = NDArray[np.float32]
-Picture = NDArray[np.uint8]
 
 # sub-pixel shifts of the instants averaged over the open shutter: antialiasing and motion blur at once
 _SHIFTS = np.array([(-5, 1), (3, -3), (-1, -5), (5, 3), (-3, 5), (1, -1)], np.float32) / 12
@@ -64,7 +62,7 @@ class Renderer:
         return self._over(picture, opened, closed, frame)
 
     def _shutter(self, frame: int) -> tuple[_Instant, _Instant]:
-        """Return the figure as the shutter opens and closes, half an interval apart about the frame's time."""
+        """Return the figure as the shutter opens and closes, a quarter interval either side of the frame."""
         centre = self._zero + frame * self.walk.timing.per_frame
         half = self.walk.timing.per_frame // 4
         return self._pose(centre - half), self._pose(centre + half)
@@ -104,15 +102,22 @@ class Renderer:
         camera = self.camera
         seen = vertices @ camera.R.T.astype(np.float32) + camera.t.astype(np.float32)
         near = 1 / seen[:, 2]
-        uv = seen[:, :2] * near[:, None] * np.float32([camera.fx, camera.fy]) + np.float32([camera.cx, camera.cy])
+        focal, centre = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
+        uv = seen[:, :2] * near[:, None] * focal + centre
         return uv.astype(np.float32), near.astype(np.float32)
 
     def _splat(
-        self, colour: Floats, cover: Floats, now: _Instant, uv: Floats, window: tuple[slice, slice], shift: Floats
+        self,
+        colour: Floats,
+        cover: Floats,
+        now: _Instant,
+        uv: Floats,
+        window: tuple[slice, slice],
+        shift: Floats,
     ) -> None:
         """Add one instant, sampled at pixel centres moved by `shift`."""
         xy, near = self._project(now.vertices)
-        xy = xy - np.float32([window[1].start, window[0].start]) - shift
+        xy = xy - np.array([window[1].start, window[0].start], np.float32) - shift
         hits = rasterise(xy, near, self.mesh.faces, cover.shape[1], cover.shape[0])
         corners = self.mesh.faces[hits.face]
 
@@ -128,7 +133,7 @@ class Renderer:
         colour[hits.row, hits.column] += albedo * (sky + SUN * facing * lit)[:, None]
         cover[hits.row, hits.column] += 1
 
-    def _albedo(self, uv: Floats, material: NDArray[np.int32]) -> Floats:
+    def _albedo(self, uv: Floats, material: Ints) -> Floats:
         texel = np.floor(uv * self._tile[material][:, None]).astype(np.int32)
         row = np.where(material == FACE, np.clip(texel[:, 1], 0, SIZE - 1), texel[:, 1] % SIZE)
         return self.look.tiles[material, row, texel[:, 0] % SIZE]
@@ -140,7 +145,7 @@ def _between(a: _Instant, b: _Instant, share: float) -> _Instant:
 
 
 def develop(light: Floats, gain: float, noise: float, rng: np.random.Generator | None) -> Picture:
-    """Turn linear light (h, w, 3) RGB into an 8-bit BGR picture: lens blur, exposure, sensor noise of `noise` levels."""
+    """Turn linear light (h, w, 3) RGB into an 8-bit BGR picture: lens blur, exposure, sensor noise."""
     soft = cv2.GaussianBlur(light, (0, 0), DEFOCUS_PX)
     shown = np.sqrt(np.maximum(soft, 0)) * np.float32(255 * gain)
     if noise > 0 and rng is not None:

@@ -13,7 +13,8 @@ GENERATOR = "generator"
 
 # option: smallest and largest value
 _LIMITS = {
-    "frames": (2, 100_000), "fps": (5.0, 240.0), "stature": (1.2, 2.2), "speed": (0.3, 2.5), "stride_hz": (0.4, 1.6),
+    "frames": (2, 100_000), "fps": (5.0, 240.0), "stature": (1.2, 2.2), "speed": (0.3, 2.5),
+    "stride_hz": (0.4, 1.6),
     "distance": (1.0, 100.0), "camera_height": (0.2, 20.0), "seed": (0, 2**31 - 1), "flicker": (0.0, 50.0),
     "noise": (0.0, 64.0),
 }  # fmt: skip
@@ -77,19 +78,21 @@ class Scenario:
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise UserError(f"--{name.replace('_', '-')} {value:g}: give a value from {low:g} to {high:g}")
+                raise UserError(
+                    f"--{name.replace('_', '-')} {value:g}: give a value from {low:g} to {high:g}"
+                )
         for pixels in self.size:
             if not _SIZE[0] <= pixels <= _SIZE[1] or pixels % 2:
                 width, height = self.size
                 raise UserError(f"--size {width}x{height}: give even numbers from {_SIZE[0]} to {_SIZE[1]}")
 
     def stream(self, name: str, *more: int) -> np.random.Generator:
-        """Return random numbers of their own for one purpose, so that one option does not change the others."""
+        """Return random numbers for one purpose, so that one option does not change the others."""
         return np.random.default_rng([self.seed, *name.encode(), *more])
 
 
 PRESETS: dict[str, Scenario] = {
-    "demo": Scenario(seed=7),
+    "demo": Scenario(seed=24, stature=1.75, speed=1.2),
     "side": Scenario(direction="rl", seed=11, flicker=1.0),
     "oblique": Scenario(view="oblique", frames=110, seed=12),
     "toward": Scenario(view="toward", frames=150, seed=13),

@@ -1,7 +1,7 @@
 """The empty scene: ground, facade, boxes, bushes and perhaps a pole, ray-cast once per clip.
 
-Everything stands behind the walker except the pole.  Light is kept in two layers, ambient and direct, so that the
-walker's shadow can take away the direct one.
+Everything stands behind the walker except the pole.  Light is kept in two layers, ambient and direct, so that
+the walker's shadow can take away the direct one.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from gait.camera import Camera
 from gait.simulate import paint
+from gait.simulate.arrays import Array, Floats
 from gait.simulate.layout import Block, Layout
 from gait.simulate.leaves import draw_bush
+from gait.simulate.paint import AMBIENT, SUN
+from gait.simulate.wardrobe import linear
 
-Array = NDArray[np.float64]
-Image = NDArray[np.float32]
-
-AMBIENT, SUN = 0.46, 0.72
 _SAMPLES = 2  # rays per pixel, each way
 
 
@@ -40,14 +39,14 @@ class Scene:
         Unit vector.
     """
 
-    ambient: Image
-    direct: Image
-    position: Image
-    front: Image
+    ambient: Floats
+    direct: Floats
+    position: Floats
+    front: Floats
     to_sun: Array
 
     @property
-    def plate(self) -> Image:
+    def plate(self) -> Floats:
         """The empty scene in linear light."""
         return self.ambient + self.direct
 
@@ -66,12 +65,12 @@ class _Caster:
         self.facing = np.zeros(u.shape, np.float32)  # cosine to the sun
         self.open = np.ones(u.shape, np.float32)  # share of the sky that lights it
 
-    def position(self) -> Image:
+    def position(self) -> Floats:
         """World places (h, w, 3) of what was hit."""
         far = np.minimum(self.depth, 1e4)[..., None]
         return self.ray * far + self.origin.astype(np.float32)
 
-    def plane(self, axis: int, level: float) -> tuple[Image, Image]:
+    def plane(self, axis: int, level: float) -> tuple[Floats, Floats]:
         """Return depth and world places where rays meet a plane across world axis `axis`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = (level - self.origin[axis]) / self.ray[..., axis]
@@ -79,7 +78,7 @@ class _Caster:
         return depth, self.ray * np.minimum(depth, 1e4)[..., None] + self.origin.astype(np.float32)
 
     def put(
-        self, hit: NDArray[np.bool_], depth: Image, albedo: Image, facing: float, sky: Image | float = 1.0,
+        self, hit: NDArray[np.bool_], depth: Floats, albedo: Floats, facing: float, sky: Floats | float = 1.0,
         box: tuple[slice, slice] = (slice(None), slice(None)),
     ) -> None:  # fmt: skip
         """Keep a surface, given in the window `box`, where it is nearer than what is there."""
@@ -108,10 +107,12 @@ def build_scene(camera: Camera, layout: Layout, rng: np.random.Generator) -> Sce
     front = np.zeros(cast.depth.shape, np.float32)
     if layout.pole is not None:
         front = _paint_pole(ambient, direct, cast, layout.pole, sun)
-    size = camera.size
-    small = [cv2.resize(layer, size, interpolation=cv2.INTER_AREA) for layer in (ambient, direct, front)]
-    place = cv2.resize(position, size, interpolation=cv2.INTER_NEAREST)
-    return Scene(small[0], small[1], place, small[2], sun)
+
+    def reduce(layer: Floats, how: int = cv2.INTER_AREA) -> Floats:
+        return np.asarray(cv2.resize(layer, camera.size, interpolation=how), np.float32)
+
+    place = reduce(position, cv2.INTER_NEAREST)
+    return Scene(reduce(ambient), reduce(direct), place, reduce(front), sun)
 
 
 def _paint_sky(cast: _Caster, rng: np.random.Generator) -> None:
@@ -129,7 +130,9 @@ def _paint_ground(cast: _Caster, layout: Layout, rng: np.random.Generator) -> No
     colour = getattr(paint, layout.paving)(rng)(u, v)
     strip = getattr(paint, layout.strip)(rng)(at[..., 0], at[..., 1])
     edge = layout.wall_y - layout.strip_width
-    kerb = np.clip(1 + 0.06 * paint.Noise(rng)(at[..., 0], at[..., 1], 2.0), 0.6, 1.3)[..., None] * paint.linear((172, 168, 160))
+    kerb = np.clip(1 + 0.06 * paint.Noise(rng)(at[..., 0], at[..., 1], 2.0), 0.6, 1.3)[..., None] * linear(
+        (172, 168, 160)
+    )
     colour = np.where((at[..., 1] > edge)[..., None], strip, colour)
     colour = np.where((np.abs(at[..., 1] - edge) < 0.07)[..., None], kerb, colour).astype(np.float32)
     corner = 1 - 0.55 * np.exp(-np.maximum(layout.wall_y - at[..., 1], 0) / 0.35)
@@ -176,7 +179,7 @@ def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
-def _sunlit(position: Image, layout: Layout) -> Image:
+def _sunlit(position: Floats, layout: Layout) -> Floats:
     """Return 0 where a box shades the surface from the sun, 1 elsewhere; (h, w)."""
     lit = np.ones(position.shape[:2], np.float32)
     sun = layout.to_sun.astype(np.float32)
@@ -190,10 +193,10 @@ def _sunlit(position: Image, layout: Layout) -> Image:
             one, two = (block.low[k] - position[..., k]) / sun[k], (block.high[k] - position[..., k]) / sun[k]
             enter, leave = np.maximum(enter, np.minimum(one, two)), np.minimum(leave, np.maximum(one, two))
         lit[(leave > enter) & (leave > 0.02)] = 0
-    return cv2.GaussianBlur(lit, (0, 0), 1.5)
+    return np.asarray(cv2.GaussianBlur(lit, (0, 0), 1.5), np.float32)
 
 
-def _paint_pole(ambient: Image, direct: Image, cast: _Caster, pole: Block, sun: Array) -> Image:
+def _paint_pole(ambient: Floats, direct: Floats, cast: _Caster, pole: Block, sun: Array) -> Floats:
     """Draw an upright cylinder; return the share of each fine pixel it covers."""
     centre = 0.5 * (pole.low + pole.high)
     radius = 0.5 * (pole.high[0] - pole.low[0])
@@ -210,4 +213,3 @@ def _paint_pole(ambient: Image, direct: Image, cast: _Caster, pole: Block, sun: 
     colour = (pole.tint * band).astype(np.float32)
     ambient[hit], direct[hit] = AMBIENT * colour, SUN * light * colour
     return hit.astype(np.float32)
-

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from gait.simulate.arrays import Floats, Ints
 from gait.simulate.raster import rasterise
 from gait.simulate.scene import Scene
-
-Floats = NDArray[np.float32]
 
 _CELL = 0.0125  # metres per pixel of the sun's view
 _BIAS = 0.025  # metres
@@ -30,7 +28,7 @@ class SunView:
         self._corner = np.zeros(2, np.float32)
         self._centre = 0.0
 
-    def look(self, vertices: Floats, faces: NDArray[np.int32]) -> None:
+    def look(self, vertices: Floats, faces: Ints) -> None:
         """Find what the sun sees of the figure."""
         seen = vertices @ self._axes.T
         self._corner = seen[:, :2].min(0) - np.float32(8 * _CELL)
@@ -38,11 +36,13 @@ class SunView:
         width, height = (int(v) for v in np.ceil(extent / _CELL))
         hits = rasterise((seen[:, :2] - self._corner) / np.float32(_CELL), seen[:, 2], faces, width, height)
         self._nearest = np.full((height, width), -np.inf, np.float32)
-        self._nearest[hits.row, hits.column] = np.einsum("nk,nk->n", hits.weights, seen[:, 2][faces[hits.face]])
+        self._nearest[hits.row, hits.column] = np.einsum(
+            "nk,nk->n", hits.weights, seen[:, 2][faces[hits.face]]
+        )
         self._centre = float(seen[:, 2].mean())
 
     def visible(self, places: Floats, normals: Floats, shift: Floats) -> Floats:
-        """Return 1 where places (n, 3) on the figure see the sun, 0 in its own shade; `shift` cells soften edges."""
+        """Return 1 where places (n, 3) on the figure see the sun, 0 in its own shade; `shift` softens."""
         seen = (places + np.float32(0.012) * normals) @ self._axes.T
         at = np.rint((seen[:, :2] - self._corner) / np.float32(_CELL) + 2.5 * shift).astype(np.int32)
         rows, columns = self._nearest.shape

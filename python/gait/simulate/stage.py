@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait.camera import Camera
 from gait.simulate.anatomy import Anatomy, draw_anatomy
+from gait.simulate.arrays import Array, Ints
 from gait.simulate.blobcurves import curves_of_model
 from gait.simulate.curves import normative
 from gait.simulate.figure import build_figure
@@ -20,8 +20,6 @@ from gait.simulate.stride import draw_timing
 from gait.simulate.views import make_camera, make_path
 from gait.simulate.walk import Walk, make_walk
 from gait.simulate.wardrobe import Look, draw_look
-
-Array = NDArray[np.float64]
 
 _USUAL_SPEED, _USUAL_CADENCE, _USUAL_STATURE = 1.25, 0.92, 1.75  # m/s, strides/s, m
 _SURFACE = 0.10  # metres from a joint to the skin, hair or shoe around it
@@ -42,7 +40,7 @@ class Stage:
     body: Anatomy
     walk: Walk
     camera: Camera
-    frames: NDArray[np.intp]
+    frames: Ints
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def build_set(stage: Stage) -> Set:
 
 
 def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
-    """Return speed in m/s and strides per second: speed and cadence rise together, taller people step slower."""
+    """Return speed (m/s) and strides per second: they rise together, and taller people step slower."""
     rng = scenario.stream("pace")
     usual = _USUAL_CADENCE * np.sqrt(_USUAL_STATURE / stature) * rng.uniform(0.97, 1.03)
     speed, cadence = scenario.speed, scenario.stride_hz
@@ -104,7 +102,7 @@ def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
     return float(speed), float(cadence)
 
 
-def _envelope(walk: Walk, frames: NDArray[np.intp]) -> Array:
+def _envelope(walk: Walk, frames: Ints) -> Array:
     """Return points (n, 3) around all that the walker's surface reaches."""
     joints = np.concatenate(list(walk.points(frames).values()))
     offsets = _SURFACE * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-0.3, 0.5)])

@@ -1,14 +1,13 @@
-"""When steps happen: jittered stride times, the phase they define, and smooth variation from stride to stride."""
+"""When steps happen: jittered stride times, the phase they define, and variation from stride to stride."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-Array = NDArray[np.float64]
+from gait.simulate.arrays import Array
 
 STRIDE_TIME_CV = 0.02
 MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that no foot is planned at an edge
@@ -57,6 +56,6 @@ def draw_timing(stride_hz: float, fps: float, frames: int, modes: int, rng: np.r
     lengths = period * (1 + STRIDE_TIME_CV * np.clip(rng.standard_normal(strides), -2.5, 2.5))
     strikes = time[0] - period * (1 + rng.uniform()) + np.concatenate([[0], np.cumsum(lengths)])
     phase = PchipInterpolator(strikes, np.arange(strides + 1.0) - 2, extrapolate=True)(time)
-    knots = rng.standard_normal((strides + 1, modes))
+    knots: Array = rng.standard_normal((strides + 1, modes))
     scores = PchipInterpolator(strikes, np.clip(knots, -2, 2), extrapolate=True)(time)
-    return Timing(time, phase, scores, per_frame)
+    return Timing(time, np.asarray(phase, np.float64), np.asarray(scores, np.float64), per_frame)

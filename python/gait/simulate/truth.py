@@ -7,17 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait._version import __version__
 from gait.files import replacing
 from gait.initial import DEFAULT_SD
 from gait.simulate.anatomy import BONE_INDEX, SIDES
+from gait.simulate.arrays import Array, Ints
 from gait.simulate.render import DEFOCUS_PX, SHUTTER
 from gait.simulate.stage import Set, Stage
 from gait.simulate.walk import Walk
-
-Array = NDArray[np.float64]
 
 EVENTS = ("l_heel_strike", "l_toe_off", "r_heel_strike", "r_toe_off")
 CRF = 14
@@ -26,8 +24,8 @@ CRF = 14
 def find_events(stage: Stage) -> dict[str, Array]:
     """Return heel strikes and toe-offs as fractional frames, those just outside the clip included.
 
-    A heel strikes where it is furthest ahead of the pelvis, the toes leave where they are furthest behind (Zeni et
-    al. 2008), found on the fine time grid.
+    A heel strikes where it is furthest ahead of the pelvis, the toes leave where they are furthest behind
+    (Zeni et al. 2008), found on the fine time grid.
     """
     walk = stage.walk
     points = walk.points()
@@ -60,7 +58,7 @@ def cycles_at(strikes: Array, frames: Array) -> Array:
 def write_truth(path: Path, stage: Stage, strikes: Array) -> None:
     """Write joints (metres, world) and their pixels, heading, speed, phase and some angles of every frame."""
     walk, frames = stage.walk, stage.frames
-    count = np.arange(len(frames))
+    count = np.arange(len(frames), dtype=float)
     heading = _wrapped(walk.heading[frames])
     columns: dict[str, Array] = {
         "phase": cycles_at(strikes, count) % 1.0,
@@ -76,7 +74,7 @@ def write_truth(path: Path, stage: Stage, strikes: Array) -> None:
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="ascii") as file:
         writer = csv.writer(file)
         writer.writerow(["frame", "time", *columns])
-        for i in count:
+        for i in range(len(frames)):
             row = (f"{values[i]:.6f}" for values in columns.values())
             writer.writerow([i, f"{i / stage.scenario.fps:.6f}", *row])
 
@@ -85,7 +83,7 @@ def _wrapped(angle: Array) -> Array:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def _angles(walk: Walk, frames: NDArray[np.intp]) -> dict[str, Array]:
+def _angles(walk: Walk, frames: Ints) -> dict[str, Array]:
     """Return hinge angles and pitches in degrees, flexion and forward positive."""
     turns = walk.turns[frames]
     out = {}
@@ -121,7 +119,10 @@ def first_state(stage: Stage, strikes: Array) -> dict[str, Any]:
 def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any]:
     """Return meta.json: how the clip was made and what happens in it."""
     scenario, walk, frames = stage.scenario, stage.walk, stage.frames
-    inside = {name: [round(float(t), 3) for t in times if 0 <= t <= len(frames) - 1] for name, times in events.items()}
+    inside = {
+        name: [round(float(t), 3) for t in times if 0 <= t <= len(frames) - 1]
+        for name, times in events.items()
+    }
     strides = np.diff(events["r_heel_strike"]) / scenario.fps
     pelvis = walk.origins[frames, 0]
     tall = _height_px(stage)
@@ -145,8 +146,8 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "stride_period_sd_s": round(float(strides.std()), 4),
         "net_displacement_m": (pelvis[-1] - pelvis[0]).round(3).tolist(),
         "events_video_frames": inside,
-        "events_note": "fractional 0-based video frames; heel strike: heel furthest ahead of the pelvis (Zeni); "
-        "toe-off: toe (MTP) furthest behind",
+        "events_note": "fractional 0-based video frames; heel strike: heel furthest ahead of the pelvis "
+        "(Zeni); toe-off: toe (MTP) furthest behind",
         "limb_lengths_m": {key: round(value, 4) for key, value in stage.body.lengths.items()},
         "stature_m": round(stage.body.stature, 4),
         "person_height_px": [round(float(q)) for q in np.percentile(tall, (0, 50, 100))],
@@ -159,7 +160,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "crf": CRF,
         "seed": scenario.seed,
         "generator": f"gait {__version__}",
-        "license": "BSD-3-Clause, as libgait: motion, body, clothes and background are generated, no data of others",
+        "license": "BSD-3-Clause, as libgait: motion, body, clothes and scene are generated",
     }
 
 
@@ -182,7 +183,9 @@ def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
     uv = stage.camera.project(np.stack(list(stage.walk.points(stage.frames).values()), axis=1))
     column, row = np.moveaxis(np.rint(np.nan_to_num(uv)).astype(int), -1, 0)
     inside = (column >= 0) & (row >= 0) & (column < stage.camera.width) & (row < stage.camera.height)
-    front = made.scene.front[np.clip(row, 0, stage.camera.height - 1), np.clip(column, 0, stage.camera.width - 1)]
+    front = made.scene.front[
+        np.clip(row, 0, stage.camera.height - 1), np.clip(column, 0, stage.camera.width - 1)
+    ]
     share = ((front > 0.5) & inside).mean(1)
     hit = np.flatnonzero(share > 0)
     centre = 0.5 * (pole.low + pole.high)

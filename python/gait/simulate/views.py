@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait.camera import Camera
 from gait.errors import UserError
+from gait.simulate.arrays import Array
 from gait.simulate.path import Path
-
-Array = NDArray[np.float64]
 
 VIEWS = ("side", "oblique", "toward", "away", "above", "circle")
 DIRECTIONS = ("lr", "rl")
@@ -22,7 +20,7 @@ _AWAY = {"side": 6.5, "oblique": 5.0, "toward": 5.0, "away": 4.5, "above": 5.5, 
 
 
 def make_path(view: str, direction: str, seed_turn: float) -> Path:
-    """Return the path; `seed_turn` in -1..1 turns straight paths by up to 3 degrees, and shifts the circle's start."""
+    """Return the path; `seed_turn` in -1..1 turns straight paths by up to 3 degrees and shifts the circle."""
     mirrored = direction == "rl"
     if view == "circle":
         return Path(np.pi * seed_turn, -CIRCLE_RADIUS if mirrored else CIRCLE_RADIUS)
@@ -33,7 +31,7 @@ def make_path(view: str, direction: str, seed_turn: float) -> Path:
 def make_camera(
     view: str, size: tuple[int, int], points: Array, distance: float | None, height: float | None
 ) -> Camera:
-    """Place the camera at (0, -distance, height) and choose the longest lens that keeps all `points` in the picture.
+    """Place the camera at (0, -distance, height) with the longest lens that keeps all `points` in view.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """A walk of given speed and cadence: pelvis, planted feet and every bone on a fine time grid.
 
-The joint angles give the shape of the movement.  The stance foot then gives the forward motion, each step is planted
-where it lies on average while flat, and the legs are solved so that the planted feet neither slide nor sink.
+The joint angles give the shape of the movement.  The stance foot then gives the forward motion, each step is
+planted where it is on average while it stands, and the legs are solved so that planted feet neither slide
+nor sink.
 """
 
 from __future__ import annotations
@@ -9,24 +10,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import brentq
 
 from gait.errors import UserError
 from gait.simulate import feet
-from gait.simulate.anatomy import BONE_INDEX, BONES, POINT_BONE, POINTS, SIDES, Anatomy
+from gait.simulate.anatomy import BONE_INDEX, BONES, JOINT_OF, POINT_BONE, POINTS, SIDES, Anatomy
+from gait.simulate.arrays import Array, Ints
 from gait.simulate.curves import Curves
 from gait.simulate.path import Path
 from gait.simulate.rotations import about, apply, euler, limb, unit
 from gait.simulate.stride import Timing
 
-Array = NDArray[np.float64]
-
 _REACH = 0.9985  # a leg is never straighter than this share of its length
 _LANDING = 0.90  # from this share of the cycle the swinging foot already binds the pelvis's height
 _SWAY = 0.012  # statures
 _SURGE = 0.05  # the pelvis is fastest in double support and slowest over the standing leg, share of the speed
+_HALF_WIDTH = 0.024  # of the step, statures
 _LEAD = 0.010  # how far the pelvis is ahead of where the angles would have it over the feet, statures
 
 
@@ -58,7 +59,7 @@ class Walk:
     pelvis_yaw: Array
     speed: Array
 
-    def points(self, index: NDArray[np.intp] | slice = slice(None)) -> dict[str, Array]:
+    def points(self, index: Ints | slice = slice(None)) -> dict[str, Array]:
         """Return the reported points (n, 3) at grid indices, world, metres."""
         rest = self.body.rest
         out = {}
@@ -70,12 +71,12 @@ class Walk:
 
 
 def _joint_name(bone: int) -> str:
-    from gait.simulate.anatomy import JOINT_OF
-
     return JOINT_OF[BONES[bone]]
 
 
-def make_walk(body: Anatomy, curves: Curves, timing: Timing, path: Path, speed: float, rng: np.random.Generator) -> Walk:
+def make_walk(
+    body: Anatomy, curves: Curves, timing: Timing, path: Path, speed: float, rng: np.random.Generator
+) -> Walk:
     """Compute a walk at `speed` m/s (mean over the grid) along `path`.
 
     Raises
@@ -87,25 +88,35 @@ def make_walk(body: Anatomy, curves: Curves, timing: Timing, path: Path, speed: 
     gain = _stride_gain(angles, timing, body, speed)
     angles = _stretched(angles, gain)
     forward = _forward_speed(angles, timing, body, gain)
-    along = np.concatenate([[0], np.cumsum((forward[1:] + forward[:-1]) / 2)]) * timing.step
-    first, last = -timing.time[0], timing.time[-1]
-    middle = np.interp((last - first) / 2, timing.time, along)
-    along -= middle
-    sway = -_SWAY * body.stature * np.sin(2 * np.pi * (timing.phase - 0.02))
+    along = cumulative_trapezoid(forward, dx=timing.step, initial=0)
+    along -= np.interp(0.5 * (timing.time[0] + timing.time[-1]), timing.time, along)  # the clip's middle
     heading = path.direction(along)
-    turn = euler(heading + angles["pelvis_yaw"], angles["pelvis_pitch"], angles["pelvis_roll"])
-    ground = np.column_stack([path.point(along, sway), np.zeros(len(along))])
-    tracks = {}
+    course = _Course(timing, body, path, angles, gain, along, heading)
+    yaw = heading + angles["pelvis_yaw"]
+    turn = euler(yaw, angles["pelvis_pitch"], angles["pelvis_roll"])
+    plans = {side: _plan_foot(side, course, rng) for side in SIDES}
+    sway = -_SWAY * body.stature * np.sin(2 * np.pi * (timing.phase - 0.02))
+    ground = path.point(along, sway)
+    pelvis = np.column_stack([ground, _pelvis_height(ground, turn, plans, timing, body)])
+    origins, turns = np.zeros((len(along), len(BONES), 3)), np.zeros((len(along), len(BONES), 3, 3))
+    _set(origins, turns, "pelvis", pelvis, turn)
     for side in SIDES:
-        tracks[side] = _plan_foot(side, angles, timing, body, path, along, heading, gain, rng)
-    ground[:, 2] = _pelvis_height(ground, turn, tracks, timing, body)
-    origins = np.zeros((len(along), len(BONES), 3))
-    turns = np.zeros((len(along), len(BONES), 3, 3))
-    _set(origins, turns, "pelvis", ground, turn)
-    for side in SIDES:
-        _solve_leg(side, origins, turns, tracks[side], heading + angles["pelvis_yaw"], body)
+        _solve_leg(side, origins, turns, plans[side], yaw, body)
     _upper_body(origins, turns, angles, body)
     return Walk(timing, body, origins, turns, heading, angles["pelvis_yaw"], forward)
+
+
+@dataclass(frozen=True)
+class _Course:
+    """What both feet have in common: the pelvis's progress along the path and the joint angles."""
+
+    timing: Timing
+    body: Anatomy
+    path: Path
+    angles: dict[str, Array]
+    gain: float
+    along: Array
+    heading: Array
 
 
 @dataclass(frozen=True)
@@ -129,15 +140,20 @@ def _stretched(angles: dict[str, Array], gain: float) -> dict[str, Array]:
 
 def _free_ankle(side: str, angles: dict[str, Array], body: Anatomy) -> Array:
     """Return the ankle relative to the pelvis joint as the angles put it, path frame (T, 3)."""
-    sign = 1.0 if side == "l" else -1.0
     pelvis = euler(angles["pelvis_yaw"], angles["pelvis_pitch"], angles["pelvis_roll"])
-    thigh = pelvis @ limb(*(angles[f"{side}_hip_{axis}"] for axis in ("flexion", "abduction", "rotation")), sign)
+    thigh = pelvis @ _ball_joint(angles, f"{side}_hip")
     shank = thigh @ about(1, angles[f"{side}_knee_flexion"])
     return (
         apply(pelvis, body.rest[f"{side}_hip"])
         + apply(thigh, [0, 0, -body["thigh"]])
         + apply(shank, [0, 0, -body["shank"]])
     )
+
+
+def _ball_joint(angles: dict[str, Array], joint: str) -> Array:
+    """Return the rotation of a hip or shoulder, named with its side."""
+    sign = 1.0 if joint.startswith("l_") else -1.0
+    return limb(angles[f"{joint}_flexion"], angles[f"{joint}_abduction"], angles[f"{joint}_rotation"], sign)
 
 
 def _forward_speed(angles: dict[str, Array], timing: Timing, body: Anatomy, gain: float) -> Array:
@@ -179,51 +195,53 @@ def _stride_gain(angles: dict[str, Array], timing: Timing, body: Anatomy, speed:
         cadence = float(np.gradient(timing.phase, timing.step).mean())
         slow, fast = excess(low) + speed, excess(high) + speed
         raise UserError(
-            f"--speed {speed:g}: at {cadence:.2f} strides/s and this stature a walk goes {slow:.2f} to {fast:.2f} m/s; "
-            "change --speed or --stride-hz"
+            f"--speed {speed:g}: at {cadence:.2f} strides/s and this stature a walk goes {slow:.2f} to "
+            f"{fast:.2f} m/s; change --speed or --stride-hz"
         )
     return float(brentq(excess, low, high, xtol=1e-4))
 
 
-def _plan_foot(
-    side: str, angles: dict[str, Array], timing: Timing, body: Anatomy, path: Path, along: Array, heading: Array,
-    gain: float, rng: np.random.Generator,
-) -> _FootPlan:  # fmt: skip
+def _plan_foot(side: str, course: _Course, rng: np.random.Generator) -> _FootPlan:
     """Plant every step of one foot and carry the foot from one to the next."""
-    sign = 1.0 if side == "l" else -1.0
-    phase = timing.of_side(side)
-    pitch = feet.foot_pitch(phase, _pitch_gain(gain))
+    phase = course.timing.of_side(side)
+    pitch = feet.foot_pitch(phase, _pitch_gain(course.gain))
     bend = feet.toe_bend(phase, pitch)
-    rel = _free_ankle(side, angles, body)
-    rolled = feet.rolling_ankle(pitch, bend, body)
-    half_width = 0.024 * body.stature * float(rng.uniform(0.7, 1.3))
-    toe_out = np.radians(rng.uniform(3, 9))
+    rel = _free_ankle(side, course.angles, course.body)
+    rolled = feet.rolling_ankle(pitch, bend, course.body)
+    left = (1.0 if side == "l" else -1.0) * _HALF_WIDTH * course.body.stature * float(rng.uniform(0.7, 1.3))
+    falls = _footfalls(side, course, course.along + rel[:, 0] - rolled[0], left, rng)
+    ahead = np.column_stack([np.cos(course.heading), np.sin(course.heading)])
+    stance = phase % 1.0 < feet.TOE_OFF
+    height = rel[:, 2] - (rel[:, 2] - rolled[1])[stance].mean()
+    free = np.column_stack([course.path.point(course.along, left) + rel[:, :1] * ahead, height])
+    ankle, yaw = feet.foot_track(phase, free, course.timing.step, falls, rolled)
+    return _FootPlan(feet.lift_swing(ankle, pitch, bend, phase, course.body), yaw, pitch, bend, phase)
+
+
+def _footfalls(
+    side: str, course: _Course, place: Array, left: float, rng: np.random.Generator
+) -> list[feet.Footfall]:
+    """Plant each step where the foot is on average while it stands: `place` (T,) along the path, metres."""
+    phase, stature = course.timing.of_side(side), course.body.stature
+    toe_out = (1.0 if side == "l" else -1.0) * np.radians(rng.uniform(3, 9))
     falls = []
-    for stride in range(int(np.ceil(phase[0])), int(np.floor(phase[-1]))):
+    for stride in range(int(np.ceil(phase[0])), int(np.floor(phase[-1] - feet.TOE_OFF)) + 1):
         stance = (phase > stride) & (phase < stride + feet.TOE_OFF)
-        if phase[-1] < stride + feet.TOE_OFF + 0.02:
-            break
-        where = float((along + rel[:, 0] - rolled[0])[stance].mean()) - _LEAD * body.stature
-        left = sign * half_width + 0.004 * body.stature * float(np.clip(rng.standard_normal(), -2, 2))
-        yaw = float(path.direction(where) + sign * toe_out + np.radians(1.5) * rng.standard_normal())
-        falls.append(feet.Footfall(stride, path.point(where, left), yaw))
-    ahead = np.column_stack([np.cos(heading), np.sin(heading)])
-    free = np.empty((len(along), 3))
-    free[:, :2] = path.point(along, sign * half_width) + rel[:, :1] * ahead
-    p = phase % 1.0
-    stance = p < feet.TOE_OFF
-    free[:, 2] = rel[:, 2] - (rel[:, 2] - rolled[1])[stance].mean()
-    ankle, yaw = feet.foot_track(phase, free, timing.step, falls, rolled)
-    ankle = feet.lift_swing(ankle, pitch, bend, phase, body)
-    return _FootPlan(ankle, yaw, pitch, bend, phase)
+        where = float(place[stance].mean()) - _LEAD * stature
+        aside = left + 0.004 * stature * float(np.clip(rng.standard_normal(), -2, 2))
+        yaw = float(course.path.direction(where) + toe_out + np.radians(1.5) * rng.standard_normal())
+        falls.append(feet.Footfall(stride, course.path.point(where, aside), yaw))
+    return falls
 
 
-def _pelvis_height(ground: Array, turn: Array, tracks: dict[str, _FootPlan], timing: Timing, body: Anatomy) -> Array:
-    """Return a smooth height of the pelvis at which every planted foot is within the leg's reach, (T,) metres."""
+def _pelvis_height(
+    ground: Array, turn: Array, plans: dict[str, _FootPlan], timing: Timing, body: Anatomy
+) -> Array:
+    """Return a smooth height of the pelvis (T,) at which the legs reach every planted foot, metres."""
     limit = np.full(len(ground), np.inf)
-    for side, plan in tracks.items():
-        hip = ground + apply(turn, body.rest[f"{side}_hip"])
-        aside = np.linalg.norm(plan.ankle[:, :2] - hip[:, :2], axis=1)
+    for side, plan in plans.items():
+        hip = apply(turn, body.rest[f"{side}_hip"])
+        aside = np.linalg.norm(plan.ankle[:, :2] - ground - hip[:, :2], axis=1)
         p = plan.phase % 1.0
         reach = body.leg * np.where(p < feet.TOE_OFF, _bent(p), 1.0)
         highest = plan.ankle[:, 2] + np.sqrt(np.maximum(reach**2 - aside**2, 0)) - hip[:, 2]
@@ -244,7 +262,9 @@ def _set(origins: Array, turns: Array, bone: str, origin: Array, turn: Array) ->
     origins[:, BONE_INDEX[bone]], turns[:, BONE_INDEX[bone]] = origin, turn
 
 
-def _solve_leg(side: str, origins: Array, turns: Array, plan: _FootPlan, pelvis_yaw: Array, body: Anatomy) -> None:
+def _solve_leg(
+    side: str, origins: Array, turns: Array, plan: _FootPlan, pelvis_yaw: Array, body: Anatomy
+) -> None:
     """Set thigh, shank, foot and toes so that the ankle is where the foot wants it."""
     pelvis = BONE_INDEX["pelvis"]
     hip = origins[:, pelvis] + apply(turns[:, pelvis], body.rest[f"{side}_hip"])
@@ -286,8 +306,8 @@ def _upper_body(origins: Array, turns: Array, angles: dict[str, Array], body: An
         ("torso", "pelvis", "spine", "pelvis", "torso"), ("head", "torso", "neck", "spine", "neck")
     ):  # fmt: skip
         place(child, parent, joint, base, euler(*(angles[f"{name}_{axis}"] for axis in "zyx")))
-    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        turn = limb(*(angles[f"{side}_shoulder_{axis}"] for axis in ("flexion", "abduction", "rotation")), sign)
+    for side in SIDES:
+        turn = _ball_joint(angles, f"{side}_shoulder")
         place(f"{side}_upper_arm", "torso", f"{side}_shoulder", "spine", turn)
         bend = np.maximum(angles[f"{side}_elbow_flexion"], np.radians(4))
         place(f"{side}_forearm", f"{side}_upper_arm", f"{side}_elbow", f"{side}_shoulder", about(1, -bend))

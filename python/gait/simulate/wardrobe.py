@@ -1,4 +1,4 @@
-"""What a walker wears and looks like: the cut of the clothes, their colours and woven patterns, skin, hair, face."""
+"""What a walker looks like: the cut, colours and patterns of the clothes, skin, hair, face."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Image = NDArray[np.float32]
+from gait.simulate.arrays import Array, Floats
 
 TOP, LEGS, SKIN, FACE, HAIR, SHOE, SOLE, SOCK = range(8)
 SIZE = 256  # texels of a texture, square
@@ -17,7 +15,15 @@ CLOTH_TILE = 0.40  # metres of cloth in one texture
 
 _SKINS = ((224, 178, 150), (205, 155, 122), (168, 117, 86), (120, 80, 58), (236, 196, 170))
 _HAIRS = ((38, 28, 24), (70, 46, 30), (112, 78, 48), (150, 120, 84), (20, 18, 20))
-_TOPS = ((176, 52, 46), (52, 88, 140), (70, 112, 78), (196, 188, 172), (120, 72, 110), (206, 150, 62), (60, 66, 78))
+_TOPS = (
+    (176, 52, 46),
+    (52, 88, 140),
+    (70, 112, 78),
+    (196, 188, 172),
+    (120, 72, 110),
+    (206, 150, 62),
+    (60, 66, 78),
+)
 _TROUSERS = ((46, 58, 86), (58, 56, 58), (120, 104, 80), (74, 84, 98), (94, 78, 66), (34, 36, 42))
 _SHOES = ((44, 38, 36), (206, 204, 198), (96, 66, 44), (60, 64, 74))
 
@@ -50,7 +56,7 @@ class Look:
     long_hair: bool
     hem: float
     loose: float
-    tiles: Image
+    tiles: Floats
     spans: Array
     notes: dict[str, str]
 
@@ -82,12 +88,12 @@ def draw_look(rng: np.random.Generator) -> Look:
 
 
 def linear(rgb: object) -> Array:
-    """Return linear light 0..1 of 8-bit display values; display = 255 sqrt(linear) throughout the simulator."""
+    """Return linear light 0..1 of 8-bit display values; display = 255 sqrt(linear) throughout."""
     return (np.asarray(rgb, np.float64) / 255) ** 2
 
 
-def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = SIZE) -> Image:
-    """Return smooth noise (size, size) that tiles, `cells` bumps down and across, zero mean, unit deviation."""
+def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = SIZE) -> Floats:
+    """Return smooth noise (size, size) that tiles: `cells` bumps down and across, mean 0, deviation 1."""
     coarse = rng.standard_normal(cells).astype(np.float32)
     wrapped = np.pad(coarse, 2, mode="wrap")
     step_y, step_x = size / cells[0], size / cells[1]
@@ -97,18 +103,24 @@ def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = SIZ
 
 
 def _pick(table: tuple[tuple[int, int, int], ...], rng: np.random.Generator) -> Array:
-    colour = np.array(table[int(rng.integers(len(table)))]) * (1 + 0.07 * rng.uniform(-1, 1) + 0.015 * rng.standard_normal(3))
+    colour = np.array(table[int(rng.integers(len(table)))]) * (
+        1 + 0.07 * rng.uniform(-1, 1) + 0.015 * rng.standard_normal(3)
+    )
     return linear(np.clip(colour, 8, 245))
 
 
-def _grain(rng: np.random.Generator, depth: float) -> Image:
+def _grain(rng: np.random.Generator, depth: float) -> Floats:
     fine = tile_noise(rng, (64, 64)) + 0.7 * tile_noise(rng, (16, 16))
     return np.clip(1 + depth * fine, 0.2, 2)[..., None]
 
 
-def _cloth(pattern: str, base: Array, rng: np.random.Generator) -> Image:
+def _cloth(pattern: str, base: Array, rng: np.random.Generator) -> Floats:
     """Return a woven texture; rows run along the body."""
-    second = np.clip(base * rng.uniform(0.25, 0.55), 0, 1) if base.mean() > 0.12 else np.clip(base * 2.6 + 0.1, 0, 1)
+    second = (
+        np.clip(base * rng.uniform(0.25, 0.55), 0, 1)
+        if base.mean() > 0.12
+        else np.clip(base * 2.6 + 0.1, 0, 1)
+    )
     y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     share = np.zeros((SIZE, SIZE))
     if pattern == "stripes":
@@ -122,9 +134,16 @@ def _cloth(pattern: str, base: Array, rng: np.random.Generator) -> Image:
         share = np.clip(0.5 + 1.5 * blotch, 0, 1) * 0.8
     colour = base + share[..., None] * (second - base)
     if pattern == "denim":
-        colour = colour * np.clip(1 + 0.16 * tile_noise(rng, (6, 90)) + 0.10 * tile_noise(rng, (90, 6)), 0.5, 1.6)[..., None]
+        colour = (
+            colour
+            * np.clip(1 + 0.16 * tile_noise(rng, (6, 90)) + 0.10 * tile_noise(rng, (90, 6)), 0.5, 1.6)[
+                ..., None
+            ]
+        )
     folds = 1 + 0.10 * tile_noise(rng, (9, 4)) + 0.06 * tile_noise(rng, (4, 9))
-    return (np.clip(colour, 0, 1) * np.clip(folds, 0.6, 1.4)[..., None] * _grain(rng, 0.05)).astype(np.float32)
+    return (np.clip(colour, 0, 1) * np.clip(folds, 0.6, 1.4)[..., None] * _grain(rng, 0.05)).astype(
+        np.float32
+    )
 
 
 def _band(x: Array, width: float) -> Array:
@@ -133,7 +152,7 @@ def _band(x: Array, width: float) -> Array:
     return np.clip(x / edge, 0, 1) * np.clip((width - x) / edge, 0, 1)
 
 
-def _face(skin: Array, hair: Array, rng: np.random.Generator) -> Image:
+def _face(skin: Array, hair: Array, rng: np.random.Generator) -> Floats:
     """Paint eyes, brows, mouth and cheeks; u = 0.5 is the front, v runs from the chin up."""
     face = np.tile(skin.astype(np.float32), (SIZE, SIZE, 1)) * _grain(rng, 0.03)
     picture = np.ascontiguousarray(face)
@@ -141,7 +160,17 @@ def _face(skin: Array, hair: Array, rng: np.random.Generator) -> Image:
     def spot(u: float, v: float, ru: float, rv: float, colour: Array, share: float) -> None:
         mask = np.zeros((SIZE, SIZE), np.float32)
         centre = (round(u * SIZE), round(v * SIZE))
-        cv2.ellipse(mask, centre, (max(round(ru * SIZE), 1), max(round(rv * SIZE), 1)), 0, 0, 360, 1.0, -1, cv2.LINE_AA)
+        cv2.ellipse(
+            mask,
+            centre,
+            (max(round(ru * SIZE), 1), max(round(rv * SIZE), 1)),
+            0,
+            0,
+            360,
+            1.0,
+            -1,
+            cv2.LINE_AA,
+        )
         mask = cv2.GaussianBlur(mask, (0, 0), 1.2)[..., None] * share
         picture[:] = picture * (1 - mask) + mask * colour.astype(np.float32)
 
