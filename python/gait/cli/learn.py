@@ -54,6 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="refined",
         help="literal: whole frames from 50 to 250, as in the paper (refined)",
     )
+    parser.add_argument("--fps", type=_rate, metavar="F", help="frames per second (.amc: 120, .bvh: as it says)")
+    parser.add_argument(
+        "--zeros-missing", action="store_true", help="three or more exact zeros in a row are missing data"
+    )
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the held-out data (1)")
     parser.add_argument("--report", metavar="DIR", help="also write figures and index.html into this folder")
 
@@ -66,12 +70,21 @@ def _components(text: str) -> int | str:
     raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor 1 to {fit.MOST_COMPONENTS}")
 
 
+def _rate(text: str) -> float:
+    value = float(text)
+    if not 10 <= value <= 2000:
+        raise argparse.ArgumentTypeError(f"{text} is not between 10 and 2000")
+    return value
+
+
 def run(args: argparse.Namespace) -> int:
     """Read, learn, write, report."""
     require_writable(args.output)
     files = sources.find(args.sources, args.exclude)
     with progress("reading motion", len(files), args.quiet) as update:
-        sequences, refused = sources.load_all(files, args.period_mode, update)
+        sequences, refused = sources.load_all(
+            files, update, mode=args.period_mode, fps=args.fps, zero_runs=args.zeros_missing
+        )
     if not args.quiet:
         for line in refused:
             print(f"left out: {line}", file=sys.stderr)

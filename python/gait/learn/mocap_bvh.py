@@ -59,11 +59,13 @@ class _Words:
         return value
 
 
-def read(path: Path, zero_runs: bool = False) -> Recording:
+def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recording:
     """Read a .bvh file.
 
     Parameters
     ----------
+    fps : float, optional
+        Frames per second; by default what the file says.
     zero_runs : bool
         Take runs of three or more exact zeros of a joint's rotation for missing data.
 
@@ -78,8 +80,8 @@ def read(path: Path, zero_runs: bool = False) -> Recording:
         raise UserError(f"{path}: {error.strerror}; check the name") from error
     words = _Words(path, lines)
     joints = _hierarchy(words)
-    values, fps = _motion(words, lines, sum(len(j.channels) for j in joints))
-    return assemble(path, joints, values, fps, zero_runs)
+    values, stated = _motion(words, lines, sum(len(j.channels) for j in joints))
+    return assemble(path, joints, values, fps or stated, zero_runs)
 
 
 def _hierarchy(words: _Words) -> list[Joint]:

@@ -114,7 +114,7 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
         "activity": activity,
         "generator": GENERATOR,
         "seed": seed,
-        "acknowledgement": CMU,
+        **({"acknowledgement": CMU} if from_cmu(learned) else {}),
         "subjects": learned.subjects,
         "statures_m": _rounded(statures, 3),
         "sequences": {"columns": list(SEQUENCE_COLUMNS), "rows": sequence_table(learned)},
@@ -124,6 +124,11 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
         "residual_deg": _rounded(np.degrees(channel_statistics(learned)[: len(ANGLES), 0]), 1),
         "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
     }
+
+
+def from_cmu(learned: Learned) -> bool:
+    """Whether any recording is in the CMU database's form, whose terms ask for an acknowledgement."""
+    return any(s.source.suffix.lower() == ".amc" for s in learned.sequences)
 
 
 SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")

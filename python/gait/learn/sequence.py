@@ -63,20 +63,29 @@ def subject_of(path: Path) -> str:
     return path.stem.split("_")[0] if "_" in path.stem else path.parent.name
 
 
-def read_recording(path: Path) -> Recording:
-    """Read a motion file by its suffix."""
-    return READERS[path.suffix.lower()](path)
+def read_recording(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recording:
+    """Read a motion file by its suffix; see `mocap_asf.read`."""
+    return READERS[path.suffix.lower()](path, fps, zero_runs)
 
 
-def load(path: Path, mode: str = "refined") -> Sequence:
+def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs: bool = False) -> Sequence:
     """Read and prepare one file.
+
+    Parameters
+    ----------
+    mode : "refined" or "literal"
+        How the period is found.
+    fps : float, optional
+        Frames per second, if not what the file or its kind says.
+    zero_runs : bool
+        Take runs of three or more exact zeros for missing data.
 
     Raises
     ------
     UserError
         If the file is malformed, or the motion is not cyclic or too short.
     """
-    levelled, slope = root.level(body(read_recording(path)))
+    levelled, slope = root.level(body(read_recording(path, fps, zero_runs)))
     levelled = root.align_pelvis(levelled)
     measures = retarget.measure(levelled)
     angles = retarget.angles(levelled, measures)

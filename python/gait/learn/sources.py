@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from gait.errors import UserError
 from gait.learn.sequence import READERS, Sequence, load
@@ -43,9 +44,16 @@ def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path
 
 
 def load_all(
-    files: list[tuple[Path, bool]], mode: str = "refined", progress: Callable[[int], None] = lambda done: None
+    files: list[tuple[Path, bool]], progress: Callable[[int], None] = lambda done: None, **options: Any
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
+
+    Parameters
+    ----------
+    progress : callable
+        Gets the number of files done.
+    **options
+        Of `gait.learn.sequence.load`.
 
     Raises
     ------
@@ -55,7 +63,7 @@ def load_all(
     sequences, refused = [], []
     for i, (path, inside) in enumerate(files):
         try:
-            sequences.append(load(path, mode))
+            sequences.append(load(path, **options))
         except UserError as error:
             if not inside:
                 raise

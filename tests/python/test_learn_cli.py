@@ -1,0 +1,199 @@
+"""gait learn and gait info from end to end on toy walks, and the shipped model (L14)."""
+
+import json
+import shutil
+from pathlib import Path
+
+import mocap_files as files
+import numpy as np
+import pytest
+
+import gait.cli
+from gait import blob, skeleton
+from gait.learn import model, sources
+from gait.skeleton import ANGLES, CHANNELS, JOINTS
+
+SHIPPED = Path(skeleton.__file__).parent / "data/walk.gait"
+WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory):
+    """Seven toy walks of three subjects, one as BVH, and a broken file."""
+    folder = tmp_path_factory.mktemp("walks")
+    for i, (subject, trial) in enumerate([(1, 1), (1, 2), (1, 3), (2, 1), (2, 2), (3, 1)]):
+        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i, "frames": 420}
+        files.write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", speed=1.1 + 0.05 * i, **motion)
+    amc = files.write_toy(folder / "09", "09_01", period=125.0, seed=9, frames=400)
+    (folder / "04").mkdir()
+    (folder / "04/04_01.bvh").write_text(files.bvh_from_amc(amc))
+    shutil.rmtree(folder / "09")
+    (folder / "02/02_99.amc").write_text(":DEGREES\n1\nroot 1 2\n")
+    return folder
+
+
+def run(*words):
+    return gait.cli.main([str(w) for w in words])
+
+
+@pytest.fixture(scope="module")
+def learned(walks, tmp_path_factory):
+    path = tmp_path_factory.mktemp("learned") / "toy.gait"
+    assert run("learn", walks, "-o", path, "--components", 3, "--quiet") == 0
+    return path
+
+
+def test_a_bad_file_in_a_folder_is_named_and_the_rest_is_learnt(walks, tmp_path, capsys):
+    assert run("learn", walks, "-o", tmp_path / "m.gait", "--components", 3, "--json") == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert [s["name"] for s in summary["sequences"]] == [
+        "01_01", "01_02", "01_03", "02_01", "02_02", "03_01", "04_01",
+    ]  # fmt: skip
+    assert err.count("\n") == 1 and "02_99.amc:3" in err and summary["left_out"][0] in err
+    periods = [s["period_ms"] * 0.12 for s in summary["sequences"][:6]]
+    assert periods == pytest.approx([110, 116, 122, 128, 134, 140], abs=0.4)
+    assert summary["stride_hz"][0] == pytest.approx(np.mean([120 / 116, 120 / 131, 120 / 140, 120 / 125]), rel=0.01)
+    assert np.all(np.diff(summary["imputation"]) <= 0)
+
+
+def test_the_same_input_gives_the_same_bytes(walks, learned, tmp_path):
+    assert run("learn", walks, "-o", tmp_path / "again.gait", "--components", 3, "--quiet") == 0
+    assert (tmp_path / "again.gait").read_bytes() == learned.read_bytes()
+    assert list(tmp_path.iterdir()) == [tmp_path / "again.gait"]
+
+
+def test_sections_are_those_of_the_format(learned):
+    s = blob.read(learned)
+    assert blob.unpack_names(s["CHNM"]) == CHANNELS and blob.unpack_names(s["PTNM"]) == JOINTS
+    assert s["CURV"].shape == (4, 128, 30) and s["CHST"].shape == (30, 4) and s["SCST"].shape == (3, 3)
+    assert np.isfinite(s["CURV"]).all()
+    assert np.all(s["CHST"][:, 0] >= 0) and np.all(s["CHST"][:, 1] <= s["CHST"][:, 2])
+    assert s["GAIT"].shape == (8,) and s["GAIT"][5] == 120
+    parents = s["FRMI"][:, 0]
+    assert parents[0] == -1 and np.all(parents[1:] < np.arange(1, len(parents)))
+    assert len(s["LIMI"]) == 13 and np.all(s["LIMF"][:, 6:] > 0)
+
+
+def test_the_mean_cycle_is_a_walk_and_phase_0_its_right_heel_strike(learned):
+    s = blob.read(learned)
+    phase = np.arange(128) / 128
+    joints, angles = skeleton.pose(s, phase, np.zeros(3), 1.7, 0.0, 0.0, 0.0, np.zeros(3))
+    right, left = (joints[:, JOINTS.index(f"{side}_heel"), 0] for side in "rl")
+    assert min(np.argmax(right), 128 - np.argmax(right)) <= 1
+    assert abs(np.argmax(left) - 64) <= 6
+    knee = np.degrees(angles[:, ANGLES.index("r_knee_flexion")])
+    assert 50 < knee.max() < 80 and 0.6 < phase[np.argmax(knee)] < 0.85
+    assert s["CURV"][0, :, CHANNELS.index("root_forward")].mean() == pytest.approx(s["GAIT"][3], rel=0.1)
+
+
+def test_exclude_matches_the_tail_of_the_path(walks):
+    def names(*globs):
+        return [p.name for p, _ in sources.find([str(walks)], globs)]
+
+    assert "02_01.amc" in names()
+    assert names("02/*") == names("02_*.amc") == ["01_01.amc", "01_02.amc", "01_03.amc", "03_01.amc", "04_01.bvh"]
+    assert names("0[1-3]/*", "nothing") == ["04_01.bvh"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["{walks}", "--exclude", "*"], "leaves none of 8 files"),
+        (["{walks}/nowhere"], "no such file or folder"),
+        (["{walks}/01/01.asf"], "not learnt from; convert it to .amc .bvh"),
+        (["{walks}/02/02_99.amc"], r"02_99.amc:3: 2 numbers where 6"),
+        (["{walks}/01/01_01.amc"], "too few for 5 components; add recordings"),
+        (["{walks}", "--components", "5", "-o", "{walks}/no/where.gait"], "does not exist; create it"),
+    ],
+)
+def test_errors_are_one_line_with_exit_code_1(walks, tmp_path, capsys, words, message):
+    words = [w.format(walks=walks) for w in words]
+    output = [] if "-o" in words else ["-o", tmp_path / "m.gait"]
+    assert run("learn", *words, *output) == 1
+    err = capsys.readouterr().err.splitlines()
+    assert message in err[-1] and err[-1].startswith("gait learn: ")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("value", ["0", "17", "many"])
+def test_a_wrong_number_of_components_is_a_usage_error(value):
+    with pytest.raises(SystemExit) as stop:
+        run("learn", "x", "-o", "y", "--components", value)
+    assert stop.value.code == 2
+
+
+def test_report_is_one_page_with_its_figures(walks, tmp_path):
+    folder = tmp_path / "report"
+    words = ("learn", walks, "-o", tmp_path / "m.gait", "--components", "auto", "--report", folder, "--quiet")
+    assert run(*words) == 0
+    page = (folder / "index.html").read_text()
+    pictures = sorted(p.name for p in folder.glob("*.png"))
+    assert pictures == [f"{n}.png" for n in (
+        "components", "convergence", "cycles", "missing", "residuals", "snr", "spectrum")]  # fmt: skip
+    assert all(p.read_bytes()[:4] == b"\x89PNG" and p.stat().st_size > 5000 for p in folder.glob("*.png"))
+    assert page.count("data:image/png;base64,") == 7 and 'src="' in page and "http" not in page
+    assert "02_99.amc" in page and "mocap.cs.cmu.edu" in page
+
+
+def test_info_tells_what_was_learnt(learned, capsys):
+    assert run("info", learned, "--json") == 0
+    info = json.loads(capsys.readouterr().out)
+    assert info["components"] == 3 and info["phases"] == 128 and len(info["joints"]) == 19
+    assert info["bytes"] == learned.stat().st_size
+    assert info["meta"]["subjects"] == ["01", "02", "03", "04"] and info["meta"]["activity"] == "walk"
+    assert run("info", learned) == 0
+    text = capsys.readouterr().out
+    assert info["crc32"] in text and model.CMU in text and "01_03" in text
+
+
+def test_info_of_something_else_fails(tmp_path, capsys):
+    (tmp_path / "x.gait").write_text("hello")
+    assert run("info", tmp_path / "x.gait") == 1
+    assert "not a .gait model" in capsys.readouterr().err
+
+
+def test_the_shipped_model_is_small_and_acknowledges_its_source():
+    assert SHIPPED.stat().st_size < 100_000
+    s = blob.read(SHIPPED)
+    meta = json.loads(s["META"].tobytes())
+    assert meta["acknowledgement"] == model.CMU and len(meta["sequences"]["rows"]) == 51
+    assert s["CURV"].shape == (6, 128, 30)
+    step = np.abs(np.diff(s["CURV"][0], axis=0, append=s["CURV"][0][:1]))
+    assert np.all(step[-1] <= 2 * np.maximum(step.max(axis=0), 1e-6))
+
+
+def test_the_shipped_model_comes_from_the_documented_command(tmp_path):
+    if not WALKS.is_dir():
+        pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
+    assert run("learn", WALKS, "-o", tmp_path / "walk.gait", "--quiet") == 0
+    again, shipped = blob.read(tmp_path / "walk.gait"), blob.read(SHIPPED)
+    assert list(again) == list(shipped)
+    for tag in shipped:
+        if tag != "META":
+            assert again[tag] == pytest.approx(shipped[tag], abs=1e-5), tag
+
+
+def test_c_and_numpy_agree_on_poses():
+    from gait.errors import LibraryError
+
+    try:
+        from gait.model import Model
+        from gait.state import State
+
+        c_model = Model(SHIPPED)
+    except LibraryError as error:
+        pytest.skip(f"libgait is not built: {error}")
+    sections, rng = blob.read(SHIPPED), np.random.default_rng(1)
+    for _ in range(50):
+        phase, coef, stature = rng.uniform(), rng.normal(size=5), rng.uniform(1.5, 2.0)
+        heading, pitch, roll = rng.uniform(-3, 3), *rng.normal(scale=0.1, size=2)
+        place = rng.normal(size=3)
+        state = State(
+            phase=phase, stride_hz=0.9, stature=stature, heading=heading, pitch=pitch, roll=roll,
+            pelvis=place, coef=coef,
+        )  # fmt: skip
+        joints, angles = skeleton.pose(sections, phase, coef, stature, heading, pitch, roll, place)
+        c_joints, c_angles = c_model.pose(state)
+        assert c_angles == pytest.approx(angles[0], abs=1e-5)
+        assert c_joints == pytest.approx(joints[0], abs=1e-5)
