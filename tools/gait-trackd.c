@@ -17,9 +17,11 @@ static struct settings {
     char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
     int32_t stream, particles, components, threads, tasks;
     uint64_t seed;
+    float max_gap;
     bool particles_channel, quiet;
     tracker_values tracker;
-} settings = {.mode = "default", .init = "auto", .components = -1, .threads = 1, .tasks = 16, .seed = 1};
+} settings = {
+    .mode = "default", .init = "auto", .components = -1, .threads = 1, .tasks = 16, .seed = 1, .max_gap = 2};
 
 #define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
@@ -51,6 +53,8 @@ static const option own_options[] = {
     {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, POOL_MAX)},
     {"tasks", 0, "N", "pieces of a step for the threads, default 16; results do not depend on it",
      INT(tasks, 1, 256)},
+    {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
+     OPTION_FLOAT, &settings.max_gap, 0, 60},
     {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
     {"quiet", 'q', "", "no summary at the end", FLAG(quiet)},
 };
@@ -146,6 +150,7 @@ static bool load(service *s, pool *threads, lcm_t *out, message *why)
         return false;
     if (has_init && !init_file_read(settings.init, s->track.model, &init, why))
         return false;
+    s->max_gap = (double)settings.max_gap;
     if (!service_open(s, out, settings.stream, settings.threads, has_init ? &init : NULL,
                       settings.particles_channel, why))
         return false;

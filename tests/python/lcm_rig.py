@@ -277,10 +277,11 @@ def without_network(*words: str) -> subprocess.CompletedProcess[str]:
     """Run a command in an empty network namespace; skip where that is not allowed."""
     unshare = ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "--map-root-user", "--net"]
     try:
-        allowed = subprocess.run([*unshare, "true"], capture_output=True, timeout=20, check=False).returncode == 0
+        allowed = (
+            subprocess.run([*unshare, "true"], capture_output=True, timeout=20, check=False).returncode == 0
+        )
     except FileNotFoundError:
         allowed = False
     if not allowed:
         pytest.skip("no network namespaces here (unshare --net)")
     return subprocess.run([*unshare, *words], capture_output=True, text=True, timeout=60, check=False)
-

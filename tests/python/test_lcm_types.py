@@ -65,10 +65,14 @@ def test_image_is_bot_core_image_on_the_wire(tmp_path):
     )
     generator = Path(sys.executable).with_name("lcm-gen")
     subprocess.run(
-        [generator, "-p", "--ppath", tmp_path, tmp_path / "a.lcm", tmp_path / "b.lcm"], check=True, cwd=tmp_path
+        [generator, "-p", "--ppath", tmp_path, tmp_path / "a.lcm", tmp_path / "b.lcm"],
+        check=True,
+        cwd=tmp_path,
     )
     code = "import bot_core; print(bot_core.image_t._get_packed_fingerprint().hex())"
-    found = subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True, text=True)
+    found = subprocess.run(
+        [sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True, text=True
+    )
     assert found.stdout.strip() == gaitmsg.image_t._get_packed_fingerprint().hex()
 
 
@@ -151,7 +155,12 @@ def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
     for i, message in enumerate(outcome.estimates):
         ours, theirs = estimate_of(message), tracker.step(rig.picture(i), rig.utime(i))
         assert message.tracker_digest & (1 << 64) - 1 == tracker.digest()
-        assert (ours.utime, ours.frame, ours.status, ours.flags) == (rig.utime(i), i, theirs.status, theirs.flags)
+        assert (ours.utime, ours.frame, ours.status, ours.flags) == (
+            rig.utime(i),
+            i,
+            theirs.status,
+            theirs.flags,
+        )
         for name in ("joints", "joint_sd", "angles", "ess", "phase_r", "mode_mass", "speed", "log_evidence"):
             np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), name)
         assert ours.joint_names == theirs.joint_names

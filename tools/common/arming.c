@@ -42,7 +42,7 @@ static arming_answer by_number(arming *a, const image_view *frame, int64_t *utim
     return ARMING_WAIT;
 }
 
-arming_answer arming_reached(arming *a, const image_view *frame, double max_dt, int64_t *utime, message *why)
+arming_answer arming_reached(arming *a, const image_view *frame, double max_gap, int64_t *utime, message *why)
 {
     arming_answer answer = ARMING_START;
     *utime = a->utime ? a->utime : frame->utime;
@@ -51,7 +51,7 @@ arming_answer arming_reached(arming *a, const image_view *frame, double max_dt, 
     else if (frame->utime < a->utime)
         answer = ARMING_WAIT;
     double const late = (double)(frame->utime - *utime) * 1e-6;
-    if (answer == ARMING_START && late > max_dt) {
+    if (answer == ARMING_START && late > max_gap) {
         message_set(why,
                     "the first frame is %.3f s later than the start: begin the stream earlier or send START",
                     late);

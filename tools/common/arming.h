@@ -18,6 +18,7 @@ typedef enum arming_answer { ARMING_WAIT, ARMING_START, ARMING_MISSED } arming_a
 void arming_by_file(arming *a, const init_state *init);
 void arming_by_time(arming *a, const gait_state *mean, const gait_state *sd, int64_t utime);
 /* Has the stream reached the start?  Then `utime` is the capture time at which the state holds.  ARMING_MISSED: the
- * stream began more than `max_dt` seconds too late. */
-arming_answer arming_reached(arming *a, const image_view *frame, double max_dt, int64_t *utime, message *why);
+ * stream began more than `max_gap` seconds too late. */
+arming_answer arming_reached(arming *a, const image_view *frame, double max_gap, int64_t *utime,
+                             message *why);
 #endif

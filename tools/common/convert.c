@@ -75,7 +75,6 @@ void convert_estimate(const gait_model *model, const gait_model_info *info, cons
 {
     gaitmsg_estimate_t *const m = &out->msg;
     m->utime = in->utime;
-    m->step = (int64_t)in->frame;
     m->status = (int8_t)in->status;
     m->flags = (int32_t)in->flags;
     m->model_digest = (int64_t)info->digest;

@@ -19,7 +19,7 @@ void convert_state(const gait_state *in, int32_t components, gaitmsg_state_t *ou
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
 bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why);
-/* All but frame, dropped, receive_utime, step_us and tracker_digest, which are the caller's. */
+/* All but frame, step, dropped, receive_utime, step_us and tracker_digest, which are the caller's. */
 void convert_estimate(const gait_model *model, const gait_model_info *info, const gait_estimate *in,
                       estimate_message *out);
 #endif

@@ -191,7 +191,7 @@ static void count_gap(service *s, const image_view *v)
 {
     if (s->state == GAITMSG_STATUS_T_RUNNING && s->last_frame >= 0 && v->frame > s->last_frame + 1)
         s->counts.dropped += v->frame - s->last_frame - 1;
-    s->last_frame = v->frame;
+    s->last_frame = v->frame > s->last_frame ? v->frame : s->last_frame;
 }
 
 /* Begin to track if the armed start has come; true when the tracker runs. */
@@ -200,7 +200,7 @@ static bool begin(service *s, const image_view *v)
     message why;
     gait_error err = {.text = ""};
     int64_t utime;
-    arming_answer const answer = arming_reached(&s->start, v, (double)s->track.config.max_dt, &utime, &why);
+    arming_answer const answer = arming_reached(&s->start, v, s->max_gap, &utime, &why);
     if (answer == ARMING_WAIT)
         return false;
     gait_status const status = answer == ARMING_MISSED ? GAIT_ERR_STATE
@@ -215,7 +215,8 @@ static bool begin(service *s, const image_view *v)
     }
     s->last_utime = utime;
     s->dropped_before = s->counts.dropped;
-    s->stepped = false;
+    s->last_frame = v->frame;
+    s->steps = 0;
     set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
     return true;
 }
@@ -231,21 +232,36 @@ static bool in_time(service *s, const image_view *v)
 {
     message why;
     int64_t const gap = v->utime - s->last_utime;
-    double const dt = (double)gap * 1e-6, max_dt = (double)s->track.config.max_dt;
-    if (dt > max_dt) {
-        message_set(&why, "no frame for %.3f s (at most %.3f): stopped; send START", dt, max_dt);
+    double const pause = (double)gap * 1e-6;
+    if (pause > s->max_gap) {
+        message_set(&why, "no frame for %.3f s (at most %.3f): stopped; send START", pause, s->max_gap);
         stop(s, &why);
         return false;
     }
-    if (gap < 0 || (gap == 0 && s->stepped)) {
-        message_set(&why, "capture time did not advance (%.6f s); stamp frames in order", dt);
+    if (gap < 0 || (gap == 0 && s->steps > 0)) {
+        message_set(&why, "capture time did not advance (%.6f s); stamp frames in order", pause);
         reject(s, &why);
         return false;
     }
     return true;
 }
 
-static void step(service *s, const image_view *v, int64_t received)
+/* Predict through a pause longer than one step may be, in equal steps without an image. */
+static gait_status bridge(service *s, int64_t utime, gait_estimate *out, gait_error *err)
+{
+    int64_t const longest = (int64_t)((double)s->track.config.max_dt * 1e6), from = s->last_utime;
+    int64_t const pieces = (utime - from + longest - 1) / longest;
+    for (int64_t i = 1; i < pieces; i++) {
+        gait_frame const nothing = {.utime = from + (utime - from) * i / pieces};
+        gait_status const status = gait_tracker_step(s->track.tracker, &nothing, out, err);
+        if (status != GAIT_OK)
+            return status;
+    }
+    return GAIT_OK;
+}
+
+/* Track the frame; false: it could not be used. */
+static bool step(service *s, const image_view *v, int64_t received)
 {
     gait_frame frame = {.utime = v->utime};
     gait_estimate estimate;
@@ -254,22 +270,25 @@ static void step(service *s, const image_view *v, int64_t received)
     int64_t const begun = clock_us(CLOCK_MONOTONIC);
     if (!pixels_of(s, v, &frame.image[0], &why)) {
         reject(s, &why);
-        return;
+        return false;
     }
-    gait_status const status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);
+    gait_status status = bridge(s, v->utime, &estimate, &err);
+    if (status == GAIT_OK)
+        status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);
     if (status != GAIT_OK) {
         message_set(&why, "stopped: %s (%s); send START", err.text, gait_status_name(status));
         stop(s, &why);
-        return;
+        return false;
     }
     int64_t const step_us = clock_us(CLOCK_MONOTONIC) - begun;
     s->last_utime = v->utime;
-    s->stepped = true;
     s->counts.frames++;
     message_set(&s->text, "tracking");
     histogram_add(&s->counts.step, step_us);
     service_send_estimate(s, v, &estimate, received, step_us);
+    s->steps++;
     histogram_add(&s->counts.latency, service_now() - v->utime);
+    return true;
 }
 
 void service_frame(service *s, const image_view *v, bool newest, int64_t receive_utime)
@@ -279,10 +298,8 @@ void service_frame(service *s, const image_view *v, bool newest, int64_t receive
         return;
     if (s->state != GAITMSG_STATUS_T_RUNNING)
         return;
-    if (!newest)
+    if (!newest || !in_time(s, v) || !step(s, v, receive_utime))
         s->counts.dropped++;
-    else if (in_time(s, v))
-        step(s, v, receive_utime);
 }
 
 uint64_t service_digest(const service *s)

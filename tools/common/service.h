@@ -32,7 +32,8 @@ typedef struct service {
     int64_t dropped_before;  /* value of counts.dropped at START */
     int64_t last_frame;      /* number of the last frame that came; -1: none */
     int64_t last_utime;      /* capture time of the last frame tracked, or of the start */
-    bool stepped;            /* a frame was tracked since START */
+    int64_t steps;           /* frames tracked since START */
+    double max_gap;          /* longest pause that is bridged by prediction, seconds */
     message text, complaint; /* what the status says; the last line on stderr */
     estimate_message estimate;
     uint8_t *particles; /* encoded particles_t; NULL: not sent */

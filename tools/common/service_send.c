@@ -30,6 +30,7 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
     gaitmsg_estimate_t *const m = &s->estimate.msg;
     convert_estimate(s->track.model, &s->track.info, e, &s->estimate);
     m->frame = v->frame;
+    m->step = s->steps;
     m->dropped = s->counts.dropped - s->dropped_before;
     m->receive_utime = received;
     m->step_us = (int32_t)step_us;

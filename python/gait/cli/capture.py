@@ -17,6 +17,9 @@ import contextlib
 import json
 import sys
 
+import cv2
+import numpy as np
+
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.initial import Start
@@ -111,6 +114,8 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
             raise UserError(
                 f"{args.init}: frame {setup.start.frame} comes before --start {args.start}; begin earlier"
             )
+    if args.grey and setup.plate is not None and setup.plate.ndim == 3:
+        setup.plate = np.asarray(cv2.cvtColor(setup.plate, cv2.COLOR_BGR2GRAY), np.uint8)
     return setup
 
 

@@ -152,5 +152,5 @@ def _figure(run: Run, paint: Painter, frames: bool = True) -> str:
             if estimate.status in _STATUS:
                 axes.axvspan(number - 0.5, number + 0.5, color=_STATUS[estimate.status], alpha=0.35, lw=0)
         text = io.StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None})
+        figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     return text.getvalue()[text.getvalue().index("<svg") :]

@@ -1,0 +1,245 @@
+"""gait-trackd and bad input: one line that names file, field and remedy; exit 1, or 2 for usage."""
+
+import json
+
+import lcm_rig as rig
+import numpy as np
+import pytest
+
+CAMERA = rig.CAMERA.to_dict()
+INIT = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": 0.1}}
+
+
+def fails(words, *expected, code=1):
+    outcome = rig.run(*words)
+    assert outcome.code == code, outcome
+    lines = [line for line in outcome.words.splitlines() if " particles, " not in line]
+    assert len(lines) == 1 and lines[0].startswith("gait-trackd: "), outcome.words
+    for word in expected:
+        assert str(word) in lines[0], lines[0]
+    return lines[0]
+
+
+def empty_log(tmp_path):
+    return rig.write_log(tmp_path / "empty.log", [("OTHER", b"x")])
+
+
+def options(tmp_path, *more):
+    return [*rig.command("--url", f"file://{empty_log(tmp_path)}?speed=0")[1:], *more]
+
+
+def test_a_truncated_model_at_every_kind_of_length(tmp_path):
+    blob, file = rig.MODEL.read_bytes(), tmp_path / "cut.gait"
+    for size in (0, 1, 63, 64, 65, 200, len(blob) // 2, len(blob) - 1):
+        file.write_bytes(blob[:size])
+        fails(["-m", file], file, "not a usable model", "learn it anew")
+
+
+def test_a_damaged_model(tmp_path):
+    blob, file = bytearray(rig.MODEL.read_bytes()), tmp_path / "bad.gait"
+    for place in (0, 9, 30, len(blob) // 3, len(blob) - 5):
+        changed = blob.copy()
+        changed[place] ^= 0x40
+        file.write_bytes(changed)
+        fails(["-m", file], file, "not a usable model")
+
+
+def test_files_that_are_not_there(tmp_path):
+    nothing = tmp_path / "nothing"
+    fails(["-m", nothing], nothing, "model", "No such file")
+    fails(["-m", tmp_path], tmp_path, "model")
+    for option, what in (("--camera", "camera"), ("--init", "init")):
+        fails(options(tmp_path, option, nothing), nothing, what, "No such file")
+    fails(rig.command("--config", nothing)[1:], nothing, "configuration", code=2)
+    fails(rig.command("--url", f"file://{nothing}?speed=0")[1:], nothing, "cannot open this log")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fx": None}, ["fx is missing", "focal length in pixels"]),
+        ({"fx": "wide"}, ["fx is not made of numbers"]),
+        ({"fx": -5}, ["fx is -5"]),
+        ({"cx": [1, 2]}, ["cx has 2 numbers, not 1"]),
+        ({"width": 160.5}, ["width is 160.5"]),
+        ({"height": 0}, ["height is 0"]),
+        ({"R": [[1, 0, 0], [0, 1, 0]]}, ["R has 6 numbers, not 9"]),
+        ({"R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, ["R is not a rotation"]),
+        ({"R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}, ["R is not a rotation"]),
+        ({"t": [1, 2]}, ["t has 2 numbers", "metres"]),
+        ({"t": [1, None, 2]}, ["t is not made of numbers"]),
+        ({"distortion": [1, 2, 3]}, ["distortion", "0, 4 or 5"]),
+        ({"distortion": "none"}, ["distortion"]),
+    ],
+)
+def test_a_wrong_camera_file(tmp_path, change, words):
+    content = {k: v for k, v in (CAMERA | change).items() if v is not None}
+    file = tmp_path / "camera.json"
+    file.write_text(json.dumps(content))
+    fails(options(tmp_path, "--camera", file), file, *words)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "line 1: expected a value"),
+        ("[]", "holds no JSON object"),
+        ("{", "line 1: expected a string"),
+        ('{"a": 1,\n "b" 2}', "line 2: expected a colon"),
+        ('{"a": 01}', "expected a comma"),
+        ('{"a": 1.}', "expected a value"),
+        ('{"a": 1e}', "expected a value"),
+        ('{"a": +1}', "expected a value"),
+        ('{"a": nan}', "expected a value"),
+        ('{"a": 1e999}', "too large"),
+        ('{"a": tru}', "expected a value"),
+        ('{"a": "\\x"}', "unknown escape"),
+        ('{"a": "open', "without closing quote"),
+        ('{"a": [1, 2}', "expected a comma or ]"),
+        ('{"a": 1} x', "after the end"),
+        ("[" * 50, "nested too deeply"),
+        ('{"a": [' + "1," * 400 + "1]}", "more values than"),
+        ('{"a": 1}\x00', "zero byte"),
+    ],
+)
+def test_json_that_is_none(tmp_path, text, words):
+    file = tmp_path / "camera.json"
+    file.write_text(text)
+    fails(options(tmp_path, "--camera", file), file, words)
+
+
+def test_the_cameras_of_the_python_side_are_accepted(tmp_path):
+    file = tmp_path / "camera.json"
+    for change in ({}, {"distortion": []}, {"distortion": [0.1, 0, 0, 0]}, {"note": 'a "quoted" \\u00e9'}):
+        file.write_text(json.dumps(CAMERA | change, indent=1))
+        outcome = rig.run(*options(tmp_path, "--camera", file))
+        assert outcome.code == 0 and "camera 160x120" in outcome.words
+    file.write_text(json.dumps({k: v for k, v in CAMERA.items() if k != "distortion"}))
+    assert rig.run(*options(tmp_path, "--camera", file)).code == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"phse": 0.5}, ["phse is not a known key"]),
+        ({"sd": {"speed": 1}}, ["speed is not a known key"]),
+        ({"sd": 0.1}, ["sd is not an object"]),
+        ({"sd": {"pelvis": -1}}, ["pelvis is -1"]),
+        ({"phase": 1.5}, ["phase is 1.5", "right heel strike"]),
+        ({"stature_m": 17.5}, ["stature_m is 17.5", "metres"]),
+        ({"stride_hz": 55}, ["stride_hz is 55"]),
+        ({"pelvis": [1]}, ["pelvis has 1 numbers", "x and y"]),
+        ({"frame": -4}, ["frame is -4"]),
+        ({"heading_rad": "north"}, ["heading_rad is not made of numbers"]),
+    ],
+)
+def test_a_wrong_init_file(tmp_path, change, words):
+    file = tmp_path / "init.json"
+    file.write_text(json.dumps(INIT | change))
+    fails(options(tmp_path, "--init", file), file, *words)
+
+
+def test_init_files_of_the_python_side_are_accepted(tmp_path):
+    file = tmp_path / "init.json"
+    for change in ({}, {"pelvis": [1, 2]}, {"sd": {"pelvis": [0.1, 0.2, 0.3]}}, {"sd": {"stature_m": 0.1}}):
+        file.write_text(json.dumps(INIT | change))
+        assert rig.run(*options(tmp_path, "--init", file)).code == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"PNG", "not a binary PGM or PPM"),
+        (b"P4\n1 1\n", "not a binary PGM or PPM"),
+        (b"P5\n160 120\n65535\n", "8 bits"),
+        (b"P5\n160 120\n255\n" + b"x" * 100, "shorter than its header"),
+        (b"P5\n0 120\n255\n", "damaged header"),
+        (b"P6\n80 60\n255\n" + b"x" * (80 * 60 * 3), "background of 80x60, the camera has 160x120"),
+    ],
+)
+def test_a_wrong_background(tmp_path, content, words):
+    camera, scene = tmp_path / "c.json", tmp_path / "p.ppm"
+    camera.write_text(json.dumps(CAMERA))
+    scene.write_bytes(content)
+    fails(options(tmp_path, "--camera", camera, "--background", scene), scene, words)
+
+
+def test_a_background_with_comments_is_read(tmp_path):
+    camera, scene = tmp_path / "c.json", tmp_path / "p.pgm"
+    camera.write_text(json.dumps(CAMERA))
+    grey = np.ascontiguousarray(rig.plate()[..., 0])
+    scene.write_bytes(b"P5 # made by hand\n160\n# and\n120 255\n" + grey.tobytes())
+    assert rig.run(*options(tmp_path, "--camera", camera, "--background", scene)).code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ([], "--model FILE is needed"),
+        (["--frobnicate"], "unknown argument --frobnicate"),
+        (["-m"], "--model: needs a value"),
+        (["-m", "x", "--particles", "2.5"], "--particles 2.5: give a whole number from 16"),
+        (["-m", "x", "--particles", "3"], "--particles 3"),
+        (["-m", "x", "--particles", "many"], "--particles many"),
+        (["-m", "x", "--seed", "-1"], "--seed -1"),
+        (["-m", "x", "--seed", "99999999999999999999"], "--seed 99999999999999999999"),
+        (["-m", "x", "--girth", "nan"], "--girth nan"),
+        (["-m", "x", "--mode", "fast"], "--mode fast: give default or paper"),
+        (["-m", "x", "--quiet=maybe"], "--quiet maybe: give yes or no"),
+        (["-m", "x", "--background", "p.ppm"], "--background needs --camera"),
+        (["-m", "x", "--url", "u" * 2000], "--url: give a value of 1 to 1023 characters"),
+    ],
+)
+def test_usage(words, expected):
+    fails(words, expected, code=2)
+
+
+def test_help_lists_every_option():
+    outcome = rig.run("--help")
+    assert outcome.code == 0 and not outcome.words
+    for option in ("--model", "--camera", "--init", "--url", "--threads", "--phase-noise", "--stature-noise"):
+        assert option in outcome.printed
+
+
+def test_configuration_file_and_command_line(tmp_path):
+    log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 3)])
+    config = tmp_path / "trackd.conf"
+    config.write_text("# for the test\nseed = 5\n\n  phase-noise=0.2 # loose\nparticles-channel = yes\n")
+    by_file = rig.play(log, "--config", config)
+    by_hand = rig.play(log, "--seed", 5, "--phase-noise", 0.2)
+    assert by_file.digest == by_hand.digest and len(by_file.particles) == 3
+    winner = rig.play(log, "--config", config, "--seed", 6, "--phase-noise=0.2", "--particles-channel=no")
+    assert winner.digest == rig.play(log, "--seed", 6, "--phase-noise", 0.2).digest and not winner.particles
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("seed = 1\nsped = 2\n", "line 2: unknown option sped"),
+        ("seed\n", "line 1: 'seed' is not of the form name = value"),
+        ("threads = 0\n", "line 1: --threads 0"),
+        ("quiet = perhaps\n", "line 1: --quiet perhaps"),
+    ],
+)
+def test_a_wrong_configuration_file(tmp_path, text, words):
+    config = tmp_path / "trackd.conf"
+    config.write_text(text)
+    fails(rig.command("--config", config)[1:], config, words, code=2)
+
+
+@pytest.mark.parametrize("url", ["nonsense://", "udpm://999.1.1.1:7667"])
+def test_a_url_that_lcm_refuses(url):
+    fails(rig.command("--url", url)[1:], url, "cannot open LCM", "ip route add 224.0.0.0/4 dev lo")
+
+
+def test_no_multicast_route_is_one_line_with_the_remedy():
+    done = rig.without_network(*rig.command())
+    assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
+    assert "cannot open LCM" in done.stderr and "ip route add 224.0.0.0/4 dev lo" in done.stderr
+    done = rig.without_network(str(rig.PYTHON), "-m", "gait", "record", "-o", "x.csv")
+    assert "ip route add 224.0.0.0/4 dev lo" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_an_output_that_cannot_be_opened(tmp_path):
+    out = f"file://{tmp_path}/no/such/folder.log?mode=w"
+    fails(options(tmp_path, "--out", out), "folder.log", "cannot open this log")

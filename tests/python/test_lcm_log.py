@@ -1,0 +1,374 @@
+"""gait-trackd on LCM logs: nothing is lost, everything is repeatable, no message can hurt it."""
+
+import struct
+
+import lcm_rig as rig
+import numpy as np
+import pytest
+
+from gait.lcm.messages import camera_message, command_message, image_message, state_message
+from gait.lcm.types import gaitmsg
+
+STOP, RESET = gaitmsg.command_t.STOP, gaitmsg.command_t.RESET
+
+
+def tracked(outcome):
+    return [m.frame for m in outcome.estimates]
+
+
+def track(tmp_path, events, *options):
+    return rig.play(rig.write_log(tmp_path / "a.log", events), *options)
+
+
+def test_same_log_same_digest_on_any_number_of_threads(tmp_path):
+    log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 12)])
+    first = rig.play(log)
+    assert (first.frames, first.dropped, first.rejected) == (12, 0, 0)
+    assert tracked(first) == list(range(12))
+    assert f"{first.estimates[-1].tracker_digest & (1 << 64) - 1:016x}" == first.digest
+    for options in ((), ("--threads", 2), ("--threads", 7, "--tasks", 16)):
+        assert rig.play(log, *options).digest == first.digest, options
+    assert rig.play(log, "--seed", 2).digest != first.digest
+
+
+def test_every_pixel_counts(tmp_path):
+    events = [*rig.opening(), *rig.frames(0, 4)]
+    before = track(tmp_path, events)
+    events[-1] = ("GAIT_IMAGE_0", rig.frame_message(3, data=events[-2][1].data))
+    assert track(tmp_path, events).digest != before.digest
+
+
+def test_grey_rgb_bgr_and_padded_rows_are_read_alike(tmp_path):
+    def variant(change):
+        events = [*rig.opening(), *rig.frames(0, 3)]
+        for channel, message in events:
+            if channel in ("GAIT_IMAGE_0", "GAIT_BACKGROUND_0"):
+                change(message)
+        return track(tmp_path, events)
+
+    def to_rgb(m):
+        m.data = np.frombuffer(m.data, np.uint8).reshape(-1, 3)[:, ::-1].tobytes()
+        m.pixelformat = m.PIXEL_FORMAT_RGB
+
+    def to_padded(m):
+        rows = np.frombuffer(m.data, np.uint8).reshape(m.height, -1)
+        m.data = np.pad(rows, ((0, 0), (0, 7)), constant_values=9).tobytes()
+        m.row_stride, m.size = m.row_stride + 7, len(m.data)
+
+    plain = variant(lambda m: None)
+    assert plain.frames == 3
+    assert variant(to_rgb).digest == variant(to_padded).digest == plain.digest
+    grey = [("GAIT_IMAGE_0", image_message(rig.picture(i)[..., 1], rig.utime(i), i)) for i in range(3)]
+    assert track(tmp_path, [*rig.opening(), *grey]).frames == 3
+
+
+def test_jpeg_frames_are_decoded_or_named(tmp_path):
+    jpegs = [("GAIT_IMAGE_0", image_message(rig.picture(i), rig.utime(i), i, jpeg=95)) for i in range(3)]
+    outcome = track(tmp_path, [*rig.opening(), *jpegs])
+    if "without libjpeg" in outcome.words:
+        assert (outcome.frames, outcome.rejected) == (0, 3)
+        assert outcome.words.count("without libjpeg") == 1, "one line per stream, not per frame"
+        return
+    assert (outcome.frames, outcome.rejected) == (3, 0)
+    damaged = jpegs[1][1]
+    damaged.data = damaged.data[: damaged.size // 2]
+    damaged.size = len(damaged.data)
+    outcome = track(tmp_path, [*rig.opening(), *jpegs])
+    assert (outcome.frames, outcome.rejected) == (2, 1) and "JPEG" in outcome.words
+
+
+def damaged_images():
+    good = rig.frame_message(1).encode()
+    header = struct.Struct(">qqiiiii")  # fingerprint, utime, width, height, row_stride, pixelformat, size
+    fields = list(header.unpack_from(good))
+
+    def altered(index, value):
+        changed = fields.copy()
+        changed[index] = value
+        return header.pack(*changed) + good[header.size :]
+
+    rest = good[header.size :]
+    metadata = rest[fields[6] :]
+    assert struct.unpack(">i", metadata[:4]) == (1,)
+    yield "truncated", good[:1000]
+    yield "empty", b""
+    yield "header only", good[: header.size]
+    yield "another type", camera_message(rig.CAMERA, 1).encode()
+    yield "size negative", altered(6, -1)
+    yield "size most negative", altered(6, -(1 << 31))
+    yield "size huge", altered(6, (1 << 31) - 1)
+    yield "stride negative", altered(4, -480)
+    yield "stride huge", altered(4, 1 << 30)
+    yield "width", altered(2, 161)
+    yield "height zero", altered(3, 0)
+    yield "height negative", altered(3, -120)
+    yield "format", altered(5, 1)
+    yield "metadata huge", good[: -len(metadata)] + struct.pack(">i", 1 << 30) + metadata[4:]
+    yield "key length", good[: -len(metadata)] + struct.pack(">ii", 1, -5) + metadata[8:]
+    yield (
+        "value length",
+        good[: -len(metadata)] + struct.pack(">ii", 1, 6) + b"frame\0" + struct.pack(">i", 1 << 30),
+    )
+
+
+@pytest.mark.parametrize("channel", ["GAIT_IMAGE_0", "GAIT_BACKGROUND_0"])
+@pytest.mark.parametrize(
+    ("name", "data"), list(damaged_images()), ids=lambda x: x if isinstance(x, str) else ""
+)
+def test_damaged_images_are_counted_and_passed_over(tmp_path, name, data, channel):
+    frames = rig.frames(0, 4)
+    outcome = track(tmp_path, [*rig.opening(), frames[0], (channel, data), *frames[2:]])
+    assert (outcome.frames, outcome.rejected) == (3, 1), outcome.words
+    assert tracked(outcome) == [0, 2, 3]
+    expected = 0 if channel == "GAIT_BACKGROUND_0" else 1
+    assert outcome.words.count("\n") == 2, f"one line about it: {outcome.words!r}"
+    assert outcome.dropped in (expected, 1)
+
+
+@pytest.mark.parametrize("channel", ["GAIT_CAMERA_0", "GAIT_COMMAND"])
+@pytest.mark.parametrize("cut", [0, 7, 8, 20, 60])
+def test_damaged_cameras_and_commands_are_passed_over(tmp_path, channel, cut):
+    message = camera_message(rig.CAMERA, 1) if channel == "GAIT_CAMERA_0" else rig.start(0)
+    events = [(channel, message.encode()[:cut]), *rig.opening(), *rig.frames(0, 2)]
+    outcome = track(tmp_path, events)
+    assert outcome.frames == 2 and f"{channel}: damaged" in outcome.words
+
+
+def test_a_wrong_camera_message_is_named(tmp_path):
+    for change, words in (
+        ({"fx": 0.0}, "focal"),
+        ({"R": [0.0] * 9}, "not a rotation"),
+        ({"width": 1 << 20}, "size"),
+    ):
+        message = camera_message(rig.CAMERA, 1)
+        for name, value in change.items():
+            setattr(message, name, value)
+        outcome = track(tmp_path, [("GAIT_CAMERA_0", message), *rig.opening(), *rig.frames(0, 2)])
+        assert words in outcome.words and outcome.frames == 2
+
+
+def test_another_camera_during_the_run_is_refused(tmp_path):
+    other = camera_message(rig.CAMERA, 1)
+    other.fx += 5
+    events = [*rig.opening(), *rig.frames(0, 2), ("GAIT_CAMERA_0", other), *rig.frames(2, 4)]
+    plain = track(tmp_path, [*rig.opening(), *rig.frames(0, 4)])
+    outcome = track(tmp_path, events)
+    assert "another camera" in outcome.words and outcome.digest == plain.digest
+
+
+def test_a_repeated_announcement_changes_nothing(tmp_path):
+    opening = rig.opening()
+    plain = track(tmp_path, [*opening, *rig.frames(0, 4)])
+    repeated = track(tmp_path, [*opening, *rig.frames(0, 2), *opening, *rig.frames(2, 4)])
+    assert repeated.digest == plain.digest and repeated.rejected == 0
+
+
+def test_the_empty_scene_matters(tmp_path):
+    opening = rig.opening()
+    with_plate = track(tmp_path, [*opening, *rig.frames(0, 4)])
+    without = track(tmp_path, [opening[0], opening[2], *rig.frames(0, 4)])
+    assert without.frames == with_plate.frames == 4 and without.digest != with_plate.digest
+
+
+def test_start_waits_for_its_capture_time(tmp_path):
+    events = [*rig.opening()[:2], ("GAIT_COMMAND", rig.start(3)), *rig.frames(0, 6)]
+    outcome = track(tmp_path, events)
+    assert tracked(outcome) == [3, 4, 5]
+    assert [m.step for m in outcome.estimates] == [0, 1, 2]
+
+
+def test_start_without_a_time_begins_at_the_next_frame(tmp_path):
+    events = [*rig.opening()[:2], *rig.frames(0, 2), ("GAIT_COMMAND", rig.start(2, at=0)), *rig.frames(2, 5)]
+    assert tracked(track(tmp_path, events)) == [2, 3, 4]
+
+
+def test_start_between_two_frames_predicts_to_the_second(tmp_path):
+    events = [*rig.opening()[:2], ("GAIT_COMMAND", rig.start(2, at=rig.utime(2) - 10_000)), *rig.frames(0, 5)]
+    assert tracked(track(tmp_path, events)) == [2, 3, 4]
+
+
+def test_a_start_long_past_is_refused(tmp_path):
+    events = [
+        *rig.opening()[:2],
+        ("GAIT_COMMAND", rig.start(0, at=rig.utime(0) - 900_000)),
+        *rig.frames(0, 3),
+    ]
+    outcome = track(tmp_path, events, "--max-gap", 0.8)
+    assert outcome.frames == 0 and "0.900 s later than the start" in outcome.words
+    assert track(tmp_path, events).frames == 3
+
+
+def test_unknown_fields_of_start_take_the_prior(tmp_path):
+    mean, sd = rig.model().prior()
+    known = {"phase": 0.1, "pelvis": [-0.5, 0, 0.95]}
+    spread = {"phase": 0.05, "pelvis": [0.05] * 3}
+    partial, full = rig.start(0), rig.start(0)
+    partial.mean, partial.sd = state_message(known), state_message(spread)
+    mean.phase, mean.pelvis, sd.phase, sd.pelvis = 0.1, known["pelvis"], 0.05, spread["pelvis"]
+    full.mean, full.sd = state_message(mean), state_message(sd)
+    outcomes = [
+        track(tmp_path, [*rig.opening()[:2], ("GAIT_COMMAND", start), *rig.frames(0, 3)])
+        for start in (partial, full)
+    ]
+    assert outcomes[0].digest == outcomes[1].digest and outcomes[0].frames == 3
+
+
+def test_stop_ends_and_a_new_start_begins_anew(tmp_path):
+    stop = ("GAIT_COMMAND", command_message(STOP))
+    again = ("GAIT_COMMAND", rig.start(6))
+    events = [*rig.opening(), *rig.frames(0, 3), stop, *rig.frames(3, 6), again, *rig.frames(6, 9)]
+    outcome = track(tmp_path, events)
+    assert tracked(outcome) == [0, 1, 2, 6, 7, 8]
+    assert [m.step for m in outcome.estimates] == [0, 1, 2, 0, 1, 2]
+    fresh = track(tmp_path, [*rig.opening()[:2], again, *rig.frames(6, 9)])
+    assert fresh.digest == outcome.digest, "nothing of the first walk is left"
+    assert outcome.frames == 6 and fresh.frames == 3
+
+
+def test_a_command_sent_again_is_carried_out_once(tmp_path):
+    start = rig.opening()[2]
+    once = track(tmp_path, [*rig.opening()[:2], start, *rig.frames(0, 5)])
+    twice = track(tmp_path, [*rig.opening()[:2], start, start, *rig.frames(0, 2), start, *rig.frames(2, 5)])
+    assert tracked(twice) == tracked(once) and twice.digest == once.digest
+
+
+def test_reset_forgets_the_walker_and_the_counts(tmp_path):
+    reset = ("GAIT_COMMAND", command_message(RESET))
+    outcome = track(tmp_path, [*rig.opening(), *rig.frames(0, 4), reset, *rig.frames(4, 8)])
+    assert tracked(outcome) == [0, 1, 2, 3] and (outcome.frames, outcome.dropped) == (0, 0)
+
+
+def test_an_unknown_command_is_named(tmp_path):
+    outcome = track(tmp_path, [*rig.opening(), ("GAIT_COMMAND", command_message(77)), *rig.frames(0, 2)])
+    assert "unknown command 77" in outcome.words and outcome.frames == 2
+
+
+def test_lost_frames_are_counted_by_their_numbers(tmp_path):
+    frames = rig.frames(0, 10)
+    outcome = track(tmp_path, [*rig.opening(), *frames[:3], *frames[5:6], *frames[8:]])
+    assert (outcome.frames, outcome.dropped) == (6, 4)
+    assert [m.dropped for m in outcome.estimates] == [0, 0, 0, 2, 4, 4]
+
+
+def test_frames_of_a_source_that_does_not_count(tmp_path):
+    """A bot_core publisher sends no frame numbers: nothing is counted as lost, estimates say -1."""
+    events = [("GAIT_IMAGE_0", rig.frame_message(i, metadata=[], nmetadata=0)) for i in range(4)]
+    outcome = track(tmp_path, [*rig.opening(), *events])
+    assert tracked(outcome) == [-1] * 4 and outcome.dropped == 0
+
+
+def test_time_that_runs_backwards_is_refused_frame_by_frame(tmp_path):
+    late = ("GAIT_IMAGE_0", rig.frame_message(3, utime=rig.utime(1)))
+    frames = rig.frames(0, 6)
+    outcome = track(tmp_path, [*rig.opening(), *frames[:3], late, frames[2], *frames[4:]])
+    assert (outcome.frames, outcome.rejected) == (5, 2) and "did not advance" in outcome.words
+
+
+def test_a_long_pause_stops_the_tracker_which_says_so(tmp_path):
+    pause = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i) + 2_000_000)) for i in range(3, 6)]
+    events = [*rig.opening(), *rig.frames(0, 3), *pause]
+    outcome = track(tmp_path, events)
+    assert outcome.frames == 3 and "no frame for 2.033 s (at most 2.000)" in outcome.words
+
+
+def test_a_shorter_pause_is_bridged_by_prediction(tmp_path):
+    """As the library does when it is stepped without an image in between."""
+    from gait.tracker import Tracker, TrackerConfig
+
+    late = [rig.frame_message(i, utime=rig.utime(i) + 1_200_000) for i in range(3, 5)]
+    events = [*rig.opening(), *rig.frames(0, 3), *(("GAIT_IMAGE_0", m) for m in late)]
+    outcome = track(tmp_path, events)
+    assert [m.step for m in outcome.estimates] == [0, 1, 2, 3, 4] and outcome.dropped == 0
+    assert not any(m.flags & m.FLAG_NO_IMAGE for m in outcome.estimates)
+    tracker = Tracker(
+        rig.model(), rig.CAMERA, TrackerConfig.default(particles=rig.PARTICLES), background=rig.plate()
+    )
+    tracker.start(rig.walker(0), rig.SD, rig.utime(0))
+    for i in range(3):
+        tracker.step(rig.picture(i), rig.utime(i))
+    gap = late[0].utime - rig.utime(2)
+    for i in (1, 2):
+        tracker.step(None, rig.utime(2) + gap * i // 3)
+    for i, message in enumerate(late, 3):
+        tracker.step(rig.picture(i), message.utime)
+    assert outcome.digest == f"{tracker.digest():016x}"
+
+
+def test_the_cloud_is_the_posterior(tmp_path):
+    outcome = track(tmp_path, [*rig.opening(), *rig.frames(0, 3)], "--particles-channel")
+    assert [p.n for p in outcome.particles] == [rig.PARTICLES] * 3
+    for cloud, estimate in zip(outcome.particles, outcome.estimates, strict=True):
+        weight = np.array(cloud.weight)
+        assert (cloud.utime, cloud.frame) == (estimate.utime, estimate.frame)
+        assert weight.min() >= 0 and weight.sum() == pytest.approx(1, abs=1e-5)
+        best = cloud.state[int(weight.argmax())]
+        assert best.encode() == estimate.best.encode()
+        assert 1 / np.square(weight).sum() == pytest.approx(estimate.ess, rel=1e-3)
+
+
+def test_camera_scene_and_start_by_file_are_the_same_as_by_message(tmp_path):
+    import json
+
+    import cv2
+
+    camera, scene, init = tmp_path / "c.json", tmp_path / "p.ppm", tmp_path / "i.json"
+    camera.write_text(json.dumps(rig.CAMERA.to_dict()))
+    cv2.imwrite(str(scene), rig.plate())  # a PPM is RGB
+    state = rig.walker(2)
+    content = {
+        "frame": 2,
+        "pelvis": state.pelvis.tolist(),
+        "heading_rad": state.heading,
+        "phase": state.phase,
+        "stride_hz": state.stride_hz,
+        "stature_m": state.stature,
+        "sd": {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.02, "stride_hz": 0.02, "stature_m": 0.02},
+    }
+    init.write_text(json.dumps(content))
+    options = ("--camera", camera, "--background", scene, "--init", init)
+    by_file = track(tmp_path, rig.frames(0, 6), *options)
+    assert tracked(by_file) == [2, 3, 4, 5]
+
+    from gait.initial import Start
+
+    read = Start.read(init, rig.model())
+    start = command_message(gaitmsg.command_t.START, rig.utime(2), read.mean, read.sd)
+    opening = rig.opening()
+    scene_message = opening[1][1]
+    scene_message.data = rig.plate()[..., ::-1].tobytes()
+    scene_message.pixelformat = scene_message.PIXEL_FORMAT_RGB
+    by_message = track(tmp_path, [*opening[:2], ("GAIT_COMMAND", start), *rig.frames(0, 6)])
+    assert by_message.digest == by_file.digest
+
+
+def test_a_start_at_a_lost_frame_is_dated_between_its_neighbours(tmp_path):
+    import json
+
+    init = tmp_path / "i.json"
+    init.write_text(json.dumps({"frame": 2, "pelvis": rig.walker(2).pelvis.tolist(), "phase": 0.2}))
+    frames = rig.frames(0, 6)
+    events = [*rig.opening()[:2], *frames[:2], *frames[3:]]
+    assert tracked(track(tmp_path, events, "--init", init)) == [3, 4, 5]
+    outcome = track(tmp_path, [*rig.opening()[:2], *frames[3:]], "--init", init)
+    assert outcome.frames == 0 and "began at frame 3, the start is for frame 2" in outcome.words
+
+
+def test_reset_puts_the_init_file_in_force_again(tmp_path):
+    import json
+
+    init = tmp_path / "i.json"
+    init.write_text(json.dumps({"pelvis": rig.walker(0).pelvis.tolist(), "phase": 0.1, "heading_rad": 0}))
+    reset = ("GAIT_COMMAND", command_message(RESET))
+    outcome = track(
+        tmp_path, [*rig.opening()[:2], *rig.frames(0, 3), reset, *rig.frames(3, 6)], "--init", init
+    )
+    assert [m.step for m in outcome.estimates] == [0, 1, 2, 0, 1, 2] and outcome.frames == 3
+
+
+def test_state_of_start_is_checked(tmp_path):
+    for change, words in (({"stature": -1.0}, "cannot start"), ({"ncoef": 99}, "ncoef 99")):
+        start = rig.start(0)
+        for name, value in change.items():
+            setattr(start.mean, name, value)
+        outcome = track(tmp_path, [*rig.opening()[:2], ("GAIT_COMMAND", start), *rig.frames(0, 2)])
+        assert outcome.frames == 0 and words in outcome.words
