@@ -56,9 +56,10 @@ class Renderer:
         opened, closed = self._shutter(frame)
         middle = _between(opened, closed, 0.5)
         self._sun.look(middle.vertices, self.mesh.faces)
-        shade = self._sun.cast()[..., None]
-        touch = self._contact.darken(middle.vertices)[..., None]
-        picture = self.scene.ambient * touch + self.scene.direct * ((1 - shade) * (0.4 + 0.6 * touch))
+        behind = 1 - self.scene.front  # what stands in front takes no shadow of the figure
+        sunny = (1 - self._sun.cast() * behind)[..., None]
+        touch = (1 - self._contact.dark(middle.vertices) * behind)[..., None]
+        picture = self.scene.ambient * touch + self.scene.direct * (sunny * (0.4 + 0.6 * touch))
         return self._over(picture, opened, closed, frame)
 
     def _shutter(self, frame: int) -> tuple[_Instant, _Instant]:

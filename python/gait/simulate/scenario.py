@@ -13,7 +13,7 @@ GENERATOR = "generator"
 
 # option: smallest and largest value
 _LIMITS = {
-    "frames": (2, 100_000), "fps": (5.0, 240.0), "stature": (1.2, 2.2), "speed": (0.3, 2.5),
+    "frames": (2, 20_000), "fps": (5.0, 240.0), "stature": (1.2, 2.2), "speed": (0.3, 2.5),
     "stride_hz": (0.4, 1.6),
     "distance": (1.0, 100.0), "camera_height": (0.2, 20.0), "seed": (0, 2**31 - 1), "flicker": (0.0, 50.0),
     "noise": (0.0, 64.0),

@@ -66,11 +66,11 @@ class Contact:
         self._x, self._y = position[..., 0].copy(), position[..., 1].copy()
         self._ground = np.abs(position[..., 2]) < 0.01
 
-    def darken(self, vertices: Floats) -> Floats:
-        """Return the share of light left on each pixel, (h, w), for figure vertices (n, 3)."""
+    def dark(self, vertices: Floats) -> Floats:
+        """Return the share of light lost at each pixel, (h, w), for figure vertices (n, 3)."""
         low = vertices[vertices[:, 2] < 0.25]
         if not len(low):
-            return np.ones_like(self._x)
+            return np.zeros_like(self._x)
         corner = 0.5 * (low[:, :2].min(0) + low[:, :2].max(0)) - np.float32(0.5 * _FOOT_SIDE * _FOOT_CELL)
         cell = np.clip(((low[:, :2] - corner) / np.float32(_FOOT_CELL)).astype(int), 0, _FOOT_SIDE - 1)
         near = np.exp(-np.maximum(low[:, 2], 0) / 0.07)
@@ -79,4 +79,4 @@ class Contact:
         grid = np.minimum(cv2.GaussianBlur(grid, (0, 0), 2.2) * 2.2, 1) * 0.6
         x, y = (self._x - corner[0]) / np.float32(_FOOT_CELL), (self._y - corner[1]) / np.float32(_FOOT_CELL)
         dark = cv2.remap(grid, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
-        return 1 - dark * self._ground
+        return np.asarray(dark * self._ground, np.float32)

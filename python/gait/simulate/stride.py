@@ -51,7 +51,7 @@ def draw_timing(stride_hz: float, fps: float, frames: int, modes: int, rng: np.r
     period = 1 / stride_hz
     before = int(np.ceil(MARGIN_STRIDES * period / step))
     count = before + (frames - 1) * per_frame + before + 1
-    time = (np.arange(count) - before) * step
+    time = (np.arange(count, dtype=np.float64) - before) * step
     strides = int(np.ceil((time[-1] - time[0]) / period)) + 4
     lengths = period * (1 + STRIDE_TIME_CV * np.clip(rng.standard_normal(strides), -2.5, 2.5))
     strikes = time[0] - period * (1 + rng.uniform()) + np.concatenate([[0], np.cumsum(lengths)])
