@@ -87,22 +87,23 @@ def fit(
     rmse: list[float] = []
     complete = bool(mask.all())
     for _ in range(ITERATIONS):
-        coded = np.einsum("bt,rtm->rbm", basis, filled).reshape(rows, -1)
+        coded = _encode(filled, basis)
         mean = coded.mean(axis=0)
-        left, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
-        scores = left[:, :components] * singular[:components]
-        model = _decode(mean + scores @ right[:components], basis, channels)
+        _, vectors = np.linalg.eigh((coded - mean) @ (coded - mean).T)
+        leading = vectors[:, ::-1][:, :components]
+        model = _decode(mean + leading @ (leading.T @ (coded - mean)), basis, channels)
         rmse.append(float(np.sqrt(np.mean((values - model)[mask] ** 2))))
         filled = np.where(mask, values, model)
         if complete or (len(rmse) > 1 and rmse[-2] - rmse[-1] <= tolerance * rmse[-2]):
             break
+    left, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
     curves = _decode(right[:components], basis, channels)
     flat = curves.reshape(len(curves), samples * channels)
     sign = np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(axis=1)])
     return Components(
         mean=_decode(mean[None], basis, channels)[0],
         curves=curves * sign[:, None, None],
-        scores=scores * sign,
+        scores=left[:, :components] * singular[:components] * sign,
         sd=singular[:components] / np.sqrt(max(rows - 1, 1)),
         filled=filled,
         spectrum=singular**2 / max(float(np.sum(singular**2)), 1e-300),
@@ -110,9 +111,14 @@ def fit(
     )
 
 
+def _encode(curves: Floats, basis: Floats) -> Floats:
+    """Curves (n, T, M) to Fourier coefficients (n, B M)."""
+    return np.matmul(basis, curves).reshape(len(curves), -1)
+
+
 def _decode(coded: Floats, basis: Floats, channels: int) -> Floats:
     """Fourier coefficients (n, B M) to curves (n, T, M)."""
-    return np.einsum("bt,rbm->rtm", basis, coded.reshape(len(coded), len(basis), channels))
+    return np.matmul(basis.T, coded.reshape(len(coded), len(basis), channels))
 
 
 def _column_mean(values: Floats, mask: Mask) -> Floats:
