@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gait import skeleton
 from gait.blob import unpack_names
-from gait.events import Strikes, walking_direction
+from gait.events import STRIDE, Strikes, walking_direction
 from gait.skeleton import EVAL15
 from gait.trackfile import Joints
 
@@ -50,7 +50,8 @@ def free_run(model: dict[str, Any], truth: Joints, strikes: Strikes, first: int)
     size = stature(model, truth)
     joints = _poses(model, cycles[0] + advance, size)
     joints += size * root_path(model, cycles[0] + advance)[:, None]
-    joints = np.einsum("ij,npj->npi", _turns(truth)[first], joints)
+    stride = (truth.time[-1] - truth.time[0]) / (advance[-1] - advance[0])
+    joints = np.einsum("ij,npj->npi", _turns(truth, stride)[first], joints)
     return np.asarray(joints - joints[first, _HIPS].mean(axis=0) + _hip_midpoint(truth)[first])
 
 
@@ -82,9 +83,9 @@ def root_path(model: dict[str, Any], cycles: Array) -> Array:
     return np.stack([np.interp(cycles, fine, path) for path in (forward, sway, height)], axis=1)
 
 
-def _turns(truth: Joints) -> Array:
+def _turns(truth: Joints, stride: float = STRIDE) -> Array:
     """Rotations (n, 3, 3) from x forward, y left, z up to the world."""
-    forward = walking_direction(truth)
+    forward = walking_direction(truth, stride)
     up = np.broadcast_to([0.0, 0.0, 1.0], forward.shape)
     return np.stack([forward, np.cross(up, forward), up], axis=2)
 

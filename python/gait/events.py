@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
 from gait.fields import Fields, read_json
@@ -15,7 +14,7 @@ from gait.trackfile import Joints
 
 Array = NDArray[np.float64]
 
-_SMOOTH = 0.25  # seconds; hides the sway of the pelvis within a stride
+STRIDE = 1.1  # seconds, where the true one is not known
 _APART = 0.5  # seconds between strikes of one foot, at least
 _REACH = 0.1  # metres that a foot swings past the pelvis, at least
 
@@ -78,13 +77,19 @@ def strikes_by_zeni(truth: Joints) -> Strikes:
     return Strikes(right, left)
 
 
-def walking_direction(truth: Joints) -> Array:
-    """Return the unit direction of travel along the ground at each frame, shape (n, 3)."""
-    pelvis, step = truth.places["pelvis"], float(np.median(np.diff(truth.time)))
-    smooth = gaussian_filter1d(pelvis[:, :2], _SMOOTH / step, axis=0, mode="nearest")
-    velocity = np.zeros_like(pelvis)
-    velocity[:, :2] = np.gradient(smooth, axis=0)
-    return np.asarray(velocity / np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-12))
+def walking_direction(truth: Joints, stride: float = STRIDE) -> Array:
+    """Return the unit direction of travel along the ground at each frame, shape (n, 3).
+
+    It is the way of the pelvis over one stride of `stride` seconds around the frame, over which the sway of
+    the pelvis cancels; near the ends, over the first and last stride.
+    """
+    time, pelvis = truth.time, truth.places["pelvis"][:, :2]
+    early = np.clip(time - stride / 2, time[0], max(time[0], time[-1] - stride))
+    late = np.minimum(early + stride, time[-1])
+    way = np.zeros((len(time), 3))
+    for axis in range(2):
+        way[:, axis] = np.interp(late, time, pelvis[:, axis]) - np.interp(early, time, pelvis[:, axis])
+    return np.asarray(way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12))
 
 
 def _foot(truth: Joints, side: str) -> Array:

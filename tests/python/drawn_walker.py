@@ -1,4 +1,4 @@
-"""A walker drawn with the library's own rasteriser on a noisy wall: a small clip whose state is known exactly."""
+"""A walker drawn by the library's own rasteriser on a noisy wall: a small clip of exactly known state."""
 
 from pathlib import Path
 

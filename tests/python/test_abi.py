@@ -60,8 +60,8 @@ def test_every_public_function_is_declared():
 
 
 def test_enumerations_and_limits_equal_the_header():
-    values = {name: int(value, 0) for name, value in re.findall(r"\b(GAIT_\w+)\s*=?\s+(-?\w+?)u?\b", HEADER) if
-              re.fullmatch(r"-?(0x[0-9a-fA-F]+|\d+)", value)}  # fmt: skip
+    pairs = re.findall(r"\b(GAIT_\w+)\s*=?\s+(-?(?:0x[0-9a-fA-F]+|\d+))u?\b", HEADER)
+    values = {name: int(value, 0) for name, value in pairs}
     ours = {f"GAIT_ERR_{s.name}": s for s in _abi.Status if s} | {"GAIT_OK": _abi.Status.OK}
     ours |= {f"GAIT_{p.name}": p for p in _abi.PixelFormat}
     ours |= {f"GAIT_MODE_{m.name}": m for m in _abi.Mode}

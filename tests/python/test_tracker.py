@@ -1,4 +1,4 @@
-"""Tracker through Python: configuration, order of calls, callbacks, replay and what it makes of a drawn walk."""
+"""Tracker through Python: configuration, order of calls, callbacks, replay, and a drawn walk followed."""
 
 import ctypes
 import gc
@@ -48,8 +48,8 @@ def utime(i):
     return round(1e6 * i / FPS)
 
 
-def run(tracker, first=0, last=len(FRAMES)):
-    return [tracker.step(FRAMES[i], utime(i)) for i in range(first, last)]
+def run(tracker, first=0, last=None):
+    return [tracker.step(FRAMES[i], utime(i)) for i in range(len(FRAMES))[first:last]]
 
 
 def test_the_dataclass_has_the_settings_of_the_c_struct():

@@ -1,0 +1,254 @@
+"""The commands that track, evaluate and draw, as a user calls them."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from drawn_walker import DATA, camera, clip, state_at, wall, write
+
+from gait import Model, Video, blob
+from gait.cli import COMMANDS, main
+from gait.model import read_blob
+
+MODEL = Model()
+SECTIONS = blob.decode(read_blob(None))
+SUMMARY = [
+    "frames",
+    "particles",
+    "threads",
+    "step_ms",
+    "wall_fps",
+    "lost",
+    "ambiguous",
+    "memory_bytes",
+    "digest",
+]
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data is absent")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """Drawn clip of 20 frames with camera, plate, init and truth."""
+    folder = tmp_path_factory.mktemp("scene")
+    pictures, states = clip(MODEL, SECTIONS, 20)
+    write(folder / "walk.mp4", pictures)
+    cv2.imwrite(str(folder / "plate.png"), wall())
+    (folder / "camera.json").write_text(json.dumps(camera().to_dict()))
+    first = state_at(MODEL, SECTIONS, 0.0)
+    init = {
+        "pelvis": first.pelvis.tolist(),
+        "heading_rad": 0.0,
+        "phase": 0.2,
+        "stride_hz": 0.9,
+        "stature_m": 1.75,
+    }
+    (folder / "init.json").write_text(json.dumps({"frame": 0, **init}))
+    with open(folder / "truth.csv", "w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["frame", "time", *(f"{j}_{a}" for j in MODEL.joint_names for a in "xyz")])
+        for i, state in enumerate(states):
+            rows.writerow([i, i / 30, *MODEL.pose(state)[0].ravel()])
+    return folder
+
+
+def track(scene, *options, out="out.csv"):
+    words = ["track", scene / "walk.mp4", "--camera", scene / "camera.json", "-o", scene / out]
+    words += ["--init", scene / "init.json", "--background", scene / "plate.png", "--particles", 300]
+    return main([str(word) for word in (*words, *options)])
+
+
+def test_track_evaluate_and_every_output(scene, capsys):
+    assert track(scene, "--json", "--overlay", scene / "o.mp4", "--trc", scene / "o.trc") == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert list(summary) == SUMMARY and list(summary["step_ms"]) == ["median", "p99", "max"]
+    assert (summary["frames"], summary["particles"], summary["threads"], summary["lost"]) == (20, 300, 1, 0)
+    assert 0 < summary["step_ms"]["median"] <= summary["step_ms"]["p99"] <= summary["step_ms"]["max"]
+    assert summary["memory_bytes"] > 1e5 and len(summary["digest"]) == 16
+    film = Video(scene / "o.mp4")
+    assert (film.size, film.count) == ((320, 240), 20)
+    drawn, plain = list(film.frames())[15].image, list(Video(scene / "walk.mp4").frames())[15].image
+    assert (np.abs(drawn.astype(int) - plain).max(axis=2) > 40).mean() > 0.05
+    trc = (scene / "o.trc").read_text().split("\n")
+    assert len(trc) == 6 + 20 + 1 and trc[2].split("\t")[2:4] == ["20", "19"]
+
+    assert main(["eval", str(scene / "out.csv"), "--truth", str(scene / "truth.csv"), "--json"]) == 0
+    errors = json.loads(capsys.readouterr().out)
+    assert errors["frames"] == 20 and errors["lost"] == 0
+    assert errors["abs"]["median"] < 70 and errors["px"]["median"] < 5
+    assert main(["eval", str(scene / "out.csv"), "--truth", str(scene / "truth.csv")]) == 0
+    table = capsys.readouterr().out
+    assert "root mm" in table and "lost 0.0% of 20 frames" in table and "static abs" in table
+
+
+def test_the_result_does_not_depend_on_threads_and_does_on_the_seed(scene, capsys):
+    digests = []
+    for options in (("--threads", 1), ("--threads", 3), ("--seed", 2)):
+        assert track(scene, "--json", *options) == 0
+        digests.append(json.loads(capsys.readouterr().out)["digest"])
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_start_and_stop_choose_the_rows(scene, capsys):
+    (scene / "anytime.json").write_text(json.dumps({"pelvis": [0.0, 0.0], "heading_rad": 0.0}))
+    assert track(scene, "--init", scene / "anytime.json", "--start", 4, "--stop", 9, "--quiet") == 0
+    with open(scene / "out.csv") as file:
+        assert [row["frame"] for row in csv.DictReader(file)] == ["4", "5", "6", "7", "8"]
+    assert capsys.readouterr().err == ""
+
+
+def test_automatic_start_says_what_it_found(scene, capsys):
+    assert track(scene, "--init", "auto", "--height", 1.75) == 0
+    out, err = capsys.readouterr()
+    assert err.startswith("start found at frame 0: x ") and "20 frames, " in out and "digest " in out
+
+
+def test_paper_mode_and_no_background(scene, capsys):
+    assert track(scene, "--mode", "paper", "--background", "none", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == 20
+
+
+FAULTS = [
+    (["--camera", "{}/none.json"], "none.json: no such camera file"),
+    (["--init", "{}/none.json"], "none.json: no such init file"),
+    (["--init", "{}/init.json", "--start", "3"], "init.json: frame is 0, --start says 3"),
+    (["--background", "{}/none.png"], "none.png: no such background image"),
+    (["--background", "{}/small.png"], "small.png: is 32x24, the video 320x240"),
+    (["--background", "none", "--init", "auto"], "--init auto: needs a background"),
+    (["-m", "{}/camera.json"], "camera.json: .*"),
+    (["-m", "{}/none.gait"], "none.gait: no such model file"),
+    (["--particles", "3"], "particles"),
+    (["--height", "170"], "--height: 170 m is not a stature"),
+    (["-o", "{}/none/out.csv"], "out.csv: folder .* does not exist"),
+    (["--overlay", "{}/none/o.mp4"], "o.mp4: folder .* does not exist"),
+    (["--overlay", "{}/o.gif"], "o.gif: unknown video suffix"),
+    (["--trc", "{}/none/o.trc"], "o.trc: folder .* does not exist"),
+    (["--stop", "0"], "walk.mp4: no frame from 0 up to 0; it has 20"),
+]
+
+
+@pytest.mark.parametrize("options, words", FAULTS, ids=[" ".join(f[0]) for f in FAULTS])
+def test_every_fault_is_one_line_and_leaves_no_output(options, words, scene, capsys):
+    cv2.imwrite(str(scene / "small.png"), np.zeros((24, 32), np.uint8))
+    before = set(scene.iterdir())
+    assert track(scene, *(str(o).format(scene) for o in options), out="fault.csv") == 1
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert err.startswith("gait track: ")
+    assert re.search(words, err)
+    assert set(scene.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [[], ["dance"], ["track"], ["track", "v.mp4", "--camera", "c.json", "-o", "o.csv", "--threads", "0"]]
+    + [["eval", "o.csv"], ["track", "v", "--camera", "c", "-o", "o", "--start", "-1"], ["render"]],
+)
+def test_usage_errors_exit_2(words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == 2 and "usage: gait" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([command, "--help"])
+    text = capsys.readouterr().out
+    assert caught.value.code == 0 and f"usage: gait {command}" in text and "--quiet" in text
+
+
+def test_the_list_of_commands(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    text = capsys.readouterr().out
+    assert all(f"    {command} " in text for command in COMMANDS)
+
+
+def test_the_module_runs_and_passes_the_exit_code(tmp_path):
+    words = [sys.executable, "-m", "gait", "eval", "none.csv", "--truth", "none.csv"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "gait eval: none.csv: no such truth file\n"
+
+
+def test_render_a_pose(tmp_path, scene):
+    assert main(["render", "--phase", "0.3", "-o", str(tmp_path / "pose.png")]) == 0
+    pose = cv2.imread(str(tmp_path / "pose.png"))
+    assert pose.shape == (900, 720, 3)
+    assert 0.03 < (np.abs(pose.astype(int) - pose[0, 0]).max(axis=2) > 30).mean() < 0.4
+    state = {"phase": 0.3, "stature": 1.6, "pelvis": [0.2, 0.0, 0.85], "coef": [1.5]}
+    (tmp_path / "state.json").write_text(json.dumps(state))
+    words = ["render", "--state", tmp_path / "state.json", "--camera", scene / "camera.json"]
+    assert main([str(w) for w in (*words, "-o", tmp_path / "seen.png")]) == 0
+    assert cv2.imread(str(tmp_path / "seen.png")).shape == (240, 320, 3)
+
+
+def test_render_a_sheet(tmp_path):
+    assert main(["render", "--strip", "-o", str(tmp_path / "sheet.png")]) == 0
+    sheet = cv2.imread(str(tmp_path / "sheet.png"))
+    rows = 1 + MODEL.info.components
+    assert sheet.shape[0] > 250 * rows
+    for row in range(rows):
+        part = sheet[len(sheet) * row // rows : len(sheet) * (row + 1) // rows].astype(int)
+        assert (np.ptp(part, axis=2) > 40).mean() > 0.005  # something coloured in every row
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (["--phase", "1.5"], "--phase 1.5: give a share"),
+        (["--strip", "--camera", "c.json"], "--camera: --strip has its own view"),
+        (["--state", "{}"], "no such state file"),
+    ],
+)
+def test_render_faults(words, message, tmp_path, capsys):
+    words = [word.format(tmp_path / "none.json") for word in words]
+    assert main(["render", *words, "-o", str(tmp_path / "o.png")]) == 1
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_render_wants_an_image_suffix(tmp_path, capsys):
+    assert main(["render", "-o", str(tmp_path / "o.txt")]) == 1
+    assert "o.txt: unknown image suffix" in capsys.readouterr().err and list(tmp_path.iterdir()) == []
+
+
+@needs_data
+def test_a_dev_clip_from_its_truth(tmp_path, capsys):
+    folder = DATA / "eval/dev/oblique45_07"
+    meta = json.loads((folder / "meta.json").read_text())
+    with open(folder / "truth.csv") as file:
+        first = next(csv.DictReader(file))
+    right = meta["events_video_frames"]["r_heel_strike"]
+    rate = 30 / np.diff(right).mean()
+    init = {
+        "frame": 0,
+        "pelvis": [float(first[f"pelvis_{a}"]) for a in "xyz"],
+        "heading_rad": float(first["heading_rad"]),
+        "phase": float((-right[0] * rate / 30) % 1),
+        "stride_hz": float(rate),
+        "stature_m": meta["stature_m"],
+    }
+    (tmp_path / "init.json").write_text(json.dumps(init))
+    words = ["track", folder / "video.mp4", "--camera", folder / "camera.json", "--stop", 30]
+    words += [
+        "--background",
+        folder / "background.png",
+        "--init",
+        tmp_path / "init.json",
+        "-o",
+        tmp_path / "o.csv",
+    ]
+    assert main([str(word) for word in (*words, "--quiet", "--json")]) == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == 30
+    assert main(["eval", str(tmp_path / "o.csv"), "--truth", str(folder / "truth.csv"), "--json"]) == 0
+    errors = json.loads(capsys.readouterr().out)
+    assert errors["frames"] == 30 and errors["lost"] == 0
+    assert errors["root"]["median"] < 90 and errors["abs"]["median"] < 200
+    assert errors["phase"]["median"] < 0.04 and errors["phase"]["flips"] == 0
+    assert errors["root"]["median"] < errors["static"]["root"]["median"]

@@ -1,0 +1,214 @@
+"""Error measures against numbers worked out by hand, and the baselines against what they should reach."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_walker import DATA
+
+from gait import Camera, UserError, blob, skeleton
+from gait.baselines import free_run, root_path, static_pose, stature
+from gait.evaluate import coverage, evaluate, phase_errors, picture_errors, pose_errors
+from gait.events import Strikes, strikes_by_zeni, strikes_from_meta, walking_direction
+from gait.model import read_blob
+from gait.skeleton import EVAL15, JOINTS
+from gait.trackfile import Joints, Track, read_truth
+
+SECTIONS = blob.decode(read_blob(None))
+RATE, FIRST_PHASE, HEIGHT = 0.9, 0.3, 1.7
+
+
+def mean_walk(frames=100, fps=30, heading=0.7, start=(1.0, -2.0)):
+    """Truth that is the model's mean cycle, walking on."""
+    frame = np.arange(frames)
+    cycles = FIRST_PHASE + RATE * frame / fps
+    path = HEIGHT * root_path(SECTIONS, cycles)
+    turn = np.array(
+        [[np.cos(heading), -np.sin(heading), 0], [np.sin(heading), np.cos(heading), 0], [0, 0, 1]]
+    )
+    joints, _ = skeleton.pose(SECTIONS, cycles, np.zeros(0), HEIGHT, 0.0, 0.0, 0.0, path)
+    joints = joints @ turn.T + [*start, 0.0]
+    names = blob.unpack_names(SECTIONS["PTNM"])
+    places = {name: joints[:, names.index(name)] for name in JOINTS}
+    return Joints(frame, frame / fps, places)
+
+
+TRUTH = mean_walk()
+# phase 0 is a right heel strike, so they come where the cycles are whole
+STRIKES = Strikes(
+    right=(np.arange(1, 4) - FIRST_PHASE) / RATE * 30, left=(np.arange(1, 4) - 0.5 - FIRST_PHASE) / RATE * 30
+)
+
+
+def track(truth=TRUTH, move=0.0, sd=0.02, **changes):
+    """Track that is the truth moved by `move` metres along x."""
+    shift = np.array([move, 0.0, 0.0])
+    made = Track(
+        frame=truth.frame,
+        time=truth.time,
+        places={name: at + shift for name, at in truth.places.items()},
+        status=["tracking"] * len(truth.frame),
+        phase=(FIRST_PHASE + RATE * truth.frame / 30) % 1,
+        sd={name: np.full_like(at, sd) for name, at in truth.places.items()},
+    )
+    return replace(made, **changes)
+
+
+def test_a_shift_counts_in_abs_and_not_in_root():
+    found = TRUTH.eval15() + [0.06, 0.0, 0.08]
+    errors = pose_errors(found, TRUTH.eval15())
+    assert errors["abs"] == pytest.approx({"median": 100, "mean": 100, "p90": 100})
+    assert errors["root"]["mean"] == pytest.approx(0, abs=1e-9) and errors["lost"] == 0
+
+
+def test_one_joint_off_is_shared_among_15_and_14():
+    found = TRUTH.eval15()
+    found[:, EVAL15.index("l_wrist")] += [0.0, 0.21, 0.0]
+    errors = pose_errors(found, TRUTH.eval15())
+    assert errors["abs"]["median"] == pytest.approx(210 / 15)
+    assert errors["root"]["median"] == pytest.approx(210 / 14)
+
+
+def test_the_pelvis_counts_in_abs_alone_and_the_hips_move_the_root():
+    found = TRUTH.eval15()
+    found[:, EVAL15.index("pelvis")] += [0.15, 0.0, 0.0]
+    errors = pose_errors(found, TRUTH.eval15())
+    assert errors["abs"]["mean"] == pytest.approx(10) and errors["root"]["mean"] == pytest.approx(0, abs=1e-9)
+    found = TRUTH.eval15()
+    found[:, EVAL15.index("l_hip")] += [0.0, 0.0, 0.28]
+    # the midpoint rises by 140 mm: the hip itself is then 140 off and so are the 13 others
+    assert pose_errors(found, TRUTH.eval15())["root"]["mean"] == pytest.approx(140)
+
+
+def test_median_mean_and_90th_percentile_are_over_frames():
+    found = TRUTH.eval15()
+    found[:, :, 0] += np.arange(100)[:, None] / 1000  # 0, 1, ... 99 mm
+    assert pose_errors(found, TRUTH.eval15())["abs"] == pytest.approx(
+        {"median": 49.5, "mean": 49.5, "p90": 89.1}
+    )
+
+
+def test_lost_is_far_off_or_said_so():
+    found = TRUTH.eval15()
+    found[:10, EVAL15.index("head_top")] += [0.0, 0.0, 14 * 0.151]
+    found[10:20, EVAL15.index("head_top")] += [0.0, 0.0, 14 * 0.149]
+    given_up = np.zeros(100, bool)
+    given_up[5:25] = True
+    assert pose_errors(found, TRUTH.eval15())["lost"] == pytest.approx(0.10)
+    assert pose_errors(found, TRUTH.eval15(), given_up)["lost"] == pytest.approx(0.25)
+
+
+def test_phase_errors_wrap_and_flips_are_counted_apart():
+    true = np.array([0.98, 0.02, 0.50, 0.10, 0.60])
+    found = np.array([0.01, 0.99, 0.52, 0.62, 0.09])  # +.03 -.03 +.02 then flipped: +.02, -.01
+    errors = phase_errors(found, true)
+    assert errors["flips"] == pytest.approx(0.4)
+    assert errors["median"] == pytest.approx(0.02) and errors["mean"] == pytest.approx(0.022)
+    assert errors["bias"] == pytest.approx((0.03 - 0.03 + 0.02 + 0.02 - 0.01) / 5)
+
+
+def test_coverage_is_the_share_inside_the_normal_intervals():
+    true = np.zeros((4, 15, 3))
+    found, sd = np.full((4, 15, 3), 0.01), np.full((4, 15, 3), 0.01)
+    assert coverage(found, sd, true) == {"50": 0.0, "90": 1.0}  # one deviation off
+    sd[:1] = 0.02  # half a deviation off in a quarter of them
+    sd[1:2] = 0.005  # two deviations
+    assert coverage(found, sd, true) == {"50": 0.25, "90": 0.75}
+
+
+def test_picture_errors_are_pixels():
+    view = Camera.looking((0.0, -5.0, 1.0), (0.0, 0.0, 1.0), (640, 480), 500.0)
+    true = np.zeros((2, 15, 3)) + [0.0, 0.0, 1.0]
+    found = true.copy()
+    found[1] += [0.03, 0.0, 0.04]  # at 5 m and f = 500 px: 100 px per metre
+    assert picture_errors(found, true, view) == pytest.approx({"median": 2.5, "mean": 2.5, "p90": 4.5})
+    found[1, 3:] = [0.0, -9.0, 1.0]  # behind the camera: left out
+    assert picture_errors(found, true, view) == pytest.approx({"median": 2.5, "mean": 2.5, "p90": 4.5})
+    assert picture_errors(found * 0 + [0.0, -9.0, 1.0], true, view) is None
+
+
+def test_phase_of_the_truth_is_linear_between_strikes_and_goes_on_outside():
+    strikes = Strikes(right=np.array([10.0, 40.0, 60.0]), left=np.array([26.0]))
+    np.testing.assert_allclose(strikes.phase([10, 25, 40, 50, 60, 70, 4]), [0, 0.5, 0, 0.5, 0, 0.5, 0.8])
+    few = Strikes(right=np.array([30.0]), left=np.array([15.0, 46.0]))
+    np.testing.assert_allclose(few.phase([15, 30, 46, 22.5]), [0.5, 0, 0.5, 0.75])
+    assert Strikes(np.array([30.0]), np.zeros(0)).phase([1]) is None
+
+
+def test_zeni_finds_the_models_own_strikes():
+    found = strikes_by_zeni(TRUTH)
+    for side in ("right", "left"):
+        expected, strikes = getattr(STRIKES, side), getattr(found, side)
+        inside = expected[(expected > 2) & (expected < 97)]
+        assert len(strikes) == len(inside)
+        # phase 0 of the model is its own heel strike; half a cycle later need not be the other's to the frame
+        np.testing.assert_allclose(strikes, inside, atol=1.5)
+    np.testing.assert_allclose(walking_direction(TRUTH)[50], [np.cos(0.7), np.sin(0.7), 0], atol=0.005)
+
+
+def test_stature_is_that_of_the_limbs():
+    assert stature(SECTIONS, TRUTH) == pytest.approx(HEIGHT, rel=1e-5)
+
+
+def test_free_run_of_the_mean_cycle_reproduces_it():
+    free = free_run(SECTIONS, TRUTH, STRIKES, first=20)
+    errors = pose_errors(free, TRUTH.eval15())
+    assert errors["root"]["p90"] < 1 and errors["abs"]["p90"] < 5
+    np.testing.assert_allclose(free[20, [9, 10]].mean(0), TRUTH.eval15()[20, [9, 10]].mean(0), atol=1e-9)
+    assert free_run(SECTIONS, TRUTH, Strikes(np.zeros(0), np.zeros(0)), first=0) is None
+
+
+def test_static_pose_stands_at_the_true_hips_and_is_worse_than_the_cycle():
+    still = static_pose(SECTIONS, TRUTH)
+    np.testing.assert_allclose(still[:, [9, 10]].mean(1), TRUTH.eval15()[:, [9, 10]].mean(1), atol=1e-9)
+    spans = np.linalg.norm(still[:, 0] - still[:, 1], axis=1)
+    assert np.ptp(spans) < 1e-9  # it is one pose
+    assert 50 < pose_errors(still, TRUTH.eval15())["root"]["median"] < 150
+
+
+def test_a_perfect_track_is_perfect():
+    view = Camera.looking((0.0, -9.0, 1.5), (0.0, 0.0, 1.0), (640, 480), 500.0)
+    measures = evaluate(track(), TRUTH, strikes=STRIKES, model=SECTIONS, camera=view)
+    assert list(measures) == ["frames", "abs", "root", "lost", "phase", "px", "coverage", "static", "free"]
+    for key in ("abs", "root", "px"):
+        assert measures[key] == pytest.approx({"median": 0, "mean": 0, "p90": 0}, abs=1e-9)
+    assert measures["phase"]["p90"] < 1e-9 and measures["phase"]["flips"] == 0
+    assert measures["coverage"] == {"50": 1.0, "90": 1.0} and measures["frames"] == 100
+    json.dumps(measures)
+
+
+def test_only_common_frames_count():
+    late = Joints(TRUTH.frame[60:], TRUTH.time[60:], {name: at[60:] for name, at in TRUTH.places.items()})
+    measures = evaluate(track(late, move=0.05), TRUTH, strikes=STRIKES, model=SECTIONS)
+    assert measures["frames"] == 40 and measures["px"] is None
+    assert measures["abs"]["p90"] == pytest.approx(50) and measures["phase"]["p90"] < 1e-9
+    assert measures["free"]["abs"]["p90"] < 5  # it starts at the first common frame
+    with pytest.raises(UserError, match="frames 500-599 and the truth's 0-99 have none in common"):
+        evaluate(track(frame=TRUTH.frame + 500), TRUTH, strikes=STRIKES, model=SECTIONS)
+
+
+def test_strikes_of_a_meta_file(tmp_path):
+    path = tmp_path / "meta.json"
+    path.write_text(
+        json.dumps({"events_video_frames": {"r_heel_strike": [8.2, 41.4], "l_heel_strike": [25.2]}})
+    )
+    strikes = strikes_from_meta(path)
+    assert strikes.right.tolist() == [8.2, 41.4] and strikes.left.tolist() == [25.2]
+    path.write_text("{}")
+    assert strikes_from_meta(path) is None
+    path.write_text(json.dumps({"events_video_frames": {"r_heel_strike": [9, 3], "l_heel_strike": []}}))
+    with pytest.raises(UserError, match="meta.json: events_video_frames: r_heel_strike does not increase"):
+        strikes_from_meta(path)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data is absent")
+@pytest.mark.parametrize("clip", ["side_lr_35", "oblique45_07"])
+def test_zeni_on_a_dev_clip_agrees_with_its_meta_file(clip):
+    folder = DATA / "eval/dev" / clip
+    found, known = strikes_by_zeni(read_truth(folder / "truth.csv")), strikes_from_meta(folder / "meta.json")
+    for side in ("right", "left"):
+        strikes = getattr(known, side)
+        inner = strikes[(strikes > 5) & (strikes < 95)]
+        assert len(inner) >= 2
+        assert max(np.abs(getattr(found, side) - at).min() for at in inner) < 2

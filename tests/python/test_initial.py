@@ -1,0 +1,183 @@
+"""First states: from a file, with every fault told, and found in the pictures."""
+
+import json
+
+import numpy as np
+import pytest
+from drawn_walker import camera, clip, wall, write
+
+from gait import Model, Start, UserError, Video, blob
+from gait.autostart import find_start
+from gait.initial import DEFAULT_SD
+from gait.model import read_blob
+
+MODEL = Model()
+SECTIONS = blob.decode(read_blob(None))
+FULL = {
+    "frame": 64,
+    "pelvis": [-0.1, 5.47, 0.82],
+    "heading_rad": -1.5708,
+    "phase": 0.108,
+    "stride_hz": 0.816,
+    "stature_m": 1.65,
+    "sd": {"pelvis": 0.1, "heading_rad": 0.2, "phase": 0.06, "stride_hz": 0.07, "stature_m": 0.02},
+}
+
+
+@pytest.fixture
+def init(tmp_path):
+    def write_json(data):
+        path = tmp_path / "init.json"
+        path.write_text(data if isinstance(data, str) else json.dumps(data))
+        return path
+
+    return write_json
+
+
+def test_a_full_file_is_taken_as_it_says(init):
+    start = Start.read(init(FULL), MODEL)
+    mean, sd = start.mean, start.sd
+    assert start.frame == 64
+    np.testing.assert_array_equal(mean.pelvis, FULL["pelvis"])
+    assert (mean.heading, mean.phase, mean.stride_hz, mean.stature) == (-1.5708, 0.108, 0.816, 1.65)
+    np.testing.assert_array_equal(sd.pelvis, [0.1, 0.1, 0.1])
+    assert (sd.heading, sd.phase, sd.stride_hz, sd.stature) == (0.2, 0.06, 0.07, 0.02)
+
+
+def test_given_values_without_sd_get_the_documented_one(init):
+    start = Start.read(init({k: v for k, v in FULL.items() if k != "sd"}), MODEL)
+    sd = start.sd
+    assert (sd.heading, sd.phase, sd.stride_hz, sd.stature) == tuple(
+        DEFAULT_SD[k] for k in ("heading_rad", "phase", "stride_hz", "stature_m")
+    )
+    np.testing.assert_array_equal(sd.pelvis, [0.05] * 3)
+
+
+@pytest.mark.parametrize("key", ["pelvis", "heading_rad", "phase", "stride_hz", "stature_m"])
+def test_absent_values_keep_the_broad_prior(key, init):
+    mean, sd = MODEL.prior()
+    start = Start.read(init({k: v for k, v in FULL.items() if k not in (key, "sd")}), MODEL)
+    name = {"heading_rad": "heading", "stature_m": "stature"}.get(key, key)
+    np.testing.assert_array_equal(getattr(start.sd, name), getattr(sd, name))
+    if key != "pelvis":
+        assert getattr(start.mean, name) == getattr(mean, name)
+
+
+def test_an_empty_file_is_the_prior_standing_on_the_ground(init):
+    mean, sd = MODEL.prior()
+    start = Start.read(init({}), MODEL)
+    assert start.frame == 0 and start.sd.phase == sd.phase
+    assert start.mean.pelvis[2] == pytest.approx(MODEL.pelvis_height(mean))
+
+
+def test_pelvis_without_height_stands_on_the_ground(init):
+    start = Start.read(init({**FULL, "pelvis": [1.0, 2.0]}), MODEL)
+    assert start.mean.pelvis[2] == pytest.approx(MODEL.pelvis_height(start.mean))
+    taller = Start.read(init({**FULL, "pelvis": [1.0, 2.0]}), MODEL, height=1.9)
+    assert taller.mean.stature == 1.9
+    assert taller.mean.pelvis[2] == pytest.approx(start.mean.pelvis[2] * 1.9 / 1.65)
+
+
+def test_sd_of_each_axis(init):
+    start = Start.read(init({**FULL, "sd": {"pelvis": [0.1, 0.2, 0.3]}}), MODEL)
+    np.testing.assert_array_equal(start.sd.pelvis, [0.1, 0.2, 0.3])
+    assert start.sd.phase == DEFAULT_SD["phase"]
+
+
+def test_phase_one_is_phase_zero(init):
+    assert Start.read(init({"phase": 1.0}), MODEL).mean.phase == 0
+
+
+def test_frame_comes_from_the_file_or_from_the_caller(init):
+    path = init(FULL)
+    assert Start.read(path, MODEL, frame=64).frame == 64
+    with pytest.raises(UserError, match="init.json: frame is 64, --start says 60; leave one"):
+        Start.read(path, MODEL, frame=60)
+    assert Start.read(init({"phase": 0.2}), MODEL, frame=7).frame == 7
+
+
+FAULTS = [
+    ({"phase": float("nan")}, "phase is not finite; give the phase"),
+    ({"phase": 1.2}, "phase is 1.2, outside"),
+    ({"phase": "0.3"}, "phase is not a number"),
+    ({"heading_rad": 90}, "heading_rad is 90, outside .*radians"),
+    ({"stride_hz": 0}, "stride_hz is 0, outside"),
+    ({"stature_m": 165}, "stature_m is 165, outside .*metres"),
+    ({"stature_m": None}, "stature_m is not a number"),
+    ({"frame": 1.5}, "frame is 1.5, not a whole number"),
+    ({"frame": -1}, "frame is -1, outside"),
+    ({"pelvis": [1]}, "pelvis has shape 1, not 2; give x and y"),
+    ({"pelvis": 3.0}, "pelvis has shape one number, not 2"),
+    ({"pelvis": [1, 2, float("inf")]}, "pelvis is not finite"),
+    ({"pelvis": {"x": 1}}, "pelvis is not an array of numbers"),
+    ({"sd": {"phase": -0.1}}, "sd: phase is -0.1, outside"),
+    ({"sd": {"pelvis": -0.1}}, "sd: pelvis is negative"),
+    ({"sd": {"pelvis": [0.1, 0.1]}}, "sd: pelvis has shape 2, not"),
+    ({"sd": {"speed": 1}}, "sd: speed is not a known key; use pelvis"),
+    ({"sd": 0.1}, "sd is not a table of keys"),
+    ({"heading": 0.1}, "heading is not a known key; use frame pelvis heading_rad"),
+    ("{'phase': 1}", "not valid JSON"),
+    ("3", "holds no JSON object"),
+]
+
+
+@pytest.mark.parametrize("data, words", FAULTS, ids=[f[1] for f in FAULTS])
+def test_every_fault_names_file_and_key(data, words, init):
+    with pytest.raises(UserError, match=f"init.json: {words}") as caught:
+        Start.read(init(data), MODEL)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_stature_in_centimetres_is_refused(init):
+    with pytest.raises(UserError, match="--height: 165 m is not a stature; give metres"):
+        Start.read(init({}), MODEL, height=165)
+
+
+def walk(tmp_path, view, **motion):
+    """Drawn walk after a few empty frames, as a video; returns it with its states."""
+    pictures, states = clip(MODEL, SECTIONS, 34, view=view, **motion)
+    write(tmp_path / "walk.mp4", [wall()] * 3 + pictures)
+    return Video(tmp_path / "walk.mp4"), states
+
+
+@pytest.mark.parametrize("heading, start", [(0.0, (-0.6, 0.0)), (2.6, (0.5, -0.2)), (-0.8, (-0.5, 1.2))])
+def test_a_walker_is_found_where_it_is(heading, start, tmp_path):
+    view = camera(place=(0.0, -6.0, 2.2))
+    video, states = walk(tmp_path, view, heading=heading, start=start)
+    found = find_start(video, view, wall(), MODEL)
+    assert 3 <= found.frame <= 5
+    truth = states[found.frame - 3]
+    mean, sd = found.mean, found.sd
+    assert (np.abs(mean.pelvis - truth.pelvis) < 2.5 * sd.pelvis).all()
+    assert mean.stature == pytest.approx(1.75, abs=2.5 * sd.stature)
+    assert abs((mean.heading - heading + np.pi) % (2 * np.pi) - np.pi) < 2 * sd.heading < 1.0
+    assert mean.stride_hz == pytest.approx(0.9, abs=2 * sd.stride_hz) and sd.phase >= 0.5
+    # wide along the viewing ray, narrow across
+    assert sd.pelvis[1] > 2 * sd.pelvis[0]
+
+
+def test_a_known_stature_is_believed(tmp_path):
+    view = camera(place=(0.0, -6.0, 3.0))
+    video, _ = walk(tmp_path, view, stature=1.6)
+    unknown, known = (
+        find_start(video, view, wall(), MODEL),
+        find_start(video, view, wall(), MODEL, height=1.6),
+    )
+    assert known.sd.stature < unknown.sd.stature and known.mean.stature == pytest.approx(1.6, abs=0.03)
+
+
+def test_somebody_standing_has_no_heading(tmp_path):
+    view = camera(place=(0.0, -6.0, 2.2))
+    pictures, states = clip(MODEL, SECTIONS, 1, view=view)
+    write(tmp_path / "stand.mp4", pictures * 33)
+    found = find_start(Video(tmp_path / "stand.mp4"), view, wall(), MODEL)
+    assert found.sd.heading >= np.pi - 1e-6
+    assert found.mean.stride_hz == pytest.approx(MODEL.info.stride_hz)
+
+
+def test_nobody_in_the_picture_is_told(tmp_path):
+    write(tmp_path / "empty.mp4", [wall()] * 12)
+    with pytest.raises(UserError, match="empty.mp4: --init auto found nobody .*give --init FILE.json"):
+        find_start(Video(tmp_path / "empty.mp4"), camera(), wall(), MODEL)
+    with pytest.raises(UserError, match="--init auto: needs a background"):
+        find_start(Video(tmp_path / "empty.mp4"), camera(), None, MODEL)

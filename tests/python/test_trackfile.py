@@ -1,0 +1,158 @@
+"""Track, truth and TRC files."""
+
+import numpy as np
+import pytest
+
+from gait import Estimate, Flag, Frame, Model, State, TrackStatus, UserError
+from gait.skeleton import EVAL15, JOINTS
+from gait.trackfile import TrackWriter, read_track, read_truth
+from gait.trc import write_trc
+
+MODEL = Model()
+HEADER = (
+    "frame,time,status,phase,stride_hz,heading_rad,stature_m,speed_m_s,ess,log_evidence,c_1,c_2,c_3,c_4,c_5,"
+    "pelvis_x,pelvis_y,pelvis_z,pelvis_sx,pelvis_sy,pelvis_sz,"
+    "neck_x,neck_y,neck_z,neck_sx,neck_sy,neck_sz,"
+    "head_top_x,head_top_y,head_top_z,head_top_sx,head_top_sy,head_top_sz,"
+)
+ORDER = [
+    *("pelvis", "neck", "head_top", "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist"),
+    *("l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle", "l_toe", "r_toe", "l_heel", "r_heel"),
+]
+
+
+def estimate(i):
+    rng = np.random.default_rng(i)
+    return Estimate(
+        utime=i * 33333,
+        frame=i,
+        status=TrackStatus(i % 4),
+        flags=Flag(0),
+        log_evidence=-80.5 - i,
+        ess=123.4,
+        phase_r=0.9,
+        mode_mass=1.0,
+        speed=1.25,
+        mean=State(phase=0.1 * i, stride_hz=0.9, stature=1.7, heading=-1.0, coef=rng.normal(size=5)),
+        sd=State(),
+        best=State(),
+        joints=rng.normal(size=(19, 3)),
+        joint_sd=rng.uniform(0.01, 0.1, (19, 3)),
+        angles=rng.normal(size=24),
+        joint_names=MODEL.joint_names,
+    )
+
+
+def write(path, count=4):
+    with TrackWriter(path, 5, MODEL.joint_names, MODEL.angle_names) as rows:
+        for i in range(count):
+            rows.write(Frame(10 + i, (10 + i) / 30, None), estimate(i))
+
+
+def test_header_is_that_of_the_interface(tmp_path):
+    write(tmp_path / "t.csv")
+    header, first, *_ = (tmp_path / "t.csv").read_text().split("\n")
+    assert header.startswith(HEADER)
+    names = header.split(",")
+    joints = [name[: -len("_sx")] for name in names if name.endswith("_sx")]
+    assert joints == ORDER == JOINTS and ORDER[:15] == EVAL15
+    assert names[-24:] == [f"{name}_deg" for name in MODEL.angle_names]
+    assert len(names) == 10 + 5 + 6 * 19 + 24 == len(first.split(","))
+    assert first.startswith("10,0.333333,init,0.000000,0.900000,-1.000000,1.700000,1.250000,123.40,-80.5000,")
+    assert f"{np.degrees(estimate(0).angles[-1]):.3f}" == first.split(",")[-1]
+
+
+def test_what_was_written_is_read_back(tmp_path):
+    write(tmp_path / "t.csv")
+    track = read_track(tmp_path / "t.csv")
+    assert track.frame.tolist() == [10, 11, 12, 13]
+    assert track.status == ["init", "tracking", "ambiguous", "lost"]
+    np.testing.assert_allclose(track.time, np.arange(10, 14) / 30, atol=1e-6)
+    np.testing.assert_allclose(track.phase, [0, 0.1, 0.2, 0.3])
+    for i in range(4):
+        for k, name in enumerate(JOINTS):
+            np.testing.assert_allclose(track.places[name][i], estimate(i).joints[k], atol=6e-6)
+            np.testing.assert_allclose(track.sd[name][i], estimate(i).joint_sd[k], atol=6e-6)
+    np.testing.assert_allclose(track.eval15()[2, 14], estimate(2).joints[14], atol=6e-6)
+
+
+def test_another_joint_order_of_the_model_is_sorted_out(tmp_path):
+    turned = MODEL.joint_names[::-1]
+    with TrackWriter(tmp_path / "t.csv", 5, turned, MODEL.angle_names) as rows:
+        rows.write(Frame(0, 0.0, None), estimate(0))
+    np.testing.assert_allclose(
+        read_track(tmp_path / "t.csv").places["pelvis"][0], estimate(0).joints[18], atol=6e-6
+    )
+    with pytest.raises(UserError, match="model: has no joint l_toe"):
+        TrackWriter(tmp_path / "t.csv", 5, tuple(n for n in turned if n != "l_toe"), MODEL.angle_names)
+
+
+def test_an_error_leaves_no_file(tmp_path):
+    with pytest.raises(RuntimeError), TrackWriter(tmp_path / "t.csv", 5, MODEL.joint_names, ()) as rows:
+        rows.write(Frame(0, 0.0, None), estimate(0))
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def spoil(path, change):
+    lines = path.read_text().split("\n")
+    change(lines)
+    path.write_text("\n".join(lines))
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (
+            lambda s: s.__setitem__(2, s[2].replace("tracking", "dancing")),
+            "line 3: status 'dancing' is not one of",
+        ),
+        (lambda s: s.__setitem__(2, s[2] + ",1"), "line 3 has 154 cells, the header 153"),
+        (
+            lambda s: s.__setitem__(3, s[3].replace("0.200000", "nan", 1)),
+            "line 4: phase is 'nan'; give a finite",
+        ),
+        (lambda s: s.__setitem__(0, s[0].replace("l_knee_sx", "x")), "column l_knee_sx is missing"),
+        (lambda s: s.__setitem__(2, "9" + s[2][2:]), "frame must be whole numbers that increase"),
+        (lambda s: s.__delitem__(slice(1, None)), "has no rows"),
+    ],
+)
+def test_damaged_tracks_are_told(change, words, tmp_path):
+    write(tmp_path / "t.csv")
+    spoil(tmp_path / "t.csv", change)
+    with pytest.raises(UserError, match=f"t.csv: {words}"):
+        read_track(tmp_path / "t.csv")
+
+
+def test_truth_needs_eval15_and_takes_feet_if_there(tmp_path):
+    write(tmp_path / "t.csv")  # a track has the columns of a truth, and more
+    truth = read_truth(tmp_path / "t.csv")
+    assert set(truth.places) == set(JOINTS)
+    spoil(tmp_path / "t.csv", lambda s: s.__setitem__(0, s[0].replace("l_heel_x", "q")))
+    assert "l_heel" not in read_truth(tmp_path / "t.csv").places
+    spoil(tmp_path / "t.csv", lambda s: s.__setitem__(0, s[0].replace("neck_y", "p")))
+    with pytest.raises(UserError, match="t.csv: column neck_y is missing; a truth file needs it"):
+        read_truth(tmp_path / "t.csv")
+    with pytest.raises(UserError, match="none.csv: no such truth file"):
+        read_truth(tmp_path / "none.csv")
+
+
+def test_trc_has_opensims_frame_and_counts(tmp_path):
+    joints = np.arange(12, dtype=float).reshape(2, 2, 3)
+    write_trc(tmp_path / "o.trc", ("a", "b"), np.array([0.5, 0.6]), joints, 10.0)
+    lines = (tmp_path / "o.trc").read_text().split("\n")
+    assert lines[0] == "PathFileType\t4\t(X/Y/Z)\to.trc"
+    assert lines[2].split("\t") == ["10", "10", "2", "2", "m", "10", "1", "2"]
+    assert lines[3] == "Frame#\tTime\ta\t\t\tb" and lines[4] == "\t\tX1\tY1\tZ1\tX2\tY2\tZ2"
+    # world (0, 1, 2), z up, is (1, 2, 0) with y up
+    assert lines[6].split("\t") == [
+        "1",
+        "0.500000",
+        "1.00000",
+        "2.00000",
+        "0.00000",
+        "4.00000",
+        "5.00000",
+        "3.00000",
+    ]
+    assert len(lines) == 9 and lines[8] == ""
