@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -16,10 +16,11 @@ from gait._abi import Flag, Mode, Term, TrackStatus
 from gait._lib import aligned, check, library
 from gait.camera import Camera
 from gait.errors import UserError
+from gait.initial import Start
 from gait.model import Model, camera_c, pose_arrays
 from gait.state import Array, State
 from gait.tasks import PythonTasks, Runner, TaskSource, threads
-from gait.video import Image
+from gait.video import Frame, Image, Video
 
 
 @dataclass(frozen=True)
@@ -265,6 +266,22 @@ class Tracker:
         self.step_seconds = time.perf_counter() - begun
         self._check(status)
         return Estimate.from_c(out, self.model)
+
+    def follow(self, video: Video, start: Start, stop: int | None = None) -> Iterator[tuple[Frame, Estimate]]:
+        """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
+
+        Parameters
+        ----------
+        video : Video
+            As seen by the only camera.
+        start : Start
+        stop : int, optional
+            First frame not to use.
+        """
+        for frame in video.frames(start.frame, stop):
+            if frame.number == start.frame:
+                self.start(start.mean, start.sd, frame.utime)
+            yield frame, self.step(frame.image, frame.utime)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""

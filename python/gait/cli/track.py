@@ -15,7 +15,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
@@ -167,23 +167,13 @@ def _track(args: argparse.Namespace, video: Video, tracker: Tracker, start: Star
                 lambda frame, estimate: film.write(overlay.draw(frame.image, estimate, frame.number))
             )
         update = stack.enter_context(progress("tracking", stop - start.frame, args.quiet))
-        _steps(video.frames(start.frame, stop), tracker, start, sinks, update)
+        for done, (frame, estimate) in enumerate(tracker.follow(video, start, stop), 1):
+            for sink in sinks:
+                sink(frame, estimate)
+            update(done)
         if not results.times:
             raise UserError(f"{video.path}: no frame from {start.frame} up to {stop}; it has {video.count}")
     return results
-
-
-def _steps(
-    frames: Iterable[Frame], tracker: Tracker, start: Start, sinks: list[Sink], update: Callable[[int], None]
-) -> None:
-    """Step through the frames and hand each estimate on."""
-    for done, frame in enumerate(frames):
-        if done == 0:
-            tracker.start(start.mean, start.sd, frame.utime)
-        estimate = tracker.step(frame.image, frame.utime)
-        for sink in sinks:
-            sink(frame, estimate)
-        update(done + 1)
 
 
 def _text(summary: dict[str, Any]) -> str:
