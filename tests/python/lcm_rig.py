@@ -27,7 +27,7 @@ from gait.model import Model
 from gait.state import State
 
 ROOT = Path(__file__).resolve().parents[2]
-TRACKD = ROOT / "build" / "bin" / "gait-trackd"
+TRACKD = Path(os.environ.get("GAIT_TRACKD", ROOT / "build" / "bin" / "gait-trackd"))
 MODEL = ROOT / "python" / "gait" / "data" / "walk.gait"
 PYTHON = ROOT / ".venv" / "bin" / "python"
 FPS = 30

@@ -46,7 +46,7 @@ def begin(listener, pacer):
 
 
 def test_a_stream_at_thirty_hertz_arrives_and_is_tracked_in_time(url, tmp_path):
-    """Capture in this process, tracker in another, recorder in a third place: loss and latency of each leg."""
+    """Capture here, tracker in another process, recorder in a thread: loss and latency of each leg."""
     count = 60
     with rig.daemon(url) as (listener, finish):
         ready(listener)

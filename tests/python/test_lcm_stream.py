@@ -124,7 +124,7 @@ def paced(rate, times, work):
 
 
 def test_delays_do_not_add_up():
-    """Each frame takes a third of the interval to prepare, one takes two intervals: the others stay on the grid."""
+    """Frames take a third of the interval to prepare, one takes two: the others stay on the grid."""
     times = np.arange(50) / 30 + 4.0
     work = np.full(50, 1 / 90)
     work[20] = 2 / 30
@@ -292,7 +292,7 @@ def leftovers(folder):
     """Processes that still have the folder on their command line."""
     found = subprocess.run(["ps", "-eo", "pid,args"], capture_output=True, text=True, check=True).stdout
     own = str(os.getpid())
-    return [line for line in found.splitlines() if str(folder) in line and not line.split()[0] == own]
+    return [line for line in found.splitlines() if str(folder) in line and line.split()[0] != own]
 
 
 def check_demo(done, out):

@@ -59,8 +59,8 @@ def test_image_is_bot_core_image_on_the_wire(tmp_path):
         "package bot_core; struct image_metadata_t { string key; int32_t n; byte value[n]; }"
     )
     (tmp_path / "b.lcm").write_text(
-        "package bot_core; struct image_t { int64_t utime; int32_t width; int32_t height; int32_t row_stride; "
-        "int32_t pixelformat; int32_t size; byte data[size]; int32_t nmetadata; "
+        "package bot_core; struct image_t { int64_t utime; int32_t width; int32_t height; "
+        "int32_t row_stride; int32_t pixelformat; int32_t size; byte data[size]; int32_t nmetadata; "
         "image_metadata_t metadata[nmetadata]; }"
     )
     generator = Path(sys.executable).with_name("lcm-gen")

@@ -107,7 +107,7 @@ def _clip(args: argparse.Namespace, out: Path, session: Session) -> Clip:
     if args.video is None:
         folder = out / "clip"
         _say(args, "rendering a clip")
-        session.start("gait simulate", [*_gait("simulate"), str(folder)]).result(600.0)
+        session.start("gait simulate", [*_gait("simulate"), "-o", str(folder)]).result(600.0)
         args.video = str(folder / "video.mp4")
     beside = Path(args.video).parent
     camera = args.camera or _beside(beside / "camera.json")

@@ -10,6 +10,7 @@ import argparse
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,7 @@ def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
     if measures is not None:
         page.block("Error against the truth", evaluation_text(measures))
     page.film("Frames", pictures)
+    page.words("Tinted in the plots: frames at the start (grey), ambiguous (yellow), lost (red).")
     for heading, svg in _drawings(results, errors, live=not args.replayed):
         page.figure(heading, svg)
     with replacing(args.output) as path:
@@ -142,7 +144,9 @@ def _film(
             estimate = known.get(frame.number)
             if film is None and frame.number not in wanted:
                 continue
-            picture = frame.image if estimate is None else overlay.draw(frame.image, estimate, frame.number)
+            picture = frame.image
+            if estimate is not None:  # the panel shows the time of the video, not of the day
+                picture = overlay.draw(picture, replace(estimate, utime=frame.utime), frame.number)
             if film is not None:
                 film.write(picture)
             if frame.number in wanted:

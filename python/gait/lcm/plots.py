@@ -69,7 +69,7 @@ def error_plot(run: Run, errors: Comparison) -> str:
         axes.plot(errors.frame, errors.abs_mm, color=_BLUE, label="as it is (abs)")
         axes.plot(errors.frame, errors.root_mm, color=_ORANGE, label="hips aligned (root)")
         axes.set(xlabel="frame", ylabel="error, mm", ylim=(0, None))
-        axes.legend(loc="upper right")
+        axes.legend(loc="best")
 
     return _figure(run, paint)
 
@@ -88,7 +88,7 @@ def phase_plot(run: Run, errors: Comparison | None) -> str:
         axes.fill_between(run.frame, -2 * sd, 2 * sd, color=_BLUE, alpha=0.15, lw=0, label="two deviations")
         axes.axhline(0, color=_GREY, lw=0.8)
         axes.set(xlabel="frame", ylabel="phase error, strides")
-        axes.legend(loc="upper right")
+        axes.legend(loc="best")
 
     return _figure(run, paint)
 
@@ -119,7 +119,7 @@ def time_plot(run: Run, live: bool) -> str:
             interval = 1000 * float(np.median(np.diff(run.seconds)))
             axes.axhline(interval, color=_GREY, ls="--", lw=0.8, label="frame interval")
         axes.set(xlabel="frame", ylabel="milliseconds", ylim=(0, None))
-        axes.legend(loc="upper right")
+        axes.legend(loc="best")
 
     return _figure(run, paint)
 
@@ -135,7 +135,7 @@ def path_plot(run: Run, errors: Comparison | None) -> str:
         axes.plot(*path.T, color=_BLUE, label="estimate")
         axes.set(xlabel="x, m", ylabel="y, m")
         axes.set_aspect("equal", adjustable="datalim")
-        axes.legend(loc="upper right")
+        axes.legend(loc="best")
 
     return _figure(run, paint, frames=False)
 
