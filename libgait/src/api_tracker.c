@@ -15,13 +15,13 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .struct_size = sizeof *cfg,
         .mode = mode,
         .seed = 1,
-        .particles = paper ? 10000 : 1000,
+        .particles = paper ? 10000 : 1500,
         .components = -1,
         .tasks = 8,
         .cameras = 1,
         .terms = paper ? GAIT_TERM_TEXTURE
                        : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
-        .term_weight = {1.0f, 40.0f, 60.0f, 10.0f},
+        .term_weight = {0.2f, 25.0f, 40.0f, 4.0f},
         .missed_weight = 0.4f,
         .girth = 1.05f,
         .resample_ess = paper ? 1.0f : 0.5f,
@@ -30,15 +30,15 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .rate_noise = 0.02f,
         .rate_noise_start = 0.055f,
         .settle_time = 1.0f,
-        .rate_time = 8.0f,
+        .rate_time = 5.0f,
         .forward_noise = 0.022f,
         .lateral_noise = 0.0164f,
         .vertical_noise = 0.0096f,
         .heading_noise = 0.044f,
         .tilt_noise = 0.033f,
         .tilt_time = 1.1f,
-        .coef_noise = 0.33f,
-        .coef_time = 18.0f,
+        .coef_noise = 0.66f,
+        .coef_time = 4.5f,
         .stature_noise = 0.005f,
     };
     if (paper) { /* random walks of eqs. 5-9 (spec 1.4), rates that the papers left open */
@@ -51,6 +51,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
         cfg->stature_noise = 0.0f;
         cfg->girth = 1.0f;
+        cfg->term_weight[0] = 1.0f;
     }
 }
 

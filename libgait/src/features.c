@@ -79,18 +79,29 @@ static int32_t exposure_gain(const view_planes *im, const view_planes *plate)
     return scene > 0 ? (int32_t)(frame * 256 / scene) : 256;
 }
 
-/* Sum over channels of the squared difference of one cell of 2 x 2 pixels, grey levels squared. */
+/* Evidence that one cell of 2 x 2 pixels changed, grey levels squared over three channels.  What a shadow explains,
+ * the plate's colour at 2/5 .. 1 of its brightness, counts a SHADOW_SHARE-th. */
 static int32_t cell_difference(const view_planes *im, const view_planes *plate, int32_t at, int32_t gain)
 {
-    int32_t total = 0;
+    enum { SHADOW_SHARE = 6 };
+    int32_t total = 0, across = 0, scene2 = 0; /* |I - B|^2, <I, B>, <B, B> */
     for (int32_t c = 0; c < im->channels; c++) {
         const uint8_t *const a = im->channel[c] + at, *const b = plate->channel[c] + at;
-        int32_t const frame = a[0] + a[1] + a[VIEW_SIZE] + a[VIEW_SIZE + 1];
-        int32_t const scene = b[0] + b[1] + b[VIEW_SIZE] + b[VIEW_SIZE + 1];
-        int32_t const d = (frame * 256 - scene * gain) / 1024;
+        int32_t const frame = (a[0] + a[1] + a[VIEW_SIZE] + a[VIEW_SIZE + 1]) / 4;
+        int32_t const scene = (b[0] + b[1] + b[VIEW_SIZE] + b[VIEW_SIZE + 1]) * gain / 1024;
+        int32_t const d = frame - scene;
         total += d * d;
+        across += frame * scene;
+        scene2 += scene * scene;
     }
-    return im->channels == 3 ? total : 3 * total;
+    if (im->channels == 1)
+        return 3 * total;
+    int32_t const ratio = 256 * across / i_max(scene2, 1); /* brightness against the plate, 1/256 */
+    if (ratio < 102 || ratio >= 256)
+        return total;
+    /* |I - B|^2 = |I - r B|^2 + (1 - r)^2 |B|^2: colour and shade */
+    int32_t const dark = 256 - ratio, shade = i_min((dark * dark / 256) * (scene2 / 16) / 16, total);
+    return total - shade + shade / SHADOW_SHARE;
 }
 
 void features_foreground(features *f, const view_planes *im, const view_planes *plate)
@@ -150,7 +161,7 @@ static void soften(const int16_t *in, int32_t *out, int32_t *tmp)
 /* gg'/(|g|^2 + k^2): an outer product that saturates at trace 1, k = local mean gradient and a noise floor. */
 static void edge_tensor(const features_scratch *s, int32_t box_area, int16_t *xx, int16_t *yy, int16_t *xy)
 {
-    float const floor2 = 20.0f * 20.0f; /* 2.5 grey levels per pixel in Sobel units */
+    float const floor2 = 40.0f * 40.0f; /* 5 grey levels per pixel in Sobel units */
     float const inv = 1.0f / (float)box_area;
     float const one = 8.0f * (float)EDGE_ONE;
     for (int32_t i = 0; i < VIEW_PIXELS; i++) {
@@ -190,7 +201,7 @@ void features_edges(const uint8_t *grey, edge_cell *out, features_scratch *s)
 void features_contrast(const uint8_t *grey, int8_t *out, features_scratch *s)
 {
     enum { RADIUS = 9, AREA = (2 * RADIUS + 1) * (2 * RADIUS + 1) };
-    float const inv = 1.0f / (float)AREA, floor2 = 4.0f * 4.0f;
+    float const inv = 1.0f / (float)AREA, floor2 = 6.0f * 6.0f;
     int32_t *const square = (int32_t *)(void *)s->tensor; /* 6 bytes a pixel are free there, 4 are needed */
     for (int32_t i = 0; i < VIEW_PIXELS; i++) {
         s->sum[i] = grey[i];

@@ -144,9 +144,11 @@ float like_evaluate(const like_body *b)
     return sum;
 }
 
-void like_terms(const like_body *b, float terms[LIKE_TERMS])
+float like_support(const like_body *b)
 {
+    float sum = 0.0f;
     for (int32_t k = 0; k < LIKE_TERMS; k++)
-        if (b->setup->terms & TERMS[k]->flag)
-            terms[k] += TERMS[k]->log_likelihood(b);
+        if ((b->setup->terms & TERMS[k]->flag) && TERMS[k]->support)
+            sum += b->setup->weight[k] * TERMS[k]->support(b);
+    return sum;
 }

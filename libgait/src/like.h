@@ -47,6 +47,7 @@ typedef struct like_term {
     const char *name;
     uint32_t flag;                               /* GAIT_TERM_* */
     float (*log_likelihood)(const like_body *b); /* nats, without its weight */
+    float (*support)(const like_body *b);        /* the same over "nobody is there"; NULL: no opinion */
 } like_term;
 
 extern const like_term like_texture, like_silhouette, like_edges, like_template;
@@ -60,8 +61,8 @@ void like_sample(const like_setup *s, const features *f, const gait_camera *cam,
 /* Sum of the weighted terms in use. */
 float like_evaluate(const like_body *b);
 
-/* Add each term in use, unweighted, in the order of GAIT_TERM_*. */
-void like_terms(const like_body *b, float terms[LIKE_TERMS]);
+/* Sum of the weighted terms over the hypothesis that nobody is there: positive if the frame shows this body. */
+float like_support(const like_body *b);
 
 /* Mean robust cost between two sets of surface samples of a limb; returns how many were seen in both. */
 int32_t like_compare(const like_setup *s, const int8_t *a, const int8_t *b, int32_t *cost);

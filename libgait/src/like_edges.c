@@ -7,7 +7,8 @@ enum {
 }; /* along each side of a cone; along each side of an ellipsoid's octagon */
 
 typedef struct tally {
-    int32_t response; /* sum of 64 x EDGE_ONE per point */
+    int32_t response; /* sum of n'Tn, 128 x EDGE_ONE at most per point */
+    int32_t chance;   /* the same for a normal of random direction: half the trace */
     int32_t points;
 } tally;
 
@@ -31,6 +32,7 @@ static void side(const features *f, const rast_mask *mask, float x0, float y0, f
             continue;
         const edge_cell *const e = f->edge + ((int32_t)y * VIEW_SIZE + (int32_t)x);
         t->response += e->trace * 64 + e->xx_yy * cos2 + e->xy2 * sin2;
+        t->chance += e->trace * 64;
         t->points++;
     }
 }
@@ -65,10 +67,9 @@ static void ellipsoid(const like_body *b, int32_t l, tally *t)
     }
 }
 
-static float log_likelihood(const like_body *b)
+static tally outline(const like_body *b)
 {
-    int32_t const enough = 20; /* points below which the outline counts as unseen */
-    tally t = {0, 0};
+    tally t = {0, 0, 0};
     for (int32_t l = 0; l < b->setup->limbs; l++) {
         if (!(b->outline->depth[l][b->lane] > 0.0f))
             continue;
@@ -77,9 +78,26 @@ static float log_likelihood(const like_body *b)
         else
             cone(b, l, &t);
     }
-    if (t.points < enough)
+    return t;
+}
+
+enum { ENOUGH = 20 }; /* points below which the outline counts as unseen */
+
+static float log_likelihood(const like_body *b)
+{
+    tally const t = outline(b);
+    if (t.points < ENOUGH)
         return -1.0f;
     return (float)t.response / (float)(t.points * 2 * 64 * EDGE_ONE) - 1.0f;
 }
 
-const like_term like_edges = {"edges", GAIT_TERM_EDGES, log_likelihood};
+/* With nobody there the outline meets edges of any direction; a tenth more than chance is asked for. */
+static float support(const like_body *b)
+{
+    tally const t = outline(b);
+    if (t.points < ENOUGH)
+        return -1.0f;
+    return ((float)t.response - 1.1f * (float)t.chance) / (float)(t.points * 2 * 64 * EDGE_ONE);
+}
+
+const like_term like_edges = {"edges", GAIT_TERM_EDGES, log_likelihood, support};

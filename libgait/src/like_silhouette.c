@@ -20,16 +20,27 @@ static void count(const like_body *b, int32_t *area, int32_t *covered)
     *covered = c;
 }
 
+/* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */
+static const float TYPICAL = 0.16f * (float)(VIEW_PERSON / 2) * (float)(VIEW_PERSON / 2) * (float)FG_ONE;
+
 static float log_likelihood(const like_body *b)
 {
-    /* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */
-    float const typical = 0.16f * (float)(VIEW_PERSON / 2) * (float)(VIEW_PERSON / 2) * (float)FG_ONE;
     int32_t area, covered;
     if (!b->features->has_fg)
         return 0.0f;
     count(b, &area, &covered);
     float const missed = (float)(b->features->fg_total - covered);
-    return -((float)(area - covered) + b->setup->missed_weight * missed) / typical;
+    return -((float)(area - covered) + b->setup->missed_weight * missed) / TYPICAL;
 }
 
-const like_term like_silhouette = {"silhouette", GAIT_TERM_SILHOUETTE, log_likelihood};
+/* With nobody there all foreground is missed and no background is inside. */
+static float support(const like_body *b)
+{
+    int32_t area, covered;
+    if (!b->features->has_fg)
+        return 0.0f;
+    count(b, &area, &covered);
+    return (b->setup->missed_weight * (float)covered - (float)(area - covered)) / TYPICAL;
+}
+
+const like_term like_silhouette = {"silhouette", GAIT_TERM_SILHOUETTE, log_likelihood, support};

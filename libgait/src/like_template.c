@@ -36,4 +36,4 @@ static float log_likelihood(const like_body *b)
     return both < enough ? unknown : -(float)sum / (float)(both * LIKE_COST_ONE);
 }
 
-const like_term like_template = {"template", GAIT_TERM_TEMPLATE, log_likelihood};
+const like_term like_template = {"template", GAIT_TERM_TEMPLATE, log_likelihood, NULL};

@@ -62,4 +62,4 @@ static float log_likelihood(const like_body *b)
     return sum;
 }
 
-const like_term like_texture = {"texture", GAIT_TERM_TEXTURE, log_likelihood};
+const like_term like_texture = {"texture", GAIT_TERM_TEXTURE, log_likelihood, NULL};

@@ -140,22 +140,6 @@ static void predict(gait_tracker *t, float dt, uint32_t frame)
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
 }
 
-/* Do the images support the estimate?  Edges near their chance level or a silhouette mostly wrong say no. */
-static bool supported(const gait_tracker *t, const float terms[LIKE_TERMS])
-{
-    float const least_edges = -0.80f, least_silhouette = -1.2f; /* per camera, unweighted */
-    int32_t cameras = 0;
-    bool plate = false;
-    for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        cameras += t->camera[c].seen.seen;
-        plate |= t->camera[c].seen.has_fg;
-    }
-    float const n = (float)i_max(cameras, 1);
-    if ((t->cfg.terms & GAIT_TERM_EDGES) && terms[2] < least_edges * n)
-        return false;
-    return !((t->cfg.terms & GAIT_TERM_SILHOUETTE) && plate && terms[1] < least_silhouette * n);
-}
-
 static int32_t judge(gait_tracker *t, bool degenerate, const gait_estimate *e, float dt, float age)
 {
     float const patience = 0.33f, acquire = 1.0f; /* seconds */
@@ -171,7 +155,6 @@ static int32_t judge(gait_tracker *t, bool degenerate, const gait_estimate *e, f
 static void observe(gait_tracker *t, float dt, gait_estimate *out)
 {
     float const age = 1e-6f * (float)(t->core->utime - t->core->start_utime);
-    float terms[LIKE_TERMS];
     weigh_particles(t);
     pf_summary const s = pf_reweigh(&t->filter, t->ll);
     t->core->ess = s.ess;
@@ -179,8 +162,8 @@ static void observe(gait_tracker *t, float dt, gait_estimate *out)
     out->log_evidence = s.log_evidence;
     out->flags |= s.degenerate || s.ess < 2.0 ? GAIT_EST_DEGENERATE : 0;
     walker const mean = estimate_fill(t, s.best, out);
-    weigh_walker(t, &mean, terms);
-    t->core->fading = supported(t, terms) ? 0 : t->core->fading + 1;
+    /* Terms without an opinion on whether anybody is there give exactly zero. */
+    t->core->fading = weigh_walker(t, &mean) >= 0.0f ? 0 : t->core->fading + 1;
     out->status = judge(t, s.degenerate, out, dt, age);
     for (int32_t c = 0; c < t->cfg.cameras && out->status == GAIT_STATUS_TRACKING; c++)
         if (t->camera[c].seen.seen && t->template[c])

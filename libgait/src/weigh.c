@@ -99,11 +99,10 @@ void weigh_particles(gait_tracker *t)
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, weigh_range, t);
 }
 
-void weigh_walker(gait_tracker *t, const walker *person, float terms[LIKE_TERMS])
+float weigh_walker(gait_tracker *t, const walker *person)
 {
     weigh_scratch *const w = &t->work[0];
-    for (int32_t k = 0; k < LIKE_TERMS; k++)
-        terms[k] = 0.0f;
+    float support = 0.0f;
     walker_body(&t->rule, person, &w->body);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
@@ -112,6 +111,7 @@ void weigh_walker(gait_tracker *t, const walker *person, float terms[LIKE_TERMS]
                         &t->camera[c].seen.map, &w->outline);
         int8_t *const seen = t->seen ? t->seen + (size_t)c * (size_t)t->like->limbs * LIKE_SAMPLES : NULL;
         like_body const b = look_at(t, c, 0, w, seen);
-        like_terms(&b, terms);
+        support += like_support(&b);
     }
+    return support;
 }

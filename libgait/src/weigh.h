@@ -9,6 +9,6 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
 /* Log-likelihoods t->ll, joints and surface samples of all particles. */
 void weigh_particles(gait_tracker *t);
 
-/* Surface samples of one walker into t->seen, and its unweighted terms (sum over cameras), in the order of GAIT_TERM_*. */
-void weigh_walker(gait_tracker *t, const walker *w, float terms[LIKE_TERMS]);
+/* Surface samples of one walker into t->seen; returns how much better it explains the frame than nobody, nats. */
+float weigh_walker(gait_tracker *t, const walker *w);
 #endif
