@@ -1,4 +1,4 @@
-"""Read and write model blobs (`.gait`, format 1.0): a container of named arrays, described in model-format.md.
+"""Read and write model blobs (`.gait`, format 1.0): a container of named arrays (model-format.md).
 
 The container knows nothing of walking; what the sections mean is `gait.skeleton` and `gait.learn`.
 """
@@ -9,6 +9,7 @@ import os
 import struct
 import zlib
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ ENTRY = struct.Struct("<4sII4IIQQ")
 ALIGN = 64
 NAME_BYTES = 32
 CRC_OFFSET = 20
-DTYPES = {1: np.dtype("<u1"), 2: np.dtype("<i4"), 3: np.dtype("<f4")}
+DTYPES: dict[int, np.dtype[Any]] = {1: np.dtype("<u1"), 2: np.dtype("<i4"), 3: np.dtype("<f4")}
 CODES = {dtype: code for code, dtype in DTYPES.items()}
 
 Array = npt.NDArray[np.generic]
@@ -77,9 +78,13 @@ def decode(blob: bytes, name: str = "blob") -> dict[str, Array]:
         raise UserError(f"{name}: not a .gait model; make one with gait learn")
     _, major, minor, header_bytes, count, crc, total = HEADER.unpack_from(blob)
     if major != FORMAT[0]:
-        raise UserError(f"{name}: format {major}.{minor}, this package reads {FORMAT[0]}.x; learn the model again")
+        raise UserError(
+            f"{name}: format {major}.{minor}, this package reads {FORMAT[0]}.x; learn the model again"
+        )
     if header_bytes != HEADER.size or total != len(blob) or HEADER.size + count * ENTRY.size > len(blob):
-        raise UserError(f"{name}: header says {total} bytes, the file has {len(blob)}; copy or learn it again")
+        raise UserError(
+            f"{name}: header says {total} bytes, the file has {len(blob)}; copy or learn it again"
+        )
     if crc != checksum(blob):
         raise UserError(f"{name}: checksum differs, the file is damaged; copy or learn it again")
     sections: dict[str, Array] = {}
@@ -147,7 +152,7 @@ def _aligned(n: int) -> int:
 
 
 def _storable(tag: str, array: Array) -> Array:
-    """The array in file order and byte order, checked."""
+    """Check an array and bring it into file order and byte order."""
     stored = np.ascontiguousarray(array, np.asarray(array).dtype.newbyteorder("<"))
     if len(tag.encode("ascii")) != 4 or stored.dtype not in CODES or not 1 <= stored.ndim <= 4:
         raise ValueError(f"section {tag!r}: {stored.dtype} with {stored.ndim} axes cannot be stored")

@@ -1,7 +1,7 @@
 """The default skeleton as data, and forward kinematics in numpy (the twin of the C library's).
 
-Frames, rotations and signs are those of libgait/doc/model-format.md.  Lengths are fractions of stature, angles
-radians; body axes x forward, y left, z up.
+Frames, rotations and signs are those of libgait/doc/model-format.md.  Lengths are fractions of stature,
+angles radians; body axes x forward, y left, z up.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Skeleton:
     limb_shapes: Floats = field(default_factory=lambda: np.zeros((0, 10)))
 
     def sections(self) -> dict[str, blobs.Array]:
-        """The sections FRNM ... LIMF of a blob."""
+        """Make the sections FRNM ... LIMF of a blob."""
         return {
             "FRNM": blobs.pack_names(self.frames),
             "FRMI": self.links,
@@ -100,7 +100,7 @@ class Skeleton:
 
 
 def default_skeleton(p: Proportions | None = None) -> Skeleton:
-    """The default skeleton with generic or given proportions."""
+    """Make the default skeleton with generic or given proportions."""
     body = p or Proportions()
     frames, links, origins = _frames(body)
     points = _points(body)
@@ -240,12 +240,14 @@ def pose(
     channels = curves(sections, phase, np.broadcast_to(coef, (n, coef.shape[1])))
     angles = channels.copy()
     angles[:, _root_columns(sections)] += np.stack([heading, pitch, roll], axis=1)
-    positions = points(sections, angles) * stature[:, None, None] + np.asarray(pelvis, float).reshape(-1, 1, 3)
+    positions = points(sections, angles) * stature[:, None, None] + np.asarray(pelvis, float).reshape(
+        -1, 1, 3
+    )
     return positions, channels[:, : channels.shape[1] - len(ROOTS)]
 
 
 def curves(sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLike) -> Floats:
-    """Channel values (N, M) at phases (N,) for scores (N, k): mean + sum of c_k comp_k, linear between samples."""
+    """Channels (N, M) at phases (N,), scores (N, k): mean + sum of c_k comp_k, linear between samples."""
     table = np.asarray(sections["CURV"], float)
     phase, coef = np.asarray(phase, float), np.asarray(coef, float)
     samples = table.shape[1]

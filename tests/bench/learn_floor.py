@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""How well the cyclic model can describe a walker it has not seen: leave one subject out, reconstruct its joints.
+"""How well the cyclic model can describe a walker it has not seen: leave one subject out.
 
     .venv/bin/python tests/bench/learn_floor.py ../shared/data/mocap/cmu_walk [--json]
 
-Mean distance of 14 joints after alignment of the pelvis (place and orientation), mm, with one constant vector of
-scores and one phase offset per sequence, the sequence's own period.  `true` uses the walker's own limb lengths,
-`generic` the model's times the walker's stature, `upright` generic lengths and also the model's own pelvis
-orientation along the true heading.  `skeleton` is the floor below all: exact angles on the walker's own lengths.
+Mean distance of 14 joints after alignment of the pelvis (place and orientation), mm, with one constant vector
+of scores and one phase offset per sequence, the sequence's own period.  `true` uses the walker's own limb
+lengths, `generic` the model's times the walker's stature, `upright` generic lengths and also the model's own
+pelvis orientation along the true heading.  `skeleton` is the floor below all: exact angles on the walker's
+own lengths.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy.typing as npt
 
 from gait.learn import fit, model, retarget
 from gait.learn.sequence import Sequence, load
-from gait.skeleton import ANGLES, CHANNELS, EVAL15, axis_rotation, curves, default_skeleton, points
+from gait.skeleton import ANGLES, CHANNELS, EVAL15, curves, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 
@@ -84,7 +85,9 @@ def fit_at(
     use = scale * (np.arange(len(CHANNELS)) != CHANNELS.index("root_sway"))
     at = (np.arange(len(s.channels)) / s.period.frames + start) % 1.0
     base = curves(sections, at, np.zeros((len(at), 0)))
-    parts = np.array([curves(sections, at, np.eye(q)[[k] * len(at)]) - base for k in range(q)]).reshape(q, *base.shape)
+    parts = np.array([curves(sections, at, np.eye(q)[[k] * len(at)]) - base for k in range(q)]).reshape(
+        q, *base.shape
+    )
     design, goal = (parts * use).reshape(q, base.size), ((s.channels - base) * use).ravel()
     weight = np.linalg.solve(design @ design.T, design @ goal)
     return float(np.sum((goal - weight @ design) ** 2)), start, base + np.einsum("k,ktm->tm", weight, parts)
@@ -137,7 +140,9 @@ def summary(rows: list[dict[str, Any]], subjects: list[str]) -> dict[str, Any]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("source", type=Path, help="folder of .amc files")
     parser.add_argument("--json", action="store_true", help="print JSON")
     args = parser.parse_args()
@@ -147,10 +152,15 @@ def main() -> int:
         return 0
     print(f"{result['sequences']} sequences; reduced skeleton with exact angles {result['skeleton_mm']} mm")
     for row in result["table"]:
-        print("q={q}: true {true} generic {generic} upright {upright} mm, angles {angle_deg} deg, "
-              "elbow+wrist {elbow_wrist}, knee+ankle {knee_ankle} mm".format(**row))
+        print(
+            "q={q}: true {true} generic {generic} upright {upright} mm, angles {angle_deg} deg, "
+            "elbow+wrist {elbow_wrist}, knee+ankle {knee_ankle} mm".format(**row)
+        )
         for kind in ("true", "generic"):
-            print(f"   by subject, {kind}: " + " ".join(f"{k}:{v:.0f}" for k, v in row[f"subjects_{kind}"].items()))
+            print(
+                f"   by subject, {kind}: "
+                + " ".join(f"{k}:{v:.0f}" for k, v in row[f"subjects_{kind}"].items())
+            )
     return 0
 
 

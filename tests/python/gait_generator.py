@@ -1,7 +1,7 @@
 """Synthetic walking with known truth (G1): normative joint angles, random modes of variation, noise and gaps.
 
-Degrees; 19 channels: neck x, y, z; right shoulder flexion, abduction, rotation; right elbow; right hip flexion,
-abduction, rotation; right knee; the same eight of the left side.
+Degrees; 19 channels: neck x, y, z; right shoulder flexion, abduction, rotation; right elbow; right hip
+flexion, abduction, rotation; right knee; the same eight of the left side.
 """
 
 from dataclasses import dataclass
@@ -35,9 +35,7 @@ def mean_curves(phase):
     left = np.asarray(phase) + 0.5
     columns = [_interpolate(FLEXIONS[f"neck_{axis}"], phase) for axis in "xyz"]
     columns += [_interpolate(FLEXIONS[name], phase) for name in SIDE]
-    columns += [
-        _interpolate(FLEXIONS[name], left) * (-1 if name.endswith(MIRRORED) else 1) for name in SIDE
-    ]
+    columns += [_interpolate(FLEXIONS[name], left) * (-1 if name.endswith(MIRRORED) else 1) for name in SIDE]
     return np.stack(columns, axis=1)
 
 
@@ -92,7 +90,7 @@ def remove_blocks(rng, values, share, low=8, high=40):
 
 
 def cycle_matrix(rng, rows, modes, noise=1.0, missing=0.2):
-    """Cycles (rows, GRID, 19) of rank five, their observed mask in circular blocks, and the scores (rows, 5)."""
+    """Cycles (rows, GRID, 19) of rank five, their mask with gaps in blocks, and the scores (rows, 5)."""
     phase = np.arange(GRID) / GRID
     scores = rng.normal(size=(rows, len(SCORE_SD))) * SCORE_SD
     values = mean_curves(phase) + np.einsum("rq,qnc->rnc", scores, modes.curves(phase))

@@ -39,7 +39,13 @@ BONES = [
 def toy_asf():
     """Text of a skeleton with all bones that a walker needs."""
     lines = [":version 1.10", ":units", "  length 0.45", "  angle deg", ":root"]
-    lines += ["  order TX TY TZ RX RY RZ", "  axis XYZ", "  position 0 0 0", "  orientation 0 0 0", ":bonedata"]
+    lines += [
+        "  order TX TY TZ RX RY RZ",
+        "  axis XYZ",
+        "  position 0 0 0",
+        "  orientation 0 0 0",
+        ":bonedata",
+    ]
     for i, (name, _, direction, length, axis, dof) in enumerate(BONES, 1):
         lines += ["  begin", f"    id {i}", f"    name {name}"]
         lines += [f"    direction {' '.join(map(str, direction))}", f"    length {length}"]
@@ -106,7 +112,9 @@ def bvh_from_amc(path, rename=None, unit=0.0254 / 0.45):
             joint(k, depth + 1)
         if not children:
             end = bone.direction * bone.length * scale
-            lines.extend([f"{pad}  End Site", f"{pad}  {{", f"{pad}    OFFSET {' '.join(f'{v:.8f}' for v in end)}"])
+            lines.extend(
+                [f"{pad}  End Site", f"{pad}  {{", f"{pad}    OFFSET {' '.join(f'{v:.8f}' for v in end)}"]
+            )
             lines.append(f"{pad}  }}")
         lines.append(f"{pad}}}")
 

@@ -34,7 +34,9 @@ def test_round_trip(sections):
 
 @pytest.fixture
 def data():
-    return blob.encode({"AAAA": np.arange(6, dtype=np.float32).reshape(2, 3), "BBBB": np.arange(3, dtype=np.uint8)})
+    return blob.encode(
+        {"AAAA": np.arange(6, dtype=np.float32).reshape(2, 3), "BBBB": np.arange(3, dtype=np.uint8)}
+    )
 
 
 def resealed(data):

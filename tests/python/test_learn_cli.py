@@ -22,7 +22,13 @@ def walks(tmp_path_factory):
     """Seven toy walks of three subjects, one as BVH, and a broken file."""
     folder = tmp_path_factory.mktemp("walks")
     for i, (subject, trial) in enumerate([(1, 1), (1, 2), (1, 3), (2, 1), (2, 2), (3, 1)]):
-        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i, "frames": 420}
+        motion = {
+            "period": 110.0 + 6 * i,
+            "offset": 13.0 * i,
+            "swing": 0.85 + 0.05 * i,
+            "seed": i,
+            "frames": 420,
+        }
         files.write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", speed=1.1 + 0.05 * i, **motion)
     amc = files.write_toy(folder / "09", "09_01", period=125.0, seed=9, frames=400)
     (folder / "04").mkdir()
@@ -53,7 +59,9 @@ def test_a_bad_file_in_a_folder_is_named_and_the_rest_is_learnt(walks, tmp_path,
     assert err.count("\n") == 1 and "02_99.amc:3" in err and summary["left_out"][0] in err
     periods = [s["period_ms"] * 0.12 for s in summary["sequences"][:6]]
     assert periods == pytest.approx([110, 116, 122, 128, 134, 140], abs=0.4)
-    assert summary["stride_hz"][0] == pytest.approx(np.mean([120 / 116, 120 / 131, 120 / 140, 120 / 125]), rel=0.01)
+    assert summary["stride_hz"][0] == pytest.approx(
+        np.mean([120 / 116, 120 / 131, 120 / 140, 120 / 125]), rel=0.01
+    )
     assert np.all(np.diff(summary["imputation"]) <= 0)
 
 
@@ -92,7 +100,11 @@ def test_exclude_matches_the_tail_of_the_path(walks):
         return [p.name for p, _ in sources.find([str(walks)], globs)]
 
     assert "02_01.amc" in names()
-    assert names("02/*") == names("02_*.amc") == ["01_01.amc", "01_02.amc", "01_03.amc", "03_01.amc", "04_01.bvh"]
+    assert (
+        names("02/*")
+        == names("02_*.amc")
+        == ["01_01.amc", "01_02.amc", "01_03.amc", "03_01.amc", "04_01.bvh"]
+    )
     assert names("0[1-3]/*", "nothing") == ["04_01.bvh"]
 
 

@@ -51,7 +51,7 @@ def test_no_multiple_or_part_of_the_period():
 
 
 def test_literal_mode_is_wrong_for_long_sequences_of_fractional_period():
-    """The paper's whole-frame fold drifts by K |p - round p| frames; a multiple nearer to a whole number wins."""
+    """The whole-frame fold drifts by K |p - round p| frames; a multiple nearer to a whole number wins."""
     signals = g.walk(np.random.default_rng(3), 80.3, 5000, noise=5.0)
     assert period.find(signals, FPS, "literal").frames == pytest.approx(241, abs=1)
     assert period.find(signals, FPS).frames == pytest.approx(80.3, abs=0.05)
@@ -111,8 +111,8 @@ def test_constant_and_missing_channels_do_not_vote():
 def test_periods_of_real_walks():
     """All agree with autocorrelation to 5 %, and all but one to 2 %.
 
-    16_31 slows down: its legs repeat after 133 frames by this method and by the paper's alike, where the first
-    peak of the knee's autocorrelation is at 128.
+    16_31 slows down: its legs repeat after 133 frames by this method and by the paper's alike, where the
+    first peak of the knee's autocorrelation is at 128.
     """
     table = WALKS / "walk_periods.txt"
     if not table.is_file():

@@ -28,7 +28,10 @@ def body_of(channels, place=None, stature=1.7, fps=120.0):
     joints["head"] = joints.pop("head_top")
     lateral = {"head": frame["head"][:, :, 1]}
     for s in SIDES:
-        lateral[f"{s}_knee"], lateral[f"{s}_elbow"] = frame[f"{s}_thigh"][:, :, 1], frame[f"{s}_upper_arm"][:, :, 1]
+        lateral[f"{s}_knee"], lateral[f"{s}_elbow"] = (
+            frame[f"{s}_thigh"][:, :, 1],
+            frame[f"{s}_upper_arm"][:, :, 1],
+        )
     return Body("made", fps, joints, frame["pelvis"], lateral)
 
 
@@ -41,7 +44,9 @@ def column(name):
 def test_angles_survive_a_round_trip(seed, size):
     rng = np.random.default_rng(seed)
     channels = np.zeros((5, len(CHANNELS)))
-    channels[:, : len(ANGLES)] = rng.uniform(-size, size, (1, len(ANGLES))) + rng.normal(scale=0.05, size=(5, 24))
+    channels[:, : len(ANGLES)] = rng.uniform(-size, size, (1, len(ANGLES))) + rng.normal(
+        scale=0.05, size=(5, 24)
+    )
     channels[:, column("root_yaw")] = rng.uniform(-3, 3)
     walker = body_of(channels)
     measures = retarget.measure(walker)
@@ -66,7 +71,9 @@ def test_lengths_survive_a_round_trip():
     assert measures.stature == pytest.approx(1.7, rel=0.02)
 
 
-@pytest.mark.parametrize(("decompose", "axes"), [(rotations.decompose_yxz, (1, 0, 2)), (rotations.decompose_zyx, (2, 1, 0))])
+@pytest.mark.parametrize(
+    ("decompose", "axes"), [(rotations.decompose_yxz, (1, 0, 2)), (rotations.decompose_zyx, (2, 1, 0))]
+)
 def test_decomposition_passes_through_gimbal_lock_without_a_jump(decompose, axes):
     middle = np.radians(np.linspace(60, 120, 61))
     angles = np.stack([np.full(61, 0.3), middle, np.full(61, -0.2)], axis=1)

@@ -16,7 +16,10 @@ CGSPEED = {
     "rfoot": "RightFoot", "rhumerus": "RightArm", "rradius": "RightForeArm", "rhand": "RightHand",
     "lowerback": "Spine", "lowerneck": "Neck", "upperneck": "Neck1", "head": "Head",
 }  # fmt: skip
-MIXAMO = {k: f"mixamorig:{v}" for k, v in CGSPEED.items()} | {"upperneck": "mixamorig:Neck", "lowerneck": "chest"}
+MIXAMO = {k: f"mixamorig:{v}" for k, v in CGSPEED.items()} | {
+    "upperneck": "mixamorig:Neck",
+    "lowerneck": "chest",
+}
 POSER = {
     "root": "hip", "lfemur": "lThigh", "ltibia": "lShin", "lfoot": "lFoot", "lhumerus": "lShldr",
     "lradius": "lForeArm", "lhand": "lHand", "rfemur": "rThigh", "rtibia": "rShin", "rfoot": "rFoot",

@@ -1,4 +1,4 @@
-"""Print what a model holds: source, sizes, statistics, checksum and the acknowledgement it must be shown with."""
+"""Print what a model holds: source, sizes, statistics, checksum, and the acknowledgement it asks for."""
 
 from __future__ import annotations
 
@@ -14,6 +14,11 @@ from gait import blob
 
 NAME = "info"
 HELP = "what a model holds"
+GAIT = (
+    "stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps", "stature_m",
+    "stature_sd_m",
+)  # fmt: skip
+"""Names of the numbers in section GAIT."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,9 +47,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int) -> dict[str, Any]
     if "CURV" in sections:
         result |= {"components": len(sections["CURV"]) - 1, "phases": sections["CURV"].shape[1]}
     if "GAIT" in sections:
-        names = ("stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps")
-        names += ("stature_m", "stature_sd_m")
-        result["gait"] = dict(zip(names, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
+        result["gait"] = dict(zip(GAIT, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
     if "SCST" in sections:
         result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
     if "META" in sections:
@@ -59,13 +62,15 @@ def text(name: str, s: Mapping[str, Any]) -> str:
     if "generator" in meta:
         lines.append(f"{meta.get('activity')} by {meta['generator']}, seed {meta.get('seed')}")
     if "components" in s:
-        counts = ", ".join(f"{len(s[key])} {key}" for key in ("channels", "frames", "joints", "limbs") if key in s)
+        counts = ", ".join(
+            f"{len(s[key])} {key}" for key in ("channels", "frames", "joints", "limbs") if key in s
+        )
         lines.append(f"{s['components']} components, {s['phases']} phases, {counts}")
     if gait:
-        lines.append(
-            "{stride_hz:.3f} +- {stride_hz_sd:.3f} strides/s, stride {stride_length:.3f} +- {stride_length_sd:.3f} "
-            "statures, stride time varies by {stride_time_cv:.1%}".format(**gait)
-        )
+        lines += [
+            "{stride_hz:.3f} +- {stride_hz_sd:.3f} strides/s, varying by {stride_time_cv:.1%}".format(**gait),
+            "stride of {stride_length:.3f} +- {stride_length_sd:.3f} statures".format(**gait),
+        ]
     if "sequences" in meta:
         lines += sequence_lines(meta["sequences"]["rows"])
     if "variance_explained" in meta:

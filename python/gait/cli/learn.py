@@ -1,9 +1,9 @@
 """Learn a cyclic model of motion from motion capture.
 
-Sources are files (.amc with its .asf beside it, .bvh) or folders of them.  Each recording is retargeted to the
-default skeleton and cut into cycles by its own period; functional principal components of all cycles give the
-mean curves and the ways in which people differ (Ormoneit and others, 2000).  In a folder, a file that cannot be
-used is named in one line and the rest is learnt.
+Sources are files (.amc with its .asf beside it, .bvh) or folders of them.  Each recording is retargeted to
+the default skeleton and cut into cycles by its own period; functional principal components of all cycles give
+the mean curves and the ways in which people differ (Ormoneit and others, 2000).  In a folder, a file that
+cannot be used is named in one line and the rest is learnt.
 
 The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
 """
@@ -23,6 +23,7 @@ from gait.cli.info import sequence_lines
 from gait.files import require_writable
 from gait.learn import fit, model, sources
 from gait.progress import progress
+from gait.skeleton import ANGLES
 
 NAME = "learn"
 HELP = "learn a cyclic model from motion capture"
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_components,
         default=fit.DEFAULT_COMPONENTS,
         metavar="auto|N",
-        help=f"how many ways to differ, 1 to {fit.MOST_COMPONENTS}; auto: by held-out data ({fit.DEFAULT_COMPONENTS})",
+        help=f"how many, 1 to {fit.MOST_COMPONENTS}; auto: by held-out data ({fit.DEFAULT_COMPONENTS})",
     )
     parser.add_argument(
         "--exclude",
@@ -54,7 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="refined",
         help="literal: whole frames from 50 to 250, as in the paper (refined)",
     )
-    parser.add_argument("--fps", type=_rate, metavar="F", help="frames per second (.amc: 120, .bvh: as it says)")
+    parser.add_argument(
+        "--fps", type=_rate, metavar="F", help="frames per second (.amc: 120, .bvh: as it says)"
+    )
     parser.add_argument(
         "--zeros-missing", action="store_true", help="three or more exact zeros in a row are missing data"
     )
@@ -101,8 +104,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str, Any]:
     """Figures of what was learnt."""
-    rate, rate_sd, variation, length, length_sd, fps, *_ = (float(v) for v in model.gait_statistics(learned))
-    residual = model.channel_statistics(learned)[: len(model.ANGLES), 0]
+    rate, rate_sd, variation, length, length_sd, fps = model.gait_statistics(learned)[:6].tolist()
+    residual = np.sqrt(np.nanmean(learned.residuals[:, :, : len(ANGLES)] ** 2))
     table = model.sequence_table(learned)
     return {
         "bytes": len(data),
@@ -113,7 +116,7 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
         "cycles": len(learned.components.scores),
         "components": len(learned.components.sd),
         "variance_explained": np.cumsum(learned.components.spectrum)[: len(learned.components.sd)].tolist(),
-        "residual_deg": float(np.degrees(np.sqrt(np.mean(residual**2)))),
+        "residual_deg": float(np.degrees(residual)),
         "held_out": learned.held_out.tolist(),
         "stride_hz": [rate, rate_sd],
         "stride_time_cv": variation,

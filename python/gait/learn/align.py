@@ -1,7 +1,7 @@
 """Phases of several sequences brought to one cycle (Ormoneit 2000, section 3.2 and Fig. 3).
 
-Alternates a periodic cubic regression spline of all sequences together and the best offset of each; both steps
-lower one weighted sum of squares.  Phase of frame j of a sequence: frac((j - offset) / period).
+Alternates a periodic cubic regression spline of all sequences together and the best offset of each; both
+steps lower one weighted sum of squares.  Phase of frame j of a sequence: frac((j - offset) / period).
 """
 
 from __future__ import annotations
@@ -42,14 +42,16 @@ class Alignment:
 
 
 def periodic_basis(phase: Floats, knots: int = KNOTS) -> Floats:
-    """Periodic cubic B-splines with uniform knots at phases (n,): (n, knots), twice continuously differentiable."""
+    """Evaluate periodic cubic B-splines with uniform knots at phases (n,): (n, knots)."""
     extended = np.arange(-3, knots + 4) / knots
     basis = BSpline.design_matrix(np.mod(phase, 1.0), extended, 3).toarray()
     basis[:, :3] += basis[:, knots:]
     return np.asarray(basis[:, :knots])
 
 
-def align(signals: list[Floats], periods: Floats, start: str = "xcorr", weights: Floats | None = None) -> Alignment:
+def align(
+    signals: list[Floats], periods: Floats, start: str = "xcorr", weights: Floats | None = None
+) -> Alignment:
     """Find the offset of each sequence.
 
     Parameters
@@ -72,7 +74,9 @@ def align(signals: list[Floats], periods: Floats, start: str = "xcorr", weights:
         if result.objective and cost > result.objective[-1] * (1 - TOLERANCE):
             break
         result.objective.append(cost)
-        result.offsets = np.array([s.best_offset(table, w, o) for s, o in zip(problem, result.offsets, strict=True)])
+        result.offsets = np.array(
+            [s.best_offset(table, w, o) for s, o in zip(problem, result.offsets, strict=True)]
+        )
     return result
 
 
@@ -116,7 +120,7 @@ class _Sequence:
         return np.asarray(np.fft.irfft(spectrum.sum(axis=1), BINS))
 
     def best_offset(self, table: Floats, weights: Floats, now: float) -> float:
-        """Offset of least cost: coarse by correlation, then halved steps and a parabola; never worse than now."""
+        """Offset of least cost: by correlation, then smaller steps and a parabola; never worse than now."""
         coarse = float(np.argmin(self.correlation(table, weights))) * self.period / BINS
         best, cost = now, self.cost(table, weights, now)
         rough = self.cost(table, weights, coarse)

@@ -14,8 +14,8 @@ from gait.skeleton import SIDES
 
 Floats = npt.NDArray[np.float64]
 
-#: Role to the names it has in files; {S} = Left/Right, {s} = l/r.  Compared without case, blanks, '_', '-' and
-#: any prefix up to ':' (Mixamo).  CMU's ASF; cgspeed and Mixamo; Poser.
+#: Role to the names it has in files; {S} = Left/Right, {s} = l/r.  Compared without case, blanks, '_', '-'
+#: and any prefix up to ':' (Mixamo).  CMU's ASF; cgspeed and Mixamo; Poser.
 ALIASES = {
     "pelvis": ("root", "hips", "hip", "pelvis"),
     "neck": ("upperneck", "neck1", "neck", "lowerneck"),
@@ -92,7 +92,9 @@ def _roles(recording: Recording) -> dict[str, int]:
             wanted = [name.format(s=s, S=side) for name in names]
             index = next((known[name] for name in wanted if name in known), None)
             if index is None and role != "{s}_hand":
-                raise UserError(f"{recording.source}: no bone for {role.format(s=s)!r}; name it one of {wanted}")
+                raise UserError(
+                    f"{recording.source}: no bone for {role.format(s=s)!r}; name it one of {wanted}"
+                )
             if index is not None:
                 found[role.format(s=s)] = index
     return found
@@ -102,7 +104,12 @@ def _joints(recording: Recording, bones: dict[str, int]) -> dict[str, Floats]:
     start, end = recording.start, recording.end
     joints = {"neck": start[:, bones["neck"]], "head": end[:, bones["head"]]}
     for s in SIDES:
-        for joint, bone in (("shoulder", "upper_arm"), ("elbow", "forearm"), ("hip", "thigh"), ("knee", "shank")):
+        for joint, bone in (
+            ("shoulder", "upper_arm"),
+            ("elbow", "forearm"),
+            ("hip", "thigh"),
+            ("knee", "shank"),
+        ):
             joints[f"{s}_{joint}"] = start[:, bones[f"{s}_{bone}"]]
         hand = bones.get(f"{s}_hand")
         joints[f"{s}_wrist"] = end[:, bones[f"{s}_forearm"]] if hand is None else start[:, hand]

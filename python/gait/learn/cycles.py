@@ -57,8 +57,10 @@ def slice_cycles(
             if mask.mean() >= observed:
                 flat, ramp = _close(values, mask)
                 rows.append((flat, mask, ramp, i, k))
-    values, mask, ramp, sequence, cycle = zip(*rows, strict=True) if rows else ((), (), (), (), ())
-    return Cycles(np.array(values), np.array(mask), np.array(ramp), np.array(sequence, int), np.array(cycle, int))
+    columns = list(zip(*rows, strict=True)) if rows else [(), (), (), (), ()]
+    values, mask, ramp = (np.array(column) for column in columns[:3])
+    sequence, cycle = (np.array(column, int) for column in columns[3:])
+    return Cycles(values, mask, ramp, sequence, cycle)
 
 
 def resample(u: Floats, z: Floats, samples: int) -> tuple[Floats, Mask]:
@@ -89,7 +91,7 @@ def resample(u: Floats, z: Floats, samples: int) -> tuple[Floats, Mask]:
         rows = seen[:, columns[0]]
         if rows.sum() < 4:
             continue
-        x, y = basis[rows], z[np.ix_(rows, columns)]
+        x, y = basis[rows], z[rows][:, columns]
         values[:, columns] = at_grid @ np.linalg.solve(x.T @ x + _penalty(x), x.T @ y)
         mask[:, columns] = _bracketed(grid, u[rows])[:, None]
     return values, mask
@@ -133,7 +135,9 @@ def _close(values: Floats, mask: Mask) -> tuple[Floats, Floats]:
     width = max(3, round(END * samples))
     u = np.arange(samples) / samples
     both = mask[:width].all(axis=0) & mask[-width:].all(axis=0)
-    level = [np.polynomial.polynomial.polyfit(u[part] - end, values[part], 1)[0] for part, end in
-             ((slice(0, width), 0.0), (slice(samples - width, samples), 1.0))]
-    ramp = np.where(both, level[1] - level[0], 0.0)
+    first, last = (
+        np.polynomial.polynomial.polyfit(u[part] - end, values[part], 1)[0]
+        for part, end in ((slice(0, width), 0.0), (slice(samples - width, samples), 1.0))
+    )
+    ramp = np.where(both, last - first, 0.0)
     return values - (u - 0.5)[:, None] * ramp, ramp

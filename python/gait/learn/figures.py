@@ -7,11 +7,19 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from gait.learn.fit import SAMPLES, Learned
 from gait.skeleton import ANGLES, CHANNELS
 
-SHOWN = ("r_hip_flexion", "r_knee_flexion", "r_ankle_flexion", "r_shoulder_flexion", "r_elbow_flexion", "torso_z")
+SHOWN = (
+    "r_hip_flexion",
+    "r_knee_flexion",
+    "r_ankle_flexion",
+    "r_shoulder_flexion",
+    "r_elbow_flexion",
+    "torso_z",
+)
 MOST_CURVES = 12  # sequences drawn in the figure of the ratio
 PHASE = np.arange(SAMPLES) / SAMPLES
 
@@ -122,16 +130,18 @@ def convergence(learned: Learned) -> Figure:
     right.plot(np.arange(1, len(rmse) + 1), np.degrees(rmse), "o-", ms=3)
     right.set(xlabel="pass", ylabel="error on observed entries, degrees", title="filling of gaps")
     for axes in (left, right):
-        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     return figure
 
 
 def residuals(learned: Learned) -> Figure:
-    """What the components leave, per angle."""
+    """Residual of each angle after the components."""
     figure, (axes,) = _grid(1, 1, 8, 3.8)
     rest = np.degrees(np.sqrt(np.nanmean(learned.residuals[:, :, : len(ANGLES)] ** 2, axis=(0, 1))))
     axes.bar(np.arange(len(ANGLES)), rest)
-    axes.set_xticks(np.arange(len(ANGLES)), [name.replace("_", " ") for name in ANGLES], rotation=90, fontsize=7)
+    axes.set_xticks(
+        np.arange(len(ANGLES)), [name.replace("_", " ") for name in ANGLES], rotation=90, fontsize=7
+    )
     axes.set(ylabel="residual, degrees (rms)")
     return figure
 

@@ -10,15 +10,16 @@ import numpy.typing as npt
 from gait.errors import UserError
 from gait.learn import align, cycles, fpca, retarget
 from gait.learn.sequence import Sequence
-from gait.skeleton import ANGLES, CHANNELS, ROOTS, SIDES, Proportions, default_skeleton, points
+from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 
 SAMPLES = 128
 DEFAULT_COMPONENTS = 5
 MOST_COMPONENTS = 16  # the library reads no more
-#: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as much as
-#: the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per radian).
+#: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as
+#: much as the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per
+#: radian).
 ROOT_SCALE = {"root_forward": 1.0, "root_sway": 3.3, "root_height": 3.3}
 
 
@@ -104,7 +105,7 @@ def fit(sequences: list[Sequence], components: int | str = DEFAULT_COMPONENTS, s
 
 
 def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int) -> Proportions:
-    """Generic proportions in which every subject counts once."""
+    """Average the proportions; every subject counts once."""
     picked = [sequences[int(np.flatnonzero(index == i)[0])].measures for i in range(subjects)]
     return retarget.mean_proportions(picked)
 

@@ -1,7 +1,7 @@
 """Functional principal components of cycles with missing entries (Ormoneit 2000, Fig. 5 steps 2-9; R7-R10).
 
-Rows are cycles on a grid of T phases for M channels.  Everything happens in the real orthonormal Fourier basis
-of the first harmonics, so means and components close smoothly, and distances are those of the curves.
+Rows are cycles on a grid of T phases for M channels.  Everything happens in the real orthonormal Fourier
+basis of the first harmonics, so means and components close smoothly, and distances are those of the curves.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def _column_mean(values: Floats, mask: Mask) -> Floats:
 
 
 def hold_out(mask: Mask, share: float, rng: np.random.Generator) -> Mask:
-    """Choose blocks of observed entries: an eighth of the cycle of one channel and row each, `share` in all."""
+    """Choose blocks of observed entries, an eighth of a cycle of one channel and row each; `share` in all."""
     rows, samples, channels = mask.shape
     length = samples // 8
     chosen = np.zeros_like(mask)
@@ -143,7 +143,7 @@ def hold_out(mask: Mask, share: float, rng: np.random.Generator) -> Mask:
 def choose(
     values: Floats, mask: Mask, rng: np.random.Generator, harmonics: int = HARMONICS, largest: int = LARGEST
 ) -> tuple[int, Floats]:
-    """Number of components with the least error on held-out blocks, and the errors for 0 ... largest."""
+    """Find the number of components with the least error on held-out blocks; errors for 0 ... largest."""
     held = hold_out(mask, HELD_OUT, rng)
     errors = []
     for q in range(min(largest, len(values) - 1) + 1):

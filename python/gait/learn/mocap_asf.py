@@ -66,14 +66,16 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
 
 
 def find_skeleton(path: Path) -> Path:
-    """The .asf that belongs to an .amc."""
+    """Find the .asf that belongs to an .amc."""
     candidates = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf")
     for candidate in candidates:
         if candidate.stem in (path.stem, path.stem.rsplit("_", 1)[0]):
             return candidate
     if len(candidates) == 1:
         return candidates[0]
-    raise UserError(f"{path}: no skeleton {path.stem.rsplit('_', 1)[0]}.asf beside it; put the .asf in that folder")
+    raise UserError(
+        f"{path}: no skeleton {path.stem.rsplit('_', 1)[0]}.asf beside it; put the .asf in that folder"
+    )
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
@@ -93,7 +95,9 @@ def _numbers(words: list[str], path: Path, line: int, count: int | None = None) 
     except ValueError:
         raise UserError(f"{path}:{line}: {' '.join(words)[:40]!r} is not numbers; restore the file") from None
     if (count is not None and len(values) != count) or not np.isfinite(values).all():
-        raise UserError(f"{path}:{line}: {len(values)} numbers where {count} finite ones belong; restore the file")
+        raise UserError(
+            f"{path}:{line}: {len(values)} numbers where {count} finite ones belong; restore the file"
+        )
     return values
 
 
@@ -171,7 +175,9 @@ def _linked(bones: list[Bone], lines: list[tuple[int, list[str]]], path: Path) -
             if word not in known:
                 raise UserError(f"{path}:{line}: bone {word!r} is not in :bonedata; restore the file")
         if words[0] not in order:
-            raise UserError(f"{path}:{line}: {words[0]!r} has children before it has a parent; sort :hierarchy")
+            raise UserError(
+                f"{path}:{line}: {words[0]!r} has children before it has a parent; sort :hierarchy"
+            )
         for word in words[1:]:
             known[word].parent = order.index(words[0])
             order.append(word)
@@ -190,12 +196,18 @@ def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
             _check_frame(rows, frame, path, line)
             number, first = int(words[0]), first or int(words[0])
             if number != first + frame:
-                raise UserError(f"{path}:{line}: frame {number} follows {first + frame - 1}; restore the file")
+                raise UserError(
+                    f"{path}:{line}: frame {number} follows {first + frame - 1}; restore the file"
+                )
             frame += 1
         elif words[0] not in moving:
-            raise UserError(f"{path}:{line}: bone {words[0]!r} does not move in the .asf; use the subject's own .asf")
+            raise UserError(
+                f"{path}:{line}: bone {words[0]!r} does not move in the .asf; use the subject's own .asf"
+            )
         elif len(rows[words[0]]) != frame - 1:
-            raise UserError(f"{path}:{line}: bone {words[0]!r} out of place in frame {frame}; restore the file")
+            raise UserError(
+                f"{path}:{line}: bone {words[0]!r} out of place in frame {frame}; restore the file"
+            )
         else:
             rows[words[0]].append(_row(words[1:], path, line, len(moving[words[0]].dof)))
     _check_frame(rows, frame, path, line)
@@ -205,7 +217,7 @@ def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
 
 
 def _row(words: list[str], path: Path, line: int, count: int) -> list[float]:
-    """A line's finite numbers; like `_numbers`, but quick for the many lines of a motion."""
+    """Read a line's finite numbers; like `_numbers`, but quick for the many lines of a motion."""
     try:
         values = list(map(float, words))
     except ValueError:
@@ -219,7 +231,9 @@ def _check_frame(rows: dict[str, list[list[float]]], frame: int, path: Path, lin
     """Every bone that moved in frame 1, and the root, must move in every frame."""
     lacking = [name for name, values in rows.items() if len(values) != frame and (values or name == "root")]
     if lacking:
-        raise UserError(f"{path}:{line}: frame {frame} lacks bone {lacking[0]!r}; cut the file before that frame")
+        raise UserError(
+            f"{path}:{line}: frame {frame} lacks bone {lacking[0]!r}; cut the file before that frame"
+        )
 
 
 def assemble(path: Path, skeleton: Skeleton, values: dict[str, Floats], fps: float) -> Recording:

@@ -16,8 +16,8 @@ from gait.learn.rotations import from_angles
 Floats = npt.NDArray[np.float64]
 
 AXES = "XYZ"
-#: Metres per unit in use: metre, inch, CMU's unit (inch / 0.45), centimetre, millimetre.  A file does not say which;
-#: the one that brings the rest pose nearest to a grown person's height is taken.
+#: Metres per unit in use: metre, inch, CMU's unit (inch / 0.45), centimetre, millimetre.  A file does not say
+#: which; the one that brings the rest pose nearest to a grown person's height is taken.
 UNITS = (1.0, 0.0254, 0.0254 / 0.45, 0.01, 0.001)
 HEIGHT = 1.7
 
@@ -38,7 +38,9 @@ class _Words:
 
     def __init__(self, path: Path, lines: list[str]) -> None:
         self.path, self.line = path, 0
-        self.words: Iterator[tuple[int, str]] = ((i, w) for i, row in enumerate(lines, 1) for w in row.split())
+        self.words: Iterator[tuple[int, str]] = (
+            (i, w) for i, row in enumerate(lines, 1) for w in row.split()
+        )
 
     def next(self, expected: str | None = None) -> str:
         self.line, word = next(self.words, (self.line, ""))
@@ -114,7 +116,9 @@ def _hierarchy(words: _Words) -> list[Joint]:
                 stack.pop()
             site = False
         else:
-            raise UserError(f"{words.path}:{words.line}: {word!r} is not known in a hierarchy; restore the file")
+            raise UserError(
+                f"{words.path}:{words.line}: {word!r} is not known in a hierarchy; restore the file"
+            )
     return joints
 
 
@@ -139,19 +143,23 @@ def _motion(words: _Words, lines: list[str], width: int) -> tuple[Floats, float]
         raise UserError(f"{words.path}:{words.line}: {count} frames of {interval} s; restore the file")
     rows = [(i, line.split()) for i, line in enumerate(lines[words.line :], words.line + 1) if line.strip()]
     if len(rows) < count:
-        raise UserError(f"{words.path}: {len(rows)} rows where {count} frames belong; correct 'Frames:' to {len(rows)}")
+        raise UserError(
+            f"{words.path}: {len(rows)} rows where {count} frames belong; correct 'Frames:' to {len(rows)}"
+        )
     values = np.empty((count, width))
     for row, (line, numbers) in zip(values, rows, strict=False):
         try:
             row[:] = np.array([float(n) for n in numbers])
         except ValueError:
             raise UserError(
-                f"{words.path}:{line}: {len(numbers)} words where {width} numbers belong; cut the file before it"
+                f"{words.path}:{line}: {len(numbers)} words where {width} numbers belong; cut the file there"
             ) from None
     return values, 1.0 / interval
 
 
-def assemble(path: Path, joints: list[Joint], values: Floats, fps: float, zero_runs: bool = False) -> Recording:
+def assemble(
+    path: Path, joints: list[Joint], values: Floats, fps: float, zero_runs: bool = False
+) -> Recording:
     """Forward kinematics of the file's own skeleton, turned to z up and metres."""
     rest = np.zeros((2, len(joints), 3))
     start, end = np.empty((2, len(values), len(joints), 3))
@@ -163,7 +171,9 @@ def assemble(path: Path, joints: list[Joint], values: Floats, fps: float, zero_r
         place, turn = _split(joint, mask_zero_runs(own) if zero_runs else own)
         parent = joint.parent
         rotation[:, i] = turn if parent < 0 else rotation[:, parent] @ turn
-        start[:, i] = place if parent < 0 else start[:, parent] + np.einsum("tij,tj->ti", rotation[:, parent], place)
+        start[:, i] = (
+            place if parent < 0 else start[:, parent] + np.einsum("tij,tj->ti", rotation[:, parent], place)
+        )
         end[:, i] = start[:, i] + rotation[:, i] @ heirs[i]
         rest[0, i] = joint.offset * (parent >= 0) + (rest[0, parent] if parent >= 0 else 0)
         rest[1, i] = rest[0, i] + heirs[i]

@@ -26,7 +26,9 @@ CMU = (
 def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array]:
     """All sections of the blob, META first."""
     return {
-        "META": np.frombuffer(json.dumps(meta(learned, activity, seed), separators=(",", ":")).encode(), np.uint8),
+        "META": np.frombuffer(
+            json.dumps(meta(learned, activity, seed), separators=(",", ":")).encode(), np.uint8
+        ),
         "CHNM": blob.pack_names(CHANNELS),
         "CURV": _stored(learned.curves),
         "CHST": _stored(channel_statistics(learned)),
@@ -37,7 +39,7 @@ def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array
 
 
 def _stored(values: Floats) -> npt.NDArray[np.float32]:
-    """Rounded to a millionth, so that the last bits of another machine's algebra do not show."""
+    """Round to a millionth, so that the last bits of another machine's algebra do not show."""
     return np.round(values, 6).astype(np.float32)
 
 
@@ -108,7 +110,8 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
     """META: what people and tools may want to know; degrees, metres, seconds."""
     c = learned.components
     statures = [
-        np.mean([s.measures.stature for s in learned.sequences if s.subject == name]) for name in learned.subjects
+        np.mean([s.measures.stature for s in learned.sequences if s.subject == name])
+        for name in learned.subjects
     ]
     return {
         "activity": activity,
@@ -135,7 +138,7 @@ SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")
 
 
 def sequence_table(learned: Learned) -> list[list[Any]]:
-    """One row of SEQUENCE_COLUMNS per sequence; sharpness is peak over median SNR, residual the rms of all angles."""
+    """Rows of SEQUENCE_COLUMNS; sharpness: peak over median SNR; residual: rms of all angles."""
     residuals, table = learned.residuals[:, :, : len(ANGLES)], []
     for i, s in enumerate(learned.sequences):
         own = residuals[learned.cycles.sequence == i]

@@ -1,8 +1,9 @@
-"""Length of the cycle by its signal-to-noise ratio (Ormoneit 2000, eq. 1), exactly the F of one-way analysis of variance.
+"""Length of the cycle by its signal-to-noise ratio (Ormoneit 2000, eq. 1).
 
-`literal` is the paper's: whole frames, one bin per frame.  `refined` scores half frames with a fixed number of
-bins, prefers divisors (a multiple of the period fits as well), then maximises the F of a harmonic regression.
-Signals are (T, A) with NaN for missing entries; periods are in frames.
+The ratio is exactly the F of one-way analysis of variance with the phase as its groups.
+`literal` is the paper's: whole frames, one bin per frame.  `refined` scores half frames with a fixed number
+of bins, prefers divisors (a multiple of the period fits as well), then maximises the F of a harmonic
+regression. Signals are (T, A) with NaN for missing entries; periods are in frames.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ class Folder:
         self.stacked = np.concatenate([values, seen.astype(float)], axis=1)
 
     def literal(self, period: int) -> Floats:
-        """Signal-to-noise ratio (A,) of folding at a whole number of frames (R1-R3); NaN if too few observations."""
+        """Ratio (A,) of folding at a whole number of frames (R1-R3); NaN if observations are too few."""
         return self._anova(np.arange(len(self.stacked)) % period)
 
     def binned(self, period: float, bins: int = BINS) -> Floats:
@@ -94,7 +95,7 @@ def patterns(signals: Floats) -> list[tuple[npt.NDArray[np.bool_], Floats]]:
     result = []
     for columns in groups.values():
         rows = seen[:, columns[0]]
-        values = signals[np.ix_(rows, columns)]
+        values = signals[rows][:, columns]
         result.append((rows, values - values.mean(axis=0)))
     return result
 
@@ -102,7 +103,7 @@ def patterns(signals: Floats) -> list[tuple[npt.NDArray[np.bool_], Floats]]:
 def harmonic_f(
     groups: list[tuple[npt.NDArray[np.bool_], Floats]], period: float, harmonics: int = HARMONICS
 ) -> float:
-    """F of the regression on a constant and harmonics of the period, summed over columns; observed samples only."""
+    """F of the regression on a constant and harmonics, summed over columns; observed samples only."""
     frames = len(groups[0][0])
     angle = 2 * np.pi / period * np.outer(np.arange(frames), np.arange(1, harmonics + 1))
     design = np.concatenate([np.ones((frames, 1)), np.cos(angle), np.sin(angle)], axis=1)
@@ -119,7 +120,9 @@ def harmonic_f(
     return score
 
 
-def find(signals: Floats, fps: float, mode: str = "refined", bounds: tuple[float, float] | None = None) -> Period:
+def find(
+    signals: Floats, fps: float, mode: str = "refined", bounds: tuple[float, float] | None = None
+) -> Period:
     """Find the period of a sequence.
 
     Parameters
@@ -160,7 +163,7 @@ def _total(scores: Floats) -> float:
 
 
 def _divisor(folder: Folder, signals: Floats, best: float, low: float) -> float:
-    """The smallest of best/5 ... best/2, refined, whose score comes near the best one's, else the best."""
+    """Find the smallest of best/5 ... best/2 that scores nearly as well, refined; else the best."""
     goal = DIVISOR_SHARE * _total(folder.binned(best))
     for divisor in DIVISORS:
         if best / divisor >= low and _total(folder.binned(best / divisor)) >= goal:

@@ -10,7 +10,9 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-Y_UP = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # x left, y up, z forward (ASF, BVH) to x forward, y left, z up
+Y_UP = np.array(
+    [[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]
+)  # x left, y up, z forward (ASF, BVH) to x forward, y left, z up
 
 
 @dataclass
@@ -55,7 +57,7 @@ class Recording:
 
 
 def mask_zero_runs(columns: Floats, run: int = 3) -> Floats:
-    """Copy of a bone's values (T, k) with NaN in runs of at least `run` rows that are exactly 0 in all columns.
+    """Copy a bone's values (T, k) with NaN in runs of at least `run` rows of exact zeros.
 
     Mocap writes 0 for what was occluded; a bone that is 0 in all rows is fixed and not missing.
     """

@@ -47,7 +47,9 @@ def write(folder: Path, learned: Learned, activity: str, refused: list[str]) -> 
     parts += [_table(learned), _left_out(refused), f"<p>{model.CMU}</p>" if model.from_cmu(learned) else ""]
     page = f"<!doctype html><html lang=en><meta charset=utf-8><title>{html.escape(activity)}</title>"
     with replacing(folder / "index.html") as path:
-        path.write_text(f"{page}<style>{STYLE}</style><body>{''.join(parts)}</body></html>\n", encoding="utf-8")
+        path.write_text(
+            f"{page}<style>{STYLE}</style><body>{''.join(parts)}</body></html>\n", encoding="utf-8"
+        )
 
 
 def _summary(learned: Learned) -> str:

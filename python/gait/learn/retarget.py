@@ -42,7 +42,8 @@ class Measures:
 def stance(body: Body, side: str) -> npt.NDArray[np.intp]:
     """Frames in which the foot of a side lies flat: ankle and ball both move least."""
     speed = sum(
-        np.linalg.norm(np.gradient(body.joints[f"{side}_{joint}"], axis=0), axis=1) for joint in ("ankle", "toe")
+        np.linalg.norm(np.gradient(body.joints[f"{side}_{joint}"], axis=0), axis=1)
+        for joint in ("ankle", "toe")
     )
     order = np.argsort(np.where(np.isfinite(speed), speed, np.inf), kind="stable")
     return order[: max(3, int(STANCE_SHARE * np.isfinite(speed).sum()))]
@@ -93,7 +94,8 @@ def torso_frames(body: Body) -> Floats:
 
 def angles(body: Body, measures: Measures) -> Floats:
     """Angles (T, 24) in the order of `gait.skeleton.ANGLES`, radians; NaN where a joint is missing."""
-    j, result = body.joints, {}
+    j = body.joints
+    result: dict[str, Floats] = {}
     torso = torso_frames(body)
     head = frame_from(j["head"] - j["neck"], body.lateral["head"])
     for name, child, parent in (("torso", torso, body.pelvis), ("neck", head, torso)):
@@ -104,8 +106,12 @@ def angles(body: Body, measures: Measures) -> Floats:
         for first, second, third, parent, sense in chains:
             hinge = body.lateral[f"{s}_{second}"]
             upper = frame_from(j[f"{s}_{first}"] - j[f"{s}_{second}"], hinge)
-            turns = decompose_yxz(np.swapaxes(parent, 1, 2) @ upper) * ((-1, 1, -1) if s == "l" else (-1, -1, 1))
-            result |= {f"{s}_{first}_{n}": turns[:, k] for k, n in enumerate(("flexion", "abduction", "rotation"))}
+            turns = decompose_yxz(np.swapaxes(parent, 1, 2) @ upper) * (
+                (-1, 1, -1) if s == "l" else (-1, -1, 1)
+            )
+            result |= {
+                f"{s}_{first}_{n}": turns[:, k] for k, n in enumerate(("flexion", "abduction", "rotation"))
+            }
             lower = j[f"{s}_{second}"] - j[f"{s}_{third}"]
             result[f"{s}_{second}_flexion"] = sense * _about_y(upper, lower)
         shank = frame_from(j[f"{s}_knee"] - j[f"{s}_ankle"], body.lateral[f"{s}_knee"])
@@ -132,12 +138,12 @@ def _centred(table: Floats) -> Floats:
 
 
 def own_proportions(m: Measures) -> Proportions:
-    """A body's own proportions, symmetric."""
+    """Proportions of one body, made symmetric."""
     return mean_proportions([m])
 
 
 def mean_proportions(bodies: list[Measures]) -> Proportions:
-    """Generic proportions: means over bodies, each divided by its stature; left and right made symmetric."""
+    """Mean proportions of bodies, each divided by its stature; left and right made symmetric."""
 
     def mean(value: object) -> float:
         return float(np.mean([np.mean(value(m)) / m.stature for m in bodies]))  # type: ignore[operator]

@@ -1,4 +1,4 @@
-"""Motion of the pelvis over the ground: level floor, heading, and the six root channels of model-format.md."""
+"""Motion of the pelvis over the ground: level floor, heading, and the six root channels."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ def level(body: Body) -> tuple[Body, float]:
     """
     path = body.joints["pelvis"]
     seen = np.flatnonzero(np.isfinite(path[:, 0]))
-    way = path[seen[-1], :2] - path[seen[0], :2]
-    distance = float(np.linalg.norm(way))
-    if distance < 1.0:
+    travel = path[seen[-1], :2] - path[seen[0], :2]
+    if np.linalg.norm(travel) < 1.0:
         return body, 0.0
-    way = way / distance
+    way: Floats = travel / np.linalg.norm(travel)
     contacts = np.concatenate([body.joints[f"{s}_toe"][stance(body, s)] for s in SIDES])
     contacts = contacts[np.isfinite(contacts).all(axis=1)]
     design = np.stack([np.ones(len(contacts)), contacts[:, :2] @ way], axis=1)
@@ -47,7 +46,9 @@ def align_pelvis(body: Body) -> Body:
     The left axis becomes the line between the hips, and the forward axis is level on average: a file's pelvis
     may be pitched by a constant that only its skeleton's calibration knows.
     """
-    line = unit(np.nanmean(np.einsum("tji,tj->ti", body.pelvis, body.joints["l_hip"] - body.joints["r_hip"]), axis=0))
+    line = unit(
+        np.nanmean(np.einsum("tji,tj->ti", body.pelvis, body.joints["l_hip"] - body.joints["r_hip"]), axis=0)
+    )
     turned = body.pelvis @ frame_from(np.array([0.0, 0, 1]), line, exact="y")
     pitch = np.nanmean(np.arcsin(np.clip(-turned[:, 2, 0], -1, 1)))
     return replace(body, pelvis=turned @ axis_rotation(1, -pitch))
@@ -56,9 +57,9 @@ def align_pelvis(body: Body) -> Body:
 def _robust_line(design: Floats, values: Floats) -> Floats:
     """Least-squares line, twice refitted without the points farther than twice the median error."""
     keep = np.ones(len(values), bool)
-    line = np.zeros(2)
+    line: Floats = np.zeros(2)
     for _ in range(3):
-        line, *_ = np.linalg.lstsq(design[keep], values[keep], rcond=None)
+        line = np.asarray(np.linalg.lstsq(design[keep], values[keep], rcond=None)[0], float)
         error = np.abs(values - design @ line)
         keep = error <= max(2 * float(np.median(error)), 1e-4)
     return line
@@ -91,7 +92,9 @@ def channels(body: Body, measures: Measures, period: float) -> tuple[Floats, Flo
     smooth, velocity, fitted = _smooth_path(path[:, :2], period)
     speed = np.linalg.norm(smooth[-1] - smooth[0]) / frames * body.fps
     yaw = np.unwrap(np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0]))
-    heading = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])) if speed > STANDING else _mean_over(yaw, period)
+    heading = (
+        np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])) if speed > STANDING else _mean_over(yaw, period)
+    )
     along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     result = np.empty((frames, 6))
@@ -117,7 +120,9 @@ def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:
     seen = np.isfinite(path[:, 0])
     weights, *_ = np.linalg.lstsq(design[seen], path[seen], rcond=None)
     slow = weights[: degree + 1]
-    derivative = np.vander(t, degree, increasing=True) @ (slow[1:] * np.arange(1, degree + 1)[:, None]) / period
+    derivative = (
+        np.vander(t, degree, increasing=True) @ (slow[1:] * np.arange(1, degree + 1)[:, None]) / period
+    )
     return powers @ slow, derivative, design @ weights
 
 

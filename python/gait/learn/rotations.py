@@ -47,7 +47,9 @@ def unit(v: Floats) -> Floats:
 
 def rotation_vectors(r: Floats) -> Floats:
     """Axis times angle (T, 3) of rotations below half a turn."""
-    twist = np.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1)
+    twist = np.stack(
+        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1
+    )
     sine = np.linalg.norm(twist, axis=-1) / 2
     angle = np.arctan2(sine, (np.trace(r, axis1=-2, axis2=-1) - 1) / 2)
     return twist * (angle / np.where(sine > 1e-12, 2 * sine, 1))[..., None]
@@ -58,9 +60,9 @@ def decompose_yxz(r: Floats) -> Floats:
     b = np.arcsin(np.clip(-r[:, 1, 2], -1, 1))
     outer = np.stack([np.arctan2(r[:, 0, 2], r[:, 2, 2]), b, np.arctan2(r[:, 1, 0], r[:, 1, 1])], axis=1)
 
-    def inner(t: int, a: float) -> list[float]:
+    def inner(t: int, a: float) -> Floats:
         rest = axis_rotation(1, -a) @ r[t]
-        return [a, np.arctan2(-rest[1, 2], rest[2, 2]), np.arctan2(-rest[0, 1], rest[0, 0])]
+        return np.array([a, np.arctan2(-rest[1, 2], rest[2, 2]), np.arctan2(-rest[0, 1], rest[0, 0])])
 
     return _continuous(outer, inner)
 
@@ -70,9 +72,9 @@ def decompose_zyx(r: Floats) -> Floats:
     b = np.arcsin(np.clip(-r[:, 2, 0], -1, 1))
     outer = np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), b, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
 
-    def inner(t: int, a: float) -> list[float]:
+    def inner(t: int, a: float) -> Floats:
         rest = axis_rotation(2, -a) @ r[t]
-        return [a, np.arctan2(-rest[2, 0], rest[0, 0]), np.arctan2(-rest[1, 2], rest[1, 1])]
+        return np.array([a, np.arctan2(-rest[2, 0], rest[0, 0]), np.arctan2(-rest[1, 2], rest[1, 1])])
 
     return _continuous(outer, inner)
 
@@ -86,7 +88,7 @@ def unwrap(table: Floats) -> Floats:
     return result
 
 
-def _continuous(angles: Floats, inner: Callable[[int, float], list[float]]) -> Floats:
+def _continuous(angles: Floats, inner: Callable[[int, float], Floats]) -> Floats:
     """Choose in each frame the branch nearest to the frame before; hold the outer angle in gimbal lock.
 
     (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation; near |b| = 90 degrees only a +- c is known.
@@ -94,16 +96,14 @@ def _continuous(angles: Floats, inner: Callable[[int, float], list[float]]) -> F
     if not np.any(np.cos(angles[:, 1]) < CLEAR):
         return unwrap(angles)
     result = angles.copy()
-    previous: Floats | None = None
-    for t in np.flatnonzero(np.isfinite(angles).all(axis=1)):
-        now = angles[t]
-        if previous is not None:
-            if np.cos(now[1]) < GIMBAL:
-                now = np.array(inner(t, float(previous[0])))
-            other = np.array([now[0] + np.pi, np.pi - now[1], now[2] + np.pi])
-            options = [_nearest_turn(option, previous) for option in (now, other)]
-            now = min(options, key=lambda option: float(np.sum((option - previous) ** 2)))
-        result[t] = previous = now
+    seen = [int(t) for t in np.flatnonzero(np.isfinite(angles).all(axis=1))]
+    previous = angles[seen[0]]
+    for t in seen[1:]:
+        now = angles[t] if np.cos(angles[t, 1]) >= GIMBAL else inner(t, float(previous[0]))
+        other = np.array([now[0] + np.pi, np.pi - now[1], now[2] + np.pi])
+        now, other = _nearest_turn(now, previous), _nearest_turn(other, previous)
+        closer = np.sum((now - previous) ** 2) <= np.sum((other - previous) ** 2)
+        result[t] = previous = now if closer else other
     return result
 
 

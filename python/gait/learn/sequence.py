@@ -59,7 +59,7 @@ class Sequence:
 
 
 def subject_of(path: Path) -> str:
-    """The part of the file's stem before '_', else the folder."""
+    """Name the subject: the part of the file's stem before '_', else the folder."""
     return path.stem.split("_")[0] if "_" in path.stem else path.parent.name
 
 
@@ -91,9 +91,13 @@ def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs:
     angles = retarget.angles(levelled, measures)
     found = period.find(angles, levelled.fps, mode)
     if not found.cyclic:
-        raise UserError(f"{path}: no cycle found (sharpness {found.sharpness:.1f}); leave it out of the sources")
+        raise UserError(
+            f"{path}: no cycle found (sharpness {found.sharpness:.1f}); leave it out of the sources"
+        )
     if len(angles) < LEAST_CYCLES * found.frames:
-        raise UserError(f"{path}: {len(angles) / found.frames:.1f} cycles, at least {LEAST_CYCLES} are needed")
+        raise UserError(
+            f"{path}: {len(angles) / found.frames:.1f} cycles, at least {LEAST_CYCLES} are needed"
+        )
     channels, heading = root.channels(levelled, measures, found.frames)
     return Sequence(
         name=path.stem,
@@ -110,7 +114,7 @@ def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs:
 
 
 def _strides(walker: Body, heading: Floats, frames: float) -> Floats:
-    """Times between successive forward extremes of each ankle about the pelvis, seconds."""
+    """Time successive forward extremes of each ankle about the pelvis, seconds."""
     along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     durations = [np.zeros(0)]
     for s in SIDES:

@@ -33,7 +33,9 @@ def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path
         elif not source.is_file():
             raise UserError(f"{source}: no such file or folder; check the name")
         elif source.suffix.lower() not in READERS:
-            raise UserError(f"{source}: {source.suffix or 'no suffix'} is not learnt from; convert it to {_kinds()}")
+            raise UserError(
+                f"{source}: {source.suffix or 'no suffix'} is not learnt from; convert it to {_kinds()}"
+            )
         else:
             found[source] = False
     globs = list(exclude)
