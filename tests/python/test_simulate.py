@@ -30,8 +30,8 @@ SEGMENTS = {
     "r_shank": ("r_knee", "r_ankle"), "l_upper_arm": ("l_shoulder", "l_elbow"),
     "l_forearm": ("l_elbow", "l_wrist"), "r_upper_arm": ("r_shoulder", "r_elbow"),
     "r_forearm": ("r_elbow", "r_wrist"), "hips": ("l_hip", "r_hip"),
-    "shoulders": ("l_shoulder", "r_shoulder"), "l_foot": ("l_ankle", "l_toe"), "r_heel": ("r_ankle", "r_heel"),
-    "head": ("neck", "head_top"),
+    "shoulders": ("l_shoulder", "r_shoulder"), "l_foot": ("l_ankle", "l_toe"),
+    "r_heel": ("r_ankle", "r_heel"), "head": ("neck", "head_top"),
 }  # fmt: skip
 
 

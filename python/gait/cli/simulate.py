@@ -21,7 +21,8 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gait.progress import progress
-from gait.simulate.scenario import GENERATOR, PRESETS, Scenario
+from gait.simulate import FILES, PRESETS, Scenario, simulate
+from gait.simulate.scenario import GENERATOR
 from gait.simulate.views import DIRECTIONS, VIEWS
 
 NAME = "simulate"
@@ -57,8 +58,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make the clip and say what is in it."""
-    from gait.simulate.clip import FILES, simulate  # rendering needs more imports than --help should
-
     scenario = replace(PRESETS[args.preset], **_given(args))
     begun = time.perf_counter()
     with progress("rendering", scenario.frames, args.quiet) as update:
