@@ -89,6 +89,7 @@ typedef struct gait_state {          /* one hypothesis: everything that places a
     float pitch, roll;               /* tilt of the pelvis beyond the model's own, radians */
     float pelvis[3];                 /* pelvis joint, metres, world */
     float coef[GAIT_MAX_COMPONENTS]; /* principal-component scores, in standard deviations; unused are 0 */
+    float offset[GAIT_MAX_ANGLES];   /* posture: added to the model's joint angles, radians; unused are 0 */
 } gait_state;
 
 typedef struct gait_pose {
@@ -142,6 +143,7 @@ GAIT_API gait_status gait_render(const gait_model *m, const gait_camera *cam, co
 /* ---- tracker (Ormoneit et al. 2000) ------------------------------------------------------------------- */
 typedef struct gait_tracker gait_tracker;
 enum { GAIT_MODE_DEFAULT = 0, GAIT_MODE_PAPER = 1 };
+#define GAIT_OFFSETS_TRUNK ((1u << 19) | (1u << 20)) /* torso_x, torso_y of the contract's order of angles */
 #define GAIT_TERM_TEXTURE    0x1u /* previous frame's texture moved by each particle, eqs. 10-13 */
 #define GAIT_TERM_SILHOUETTE 0x2u /* foreground both ways; needs a background plate */
 #define GAIT_TERM_EDGES      0x4u /* image gradient along the limbs' outlines */
@@ -173,7 +175,9 @@ typedef struct gait_tracker_config {
     float    coef_noise;       /* score standard deviations */
     float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
     float    stature_noise;    /* fraction of stature, while settling */
-    uint32_t reserved;
+    float    offset_noise;     /* posture of the angles in offset_angles, radians */
+    float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
+    uint32_t offset_angles;    /* bit i: angle i has an offset of its own; default torso_x and torso_y */
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;

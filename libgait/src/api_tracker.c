@@ -40,6 +40,9 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .coef_noise = 0.66f,
         .coef_time = 4.5f,
         .stature_noise = 0.005f,
+        .offset_noise = 0.02f,
+        .offset_sd = 0.07f,
+        .offset_angles = GAIT_OFFSETS_TRUNK,
     };
     if (paper) { /* random walks of eqs. 5-9 (spec 1.4), rates that the papers left open */
         cfg->phase_noise = 0.022f;
@@ -50,6 +53,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->tilt_noise = 0.055f;
         cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
         cfg->stature_noise = 0.0f;
+        cfg->offset_angles = 0;
         cfg->girth = 1.0f;
         cfg->term_weight[0] = 1.0f;
     }
@@ -77,6 +81,7 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(heading_noise, 0.0f, 100.0f),   RANGE(tilt_noise, 0.0f, 100.0f),
         RANGE(tilt_time, 0.0f, 1e6f),         RANGE(coef_noise, 0.0f, 100.0f),
         RANGE(coef_time, 0.0f, 1e6f),         RANGE(stature_noise, 0.0f, 1.0f),
+        RANGE(offset_noise, 0.0f, 10.0f),     RANGE(offset_sd, 0.0f, 10.0f),
     };
     for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
         float v;
@@ -182,6 +187,8 @@ gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
                        .pelvis = {1.0f, 1.0f, 0.1f}};
     for (int32_t k = 0; k < m->components; k++)
         sd->coef[k] = 1.0f;
+    for (int32_t a = 0; a < m->angles; a++)
+        sd->offset[a] = 0.07f; /* 4 degrees */
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2]);
 }
 

@@ -2,7 +2,7 @@
 #include "fmath.h"
 #include "rng.h"
 
-enum { NORMALS = 4 * ((F_MAX + 2 + 3) / 4) };
+enum { NORMALS = 4 * ((F_MAX + 3) / 4) };
 
 static const float RATE_MIN = 1.0f / 2.1f, RATE_MAX = 1.0f / 0.4f; /* strides per second (spec, eq. 7) */
 
@@ -25,7 +25,7 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
     int32_t const q = d->rule.components;
     float n[NORMALS], u[4];
     gait_state s = *mean;
-    normals(d, STREAM_START, 0, i, 9 + q, n);
+    normals(d, STREAM_START, 0, i, body_rule_fields(&d->rule), n);
     rng_uniform4(d->seed, STREAM_START, 1, (uint32_t)i, 0, u);
     s.phase = sd->phase >= 0.5f ? u[0] : m_wrap1(mean->phase + sd->phase * n[0]);
     s.heading = sd->heading >= PI_F ? TWO_PI_F * u[1] : mean->heading + sd->heading * n[1];
@@ -36,7 +36,11 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
     s.pelvis[0] += sd->pelvis[0] * n[6];
     s.pelvis[1] += sd->pelvis[1] * n[7];
     for (int32_t k = 0; k < q; k++)
-        s.coef[k] += sd->coef[k] * n[9 + k];
+        s.coef[k] += sd->coef[k] * n[F_COEF + k];
+    for (int32_t k = 0; k < d->rule.offsets; k++) {
+        int32_t const a = d->rule.angle[k];
+        s.offset[a] += sd->offset[a] * n[F_COEF + q + k];
+    }
     walker w = walker_from_state(&d->rule, &s);
     /* The given height of the pelvis and the ground at z = 0 are two measurements of one level. */
     float const var = sd->pelvis[2] * sd->pelvis[2],
@@ -61,7 +65,7 @@ walker dynamics_move(const dynamics *d, const walker *from, float dt, float age,
     bool const settling = age < c->settle_time;
     float n[NORMALS], sn, cs;
     walker w = *from;
-    normals(d, STREAM_MOVE, frame, i, 9 + q, n);
+    normals(d, STREAM_MOVE, frame, i, body_rule_fields(&d->rule), n);
 
     /* eqs. 6 and 7: phase advances by the previous rate; the rate diffuses */
     float const turn = from->f[F_RATE] * dt + c->phase_noise * root_dt * n[0];
@@ -91,6 +95,12 @@ walker dynamics_move(const dynamics *d, const walker *from, float dt, float age,
     if (settling)
         w.f[F_STATURE] = f_max(from->f[F_STATURE] * (1.0f + c->stature_noise * root_dt * n[8]), 0.3f);
     for (int32_t k = 0; k < q; k++)
-        w.f[F_COEF + k] = relax(from->f[F_COEF + k], dt, c->coef_time, c->coef_noise, n[9 + k]);
+        w.f[F_COEF + k] = relax(from->f[F_COEF + k], dt, c->coef_time, c->coef_noise, n[F_COEF + k]);
+    /* posture hardly changes: the time constant that keeps offset_sd with so little noise */
+    float const posture_time = c->offset_noise > 0.0f
+                                   ? 2.0f * c->offset_sd * c->offset_sd / (c->offset_noise * c->offset_noise)
+                                   : 0.0f;
+    for (int32_t k = F_COEF + q; k < body_rule_fields(&d->rule); k++)
+        w.f[k] = relax(from->f[k], dt, posture_time, c->offset_noise, n[k]);
     return w;
 }

@@ -143,6 +143,8 @@ static void spread(const gait_tracker *t, const walker *sd, float phase_sd, floa
         out->sd.pelvis[k] = out->joint_sd[0][k];
     for (int32_t k = 0; k < t->rule.components; k++)
         out->sd.coef[k] = sd->f[F_COEF + k];
+    for (int32_t k = 0; k < t->rule.offsets; k++)
+        out->sd.offset[t->rule.angle[k]] = sd->f[F_COEF + t->rule.components + k];
 }
 
 walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
@@ -152,7 +154,7 @@ walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
     uint8_t *const use = t->mode;
     double const mass = dominant_mode(p, weight, best, use);
     walker mean, sd;
-    for (int32_t f = 0; f < F_COEF + p->components; f++)
+    for (int32_t f = 0; f < p->fields; f++)
         mean_and_sd(field(p, f), weight, use, mass, p->n, &mean.f[f], &sd.f[f]);
     circular const phase = resultant(field(p, F_PHASE), TWO_PI_F, weight, NULL, p->n);
     circular const mode = resultant(field(p, F_PHASE), TWO_PI_F, weight, use, p->n);

@@ -141,7 +141,8 @@ static bool state_usable(const gait_state *s)
 {
     const float place[9] = {s->phase, s->stride_hz, s->stature,   s->heading,  s->pitch,
                             s->roll,  s->pelvis[0], s->pelvis[1], s->pelvis[2]};
-    return f_finite(place, 9) && f_finite(s->coef, GAIT_MAX_COMPONENTS) && s->stature > 0.0f;
+    return f_finite(place, 9) && f_finite(s->coef, GAIT_MAX_COMPONENTS) &&
+           f_finite(s->offset, GAIT_MAX_ANGLES) && s->stature > 0.0f;
 }
 
 /* Curves of one body into channel, then its frames. */
@@ -156,6 +157,8 @@ static void place_state(const gait_model *m, const gait_state *s, float *channel
                       .R = R,
                       .o = o};
     curves_at(m, s->phase, s->coef, 1, m->components, channel);
+    for (int32_t a = 0; a < m->angles; a++)
+        channel[a] += s->offset[a];
     place_frames(m, &b, 1);
 }
 

@@ -1,10 +1,10 @@
 #include "population.h"
 #include "fmath.h"
 
-population population_layout(arena *a, int32_t n, int32_t components)
+population population_layout(arena *a, int32_t n, int32_t fields)
 {
-    population p = {.n = n, .components = components};
-    p.value = TAKE(a, float, (size_t)(F_COEF + components) * (size_t)n);
+    population p = {.n = n, .fields = fields};
+    p.value = TAKE(a, float, (size_t)fields *(size_t)n);
     return p;
 }
 
@@ -23,25 +23,28 @@ float root_channel(const gait_model *m, int32_t c, float phase, const float *coe
     return sum;
 }
 
-body_rule body_rule_init(const gait_model *m, int32_t components, bool plain_root)
+body_rule body_rule_init(const gait_model *m, const gait_tracker_config *cfg)
 {
-    body_rule r = {.model = m, .components = components, .plain_root = plain_root};
+    body_rule r = {.model = m, .components = cfg->components, .plain_root = cfg->mode == GAIT_MODE_PAPER};
     for (int32_t j = 0; j < m->phases; j++)
         r.mean_height += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
+    for (int32_t a = 0; a < m->angles; a++)
+        if (cfg->offset_angles >> a & 1u)
+            r.angle[r.offsets++] = a;
     return r;
 }
 
 walker walker_get(const population *p, int32_t i)
 {
     walker w = {{0}};
-    for (int32_t f = 0; f < F_COEF + p->components; f++)
+    for (int32_t f = 0; f < p->fields; f++)
         w.f[f] = field(p, f)[i];
     return w;
 }
 
 void walker_put(population *p, int32_t i, const walker *w)
 {
-    for (int32_t f = 0; f < F_COEF + p->components; f++)
+    for (int32_t f = 0; f < p->fields; f++)
         field(p, f)[i] = w->f[f];
 }
 
@@ -73,6 +76,8 @@ gait_state walker_state(const body_rule *r, const walker *w)
     s.pelvis[2] = w->f[F_Z] + height;
     for (int32_t k = 0; k < r->components; k++)
         s.coef[k] = w->f[F_COEF + k];
+    for (int32_t k = 0; k < r->offsets; k++)
+        s.offset[r->angle[k]] = w->f[F_COEF + r->components + k];
     return s;
 }
 
@@ -88,6 +93,8 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
     w.f[F_ROLL] = s->roll;
     for (int32_t k = 0; k < r->components; k++)
         w.f[F_COEF + k] = s->coef[k];
+    for (int32_t k = 0; k < r->offsets; k++)
+        w.f[F_COEF + r->components + k] = s->offset[r->angle[k]];
     pelvis_offset(r, &w, &sway, &height);
     m_sincos(s->heading, &sn, &cs);
     w.f[F_X] = s->pelvis[0] + sway * sn;
@@ -96,30 +103,40 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
     return w;
 }
 
-/* Fields in the lanes of a block to bodies. */
-static void bodies(const body_rule *r, kin_input *in, kin_body *out)
+typedef struct block { /* fields of BLOCK walkers */
+    kin_input in;
+    float offset[GAIT_MAX_ANGLES][BLOCK];
+} block;
+
+/* The track and level in in.pelvis become the pelvis; then curves, posture and kinematics. */
+static void block_bodies(const body_rule *r, block *b, kin_body *out)
 {
     kin_channels ch;
+    kin_input *const in = &b->in;
     kin_curves(r->model, in->phase, (const float (*)[BLOCK])in->coef, r->components, &ch);
-    float *const root = ch.v[r->model->root_channel];
+    float (*const root)[BLOCK] = ch.v + r->model->root_channel;
+    for (int32_t k = 0; k < r->offsets; k++)
+        for (int32_t i = 0; i < BLOCK; i++)
+            ch.v[r->angle[k]][i] += b->offset[k][i];
     for (int32_t i = 0; r->plain_root && i < BLOCK; i++) {
         for (int32_t c = ROOT_SWAY; c <= ROOT_YAW; c++)
-            root[c * BLOCK + i] = 0.0f;
-        root[ROOT_HEIGHT * BLOCK + i] = r->mean_height;
+            root[c][i] = 0.0f;
+        root[ROOT_HEIGHT][i] = r->mean_height;
     }
     for (int32_t i = 0; i < BLOCK; i++) {
         float sn, cs;
-        float const sway = in->stature[i] * root[ROOT_SWAY * BLOCK + i];
+        float const sway = in->stature[i] * root[ROOT_SWAY][i];
         m_sincos(in->heading[i], &sn, &cs);
         in->pelvis[0][i] -= sway * sn;
         in->pelvis[1][i] += sway * cs;
-        in->pelvis[2][i] += in->stature[i] * root[ROOT_HEIGHT * BLOCK + i];
+        in->pelvis[2][i] += in->stature[i] * root[ROOT_HEIGHT][i];
     }
     kin_pose(r->model, &ch, in, out);
 }
 
-static void lane_put(kin_input *in, int32_t lane, const walker *w, int32_t components)
+static void block_put(const body_rule *r, block *b, int32_t lane, const walker *w)
 {
+    kin_input *const in = &b->in;
     in->phase[lane] = w->f[F_PHASE];
     in->stature[lane] = w->f[F_STATURE];
     in->heading[lane] = w->f[F_HEADING];
@@ -128,24 +145,26 @@ static void lane_put(kin_input *in, int32_t lane, const walker *w, int32_t compo
     in->pelvis[0][lane] = w->f[F_X];
     in->pelvis[1][lane] = w->f[F_Y];
     in->pelvis[2][lane] = w->f[F_Z];
-    for (int32_t k = 0; k < components; k++)
+    for (int32_t k = 0; k < r->components; k++)
         in->coef[k][lane] = w->f[F_COEF + k];
+    for (int32_t k = 0; k < r->offsets; k++)
+        b->offset[k][lane] = w->f[F_COEF + r->components + k];
 }
 
 void population_bodies(const body_rule *r, const population *p, int32_t begin, kin_body *out)
 {
-    kin_input in;
+    block b;
     for (int32_t lane = 0; lane < BLOCK; lane++) {
         walker const w = walker_get(p, i_min(begin + lane, p->n - 1));
-        lane_put(&in, lane, &w, r->components);
+        block_put(r, &b, lane, &w);
     }
-    bodies(r, &in, out);
+    block_bodies(r, &b, out);
 }
 
 void walker_body(const body_rule *r, const walker *w, kin_body *out)
 {
-    kin_input in;
+    block b;
     for (int32_t lane = 0; lane < BLOCK; lane++)
-        lane_put(&in, lane, w, r->components);
-    bodies(r, &in, out);
+        block_put(r, &b, lane, w);
+    block_bodies(r, &b, out);
 }

@@ -15,13 +15,13 @@ enum {
     F_PITCH,
     F_ROLL,
     F_STATURE,
-    F_COEF,
-    F_MAX = F_COEF + GAIT_MAX_COMPONENTS
+    F_COEF, /* the scores, then the posture offsets of the angles that have one */
+    F_MAX = F_COEF + GAIT_MAX_COMPONENTS + GAIT_MAX_ANGLES
 };
 
 typedef struct population {
-    int32_t n, components;
-    float *value; /* (F_COEF + components) x n */
+    int32_t n, fields;
+    float *value; /* fields x n */
 } population;
 
 static inline float *field(const population *p, int32_t f)
@@ -29,17 +29,26 @@ static inline float *field(const population *p, int32_t f)
     return p->value + (size_t)f * (size_t)p->n;
 }
 
-population population_layout(arena *a, int32_t n, int32_t components);
+population population_layout(arena *a, int32_t n, int32_t fields);
 
 /* Constants that turn fields into bodies. */
 typedef struct body_rule {
     const gait_model *model;
     int32_t components;
-    bool plain_root;   /* paper: no root motion within the stride, pelvis at its mean height */
-    float mean_height; /* statures */
+    int32_t offsets;                /* how many angles have a posture offset, */
+    int32_t angle[GAIT_MAX_ANGLES]; /* and which */
+    bool plain_root;                /* paper: no root motion within the stride, pelvis at its mean height */
+    float mean_height;              /* statures */
 } body_rule;
 
-body_rule body_rule_init(const gait_model *m, int32_t components, bool plain_root);
+/* components of cfg must be resolved (>= 0). */
+body_rule body_rule_init(const gait_model *m, const gait_tracker_config *cfg);
+
+/* Fields of a particle. */
+static inline int32_t body_rule_fields(const body_rule *r)
+{
+    return F_COEF + r->components + r->offsets;
+}
 
 /* One hypothesis as fields, in SI units. */
 typedef struct walker {

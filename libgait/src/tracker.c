@@ -18,7 +18,7 @@ static void layout_state(arena *a, gait_tracker *t)
     size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
     t->core = TAKE(a, tracker_core, 1);
     for (int32_t g = 0; g < 2; g++) {
-        t->gen[g].people = population_layout(a, n, t->cfg.components);
+        t->gen[g].people = population_layout(a, n, body_rule_fields(&t->rule));
         if (wants_texture(&t->cfg))
             t->gen[g].texture = TAKE(a, int8_t, (size_t)n *(size_t)cameras *samples);
     }
@@ -53,11 +53,11 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     gait_tracker t = {.model = m, .cfg = *cfg};
     if (t.cfg.components < 0)
         t.cfg.components = m->components;
+    t.rule = body_rule_init(m, &t.cfg);
     layout_state(a, &t);
     layout_work(a, &t);
     if (!self || a->overflow)
         return NULL;
-    t.rule = body_rule_init(m, t.cfg.components, cfg->mode == GAIT_MODE_PAPER);
     like_setup_init(t.like, m, &t.cfg);
     *self = t;
     return self;

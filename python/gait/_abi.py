@@ -136,6 +136,7 @@ class StateC(ctypes.Structure):
         ("roll", c_float),
         ("pelvis", c_float * 3),
         ("coef", c_float * MAX_COMPONENTS),
+        ("offset", c_float * MAX_ANGLES),
     ]
 
 
@@ -204,7 +205,9 @@ class TrackerConfigC(ctypes.Structure):
         ("coef_noise", c_float),
         ("coef_time", c_float),
         ("stature_noise", c_float),
-        ("reserved", c_uint32),
+        ("offset_noise", c_float),
+        ("offset_sd", c_float),
+        ("offset_angles", c_uint32),
         ("camera", CameraC * MAX_CAMERAS),
         ("exec", Tasks),
     ]

@@ -117,7 +117,8 @@ class Model:
         """Mean and standard deviation of a walker of whom nothing is known, with the pelvis at the origin."""
         mean, sd = _abi.StateC(), _abi.StateC()
         check(self._lib.gait_tracker_prior(self.handle, ctypes.byref(mean), ctypes.byref(sd)))
-        return State.from_c(mean, self.info.components), State.from_c(sd, self.info.components)
+        sizes = (self.info.components, self.info.angles)
+        return State.from_c(mean, *sizes), State.from_c(sd, *sizes)
 
     def render(self, camera: Camera, state: State) -> NDArray[np.uint8]:
         """Draw a hypothesis through an ideal lens: (height, width) of limb index + 1, or 0 for none."""

@@ -34,6 +34,8 @@ class State:
         Pelvis joint in the world, metres.
     coef : ndarray of shape (q,)
         Principal-component scores in standard deviations; missing ones are 0.
+    offset : ndarray of shape (A,)
+        Posture: added to the model's joint angles, radians; missing ones are 0.
     """
 
     phase: float = 0.0
@@ -44,12 +46,14 @@ class State:
     roll: float = 0.0
     pelvis: Array = field(default_factory=lambda: np.zeros(3))
     coef: Array = field(default_factory=lambda: np.zeros(0))
+    offset: Array = field(default_factory=lambda: np.zeros(0))
 
     @staticmethod
-    def from_c(c: _abi.StateC, components: int) -> State:
-        """Copy a ``gait_state``, keeping `components` scores."""
+    def from_c(c: _abi.StateC, components: int, angles: int) -> State:
+        """Copy a ``gait_state``, keeping `components` scores and `angles` offsets."""
         scalars = {name: float(getattr(c, name)) for name in SCALARS}
-        return State(**scalars, pelvis=np.array(c.pelvis, float), coef=np.array(c.coef[:components], float))
+        arrays = {"pelvis": c.pelvis, "coef": c.coef[:components], "offset": c.offset[:angles]}
+        return State(**scalars, **{name: np.array(values, float) for name, values in arrays.items()})
 
     def to_c(self) -> _abi.StateC:
         """Make a ``gait_state``.
@@ -57,13 +61,16 @@ class State:
         Raises
         ------
         ValueError
-            If `pelvis` is not of 3 numbers or `coef` has more than the library can hold.
+            If `pelvis` is not of 3 numbers, or `coef` or `offset` has more than the library can hold.
         """
         pelvis: Sequence[float] = np.asarray(self.pelvis, float).tolist()
         coef: Sequence[float] = np.asarray(self.coef, float).tolist()
-        if len(pelvis) != 3 or len(coef) > _abi.MAX_COMPONENTS:
-            raise ValueError(f"state: pelvis has 3 numbers and coef at most {_abi.MAX_COMPONENTS}")
+        offset: Sequence[float] = np.asarray(self.offset, float).tolist()
+        if len(pelvis) != 3 or len(coef) > _abi.MAX_COMPONENTS or len(offset) > _abi.MAX_ANGLES:
+            limits = f"coef at most {_abi.MAX_COMPONENTS}, offset at most {_abi.MAX_ANGLES}"
+            raise ValueError(f"state: pelvis has 3 numbers, {limits}")
         c = _abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
         c.pelvis[:] = pelvis
         c.coef[: len(coef)] = coef
+        c.offset[: len(offset)] = offset
         return c

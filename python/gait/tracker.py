@@ -52,6 +52,9 @@ class TrackerConfig:
     coef_noise: float
     coef_time: float
     stature_noise: float
+    offset_noise: float
+    offset_sd: float
+    offset_angles: int
 
     @staticmethod
     def default(mode: Mode | int = Mode.DEFAULT, **changes: Any) -> TrackerConfig:
@@ -151,9 +154,9 @@ class Estimate:
             phase_r=c.phase_r,
             mode_mass=c.mode_mass,
             speed=c.speed,
-            mean=State.from_c(c.mean, info.components),
-            sd=State.from_c(c.sd, info.components),
-            best=State.from_c(c.best, info.components),
+            mean=State.from_c(c.mean, info.components, info.angles),
+            sd=State.from_c(c.sd, info.components, info.angles),
+            best=State.from_c(c.best, info.components, info.angles),
             joints=joints,
             joint_sd=np.array(c.joint_sd, float)[: info.joints],
             angles=angles,
