@@ -30,13 +30,13 @@ from gait.state import State
 FINGERPRINTS = {
     "angle_t": "70ec7fc36619a1e2",
     "camera_t": "be86d3ea284d3ddd",
-    "command_t": "276be2ecf9a5b191",
-    "estimate_t": "f68901038e6a43e6",
+    "command_t": "915eeb6f0356b2b8",
+    "estimate_t": "15758dc69cf3c5a3",
     "image_metadata_t": "9a4b634d0577fb8e",
     "image_t": "14739ffe13d5f5f0",
     "joint_t": "fc582328f6d14f63",
-    "particles_t": "cb07be22cccc9284",
-    "state_t": "4b2f9159965b1bdb",
+    "particles_t": "80014263d1a51319",
+    "state_t": "a5ac537a18c75c25",
     "status_t": "a0ea033100bad162",
     "track_t": "3bf4b97187897236",
     "tracks_t": "e04dceb9e672c2c6",
@@ -131,6 +131,7 @@ def test_cameras_come_through():
 
 def test_states_come_through_and_the_unknown_is_nan():
     state = State(0.25, 0.875, 1.75, -0.5, 0.125, 0.0625, np.array([1.0, 2.0, 3.0]), np.array([0.5, -0.25]))
+    state.offset = np.array([0.125, 0, -1.0])
     back = state_of(gaitmsg.state_t.decode(state_message(state).encode()))
     assert vars(back).keys() == vars(state).keys()
     for name, value in vars(state).items():

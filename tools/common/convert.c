@@ -8,8 +8,10 @@
 enum { MAX_PIXELS = 1 << 14 };
 _Static_assert(sizeof((gaitmsg_state_t *)0)->coef == sizeof((gait_state *)0)->coef,
                "state_t holds every component");
+_Static_assert(sizeof((gaitmsg_state_t *)0)->offset == sizeof((gait_state *)0)->offset,
+               "state_t holds every angle");
 
-void convert_state(const gait_state *in, int32_t components, gaitmsg_state_t *out)
+void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_state_t *out)
 {
     out->phase = in->phase;
     out->stride_hz = in->stride_hz;
@@ -18,8 +20,10 @@ void convert_state(const gait_state *in, int32_t components, gaitmsg_state_t *ou
     out->pitch = in->pitch;
     out->roll = in->roll;
     memcpy(out->pelvis, in->pelvis, sizeof out->pelvis);
-    out->ncoef = components;
+    out->ncoef = info->components;
     memcpy(out->coef, in->coef, sizeof out->coef);
+    out->noffset = info->angles;
+    memcpy(out->offset, in->offset, sizeof out->offset);
 }
 
 static float known(float value, float unknown)
@@ -32,6 +36,8 @@ bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown,
 {
     if (in->ncoef < 0 || in->ncoef > GAIT_MAX_COMPONENTS)
         return message_set(why, "state with ncoef %d; give 0 to %d", in->ncoef, GAIT_MAX_COMPONENTS);
+    if (in->noffset < 0 || in->noffset > GAIT_MAX_ANGLES)
+        return message_set(why, "state with noffset %d; give 0 to %d", in->noffset, GAIT_MAX_ANGLES);
     *out = (gait_state){0};
     out->phase = known(in->phase, unknown->phase);
     out->stride_hz = known(in->stride_hz, unknown->stride_hz);
@@ -43,6 +49,8 @@ bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown,
         out->pelvis[i] = known(in->pelvis[i], unknown->pelvis[i]);
     for (int i = 0; i < in->ncoef; i++)
         out->coef[i] = known(in->coef[i], unknown->coef[i]);
+    for (int i = 0; i < in->noffset; i++)
+        out->offset[i] = known(in->offset[i], unknown->offset[i]);
     return true;
 }
 
@@ -79,9 +87,9 @@ void convert_estimate(const gait_model *model, const gait_model_info *info, cons
     m->flags = (int32_t)in->flags;
     m->model_digest = (int64_t)info->digest;
     m->log_evidence = in->log_evidence;
-    convert_state(&in->mean, info->components, &m->mean);
-    convert_state(&in->sd, info->components, &m->sd);
-    convert_state(&in->best, info->components, &m->best);
+    convert_state(&in->mean, info, &m->mean);
+    convert_state(&in->sd, info, &m->sd);
+    convert_state(&in->best, info, &m->best);
     m->ess = in->ess;
     m->phase_r = in->phase_r;
     m->mode_mass = in->mode_mass;

@@ -14,8 +14,8 @@ typedef struct estimate_message {
     gaitmsg_angle_t angle[GAIT_MAX_ANGLES];
 } estimate_message;
 
-void convert_state(const gait_state *in, int32_t components, gaitmsg_state_t *out);
-/* Fields that are not numbers become those of `unknown`; components beyond the message's ncoef are 0. */
+void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_state_t *out);
+/* Fields that are not numbers become those of `unknown`; components and offsets beyond the message's are 0. */
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
 bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why);

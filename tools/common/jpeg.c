@@ -1,9 +1,11 @@
 #include "jpeg.h"
 
 #ifdef HAVE_LIBJPEG
-#include <jpeglib.h>
+/* clang-format off: jpeglib.h needs the others before it */
 #include <setjmp.h>
-#include <stdio.h> /* jpeglib.h needs it first */
+#include <stdio.h>
+#include <jpeglib.h>
+/* clang-format on */
 
 typedef struct failure {
     struct jpeg_error_mgr base; /* first: libjpeg knows only this */

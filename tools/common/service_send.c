@@ -18,7 +18,7 @@ static void send_particles(service *s, const image_view *v)
     s->cloud.frame = v->frame;
     s->cloud.n = n < 0 ? 0 : n;
     for (int32_t i = 0; i < s->cloud.n; i++)
-        convert_state(&s->hypothesis[i], s->track.info.components, &s->cloud.state[i]);
+        convert_state(&s->hypothesis[i], &s->track.info, &s->cloud.state[i]);
     publish(s, "GAIT_PARTICLES", s->particles,
             gaitmsg_particles_t_encode(s->particles, 0, (int)s->particles_bytes, &s->cloud));
 }

@@ -79,8 +79,8 @@ def buffer_warning(url: str) -> str | None:
     if granted >= _RMEM_ENOUGH:
         return None
     return (
-        f"the kernel grants {granted} bytes to a receiver, too few for a colour stream: "
-        f"sysctl -w net.core.rmem_max=4194304 (as root), or send --jpeg 90 or --grey"
+        f"the kernel grants a receiver {granted} bytes, too few for uncompressed frames: some will be lost; "
+        f"sysctl -w net.core.rmem_max=4194304 (as root), or send --jpeg 90"
     )
 
 

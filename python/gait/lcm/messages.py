@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from gait._abi import MAX_COMPONENTS, Flag, TrackStatus
+from gait._abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.lcm.types import gaitmsg
@@ -141,16 +141,26 @@ def state_message(values: State | Mapping[str, Any]) -> Any:
     for name in SCALARS:
         setattr(message, name, float(known.get(name, _UNKNOWN)))
     message.pelvis = [float(x) for x in known.get("pelvis", [_UNKNOWN] * 3)]
-    coef = [float(x) for x in known.get("coef", [_UNKNOWN] * MAX_COMPONENTS)]
-    message.ncoef = len(coef)
-    message.coef = coef + [0.0] * (MAX_COMPONENTS - len(coef))
+    message.ncoef, message.coef = _padded(known.get("coef"), MAX_COMPONENTS)
+    message.noffset, message.offset = _padded(known.get("offset"), MAX_ANGLES)
     return message
+
+
+def _padded(values: Any, room: int) -> tuple[int, list[float]]:
+    """Count and values, with zeros up to `room`; all of them unknown if `values` is None."""
+    given = [_UNKNOWN] * room if values is None else [float(x) for x in values]
+    return len(given), given + [0.0] * (room - len(given))
 
 
 def state_of(message: Any) -> State:
     """Read a ``state_t``."""
     scalars = {name: float(getattr(message, name)) for name in SCALARS}
-    return State(**scalars, pelvis=np.array(message.pelvis), coef=np.array(message.coef[: message.ncoef]))
+    arrays = {
+        "pelvis": message.pelvis,
+        "coef": message.coef[: message.ncoef],
+        "offset": message.offset[: message.noffset],
+    }
+    return State(**scalars, **{name: np.array(values, float) for name, values in arrays.items()})
 
 
 def command_message(
