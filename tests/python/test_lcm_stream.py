@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import subprocess
+import threading
 
 import cv2
 import lcm_rig as rig
@@ -12,6 +13,7 @@ import pytest
 
 from gait.errors import UserError
 from gait.lcm import link
+from gait.lcm.ahead import ahead
 from gait.lcm.pacing import Pacer, parse_rate
 from gait.lcm.record import Recorder
 from gait.lcm.results import read_run
@@ -145,6 +147,31 @@ def test_rates():
     for bad in ("fast", "0", "-3", "1e9", "nan"):
         with pytest.raises(UserError, match="--rate"):
             parse_rate(bad)
+
+
+def test_work_ahead_keeps_order_and_raises_at_its_place():
+    def source():
+        yield from range(5)
+        raise UserError("broken")
+
+    items = ahead(source(), 2)
+    assert [next(items) for _ in range(5)] == list(range(5))
+    with pytest.raises(UserError, match="broken"):
+        next(items)
+
+
+def test_work_ahead_stops_when_nobody_wants_more():
+    drawn = []
+
+    def source():
+        for i in range(1000):
+            drawn.append(i)
+            yield i
+
+    items = ahead(source(), 3)
+    assert next(items) == 0
+    items.close()
+    assert len(drawn) <= 6 and not any(t.name == "ahead" for t in threading.enumerate())
 
 
 # ---- capture ----

@@ -16,6 +16,8 @@ import argparse
 import contextlib
 import json
 import sys
+from collections.abc import Iterator
+from itertools import chain
 
 import cv2
 import numpy as np
@@ -29,7 +31,7 @@ from gait.lcm.pacing import Pacer, parse_rate
 from gait.lcm.source import DeviceSource, FileSource, is_device
 from gait.model import Model
 from gait.progress import progress
-from gait.video import background, read_plate
+from gait.video import Frame, background, read_plate
 
 NAME = "capture"
 HELP = "send the frames of a video or a camera over LCM"
@@ -78,13 +80,22 @@ def run(args: argparse.Namespace) -> int:
         print(f"gait capture: {warning}", file=sys.stderr)
     if args.wait > 0:
         publisher.meet(args.wait)
+    frames = _primed(source)
     pacer = publisher.begin(source, float("inf") if source.live else rate, args.wait)
     total = None if isinstance(source, DeviceSource) or args.loop else (args.stop or source.video.count)
     interrupt = contextlib.suppress(KeyboardInterrupt)  # the way to end a camera or a loop
     with progress("sending", total, args.quiet) as update, interrupt:
-        publisher.send(source.frames(), pacer, update)
+        publisher.send(frames, pacer, update)
     _report(args, publisher, pacer)
     return 0
+
+
+def _primed(source: FileSource | DeviceSource) -> Iterator[Frame]:
+    """Frames of the source; of a file the first is decoded already, which may have taken long to find."""
+    frames = source.frames()
+    if isinstance(source, DeviceSource):
+        return frames
+    return chain([next(frames)], frames)
 
 
 def _source(args: argparse.Namespace) -> FileSource | DeviceSource:

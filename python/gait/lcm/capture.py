@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.initial import Start
+from gait.lcm.ahead import ahead
 from gait.lcm.link import is_log, open_lcm
 from gait.lcm.messages import camera_message, command_message, decode, image_message
 from gait.lcm.pacing import Pacer
@@ -19,6 +20,7 @@ from gait.lcm.types import gaitmsg
 from gait.video import Frame, Image
 
 ANNOUNCE = 2.0  # seconds of video between two announcements of camera and empty scene
+_AHEAD = 8  # frames decoded before they are due
 _ASK = 0.5  # seconds until a question to the tracker is repeated
 _LEAD = 0.5  # seconds from START to the first frame, in which the tracker can confirm
 
@@ -103,16 +105,21 @@ class Publisher:
 
     def send(self, frames: Iterable[Frame], pacer: Pacer, done: Callable[[int], None]) -> None:
         """Send each frame when it is due; `done` is told the number of each."""
-        channel, jpeg = f"GAIT_IMAGE_{self._setup.stream}", self._setup.jpeg
-        for frame in frames:
-            if frame.time - self._announced >= ANNOUNCE:
-                self._announced = frame.time
-                self.announce(pacer.utime(frame.time))
-            data = image_message(frame.image, pacer.utime(frame.time), frame.number, jpeg).encode()
-            pacer.wait(frame.time)
+        channel = f"GAIT_IMAGE_{self._setup.stream}"
+        for number, seconds, data in ahead(self._encoded(frames, pacer), _AHEAD):
+            if seconds - self._announced >= ANNOUNCE:
+                self._announced = seconds
+                self.announce(pacer.utime(seconds))
+            pacer.wait(seconds)
             self._lcm.publish(channel, data)
             self.sent += 1
-            done(frame.number)
+            done(number)
+
+    def _encoded(self, frames: Iterable[Frame], pacer: Pacer) -> Iterator[tuple[int, float, bytes]]:
+        """Yield number, video time and message of each frame."""
+        for frame in frames:
+            message = image_message(frame.image, pacer.utime(frame.time), frame.number, self._setup.jpeg)
+            yield frame.number, frame.time, message.encode()
 
     def announce(self, utime: int) -> None:
         """Send calibration and empty scene, as far as they are known."""

@@ -155,12 +155,10 @@ def _padded(values: Any, room: int) -> tuple[int, list[float]]:
 def state_of(message: Any) -> State:
     """Read a ``state_t``."""
     scalars = {name: float(getattr(message, name)) for name in SCALARS}
-    arrays = {
-        "pelvis": message.pelvis,
-        "coef": message.coef[: message.ncoef],
-        "offset": message.offset[: message.noffset],
-    }
-    return State(**scalars, **{name: np.array(values, float) for name, values in arrays.items()})
+    state = State(**scalars, pelvis=np.array(message.pelvis, float))
+    state.coef = np.array(message.coef[: message.ncoef], float)
+    state.offset = np.array(message.offset[: message.noffset], float)
+    return state
 
 
 def command_message(
