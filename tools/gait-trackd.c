@@ -1,5 +1,6 @@
 /* gait-trackd - frames in, estimates out, over LCM.  `gait-trackd --help` is the manual. */
 #include "common/camera_file.h"
+#include "common/jpeg.h"
 #include "common/link.h"
 #include "common/pnm.h"
 #include "common/pool.h"
@@ -18,7 +19,7 @@ static struct settings {
     int32_t stream, particles, components, threads, tasks;
     uint64_t seed;
     float max_gap;
-    bool particles_channel, quiet;
+    bool particles_channel, quiet, version;
     tracker_values tracker;
 } settings = {
     .mode = "default", .init = "auto", .components = -1, .threads = 1, .tasks = 16, .seed = 1, .max_gap = 2};
@@ -56,6 +57,7 @@ static const option own_options[] = {
     {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
      OPTION_FLOAT, &settings.max_gap, 0, 60},
     {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
+    {"version", 0, "", "say the version, and whether JPEG frames are understood", FLAG(version)},
     {"quiet", 'q', "", "no summary at the end", FLAG(quiet)},
 };
 enum { OWN = sizeof own_options / sizeof *own_options, OPTIONS = OWN + TRACKER_OPTIONS };
@@ -103,12 +105,12 @@ static option_result read_settings(int argc, char **argv, const option *table, m
                      : OPTION_BAD;
     if (result != OPTION_OK)
         return result;
-    bool const ok =
-        (settings.model[0] || message_set(why, "--model FILE is needed; `gait learn` makes one")) &&
-        (strcmp(settings.mode, "paper") == 0 || strcmp(settings.mode, "default") == 0 ||
-         message_set(why, "--mode %.100s: give default or paper", settings.mode)) &&
-        (!settings.background[0] || settings.camera[0] ||
-         message_set(why, "--background needs --camera, or leave both to `gait capture`"));
+    bool const ok = (settings.model[0] || settings.version ||
+                     message_set(why, "--model FILE is needed; `gait learn` makes one")) &&
+                    (strcmp(settings.mode, "paper") == 0 || strcmp(settings.mode, "default") == 0 ||
+                     message_set(why, "--mode %.100s: give default or paper", settings.mode)) &&
+                    (!settings.background[0] || settings.camera[0] ||
+                     message_set(why, "--background needs --camera, or leave both to `gait capture`"));
     return ok ? OPTION_OK : OPTION_BAD;
 }
 
@@ -209,6 +211,12 @@ int main(int argc, char **argv)
         fprintf(stderr, "gait-trackd: %s\n", why.text);
     if (result != OPTION_OK)
         return result == OPTION_HELP ? 0 : 2;
+    if (settings.version) {
+        uint32_t const v = gait_version();
+        printf("gait-trackd %u.%u.%u jpeg %s\n", v / 10000, v / 100 % 100, v % 100,
+               jpeg_supported() ? "yes" : "no");
+        return 0;
+    }
     set_signals(&unblocked);
     bool ok = pool_start(&threads, settings.threads, &why);
     if (ok) {

@@ -6,6 +6,8 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
+import gait
+
 CAMERA = rig.CAMERA.to_dict()
 INIT = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": 0.1}}
 
@@ -199,6 +201,12 @@ def test_help_lists_every_option():
     assert outcome.code == 0 and not outcome.words
     for option in ("--model", "--camera", "--init", "--url", "--threads", "--phase-noise", "--stature-noise"):
         assert option in outcome.printed
+
+
+def test_version_says_whether_jpeg_is_understood():
+    outcome = rig.run("--version")
+    assert outcome.code == 0
+    assert outcome.printed in [f"gait-trackd {gait.__version__} jpeg {answer}\n" for answer in ("yes", "no")]
 
 
 def test_configuration_file_and_command_line(tmp_path):

@@ -7,6 +7,11 @@
 #include <jpeglib.h>
 /* clang-format on */
 
+bool jpeg_supported(void)
+{
+    return true;
+}
+
 typedef struct failure {
     struct jpeg_error_mgr base; /* first: libjpeg knows only this */
     jmp_buf back;
@@ -68,6 +73,11 @@ bool jpeg_decode(const uint8_t *data, size_t size, int32_t width, int32_t height
     return ok;
 }
 #else
+bool jpeg_supported(void)
+{
+    return false;
+}
+
 bool jpeg_decode(const uint8_t *data, size_t size, int32_t width, int32_t height, uint8_t *pixels,
                  gait_image *out, message *why)
 {

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +25,9 @@ from gait.cli.record import text as recording_text
 from gait.cli.report import make_report
 from gait.errors import UserError
 from gait.fields import read_json
-from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url
+from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_buffer
 from gait.lcm.session import Session
+from gait.video import Video
 
 NAME = "demo"
 HELP = "run capture, tracker and recorder on a clip and report"
@@ -34,6 +36,7 @@ _ROOT = Path(__file__).resolve().parents[3]
 _TRACKD = _ROOT / "build" / "bin" / "gait-trackd"
 _MODEL = _ROOT / "python" / "gait" / "data" / "walk.gait"
 _READY = 60.0  # seconds in which the tracker must have confirmed camera and start
+_LARGE = 1 << 21  # bytes of a colour frame that no receiver keeps up with
 _IDLE = 2.0  # seconds without an estimate that end the recording
 _END = 30.0  # seconds that a process may take to end once its work is done
 
@@ -49,12 +52,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--start", metavar="F", help="first frame to send, from 0 (the frame of --init)")
     parser.add_argument("--stop", metavar="F", help="first frame not to send")
     parser.add_argument("--particles", metavar="N", help="hypotheses (1000)")
-    parser.add_argument("--threads", default="1", metavar="T", help="of the tracker (1)")
+    parser.add_argument("--threads", default=_threads(), metavar="T", help="of the tracker (%(default)s)")
     parser.add_argument(
         "-m", "--model", default=str(_MODEL), metavar="M.gait", help="walking model (the shipped one)"
     )
     parser.add_argument("--trackd", default=str(_TRACKD), metavar="PROGRAM", help="gait-trackd (build/bin)")
     parser.add_argument("-o", "--output", default="build/demo", metavar="DIR", help="folder for the results")
+
+
+def _threads() -> str:
+    """All cores but the one that decodes the clip, up to four."""
+    return str(max(1, min(4, (os.cpu_count() or 1) - 1)))
 
 
 @dataclass
@@ -132,13 +140,28 @@ def _run_live(args: argparse.Namespace, clip: Clip, out: Path, session: Session)
     tracker = session.start("gait-trackd", _trackd(args, url))
     recorder = session.start("gait record", _record(url, out), pipe_errors=True)
     recorder.wait_for_word(LISTENING)
-    capture = session.start("gait capture", [*_capture(args, clip), "--url", url, "--wait", str(_READY)])
+    sending = ["--url", url, "--wait", str(_READY), *_compression(args, clip, session)]
+    capture = session.start("gait capture", [*_capture(args, clip), *sending])
     session.wait(capture, needed=[tracker, recorder])
     capture.result(_END)
     figures: dict[str, Any] = json.loads(recorder.result(_END))
     tracker.interrupt()
     _say(args, f"gait-trackd: {tracker.result(_END).strip()}")
     return figures
+
+
+def _compression(args: argparse.Namespace, clip: Clip, session: Session) -> list[str]:
+    """Options of gait capture that make a frame fit the receivers' buffers twice; colour where it does."""
+    width, height = Video(clip.video).size
+    if 2 * 3 * width * height <= receive_buffer():
+        return []
+    if session.start("gait-trackd", [args.trackd, "--version"]).result(_END).strip().endswith("jpeg yes"):
+        _say(args, "frames are larger than half the receive buffer: sent as JPEG")
+        return ["--jpeg", "90"]
+    if 3 * width * height <= _LARGE:
+        return []
+    _say(args, "frames are larger than half the receive buffer and gait-trackd has no JPEG: sent in grey")
+    return ["--grey"]
 
 
 def _run_through_log(args: argparse.Namespace, clip: Clip, out: Path, session: Session) -> dict[str, Any]:

@@ -71,12 +71,16 @@ def multicast_works() -> bool:
     return True
 
 
+def receive_buffer() -> int:
+    """Bytes that a receiver on this machine gets when it asks for those of `DEFAULT_URL`."""
+    asked = int(DEFAULT_URL.rpartition("=")[2])
+    return min(asked, int(_RMEM_MAX.read_text(encoding="ascii"))) if _RMEM_MAX.is_file() else asked
+
+
 def buffer_warning(url: str) -> str | None:
     """One line if the kernel will not grant the receive buffer that `url` asks for."""
-    if not url.startswith("udpm://") or not _RMEM_MAX.is_file():
-        return None
-    granted = int(_RMEM_MAX.read_text(encoding="ascii"))
-    if granted >= _RMEM_ENOUGH:
+    granted = receive_buffer()
+    if not url.startswith("udpm://") or granted >= _RMEM_ENOUGH:
         return None
     return (
         f"the kernel grants a receiver {granted} bytes, too few for uncompressed frames: some will be lost; "

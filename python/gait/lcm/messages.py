@@ -154,8 +154,9 @@ def _padded(values: Any, room: int) -> tuple[int, list[float]]:
 
 def state_of(message: Any) -> State:
     """Read a ``state_t``."""
-    scalars = {name: float(getattr(message, name)) for name in SCALARS}
-    state = State(**scalars, pelvis=np.array(message.pelvis, float))
+    state = State(pelvis=np.array(message.pelvis, float))
+    for name in SCALARS:
+        setattr(state, name, float(getattr(message, name)))
     state.coef = np.array(message.coef[: message.ncoef], float)
     state.offset = np.array(message.offset[: message.noffset], float)
     return state
