@@ -44,9 +44,14 @@ class Proportions:
     """
 
     hip: tuple[float, float, float] = (0.0, 0.055, 0.0)  #: left hip from the pelvis joint, in the pelvis
+    torso: tuple[float, float, float] = (
+        0.0,
+        0.0,
+        0.0,
+    )  #: foot of the spine from the pelvis joint, in the pelvis
     shoulder: tuple[float, float, float] = (0.0, 0.107, 0.283)  #: left shoulder, in the torso
-    neck: float = 0.320  #: pelvis joint to neck joint
-    head: float = 0.143  #: neck joint to the top of the head
+    neck: float = 0.320  #: foot of the spine to neck joint
+    head: tuple[float, float, float] = (0.0, 0.0, 0.143)  #: top of the head from the neck joint, in the head
     upper_arm: float = 0.168
     forearm: float = 0.155  #: elbow to wrist
     thigh: float = 0.240
@@ -127,7 +132,7 @@ def _frames(p: Proportions) -> tuple[list[str], npt.NDArray[np.int32], Floats]:
     """Frame names, FRMI rows and origins."""
     rows: list[tuple[str, str, tuple[float, float, float], list[tuple[int, str]]]] = [
         ("pelvis", "", (0, 0, 0), [(3, "root_yaw"), (2, "root_pitch"), (1, "root_roll")]),
-        ("torso", "pelvis", (0, 0, 0), [(3, "torso_z"), (2, "torso_y"), (1, "torso_x")]),
+        ("torso", "pelvis", p.torso, [(3, "torso_z"), (2, "torso_y"), (1, "torso_x")]),
         ("head", "torso", (0, 0, p.neck), [(3, "neck_z"), (2, "neck_y"), (1, "neck_x")]),
     ]
     for s in SIDES:
@@ -155,7 +160,7 @@ def _points(p: Proportions) -> dict[str, tuple[str, tuple[float, float, float]]]
     points: dict[str, tuple[str, tuple[float, float, float]]] = {
         "pelvis": ("pelvis", zero),
         "neck": ("head", zero),
-        "head_top": ("head", (0.0, 0.0, p.head)),
+        "head_top": ("head", p.head),
     }
     for s in SIDES:
         points |= {
@@ -185,9 +190,15 @@ def _limbs(p: Proportions) -> dict[str, tuple[str, int, list[float]]]:
 
     top = p.shoulder[2] + 0.015
     limbs = {
-        "torso": limb("torso", CONE, (0, 0, 0.06), (0, 0, top), (140, 105, 165, 105)),
+        "torso": limb("torso", CONE, (0, 0, 0.06), (0, 0, top), (140, 105, 155, 105)),
         "pelvis": limb("pelvis", CONE, (0, 0, -0.045), (0, 0, 0.075), (155, 115, 140, 105)),
-        "head": limb("head", ELLIPSOID, (0.012, 0, p.head - 0.135), (0.012, 0, p.head), (78, 95, 78, 95)),
+        "head": limb(
+            "head",
+            ELLIPSOID,
+            (p.head[0] + 0.012, 0, p.head[2] - 0.135),
+            (p.head[0] + 0.012, 0, p.head[2]),
+            (78, 95, 78, 95),
+        ),
     }
     heel, ball = (p.heel[0] + 0.012, 0.0, 0.024 - p.sole), (p.toe[0] + 0.02, 0.0, 0.02 - p.sole)
     for s in SIDES:

@@ -55,6 +55,16 @@ def test_angles_survive_a_round_trip(seed, size):
     assert retarget.angles(walker, measures) == pytest.approx(channels[:, :24], abs=1e-6)
 
 
+def test_generic_proportions_stay_between_recordings_and_anatomy():
+    channels = np.zeros((4, len(CHANNELS)))
+    measures = retarget.measure(body_of(channels))
+    own, generic = retarget.own_proportions(measures), retarget.generic_proportions([measures, measures])
+    assert generic.shoulder[2] == pytest.approx((own.shoulder[2] + retarget.SHOULDER_HEIGHT) / 2)
+    assert min(own.upper_arm, retarget.UPPER_ARM) < generic.upper_arm < max(own.upper_arm, retarget.UPPER_ARM)
+    assert np.linalg.norm(generic.head) == pytest.approx(retarget.HEAD, abs=1e-3)
+    assert (generic.thigh, generic.forearm, generic.hip) == (own.thigh, own.forearm, own.hip)
+
+
 def test_lengths_survive_a_round_trip():
     channels = np.zeros((8, len(CHANNELS)))
     channels[:, : len(ANGLES)] = 0.2 * np.sin(np.arange(8)[:, None] + np.arange(24))

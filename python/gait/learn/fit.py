@@ -107,7 +107,7 @@ def fit(sequences: list[Sequence], components: int | str = DEFAULT_COMPONENTS, s
 def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int) -> Proportions:
     """Average the proportions; every subject counts once."""
     picked = [sequences[int(np.flatnonzero(index == i)[0])].measures for i in range(subjects)]
-    return retarget.mean_proportions(picked)
+    return retarget.generic_proportions(picked)
 
 
 def heel_strike(curve: Floats, proportions: Proportions) -> float:
