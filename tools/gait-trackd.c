@@ -105,12 +105,15 @@ static option_result read_settings(int argc, char **argv, const option *table, m
                      : OPTION_BAD;
     if (result != OPTION_OK)
         return result;
-    bool const ok = (settings.model[0] || settings.version ||
-                     message_set(why, "--model FILE is needed; `gait learn` makes one")) &&
-                    (strcmp(settings.mode, "paper") == 0 || strcmp(settings.mode, "default") == 0 ||
-                     message_set(why, "--mode %.100s: give default or paper", settings.mode)) &&
-                    (!settings.background[0] || settings.camera[0] ||
-                     message_set(why, "--background needs --camera, or leave both to `gait capture`"));
+    bool const ok =
+        (settings.model[0] || settings.version ||
+         message_set(why, "--model FILE is needed; `gait learn` makes one")) &&
+        (strcmp(settings.mode, "paper") == 0 || strcmp(settings.mode, "default") == 0 ||
+         message_set(why, "--mode %.100s: give default or paper", settings.mode)) &&
+        (strncmp(link_url(settings.url), "memq://", 7) != 0 ||
+         message_set(why, "--url memq://: reaches nobody outside one process; give udpm:// or file://")) &&
+        (!settings.background[0] || settings.camera[0] ||
+         message_set(why, "--background needs --camera, or leave both to `gait capture`"));
     return ok ? OPTION_OK : OPTION_BAD;
 }
 

@@ -188,6 +188,7 @@ def test_a_background_with_comments_is_read(tmp_path):
         (["-m", "x", "--girth", "nan"], "--girth nan"),
         (["-m", "x", "--mode", "fast"], "--mode fast: give default or paper"),
         (["-m", "x", "--quiet=maybe"], "--quiet maybe: give yes or no"),
+        (["-m", "x", "--url", "memq://"], "--url memq://: reaches nobody"),
         (["-m", "x", "--background", "p.ppm"], "--background needs --camera"),
         (["-m", "x", "--url", "u" * 2000], "--url: give a value of 1 to 1023 characters"),
     ],
