@@ -27,6 +27,7 @@ COMMANDS = {
     "record": "record",
     "demo": "demo",
     "report": "report",
+    "view": "view",
 }
 """Command to its module, in the order of ``gait --help``."""
 

@@ -1,0 +1,72 @@
+"""Watch a tracker at work: each estimate of gait-trackd drawn into its frame.
+
+Opens a page on this machine (its address is printed) that any browser shows.  With --save the first finished
+picture is written to a PNG file instead, and the command ends.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import time
+
+import cv2
+
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.files import replacing
+from gait.lcm.link import lcm_url
+from gait.lcm.viewer import Screen, Viewer
+from gait.model import Model
+from gait.video import Image
+
+NAME = "view"
+HELP = "watch the estimates of gait-trackd in a browser"
+JSON = False
+_TURN = 0.1  # seconds
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("--url", metavar="URL", help="LCM (LCM_DEFAULT_URL or multicast on this machine)")
+    parser.add_argument("--save", metavar="PNG", help="write one picture and end")
+    parser.add_argument("--patience", type=float, default=30.0, metavar="S", help="of --save, seconds (30)")
+    parser.add_argument("--port", type=int, default=0, metavar="N", help="of the page (any that is free)")
+    parser.add_argument("--stream", type=int, default=0, metavar="I", help="number of the camera (0)")
+    parser.add_argument("--camera", metavar="CAM", help="calibration (from GAIT_CAMERA_<i>)")
+    parser.add_argument("-m", "--model", metavar="M.gait", help="that tracks (the shipped one)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show or save."""
+    camera = Camera.read(args.camera) if args.camera else None
+    model, url = Model(args.model), lcm_url(args.url)
+    if args.save:
+        _save(args, url, model, camera)
+        return 0
+    screen = Screen(args.port)
+    viewer = Viewer(url, args.stream, model, camera, screen.show)
+    print(screen.address, flush=True)
+    with contextlib.suppress(KeyboardInterrupt):  # the way to end it
+        while viewer.handle(_TURN):
+            pass
+    screen.close()
+    return 0
+
+
+def _save(args: argparse.Namespace, url: str, model: Model, camera: Camera | None) -> None:
+    pictures: list[Image] = []
+    with replacing(args.save) as path:
+        viewer = Viewer(url, args.stream, model, camera, pictures.append)
+        if not args.quiet:
+            print(f"listening on {url}", file=sys.stderr, flush=True)
+        deadline = time.monotonic() + args.patience
+        while not pictures and time.monotonic() < deadline and viewer.handle(_TURN):
+            pass
+        if not pictures:
+            raise UserError(
+                "no estimate with its frame and camera came; is gait-trackd tracking on this URL?"
+            )
+        if not cv2.imwrite(str(path), pictures[0]):
+            raise UserError(f"{args.save}: cannot be written as an image; give a name that ends in .png")

@@ -1,0 +1,175 @@
+"""Frames and estimates brought together again, and shown to a browser."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+import cv2
+
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.lcm.link import is_log, open_lcm
+from gait.lcm.messages import camera_of, decode, estimate_of, picture
+from gait.lcm.types import gaitmsg
+from gait.model import Model
+from gait.overlay import Overlay
+from gait.video import Image
+
+_KEPT = 64  # frames that wait for their estimate
+_PART = "gait-frame"
+_PAGE = b"""<!DOCTYPE html><html><head><meta charset="utf-8"><title>gait view</title></head>
+<body style="margin:0;background:#222;text-align:center">
+<img src="/stream" style="max-width:100%"></body></html>"""
+
+
+class Viewer:
+    """Draws each estimate into its own frame.
+
+    Parameters
+    ----------
+    url : str
+    stream : int
+        Number of the camera.
+    model : Model
+        Whose body is drawn.
+    camera : Camera, optional
+        Taken from ``GAIT_CAMERA_<i>`` if left out.
+    show : callable
+        Gets each finished BGR picture.
+    """
+
+    def __init__(
+        self, url: str, stream: int, model: Model, camera: Camera | None, show: Callable[[Image], None]
+    ) -> None:
+        self._lcm, self._log = open_lcm(url), is_log(url)
+        self._model, self._show = model, show
+        self._overlay = Overlay(model, camera) if camera is not None else None
+        self._frames: dict[int, Any] = {}
+        self._origin: int | None = None
+        for channel, handler, capacity in (
+            (f"GAIT_IMAGE_{stream}", self._on_image, _KEPT),
+            (f"GAIT_CAMERA_{stream}", self._on_camera, 1),
+            ("GAIT_ESTIMATE", self._on_estimate, _KEPT),
+        ):
+            self._lcm.subscribe(channel, handler).set_queue_capacity(capacity)
+
+    def handle(self, seconds: float) -> bool:
+        """Take in a message, waiting at most so long; False at the end of a log."""
+        try:
+            self._lcm.handle_timeout(max(1, round(1000 * seconds)))
+        except OSError:
+            if not self._log:
+                raise
+            return False
+        return True
+
+    def _on_image(self, channel: str, data: bytes) -> None:
+        message = decode(gaitmsg.image_t, data, channel)
+        self._frames[message.utime] = message
+        while len(self._frames) > _KEPT:
+            del self._frames[next(iter(self._frames))]
+
+    def _on_camera(self, channel: str, data: bytes) -> None:
+        if self._overlay is None:
+            self._overlay = Overlay(self._model, camera_of(decode(gaitmsg.camera_t, data, channel)))
+
+    def _on_estimate(self, channel: str, data: bytes) -> None:
+        message = decode(gaitmsg.estimate_t, data, channel)
+        image = self._frames.pop(message.utime, None)
+        if image is None or self._overlay is None:
+            return
+        self._origin = message.utime if self._origin is None else self._origin
+        # The panel shows seconds since the first frame seen, not the time of the day.
+        estimate = replace(estimate_of(message), utime=message.utime - self._origin)
+        self._show(self._overlay.draw(picture(image), estimate, message.frame))
+
+
+class Screen:
+    """The newest picture, for any number of browsers on this machine.
+
+    Parameters
+    ----------
+    port : int
+        Of 127.0.0.1; 0: any that is free.
+
+    Attributes
+    ----------
+    address : str
+        What to open in a browser.
+    """
+
+    def __init__(self, port: int) -> None:
+        self._new = threading.Condition()
+        self._jpeg, self._count = b"", 0
+        try:
+            self._server = ThreadingHTTPServer(("127.0.0.1", port), partial(_Request, self))
+        except (OSError, OverflowError) as exc:
+            raise UserError(f"--port {port}: cannot be opened ({exc}); give another, or 0 for any") from None
+        self._server.daemon_threads = True
+        self.address = f"http://127.0.0.1:{self._server.server_address[1]}/"
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+
+    def show(self, image: Image) -> None:
+        """Make `image` the newest."""
+        jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
+        with self._new:
+            self._jpeg, self._count = jpeg, self._count + 1
+            self._new.notify_all()
+
+    def after(self, count: int) -> tuple[bytes, int]:
+        """Wait for a picture later than the one of this count; return it and its count."""
+        with self._new:
+            self._new.wait_for(lambda: self._count > count)
+            return self._jpeg, self._count
+
+    def close(self) -> None:
+        """Serve no more."""
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class _Request(BaseHTTPRequestHandler):
+    """/ is a page with the moving picture, /stream the picture itself, /frame.jpg one of it."""
+
+    def __init__(self, screen: Screen, *rest: Any) -> None:
+        self._screen = screen
+        super().__init__(*rest)
+
+    def do_GET(self) -> None:
+        """Answer, for as long as the browser stays."""
+        if self.path == "/":
+            self._answer("text/html; charset=utf-8", _PAGE)
+        elif self.path == "/frame.jpg":
+            self._answer("image/jpeg", self._screen.after(0)[0])
+        elif self.path == "/stream":
+            self._stream()
+        else:
+            self.send_error(404)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing: stderr is for the user."""
+
+    def _answer(self, kind: str, body: bytes) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def _stream(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={_PART}")
+        self.end_headers()
+        count = 0
+        try:
+            while True:
+                jpeg, count = self._screen.after(count)
+                head = f"--{_PART}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                self.wfile.write(head.encode("ascii") + jpeg + b"\r\n")
+        except (BrokenPipeError, ConnectionResetError):
+            pass  # the browser has left
