@@ -1,0 +1,167 @@
+/* Depth order: by hand on rectangles, by brute force on the toy walker. */
+#include "layers.h"
+
+#include "population.h"
+#include "toy_scene.h"
+
+#include "check.h"
+
+static layers drawn;
+static outline_block outline;
+static limb_geometry flat[MODEL_MAX_LIMBS]; /* cones: four vertices each */
+
+static void rectangle(int32_t limb, int32_t lane, float x0, float y0, float x1, float y1, float depth)
+{
+    const float x[4] = {x0, x1, x1, x0}, y[4] = {y0, y0, y1, y1};
+    for (int k = 0; k < 4; k++) {
+        outline.x[limb][k][lane] = x[k];
+        outline.y[limb][k][lane] = y[k];
+    }
+    outline.depth[limb][lane] = depth;
+}
+
+static bool bit(const rast_mask *m, int32_t x, int32_t y)
+{
+    return y >= m->first && y < m->last && (m->row[y][x >> 6] >> (x & 63) & 1);
+}
+
+static int32_t count(const rast_mask *m)
+{
+    int32_t n = 0;
+    for (int32_t y = m->first; y < m->last; y++)
+        n += rast_popcount(m->row[y][0]) + rast_popcount(m->row[y][1]);
+    return n;
+}
+
+static void test_order(void)
+{
+    static const float depth[] = {4.0f, 2.0f, 0.0f, 3.0f, 2.0f, -1.0f, 1.0f, NAN};
+    static const int32_t want[] = {6, 1, 4, 3, 0};
+    int32_t order[MODEL_MAX_LIMBS];
+    for (int32_t l = 0; l < 8; l++) {
+        outline.depth[l][5] = depth[l];
+        outline.depth[l][4] = 1.0f;
+    }
+    CHECK(layers_order(&outline, 8, 5, order) == 5);
+    CHECK(memcmp(order, want, sizeof want) == 0); /* near to far; equal ones by index; none behind */
+    CHECK(layers_order(&outline, 0, 5, order) == 0);
+}
+
+/* Working pixels [20, 60) x [40, 100) are cells [10, 30) x [20, 50). */
+static void test_cells(void)
+{
+    int32_t wrong = 0;
+    memset(&drawn, 0xff, sizeof drawn);
+    rectangle(0, 3, 20, 40, 60, 100, 2.0f);
+    layers_draw(&outline, flat, 1, 3, &drawn);
+    for (int32_t y = 0; y < RAST_SIZE; y++)
+        for (int32_t x = 0; x < RAST_SIZE; x++) {
+            bool const in = x >= 10 && x < 30 && y >= 20 && y < 50;
+            wrong += bit(&drawn.visible[0], x, y) != in;
+            wrong += (drawn.whole.row[y][x >> 6] >> (x & 63) & 1) != in; /* every row is written */
+        }
+    CHECK(wrong == 0);
+    CHECK(drawn.whole.first == 20 && drawn.whole.last == 50);
+    const rast_mask *const m = &drawn.visible[0];
+    CHECK(layers_visible(m, 20.0f, 40.0f) && layers_visible(m, 59.9f, 99.9f));
+    CHECK(!layers_visible(m, 19.9f, 40.0f) && !layers_visible(m, 60.0f, 50.0f));
+    CHECK(!layers_visible(m, 30.0f, 39.9f) && !layers_visible(m, 30.0f, 100.0f));
+    CHECK(!layers_visible(m, NAN, 50.0f) && !layers_visible(m, 30.0f, NAN));
+    CHECK(!layers_visible(m, 1e30f, 50.0f) && !layers_visible(m, -1e30f, 50.0f));
+    rectangle(0, 3, -100, -100, 400, 400, 2.0f); /* the whole grid, and not a cell more */
+    layers_draw(&outline, flat, 1, 3, &drawn);
+    CHECK(count(m) == RAST_SIZE * RAST_SIZE);
+    CHECK(layers_visible(m, 0.0f, 0.0f) && layers_visible(m, 255.9f, 255.9f));
+    CHECK(!layers_visible(m, -0.1f, 5.0f) && !layers_visible(m, 5.0f, -0.1f));
+    CHECK(!layers_visible(m, 256.0f, 5.0f) && !layers_visible(m, 5.0f, 256.0f));
+}
+
+/* The nearer one hides the farther one, whatever their indices. */
+static void test_hiding(void)
+{
+    memset(&drawn, 0xff, sizeof drawn);
+    for (int32_t l = 0; l < 6; l++) { /* of a body before */
+        drawn.visible[l].first = 0;
+        drawn.visible[l].last = RAST_SIZE;
+    }
+    for (int swap = 0; swap < 2; swap++) {
+        int32_t const near = swap, far = 1 - swap;
+        rectangle(near, 0, 40, 40, 80, 80, 2.0f);
+        rectangle(far, 0, 60, 20, 100, 100, 2.5f);
+        rectangle(2, 0, 60, 40, 80, 80, 9.0f);     /* wholly hidden */
+        rectangle(3, 0, 0, 0, 200, 200, 0.0f);     /* behind the camera */
+        rectangle(4, 0, 300, 10, 400, 30, 1.0f);   /* outside */
+        rectangle(5, 0, 120, 200, 140, 210, 3.0f); /* apart */
+        layers_draw(&outline, flat, 6, 0, &drawn);
+        CHECK(count(&drawn.visible[near]) == 20 * 20);
+        CHECK(count(&drawn.visible[far]) == 20 * 40 - 10 * 20);
+        CHECK(bit(&drawn.visible[near], 35, 30) && !bit(&drawn.visible[far], 35, 30));
+        CHECK(bit(&drawn.visible[far], 45, 30) && bit(&drawn.visible[far], 35, 15));
+        CHECK(count(&drawn.visible[2]) == 0 && count(&drawn.visible[3]) == 0 && count(&drawn.visible[4]) == 0);
+        CHECK(count(&drawn.visible[5]) == 10 * 5);
+        CHECK(count(&drawn.whole) == 400 + 600 + 50);
+        CHECK(drawn.whole.first <= 10 && drawn.whole.last >= 105);
+    }
+    layers_draw(&outline, flat, 0, 0, &drawn);
+    CHECK(drawn.whole.first == drawn.whole.last && count(&drawn.whole) == 0 && drawn.whole.row[35][0] == 0);
+}
+
+/* The walker: every cell belongs to the nearest limb whose polygon covers it. */
+static void test_walker(void)
+{
+    const gait_model *const m = toy_model();
+    gait_tracker_config cfg;
+    gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
+    cfg.components = 0;
+    body_rule const rule = body_rule_init(m, &cfg);
+    static kin_body body;
+    limb_geometry limbs[MODEL_MAX_LIMBS];
+    limb_geometry_init(m, 1.0f, limbs);
+    int32_t wrong = 0, hidden = 0, cells = 0;
+    for (int n = 0; n < 24; n++) {
+        gait_camera const cam = toy_camera(n % 2);
+        view_map const map = {.scale = 1.4f, .u0 = 85.0f + 2.0f * (float)n, .v0 = 60.0f};
+        gait_state const s = toy_walk(0.05f * (float)n);
+        walker const w = walker_from_state(&rule, &s);
+        walker_body(&rule, &w, &body);
+        outline_project(limbs, m->limbs, &body, &cam, &map, &outline);
+        int32_t const lane = n % BLOCK;
+        layers_draw(&outline, limbs, m->limbs, lane, &drawn);
+        static rast_mask alone[MODEL_MAX_LIMBS];
+        for (int32_t l = 0; l < m->limbs; l++) {
+            float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES];
+            rast_spans spans;
+            for (int32_t k = 0; k < outline_vertices(&limbs[l]); k++) {
+                x[k] = (outline.x[l][k][lane] - 0.5f) / 2.0f;
+                y[k] = (outline.y[l][k][lane] - 0.5f) / 2.0f;
+            }
+            rast_convex(x, y, outline_vertices(&limbs[l]), 0, RAST_SIZE, &spans);
+            rast_fill(&spans, &alone[l]);
+        }
+        for (int32_t y = 0; y < RAST_SIZE; y++)
+            for (int32_t x = 0; x < RAST_SIZE; x++) {
+                int32_t top = -1, covering = 0;
+                for (int32_t l = 0; l < m->limbs; l++)
+                    if (bit(&alone[l], x, y)) {
+                        covering++;
+                        top = top < 0 || outline.depth[l][lane] < outline.depth[top][lane] ? l : top;
+                    }
+                for (int32_t l = 0; l < m->limbs; l++)
+                    wrong += bit(&drawn.visible[l], x, y) != (l == top);
+                wrong += bit(&drawn.whole, x, y) != (top >= 0);
+                cells += top >= 0;
+                hidden += covering > 1;
+            }
+    }
+    CHECK(cells > 24 * 900 && hidden > 24 * 100);
+    CHECK(wrong == 0);
+}
+
+int main(void)
+{
+    test_order();
+    test_cells();
+    test_hiding();
+    test_walker();
+    return CHECK_DONE();
+}
