@@ -9,14 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import mocap_asf, mocap_bvh, period, retarget, root
+from gait.learn import joint_file, mocap_asf, mocap_bvh, period, retarget, root
 from gait.learn.body import Body, body
-from gait.learn.recording import Recording
 from gait.skeleton import SIDES
 
 Floats = npt.NDArray[np.float64]
 
-READERS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
+RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
+POSITIONS = {".csv": joint_file.read_csv, ".trc": joint_file.read_trc}
+READERS = (*RECORDINGS, *POSITIONS)
 LEAST_CYCLES = 1.5
 
 
@@ -63,9 +64,12 @@ def subject_of(path: Path) -> str:
     return path.stem.split("_")[0] if "_" in path.stem else path.parent.name
 
 
-def read_recording(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recording:
-    """Read a motion file by its suffix; see `mocap_asf.read`."""
-    return READERS[path.suffix.lower()](path, fps, zero_runs)
+def read_body(path: Path, fps: float | None = None, zero_runs: bool = False) -> Body:
+    """Read a motion file by its suffix; see `mocap_asf.read` for the options."""
+    suffix = path.suffix.lower()
+    if suffix in POSITIONS:
+        return POSITIONS[suffix](path, fps, zero_runs)
+    return body(RECORDINGS[suffix](path, fps, zero_runs))
 
 
 def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs: bool = False) -> Sequence:
@@ -85,7 +89,7 @@ def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs:
     UserError
         If the file is malformed, or the motion is not cyclic or too short.
     """
-    levelled, slope = root.level(body(read_recording(path, fps, zero_runs)))
+    levelled, slope = root.level(read_body(path, fps, zero_runs))
     levelled = root.align_pelvis(levelled)
     measures = retarget.measure(levelled)
     angles = retarget.angles(levelled, measures)

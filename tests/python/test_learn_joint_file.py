@@ -1,0 +1,114 @@
+"""Joint positions in .csv and .trc as a source of learning."""
+
+import mocap_files as files
+import numpy as np
+import pytest
+
+from gait.errors import UserError
+from gait.learn import body, joint_file, mocap_asf, retarget
+from gait.learn.recording import Y_UP
+from gait.learn.sequence import load
+from gait.skeleton import ANGLES
+
+TRC_NAMES = {"neck": "Neck", "head": "Head", "l_toe": "LBigToe", "r_toe": "RBigToe"}
+
+
+@pytest.fixture(scope="module")
+def walker(tmp_path_factory):
+    return body.body(mocap_asf.read(files.write_toy(tmp_path_factory.mktemp("toy"), frames=400)))
+
+
+def write_csv(path, walker):
+    names = {n: "head_top" if n == "head" else n for n in joint_file.NEEDED}
+    header = ["frame", "time", "status"] + [f"{names[n]}_{axis}" for n in names for axis in "xyz"]
+    rows = [",".join(header)]
+    for t in range(walker.frames):
+        cells = [f"{v:.5f}" for n in names for v in walker.joints[n][t]]
+        rows.append(",".join([str(t), f"{t / walker.fps:.6f}", "tracking", *cells]))
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def write_trc(path, walker):
+    names = {n: TRC_NAMES.get(n, n[0].upper() + n[2:].title()) for n in joint_file.NEEDED}
+    head = "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"
+    lines = [f"PathFileType\t4\t(X/Y/Z)\t{path.name}", head]
+    lines += [
+        f"120\t120\t{walker.frames}\t{len(names)}\tmm",
+        "Frame#\tTime\t" + "\t\t\t".join(names.values()),
+    ]
+    lines.append("\t\t" + "\t".join(f"{axis}{i}" for i in range(1, len(names) + 1) for axis in "XYZ"))
+    for t in range(walker.frames):
+        cells = [f"{v:.3f}" for n in names for v in 1000 * (walker.joints[n][t] @ Y_UP)]
+        lines.append("\t".join([str(t + 1), f"{t / 120:.5f}", *cells]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_csv_and_trc_hold_the_same_joints(walker, tmp_path):
+    first = joint_file.read_csv(write_csv(tmp_path / "a.csv", walker))
+    second = joint_file.read_trc(write_trc(tmp_path / "a.trc", walker))
+    assert first.fps == pytest.approx(120, rel=1e-3) and second.fps == 120
+    for name in joint_file.NEEDED:
+        assert first.joints[name] == pytest.approx(walker.joints[name], abs=1e-4), name
+        assert second.joints[name] == pytest.approx(walker.joints[name], abs=1e-4), name
+
+
+def test_flexions_agree_with_the_recording_that_has_orientations(walker, tmp_path):
+    again = joint_file.read_csv(write_csv(tmp_path / "a.csv", walker))
+    true, found = (np.degrees(retarget.angles(b, retarget.measure(b))) for b in (walker, again))
+    for name in ("l_knee_flexion", "r_knee_flexion", "l_elbow_flexion", "r_hip_flexion", "l_hip_flexion"):
+        k = ANGLES.index(name)
+        assert np.ptp(found[:, k]) == pytest.approx(np.ptp(true[:, k]), abs=4), name
+        assert np.std((found - true)[:, k]) < 3, name
+
+
+def test_a_csv_is_learnt_from(walker, tmp_path):
+    sequence = load(write_csv(tmp_path / "p1_a.csv", walker))
+    assert sequence.period.frames == pytest.approx(120, abs=0.5)
+    assert sequence.subject == "p1" and np.isfinite(sequence.channels).all()
+
+
+def test_empty_cells_are_missing(walker, tmp_path):
+    path = write_csv(tmp_path / "a.csv", walker)
+    lines = path.read_text().splitlines()
+    column = lines[0].split(",").index("l_wrist_x")
+    for t in range(50, 70):
+        cells = lines[t + 1].split(",")
+        cells[column : column + 3] = ["", "", ""]
+        lines[t + 1] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+    sequence = load(path)
+    gone = np.isnan(sequence.channels).any(axis=1)
+    assert list(np.flatnonzero(gone)) == list(range(50, 70))
+    assert np.isfinite(sequence.channels[:, ANGLES.index("r_knee_flexion")]).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: s.replace("l_knee_y", "l_knie_y", 1), "a.csv:1: column 'l_knee_y' is missing"),
+        (lambda s: s.replace("l_knee", "left_knie"), "a.csv: no joint 'l_knee'"),
+        (lambda s: s.replace("time", "zeit", 1), "a.csv:1: no column 'time'"),
+        (lambda s: s[:-20] + "\n", r"a.csv:401: \d+ cells where"),
+        (lambda s: s[:-9] + "1.2.3\n", r"a.csv:401: '.*1.2.3' is not a number"),
+        (lambda s: s.split("\n")[0] + "\n", "a.csv: 0 frames"),
+        (lambda s: "", "a.csv: the file is empty"),
+    ],
+)
+def test_malformed_csv_is_named(walker, tmp_path, change, words):
+    path = write_csv(tmp_path / "a.csv", walker)
+    path.write_text(change(path.read_text()))
+    with pytest.raises(UserError, match=words):
+        joint_file.read_csv(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [lambda s: s.replace("Units", "Unit"), lambda s: s.replace("\tmm", "\tfurlong"), lambda s: s[:40]],
+)
+def test_malformed_trc_is_named(walker, tmp_path, change):
+    path = write_trc(tmp_path / "a.trc", walker)
+    path.write_text(change(path.read_text()))
+    with pytest.raises(UserError, match="not a .trc header"):
+        joint_file.read_trc(path)
