@@ -34,6 +34,8 @@ static const struct {
     {"coef-noise", FIELD(coef_noise), 0, 1e3, "score standard deviations per sqrt(second)"},
     {"coef-time", FIELD(coef_time), 0, 1e6, "seconds in which the scores return to the mean; 0: never"},
     {"stature-noise", FIELD(stature_noise), 0, 1e3, "fraction of stature per sqrt(second), while settling"},
+    {"offset-noise", FIELD(offset_noise), 0, 1e3, "radians of posture per sqrt(second)"},
+    {"offset-sd", FIELD(offset_sd), 0, 1e3, "radians by which people differ in posture"},
 };
 
 _Static_assert(sizeof fields / sizeof *fields == TRACKER_OPTIONS, "every field has a value");
