@@ -5,4 +5,6 @@ def pytest_terminal_summary(terminalreporter):
     """Print the counts in the form of the C tests: an error outside a test counts as a failed one."""
     count = {k: len(terminalreporter.getreports(k)) for k in ("passed", "failed", "error", "skipped")}
     failed = count["failed"] + count["error"]
-    terminalreporter.write_line(f"Python tests: {count['passed']} passed, {failed} failed, {count['skipped']} skipped")
+    terminalreporter.write_line(
+        f"Python tests: {count['passed']} passed, {failed} failed, {count['skipped']} skipped"
+    )
