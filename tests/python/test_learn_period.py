@@ -95,6 +95,15 @@ def test_ratio_of_a_sinusoid_has_its_closed_form():
     assert scores.mean() == pytest.approx(1 + frames * amplitude**2 / (2 * noise**2 * (p - 1)), rel=0.03)
 
 
+@pytest.mark.parametrize("fps", [25.0, 30.0, 60.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_low_frame_rates_do_not_halve_the_period(fps, seed):
+    """With more bins than frames in a cycle no bin repeats, and half a cycle once looked best."""
+    true, frames = 1.05 * fps, int(3.1 * fps)
+    signals = g.walk(np.random.default_rng(seed), true, frames, offset=3.0 * seed, noise=1.0)
+    assert period.find(signals, fps).frames == pytest.approx(true, rel=0.01)
+
+
 def test_noise_is_not_cyclic():
     found = period.find(np.random.default_rng(8).normal(size=(600, 19)), FPS)
     assert not found.cyclic

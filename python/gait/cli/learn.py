@@ -1,9 +1,9 @@
 """Learn a cyclic model of motion from motion capture.
 
 Sources are files or folders of them: .amc with its .asf beside it, .bvh, and joint positions in .csv or .trc.
-Each recording is retargeted to the default skeleton and cut into cycles by its own period; functional principal
-components of all cycles give the mean curves and the ways in which people differ (Ormoneit and others, 2000).
-In a folder, a file that cannot be used is named in one line and the rest is learnt.
+Each recording is retargeted to the default skeleton and cut into cycles by its own period; functional
+principal components of all cycles give the mean curves and the ways in which people differ (Ormoneit and
+others, 2000).  In a folder, a file that cannot be used is named in one line and the rest is learnt.
 
 The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
 """

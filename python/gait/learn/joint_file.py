@@ -64,8 +64,9 @@ def read_trc(path: Path, fps: float | None = None, zero_runs: bool = False) -> B
     """Read a .trc of joint centres: y up, x or z ahead; see `read_csv`."""
     lines = _lines(path, "\t")
     try:
-        head = dict(zip(lines[1], lines[2], strict=False))
-        rate, unit_name, count = float(head["DataRate"]), head["Units"].strip(), int(head["NumMarkers"])
+        keys, values = ([cell.strip() for cell in line if cell.strip()] for line in lines[1:3])
+        head = dict(zip(keys, values, strict=False))
+        rate, unit_name, count = float(head["DataRate"]), head["Units"], int(head["NumMarkers"])
         scale = UNITS[unit_name]
         names = [name for name in lines[3][2:] if name.strip()]
         if len(names) != count:

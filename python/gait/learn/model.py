@@ -15,6 +15,7 @@ from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 
+MOST_ROWS = 60  # of the table of sequences in META, which would outgrow the curves
 GENERATOR = f"gait {__version__}"
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not this training set
 CMU = (
@@ -120,7 +121,11 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
         **({"acknowledgement": CMU} if from_cmu(learned) else {}),
         "subjects": learned.subjects,
         "statures_m": _rounded(statures, 3),
-        "sequences": {"columns": list(SEQUENCE_COLUMNS), "rows": sequence_table(learned)},
+        "sequences": {
+            "count": len(learned.sequences),
+            "columns": list(SEQUENCE_COLUMNS),
+            "rows": sequence_table(learned)[:MOST_ROWS],
+        },
         "cycles": len(c.scores),
         "missing": round(float(1 - learned.cycles.mask.mean()), 3),
         "variance_explained": _rounded(np.cumsum(c.spectrum)[:8], 3),

@@ -68,7 +68,7 @@ class Folder:
         """Ratio (A,) of folding at a whole number of frames (R1-R3); NaN if observations are too few."""
         return self._anova(np.arange(len(self.stacked)) % period)
 
-    def binned(self, period: float, bins: int = BINS) -> Floats:
+    def binned(self, period: float, bins: int) -> Floats:
         """Signal-to-noise ratio (A,) with a fixed number of phase bins (R4)."""
         phase = np.arange(len(self.stacked)) / period % 1.0
         return self._anova(np.minimum((bins * phase).astype(int), bins - 1))
@@ -136,15 +136,16 @@ def find(
     low, high = bounds or ((50.0, 250.0) if literal else (SECONDS[0] * fps, SECONDS[1] * fps))
     candidates = np.arange(np.ceil(low), high + 0.1, 1.0 if literal else 0.5)
     folder, longest = Folder(moving), len(signals) / CYCLES
+    bins = int(np.clip(1.05 * low, 8, BINS))  # not more than frames in the shortest cycle
     if literal:
         scores = np.array([_total(folder.literal(int(p))) for p in candidates])
     else:
-        scores = np.array([_total(folder.binned(p)) if p <= longest else np.nan for p in candidates])
+        scores = np.array([_total(folder.binned(p, bins)) if p <= longest else np.nan for p in candidates])
     if np.isnan(scores).all():
         return Period(float("nan"), candidates, scores, 0.0, False)
     best = float(candidates[np.nanargmax(scores)])
     if not literal:
-        best = _divisor(folder, moving, _refine(moving, best), low)
+        best = _divisor(folder, bins, moving, _refine(moving, best), low)
     sharpness = float(np.nanmax(scores) / np.nanmedian(scores))
     return Period(best, candidates, scores, sharpness, sharpness >= CYCLIC)
 
@@ -162,11 +163,11 @@ def _total(scores: Floats) -> float:
     return float(scores[valid].mean() * len(scores)) if 2 * valid.sum() > len(scores) else float("nan")
 
 
-def _divisor(folder: Folder, signals: Floats, best: float, low: float) -> float:
+def _divisor(folder: Folder, bins: int, signals: Floats, best: float, low: float) -> float:
     """Find the smallest of best/5 ... best/2 that scores nearly as well, refined; else the best."""
-    goal = DIVISOR_SHARE * _total(folder.binned(best))
+    goal = DIVISOR_SHARE * _total(folder.binned(best, bins))
     for divisor in DIVISORS:
-        if best / divisor >= low and _total(folder.binned(best / divisor)) >= goal:
+        if best / divisor >= low and _total(folder.binned(best / divisor, bins)) >= goal:
             return _refine(signals, best / divisor)
     return best
 

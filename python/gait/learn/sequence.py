@@ -104,7 +104,7 @@ def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs:
         )
     channels, heading = root.channels(levelled, measures, found.frames)
     return Sequence(
-        name=path.stem,
+        name=path.stem if "_" in path.stem else f"{path.parent.name}/{path.stem}",
         subject=subject_of(path),
         source=path,
         body=levelled,
