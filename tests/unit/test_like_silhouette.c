@@ -1,0 +1,103 @@
+/* Foreground against the body, by counting cells one by one. */
+#include "toy_look.h"
+
+#include "rng.h"
+
+#include "check.h"
+
+static layers body;
+
+static void random_words(uint32_t draw, uint64_t (*out)[RAST_WORDS])
+{
+    for (uint32_t y = 0; y < RAST_SIZE; y++) {
+        uint32_t r[4];
+        rng_bits(8, 0, 0, y, draw, r);
+        out[y][0] = (uint64_t)r[0] << 32 | r[1];
+        out[y][1] = (uint64_t)r[2] << 32 | r[3];
+    }
+}
+
+static int32_t bit(const uint64_t (*m)[RAST_WORDS], int32_t x, int32_t y)
+{
+    return (int32_t)(m[y][x >> 6] >> (x & 63) & 1);
+}
+
+/* Any foreground, body and field of view: background inside + missed_weight x foreground outside, over the area of
+ * a typical person (0.16 x 96 x 96 cells). */
+static void test_counts(void)
+{
+    toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    double const typical = 0.16 * 96.0 * 96.0;
+    for (uint32_t round = 0; round < 20; round++) {
+        double inside = 0.0, outside = 0.0, under = 0.0;
+        int32_t const first = (int32_t)(6 * round), last = i_min(first + 40, RAST_SIZE);
+        random_words(8 * round, v->f.inside);
+        random_words(8 * round + 1, body.whole.row); /* rows outside [first, last) hold leftovers */
+        for (uint32_t k = 0; k < FG_PLANES; k++)
+            random_words(8 * round + 2 + k, v->f.fg[k]);
+        body.whole.first = first;
+        body.whole.last = last;
+        v->f.has_fg = true;
+        v->f.fg_total = 0;
+        for (int32_t y = 0; y < RAST_SIZE; y++)
+            for (int32_t x = 0; x < RAST_SIZE; x++) {
+                int32_t p = 0;
+                for (int32_t k = 0; k < FG_PLANES; k++) {
+                    v->f.fg[k][y][x >> 6] &= v->f.inside[y][x >> 6];
+                    p |= bit((const uint64_t(*)[RAST_WORDS])v->f.fg[k], x, y) << k;
+                }
+                bool const see = bit((const uint64_t(*)[RAST_WORDS])v->f.inside, x, y);
+                bool const in = y >= first && y < last && bit((const uint64_t(*)[RAST_WORDS])body.whole.row, x, y);
+                v->f.fg_total += p;
+                inside += see && in ? 1.0 - p / 15.0 : 0.0;
+                under += see && in ? p / 15.0 : 0.0;
+                outside += see && !in ? p / 15.0 : 0.0;
+            }
+        v->setup.missed_weight = 0.05f * (float)round;
+        like_body const b = {.setup = &v->setup, .features = &v->f, .layers = &body};
+        double const missed = (double)v->setup.missed_weight;
+        CHECK_NEAR(like_silhouette.log_likelihood(&b), -(inside + missed * outside) / typical, 1e-4);
+        CHECK_NEAR(like_silhouette.support(&b), (missed * under - inside) / typical, 1e-4);
+    }
+}
+
+/* Without a plate the term is silent. */
+static void test_silent(void)
+{
+    toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    like_body const b = {.setup = &v->setup, .features = &v->f, .layers = &body};
+    v->f.has_fg = false;
+    CHECK(like_silhouette.log_likelihood(&b) == 0.0f && like_silhouette.support(&b) == 0.0f);
+    CHECK(like_silhouette.flag == GAIT_TERM_SILHOUETTE);
+}
+
+/* The walker on its wall: nearly all its area is found, and nearly nothing else. */
+static void test_scene(void)
+{
+    static uint8_t wall[SCENE_PIXELS], shot[SCENE_PIXELS];
+    for (int camera = 0; camera < SCENE_CAMERAS; camera++) {
+        toy_look *const v = toy_look_new(camera, GAIT_MODE_DEFAULT);
+        gait_state const s = toy_walk(1.0f);
+        toy_wall(camera, wall);
+        toy_shot(camera, 30, shot);
+        toy_look_aim(v, &s);
+        toy_look_at(v, shot, wall);
+        like_body const b = toy_look_body(v, &s);
+        CHECK(like_silhouette.log_likelihood(&b) > -0.3f);
+        CHECK(like_silhouette.support(&b) > 0.1f);
+        gait_state away = s;
+        away.pelvis[0] += 0.6f; /* both wrong: the body on the wall, the walker unexplained */
+        away.pelvis[1] += 0.4f;
+        like_body const c = toy_look_body(v, &away);
+        CHECK(like_silhouette.log_likelihood(&c) < -0.7f);
+        CHECK(like_silhouette.support(&c) < -0.3f);
+    }
+}
+
+int main(void)
+{
+    test_counts();
+    test_silent();
+    test_scene();
+    return CHECK_DONE();
+}

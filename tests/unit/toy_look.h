@@ -1,0 +1,83 @@
+/* toy_look.h - one camera's evidence of one body, without a tracker: for tests of the likelihood.
+ *
+ *   toy_look *v = toy_look_new(0, GAIT_MODE_DEFAULT);  camera 0 of the scene, all terms
+ *   toy_look_aim(v, &state);                           region around a body
+ *   toy_look_at(v, grey, wall);                        features of a frame; wall NULL: no plate
+ *   like_body b = toy_look_body(v, &state);            outline, layers and surface samples, until the next call */
+#ifndef TOY_LOOK_H
+#define TOY_LOOK_H
+#include "like.h"
+#include "toy_scene.h"
+
+typedef struct toy_look {
+    gait_tracker_config cfg;
+    body_rule rule;
+    like_setup setup;
+    gait_camera cam;
+    features f;
+    features_scratch scratch;
+    view_planes plate;
+    kin_body body;
+    outline_block outline;
+    layers drawn;
+    int8_t seen[TOY_LIMBS * LIKE_SAMPLES];
+} toy_look;
+
+static inline toy_look *toy_look_new(int camera, int32_t mode)
+{
+    static _Alignas(GAIT_ALIGN) unsigned char memory[4 << 20];
+    static toy_look v;
+    arena a = {.base = memory, .cap = sizeof memory};
+    gait_tracker_default(&v.cfg, mode);
+    v.cfg.components = TOY_COMPONENTS;
+    v.cfg.offset_angles = 1u << (TOY_TORSO + 1);
+    v.cfg.terms = 0xf;
+    v.cfg.girth = 1.0f;
+    v.cfg.missed_weight = 0.4f;
+    v.rule = body_rule_init(toy_model(), &v.cfg);
+    v.rule.plain_root = false; /* the truth has its sway */
+    v.cam = toy_camera(camera);
+    v.f = features_layout(&a);
+    v.scratch = features_scratch_layout(&a);
+    v.plate = view_planes_layout(&a, 3);
+    v.f.map = (view_map){.scale = 1.4f, .u0 = 100.0f, .v0 = 60.0f};
+    if (a.overflow)
+        abort();
+    like_setup_init(&v.setup, toy_model(), &v.cfg);
+    return &v;
+}
+
+/* Aim the region at a body's pelvis. */
+static inline void toy_look_aim(toy_look *v, const gait_state *s)
+{
+    float uv[2] = {0};
+    camera_project(&v->cam, s->pelvis, uv);
+    v->f.map = (view_map){.scale = 1.4f, .u0 = uv[0] - 91.0f, .v0 = uv[1] - 91.0f};
+}
+
+static inline void toy_look_at(toy_look *v, const uint8_t *grey, const uint8_t *wall)
+{
+    gait_image const im = toy_image(grey);
+    if (wall) {
+        gait_image const empty = toy_image(wall);
+        view_sample(&v->f.map, &v->cam, &empty, &v->plate);
+    }
+    features_compute(&v->f, &v->cam, &im, wall ? &v->plate : NULL, v->setup.paper, &v->scratch);
+}
+
+static inline like_body toy_look_body(toy_look *v, const gait_state *s)
+{
+    enum { LANE = 5 };
+    walker const w = walker_from_state(&v->rule, s);
+    walker_body(&v->rule, &w, &v->body);
+    outline_project(v->setup.geometry, v->setup.limbs, &v->body, &v->cam, &v->f.map, &v->outline);
+    layers_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
+    like_sample(&v->setup, &v->f, &v->cam, &v->body, LANE, &v->drawn, v->seen);
+    return (like_body){.setup = &v->setup,
+                       .features = &v->f,
+                       .outline = &v->outline,
+                       .lane = LANE,
+                       .layers = &v->drawn,
+                       .seen = v->seen};
+}
+#endif
