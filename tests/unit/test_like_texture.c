@@ -1,0 +1,110 @@
+/* Brightness constancy of one limb against values worked out by hand, and the bounds of the occlusion mixture. */
+#include "toy_look.h"
+
+#include "check.h"
+
+enum { LANE = 5 };
+
+static toy_look *v;
+static int8_t now[TOY_LIMBS * LIKE_SAMPLES], then[TOY_LIMBS * LIKE_SAMPLES];
+
+/* One limb with this cosine to the image plane; n samples seen in both frames, differing by d; the rest in one. */
+static float limb(int32_t mode, double facing, int n, int d)
+{
+    v = toy_look_new(0, mode);
+    v->setup.limbs = 1;
+    v->outline.facing[0][LANE] = (float)facing;
+    for (int i = 0; i < LIKE_SAMPLES; i++) {
+        now[i] = (int8_t)(i < n ? 20 : i % 2 ? TEXTURE_HIDDEN : 3);
+        then[i] = (int8_t)(i < n ? 20 - d : i % 2 ? 100 : TEXTURE_HIDDEN);
+    }
+    like_body const b = {.setup = &v->setup,
+                         .features = &v->f,
+                         .outline = &v->outline,
+                         .lane = LANE,
+                         .seen = now,
+                         .ancestor = then};
+    return like_texture.log_likelihood(&b);
+}
+
+static double cost(int d)
+{
+    return 2.5 * log(1.0 + d / 16.0 * (d / 16.0) / 4.0);
+}
+
+static double mixture(double q, double visible, double occluded)
+{
+    return log(q * exp(visible) + (1.0 - q) * exp(occluded));
+}
+
+/* Default form: mean Student-t cost; "occluded" costs 1.6; share of 12.8 samples seen in both frames. */
+static void test_robust(void)
+{
+    static const double facing[] = {1.0, 0.9, 0.5, 0.0};
+    static const int diff[] = {0, 5, 16, 40, 100};
+    for (size_t k = 0; k < sizeof facing / sizeof *facing; k++)
+        for (size_t i = 0; i < sizeof diff / sizeof *diff; i++) {
+            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, facing[k], 32, diff[i]), mixture(facing[k], -cost(diff[i]), -1.6),
+                       0.01);
+            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, facing[k], 8, diff[i]),
+                       mixture(facing[k] * 8.0 / 12.8, -cost(diff[i]), -1.6), 0.01);
+            CHECK(limb(GAIT_MODE_DEFAULT, facing[k], 7, diff[i]) == -1.6f); /* too few: occluded */
+        }
+    /* Bounded on both sides: neither a match nor a mismatch of one limb decides alone. */
+    CHECK_NEAR(limb(GAIT_MODE_DEFAULT, 1.0, 20, 0), 0.0, 1e-5);
+    for (int d = 0; d < 140; d += 10) {
+        float const ll = limb(GAIT_MODE_DEFAULT, 0.95, 32, d);
+        CHECK(ll <= 0.0f && ll > -1.6f + (float)log(0.05) - 0.01f);
+    }
+}
+
+/* Equations 10-13: mean squared grey-level difference, variance 2 x 9 + 64 (1 + tan^2), tan capped at 3; a limb that
+ * is not seen has the density 0.0018. */
+static void test_paper(void)
+{
+    static const double facing[] = {1.0, 0.8, 0.6, 0.2};
+    static const int diff[] = {0, 3, 10, 30};
+    for (size_t k = 0; k < sizeof facing / sizeof *facing; k++) {
+        double const f2 = facing[k] * facing[k], tan2 = fmin((1.0 - f2) / f2, 9.0);
+        double const var = 2.0 * 9.0 + 64.0 * (1.0 + tan2);
+        for (size_t i = 0; i < sizeof diff / sizeof *diff; i++) {
+            double const log_p = -0.5 * log(2.0 * 3.14159265358979 * var) - diff[i] * diff[i] / (2.0 * var);
+            CHECK_NEAR(limb(GAIT_MODE_PAPER, facing[k], 32, diff[i]), mixture(facing[k], log_p, log(0.0018)), 0.01);
+            CHECK_NEAR(limb(GAIT_MODE_PAPER, facing[k], 10, diff[i]),
+                       mixture(facing[k] * 10.0 / 12.8, log_p, log(0.0018)), 0.01);
+        }
+    }
+    CHECK_NEAR(limb(GAIT_MODE_PAPER, 1.0, 5, 0), log(0.0018), 0.01);
+    /* The figure of spec R18: a fronto-parallel limb falls by about 3 nats at most, then occlusion explains it. */
+    CHECK(limb(GAIT_MODE_PAPER, 0.99, 32, 120) > (float)log(0.0018 * 0.01) - 0.01f);
+}
+
+/* Limbs add; without an ancestor the term is silent. */
+static void test_limbs(void)
+{
+    float const one = limb(GAIT_MODE_DEFAULT, 0.9, 32, 7);
+    v->setup.limbs = 3;
+    for (int l = 1; l < 3; l++) {
+        v->outline.facing[l][LANE] = 0.9f;
+        memset(now + l * LIKE_SAMPLES, l == 1 ? 20 : TEXTURE_HIDDEN, LIKE_SAMPLES);
+        memset(then + l * LIKE_SAMPLES, 13, LIKE_SAMPLES);
+    }
+    like_body b = {.setup = &v->setup,
+                   .features = &v->f,
+                   .outline = &v->outline,
+                   .lane = LANE,
+                   .seen = now,
+                   .ancestor = then};
+    CHECK_NEAR(like_texture.log_likelihood(&b), 2.0f * one - 1.6f, 1e-4);
+    b.ancestor = NULL;
+    CHECK(like_texture.log_likelihood(&b) == 0.0f);
+    CHECK(like_texture.flag == GAIT_TERM_TEXTURE && !like_texture.support);
+}
+
+int main(void)
+{
+    test_robust();
+    test_paper();
+    test_limbs();
+    return CHECK_DONE();
+}
