@@ -11,6 +11,7 @@ typedef struct arena {
     unsigned char *base; /* NULL: count only */
     size_t cap, used;    /* bytes */
     int overflow;        /* set for good by the first block that did not fit */
+    bool solid;          /* no red zones under ASan: the blocks are handled as one stretch */
 } arena;
 
 /* count elements of elem bytes, aligned to GAIT_ALIGN, not cleared.  NULL when counting or on overflow. */

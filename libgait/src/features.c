@@ -226,10 +226,12 @@ void features_compute(features *f, const gait_camera *cam, const gait_image *im,
         return;
     view_sample(&f->map, cam, im, &s->planes);
     view_inside(&f->map, cam, f->inside);
-    f->has_fg = plate != NULL && plate->channels == s->planes.channels;
-    if (f->has_fg)
-        features_foreground(f, &s->planes, plate);
-    view_grey(&s->planes, im->format, s->grey);
+    view_grey(&s->planes, s->grey);
+    f->has_fg = plate != NULL;
+    if (f->has_fg) {
+        view_planes const luma = {.channel = {s->grey}, .channels = 1};
+        features_foreground(f, plate->channels == 1 ? &luma : &s->planes, plate);
+    }
     features_edges(s->grey, f->edge, s);
     if (raw)
         for (int32_t i = 0; i < VIEW_PIXELS; i++)

@@ -54,7 +54,9 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     if (t.cfg.components < 0)
         t.cfg.components = m->components;
     t.rule = body_rule_init(m, &t.cfg);
+    a->solid = true;
     layout_state(a, &t);
+    a->solid = false;
     layout_work(a, &t);
     if (!self || a->overflow)
         return NULL;
@@ -65,7 +67,7 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
 
 void tracker_clear(gait_tracker *t)
 {
-    memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core) + 1);
+    memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         t->camera[c].plate_stale = true;
         if (t->template[c])

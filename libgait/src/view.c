@@ -86,13 +86,15 @@ void view_sample(const view_map *map, const gait_camera *cam, const gait_image *
     for (int32_t j = 0; j < VIEW_SIZE; j++) {
         source_row(map, cam, j, su, sv);
         for (int32_t c = 0; c < step; c++) {
+            /* Planes are R, G, B whatever the order in the frame. */
+            int32_t const from = im->format == GAIT_BGR8 ? 2 - c : c;
             uint8_t *const row = out->channel[c] + j * VIEW_SIZE;
             if (side == 1)
                 for (int32_t i = 0; i < VIEW_SIZE; i++)
-                    row[i] = tap_bilinear(im, step, c, su[i], sv[i]);
+                    row[i] = tap_bilinear(im, step, from, su[i], sv[i]);
             else
                 for (int32_t i = 0; i < VIEW_SIZE; i++)
-                    row[i] = tap_box(im, step, c, su[i], sv[i], side);
+                    row[i] = tap_box(im, step, from, su[i], sv[i], side);
         }
     }
 }
@@ -112,11 +114,9 @@ void view_inside(const view_map *map, const gait_camera *cam, uint64_t (*inside)
     }
 }
 
-void view_grey(const view_planes *in, int32_t format, uint8_t *grey)
+void view_grey(const view_planes *in, uint8_t *grey)
 {
-    const uint8_t *const r = in->channel[format == GAIT_BGR8 ? 2 : 0],
-                         *const b = in->channel[format == GAIT_BGR8 ? 0 : 2];
+    const uint8_t *const r = in->channel[0], *const g = in->channel[1], *const b = in->channel[2];
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
-        grey[i] = in->channels == 1 ? in->channel[0][i]
-                                    : (uint8_t)((77 * r[i] + 150 * in->channel[1][i] + 29 * b[i] + 128) >> 8);
+        grey[i] = in->channels == 1 ? r[i] : (uint8_t)((77 * r[i] + 150 * g[i] + 29 * b[i] + 128) >> 8);
 }

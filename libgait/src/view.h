@@ -15,7 +15,7 @@ typedef struct view_map { /* working = (pixel - origin) * scale, ideal (undistor
     float scale, u0, v0;
 } view_map;
 
-typedef struct view_planes { /* resampled colour planes; grey frames fill the first only */
+typedef struct view_planes { /* resampled planes: R, G, B, or grey in the first */
     uint8_t *channel[3];     /* VIEW_PIXELS each */
     int32_t channels;
 } view_planes;
@@ -33,7 +33,7 @@ void view_sample(const view_map *map, const gait_camera *cam, const gait_image *
 void view_inside(const view_map *map, const gait_camera *cam, uint64_t (*inside)[2]);
 
 /* Luma of the planes: (77 R + 150 G + 29 B) / 256. */
-void view_grey(const view_planes *in, int32_t format, uint8_t *grey);
+void view_grey(const view_planes *in, uint8_t *grey);
 
 view_planes view_planes_layout(arena *a, int32_t channels);
 #endif

@@ -16,6 +16,20 @@ static bool aim(gait_tracker *t, int32_t c, const walker *w)
     return true;
 }
 
+/* Resample the background where the region moved; a grey frame is compared with a grey plate. */
+static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
+{
+    camera_state *const s = &t->camera[c];
+    if (!s->plate_stale && (!grey || s->plate.channels == 1))
+        return;
+    view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
+    if (grey) {
+        view_grey(&s->plate, s->plate.channel[0]);
+        s->plate.channels = 1;
+    }
+    s->plate_stale = false;
+}
+
 int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted)
 {
     int32_t count = 0;
@@ -25,12 +39,9 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
         if (!aim(t, c, predicted))
             im.data = NULL;
         s->seen.map = t->core->map[c];
-        bool const plate = s->plate.channel[0] && s->background.data && im.data &&
-                           (s->background.format == GAIT_GREY8) == (im.format == GAIT_GREY8);
-        if (plate && s->plate_stale) {
-            view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
-            s->plate_stale = false;
-        }
+        bool const plate = s->plate.channel[0] && s->background.data && im.data;
+        if (plate)
+            refresh_plate(t, c, im.format == GAIT_GREY8);
         features_compute(&s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL, t->like->paper,
                          &t->scratch);
         count += s->seen.seen;
