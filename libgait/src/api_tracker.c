@@ -116,12 +116,16 @@ static gait_status check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->terms == 0 || (cfg->terms & ~known) != 0)
         return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
                          (unsigned)cfg->terms);
-    for (int32_t c = 0; c < cfg->cameras; c++)
+    for (int32_t c = 0; c < cfg->cameras; c++) {
         if (!camera_valid(&cfg->camera[c]))
             return base_fail(
                 err, GAIT_ERR_ARG, c,
                 "camera %d: size and focal lengths must be positive, R a rotation, all numbers finite",
                 (int)c);
+        if (cfg->camera[c].width > RAST_LIMIT || cfg->camera[c].height > RAST_LIMIT)
+            return base_fail(err, GAIT_ERR_LIMIT, c, "camera %d: %d x %d pixels, at most %d each way", (int)c,
+                             (int)cfg->camera[c].width, (int)cfg->camera[c].height, RAST_LIMIT);
+    }
     return check_numbers(cfg, err);
 }
 
@@ -227,9 +231,10 @@ gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const ga
 
 static gait_status check_frame(const gait_tracker *t, const gait_frame *frame, gait_error *err)
 {
-    int64_t const dt = frame->utime - t->core->utime;
-    if (dt < 0 || (dt == 0 && t->core->frame > 0))
+    int64_t const before = t->core->utime;
+    if (frame->utime < before || (frame->utime == before && t->core->frame > 0))
         return base_fail(err, GAIT_ERR_STATE, -1, "frame is not newer than the one before");
+    uint64_t const dt = (uint64_t)frame->utime - (uint64_t)before; /* cannot overflow */
     if ((double)dt > 1e6 * (double)t->cfg.max_dt)
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "%.3f s since the last frame, max_dt is %.3f s: start again", 1e-6 * (double)dt,

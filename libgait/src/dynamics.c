@@ -42,18 +42,22 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
         s.offset[a] += sd->offset[a] * n[F_COEF + q + k];
     }
     walker w = walker_from_state(&d->rule, &s);
-    /* The given height of the pelvis and the ground at z = 0 are two measurements of one level. */
-    float const var = sd->pelvis[2] * sd->pelvis[2],
-                trust = level_sd * level_sd / (level_sd * level_sd + var);
+    /* The given height of the pelvis and the ground at z = 0 are two measurements of one level (paper: one). */
+    float const var = sd->pelvis[2] * sd->pelvis[2];
+    float const trust = d->rule.plain_root ? 1.0f : level_sd * level_sd / (level_sd * level_sd + var);
     w.f[F_Z] = trust * w.f[F_Z] + __builtin_sqrtf(trust) * sd->pelvis[2] * n[8];
     return w;
 }
 
-/* Return to zero with time constant tau (never if 0), plus noise per sqrt(second). */
+/* Return to zero with time constant tau (never if 0), plus noise per sqrt(second): the exact transition, so that
+ * the frame rate does not matter and the stationary deviation is noise sqrt(tau / 2). */
 static float relax(float x, float dt, float tau, float noise, float n)
 {
-    float const keep = tau > 0.0f ? m_exp(-dt / tau) : 1.0f;
-    return keep * x + noise * __builtin_sqrtf(dt) * n;
+    if (!(tau > 0.0f))
+        return x + noise * __builtin_sqrtf(dt) * n;
+    float const keep = m_exp(-dt / tau), a = 2.0f * dt / tau;
+    float const share = a > 0.01f ? (1.0f - keep * keep) / a : 1.0f - 0.5f * a; /* (1 - exp(-a)) / a */
+    return keep * x + noise * __builtin_sqrtf(share * dt) * n;
 }
 
 walker dynamics_move(const dynamics *d, const walker *from, float dt, float age, uint32_t frame, int32_t i)

@@ -65,18 +65,22 @@ void features_box(const int32_t *in, int32_t *out, int32_t radius, int32_t *tmp)
 
 /* ---- foreground ----------------------------------------------------------------------------------------- */
 
-/* Exposure of the frame against the plate in 1/256, over pixels that changed little. */
+/* Exposure of the frame against the plate in 1/256, half to double, over pixels that changed little. */
 static int32_t exposure_gain(const view_planes *im, const view_planes *plate)
 {
-    int64_t frame = 0, scene = 0;
+    int64_t frame = 0, scene = 0, count = 0;
     for (int32_t c = 0; c < im->channels; c++)
         for (int32_t i = 0; i < VIEW_PIXELS; i++) {
             int32_t const a = im->channel[c][i], b = plate->channel[c][i], d = a - b;
             int32_t const calm = d > -32 && d < 32;
             frame += calm * a;
             scene += calm * b;
+            count += calm;
         }
-    return scene > 0 ? (int32_t)(frame * 256 / scene) : 256;
+    /* Too few or too dark pixels say nothing of the exposure. */
+    if (count < VIEW_PIXELS / 16 || scene < 8 * count)
+        return 256;
+    return i_clamp((int32_t)(frame * 256 / scene), 128, 512);
 }
 
 /* Evidence that one cell of 2 x 2 pixels changed, grey levels squared over three channels.  What a shadow explains,

@@ -1,5 +1,7 @@
 #include "hash.h"
 
+#include <string.h>
+
 uint64_t hash_fnv1a(uint64_t h, const void *p, size_t n)
 {
     const unsigned char *const b = p;
@@ -24,4 +26,22 @@ uint32_t hash_crc32(uint32_t crc, const void *p, size_t n)
         crc = (crc >> 4) ^ table[crc & 15u];
     }
     return ~crc;
+}
+
+uint64_t hash_state(const void *p, size_t n)
+{
+    enum { CHAINS = 4 }; /* independent, so that multiplications overlap */
+    uint64_t const prime = UINT64_C(0x100000001b3);
+    uint64_t h[CHAINS], word[CHAINS];
+    const unsigned char *const bytes = p;
+    for (int i = 0; i < CHAINS; i++)
+        h[i] = HASH_INIT + (uint64_t)i;
+    for (size_t at = 0; at + sizeof word <= n; at += sizeof word) {
+        memcpy(word, bytes + at, sizeof word);
+        for (int i = 0; i < CHAINS; i++) {
+            h[i] = (h[i] ^ word[i]) * prime;
+            h[i] ^= h[i] >> 29;
+        }
+    }
+    return hash_fnv1a(HASH_INIT, h, sizeof h);
 }

@@ -20,22 +20,35 @@ typedef struct bodies {
     float *R, *o;                        /* F x 9 x n, F x 3 x n */
 } bodies;
 
-/* All channels of one body; component k's score is coef[k * stride]. */
-static void curves_at(const gait_model *m, float phase, const float *coef, int32_t stride, int32_t components,
-                      float acc[MODEL_MAX_CHANNELS])
+/* Channels first .. first + count - 1 of one body; component k's score is coef[k * stride]. */
+static inline void curves_part(const gait_model *m, float phase, const float *coef, int32_t stride,
+                               int32_t components, int32_t first, int32_t count, float *acc)
 {
     int32_t const T = m->phases, M = m->channels;
     float const at = m_wrap1(phase) * (float)T;
     int32_t const j = i_min((int32_t)at, T - 1), next = j + 1 < T ? j + 1 : 0;
     float const w = at - (float)j;
-    memset(acc, 0, MODEL_MAX_CHANNELS * sizeof *acc);
+    memset(acc, 0, (size_t)count * sizeof *acc);
     for (int32_t k = 0; k <= components; k++) {
-        const float *const curve = m->curves + (size_t)k * (size_t)T * (size_t)M;
+        const float *const curve = m->curves + (size_t)k * (size_t)T * (size_t)M + first;
         const float *const a = curve + (size_t)j * (size_t)M, *const b = curve + (size_t)next * (size_t)M;
         float const c = k ? coef[(k - 1) * stride] : 1.0f, ca = c * (1.0f - w), cb = c * w;
-        for (int32_t i = 0; i < M; i++)
+        for (int32_t i = 0; i < count; i++)
             acc[i] += ca * a[i] + cb * b[i];
     }
+}
+
+static void curves_at(const gait_model *m, float phase, const float *coef, int32_t stride, int32_t components,
+                      float acc[MODEL_MAX_CHANNELS])
+{
+    curves_part(m, phase, coef, stride, components, 0, m->channels, acc);
+}
+
+float kin_channel(const gait_model *m, int32_t channel, float phase, const float *coef, int32_t components)
+{
+    float value;
+    curves_part(m, phase, coef, 1, components, channel, 1, &value);
+    return value;
 }
 
 /* R = R Rot(axis, angle): it mixes the two columns other than axis (0..2). */

@@ -30,6 +30,9 @@ typedef struct kin_body {
 void kin_curves(const gait_model *m, const float phase[BLOCK], const float coef[][BLOCK], int32_t components,
                 kin_channels *out);
 
+/* One channel of one body: the same bits as kin_curves gives. */
+float kin_channel(const gait_model *m, int32_t channel, float phase, const float *coef, int32_t components);
+
 /* Place every frame in the world. */
 void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, kin_body *out);
 

@@ -1,15 +1,15 @@
 #include "layers.h"
 #include <string.h>
 
-int32_t layers_order(const outline_block *outline, int32_t limbs, int32_t lane, int32_t *order)
+int32_t layers_order(const float *depth, int32_t stride, int32_t limbs, int32_t *order)
 {
     int32_t n = 0;
     for (int32_t l = 0; l < limbs; l++) {
-        float const depth = outline->depth[l][lane];
-        if (!(depth > 0.0f))
+        float const d = depth[l * stride];
+        if (!(d > 0.0f))
             continue;
         int32_t k = n++;
-        for (; k > 0 && outline->depth[order[k - 1]][lane] > depth; k--)
+        for (; k > 0 && depth[order[k - 1] * stride] > d; k--)
             order[k] = order[k - 1];
         order[k] = l;
     }
@@ -29,7 +29,7 @@ void layers_draw(const outline_block *outline, const limb_geometry *limbs, int32
                  layers *out)
 {
     int32_t order[MODEL_MAX_LIMBS];
-    int32_t const drawn = layers_order(outline, count, lane, order);
+    int32_t const drawn = layers_order(&outline->depth[0][lane], BLOCK, count, order);
     memset(out->whole.row, 0, sizeof out->whole.row);
     out->whole.first = RAST_SIZE;
     out->whole.last = 0;

@@ -8,8 +8,9 @@ typedef struct layers {
     rast_mask whole;                    /* the body; every row of the grid is written */
 } layers;
 
-/* Limb indices from near to far; limbs behind the camera are left out.  Returns how many. */
-int32_t layers_order(const outline_block *outline, int32_t limbs, int32_t lane, int32_t *order);
+/* Limb indices from near to far by depth[l * stride]; limbs behind the camera (depth 0) are left out.  Returns how
+ * many there are. */
+int32_t layers_order(const float *depth, int32_t stride, int32_t limbs, int32_t *order);
 
 /* Polygon of one limb of one lane in grid cells (two working pixels each). */
 void layers_polygon(const outline_block *outline, int32_t limb, int32_t vertices, int32_t lane, float *x,

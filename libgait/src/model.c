@@ -69,10 +69,9 @@ static const int32_t *take_ints(reader *r, const char *tag, int32_t rows, uint32
 }
 
 /* Names: [1, most] of them, none empty, NUL-terminated, all different. */
-static const char (*take_names(reader *r, const char *tag, uint32_t most, int32_t *count))[MODEL_NAME]
-{
+static const char (*take_names(reader *r, const char *tag, uint32_t most, int32_t *count)) [MODEL_NAME] {
     uint32_t dims[4] = {ANY, MODEL_NAME};
-    const char(*const name)[MODEL_NAME] = (const char(*)[MODEL_NAME])take(r, tag, BLOB_U8, 2, dims);
+    const char (*const name)[MODEL_NAME] = (const char (*)[MODEL_NAME])take(r, tag, BLOB_U8, 2, dims);
     if (!name)
         return NULL;
     require(r, dims[0] > 0, tag, "is empty");
@@ -175,6 +174,8 @@ static void read_points(reader *r, gait_model *m)
     m->point_name = take_names(r, "PTNM", GAIT_MAX_JOINTS, &m->points);
     m->point_frame = take_ints(r, "PTNI", m->points, 0);
     m->point_offset = take_table(r, "PTNF", m->points, 3);
+    if (r->status == GAIT_OK)
+        require(r, strcmp(m->point_name[0], "pelvis") == 0, "PTNM", "does not begin with the pelvis");
     for (int32_t i = 0; r->status == GAIT_OK && i < m->points; i++)
         require(r, m->point_frame[i] >= 0 && m->point_frame[i] < m->frames, "PTNI", "no such frame");
 }

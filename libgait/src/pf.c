@@ -27,6 +27,14 @@ void pf_keep(pf *p)
         p->parent[i] = i;
 }
 
+int32_t pf_heaviest(const pf *p)
+{
+    int32_t best = 0;
+    for (int32_t i = 1; i < p->n; i++)
+        best = p->weight[i] > p->weight[best] ? i : best;
+    return best;
+}
+
 double pf_ess(const pf *p)
 {
     double sum = 0.0;
@@ -52,6 +60,7 @@ pf_summary pf_reweigh(pf *p, const float *ll)
     }
     if (!(top > none)) {
         s.degenerate = true;
+        s.best = pf_heaviest(p);
         s.ess = pf_ess(p);
         return s;
     }
@@ -91,7 +100,7 @@ void pf_resample_systematic(pf *p, uint32_t u)
     int32_t from = 0;
     for (uint64_t i = 0; i < n; i++) {
         uint64_t const at = start + i * step + i * rest / n; /* floor(i total / n) without 128 bits */
-        while (p->ticket[from] <= at)
+        while (from < p->n - 1 && p->ticket[from] <= at)
             from++;
         p->parent[i] = from;
     }

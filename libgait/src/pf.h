@@ -26,6 +26,9 @@ pf_summary pf_reweigh(pf *p, const float *ll);
 
 double pf_ess(const pf *p);
 
+/* First particle of the largest weight. */
+int32_t pf_heaviest(const pf *p);
+
 /* Ancestor indices by systematic resampling: |children - n w| < 1; u is the common offset in 2^-32 of a step. */
 void pf_resample_systematic(pf *p, uint32_t u);
 

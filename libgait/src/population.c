@@ -10,17 +10,7 @@ population population_layout(arena *a, int32_t n, int32_t fields)
 
 float root_channel(const gait_model *m, int32_t c, float phase, const float *coef, int32_t components)
 {
-    float const x = m_wrap1(phase) * (float)m->phases;
-    int32_t const j = i_min((int32_t)x, m->phases - 1), next = j + 1 < m->phases ? j + 1 : 0;
-    float const t = x - (float)j;
-    size_t const stride = (size_t)m->phases * (size_t)m->channels;
-    const float *curve = m->curves + m->root_channel + c;
-    float sum = 0.0f;
-    for (int32_t k = 0; k <= components; k++, curve += stride) {
-        float const a = curve[j * m->channels], b = curve[next * m->channels], v = a + t * (b - a);
-        sum += k == 0 ? v : coef[k - 1] * v;
-    }
-    return sum;
+    return kin_channel(m, m->root_channel + c, phase, coef, components);
 }
 
 body_rule body_rule_init(const gait_model *m, const gait_tracker_config *cfg)

@@ -17,38 +17,28 @@ static void paint(const limb_polygon *p, int32_t n, uint8_t id, uint8_t *ids, co
     }
 }
 
-/* Limb indices from far to near. */
-static void far_to_near(const limb_polygon *poly, int32_t n, int32_t *order)
-{
-    for (int32_t l = 0; l < n; l++) {
-        int32_t k = l;
-        for (; k > 0 && poly[order[k - 1]].depth < poly[l].depth; k--)
-            order[k] = order[k - 1];
-        order[k] = l;
-    }
-}
-
 gait_status render_limbs(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
                          int32_t stride)
 {
     view_map const whole = {.scale = 1.0f};
     limb_geometry limbs[MODEL_MAX_LIMBS];
     limb_polygon poly[MODEL_MAX_LIMBS];
+    float depth[MODEL_MAX_LIMBS];
     int32_t order[MODEL_MAX_LIMBS];
     float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
     gait_status const status = model_place_state(m, s, R, o);
     if (status != GAIT_OK)
         return status;
     limb_geometry_init(m, 1.0f, limbs);
-    for (int32_t l = 0; l < m->limbs; l++)
-        outline_limb(&limbs[l], R + 9 * limbs[l].frame, o + 3 * limbs[l].frame, s->stature, cam, &whole,
-                     &poly[l]);
+    for (int32_t l = 0; l < m->limbs; l++) {
+        int32_t const f = limbs[l].frame;
+        outline_limb(&limbs[l], R + 9 * f, o + 3 * f, s->stature, cam, &whole, &poly[l]);
+        depth[l] = poly[l].depth;
+    }
     for (int32_t row = 0; row < cam->height; row++)
         memset(ids + (size_t)row * (size_t)stride, 0, (size_t)cam->width);
-    far_to_near(poly, m->limbs, order);
-    for (int32_t k = 0; k < m->limbs; k++)
-        if (poly[order[k]].depth > 0.0f)
-            paint(&poly[order[k]], outline_vertices(&limbs[order[k]]), (uint8_t)(order[k] + 1), ids, cam,
-                  stride);
+    /* From far to near: nearer limbs are painted over. */
+    for (int32_t k = layers_order(depth, 1, m->limbs, order) - 1; k >= 0; k--)
+        paint(&poly[order[k]], outline_vertices(&limbs[order[k]]), (uint8_t)(order[k] + 1), ids, cam, stride);
     return GAIT_OK;
 }

@@ -21,6 +21,7 @@ static size_t state_bytes(const gait_tracker *t)
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;
+    memset(&c.camera[c.cameras], 0, (size_t)(GAIT_MAX_CAMERAS - c.cameras) * sizeof *c.camera);
     memset(&c.exec, 0, sizeof c.exec);
     c.tasks = 0;
     return hash_fnv1a(HASH_INIT, &c, sizeof c);
@@ -44,13 +45,66 @@ void snapshot_save(const gait_tracker *t, void *mem)
     memcpy((unsigned char *)mem + sizeof h, t->core, state_bytes(t));
 }
 
-/* Indices inside the state that later code trusts. */
-static bool state_plausible(const gait_tracker *t)
+/* Where an array of the state lies in the body of a snapshot, which need not be aligned. */
+static const unsigned char *in_body(const gait_tracker *t, const unsigned char *body, const void *array)
 {
-    for (int32_t i = 0; i < t->filter.n; i++)
-        if (t->filter.parent[i] < 0 || t->filter.parent[i] >= t->filter.n)
+    return body + ((const unsigned char *)array - (const unsigned char *)t->core);
+}
+
+static bool core_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    tracker_core c;
+    memcpy(&c, body, sizeof c);
+    bool ok = (c.current == 0 || c.current == 1) && (c.started == 0 || c.started == 1);
+    ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->cfg.particles;
+    ok &= c.start_utime <= c.utime && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
+    for (int32_t k = 0; k < t->cfg.cameras; k++) {
+        const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
+        ok &= f_finite(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;
+    }
+    return ok;
+}
+
+static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < t->filter.n; i++) {
+        double weight, log_weight;
+        int32_t parent;
+        memcpy(&weight, in_body(t, body, &t->filter.weight[i]), sizeof weight);
+        memcpy(&log_weight, in_body(t, body, &t->filter.log_weight[i]), sizeof log_weight);
+        memcpy(&parent, in_body(t, body, &t->filter.parent[i]), sizeof parent);
+        if (!(weight >= 0.0 && log_weight <= 1.0 && log_weight >= -2e300) || parent < 0 ||
+            parent >= t->filter.n)
             return false;
-    return t->core->current == 0 || t->core->current == 1;
+        sum += weight;
+    }
+    return sum > 0.999 && sum < 1.001;
+}
+
+static bool people_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    size_t const count = (size_t)t->gen[0].people.fields * (size_t)t->gen[0].people.n;
+    for (int32_t g = 0; g < 2; g++)
+        for (size_t i = 0; i < count; i++) {
+            float v;
+            memcpy(&v, in_body(t, body, &t->gen[g].people.value[i]), sizeof v);
+            if (!f_finite(&v, 1))
+                return false;
+        }
+    return true;
+}
+
+static bool template_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    for (int32_t c = 0; c < t->cfg.cameras && t->template[c]; c++)
+        for (int32_t i = 0; i < t->model->limbs * LIKE_SAMPLES; i++) {
+            int16_t v;
+            memcpy(&v, in_body(t, body, &t->template[c][i]), sizeof v);
+            if (v != TEMPLATE_EMPTY && (v < -127 * TEMPLATE_ONE || v > 127 * TEMPLATE_ONE))
+                return false;
+        }
+    return true;
 }
 
 gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err)
@@ -69,21 +123,18 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     if (h.model != t->model->digest || h.config != config_digest(t))
         return base_fail(err, GAIT_ERR_VERSION, -1,
                          "snapshot of a tracker with another model or configuration");
-    if (h.bytes != bytes || bytes != snapshot_bytes(t) ||
-        h.body != hash_fnv1a(HASH_INIT, body, state_bytes(t)))
+    if (h.bytes != bytes || bytes != snapshot_bytes(t) || h.body != hash_state(body, state_bytes(t)))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot is damaged: length or checksum do not match");
+    if (!core_plausible(t, body) || !weights_plausible(t, body) || !people_plausible(t, body) ||
+        !template_plausible(t, body))
+        return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot holds a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         t->camera[c].plate_stale = true;
-    if (!state_plausible(t)) {
-        tracker_clear(t);
-        return base_fail(err, GAIT_ERR_CORRUPT, -1,
-                         "snapshot holds an index out of range; start the tracker again");
-    }
     return GAIT_OK;
 }
 
 uint64_t snapshot_digest(const gait_tracker *t)
 {
-    return hash_fnv1a(HASH_INIT, t->core, state_bytes(t));
+    return hash_state(t->core, state_bytes(t));
 }

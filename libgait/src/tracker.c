@@ -88,11 +88,16 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
     dynamics const d = tracker_dynamics(t);
     tracker_clear(t);
     t->core->started = 1;
-    t->core->utime = t->core->start_utime = utime;
+    t->core->utime = t->core->start_utime = t->core->support_utime = utime;
     for (int32_t i = 0; i < t->cfg.particles; i++) {
         walker const w = dynamics_draw(&d, mean, sd, i);
         walker_put(&t->gen[0].people, i, &w);
     }
+}
+
+static float seconds_since(const gait_tracker *t, int64_t utime)
+{
+    return 1e-6f * (float)(t->core->utime - utime);
 }
 
 /* Ancestors of the next generation. */
@@ -137,55 +142,64 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 static void predict(gait_tracker *t, float dt, uint32_t frame)
 {
     move_job j = {.t = t, .d = tracker_dynamics(t), .dt = dt, .frame = frame};
-    j.age = 1e-6f * (float)(t->core->utime - t->core->start_utime);
+    j.age = seconds_since(t, t->core->start_utime);
     t->core->current = 1 - t->core->current;
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
 }
 
-static int32_t judge(gait_tracker *t, bool degenerate, const gait_estimate *e, float dt, float age)
+static int32_t judge(const gait_tracker *t, bool degenerate, const gait_estimate *e)
 {
     float const patience = 0.33f, acquire = 1.0f; /* seconds */
-    float const frames = dt > 0.0f ? patience / dt : 1.0f;
-    if (degenerate || (float)t->core->fading > frames)
+    if (degenerate || seconds_since(t, t->core->support_utime) > patience)
         return GAIT_STATUS_LOST;
     if (e->mode_mass < 0.7f)
-        return age < acquire ? GAIT_STATUS_INIT : GAIT_STATUS_AMBIGUOUS;
+        return seconds_since(t, t->core->start_utime) < acquire ? GAIT_STATUS_INIT : GAIT_STATUS_AMBIGUOUS;
     return GAIT_STATUS_TRACKING;
 }
 
-/* Weigh the particles by the frame and fill in the estimate. */
-static void observe(gait_tracker *t, float dt, gait_estimate *out)
+/* Which cameras saw this frame, as bits. */
+static uint32_t seeing(const gait_tracker *t)
 {
-    float const age = 1e-6f * (float)(t->core->utime - t->core->start_utime);
+    uint32_t mask = 0;
+    for (int32_t c = 0; c < t->cfg.cameras; c++)
+        mask |= (uint32_t)t->camera[c].seen.seen << c;
+    return mask;
+}
+
+static void remember_appearance(gait_tracker *t)
+{
+    size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
+    for (int32_t c = 0; c < t->cfg.cameras; c++)
+        if (t->camera[c].seen.seen && t->template[c])
+            template_update(t->template[c], t->model->limbs, t->seen + (size_t)c * samples);
+}
+
+/* Weigh the particles by the frame and fill in the estimate. */
+static void observe(gait_tracker *t, gait_estimate *out)
+{
     weigh_particles(t);
     pf_summary const s = pf_reweigh(&t->filter, t->ll);
     t->core->ess = s.ess;
-    t->core->textured = wants_texture(&t->cfg);
+    t->core->textured = wants_texture(&t->cfg) ? seeing(t) : 0;
     out->log_evidence = s.log_evidence;
     out->flags |= s.degenerate || s.ess < 2.0 ? GAIT_EST_DEGENERATE : 0;
     walker const mean = estimate_fill(t, s.best, out);
     /* Terms without an opinion on whether anybody is there give exactly zero. */
-    t->core->fading = weigh_walker(t, &mean) >= 0.0f ? 0 : t->core->fading + 1;
-    out->status = judge(t, s.degenerate, out, dt, age);
-    for (int32_t c = 0; c < t->cfg.cameras && out->status == GAIT_STATUS_TRACKING; c++)
-        if (t->camera[c].seen.seen && t->template[c])
-            template_update(t->template[c], t->model->limbs,
-                            t->seen + (size_t)c * (size_t)t->model->limbs * LIKE_SAMPLES);
+    if (weigh_walker(t, &mean) >= 0.0f)
+        t->core->support_utime = t->core->utime;
+    out->status = judge(t, s.degenerate, out);
+    if (out->status == GAIT_STATUS_TRACKING)
+        remember_appearance(t);
 }
 
 /* No camera saw anything: the prediction is the estimate. */
 static void coast(gait_tracker *t, gait_estimate *out)
 {
-    int32_t best = 0;
-    for (int32_t i = 0; i < t->cfg.particles; i++) {
-        t->ll[i] = 0.0f;
-        best = t->filter.weight[i] > t->filter.weight[best] ? i : best;
-    }
-    weigh_particles(t); /* for the joints */
+    weigh_particles(t); /* no camera: only the joints */
     t->core->textured = 0;
-    estimate_fill(t, best, out);
+    estimate_fill(t, pf_heaviest(&t->filter), out);
     out->flags |= GAIT_EST_NO_IMAGE;
-    out->status = GAIT_STATUS_LOST;
+    out->status = judge(t, false, out);
 }
 
 gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
@@ -199,7 +213,7 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
     predict(t, dt, counter);
     walker const place = estimate_place(&t->gen[core->current].people, t->filter.weight);
     if (weigh_look(t, frame, &place) > 0)
-        observe(t, dt, &e);
+        observe(t, &e);
     else
         coast(t, &e);
     e.flags |= resampled ? GAIT_EST_RESAMPLED : 0;

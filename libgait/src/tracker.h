@@ -8,11 +8,12 @@
 
 typedef struct tracker_core { /* small mutable state; saved and hashed with the arrays that follow it */
     int64_t utime, start_utime;
-    uint64_t frame; /* steps since start */
+    int64_t support_utime; /* when the images last supported the estimate */
+    uint64_t frame;        /* steps since start */
     int32_t started;
-    int32_t current;  /* which of the two generations holds the particles */
-    int32_t textured; /* that generation carries surface samples of the previous frame */
-    int32_t fading;   /* consecutive frames without support from the images */
+    int32_t current;   /* which of the two generations holds the particles */
+    uint32_t textured; /* bit c: that generation carries surface samples of camera c's previous frame */
+    int32_t reserved;
     double ess;
     view_map map[GAIT_MAX_CAMERAS];
 } tracker_core;

@@ -16,14 +16,16 @@ static bool aim(gait_tracker *t, int32_t c, const walker *w)
     return true;
 }
 
-/* Resample the background where the region moved; a grey frame is compared with a grey plate. */
+/* Resample the background where the region moved or the frames changed between grey and colour: a grey frame is
+ * compared with a grey plate. */
 static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
 {
     camera_state *const s = &t->camera[c];
-    if (!s->plate_stale && (!grey || s->plate.channels == 1))
+    bool const colour = s->background.format != GAIT_GREY8;
+    if (!s->plate_stale && s->plate.channels == (colour && !grey ? 3 : 1))
         return;
     view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
-    if (grey) {
+    if (colour && grey) {
         view_grey(&s->plate, s->plate.channel[0]);
         s->plate.channels = 1;
     }
@@ -92,7 +94,7 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
         for (int32_t lane = 0; lane < lanes; lane++) {
             int32_t const i = begin + lane;
             like_body b = look_at(t, c, lane, w, texture_of(t, now, i, c));
-            b.ancestor = t->core->textured ? texture_of(t, then, t->filter.parent[i], c) : NULL;
+            b.ancestor = t->core->textured >> c & 1u ? texture_of(t, then, t->filter.parent[i], c) : NULL;
             t->ll[i] += like_evaluate(&b);
         }
     }

@@ -42,9 +42,9 @@ static void test_order(void)
         outline.depth[l][5] = depth[l];
         outline.depth[l][4] = 1.0f;
     }
-    CHECK(layers_order(&outline, 8, 5, order) == 5);
+    CHECK(layers_order(&outline.depth[0][5], BLOCK, 8, order) == 5);
     CHECK(memcmp(order, want, sizeof want) == 0); /* near to far; equal ones by index; none behind */
-    CHECK(layers_order(&outline, 0, 5, order) == 0);
+    CHECK(layers_order(&outline.depth[0][5], BLOCK, 0, order) == 0);
 }
 
 /* Working pixels [20, 60) x [40, 100) are cells [10, 30) x [20, 50). */

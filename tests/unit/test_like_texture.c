@@ -98,7 +98,7 @@ static void test_limbs(void)
     CHECK_NEAR(like_texture.log_likelihood(&b), 2.0f * one - 1.6f, 1e-4);
     b.ancestor = NULL;
     CHECK(like_texture.log_likelihood(&b) == 0.0f);
-    CHECK(like_texture.flag == GAIT_TERM_TEXTURE && !like_texture.support);
+    CHECK(like_texture.flag == GAIT_TERM_TEXTURE && like_texture.support);
 }
 
 int main(void)
