@@ -1,0 +1,430 @@
+/* Temporal prior: moments of the start and of every field's motion against closed forms (spec 1.4, 3.4 K6). */
+#include "dynamics.h"
+
+#include "fmath.h"
+
+#include "toy_model.h"
+
+#include "check.h"
+
+enum { DRAWS = 8000, FIELDS = F_COEF + 3, OFFSET_ANGLE = TOY_TORSO };
+
+static gait_tracker_config cfg;
+
+/* Default mode, two components and one posture offset, no noise at all. */
+static dynamics quiet(int32_t mode, uint64_t seed)
+{
+    gait_tracker_default(&cfg, mode);
+    cfg.components = 2;
+    cfg.offset_angles = 1u << OFFSET_ANGLE;
+    cfg.phase_noise = cfg.rate_noise = cfg.rate_noise_start = cfg.stature_noise = 0.0f;
+    cfg.forward_noise = cfg.lateral_noise = cfg.vertical_noise = 0.0f;
+    cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = 0.0f;
+    cfg.offset_sd = 0.07f;
+    cfg.settle_time = 1.0f;
+    cfg.rate_time = 5.0f;
+    cfg.tilt_time = 1.1f;
+    cfg.coef_time = 4.5f;
+    return (dynamics){.cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed};
+}
+
+static void noisy(void)
+{
+    cfg.phase_noise = 0.02f;
+    cfg.rate_noise = 0.02f;
+    cfg.rate_noise_start = 0.05f;
+    cfg.forward_noise = 0.022f;
+    cfg.lateral_noise = 0.0164f;
+    cfg.vertical_noise = 0.0096f;
+    cfg.heading_noise = 0.044f;
+    cfg.tilt_noise = 0.033f;
+    cfg.coef_noise = 0.66f;
+    cfg.stature_noise = 0.005f;
+    cfg.offset_noise = 0.02f;
+}
+
+typedef struct moments {
+    double mean, var;
+} moments;
+
+static moments moments_of(const double *v, int n)
+{
+    moments m = {0.0, 0.0};
+    for (int i = 0; i < n; i++)
+        m.mean += v[i] / n;
+    for (int i = 0; i < n; i++)
+        m.var += (v[i] - m.mean) * (v[i] - m.mean) / n;
+    return m;
+}
+
+/* Sample moments against the true ones, 4.5 standard errors; floats add a little. */
+static void check_moments(moments have, double mean, double sd, int n)
+{
+    CHECK_NEAR(have.mean, mean, 4.5 * sd / sqrt(n) + 1e-5);
+    CHECK_NEAR(have.var, sd * sd, 4.5 * sd * sd * sqrt(2.0 / n) + 1e-9);
+}
+
+/* ---- start ---- */
+static const size_t state_fields = 11; /* phase, rate, stature, heading, pitch, roll, pelvis x y, scores, offset */
+
+static float *state_number(gait_state *s, size_t k)
+{
+    float *const at[] = {&s->phase, &s->stride_hz, &s->stature, &s->heading, &s->pitch, &s->roll, &s->pelvis[0],
+                         &s->pelvis[1], &s->coef[0], &s->coef[1], &s->offset[OFFSET_ANGLE]};
+    return at[k];
+}
+
+static void test_draw(void)
+{
+    static double v[11][DRAWS];
+    static const float sds[] = {0.05f, 0.04f, 0.06f, 0.3f, 0.05f, 0.04f, 0.2f, 0.3f, 1.0f, 0.5f, 0.07f};
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 5);
+    gait_state mean = toy_state(0.5f), sd = {0};
+    mean.heading = 0.8f;
+    mean.pitch = 0.1f;
+    mean.roll = -0.05f;
+    mean.pelvis[0] = 3.0f;
+    mean.pelvis[1] = -2.0f;
+    mean.coef[0] = 0.7f;
+    mean.coef[1] = -1.1f;
+    mean.offset[OFFSET_ANGLE] = 0.1f;
+    for (size_t k = 0; k < state_fields; k++)
+        *state_number(&sd, k) = sds[k];
+    sd.coef[5] = sd.offset[2] = 9.0f; /* not in use */
+    for (int32_t i = 0; i < DRAWS; i++) {
+        walker const w = dynamics_draw(&d, &mean, &sd, i);
+        gait_state s = walker_state(&d.rule, &w);
+        for (size_t k = 0; k < state_fields; k++)
+            v[k][i] = (double)*state_number(&s, k);
+    }
+    moments have[11];
+    for (size_t k = 0; k < state_fields; k++) {
+        have[k] = moments_of(v[k], DRAWS);
+        check_moments(have[k], (double)*state_number(&mean, k), (double)sds[k], DRAWS);
+    }
+    for (size_t a = 0; a < state_fields; a++) /* independent */
+        for (size_t b = 0; b < a; b++) {
+            double cov = 0.0;
+            for (int i = 0; i < DRAWS; i++)
+                cov += (v[a][i] - have[a].mean) * (v[b][i] - have[b].mean) / DRAWS;
+            CHECK_NEAR(cov / sqrt(have[a].var * have[b].var), 0.0, 4.5 / sqrt(DRAWS));
+        }
+}
+
+/* No deviation: every particle is the mean, pelvis and all. */
+static void test_draw_exact(void)
+{
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
+        dynamics const d = quiet(mode, 5);
+        gait_state mean = toy_state(0.3f);
+        gait_state const sd = {0};
+        mean.pelvis[2] += 0.13f;
+        for (int32_t i = 0; i < 5; i++) {
+            walker const w = dynamics_draw(&d, &mean, &sd, i);
+            gait_state const s = walker_state(&d.rule, &w);
+            CHECK(s.phase == mean.phase && s.stride_hz == mean.stride_hz && s.stature == mean.stature);
+            for (int k = 0; k < 3; k++)
+                CHECK_NEAR(s.pelvis[k], mean.pelvis[k], 1e-6);
+        }
+    }
+}
+
+/* Height: the given one and the ground at z = 0 (sd 3 cm) are combined. */
+static void test_draw_level(void)
+{
+    static double v[DRAWS];
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 6);
+    gait_state mean = toy_state(0.3f), sd = {.pelvis = {0, 0, 0.04f}};
+    mean.pelvis[2] += 0.06f;
+    for (int32_t i = 0; i < DRAWS; i++)
+        v[i] = (double)dynamics_draw(&d, &mean, &sd, i).f[F_Z];
+    double const trust = 0.0009 / (0.0009 + 0.0016);
+    check_moments(moments_of(v, DRAWS), 0.06 * trust, sqrt(trust) * 0.04, DRAWS);
+}
+
+/* Unknown phase and heading are uniform over the circle; wild rates and statures stay possible. */
+static void test_draw_broad(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 7);
+    gait_state mean = toy_state(0.3f), sd = {.phase = 0.5f, .heading = PI_F, .stride_hz = 2.0f, .stature = 2.0f};
+    int32_t phase[16] = {0}, heading[16] = {0}, wrong = 0;
+    for (int32_t i = 0; i < DRAWS; i++) {
+        walker const w = dynamics_draw(&d, &mean, &sd, i);
+        float const turn = m_wrap1(w.f[F_HEADING] / TWO_PI_F);
+        wrong += !(w.f[F_PHASE] >= 0.0f && w.f[F_PHASE] < 1.0f);
+        wrong += !(w.f[F_RATE] >= 0.476f && w.f[F_RATE] <= 2.5f && w.f[F_STATURE] >= 0.3f);
+        phase[(int32_t)(16.0f * w.f[F_PHASE])]++;
+        heading[(int32_t)(16.0f * turn)]++;
+    }
+    CHECK(wrong == 0);
+    double chi2[2] = {0.0, 0.0};
+    for (int k = 0; k < 16; k++) {
+        double const expect = DRAWS / 16.0;
+        chi2[0] += (phase[k] - expect) * (phase[k] - expect) / expect;
+        chi2[1] += (heading[k] - expect) * (heading[k] - expect) / expect;
+    }
+    CHECK(chi2[0] < 37.7 && chi2[1] < 37.7); /* 15 degrees of freedom, p = 0.001 */
+}
+
+/* ---- motion without noise ---- */
+
+/* Phase, path and relaxing fields follow their equations. */
+static void test_drift(void)
+{
+    const gait_model *const m = toy_model();
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++)
+        for (int32_t steps = 12; steps <= 48; steps *= 2) {
+            dynamics const d = quiet(mode, 1);
+            float const dt = 1.2f / (float)steps, rate = m->stride_hz;
+            walker w = {{0}};
+            w.f[F_PHASE] = 0.9f;
+            w.f[F_RATE] = rate;
+            w.f[F_STATURE] = 1.8f;
+            w.f[F_HEADING] = 0.7f;
+            w.f[F_X] = 2.0f;
+            w.f[F_Z] = 0.05f;
+            w.f[F_PITCH] = 0.2f;
+            w.f[F_ROLL] = -0.1f;
+            w.f[F_COEF] = 1.5f;
+            w.f[F_COEF + 1] = 0.0f;
+            w.f[F_COEF + 2] = 0.04f;
+            for (int32_t k = 0; k < steps; k++)
+                w = dynamics_move(&d, &w, dt, 1.0f, (uint32_t)k, 3);
+            double path = 0.0; /* statures: integral of forward motion over phase, with the score decaying */
+            for (int k = 0; k < 4000; k++) {
+                double const t = 1.2 * (k + 0.5) / 4000.0;
+                const float coef[2] = {(float)(1.5 * exp(-t / 4.5)), 0.0f};
+                path += (double)root_channel(m, ROOT_FORWARD, (float)(0.9 + (double)rate * t), coef, 2) *
+                        (double)rate * 1.2 / 4000.0;
+            }
+            path = mode == GAIT_MODE_PAPER ? (double)m->stride_length * (double)rate * 1.2 : path;
+            double const tol = mode == GAIT_MODE_PAPER ? 1e-4 : 0.2 / steps; /* the score lags a step */
+            CHECK_NEAR(w.f[F_PHASE], fmod(0.9 + (double)rate * 1.2, 1.0), 1e-5);
+            CHECK_NEAR(w.f[F_X], 2.0 + 1.8 * path * cos(0.7), tol);
+            CHECK_NEAR(w.f[F_Y], 1.8 * path * sin(0.7), tol);
+            CHECK(w.f[F_HEADING] == 0.7f && w.f[F_STATURE] == 1.8f && w.f[F_RATE] == rate);
+            CHECK_NEAR(w.f[F_Z], 0.05 * exp(-1.2 / 1.1), 1e-6);
+            CHECK_NEAR(w.f[F_PITCH], 0.2 * exp(-1.2 / 1.1), 1e-6);
+            CHECK_NEAR(w.f[F_ROLL], -0.1 * exp(-1.2 / 1.1), 1e-6);
+            CHECK_NEAR(w.f[F_COEF], 1.5 * exp(-1.2 / 4.5), 1e-5);
+            CHECK(w.f[F_COEF + 2] == 0.04f); /* without noise posture stays */
+        }
+}
+
+/* The rate returns to the population's, or never. */
+static void test_rate(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 1);
+    double const own = (double)toy_model()->stride_hz;
+    for (int never = 0; never < 2; never++) {
+        walker w = {.f = {[F_RATE] = 1.3f, [F_STATURE] = 1.7f}};
+        cfg.rate_time = never ? 0.0f : 5.0f;
+        for (uint32_t k = 0; k < 60; k++)
+            w = dynamics_move(&d, &w, 0.05f, 2.0f, k, 0);
+        CHECK_NEAR(w.f[F_RATE], never ? 1.3 : own + (1.3 - own) * exp(-3.0 / 5.0), 1e-4);
+    }
+}
+
+/* ---- motion with noise ---- */
+
+/* Fields of many particles after `seconds` in steps of dt; everyone starts alike. */
+static void spread_after(const dynamics *d, const walker *from, float dt, float seconds, float age,
+                         double v[FIELDS][DRAWS])
+{
+    int32_t const steps = (int32_t)(seconds / dt + 0.5f);
+    for (int32_t i = 0; i < DRAWS; i++) {
+        walker w = *from;
+        double cycles = 0.0; /* unwrapped phase */
+        for (int32_t k = 0; k < steps; k++) {
+            float const before = w.f[F_PHASE];
+            w = dynamics_move(d, &w, dt, age + (float)k * dt, (uint32_t)k, i);
+            double const turn = (double)w.f[F_PHASE] - (double)before;
+            cycles += turn - floor(turn + 0.5);
+        }
+        for (int f = 0; f < FIELDS; f++)
+            v[f][i] = (double)w.f[f];
+        v[F_PHASE][i] = cycles;
+    }
+}
+
+static walker standing(void)
+{
+    return (walker){.f = {[F_PHASE] = 0.2f, [F_RATE] = toy_model()->stride_hz, [F_STATURE] = 1.75f}};
+}
+
+static double sampled[2][FIELDS][DRAWS];
+
+/* After a second: random walks t s^2, relaxing fields s^2 tau/2 (1 - exp(-2t/tau)), phase with its rate's integral. */
+static void test_spread(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 9);
+    walker const from = standing();
+    double const T = 1.0, dt = 1.0 / 30.0, own = (double)toy_model()->stride_hz;
+    noisy();
+    cfg.settle_time = 0.0f;
+    cfg.rate_time = 0.0f;
+    spread_after(&d, &from, (float)dt, (float)T, 1.0f, sampled[0]);
+    double const s = 0.02 * own, integral = s * s * T * T * T / 3.0 * (1.0 - 1.5 * dt / T);
+    check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, s * sqrt(T), DRAWS);
+    check_moments(moments_of(sampled[0][F_PHASE], DRAWS), own * T, sqrt(0.02 * 0.02 * T + integral), DRAWS);
+    check_moments(moments_of(sampled[0][F_HEADING], DRAWS), 0.0, 0.044 * sqrt(T), DRAWS);
+    double const keep = 1.0 - exp(-2.0 * T / 1.1);
+    check_moments(moments_of(sampled[0][F_PITCH], DRAWS), 0.0, 0.033 * sqrt(0.55 * keep), DRAWS);
+    check_moments(moments_of(sampled[0][F_ROLL], DRAWS), 0.0, 0.033 * sqrt(0.55 * keep), DRAWS);
+    check_moments(moments_of(sampled[0][F_Z], DRAWS), 0.0, 0.0096 * sqrt(0.55 * keep), DRAWS);
+    double const coef = 0.66 * sqrt(2.25 * (1.0 - exp(-2.0 * T / 4.5)));
+    check_moments(moments_of(sampled[0][F_COEF], DRAWS), 0.0, coef, DRAWS);
+    check_moments(moments_of(sampled[0][F_COEF + 1], DRAWS), 0.0, coef, DRAWS);
+    double const tau = 2.0 * 0.07 * 0.07 / (0.02 * 0.02);
+    check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, 0.07 * sqrt(1.0 - exp(-2.0 * T / tau)), DRAWS);
+    moments const still = moments_of(sampled[0][F_STATURE], DRAWS);
+    CHECK(still.var < 1e-12); /* settled: stature is fixed */
+    moments const side = moments_of(sampled[0][F_Y], DRAWS); /* lateral noise, and drifting headings */
+    double const path = 1.75 * 0.8 * own, veer = path * 0.044;
+    CHECK_NEAR(sqrt(side.var), sqrt(0.0164 * 0.0164 + veer * veer / 3.0), 0.0015);
+    CHECK_NEAR(moments_of(sampled[0][F_X], DRAWS).mean, path, 0.02);
+}
+
+/* Relaxing fields end at their stationary spread, exactly, whatever the frame rate; the start's rate noise is wider. */
+static void test_stationary(void)
+{
+    static const float steps[] = {0.05f, 0.5f};
+    for (size_t k = 0; k < 2; k++) {
+        dynamics const d = quiet(GAIT_MODE_DEFAULT, 10 + k);
+        walker const from = standing();
+        noisy();
+        cfg.tilt_time = 0.5f;
+        cfg.coef_time = 0.6f;
+        cfg.rate_time = 0.5f;
+        cfg.offset_noise = 0.1f; /* time constant 0.98 s */
+        spread_after(&d, &from, steps[k], 4.0f, 9.0f, sampled[0]);
+        check_moments(moments_of(sampled[0][F_PITCH], DRAWS), 0.0, 0.033 * sqrt(0.25), DRAWS);
+        check_moments(moments_of(sampled[0][F_Z], DRAWS), 0.0, 0.0096 * sqrt(0.25), DRAWS);
+        check_moments(moments_of(sampled[0][F_COEF], DRAWS), 0.0, 0.66 * sqrt(0.3), DRAWS);
+        check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, 0.07, DRAWS);
+        double const own = (double)toy_model()->stride_hz;
+        check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.02 * own * sqrt(0.25), DRAWS);
+    }
+}
+
+/* A very long time constant is a random walk. */
+static void test_slow(void)
+{
+    static const float times[] = {0.0f, 1e6f, 1e4f, 100.0f};
+    double var[4];
+    walker const from = standing();
+    for (size_t k = 0; k < 4; k++) {
+        dynamics const d = quiet(GAIT_MODE_DEFAULT, 60);
+        cfg.tilt_noise = 0.033f;
+        cfg.tilt_time = times[k];
+        spread_after(&d, &from, 0.04f, 0.2f, 9.0f, sampled[0]);
+        var[k] = moments_of(sampled[0][F_PITCH], DRAWS).var;
+        CHECK_NEAR(var[k] / var[0], 1.0, k == 3 ? 0.004 : 1e-4);
+    }
+    CHECK_NEAR(var[0], 0.033 * 0.033 * 0.2, 2e-5);
+}
+
+/* A second in 30, 15 or 3 frames is the same second. */
+static void test_frame_rate(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 20);
+    walker from = standing();
+    noisy();
+    cfg.settle_time = 9.0f;
+    from.f[F_HEADING] = 0.5f;
+    from.f[F_PITCH] = 0.1f;
+    from.f[F_COEF] = 1.0f;
+    spread_after(&d, &from, 1.0f / 30.0f, 1.0f, 0.0f, sampled[0]);
+    for (int k = 0; k < 2; k++) {
+        spread_after(&d, &from, k ? 1.0f / 3.0f : 1.0f / 15.0f, 1.0f, 0.0f, sampled[1]);
+        for (int f = 0; f < FIELDS; f++) {
+            moments const a = moments_of(sampled[0][f], DRAWS), b = moments_of(sampled[1][f], DRAWS);
+            double const slack = f == F_X || f == F_Y || f == F_PHASE ? (k ? 0.35 : 0.07) : 0.0;
+            double const lag = f == F_X || f == F_Y ? (k ? 0.02 : 0.004) : 0.0; /* metres: speed held for a step */
+            CHECK_NEAR(b.mean, a.mean, 4.5 * sqrt(2.0 * a.var / DRAWS) + lag + 1e-5);
+            CHECK_NEAR(b.var, a.var, a.var * (4.5 * sqrt(4.0 / DRAWS) + slack) + 1e-9);
+        }
+    }
+}
+
+/* Rates are reflected at the ends of what people walk. */
+static void test_reflect(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 30);
+    int32_t wrong = 0, high = 0, low = 0;
+    cfg.rate_time = 0.0f;
+    cfg.rate_noise = cfg.rate_noise_start = 0.3f;
+    for (int32_t i = 0; i < 500; i++) {
+        walker w = {.f = {[F_RATE] = i % 2 ? 2.45f : 0.5f, [F_STATURE] = 1.7f}};
+        for (uint32_t k = 0; k < 20; k++) {
+            w = dynamics_move(&d, &w, 0.1f, 2.0f, k, i);
+            wrong += !(w.f[F_RATE] >= 1.0f / 2.1f && w.f[F_RATE] <= 2.5f);
+            wrong += !(w.f[F_PHASE] >= 0.0f && w.f[F_PHASE] < 1.0f);
+            high += w.f[F_RATE] == 2.5f;
+            low += w.f[F_RATE] == 1.0f / 2.1f;
+        }
+    }
+    CHECK(wrong == 0);
+    CHECK(high < 10 && low < 10); /* reflected, not piled up at the limit */
+}
+
+/* Rate noise is wide and stature moves only while settling. */
+static void test_settling(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 40);
+    walker const from = standing();
+    double const own = (double)toy_model()->stride_hz;
+    noisy();
+    cfg.rate_time = 0.0f;
+    spread_after(&d, &from, 0.1f, 0.1f, 0.95f, sampled[0]);
+    check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.05 * own * sqrt(0.1), DRAWS);
+    check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.005 * sqrt(0.1), DRAWS);
+    spread_after(&d, &from, 0.1f, 0.1f, 1.0f, sampled[0]);
+    check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.02 * own * sqrt(0.1), DRAWS);
+    CHECK(moments_of(sampled[0][F_STATURE], DRAWS).var < 1e-20);
+}
+
+/* Noise of different fields, frames and particles is independent; the same arguments give the same. */
+static void test_independent(void)
+{
+    dynamics const d = quiet(GAIT_MODE_DEFAULT, 50), other = quiet(GAIT_MODE_DEFAULT, 51);
+    walker const from = standing();
+    noisy();
+    spread_after(&d, &from, 0.04f, 0.04f, 0.0f, sampled[0]);
+    for (int a = 0; a < FIELDS; a++)
+        for (int b = 0; b < a; b++) {
+            moments const x = moments_of(sampled[0][a], DRAWS), y = moments_of(sampled[0][b], DRAWS);
+            double cov = 0.0;
+            if ((a == F_X && b == F_PHASE) || x.var == 0.0 || y.var == 0.0)
+                continue; /* a longer stride carries further */
+            for (int i = 0; i < DRAWS; i++)
+                cov += (sampled[0][a][i] - x.mean) * (sampled[0][b][i] - y.mean) / DRAWS;
+            CHECK_NEAR(cov / sqrt(x.var * y.var), 0.0, 4.5 / sqrt(DRAWS));
+        }
+    walker const w = dynamics_move(&d, &from, 0.04f, 0.0f, 3, 7);
+    walker const same = dynamics_move(&d, &from, 0.04f, 0.0f, 3, 7);
+    walker const frame = dynamics_move(&d, &from, 0.04f, 0.0f, 4, 7);
+    walker const index = dynamics_move(&d, &from, 0.04f, 0.0f, 3, 8);
+    walker const seed = dynamics_move(&other, &from, 0.04f, 0.0f, 3, 7);
+    CHECK(memcmp(&w, &same, sizeof w) == 0);
+    for (int f = 0; f < FIELDS; f++)
+        CHECK(w.f[f] != frame.f[f] && w.f[f] != index.f[f] && w.f[f] != seed.f[f]);
+}
+
+int main(void)
+{
+    test_draw();
+    test_draw_exact();
+    test_draw_level();
+    test_draw_broad();
+    test_drift();
+    test_rate();
+    test_spread();
+    test_stationary();
+    test_slow();
+    test_frame_rate();
+    test_reflect();
+    test_settling();
+    test_independent();
+    return CHECK_DONE();
+}
