@@ -107,6 +107,9 @@ $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%
 
 # ---- LCM tools -----------------------------------------------------------------------------------------------
 LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
+# JPEG frames where the system has libjpeg's headers; elsewhere gait-trackd says so.
+JPEG_LIBS := $(shell pkg-config --libs libjpeg 2>/dev/null)
+JPEG_CFLAGS := $(if $(JPEG_LIBS),-DHAVE_LIBJPEG $(shell pkg-config --cflags libjpeg))
 LCM_CFLAGS := -isystem $(SITE)/include -isystem build/lcm
 LCM_LIBS = -L$(SITE)/lib -llcm -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relative-to=$(BIN) $(SITE)/lib)'
 
@@ -124,11 +127,11 @@ $(B)/libgaitmsg.a: build/lcm/.stamp | $(B)/lcm/
 
 TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/common/*.c)))
 $(BIN)/%: $(B)/tools/%.c.o $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
-	$(call say,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) -lm
+	$(call say,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) $(JPEG_LIBS) -lm
 
 $(B)/tools/%.c.o: tools/%.c Makefile build/lcm/.stamp | $(B)/tools/common/
 	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
-	    $(CFLAGS) -c $< -o $@
+	    $(JPEG_CFLAGS) $(CFLAGS) -c $< -o $@
 
 # ---- tests ---------------------------------------------------------------------------------------------------
 test: setup lib tools check unit python-test ## everything below that can fail
