@@ -50,6 +50,29 @@ def test_no_multiple_or_part_of_the_period():
         assert abs(period.find(signals, FPS).frames / true - 1) < 0.02
 
 
+@pytest.mark.parametrize("noise", [0.5, 1.0, 5.0])
+@pytest.mark.parametrize("frames", [400, 1500])
+def test_angles_of_half_the_period_do_not_outvote_the_others(noise, frames):
+    """Eight channels of odd harmonics (legs), eleven that repeat every step (trunk)."""
+    rng, true = np.random.default_rng(frames), 132.4
+    turn = 2 * np.pi * np.arange(frames) / true
+    order = np.repeat([1, 2], [8, 11])
+    start = rng.uniform(0, 2 * np.pi, len(order))
+    signals = 10 * np.cos(np.outer(turn, order) + start) + 3 * np.cos(3 * np.outer(turn, order) + start)
+    signals += rng.normal(scale=noise, size=signals.shape)
+    assert period.find(signals, FPS).frames == pytest.approx(true, abs=0.5)
+
+
+def test_a_multiple_that_fits_a_short_recording_is_divided():
+    """A sway over two strides, a tenth of each angle's range, makes the double score best (as CMU 38_02)."""
+    rng, true, frames = np.random.default_rng(3), 123.5, 371
+    signals = g.walk(rng, true, frames, noise=1.0)
+    sway = np.sin(np.pi * np.arange(frames) / true)[:, None] * rng.normal(size=19)
+    found = period.find(signals + 0.05 * np.ptp(signals, axis=0) * sway, FPS)
+    assert found.candidates[np.nanargmax(found.scores)] > 1.9 * true
+    assert found.frames == pytest.approx(true, abs=0.2)
+
+
 def test_literal_mode_is_wrong_for_long_sequences_of_fractional_period():
     """The whole-frame fold drifts by K |p - round p| frames; a multiple nearer to a whole number wins."""
     signals = g.walk(np.random.default_rng(3), 80.3, 5000, noise=5.0)

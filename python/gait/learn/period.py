@@ -18,8 +18,9 @@ Floats = npt.NDArray[np.float64]
 BINS = 50
 HARMONICS = 8
 DIVISORS = (5, 4, 3, 2)
-DIVISOR_SHARE = 0.5  # of the best score that a divisor of the best period must reach
-CYCLES = 1.5  # cycles a sequence must hold for a candidate to be scored
+DIVISOR_ANGLES = 0.8  # share of the angles that must allow a divisor of the best period
+DIVISOR_SCORE = 0.5  # of its score at the best period that an allowing angle keeps at the divisor
+CYCLES = 1.5  # cycles a sequence must hold for a candidate to be scored; why so few: sequence.py
 CYCLIC = 3.0  # sharpness, peak over median score, of a sequence that counts as cyclic
 SECONDS = (0.4, 2.1)
 
@@ -164,10 +165,18 @@ def _total(scores: Floats) -> float:
 
 
 def _divisor(folder: Folder, bins: int, signals: Floats, best: float, low: float) -> float:
-    """Find the smallest of best/5 ... best/2 that scores nearly as well, refined; else the best."""
-    goal = DIVISOR_SHARE * _total(folder.binned(best, bins))
+    """Find the smallest of best/5 ... best/2 that most angles allow, refined; else the best.
+
+    Angles vote singly: in a sum of scores the trunk, which repeats every step, could outvote the legs, and a
+    multiple fitted to a recording hardly longer than itself scores a quarter above the period (CMU 38_02).
+    """
+    whole = folder.binned(best, bins)
     for divisor in DIVISORS:
-        if best / divisor >= low and _total(folder.binned(best / divisor, bins)) >= goal:
+        part = folder.binned(best / divisor, bins)
+        voting = np.isfinite(whole) & np.isfinite(part)
+        allowing = (part >= DIVISOR_SCORE * whole)[voting]
+        enough = 2 * len(allowing) > len(part) and allowing.mean() >= DIVISOR_ANGLES
+        if enough and best / divisor >= low:
             return _refine(signals, best / divisor)
     return best
 
