@@ -155,9 +155,9 @@ asan: ## C tests under the address and undefined-behaviour sanitizers
 
 # The plain program needs no libFuzzer; with clang: -fsanitize=fuzzer instead of standalone.c's main.
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
-$(B)/fuzz/%: tests/fuzz/%.c tests/fuzz/standalone.c tests/fuzz/fuzz.h $(B)/libgait.a Makefile | $(B)/fuzz/
-	$(call say,CC   $<)$(CC) -std=c11 $(OPT) -g -ffp-contract=off $(CWARN) -Ilibgait/include $(CFLAGS) $(LDFLAGS) \
-	    -o $@ $(filter %.c %.a,$^) -lm
+$(B)/fuzz/%: tests/fuzz/%.c tests/fuzz/standalone.c tests/fuzz/fuzz.h $(OBJ) Makefile | $(B)/fuzz/
+	$(call say,CC   $<)$(CC) -std=c11 $(OPT) -g -ffp-contract=off $(CWARN) -Ilibgait/include -iquote libgait/src \
+	    $(CFLAGS) $(LDFLAGS) -o $@ $(filter %.c %.o,$^) -lm
 
 fuzz-run: $(FUZZ)
 	@for f in $^; do $$f python/gait/data/walk.gait $(or $(COUNT),500) $(SEED) || exit 1; done

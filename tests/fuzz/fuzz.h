@@ -4,17 +4,13 @@
 #define FUZZ_H
 #include "gait.h"
 
-/* A valid input, made from the shipped model's blob; *size at most cap. */
+/* A valid input, checked to be accepted, made from the shipped model's blob; *size at most cap. */
 void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 /* Copy into memory that ends where the input ends (an overrun is noticed), aligned to GAIT_ALIGN; free() it. */
 uint8_t *fuzz_aligned(const uint8_t *data, size_t size, void **memory);
-
-/* The library's own checksums, repaired in a damaged input so that what lies behind them is reached. */
-uint32_t fuzz_crc32(uint32_t crc, const void *data, size_t size);
-uint64_t fuzz_fnv1a(const void *data, size_t size);
 
 /* A small tracker of this model in its own memory, or NULL. */
 gait_tracker *fuzz_tracker(const gait_model *model, void **memory);

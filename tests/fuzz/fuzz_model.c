@@ -1,26 +1,30 @@
 /* fuzz_model.c - a damaged model is refused, or else can be used: pose, picture, tracking. */
 #include "fuzz.h"
+#include "hash.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 enum { CRC_AT = 20, WIDTH = 64, HEIGHT = 48 };
 
-void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size)
-{
-    if (blob_size > cap)
-        abort();
-    memcpy(out, blob, blob_size);
-    *size = blob_size;
-}
-
 static void repair(uint8_t *data, size_t size)
 {
     if (size < CRC_AT + 4)
         return;
     memset(data + CRC_AT, 0, 4);
-    uint32_t const crc = fuzz_crc32(0, data, size);
+    uint32_t const crc = hash_crc32(0, data, size);
     memcpy(data + CRC_AT, &crc, sizeof crc);
+}
+
+void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size)
+{
+    if (blob_size > cap)
+        abort();
+    memcpy(out, blob, blob_size);
+    repair(out, blob_size);
+    if (memcmp(out, blob, blob_size) != 0) /* else every damaged model would be refused for its checksum */
+        abort();
+    *size = blob_size;
 }
 
 static void use(const gait_model *m)

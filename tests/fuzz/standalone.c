@@ -56,25 +56,6 @@ uint8_t *fuzz_aligned(const uint8_t *data, size_t size, void **memory)
     return at;
 }
 
-uint32_t fuzz_crc32(uint32_t crc, const void *data, size_t size)
-{
-    const uint8_t *p = data;
-    for (crc = ~crc; size--; p++) {
-        crc ^= *p;
-        for (int k = 0; k < 8; k++)
-            crc = crc >> 1 ^ (0xedb88320u & (0u - (crc & 1)));
-    }
-    return ~crc;
-}
-
-uint64_t fuzz_fnv1a(const void *data, size_t size)
-{
-    uint64_t h = UINT64_C(0xcbf29ce484222325);
-    for (const uint8_t *p = data; size--; p++)
-        h = (h ^ *p) * UINT64_C(0x100000001b3);
-    return h;
-}
-
 gait_tracker *fuzz_tracker(const gait_model *model, void **memory)
 {
     gait_tracker_config cfg;
