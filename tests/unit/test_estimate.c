@@ -1,0 +1,286 @@
+/* What is reported of weighted particles, against direct sums in double precision. */
+#include "estimate.h"
+
+#include "rng.h"
+#include "toy_tracker.h"
+
+#include "check.h"
+
+enum { N = 40 };
+
+static gait_tracker *t;
+static population *people;
+
+/* Every particle the same plausible walker of weight 1/N, its joints zero. */
+static void reset(void)
+{
+    people = &t->gen[t->core->current].people;
+    pf_uniform(&t->filter);
+    for (int32_t i = 0; i < N; i++) {
+        walker const w = {.f = {[F_PHASE] = 0.5f, [F_RATE] = 0.9f, [F_STATURE] = 1.75f}};
+        walker_put(people, i, &w);
+    }
+    memset(t->joint, 0, (size_t)(3 * TOY_POINTS * N) * sizeof *t->joint);
+}
+
+static float normal(uint32_t index, uint32_t draw)
+{
+    float n[4];
+    rng_normal4(31, 0, 0, index, draw, n);
+    return n[0];
+}
+
+/* Weights that fall from the particle `best` on, normalised. */
+static void weigh(int32_t best)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < N; i++)
+        sum += t->filter.weight[i] = i == best ? 2.0 : 0.2 + fabs((double)normal((uint32_t)i, 99)) / 3.0;
+    for (int32_t i = 0; i < N; i++)
+        t->filter.weight[i] /= sum;
+}
+
+static gait_estimate estimate(int32_t best)
+{
+    gait_estimate e = {0};
+    estimate_fill(t, best, &e);
+    return e;
+}
+
+static double circle(double x) /* to (-1/2, 1/2] */
+{
+    return x - floor(x + 0.5);
+}
+
+/* Weighted resultant of angles in turns: mean direction (turns) and length. */
+static void resultant(const float *turns, double scale, double *mean, double *length)
+{
+    double c = 0.0, s = 0.0;
+    for (int i = 0; i < N; i++) {
+        c += t->filter.weight[i] * cos(6.283185307179586 * (double)turns[i] * scale);
+        s += t->filter.weight[i] * sin(6.283185307179586 * (double)turns[i] * scale);
+    }
+    *mean = atan2(s, c) / 6.283185307179586;
+    *length = hypot(c, s);
+}
+
+/* ---- circles ---- */
+static void test_phase(void)
+{
+    static const float centre[] = {0.0f, 0.99f, 0.5f, 0.02f};
+    for (size_t k = 0; k < 4; k++) { /* also across 0 / 1 */
+        double mean, length;
+        reset();
+        for (int32_t i = 0; i < N; i++)
+            field(people, F_PHASE)[i] = m_wrap1(centre[k] + 0.03f * normal((uint32_t)i, 1));
+        weigh(4);
+        field(people, F_PHASE)[4] = centre[k];
+        resultant(field(people, F_PHASE), 1.0, &mean, &length);
+        gait_estimate const e = estimate(4);
+        CHECK_NEAR(circle((double)e.mean.phase - mean), 0.0, 1e-5);
+        CHECK(e.mean.phase >= 0.0f && e.mean.phase < 1.0f);
+        CHECK_NEAR(e.phase_r, length, 1e-5);
+        CHECK_NEAR(e.sd.phase, sqrt(-2.0 * log(length)) / 6.283185307, 1e-4);
+        CHECK_NEAR(e.mode_mass, 1.0, 1e-6);
+    }
+}
+
+static void test_heading(void)
+{
+    static const float centre[] = {0.0f, 3.1f, -3.1f, 1.5f};
+    for (size_t k = 0; k < 4; k++) { /* also across +-pi */
+        double mean, length;
+        reset();
+        for (int32_t i = 0; i < N; i++)
+            field(people, F_HEADING)[i] = m_wrap_pi(centre[k] + 0.1f * normal((uint32_t)i, 2));
+        weigh(7);
+        field(people, F_HEADING)[7] = centre[k];
+        resultant(field(people, F_HEADING), 1.0 / 6.283185307179586, &mean, &length);
+        gait_estimate const e = estimate(7);
+        CHECK_NEAR(circle((double)e.mean.heading / 6.283185307 - mean), 0.0, 1e-4);
+        CHECK(fabsf(e.mean.heading) <= PI_F);
+        CHECK_NEAR(e.sd.heading, sqrt(-2.0 * log(length)), 1e-4);
+    }
+}
+
+/* No phase at all is no certainty, and still a phase. */
+static void test_no_phase(void)
+{
+    reset();
+    for (int32_t i = 0; i < N; i++)
+        field(people, F_PHASE)[i] = (float)i / N;
+    gait_estimate const e = estimate(0);
+    CHECK_NEAR(e.phase_r, 0.0, 1e-5);
+    CHECK(e.sd.phase > 0.5f && isfinite(e.sd.phase));
+    CHECK(e.mean.phase >= 0.0f && e.mean.phase < 1.0f);
+    CHECK_NEAR(e.mode_mass, 11.0 / N, 0.051); /* within 0.15 of the best: 11 .. 13 of 40 */
+}
+
+/* ---- modes ---- */
+
+/* Two groups half a stride (or half a turn) apart: the mean is that of the group of the best particle. */
+static void test_modes(void)
+{
+    for (int by_heading = 0; by_heading < 2; by_heading++)
+        for (int32_t best = 0; best < 2; best++) {
+            double mass = 0.0, stature = 0.0, all = 0.0, square = 0.0;
+            reset();
+            weigh(best);
+            for (int32_t i = 0; i < N; i++) { /* even ones: group 0 */
+                field(people, by_heading ? F_HEADING : F_PHASE)[i] =
+                    i % 2 ? 0.2f + (by_heading ? 2.0f : 0.5f) : 0.2f + 0.001f * (float)i;
+                field(people, F_STATURE)[i] = i % 2 ? 1.6f : 1.9f;
+                field(people, F_RATE)[i] = i % 2 ? 0.8f : 1.0f;
+                double const w = t->filter.weight[i];
+                mass += i % 2 == best ? w : 0.0;
+                stature += i % 2 == best ? w * (double)field(people, F_STATURE)[i] : 0.0;
+                all += w * (double)field(people, F_STATURE)[i];
+            }
+            for (int32_t i = 0; i < N; i++) {
+                double const d = (double)field(people, F_STATURE)[i] - all;
+                square += t->filter.weight[i] * d * d;
+            }
+            gait_estimate const e = estimate(best);
+            CHECK_NEAR(e.mode_mass, mass, 1e-6);
+            CHECK_NEAR(e.mean.stature, stature / mass, 1e-6);
+            CHECK_NEAR(e.mean.stride_hz, best ? 0.8 : 1.0, 1e-6);
+            CHECK_NEAR(e.sd.stature, sqrt(square), 1e-6); /* over all particles */
+            CHECK(e.best.stature == field(people, F_STATURE)[best]);
+            if (by_heading)
+                CHECK_NEAR(e.mean.heading, best ? 2.2 : 0.22, 0.03);
+            else
+                CHECK_NEAR(e.mean.phase, best ? 0.7 : 0.22, 0.03);
+        }
+}
+
+/* ---- rotations ---- */
+static void rotation(float heading, float pitch, float roll, double R[9])
+{
+    double const ch = cos((double)heading), sh = sin((double)heading), cp = cos((double)pitch);
+    double const sp = sin((double)pitch), cr = cos((double)roll), sr = sin((double)roll);
+    const double out[9] = {ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr,
+                           sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr,
+                           -sp,     cp * sr,                cp * cr};
+    memcpy(R, out, sizeof out);
+}
+
+/* The mean rotation minimises the sum of squared chordal distances: no small turn of it is better. */
+static void test_rotation(void)
+{
+    for (uint32_t round = 0; round < 8; round++) {
+        double sum[9] = {0}, R[9], best = 0.0;
+        reset();
+        weigh(3);
+        for (uint32_t i = 0; i < N; i++) {
+            float *const angle[] = {&field(people, F_HEADING)[i], &field(people, F_PITCH)[i],
+                                    &field(people, F_ROLL)[i]};
+            for (uint32_t k = 0; k < 3; k++)
+                *angle[k] = (k ? 0.3f : 2.9f) * normal(round, 60 + k) + (i == 3 ? 0.0f : 0.12f) * normal(i, 10 + k);
+            *angle[0] = m_wrap_pi(*angle[0]);
+            rotation(*angle[0], *angle[1], *angle[2], R);
+            for (int k = 0; k < 9; k++)
+                sum[k] += t->filter.weight[i] * R[k];
+        }
+        gait_estimate const e = estimate(3);
+        CHECK_NEAR(e.mode_mass, 1.0, 1e-6);
+        rotation(e.mean.heading, e.mean.pitch, e.mean.roll, R);
+        for (int k = 0; k < 9; k++)
+            best += R[k] * sum[k]; /* larger: nearer */
+        CHECK(best > 2.5);
+        for (int k = 0; k < 6; k++) {
+            float const d = k % 2 ? 0.01f : -0.01f;
+            double near = 0.0;
+            rotation(e.mean.heading + (k / 2 == 0 ? d : 0), e.mean.pitch + (k / 2 == 1 ? d : 0),
+                     e.mean.roll + (k / 2 == 2 ? d : 0), R);
+            for (int i = 0; i < 9; i++)
+                near += R[i] * sum[i];
+            CHECK(near < best);
+        }
+    }
+}
+
+/* ---- joints and the rest ---- */
+static void test_joints(void)
+{
+    reset();
+    weigh(11);
+    for (uint32_t i = 0; i < 3 * TOY_POINTS * N; i++)
+        t->joint[i] = (float)(i / N % 7) + (0.1f + 0.01f * (float)(i / N)) * normal(i, 3);
+    gait_estimate const e = estimate(11);
+    for (int p = 0; p < 3 * TOY_POINTS; p++) {
+        double sum = 0.0, square = 0.0;
+        for (int i = 0; i < N; i++)
+            sum += t->filter.weight[i] * (double)t->joint[p * N + i];
+        for (int i = 0; i < N; i++)
+            square += t->filter.weight[i] * pow((double)t->joint[p * N + i] - sum, 2.0);
+        CHECK_NEAR(e.pose.joint[p / 3][p % 3], sum, 1e-6);
+        CHECK_NEAR(e.joint_sd[p / 3][p % 3], sqrt(square), 1e-6);
+    }
+    for (int k = 0; k < 3; k++)
+        CHECK(e.sd.pelvis[k] == e.joint_sd[0][k]);
+    CHECK(e.pose.joint[TOY_POINTS][0] == 0.0f && e.joint_sd[TOY_POINTS][1] == 0.0f); /* unused */
+}
+
+/* Means of the plain fields, the pelvis they imply, speed, and angles of the mean state. */
+static void test_fields(void)
+{
+    double mean[F_COEF + 3] = {0};
+    reset();
+    weigh(2);
+    for (uint32_t i = 0; i < N; i++)
+        for (int f = 0; f < people->fields; f++) {
+            float *const v = &field(people, f)[i];
+            *v = (f == F_STATURE ? 1.7f : f == F_RATE ? 0.9f : f == F_PHASE ? 0.4f : 0.3f) +
+                 0.02f * normal(i, 20 + (uint32_t)f);
+            mean[f] += t->filter.weight[i] * (double)*v;
+        }
+    gait_estimate const e = estimate(2);
+    CHECK_NEAR(e.mean.stature, mean[F_STATURE], 1e-6);
+    CHECK_NEAR(e.mean.stride_hz, mean[F_RATE], 1e-6);
+    CHECK_NEAR(e.mean.coef[0], mean[F_COEF], 1e-6);
+    CHECK_NEAR(e.mean.coef[1], mean[F_COEF + 1], 1e-6);
+    CHECK_NEAR(e.mean.offset[TOY_TORSO], mean[F_COEF + 2], 1e-6);
+    CHECK(e.sd.coef[0] > 0.01f && e.sd.offset[TOY_TORSO] > 0.01f && e.sd.stride_hz > 0.01f && e.sd.coef[2] == 0.0f);
+    walker w = {{0}};
+    for (int f = 0; f < people->fields; f++)
+        w.f[f] = (float)mean[f];
+    w.f[F_PHASE] = e.mean.phase;
+    w.f[F_HEADING] = e.mean.heading;
+    gait_state const s = walker_state(&t->rule, &w);
+    for (int k = 0; k < 3; k++)
+        CHECK_NEAR(e.mean.pelvis[k], s.pelvis[k], 1e-5);
+    gait_pose pose;
+    CHECK(gait_model_pose(toy_model(), &e.mean, &pose) == GAIT_OK);
+    CHECK(memcmp(pose.angle, e.pose.angle, sizeof pose.angle) == 0);
+    walker const heaviest = walker_get(people, 2);
+    gait_state const best = walker_state(&t->rule, &heaviest);
+    CHECK(memcmp(&best, &e.best, sizeof best) == 0);
+    double forward = 0.0;
+    for (int j = 0; j < TOY_PHASES; j++)
+        for (int k = 0; k < 3; k++)
+            forward += (k ? mean[F_COEF + k - 1] : 1.0) / TOY_PHASES *
+                       (double)toy_model()->curves[(k * TOY_PHASES + j) * TOY_CHANNELS + TOY_ROOT + ROOT_FORWARD];
+    CHECK_NEAR(e.speed, mean[F_STATURE] * mean[F_RATE] * forward, 1e-4);
+    walker const place = estimate_place(people, t->filter.weight);
+    CHECK_NEAR(place.f[F_X], mean[F_X], 1e-6);
+    CHECK_NEAR(place.f[F_Y], mean[F_Y], 1e-6);
+    CHECK_NEAR(place.f[F_Z], mean[F_Z], 1e-6);
+    CHECK_NEAR(place.f[F_STATURE], mean[F_STATURE], 1e-6);
+}
+
+int main(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    cfg.particles = N;
+    cfg.offset_angles = 1u << TOY_TORSO;
+    t = toy_tracker_new(&cfg);
+    test_phase();
+    test_heading();
+    test_no_phase();
+    test_modes();
+    test_rotation();
+    test_joints();
+    test_fields();
+    toy_tracker_free(t);
+    return CHECK_DONE();
+}

@@ -1,0 +1,112 @@
+/* toy_tracker.h - trackers of the toy walker for tests, with numbers of their own instead of the library's defaults.
+ *
+ *   gait_tracker_config cfg = toy_config(1);         300 particles, all terms; change what the test needs
+ *   gait_tracker *t = toy_tracker_new(&cfg);         in exactly the memory it asks for; stops the test on failure
+ *   toy_tracker_start(t, seconds, 0.5f);             near the truth: a normal start of half the usual spread
+ *   toy_tracker_step(t, n, shots, &e);               frame n of the scene; shots[camera] NULL: missed
+ *   toy_tracker_free(t); */
+#ifndef TOY_TRACKER_H
+#define TOY_TRACKER_H
+#include "toy_scene.h"
+
+static inline gait_tracker_config toy_config(int32_t cameras)
+{
+    gait_tracker_config c;
+    gait_tracker_default(&c, GAIT_MODE_DEFAULT);
+    c.seed = 7;
+    c.particles = 300;
+    c.components = TOY_COMPONENTS;
+    c.tasks = 4;
+    c.cameras = cameras;
+    c.terms = GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE;
+    c.term_weight[0] = 0.2f;
+    c.term_weight[1] = 25.0f;
+    c.term_weight[2] = 40.0f;
+    c.term_weight[3] = 4.0f;
+    c.missed_weight = 0.4f;
+    c.girth = 1.0f;
+    c.resample_ess = 0.5f;
+    c.max_dt = 0.5f;
+    c.phase_noise = 0.0164f;
+    c.rate_noise = 0.02f;
+    c.rate_noise_start = 0.055f;
+    c.settle_time = 1.0f;
+    c.rate_time = 5.0f;
+    c.forward_noise = 0.022f;
+    c.lateral_noise = 0.0164f;
+    c.vertical_noise = 0.0096f;
+    c.heading_noise = 0.044f;
+    c.tilt_noise = 0.033f;
+    c.tilt_time = 1.1f;
+    c.coef_noise = 0.66f;
+    c.coef_time = 4.5f;
+    c.stature_noise = 0.005f;
+    c.offset_noise = 0.02f;
+    c.offset_sd = 0.07f;
+    c.offset_angles = 0;
+    for (int k = 0; k < GAIT_MAX_CAMERAS; k++)
+        c.camera[k] = toy_camera(k);
+    return c;
+}
+
+static inline void toy_stop(const char *what, const gait_error *err)
+{
+    fprintf(stderr, "toy tracker: %s refused: %s\n", what, err->text);
+    abort();
+}
+
+static inline gait_tracker *toy_tracker_new(const gait_tracker_config *cfg)
+{
+    size_t bytes = 0;
+    void *memory = NULL;
+    gait_tracker *t = NULL;
+    gait_error err = {0};
+    if (gait_tracker_bytes(toy_model(), cfg, &bytes, &err) != GAIT_OK)
+        toy_stop("configuration", &err);
+    if (posix_memalign(&memory, GAIT_ALIGN, bytes))
+        abort();
+    if (gait_tracker_init(memory, bytes, toy_model(), cfg, &t, &err) != GAIT_OK || (void *)t != memory)
+        toy_stop("memory", &err);
+    return t;
+}
+
+static inline void toy_tracker_free(gait_tracker *t)
+{
+    free(t); /* a tracker lies at the start of its memory */
+}
+
+/* Deviations of a start by hand, times `wide`. */
+static inline gait_state toy_doubt(float wide)
+{
+    gait_state sd = {.phase = 0.04f * wide,
+                     .stride_hz = 0.05f * wide,
+                     .stature = 0.02f * wide,
+                     .heading = 0.08f * wide,
+                     .pitch = 0.02f * wide,
+                     .roll = 0.02f * wide,
+                     .pelvis = {0.05f * wide, 0.05f * wide, 0.03f * wide}};
+    for (int k = 0; k < TOY_COMPONENTS; k++)
+        sd.coef[k] = 0.5f * wide;
+    return sd;
+}
+
+static inline void toy_tracker_start(gait_tracker *t, int n, float wide)
+{
+    gait_state const mean = toy_walk((float)n / 30.0f), sd = toy_doubt(wide);
+    gait_error err = {0};
+    if (gait_tracker_start(t, &mean, &sd, toy_frame(n).utime, &err) != GAIT_OK)
+        toy_stop("start", &err);
+}
+
+static inline void toy_tracker_step(gait_tracker *t, int n, const uint8_t *const shots[SCENE_CAMERAS],
+                                    gait_estimate *out)
+{
+    gait_frame f = toy_frame(n);
+    gait_error err = {0};
+    for (int k = 0; k < SCENE_CAMERAS; k++)
+        if (shots[k])
+            f.image[k] = toy_image(shots[k]);
+    if (gait_tracker_step(t, &f, out, &err) != GAIT_OK)
+        toy_stop("frame", &err);
+}
+#endif
