@@ -21,12 +21,13 @@ static struct settings {
     float max_gap;
     bool particles_channel, quiet, version;
     tracker_values tracker;
-} settings = {
-    .mode = "default", .init = "auto", .components = -1, .threads = 1, .tasks = 16, .seed = 1, .max_gap = 2};
+} settings = {.mode = "default", .init = "auto", .components = -1, .threads = 1, .seed = 1, .max_gap = 2};
 
 #define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
 #define FLAG(field)           OPTION_FLAG, &settings.field, 0, 0
+
+static char particles_help[80], tasks_help[120]; /* written by say_defaults() */
 
 static const option own_options[] = {
     {"model", 'm', "FILE", "model blob (.gait), from `gait learn`; needed", TEXT(model)},
@@ -47,13 +48,12 @@ static const option own_options[] = {
      TEXT(config)},
     {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
     {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
-    {"particles", 'n', "N", "hypotheses; default 1000, paper mode 10000", INT(particles, 16, 1 << 20)},
+    {"particles", 'n', "N", particles_help, INT(particles, 16, 1 << 20)},
     {"components", 0, "Q", "principal components in use; default all of the model's",
      INT(components, 0, GAIT_MAX_COMPONENTS)},
     {"seed", 0, "N", "of the random numbers, default 1", OPTION_U64, &settings.seed, 0, 0},
     {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, POOL_MAX)},
-    {"tasks", 0, "N", "pieces of a step for the threads, default 16; results do not depend on it",
-     INT(tasks, 1, 256)},
+    {"tasks", 0, "N", tasks_help, INT(tasks, 1, 256)},
     {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
      OPTION_FLOAT, &settings.max_gap, 0, 60},
     {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
@@ -84,8 +84,23 @@ static void set_signals(sigset_t *unblocked)
     signal(SIGPIPE, SIG_IGN);
 }
 
+/* The defaults of the library that the help names. */
+static void say_defaults(void)
+{
+    gait_tracker_config usual, paper;
+    gait_tracker_default(&usual, GAIT_MODE_DEFAULT);
+    gait_tracker_default(&paper, GAIT_MODE_PAPER);
+    snprintf(particles_help, sizeof particles_help, "hypotheses; default %d, paper mode %d",
+             (int)usual.particles, (int)paper.particles);
+    snprintf(tasks_help, sizeof tasks_help,
+             "pieces of a step for the threads, default %d or, if more, one per thread;\n"
+             "        results do not depend on it",
+             (int)usual.tasks);
+}
+
 static void help(const option *table)
 {
+    say_defaults();
     printf(
         "usage: gait-trackd -m MODEL.gait [--camera CAMERA.json] [--init INIT.json|auto] [options]\n\n"
         "Track a walking person: frames come over LCM (GAIT_IMAGE_<i>), estimates go out (GAIT_ESTIMATE,\n"
@@ -123,7 +138,10 @@ static void make_config(pool *threads, gait_tracker_config *c)
     c->particles = settings.particles ? settings.particles : c->particles;
     c->components = settings.components;
     c->seed = settings.seed;
-    c->tasks = settings.tasks;
+    if (settings.tasks)
+        c->tasks = settings.tasks;
+    else if (c->tasks < settings.threads)
+        c->tasks = settings.threads;
     c->exec = pool_tasks(threads);
     tracker_options_apply(&settings.tracker, c);
 }

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from drawn_walker import DATA, camera, clip, state_at, wall, write
 from gait import Model, Video, blob
 from gait.cli import COMMANDS, main
 from gait.model import read_blob
+from gait.tracker import TrackerConfig
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -160,6 +162,20 @@ def test_every_command_has_help(command, capsys):
         main([command, "--help"])
     text = capsys.readouterr().out
     assert caught.value.code == 0 and f"usage: gait {command}" in text and "--quiet" in text
+
+
+@pytest.mark.parametrize("command", ["track", "demo"])
+def test_the_help_names_the_defaults_of_the_library(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    assert f"hypotheses ({TrackerConfig.default().particles}" in " ".join(capsys.readouterr().out.split())
+
+
+def test_help_without_a_library(tmp_path):
+    words = [sys.executable, "-m", "gait", "track", "--help"]
+    nowhere = os.environ | {"GAIT_LIBRARY": str(tmp_path / "none.so")}
+    done = subprocess.run(words, env=nowhere, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "hypotheses" in done.stdout, done.stderr
 
 
 def test_the_list_of_commands(capsys):

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gait.cli import defaults
 from gait.cli.evaluate import text as evaluation_text
 from gait.cli.record import LISTENING
 from gait.cli.record import text as recording_text
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--height", metavar="M", help="the person's stature in metres")
     parser.add_argument("--start", metavar="F", help="first frame to send, from 0 (the frame of --init)")
     parser.add_argument("--stop", metavar="F", help="first frame not to send")
-    parser.add_argument("--particles", metavar="N", help="hypotheses (1000)")
+    parser.add_argument("--particles", metavar="N", help=f"hypotheses ({defaults.particles()})")
     parser.add_argument("--threads", default=_threads(), metavar="T", help="of the tracker (%(default)s)")
     parser.add_argument(
         "-m", "--model", default=str(_MODEL), metavar="M.gait", help="walking model (the shipped one)"

@@ -24,6 +24,7 @@ import numpy as np
 from gait._abi import Mode, TrackStatus
 from gait.autostart import find_start
 from gait.camera import Camera
+from gait.cli import defaults
 from gait.errors import UserError
 from gait.files import require_writable
 from gait.initial import Start
@@ -57,7 +58,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="empty scene: an image, the median of the clip, or none (auto)",
     )
     parser.add_argument("--height", type=float, metavar="M", help="the person's stature in metres")
-    parser.add_argument("--particles", type=int, metavar="N", help="hypotheses (1000, paper mode 10000)")
+    usual, paper = defaults.particles(), defaults.particles(Mode.PAPER)
+    parser.add_argument(
+        "--particles", type=int, metavar="N", help=f"hypotheses ({usual}, paper mode {paper})"
+    )
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the random numbers (1)")
     parser.add_argument(
         "--threads", type=_positive, default=1, metavar="T", help="does not change the result (1)"
