@@ -75,10 +75,29 @@ static bool parse(const fields *f, gait_camera *c, message *why)
                        f->path);
 }
 
+/* The kinds of file that `gait capture` reads and this program does not. */
+static bool others_kind(const char *path)
+{
+    static const char *const endings[] = {".toml", ".yaml", ".yml", ".xml"};
+    const char *const folder = strrchr(path, '/'), *const name = folder ? folder + 1 : path;
+    size_t const length = strcspn(name, ":"); /* FILE.toml:name chooses a camera */
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+        size_t const n = strlen(endings[i]);
+        if (length >= n && memcmp(name + length - n, endings[i], n) == 0)
+            return true;
+    }
+    return false;
+}
+
 bool camera_file_read(const char *path, gait_camera *out, message *why)
 {
     fields f;
     gait_camera camera = {0};
+    if (others_kind(path))
+        return message_set(why,
+                           "%.100s: gait-trackd reads JSON only; give this file to `gait capture --camera`, "
+                           "which sends it over LCM, and no --camera here",
+                           path);
     bool const ok = fields_open(&f, path, "camera", why) && parse(&f, &camera, why);
     fields_close(&f);
     if (ok)
