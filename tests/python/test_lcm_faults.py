@@ -1,12 +1,18 @@
 """gait-trackd and bad input: one line that names file, field and remedy; exit 1, or 2 for usage."""
 
 import json
+import re
+from dataclasses import fields
 
 import lcm_rig as rig
 import numpy as np
 import pytest
 
 import gait
+from gait._abi import Mode
+from gait.errors import GaitError
+from gait.model import Model
+from gait.tracker import Tracker, TrackerConfig
 
 CAMERA = rig.CAMERA.to_dict()
 INIT = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": 0.1}}
@@ -110,6 +116,12 @@ def test_json_that_is_none(tmp_path, text, words):
     fails(options(tmp_path, "--camera", file), file, words)
 
 
+@pytest.mark.parametrize("name", ["c.toml", "c.toml:cam_01", "c.yaml", "c.yml", "c.xml"])
+def test_a_camera_for_gait_capture(tmp_path, name):
+    (tmp_path / name.partition(":")[0]).write_text("[cam_01]\n")
+    fails(options(tmp_path, "--camera", tmp_path / name), name, "JSON only", "gait capture --camera", "LCM")
+
+
 def test_the_cameras_of_the_python_side_are_accepted(tmp_path):
     file = tmp_path / "camera.json"
     for change in ({}, {"distortion": []}, {"distortion": [0.1, 0, 0, 0]}, {"note": 'a "quoted" \\u00e9'}):
@@ -202,6 +214,30 @@ def test_help_lists_every_option():
     assert outcome.code == 0 and not outcome.words
     for option in ("--model", "--camera", "--init", "--url", "--threads", "--phase-noise", "--stature-noise"):
         assert option in outcome.printed
+
+
+def test_help_names_the_defaults_of_the_library():
+    usual, paper = (TrackerConfig.default(mode) for mode in Mode)
+    printed = rig.run("--help").printed
+    assert f"default {usual.particles}, paper mode {paper.particles}\n" in printed
+    assert f"pieces of a step for the threads, default {usual.tasks} " in printed
+
+
+TERMS = [f"{term}-weight" for term in ("texture", "silhouette", "edges", "template")]
+SETTINGS = [f.name.replace("_", "-") for f in fields(TrackerConfig) if f.type == "float"]
+
+
+@pytest.mark.parametrize("option", [*TERMS, *SETTINGS])
+def test_the_ranges_are_those_of_the_library(option):
+    """A value the library would refuse is a usage error, and no other value is."""
+    if option in TERMS:
+        change = {"term_weight": [1e9 if name == option else 1.0 for name in TERMS]}
+    else:
+        change = {option.replace("-", "_"): 1e9}
+    with pytest.raises(GaitError, match="is outside") as refused:
+        Tracker(Model(), rig.CAMERA, TrackerConfig.default(**change))
+    low, high = re.search(r"outside \[(.*), (.*)\]", refused.value.text).groups()
+    fails(["-m", "x", f"--{option}", "1e9"], f"--{option} 1e9: give a number from {low} to {high}", code=2)
 
 
 def test_version_says_whether_jpeg_is_understood():

@@ -5,6 +5,7 @@
 
 #define FIELD(f) offsetof(gait_tracker_config, f)
 
+/* The ranges are those of the library (api_tracker.c), so that the usage error comes before any work. */
 static const struct {
     const char *name;
     size_t offset;
@@ -18,24 +19,24 @@ static const struct {
     {"missed-weight", FIELD(missed_weight), 0, 1, "foreground outside the limbs against background inside"},
     {"girth", FIELD(girth), 0.5, 2, "limb radii against the model's (clothes)"},
     {"resample-ess", FIELD(resample_ess), 0, 1, "resample below this fraction of the particles"},
-    {"max-dt", FIELD(max_dt), 1e-3, 1e3, "longest pause between frames, seconds"},
-    {"phase-noise", FIELD(phase_noise), 0, 1e3, "strides per sqrt(second)"},
-    {"rate-noise", FIELD(rate_noise), 0, 1e3, "fraction of the mean stride rate per sqrt(second)"},
-    {"rate-noise-start", FIELD(rate_noise_start), 0, 1e3, "the same while settling"},
-    {"settle-time", FIELD(settle_time), 0, 1e3, "seconds after the start with rate-noise-start"},
-    {"rate-time", FIELD(rate_time), 0, 1e3,
+    {"max-dt", FIELD(max_dt), 1e-3, 10, "longest pause between frames, seconds"},
+    {"phase-noise", FIELD(phase_noise), 0, 10, "strides per sqrt(second)"},
+    {"rate-noise", FIELD(rate_noise), 0, 10, "fraction of the mean stride rate per sqrt(second)"},
+    {"rate-noise-start", FIELD(rate_noise_start), 0, 10, "the same while settling"},
+    {"settle-time", FIELD(settle_time), 0, 1e6, "seconds after the start with rate-noise-start"},
+    {"rate-time", FIELD(rate_time), 0, 1e6,
      "time constant of the rate's return to the population's, seconds"},
-    {"forward-noise", FIELD(forward_noise), 0, 1e3, "metres per sqrt(second)"},
-    {"lateral-noise", FIELD(lateral_noise), 0, 1e3, "metres per sqrt(second)"},
-    {"vertical-noise", FIELD(vertical_noise), 0, 1e3, "metres per sqrt(second)"},
-    {"heading-noise", FIELD(heading_noise), 0, 1e3, "radians per sqrt(second)"},
-    {"tilt-noise", FIELD(tilt_noise), 0, 1e3, "radians per sqrt(second)"},
+    {"forward-noise", FIELD(forward_noise), 0, 100, "metres per sqrt(second)"},
+    {"lateral-noise", FIELD(lateral_noise), 0, 100, "metres per sqrt(second)"},
+    {"vertical-noise", FIELD(vertical_noise), 0, 100, "metres per sqrt(second)"},
+    {"heading-noise", FIELD(heading_noise), 0, 100, "radians per sqrt(second)"},
+    {"tilt-noise", FIELD(tilt_noise), 0, 100, "radians per sqrt(second)"},
     {"tilt-time", FIELD(tilt_time), 0, 1e6, "seconds in which tilt and height return to the model's"},
-    {"coef-noise", FIELD(coef_noise), 0, 1e3, "score standard deviations per sqrt(second)"},
+    {"coef-noise", FIELD(coef_noise), 0, 100, "score standard deviations per sqrt(second)"},
     {"coef-time", FIELD(coef_time), 0, 1e6, "seconds in which the scores return to the mean; 0: never"},
-    {"stature-noise", FIELD(stature_noise), 0, 1e3, "fraction of stature per sqrt(second), while settling"},
-    {"offset-noise", FIELD(offset_noise), 0, 1e3, "radians of posture per sqrt(second)"},
-    {"offset-sd", FIELD(offset_sd), 0, 1e3, "radians by which people differ in posture"},
+    {"stature-noise", FIELD(stature_noise), 0, 1, "fraction of stature per sqrt(second), while settling"},
+    {"offset-noise", FIELD(offset_noise), 0, 10, "radians of posture per sqrt(second)"},
+    {"offset-sd", FIELD(offset_sd), 0, 10, "radians by which people differ in posture"},
 };
 
 _Static_assert(sizeof fields / sizeof *fields == TRACKER_OPTIONS, "every field has a value");
