@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +52,10 @@ class State:
     @staticmethod
     def from_c(c: _abi.StateC, components: int, angles: int) -> State:
         """Copy a ``gait_state``, keeping `components` scores and `angles` offsets."""
-        scalars = {name: float(getattr(c, name)) for name in SCALARS}
         arrays = {"pelvis": c.pelvis, "coef": c.coef[:components], "offset": c.offset[:angles]}
-        return State(**scalars, **{name: np.array(values, float) for name, values in arrays.items()})
+        values: dict[str, Any] = {name: float(getattr(c, name)) for name in SCALARS}
+        values |= {name: np.array(numbers, float) for name, numbers in arrays.items()}
+        return State(**values)
 
     def to_c(self) -> _abi.StateC:
         """Make a ``gait_state``.
