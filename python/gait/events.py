@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +55,12 @@ class Strikes:
         is_left = np.concatenate([np.zeros(len(self.right), bool), np.ones(len(self.left), bool)])[order]
         first = 0.5 if len(at) and is_left[0] else 0.0
         return at[order], first + 0.5 * np.arange(len(at), dtype=float)
+
+
+def strikes_of(truth: Joints, meta: Path) -> Strikes:
+    """Strikes that the file `meta` lists, if it is there and lists any, else those found in the truth."""
+    known = strikes_from_meta(meta) if meta.is_file() else None
+    return known or strikes_by_zeni(truth)
 
 
 def strikes_from_meta(path: str | os.PathLike[str]) -> Strikes | None:

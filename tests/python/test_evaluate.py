@@ -10,7 +10,7 @@ from drawn_walker import DATA
 from gait import Camera, UserError, blob, skeleton
 from gait.baselines import free_run, root_path, static_pose, stature
 from gait.evaluate import coverage, evaluate, phase_errors, picture_errors, pose_errors
-from gait.events import Strikes, strikes_by_zeni, strikes_from_meta, walking_direction
+from gait.events import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
 from gait.model import read_blob
 from gait.skeleton import EVAL15, JOINTS
 from gait.trackfile import Joints, Track, read_truth
@@ -195,8 +195,11 @@ def test_strikes_of_a_meta_file(tmp_path):
     )
     strikes = strikes_from_meta(path)
     assert strikes.right.tolist() == [8.2, 41.4] and strikes.left.tolist() == [25.2]
+    assert strikes_of(TRUTH, path).right.tolist() == [8.2, 41.4]
     path.write_text("{}")
     assert strikes_from_meta(path) is None
+    for meta in (path, tmp_path / "absent.json"):  # found in the truth instead
+        assert strikes_of(TRUTH, meta).right.tolist() == strikes_by_zeni(TRUTH).right.tolist()
     path.write_text(json.dumps({"events_video_frames": {"r_heel_strike": [9, 3], "l_heel_strike": []}}))
     with pytest.raises(UserError, match="meta.json: events_video_frames: r_heel_strike does not increase"):
         strikes_from_meta(path)

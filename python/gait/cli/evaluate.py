@@ -20,9 +20,9 @@ from typing import Any
 from gait import blob
 from gait.camera import Camera
 from gait.evaluate import Measures, evaluate
-from gait.events import Strikes, strikes_by_zeni, strikes_from_meta
+from gait.events import strikes_of
 from gait.model import read_blob
-from gait.trackfile import Joints, read_track, read_truth
+from gait.trackfile import read_track, read_truth
 
 NAME = "eval"
 HELP = "errors of a track against the truth"
@@ -46,17 +46,12 @@ def run(args: argparse.Namespace) -> int:
     measures = evaluate(
         read_track(args.track),
         truth,
-        strikes=_strikes(truth, beside / "meta.json"),
+        strikes=strikes_of(truth, beside / "meta.json"),
         model=blob.decode(read_blob(args.model), str(args.model)),
         camera=Camera.read(str(camera)) if camera else None,
     )
     print(json.dumps(measures) if args.json else text(measures))
     return 0
-
-
-def _strikes(truth: Joints, meta: Path) -> Strikes:
-    known = strikes_from_meta(meta) if meta.is_file() else None
-    return known or strikes_by_zeni(truth)
 
 
 def text(m: Measures) -> str:

@@ -20,7 +20,7 @@ from gait import blob
 from gait.camera import Camera
 from gait.cli.evaluate import text as evaluation_text
 from gait.evaluate import Measures, evaluate
-from gait.events import Strikes, strikes_by_zeni, strikes_from_meta
+from gait.events import Strikes, strikes_of
 from gait.files import replacing
 from gait.lcm.page import Page
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
@@ -69,7 +69,7 @@ def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
     measures: Measures | None = None
     errors: Comparison | None = None
     if truth is not None:
-        strikes = _strikes(truth, Path(args.truth).parent / "meta.json")
+        strikes = strikes_of(truth, Path(args.truth).parent / "meta.json")
         measures = _measures(args, track, truth, strikes, camera)
         errors = compare(track, truth, strikes)
     pictures = _film(args, video, Overlay(model, camera), results, quiet)
@@ -91,11 +91,6 @@ def _measures(
 ) -> Measures:
     sections = blob.decode(read_blob(args.model), str(args.model))
     return evaluate(track, truth, strikes=strikes, model=sections, camera=camera)
-
-
-def _strikes(truth: Joints, meta: Path) -> Strikes:
-    known = strikes_from_meta(meta) if meta.is_file() else None
-    return known or strikes_by_zeni(truth)
 
 
 def _figures(results: Run, live: bool) -> dict[str, str]:
