@@ -1,0 +1,310 @@
+/* Evidence of a frame: regions, plates, and every particle's log-likelihood against one worked out on its own. */
+#include "weigh.h"
+
+#include "toy_look.h"
+#include "toy_tracker.h"
+
+#include "check.h"
+
+enum { N = 40 };
+
+static uint8_t wall[SCENE_CAMERAS][SCENE_PIXELS], shot[SCENE_CAMERAS][2][SCENE_PIXELS];
+
+static gait_tracker *tracker(int32_t cameras, int first_camera, uint32_t terms)
+{
+    gait_tracker_config cfg = toy_config(cameras);
+    cfg.particles = N;
+    cfg.terms = terms;
+    cfg.resample_ess = 0.0f; /* never: particle i stays particle i */
+    if (first_camera)
+        cfg.camera[0] = toy_camera(first_camera);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    for (int k = 0; k < cameras; k++) {
+        gait_image const plate = toy_image(wall[k + first_camera]);
+        CHECK(gait_tracker_set_background(t, k, &plate) == GAIT_OK);
+    }
+    toy_tracker_start(t, 20, 1.0f);
+    return t;
+}
+
+/* Log-likelihoods of two cameras are the sums of each alone, term by term; a camera that missed adds nothing. */
+static void test_cameras_add(void)
+{
+    for (uint32_t terms = 1; terms < 16; terms++) {
+        gait_tracker *const both = tracker(2, 0, terms), *const first = tracker(1, 0, terms);
+        gait_tracker *const second = tracker(1, 1, terms);
+        gait_estimate e;
+        int32_t wrong = 0, alike = 0;
+        for (int n = 0; n < 2; n++) {
+            const uint8_t *const two[] = {shot[0][n], shot[1][n]}, *const one[] = {shot[0][n], NULL};
+            const uint8_t *const other[] = {shot[1][n], NULL};
+            toy_tracker_step(both, 20 + n, two, &e);
+            toy_tracker_step(first, 20 + n, one, &e);
+            toy_tracker_step(second, 20 + n, other, &e);
+            if (n == 1 && terms & GAIT_TERM_TEMPLATE)
+                break; /* what each has learned comes from its own estimate */
+            for (int32_t i = 0; i < N; i++) {
+                wrong += both->ll[i] != first->ll[i] + second->ll[i];
+                alike += first->ll[i] == first->ll[0];
+            }
+        }
+        CHECK(wrong == 0);
+        CHECK(alike < N || terms == GAIT_TERM_TEXTURE || terms & GAIT_TERM_TEMPLATE);
+        toy_tracker_free(both);
+        toy_tracker_free(first);
+        toy_tracker_free(second);
+    }
+    gait_tracker *const both = tracker(2, 0, 0xf), *const first = tracker(1, 0, 0xf);
+    const uint8_t *const half[] = {shot[0][0], NULL};
+    gait_estimate e;
+    toy_tracker_step(both, 20, half, &e);
+    toy_tracker_step(first, 20, half, &e);
+    CHECK(memcmp(both->ll, first->ll, N * sizeof *both->ll) == 0 && !(e.flags & GAIT_EST_NO_IMAGE));
+    toy_tracker_free(both);
+    toy_tracker_free(first);
+}
+
+/* Each particle's number is the likelihood of its own body; its joints are its own too. */
+static void test_particles(void)
+{
+    toy_look *const v = toy_look_new(1, GAIT_MODE_DEFAULT);
+    gait_tracker *const t = tracker(1, 1, GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES);
+    const uint8_t *const see[] = {shot[1][0], NULL};
+    gait_state s[N];
+    float weight[N];
+    gait_estimate e;
+    toy_tracker_step(t, 20, see, &e);
+    CHECK(gait_tracker_particles(t, s, weight, N) == N);
+    v->f.map = t->core->map[0];
+    toy_look_at(v, shot[1][0], wall[1]);
+    v->setup = *t->like;
+    double worst = 0.0, place = 0.0;
+    for (int32_t i = 0; i < N; i++) {
+        like_body const b = toy_look_body(v, &s[i]);
+        gait_pose pose;
+        CHECK(gait_model_pose(toy_model(), &s[i], &pose) == GAIT_OK);
+        worst = fmax(worst, fabs((double)(t->ll[i] - like_evaluate(&b))));
+        for (int32_t p = 0; p < 3 * TOY_POINTS; p++)
+            place = fmax(place, fabs((double)(t->joint[p * N + i] - pose.joint[p / 3][p % 3])));
+    }
+    CHECK_NEAR(worst, 0.0, 0.3); /* a body from its state differs by rounding: a cell or an edge point flips */
+    CHECK_NEAR(place, 0.0, 1e-5);
+    toy_tracker_free(t);
+}
+
+/* Outline of one particle in lane 0. */
+static const outline_block *outline_of(const gait_tracker *t, int32_t i)
+{
+    static kin_body body;
+    static outline_block out;
+    walker const w = walker_get(&t->gen[t->core->current].people, i);
+    walker_body(&t->rule, &w, &body);
+    outline_project(t->like->geometry, TOY_LIMBS, &body, &t->cfg.camera[0], &t->camera[0].seen.map, &out);
+    return &out;
+}
+
+/* With texture, the ancestor's samples count: those of the particle each one came from. */
+static void test_ancestor(void)
+{
+    gait_tracker *const t = tracker(1, 0, GAIT_TERM_TEXTURE);
+    size_t const stride = TOY_LIMBS * LIKE_SAMPLES;
+    const uint8_t *see[] = {shot[0][0], NULL};
+    gait_estimate e;
+    toy_tracker_step(t, 20, see, &e);
+    for (int32_t i = 0; i < N; i++)
+        CHECK(t->ll[i] == 0.0f); /* the first frame has nothing before it */
+    CHECK(e.log_evidence == 0.0);
+    see[0] = shot[0][1];
+    t->cfg.resample_ess = 1.0f;
+    t->core->ess = 1.0;
+    for (int32_t i = 0; i < N; i++)
+        t->filter.weight[i] = i == 5 || i == 9 ? 0.5 : 0.0;
+    toy_tracker_step(t, 21, see, &e);
+    CHECK(e.flags & GAIT_EST_RESAMPLED);
+    const generation *const now = &t->gen[t->core->current], *const then = &t->gen[1 - t->core->current];
+    for (int32_t i = 0; i < N; i++) {
+        int32_t const parent = i < N / 2 ? 5 : 9;
+        int32_t shared = 0;
+        CHECK(t->filter.parent[i] == parent);
+        for (int32_t l = 0; l < TOY_LIMBS; l++) {
+            int32_t cost;
+            size_t const at = (size_t)l * LIKE_SAMPLES;
+            shared += like_compare(t->like, now->texture + (size_t)i * stride + at,
+                                   then->texture + (size_t)parent * stride + at, &cost);
+        }
+        CHECK(shared > 60); /* the same walker a frame later */
+        if (i == 5 || i == 25) { /* worked out again from the samples */
+            like_body const b = {.setup = t->like,
+                                 .features = &t->camera[0].seen,
+                                 .outline = outline_of(t, i),
+                                 .seen = now->texture + (size_t)i * stride,
+                                 .ancestor = then->texture + (size_t)parent * stride};
+            CHECK_NEAR(t->ll[i], like_evaluate(&b), 1e-5);
+        }
+    }
+    toy_tracker_free(t);
+}
+
+/* Make every sample that camera 1 took for the current particles a constant. */
+static void spoil(gait_tracker *t, int value)
+{
+    size_t const stride = TOY_LIMBS * LIKE_SAMPLES;
+    for (size_t i = 0; i < N; i++)
+        memset(t->gen[t->core->current].texture + (2 * i + 1) * stride, value, stride);
+}
+
+/* What a camera saw before it missed a frame does not count when it is back; what it sees then does. */
+static void test_missed_texture(void)
+{
+    const uint8_t *const both[] = {shot[0][0], shot[1][0]}, *const one[] = {shot[0][1], NULL};
+    float ll[3][2][N]; /* undisturbed, spoilt while missing, spoilt when back; frames 22 and 23 */
+    for (int k = 0; k < 3; k++) {
+        gait_tracker *const t = tracker(2, 0, GAIT_TERM_TEXTURE);
+        gait_estimate e;
+        toy_tracker_step(t, 20, both, &e);
+        toy_tracker_step(t, 21, one, &e);
+        if (k == 1)
+            spoil(t, 99);
+        toy_tracker_step(t, 22, both, &e);
+        memcpy(ll[k][0], t->ll, sizeof ll[k][0]);
+        if (k == 2)
+            spoil(t, 99);
+        toy_tracker_step(t, 23, both, &e);
+        memcpy(ll[k][1], t->ll, sizeof ll[k][1]);
+        toy_tracker_free(t);
+    }
+    CHECK(memcmp(ll[0], ll[1], sizeof ll[0]) == 0);
+    CHECK(memcmp(ll[0][0], ll[2][0], sizeof ll[0][0]) == 0 && memcmp(ll[0][1], ll[2][1], sizeof ll[0][1]) != 0);
+}
+
+/* The region holds the whole walker, who is VIEW_PERSON tall in it. */
+static void test_region(void)
+{
+    gait_tracker *const t = tracker(2, 0, GAIT_TERM_EDGES);
+    gait_state const s = toy_walk(20.0f / 30.0f);
+    const uint8_t *const see[] = {shot[0][0], shot[1][0]};
+    gait_estimate e;
+    gait_pose pose;
+    toy_tracker_step(t, 20, see, &e);
+    CHECK(gait_model_pose(toy_model(), &s, &pose) == GAIT_OK);
+    for (int k = 0; k < 2; k++) {
+        gait_camera const cam = toy_camera(k);
+        float high = 1e9f, low = -1e9f;
+        for (int32_t p = 0; p < TOY_POINTS; p++) {
+            float uv[2] = {0};
+            camera_project(&cam, pose.joint[p], uv);
+            float const x = (uv[0] - t->core->map[k].u0) * t->core->map[k].scale;
+            float const y = (uv[1] - t->core->map[k].v0) * t->core->map[k].scale;
+            CHECK(x > 30.0f && x < 226.0f && y > 15.0f && y < 241.0f);
+            high = fminf(high, y);
+            low = fmaxf(low, y);
+        }
+        CHECK_NEAR(low - high, 186.0, 12.0); /* head top to toe joint */
+    }
+    toy_tracker_free(t);
+}
+
+/* The plate follows the region: an empty scene has no foreground, wherever the region goes. */
+static void test_plate(void)
+{
+    gait_tracker *const t = tracker(1, 0, GAIT_TERM_SILHOUETTE);
+    gait_frame f = toy_frame(20);
+    int32_t moved = 0;
+    f.image[0] = toy_image(wall[0]);
+    for (int n = 0; n < 12; n++) {
+        walker const w = {.f = {[F_X] = -1.5f + 0.3f * (float)n, [F_STATURE] = 1.75f}};
+        float const before = t->core->map[0].u0;
+        CHECK(weigh_look(t, &f, &w) == 1);
+        moved += t->core->map[0].u0 != before;
+        CHECK(t->camera[0].seen.has_fg && t->camera[0].seen.fg_total == 0);
+    }
+    CHECK(moved > 6);
+    f.image[0] = toy_image(shot[0][0]);
+    walker const there = {.f = {[F_X] = toy_walk(20.0f / 30.0f).pelvis[0], [F_STATURE] = 1.75f}};
+    CHECK(weigh_look(t, &f, &there) == 1 && t->camera[0].seen.fg_total > 800 * FG_ONE);
+    CHECK(gait_tracker_set_background(t, 0, NULL) == GAIT_OK);
+    CHECK(weigh_look(t, &f, &there) == 1 && !t->camera[0].seen.has_fg);
+    gait_image const plate = toy_image(shot[0][0]); /* another plate takes effect at once */
+    CHECK(gait_tracker_set_background(t, 0, &plate) == GAIT_OK);
+    CHECK(weigh_look(t, &f, &there) == 1 && t->camera[0].seen.has_fg && t->camera[0].seen.fg_total == 0);
+    toy_tracker_free(t);
+}
+
+/* Plates and frames of any format together; what is one picture in two formats has no foreground. */
+static void test_formats(void)
+{
+    static uint8_t colour[2][SCENE_PIXELS * 3], luma[SCENE_PIXELS]; /* RGB, BGR */
+    for (int32_t i = 0; i < SCENE_PIXELS; i++) {
+        const int32_t v = wall[0][i], rgb[3] = {v + 40, v, v - 30};
+        for (int32_t c = 0; c < 3; c++)
+            colour[0][3 * i + c] = colour[1][3 * i + 2 - c] = (uint8_t)rgb[c];
+        luma[i] = (uint8_t)((77 * rgb[0] + 150 * rgb[1] + 29 * rgb[2] + 128) >> 8);
+    }
+    gait_image image[3] = {toy_image(colour[0]), toy_image(colour[1]), toy_image(luma)};
+    for (int k = 0; k < 2; k++) {
+        image[k].format = k ? GAIT_BGR8 : GAIT_RGB8;
+        image[k].stride = 3 * SCENE_W;
+    }
+    walker const w = {.f = {[F_X] = -0.4f, [F_STATURE] = 1.75f}};
+    for (int plate = 0; plate < 3; plate++) {
+        gait_tracker *const t = tracker(1, 0, GAIT_TERM_SILHOUETTE);
+        CHECK(gait_tracker_set_background(t, 0, &image[plate]) == GAIT_OK);
+        for (int n = 0; n < 9; n++) { /* also changing from frame to frame */
+            gait_frame f = toy_frame(n);
+            f.image[0] = image[n < 6 ? n / 2 : n % 3];
+            CHECK(weigh_look(t, &f, &w) == 1 && t->camera[0].seen.has_fg);
+            CHECK(t->camera[0].seen.fg_total < RAST_SIZE * RAST_SIZE / 8); /* luma is rounded */
+        }
+        toy_tracker_free(t);
+    }
+}
+
+/* A walker behind the camera cannot be seen by it. */
+static void test_behind(void)
+{
+    gait_tracker *const t = tracker(2, 0, 0xf);
+    gait_frame f = toy_frame(20);
+    walker w = {.f = {[F_X] = 0.0f, [F_Y] = -5.6f, [F_STATURE] = 1.75f}};
+    for (int k = 0; k < 2; k++)
+        f.image[k] = toy_image(shot[k][0]);
+    CHECK(weigh_look(t, &f, &w) == 1 && !t->camera[0].seen.seen && t->camera[1].seen.seen);
+    w.f[F_Y] = 0.0f;
+    CHECK(weigh_look(t, &f, &w) == 2);
+    f.image[0].data = NULL;
+    CHECK(weigh_look(t, &f, &w) == 1);
+    toy_tracker_free(t);
+}
+
+/* The body that stands there is supported, one on the empty wall is not. */
+static void test_support(void)
+{
+    gait_tracker *const t = tracker(2, 0, 0xf);
+    gait_state s = toy_walk(20.0f / 30.0f);
+    const uint8_t *const see[] = {shot[0][0], shot[1][0]};
+    gait_estimate e;
+    toy_tracker_step(t, 20, see, &e);
+    walker w = walker_from_state(&t->rule, &s);
+    float const there = weigh_walker(t, &w);
+    w.f[F_X] += 0.5f;
+    CHECK(there > 1.0f && weigh_walker(t, &w) < -1.0f);
+    toy_tracker_free(t);
+}
+
+int main(void)
+{
+    for (int k = 0; k < SCENE_CAMERAS; k++) {
+        toy_wall(k, wall[k]);
+        for (int n = 0; n < 2; n++)
+            toy_shot(k, 20 + n, shot[k][n]);
+    }
+    test_cameras_add();
+    test_particles();
+    test_ancestor();
+    test_missed_texture();
+    test_region();
+    test_plate();
+    test_formats();
+    test_behind();
+    test_support();
+    return CHECK_DONE();
+}
