@@ -17,7 +17,7 @@ static void side(const features *f, const rast_mask *mask, float x0, float y0, f
                  float my, int32_t n, tally *t)
 {
     float const dx = x1 - x0, dy = y1 - y0, len2 = dx * dx + dy * dy;
-    if (!(len2 > 1.0f))
+    if (!(len2 > 1.0f && len2 < 1e12f)) /* a point, or beyond all pictures */
         return;
     /* Double-angle form of the normal (dy, -dx): n'Tn = (trace + (xx - yy) cos 2a + 2 xy sin 2a) / 2. */
     int32_t const cos2 = (int32_t)(64.0f * (dy * dy - dx * dx) / len2);

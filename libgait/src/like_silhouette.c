@@ -21,7 +21,7 @@ static void count(const like_body *b, int32_t *area, int32_t *covered)
 }
 
 /* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */
-static const float TYPICAL = 0.16f * (float)(VIEW_PERSON / 2) * (float)(VIEW_PERSON / 2) * (float)FG_ONE;
+static const float TYPICAL = 0.16f * 0.25f * (float)VIEW_PERSON * (float)VIEW_PERSON * (float)FG_ONE;
 
 static float log_likelihood(const like_body *b)
 {

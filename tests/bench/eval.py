@@ -2,8 +2,9 @@
 
     make eval ARGS='--seeds 3 --modes default paper'
 
-Each clip's subject is left out of learning.  Every run starts from the truth plus noise drawn from the start's own
-deviations by the seed.  Writes build/eval/results.json and results.csv and prints one table; lost runs are in it.
+Each clip's subject is left out of learning.  Every run starts from the truth plus noise drawn from the
+start's own deviations by the seed.  Writes build/eval/results.json and results.csv and prints one table;
+lost runs are in it.
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ class Run:
 
 def call(*words: object) -> dict[str, Any]:
     """Run a gait command that prints JSON; the first line of its error ends the evaluation."""
-    done = subprocess.run([*GAIT, *map(str, words), "--json", "--quiet"], capture_output=True, text=True, cwd=ROOT)
+    command = [*GAIT, *map(str, words), "--json", "--quiet"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     if done.returncode:
         raise SystemExit(f"eval: gait {words[0]}: {done.stderr.strip()}")
     return dict(json.loads(done.stdout))
@@ -73,9 +75,13 @@ def noisy_start(folder: Path, seed: int) -> dict[str, Any]:
         "stature_m": meta["stature_m"],
         "heading_rad": float(first["heading_rad"]),
     }
-    start: dict[str, Any] = {key: value + SPREAD[key] * n for (key, value), n in zip(true.items(), noise, strict=False)}
+    start: dict[str, Any] = {
+        key: value + SPREAD[key] * n for (key, value), n in zip(true.items(), noise, strict=False)
+    }
     start["phase"] %= 1.0
-    start["pelvis"] = [float(first[f"pelvis_{a}"]) + SPREAD["pelvis"] * n for a, n in zip("xyz", noise[4:], strict=True)]
+    start["pelvis"] = [
+        float(first[f"pelvis_{a}"]) + SPREAD["pelvis"] * n for a, n in zip("xyz", noise[4:], strict=True)
+    ]
     return {"frame": 0, **start, "sd": SPREAD}
 
 
@@ -94,10 +100,19 @@ def dev_run(run: Run) -> dict[str, Any]:
 
 
 def outdoor_run(run: Run) -> dict[str, Any]:
-    """Track the outdoor clip and measure the distance to the joints marked by hand (near side, clear ones)."""
+    """Track the outdoor clip and measure the distance to the near leg's joints marked by hand."""
     folder, track = DATA / "video/outdoor", OUT / f"{run.name}.csv"
     figures = call(
-        *("track", folder / "demo.mp4", "--camera", folder / "Calib_demo.toml", "--height", 1.65, "-o", track),
+        *(
+            "track",
+            folder / "demo.mp4",
+            "--camera",
+            folder / "Calib_demo.toml",
+            "--height",
+            1.65,
+            "-o",
+            track,
+        ),
         *("--init", folder / "init.json", "--background", folder / "background_median.png"),
         *("--start", 64, "--stop", 186, "--seed", run.seed, "--mode", run.mode),
     )
@@ -113,7 +128,9 @@ def marked_distances(folder: Path, track: Path) -> list[float]:
     with open(track, newline="") as file:
         rows = {int(row["frame"]): row for row in csv.DictReader(file)}
     distances = []
-    for number, marks, clear in zip(reference["frame_numbers"], reference["uv"], reference["vis"], strict=True):
+    for number, marks, clear in zip(
+        reference["frame_numbers"], reference["uv"], reference["vis"], strict=True
+    ):
         for joint in NEAR:
             k = reference["joints"].index(joint)
             if number in rows and clear[k]:
@@ -148,7 +165,10 @@ def show(rows: list[dict[str, Any]]) -> None:
     keys = list(rows[0])
     print(" ".join(f"{k:>10}" for k in keys).replace("      clip", f"{'clip':18}", 1))
     for row in rows:
-        cells = ["" if row[k] is None else f"{row[k]:.2f}" if isinstance(row[k], float) else str(row[k]) for k in keys[1:]]
+        cells = [
+            "" if row[k] is None else f"{row[k]:.2f}" if isinstance(row[k], float) else str(row[k])
+            for k in keys[1:]
+        ]
         print(f"{row['clip']:18} " + " ".join(f"{c:>10}" for c in cells))
     for mode in dict.fromkeys(row["mode"] for row in rows):
         known = [row for row in rows if row["mode"] == mode and row["root_mm"] is not None]
@@ -177,7 +197,9 @@ def main() -> int:
     with ThreadPoolExecutor(args.jobs) as pool:
         results = list(pool.map(lambda run: (outdoor_run if run.clip == "outdoor" else dev_run)(run), runs))
     rows = [row_of(run, result) for run, result in zip(runs, results, strict=True)]
-    (OUT / "results.json").write_text(json.dumps([vars(r) | {"figures": f} for r, f in zip(runs, results, strict=True)]))
+    (OUT / "results.json").write_text(
+        json.dumps([vars(r) | {"figures": f} for r, f in zip(runs, results, strict=True)])
+    )
     with open(OUT / "results.csv", "w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
