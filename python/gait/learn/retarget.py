@@ -146,9 +146,9 @@ def generic_proportions(bodies: list[Measures]) -> Proportions:
 
     Recordings end the clavicle near the acromion; anatomical bodies (MakeHuman) have the joint's centre lower
     and the elbow nearer, and the top of the head lies ahead of the base of the neck.  All three are set, by
-    hand, halfway towards the rendered bodies of the development clips of ../shared/data.  That gains 6 mm there
-    and costs 1.8 mm on CMU's walkers (tests/bench/learn_floor.py, q = 5, with the head); errors measured on
-    these clips are therefore no independent proof of it.
+    hand, halfway towards the rendered bodies of the development clips of ../shared/data.  That gains 6 mm
+    there and costs 1.8 mm on CMU's walkers (tests/bench/learn_floor.py, q = 5, with the head); errors
+    measured on these clips are therefore no independent proof of it.
     """
     mean = mean_proportions(bodies)
     x, y, z = mean.shoulder
