@@ -91,13 +91,15 @@ static float log_likelihood(const like_body *b)
     return (float)t.response / (float)(t.points * 2 * 64 * EDGE_ONE) - 1.0f;
 }
 
-/* With nobody there the outline meets edges of any direction; a tenth more than chance is asked for. */
+/* With nobody there the outline meets edges of any direction: a tenth more than chance is asked for, and something
+ * where the picture has no edges at all. */
 static float support(const like_body *b)
 {
+    float const least = 0.005f;
     tally const t = outline(b);
     if (t.points < ENOUGH)
         return -1.0f;
-    return ((float)t.response - 1.1f * (float)t.chance) / (float)(t.points * 2 * 64 * EDGE_ONE);
+    return ((float)t.response - 1.1f * (float)t.chance) / (float)(t.points * 2 * 64 * EDGE_ONE) - least;
 }
 
 const like_term like_edges = {"edges", GAIT_TERM_EDGES, log_likelihood, support};

@@ -196,6 +196,7 @@ static void observe(gait_tracker *t, gait_estimate *out)
 static void coast(gait_tracker *t, gait_estimate *out)
 {
     weigh_particles(t); /* no camera: only the joints */
+    t->core->ess = pf_ess(&t->filter); /* resampled weights are even */
     t->core->textured = 0;
     estimate_fill(t, pf_heaviest(&t->filter), out);
     out->flags |= GAIT_EST_NO_IMAGE;

@@ -1,0 +1,400 @@
+/* The tracker on the synthetic walker: it follows, it says when it does not, and it refuses what makes no sense. */
+#include "toy_film.h"
+
+#include "check.h"
+
+enum { FRAMES = 60 };
+
+/* ---- how far from the truth ---- */
+typedef struct error {
+    double across, depth, phase, joint; /* metres, cycles; largest over the frames looked at */
+    int status[4];
+} error;
+
+static void look(const gait_estimate *e, int n, error *out)
+{
+    gait_state const truth = toy_walk((float)n / 30.0f);
+    gait_pose pose;
+    double joint = 0.0, dp = fabs((double)(e->mean.phase - truth.phase));
+    CHECK(gait_model_pose(toy_model(), &truth, &pose) == GAIT_OK);
+    for (int p = 0; p < TOY_POINTS; p++)
+        joint += hypot((double)(e->pose.joint[p][0] - pose.joint[p][0]),
+                       (double)(e->pose.joint[p][2] - pose.joint[p][2])) /
+                 TOY_POINTS;
+    out->across = fmax(out->across, hypot((double)(e->mean.pelvis[0] - truth.pelvis[0]),
+                                          (double)(e->mean.pelvis[2] - truth.pelvis[2])));
+    out->depth = fmax(out->depth, fabs((double)(e->mean.pelvis[1] - truth.pelvis[1])));
+    out->phase = fmax(out->phase, fmin(dp, 1.0 - dp));
+    out->joint = fmax(out->joint, joint);
+}
+
+/* What every estimate must satisfy. */
+static void check_sane(const gait_tracker *t, const gait_estimate *e, const gait_tracker_config *cfg, int steps)
+{
+    static float weight[1024];
+    static gait_state s[1024];
+    double square = 0.0, sum = 0.0;
+    CHECK(gait_tracker_particles(t, s, weight, 1024) == cfg->particles);
+    for (int i = 0; i < cfg->particles; i++) {
+        sum += (double)weight[i];
+        square += (double)weight[i] * (double)weight[i];
+    }
+    CHECK_NEAR(sum, 1.0, 1e-4);
+    CHECK_NEAR(e->ess * square, 1.0, 1e-3);
+    CHECK(e->frame == (uint64_t)steps && isfinite(e->log_evidence) && e->reserved == 0);
+    CHECK(e->phase_r >= 0.0f && e->phase_r <= 1.0f && e->mode_mass > 0.0f && e->mode_mass <= 1.0001f);
+    for (int p = 0; p < TOY_POINTS; p++)
+        for (int k = 0; k < 3; k++)
+            CHECK(isfinite(e->pose.joint[p][k]) && e->joint_sd[p][k] >= 0.0f && e->joint_sd[p][k] < 2.0f);
+}
+
+/* Follow the film from a start displaced by hand; errors after the first 15 frames. */
+static error follow(const gait_tracker_config *cfg, int every, uint32_t (*missing)(int n))
+{
+    gait_tracker *const t = film_tracker(cfg, 0, 1.0f);
+    gait_state start = toy_walk(0.0f), sd = toy_doubt(1.0f);
+    error out = {0};
+    gait_estimate e;
+    start.phase += 0.03f;
+    start.pelvis[0] += 0.03f;
+    start.heading = 0.06f;
+    start.stride_hz *= 1.04f;
+    CHECK(gait_tracker_start(t, &start, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
+    for (int n = 0; n < FRAMES; n += every) {
+        film_step(t, cfg->cameras, n, missing ? missing(n) : 0, &e);
+        check_sane(t, &e, cfg, n / every);
+        CHECK(e.utime == toy_frame(n).utime);
+        out.status[e.status]++;
+        if (n >= 15)
+            look(&e, n, &out);
+    }
+    toy_tracker_free(t);
+    return out;
+}
+
+static void check_error(error have, double across, double depth, double phase, double joint)
+{
+    if (have.across > across || have.depth > depth || have.phase > phase || have.joint > joint)
+        fprintf(stderr, "across %.3f m, depth %.3f m, phase %.4f, joints %.3f m\n", have.across, have.depth,
+                have.phase, have.joint);
+    CHECK(have.across < across && have.depth < depth && have.phase < phase && have.joint < joint);
+    CHECK(have.status[GAIT_STATUS_LOST] == 0 && have.status[GAIT_STATUS_AMBIGUOUS] == 0);
+}
+
+static void test_follow(void)
+{
+    for (uint64_t seed = 1; seed <= 3; seed++) {
+        gait_tracker_config cfg = toy_config(1);
+        cfg.seed = seed;
+        check_error(follow(&cfg, 1, NULL), 0.04, 0.16, 0.015, 0.05);
+    }
+}
+
+static uint32_t second_now_and_then(int n)
+{
+    return n % 7 > 3 || (n > 30 && n < 40) ? 2u : 0u;
+}
+
+static void test_two_cameras(void)
+{
+    gait_tracker_config cfg = toy_config(2);
+    check_error(follow(&cfg, 1, NULL), 0.02, 0.02, 0.01, 0.03);
+    check_error(follow(&cfg, 1, second_now_and_then), 0.03, 0.06, 0.015, 0.04);
+}
+
+/* Two of three frames missing: 10 per second. */
+static void test_slow_frames(void)
+{
+    gait_tracker_config cfg = toy_config(2);
+    check_error(follow(&cfg, 3, NULL), 0.03, 0.03, 0.015, 0.04);
+}
+
+/* Without a background plate. */
+static void test_no_plate(void)
+{
+    gait_tracker_config cfg = toy_config(2);
+    cfg.terms = GAIT_TERM_TEXTURE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE;
+    check_error(follow(&cfg, 1, NULL), 0.03, 0.03, 0.01, 0.03);
+}
+
+/* The papers' own mode: it runs, resamples in every step, and holds on for a while from a good start. */
+static void test_paper(void)
+{
+    gait_tracker_config cfg = toy_config(1), own;
+    gait_tracker_default(&own, GAIT_MODE_PAPER);
+    cfg.mode = GAIT_MODE_PAPER;
+    cfg.terms = GAIT_TERM_TEXTURE;
+    cfg.term_weight[0] = own.term_weight[0];
+    cfg.resample_ess = 1.0f;
+    cfg.settle_time = 0.0f;
+    cfg.rate_time = cfg.tilt_time = cfg.coef_time = 0.0f;
+    gait_tracker *const t = film_tracker(&cfg, 0, 0.3f);
+    error have = {0};
+    for (int n = 0; n < 20; n++) {
+        gait_estimate e;
+        film_step(t, 1, n, 0, &e);
+        check_sane(t, &e, &cfg, n);
+        CHECK(!(e.flags & GAIT_EST_RESAMPLED) == (n == 0));
+        look(&e, n, &have);
+    }
+    CHECK(have.across < 0.15 && have.phase < 0.1);
+    toy_tracker_free(t);
+}
+
+/* ---- colour ---- */
+
+/* Frames of a tinted scene in one format. */
+static void tint(int n, int32_t format, uint8_t *out)
+{
+    for (int32_t i = 0; i < SCENE_PIXELS; i++) {
+        uint8_t const v = film[0][n][i], rgb[3] = {(uint8_t)(v / 2 + 60), v, (uint8_t)(255 - v)};
+        for (int32_t c = 0; c < 3; c++)
+            out[3 * i + c] = format == GAIT_GREY8 ? v : rgb[format == GAIT_BGR8 ? 2 - c : c];
+    }
+}
+
+static uint64_t colour_digest(uint32_t terms, int32_t format, int32_t plate_format)
+{
+    static uint8_t shot[3 * SCENE_PIXELS], plate[3 * SCENE_PIXELS];
+    gait_tracker_config cfg = toy_config(1);
+    cfg.particles = 100;
+    cfg.terms = terms;
+    gait_tracker *const t = film_tracker(&cfg, 30, 1.0f);
+    gait_image image = {.data = plate, .width = SCENE_W, .height = SCENE_H, .stride = 3 * SCENE_W};
+    error have = {0};
+    gait_estimate e;
+    tint(0, plate_format, plate); /* the walker is elsewhere in frame 0 */
+    image.format = plate_format == GAIT_GREY8 ? GAIT_RGB8 : plate_format;
+    CHECK(gait_tracker_set_background(t, 0, &image) == GAIT_OK);
+    for (int n = 30; n < 40; n++) {
+        gait_frame f = toy_frame(n);
+        tint(n, format, shot);
+        image.data = shot;
+        image.format = format == GAIT_GREY8 ? GAIT_RGB8 : format;
+        f.image[0] = image;
+        CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
+    }
+    look(&e, 39, &have);
+    CHECK(have.across < 0.06 && have.phase < 0.03);
+    uint64_t const digest = gait_tracker_digest(t);
+    toy_tracker_free(t);
+    return digest;
+}
+
+/* The order of the channels does not matter, and three equal channels are grey. */
+static void test_colour(void)
+{
+    uint32_t const plain = GAIT_TERM_TEXTURE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE;
+    uint64_t const rgb = colour_digest(0xf, GAIT_RGB8, GAIT_RGB8);
+    CHECK(colour_digest(0xf, GAIT_BGR8, GAIT_BGR8) == rgb && colour_digest(0xf, GAIT_BGR8, GAIT_RGB8) == rgb);
+    gait_tracker_config cfg = toy_config(1);
+    cfg.particles = 100;
+    cfg.terms = plain;
+    gait_tracker *const t = film_tracker(&cfg, 30, 1.0f);
+    for (int n = 30; n < 40; n++) {
+        gait_estimate e;
+        film_step(t, 1, n, 0, &e);
+    }
+    CHECK(colour_digest(plain, GAIT_GREY8, GAIT_GREY8) == gait_tracker_digest(t));
+    CHECK(colour_digest(plain, GAIT_RGB8, GAIT_RGB8) != gait_tracker_digest(t));
+    toy_tracker_free(t);
+}
+
+/* ---- time ---- */
+
+/* The first frame, if taken at the time of the start, weighs the particles where they stand; a later one moves them. */
+static void test_first_frame(void)
+{
+    static gait_state before[300], after[300];
+    static float weight[300];
+    gait_tracker_config const cfg = toy_config(1);
+    for (int late = 0; late < 2; late++) {
+        gait_tracker *const t = film_tracker(&cfg, 10, 1.0f);
+        gait_estimate e;
+        int32_t equal = 0;
+        CHECK(gait_tracker_particles(t, before, weight, 300) == 300 && weight[0] == 1.0f / 300.0f);
+        film_step(t, 1, 10 + late, 0, &e);
+        CHECK(gait_tracker_particles(t, after, weight, 300) == 300 && weight[0] != 1.0f / 300.0f);
+        for (int i = 0; i < 300; i++)
+            equal += memcmp(&before[i], &after[i], sizeof *after) == 0;
+        CHECK(equal == (late ? 0 : 300) && e.frame == 0 && !(e.flags & GAIT_EST_RESAMPLED));
+        toy_tracker_free(t);
+    }
+}
+
+/* Status of a frame at a time, and that a refusal changes nothing. */
+static void refuse(gait_tracker *t, gait_frame f, gait_status want, const char *word)
+{
+    uint64_t const digest = gait_tracker_digest(t);
+    gait_estimate e, kept;
+    gait_error err = {0};
+    memset(&e, 0x5a, sizeof e);
+    kept = e;
+    CHECK(gait_tracker_step(t, &f, &e, &err) == want && err.status == want);
+    CHECK(strstr(err.text, word) != NULL);
+    CHECK(gait_tracker_digest(t) == digest && memcmp(&e, &kept, sizeof e) == 0);
+}
+
+static void test_refusals(void)
+{
+    gait_tracker_config const cfg = toy_config(2);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_frame f = toy_frame(10);
+    gait_estimate e;
+    f.image[0] = toy_image(film[0][10]);
+    refuse(t, f, GAIT_ERR_STATE, "before start");
+    toy_tracker_start(t, 10, 1.0f);
+    f.utime = toy_frame(9).utime;
+    refuse(t, f, GAIT_ERR_STATE, "not newer");
+    film_step(t, 2, 10, 0, &e);
+    refuse(t, toy_frame(10), GAIT_ERR_STATE, "not newer"); /* the same again */
+    refuse(t, toy_frame(9), GAIT_ERR_STATE, "not newer");
+    refuse(t, toy_frame(26), GAIT_ERR_STATE, "max_dt");
+    f.utime = INT64_MIN;
+    refuse(t, f, GAIT_ERR_STATE, "not newer");
+    f.utime = INT64_MAX;
+    refuse(t, f, GAIT_ERR_STATE, "max_dt");
+    gait_image const good = toy_image(film[0][11]);
+    for (int k = 0; k < 6; k++) {
+        gait_image bad = good;
+        int32_t *const number[] = {&bad.width, &bad.height, &bad.stride, &bad.format, &bad.stride, &bad.format};
+        static const int32_t value[] = {SCENE_W - 1, SCENE_H + 1, SCENE_W - 1, 0, -SCENE_W, GAIT_RGB8};
+        *number[k] = value[k];
+        f = toy_frame(11);
+        f.image[0] = good;
+        f.image[1] = bad;
+        refuse(t, f, GAIT_ERR_ARG, "image of camera 1");
+    }
+    f = toy_frame(11);
+    CHECK(gait_tracker_step(NULL, &f, &e, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_step(t, NULL, &e, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_step(t, &f, NULL, NULL) == GAIT_ERR_ARG);
+    film_step(t, 2, 11, 0, &e); /* and it goes on */
+    CHECK(e.frame == 1 && e.status == GAIT_STATUS_TRACKING);
+    gait_state const mean = toy_walk(0.0f), sd = toy_doubt(1.0f);
+    CHECK(gait_tracker_start(t, &mean, &sd, INT64_MIN, NULL) == GAIT_OK);
+    f.utime = INT64_MAX;
+    refuse(t, f, GAIT_ERR_STATE, "max_dt");
+    toy_tracker_free(t);
+}
+
+/* ---- loss ---- */
+
+/* A picture of nothing: after a third of a second the walker is lost, and its place less and less known. */
+static void test_occluded(void)
+{
+    static uint8_t blank[SCENE_PIXELS];
+    for (int plate = 0; plate < 2; plate++) {
+        gait_tracker_config const cfg = toy_config(1);
+        gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+        const uint8_t *const shots[SCENE_CAMERAS] = {blank, NULL};
+        gait_estimate e;
+        int lost_at = 0;
+        if (!plate)
+            CHECK(gait_tracker_set_background(t, 0, NULL) == GAIT_OK);
+        memset(blank, 128, sizeof blank);
+        for (int n = 0; n < 20; n++)
+            film_step(t, 1, n, 0, &e);
+        CHECK(e.status == GAIT_STATUS_TRACKING);
+        float const sd = e.sd.pelvis[0];
+        for (int n = 20; n < 60; n++) {
+            toy_tracker_step(t, n, shots, &e);
+            lost_at = !lost_at && e.status == GAIT_STATUS_LOST ? n : lost_at;
+            CHECK(!lost_at || e.status == GAIT_STATUS_LOST);
+        }
+        CHECK(lost_at >= 28 && lost_at <= 34);
+        CHECK(plate || e.sd.pelvis[0] > 2.0f * sd); /* with a plate the absence says where nobody is */
+        toy_tracker_free(t);
+    }
+}
+
+/* No picture at all: prediction, flagged, lost after the same time; pictures again: found again. */
+static void test_no_image(void)
+{
+    gait_tracker_config const cfg = toy_config(2);
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    gait_estimate e;
+    error have = {0};
+    for (int n = 0; n < 20; n++)
+        film_step(t, 2, n, 0, &e);
+    float const sd = e.sd.pelvis[0];
+    for (int n = 20; n < 36; n++) {
+        film_step(t, 2, n, 3, &e);
+        check_sane(t, &e, &cfg, n);
+        CHECK((e.flags & GAIT_EST_NO_IMAGE) && e.log_evidence == 0.0);
+        CHECK((e.status == GAIT_STATUS_LOST) == (n >= 29)); /* 0.33 s after frame 19 */
+    }
+    CHECK(e.sd.pelvis[0] > 1.5f * sd && e.sd.phase > 0.0f);
+    look(&e, 35, &have);
+    CHECK(have.across < 0.15 && have.phase < 0.04); /* half a second on its own */
+    for (int n = 36; n < 46; n++)
+        film_step(t, 2, n, 0, &e);
+    CHECK(!(e.flags & GAIT_EST_NO_IMAGE) && e.status == GAIT_STATUS_TRACKING);
+    have = (error){0};
+    look(&e, 45, &have);
+    CHECK(have.across < 0.03 && have.phase < 0.015);
+    toy_tracker_free(t);
+}
+
+/* Phase unknown: no status of tracking before one mode holds 70 % of the weight. */
+static void test_unknown_phase(void)
+{
+    gait_tracker_config cfg = toy_config(2);
+    cfg.particles = 600;
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    gait_state const mean = toy_walk(0.0f);
+    gait_state sd = toy_doubt(1.0f);
+    gait_estimate e;
+    error have = {0};
+    sd.phase = 0.5f;
+    CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
+    for (int n = 0; n < 30; n++) {
+        film_step(t, 2, n, 0, &e);
+        CHECK((e.status == GAIT_STATUS_TRACKING) == (e.mode_mass >= 0.7f));
+        CHECK(e.status != GAIT_STATUS_AMBIGUOUS && e.status != GAIT_STATUS_LOST);
+    }
+    look(&e, 29, &have);
+    CHECK(e.status == GAIT_STATUS_TRACKING && have.phase < 0.02); /* legs and arms tell left from right here */
+    toy_tracker_free(t);
+}
+
+/* Resampling happens where the weights of the frame before were uneven, and is told. */
+static void test_resampling(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    int told[3] = {0};
+    cfg.term_weight[1] = cfg.term_weight[2] = cfg.term_weight[3] = 2.0f;
+    for (int k = 0; k < 3; k++) {
+        cfg.resample_ess = 0.5f * (float)k;
+        gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+        float before = (float)cfg.particles;
+        for (int n = 0; n < 20; n++) {
+            gait_estimate e;
+            film_step(t, 1, n, 0, &e);
+            bool const due = n > 0 && (k == 2 || before < cfg.resample_ess * (float)cfg.particles);
+            CHECK(((e.flags & GAIT_EST_RESAMPLED) != 0) == due);
+            told[k] += due;
+            before = e.ess;
+        }
+        toy_tracker_free(t);
+    }
+    CHECK(told[0] == 0 && told[1] > 3 && told[1] < 19 && told[2] == 19);
+}
+
+int main(void)
+{
+    film_make(SCENE_CAMERAS, FRAMES);
+    test_follow();
+    test_two_cameras();
+    test_slow_frames();
+    test_no_plate();
+    test_paper();
+    test_colour();
+    test_first_frame();
+    test_refusals();
+    test_occluded();
+    test_no_image();
+    test_unknown_phase();
+    test_resampling();
+    return CHECK_DONE();
+}
