@@ -1,4 +1,6 @@
 /* The tracker on the synthetic walker: it follows, it says when it does not, and it refuses what makes no sense. */
+#include "tracker.h"
+
 #include "toy_film.h"
 
 #include "check.h"
@@ -136,6 +138,10 @@ static void test_paper(void)
         check_sane(t, &e, &cfg, n);
         CHECK(!(e.flags & GAIT_EST_RESAMPLED) == (n == 0));
         look(&e, n, &have);
+        int32_t descents = 0; /* independent draws: ancestors in no order */
+        for (int32_t i = 1; i < cfg.particles; i++)
+            descents += t->filter.parent[i] < t->filter.parent[i - 1];
+        CHECK(n == 0 ? descents == 0 : descents > cfg.particles / 4);
     }
     CHECK(have.across < 0.15 && have.phase < 0.1);
     toy_tracker_free(t);
@@ -358,6 +364,59 @@ static void test_unknown_phase(void)
     toy_tracker_free(t);
 }
 
+/* A share of the particles half a stride away: one mode must hold 70 % to be tracked. */
+static void test_ambiguous(void)
+{
+    static const struct {
+        int32_t apart, seconds, status;
+    } cases[] = {{25, 0, GAIT_STATUS_TRACKING},
+                 {35, 0, GAIT_STATUS_INIT},
+                 {35, 2, GAIT_STATUS_AMBIGUOUS},
+                 {25, 2, GAIT_STATUS_TRACKING}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        gait_tracker_config cfg = toy_config(1);
+        cfg.particles = 100;
+        cfg.terms = GAIT_TERM_TEXTURE; /* nothing to compare with in the first frame: all weights equal */
+        gait_tracker *const t = film_tracker(&cfg, 10, 0.1f);
+        float *const phase = field(&t->gen[t->core->current].people, F_PHASE);
+        for (int32_t i = 0; i < cases[k].apart; i++)
+            phase[99 - i] = m_wrap1(phase[99 - i] + 0.5f);
+        t->core->start_utime -= 1000000 * cases[k].seconds;
+        gait_estimate e;
+        film_step(t, 1, 10, 0, &e);
+        CHECK(e.status == cases[k].status);
+        CHECK_NEAR(e.mode_mass, 1.0 - 0.01 * cases[k].apart, 1e-5);
+        toy_tracker_free(t);
+    }
+}
+
+/* While it tracks, the tracker learns what the limbs look like in every camera that sees them. */
+static void test_appearance(void)
+{
+    gait_tracker_config const cfg = toy_config(2);
+    gait_tracker *const t = film_tracker(&cfg, 0, 0.5f);
+    int32_t known[2][2] = {{0}};
+    for (int n = 0; n < 20; n++) {
+        gait_estimate e;
+        film_step(t, 2, n, n < 10 ? 2u : 0u, &e);
+        for (int c = 0; c < 2 && (n == 9 || n == 19); c++)
+            for (int i = 0; i < TOY_LIMBS * LIKE_SAMPLES; i++)
+                known[n / 10][c] += t->template[c][i] != TEMPLATE_EMPTY;
+    }
+    CHECK(known[0][0] > 100 && known[0][1] == 0);
+    CHECK(known[1][0] >= known[0][0] && known[1][1] > 100);
+    for (int c = 0; c < 2; c++) { /* each its own */
+        int32_t near = 0, both = 0;
+        for (int i = 0; i < TOY_LIMBS * LIKE_SAMPLES; i++) {
+            int32_t const now = t->seen[c * TOY_LIMBS * LIKE_SAMPLES + i], mean = t->template[c][i] / TEMPLATE_ONE;
+            both += now != TEXTURE_HIDDEN;
+            near += now != TEXTURE_HIDDEN && abs(now - mean) < 25;
+        }
+        CHECK(both > 80 && near > both * 3 / 4);
+    }
+    toy_tracker_free(t);
+}
+
 /* Resampling happens where the weights of the frame before were uneven, and is told. */
 static void test_resampling(void)
 {
@@ -395,6 +454,8 @@ int main(void)
     test_occluded();
     test_no_image();
     test_unknown_phase();
+    test_ambiguous();
+    test_appearance();
     test_resampling();
     return CHECK_DONE();
 }
