@@ -1,0 +1,236 @@
+/* Configurations and starts that make no sense are refused, each with an error that names what is wrong. */
+#include "toy_tracker.h"
+
+#include "check.h"
+
+static void refuse(const gait_tracker_config *cfg, gait_status want, int32_t index, const char *word)
+{
+    size_t bytes = 5;
+    gait_error err = {.index = -7};
+    gait_tracker *t = NULL;
+    static _Alignas(GAIT_ALIGN) unsigned char memory[64];
+    CHECK(gait_tracker_bytes(toy_model(), cfg, &bytes, &err) == want);
+    CHECK(bytes == 5 && err.status == want && (index == -2 || err.index == index));
+    if (!strstr(err.text, word))
+        fprintf(stderr, "\"%s\" does not name \"%s\"\n", err.text, word);
+    CHECK(strstr(err.text, word) != NULL);
+    CHECK(gait_tracker_init(memory, sizeof memory, toy_model(), cfg, &t, NULL) == want && !t);
+}
+
+static void test_integers(void)
+{
+    static const struct {
+        size_t offset;
+        int32_t value;
+        gait_status want;
+        const char *word;
+    } bad[] = {
+        {offsetof(gait_tracker_config, struct_size), 0, GAIT_ERR_STRUCT, "gait_tracker_default"},
+        {offsetof(gait_tracker_config, struct_size), (int32_t)sizeof(gait_tracker_config) + 8, GAIT_ERR_STRUCT,
+         "gait_tracker_default"},
+        {offsetof(gait_tracker_config, mode), 2, GAIT_ERR_ARG, "mode"},
+        {offsetof(gait_tracker_config, mode), -1, GAIT_ERR_ARG, "mode"},
+        {offsetof(gait_tracker_config, particles), 15, GAIT_ERR_LIMIT, "particles"},
+        {offsetof(gait_tracker_config, particles), (1 << 20) + 1, GAIT_ERR_LIMIT, "particles"},
+        {offsetof(gait_tracker_config, particles), INT32_MIN, GAIT_ERR_LIMIT, "particles"},
+        {offsetof(gait_tracker_config, components), -2, GAIT_ERR_LIMIT, "components"},
+        {offsetof(gait_tracker_config, components), TOY_COMPONENTS + 1, GAIT_ERR_LIMIT, "components"},
+        {offsetof(gait_tracker_config, tasks), 0, GAIT_ERR_LIMIT, "tasks"},
+        {offsetof(gait_tracker_config, tasks), 257, GAIT_ERR_LIMIT, "tasks"},
+        {offsetof(gait_tracker_config, cameras), 0, GAIT_ERR_LIMIT, "cameras"},
+        {offsetof(gait_tracker_config, cameras), GAIT_MAX_CAMERAS + 1, GAIT_ERR_LIMIT, "cameras"},
+        {offsetof(gait_tracker_config, terms), 0, GAIT_ERR_ARG, "terms"},
+        {offsetof(gait_tracker_config, terms), 0x11, GAIT_ERR_ARG, "terms"},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        gait_tracker_config cfg = toy_config(2);
+        memcpy((char *)&cfg + bad[k].offset, &bad[k].value, sizeof bad[k].value);
+        refuse(&cfg, bad[k].want, -1, bad[k].word);
+    }
+}
+
+/* Every float of the configuration: not a number, infinite, below and above its range; named in the message. */
+static void test_floats(void)
+{
+#define FLOAT(member, low, high) {offsetof(gait_tracker_config, member), #member, low, high}
+    static const struct {
+        size_t offset;
+        const char *name;
+        float low, high;
+    } number[] = {
+        FLOAT(term_weight[0], -1e-3f, 2e6f), FLOAT(term_weight[1], -1e-3f, 2e6f),
+        FLOAT(term_weight[2], -1e-3f, 2e6f), FLOAT(term_weight[3], -1e-3f, 2e6f),
+        FLOAT(missed_weight, -0.01f, 1.01f), FLOAT(girth, 0.49f, 2.01f),
+        FLOAT(resample_ess, -0.01f, 1.01f),  FLOAT(max_dt, 0.0f, 11.0f),
+        FLOAT(phase_noise, -1e-3f, 1e9f),    FLOAT(rate_noise, -1e-3f, 1e9f),
+        FLOAT(rate_noise_start, -1e-3f, 1e9f), FLOAT(settle_time, -1e-3f, 1e9f),
+        FLOAT(rate_time, -1e-3f, 1e9f),      FLOAT(forward_noise, -1e-3f, 1e9f),
+        FLOAT(lateral_noise, -1e-3f, 1e9f),  FLOAT(vertical_noise, -1e-3f, 1e9f),
+        FLOAT(heading_noise, -1e-3f, 1e9f),  FLOAT(tilt_noise, -1e-3f, 1e9f),
+        FLOAT(tilt_time, -1e-3f, 1e9f),      FLOAT(coef_noise, -1e-3f, 1e9f),
+        FLOAT(coef_time, -1e-3f, 1e9f),      FLOAT(stature_noise, -1e-3f, 1e9f),
+        FLOAT(offset_noise, -1e-3f, 1e9f),   FLOAT(offset_sd, -1e-3f, 1e9f),
+    };
+#undef FLOAT
+    size_t floats = 0; /* none is forgotten: the config has as many floats as stand here */
+    uint32_t count = 0;
+    const gait_abi_field *const f = gait_abi_fields(&count);
+    for (uint32_t i = 0; i < count; i++)
+        if (f[i].field && strcmp(f[i].type, "gait_tracker_config") == 0 &&
+            f[i].offset >= offsetof(gait_tracker_config, term_weight) &&
+            f[i].offset < offsetof(gait_tracker_config, camera) && strcmp(f[i].field, "offset_angles") != 0)
+            floats += f[i].size / sizeof(float);
+    CHECK(floats == sizeof number / sizeof *number);
+    for (size_t k = 0; k < sizeof number / sizeof *number; k++) {
+        const float value[] = {number[k].low, number[k].high, NAN, INFINITY, -INFINITY};
+        for (size_t v = 0; v < sizeof value / sizeof *value; v++) {
+            gait_tracker_config cfg = toy_config(1);
+            memcpy((char *)&cfg + number[k].offset, &value[v], sizeof value[v]);
+            refuse(&cfg, GAIT_ERR_ARG, -2, number[k].name);
+        }
+    }
+}
+
+static void test_cameras(void)
+{
+    for (int k = 0; k < 2; k++) {
+        gait_tracker_config cfg = toy_config(2);
+        cfg.camera[k].width = 0;
+        refuse(&cfg, GAIT_ERR_ARG, k, k ? "camera 1" : "camera 0");
+        cfg = toy_config(2);
+        cfg.camera[k].R[4] = 0.5f;
+        refuse(&cfg, GAIT_ERR_ARG, k, k ? "camera 1" : "camera 0");
+        cfg = toy_config(2);
+        cfg.camera[k].fy = NAN;
+        refuse(&cfg, GAIT_ERR_ARG, k, k ? "camera 1" : "camera 0");
+        cfg = toy_config(2);
+        cfg.camera[k].height = 1 << 20;
+        refuse(&cfg, GAIT_ERR_LIMIT, k, k ? "camera 1" : "camera 0");
+    }
+    gait_tracker_config cfg = toy_config(1);
+    size_t bytes;
+    memset(&cfg.camera[1], 0xff, sizeof cfg.camera[1]); /* not in use */
+    CHECK(gait_tracker_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
+}
+
+/* The defaults of both modes are accepted as they are. */
+static void test_defaults(void)
+{
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
+        gait_tracker_config cfg;
+        size_t bytes;
+        memset(&cfg, 0xff, sizeof cfg);
+        gait_tracker_default(&cfg, mode);
+        CHECK(cfg.struct_size == sizeof cfg && cfg.mode == mode && cfg.seed == 1 && cfg.exec.run == NULL);
+        CHECK(cfg.components == -1 && cfg.cameras == 1);
+        CHECK((cfg.terms == GAIT_TERM_TEXTURE) == (mode == GAIT_MODE_PAPER));
+        cfg.camera[0] = toy_camera(0);
+        CHECK(gait_tracker_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
+    }
+    gait_tracker_default(NULL, GAIT_MODE_DEFAULT);
+}
+
+static void test_start(void)
+{
+    gait_tracker_config const cfg = toy_config(1);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_state const good = toy_walk(0.2f), doubt = toy_doubt(1.0f);
+    uint64_t const digest = gait_tracker_digest(t);
+    static gait_state particle[4];
+    static float weight[4];
+    gait_error err = {0};
+    CHECK(gait_tracker_particles(t, particle, weight, 4) == GAIT_ERR_STATE);
+    CHECK(gait_tracker_start(NULL, &good, &doubt, 0, &err) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_start(t, NULL, &doubt, 0, &err) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_start(t, &good, NULL, 0, &err) == GAIT_ERR_ARG);
+    for (size_t k = 0; k < sizeof good / sizeof(float); k++)
+        for (int which = 0; which < 3; which++) {
+            gait_state mean = good, sd = doubt;
+            float const bad = which == 2 ? -0.1f : k % 2 ? NAN : INFINITY;
+            memcpy((char *)(which ? &sd : &mean) + k * sizeof bad, &bad, sizeof bad);
+            CHECK(gait_tracker_start(t, &mean, &sd, 0, &err) == GAIT_ERR_ARG && err.text[0]);
+        }
+    static const float stature[] = {0.0f, -1.0f, 3.5f};
+    for (size_t k = 0; k < 3; k++) {
+        gait_state mean = good;
+        mean.stature = stature[k];
+        CHECK(gait_tracker_start(t, &mean, &doubt, 0, &err) == GAIT_ERR_ARG && strstr(err.text, "stature"));
+    }
+    gait_state still = good;
+    still.stride_hz = 0.0f;
+    CHECK(gait_tracker_start(t, &still, &doubt, 0, &err) == GAIT_ERR_ARG && strstr(err.text, "stride_hz"));
+    CHECK(gait_tracker_digest(t) == digest);
+    CHECK(gait_tracker_start(t, &good, &doubt, 0, NULL) == GAIT_OK && gait_tracker_digest(t) != digest);
+    toy_tracker_free(t);
+}
+
+/* The broad prior is a start that works: no phase, no heading, the population's rate and stature. */
+static void test_prior(void)
+{
+    gait_state mean, sd;
+    gait_tracker_config const cfg = toy_config(1);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    CHECK(gait_tracker_prior(toy_model(), &mean, &sd) == GAIT_OK);
+    CHECK(mean.stride_hz == 0.92f && sd.stride_hz == 0.07f && mean.stature == 1.72f && sd.stature == 0.09f);
+    CHECK(sd.phase >= 0.5f && sd.heading >= 3.1415f && sd.coef[0] == 1.0f && sd.coef[1] == 1.0f && sd.coef[2] == 0.0f);
+    CHECK_NEAR(mean.pelvis[2], 0.53 * 1.72, 0.05);
+    CHECK(gait_tracker_start(t, &mean, &sd, 0, NULL) == GAIT_OK);
+    CHECK(gait_tracker_prior(NULL, &mean, &sd) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_prior(toy_model(), NULL, &sd) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_prior(toy_model(), &mean, NULL) == GAIT_ERR_ARG);
+    toy_tracker_free(t);
+}
+
+static void test_background(void)
+{
+    static uint8_t grey[SCENE_PIXELS];
+    gait_tracker_config const cfg = toy_config(2);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_image const good = toy_image(grey);
+    for (int k = 0; k < 4; k++) {
+        gait_image bad = good;
+        int32_t *const number[] = {&bad.width, &bad.height, &bad.stride, &bad.format};
+        *number[k] -= 1;
+        CHECK(gait_tracker_set_background(t, 0, &bad) == GAIT_ERR_ARG);
+    }
+    CHECK(gait_tracker_set_background(NULL, 0, &good) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_background(t, -1, &good) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_background(t, 2, &good) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_background(t, 1, &good) == GAIT_OK);
+    CHECK(gait_tracker_set_background(t, 1, NULL) == GAIT_OK);
+    toy_tracker_free(t);
+}
+
+/* No more particles than there is room for; the count is always told. */
+static void test_particles(void)
+{
+    gait_tracker_config const cfg = toy_config(1);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_state s[3];
+    float weight[3] = {-1.0f, -1.0f, -1.0f};
+    toy_tracker_start(t, 0, 1.0f);
+    CHECK(gait_tracker_particles(t, NULL, NULL, 0) == 300);
+    CHECK(gait_tracker_particles(t, s, weight, 2) == 300);
+    CHECK(weight[0] == 1.0f / 300.0f && weight[1] == weight[0] && weight[2] == -1.0f);
+    CHECK_NEAR(s[0].pelvis[0], -1.3, 0.3);
+    CHECK(s[0].pelvis[0] != s[1].pelvis[0]);
+    CHECK(gait_tracker_particles(NULL, s, weight, 2) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_particles(t, NULL, weight, 2) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_particles(t, s, NULL, 2) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_particles(t, s, weight, -1) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_digest(NULL) == 0);
+    toy_tracker_free(t);
+}
+
+int main(void)
+{
+    test_integers();
+    test_floats();
+    test_cameras();
+    test_defaults();
+    test_start();
+    test_prior();
+    test_background();
+    test_particles();
+    return CHECK_DONE();
+}

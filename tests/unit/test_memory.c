@@ -1,0 +1,139 @@
+/* The tracker's memory: exactly what it asks for, aligned, and nothing beside it. */
+#include "toy_film.h"
+
+#include "check.h"
+
+enum { CANARY = 256, SHOTS = 6 };
+
+static int intact(const unsigned char *p, int value)
+{
+    int same = 1;
+    for (int i = 0; i < CANARY; i++)
+        same &= p[i] == value;
+    return same;
+}
+
+static size_t bytes_of(const gait_tracker_config *cfg)
+{
+    size_t bytes = 0;
+    CHECK(gait_tracker_bytes(toy_model(), cfg, &bytes, NULL) == GAIT_OK);
+    return bytes;
+}
+
+/* Too small by one, or misaligned: refused, with the need told and nothing touched. */
+static void test_refused(void)
+{
+    gait_tracker_config const cfg = toy_config(1);
+    size_t const need = bytes_of(&cfg);
+    unsigned char *memory;
+    gait_tracker *t = NULL;
+    gait_error err = {0};
+    char told[32];
+    if (posix_memalign((void **)&memory, GAIT_ALIGN, need + GAIT_ALIGN))
+        abort();
+    memset(memory, 0xc3, need + GAIT_ALIGN);
+    CHECK(gait_tracker_init(memory, need - 1, toy_model(), &cfg, &t, &err) == GAIT_ERR_MEMORY && !t);
+    snprintf(told, sizeof told, "%zu", need);
+    CHECK(strstr(err.text, told) && err.status == GAIT_ERR_MEMORY);
+    CHECK(gait_tracker_init(memory, 0, toy_model(), &cfg, &t, NULL) == GAIT_ERR_MEMORY && !t);
+    for (size_t off = 1; off < GAIT_ALIGN; off += 21)
+        CHECK(gait_tracker_init(memory + off, need, toy_model(), &cfg, &t, NULL) == GAIT_ERR_MEMORY && !t);
+    CHECK(gait_tracker_init(NULL, need, toy_model(), &cfg, &t, NULL) == GAIT_ERR_ARG && !t);
+    CHECK(gait_tracker_init(memory, need, toy_model(), &cfg, NULL, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_init(memory, need, NULL, &cfg, &t, NULL) == GAIT_ERR_ARG && !t);
+    CHECK(intact(memory, 0xc3) && intact(memory + need - CANARY, 0xc3));
+    CHECK(gait_tracker_init(memory, need, toy_model(), &cfg, &t, &err) == GAIT_OK && t);
+    free(memory);
+}
+
+/* Three hundred steps through every path write nothing outside; the memory's old contents do not matter. */
+static void test_canaries(void)
+{
+    uint64_t digest[2];
+    for (int fill = 0; fill < 2; fill++) {
+        gait_tracker_config cfg = toy_config(2);
+        cfg.particles = 33; /* not a multiple of a block */
+        cfg.tasks = 5;
+        cfg.offset_angles = GAIT_OFFSETS_TRUNK;
+        size_t const need = bytes_of(&cfg);
+        unsigned char *memory;
+        gait_tracker *t = NULL;
+        if (posix_memalign((void **)&memory, GAIT_ALIGN, need + 2 * CANARY))
+            abort();
+        memset(memory, fill ? 0xff : 0x5a, need + 2 * CANARY);
+        CHECK(gait_tracker_init(memory + CANARY, need, toy_model(), &cfg, &t, NULL) == GAIT_OK);
+        for (int k = 0; k < 2; k++) {
+            gait_image const plate = toy_image(film_wall[k]);
+            CHECK(gait_tracker_set_background(t, k, &plate) == GAIT_OK);
+        }
+        toy_tracker_start(t, 0, 1.0f);
+        for (int n = 0; n < 300; n++) {
+            gait_frame f = toy_frame(n);
+            gait_estimate e;
+            for (int k = 0; k < 2; k++) /* back and forth; now and then a camera or both miss */
+                if ((n / 5 + k) % 4 && n % 11)
+                    f.image[k] = toy_image(film[k][n % (2 * SHOTS) < SHOTS ? n % SHOTS : SHOTS - 1 - n % SHOTS]);
+            CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
+        }
+        CHECK(intact(memory, fill ? 0xff : 0x5a) && intact(memory + CANARY + need, fill ? 0xff : 0x5a));
+        digest[fill] = gait_tracker_digest(t);
+        free(memory);
+    }
+    CHECK(digest[0] == digest[1]);
+}
+
+/* The need grows with what is asked for and not otherwise; a start begins anew in the same memory. */
+static void test_sizes(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    size_t const base = bytes_of(&cfg);
+    CHECK(base % GAIT_ALIGN == 0 && base < 8u << 20);
+    cfg.particles = 600;
+    size_t const more = bytes_of(&cfg);
+    CHECK(more > base && more < base + 300 * 2048);
+    cfg.particles = 300;
+    cfg.cameras = 2;
+    CHECK(bytes_of(&cfg) > base);
+    cfg.cameras = 1;
+    cfg.tasks = 5;
+    CHECK(bytes_of(&cfg) > base);
+    cfg.tasks = 4;
+    cfg.terms = GAIT_TERM_EDGES;
+    CHECK(bytes_of(&cfg) < base);
+    cfg.terms = 0xf;
+    cfg.seed = 99;
+    CHECK(bytes_of(&cfg) == base);
+    cfg.components = -1; /* all of the model's */
+    CHECK(bytes_of(&cfg) == base);
+    size_t bytes = 7;
+    CHECK(gait_tracker_bytes(toy_model(), &cfg, NULL, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_bytes(NULL, &cfg, &bytes, NULL) == GAIT_ERR_ARG && bytes == 7);
+    CHECK(gait_tracker_bytes(toy_model(), NULL, &bytes, NULL) == GAIT_ERR_ARG && bytes == 7);
+}
+
+static void test_restart(void)
+{
+    gait_tracker_config const cfg = toy_config(1);
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    uint64_t digest[2];
+    for (int round = 0; round < 2; round++) {
+        toy_tracker_start(t, 0, 1.0f);
+        for (int n = 0; n < SHOTS; n++) {
+            gait_estimate e;
+            film_step(t, 1, n, 0, &e);
+        }
+        digest[round] = gait_tracker_digest(t);
+    }
+    CHECK(digest[0] == digest[1]);
+    toy_tracker_free(t);
+}
+
+int main(void)
+{
+    film_make(SCENE_CAMERAS, SHOTS);
+    test_refused();
+    test_canaries();
+    test_sizes();
+    test_restart();
+    return CHECK_DONE();
+}
