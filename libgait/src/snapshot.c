@@ -39,7 +39,7 @@ void snapshot_save(const gait_tracker *t, void *mem)
                          .bytes = snapshot_bytes(t),
                          .model = t->model->digest,
                          .config = config_digest(t),
-                         .body = snapshot_digest(t)};
+                         .body = hash_state(t->core, state_bytes(t))};
     memcpy(h.magic, MAGIC, sizeof MAGIC);
     memcpy(mem, &h, sizeof h);
     memcpy((unsigned char *)mem + sizeof h, t->core, state_bytes(t));
@@ -134,7 +134,15 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     return GAIT_OK;
 }
 
+/* Times count from the start, so that the same walk at another time of day has the same digest. */
 uint64_t snapshot_digest(const gait_tracker *t)
 {
-    return hash_state(t->core, state_bytes(t));
+    unsigned char *const arrays = (unsigned char *)t->gen[0].people.value; /* the core comes first */
+    tracker_core core;
+    memcpy(&core, t->core, sizeof core); /* with its padding, which is zero */
+    core.utime -= core.start_utime;
+    core.support_utime -= core.start_utime;
+    core.start_utime = 0;
+    uint64_t const small = hash_fnv1a(HASH_INIT, &core, sizeof core);
+    return small ^ hash_state(arrays, (size_t)(t->state_end - arrays));
 }

@@ -188,6 +188,17 @@ def test_seeds_differ():
     assert one.digest() != two.digest()
 
 
+def test_another_time_of_day_gives_the_same_digest():
+    digests = []
+    for epoch in (0, 1_760_000_000_000_000, -5):
+        tracker = Tracker(MODEL, VIEW, SMALL, background=PLATE)
+        tracker.start(TRUE[0], spread(), epoch)
+        for i in range(3):
+            tracker.step(FRAMES[i], epoch + utime(i))
+        digests.append(tracker.digest())
+    assert len(set(digests)) == 1
+
+
 def test_particles_carry_weights():
     tracker = started()
     estimate = run(tracker, 0, 3)[-1]
