@@ -1,12 +1,12 @@
 #!/bin/sh
-# The digests that test_tracker prints are the same at every optimisation level and with every compiler found.
+# The digest that test_determinism prints is the same at every optimisation level and with every compiler found.
 cd "$(dirname "$0")/../.." || exit 1
 release=$(sed -n 's/^OPT_release *:= *//p' Makefile)
 want='' failed=0 runs=0
 compare() { # CC CXX CONFIG OPT
-    test=build/$3/unit/test_tracker
+    test=build/$3/unit/test_determinism
     ${MAKE:-make} -s config="$3" OPT="$4" CC="$1" CXX="$2" "$test" >/dev/null || exit 1
-    have=$("$test" | sed -n 's/^digest //p')
+    have=$("$test" digest | sed -n 's/^digest //p')
     [ -n "$have" ] || { echo "golden: $test printed no digest" >&2; exit 1; }
     echo "golden: $1 $4:" $have
     want=${want:-$have} runs=$((runs + 1))
