@@ -12,7 +12,7 @@ from gait.camera import Camera
 from gait.errors import UserError
 from gait.initial import Start
 from gait.lcm.ahead import ahead
-from gait.lcm.link import is_log, open_lcm
+from gait.lcm.link import handle, is_log, open_lcm
 from gait.lcm.messages import camera_message, command_message, decode, image_message
 from gait.lcm.pacing import Pacer
 from gait.lcm.source import DeviceSource, FileSource
@@ -158,7 +158,8 @@ class Publisher:
         """Wait for a status that is `wanted`."""
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:
-            if self._lcm.handle_timeout(max(1, round(left * 1000))) > 0 and wanted(self._status):
+            handle(self._lcm, left, self._log)
+            if self._status is not None and wanted(self._status):
                 return True
         return False
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import socket
 import sys
 from collections.abc import Iterator
@@ -47,6 +48,22 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
                 f"{wanted}: cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
             ) from None
         raise UserError(f"{wanted}: cannot open LCM; {ROUTE_REMEDY}") from None
+
+
+def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
+    """Take in a message, waiting at most so long; False at the end of a `log`.
+
+    A live link waits in `select`, which a signal interrupts without harm; liblcm's own wait fails then.
+    """
+    if not log:
+        if select.select([link.fileno()], [], [], seconds)[0]:
+            link.handle()
+        return True
+    try:
+        link.handle_timeout(max(1, round(1000 * seconds)))
+    except OSError:
+        return False
+    return True
 
 
 def is_log(url: str) -> bool:

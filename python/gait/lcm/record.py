@@ -12,14 +12,14 @@ import numpy as np
 
 from gait.errors import UserError
 from gait.files import replacing
-from gait.lcm.link import is_log, open_lcm
+from gait.lcm.link import handle, is_log, open_lcm
 from gait.lcm.messages import decode, estimate_of, now
 from gait.lcm.types import gaitmsg
 from gait.trackfile import TrackWriter
 from gait.video import Frame
 
 _NO_IMAGE = np.empty((0, 0), np.uint8)
-_TURN_MS = 100  # longest wait before looking whether to stop
+_TURN = 0.1  # seconds, longest wait before looking whether to stop
 _QUEUE = 1000  # estimates that may wait for the disk
 
 
@@ -105,7 +105,7 @@ class Recorder:
                 self._log = self._stack.enter_context(
                     closing(lcm.EventLog(str(temporary), "w", overwrite=True))
                 )
-            while not self.stop and self._handle():
+            while not self.stop and handle(self._lcm, _TURN, not self._live):
                 count, clock = len(self.figures.utime), time.monotonic()
                 quiet = idle is not None and clock - self._last > idle
                 late = patience is not None and clock - begun > patience
@@ -120,16 +120,6 @@ class Recorder:
     def summary(self) -> dict[str, Any]:
         """Figures of the recording."""
         return self.figures.summary(self._live)
-
-    def _handle(self) -> bool:
-        """Wait for a message; False at the end of a log."""
-        try:
-            self._lcm.handle_timeout(_TURN_MS)
-        except OSError:
-            if self._live:
-                raise
-            return False
-        return True
 
     def _on_estimate(self, channel: str, data: bytes) -> None:
         arrived = now()

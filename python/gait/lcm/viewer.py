@@ -13,7 +13,7 @@ import cv2
 
 from gait.camera import Camera
 from gait.errors import UserError
-from gait.lcm.link import is_log, open_lcm
+from gait.lcm.link import handle, is_log, open_lcm
 from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.lcm.types import gaitmsg
 from gait.model import Model
@@ -60,13 +60,7 @@ class Viewer:
 
     def handle(self, seconds: float) -> bool:
         """Take in a message, waiting at most so long; False at the end of a log."""
-        try:
-            self._lcm.handle_timeout(max(1, round(1000 * seconds)))
-        except OSError:
-            if not self._log:
-                raise
-            return False
-        return True
+        return handle(self._lcm, seconds, self._log)
 
     def _on_image(self, channel: str, data: bytes) -> None:
         message = decode(gaitmsg.image_t, data, channel)
