@@ -10,9 +10,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from importlib import import_module
+from types import FrameType
 
 from gait.errors import GaitError, UserError
 
@@ -37,7 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     args = _parser(words).parse_args(words)
     try:
-        return int(args.run(args))
+        with _terminated_like_interrupted():
+            return int(args.run(args))
     except (UserError, GaitError) as exc:
         return _failed(args.command, str(exc))
     except BrokenPipeError:  # the reader of our output has left, which is its right
@@ -48,6 +52,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _failed(args.command, f"{exc.filename or 'file'}: {exc.strerror or exc}")
     except KeyboardInterrupt:
         return _failed(args.command, "interrupted")
+
+
+@contextlib.contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """Let SIGTERM end a command as Ctrl-C does, so that no temporary file stays behind."""
+    if threading.current_thread() is not threading.main_thread():  # where handlers cannot be set
+        yield
+        return
+    previous = signal.signal(signal.SIGTERM, _interrupted)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+def _interrupted(number: int, frame: FrameType | None) -> None:
+    """Handle a signal as Python handles Ctrl-C."""
+    raise KeyboardInterrupt
 
 
 def _failed(command: str, text: str) -> int:

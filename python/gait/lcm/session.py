@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from types import FrameType, TracebackType
+from types import TracebackType
 
 from gait.errors import UserError
 
@@ -70,7 +70,7 @@ class Child:
 
 
 class Session:
-    """Start processes that end with this one: at the end of the block, by Ctrl-C or SIGTERM, even by SIGKILL.
+    """Start processes that end with this one: at the end of the block, however it ends, even by SIGKILL.
 
     Ends nothing that it did not start.
     """
@@ -79,20 +79,16 @@ class Session:
         self._children: list[Child] = []
 
     def __enter__(self) -> Session:
-        self._previous = signal.signal(signal.SIGTERM, _interrupted)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
-            for child in self._children:
-                child.interrupt()
-            deadline = time.monotonic() + _GRACE
-            for child in self._children:
-                _end(child.process, deadline)
-        finally:
-            signal.signal(signal.SIGTERM, self._previous)
+        for child in self._children:
+            child.interrupt()
+        deadline = time.monotonic() + _GRACE
+        for child in self._children:
+            _end(child.process, deadline)
 
     def start(self, name: str, command: Sequence[str], *, pipe_errors: bool = False) -> Child:
         """Start a process whose stdout is kept, and whose stderr is kept too if `pipe_errors`.
@@ -121,10 +117,6 @@ class Session:
                 if not child.running:
                     raise UserError(f"{child.name}: ended too early; see its words above")
             time.sleep(_TURN)
-
-
-def _interrupted(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 def _end(process: subprocess.Popen[str], deadline: float) -> None:

@@ -1,0 +1,47 @@
+"""Commands that are ended from outside leave nothing behind."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from drawn_walker import camera, write
+
+PATIENCE = 30.0
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    """Video of noise, long enough that nobody tracks it to its end; its camera and a start."""
+    folder = tmp_path_factory.mktemp("clip")
+    rng = np.random.default_rng(0)
+    pictures = [rng.integers(0, 255, (240, 320, 3), np.uint8) for _ in range(20)] * 15
+    write(folder / "video.mp4", pictures)
+    (folder / "camera.json").write_text(json.dumps(camera().to_dict()))
+    (folder / "init.json").write_text(json.dumps({"frame": 0, "pelvis": [0, 0]}))
+    return folder
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_track_leaves_no_temporary_files(clip, tmp_path, number):
+    words = ["track", clip / "video.mp4", "--camera", clip / "camera.json", "--init", clip / "init.json"]
+    words += ["--background", "none", "--particles", "2000"]
+    words += ["-o", tmp_path / "t.csv", "--overlay", tmp_path / "o.mp4"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gait", *map(str, words)], stderr=subprocess.PIPE, text=True
+    )
+    try:
+        deadline = time.monotonic() + PATIENCE
+        while len(list(tmp_path.iterdir())) < 2:  # both outputs have been begun
+            assert process.poll() is None and time.monotonic() < deadline
+            time.sleep(0.01)
+        process.send_signal(number)
+        _, said = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+        process.communicate()
+    assert (process.returncode, said) == (1, "gait track: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
