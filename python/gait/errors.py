@@ -7,6 +7,10 @@ class UserError(Exception):
     """Bad input: one line naming the file, the field and the remedy.  Commands print it and exit 1."""
 
 
+class UsageError(UserError):
+    """Options that do not go together.  Commands print it and exit 2."""
+
+
 class LibraryError(UserError):
     """libgait could not be loaded, or the file found is of another version or layout than this package."""
 

@@ -123,19 +123,19 @@ FAULTS = [
     (["--background", "none", "--init", "auto"], "--init auto: needs a background"),
     (["-m", "{}/camera.json"], "camera.json: .*"),
     (["-m", "{}/none.gait"], "none.gait: no such model file"),
-    (["--particles", "3"], "particles"),
-    (["--height", "170"], "--height: 170 m is not a stature"),
     (["-o", "{}/none/out.csv"], "out.csv: folder .* does not exist"),
     (["--overlay", "{}/none/o.mp4"], "o.mp4: folder .* does not exist"),
     (["--overlay", "{}/o.gif"], "o.gif: unknown video suffix"),
     (["--trc", "{}/none/o.trc"], "o.trc: folder .* does not exist"),
-    (["--stop", "0"], "walk.mp4: no frame from 0 up to 0; it has 20"),
+    (["--init", "{}/late.json"], "walk.mp4: no frame from 20 up to 20; it has 20"),
+    (["--init", "auto", "--start", "500"], "walk.mp4: no frame from 500 up to 20; it has 20"),
 ]
 
 
 @pytest.mark.parametrize("options, words", FAULTS, ids=[" ".join(f[0]) for f in FAULTS])
 def test_every_fault_is_one_line_and_leaves_no_output(options, words, scene, capsys):
     cv2.imwrite(str(scene / "small.png"), np.zeros((24, 32), np.uint8))
+    (scene / "late.json").write_text('{"frame": 20}')
     before = set(scene.iterdir())
     assert track(scene, *(str(o).format(scene) for o in options), out="fault.csv") == 1
     out, err = capsys.readouterr()
@@ -154,6 +154,26 @@ def test_usage_errors_exit_2(words, capsys):
     with pytest.raises(SystemExit) as caught:
         main(words)
     assert caught.value.code == 2 and "usage: gait" in capsys.readouterr().err
+
+
+RANGES = [
+    *((f"--particles {n}", f"{n}: give a whole number from 16 to 1048576") for n in ("5", "0", "-3", "1e8")),
+    *((f"--threads {n}", f"{n}: give a whole number from 1 to 64") for n in ("0", "9999")),
+    *((f"--seed {n}", f"from 0 to {2**64 - 1}") for n in ("-1", str(2**64))),
+    *((f"--height {m}", f"{m}: is not a stature; give metres from 0.5 to 2.5") for m in ("17", "nan", "x")),
+    ("--start 50 --stop 20", "--stop 20: must be greater than --start 50"),
+    ("--stop 0", "--stop 0: must be greater than --start 0"),
+]
+
+
+@pytest.mark.parametrize("options, words", RANGES, ids=[r[0] for r in RANGES])
+def test_values_out_of_range_are_usage_errors(options, words, capsys):
+    name, value = options.split(" ", 1)
+    try:
+        code = main(["track", "v.mp4", "--camera", "c.json", "-o", "o.csv", *f"{name}={value}".split(" ")])
+    except SystemExit as exc:
+        code = exc.code
+    assert code == 2 and words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 from types import FrameType
 
-from gait.errors import GaitError, UserError
+from gait.errors import GaitError, UsageError, UserError
 
 COMMANDS = {
     "learn": "learn",
@@ -42,6 +42,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with _terminated_like_interrupted():
             return int(args.run(args))
+    except UsageError as exc:
+        _failed(args.command, str(exc))
+        return 2
     except (UserError, GaitError) as exc:
         return _failed(args.command, str(exc))
     except BrokenPipeError:  # the reader of our output has left, which is its right

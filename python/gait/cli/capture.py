@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 
 from gait.camera import Camera
+from gait.cli import values
 from gait.errors import UserError
 from gait.initial import Start
 from gait.lcm.capture import Publisher, Setup
@@ -53,10 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-m", "--model", metavar="M.gait", help="whose prior fills what --init leaves open (the shipped one)"
     )
     parser.add_argument(
-        "--height", type=float, metavar="M", help="the person's stature in metres, for --init"
+        "--height", type=values.stature, metavar="M", help="the person's stature in metres, for --init"
     )
-    parser.add_argument("--start", type=int, default=0, metavar="F", help="first frame to send, from 0 (0)")
-    parser.add_argument("--stop", type=int, metavar="F", help="first frame not to send")
+    parser.add_argument(
+        "--start", type=values.whole(0), default=0, metavar="F", help="first frame to send (0)"
+    )
+    parser.add_argument("--stop", type=values.whole(0), metavar="F", help="first frame not to send")
     parser.add_argument("--rate", default="true", metavar="true|max|HZ", help="speed of sending (true)")
     parser.add_argument("--jpeg", type=int, metavar="Q", help="compress frames with this quality, 1 to 100")
     parser.add_argument("--grey", action="store_true", help="send grey frames")

@@ -24,8 +24,8 @@ import numpy as np
 from gait._abi import Mode, TrackStatus
 from gait.autostart import find_start
 from gait.camera import Camera
-from gait.cli import defaults
-from gait.errors import UserError
+from gait.cli import defaults, values
+from gait.errors import UsageError, UserError
 from gait.files import require_writable
 from gait.initial import Start
 from gait.model import Model
@@ -57,17 +57,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PNG|auto|none",
         help="empty scene: an image, the median of the clip, or none (auto)",
     )
-    parser.add_argument("--height", type=float, metavar="M", help="the person's stature in metres")
+    parser.add_argument("--height", type=values.stature, metavar="M", help="the person's stature in metres")
     usual, paper = defaults.particles(), defaults.particles(Mode.PAPER)
+    least, most = values.PARTICLES
     parser.add_argument(
-        "--particles", type=int, metavar="N", help=f"hypotheses ({usual}, paper mode {paper})"
+        "--particles",
+        type=values.whole(least, most),
+        metavar="N",
+        help=f"hypotheses ({usual}, paper mode {paper}; at least {least}, at most {most})",
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the random numbers (1)")
     parser.add_argument(
-        "--threads", type=_positive, default=1, metavar="T", help="does not change the result (1)"
+        "--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the random numbers (1)"
     )
-    parser.add_argument("--start", type=_count, metavar="F", help="first frame to use, from 0")
-    parser.add_argument("--stop", type=_count, metavar="F", help="first frame not to use")
+    parser.add_argument(
+        "--threads",
+        type=values.whole(*values.THREADS),
+        default=1,
+        metavar="T",
+        help=f"does not change the result (1; at most {values.THREADS[1]})",
+    )
+    parser.add_argument("--start", type=values.whole(0), metavar="F", help="first frame to use, from 0")
+    parser.add_argument("--stop", type=values.whole(0), metavar="F", help="first frame not to use")
     parser.add_argument(
         "--mode", choices=[m.name.lower() for m in Mode], default="default", help="set of settings"
     )
@@ -77,6 +87,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track and report."""
+    if args.stop is not None and args.stop <= (args.start or 0):
+        raise UsageError(f"--stop {args.stop}: must be greater than --start {args.start or 0}")
     for path in filter(None, (args.output, args.overlay, args.trc)):
         require_writable(path)
     video = Video(args.video)
@@ -85,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
     with progress("background", video.count, args.quiet) as update:
         plate = background(args.background, video, update)
     start = _start(args, video, camera, plate, model)
+    _require_frames(video, start.frame, args.stop)
     config = TrackerConfig.default(Mode[args.mode.upper()], **_given(args))
     tracker = Tracker(model, camera, config, background=plate, tasks=args.threads)
     results = _track(args, video, tracker, start)
@@ -93,6 +106,13 @@ def run(args: argparse.Namespace) -> int:
     summary = results.summary(args.threads)
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
+
+
+def _require_frames(video: Video, start: int, stop: int | None) -> None:
+    """Raise UserError if no frame of the video is chosen."""
+    stop = video.count if stop is None else min(stop, video.count)
+    if start >= stop:
+        raise UserError(f"{video.path}: no frame from {start} up to {stop}; it has {video.count}")
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
@@ -106,6 +126,7 @@ def _start(
     """First state by --init, --start and --height."""
     if args.init != "auto":
         return Start.read(args.init, model, frame=args.start, height=args.height)
+    _require_frames(video, args.start or 0, args.stop)
     if plate is None:
         raise UserError("--init auto: needs a background to see the person against; give --init FILE.json")
     start = find_start(video, camera, plate, model, first=args.start or 0, stop=args.stop, height=args.height)
@@ -176,7 +197,7 @@ def _track(args: argparse.Namespace, video: Video, tracker: Tracker, start: Star
                 sink(frame, estimate)
             update(done)
         if not results.times:
-            raise UserError(f"{video.path}: no frame from {start.frame} up to {stop}; it has {video.count}")
+            raise UserError(f"{video.path}: no frame from {start.frame} on can be decoded; convert it anew")
     return results
 
 
@@ -188,17 +209,3 @@ def _text(summary: dict[str, Any]) -> str:
         f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "
         f"{summary['wall_fps']:.1f} frames/s in all\ndigest {summary['digest']}"
     )
-
-
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return value
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError("must not be negative")
-    return value

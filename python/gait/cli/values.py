@@ -1,0 +1,40 @@
+"""Values of options with their ranges, as types of `argparse`: a fault is a usage error naming the range."""
+
+from __future__ import annotations
+
+from argparse import ArgumentTypeError
+from collections.abc import Callable
+
+from gait.initial import STATURE
+
+PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
+THREADS = (1, 64)
+SEED = (0, (1 << 64) - 1)
+
+
+def whole(low: int, high: int | None = None) -> Callable[[str], int]:
+    """Whole numbers in [low, high]."""
+
+    def value(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = low - 1
+        if number < low or (high is not None and number > high):
+            wanted = f"from {low} up" if high is None else f"from {low} to {high}"
+            raise ArgumentTypeError(f"{text}: give a whole number {wanted}")
+        return number
+
+    return value
+
+
+def stature(text: str) -> float:
+    """Height of a person in metres."""
+    low, high = STATURE
+    try:
+        metres = float(text)
+    except ValueError:
+        metres = float("nan")
+    if not low <= metres <= high:
+        raise ArgumentTypeError(f"{text}: is not a stature; give metres from {low} to {high}")
+    return metres
