@@ -81,14 +81,14 @@ def version_text(number: int) -> str:
     return f"{number // 10000}.{number // 100 % 100}.{number % 100}"
 
 
-def check(status: int, error: _abi.Error | None = None, about: str = "") -> int:
-    """Raise what a negative status means, naming the file it is `about`; return any other."""
+def check(status: int, error: _abi.Error | None = None) -> int:
+    """Raise what a negative status means; return any other."""
     if status >= 0:
         return status
     name = library().gait_status_name(status).decode()
     kind = _RAISES.get(_abi.Status(status), GaitError)
     text, index = (error.text.decode(errors="replace"), error.index) if error else ("", -1)
-    raise kind(status, name, ": ".join(filter(None, (about, text))), index)
+    raise kind(status, name, text, index)
 
 
 def aligned(size: int) -> NDArray[np.uint8]:

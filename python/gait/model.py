@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from gait import _abi
 from gait._lib import aligned, check, library
+from gait.blob import decode
 from gait.camera import Camera
-from gait.errors import UserError
+from gait.errors import GaitError, UserError
 from gait.state import State
 
 Array = NDArray[np.float64]
@@ -70,25 +71,33 @@ class Model:
     Raises
     ------
     UserError
-        If the file cannot be read.
+        If the file cannot be read, or is no sound model: not one, damaged, of another version.
     GaitError
-        If the library refuses the blob: not one, damaged, of another version.
+        If the library refuses a blob given as bytes.
     """
 
     def __init__(self, source: str | os.PathLike[str] | bytes | None = None) -> None:
         self._lib = library()
-        blob = source if isinstance(source, bytes) else read_blob(source)
+        if isinstance(source, bytes):
+            self._load(source)
+            return
+        try:
+            self._load(read_blob(source))
+        except GaitError as exc:
+            raise UserError(f"{source or 'walk.gait'}: {exc.text}; copy or learn it again") from exc
+
+    def _load(self, blob: bytes) -> None:
+        """Check and take in a blob."""
         self._blob = aligned(len(blob))
         self._blob[:] = np.frombuffer(blob, np.uint8)
         size, error, handle = ctypes.c_size_t(), _abi.Error(), ctypes.c_void_p()
         where = (self._blob.ctypes.data, len(blob))
-        about = "" if isinstance(source, bytes) or source is None else str(source)
-        check(self._lib.gait_model_bytes(*where, ctypes.byref(size), ctypes.byref(error)), error, about)
+        check(self._lib.gait_model_bytes(*where, ctypes.byref(size), ctypes.byref(error)), error)
         self._memory = aligned(size.value)
         status = self._lib.gait_model_init(
             self._memory.ctypes.data, size.value, *where, ctypes.byref(handle), ctypes.byref(error)
         )
-        check(status, error, about)
+        check(status, error)
         self.handle = handle
         self.info = self._read_info()
         names, info = self._lib, self.info
@@ -150,7 +159,7 @@ def camera_c(camera: Camera) -> _abi.CameraC:
 
 
 def read_blob(path: str | os.PathLike[str] | None) -> bytes:
-    """Bytes of a blob file, or of the package's own."""
+    """Bytes of a blob file, or of the package's own, whose container is sound."""
     if path is None:
         shipped = resources.files("gait") / "data" / "walk.gait"
         if not shipped.is_file():
@@ -158,4 +167,6 @@ def read_blob(path: str | os.PathLike[str] | None) -> bytes:
         return shipped.read_bytes()
     if not Path(path).is_file():
         raise UserError(f"{path}: no such model file; make one with gait learn")
-    return Path(path).read_bytes()
+    contents = Path(path).read_bytes()
+    decode(contents, str(path))
+    return contents

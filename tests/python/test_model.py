@@ -1,5 +1,6 @@
 """Model: poses equal the numpy twin, pictures agree with them, bad blobs are refused with a reason."""
 
+import re
 import struct
 
 import numpy as np
@@ -118,19 +119,23 @@ def damaged(change):
 
 
 BAD = {
-    "GAIT_ERR_MAGIC": damaged(lambda b: b.__setitem__(0, 0)),
-    "GAIT_ERR_VERSION": damaged(lambda b: struct.pack_into("<H", b, 8, 2)),
-    "GAIT_ERR_CORRUPT": damaged(lambda b: b.__setitem__(2000, b[2000] ^ 1)),
+    "not a .gait model": damaged(lambda b: b.__setitem__(0, 0)),
+    "format 2.0, this package reads 1.x": damaged(lambda b: struct.pack_into("<H", b, 8, 2)),
+    "checksum differs, the file is damaged": damaged(lambda b: b.__setitem__(2000, b[2000] ^ 1)),
+    "header says .* bytes, the file has 500": read_blob(None)[:500],
+    "not a .gait model; make one with": b"",
+    "CHNM: missing": blob.encode({"MEAN": np.zeros((1, 1), np.float32)}),
 }
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_bad_blobs_are_refused_naming_the_file(name, tmp_path):
+@pytest.mark.parametrize("words", BAD)
+def test_bad_files_are_refused_in_one_line_naming_file_and_remedy(words, tmp_path):
     path = tmp_path / "bad.gait"
-    path.write_bytes(BAD[name])
-    with pytest.raises(GaitError, match="bad.gait") as caught:
+    path.write_bytes(BAD[words])
+    with pytest.raises(UserError, match=f"bad.gait: .*{words}") as caught:
         Model(path)
-    assert caught.value.name == name
+    assert "GAIT_ERR" not in str(caught.value)
+    assert re.search("; (make|copy|learn) ", str(caught.value))
 
 
 @pytest.mark.parametrize("size", [0, 1, 63, 64, 500, 20000])
