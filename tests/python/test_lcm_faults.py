@@ -68,6 +68,8 @@ def test_files_that_are_not_there(tmp_path):
         ({"fx": None}, ["fx is missing", "focal length in pixels"]),
         ({"fx": "wide"}, ["fx is not made of numbers"]),
         ({"fx": -5}, ["fx is -5"]),
+        ({"fx": float("nan")}, ["fx is not finite", "focal length in pixels"]),
+        ({"t": [0, -float("inf"), 4]}, ["t is not finite", "metres"]),
         ({"cx": [1, 2]}, ["cx has 2 numbers, not 1"]),
         ({"width": 160.5}, ["width is 160.5"]),
         ({"height": 0}, ["height is 0"]),
@@ -193,7 +195,7 @@ def test_a_background_with_comments_is_read(tmp_path):
         (["--frobnicate"], "unknown argument --frobnicate"),
         (["-m"], "--model: needs a value"),
         (["-m", "x", "--particles", "2.5"], "--particles 2.5: give a whole number from 16"),
-        (["-m", "x", "--particles", "3"], "--particles 3"),
+        (["-m", "x", "--particles", "3"], "--particles 3: give a whole number from 16 to 1048576\n"),
         (["-m", "x", "--particles", "many"], "--particles many"),
         (["-m", "x", "--seed", "-1"], "--seed -1"),
         (["-m", "x", "--seed", "99999999999999999999"], "--seed 99999999999999999999"),
@@ -272,9 +274,17 @@ def test_a_wrong_configuration_file(tmp_path, text, words):
     fails(rig.command("--config", config)[1:], config, words, code=2)
 
 
-@pytest.mark.parametrize("url", ["nonsense://", "udpm://999.1.1.1:7667"])
-def test_a_url_that_lcm_refuses(url):
-    fails(rig.command("--url", url)[1:], url, "cannot open LCM", "ip route add 224.0.0.0/4 dev lo")
+@pytest.mark.parametrize(
+    ("url", "remedy"),
+    [
+        ("nonsense://", "; give udpm://ADDRESS:PORT or file:///PATH?speed=0\n"),
+        ("udpm://999.1.1.1:7667", "ip route add 224.0.0.0/4 dev lo"),
+    ],
+)
+def test_a_url_that_lcm_refuses(url, remedy):
+    fails(rig.command("--url", url)[1:], url, "cannot open LCM", remedy)
+    done = rig.gait("record", "--url", url, "-o", "x.csv")
+    assert done.returncode == 1 and remedy in done.stderr
 
 
 def test_no_multicast_route_is_one_line_with_the_remedy():

@@ -1,5 +1,6 @@
 #include "fields.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -45,7 +46,9 @@ bool fields_numbers(const fields *f, int object, const char *key, double *out, i
     if (found != count)
         return message_set(why, "%s: %s has %d numbers, not %d; %s", f->path, key, found, count, remedy);
     for (int i = 0; i < count; i++)
-        if (out[i] < low || out[i] > high)
+        if (!isfinite(out[i]))
+            return message_set(why, "%s: %s is not finite; %s", f->path, key, remedy);
+        else if (out[i] < low || out[i] > high)
             return message_set(why, "%s: %s is %g, outside [%g, %g]; %s", f->path, key, out[i], low, high,
                                remedy);
     return true;

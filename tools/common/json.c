@@ -109,16 +109,23 @@ static const char *number_end(const char *s)
     return s;
 }
 
+/* End of what Python's json writes for a number that is not finite; NULL if s starts none. */
+static const char *not_finite_end(const char *s)
+{
+    s += *s == '-';
+    return strncmp(s, "NaN", 3) == 0 ? s + 3 : strncmp(s, "Infinity", 8) == 0 ? s + 8 : NULL;
+}
+
 static bool parse_number(parser *p)
 {
-    const char *const end = number_end(p->at);
+    const char *const wild = not_finite_end(p->at), *const end = wild ? wild : number_end(p->at);
     int const i = end ? add(p, JSON_NUMBER) : -1;
     if (!end)
         return fail(p, "expected a value");
     if (i < 0)
         return false;
-    p->doc->node[i].number = strtod(p->at, NULL);
-    if (!isfinite(p->doc->node[i].number))
+    p->doc->node[i].number = wild ? (double)NAN : strtod(p->at, NULL);
+    if (!wild && !isfinite(p->doc->node[i].number))
         return fail(p, "number too large");
     p->at = end;
     return true;

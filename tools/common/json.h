@@ -1,4 +1,6 @@
-/* json.h - strict JSON (RFC 8259) into nodes of the caller; strings are checked but their escapes stay as they are. */
+/* json.h - strict JSON (RFC 8259) into nodes of the caller; strings are checked but their escapes stay as they are.
+ * NaN and Infinity, which JSON does not have, come through as NAN so that the reader of a key can refuse them by name.
+ */
 #ifndef TOOLS_JSON_H
 #define TOOLS_JSON_H
 #include "message.h"
@@ -12,7 +14,7 @@ typedef struct json_node {
     json_type type;
     int next;         /* index of the node after this value and all its parts */
     int line;         /* in the text, from 1 */
-    double number;    /* JSON_NUMBER; JSON_BOOL: 0 or 1 */
+    double number;    /* JSON_NUMBER, may be NAN; JSON_BOOL: 0 or 1 */
     const char *text; /* JSON_STRING: between the quotes, not terminated */
     size_t length;
 } json_node;

@@ -49,8 +49,10 @@ lcm_t *link_open(const char *url, message *why)
     unmute(saved);
     if (!lcm && link_is_log(url))
         message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", url);
-    else if (!lcm)
+    else if (!lcm && strstr(url, "udpm://")) /* or mpudpm:// */
         message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
+    else if (!lcm)
+        message_set(why, "%.120s: cannot open LCM; give udpm://ADDRESS:PORT or file:///PATH?speed=0", url);
     return lcm;
 }
 

@@ -15,8 +15,10 @@ static bool set_number(const option *o, const char *text, message *why)
     double const value = strtod(text, &end);
     bool const whole = o->kind != OPTION_INT || value == (double)(int32_t)value;
     if (end == text || *end || !(value >= o->low && value <= o->high) || !whole)
-        return message_set(why, "--%s %s: give a %snumber from %g to %g", o->name, text,
-                           o->kind == OPTION_INT ? "whole " : "", o->low, o->high);
+        return message_set(why,
+                           o->kind == OPTION_INT ? "--%s %s: give a whole number from %.0f to %.0f"
+                                                 : "--%s %s: give a number from %g to %g",
+                           o->name, text, o->low, o->high);
     if (o->kind == OPTION_INT)
         *(int32_t *)o->value = (int32_t)value;
     else

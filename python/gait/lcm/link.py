@@ -47,7 +47,8 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
             raise UserError(
                 f"{wanted}: cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
             ) from None
-        raise UserError(f"{wanted}: cannot open LCM; {ROUTE_REMEDY}") from None
+        remedy = ROUTE_REMEDY if "udpm://" in wanted else "give udpm://ADDRESS:PORT or file:///PATH?speed=0"
+        raise UserError(f"{wanted}: cannot open LCM; {remedy}") from None
 
 
 def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
