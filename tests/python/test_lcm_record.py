@@ -65,3 +65,12 @@ def test_an_interrupted_recording_is_whole(estimates, tmp_path, number, flowing)
     if not flowing:
         assert track.frame.tolist() == [e.frame for e in estimates]
     assert [path.name for path in tmp_path.iterdir()] == ["track.csv"]
+
+
+@pytest.mark.parametrize("option", ["-o", "--log"])
+def test_a_missing_folder_is_named_before_anybody_listens(tmp_path, option):
+    files = {"-o": tmp_path / "t.csv", "--log": tmp_path / "e.log"} | {option: tmp_path / "none" / "x"}
+    words = [word for pair in files.items() for word in pair]
+    done = rig.gait("record", "--url", f"file://{tmp_path}/absent.log", *words)
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "none does not exist" in done.stderr and not list(tmp_path.iterdir())

@@ -16,6 +16,7 @@ import signal
 import sys
 from typing import Any
 
+from gait.files import require_writable
 from gait.lcm.link import lcm_url
 from gait.lcm.record import Recorder
 
@@ -41,6 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record and report."""
+    for path in filter(None, (args.output, args.log)):
+        require_writable(path)
     url = lcm_url(args.url)
     recorder = Recorder(url, args.output, args.log)
 
