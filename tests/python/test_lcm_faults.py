@@ -195,7 +195,7 @@ def test_a_background_with_comments_is_read(tmp_path):
         (["--frobnicate"], "unknown argument --frobnicate"),
         (["-m"], "--model: needs a value"),
         (["-m", "x", "--particles", "2.5"], "--particles 2.5: give a whole number from 16"),
-        (["-m", "x", "--particles", "3"], "--particles 3: give a whole number from 16 to 1048576\n"),
+        (["-m", "x", "--particles", "3"], "--particles 3: give a whole number from 16 to 1048576"),
         (["-m", "x", "--particles", "many"], "--particles many"),
         (["-m", "x", "--seed", "-1"], "--seed -1"),
         (["-m", "x", "--seed", "99999999999999999999"], "--seed 99999999999999999999"),
@@ -277,7 +277,7 @@ def test_a_wrong_configuration_file(tmp_path, text, words):
 @pytest.mark.parametrize(
     ("url", "remedy"),
     [
-        ("nonsense://", "; give udpm://ADDRESS:PORT or file:///PATH?speed=0\n"),
+        ("nonsense://", "; give udpm://ADDRESS:PORT or file:///PATH?speed=0"),
         ("udpm://999.1.1.1:7667", "ip route add 224.0.0.0/4 dev lo"),
     ],
 )
