@@ -195,7 +195,7 @@ static void observe(gait_tracker *t, gait_estimate *out)
 /* No camera saw anything: the prediction is the estimate. */
 static void coast(gait_tracker *t, gait_estimate *out)
 {
-    weigh_particles(t); /* no camera: only the joints */
+    weigh_particles(t);                /* no camera: only the joints */
     t->core->ess = pf_ess(&t->filter); /* resampled weights are even */
     t->core->textured = 0;
     estimate_fill(t, pf_heaviest(&t->filter), out);

@@ -26,8 +26,8 @@ static void test_integers(void)
         const char *word;
     } bad[] = {
         {offsetof(gait_tracker_config, struct_size), 0, GAIT_ERR_STRUCT, "gait_tracker_default"},
-        {offsetof(gait_tracker_config, struct_size), (int32_t)sizeof(gait_tracker_config) + 8, GAIT_ERR_STRUCT,
-         "gait_tracker_default"},
+        {offsetof(gait_tracker_config, struct_size), (int32_t)sizeof(gait_tracker_config) + 8,
+         GAIT_ERR_STRUCT, "gait_tracker_default"},
         {offsetof(gait_tracker_config, mode), 2, GAIT_ERR_ARG, "mode"},
         {offsetof(gait_tracker_config, mode), -1, GAIT_ERR_ARG, "mode"},
         {offsetof(gait_tracker_config, particles), 15, GAIT_ERR_LIMIT, "particles"},
@@ -52,24 +52,27 @@ static void test_integers(void)
 /* Every float of the configuration: not a number, infinite, below and above its range; named in the message. */
 static void test_floats(void)
 {
-#define FLOAT(member, low, high) {offsetof(gait_tracker_config, member), #member, low, high}
+#define FLOAT(member, low, high)                                                                             \
+    {                                                                                                        \
+        offsetof(gait_tracker_config, member), #member, low, high                                            \
+    }
     static const struct {
         size_t offset;
         const char *name;
         float low, high;
     } number[] = {
-        FLOAT(term_weight[0], -1e-3f, 2e6f), FLOAT(term_weight[1], -1e-3f, 2e6f),
-        FLOAT(term_weight[2], -1e-3f, 2e6f), FLOAT(term_weight[3], -1e-3f, 2e6f),
-        FLOAT(missed_weight, -0.01f, 1.01f), FLOAT(girth, 0.49f, 2.01f),
-        FLOAT(resample_ess, -0.01f, 1.01f),  FLOAT(max_dt, 0.0f, 11.0f),
-        FLOAT(phase_noise, -1e-3f, 1e9f),    FLOAT(rate_noise, -1e-3f, 1e9f),
+        FLOAT(term_weight[0], -1e-3f, 2e6f),   FLOAT(term_weight[1], -1e-3f, 2e6f),
+        FLOAT(term_weight[2], -1e-3f, 2e6f),   FLOAT(term_weight[3], -1e-3f, 2e6f),
+        FLOAT(missed_weight, -0.01f, 1.01f),   FLOAT(girth, 0.49f, 2.01f),
+        FLOAT(resample_ess, -0.01f, 1.01f),    FLOAT(max_dt, 0.0f, 11.0f),
+        FLOAT(phase_noise, -1e-3f, 1e9f),      FLOAT(rate_noise, -1e-3f, 1e9f),
         FLOAT(rate_noise_start, -1e-3f, 1e9f), FLOAT(settle_time, -1e-3f, 1e9f),
-        FLOAT(rate_time, -1e-3f, 1e9f),      FLOAT(forward_noise, -1e-3f, 1e9f),
-        FLOAT(lateral_noise, -1e-3f, 1e9f),  FLOAT(vertical_noise, -1e-3f, 1e9f),
-        FLOAT(heading_noise, -1e-3f, 1e9f),  FLOAT(tilt_noise, -1e-3f, 1e9f),
-        FLOAT(tilt_time, -1e-3f, 1e9f),      FLOAT(coef_noise, -1e-3f, 1e9f),
-        FLOAT(coef_time, -1e-3f, 1e9f),      FLOAT(stature_noise, -1e-3f, 1e9f),
-        FLOAT(offset_noise, -1e-3f, 1e9f),   FLOAT(offset_sd, -1e-3f, 1e9f),
+        FLOAT(rate_time, -1e-3f, 1e9f),        FLOAT(forward_noise, -1e-3f, 1e9f),
+        FLOAT(lateral_noise, -1e-3f, 1e9f),    FLOAT(vertical_noise, -1e-3f, 1e9f),
+        FLOAT(heading_noise, -1e-3f, 1e9f),    FLOAT(tilt_noise, -1e-3f, 1e9f),
+        FLOAT(tilt_time, -1e-3f, 1e9f),        FLOAT(coef_noise, -1e-3f, 1e9f),
+        FLOAT(coef_time, -1e-3f, 1e9f),        FLOAT(stature_noise, -1e-3f, 1e9f),
+        FLOAT(offset_noise, -1e-3f, 1e9f),     FLOAT(offset_sd, -1e-3f, 1e9f),
     };
 #undef FLOAT
     size_t floats = 0; /* none is forgotten: the config has as many floats as stand here */
@@ -172,7 +175,8 @@ static void test_prior(void)
     gait_tracker *const t = toy_tracker_new(&cfg);
     CHECK(gait_tracker_prior(toy_model(), &mean, &sd) == GAIT_OK);
     CHECK(mean.stride_hz == 0.92f && sd.stride_hz == 0.07f && mean.stature == 1.72f && sd.stature == 0.09f);
-    CHECK(sd.phase >= 0.5f && sd.heading >= 3.1415f && sd.coef[0] == 1.0f && sd.coef[1] == 1.0f && sd.coef[2] == 0.0f);
+    CHECK(sd.phase >= 0.5f && sd.heading >= 3.1415f && sd.coef[0] == 1.0f && sd.coef[1] == 1.0f &&
+          sd.coef[2] == 0.0f);
     CHECK_NEAR(mean.pelvis[2], 0.53 * 1.72, 0.05);
     CHECK(gait_tracker_start(t, &mean, &sd, 0, NULL) == GAIT_OK);
     CHECK(gait_tracker_prior(NULL, &mean, &sd) == GAIT_ERR_ARG);

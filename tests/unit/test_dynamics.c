@@ -1,32 +1,9 @@
-/* Temporal prior: moments of the start and of every field's motion against closed forms (spec 1.4, 3.4 K6). */
-#include "dynamics.h"
+/* How particles move: every field's mean and spread against closed forms (spec 1.4, 3.4 K6). */
+#include "toy_prior.h"
 
 #include "fmath.h"
 
-#include "toy_model.h"
-
-#include "check.h"
-
-enum { DRAWS = 8000, FIELDS = F_COEF + 3, OFFSET_ANGLE = TOY_TORSO };
-
-static gait_tracker_config cfg;
-
-/* Default mode, two components and one posture offset, no noise at all. */
-static dynamics quiet(int32_t mode, uint64_t seed)
-{
-    gait_tracker_default(&cfg, mode);
-    cfg.components = 2;
-    cfg.offset_angles = 1u << OFFSET_ANGLE;
-    cfg.phase_noise = cfg.rate_noise = cfg.rate_noise_start = cfg.stature_noise = 0.0f;
-    cfg.forward_noise = cfg.lateral_noise = cfg.vertical_noise = 0.0f;
-    cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = 0.0f;
-    cfg.offset_sd = 0.07f;
-    cfg.settle_time = 1.0f;
-    cfg.rate_time = 5.0f;
-    cfg.tilt_time = 1.1f;
-    cfg.coef_time = 4.5f;
-    return (dynamics){.cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed};
-}
+enum { FIELDS = F_COEF + 3 };
 
 static void noisy(void)
 {
@@ -41,132 +18,6 @@ static void noisy(void)
     cfg.coef_noise = 0.66f;
     cfg.stature_noise = 0.005f;
     cfg.offset_noise = 0.02f;
-}
-
-typedef struct moments {
-    double mean, var;
-} moments;
-
-static moments moments_of(const double *v, int n)
-{
-    moments m = {0.0, 0.0};
-    for (int i = 0; i < n; i++)
-        m.mean += v[i] / n;
-    for (int i = 0; i < n; i++)
-        m.var += (v[i] - m.mean) * (v[i] - m.mean) / n;
-    return m;
-}
-
-/* Sample moments against the true ones, 4.5 standard errors; floats add a little. */
-static void check_moments(moments have, double mean, double sd, int n)
-{
-    CHECK_NEAR(have.mean, mean, 4.5 * sd / sqrt(n) + 1e-5);
-    CHECK_NEAR(have.var, sd * sd, 4.5 * sd * sd * sqrt(2.0 / n) + 1e-9);
-}
-
-/* ---- start ---- */
-static const size_t state_fields = 11; /* phase, rate, stature, heading, pitch, roll, pelvis x y, scores, offset */
-
-static float *state_number(gait_state *s, size_t k)
-{
-    float *const at[] = {&s->phase, &s->stride_hz, &s->stature, &s->heading, &s->pitch, &s->roll, &s->pelvis[0],
-                         &s->pelvis[1], &s->coef[0], &s->coef[1], &s->offset[OFFSET_ANGLE]};
-    return at[k];
-}
-
-static void test_draw(void)
-{
-    static double v[11][DRAWS];
-    static const float sds[] = {0.05f, 0.04f, 0.06f, 0.3f, 0.05f, 0.04f, 0.2f, 0.3f, 1.0f, 0.5f, 0.07f};
-    dynamics const d = quiet(GAIT_MODE_DEFAULT, 5);
-    gait_state mean = toy_state(0.5f), sd = {0};
-    mean.heading = 0.8f;
-    mean.pitch = 0.1f;
-    mean.roll = -0.05f;
-    mean.pelvis[0] = 3.0f;
-    mean.pelvis[1] = -2.0f;
-    mean.coef[0] = 0.7f;
-    mean.coef[1] = -1.1f;
-    mean.offset[OFFSET_ANGLE] = 0.1f;
-    for (size_t k = 0; k < state_fields; k++)
-        *state_number(&sd, k) = sds[k];
-    sd.coef[5] = sd.offset[2] = 9.0f; /* not in use */
-    for (int32_t i = 0; i < DRAWS; i++) {
-        walker const w = dynamics_draw(&d, &mean, &sd, i);
-        gait_state s = walker_state(&d.rule, &w);
-        for (size_t k = 0; k < state_fields; k++)
-            v[k][i] = (double)*state_number(&s, k);
-    }
-    moments have[11];
-    for (size_t k = 0; k < state_fields; k++) {
-        have[k] = moments_of(v[k], DRAWS);
-        check_moments(have[k], (double)*state_number(&mean, k), (double)sds[k], DRAWS);
-    }
-    for (size_t a = 0; a < state_fields; a++) /* independent */
-        for (size_t b = 0; b < a; b++) {
-            double cov = 0.0;
-            for (int i = 0; i < DRAWS; i++)
-                cov += (v[a][i] - have[a].mean) * (v[b][i] - have[b].mean) / DRAWS;
-            CHECK_NEAR(cov / sqrt(have[a].var * have[b].var), 0.0, 4.5 / sqrt(DRAWS));
-        }
-}
-
-/* No deviation: every particle is the mean, pelvis and all. */
-static void test_draw_exact(void)
-{
-    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
-        dynamics const d = quiet(mode, 5);
-        gait_state mean = toy_state(0.3f);
-        gait_state const sd = {0};
-        mean.pelvis[2] += 0.13f;
-        for (int32_t i = 0; i < 5; i++) {
-            walker const w = dynamics_draw(&d, &mean, &sd, i);
-            gait_state const s = walker_state(&d.rule, &w);
-            CHECK(s.phase == mean.phase && s.stride_hz == mean.stride_hz && s.stature == mean.stature);
-            for (int k = 0; k < 3; k++)
-                CHECK_NEAR(s.pelvis[k], mean.pelvis[k], 1e-6);
-        }
-    }
-}
-
-/* Height: the given one and the ground at z = 0 (sd 3 cm) are combined. */
-static void test_draw_level(void)
-{
-    static double v[DRAWS];
-    dynamics const d = quiet(GAIT_MODE_DEFAULT, 6);
-    gait_state mean = toy_state(0.3f), sd = {.pelvis = {0, 0, 0.04f}};
-    mean.pelvis[2] += 0.06f;
-    for (int32_t i = 0; i < DRAWS; i++)
-        v[i] = (double)dynamics_draw(&d, &mean, &sd, i).f[F_Z];
-    double const trust = 0.0009 / (0.0009 + 0.0016);
-    check_moments(moments_of(v, DRAWS), 0.06 * trust, sqrt(trust) * 0.04, DRAWS);
-}
-
-/* Unknown phase and heading are uniform over the circle; wild rates and statures stay possible. */
-static void test_draw_broad(void)
-{
-    dynamics const d = quiet(GAIT_MODE_DEFAULT, 7);
-    gait_state mean = toy_state(0.3f), sd = {.phase = 0.5f, .heading = PI_F, .stride_hz = 2.0f, .stature = 2.0f};
-    int32_t phase[16] = {0}, heading[16] = {0}, wrong = 0;
-    double together = 0.0;
-    for (int32_t i = 0; i < DRAWS; i++) {
-        walker const w = dynamics_draw(&d, &mean, &sd, i);
-        float const turn = m_wrap1(w.f[F_HEADING] / TWO_PI_F);
-        wrong += !(w.f[F_PHASE] >= 0.0f && w.f[F_PHASE] < 1.0f);
-        wrong += !(w.f[F_RATE] >= 0.476f && w.f[F_RATE] <= 2.5f && w.f[F_STATURE] >= 0.3f);
-        phase[(int32_t)(16.0f * w.f[F_PHASE])]++;
-        heading[(int32_t)(16.0f * turn)]++;
-        together += cos(6.283185307 * (double)(w.f[F_PHASE] - turn)) / DRAWS;
-    }
-    CHECK(wrong == 0);
-    double chi2[2] = {0.0, 0.0};
-    for (int k = 0; k < 16; k++) {
-        double const expect = DRAWS / 16.0;
-        chi2[0] += (phase[k] - expect) * (phase[k] - expect) / expect;
-        chi2[1] += (heading[k] - expect) * (heading[k] - expect) / expect;
-    }
-    CHECK_NEAR(together, 0.0, 4.5 / sqrt(2.0 * DRAWS));
-    CHECK(chi2[0] < 37.7 && chi2[1] < 37.7); /* 15 degrees of freedom, p = 0.001 */
 }
 
 /* ---- motion without noise ---- */
@@ -194,7 +45,8 @@ static void test_drift(void)
                 w = dynamics_move(&d, &w, dt, 1.0f, (uint32_t)k, 3);
             double path = 0.0; /* statures: integral of the forward motion over phase */
             for (int k = 0; k < 4000; k++)
-                path += (double)root_channel(m, ROOT_FORWARD, (float)(0.9 + (double)rate * 1.2 * (k + 0.5) / 4000.0),
+                path += (double)root_channel(m, ROOT_FORWARD,
+                                             (float)(0.9 + (double)rate * 1.2 * (k + 0.5) / 4000.0),
                                              w.f + F_COEF, 0) *
                         (double)rate * 1.2 / 4000.0;
             path = mode == GAIT_MODE_PAPER ? (double)m->stride_length * (double)rate * 1.2 : path;
@@ -285,9 +137,10 @@ static void test_spread(void)
     check_moments(moments_of(sampled[0][F_COEF], DRAWS), 0.0, coef, DRAWS);
     check_moments(moments_of(sampled[0][F_COEF + 1], DRAWS), 0.0, coef, DRAWS);
     double const tau = 2.0 * 0.07 * 0.07 / (0.02 * 0.02);
-    check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, 0.07 * sqrt(1.0 - exp(-2.0 * T / tau)), DRAWS);
+    check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, 0.07 * sqrt(1.0 - exp(-2.0 * T / tau)),
+                  DRAWS);
     moments const still = moments_of(sampled[0][F_STATURE], DRAWS);
-    CHECK(still.var < 1e-12); /* settled: stature is fixed */
+    CHECK(still.var < 1e-12);                                /* settled: stature is fixed */
     moments const side = moments_of(sampled[0][F_Y], DRAWS); /* lateral noise, and drifting headings */
     double const path = 1.75 * 0.8 * own, veer = path * 0.044;
     CHECK_NEAR(sqrt(side.var), sqrt(0.0164 * 0.0164 + veer * veer / 3.0), 0.0015);
@@ -349,7 +202,8 @@ static void test_frame_rate(void)
         for (int f = 0; f < FIELDS; f++) {
             moments const a = moments_of(sampled[0][f], DRAWS), b = moments_of(sampled[1][f], DRAWS);
             double const slack = f == F_X || f == F_Y || f == F_PHASE ? (k ? 0.35 : 0.07) : 0.0;
-            double const lag = f == F_X || f == F_Y ? (k ? 0.02 : 0.004) : 0.0; /* metres: speed held for a step */
+            double const lag =
+                f == F_X || f == F_Y ? (k ? 0.02 : 0.004) : 0.0; /* metres: speed held for a step */
             CHECK_NEAR(b.mean, a.mean, 4.5 * sqrt(2.0 * a.var / DRAWS) + lag + 1e-5);
             CHECK_NEAR(b.var, a.var, a.var * (4.5 * sqrt(4.0 / DRAWS) + slack) + 1e-9);
         }
@@ -422,10 +276,6 @@ static void test_independent(void)
 
 int main(void)
 {
-    test_draw();
-    test_draw_exact();
-    test_draw_level();
-    test_draw_broad();
     test_drift();
     test_rate();
     test_paper_way();

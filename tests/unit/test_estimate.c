@@ -158,9 +158,15 @@ static void rotation(float heading, float pitch, float roll, double R[9])
 {
     double const ch = cos((double)heading), sh = sin((double)heading), cp = cos((double)pitch);
     double const sp = sin((double)pitch), cr = cos((double)roll), sr = sin((double)roll);
-    const double out[9] = {ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr,
-                           sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr,
-                           -sp,     cp * sr,                cp * cr};
+    const double out[9] = {ch * cp,
+                           ch * sp * sr - sh * cr,
+                           ch * sp * cr + sh * sr,
+                           sh * cp,
+                           sh * sp * sr + ch * cr,
+                           sh * sp * cr - ch * sr,
+                           -sp,
+                           cp * sr,
+                           cp * cr};
     memcpy(R, out, sizeof out);
 }
 
@@ -175,7 +181,8 @@ static void test_rotation(void)
             float *const angle[] = {&field(people, F_HEADING)[i], &field(people, F_PITCH)[i],
                                     &field(people, F_ROLL)[i]};
             for (uint32_t k = 0; k < 3; k++)
-                *angle[k] = (k ? 0.3f : 2.9f) * normal(round, 60 + k) + (i == 3 ? 0.0f : 0.12f) * normal(i, 10 + k);
+                *angle[k] =
+                    (k ? 0.3f : 2.9f) * normal(round, 60 + k) + (i == 3 ? 0.0f : 0.12f) * normal(i, 10 + k);
             *angle[0] = m_wrap_pi(*angle[0]);
             rotation(*angle[0], *angle[1], *angle[2], R);
             for (int k = 0; k < 9; k++)
@@ -230,7 +237,10 @@ static void test_fields(void)
     for (uint32_t i = 0; i < N; i++)
         for (int f = 0; f < people->fields; f++) {
             float *const v = &field(people, f)[i];
-            *v = (f == F_STATURE ? 1.7f : f == F_RATE ? 0.9f : f == F_PHASE ? 0.4f : 0.3f) +
+            *v = (f == F_STATURE ? 1.7f
+                  : f == F_RATE  ? 0.9f
+                  : f == F_PHASE ? 0.4f
+                                 : 0.3f) +
                  0.02f * normal(i, 20 + (uint32_t)f);
             mean[f] += t->filter.weight[i] * (double)*v;
         }
@@ -240,7 +250,8 @@ static void test_fields(void)
     CHECK_NEAR(e.mean.coef[0], mean[F_COEF], 1e-6);
     CHECK_NEAR(e.mean.coef[1], mean[F_COEF + 1], 1e-6);
     CHECK_NEAR(e.mean.offset[TOY_TORSO], mean[F_COEF + 2], 1e-6);
-    CHECK(e.sd.coef[0] > 0.01f && e.sd.offset[TOY_TORSO] > 0.01f && e.sd.stride_hz > 0.01f && e.sd.coef[2] == 0.0f);
+    CHECK(e.sd.coef[0] > 0.01f && e.sd.offset[TOY_TORSO] > 0.01f && e.sd.stride_hz > 0.01f &&
+          e.sd.coef[2] == 0.0f);
     walker w = {{0}};
     for (int f = 0; f < people->fields; f++)
         w.f[f] = (float)mean[f];
@@ -258,8 +269,9 @@ static void test_fields(void)
     double forward = 0.0;
     for (int j = 0; j < TOY_PHASES; j++)
         for (int k = 0; k < 3; k++)
-            forward += (k ? mean[F_COEF + k - 1] : 1.0) / TOY_PHASES *
-                       (double)toy_model()->curves[(k * TOY_PHASES + j) * TOY_CHANNELS + TOY_ROOT + ROOT_FORWARD];
+            forward +=
+                (k ? mean[F_COEF + k - 1] : 1.0) / TOY_PHASES *
+                (double)toy_model()->curves[(k * TOY_PHASES + j) * TOY_CHANNELS + TOY_ROOT + ROOT_FORWARD];
     CHECK_NEAR(e.speed, mean[F_STATURE] * mean[F_RATE] * forward, 1e-4);
     walker const place = estimate_place(people, t->filter.weight);
     CHECK_NEAR(place.f[F_X], mean[F_X], 1e-6);

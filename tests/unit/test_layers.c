@@ -97,7 +97,8 @@ static void test_hiding(void)
         CHECK(count(&drawn.visible[far]) == 20 * 40 - 10 * 20);
         CHECK(bit(&drawn.visible[near], 35, 30) && !bit(&drawn.visible[far], 35, 30));
         CHECK(bit(&drawn.visible[far], 45, 30) && bit(&drawn.visible[far], 35, 15));
-        CHECK(count(&drawn.visible[2]) == 0 && count(&drawn.visible[3]) == 0 && count(&drawn.visible[4]) == 0);
+        CHECK(count(&drawn.visible[2]) == 0 && count(&drawn.visible[3]) == 0 &&
+              count(&drawn.visible[4]) == 0);
         CHECK(count(&drawn.visible[5]) == 10 * 5);
         CHECK(count(&drawn.whole) == 400 + 600 + 50);
         CHECK(drawn.whole.first <= 10 && drawn.whole.last >= 105);

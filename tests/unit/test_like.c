@@ -6,7 +6,8 @@
 
 enum { SAMPLES = TOY_LIMBS * LIKE_SAMPLES };
 
-static const like_term *const terms[LIKE_TERMS] = {&like_texture, &like_silhouette, &like_edges, &like_template};
+static const like_term *const terms[LIKE_TERMS] = {&like_texture, &like_silhouette, &like_edges,
+                                                   &like_template};
 static uint8_t wall[SCENE_PIXELS], now[SCENE_PIXELS], before[SCENE_PIXELS];
 
 /* ---- surface points ---- */
@@ -32,7 +33,8 @@ static void test_surface(void)
                 size += n * n;
                 out += n * (p - axis[k] * 0.5);
             }
-            double a = (double)g->a0 + z * (double)(g->a1 - g->a0), b = (double)g->b0 + z * (double)(g->b1 - g->b0);
+            double a = (double)g->a0 + z * (double)(g->a1 - g->a0),
+                   b = (double)g->b0 + z * (double)(g->b1 - g->b0);
             if (g->shape == LIMB_ELLIPSOID) {
                 a = (double)g->a0 * sqrt(1.0 - (2.0 * z - 1.0) * (2.0 * z - 1.0));
                 b = a * (double)g->b0 / (double)g->a0;
@@ -71,7 +73,8 @@ static void test_sample(void)
             for (int k = 0; k < 3; k++) {
                 const float *const r = R + 9 * v->setup.geometry[l].frame + 3 * k;
                 const float *const eye = v->cam.R; /* camera centre: -R't */
-                float const centre = -(eye[k] * v->cam.t[0] + eye[3 + k] * v->cam.t[1] + eye[6 + k] * v->cam.t[2]);
+                float const centre =
+                    -(eye[k] * v->cam.t[0] + eye[3 + k] * v->cam.t[1] + eye[6 + k] * v->cam.t[2]);
                 float const n = r[0] * f->normal[0][i] + r[1] * f->normal[1][i] + r[2] * f->normal[2][i];
                 p[k] = o[3 * v->setup.geometry[l].frame + k] +
                        s.stature * (r[0] * f->point[0][i] + r[1] * f->point[1][i] + r[2] * f->point[2][i]);
@@ -86,7 +89,8 @@ static void test_sample(void)
                 back++;
                 wrong += have != TEXTURE_HIDDEN;
             } else if (have != TEXTURE_HIDDEN) {
-                float const x = (uv[0] - v->f.map.u0) * v->f.map.scale, y = (uv[1] - v->f.map.v0) * v->f.map.scale;
+                float const x = (uv[0] - v->f.map.u0) * v->f.map.scale,
+                            y = (uv[1] - v->f.map.v0) * v->f.map.scale;
                 int32_t const at = (int32_t)y * VIEW_SIZE + (int32_t)x;
                 int32_t lo = 127, hi = -127;
                 for (int k = 0; k < 4; k++) {
@@ -154,15 +158,23 @@ enum { SHAPES = 11, FRAMES = 6 };
 static const struct {
     const char *name;
     float amount;
-} shift[SHAPES] = {{"phase", 0.1f},  {"across", 0.05f}, {"up", 0.05f},  {"away", 0.5f},
+} shift[SHAPES] = {{"phase", 0.1f},   {"across", 0.05f}, {"up", 0.05f},  {"away", 0.5f},
                    {"heading", 0.6f}, {"pitch", 0.2f},   {"roll", 0.2f}, {"stature", 0.1f},
                    {"coef 1", 2.5f},  {"coef 2", 2.5f},  {"torso", 0.2f}};
 
 static void displace(const gait_camera *cam, int k, float d, gait_state *s)
 {
-    float *const number[SHAPES] = {&s->phase, NULL,        NULL,        NULL,
-                                   &s->heading, &s->pitch, &s->roll,    &s->stature,
-                                   &s->coef[0], &s->coef[1], &s->offset[TOY_TORSO + 1]};
+    float *const number[SHAPES] = {&s->phase,
+                                   NULL,
+                                   NULL,
+                                   NULL,
+                                   &s->heading,
+                                   &s->pitch,
+                                   &s->roll,
+                                   &s->stature,
+                                   &s->coef[0],
+                                   &s->coef[1],
+                                   &s->offset[TOY_TORSO + 1]};
     if (number[k])
         *number[k] += d;
     else
@@ -181,7 +193,8 @@ static gait_state displaced(const toy_look *v, int frame, int k, int sign)
 static void score(toy_look *v, int frame, float sum[SHAPES][3][LIKE_TERMS])
 {
     static int8_t ancestor[SHAPES][3][SAMPLES];
-    gait_state const true_now = toy_walk((float)frame / 30.0f), true_before = toy_walk((float)(frame - 1) / 30.0f);
+    gait_state const true_now = toy_walk((float)frame / 30.0f),
+                     true_before = toy_walk((float)(frame - 1) / 30.0f);
     int16_t template[SAMPLES];
     toy_look_aim(v, &true_now);
     toy_look_at(v, before, wall);

@@ -157,6 +157,31 @@ static void test_border(void)
         }
 }
 
+/* Points right of or below the map find no edges there, though a reader out of bounds would. */
+static void test_beyond(void)
+{
+    static const float x[2][4] = {{234, 234, 258, 258}, {116, 116, 140, 140}};
+    static const float y[2][4] = {{68, 188, 188, 68}, {148, 268, 268, 148}};
+    edge_field(0.0, 0.0, false);
+    memset(v->f.surface, 0x7f, VIEW_PIXELS); /* what lies behind the edges in memory */
+    for (int32_t i = 0; i < VIEW_SIZE; i++)
+        for (int32_t k = 0; k < 20; k++)
+            v->f.edge[i * VIEW_SIZE + k] = (edge_cell){.trace = EDGE_ONE, .xx_yy = EDGE_ONE};
+    for (int k = 0; k < 2; k++) {
+        like_body b = one_limb(LIMB_CONE, x[k], y[k]);
+        v->setup.limbs = 2; /* the same twice: points enough to judge */
+        v->setup.geometry[1] = v->setup.geometry[0];
+        for (int i = 0; i < 4; i++) {
+            v->outline.x[1][i][b.lane] = x[k][i] - 60.0f;
+            v->outline.y[1][i][b.lane] = y[k][i] - 20.0f;
+        }
+        v->outline.depth[1][b.lane] = 3.0f;
+        layers_draw(&v->outline, v->setup.geometry, 2, b.lane, &drawn);
+        CHECK_NEAR(like_edges.support(&b), -0.005, 1e-6); /* enough points, no edges */
+        CHECK(like_edges.log_likelihood(&b) == -1.0f);
+    }
+}
+
 int main(void)
 {
     v = toy_look_new(0, GAIT_MODE_DEFAULT);
@@ -166,5 +191,6 @@ int main(void)
     test_where();
     test_hidden();
     test_border();
+    test_beyond();
     return CHECK_DONE();
 }

@@ -44,10 +44,11 @@ static void test_counts(void)
                 int32_t p = 0;
                 for (int32_t k = 0; k < FG_PLANES; k++) {
                     v->f.fg[k][y][x >> 6] &= v->f.inside[y][x >> 6];
-                    p |= bit((const uint64_t(*)[RAST_WORDS])v->f.fg[k], x, y) << k;
+                    p |= bit((const uint64_t (*)[RAST_WORDS])v->f.fg[k], x, y) << k;
                 }
-                bool const see = bit((const uint64_t(*)[RAST_WORDS])v->f.inside, x, y);
-                bool const in = y >= first && y < last && bit((const uint64_t(*)[RAST_WORDS])body.whole.row, x, y);
+                bool const see = bit((const uint64_t (*)[RAST_WORDS])v->f.inside, x, y);
+                bool const in =
+                    y >= first && y < last && bit((const uint64_t (*)[RAST_WORDS])body.whole.row, x, y);
                 v->f.fg_total += p;
                 inside += see && in ? 1.0 - p / 15.0 : 0.0;
                 under += see && in ? p / 15.0 : 0.0;

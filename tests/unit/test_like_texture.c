@@ -44,8 +44,8 @@ static void test_robust(void)
     static const int diff[] = {0, 5, 16, 40, 100};
     for (size_t k = 0; k < sizeof facing / sizeof *facing; k++)
         for (size_t i = 0; i < sizeof diff / sizeof *diff; i++) {
-            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, facing[k], 32, diff[i]), mixture(facing[k], -cost(diff[i]), -1.6),
-                       0.01);
+            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, facing[k], 32, diff[i]),
+                       mixture(facing[k], -cost(diff[i]), -1.6), 0.01);
             CHECK_NEAR(limb(GAIT_MODE_DEFAULT, facing[k], 8, diff[i]),
                        mixture(facing[k] * 8.0 / 12.8, -cost(diff[i]), -1.6), 0.01);
             CHECK(limb(GAIT_MODE_DEFAULT, facing[k], 7, diff[i]) == -1.6f); /* too few: occluded */
@@ -69,7 +69,8 @@ static void test_paper(void)
         double const var = 2.0 * 9.0 + 64.0 * (1.0 + tan2);
         for (size_t i = 0; i < sizeof diff / sizeof *diff; i++) {
             double const log_p = -0.5 * log(2.0 * 3.14159265358979 * var) - diff[i] * diff[i] / (2.0 * var);
-            CHECK_NEAR(limb(GAIT_MODE_PAPER, facing[k], 32, diff[i]), mixture(facing[k], log_p, log(0.0018)), 0.01);
+            CHECK_NEAR(limb(GAIT_MODE_PAPER, facing[k], 32, diff[i]), mixture(facing[k], log_p, log(0.0018)),
+                       0.01);
             CHECK_NEAR(limb(GAIT_MODE_PAPER, facing[k], 10, diff[i]),
                        mixture(facing[k] * 10.0 / 12.8, log_p, log(0.0018)), 0.01);
         }

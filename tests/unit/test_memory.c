@@ -72,7 +72,8 @@ static void test_canaries(void)
             gait_estimate e;
             for (int k = 0; k < 2; k++) /* back and forth; now and then a camera or both miss */
                 if ((n / 5 + k) % 4 && n % 11)
-                    f.image[k] = toy_image(film[k][n % (2 * SHOTS) < SHOTS ? n % SHOTS : SHOTS - 1 - n % SHOTS]);
+                    f.image[k] =
+                        toy_image(film[k][n % (2 * SHOTS) < SHOTS ? n % SHOTS : SHOTS - 1 - n % SHOTS]);
             CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
         }
         CHECK(intact(memory, fill ? 0xff : 0x5a) && intact(memory + CANARY + need, fill ? 0xff : 0x5a));

@@ -46,10 +46,11 @@ static double dot3(const float *a, const float *b)
 /* ---- geometry ---- */
 static void test_geometry(void)
 {
-    static const float numbers[][LIMB_SHAPE] = {
-        {0, 0, 0, 0, 0, -0.2f, 0.05f, 0.04f, 0.03f, 0.02f}, {0.1f, 0, 0, 0.3f, 0, 0, 0.05f, 0.04f, 0.03f, 0.02f},
-        {0, 0, 0, 0, 0.4f, 0, 0.05f, 0.04f, 0.03f, 0.02f},  {0, 0, 0, 0.01f, -0.4f, 0, 0.05f, 0.04f, 0.03f, 0.02f},
-        {0, 0, 0, 0.2f, 0.2f, 0.3f, 0.05f, 0.04f, 0.03f, 0.02f}};
+    static const float numbers[][LIMB_SHAPE] = {{0, 0, 0, 0, 0, -0.2f, 0.05f, 0.04f, 0.03f, 0.02f},
+                                                {0.1f, 0, 0, 0.3f, 0, 0, 0.05f, 0.04f, 0.03f, 0.02f},
+                                                {0, 0, 0, 0, 0.4f, 0, 0.05f, 0.04f, 0.03f, 0.02f},
+                                                {0, 0, 0, 0.01f, -0.4f, 0, 0.05f, 0.04f, 0.03f, 0.02f},
+                                                {0, 0, 0, 0.2f, 0.2f, 0.3f, 0.05f, 0.04f, 0.03f, 0.02f}};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) {
         limb_geometry const g = one_limb(LIMB_CONE, numbers[k], 1.2f);
         float axis[3], cross[3];
@@ -57,7 +58,8 @@ static void test_geometry(void)
             axis[i] = g.end[i] - g.start[i];
         double const length = sqrt(dot3(axis, axis));
         for (int i = 0; i < 3; i++)
-            cross[i] = g.lateral[(i + 1) % 3] * axis[(i + 2) % 3] - g.lateral[(i + 2) % 3] * axis[(i + 1) % 3];
+            cross[i] =
+                g.lateral[(i + 1) % 3] * axis[(i + 2) % 3] - g.lateral[(i + 2) % 3] * axis[(i + 1) % 3];
         CHECK_NEAR(dot3(g.lateral, g.lateral), 1.0, 1e-5);
         CHECK_NEAR(dot3(g.sagittal, g.sagittal), 1.0, 1e-5);
         CHECK_NEAR(dot3(g.lateral, axis), 0.0, 1e-6);
@@ -81,7 +83,8 @@ static void test_front_cone(void)
     static const float number[LIMB_SHAPE] = {0, 0, 0.25f, 0, 0, -0.25f, 0.10f, 0.06f, 0.05f, 0.03f};
     static const float quarter[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1}; /* turned 90 degrees about the limb */
     static const view_map half = {.scale = 0.5f, .u0 = 100.0f, .v0 = 40.0f};
-    static const double radius[2][4] = {{0.06, 0.03, 0.10, 0.05}, {0.10, 0.05, 0.06, 0.03}}; /* across, away */
+    static const double radius[2][4] = {{0.06, 0.03, 0.10, 0.05},
+                                        {0.10, 0.05, 0.06, 0.03}}; /* across, away */
     limb_geometry const g = one_limb(LIMB_CONE, number, 1.0f);
     gait_camera const cam = front_camera();
     const float at[3] = {0, 4, 0};
@@ -205,7 +208,8 @@ static void image_of(const view_of_limb *v, const float p[3], float uv[2])
 {
     float world[3];
     for (int k = 0; k < 3; k++)
-        world[k] = v->o[k] + v->scale * (v->R[3 * k] * p[0] + v->R[3 * k + 1] * p[1] + v->R[3 * k + 2] * p[2]);
+        world[k] =
+            v->o[k] + v->scale * (v->R[3 * k] * p[0] + v->R[3 * k + 1] * p[1] + v->R[3 * k + 2] * p[2]);
     if (!(camera_project(v->cam, world, uv) > 1.0f))
         CHECK(!"in front of the camera");
 }

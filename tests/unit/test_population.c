@@ -158,7 +158,8 @@ static void test_bodies(void)
             walker const w = walker_get(&p, i);
             walker_body(&r, &w, &single);
             for (int k = 0; k < 3; k++)
-                same &= single.o[5][k][3] == body.o[5][k][lane] && single.o[5][k][BLOCK - 1] == body.o[5][k][lane];
+                same &= single.o[5][k][3] == body.o[5][k][lane] &&
+                        single.o[5][k][BLOCK - 1] == body.o[5][k][lane];
         }
     }
     CHECK_NEAR(turn, 0.0, 1e-5);

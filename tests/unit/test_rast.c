@@ -50,7 +50,8 @@ static bool twin_covers(const polygon *p, int32_t x, int32_t y, bool *close)
         int64_t const xi = (int64_t)(p->x[i] * SUB), yi = (int64_t)(p->y[i] * SUB);
         int64_t const xj = (int64_t)(p->x[j] * SUB), yj = (int64_t)(p->y[j] * SUB);
         bool const up = yi < yj;
-        int64_t const x0 = up ? xi : xj, y0 = up ? yi : yj, dx = up ? xj - xi : xi - xj, dy = up ? yj - yi : yi - yj;
+        int64_t const x0 = up ? xi : xj, y0 = up ? yi : yj, dx = up ? xj - xi : xi - xj,
+                      dy = up ? yj - yi : yi - yj;
         if (Y < y0 || Y >= y0 + dy)
             continue;
         int64_t const side = (X - x0) * dy - dx * (Y - y0); /* >= 0: at or right of the edge */
@@ -225,12 +226,13 @@ static void test_outside(void)
 /* Any bits as coordinates: no trap, and the spans stay inside the window. */
 static void test_garbage(void)
 {
-    static const float odd[] = {NAN,  INFINITY, -INFINITY, 1e30f, -1e30f, FLT_MAX, 16000.0f, -16000.0f,
-                                0.0f, -0.0f,    127.5f,    1e-40f};
+    static const float odd[] = {NAN,      INFINITY,  -INFINITY, 1e30f, -1e30f, FLT_MAX,
+                                16000.0f, -16000.0f, 0.0f,      -0.0f, 127.5f, 1e-40f};
     int32_t wrong = 0, huge = 0;
     for (uint32_t i = 0; i < 20000; i++) {
         float x[N], y[N];
-        int32_t const n = 3 + (int32_t)(i % 6), top = i % 5 ? 0 : 15000, width = i % 3 ? RAST_SIZE : RAST_LIMIT;
+        int32_t const n = 3 + (int32_t)(i % 6), top = i % 5 ? 0 : 15000,
+                      width = i % 3 ? RAST_SIZE : RAST_LIMIT;
         rast_spans s;
         for (int32_t k = 0; k < n; k++) {
             uint32_t r[4];
@@ -288,7 +290,8 @@ static void test_fill(void)
         for (int32_t row = 0; row < RAST_SIZE; row++) {
             for (int32_t x = 0; x < RAST_SIZE; x++)
                 wrong += (mask.row[row][x >> 6] >> (x & 63) & 1) != (uint64_t)(x >= b && x < row + 1);
-            wrong += rast_popcount(mask.row[row][0]) + rast_popcount(mask.row[row][1]) != i_max(row + 1 - b, 0);
+            wrong +=
+                rast_popcount(mask.row[row][0]) + rast_popcount(mask.row[row][1]) != i_max(row + 1 - b, 0);
         }
     }
     CHECK(wrong == 0);

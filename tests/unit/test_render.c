@@ -107,7 +107,9 @@ static void test_places(void)
 {
     static const struct {
         const char *from, *to, *limb;
-    } part[] = {{"r_hip", "r_knee", "r_thigh"}, {"r_knee", "r_ankle", "r_shank"}, {"r_elbow", "r_wrist", "r_forearm"},
+    } part[] = {{"r_hip", "r_knee", "r_thigh"},
+                {"r_knee", "r_ankle", "r_shank"},
+                {"r_elbow", "r_wrist", "r_forearm"},
                 {"neck", "head_top", "head"}};
     const gait_model *const m = toy_model();
     gait_camera const cam = toy_camera(0); /* sees the right side */

@@ -87,7 +87,8 @@ static void test_particles(void)
         for (int32_t p = 0; p < 3 * TOY_POINTS; p++)
             place = fmax(place, fabs((double)(t->joint[p * N + i] - pose.joint[p / 3][p % 3])));
     }
-    CHECK_NEAR(worst, 0.0, 0.3); /* a body from its state differs by rounding: a cell or an edge point flips */
+    CHECK_NEAR(worst, 0.0,
+               0.3); /* a body from its state differs by rounding: a cell or an edge point flips */
     CHECK_NEAR(place, 0.0, 1e-5);
     toy_tracker_free(t);
 }
@@ -132,7 +133,7 @@ static void test_ancestor(void)
             shared += like_compare(t->like, now->texture + (size_t)i * stride + at,
                                    then->texture + (size_t)parent * stride + at, &cost);
         }
-        CHECK(shared > 60); /* the same walker a frame later */
+        CHECK(shared > 60);      /* the same walker a frame later */
         if (i == 5 || i == 25) { /* worked out again from the samples */
             like_body const b = {.setup = t->like,
                                  .features = &t->camera[0].seen,
@@ -174,7 +175,8 @@ static void test_missed_texture(void)
         toy_tracker_free(t);
     }
     CHECK(memcmp(ll[0], ll[1], sizeof ll[0]) == 0);
-    CHECK(memcmp(ll[0][0], ll[2][0], sizeof ll[0][0]) == 0 && memcmp(ll[0][1], ll[2][1], sizeof ll[0][1]) != 0);
+    CHECK(memcmp(ll[0][0], ll[2][0], sizeof ll[0][0]) == 0 &&
+          memcmp(ll[0][1], ll[2][1], sizeof ll[0][1]) != 0);
 }
 
 /* The region holds the whole walker, who is VIEW_PERSON tall in it. */

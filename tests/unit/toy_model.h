@@ -270,17 +270,36 @@ static inline void toy_put_limbs(toy_file *f)
 
 static inline void toy_put_curves(toy_file *f, int phases, int components)
 {
-    static const char name[TOY_CHANNELS][32] = {
-        "neck_x",             "neck_y",               "neck_z",
-        "l_shoulder_flexion", "l_shoulder_abduction", "l_shoulder_rotation",
-        "r_shoulder_flexion", "r_shoulder_abduction", "r_shoulder_rotation",
-        "l_elbow_flexion",    "r_elbow_flexion",      "l_hip_flexion",
-        "l_hip_abduction",    "l_hip_rotation",       "r_hip_flexion",
-        "r_hip_abduction",    "r_hip_rotation",       "l_knee_flexion",
-        "r_knee_flexion",     "torso_x",              "torso_y",
-        "torso_z",            "l_ankle_flexion",      "r_ankle_flexion",
-        "root_forward",       "root_sway",            "root_height",
-        "root_roll",          "root_pitch",           "root_yaw"};
+    static const char name[TOY_CHANNELS][32] = {"neck_x",
+                                                "neck_y",
+                                                "neck_z",
+                                                "l_shoulder_flexion",
+                                                "l_shoulder_abduction",
+                                                "l_shoulder_rotation",
+                                                "r_shoulder_flexion",
+                                                "r_shoulder_abduction",
+                                                "r_shoulder_rotation",
+                                                "l_elbow_flexion",
+                                                "r_elbow_flexion",
+                                                "l_hip_flexion",
+                                                "l_hip_abduction",
+                                                "l_hip_rotation",
+                                                "r_hip_flexion",
+                                                "r_hip_abduction",
+                                                "r_hip_rotation",
+                                                "l_knee_flexion",
+                                                "r_knee_flexion",
+                                                "torso_x",
+                                                "torso_y",
+                                                "torso_z",
+                                                "l_ankle_flexion",
+                                                "r_ankle_flexion",
+                                                "root_forward",
+                                                "root_sway",
+                                                "root_height",
+                                                "root_roll",
+                                                "root_pitch",
+                                                "root_yaw"};
     static const float score[TOY_COMPONENTS][3] = {{1.5f, 0.9f, 0.4f}, {0.8f, 0.8f, 0.6f}};
     static const float gait[8] = {0.92f, 0.07f, 0.02f, 0.80f, 0.06f, 120.0f, 1.72f, 0.09f};
     static float curve[(1 + TOY_COMPONENTS) * TOY_PHASES * TOY_CHANNELS], stat[TOY_CHANNELS][4];

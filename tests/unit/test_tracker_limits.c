@@ -1,0 +1,255 @@
+/* Where tracking begins and ends: first frames, refusals, loss, ambiguity, what is learned on the way. */
+#include "tracker.h"
+
+#include "toy_error.h"
+
+/* ---- time ---- */
+
+/* The first frame, if taken at the time of the start, weighs the particles where they stand; a later one moves them. */
+static void test_first_frame(void)
+{
+    static gait_state before[300], after[300];
+    static float weight[300];
+    gait_tracker_config const cfg = toy_config(1);
+    for (int late = 0; late < 2; late++) {
+        gait_tracker *const t = film_tracker(&cfg, 10, 1.0f);
+        gait_estimate e;
+        int32_t equal = 0;
+        CHECK(gait_tracker_particles(t, before, weight, 300) == 300 && weight[0] == 1.0f / 300.0f);
+        film_step(t, 1, 10 + late, 0, &e);
+        CHECK(gait_tracker_particles(t, after, weight, 300) == 300 && weight[0] != 1.0f / 300.0f);
+        for (int i = 0; i < 300; i++)
+            equal += memcmp(&before[i], &after[i], sizeof *after) == 0;
+        CHECK(equal == (late ? 0 : 300) && e.frame == 0 && !(e.flags & GAIT_EST_RESAMPLED));
+        toy_tracker_free(t);
+    }
+}
+
+/* Status of a frame at a time, and that a refusal changes nothing. */
+static void refuse(gait_tracker *t, gait_frame f, gait_status want, const char *word)
+{
+    uint64_t const digest = gait_tracker_digest(t);
+    gait_estimate e, kept;
+    gait_error err = {0};
+    memset(&e, 0x5a, sizeof e);
+    kept = e;
+    CHECK(gait_tracker_step(t, &f, &e, &err) == want && err.status == want);
+    CHECK(strstr(err.text, word) != NULL);
+    CHECK(gait_tracker_digest(t) == digest && memcmp(&e, &kept, sizeof e) == 0);
+}
+
+static void test_refusals(void)
+{
+    gait_tracker_config const cfg = toy_config(2);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_frame f = toy_frame(10);
+    gait_estimate e;
+    f.image[0] = toy_image(film[0][10]);
+    refuse(t, f, GAIT_ERR_STATE, "before start");
+    toy_tracker_start(t, 10, 1.0f);
+    f.utime = toy_frame(9).utime;
+    refuse(t, f, GAIT_ERR_STATE, "not newer");
+    film_step(t, 2, 10, 0, &e);
+    refuse(t, toy_frame(10), GAIT_ERR_STATE, "not newer"); /* the same again */
+    refuse(t, toy_frame(9), GAIT_ERR_STATE, "not newer");
+    refuse(t, toy_frame(26), GAIT_ERR_STATE, "max_dt");
+    f.utime = INT64_MIN;
+    refuse(t, f, GAIT_ERR_STATE, "not newer");
+    f.utime = INT64_MAX;
+    refuse(t, f, GAIT_ERR_STATE, "max_dt");
+    gait_image const good = toy_image(film[0][11]);
+    for (int k = 0; k < 6; k++) {
+        gait_image bad = good;
+        int32_t *const number[] = {&bad.width,  &bad.height, &bad.stride,
+                                   &bad.format, &bad.stride, &bad.format};
+        static const int32_t value[] = {SCENE_W - 1, SCENE_H + 1, SCENE_W - 1, 0, -SCENE_W, GAIT_RGB8};
+        *number[k] = value[k];
+        f = toy_frame(11);
+        f.image[0] = good;
+        f.image[1] = bad;
+        refuse(t, f, GAIT_ERR_ARG, "image of camera 1");
+    }
+    f = toy_frame(11);
+    CHECK(gait_tracker_step(NULL, &f, &e, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_step(t, NULL, &e, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_step(t, &f, NULL, NULL) == GAIT_ERR_ARG);
+    film_step(t, 2, 11, 0, &e); /* and it goes on */
+    CHECK(e.frame == 1 && e.status == GAIT_STATUS_TRACKING);
+    gait_state const mean = toy_walk(0.0f), sd = toy_doubt(1.0f);
+    CHECK(gait_tracker_start(t, &mean, &sd, INT64_MIN, NULL) == GAIT_OK);
+    f.utime = INT64_MAX;
+    refuse(t, f, GAIT_ERR_STATE, "max_dt");
+    toy_tracker_free(t);
+}
+
+/* ---- loss ---- */
+
+/* A picture of nothing: after a third of a second the walker is lost, and its place less and less known. */
+static void test_occluded(void)
+{
+    static uint8_t blank[SCENE_PIXELS];
+    for (int plate = 0; plate < 2; plate++) {
+        gait_tracker_config const cfg = toy_config(1);
+        gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+        const uint8_t *const shots[SCENE_CAMERAS] = {blank, NULL};
+        gait_estimate e;
+        int lost_at = 0;
+        if (!plate)
+            CHECK(gait_tracker_set_background(t, 0, NULL) == GAIT_OK);
+        memset(blank, 128, sizeof blank);
+        for (int n = 0; n < 20; n++)
+            film_step(t, 1, n, 0, &e);
+        CHECK(e.status == GAIT_STATUS_TRACKING);
+        float const sd = e.sd.pelvis[0];
+        for (int n = 20; n < 60; n++) {
+            toy_tracker_step(t, n, shots, &e);
+            lost_at = !lost_at && e.status == GAIT_STATUS_LOST ? n : lost_at;
+            CHECK(!lost_at || e.status == GAIT_STATUS_LOST);
+        }
+        CHECK(lost_at >= 28 && lost_at <= 34);
+        CHECK(plate || e.sd.pelvis[0] > 2.0f * sd); /* with a plate the absence says where nobody is */
+        toy_tracker_free(t);
+    }
+}
+
+/* No picture at all: prediction, flagged, lost after the same time; pictures again: found again. */
+static void test_no_image(void)
+{
+    gait_tracker_config const cfg = toy_config(2);
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    gait_estimate e;
+    error have = {0};
+    for (int n = 0; n < 20; n++)
+        film_step(t, 2, n, 0, &e);
+    float const sd = e.sd.pelvis[0];
+    for (int n = 20; n < 36; n++) {
+        film_step(t, 2, n, 3, &e);
+        check_sane(t, &e, &cfg, n);
+        CHECK((e.flags & GAIT_EST_NO_IMAGE) && e.log_evidence == 0.0);
+        CHECK((e.status == GAIT_STATUS_LOST) == (n >= 29)); /* 0.33 s after frame 19 */
+    }
+    CHECK(e.sd.pelvis[0] > 1.5f * sd && e.sd.phase > 0.0f);
+    look(&e, 35, &have);
+    CHECK(have.across < 0.15 && have.phase < 0.04); /* half a second on its own */
+    for (int n = 36; n < 46; n++)
+        film_step(t, 2, n, 0, &e);
+    CHECK(!(e.flags & GAIT_EST_NO_IMAGE) && e.status == GAIT_STATUS_TRACKING);
+    have = (error){0};
+    look(&e, 45, &have);
+    CHECK(have.across < 0.03 && have.phase < 0.015);
+    toy_tracker_free(t);
+}
+
+/* Phase unknown: no status of tracking before one mode holds 70 % of the weight. */
+static void test_unknown_phase(void)
+{
+    gait_tracker_config cfg = toy_config(2);
+    cfg.particles = 600;
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    gait_state const mean = toy_walk(0.0f);
+    gait_state sd = toy_doubt(1.0f);
+    gait_estimate e;
+    error have = {0};
+    sd.phase = 0.5f;
+    CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
+    for (int n = 0; n < 30; n++) {
+        film_step(t, 2, n, 0, &e);
+        CHECK((e.status == GAIT_STATUS_TRACKING) == (e.mode_mass >= 0.7f));
+        CHECK(e.status != GAIT_STATUS_AMBIGUOUS && e.status != GAIT_STATUS_LOST);
+    }
+    look(&e, 29, &have);
+    CHECK(e.status == GAIT_STATUS_TRACKING &&
+          have.phase < 0.02); /* legs and arms tell left from right here */
+    toy_tracker_free(t);
+}
+
+/* A share of the particles half a stride away: one mode must hold 70 % to be tracked. */
+static void test_ambiguous(void)
+{
+    static const struct {
+        int32_t apart, seconds, status;
+    } cases[] = {{25, 0, GAIT_STATUS_TRACKING},
+                 {35, 0, GAIT_STATUS_INIT},
+                 {35, 2, GAIT_STATUS_AMBIGUOUS},
+                 {25, 2, GAIT_STATUS_TRACKING}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        gait_tracker_config cfg = toy_config(1);
+        cfg.particles = 100;
+        cfg.terms = GAIT_TERM_TEXTURE; /* nothing to compare with in the first frame: all weights equal */
+        gait_tracker *const t = film_tracker(&cfg, 10, 0.1f);
+        float *const phase = field(&t->gen[t->core->current].people, F_PHASE);
+        for (int32_t i = 0; i < cases[k].apart; i++)
+            phase[99 - i] = m_wrap1(phase[99 - i] + 0.5f);
+        t->core->start_utime -= 1000000 * cases[k].seconds;
+        gait_estimate e;
+        film_step(t, 1, 10, 0, &e);
+        CHECK(e.status == cases[k].status);
+        CHECK_NEAR(e.mode_mass, 1.0 - 0.01 * cases[k].apart, 1e-5);
+        toy_tracker_free(t);
+    }
+}
+
+/* While it tracks, the tracker learns what the limbs look like in every camera that sees them. */
+static void test_appearance(void)
+{
+    gait_tracker_config const cfg = toy_config(2);
+    gait_tracker *const t = film_tracker(&cfg, 0, 0.5f);
+    int32_t known[2][2] = {{0}};
+    for (int n = 0; n < 20; n++) {
+        gait_estimate e;
+        film_step(t, 2, n, n < 10 ? 2u : 0u, &e);
+        for (int c = 0; c < 2 && (n == 9 || n == 19); c++)
+            for (int i = 0; i < TOY_LIMBS * LIKE_SAMPLES; i++)
+                known[n / 10][c] += t->template[c][i] != TEMPLATE_EMPTY;
+    }
+    CHECK(known[0][0] > 100 && known[0][1] == 0);
+    CHECK(known[1][0] >= known[0][0] && known[1][1] > 100);
+    for (int c = 0; c < 2; c++) { /* each its own */
+        int32_t near = 0, both = 0;
+        for (int i = 0; i < TOY_LIMBS * LIKE_SAMPLES; i++) {
+            int32_t const now = t->seen[c * TOY_LIMBS * LIKE_SAMPLES + i],
+                          mean = t->template[c][i] / TEMPLATE_ONE;
+            both += now != TEXTURE_HIDDEN;
+            near += now != TEXTURE_HIDDEN && abs(now - mean) < 25;
+        }
+        CHECK(both > 80 && near > both * 3 / 4);
+    }
+    toy_tracker_free(t);
+}
+
+/* Resampling happens where the weights of the frame before were uneven, and is told. */
+static void test_resampling(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    int told[3] = {0};
+    cfg.term_weight[1] = cfg.term_weight[2] = cfg.term_weight[3] = 2.0f;
+    for (int k = 0; k < 3; k++) {
+        cfg.resample_ess = 0.5f * (float)k;
+        gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+        float before = (float)cfg.particles;
+        for (int n = 0; n < 20; n++) {
+            gait_estimate e;
+            film_step(t, 1, n, 0, &e);
+            bool const due = n > 0 && (k == 2 || before < cfg.resample_ess * (float)cfg.particles);
+            CHECK(((e.flags & GAIT_EST_RESAMPLED) != 0) == due);
+            told[k] += due;
+            before = e.ess;
+        }
+        toy_tracker_free(t);
+    }
+    CHECK(told[0] == 0 && told[1] > 3 && told[1] < 19 && told[2] == 19);
+}
+
+int main(void)
+{
+    film_make(SCENE_CAMERAS, 60);
+    test_first_frame();
+    test_refusals();
+    test_occluded();
+    test_no_image();
+    test_unknown_phase();
+    test_ambiguous();
+    test_appearance();
+    test_resampling();
+    return CHECK_DONE();
+}

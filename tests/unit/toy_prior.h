@@ -1,0 +1,50 @@
+/* toy_prior.h - a dynamics without noise for tests to add theirs to, and sample moments against true ones. */
+#ifndef TOY_PRIOR_H
+#define TOY_PRIOR_H
+#include "dynamics.h"
+#include "toy_model.h"
+
+#include "check.h"
+
+enum { DRAWS = 8000, OFFSET_ANGLE = TOY_TORSO };
+
+static gait_tracker_config cfg;
+
+/* Default mode, two components and one posture offset, no noise at all. */
+static inline dynamics quiet(int32_t mode, uint64_t seed)
+{
+    gait_tracker_default(&cfg, mode);
+    cfg.components = 2;
+    cfg.offset_angles = 1u << OFFSET_ANGLE;
+    cfg.phase_noise = cfg.rate_noise = cfg.rate_noise_start = cfg.stature_noise = 0.0f;
+    cfg.forward_noise = cfg.lateral_noise = cfg.vertical_noise = 0.0f;
+    cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = 0.0f;
+    cfg.offset_sd = 0.07f;
+    cfg.settle_time = 1.0f;
+    cfg.rate_time = 5.0f;
+    cfg.tilt_time = 1.1f;
+    cfg.coef_time = 4.5f;
+    return (dynamics){.cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed};
+}
+
+typedef struct moments {
+    double mean, var;
+} moments;
+
+static inline moments moments_of(const double *v, int n)
+{
+    moments m = {0.0, 0.0};
+    for (int i = 0; i < n; i++)
+        m.mean += v[i] / n;
+    for (int i = 0; i < n; i++)
+        m.var += (v[i] - m.mean) * (v[i] - m.mean) / n;
+    return m;
+}
+
+/* Sample moments against the true ones, 4.5 standard errors; floats add a little. */
+static inline void check_moments(moments have, double mean, double sd, int n)
+{
+    CHECK_NEAR(have.mean, mean, 4.5 * sd / sqrt(n) + 1e-5);
+    CHECK_NEAR(have.var, sd * sd, 4.5 * sd * sd * sqrt(2.0 / n) + 1e-9);
+}
+#endif
