@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -14,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import cv2
 import lcm
 import numpy as np
 import pytest
@@ -25,6 +27,7 @@ from gait.lcm.messages import camera_message, command_message, image_message
 from gait.lcm.types import gaitmsg
 from gait.model import Model
 from gait.state import State
+from gait.video import VideoWriter
 
 ROOT = Path(__file__).resolve().parents[2]
 TRACKD = Path(os.environ.get("GAIT_TRACKD", ROOT / "build" / "bin" / "gait-trackd"))
@@ -107,6 +110,25 @@ def opening(first: int = 0) -> list[Event]:
 
 def frames(first: int, stop: int) -> list[Event]:
     return [("GAIT_IMAGE_0", frame_message(i)) for i in range(first, stop)]
+
+
+def write_clip(path: Path, count: int) -> Path:
+    """Put a clip as files into a folder: video, camera, empty scene, and init for frame 2."""
+    with VideoWriter(path / "video.mp4", FPS, crf=5) as video:
+        for i in range(count):
+            video.write(picture(i))
+    (path / "camera.json").write_text(json.dumps(CAMERA.to_dict()))
+    cv2.imwrite(str(path / "background.png"), plate())
+    state = walker(2)
+    init = {
+        "frame": 2,
+        "pelvis": state.pelvis.tolist(),
+        "phase": state.phase,
+        "stature_m": 1.75,
+        "stride_hz": 1.0,
+    }
+    (path / "init.json").write_text(json.dumps(init | {"heading_rad": 0.0}))
+    return path
 
 
 def write_log(path: Path, events: Sequence[Event]) -> Path:

@@ -1,9 +1,6 @@
-"""The Python side: links, pacing, capture, recorder, report and demo."""
+"""The Python side: links, pacing, capture, recorder and report."""
 
 import json
-import os
-import signal
-import subprocess
 import threading
 
 import cv2
@@ -20,7 +17,6 @@ from gait.lcm.results import read_run
 from gait.lcm.source import FileSource
 from gait.lcm.types import gaitmsg
 from gait.trackfile import read_track
-from gait.video import VideoWriter
 
 COUNT = 20
 
@@ -28,22 +24,7 @@ COUNT = 20
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A clip as files: video, camera, empty scene, init."""
-    path = tmp_path_factory.mktemp("clip")
-    with VideoWriter(path / "video.mp4", rig.FPS, crf=5) as video:
-        for i in range(COUNT):
-            video.write(rig.picture(i))
-    (path / "camera.json").write_text(json.dumps(rig.CAMERA.to_dict()))
-    cv2.imwrite(str(path / "background.png"), rig.plate())
-    state = rig.walker(2)
-    init = {
-        "frame": 2,
-        "pelvis": state.pelvis.tolist(),
-        "phase": state.phase,
-        "stature_m": 1.75,
-        "stride_hz": 1.0,
-    }
-    (path / "init.json").write_text(json.dumps(init | {"heading_rad": 0.0}))
-    return path
+    return rig.write_clip(tmp_path_factory.mktemp("clip"), COUNT)
 
 
 def capture_options(folder):
@@ -310,67 +291,3 @@ def test_a_report_stands_alone(folder, recorded, tmp_path):
     assert "latency" not in text
     capture = cv2.VideoCapture(str(film))
     assert capture.get(cv2.CAP_PROP_FRAME_COUNT) == COUNT - 2
-
-
-# ---- demo ----
-
-
-def leftovers(folder):
-    """Processes that still have the folder on their command line."""
-    found = subprocess.run(["ps", "-eo", "pid,args"], capture_output=True, text=True, check=True).stdout
-    own = str(os.getpid())
-    return [line for line in found.splitlines() if str(folder) in line and line.split()[0] != own]
-
-
-def check_demo(done, out):
-    assert done.returncode == 0, done.stderr
-    assert {p.name for p in out.iterdir()} == {"track.csv", "estimates.log", "overlay.mp4", "report.html"}
-    assert "frames" in done.stdout and str(out / "report.html") in done.stdout
-    assert not leftovers(out)
-    return read_track(out / "track.csv")
-
-
-def test_the_demo_over_multicast(folder, tmp_path):
-    rig.need_multicast()
-    out = tmp_path / "out"
-    done = rig.gait("demo", "--video", folder / "video.mp4", "--particles", rig.PARTICLES, "-o", out)
-    track = check_demo(done, out)
-    assert track.frame[-1] > COUNT / 2 and "latency ms: median" in done.stdout
-
-
-def test_the_demo_without_multicast_goes_through_a_log(folder, tmp_path):
-    out = tmp_path / "out"
-    words = ["-m", "gait", "demo", "--video", folder / "video.mp4", "--particles", rig.PARTICLES, "-o", out]
-    done = rig.without_network(str(rig.PYTHON), *map(str, words))
-    track = check_demo(done, out)
-    assert track.frame.tolist() == list(range(2, COUNT))
-    assert "ip route add" in done.stderr and "latency" not in done.stdout
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_demo_leaves_nothing_running(folder, tmp_path, number):
-    rig.need_multicast()
-    out = tmp_path / "out"
-    command = [str(rig.PYTHON), "-m", "gait", "demo", "--video", str(folder / "video.mp4"), "-o", str(out)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    try:
-        for line in process.stderr:  # the tracker says its memory once it has the camera
-            if "bytes" in line:
-                break
-        process.send_signal(number)
-        _, words = process.communicate(timeout=rig.PATIENCE)
-    finally:
-        process.kill()
-        process.communicate()
-    assert process.returncode == 1 and "interrupted" in words
-    assert not leftovers(out)
-
-
-def test_a_demo_whose_tracker_fails_says_so_and_ends(folder, tmp_path):
-    rig.need_multicast()
-    model = tmp_path / "bad.gait"
-    model.write_bytes(rig.MODEL.read_bytes()[:500])
-    out = tmp_path / "out"
-    done = rig.gait("demo", "--video", folder / "video.mp4", "-m", model, "-o", out, timeout=60)
-    assert done.returncode == 1 and "not a usable model" in done.stderr, done.stderr
-    assert not leftovers(out)

@@ -12,23 +12,30 @@ after the other through an LCM log file; there is no latency then.
 from __future__ import annotations
 
 import argparse
+import fcntl
 import json
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gait.cli import defaults
+from gait.camera import Camera
+from gait.cli import defaults, values
 from gait.cli.evaluate import text as evaluation_text
 from gait.cli.record import LISTENING
 from gait.cli.record import text as recording_text
 from gait.cli.report import make_report
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
 from gait.fields import read_json
+from gait.initial import Start
 from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_buffer
 from gait.lcm.session import Session
-from gait.video import Video
+from gait.model import Model
+from gait.trackfile import read_truth
+from gait.video import Video, read_plate
 
 NAME = "demo"
 HELP = "run capture, tracker and recorder on a clip and report"
@@ -36,6 +43,7 @@ HELP = "run capture, tracker and recorder on a clip and report"
 _ROOT = Path(__file__).resolve().parents[3]
 _TRACKD = _ROOT / "build" / "bin" / "gait-trackd"
 _MODEL = _ROOT / "python" / "gait" / "data" / "walk.gait"
+_RESULTS = ("track.csv", "overlay.mp4", "report.html")
 _READY = 60.0  # seconds in which the tracker must have confirmed camera and start
 _LARGE = 1 << 21  # bytes of a colour frame that no receiver keeps up with
 _IDLE = 2.0  # seconds without an estimate that end the recording
@@ -49,11 +57,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--init", metavar="INIT.json|auto", help="first state (auto)")
     parser.add_argument("--background", metavar="PNG|auto|none", help="empty scene (auto)")
     parser.add_argument("--truth", metavar="TRUTH.csv", help="for the errors")
-    parser.add_argument("--height", metavar="M", help="the person's stature in metres")
-    parser.add_argument("--start", metavar="F", help="first frame to send, from 0 (the frame of --init)")
-    parser.add_argument("--stop", metavar="F", help="first frame not to send")
-    parser.add_argument("--particles", metavar="N", help=f"hypotheses ({defaults.particles()})")
-    parser.add_argument("--threads", default=_threads(), metavar="T", help="of the tracker (%(default)s)")
+    parser.add_argument("--height", type=values.stature, metavar="M", help="the person's stature in metres")
+    frame, particles, threads = (values.whole(*r) for r in ((0,), values.PARTICLES, values.THREADS))
+    parser.add_argument("--start", type=frame, metavar="F", help="first frame to send (that of --init)")
+    parser.add_argument("--stop", type=frame, metavar="F", help="first frame not to send")
+    parser.add_argument(
+        "--particles", type=particles, metavar="N", help=f"hypotheses ({defaults.particles()})"
+    )
+    parser.add_argument(
+        "--threads", type=threads, default=_threads(), metavar="T", help="of the tracker (%(default)s)"
+    )
     parser.add_argument(
         "-m", "--model", default=str(_MODEL), metavar="M.gait", help="walking model (the shipped one)"
     )
@@ -61,9 +74,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", default="build/demo", metavar="DIR", help="folder for the results")
 
 
-def _threads() -> str:
+def _threads() -> int:
     """All cores but the one that decodes the clip, up to four."""
-    return str(max(1, min(4, (os.cpu_count() or 1) - 1)))
+    return max(1, min(4, (os.cpu_count() or 1) - 1))
 
 
 @dataclass
@@ -88,10 +101,13 @@ def run(args: argparse.Namespace) -> int:
     """Make the clip, run the processes, report."""
     if not Path(args.trackd).is_file():
         raise UserError(f"{args.trackd}: no such program; run make tools, or give --trackd")
+    _check_inputs(args)
     out = Path(args.output)
     out.mkdir(parents=True, exist_ok=True)
     live = multicast_works()
-    with Session() as session:
+    with _alone(out), Session() as session:
+        for name in _RESULTS:
+            (out / name).unlink(missing_ok=True)  # should this run fail, they would look like its own
         clip = _clip(args, out, session)
         if live:
             recording = _run_live(args, clip, out, session)
@@ -100,15 +116,49 @@ def run(args: argparse.Namespace) -> int:
                 f"gait demo: no latency will be measured: {ROUTE_REMEDY}; using a log file", file=sys.stderr
             )
             recording = _run_through_log(args, clip, out, session)
-    measures = make_report(_report_arguments(args, clip, out, live), quiet=args.quiet)
+        measures = make_report(_report_arguments(args, clip, out, live), quiet=args.quiet)
     if args.json:
         print(json.dumps({"recording": recording, "error": measures}))
         return 0
     if measures is not None:
         print(f"error against the truth\n{evaluation_text(measures)}\n")
     print(recording_text(recording))
-    print(" ".join(str(out / name) for name in ("track.csv", "overlay.mp4", "report.html")))
+    print(" ".join(str(out / name) for name in _RESULTS))
     return 0
+
+
+@contextmanager
+def _alone(out: Path) -> Iterator[None]:
+    """Hold the folder for this demo; the lock goes with the process, however that ends."""
+    folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UserError(f"{out}: another demo is writing there; wait for it or give -o DIR") from None
+        yield
+    finally:
+        os.close(folder)
+
+
+def _check_inputs(args: argparse.Namespace) -> None:
+    """Read what the user gave, so that a fault shows before anything is rendered or started."""
+    model = Model(args.model)
+    own = {name: getattr(args, name) for name in ("camera", "init", "background", "truth")}
+    files = {name: path for name, path in own.items() if path not in (None, "auto", "none")}
+    if args.video is None:
+        for name in files:
+            raise UsageError(f"--{name}: belongs to a clip of your own; give --video too (make demo VIDEO=)")
+        return
+    size = Video(args.video).size
+    clip = _clip_of(args)
+    Camera.read(clip.camera, size)
+    if clip.init != "auto":
+        Start.read(clip.init, model, height=args.height)
+    if clip.background not in ("auto", "none"):
+        read_plate(clip.background, size)
+    if clip.truth is not None:
+        read_truth(clip.truth)
 
 
 def _clip(args: argparse.Namespace, out: Path, session: Session) -> Clip:
@@ -118,6 +168,11 @@ def _clip(args: argparse.Namespace, out: Path, session: Session) -> Clip:
         _say(args, "rendering a clip")
         session.start("gait simulate", [*_gait("simulate"), "-o", str(folder)]).result(600.0)
         args.video = str(folder / "video.mp4")
+    return _clip_of(args)
+
+
+def _clip_of(args: argparse.Namespace) -> Clip:
+    """Put what was given together with what lies beside the video."""
     beside = Path(args.video).parent
     camera = args.camera or _beside(beside / "camera.json")
     if camera is None:
@@ -190,8 +245,8 @@ def _gait(command: str) -> list[str]:
 
 
 def _trackd(args: argparse.Namespace, url: str) -> list[str]:
-    particles = ["--particles", args.particles] if args.particles else []
-    return [args.trackd, "--model", args.model, "--url", url, "--threads", args.threads, *particles]
+    particles = ["--particles", str(args.particles)] if args.particles else []
+    return [args.trackd, "--model", args.model, "--url", url, "--threads", str(args.threads), *particles]
 
 
 def _record(url: str, out: Path) -> list[str]:
@@ -205,7 +260,7 @@ def _capture(args: argparse.Namespace, clip: Clip) -> list[str]:
     command += ["--background", clip.background, "--model", args.model]
     for option in ("height", "stop"):
         if getattr(args, option) is not None:
-            command += [f"--{option}", getattr(args, option)]
+            command += [f"--{option}", str(getattr(args, option))]
     start = args.start if args.start is not None else _frame_of(clip.init)
     return [*command, "--start", str(start), *(["--quiet"] if args.quiet else [])]
 

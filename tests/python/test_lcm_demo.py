@@ -1,0 +1,113 @@
+"""gait demo: what it writes, what it leaves behind when it is ended or fails, and what it refuses."""
+
+import fcntl
+import os
+import signal
+import subprocess
+
+import lcm_rig as rig
+import pytest
+
+from gait.trackfile import read_track
+
+COUNT = 20
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return rig.write_clip(tmp_path_factory.mktemp("clip"), COUNT)
+
+
+def leftovers(folder):
+    """Processes that still have the folder on their command line."""
+    found = subprocess.run(["ps", "-eo", "pid,args"], capture_output=True, text=True, check=True).stdout
+    own = str(os.getpid())
+    return [line for line in found.splitlines() if str(folder) in line and line.split()[0] != own]
+
+
+def check_demo(done, out):
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in out.iterdir()} == {"track.csv", "estimates.log", "overlay.mp4", "report.html"}
+    assert "frames" in done.stdout and str(out / "report.html") in done.stdout
+    assert not leftovers(out)
+    return read_track(out / "track.csv")
+
+
+def test_the_demo_over_multicast(folder, tmp_path):
+    rig.need_multicast()
+    out = tmp_path / "out"
+    done = rig.gait("demo", "--video", folder / "video.mp4", "--particles", rig.PARTICLES, "-o", out)
+    track = check_demo(done, out)
+    assert track.frame[-1] > COUNT / 2 and "latency ms: median" in done.stdout
+
+
+def test_the_demo_without_multicast_goes_through_a_log(folder, tmp_path):
+    out = tmp_path / "out"
+    words = ["-m", "gait", "demo", "--video", folder / "video.mp4", "--particles", rig.PARTICLES, "-o", out]
+    done = rig.without_network(str(rig.PYTHON), *map(str, words))
+    track = check_demo(done, out)
+    assert track.frame.tolist() == list(range(2, COUNT))
+    assert "ip route add" in done.stderr and "latency" not in done.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_demo_leaves_nothing_running(folder, tmp_path, number):
+    rig.need_multicast()
+    out = tmp_path / "out"
+    command = [str(rig.PYTHON), "-m", "gait", "demo", "--video", str(folder / "video.mp4"), "-o", str(out)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    try:
+        for line in process.stderr:  # the tracker says its memory once it has the camera
+            if "bytes" in line:
+                break
+        process.send_signal(number)
+        _, words = process.communicate(timeout=rig.PATIENCE)
+    finally:
+        process.kill()
+        process.communicate()
+    assert process.returncode == 1 and "interrupted" in words
+    assert not leftovers(out)
+
+
+def test_a_demo_whose_tracker_fails_says_so_and_ends(folder, tmp_path):
+    rig.need_multicast()
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in ("track.csv", "overlay.mp4", "report.html"):
+        (out / name).write_text("of an older run")
+    words = ["--video", folder / "video.mp4", "--trackd", "/bin/false", "-o", out]
+    done = rig.gait("demo", *words, timeout=60)
+    assert done.returncode == 1 and "gait-trackd: ended too early" in done.stderr, done.stderr
+    assert not leftovers(out) and not list(out.iterdir())
+
+
+def test_a_second_demo_in_the_same_folder_keeps_out(folder, tmp_path):
+    holder = os.open(tmp_path, os.O_RDONLY)
+    try:
+        fcntl.flock(holder, fcntl.LOCK_EX)
+        (tmp_path / "track.csv").write_text("of the other")
+        done = rig.gait("demo", "--video", folder / "video.mp4", "-o", tmp_path)
+    finally:
+        os.close(holder)
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "another demo is writing there" in done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["track.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said", "code"),
+    [
+        (["--camera", "c.json"], "--camera: belongs to a clip of your own; give --video", 2),
+        (["--height", "17"], "17: is not a stature", 2),
+        (["--particles", "5"], "5: give a whole number from 16 to 1048576", 2),
+        (["--video", "{}/none.mp4"], "none.mp4: no such video file", 1),
+        (["--video", "{}/video.mp4", "--camera", "{}/none.json"], "none.json: no such camera file", 1),
+        (["--video", "{}/video.mp4", "--init", "{}/camera.json"], "camera.json: ", 1),
+        (["--video", "{}/video.mp4", "--background", "{}/none.png"], "none.png: no such background", 1),
+        (["--model", "{}/camera.json"], "camera.json: not a .gait model", 1),
+    ],
+)
+def test_the_demo_checks_its_inputs_first(folder, tmp_path, words, said, code):
+    out = tmp_path / "out"
+    done = rig.gait("demo", *(word.format(folder) for word in words), "-o", out)
+    assert done.returncode == code and said in done.stderr.splitlines()[-1] and not out.exists()
