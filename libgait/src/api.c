@@ -58,8 +58,7 @@ gait_status gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_
     if (!mem || !blob || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "gait_model_init: null pointer");
     if ((uintptr_t)mem % GAIT_ALIGN)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "gait_model_init: mem is not aligned to %d",
-                         GAIT_ALIGN);
+        return base_fail(err, GAIT_ERR_MEMORY, -1, "gait_model_init: mem is not aligned to %d", GAIT_ALIGN);
     gait_model m;
     gait_status const s = model_open(blob, blob_bytes, &m, err);
     if (s != GAIT_OK)

@@ -2,8 +2,7 @@
 
 #include "fmath.h"
 
-void rng_bits(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw,
-              uint32_t out[4])
+void rng_bits(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, uint32_t out[4])
 {
     uint32_t c0 = index, c1 = draw, c2 = frame, c3 = stream;
     uint32_t k0 = (uint32_t)seed, k1 = (uint32_t)(seed >> 32);
@@ -28,8 +27,7 @@ static float unit(uint32_t bits)
     return (float)(int32_t)(bits >> 8) * 0x1p-24f;
 }
 
-void rng_uniform4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw,
-                  float out[4])
+void rng_uniform4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, float out[4])
 {
     uint32_t bits[4];
     rng_bits(seed, stream, frame, index, draw, bits);
@@ -37,8 +35,7 @@ void rng_uniform4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index
         out[i] = unit(bits[i]);
 }
 
-void rng_normal4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw,
-                 float out[4])
+void rng_normal4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, float out[4])
 {
     uint32_t bits[4];
     rng_bits(seed, stream, frame, index, draw, bits);

@@ -8,7 +8,8 @@
 static int check_passed, check_failed;
 
 #define CHECK(cond) check_that((cond) ? 1 : 0, #cond, __FILE__, __LINE__)
-#define CHECK_NEAR(a, b, tol) check_near((double)(a), (double)(b), (double)(tol), #a " ~ " #b, __FILE__, __LINE__)
+#define CHECK_NEAR(a, b, tol)                                                                                \
+    check_near((double)(a), (double)(b), (double)(tol), #a " ~ " #b, __FILE__, __LINE__)
 #define CHECK_DONE() check_done(__FILE__)
 
 static inline void check_that(int ok, const char *what, const char *file, int line)
@@ -25,7 +26,8 @@ static inline void check_near(double a, double b, double tol, const char *what, 
     check_passed += ok;
     check_failed += !ok;
     if (!ok)
-        fprintf(stderr, "%s:%d: failed: %s: %.9g against %.9g, tolerance %.3g\n", file, line, what, a, b, tol);
+        fprintf(stderr, "%s:%d: failed: %s: %.9g against %.9g, tolerance %.3g\n", file, line, what, a, b,
+                tol);
 }
 
 static inline int check_done(const char *file)

@@ -98,9 +98,9 @@ static void test_wrap(void)
 
 static void test_floor(void)
 {
-    static const float x[] = {0.0f,       0.5f,       -0.5f,      0.99999994f,  -1e-30f,      1e-30f,
-                              -1.0f,      8.0f,       -8.5f,      8388607.5f,   8388608.0f,   -8388607.5f,
-                              3e9f,       -3e9f,      FLT_MAX,    -FLT_MAX,     16777216.0f,  -8388608.0f};
+    static const float x[] = {0.0f,  0.5f,  -0.5f,   0.99999994f, -1e-30f,     1e-30f,
+                              -1.0f, 8.0f,  -8.5f,   8388607.5f,  8388608.0f,  -8388607.5f,
+                              3e9f,  -3e9f, FLT_MAX, -FLT_MAX,    16777216.0f, -8388608.0f};
     for (size_t i = 0; i < sizeof x / sizeof *x; i++)
         CHECK(m_floor(x[i]) == floorf(x[i]));
     for (double t = -5.0; t < 5.0; t += 0.01)

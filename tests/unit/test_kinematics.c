@@ -30,7 +30,7 @@ static void twin_turn(double R[3][3], int axis, double angle)
     double const c = cos(angle), s = sin(angle);
     double const x[3][3] = {{1, 0, 0}, {0, c, -s}, {0, s, c}}, y[3][3] = {{c, 0, s}, {0, 1, 0}, {-s, 0, c}},
                  z[3][3] = {{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
-    const double(*const rot)[3] = axis == 1 ? x : axis == 2 ? y : z;
+    const double (*const rot)[3] = axis == 1 ? x : axis == 2 ? y : z;
     double out[3][3] = {{0}};
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)

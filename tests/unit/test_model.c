@@ -76,34 +76,34 @@ static void test_refused(void)
         {"CURV", 17, 0, NAN},
         {"CURV", 900, 0, HUGE_VAL},
         {"CURV", 2, 0, -1e6},
-        {"CHST", 0, 0, -1.0},        /* negative residual */
-        {"CHST", 1, 0, 100.0},       /* smallest above largest */
+        {"CHST", 0, 0, -1.0},  /* negative residual */
+        {"CHST", 1, 0, 100.0}, /* smallest above largest */
         {"CHST", 3, 0, -0.1},
         {"SCST", 4, 0, -0.1},
-        {"GAIT", 0, 0, 0.0},         /* no stride rate */
+        {"GAIT", 0, 0, 0.0}, /* no stride rate */
         {"GAIT", 1, 0, -0.1},
         {"GAIT", 6, 0, -1.7},
-        {"FRMI", 0, 1, 0},           /* the root with a parent */
-        {"FRMI", 3, 1, TOY_ROOT},    /* the root turned by another channel */
-        {"FRMI", 8, 1, 1},           /* its own parent */
-        {"FRMI", 8 * 4, 1, 5},       /* a parent that comes later */
-        {"FRMI", 8 * 4, 1, -1},      /* a second root */
-        {"FRMI", 8 * 2 + 1, 1, 4},   /* four rotations */
+        {"FRMI", 0, 1, 0},         /* the root with a parent */
+        {"FRMI", 3, 1, TOY_ROOT},  /* the root turned by another channel */
+        {"FRMI", 8, 1, 1},         /* its own parent */
+        {"FRMI", 8 * 4, 1, 5},     /* a parent that comes later */
+        {"FRMI", 8 * 4, 1, -1},    /* a second root */
+        {"FRMI", 8 * 2 + 1, 1, 4}, /* four rotations */
         {"FRMI", 8 * 2 + 1, 1, -1},
-        {"FRMI", 8 * 2 + 1, 1, 2},   /* a pair beyond the count */
-        {"FRMI", 8 * 2 + 2, 1, 4},   /* axes are 1..3 */
+        {"FRMI", 8 * 2 + 1, 1, 2}, /* a pair beyond the count */
+        {"FRMI", 8 * 2 + 2, 1, 4}, /* axes are 1..3 */
         {"FRMI", 8 * 2 + 2, 1, 0},
         {"FRMI", 8 * 2 + 2, 1, INT32_MIN},
         {"FRMI", 8 * 2 + 3, 1, TOY_CHANNELS},
         {"FRMI", 8 * 2 + 3, 1, -1},
-        {"FRMF", 1, 0, 0.1},         /* the root off its joint */
+        {"FRMF", 1, 0, 0.1}, /* the root off its joint */
         {"FRMF", 7, 0, NAN},
         {"PTNI", 5, 1, TOY_FRAMES},
         {"PTNI", 5, 1, -1},
         {"PTNF", 5, 0, NAN},
         {"LIMI", 0, 1, TOY_FRAMES},
         {"LIMI", 0, 1, -1},
-        {"LIMI", 1, 1, 2},           /* a third shape */
+        {"LIMI", 1, 1, 2}, /* a third shape */
         {"LIMF", 6, 0, 0.0},
         {"LIMF", 9, 0, -0.1},
         {"LIMF", 5, 0, 0.06},        /* end = start */
