@@ -15,6 +15,7 @@ from gait.state import State
 # Standard deviations of values that an init file gives without saying how sure they are (interfaces.md, 3).
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
+FAR = 1e4  # metres from the origin; single precision places nothing to the millimetre further out
 STATURE = (0.5, 2.5)  # metres, accepted range
 
 _SCALARS = {  # key in the file: attribute of State, accepted range, remedy
@@ -102,6 +103,9 @@ def _place(fields: Fields, spread: Fields, model: Model, mean: State, sd: State)
     if "pelvis" in fields:
         known = 3 if np.size(fields.get("pelvis", remedy)) == 3 else 2
         mean.pelvis[:known] = fields.array("pelvis", (known,), remedy)
+        if (np.abs(mean.pelvis) > FAR).any():
+            what = f"is further than {FAR:g} m from the origin"
+            raise fields.fail("pelvis", what, "lay the world's origin near the scene")
         sd.pelvis[:] = DEFAULT_SD["pelvis"]
     if known == 2:
         mean.pelvis[2] = model.pelvis_height(mean)

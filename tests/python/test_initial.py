@@ -88,6 +88,12 @@ def test_phase_one_is_phase_zero(init):
     assert Start.read(init({"phase": 1.0}), MODEL).mean.phase == 0
 
 
+@pytest.mark.parametrize("place", [[1.1e4, 0], [0, -1e6, 0.9], [0, 0, 2e4]])
+def test_a_pelvis_beyond_ten_kilometres_is_refused(place, init):
+    with pytest.raises(UserError, match=r"pelvis is further than 10000 m from the origin; lay"):
+        Start.read(init(FULL | {"pelvis": place}), MODEL)
+
+
 def test_frame_comes_from_the_file_or_from_the_caller(init):
     path = init(FULL)
     assert Start.read(path, MODEL, frame=64).frame == 64

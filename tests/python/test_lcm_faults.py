@@ -144,6 +144,7 @@ def test_the_cameras_of_the_python_side_are_accepted(tmp_path):
         ({"phase": 1.5}, ["phase is 1.5", "right heel strike"]),
         ({"stature_m": 17.5}, ["stature_m is 17.5", "metres"]),
         ({"stride_hz": 55}, ["stride_hz is 55"]),
+        ({"pelvis": [1.1e4, 0]}, ["pelvis is 11000, outside [-10000, 10000]"]),
         ({"pelvis": [1]}, ["pelvis has 1 numbers", "x and y"]),
         ({"frame": -4}, ["frame is -4"]),
         ({"heading_rad": "north"}, ["heading_rad is not made of numbers"]),

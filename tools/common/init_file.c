@@ -25,7 +25,7 @@ static const char *const known[] = {"pelvis",    "heading_rad", "phase", "stride
                                     "stature_m", "frame",       "sd"};
 
 enum { SCALARS = sizeof scalars / sizeof *scalars, KNOWN = sizeof known / sizeof *known };
-static const double PELVIS_SD = 0.05, MAX_SD = 10, FAR = 1e5;
+static const double PELVIS_SD = 0.05, MAX_SD = 10, FAR = 1e4;
 
 static void put(gait_state *s, size_t offset, double value)
 {
