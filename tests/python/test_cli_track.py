@@ -85,6 +85,7 @@ def test_track_evaluate_and_every_output(scene, capsys):
     assert main(["eval", str(scene / "out.csv"), "--truth", str(scene / "truth.csv")]) == 0
     table = capsys.readouterr().out
     assert "root mm" in table and "lost 0.0% of 20 frames" in table and "static abs" in table
+    assert table.rstrip().split("\n")[-1].startswith("abs: 15 joints") and "given the true" in table
 
 
 def test_the_result_does_not_depend_on_threads_and_does_on_the_seed(scene, capsys):

@@ -28,6 +28,14 @@ NAME = "eval"
 HELP = "errors of a track against the truth"
 
 
+MEANING = (
+    "abs: 15 joints as they stand; root: hip midpoints laid on each other; static: the mean pose, given the true "
+    "place and heading of every frame, so compare its root, not its abs; free: the mean cycle, given the true "
+    "first state"
+)
+"""One line for readers of the table."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("track", metavar="OUT.csv", help="what gait track wrote")
@@ -66,7 +74,9 @@ def text(m: Measures) -> str:
         lines.append(_row("phase cycles", m["phase"], ".4f"))
         lines.append(f"phase bias {m['phase']['bias']:+.4f}, flipped {m['phase']['flips']:.1%} of the frames")
     covered = ", ".join(f"{share:.0%} in the {level} % intervals" for level, share in m["coverage"].items())
-    return "\n".join([*lines, f"coverage: {covered}", f"lost {m['lost']:.1%} of {m['frames']} frames"])
+    return "\n".join(
+        [*lines, f"coverage: {covered}", f"lost {m['lost']:.1%} of {m['frames']} frames", MEANING]
+    )
 
 
 def _row(label: str, values: dict[str, Any], form: str) -> str:
