@@ -143,3 +143,16 @@ def test_the_c_example_refuses_a_file_that_is_no_model(example):
     done = subprocess.run([example, ROOT / "README.md"], input=b"", capture_output=True, timeout=60)
     assert done.returncode == 1
     assert done.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["/nonexistent"], "/nonexistent: cannot be read\n"),
+        (["/dev/null"], "/dev/null: is empty or too large for a model\n"),
+        ([], "usage: example MODEL.gait < 640x480 grey frames\n"),
+    ],
+)
+def test_the_c_example_says_what_is_wrong_with_its_argument(example, words, said):
+    done = subprocess.run([example, *words], input=b"", capture_output=True, timeout=60)
+    assert (done.returncode, done.stdout.decode()) == (1, said)
