@@ -135,8 +135,8 @@ GAIT_API gait_status gait_model_pose(const gait_model *m, const gait_state *s, g
 GAIT_API gait_status gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out);
 
 /* ---- render: limbs with depth order ------------------------------------------------------------------- */
-/* Draw a hypothesis with the model's own radii: every pixel of ids (width x height of the camera, ids_stride bytes per row) becomes 0 or
- * limb index + 1, nearest limb in front (ideal pinhole image, distortion not applied). */
+/* Draw a hypothesis with the model's own radii: every pixel of ids (width x height of the camera, ids_stride
+ * bytes per row) becomes 0 or limb index + 1, nearest limb in front (ideal pinhole image, no distortion). */
 GAIT_API gait_status gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
                                  int32_t ids_stride);
 
@@ -177,7 +177,7 @@ typedef struct gait_tracker_config {
     float    stature_noise;    /* fraction of stature, while settling */
     float    offset_noise;     /* posture of the angles in offset_angles, radians */
     float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
-    uint32_t offset_angles;    /* bit i: angle i has an offset of its own (bits past the model's: no effect); default trunk */
+    uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk */
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;
@@ -198,7 +198,7 @@ typedef struct gait_estimate {
     gait_state mean;        /* of the dominant mode: circular in phase and heading */
     gait_state sd;          /* over all particles, field by field; circular for phase and heading */
     gait_state best;        /* heaviest particle */
-    gait_pose  pose;        /* joints: posterior mean over all particles (in paper mode without root motion); angles: mode */
+    gait_pose  pose;        /* joints: posterior mean (paper mode: no root motion); angles: of the mode */
     float      joint_sd[GAIT_MAX_JOINTS][3]; /* posterior standard deviation, metres */
     float      ess;         /* effective sample size after weighting */
     float      phase_r;     /* resultant length of the phase, [0, 1]: 1 = certain */

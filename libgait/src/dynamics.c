@@ -42,15 +42,16 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
         s.offset[a] += sd->offset[a] * n[F_COEF + q + k];
     }
     walker w = walker_from_state(&d->rule, &s);
-    /* The given height of the pelvis and the ground at z = 0 are two measurements of one level (paper: one). */
+    /* The given height of the pelvis and the ground at z = 0 are two measurements of one level (paper:
+     * one). */
     float const var = sd->pelvis[2] * sd->pelvis[2];
     float const trust = d->rule.plain_root ? 1.0f : level_sd * level_sd / (level_sd * level_sd + var);
     w.f[F_Z] = trust * w.f[F_Z] + __builtin_sqrtf(trust) * sd->pelvis[2] * n[8];
     return w;
 }
 
-/* Return to zero with time constant tau (never if 0), plus noise per sqrt(second): the exact transition, so that
- * the frame rate does not matter and the stationary deviation is noise sqrt(tau / 2). */
+/* Return to zero with time constant tau (never if 0), plus noise per sqrt(second): the exact transition,
+ * so that the frame rate does not matter and the stationary deviation is noise sqrt(tau / 2). */
 static float relax(float x, float dt, float tau, float noise, float n)
 {
     if (!(tau > 0.0f))

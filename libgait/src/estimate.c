@@ -117,7 +117,8 @@ static void joints(const gait_tracker *t, gait_estimate *out)
     }
 }
 
-/* Metres per second along the ground: stride length (mean forward speed over the stride) times stride rate. */
+/* Metres per second along the ground: stride length (mean forward speed over the stride) times stride
+ * rate. */
 static float ground_speed(const gait_tracker *t, const walker *w)
 {
     const gait_model *const m = t->model;

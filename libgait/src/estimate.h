@@ -6,6 +6,7 @@
 /* Weighted mean of the fields that place the region of interest: track, level and stature. */
 walker estimate_place(const population *p, const double *weight);
 
-/* Means, deviations, dominant mode and joints; best is the heaviest particle.  Returns the mean of the dominant mode. */
+/* Means, deviations, dominant mode and joints; best is the heaviest particle.  Returns the mean of the
+ * dominant mode. */
 walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out);
 #endif

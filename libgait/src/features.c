@@ -63,7 +63,7 @@ void features_box(const int32_t *in, int32_t *out, int32_t radius, int32_t *tmp)
     box_columns(tmp, out, radius);
 }
 
-/* ---- foreground ----------------------------------------------------------------------------------------- */
+/* ---- foreground ------------------------------------------------------------ */
 
 /* Exposure of the frame against the plate in 1/256, half to double, over pixels that changed little. */
 static int32_t exposure_gain(const view_planes *im, const view_planes *plate)
@@ -83,8 +83,8 @@ static int32_t exposure_gain(const view_planes *im, const view_planes *plate)
     return i_clamp((int32_t)(frame * 256 / scene), 128, 512);
 }
 
-/* Evidence that one cell of 2 x 2 pixels changed, grey levels squared over three channels.  What a shadow explains,
- * the plate's colour at 2/5 .. 1 of its brightness, counts a SHADOW_SHARE-th. */
+/* Evidence that one cell of 2 x 2 pixels changed, grey levels squared over three channels.  What a shadow
+ * explains, the plate's colour at 2/5 .. 1 of its brightness, counts a SHADOW_SHARE-th. */
 static int32_t cell_difference(const view_planes *im, const view_planes *plate, int32_t at, int32_t gain)
 {
     enum { SHADOW_SHARE = 6 };
@@ -126,7 +126,7 @@ void features_foreground(features *f, const view_planes *im, const view_planes *
         }
 }
 
-/* ---- edges ---------------------------------------------------------------------------------------------- */
+/* ---- edges ------------------------------------------------------------ */
 
 /* Gradient of the binomially smoothed image (Sobel's kernel, 8 per grey level and pixel). */
 static void gradient(const uint8_t *grey, int16_t *gx, int16_t *gy)
@@ -162,7 +162,8 @@ static void soften(const int16_t *in, int32_t *out, int32_t *tmp)
     }
 }
 
-/* gg'/(|g|^2 + k^2): an outer product that saturates at trace 1, k = local mean gradient and a noise floor. */
+/* gg'/(|g|^2 + k^2): an outer product that saturates at trace 1, k = local mean gradient and a noise
+ * floor. */
 static void edge_tensor(const features_scratch *s, int32_t box_area, int16_t *xx, int16_t *yy, int16_t *xy)
 {
     float const floor2 = 40.0f * 40.0f; /* 5 grey levels per pixel in Sobel units */
@@ -200,7 +201,7 @@ void features_edges(const uint8_t *grey, edge_cell *out, features_scratch *s)
         out[i].xy2 = (int8_t)(s->sum[i] / 4);
 }
 
-/* ---- surface -------------------------------------------------------------------------------------------- */
+/* ---- surface ------------------------------------------------------------ */
 
 void features_contrast(const uint8_t *grey, int8_t *out, features_scratch *s)
 {

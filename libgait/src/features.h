@@ -38,7 +38,8 @@ typedef struct features_scratch { /* shared by the cameras */
 features features_layout(arena *a);
 features_scratch features_scratch_layout(arena *a);
 
-/* All maps of one frame.  plate: resampled empty scene, with colour only if the frame has, or NULL; raw: surface keeps grey levels (paper mode). */
+/* All maps of one frame.  plate: resampled empty scene, with colour only if the frame has, or NULL; raw:
+ * surface keeps grey levels (paper mode). */
 void features_compute(features *f, const gait_camera *cam, const gait_image *im, const view_planes *plate,
                       bool raw, features_scratch *s);
 

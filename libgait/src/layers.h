@@ -8,8 +8,8 @@ typedef struct layers {
     rast_mask whole;                    /* the body; every row of the grid is written */
 } layers;
 
-/* Limb indices from near to far by depth[l * stride]; limbs behind the camera (depth 0) are left out.  Returns how
- * many there are. */
+/* Limb indices from near to far by depth[l * stride]; limbs behind the camera (depth 0) are left out.
+ * Returns how many there are. */
 int32_t layers_order(const float *depth, int32_t stride, int32_t limbs, int32_t *order);
 
 /* Polygon of one limb of one lane in grid cells (two working pixels each). */

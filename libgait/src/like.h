@@ -1,7 +1,8 @@
 /* like.h - the likelihood of one body in one camera: terms behind one small interface.
  *
- * Each term is an average (per limb, per area, per outline) times a weight in nats, so that pixels which are not
- * independent do not count as if they were (spec R13).  log p(frames | body) is the sum over terms and cameras. */
+ * Each term is an average (per limb, per area, per outline) times a weight in nats, so that pixels which
+ * are not independent do not count as if they were (spec R13).  log p(frames | body) is the sum over terms
+ * and cameras. */
 #ifndef GAIT_LIKE_H
 #define GAIT_LIKE_H
 #include "features.h"
@@ -61,7 +62,8 @@ void like_sample(const like_setup *s, const features *f, const gait_camera *cam,
 /* Sum of the weighted terms in use. */
 float like_evaluate(const like_body *b);
 
-/* Sum of the weighted terms over the hypothesis that nobody is there: positive if the frame shows this body. */
+/* Sum of the weighted terms over the hypothesis that nobody is there: positive if the frame shows this
+ * body. */
 float like_support(const like_body *b);
 
 /* Mean robust cost between two sets of surface samples of a limb; returns how many were seen in both. */

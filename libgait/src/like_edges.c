@@ -41,18 +41,15 @@ static void cone(const like_body *b, int32_t l, tally *t)
 {
     const outline_block *const o = b->outline;
     int32_t const i = b->lane;
-    float x[4], y[4];
+    float x[4], y[4], mx = 0.0f, my = 0.0f;
     for (int32_t k = 0; k < 4; k++) {
         x[k] = o->x[l][k][i];
         y[k] = o->y[l][k][i];
+        mx += 0.25f * x[k];
+        my += 0.25f * y[k];
     }
-    /* The point inside moves along with the sample: interpolate the axis. */
-    for (int32_t k = 0; k < 2; k++) {
-        int32_t const from = k ? 3 : 0, to = k ? 2 : 1, over = k ? 0 : 3, far = k ? 1 : 2;
-        float const mx = 0.25f * (x[from] + x[to] + x[over] + x[far]),
-                    my = 0.25f * (y[from] + y[to] + y[over] + y[far]);
-        side(b->features, &b->layers->visible[l], x[from], y[from], x[to], y[to], mx, my, SIDE_POINTS, t);
-    }
+    side(b->features, &b->layers->visible[l], x[0], y[0], x[1], y[1], mx, my, SIDE_POINTS, t);
+    side(b->features, &b->layers->visible[l], x[3], y[3], x[2], y[2], mx, my, SIDE_POINTS, t);
 }
 
 static void ellipsoid(const like_body *b, int32_t l, tally *t)
@@ -91,8 +88,8 @@ static float log_likelihood(const like_body *b)
     return (float)t.response / (float)(t.points * 2 * 64 * EDGE_ONE) - 1.0f;
 }
 
-/* With nobody there the outline meets edges of any direction: a tenth more than chance is asked for, and something
- * where the picture has no edges at all. */
+/* With nobody there the outline meets edges of any direction: a tenth more than chance is asked for, and
+ * something where the picture has no edges at all. */
 static float support(const like_body *b)
 {
     float const least = 0.005f;

@@ -63,8 +63,8 @@ static float log_likelihood(const like_body *b)
     return sum;
 }
 
-/* With nobody there every limb is as good as occluded.  Only the paper's mode asks: its other evidence is none, while a
- * motionless background predicts itself too well to speak against silhouette and edges. */
+/* With nobody there every limb is as good as occluded.  Only the paper's mode asks: its other evidence is
+ * none, while a motionless background predicts itself too well to speak against silhouette and edges. */
 static float support(const like_body *b)
 {
     if (!b->setup->paper || !b->ancestor)

@@ -16,7 +16,8 @@ typedef struct limb_geometry { /* one body part in its frame, statures */
 /* All limbs of the model with radii multiplied by girth; out holds MODEL_MAX_LIMBS. */
 void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out);
 
-/* One limb in the working image.  Cones: vertices 0-1 and 3-2 are the two sides, 4 in all; ellipsoids: 8 around. */
+/* One limb in the working image.  Cones: vertices 0-1 and 3-2 are the two sides, 4 in all; ellipsoids: 8
+ * around. */
 typedef struct limb_polygon {
     float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES]; /* working pixels */
     float depth;                                      /* metres, of the limb's middle; 0: behind the camera */

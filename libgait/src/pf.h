@@ -29,7 +29,8 @@ double pf_ess(const pf *p);
 /* First particle of the largest weight. */
 int32_t pf_heaviest(const pf *p);
 
-/* Ancestor indices by systematic resampling: |children - n w| < 1; u is the common offset in 2^-32 of a step. */
+/* Ancestor indices by systematic resampling: |children - n w| < 1; u is the common offset in 2^-32 of a
+ * step. */
 void pf_resample_systematic(pf *p, uint32_t u);
 
 /* n independent draws (Ormoneit et al. 2000, 4.4). */

@@ -3,8 +3,8 @@
 #define GAIT_POPULATION_H
 #include "kinematics.h"
 
-/* One float array per field.  (X, Y) is the smooth track over the ground and Z the ground's height under the walker;
- * the pelvis follows by the model's sway and height (ROOT_*). */
+/* One float array per field.  (X, Y) is the smooth track over the ground and Z the ground's height under
+ * the walker; the pelvis follows by the model's sway and height (ROOT_*). */
 enum {
     F_PHASE,
     F_RATE,

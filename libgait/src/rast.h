@@ -1,7 +1,7 @@
 /* rast.h - scan conversion of convex polygons to exact row spans and to bit masks of a small grid.
  *
- * Coverage is decided in integers (1/256 of a pixel): a pixel belongs to a polygon if its centre does, left and
- * top edges included, so two polygons that share an edge never cover a pixel twice. */
+ * Coverage is decided in integers (1/256 of a pixel): a pixel belongs to a polygon if its centre does,
+ * left and top edges included, so two polygons that share an edge never cover a pixel twice. */
 #ifndef GAIT_RAST_H
 #define GAIT_RAST_H
 #include <stdint.h>
@@ -23,7 +23,8 @@ typedef struct rast_mask { /* bit x of row y; rows outside [first, last) are not
     uint64_t row[RAST_SIZE][RAST_WORDS];
 } rast_mask;
 
-/* Spans of a convex polygon of n vertices in the window of RAST_SIZE rows from top and width columns from 0. */
+/* Spans of a convex polygon of n vertices in the window of RAST_SIZE rows from top and width columns from
+ * 0. */
 void rast_convex(const float *x, const float *y, int32_t n, int32_t top, int32_t width, rast_spans *out);
 
 /* The spans as bits; width must have been RAST_SIZE and top 0. */

@@ -17,7 +17,8 @@ static size_t state_bytes(const gait_tracker *t)
     return (size_t)(t->state_end - (unsigned char *)t->core);
 }
 
-/* The configuration without pointers: where threads come from and how many pieces they get does not matter. */
+/* The configuration without pointers: where threads come from and how many pieces they get does not
+ * matter. */
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;

@@ -1,8 +1,8 @@
 /* view.h - the region of interest of one camera, resampled so that the walker has a fixed size in it.
  *
- * All image evidence is measured in this working image of VIEW_SIZE x VIEW_SIZE pixels in which the predicted
- * person is about VIEW_PERSON pixels tall, whatever the camera's resolution: cost and constants do not depend on
- * the distance.  Two working pixels make one cell of the rasteriser's grid. */
+ * All image evidence is measured in this working image of VIEW_SIZE x VIEW_SIZE pixels in which the
+ * predicted person is about VIEW_PERSON pixels tall, whatever the camera's resolution: cost and constants
+ * do not depend on the distance.  Two working pixels make one cell of the rasteriser's grid. */
 #ifndef GAIT_VIEW_H
 #define GAIT_VIEW_H
 #include "arena.h"
@@ -20,13 +20,13 @@ typedef struct view_planes { /* resampled planes: R, G, B, or grey in the first 
     int32_t channels;
 } view_planes;
 
-/* Centre and size the region on a person whose middle is at pixel uv and who is `tall` pixels high.  Returns false
- * and keeps the map while the person stays well inside it, so that static pixels are not resampled differently
- * from frame to frame. */
+/* Centre and size the region on a person whose middle is at pixel uv and who is `tall` pixels high.
+ * Returns false and keeps the map while the person stays well inside it, so that static pixels are not
+ * resampled differently from frame to frame. */
 bool view_follow(view_map *map, const float uv[2], float tall);
 
-/* Resample one captured frame (bilinear, or a box of pixels where the working image is coarser), undoing the lens
- * distortion. */
+/* Resample one captured frame (bilinear, or a box of pixels where the working image is coarser), undoing
+ * the lens distortion. */
 void view_sample(const view_map *map, const gait_camera *cam, const gait_image *im, view_planes *out);
 
 /* Working pixels whose source lies inside the frame, as bits of the RAST grid. */

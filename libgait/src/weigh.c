@@ -16,8 +16,8 @@ static bool aim(gait_tracker *t, int32_t c, const walker *w)
     return true;
 }
 
-/* Resample the background where the region moved or the frames changed between grey and colour: a grey frame is
- * compared with a grey plate. */
+/* Resample the background where the region moved or the frames changed between grey and colour: a grey
+ * frame is compared with a grey plate. */
 static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
 {
     camera_state *const s = &t->camera[c];

@@ -1,14 +1,17 @@
-/* weigh.h - image evidence of bodies: regions and features of a frame, then every particle's log-likelihood. */
+/* weigh.h - image evidence of bodies: regions and features of a frame, then every particle's
+ * log-likelihood. */
 #ifndef GAIT_WEIGH_H
 #define GAIT_WEIGH_H
 #include "tracker.h"
 
-/* Move each camera's region to the predicted walker and compute its features.  Returns how many cameras saw. */
+/* Move each camera's region to the predicted walker and compute its features.  Returns how many cameras
+ * saw. */
 int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted);
 
 /* Log-likelihoods t->ll, joints and surface samples of all particles. */
 void weigh_particles(gait_tracker *t);
 
-/* Surface samples of one walker into t->seen; returns how much better it explains the frame than nobody, nats. */
+/* Surface samples of one walker into t->seen; returns how much better it explains the frame than nobody,
+ * nats. */
 float weigh_walker(gait_tracker *t, const walker *w);
 #endif
