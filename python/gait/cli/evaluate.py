@@ -30,8 +30,8 @@ HELP = "errors of a track against the truth"
 
 MEANING = (
     "abs: 15 joints as they stand; root: hip midpoints laid on each other; static: the mean pose, given the "
-    "true place and heading of every frame, so compare its root, not its abs; free: the mean cycle, given the "
-    "true first state"
+    "true place and heading of every frame, so compare its root, not its abs; free: the mean cycle, given "
+    "the true first state"
 )
 """One line for readers of the table."""
 
