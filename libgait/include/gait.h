@@ -46,7 +46,7 @@ typedef enum gait_status {
     GAIT_ERR_VERSION = -6, /* format major or snapshot layout is not the one this build reads */
     GAIT_ERR_CORRUPT = -7, /* checksum, bounds or cross-reference check failed */
     GAIT_ERR_STATE   = -8, /* call out of order: step before start, time running backwards */
-    GAIT_ERR_NUMERIC = -9  /* every weight zero or not a number */
+    GAIT_ERR_NUMERIC = -9  /* reserved: this version flags GAIT_EST_DEGENERATE instead */
 } gait_status;
 
 typedef struct gait_error { /* optional detail, written on failure only; there is no global "last error" */

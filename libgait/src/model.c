@@ -228,11 +228,3 @@ gait_model *model_layout(arena *a, const gait_model *m)
         *self = *m;
     return self;
 }
-
-int32_t model_find_point(const gait_model *m, const char *name)
-{
-    for (int32_t i = 0; i < m->points; i++)
-        if (strcmp(m->point_name[i], name) == 0)
-            return i;
-    return -1;
-}

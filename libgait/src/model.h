@@ -52,7 +52,4 @@ gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error
 
 /* Place a copy of m in the arena (NULL in the counting pass). */
 gait_model *model_layout(arena *a, const gait_model *m);
-
-/* Index of a point by name, -1 if the skeleton has none. */
-int32_t model_find_point(const gait_model *m, const char *name);
 #endif

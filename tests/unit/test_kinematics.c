@@ -260,7 +260,7 @@ static float moved(int channel, const char *point, int axis)
     CHECK(model_pose_state(m, &s, &rest) == GAIT_OK);
     s.coef[0] = 0.2f;
     CHECK(model_pose_state(m, &s, &pose) == GAIT_OK);
-    int32_t const p = model_find_point(m, point);
+    int32_t const p = toy_find_point(m, point);
     return pose.joint[p][axis] - rest.joint[p][axis];
 }
 
@@ -322,8 +322,8 @@ static void test_placement(void)
     gait_state s = {.stature = 2.0f, .heading = 0.5f * PI_F, .pelvis = {4, 5, 1}};
     gait_pose p;
     CHECK(model_pose_state(m, &s, &p) == GAIT_OK);
-    int32_t const toe = model_find_point(m, "l_toe"), neck = model_find_point(m, "neck");
-    int32_t const hip = model_find_point(m, "l_hip");
+    int32_t const toe = toy_find_point(m, "l_toe"), neck = toy_find_point(m, "neck");
+    int32_t const hip = toy_find_point(m, "l_hip");
     CHECK_NEAR(p.joint[toe][X], 4.0 - 2 * TOY_HIP_HALF, 1e-5); /* left of +y is -x */
     CHECK_NEAR(p.joint[toe][Y], 5.0 + 2 * 0.069, 1e-5);
     CHECK_NEAR(p.joint[toe][Z], 1.0 - 2 * (TOY_THIGH + TOY_SHANK + 0.0235), 1e-5);

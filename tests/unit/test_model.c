@@ -33,8 +33,8 @@ static void test_views(void)
     CHECK(m.limb_info[2 * LIMB_INFO + 1] == LIMB_ELLIPSOID && m.limb_shape[6] == 0.084f);
     CHECK(m.frame_origin[3 * 8 + 1] == -0.107f && m.point_offset[3 * 2 + 2] == TOY_HEAD);
     CHECK(m.channel_stat[4 * TOY_ROOT] == 0.005f && m.score_stat[3] == 0.8f);
-    CHECK(model_find_point(&m, "r_heel") == 18 && model_find_point(&m, "pelvis") == 0);
-    CHECK(model_find_point(&m, "tail") == -1);
+    CHECK(toy_find_point(&m, "r_heel") == 18 && toy_find_point(&m, "pelvis") == 0);
+    CHECK(toy_find_point(&m, "tail") == -1);
     CHECK(m.curves[TOY_KNEE + 1] == toy_round(toy_interpolate(toy_curve[3].at, 0)));
 }
 

@@ -119,8 +119,8 @@ static void test_places(void)
         gait_pose pose;
         CHECK(gait_render(m, &cam, &s, ids, SCENE_W) == GAIT_OK && gait_model_pose(m, &s, &pose) == GAIT_OK);
         for (size_t k = 0; k < sizeof part / sizeof *part; k++) {
-            const float *const a = pose.joint[model_find_point(m, part[k].from)];
-            const float *const b = pose.joint[model_find_point(m, part[k].to)];
+            const float *const a = pose.joint[toy_find_point(m, part[k].from)];
+            const float *const b = pose.joint[toy_find_point(m, part[k].to)];
             const float mid[3] = {0.5f * (a[0] + b[0]), 0.5f * (a[1] + b[1]), 0.5f * (a[2] + b[2])};
             float uv[2] = {0};
             camera_project(&cam, mid, uv);

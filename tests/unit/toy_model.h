@@ -363,6 +363,16 @@ static inline const gait_model *toy_model(void)
 }
 
 /* Standing at the origin at the model's own pelvis height, 1.75 m, mean shape, heading +x. */
+/* Index of a point by its public name; -1 if there is none. */
+static inline int32_t toy_find_point(const gait_model *m, const char *name)
+{
+    const char *own;
+    for (int32_t i = 0; (own = gait_model_joint_name(m, i)) != NULL; i++)
+        if (strcmp(own, name) == 0)
+            return i;
+    return -1;
+}
+
 static inline gait_state toy_state(float phase)
 {
     gait_state s = {.phase = phase, .stride_hz = 0.92f, .stature = 1.75f};
