@@ -164,18 +164,18 @@ def test_real_walks_are_reproduced_to_8_mm():
     """The 24 angles with own lengths and a rigid shoulder girdle reach 8 mm on average (root-aligned)."""
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
-    from gait.learn.sequence import load
+    from gait.learn.sequence import level_body, load
 
     errors = []
     for name in ("02/02_01", "07/07_01", "16/16_16", "35/35_01", "38/38_01"):
-        s = load(WALKS / f"{name}.amc")
+        s, walker = load(WALKS / f"{name}.amc"), level_body(WALKS / f"{name}.amc")
         own = skeleton.default_skeleton(retarget.own_proportions(s.measures)).sections()
         local = s.channels.copy()
         local[:, [column(f"root_{n}") for n in ("roll", "pitch", "yaw")]] = 0
         position = skeleton.points(own, local) * s.measures.stature
-        found = np.einsum("tij,tpj->tpi", s.body.pelvis, position)
+        found = np.einsum("tij,tpj->tpi", walker.pelvis, position)
         names = [n for n in skeleton.EVAL15 if n not in ("pelvis", "head_top")]
-        truth = np.stack([s.body.joints[n] - s.body.joints["pelvis"] for n in names], axis=1)
+        truth = np.stack([walker.joints[n] - walker.joints["pelvis"] for n in names], axis=1)
         distance = np.linalg.norm(found[:, [skeleton.JOINTS.index(n) for n in names]] - truth, axis=2)
         errors.append(distance.mean())
     assert np.mean(errors) < 0.0105 and max(errors) < 0.013

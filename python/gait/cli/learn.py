@@ -22,6 +22,7 @@ from gait import blob
 from gait.cli.info import sequence_lines
 from gait.files import require_writable
 from gait.learn import fit, model, sources
+from gait.learn.reading import Reading
 from gait.progress import progress
 from gait.skeleton import ANGLES
 
@@ -86,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     files = sources.find(args.sources, args.exclude)
     with progress("reading motion", len(files), args.quiet) as update:
         sequences, refused = sources.load_all(
-            files, update, mode=args.period_mode, fps=args.fps, zero_runs=args.zeros_missing
+            files, Reading(args.period_mode, args.fps, args.zeros_missing, args.activity), update
         )
     if not args.quiet:
         for line in refused:

@@ -40,9 +40,9 @@ def ratio(learned: Learned) -> Figure:
     figure, (axes,) = _grid(1, 1, 8, 4.2)
     step = max(1, len(learned.sequences) // MOST_CURVES)
     for s in learned.sequences[::step]:
-        seconds, share = s.period.candidates / s.body.fps, s.period.scores / np.nanmax(s.period.scores)
+        seconds, share = s.period.candidates / s.fps, s.period.scores / np.nanmax(s.period.scores)
         axes.plot(seconds, share, lw=1, label=s.name)
-        axes.plot(s.period.frames / s.body.fps, 1.02, "v", ms=5, color=axes.lines[-1].get_color())
+        axes.plot(s.period.frames / s.fps, 1.02, "v", ms=5, color=axes.lines[-1].get_color())
     axes.set(xlabel="period, s", ylabel="signal-to-noise ratio / its maximum", ylim=(0, 1.08))
     axes.legend(ncols=2, fontsize=7, frameon=False)
     return figure

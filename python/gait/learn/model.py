@@ -85,10 +85,10 @@ def anova(values: Floats, group: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
 
 def gait_statistics(learned: Learned) -> Floats:
     """GAIT (8,): stride rate, stride length, sample rate and stature of the training set."""
-    rates = np.array([s.body.fps / s.period.frames for s in learned.sequences])
+    rates = np.array([s.fps / s.period.frames for s in learned.sequences])
     column = CHANNELS.index("root_forward")
     lengths = np.array([np.nanmean(s.channels[:, column]) for s in learned.sequences])
-    fps = float(np.median([s.body.fps for s in learned.sequences]))
+    fps = float(np.median([s.fps for s in learned.sequences]))
     rate, length = (_by_subject(v, learned.subject_index) for v in (rates, lengths))
     return np.array([*rate, stride_variation(learned), *length, fps, *ADULT_STATURE])
 
@@ -148,7 +148,7 @@ def sequence_table(learned: Learned) -> list[list[Any]]:
     for i, s in enumerate(learned.sequences):
         own = residuals[learned.cycles.sequence == i]
         rms = float(np.degrees(np.sqrt(np.nanmean(own**2)))) if own.size else float("nan")
-        row = [round(1000 * s.period.frames / s.body.fps), round(s.cycles, 1), round(s.period.sharpness)]
+        row = [round(1000 * s.period.frames / s.fps), round(s.cycles, 1), round(s.period.sharpness)]
         table.append([s.name, *row, round(rms, 1) if own.size else None])
     return table
 

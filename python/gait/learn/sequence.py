@@ -9,15 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import joint_file, mocap_asf, mocap_bvh, period, retarget, root
-from gait.learn.body import Body, body
+from gait.learn import period, readers, retarget, root
+from gait.learn.body import Body
+from gait.learn.reading import DEFAULT, Reading
 from gait.skeleton import SIDES
 
 Floats = npt.NDArray[np.float64]
 
-RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
-POSITIONS = {".csv": joint_file.read_csv, ".trc": joint_file.read_trc}
-READERS = (*RECORDINGS, *POSITIONS)
 #: Fewer than the three that a clean fold would want: the walks of CMU hold 1.7 to 3.5 strides, and their
 #: periods still agree with autocorrelation (tests/python/test_learn_period.py)
 LEAST_CYCLES = 1.5
@@ -31,15 +29,12 @@ class Sequence:
     ----------
     name, subject : str
     source : Path
-    body : Body
-        With a level floor.
+    fps : float
     measures : retarget.Measures
     channels : (T, 30)
         Angles and root channels, radians and statures.
     heading : (T,)
     period : period.Period
-    slope : float
-        Of the floor that was removed, radians.
     strides : (n,)
         Durations of the single strides between forward extremes of either ankle, seconds.
     """
@@ -47,12 +42,11 @@ class Sequence:
     name: str
     subject: str
     source: Path
-    body: Body
+    fps: float
     measures: retarget.Measures
     channels: Floats
     heading: Floats
     period: period.Period
-    slope: float
     strides: Floats
 
     @property
@@ -66,36 +60,23 @@ def subject_of(path: Path) -> str:
     return path.stem.split("_")[0] if "_" in path.stem else path.parent.name
 
 
-def read_body(path: Path, fps: float | None = None, zero_runs: bool = False) -> Body:
-    """Read a motion file by its suffix; see `mocap_asf.read` for the options."""
-    suffix = path.suffix.lower()
-    if suffix in POSITIONS:
-        return POSITIONS[suffix](path, fps, zero_runs)
-    return body(RECORDINGS[suffix](path, fps, zero_runs))
+def level_body(path: Path, reading: Reading = DEFAULT) -> Body:
+    """Read a recording's joints, on a level floor, with the pelvis axes in their standard place."""
+    return root.align_pelvis(root.level(readers.read(path, reading))[0])
 
 
-def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs: bool = False) -> Sequence:
+def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
     """Read and prepare one file.
-
-    Parameters
-    ----------
-    mode : "refined" or "literal"
-        How the period is found.
-    fps : float, optional
-        Frames per second, if not what the file or its kind says.
-    zero_runs : bool
-        Take runs of three or more exact zeros for missing data.
 
     Raises
     ------
     UserError
         If the file is malformed, or the motion is not cyclic or too short.
     """
-    levelled, slope = root.level(read_body(path, fps, zero_runs))
-    levelled = root.align_pelvis(levelled)
-    measures = retarget.measure(levelled)
-    angles = retarget.angles(levelled, measures)
-    found = period.find(angles, levelled.fps, mode)
+    walker = level_body(path, reading)
+    measures = retarget.measure(walker)
+    angles = retarget.angles(walker, measures)
+    found = period.find(angles, walker.fps, reading.mode)
     if not found.cyclic:
         raise UserError(
             f"{path}: no cycle found (sharpness {found.sharpness:.1f}); leave it out of the sources"
@@ -104,18 +85,17 @@ def load(path: Path, mode: str = "refined", fps: float | None = None, zero_runs:
         raise UserError(
             f"{path}: {len(angles) / found.frames:.1f} cycles, at least {LEAST_CYCLES} are needed"
         )
-    channels, heading = root.channels(levelled, measures, found.frames)
+    channels, heading = root.channels(walker, measures, found.frames)
     return Sequence(
         name=path.stem if "_" in path.stem else f"{path.parent.name}/{path.stem}",
         subject=subject_of(path),
         source=path,
-        body=levelled,
+        fps=walker.fps,
         measures=measures,
         channels=np.concatenate([angles, channels], axis=1),
         heading=heading,
         period=found,
-        slope=slope,
-        strides=_strides(levelled, heading, found.frames),
+        strides=_strides(walker, heading, found.frames),
     )
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 from gait.errors import UserError
-from gait.learn.sequence import READERS, Sequence, load
+from gait.learn.readers import KINDS
+from gait.learn.reading import DEFAULT, Reading
+from gait.learn.sequence import Sequence, load
 
 
 def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path, bool]]:
@@ -26,13 +27,13 @@ def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path
     found: dict[Path, bool] = {}
     for source in map(Path, sources):
         if source.is_dir():
-            inside = sorted(p for p in source.rglob("*") if p.suffix.lower() in READERS and p.is_file())
+            inside = sorted(p for p in source.rglob("*") if p.suffix.lower() in KINDS and p.is_file())
             if not inside:
                 raise UserError(f"{source}: no motion files ({_kinds()}) in this folder; name another one")
             found.update((path, True) for path in inside if path not in found)
         elif not source.is_file():
             raise UserError(f"{source}: no such file or folder; check the name")
-        elif source.suffix.lower() not in READERS:
+        elif source.suffix.lower() not in KINDS:
             raise UserError(
                 f"{source}: {source.suffix or 'no suffix'} is not learnt from; convert it to {_kinds()}"
             )
@@ -46,7 +47,9 @@ def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path
 
 
 def load_all(
-    files: list[tuple[Path, bool]], progress: Callable[[int], None] = lambda done: None, **options: Any
+    files: list[tuple[Path, bool]],
+    reading: Reading = DEFAULT,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
 
@@ -54,8 +57,6 @@ def load_all(
     ----------
     progress : callable
         Gets the number of files done.
-    **options
-        Of `gait.learn.sequence.load`.
 
     Raises
     ------
@@ -65,7 +66,7 @@ def load_all(
     sequences, refused = [], []
     for i, (path, inside) in enumerate(files):
         try:
-            sequences.append(load(path, **options))
+            sequences.append(load(path, reading))
         except UserError as error:
             if not inside:
                 raise
@@ -77,4 +78,4 @@ def load_all(
 
 
 def _kinds() -> str:
-    return " ".join(sorted(READERS))
+    return " ".join(sorted(KINDS))
