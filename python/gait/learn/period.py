@@ -23,6 +23,7 @@ DIVISOR_SCORE = 0.5  # of its score at the best period that an allowing angle ke
 CYCLES = 1.5  # cycles a sequence must hold for a candidate to be scored; why so few: sequence.py
 CYCLIC = 3.0  # sharpness, peak over median score, of a sequence that counts as cyclic
 SECONDS = (0.4, 2.1)
+LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, taken as of 120 per second
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ class Period:
     frames : float
         Length of the cycle.
     candidates, scores : (n,)
-        Signal-to-noise ratio, summed over the angles, of each candidate; NaN where invalid.
+        Signal-to-noise ratio, summed over the angles, of each candidate; NaN where invalid (`curves` gives
+        the angles singly).
     sharpness : float
         Best score over the median one.
     cyclic : bool
@@ -121,34 +123,72 @@ def harmonic_f(
     return score
 
 
+def curves(
+    signals: Floats, fps: float, mode: str = "refined", bounds: tuple[float, float] | None = None
+) -> tuple[Floats, Floats]:
+    """Signal-to-noise ratio of each angle against the period: the rows of the paper's figure 2.
+
+    White noise has the law of Fisher's F and so a flat row at about 1.
+
+    Parameters
+    ----------
+    signals : (T, A)
+        NaN where missing.
+    mode : "refined" or "literal"
+        Half frames in a fixed number of bins, or whole frames in one bin each.
+    bounds : (low, high), optional
+        Frames; by default 0.4 to 2.1 s, in the literal mode 0.42 to 2.08 s (50 to 250 frames at 120 per s).
+
+    Returns
+    -------
+    candidates : (n,)
+        Periods, frames.
+    ratios : (n, A)
+        NaN where there are too few observations for the period, or the angle does not move.
+    """
+    moving = _moving(signals)
+    literal = mode == "literal"
+    low, high = bounds or _bounds(fps, mode)
+    candidates = np.arange(np.ceil(low - 1e-9), high + 0.1, 1.0 if literal else 0.5)
+    folder, longest, bins = Folder(signals[:, moving]), len(signals) / CYCLES, _bins(low)
+    ratios = np.full((len(candidates), signals.shape[1]), np.nan)
+    for row, p in zip(ratios, candidates, strict=True):
+        if literal:
+            row[moving] = folder.literal(int(p))
+        elif p <= longest:
+            row[moving] = folder.binned(p, bins)
+    return candidates, ratios
+
+
 def find(
     signals: Floats, fps: float, mode: str = "refined", bounds: tuple[float, float] | None = None
 ) -> Period:
     """Find the period of a sequence.
 
-    Parameters
-    ----------
-    mode : "refined" or "literal"
-    bounds : (low, high), optional
-        Frames; by default 0.4 to 2.1 s, or 50 to 250 frames in the literal mode, as the paper has it.
+    Parameters are those of `curves`.
     """
     moving = signals[:, _moving(signals)]
-    literal = mode == "literal"
-    low, high = bounds or ((50.0, 250.0) if literal else (SECONDS[0] * fps, SECONDS[1] * fps))
-    candidates = np.arange(np.ceil(low), high + 0.1, 1.0 if literal else 0.5)
-    folder, longest = Folder(moving), len(signals) / CYCLES
-    bins = int(np.clip(1.05 * low, 8, BINS))  # not more than frames in the shortest cycle
-    if literal:
-        scores = np.array([_total(folder.literal(int(p))) for p in candidates])
-    else:
-        scores = np.array([_total(folder.binned(p, bins)) if p <= longest else np.nan for p in candidates])
+    candidates, ratios = curves(moving, fps, mode, bounds)
+    scores = np.array([_total(row) for row in ratios])
     if np.isnan(scores).all():
         return Period(float("nan"), candidates, scores, 0.0, False)
     best = float(candidates[np.nanargmax(scores)])
-    if not literal:
-        best = _divisor(folder, bins, moving, _refine(moving, best), low)
+    if mode != "literal":
+        low = (bounds or _bounds(fps, mode))[0]
+        best = _divisor(Folder(moving), _bins(low), moving, _refine(moving, best), low)
     sharpness = float(np.nanmax(scores) / np.nanmedian(scores))
     return Period(best, candidates, scores, sharpness, sharpness >= CYCLIC)
+
+
+def _bounds(fps: float, mode: str) -> tuple[float, float]:
+    """Shortest and longest candidate, frames."""
+    low, high = LITERAL_SECONDS if mode == "literal" else SECONDS
+    return low * fps, high * fps
+
+
+def _bins(low: float) -> int:
+    """Phase bins: not more than there are frames in the shortest cycle."""
+    return int(np.clip(1.05 * low, 8, BINS))
 
 
 def _moving(signals: Floats) -> npt.NDArray[np.bool_]:
