@@ -49,8 +49,8 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test check unit python-test demo model bench eval asan fuzz fuzz-run golden-check lint format \
-        install uninstall clean
+.PHONY: help setup lib tools test check unit python-test demo model bench eval eval-learn asan fuzz fuzz-run golden-check \
+        lint format install uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
@@ -188,6 +188,9 @@ bench: $(B)/bench/step ## time a step by particles and threads (ARGS='-n 1000 -t
 
 eval: setup lib ## errors on the clips of ../shared/data
 	@$(PY) tests/bench/eval.py $(ARGS)
+
+eval-learn: setup ## learning beside other packages: tests/bench/results/learn.md
+	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------
 C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.c tests/fuzz/*.[ch] tools/*.[ch] \

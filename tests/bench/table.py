@@ -1,0 +1,88 @@
+"""Results of the evaluations: aligned tables on the screen, the same as .csv and .md in tests/bench/results."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from gait.files import replacing
+
+RESULTS = Path(__file__).resolve().parent / "results"
+DIGITS = 4  # significant ones of a number that is not whole
+
+
+def publish(
+    name: str, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], note: str = ""
+) -> None:
+    """Print a table and write it to results/`name`.csv and .md, whole or not at all.
+
+    Parameters
+    ----------
+    rows : iterable of sequences
+        Cells: text, whole numbers, numbers (rounded to DIGITS significant digits), None or NaN (shown as -).
+    note : str
+        What a reader must know to judge the numbers: data, method, command; paragraphs of Markdown.
+    """
+    head, cells = [str(c) for c in columns], [[_text(v) for v in row] for row in rows]
+    for row in cells:
+        if len(row) != len(head):
+            raise ValueError(f"{name}: {len(row)} cells {row} under {len(head)} columns")
+    numbers = [all(_is_number(row[k]) for row in cells) for k in range(len(head))]
+    print(f"\n{title}\n\n{_aligned(head, cells, numbers)}\n", flush=True)
+    text = "\n\n".join(
+        part for part in (f"## {title}", note.strip(), _markdown(head, cells, numbers)) if part
+    )
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    _write(RESULTS / f"{name}.csv", _csv(head, cells))
+    _write(RESULTS / f"{name}.md", "\n\n".join(filter(None, parts)) + "\n")
+
+
+def _text(value: Any) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    if isinstance(value, str | bool | int):
+        return str(value)
+    value = float(value)
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    before = math.floor(math.log10(abs(value))) + 1
+    return f"{value:.{min(max(DIGITS - before, 0), DIGITS)}f}" if before > -2 else f"{value:.1e}"
+
+
+def _is_number(text: str) -> bool:
+    return text == "-" or text[:1].isdigit() or text[:2].strip("-+<>")[:1].isdigit()
+
+
+def _aligned(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
+    """Columns padded with blanks, numbers to the right."""
+    width = [max(map(len, column)) for column in zip(head, *cells, strict=True)]
+    rule = ["-" * w for w in width]
+    return "\n".join(
+        "  ".join(_padded(*cell) for cell in zip(row, width, numbers, strict=True)).rstrip()
+        for row in [head, rule, *cells]
+    )
+
+
+def _padded(text: str, width: int, right: bool) -> str:
+    return text.rjust(width) if right else text.ljust(width)
+
+
+def _markdown(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
+    lines = [head, ["--:" if right else "---" for right in numbers], *cells]
+    return "\n".join("| " + " | ".join(c.replace("|", "\\|") for c in line) + " |" for line in lines)
+
+
+def _csv(head: list[str], cells: list[list[str]]) -> str:
+    text = io.StringIO()
+    values = [["" if cell == "-" else cell for cell in row] for row in cells]
+    csv.writer(text, lineterminator="\n").writerows([head, *values])
+    return text.getvalue()
+
+
+def _write(path: Path, text: str) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
