@@ -1,4 +1,4 @@
-"""Results of the evaluations: aligned tables on the screen, the same as .csv and .md in tests/bench/results."""
+"""Results of the evaluations: tables on the screen, the same as .csv and .md in tests/bench/results."""
 
 from __future__ import annotations
 
@@ -33,9 +33,7 @@ def publish(
             raise ValueError(f"{name}: {len(row)} cells {row} under {len(head)} columns")
     numbers = [all(_is_number(row[k]) for row in cells) for k in range(len(head))]
     print(f"\n{title}\n\n{_aligned(head, cells, numbers)}\n", flush=True)
-    text = "\n\n".join(
-        part for part in (f"## {title}", note.strip(), _markdown(head, cells, numbers)) if part
-    )
+    parts = [f"## {title}", note.strip(), _markdown(head, cells, numbers)]
     RESULTS.mkdir(parents=True, exist_ok=True)
     _write(RESULTS / f"{name}.csv", _csv(head, cells))
     _write(RESULTS / f"{name}.md", "\n\n".join(filter(None, parts)) + "\n")
