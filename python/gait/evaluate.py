@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.baselines import free_run, static_pose
+from gait.calibration import calibration, coverage
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.events import Strikes
 from gait.skeleton import EVAL15
-from gait.trackfile import Joints, Track
+from gait.trackfile import STATUSES, Joints, Track
 
 Array = NDArray[np.float64]
 Measures = dict[str, Any]
@@ -20,7 +21,7 @@ Measures = dict[str, Any]
 LOST_MM = 150.0
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 BODY = [i for i, name in enumerate(EVAL15) if name != "pelvis"]
-_QUANTILE = {"50": 0.6744898, "90": 1.6448536}  # half-widths of normal intervals, standard deviations
+LIMBS = [i for i, name in enumerate(EVAL15) if name not in ("pelvis", "neck", "head_top")]
 
 
 def evaluate(
@@ -48,7 +49,10 @@ def evaluate(
     dict
         ``frames``; ``abs``, ``root`` (mm) and ``px`` each as ``median``, ``mean``, ``p90``; ``lost`` (share);
         ``phase`` (cycles; see `phase_errors`) and ``px`` are None where strikes or camera are unknown;
-        ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines.
+        ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines;
+        ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D pose
+        networks have; ``proc``: after the best rotation, scale and shift of every frame, for comparison with
+        literature only; ``status`` and ``trust`` (see `trust`); ``calibration`` (see `gait.calibration`).
 
     Raises
     ------
@@ -59,7 +63,8 @@ def evaluate(
     if len(common) == 0:
         raise UserError(f"track: frames {_span(track)} and the truth's {_span(truth)} have none in common")
     found, true = track.eval15()[ours], truth.eval15()[theirs]
-    given_up = np.array([track.status[i] == "lost" for i in ours])
+    status = np.array(track.status)[ours]
+    given_up = status == "lost"
     true_phase = strikes.phase(common)
     still = static_pose(model, truth)[theirs]
     free = free_run(model, truth, strikes, first=int(theirs[0]))
@@ -71,6 +76,11 @@ def evaluate(
         "coverage": coverage(found, track.eval15_sd()[ours], true),
         "static": pose_errors(still, true),
         "free": None if free is None else pose_errors(free[theirs], true),
+        "root12": spread(root_errors(found, true, LIMBS)),
+        "proc": spread(procrustes_errors(found, true)),
+        "status": {word: float((status == word).mean()) for word in STATUSES},
+        "trust": trust(root_errors(found, true), status),
+        "calibration": calibration(found, track.eval15_sd()[ours], true),
     }
 
 
@@ -91,11 +101,36 @@ def pose_errors(found: Array, true: Array, given_up: NDArray[np.bool_] | None = 
     return {"abs": spread(absolute), "root": spread(root), "lost": float(lost.mean())}
 
 
-def root_errors(found: Array, true: Array) -> Array:
-    """Mean distance (n,) in mm of the 14 joints other than the pelvis, hip midpoints laid together."""
+def root_errors(found: Array, true: Array, joints: list[int] = BODY) -> Array:
+    """Mean distance (n,) in mm of `joints` (the 14 other than the pelvis), hip midpoints laid together."""
     found = found - found[:, HIPS].mean(axis=1, keepdims=True)
     true = true - true[:, HIPS].mean(axis=1, keepdims=True)
-    return np.asarray(1000 * np.linalg.norm(found - true, axis=2)[:, BODY].mean(axis=1))
+    return np.asarray(1000 * np.linalg.norm(found - true, axis=2)[:, joints].mean(axis=1))
+
+
+def procrustes_errors(found: Array, true: Array) -> Array:
+    """Mean distance (n,) in mm of EVAL15 after the least-squares similarity of every frame (Umeyama 1991)."""
+    found = found - found.mean(axis=1, keepdims=True)
+    true = true - true.mean(axis=1, keepdims=True)
+    u, s, vt = np.linalg.svd(np.einsum("nji,njk->nik", true, found))
+    mirror = np.ones_like(s)
+    mirror[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    turn = np.einsum("nij,nj,njk->nik", u, mirror, vt)
+    scale = (s * mirror).sum(axis=1) / np.maximum((found**2).sum(axis=(1, 2)), 1e-12)
+    fitted = scale[:, None, None] * np.einsum("nij,nkj->nki", turn, found)
+    return np.asarray(1000 * np.linalg.norm(fitted - true, axis=2).mean(axis=1))
+
+
+def trust(root: Array, status: NDArray[np.str_]) -> dict[str, float]:
+    """How far the status can be believed, shares of all frames.
+
+    ``wrong_tracking``: off by more than `LOST_MM` while it says ``tracking``; ``weighted_lost``: frames lost, those
+    counted twice.
+    """
+    off = root > LOST_MM
+    silent = off & (status == "tracking")
+    lost = off | (status == "lost")
+    return {"wrong_tracking": float(silent.mean()), "weighted_lost": float((lost + 1.0 * silent).mean())}
 
 
 def phase_errors(found: Array, true: Array) -> dict[str, float]:
@@ -119,12 +154,6 @@ def picture_errors(found: Array, true: Array, camera: Camera) -> dict[str, float
     if not frames.any():
         return None
     return spread(np.nanmean(np.where(seen, distance, np.nan)[frames], axis=1))
-
-
-def coverage(found: Array, sd: Array, true: Array) -> dict[str, float]:
-    """Share of the joint coordinates inside the normal 50 % and 90 % intervals of the track."""
-    off = np.abs(found - true)
-    return {level: float((off <= half * sd).mean()) for level, half in _QUANTILE.items()}
 
 
 def _span(joints: Joints) -> str:

@@ -31,7 +31,8 @@ HELP = "errors of a track against the truth"
 MEANING = (
     "abs: 15 joints as they stand; root: hip midpoints laid on each other; static: the mean pose, given the "
     "true place and heading of every frame, so compare its root, not its abs; free: the mean cycle, given "
-    "the true first state"
+    "the true first state; root12: as root, of the 12 joints that 2-D pose networks have; proc: after the best "
+    "rotation, scale and shift of each frame, to compare with literature only"
 )
 """One line for readers of the table."""
 
@@ -73,10 +74,21 @@ def text(m: Measures) -> str:
     if m["phase"] is not None:
         lines.append(_row("phase cycles", m["phase"], ".4f"))
         lines.append(f"phase bias {m['phase']['bias']:+.4f}, flipped {m['phase']['flips']:.1%} of the frames")
+    lines += [_row(f"{key} mm", m[key], ".1f") for key in ("root12", "proc")]
     covered = ", ".join(f"{share:.0%} in the {level} % intervals" for level, share in m["coverage"].items())
-    return "\n".join(
-        [*lines, f"coverage: {covered}", f"lost {m['lost']:.1%} of {m['frames']} frames", MEANING]
+    honest = m["calibration"]
+    lines.append(f"coverage: {covered}; width of the 90 % intervals {honest['width_mm']:.0f} mm")
+    lines.append(
+        f"squared error in variances {honest['z2']:.2f} (1 is right), score {honest['crps_mm']:.1f} mm (CRPS)"
     )
+    lines.append(
+        "status: " + ", ".join(f"{word} {share:.1%}" for word, share in m["status"].items() if share)
+    )
+    lines.append(
+        f"lost {m['lost']:.1%} of {m['frames']} frames; {m['trust']['wrong_tracking']:.1%} of all are far off while it "
+        "says tracking"
+    )
+    return "\n".join([*lines, MEANING])
 
 
 def _row(label: str, values: dict[str, Any], form: str) -> str:
