@@ -1,4 +1,4 @@
-"""How honest a normal posterior is: coverage, probability integral transform, score and width of intervals."""
+"""How honest a normal posterior is: coverage, probability integral transform, score, width."""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ def evaluate(
         ``frames``; ``abs``, ``root`` (mm) and ``px`` each as ``median``, ``mean``, ``p90``; ``lost`` (share);
         ``phase`` (cycles; see `phase_errors`) and ``px`` are None where strikes or camera are unknown;
         ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines;
-        ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D pose
-        networks have; ``proc``: after the best rotation, scale and shift of every frame, for comparison with
+        ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D
+        pose networks have; ``proc``: after the best rotation, scale and shift of every frame, for comparison with
         literature only; ``status`` and ``trust`` (see `trust`); ``calibration`` (see `gait.calibration`).
 
     Raises
@@ -124,8 +124,8 @@ def procrustes_errors(found: Array, true: Array) -> Array:
 def trust(root: Array, status: NDArray[np.str_]) -> dict[str, float]:
     """How far the status can be believed, shares of all frames.
 
-    ``wrong_tracking``: off by more than `LOST_MM` while it says ``tracking``; ``weighted_lost``: frames lost, those
-    counted twice.
+    ``wrong_tracking``: off by more than `LOST_MM` while it says ``tracking``; ``weighted_lost``: frames lost,
+    those counted twice.
     """
     off = root > LOST_MM
     silent = off & (status == "tracking")

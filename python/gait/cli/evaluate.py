@@ -31,8 +31,8 @@ HELP = "errors of a track against the truth"
 MEANING = (
     "abs: 15 joints as they stand; root: hip midpoints laid on each other; static: the mean pose, given the "
     "true place and heading of every frame, so compare its root, not its abs; free: the mean cycle, given "
-    "the true first state; root12: as root, of the 12 joints that 2-D pose networks have; proc: after the best "
-    "rotation, scale and shift of each frame, to compare with literature only"
+    "the true first state; root12: as root, of the 12 joints that 2-D pose networks have; proc: after the "
+    "best rotation, scale and shift of each frame, to compare with literature only"
 )
 """One line for readers of the table."""
 
@@ -85,8 +85,8 @@ def text(m: Measures) -> str:
         "status: " + ", ".join(f"{word} {share:.1%}" for word, share in m["status"].items() if share)
     )
     lines.append(
-        f"lost {m['lost']:.1%} of {m['frames']} frames; {m['trust']['wrong_tracking']:.1%} of all are far off while it "
-        "says tracking"
+        f"lost {m['lost']:.1%} of {m['frames']} frames; "
+        f"{m['trust']['wrong_tracking']:.1%} of all are far off while it says tracking"
     )
     return "\n".join([*lines, MEANING])
 
