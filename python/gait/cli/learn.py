@@ -1,9 +1,14 @@
 """Learn a cyclic model of motion from motion capture.
 
-Sources are files or folders of them: .amc with its .asf beside it, .bvh, and joint positions in .csv or .trc.
-Each recording is retargeted to the default skeleton and cut into cycles by its own period; functional
-principal components of all cycles give the mean curves and the ways in which people differ (Ormoneit and
-others, 2000).  In a folder, a file that cannot be used is named in one line and the rest is learnt.
+Sources are files or folders of them: .amc with its .asf beside it, .bvh, .c3d, .trc, and .csv of joint
+positions or angles.  Each recording is retargeted to the default skeleton and cut into cycles by its own
+period; functional principal components of all cycles give the mean curves and the ways in which people differ
+(Ormoneit and others, 2000).  In a folder, a file that cannot be used is named in one line and the rest is
+learnt.  gait info lists the sequences of a model, --report shows everything.
+
+The signals wait on disk, in the folder that TMPDIR names, so a corpus may be larger than memory.  The model
+does not depend on --jobs or --dask.  The workers of a Dask cluster (pip install 'gait[dask]') need this
+version of the package and the files under the same paths.
 
 The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
 """
@@ -12,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -19,15 +25,19 @@ from typing import Any
 import numpy as np
 
 from gait import blob
-from gait.cli.info import sequence_lines
+from gait.cli import values
+from gait.errors import UsageError, UserError
 from gait.files import require_writable
 from gait.learn import fit, model, sources
 from gait.learn.reading import Reading
+from gait.learn.sequence import Sequence
+from gait.learn.stage import one_thread
 from gait.progress import progress
 from gait.skeleton import ANGLES
 
 NAME = "learn"
 HELP = "learn a cyclic model from motion capture"
+MOST_LINES = 20  # about files left out
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,12 +67,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="literal: whole frames from 50 to 250, as in the paper (refined)",
     )
     parser.add_argument(
-        "--fps", type=_rate, metavar="F", help="frames per second (.amc: 120, .bvh: as it says)"
+        "--fps", type=_rate, metavar="F", help="frames per second (what the file says; .amc: 120)"
+    )
+    parser.add_argument(
+        "--markers", type=Path, metavar="MAP.json", help="which joints the markers of .c3d and .trc belong to"
     )
     parser.add_argument(
         "--zeros-missing", action="store_true", help="three or more exact zeros in a row are missing data"
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the held-out data (1)")
+    parser.add_argument(
+        "--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings"
+    )
+    parser.add_argument(
+        "--jobs", type=values.whole(1), metavar="N", help="processes that read files (one per core)"
+    )
+    parser.add_argument("--dask", metavar="SCHEDULER", help="read on a Dask cluster, such as tcp://host:8786")
+    parser.add_argument(
+        "--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the held-out data (1)"
+    )
     parser.add_argument("--report", metavar="DIR", help="also write figures and index.html into this folder")
 
 
@@ -75,32 +97,63 @@ def _components(text: str) -> int | str:
 
 
 def _rate(text: str) -> float:
-    value = float(text)
-    if not 10 <= value <= 2000:
-        raise argparse.ArgumentTypeError(f"{text} is not between 10 and 2000")
+    low, high = 10, 2000
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(f"{text}: give frames per second from {low} to {high}")
     return value
 
 
 def run(args: argparse.Namespace) -> int:
     """Read, learn, write, report."""
-    require_writable(args.output)
-    files = sources.find(args.sources, args.exclude)
-    with progress("reading motion", len(files), args.quiet) as update:
-        sequences, refused = sources.load_all(
-            files, Reading(args.period_mode, args.fps, args.zeros_missing, args.activity), update
-        )
-    if not args.quiet:
-        for line in refused:
-            print(f"left out: {line}", file=sys.stderr)
-    learned = fit.fit(sequences, args.components, args.seed)
-    data = blob.write(args.output, model.sections(learned, args.activity, args.seed))
-    if args.report:
-        from gait.learn import report  # matplotlib is slow to import
+    _check(args)
+    with one_thread():
+        sequences, refused = _read(args)
+        learned = fit.fit(sequences, args.components, args.seed)
+        data = blob.write(args.output, model.sections(learned, args.activity, args.seed))
+        if args.report:
+            from gait.learn import report  # matplotlib is slow to import
 
-        report.write(Path(args.report), learned, args.activity, refused)
+            report.write(Path(args.report), learned, args.activity, refused, args.quiet)
     summary = _summary(learned, data, refused)
     print(json.dumps(summary) if args.json else _text(args.output, summary))
     return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse before the work what would fail after it."""
+    if args.dask and args.jobs:
+        raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
+    if args.markers and not args.markers.is_file():
+        raise UserError(f"--markers {args.markers}: no such file; check the name")
+    require_writable(args.output)
+    if args.report:
+        folder = Path(args.report).absolute()
+        there = next(p for p in (folder, *folder.parents) if p.exists())
+        if not (there.is_dir() and os.access(there, os.W_OK)):
+            raise UserError(
+                f"--report {args.report}: {there} is not a folder to write in; choose another one"
+            )
+
+
+def _read(args: argparse.Namespace) -> tuple[list[Sequence], list[str]]:
+    """Find and prepare the files; say which were left out."""
+    files = sources.find(args.sources, args.exclude)
+    reading = Reading(
+        args.period_mode, args.fps, args.zeros_missing, args.activity, args.markers, not args.no_trim
+    )
+    jobs = args.jobs or len(os.sched_getaffinity(0))
+    with progress("reading motion", len(files), args.quiet) as update:
+        sequences, refused = sources.load_all(files, reading, update, jobs=jobs, dask=args.dask)
+    if not args.quiet:
+        for line in refused[:MOST_LINES]:
+            print(f"left out: {line}", file=sys.stderr)
+        if len(refused) > MOST_LINES:
+            print(f"left out: {len(refused) - MOST_LINES} more (see --json or --report)", file=sys.stderr)
+    return sequences, refused
 
 
 def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str, Any]:
@@ -131,11 +184,11 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
 def _text(path: str, s: dict[str, Any]) -> str:
     """Lay the figures out for people."""
     explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
+    left = f"; {len(s['left_out'])} files left out" if s["left_out"] else ""
     lines = [
-        *sequence_lines([list(row.values()) for row in s["sequences"]]),
-        f"{len(s['sequences'])} sequences of {len(s['subjects'])} subjects, {s['cycles']} cycles",
-        f"{s['components']} components explain {explained} %; residual {s['residual_deg']:.1f} deg",
+        f"{len(s['sequences'])} sequences of {len(s['subjects'])} subjects, {s['cycles']} cycles{left}",
         f"{s['stride_hz'][0]:.2f} strides/s of {s['stride_length_statures'][0]:.2f} statures",
+        f"{s['components']} components explain {explained} %; residual {s['residual_deg']:.1f} deg",
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
     ]
     return "\n".join(lines)

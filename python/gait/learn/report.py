@@ -21,7 +21,7 @@ STYLE = (
 )
 
 
-def write(folder: Path, learned: Learned, activity: str, refused: list[str]) -> None:
+def write(folder: Path, learned: Learned, activity: str, refused: list[str], quiet: bool = True) -> None:
     """Write `folder`/*.png and `folder`/index.html, which needs no other file.
 
     Raises

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from gait.errors import UserError
+from gait.learn import cluster, pool
 from gait.learn.readers import KINDS
 from gait.learn.reading import DEFAULT, Reading
-from gait.learn.sequence import Sequence, load
+from gait.learn.sequence import Sequence
+from gait.learn.spool import Spool
+
+NOT_YET = np.zeros((0, 0))  # channels of a sequence while they go to disk
 
 
 def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path, bool]]:
@@ -50,30 +58,48 @@ def load_all(
     files: list[tuple[Path, bool]],
     reading: Reading = DEFAULT,
     progress: Callable[[int], None] = lambda done: None,
+    *,
+    jobs: int = 1,
+    dask: str | None = None,
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
+
+    The result does not depend on where the files are prepared.  The signals of the sequences are on disk and
+    come into memory when they are used.
 
     Parameters
     ----------
     progress : callable
         Gets the number of files done.
+    jobs : int
+        Processes at most.
+    dask : str, optional
+        Address of the scheduler of a Dask cluster that shall do it.
 
     Raises
     ------
     UserError
         If a file named by itself cannot be used, or none can.
     """
+    paths = [path for path, _ in files]
+    outcomes = cluster.prepared(paths, reading, dask) if dask else pool.prepared(paths, reading, jobs)
     sequences, refused = [], []
-    for i, (path, inside) in enumerate(files):
-        try:
-            sequences.append(load(path, reading))
-        except UserError as error:
-            if not inside:
-                raise
-            refused.append(str(error))
-        progress(i + 1)
+    with closing(outcomes), Spool() as spool:
+        for i, outcome in enumerate(outcomes):
+            if not isinstance(outcome, UserError):
+                spool.put(outcome.channels)
+                sequences.append(replace(outcome, channels=NOT_YET))
+            elif files[i][1]:
+                refused.append(str(outcome))
+            else:
+                raise outcome
+            progress(i + 1)
+        views = spool.views()
     if not sequences:
-        raise UserError(f"{refused[0]} (and none of the other {len(refused) - 1} files can be used)")
+        others = f" (and none of the other {len(refused) - 1} files can be used)" if refused[1:] else ""
+        raise UserError(refused[0] + others)
+    for sequence, channels in zip(sequences, views, strict=True):
+        sequence.channels = channels
     return sequences, refused
 
 

@@ -1,0 +1,125 @@
+"""The per-file stage on a Dask cluster, in the order of the files.
+
+The workers read the files themselves, so they need the same paths as this machine: a shared file system.
+They also need this package, and the same versions of it, numpy and scipy, or the results would differ.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gait.errors import UserError
+from gait.learn.reading import Reading
+from gait.learn.stage import Outcome, one_thread_for_good, prepare
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+CONNECT = 5.0  # seconds that a scheduler gets to answer and to have a worker
+PATIENCE = 10.0  # seconds between looks at whether there still are workers
+AHEAD = 4  # files in flight per thread of the workers
+SAME = ("gait", "numpy", "scipy")  # packages on which the results depend
+
+
+def prepared(paths: Sequence[Path], reading: Reading, address: str) -> Generator[Outcome, None, None]:
+    """Outcomes of the files in their order, from the workers of the scheduler at `address`.
+
+    Raises
+    ------
+    UserError
+        If dask is not installed, nothing answers, the workers have other versions or do not see the files.
+    """
+    if reading.markers:
+        reading = replace(reading, markers=reading.markers.absolute())
+    with _connected(address) as client:
+        _require_same_versions(client, address)
+        ahead = AHEAD * max(1, sum(client.nthreads().values()))
+        waiting, flying = deque(paths), deque[tuple[Path, "Future"]]()
+        while waiting or flying:
+            while waiting and len(flying) < ahead:
+                path = waiting.popleft()
+                flying.append((path, client.submit(_task, path.absolute(), reading, pure=False)))
+            path, future = flying.popleft()
+            yield _as_named(_result(client, address, path, future), path)
+
+
+def _task(path: Path, reading: Reading) -> Outcome | None:
+    """Prepare a file on a worker; None if the worker does not see it."""
+    one_thread_for_good()
+    return prepare(path, reading) if path.is_file() else None
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Client]:
+    """Client of a scheduler that answers and has a worker."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise UserError("--dask: dask is not installed; pip install 'gait[dask]'") from error
+    log = logging.getLogger("distributed")
+    before = log.level
+    log.setLevel(logging.CRITICAL)  # a lost connection is one line of ours, not its tracebacks
+    try:
+        with Client(address, timeout=CONNECT, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=CONNECT)
+            yield client
+    except (TimeoutError, ValueError, OSError) as error:
+        raise UserError(
+            f"--dask {address}: no scheduler with a worker answered within {CONNECT:.0f} s; "
+            f"start them with 'dask scheduler' and 'dask worker {address}'"
+        ) from error
+    finally:
+        log.setLevel(before)
+
+
+def _require_same_versions(client: Client, address: str) -> None:
+    for package in SAME:
+        here = metadata.version(package)
+        for worker, there in client.run(metadata.version, package, on_error="return").items():
+            if there != here:
+                found = there if isinstance(there, str) else "none"
+                raise UserError(
+                    f"--dask {address}: worker {worker} has {found} of {package}, this machine {here}; "
+                    "install the same versions on both"
+                )
+
+
+def _result(client: Client, address: str, path: Path, future: Future) -> Outcome | None:
+    """Wait for a result while there are workers."""
+    from distributed import CancelledError, KilledWorker
+    from distributed.comm import CommClosedError
+
+    lost = UserError(f"--dask {address}: the connection was lost at {path}; start again")
+    while True:
+        try:
+            outcome: Outcome | None = future.result(timeout=PATIENCE)
+            return outcome
+        except KilledWorker:
+            return UserError(
+                f"{path}: the workers that read it were killed (out of memory?); "
+                "leave it out with --exclude or cut the recording"
+            )
+        except TimeoutError as error:
+            if client.status != "running" or not client.nthreads():
+                raise lost from error
+        except (CancelledError, CommClosedError) as error:
+            raise lost from error
+
+
+def _as_named(outcome: Outcome | None, path: Path) -> Outcome:
+    """Outcome as if the file had been read by the name it has here."""
+    if outcome is None:
+        raise UserError(
+            f"{path}: a worker does not see {path.absolute()}; put the files where all workers find them "
+            "under the same path"
+        )
+    if isinstance(outcome, UserError):
+        return type(outcome)(str(outcome).replace(str(path.absolute()), str(path)))
+    return replace(outcome, source=path)
