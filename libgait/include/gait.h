@@ -157,6 +157,8 @@ typedef struct gait_tracker_config {
     int32_t  components;       /* [0, the model's]; default -1: all */
     int32_t  tasks;            /* pieces per step [1, 256], sizes the scratch; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
+    int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
+    uint32_t reserved;
     uint32_t terms;            /* GAIT_TERM_* in use */
     float    term_weight[4];   /* nats per unit cost of texture, silhouette, edges, template */
     float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
@@ -224,6 +226,10 @@ GAIT_API gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean,
                                         gait_error *err);
 /* One frame: resample, predict, weigh, estimate.  The first frame after start at the same utime is not moved. */
 GAIT_API gait_status gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out, gait_error *err);
+/* The frame `back` steps ago given every frame since: today's weights on the ancestors of then.  back 0 is the
+ * present.  GAIT_ERR_ARG: back is not in [0, config lag]; GAIT_ERR_STATE: not so many steps since start.  ess counts
+ * the ancestors that are left; status is LOST if it was, else the mode's mass as known now decides. */
+GAIT_API gait_status gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err);
 /* Copy up to cap particles with normalised weights; returns how many there are, or a negative status. */
 GAIT_API int32_t     gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap);
 GAIT_API uint64_t    gait_tracker_digest(const gait_tracker *t); /* hash of the whole state, for replay */

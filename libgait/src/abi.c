@@ -65,6 +65,8 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_tracker_config, components),
         FIELD(gait_tracker_config, tasks),
         FIELD(gait_tracker_config, cameras),
+        FIELD(gait_tracker_config, lag),
+        FIELD(gait_tracker_config, reserved),
         FIELD(gait_tracker_config, terms),
         FIELD(gait_tracker_config, term_weight),
         FIELD(gait_tracker_config, missed_weight),

@@ -19,6 +19,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .components = -1,
         .tasks = 8,
         .cameras = 1,
+        .lag = 5,
         .terms = paper ? GAIT_TERM_TEXTURE
                        : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
         .term_weight = {0.2f, 25.0f, 40.0f, 4.0f},
@@ -113,6 +114,8 @@ static gait_status check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->cameras < 1 || cfg->cameras > GAIT_MAX_CAMERAS)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config cameras = %d is outside [1, %d]", (int)cfg->cameras,
                          GAIT_MAX_CAMERAS);
+    if (cfg->lag < 0 || cfg->lag > 64)
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config lag = %d is outside [0, 64]", (int)cfg->lag);
     if (cfg->terms == 0 || (cfg->terms & ~known) != 0)
         return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
                          (unsigned)cfg->terms);
@@ -258,6 +261,19 @@ gait_status gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_est
         return base_fail(err, GAIT_ERR_STATE, -1, "step before start");
     gait_status const s = check_frame(t, frame, err);
     return s != GAIT_OK ? s : tracker_step(t, frame, out);
+}
+
+gait_status gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err)
+{
+    if (!t || !out)
+        return base_fail(err, GAIT_ERR_ARG, -1, "tracker or out is NULL");
+    if (back < 0 || back > t->cfg.lag || t->cfg.lag == 0)
+        return base_fail(err, GAIT_ERR_ARG, -1, "back = %d is outside the config's lag of %d", (int)back,
+                         (int)t->cfg.lag);
+    if (!t->core->started || back > lag_reach(t))
+        return base_fail(err, GAIT_ERR_STATE, -1, "no frame %d steps ago since the start", (int)back);
+    lag_estimate(t, back, out);
+    return GAIT_OK;
 }
 
 int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap)

@@ -96,6 +96,26 @@ static bool people_plausible(const gait_tracker *t, const unsigned char *body)
     return true;
 }
 
+/* Indices and numbers of the generations kept; those of steps not yet done are zero. */
+static bool past_plausible(const gait_tracker *t, const unsigned char *body)
+{
+    const lag *const l = &t->past;
+    size_t const n = (size_t)t->cfg.particles, values = n * (size_t)t->gen[0].people.fields;
+    for (size_t i = 0; i < (size_t)l->depth * n; i++) {
+        int32_t parent;
+        memcpy(&parent, in_body(t, body, &l->parent[i]), sizeof parent);
+        if (parent < 0 || parent >= t->cfg.particles)
+            return false;
+    }
+    for (size_t i = 0; i < (size_t)l->depth * values; i++) {
+        float v;
+        memcpy(&v, in_body(t, body, &l->value[i]), sizeof v);
+        if (!f_finite(&v, 1))
+            return false;
+    }
+    return true;
+}
+
 static bool template_plausible(const gait_tracker *t, const unsigned char *body)
 {
     for (int32_t c = 0; c < t->cfg.cameras && t->template[c]; c++)
@@ -127,7 +147,7 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     if (h.bytes != bytes || bytes != snapshot_bytes(t) || h.body != hash_state(body, state_bytes(t)))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot is damaged: length or checksum do not match");
     if (!core_plausible(t, body) || !weights_plausible(t, body) || !people_plausible(t, body) ||
-        !template_plausible(t, body))
+        !past_plausible(t, body) || !template_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot holds a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     for (int32_t c = 0; c < t->cfg.cameras; c++)

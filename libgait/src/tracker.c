@@ -26,6 +26,7 @@ static void layout_state(arena *a, gait_tracker *t)
     t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
     for (int32_t c = 0; c < cameras && wants_texture(&t->cfg); c++)
         t->template[c] = TAKE(a, int16_t, samples);
+    lag_layout_state(&t->past, a, t->cfg.lag, n, body_rule_fields(&t->rule));
     t->state_end = TAKE(a, unsigned char, 1);
 }
 
@@ -43,6 +44,7 @@ static void layout_work(arena *a, gait_tracker *t)
     t->mode = TAKE(a, uint8_t, n);
     if (wants_texture(&t->cfg))
         t->seen = TAKE(a, int8_t, (size_t)t->cfg.cameras *samples);
+    lag_layout_work(&t->past, a, n, body_rule_fields(&t->rule), t->model->points);
     t->scratch = features_scratch_layout(a);
     t->work = TAKE(a, weigh_scratch, t->cfg.tasks);
 }
@@ -219,6 +221,7 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
         coast(t, &e);
     e.flags |= resampled ? GAIT_EST_RESAMPLED : 0;
     e.ess = (float)core->ess;
+    lag_keep(t, &e);
     core->frame++;
     *out = e;
     return GAIT_OK;

@@ -2,6 +2,7 @@
 #ifndef GAIT_TRACKER_H
 #define GAIT_TRACKER_H
 #include "dynamics.h"
+#include "lag.h"
 #include "like_template.h"
 #include "pf.h"
 #include "task.h"
@@ -48,6 +49,7 @@ struct gait_tracker {
     pf filter;
     float *joint; /* P x 3 x n, metres: of the current generation */
     int16_t *template[GAIT_MAX_CAMERAS];
+    lag past;
     unsigned char *state_end;
     /* Recomputed in every step. */
     camera_state camera[GAIT_MAX_CAMERAS];

@@ -32,6 +32,7 @@ class TrackerConfig:
     particles: int
     components: int
     tasks: int
+    lag: int
     terms: Term
     term_weight: tuple[float, ...]
     missed_weight: float
@@ -267,6 +268,28 @@ class Tracker:
         begun = time.perf_counter()
         status = self._lib.gait_tracker_step(self._handle, *arguments)
         self.step_seconds = time.perf_counter() - begun
+        self._check(status)
+        return Estimate.from_c(out, self.model)
+
+    def lagged(self, back: int | None = None) -> Estimate | None:
+        """Estimate of the frame `back` steps ago given every frame since, by tracing ancestors.
+
+        Parameters
+        ----------
+        back : int, optional
+            At most ``config.lag``, which is also the default.
+
+        Returns
+        -------
+        Estimate or None
+            None if there were not so many steps since the start.
+        """
+        out = _abi.EstimateC()
+        status = self._lib.gait_tracker_lagged(
+            self._handle, self.config.lag if back is None else back, ctypes.byref(out), ctypes.byref(self._error)
+        )
+        if status == _abi.Status.STATE:
+            return None
         self._check(status)
         return Estimate.from_c(out, self.model)
 

@@ -39,6 +39,8 @@ static void test_integers(void)
         {offsetof(gait_tracker_config, tasks), 257, GAIT_ERR_LIMIT, "tasks"},
         {offsetof(gait_tracker_config, cameras), 0, GAIT_ERR_LIMIT, "cameras"},
         {offsetof(gait_tracker_config, cameras), GAIT_MAX_CAMERAS + 1, GAIT_ERR_LIMIT, "cameras"},
+        {offsetof(gait_tracker_config, lag), -1, GAIT_ERR_LIMIT, "lag"},
+        {offsetof(gait_tracker_config, lag), 65, GAIT_ERR_LIMIT, "lag"},
         {offsetof(gait_tracker_config, terms), 0, GAIT_ERR_ARG, "terms"},
         {offsetof(gait_tracker_config, terms), 0x11, GAIT_ERR_ARG, "terms"},
     };

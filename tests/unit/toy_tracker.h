@@ -18,6 +18,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.components = TOY_COMPONENTS;
     c.tasks = 4;
     c.cameras = cameras;
+    c.lag = 5;
     c.terms = GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE;
     c.term_weight[0] = 0.2f;
     c.term_weight[1] = 25.0f;
