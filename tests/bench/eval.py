@@ -1,10 +1,15 @@
-"""Errors of the tracker on the development clips and the outdoor video, by the public commands alone.
+"""Errors of the tracker on the development clips and the outdoor video, through the public Python API.
 
-    make eval ARGS='--seeds 3 --modes default paper'
+    make eval                                  everything that the table needs, default and paper mode
+    make eval ARGS='--modes default --init truth --seeds 1'
+    make eval ARGS='--all'                     also wrong stature, no background, 15 and 10 frames a second
+    make eval ARGS='--particles 300 1000 3000 --modes default --init truth'
+    make eval ARGS='--ablate --modes default --init truth'
+    make eval ARGS='--folder DIR'              any folder of clips (video.mp4 camera.json truth.csv ...)
+    make eval ARGS='--simulated DIR'           hard cases: made in DIR if absent, then evaluated
 
-Each clip's subject is left out of learning.  Every run starts from the truth plus noise drawn from the
-start's own deviations by the seed.  Writes build/eval/results.json and results.csv and prints one table;
-lost runs are in it.
+A development clip's subject is left out of learning.  A start from the truth has noise drawn by the seed.
+Writes results.json, results.csv and index.html (overlays, plots; failures first) into build/eval.
 """
 
 from __future__ import annotations
@@ -12,199 +17,191 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import eval_ablate
+import eval_clips
+import eval_page
+import eval_simulated
+import eval_table
+import eval_wanted
+from eval_plan import Arm, Clip, Job, main_arms, varied_arms
+from eval_run import Result, run
 
-ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT.parent / "shared" / "data"
-OUT = ROOT / "build" / "eval"
-GAIT = [sys.executable, "-m", "gait"]
-SPREAD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "stature_m": 0.01}
-NEAR = ("l_hip", "l_knee", "l_ankle")  # the near side of the outdoor clip
+from gait import TrackerConfig, UserError
+from gait.files import replacing
+from gait.progress import progress
 
-
-@dataclass(frozen=True)
-class Run:
-    """One clip, seed and mode."""
-
-    clip: str
-    seed: int
-    mode: str
-
-    @property
-    def name(self) -> str:
-        """Stem of the run's files."""
-        return f"{self.clip}.{self.mode}.{self.seed}"
+OUT = eval_clips.ROOT / "build" / "eval"
+RESULTS = Path(__file__).parent / "results"
 
 
-def call(*words: object) -> dict[str, Any]:
-    """Run a gait command that prints JSON; the first line of its error ends the evaluation."""
-    command = [*GAIT, *map(str, words), "--json", "--quiet"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
-    if done.returncode:
-        raise SystemExit(f"eval: gait {words[0]}: {done.stderr.strip()}")
-    return dict(json.loads(done.stdout))
+def arguments() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("--modes", nargs="+", choices=("default", "paper"), default=["default", "paper"], help="(both)")
+    add("--init", nargs="+", choices=("truth", "auto"), default=["truth", "auto"], help="(both)")
+    add("--seeds", type=int, metavar="N", help="runs of a clip in each arm (3; from auto 4)")
+    add("--clips", nargs="+", metavar="NAME", help="names of clips (all, and outdoor)")
+    add("--folder", type=Path, metavar="DIR", help="evaluate the clips in DIR instead")
+    add("--simulated", type=Path, metavar="DIR", help="make the hard cases in DIR if need be, evaluate them")
+    add("--stature-error", type=float, metavar="SHARE", help="also with the start's stature wrong by +-SHARE")
+    add("--background", nargs="+", choices=("plate", "auto", "none"), default=[], help="also with these")
+    add("--every", type=int, nargs="+", default=[], metavar="K", help="also with each K-th frame")
+    add("--particles", type=int, nargs="+", default=[], metavar="N", help="also with N particles")
+    add("--ablate", action="store_true", help="also with each term and feature switched off")
+    add("--all", action="store_true", help="--stature-error 0.05 --background none --every 2 3")
+    add("--jobs", type=int, default=2, metavar="J", help="runs side by side, same results (2)")
+    add("--json", action="store_true", help="print the figures of every run as JSON instead of tables")
+    add("--html", type=Path, default=OUT, metavar="DIR", help="folder of the results (build/eval)")
+    add("--no-pictures", action="store_true", help="neither overlays nor a page")
+    add("--record", action="store_true", help="also write tests/bench/results/eval.md and eval.csv")
+    args = parser.parse_args()
+    if args.all:
+        args.stature_error = args.stature_error or 0.05
+        args.background, args.every = args.background or ["none"], args.every or [2, 3]
+    return args
 
 
-def model_without(subject: str) -> Path:
-    """Walking model learned without one subject, made once."""
-    path = OUT / f"without_{subject}.gait"
-    newest = max(p.stat().st_mtime for p in (ROOT / "python/gait").rglob("*.py") if "learn" in p.parts)
-    if not path.exists() or path.stat().st_mtime < newest:
-        call("learn", DATA / "mocap/cmu_walk", "-o", path, "--exclude", f"cmu_walk/{subject}/*")
-    return path
+def arms_of(args: argparse.Namespace) -> list[Arm]:
+    """The main arms, then one for each thing that the command line varies."""
+    switches = eval_ablate.switches(TrackerConfig.default()) if args.ablate else None
+    return main_arms(args.modes, args.init, args.seeds) + varied_arms(
+        seeds=args.seeds or 3,
+        stature_error=args.stature_error,
+        backgrounds=args.background,
+        every=args.every,
+        particles=args.particles,
+        switches=switches,
+    )
 
 
-def noisy_start(folder: Path, seed: int) -> dict[str, Any]:
-    """The truth at frame 0 plus noise, in the form of an --init file."""
-    meta = json.loads((folder / "meta.json").read_text())
-    with open(folder / "truth.csv", newline="") as file:
-        first = next(csv.DictReader(file))
-    strikes = np.array(meta["events_video_frames"]["r_heel_strike"])
-    stride = float(np.median(np.diff(strikes)))
-    noise = np.random.default_rng(seed).standard_normal(7)
-    true = {
-        "phase": -strikes[0] / stride,
-        "stride_hz": meta["fps"] / stride,
-        "stature_m": meta["stature_m"],
-        "heading_rad": float(first["heading_rad"]),
-    }
-    start: dict[str, Any] = {
-        key: value + SPREAD[key] * n for (key, value), n in zip(true.items(), noise, strict=False)
-    }
-    start["phase"] %= 1.0
-    start["pelvis"] = [
-        float(first[f"pelvis_{a}"]) + SPREAD["pelvis"] * n for a, n in zip("xyz", noise[4:], strict=True)
+def clips_of(args: argparse.Namespace) -> list[Clip]:
+    """The clips that the command line asks for."""
+    if args.simulated:
+        with progress("clips", len(eval_simulated.CASES)) as update:
+            eval_simulated.make(args.simulated, update)
+    folder = args.folder or args.simulated
+    if folder is None:
+        return eval_clips.shared_clips(args.clips)
+    return [clip for clip in eval_clips.folder_clips(folder) if not args.clips or clip.name in args.clips]
+
+
+def run_all(jobs: list[Job], workers: int, update: Callable[[int], None]) -> list[Result]:
+    """Run the jobs side by side, the long ones first; results in the order of `jobs`."""
+    if workers < 2:
+        return [_counted(job, number, update) for number, job in enumerate(jobs, 1)]
+    order = sorted(
+        range(len(jobs)), key=lambda i: (jobs[i].arm.mode == "paper", jobs[i].clip.name), reverse=True
+    )
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        places = {pool.submit(run, jobs[i]): i for i in order}
+        results: dict[int, Result] = {}
+        try:
+            for done, future in enumerate(as_completed(places), 1):
+                results[places[future]] = future.result()
+                update(done)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return [results[i] for i in range(len(jobs))]
+
+
+def _counted(job: Job, number: int, update: Callable[[int], None]) -> Result:
+    result = run(job)
+    update(number)
+    return result
+
+
+def save(folder: Path, results: list[Result], rows: list[dict[str, Any]]) -> None:
+    """Write results.json and results.csv."""
+    data = [row | {"measures": result.measures} for row, result in zip(rows, results, strict=True)]
+    with replacing(folder / "results.json") as path:
+        path.write_text(json.dumps(data), encoding="utf-8")
+    write_csv(folder / "results.csv", rows)
+
+
+def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Write a row for each run; numbers to four digits."""
+    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        for row in rows:
+            writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
+
+
+def tables(rows: list[dict[str, Any]], shape: Callable[[list[list[str]]], str]) -> list[tuple[str, str]]:
+    """Headings and tables in the shape of `shape`."""
+    parts = [("Clips", shape(eval_table.grid(eval_table.summaries(rows))))]
+    costs = eval_ablate.costs(rows)
+    if costs:
+        parts.append(("Switched off: change of each measure, 95 % interval", shape(eval_ablate.grid(costs))))
+    parts.append(("Wanted and reached", shape(eval_wanted.grid(eval_wanted.verdicts(rows)))))
+    return parts
+
+
+def record(rows: list[dict[str, Any]], words: str) -> None:
+    """Keep the figures of this run in the repository."""
+    RESULTS.mkdir(exist_ok=True)
+    write_csv(RESULTS / "eval.csv", rows)
+    text = [f"# Evaluation of the tracker\n\nMade by `{words}`; a row for each run is in eval.csv.\n"]
+    text += [f"## {heading}\n\n{table}\n" for heading, table in reversed(tables(rows, eval_table.markdown))]
+    with replacing(RESULTS / "eval.md") as path:
+        path.write_text("\n".join([*text, eval_table.LEGEND, ""]), encoding="utf-8")
+
+
+def evaluate(args: argparse.Namespace) -> list[dict[str, Any]]:
+    """Run, write, and return the rows of figures."""
+    clips, arms = clips_of(args), arms_of(args)
+    tracks = args.html / "tracks"
+    tracks.mkdir(parents=True, exist_ok=True)
+    with progress("learning", len({clip.subject for clip in clips})) as update:
+        models = eval_clips.models(clips, OUT / "models", args.jobs, update)
+    jobs = [
+        Job(clip, arm, seed, models.get(clip.subject or ""), tracks, pictures=not args.no_pictures)
+        for arm in arms
+        for clip in clips
+        for seed in range(1, arm.seeds + 1)
     ]
-    return {"frame": 0, **start, "sd": SPREAD}
-
-
-def dev_run(run: Run) -> dict[str, Any]:
-    """Track and judge one development clip."""
-    folder, track = DATA / "eval/dev" / run.clip, OUT / f"{run.name}.csv"
-    init = OUT / f"{run.name}.init.json"
-    init.write_text(json.dumps(noisy_start(folder, run.seed)))
-    model = OUT / f"without_{run.clip[-2:]}.gait"
-    common = ["--camera", folder / "camera.json", "-m", model]
-    figures = call(
-        *("track", folder / "video.mp4", *common, "--init", init, "--background", folder / "background.png"),
-        *("-o", track, "--seed", run.seed, "--mode", run.mode),
-    )
-    return figures | call("eval", track, "--truth", folder / "truth.csv", *common)
-
-
-def outdoor_run(run: Run) -> dict[str, Any]:
-    """Track the outdoor clip and measure the distance to the near leg's joints marked by hand."""
-    folder, track = DATA / "video/outdoor", OUT / f"{run.name}.csv"
-    figures = call(
-        *(
-            "track",
-            folder / "demo.mp4",
-            "--camera",
-            folder / "Calib_demo.toml",
-            "--height",
-            1.65,
-            "-o",
-            track,
-        ),
-        *("--init", folder / "init.json", "--background", folder / "background_median.png"),
-        *("--start", 64, "--stop", 186, "--seed", run.seed, "--mode", run.mode),
-    )
-    return figures | {"px": {"median": float(np.median(marked_distances(folder, track)))}}
-
-
-def marked_distances(folder: Path, track: Path) -> list[float]:
-    """Pixels between estimated and marked joints of the near leg."""
-    from gait.camera import Camera
-
-    camera = Camera.read(str(folder / "Calib_demo.toml"))
-    reference = json.loads((folder / "reference2d.json").read_text())
-    with open(track, newline="") as file:
-        rows = {int(row["frame"]): row for row in csv.DictReader(file)}
-    distances = []
-    for number, marks, clear in zip(
-        reference["frame_numbers"], reference["uv"], reference["vis"], strict=True
-    ):
-        for joint in NEAR:
-            k = reference["joints"].index(joint)
-            if number in rows and clear[k]:
-                place = [float(rows[number][f"{joint}_{axis}"]) for axis in "xyz"]
-                distances.append(float(np.linalg.norm(camera.project(place) - marks[k])))
-    return distances
-
-
-def row_of(run: Run, r: dict[str, Any]) -> dict[str, Any]:
-    """One line of the table; blanks where the outdoor clip has no 3-D truth."""
-    phase = r.get("phase") or {}
-    return {
-        "clip": run.clip,
-        "mode": run.mode,
-        "seed": run.seed,
-        "root_mm": r["root"]["median"] if "root" in r else None,
-        "root_p90": r["root"]["p90"] if "root" in r else None,
-        "abs_mm": r["abs"]["median"] if "abs" in r else None,
-        "px": r["px"]["median"] if r.get("px") else None,
-        "phase_pct": 100 * phase["median"] if phase else None,
-        "flips_pct": 100 * phase["flips"] if phase else None,
-        "cover90": r["coverage"]["90"] if r.get("coverage") else None,
-        "lost_pct": 100 * (r["lost"] if "root" in r else r["lost"] / r["frames"]),
-        "static_mm": r["static"]["root"]["median"] if "static" in r else None,
-        "free_mm": r["free"]["root"]["median"] if r.get("free") else None,
-        "step_ms": r["step_ms"]["median"],
-    }
-
-
-def show(rows: list[dict[str, Any]]) -> None:
-    """Print the table, a run a line, then medians over all runs with truth."""
-    keys = list(rows[0])
-    print(" ".join(f"{k:>10}" for k in keys).replace("      clip", f"{'clip':18}", 1))
-    for row in rows:
-        cells = [
-            "" if row[k] is None else f"{row[k]:.2f}" if isinstance(row[k], float) else str(row[k])
-            for k in keys[1:]
-        ]
-        print(f"{row['clip']:18} " + " ".join(f"{c:>10}" for c in cells))
-    for mode in dict.fromkeys(row["mode"] for row in rows):
-        known = [row for row in rows if row["mode"] == mode and row["root_mm"] is not None]
-        if known:
-            lost = sum(row["lost_pct"] > 50 for row in known)
-            root, place = (np.median([row[k] for row in known]) for k in ("root_mm", "abs_mm"))
-            print(f"{mode}: median root {root:.1f} mm, abs {place:.1f} mm; {lost} of {len(known)} runs lost")
+    with progress("runs", len(jobs)) as update:
+        results = run_all(jobs, args.jobs, update)
+    rows = [eval_table.figures(result) for result in results]
+    save(args.html, results, rows)
+    if not args.no_pictures:
+        with progress("page", len(clips) * len(arms)) as update:
+            eval_page.write(args.html / "index.html", "Evaluation of the tracker", results, rows, update)
+    return rows
 
 
 def main() -> int:
     """Evaluate and report."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=1, help="runs per clip (1)")
-    parser.add_argument("--modes", nargs="+", choices=("default", "paper"), default=["default"])
-    parser.add_argument("--clips", nargs="+", help="names of clips (all, and outdoor)")
-    parser.add_argument("--jobs", type=int, default=2, help="runs at a time (2)")
-    args = parser.parse_args()
-    if not DATA.is_dir():
+    args = arguments()
+    if not eval_clips.DATA.is_dir() and not (args.folder or args.simulated):
         print("eval: ../shared/data is absent: nothing to evaluate on", file=sys.stderr)
         return 0
-    OUT.mkdir(parents=True, exist_ok=True)
-    clips = args.clips or [*sorted(p.name for p in (DATA / "eval/dev").iterdir()), "outdoor"]
-    for subject in sorted({clip[-2:] for clip in clips if clip != "outdoor"}):
-        model_without(subject)
-    runs = [Run(c, s, m) for m in args.modes for c in clips for s in range(1, args.seeds + 1)]
-    with ThreadPoolExecutor(args.jobs) as pool:
-        results = list(pool.map(lambda run: (outdoor_run if run.clip == "outdoor" else dev_run)(run), runs))
-    rows = [row_of(run, result) for run, result in zip(runs, results, strict=True)]
-    (OUT / "results.json").write_text(
-        json.dumps([vars(r) | {"figures": f} for r, f in zip(runs, results, strict=True)])
-    )
-    with open(OUT / "results.csv", "w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    show(rows)
+    try:
+        rows = evaluate(args)
+    except UserError as exc:
+        print(f"eval: {exc}", file=sys.stderr)
+        return 1
+    if args.json:
+        print(json.dumps(rows))
+    else:
+        for heading, table in tables(rows, eval_table.plain):
+            print(f"\n{heading}\n{table}")
+        print(f"\n{eval_table.LEGEND}")
+    if args.record:
+        record(rows, f"make eval ARGS='{' '.join(sys.argv[1:])}'")
+    if not args.no_pictures:
+        print(f"pictures and plots: {args.html / 'index.html'}", file=sys.stderr)
     return 0
 
 

@@ -1,0 +1,108 @@
+"""Ablation: what each adopted term and feature is worth, by switching it off through the public settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from eval_plan import BASE
+
+from gait import Term, TrackerConfig
+
+Rows = list[dict[str, Any]]
+
+# feature: settings that switch it off; those that this version lacks, or has off already, are passed over
+_FEATURES: dict[str, dict[str, Any]] = {
+    "components": {"components": 0},
+    "score noise": {"coef_noise": 0.0},
+    "score return": {"coef_time": 0.0},
+    "posture": {"offset_angles": 0},
+    "stature search": {"stature_noise": 0.0},
+    "tilt": {"tilt_noise": 0.0},
+    "rate return": {"rate_time": 0.0},
+    "clothes (girth)": {"girth": 1.0},
+    "missed foreground": {"missed_weight": 0.0},
+}
+_SAME_AS = {"two-stage rate": ("rate_noise_start", "rate_noise")}  # off: the first is set to the second
+MEASURES = {
+    "root_mm": "root mm",
+    "abs_mm": "abs mm",
+    "any_px": "px",
+    "lost_pct": "lost %",
+    "crps_mm": "crps mm",
+}
+_DRAWS = 4000
+
+
+def switches(config: TrackerConfig) -> dict[str, dict[str, Any]]:
+    """Name of each feature that is on in `config`: the settings that switch it off."""
+    out: dict[str, dict[str, Any]] = {}
+    for term in Term:
+        if term in config.terms and config.terms != term:
+            out[f"{term.name.lower()}"] = {"terms": config.terms & ~term}
+    for name, off in _FEATURES.items():
+        if all(hasattr(config, key) for key in off) and any(getattr(config, k) != v for k, v in off.items()):
+            out[name] = off
+    for name, (key, usual) in _SAME_AS.items():
+        if hasattr(config, key) and getattr(config, key) != getattr(config, usual):
+            out[name] = {key: getattr(config, usual)}
+    return out
+
+
+def costs(rows: Rows) -> list[dict[str, Any]]:
+    """For each arm that is not the base: mean change with a 95 % interval, worst first."""
+    base = {(r["clip"], r["seed"]): r for r in rows if r["arm"] == BASE}
+    out = []
+    for arm in dict.fromkeys(r["arm"] for r in rows if r["arm"].startswith("no ")):
+        runs = {(r["clip"], r["seed"]): r for r in rows if r["arm"] == arm}
+        line: dict[str, Any] = {"arm": arm, "refused": next((r["failure"] for r in runs.values()), "")}
+        for name in MEASURES:
+            table = _differences(base, runs, name)
+            line[name] = None if table is None else interval(table)
+        out.append(line)
+    return sorted(out, key=lambda line: -(line["root_mm"] or (-np.inf,))[0])
+
+
+def _differences(base: dict[Any, Any], runs: dict[Any, Any], name: str) -> np.ndarray | None:
+    """Run minus base, (clips, seeds), where both are known for every seed of a clip."""
+    clips: dict[str, list[float]] = {}
+    for (clip, seed), row in runs.items():
+        before = base.get((clip, seed))
+        if before is not None and before[name] is not None and row[name] is not None:
+            clips.setdefault(clip, []).append(row[name] - before[name])
+    most = max((len(v) for v in clips.values()), default=0)
+    whole = [v for v in clips.values() if len(v) == most]
+    return np.array(whole) if whole else None
+
+
+def interval(differences: np.ndarray) -> tuple[float, float, float]:
+    """Mean and 95 % bootstrap interval: clips are drawn with replacement, then seeds within each.
+
+    Parameters
+    ----------
+    differences : ndarray of shape (clips, seeds)
+        Paired: the same clip and seed with and without.
+    """
+    rng = np.random.default_rng(1)
+    clips, seeds = differences.shape
+    which = rng.integers(clips, size=(_DRAWS, clips, 1))
+    draws = differences[which, rng.integers(seeds, size=(_DRAWS, clips, seeds))].mean(axis=(1, 2))
+    low, high = np.percentile(draws, [2.5, 97.5])
+    return float(differences.mean()), float(low), float(high)
+
+
+def grid(lines: list[dict[str, Any]]) -> list[list[str]]:
+    """Head and lines: positive is worse without; a star where the interval excludes 0."""
+    head = ["switched off", "", *MEASURES.values()]
+    return [head, *([line["arm"][3:], line["refused"], *map(_cell, _values(line))] for line in lines)]
+
+
+def _values(line: dict[str, Any]) -> list[tuple[float, float, float] | None]:
+    return [line[name] for name in MEASURES]
+
+
+def _cell(value: tuple[float, float, float] | None) -> str:
+    if value is None:
+        return ""
+    mean, low, high = value
+    return f"{mean:+.1f} [{low:+.1f}, {high:+.1f}]" + ("*" if low > 0 or high < 0 else " ")

@@ -1,0 +1,180 @@
+"""One run: track a clip through the public Python API and judge the track file."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import eval_marks
+import eval_measures
+import eval_pictures
+import numpy as np
+from eval_clips import noisy_start
+from eval_plan import Clip, Job
+
+from gait import Camera, Model, Start, Tracker, TrackerConfig, UserError, Video, blob
+from gait._abi import Mode
+from gait.autostart import find_start
+from gait.errors import GaitError
+from gait.evaluate import evaluate
+from gait.events import Strikes, strikes_of
+from gait.model import read_blob
+from gait.tracker import Estimate
+from gait.trackfile import Track, TrackWriter, read_track, read_truth
+from gait.video import Frame, Image, median_plate, read_plate
+
+
+@dataclass
+class Result:
+    """What came out of a job.
+
+    Attributes
+    ----------
+    measures : dict
+        Of `gait eval`, and those of `eval_measures` and `eval_marks`; empty after a failure.
+    series : dict of str to ndarray
+        Frame by frame, for the plots.
+    pictures : list of (str, bytes)
+        Caption and JPEG.
+    failure : str
+        The tracker's or the start's one line, if it gave up.
+    """
+
+    job: Job
+    measures: dict[str, Any] = field(default_factory=dict)
+    series: dict[str, np.ndarray] = field(default_factory=dict)
+    pictures: list[tuple[str, bytes]] = field(default_factory=list)
+    failure: str = ""
+
+
+class Thinned(Video):
+    """Every n-th frame of a video, with the numbers and times they have there."""
+
+    def __init__(self, clip: Clip, every: int) -> None:
+        super().__init__(clip.video)
+        self._first, self._every = clip.first, every
+
+    def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
+        """Yield the chosen frames from `start` on."""
+        for frame in super().frames(start, stop, grey=grey):
+            if (frame.number - self._first) % self._every == 0:
+                yield frame
+
+
+@dataclass
+class _Kept:
+    """What the run keeps of each frame beside the track file."""
+
+    estimates: dict[int, Estimate] = field(default_factory=dict)
+    nees: list[float] = field(default_factory=list)
+    steps: list[float] = field(default_factory=list)
+
+
+def run(job: Job) -> Result:
+    """Track and judge; an error of the user's kind is a result, not the end of the evaluation."""
+    cv2.setNumThreads(1)  # jobs run side by side
+    try:
+        return _run(job)
+    except (UserError, GaitError) as exc:
+        return Result(job, failure=str(exc))
+
+
+def _run(job: Job) -> Result:
+    clip, arm = job.clip, job.arm
+    video = Thinned(clip, arm.every)
+    camera, model = Camera.read(str(clip.camera), video.size), Model(job.model)
+    plate = _plate(job, video)
+    config = TrackerConfig.default(Mode[arm.mode.upper()], seed=job.seed, **dict(arm.changes))
+    tracker = Tracker(model, camera, config, background=plate)
+    begun = time.perf_counter()
+    start = _start(job, video, camera, plate, model)
+    kept = _follow(job, video, tracker, start)
+    seconds = time.perf_counter() - begun
+    track = read_track(job.folder / f"{job.stem}.csv")
+    result = _judge(job, track, camera)
+    phase_sd = np.array([kept.estimates[n].sd.phase for n in track.frame.tolist()])
+    result.measures |= {
+        "frames": len(track.frame),
+        "first": int(track.frame[0]),
+        "nees": float(np.median(kept.nees)) if kept.nees else None,
+        "step_ms": {"median": float(np.median(kept.steps)), "p99": float(np.percentile(kept.steps, 99))},
+        "wall_fps": len(kept.steps) / seconds,
+        "digest": f"{tracker.digest():016x}",
+        **eval_measures.phase_interval(result.series, phase_sd),
+    }
+    if job.pictures:
+        result.pictures = eval_pictures.pictures(result, video, camera, model, kept.estimates)
+    return result
+
+
+def _plate(job: Job, video: Video) -> Image | None:
+    choice = job.arm.background
+    if choice == "none" or (choice == "plate" and job.clip.plate is None):
+        return None
+    return median_plate(video) if choice == "auto" else read_plate(job.clip.plate, video.size)
+
+
+def _start(job: Job, video: Video, camera: Camera, plate: Image | None, model: Model) -> Start:
+    """As `gait track --init auto` or `--init FILE.json` would start."""
+    clip, arm = job.clip, job.arm
+    if arm.init == "auto":
+        return find_start(video, camera, plate, model, first=clip.first, stop=clip.stop, height=clip.height)
+    path = job.folder / f"{job.stem}.init.json"
+    path.write_text(json.dumps(noisy_start(clip, job.seed, arm.stature_error)))
+    return Start.read(path, model)
+
+
+def _follow(job: Job, video: Video, tracker: Tracker, start: Start) -> _Kept:
+    """Track into the run's CSV file."""
+    model, kept = tracker.model, _Kept()
+    spread = eval_measures.Spread(job.clip.truth, model) if job.arm.mode == "default" else None
+    rows = TrackWriter(
+        job.folder / f"{job.stem}.csv", model.info.components, model.joint_names, model.angle_names
+    )
+    with rows:
+        for frame, estimate in tracker.follow(video, start, job.clip.stop):
+            rows.write(frame, estimate)
+            kept.estimates[frame.number] = estimate
+            kept.steps.append(1000 * tracker.step_seconds)
+            if spread is not None and spread.wants(frame.number):
+                kept.nees.append(spread.nees(frame.number, estimate, *tracker.particles()))
+    if not kept.steps:
+        raise UserError(f"{video.path}: no frame from {start.frame} on")
+    return kept
+
+
+def _judge(job: Job, track: Track, camera: Camera) -> Result:
+    """Measures and series of a track against whatever truth the clip has."""
+    clip = job.clip
+    result = Result(job)
+    result.series = {
+        "frame": track.frame,
+        "status": np.array(track.status),
+        "phase": track.phase,
+        "path": track.places["pelvis"][:, :2],
+    }
+    strikes: Strikes | None = None
+    if clip.truth is not None:
+        truth = read_truth(clip.truth)
+        strikes = strikes_of(truth, clip.folder / "meta.json")
+        sections = blob.decode(read_blob(job.model), str(job.model))
+        result.measures = evaluate(track, truth, strikes=strikes, model=sections, camera=camera)
+        result.series |= eval_measures.against_truth(track, truth, camera)
+    elif clip.marks is not None:
+        marks = eval_marks.Marks.read(clip.marks)
+        strikes = marks.strikes
+        result.measures = marks.measure(track, camera)
+        result.series |= marks.series(track, camera)
+    else:
+        result.measures = {"status": eval_measures.shares(track)}
+    if strikes is not None:
+        result.measures["events"] = eval_measures.strike_errors(track, strikes)
+        true_phase = strikes.phase(track.frame)
+        if true_phase is not None:
+            result.series["true_phase"] = true_phase
+            result.measures["start"] = eval_measures.start_quality(track, true_phase)
+    return result

@@ -1,0 +1,5 @@
+CASES = {}
+
+
+def make(folder, update):
+    pass

@@ -1,0 +1,177 @@
+"""Rows of figures: one of each run (CSV), and one of each clip and arm with medians over the seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from eval_measures import lost_at_end
+from eval_run import Result
+
+MEDIAPIPE = {  # MediaPipe Pose 0.10.21, 12 joints root-aligned, mm: ../shared/data/README.md
+    "side_lr_35": 127, "side_rl_16": 89, "oblique45_07": 84, "oblique45_pole_05": 93, "toward300_08": 113,
+}  # fmt: skip
+
+_FROM = {  # column: path into the measures, factor
+    "root_mm": ("root.median", 1),
+    "root_p90": ("root.p90", 1),
+    "abs_mm": ("abs.median", 1),
+    "proc_mm": ("proc.median", 1),
+    "root12_mm": ("root12.median", 1),
+    "px": ("px.median", 1),
+    "near_px": ("near_px", 1),
+    "clear_px": ("clear_px", 1),
+    "phase_pct": ("phase.median", 100),
+    "flips_pct": ("phase.flips", 100),
+    "lost_pct": ("lost", 100),
+    "lost2_pct": ("trust.weighted_lost", 100),
+    "silent_pct": ("trust.wrong_tracking", 100),
+    "said_lost_pct": ("status.lost", 100),
+    "ambig_pct": ("status.ambiguous", 100),
+    "init_pct": ("status.init", 100),
+    "track_pct": ("status.tracking", 100),
+    "cover50": ("coverage.50", 1),
+    "cover90": ("coverage.90", 1),
+    "phase90": ("phase90", 1),
+    "pit_chi2": ("calibration.pit_chi2", 1),
+    "z2": ("calibration.z2", 1),
+    "nees": ("nees", 1),
+    "crps_mm": ("calibration.crps_mm", 1),
+    "width_mm": ("calibration.width_mm", 1),
+    "strikes_pct": ("events.within", 100),
+    "strike_worst": ("events.worst", 1),
+    "stride_pct": ("events.stride", 100),
+    "static_mm": ("static.root.median", 1),
+    "free_mm": ("free.root.median", 1),
+    "free_abs_mm": ("free.abs.median", 1),
+    "step_ms": ("step_ms.median", 1),
+    "frames": ("frames", 1),
+    "first": ("first", 1),
+}
+
+SHOWN = {  # column of the printed table: figure, decimals
+    "root": ("root_mm", 1),
+    "p90": ("root_p90", 0),
+    "abs": ("abs_mm", 0),
+    "proc": ("proc_mm", 0),
+    "12j": ("root12_mm", 0),
+    "MPipe": ("mediapipe_mm", 0),
+    "static": ("static_mm", 0),
+    "free": ("free_mm", 0),
+    "px": ("any_px", 1),
+    "clear": ("clear_px", 1),
+    "phase%": ("phase_pct", 1),
+    "flip%": ("flips_pct", 0),
+    "lost%": ("lost_pct", 1),
+    "twice%": ("lost2_pct", 1),
+    "ambig%": ("ambig_pct", 0),
+    "c50": ("cover50", 2),
+    "c90": ("cover90", 2),
+    "nees": ("nees", 1),
+    "crps": ("crps_mm", 0),
+    "HS%": ("strikes_pct", 0),
+    "ms": ("step_ms", 1),
+}
+_SPREAD = ("root", "abs", "px")  # columns that also show least and most over the seeds
+
+LEGEND = (
+    "Medians over the seeds of a clip's median over frames (least-most over the seeds). root abs proc 12j: mm, "
+    "hips laid together, as it stands, after the best similarity of each frame (to compare with literature "
+    "only), root over 12 limb joints; MPipe: MediaPipe Pose in the measure of 12j; static: mean pose at the "
+    "true place (root); free: mean cycle running free from the true start (root); px: distance in the picture, "
+    "outdoor: near hip, knee, ankle; clear: all clear marks; lost: root > 150 mm or said lost; twice: the same, "
+    "frames under tracking counted twice; c50 c90: share of joint coordinates inside the intervals; nees: "
+    "error in the particles' covariance, 1 is right; crps: mm; HS: heel strikes within 2 frames; ms: one step "
+    "of the tracker."
+)
+
+
+def figures(result: Result) -> dict[str, Any]:
+    """All figures of one run; None where the clip has no such truth."""
+    job = result.job
+    row: dict[str, Any] = {"clip": job.clip.name, "arm": job.arm.name, "seed": job.seed}
+    for name, (path, factor) in _FROM.items():
+        value = _dig(result.measures, path.split("."))
+        row[name] = None if value is None else factor * value
+    row["any_px"] = row["near_px"] if row["px"] is None else row["px"]
+    start = result.measures.get("start") or {}
+    row["locked"], row["side"] = start.get("locked"), start.get("side")
+    row["lost_run"] = True if result.failure else lost_at_end(result.series)
+    row["mediapipe_mm"] = MEDIAPIPE.get(job.clip.name)
+    row["failure"] = result.failure
+    if result.failure:  # who gives up has lost every frame
+        row["lost_pct"] = row["lost2_pct"] = 100.0
+    return row
+
+
+def _dig(tree: Any, path: Iterable[str]) -> Any:
+    for key in path:
+        if not isinstance(tree, dict) or tree.get(key) is None:
+            return None
+        tree = tree[key]
+    return tree
+
+
+def summaries(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row of each clip and arm: medians of numbers, with ``<name>_range`` over the seeds."""
+    out = []
+    for key in dict.fromkeys((row["arm"], row["clip"]) for row in rows):
+        group = [row for row in rows if (row["arm"], row["clip"]) == key]
+        summary: dict[str, Any] = {"arm": key[0], "clip": key[1], "runs": len(group)}
+        for name in [*_FROM, "any_px", "mediapipe_mm"]:
+            values = [row[name] for row in group if row[name] is not None]
+            summary[name] = float(np.median(values)) if values else None
+            summary[f"{name}_range"] = (min(values), max(values)) if values else None
+        summary["lost_runs"] = sum(row["lost_run"] for row in group)
+        summary["failures"] = [row["failure"] for row in group if row["failure"]]
+        out.append(summary)
+    return out
+
+
+def cells(summary: dict[str, Any]) -> list[str]:
+    """Texts of one line of the table, without clip and arm."""
+    out = []
+    for column, (name, decimals) in SHOWN.items():
+        value = summary[name]
+        if value is None:
+            out.append("")
+            continue
+        text = f"{value:.{decimals}f}"
+        if column in _SPREAD and summary["runs"] > 1:
+            low, high = summary[f"{name}_range"]
+            text += f" ({low:.{min(decimals, 1)}f}-{high:.{min(decimals, 1)}f})"
+        out.append(text)
+    return out
+
+
+def grid(rows: list[dict[str, Any]]) -> list[list[str]]:
+    """Head and lines of the table of `summaries`."""
+    head = ["clip", "arm", "runs", *SHOWN, "lost runs"]
+    lines = [
+        [s["clip"], s["arm"], str(s["runs"]), *cells(s), str(s["lost_runs"]) if s["lost_runs"] else ""]
+        for s in rows
+    ]
+    return [head, *lines]
+
+
+def plain(lines: list[list[str]]) -> str:
+    """Columns aligned for a terminal; those that are empty throughout are left out."""
+    kept = [k for k in range(len(lines[0])) if any(line[k] for line in lines[1:])]
+    widths = [max(len(line[k]) for line in lines) for k in kept]
+    left = 2  # columns of words
+    return "\n".join(
+        "  ".join(
+            line[k].ljust(w) if i < left else line[k].rjust(w)
+            for i, (k, w) in enumerate(zip(kept, widths, strict=True))
+        ).rstrip()
+        for line in lines
+    )
+
+
+def markdown(lines: list[list[str]]) -> str:
+    """The same as a table of Markdown."""
+    kept = [k for k in range(len(lines[0])) if any(line[k] for line in lines[1:])]
+    rule = "| " + " | ".join("---" for _ in kept) + " |"
+    body = ["| " + " | ".join(line[k].replace("|", "/") for k in kept) + " |" for line in lines]
+    return "\n".join([body[0], rule, *body[1:]])
