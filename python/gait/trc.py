@@ -1,15 +1,73 @@
-"""Write joints as TRC, the marker format of OpenSim."""
+"""TRC, the marker format of OpenSim: joints written, points read."""
 
 from __future__ import annotations
 
 import os
+import re
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.errors import UserError
 from gait.files import replacing
 
 Array = NDArray[np.float64]
+
+METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: one unit of a file
+HEAD = 5  # lines of the header; an empty one may follow
+
+
+def read_trc(path: Path) -> tuple[list[str], Array, float]:
+    """Read the points of a .trc.
+
+    Returns
+    -------
+    labels : list of str
+        M labels.
+    points : ndarray of shape (T, M, 3)
+        Metres, axes of the file; NaN where cells are empty.
+    rate : float
+        Frames per second.
+
+    Raises
+    ------
+    UserError
+        Naming file, line and remedy.
+    """
+    try:
+        lines = path.read_text(encoding="latin-1").splitlines()
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}; check the name") from error
+    try:
+        head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
+        rate, scale, count = float(head["DataRate"]), METRES[head["Units"].lower()], int(head["NumMarkers"])
+        labels = [cell.strip() for cell in lines[3].split("\t")[2:] if cell.strip()]
+        if len(labels) != count or not 0 < rate < np.inf:
+            raise ValueError
+    except (IndexError, KeyError, ValueError):
+        raise UserError(f"{path}: not a .trc header of five lines; export the file again") from None
+    numbered = [(i, line) for i, line in enumerate(lines[HEAD:], HEAD + 1) if line.strip()]
+    rows = [_row(line, 2 + 3 * count, f"{path}:{i}") for i, line in numbered]
+    if len(rows) < 3:
+        raise UserError(f"{path}: {len(rows)} frames; a recording of a few seconds is needed")
+    return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, rate
+
+
+def _row(line: str, width: int, where: str) -> list[float]:
+    """Cells as numbers, empty ones NaN; exporters leave out empty cells at the end of a line."""
+    cells = line.rstrip("\r\n").split("\t")
+    if len(cells) < 2 or any(cell.strip() for cell in cells[width:]):
+        raise UserError(f"{where}: {len(cells)} cells where {width} belong; restore the file")
+    try:
+        values = [float(cell) if cell.strip() else float("nan") for cell in cells[:width]]
+    except ValueError:
+        bad = next(cell for cell in cells if cell.strip() and not _NUMBER.fullmatch(cell.strip()))
+        raise UserError(f"{where}: {bad.strip()!r} is not a number; restore the file") from None
+    return values + [float("nan")] * (width - len(values))
+
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.IGNORECASE)
 
 
 def write_trc(

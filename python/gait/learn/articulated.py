@@ -99,7 +99,7 @@ class Posed:
         return self.origins[:, segment] + np.einsum("tmij,mj->tmi", self.turns[:, segment], local)
 
     def by_pose(self, points: Floats, segment: Indices) -> Floats:
-        """Derivatives (T, M, 3, 30) of world points (T, M, 3)."""
+        """Give the derivatives (T, M, 3, 30) of world points (T, M, 3)."""
         result = np.zeros((*points.shape, FREEDOMS))
         result[..., [0, 1, 2], [0, 1, 2]] = 1.0
         lever = points[:, :, None] - self.pivots[:, None]
@@ -108,14 +108,14 @@ class Posed:
         return result
 
     def directions_by_pose(self, directions: Floats, segment: Indices) -> Floats:
-        """Derivatives (T, M, 3, 30) of directions (T, M, 3) fixed in segments."""
+        """Give the derivatives (T, M, 3, 30) of directions (T, M, 3) fixed in segments."""
         result = np.zeros((*directions.shape, FREEDOMS))
         turned = _cross(self.axes[:, None], directions[:, :, None]) * MOVES[segment][..., None]
         result[..., 3:] = np.moveaxis(turned, -1, 2)
         return result
 
     def by_stretch(self, stretch: Floats, at: Floats, segment: Indices) -> Floats:
-        """Derivatives (T, M, 3, S) of points at (M, 3) statures by the stretches (S,)."""
+        """Give the derivatives (T, M, 3, S) of points at (M, 3) statures by the stretches (S,)."""
         change = scales(stretch)[..., None] * STRETCH  # of a unit vector, (F, 3, S)
         moved = np.zeros((*self.origins.shape, STRETCH.shape[2]))
         for i, parent in enumerate(PARENTS):

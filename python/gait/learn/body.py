@@ -44,6 +44,8 @@ class Body:
         Pelvis axes forward, left, up as columns.
     lateral : dict of str to (T, 3)
         The head's direction to the left and the hinge axes {l,r}_{knee,elbow}, to the left in the rest pose.
+    residual : float or None
+        Rms distance of markers from the body fitted to them, metres; None if it is not fitted to markers.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Body:
     joints: dict[str, Floats]
     pelvis: Floats
     lateral: dict[str, Floats] = field(default_factory=dict)
+    residual: float | None = None
 
     @property
     def frames(self) -> int:

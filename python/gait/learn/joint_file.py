@@ -1,4 +1,4 @@
-"""Bodies from files of joint positions alone: .csv as tracks and truth have it, .trc of joint centres.
+"""Bodies from joint positions alone: .csv as tracks and truth have it, .trc of joint centres.
 
 Orientations are not in such files: the pelvis is level across the hips, and a limb's hinge is across the bent
 limb, or across the body while the limb is straight.  Rotations about a limb's own axis are therefore rough.
@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn.body import Body
-from gait.learn.recording import Y_UP
 from gait.learn.rotations import frame_from, unit
 from gait.skeleton import SIDES
 
@@ -27,7 +26,6 @@ ALIASES = {"head": ("headtop",), "l_toe": ("lbigtoe",), "r_toe": ("rbigtoe",)}
 STRAIGHT = (
     0.25  # sine of the bend at which the bent limb and the body weigh the same in the hinge's direction
 )
-UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01}
 
 
 def read_csv(path: Path, fps: float | None = None, zero_runs: bool = False) -> Body:
@@ -60,35 +58,10 @@ def read_csv(path: Path, fps: float | None = None, zero_runs: bool = False) -> B
     return body(path, places, fps or 1 / step)
 
 
-def read_trc(path: Path, fps: float | None = None, zero_runs: bool = False) -> Body:
-    """Read a .trc of joint centres: y up, x or z ahead; see `read_csv`."""
-    lines = _lines(path, "\t")
-    try:
-        keys, values = ([cell.strip() for cell in line if cell.strip()] for line in lines[1:3])
-        head = dict(zip(keys, values, strict=False))
-        rate, unit_name, count = float(head["DataRate"]), head["Units"], int(head["NumMarkers"])
-        scale = UNITS[unit_name]
-        names = [name for name in lines[3][2:] if name.strip()]
-        if len(names) != count:
-            raise ValueError
-    except (IndexError, KeyError, ValueError):
-        raise UserError(f"{path}: not a .trc header of five lines; export the file again") from None
-    width = 2 + 3 * count
-    rows = [
-        _numbers(row[:width], width, path, i)
-        for i, row in enumerate(lines[5:], 6)
-        if any(map(str.strip, row))
-    ]
-    if len(rows) < 3:
-        raise UserError(f"{path}: {len(rows)} frames; a recording of a few seconds is needed")
-    points = np.array(rows)[:, 2:].reshape(len(rows), count, 3) @ Y_UP.T * scale
-    return body(path, {name: points[:, k] for k, name in enumerate(names)}, fps or rate)
-
-
-def _lines(path: Path, delimiter: str = ",") -> list[list[str]]:
+def _lines(path: Path) -> list[list[str]]:
     try:
         with path.open(newline="", encoding="latin-1") as file:
-            lines = list(csv.reader(file, delimiter=delimiter))
+            lines = list(csv.reader(file))
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}; check the name") from error
     if not lines:
@@ -118,14 +91,11 @@ def body(path: Path, places: dict[str, Floats], fps: float) -> Body:
     UserError
         If a joint is missing.
     """
-    plain = {name.lower().replace("_", "").replace(" ", ""): p for name, p in places.items()}
-    joints: dict[str, Floats] = {}
-    for joint in NEEDED:
-        names = (joint.replace("_", ""), *ALIASES.get(joint, ()))
-        found = next((plain[name] for name in reversed(names) if name in plain), None)
-        if found is None:
-            raise UserError(f"{path}: no joint {joint!r}; name one of its columns so, or leave the file out")
-        joints[joint] = found
+    columns = find(list(places))
+    lacking = next((joint for joint in NEEDED if joint not in columns), None)
+    if lacking is not None:
+        raise UserError(f"{path}: no joint {lacking!r}; name one of its columns so, or leave the file out")
+    joints = {joint: places[columns[joint]] for joint in NEEDED}
     hips, shoulders = (joints[f"l_{part}"] - joints[f"r_{part}"] for part in ("hip", "shoulder"))
     joints["pelvis"] = (joints["l_hip"] + joints["r_hip"]) / 2
     lateral = {"head": unit(shoulders)}
@@ -136,6 +106,14 @@ def body(path: Path, places: dict[str, Floats], fps: float) -> Body:
         lateral[f"{s}_elbow"] = unit(-elbow + STRAIGHT * unit(shoulders))
     up = np.broadcast_to([0.0, 0, 1], hips.shape)
     return Body(path.stem, fps, joints, frame_from(up, hips, exact="y"), lateral)
+
+
+def find(names: list[str]) -> dict[str, str]:
+    """Joints that names stand for: joint to name."""
+    plain = {name.rsplit(":", 1)[-1].lower().replace("_", "").replace(" ", ""): name for name in names}
+    known = {joint: (*ALIASES.get(joint, ()), joint.replace("_", "")) for joint in NEEDED}
+    found = {joint: next((plain[n] for n in aliases if n in plain), None) for joint, aliases in known.items()}
+    return {joint: name for joint, name in found.items() if name is not None}
 
 
 def _hinge(joints: dict[str, Floats], s: str, chain: tuple[str, str, str]) -> Floats:

@@ -98,17 +98,20 @@ _PLUG_IN_GAIT = {
     "{s}medkne": "knee_medial", "{s}tib": "shank_side", "{s}ank": "ankle_lateral", "{s}ankin": "ankle_medial",
     "{s}med": "ankle_medial", "{s}mank": "ankle_medial", "{s}mma": "ankle_medial", "{s}hee": "heel",
     "{s}toe": "mt2", "{s}mt1": "mt1", "{s}mt5": "mt5", "{s}fhd": "head_front", "{s}bhd": "head_back",
-    "c7": "c7", "t10": "t10", "clav": "suprasternale", "strn": "xiphoid", "{s}bak": "back", "{s}cla": "clavicle",
-    "{s}sho": "acromion", "{s}upa": "upper_arm_side", "{s}elb": "elbow_lateral", "{s}elbm": "elbow_medial",
+    "c7": "c7", "t10": "t10", "clav": "suprasternale", "strn": "xiphoid", "{s}bak": "back",
+    "{s}cla": "clavicle", "{s}sho": "acromion", "{s}upa": "upper_arm_side", "{s}elb": "elbow_lateral",
+    "{s}elbm": "elbow_medial",
     "{s}fra": "forearm_side", "{s}frm": "forearm_side", "{s}wra": "wrist_radial", "{s}wrb": "wrist_ulnar",
     "{s}trn": "trochanter", "{s}gtr": "trochanter", "{s}ili": "iliac_crest",
-    **{f"{{s}}f0{i}": "thigh_front" for i in range(1, 6)}, **{f"{{s}}t0{i}": "shank_front" for i in range(1, 6)},
+    **{f"{{s}}f0{i}": "thigh_front" for i in range(1, 6)},
+    **{f"{{s}}t0{i}": "shank_front" for i in range(1, 6)},
 }  # fmt: skip
 _HELEN_HAYES = {
     "{s}asis": "asis", "{s}psis": "psis", "vsacral": "sacrum", "sacral": "sacrum", "sacrum": "sacrum",
     "s2": "sacrum", "{s}iliaccrest": "iliac_crest", "{s}sacwand": "pelvis_wand", "{s}hip": "trochanter",
-    "{s}gtroch": "trochanter", "{s}trochanter": "trochanter", "{s}thigh": "thigh_side", "{s}postfem": "thigh_side",
-    "{s}antfem": "thigh_side", "{s}knee": "knee_lateral", "{s}kneelat": "knee_lateral",
+    "{s}gtroch": "trochanter", "{s}trochanter": "trochanter", "{s}thigh": "thigh_side",
+    "{s}postfem": "thigh_side", "{s}antfem": "thigh_side", "{s}knee": "knee_lateral",
+    "{s}kneelat": "knee_lateral",
     "{s}kneelateral": "knee_lateral", "{s}kneemed": "knee_medial", "{s}kneemedial": "knee_medial",
     "{s}shank": "shank_side", "{s}tibia": "shank_side", "{s}posttib": "shank_side", "{s}anttib": "shank_side",
     "{s}ankle": "ankle_lateral", "{s}anklelat": "ankle_lateral", "{s}anklelateral": "ankle_lateral",
@@ -122,14 +125,16 @@ _HELEN_HAYES = {
 }  # fmt: skip
 _OPENSIM = {
     **_HELEN_HAYES, "{s}toe": "toe_tip", "{s}biceps": "upper_arm_side",
-    **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)}, **{f"{{s}}sh{i}": "shank_side" for i in range(1, 5)},
+    **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
+    **{f"{{s}}sh{i}": "shank_side" for i in range(1, 5)},
 }  # fmt: skip
 _OPENSIM_SHORT = {
     **_PLUG_IN_GAIT, "{s}toe": "toe_tip", "{s}cal": "heel", "{s}acr": "acromion", "{s}lel": "elbow_lateral",
     "{s}mel": "elbow_medial", "{s}faradius": "wrist_radial", "{s}faulna": "wrist_ulnar",
     "{s}fasuperior": "forearm_side", "{s}lfc": "knee_lateral", "{s}mfc": "knee_medial",
     "{s}lmal": "ankle_lateral", "{s}mmal": "ankle_medial", "{s}mt2": "mt2", "{s}ash": "upper_arm_side",
-    **{f"{{s}}ua{i}": "upper_arm_side" for i in range(1, 5)}, **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
+    **{f"{{s}}ua{i}": "upper_arm_side" for i in range(1, 5)},
+    **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
     **{f"{{s}}tb{i}": "shank_side" for i in range(1, 5)},
 }  # fmt: skip
 _PATTERNS = {

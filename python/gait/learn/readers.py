@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gait.learn import joint_file, mocap_asf, mocap_bvh
+from gait.learn import c3d_file, joint_file, marker_body, mocap_asf, mocap_bvh
 from gait.learn.body import Body, body
 from gait.learn.reading import DEFAULT, Reading
+from gait.learn.recording import Y_UP
+from gait.trc import read_trc
 
 RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
-POSITIONS = {".csv": joint_file.read_csv, ".trc": joint_file.read_trc}
 #: Suffixes that are learnt from.
-KINDS = (*RECORDINGS, *POSITIONS)
+KINDS = (*RECORDINGS, ".c3d", ".trc", ".csv")
 
 
 def read(path: Path, reading: Reading = DEFAULT) -> Body:
@@ -23,6 +24,18 @@ def read(path: Path, reading: Reading = DEFAULT) -> Body:
         If the file is malformed or lacks a joint; it names file, place and remedy.
     """
     suffix = path.suffix.lower()
-    if suffix in POSITIONS:
-        return POSITIONS[suffix](path, reading.fps, reading.zero_runs)
-    return body(RECORDINGS[suffix](path, reading.fps, reading.zero_runs))
+    if suffix in RECORDINGS:
+        return body(RECORDINGS[suffix](path, reading.fps, reading.zero_runs))
+    if suffix == ".csv":
+        return joint_file.read_csv(path, reading.fps)
+    return _points(path, reading)
+
+
+def _points(path: Path, reading: Reading) -> Body:
+    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
+    labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else c3d_file.read)(path)
+    fps = reading.fps or rate
+    if reading.markers is None and set(joint_file.NEEDED) <= set(joint_file.find(labels)):
+        upright = points @ Y_UP.T
+        return joint_file.body(path, {name: upright[:, k] for k, name in enumerate(labels)}, fps)
+    return marker_body.body(path, labels, points, fps, reading.markers)

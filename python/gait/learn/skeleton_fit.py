@@ -3,7 +3,7 @@
 The points are attached to segments at places known roughly; they may be markers on the skin or joints.  First
 the subject's stretches and the points' true places are found together with the poses of some frames
 (Levenberg-Marquardt, the poses eliminated by their Schur complement), then the poses of all frames at once.
-The loss is robust (Cauchy).  What the points do not determine is left to weak priors, and its covariance says so.
+The loss is robust (Cauchy).  What the points do not determine is left to weak priors; the covariance says so.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ CHUNK = 128  # frames solved at once
 FEWEST = 3  # points seen in a frame that is fitted
 _RANGES = {
     "neck": (-80, 80), "shoulder_flexion": (-120, 190), "shoulder_abduction": (-60, 120),
-    "shoulder_rotation": (-120, 120), "elbow": (-5, 160), "hip_flexion": (-60, 140), "hip_abduction": (-50, 70),
-    "hip_rotation": (-60, 60), "knee": (-5, 165), "torso": (-60, 90), "ankle": (-80, 50),
+    "shoulder_rotation": (-120, 120), "elbow": (-5, 160), "hip_flexion": (-60, 140),
+    "hip_abduction": (-50, 70), "hip_rotation": (-60, 60), "knee": (-5, 165), "torso": (-60, 90),
+    "ankle": (-80, 50),
 }  # fmt: skip
 #: Least and largest values (2, 24) of the angles of a living body, radians.
 LIMITS = np.radians(
@@ -121,7 +122,7 @@ def fit(observed: Floats, points: Points, weights: Floats | None = None) -> Fit:
     ValueError
         If no frame has three points.
     """
-    seen = np.isfinite(observed).all(axis=2)
+    seen = np.asarray(np.isfinite(observed).all(axis=2))
     weight = seen * (np.ones(len(points.at)) if weights is None else weights)
     data = _Data(np.where(seen[..., None], observed, 0.0), weight, points.segment)
     if not (seen.sum(axis=1) >= FEWEST).any():
@@ -245,12 +246,13 @@ def _descend(
         hessian, gradient = normal(pose[active], data[active])
         diagonal = np.einsum("tii->ti", hessian)
         diagonal *= 1 + damping[active, None]
-        moved = pose[active].moved(-np.linalg.solve(hessian, gradient[..., None])[..., 0])
+        step = -np.asarray(np.linalg.solve(hessian, gradient[..., None])[..., 0], float)
+        moved = pose[active].moved(step)
         tried = loss(moved, data[active])
-        better = tried < cost[active]
+        better = np.asarray(tried < cost[active])
         gain = (cost[active] - tried) / np.maximum(cost[active], 1e-9)
         won = active[better]
-        pose[won], cost[won] = moved[better], tried[better]
+        pose[won], cost[won] = moved[np.flatnonzero(better)], tried[better]
         damping[active] = np.clip(damping[active] * np.where(better, 0.2, 10.0), 1e-7, 1e7)
         active = active[(better & (gain > 1e-4)) | (~better & (damping[active] < 1e4))]
         if not len(active):
@@ -305,7 +307,7 @@ def _subject_step(
     damping: float,
     prior: tuple[Floats, Floats],
 ) -> tuple[Floats, Floats]:
-    """Steps of the shape (S + 3 M,) and of the poses (K, 30); prior: inverse variances and means."""
+    """Find the steps of the shape (S + 3 M,) and of the poses (K, 30); prior: inverse variances and means."""
     count, marks = articulated.STRETCH.shape[2], len(local)
     body = articulated.posed(pose, articulated.origins(shape[:count]))
     world = body.points(local, few.segment)
@@ -345,7 +347,7 @@ def _all_poses(data: _Data, local: Floats, offsets: Floats, known: Pose, picked:
         closest = np.flatnonzero(good)[np.argmin(np.abs(bad[:, None] - np.flatnonzero(good)[None]), axis=1)]
         start = _rooted(pose[closest], local, offsets, data[bad])[0]
         again, cheaper = solve(data[bad], local, offsets, start, OUTLIERS[-1])
-        won = cheaper < cost[bad]
+        won = np.flatnonzero(cheaper < cost[bad])
         pose[bad[won]] = again[won]
     return pose
 

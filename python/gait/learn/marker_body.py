@@ -1,0 +1,160 @@
+"""Bodies from markers on the skin: the skeleton fitted to them stands for the person.
+
+What the markers of a frame do not determine is missing there: a joint, an axis or the pelvis whose standard
+deviation by the fit's covariance is too large is NaN.  Nothing is interpolated.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.errors import UserError
+from gait.learn import articulated, marker_map, marker_sets, skeleton_fit
+from gait.learn.articulated import SEGMENTS, Indices, Posed
+from gait.learn.body import Body
+from gait.learn.marker_sets import LANDMARKS, Landmark, plain
+from gait.skeleton import JOINTS, SIDES, default_skeleton
+
+Floats = npt.NDArray[np.float64]
+
+FEWEST_LABELS = 6
+JOINT_SD = 0.03  # metres beyond which a joint is not known
+AXIS_SD = np.radians(15)  # beyond which a direction is not known
+WORST_RMS = 0.05  # metres: markers in other places than their labels say
+LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
+
+
+def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Path | None = None) -> Body:
+    """Fit the skeleton to markers.
+
+    Parameters
+    ----------
+    path : Path
+        The file they come from.
+    points : (T, M, 3)
+        Metres, any axis up; NaN, or exact zeros, where missing.
+    fps : float
+        Frames per second.
+    markers : Path, optional
+        Mapping file; by default the labels of known sets.
+
+    Raises
+    ------
+    UserError
+        If too few labels are known, or the markers do not fit a walker.
+    """
+    points = np.where((points == 0).all(axis=2, keepdims=True), np.nan, points)
+    places = assign(path, labels, points, markers)
+    columns = list(places)
+    found = skeleton_fit.Points(
+        segment=np.array([SEGMENTS.index(places[k].segment) for k in columns], np.intp),
+        at=np.array([places[k].at for k in columns]),
+        sd=np.array([places[k].sd for k in columns]),
+    )
+    try:
+        fit = skeleton_fit.fit(points[:, columns], found)
+    except ValueError:
+        raise UserError(f"{path}: fewer than three known markers in every frame; see --markers") from None
+    walker = from_fit(path.stem, fps, fit)
+    if not walker.residual or not walker.residual < WORST_RMS:
+        worst = labels[columns[int(np.nanargmax(np.nanmedian(fit.residual, axis=0)))]]
+        rms = 1000 * (walker.residual or 0)
+        raise UserError(
+            f"{path}: the markers do not fit a body (rms {rms:.0f} mm, worst {worst!r})"
+            "; check labels and units, or give a --markers file"
+        )
+    unknown = [name for name in LEGS if not np.isfinite(walker.joints[name]).any()]
+    if unknown:
+        raise UserError(
+            f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers file"
+        )
+    return walker
+
+
+def assign(path: Path, labels: list[str], points: Floats, markers: Path | None) -> dict[int, Landmark]:
+    """Give the places of the markers that are known and ever seen: column to place.
+
+    In a file of several subjects ("Anna:LASI") the one with most of them is taken.
+    """
+    seen = [k for k in range(len(labels)) if np.isfinite(points[:, k]).all(axis=1).any()]
+    table = marker_map.read(markers) if markers else None
+    best: dict[int, Landmark] = {}
+    for subject in sorted({_subject(labels[k]) for k in seen}):
+        own = [k for k in seen if _subject(labels[k]) == subject]
+        known = table
+        if known is None:
+            _, names = marker_sets.find([labels[k] for k in own])
+            known = {plain(label): LANDMARKS[name] for label, name in names.items()}
+        columns = {plain(labels[k]): k for k in reversed(own)}
+        places = {columns[label]: known[label] for label in columns if label in known}
+        best = max(best, places, key=len)
+    if len(best) < FEWEST_LABELS:
+        examples = ", ".join(labels[k] for k in seen[:5])
+        raise UserError(
+            f"{path}: {len(best)} of {len(seen)} marker labels are known ({examples} ...); "
+            "name them in a --markers file"
+        )
+    return dict(sorted(best.items()))
+
+
+def _subject(label: str) -> str:
+    return label.rsplit(":", 1)[0] if ":" in label else ""
+
+
+def from_fit(name: str, fps: float, fit: skeleton_fit.Fit) -> Body:
+    """Body of a fitted skeleton, turned to z up, without what is not determined."""
+    skeleton, posed = default_skeleton(), fit.posed()
+    segment = np.array(skeleton.point_frames, np.intp)
+    local = articulated.scales(fit.stretch)[segment] * skeleton.point_positions
+    positions = _known_points(posed, posed.points(local, segment), segment, fit.covariance)
+    joints = {joint: positions[:, k] for k, joint in enumerate(JOINTS)}
+    joints["head"] = joints.pop("head_top")
+    hinges = {"head": "head"}
+    hinges |= {
+        f"{s}_{j}": f"{s}_{part}" for s in SIDES for j, part in (("knee", "thigh"), ("elbow", "upper_arm"))
+    }
+    axes = _known_axes(posed, np.array([SEGMENTS.index(part) for part in hinges.values()]), fit.covariance)
+    turn_sd = np.sqrt(np.trace(fit.covariance[:, 3:6, 3:6], axis1=1, axis2=2))
+    pelvis = np.where((turn_sd < AXIS_SD)[:, None, None], fit.pose.turn, np.nan)
+    up = _upright(fit.pose.turn[np.isfinite(pelvis[:, 0, 0])])
+    rms = float(np.sqrt(np.nanmean(fit.residual**2)))
+    return Body(
+        name,
+        fps,
+        {joint: place @ up.T for joint, place in joints.items()},
+        up @ pelvis,
+        {hinge: axes[:, k] @ up.T for k, hinge in enumerate(hinges)},
+        residual=rms,
+    )
+
+
+def _known_points(posed: Posed, points: Floats, segment: Indices, covariance: Floats) -> Floats:
+    """Points (T, P, 3), NaN where their standard deviation is too large."""
+    return np.where(_sd(posed.by_pose(points, segment), covariance)[..., None] < JOINT_SD, points, np.nan)
+
+
+def _known_axes(posed: Posed, segment: Indices, covariance: Floats) -> Floats:
+    """Axes to the left (T, P, 3) of segments, NaN where their direction is uncertain."""
+    axes = posed.turns[:, segment][..., 1]
+    return np.where(
+        _sd(posed.directions_by_pose(axes, segment), covariance)[..., None] < AXIS_SD, axes, np.nan
+    )
+
+
+def _sd(slopes: Floats, covariance: Floats) -> Floats:
+    """Give the standard deviations (T, P) of vectors with derivatives (T, P, 3, 30)."""
+    frames, count = slopes.shape[:2]
+    rows = slopes.reshape(frames, 3 * count, -1)
+    return np.sqrt(((rows @ covariance) * rows).sum(axis=2).reshape(frames, count, 3).sum(axis=2))
+
+
+def _upright(turns: Floats) -> Floats:
+    """Rotation to z up: up is the file's axis that is nearest to the pelvis's."""
+    up = turns[:, :, 2].mean(axis=0) if len(turns) else np.array([0.0, 0, 1])
+    k = int(np.argmax(np.abs(up)))
+    z = np.eye(3)[k] * np.sign(up[k])
+    x = np.eye(3)[(k + 1) % 3]
+    return np.stack([x, np.cross(z, x), z])
