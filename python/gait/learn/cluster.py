@@ -7,21 +7,23 @@ They also need this package, and the same versions of it, numpy and scipy, or th
 from __future__ import annotations
 
 import logging
+import re
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
 from gait.learn.reading import Reading
 from gait.learn.stage import Outcome, one_thread_for_good, prepare
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+ADDRESS = re.compile(r"(tcp://|tls://)?[^/\s]+:\d{1,5}")
 CONNECT = 5.0  # seconds that a scheduler gets to answer and to have a worker
 PATIENCE = 10.0  # seconds between looks at whether there still are workers
 AHEAD = 4  # files in flight per thread of the workers
@@ -59,6 +61,8 @@ def _task(path: Path, reading: Reading) -> Outcome | None:
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
     """Client of a scheduler that answers and has a worker."""
+    if not ADDRESS.fullmatch(address):
+        raise UsageError(f"--dask {address}: is not an address; give one such as tcp://192.168.0.7:8786")
     try:
         from distributed import Client
     except ImportError as error:
@@ -67,14 +71,16 @@ def _connected(address: str) -> Iterator[Client]:
     before = log.level
     log.setLevel(logging.CRITICAL)  # a lost connection is one line of ours, not its tracebacks
     try:
-        with Client(address, timeout=CONNECT, set_as_default=False) as client:
-            client.wait_for_workers(1, timeout=CONNECT)
+        with ExitStack() as stack:
+            try:
+                client = stack.enter_context(Client(address, timeout=CONNECT, set_as_default=False))
+                client.wait_for_workers(1, timeout=CONNECT)
+            except (TimeoutError, OSError) as error:
+                raise UserError(
+                    f"--dask {address}: no scheduler with a worker answered within {CONNECT:.0f} s; "
+                    f"start them with 'dask scheduler' and 'dask worker {address}'"
+                ) from error
             yield client
-    except (TimeoutError, ValueError, OSError) as error:
-        raise UserError(
-            f"--dask {address}: no scheduler with a worker answered within {CONNECT:.0f} s; "
-            f"start them with 'dask scheduler' and 'dask worker {address}'"
-        ) from error
     finally:
         log.setLevel(before)
 

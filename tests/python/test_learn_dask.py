@@ -1,0 +1,97 @@
+"""Files read on a Dask cluster, here one of this machine: the same result, one line for what fails."""
+
+import importlib.metadata
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import mocap_files as files
+import pytest
+
+import gait.cli
+from gait.errors import UserError
+from gait.learn import cluster, sources
+
+distributed = pytest.importorskip("distributed", reason="dask is not installed: pip install 'gait[dask]'")
+pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory):
+    """Six toy walks and a broken file in their midst."""
+    folder = tmp_path_factory.mktemp("walks")
+    for i in range(6):
+        files.write_toy(folder, f"01_{i:02}", period=110.0 + 5 * i, seed=i, frames=300 + 20 * i)
+    (folder / "01_02x.amc").write_text(":DEGREES\n1\nroot 1 2\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def scheduler():
+    """Address of a cluster of two processes."""
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as local:
+        yield local.scheduler_address
+
+
+def test_a_cluster_gives_the_same_model(walks, scheduler, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(walks.parent)  # the workers have another folder
+    words = ["learn", walks.name, "--components", "2", "-o"]
+    assert gait.cli.main([*words, str(tmp_path / "alone.gait"), "--jobs", "1"]) == 0
+    alone = capsys.readouterr()
+    assert gait.cli.main([*words, str(tmp_path / "dask.gait"), "--dask", scheduler]) == 0
+    assert capsys.readouterr().err == alone.err and "01_02x.amc:3" in alone.err
+    assert (tmp_path / "dask.gait").read_bytes() == (tmp_path / "alone.gait").read_bytes()
+
+
+def test_a_bad_file_named_by_itself_stops_the_run(walks, scheduler):
+    with pytest.raises(UserError, match="01_02x.amc:3: 2 numbers where 6"):
+        sources.load_all([(walks / "01_02x.amc", False)], dask=scheduler)
+
+
+def test_a_file_that_workers_do_not_see_is_named_with_the_remedy(walks, scheduler, tmp_path):
+    with pytest.raises(UserError, match="absent.amc: a worker does not see .* under the same path"):
+        sources.load_all([(tmp_path / "absent.amc", True)], dask=scheduler)
+
+
+def test_a_worker_of_another_version_is_refused(walks, scheduler, monkeypatch):
+    here = os.getpid()
+    true = importlib.metadata.version
+    monkeypatch.setattr(
+        cluster.metadata, "version", lambda name: "0.0.1" if os.getpid() == here else true(name)
+    )
+    with pytest.raises(UserError, match=r"worker tcp://.* has \d.* of gait, this machine 0.0.1; install"):
+        sources.load_all([(walks / "01_00.amc", True)], dask=scheduler)
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [("cluster", "is not an address"), ("tcp://127.0.0.1:9", "no scheduler with a worker answered within")],
+)
+def test_an_address_without_a_scheduler_is_one_line(walks, tmp_path, monkeypatch, capsys, address, words):
+    monkeypatch.setattr(cluster, "CONNECT", 0.5)
+    out = str(tmp_path / "m.gait")
+    assert gait.cli.main(["learn", str(walks), "-o", out, "--dask", address]) in (1, 2)
+    err = capsys.readouterr().err
+    assert words in err and err.count("\n") == 1 and not list(tmp_path.iterdir())
+
+
+def test_without_dask_the_remedy_is_named(walks, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UserError, match="dask is not installed; pip install"):
+        sources.load_all([(walks / "01_00.amc", True)], dask="127.0.0.1:9")
+
+
+def test_a_file_that_kills_its_workers_is_named(walks, scheduler, tmp_path, monkeypatch):
+    """Workers that die on a task are KilledWorker to the client; here a task that ends its process."""
+    bad = Path(shutil.copy(walks / "01_00.amc", tmp_path / "05_01.amc"))
+    true = cluster._task
+    monkeypatch.setattr(
+        cluster,
+        "_task",
+        lambda path, reading: os._exit(9) if path.name == "05_01.amc" else true(path, reading),
+    )
+    _, refused = sources.load_all([(walks / "01_01.amc", True), (bad, True)], dask=scheduler)
+    assert len(refused) == 1 and refused[0].startswith(f"{bad}: the workers that read it were killed")

@@ -1,0 +1,182 @@
+"""Files read in several processes: the same result, one line for what fails, nothing left behind."""
+
+import errno
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import mocap_files as files
+import numpy as np
+import pytest
+
+from gait.errors import UserError
+from gait.learn import pool, sources
+from gait.learn.spool import Spool
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory):
+    """Five toy walks and a broken file in their midst."""
+    folder = tmp_path_factory.mktemp("walks")
+    for i in range(5):
+        files.write_toy(folder, f"01_{i:02}", period=110.0 + 5 * i, seed=i, frames=300 + 20 * i)
+    (folder / "01_02x.amc").write_text(":DEGREES\n1\nroot 1 2\n")
+    return folder
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """Make the pool start with the first file."""
+    monkeypatch.setattr(pool, "START", -1.0)
+
+
+@pytest.fixture
+def stuck(walks):
+    """A file on which its reader waits for ever, between others."""
+    path = walks / "01_03x.amc"
+    os.mkfifo(path)
+    writer = os.open(path, os.O_RDWR)
+    yield path
+    os.close(writer)
+    path.unlink()
+
+
+def readers_of(path):
+    """Yield other processes that have `path` open."""
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit() and int(folder.name) != os.getpid():
+            try:
+                if any(os.readlink(fd) == str(path) for fd in (folder / "fd").iterdir()):
+                    yield int(folder.name)
+            except OSError:  # gone, or not ours
+                continue
+
+
+def wait_for(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not (value := condition()):
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+    return value
+
+
+def contents(sequences):
+    """All that could differ."""
+    return [
+        (s.name, s.subject, s.source, s.fps, s.channels.tobytes(), s.heading.tobytes(), s.strides.tobytes(),
+         s.period.frames, s.period.scores.tobytes(), s.measures.stature)
+        for s in sequences
+    ]  # fmt: skip
+
+
+def test_processes_give_the_same_bits_in_the_order_of_the_files(walks, at_once):
+    found = sources.find([str(walks)])
+    alone, refused_alone = sources.load_all(found, jobs=1)
+    counts = []
+    together, refused = sources.load_all(found, progress=counts.append, jobs=3)
+    assert contents(together) == contents(alone) and len(together) == 5
+    assert refused == refused_alone and "01_02x.amc:3" in refused[0]
+    assert counts == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_bad_file_named_by_itself_stops_the_run_from_a_process_too(walks, at_once):
+    found = [(path, path.stem != "01_02x") for path, _ in sources.find([str(walks)])]
+    with pytest.raises(UserError, match="01_02x.amc:3: 2 numbers where 6"):
+        sources.load_all(found, jobs=2)
+    assert not multiprocessing.active_children()
+
+
+def test_few_small_files_do_not_start_processes_and_many_do(walks, monkeypatch):
+    started = []
+    monkeypatch.setattr(pool, "_pooled", lambda paths, *_: started.append(len(paths)) or iter(()))
+    path = walks / "01_00.amc"
+    assert len(list(pool.prepared([path] * 3, sources.DEFAULT, 2))) == 3 and not started
+    done = len(list(pool.prepared([path] * 3000, sources.DEFAULT, 2)))
+    assert started == [3000 - done] and done <= 3
+
+
+def test_a_file_that_kills_its_process_is_named_and_the_rest_is_read(walks, stuck, at_once):
+    found = [(p, True) for p in sorted(walks.glob("*.amc"))]
+    finished = threading.Event()
+
+    def kill_readers():
+        while not finished.wait(0.02):
+            for pid in readers_of(stuck):
+                os.kill(pid, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill_readers)
+    killer.start()
+    try:
+        sequences, refused = sources.load_all(found, jobs=2)
+    finally:
+        finished.set()
+        killer.join()
+    assert [s.name for s in sequences] == [f"01_{i:02}" for i in range(5)]
+    assert [line.split(":")[0] for line in refused] == [str(walks / "01_02x.amc"), str(stuck)]
+    assert "was killed" in refused[1] and "--exclude" in refused[1] and "\n" not in refused[1]
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_stopped_command_leaves_no_processes(walks, stuck, tmp_path, number):
+    script = (
+        "import sys, gait.cli; from pathlib import Path; from gait.learn import pool, sources\n"
+        "pool.START = -1.0\n"
+        f"sources.find = lambda *_: [(p, True) for p in sorted(Path({str(walks)!r}).glob('*.amc'))]\n"
+        f"sys.exit(gait.cli.main(['learn', 'x', '-o', {str(tmp_path / 'm.gait')!r}, '--jobs', '2']))"
+    )
+    run = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )
+    try:
+        wait_for(lambda: list(readers_of(stuck)) or run.poll() is not None)
+        if number == signal.SIGINT:  # from a terminal it reaches the whole group
+            os.killpg(run.pid, number)
+        else:
+            run.send_signal(number)
+        words = run.communicate(timeout=20)[1]
+    finally:
+        run.kill()
+    if number == signal.SIGKILL:
+        assert run.returncode == -signal.SIGKILL
+    else:
+        assert (run.returncode, words) == (1, "gait learn: interrupted\n")
+    wait_for(lambda: not _group_lives(run.pid), 20)
+    assert not [p for p in tmp_path.iterdir() if not p.name.startswith("pymp-")]
+
+
+def _group_lives(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_spooled_arrays_come_back_and_leave_no_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    arrays = [np.arange(12.0).reshape(3, 4), np.zeros((0, 4)), np.full((2, 2), np.nan)]
+    with Spool() as spool:
+        for array in arrays:
+            spool.put(array)
+        views = spool.views()
+        assert not list(tmp_path.iterdir())
+    for array, view in zip(arrays, views, strict=True):
+        assert np.array_equal(array, view, equal_nan=True) and view.shape == array.shape
+        assert not view.flags.owndata and not view.flags.writeable
+
+
+def test_a_full_disk_is_one_line_with_its_remedy(walks, monkeypatch):
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: open("/dev/full", "r+b", buffering=0))  # noqa: SIM115
+    with pytest.raises(UserError, match=f"{os.strerror(errno.ENOSPC)}.*set TMPDIR"):
+        sources.load_all(sources.find([str(walks)]))
