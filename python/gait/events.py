@@ -103,14 +103,19 @@ def _foot(truth: Joints, side: str) -> Array:
     return truth.places.get(f"{side}_heel", truth.places[f"{side}_ankle"])
 
 
-def _strikes(truth: Joints, reach: Array) -> Array:
-    """Fractional frame numbers of the maxima of `reach`, refined by the parabola through three frames."""
-    step = float(np.median(np.diff(truth.time)))
+def furthest(time: Array, reach: Array) -> Array:
+    """Return the times of the maxima of `reach` (n,) over `time`, refined by the parabola through three frames."""
+    step = float(np.median(np.diff(time)))
     peaks, _ = find_peaks(reach, height=_REACH, distance=max(1, round(_APART / step)))
     before, top, after = reach[peaks - 1], reach[peaks], reach[peaks + 1]
     bend = before - 2 * top + after
     shift = np.where(bend < 0, 0.5 * (before - after) / np.where(bend < 0, bend, 1), 0.0)
-    return np.interp(peaks + shift, np.arange(len(reach)), truth.frame.astype(float))
+    return np.interp(peaks + shift, np.arange(len(reach)), time)
+
+
+def _strikes(truth: Joints, reach: Array) -> Array:
+    """Fractional frame numbers of the strikes of a foot that is `reach` (n,) metres ahead."""
+    return np.interp(furthest(truth.time, reach), truth.time, truth.frame.astype(float))
 
 
 def _times(events: Fields, key: str) -> Array:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 
@@ -24,6 +25,7 @@ STATE_COLUMNS = (
     *("frame", "time", "status", "phase", "stride_hz", "heading_rad", "stature_m", "speed_m_s"),
     *("ess", "log_evidence"),
 )
+SPREAD_COLUMNS = ("phase_sd", "stride_hz_sd", "heading_sd_rad", "stature_sd_m")
 STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
@@ -31,7 +33,8 @@ def header(components: int, angle_names: tuple[str, ...]) -> list[str]:
     """Column names of a track file."""
     scores = [f"c_{k + 1}" for k in range(components)]
     joints = [f"{joint}_{axis}" for joint in JOINTS for axis in ("x", "y", "z", "sx", "sy", "sz")]
-    return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names)]
+    spreads = [*SPREAD_COLUMNS, *(f"{score}_sd" for score in scores)]
+    return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names), *spreads]
 
 
 class TrackWriter:
@@ -58,6 +61,7 @@ class TrackWriter:
         if missing:
             raise UserError(f"model: has no joint {' '.join(missing)}; learn it with the default skeleton")
         self._order = [joint_names.index(name) for name in JOINTS]
+        self._components = components
         self._header = header(components, angle_names)
         self._stack = ExitStack()
 
@@ -75,17 +79,23 @@ class TrackWriter:
 
     def write(self, frame: Frame, estimate: Estimate) -> None:
         """Append the estimate of one frame."""
-        state = estimate.mean
+        state, sd = estimate.mean, estimate.sd
         joints = np.hstack([estimate.joints, estimate.joint_sd])[self._order]
         values = [state.phase, state.stride_hz, state.heading, state.stature, estimate.speed]
         self._csv.writerow(
             [frame.number, f"{frame.time:.6f}", estimate.status.name.lower()]
             + [f"{value:.6f}" for value in values]
             + [f"{estimate.ess:.2f}", f"{estimate.log_evidence:.4f}"]
-            + [f"{value:.4f}" for value in state.coef]
+            + [f"{value:.4f}" for value in self._scores(state.coef)]
             + [f"{value:.5f}" for value in joints.ravel()]
             + [f"{value:.3f}" for value in np.degrees(estimate.angles)]
+            + [f"{value:.6f}" for value in (sd.phase, sd.stride_hz, sd.heading, sd.stature)]
+            + [f"{value:.4f}" for value in self._scores(sd.coef)]
         )
+
+    def _scores(self, coef: Array) -> Array:
+        """One value for each score column; a state may hold fewer, which are 0."""
+        return np.pad(np.asarray(coef, float)[: self._components], (0, max(0, self._components - len(coef))))
 
 
 @dataclass(frozen=True)
@@ -122,11 +132,14 @@ class Track(Joints):
     phase : ndarray of shape (n,)
     sd : dict of str to ndarray of shape (n, 3)
         Posterior standard deviations, metres.
+    numbers : dict of str to ndarray of shape (n,)
+        Every other column of numbers by its name: state, scores, angles and their standard deviations.
     """
 
     status: list[str]
     phase: Array
     sd: dict[str, Array]
+    numbers: dict[str, Array] = field(default_factory=dict)
 
     def eval15_sd(self) -> Array:
         """Return the standard deviations of EVAL15, shape (n, 15, 3)."""
@@ -154,7 +167,14 @@ def read_track(path: str | os.PathLike[str]) -> Track:
         status=status,
         phase=table.numbers("phase"),
         sd={name: table.vectors(name, ("sx", "sy", "sz")) for name in JOINTS},
+        numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
     )
+
+
+def _is_number(column: str) -> bool:
+    """Whether `read_track` takes a column into `Track.numbers`."""
+    known = column in STATE_COLUMNS[3:] or column in SPREAD_COLUMNS or column.endswith("_deg")
+    return known or re.fullmatch(r"c_\d+(_sd)?", column) is not None
 
 
 class _Table:

@@ -56,10 +56,17 @@ def test_header_is_that_of_the_interface(tmp_path):
     names = header.split(",")
     joints = [name[: -len("_sx")] for name in names if name.endswith("_sx")]
     assert joints == ORDER == JOINTS and ORDER[:15] == EVAL15
-    assert names[-24:] == [f"{name}_deg" for name in MODEL.angle_names]
-    assert len(names) == 10 + 5 + 6 * 19 + 24 == len(first.split(","))
+    spreads = [
+        "phase_sd",
+        "stride_hz_sd",
+        "heading_sd_rad",
+        "stature_sd_m",
+        *(f"c_{k}_sd" for k in range(1, 6)),
+    ]
+    assert names[-33:-9] == [f"{name}_deg" for name in MODEL.angle_names] and names[-9:] == spreads
+    assert len(names) == 10 + 5 + 6 * 19 + 24 + 9 == len(first.split(","))
     assert first.startswith("10,0.333333,init,0.000000,0.900000,-1.000000,1.700000,1.250000,123.40,-80.5000,")
-    assert f"{np.degrees(estimate(0).angles[-1]):.3f}" == first.split(",")[-1]
+    assert f"{np.degrees(estimate(0).angles[-1]):.3f}" == first.split(",")[-10]
 
 
 def test_what_was_written_is_read_back(tmp_path):
@@ -107,7 +114,7 @@ def spoil(path, change):
             lambda s: s.__setitem__(2, s[2].replace("tracking", "dancing")),
             "line 3: status 'dancing' is not one of",
         ),
-        (lambda s: s.__setitem__(2, s[2] + ",1"), "line 3 has 154 cells, the header 153"),
+        (lambda s: s.__setitem__(2, s[2] + ",1"), "line 3 has 163 cells, the header 162"),
         (
             lambda s: s.__setitem__(3, s[3].replace("0.200000", "nan", 1)),
             "line 4: phase is 'nan'; give a finite",
