@@ -48,6 +48,7 @@ def write(
     parts.append(f'<p class="dim">{escape(eval_table.LEGEND)}</p>')
     failed = {key: group for key, group in groups.items() if any(map(faults, (row for _, row in group)))}
     parts.append(f"<h2>Failures ({len(failed)})</h2>")
+    parts.append('<p class="dim">Violet in the pictures: truth, or marks. Left blue, right orange.</p>')
     parts += [_section(key, group, True) for key, group in failed.items()]
     parts.append("<h2>Every clip</h2>")
     for done, (key, group) in enumerate(groups.items(), 1):

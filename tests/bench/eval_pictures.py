@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import cv2
@@ -9,7 +10,7 @@ import numpy as np
 from eval_marks import Marks
 
 from gait import Camera, Model, Video
-from gait.overlay import Overlay
+from gait.overlay import BONES, Overlay
 from gait.tracker import Estimate
 from gait.trackfile import read_truth
 from gait.video import Image
@@ -17,8 +18,10 @@ from gait.video import Image
 if TYPE_CHECKING:
     from eval_run import Result
 
-WIDTH = 640  # of a picture, pixels
-_WHITE = (255, 255, 255)
+Array = np.ndarray
+WIDTH, HEIGHT = 480, 420  # of a picture, pixels
+KNOWN = (255, 60, 255)  # colour of truth and marks, BGR
+_ROOM = 1.35  # height of the picture in heights of the person
 
 
 def pictures(
@@ -30,9 +33,13 @@ def pictures(
     numbers = {number for number, _ in chosen}
     for frame in video.frames(min(numbers), max(numbers) + 1):
         if frame.number in numbers:
-            canvas = overlay.draw(frame.image, estimates[frame.number], frame.number)
-            _draw_known(result, overlay, canvas, frame.number)
-            out[frame.number] = _jpeg(_crop(canvas, camera, estimates[frame.number]))
+            estimate, known = estimates[frame.number], _known(result, model, camera, frame.number)
+            canvas = overlay.body(frame.image, estimate.mean)
+            overlay.skeleton(canvas, estimate.joints)
+            seen = np.vstack([camera.project(estimate.joints), known])
+            picture, place = _crop(canvas, seen[np.isfinite(seen).all(axis=1)])
+            _draw_known(picture, place(known), model.joint_names if result.job.clip.truth else None)
+            out[frame.number] = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 82])[1].tobytes()
     return [(words, out[number]) for number, words in chosen if number in out]
 
 
@@ -53,37 +60,44 @@ def _choose(result: Result) -> list[tuple[int, str]]:
     ]
 
 
-def _draw_known(result: Result, overlay: Overlay, canvas: Image, number: int) -> None:
-    """Truth as a thin white skeleton, marks as white rings, in place."""
+def _known(result: Result, model: Model, camera: Camera, number: int) -> Array:
+    """Pixels of the truth in the order of the model's joints, or of the visible marks; NaN where unknown."""
     clip = result.job.clip
     if clip.truth is not None:
         truth = read_truth(clip.truth)
-        row = np.flatnonzero(truth.frame == number)
-        if len(row) and all(name in truth.places for name in overlay.model.joint_names):
-            joints = np.stack([truth.places[name][row[0]] for name in overlay.model.joint_names])
-            overlay.sticks(canvas, joints, 1, _WHITE)
-    elif clip.marks is not None:
+        places = [
+            truth.places.get(name, np.full_like(truth.places["pelvis"], np.nan)) for name in model.joint_names
+        ]
+        row = truth.frame == number
+        return camera.project(np.stack(places)[:, row][:, 0]) if row.any() else np.zeros((0, 2))
+    if clip.marks is not None:
         marks = Marks.read(clip.marks)
-        for row in np.flatnonzero(marks.frames == number):
-            for uv, seen in zip(marks.uv[row], marks.seen[row], strict=True):
-                if seen:
-                    cv2.circle(canvas, tuple(np.rint(uv).astype(int).tolist()), 6, _WHITE, 1, cv2.LINE_AA)
+        row = marks.frames == number
+        return marks.uv[row][marks.seen[row] > 0]
+    return np.zeros((0, 2))
 
 
-def _crop(canvas: Image, camera: Camera, estimate: Estimate) -> Image:
-    """Large pictures are cut to the person's surroundings; the instrument panel stays at the top left."""
+def _crop(canvas: Image, seen: Array) -> tuple[Image, Callable[[Array], Array]]:
+    """Picture of the surroundings of the points `seen`, and what takes pixels there."""
     height, width = canvas.shape[:2]
-    if width <= 2 * WIDTH:
-        return canvas
-    middle = camera.project(estimate.joints.mean(axis=0))
-    left = 0 if not np.isfinite(middle).all() else int(np.clip(middle[0] - WIDTH, 0, width - 2 * WIDTH))
-    out = canvas[:, left : left + 2 * WIDTH].copy()
-    corner = (slice(0, round(0.2 * height)), slice(0, round(0.3 * WIDTH * 2)))
-    out[corner] = canvas[corner]
-    return out
+    low, high = np.clip([seen.min(axis=0), seen.max(axis=0)], 0, [width - 1, height - 1])
+    tall = max(_ROOM * float((high - low)[1]), _ROOM * float((high - low)[0]) * HEIGHT / WIDTH, 60.0)
+    scale = HEIGHT / tall
+    move = 0.5 * np.array([WIDTH, HEIGHT]) - scale * 0.5 * (low + high)
+    picture = cv2.warpAffine(
+        canvas, np.array([[scale, 0, move[0]], [0, scale, move[1]]]), (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR
+    )
+    return np.asarray(picture, np.uint8), lambda uv: scale * uv + move
 
 
-def _jpeg(image: Image) -> bytes:
-    height, width = image.shape[:2]
-    small = cv2.resize(image, (WIDTH, round(height * WIDTH / width)), interpolation=cv2.INTER_AREA)
-    return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
+def _draw_known(picture: Image, uv: Array, names: Sequence[str] | None) -> None:
+    """Truth as a thin skeleton of the joints `names`, or marks as rings, in place."""
+    if names is None or len(uv) == 0:
+        for at in uv[np.isfinite(uv).all(axis=1)]:
+            cv2.circle(picture, tuple(np.rint(at).astype(int).tolist()), 5, KNOWN, 1, cv2.LINE_AA)
+        return
+    at = dict(zip(names, uv, strict=True))
+    for a, b in BONES:
+        if np.isfinite([at[a], at[b]]).all():
+            ends = np.rint([at[a], at[b]]).astype(int).tolist()
+            cv2.line(picture, tuple(ends[0]), tuple(ends[1]), KNOWN, 1, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""Plots of a clip in one arm: error over time, phase, joints, the way over the ground; a line for each seed."""
+"""Plots of a clip in one arm: error over time, phase, joints, the way from above; a line for each seed."""
 
 from __future__ import annotations
 

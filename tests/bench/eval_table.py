@@ -71,19 +71,19 @@ SHOWN = {  # column of the printed table: figure, decimals
     "nees": ("nees", 1),
     "crps": ("crps_mm", 0),
     "HS%": ("strikes_pct", 0),
+    "from": ("first", 0),
     "ms": ("step_ms", 1),
 }
 _SPREAD = ("root", "abs", "px")  # columns that also show least and most over the seeds
 
 LEGEND = (
-    "Medians over the seeds of a clip's median over frames (least-most over the seeds). root abs proc 12j: mm, "
+    "Medians over the seeds of a clip's median over frames (least-most). root abs proc 12j: mm, "
     "hips laid together, as it stands, after the best similarity of each frame (to compare with literature "
     "only), root over 12 limb joints; MPipe: MediaPipe Pose in the measure of 12j; static: mean pose at the "
-    "true place (root); free: mean cycle running free from the true start (root); px: distance in the picture, "
-    "outdoor: near hip, knee, ankle; clear: all clear marks; lost: root > 150 mm or said lost; twice: the same, "
+    "true place (root); free: mean cycle running free from the true start (root); px: distance in the image, "
+    "outdoor: near leg; clear: all clear marks; lost: root > 150 mm or said so; twice: the same, "
     "frames under tracking counted twice; c50 c90: share of joint coordinates inside the intervals; nees: "
-    "error in the particles' covariance, 1 is right; crps: mm; HS: heel strikes within 2 frames; ms: one step "
-    "of the tracker."
+    "error in the particles' covariance, 1 is right; crps: mm; HS: heel strikes within 2 frames; from: first frame tracked; ms: a step."
 )
 
 
