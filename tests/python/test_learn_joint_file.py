@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gait.errors import UserError
-from gait.learn import body, joint_file, mocap_asf, retarget
+from gait.learn import body, joint_file, mocap_asf, readers, retarget
 from gait.learn.recording import Y_UP
 from gait.learn.sequence import load
 from gait.skeleton import ANGLES
@@ -47,7 +47,7 @@ def write_trc(path, walker):
 
 def test_csv_and_trc_hold_the_same_joints(walker, tmp_path):
     first = joint_file.read_csv(write_csv(tmp_path / "a.csv", walker))
-    second = joint_file.read_trc(write_trc(tmp_path / "a.trc", walker))
+    second = readers.read(write_trc(tmp_path / "a.trc", walker))
     assert first.fps == pytest.approx(120, rel=1e-3) and second.fps == 120
     for name in joint_file.NEEDED:
         assert first.joints[name] == pytest.approx(walker.joints[name], abs=1e-4), name
@@ -111,4 +111,4 @@ def test_malformed_trc_is_named(walker, tmp_path, change):
     path = write_trc(tmp_path / "a.trc", walker)
     path.write_text(change(path.read_text()))
     with pytest.raises(UserError, match="not a .trc header"):
-        joint_file.read_trc(path)
+        readers.read(path)

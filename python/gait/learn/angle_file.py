@@ -1,13 +1,33 @@
-"""Angles as a source of learning: .csv of the model's joint angles, as `gait track` writes them too."""
+"""Angles as a source of learning: .csv of the model's joint angles.
+
+    frame,time,l_hip_flexion_deg,l_knee_flexion_deg,...
+
+Columns are named like `gait.skeleton.ANGLES`, with `_deg`, `_rad` or no suffix; at least flexion of both hips
+and knees, the rest is missing.  Angles without suffix are degrees if any of them is beyond `RADIANS`, else
+radians.
+Columns named like `gait.skeleton.ROOTS` (statures, or angles as above) and `stature_m` are used if present.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from gait.errors import UserError
+from gait.learn import csv_table, joint_file
+from gait.learn.rotations import unwrap
+from gait.skeleton import ANGLES, ROOTS, SIDES
+
 Floats = npt.NDArray[np.float64]
+
+SUFFIXES = ("_deg", "_rad", "")
+RADIANS = 4.0  # in a walk some joint turns by more degrees than that, and none by more radians
+LEGS = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]
+LENGTHS = ("root_forward", "root_sway", "root_height")
 
 
 @dataclass
@@ -38,3 +58,64 @@ class AngleTable:
     def frames(self) -> int:
         """Number of frames T."""
         return len(self.angles)
+
+
+def holds_angles(path: Path) -> bool:
+    """Whether a .csv has columns of angles, and not the positions of all joints."""
+    names = csv_table.header(path)
+    joints = joint_file.find([name[:-2] for name in names if name.endswith("_x")])
+    return set(joint_file.NEEDED) > set(joints) and bool(_columns(names, ANGLES))
+
+
+def read(path: Path, fps: float | None = None) -> AngleTable:
+    """Read a .csv of angles.
+
+    Parameters
+    ----------
+    fps : float, optional
+        Frames per second, by default those of the column `time`.
+
+    Raises
+    ------
+    UserError
+        Naming file, line or column, and remedy.
+    """
+    table = csv_table.read(path, fps)
+    columns = _columns(table.names, ANGLES + ROOTS)
+    lacking = next((name for name in LEGS if name not in columns), None)
+    if lacking is not None:
+        raise UserError(f"{path}:1: no column {lacking}_deg or {lacking}_rad; add it, or leave the file out")
+    twice = next((name for name, found in columns.items() if len(found) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path}:1: {twice} is there as {' and '.join(columns[twice])}; remove one")
+    values = _in_radians(table, {name: found[0] for name, found in columns.items()})
+    empty = next((name for name in LEGS if not np.isfinite(values[name]).any()), None)
+    if empty is not None:
+        raise UserError(f"{path}: column {columns[empty][0]} is empty; leave the file out")
+    missing = np.full(len(table.values), np.nan)
+    angles, root = (np.stack([values.get(n, missing) for n in names], axis=1) for names in (ANGLES, ROOTS))
+    stature = table["stature_m"] if "stature_m" in table.names else missing
+    return AngleTable(
+        path.stem,
+        table.fps,
+        unwrap(angles),
+        root if any(name in values for name in ROOTS) else None,
+        float(np.nanmedian(stature)) if np.isfinite(stature).any() else None,
+    )
+
+
+def _columns(names: list[str], wanted: Sequence[str]) -> dict[str, list[str]]:
+    """Columns of each quantity that is there."""
+    found = {name: [name + suffix for suffix in SUFFIXES if name + suffix in names] for name in wanted}
+    return {name: columns for name, columns in found.items() if columns}
+
+
+def _in_radians(table: csv_table.Table, columns: dict[str, str]) -> dict[str, Floats]:
+    """Values by quantity; angles in radians."""
+    bare = [table[column] for name, column in columns.items() if column == name and name not in LENGTHS]
+    largest = max((float(np.nanmax(np.abs(v))) for v in bare if np.isfinite(v).any()), default=0.0)
+    result = {}
+    for name, column in columns.items():
+        degrees = column.endswith("_deg") or (column == name and largest > RADIANS)
+        result[name] = np.radians(table[column]) if degrees and name not in LENGTHS else table[column]
+    return result

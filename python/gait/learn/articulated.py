@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gait.skeleton import ANGLES, axis_rotation, default_skeleton
+from gait.skeleton import ANGLES, SIDES, axis_rotation, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -43,22 +43,25 @@ def _moves() -> npt.NDArray[np.bool_]:
 
 MOVES = _moves()
 
-#: What may differ between bodies of one stature, by axes of segments that stretch together; left and right
-#: are alike.  A segment's stretch also moves the origins of its children.
-STRETCHES: dict[str, list[tuple[str, str]]] = {
-    "stature": [(name, "xyz") for name in SEGMENTS],
-    "pelvis width": [("pelvis", "y")],
-    "trunk": [("torso", "z")],
-    "shoulder width": [("torso", "y")],
-    "head": [("head", "z")],
-    **{part: [(f"{s}_{part}", "z") for s in "lr"] for part in ("upper_arm", "forearm", "thigh", "shank")},
-    "foot": [("l_foot", "x"), ("r_foot", "x")],
+LIMBS = {"upper_arm": "z", "forearm": "z", "thigh": "z", "shank": "z", "foot": "x"}
+#: What may differ between bodies: the stature, then the logarithms of ratios, with the axes of the segments
+#: that they stretch (or shrink, -1).  A segment's stretch also moves the origins of its children.
+STRETCHES: dict[str, list[tuple[str, str, float]]] = {
+    "stature": [(name, "xyz", 1.0) for name in SEGMENTS],
+    "pelvis width": [("pelvis", "y", 1.0)],
+    "trunk": [("torso", "z", 1.0)],
+    "shoulder width": [("torso", "y", 1.0)],
+    "head": [("head", "z", 1.0)],
+    **{part: [(f"{s}_{part}", axis, 1.0) for s in SIDES] for part, axis in LIMBS.items()},
+    **{f"{part} left": [(f"l_{part}", axis, 1.0), (f"r_{part}", axis, -1.0)] for part, axis in LIMBS.items()},
 }
+#: Their standard deviations in people: of ratios to the stature, and of half the difference of the sides.
+STRETCH_SD = np.array([0.25] + [0.04 if name.endswith(" left") else 0.08 for name in list(STRETCHES)[1:]])
 #: Table (F, 3, S): the logarithm of a segment's scale along each axis is this times the S stretches.
 STRETCH = np.zeros((len(SEGMENTS), 3, len(STRETCHES)))
 for _k, _members in enumerate(STRETCHES.values()):
-    for _name, _axes in _members:
-        STRETCH[SEGMENTS.index(_name), ["xyz".index(a) for a in _axes], _k] = 1.0
+    for _name, _axes, _sign in _members:
+        STRETCH[SEGMENTS.index(_name), ["xyz".index(a) for a in _axes], _k] = _sign
 
 
 @dataclass

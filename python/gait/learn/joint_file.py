@@ -6,13 +6,13 @@ limb, or across the body while the limb is straight.  Rotations about a limb's o
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
+from gait.learn import csv_table
 from gait.learn.body import Body
 from gait.learn.rotations import frame_from, unit
 from gait.skeleton import SIDES
@@ -28,59 +28,23 @@ STRAIGHT = (
 )
 
 
-def read_csv(path: Path, fps: float | None = None, zero_runs: bool = False) -> Body:
+def read_csv(path: Path, fps: float | None = None) -> Body:
     """Read `frame,time,<joint>_x,<joint>_y,<joint>_z,...`: metres, z up; empty cells are missing.
-
-    `zero_runs` is of no use here and ignored.
 
     Raises
     ------
     UserError
         Naming file, line and remedy.
     """
-    lines = _lines(path)
-    header = [name.strip() for name in lines[0]]
-    if "time" not in header:
-        raise UserError(f"{path}:1: no column 'time'; the header must be frame,time,<joint>_x,...")
-    table = np.array([_numbers(row, len(header), path, i) for i, row in enumerate(lines[1:], 2) if row])
-    if len(table) < 3:
-        raise UserError(f"{path}: {len(table)} frames; a recording of a few seconds is needed")
-    names = [name[:-2] for name in header if name.endswith("_x")]
+    table = csv_table.read(path, fps)
+    names = [name[:-2] for name in table.names if name.endswith("_x")]
     try:
-        places = {n: table[:, [header.index(f"{n}_{axis}") for axis in "xyz"]] for n in names}
+        places = {n: np.stack([table[f"{n}_{axis}"] for axis in "xyz"], axis=1) for n in names}
     except ValueError as error:
         raise UserError(
             f"{path}:1: column {error.args[0].split()[0]} is missing; each joint needs x, y, z"
         ) from None
-    step = float(np.median(np.diff(table[:, header.index("time")])))
-    if not step > 0:
-        raise UserError(f"{path}: the times do not increase; correct column 'time'")
-    return body(path, places, fps or 1 / step)
-
-
-def _lines(path: Path) -> list[list[str]]:
-    try:
-        with path.open(newline="", encoding="latin-1") as file:
-            lines = list(csv.reader(file))
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; check the name") from error
-    if not lines:
-        raise UserError(f"{path}: the file is empty; export it again")
-    return lines
-
-
-def _numbers(row: list[str], width: int, path: Path, line: int) -> Floats:
-    """Cells as numbers; empty ones, and words in columns of words, are NaN."""
-    if len(row) < width:
-        raise UserError(f"{path}:{line}: {len(row)} cells where {width} belong; restore the file")
-    values = np.full(width, np.nan)
-    for k, cell in enumerate(row[:width]):
-        try:
-            values[k] = float(cell)
-        except ValueError:
-            if any(c.isdigit() for c in cell):
-                raise UserError(f"{path}:{line}: {cell!r} is not a number; restore the file") from None
-    return values
+    return body(path, places, table.fps)
 
 
 def body(path: Path, places: dict[str, Floats], fps: float) -> Body:
@@ -89,13 +53,17 @@ def body(path: Path, places: dict[str, Floats], fps: float) -> Body:
     Raises
     ------
     UserError
-        If a joint is missing.
+        If a joint is missing, or one of the legs never seen.
     """
     columns = find(list(places))
     lacking = next((joint for joint in NEEDED if joint not in columns), None)
     if lacking is not None:
         raise UserError(f"{path}: no joint {lacking!r}; name one of its columns so, or leave the file out")
     joints = {joint: places[columns[joint]] for joint in NEEDED}
+    legs = [joint for joint in NEEDED if joint.split("_")[-1] in ("hip", "knee", "ankle")]
+    empty = next((joint for joint in legs if not np.isfinite(joints[joint]).any()), None)
+    if empty is not None:
+        raise UserError(f"{path}: no values for joint {empty!r}; leave the file out")
     hips, shoulders = (joints[f"l_{part}"] - joints[f"r_{part}"] for part in ("hip", "shoulder"))
     joints["pelvis"] = (joints["l_hip"] + joints["r_hip"]) / 2
     lateral = {"head": unit(shoulders)}

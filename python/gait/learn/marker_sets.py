@@ -23,8 +23,8 @@ class Landmark(NamedTuple):
     sd: float
 
 
-BONE = 0.010  # felt under the skin
-SOFT = 0.016  # on the joint's side, but not at one bony point
+BONE = 0.008  # felt under the skin
+SOFT = 0.012  # on the joint's side, but not at one bony point
 LOOSE = 0.045  # somewhere about there
 
 #: Left landmarks, named without their side; the right ones mirror them.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gait.learn import c3d_file, joint_file, marker_body, mocap_asf, mocap_bvh
+from gait.learn import angle_file, c3d_file, joint_file, marker_body, mocap_asf, mocap_bvh, root
+from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body, body
 from gait.learn.reading import DEFAULT, Reading
 from gait.learn.recording import Y_UP
@@ -15,8 +16,8 @@ RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
 KINDS = (*RECORDINGS, ".c3d", ".trc", ".csv")
 
 
-def read(path: Path, reading: Reading = DEFAULT) -> Body:
-    """Read a motion file by its suffix.
+def read(path: Path, reading: Reading = DEFAULT) -> Body | AngleTable:
+    """Read a motion file by its suffix; a .csv may hold angles alone.
 
     Raises
     ------
@@ -24,11 +25,15 @@ def read(path: Path, reading: Reading = DEFAULT) -> Body:
         If the file is malformed or lacks a joint; it names file, place and remedy.
     """
     suffix = path.suffix.lower()
+    if suffix == ".csv" and angle_file.holds_angles(path):
+        return angle_file.read(path, reading.fps)
     if suffix in RECORDINGS:
-        return body(RECORDINGS[suffix](path, reading.fps, reading.zero_runs))
-    if suffix == ".csv":
-        return joint_file.read_csv(path, reading.fps)
-    return _points(path, reading)
+        walker = body(RECORDINGS[suffix](path, reading.fps, reading.zero_runs))
+    elif suffix == ".csv":
+        walker = joint_file.read_csv(path, reading.fps)
+    else:
+        walker = _points(path, reading)
+    return root.overground(walker)
 
 
 def _points(path: Path, reading: Reading) -> Body:

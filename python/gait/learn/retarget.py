@@ -6,7 +6,7 @@ of neighbours (model-format.md), continuous in time.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,12 +23,17 @@ HEAD_TOP = (0.015, 0.0, 0.140)  # top of the head from the base of the neck, of 
 SHOULDER_HEIGHT = 0.262  # centre of the shoulder's joint over the hips, statures
 UPPER_ARM = 0.156  # from there to the elbow
 BALL = 0.0235  # centre of the ball of the foot over the ground in stance, statures
+#: What the parts of a standing body that may be unknown take of its height, statures.
+SHARES = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
 STANCE_SHARE = 0.15  # share of frames in which a foot moves least: it is flat on the ground then
 
 
 @dataclass(frozen=True)
 class Measures:
-    """A body's own size, metres, of the same meaning as `gait.skeleton.Proportions` times the stature."""
+    """A body's own size, metres, of the same meaning as `gait.skeleton.Proportions` times the stature.
+
+    Lengths of parts that were never seen are NaN; the stature is then that of a person with the rest.
+    """
 
     stature: float
     hip: Floats  #: (2, 3) left and right, in the pelvis frame
@@ -44,13 +49,13 @@ class Measures:
 
 
 def stance(body: Body, side: str) -> npt.NDArray[np.intp]:
-    """Frames in which the foot of a side lies flat: ankle and ball both move least."""
-    speed = sum(
-        np.linalg.norm(np.gradient(body.joints[f"{side}_{joint}"], axis=0), axis=1)
-        for joint in ("ankle", "toe")
-    )
+    """Frames in which the foot of a side lies flat: ankle and ball, if it is known, both move least."""
+    points = [body.joints[f"{side}_{joint}"] for joint in ("ankle", "toe")]
+    known = [place for place in points if np.isfinite(place).any()]
+    speed = sum((np.linalg.norm(np.gradient(p, axis=0), axis=1) for p in known), np.zeros(body.frames))
+    seen = int(np.isfinite(speed).sum())
     order = np.argsort(np.where(np.isfinite(speed), speed, np.inf), kind="stable")
-    return order[: max(3, int(STANCE_SHARE * np.isfinite(speed).sum()))]
+    return order[: min(max(3, int(STANCE_SHARE * seen)), seen)]
 
 
 def measure(body: Body) -> Measures:
@@ -62,10 +67,12 @@ def measure(body: Body) -> Measures:
 
     torso = torso_frames(body)
     flat = {s: stance(body, s) for s in SIDES}
-    rise = np.array([np.nanmedian((j[f"{s}_ankle"] - j[f"{s}_toe"])[flat[s], 2]) for s in SIDES])
+    rise = np.array([median((j[f"{s}_ankle"] - j[f"{s}_toe"])[flat[s], 2]) for s in SIDES])
     foot, neck = distances("ankle", "toe"), _distance(j["pelvis"], j["neck"])
     thigh, shank = distances("hip", "knee"), distances("knee", "ankle")
-    stature = float(rise.mean() + thigh.mean() + shank.mean() + neck) / (1 - HEAD - BALL)
+    parts = {"rise": mean(rise), "thigh": mean(thigh), "shank": mean(shank), "neck": neck}
+    known = 1 - HEAD - BALL - sum(share for part, share in SHARES.items() if np.isnan(parts[part]))
+    stature = float(sum(length for length in parts.values() if np.isfinite(length))) / known
     return Measures(
         stature=stature,
         hip=np.array([_in_frame(body.pelvis, j[f"{s}_hip"] - j["pelvis"]) for s in SIDES]),
@@ -77,17 +84,28 @@ def measure(body: Body) -> Measures:
         shank=shank,
         foot=foot,
         slope=np.arcsin(np.clip(rise / foot, -1, 1)),
-        sole=float(rise.mean()) + BALL * stature,
+        sole=parts["rise"] + BALL * stature,
     )
 
 
+def mean(values: Floats) -> float:
+    """Mean of what is known; NaN if nothing is."""
+    return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
+
+
+def median(values: Floats) -> float:
+    """Median of what is known; NaN if nothing is."""
+    return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
+
+
 def _distance(a: Floats, b: Floats) -> float:
-    return float(np.nanmean(np.linalg.norm(a - b, axis=1)))
+    return mean(np.asarray(np.linalg.norm(a - b, axis=1)))
 
 
 def _in_frame(frames: Floats, vectors: Floats) -> Floats:
     """Mean of vectors (T, 3) seen in frames (T, 3, 3)."""
-    return np.asarray(np.nanmean(np.einsum("tji,tj->ti", frames, vectors), axis=0))
+    seen = np.einsum("tji,tj->ti", frames, vectors)
+    return np.asarray(np.nanmean(seen, axis=0)) if np.isfinite(seen).any() else np.full(3, np.nan)
 
 
 def torso_frames(body: Body) -> Floats:
@@ -141,7 +159,7 @@ def _centred(table: Floats) -> Floats:
     return result
 
 
-def generic_proportions(bodies: list[Measures]) -> Proportions:
+def generic_proportions(bodies: Sequence[Measures | None]) -> Proportions:
     """Mean proportions for people who were not measured.
 
     Recordings end the clavicle near the acromion; anatomical bodies (MakeHuman) have the joint's centre lower
@@ -165,29 +183,38 @@ def own_proportions(m: Measures) -> Proportions:
     return mean_proportions([m])
 
 
-def mean_proportions(bodies: list[Measures]) -> Proportions:
-    """Mean proportions of bodies, each divided by its stature; left and right made symmetric."""
+def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
+    """Mean proportions of bodies, each divided by its stature; left and right made symmetric.
 
-    def mean(value: Callable[[Measures], Floats | float]) -> float:
-        return float(np.mean([np.mean(value(m)) / m.stature for m in bodies]))
+    Every part is the mean over those bodies that have it, and generic if none does; None is a body without any.
+    """
+    generic, measured = Proportions(), [m for m in bodies if m is not None]
+
+    def part(value: Callable[[Measures], Floats | float], default: float) -> float:
+        found = mean(np.array([mean(np.asarray(value(m))) / m.stature for m in measured]))
+        return found if np.isfinite(found) else default
 
     def offset(points: str) -> tuple[float, float, float]:
-        both = np.mean([getattr(m, points) / m.stature for m in bodies], axis=0)
+        known = [m for m in measured if np.isfinite(getattr(m, points)).all()]
+        if not known:
+            return getattr(generic, points)
+        both = np.mean([getattr(m, points) / m.stature for m in known], axis=0)
         middle = (both[0] + both[1] * (1, -1, 1)) / 2
         return float(middle[0]), float(middle[1]), float(middle[2])
 
-    foot, slope, sole = mean(lambda m: m.foot), mean(lambda m: m.slope * m.stature), mean(lambda m: m.sole)
+    foot = part(lambda m: m.foot, float(np.hypot(generic.toe[0], generic.toe[2])))
+    slope = part(lambda m: m.slope * m.stature, float(np.arctan2(-generic.toe[2], generic.toe[0])))
+    sole = part(lambda m: m.sole, generic.sole)
     toe = (foot * np.cos(slope), 0.0, -foot * np.sin(slope))
-    generic = Proportions()
     return Proportions(
         hip=(0.0, offset("hip")[1], 0.0),
         shoulder=offset("shoulder"),
-        neck=mean(lambda m: m.neck),
+        neck=part(lambda m: m.neck, generic.neck),
         head=(0.0, 0.0, HEAD),
-        upper_arm=mean(lambda m: m.upper_arm),
-        forearm=mean(lambda m: m.forearm),
-        thigh=mean(lambda m: m.thigh),
-        shank=mean(lambda m: m.shank),
+        upper_arm=part(lambda m: m.upper_arm, generic.upper_arm),
+        forearm=part(lambda m: m.forearm, generic.forearm),
+        thigh=part(lambda m: m.thigh, generic.thigh),
+        shank=part(lambda m: m.shank, generic.shank),
         toe=(float(toe[0]), 0.0, float(toe[2])),
         heel=(generic.heel[0], 0.0, generic.heel[2] + generic.sole - sole),
         sole=sole,

@@ -8,14 +8,47 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.learn.body import Body
-from gait.learn.retarget import BALL, Measures, stance
-from gait.learn.rotations import decompose_zyx, frame_from, unit
-from gait.skeleton import SIDES, axis_rotation
+from gait.learn.retarget import BALL, Measures, median, stance
+from gait.learn.rotations import decompose_zyx, frame_from, unit, unwrap
+from gait.skeleton import SIDES, Proportions, axis_rotation
 
 Floats = npt.NDArray[np.float64]
 
 HARMONICS = 4  # of the pelvis's path within a stride
 STANDING = 0.2  # mean speed, m/s, below which the pelvis and not the path gives the heading
+LOW = 0.15  # share of the frames in which a foot is lowest: it is on the ground then
+BELT = 0.4  # m/s, speed of the ground under a person who stays in place that makes a treadmill
+STEADY = 0.35  # share of the belt's speed that half of the feet's velocities may differ from it
+
+
+def overground(body: Body) -> Body:
+    """Let somebody on a treadmill, or of an animation in place, move over the ground.
+
+    The velocity of the feet while they are lowest is the belt's; the body then moves against it.  Bodies that
+    travel, and feet that do not slide steadily, are left as they are.
+    """
+    path = body.joints["pelvis"]
+    seen = np.flatnonzero(np.isfinite(path[:, 0]))
+    if (
+        len(seen) < 3
+        or np.linalg.norm(path[seen[-1], :2] - path[seen[0], :2]) / len(seen) * body.fps > STANDING
+    ):
+        return body
+    sliding = [np.zeros((0, 2))]
+    for s in SIDES:
+        foot = body.joints[f"{s}_ankle"]
+        velocity = np.gradient(foot[:, :2], axis=0) * body.fps
+        known = np.isfinite(velocity).all(axis=1)
+        if known.any():
+            sliding.append(velocity[known & (foot[:, 2] <= np.quantile(foot[known, 2], LOW))])
+    slides = np.concatenate(sliding)
+    belt = np.median(slides, axis=0) if len(slides) else np.zeros(2)
+    speed = float(np.linalg.norm(belt))
+    if speed < BELT or np.median(np.linalg.norm(slides - belt, axis=1)) > STEADY * speed:
+        return body
+    shift = np.zeros((body.frames, 3))
+    shift[:, :2] = -belt * np.arange(body.frames)[:, None] / body.fps
+    return replace(body, joints={name: place + shift for name, place in body.joints.items()})
 
 
 def level(body: Body) -> tuple[Body, float]:
@@ -26,12 +59,12 @@ def level(body: Body) -> tuple[Body, float]:
     """
     path = body.joints["pelvis"]
     seen = np.flatnonzero(np.isfinite(path[:, 0]))
-    travel = path[seen[-1], :2] - path[seen[0], :2]
-    if np.linalg.norm(travel) < 1.0:
-        return body, 0.0
-    way: Floats = travel / np.linalg.norm(travel)
+    travel = path[seen[-1], :2] - path[seen[0], :2] if len(seen) else np.zeros(2)
     contacts = np.concatenate([body.joints[f"{s}_toe"][stance(body, s)] for s in SIDES])
     contacts = contacts[np.isfinite(contacts).all(axis=1)]
+    if np.linalg.norm(travel) < 1.0 or len(contacts) < 3:
+        return body, 0.0
+    way: Floats = travel / np.linalg.norm(travel)
     design = np.stack([np.ones(len(contacts)), contacts[:, :2] @ way], axis=1)
     slope = float(np.arctan(_robust_line(design, contacts[:, 2])[1]))
     turn = _about(np.array([-way[1], way[0], 0.0]), slope)
@@ -46,6 +79,8 @@ def align_pelvis(body: Body) -> Body:
     The left axis becomes the line between the hips, and the forward axis is level on average: a file's pelvis
     may be pitched by a constant that only its skeleton's calibration knows.
     """
+    if not np.isfinite(body.pelvis).any():
+        return body
     line = unit(
         np.nanmean(np.einsum("tji,tj->ti", body.pelvis, body.joints["l_hip"] - body.joints["r_hip"]), axis=0)
     )
@@ -82,28 +117,43 @@ def channels(body: Body, measures: Measures, period: float) -> tuple[Floats, Flo
     Returns
     -------
     channels : (T, 6)
-        root_forward ... root_yaw: statures per stride, statures, statures, radians.
+        root_forward ... root_yaw: statures per stride, statures, statures, radians; NaN where the pelvis is
+        not seen.
     heading : (T,)
-        Direction of travel, radians.
+        Direction of travel, radians; before the pelvis is first seen and after the last time, as then.
     """
     path, frames = body.joints["pelvis"], body.frames
-    floor = np.nanmedian([np.nanmedian(body.joints[f"{s}_toe"][stance(body, s), 2]) for s in SIDES])
-    ground = float(floor) - BALL * measures.stature
+    seen = np.isfinite(path[:, 0])
+    if seen.sum() < 3:
+        return np.full((frames, 6), np.nan), np.zeros(frames)
+    ground = _ground(body, measures.stature)
     smooth, velocity, fitted = _smooth_path(path[:, :2], period)
-    speed = np.linalg.norm(smooth[-1] - smooth[0]) / frames * body.fps
-    yaw = np.unwrap(np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0]))
+    first, last = np.flatnonzero(seen)[[0, -1]]
+    speed = np.linalg.norm(smooth[last] - smooth[first]) / (last + 1 - first) * body.fps
+    yaw = unwrap(np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0])[:, None])[:, 0]
     heading = (
         np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])) if speed > STANDING else _mean_over(yaw, period)
     )
+    heading = heading[np.clip(np.arange(frames), first, last)]
     along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     result = np.empty((frames, 6))
-    result[:, 0] = np.sum(np.gradient(fitted, axis=0) * along, axis=1) * period / measures.stature
+    forward = np.sum(np.gradient(fitted, axis=0) * along, axis=1) * period / measures.stature
+    result[:, 0] = np.where(seen, forward, np.nan)
     result[:, 1] = np.sum((path[:, :2] - smooth) * across, axis=1) / measures.stature
     result[:, 2] = (path[:, 2] - ground) / measures.stature
     turns = decompose_zyx(axis_rotation(2, -heading) @ body.pelvis)
     result[:, 3:] = turns[:, ::-1]
     return result, heading
+
+
+def _ground(body: Body, stature: float) -> float:
+    """Height of the ground under the feet in stance, by their balls, else by their ankles."""
+    for joint, height in (("toe", BALL), ("ankle", Proportions().sole)):
+        lowest = median(np.array([median(body.joints[f"{s}_{joint}"][stance(body, s), 2]) for s in SIDES]))
+        if np.isfinite(lowest):
+            return lowest - height * stature
+    return float("nan")
 
 
 def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:

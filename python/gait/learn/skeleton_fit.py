@@ -22,12 +22,11 @@ Floats = npt.NDArray[np.float64]
 
 NOISE = 0.01  # metres: skin over bone and what 24 angles cannot do
 ANGLE_SD = 1.5  # radians about the rest pose: only counts for what is not seen
-STATURE = (1.7, 0.25)  # metres, and the sd of its logarithm
-STRETCH_SD = 0.08
+STATURE = 1.7  # metres
 LIMIT_SD = 0.05  # radians beyond a limit that count as one sd
 OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many NOISE lose weight: first rounds to last
 SUBJECT_FRAMES = 60
-EFFECTIVE = 10.0  # frames that these count for: neighbours share their errors
+EFFECTIVE = 5.0  # frames that these count for: neighbours share their errors
 ROUNDS = 30
 CHUNK = 128  # frames solved at once
 FEWEST = 3  # points seen in a frame that is fitted
@@ -263,9 +262,9 @@ def _descend(
 def _subject(few: _Data, points: Points, stretch: Floats, pose: Pose) -> tuple[Floats, Floats, Pose]:
     """Stretches (S,), places of the points (M, 3) and poses, together."""
     count, share = len(stretch), len(pose) / EFFECTIVE
-    sd = np.concatenate([[STATURE[1]], np.full(count - 1, STRETCH_SD), np.repeat(points.sd, 3) * STATURE[0]])
+    sd = np.concatenate([articulated.STRETCH_SD, np.repeat(points.sd, 3) * STATURE])
     goal = np.zeros(len(sd))
-    goal[0] = np.log(STATURE[0])
+    goal[0] = np.log(STATURE)
     shape = np.concatenate([stretch, np.zeros(3 * len(points.at))])
 
     def places(shape: Floats) -> Floats:

@@ -1,0 +1,138 @@
+"""Tables of numbers over time in .csv: `frame,time,...`, evenly sampled, with what is missing as NaN."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.errors import UserError
+
+Floats = npt.NDArray[np.float64]
+
+DELIMITERS = ",;\t"
+LONGEST = 10.0  # a table may grow to so many times its rows by the frames that are missing in it
+LOST = "lost"  # status of rows of a track in which nobody was followed
+
+
+@dataclass
+class Table:
+    """Columns of numbers.
+
+    Attributes
+    ----------
+    names : list of str
+        As in the header.
+    values : (T, n)
+        NaN where cells are empty or words, in rows left out, and in rows of a track that is lost.
+    fps : float
+        Rows per second.
+    """
+
+    names: list[str]
+    values: Floats
+    fps: float
+
+    def __getitem__(self, name: str) -> Floats:
+        return self.values[:, self.names.index(name)]
+
+
+def header(path: Path) -> list[str]:
+    """Read the column names.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read or is empty.
+    """
+    return [name.strip() for name in _lines(path)[0]]
+
+
+def read(path: Path, fps: float | None = None) -> Table:
+    """Read a table; without column `time` the rate must be given.
+
+    Rows whose times jump by whole frames have the frames between them missing.
+
+    Raises
+    ------
+    UserError
+        Naming file, line and remedy.
+    """
+    lines = _lines(path)
+    names = [name.strip() for name in lines[0]]
+    if "time" not in names and not fps:
+        raise UserError(f"{path}:1: no column 'time'; the header must be frame,time,... (or give --fps)")
+    twice = next((name for name in names if name and names.count(name) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path}:1: column {twice!r} is there twice; remove one")
+    values = np.array([_numbers(row, len(names), path, i) for i, row in enumerate(lines[1:], 2) if any(row)])
+    if len(values) < 3:
+        raise UserError(f"{path}: {len(values)} frames; a recording of a few seconds is needed")
+    if "status" in names:
+        status = [row[names.index("status")].strip() for row in lines[1:] if any(row)]
+        values[[k for k, word in enumerate(status) if word == LOST]] = np.nan
+    if "time" not in names:
+        return Table(names, values, float(fps or 0))
+    times = np.array(
+        [_number(row[names.index("time")], path, i) for i, row in enumerate(lines[1:], 2) if any(row)]
+    )
+    place, rate = _places(path, times)
+    even = np.full((place[-1] + 1, len(names)), np.nan)
+    even[place] = values
+    return Table(names, even, fps or rate)
+
+
+def _places(path: Path, times: Floats) -> tuple[npt.NDArray[np.intp], float]:
+    """Frames that rows belong to, and the rate."""
+    steps = np.diff(times)
+    if not (steps > 0).all():  # also if one is NaN
+        line = int(np.argmin(np.nan_to_num(steps, nan=-1.0) > 0)) + 3
+        raise UserError(f"{path}:{line}: the times do not increase; correct column 'time'")
+    frames = np.maximum(1.0, np.round(steps / np.median(steps)))
+    if frames.sum() > LONGEST * len(times):
+        line = int(np.argmax(frames)) + 3
+        raise UserError(f"{path}:{line}: {steps[line - 3]:.3g} s after the row before; cut the file there")
+    place = np.concatenate([[0], np.cumsum(frames)]).astype(np.intp)
+    return place, float(place[-1] / (times[-1] - times[0]))
+
+
+def _lines(path: Path) -> list[list[str]]:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}; check the name") from error
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    first = text.split("\n", 1)[0]
+    delimiter = max(DELIMITERS, key=first.count)
+    try:
+        lines = list(csv.reader(text.splitlines(), delimiter=delimiter))
+    except csv.Error as error:
+        raise UserError(f"{path}: not a .csv ({error}); export it again") from None
+    if not lines or not any(lines[0]):
+        raise UserError(f"{path}: the file is empty; export it again")
+    if delimiter == ";":  # where numbers have decimal commas
+        lines[1:] = [[cell.replace(",", ".") for cell in row] for row in lines[1:]]
+    return lines
+
+
+def _numbers(row: list[str], width: int, path: Path, line: int) -> Floats:
+    if len(row) < width:
+        raise UserError(f"{path}:{line}: {len(row)} cells where {width} belong; restore the file")
+    return np.array([_number(cell, path, line) for cell in row[:width]])
+
+
+def _number(cell: str, path: Path, line: int) -> float:
+    """Read the number of a cell; NaN if it is empty, a word or infinite."""
+    try:
+        value = float(cell)
+    except ValueError:
+        if any(c.isdigit() for c in cell):
+            raise UserError(f"{path}:{line}: {cell!r} is not a number; restore the file") from None
+        return float("nan")
+    return value if np.isfinite(value) else float("nan")
