@@ -87,8 +87,8 @@ def arms_of(args: argparse.Namespace) -> list[Arm]:
 def clips_of(args: argparse.Namespace) -> list[Clip]:
     """The clips that the command line asks for."""
     if args.simulated:
-        with progress("clips", len(eval_simulated.CASES)) as update:
-            eval_simulated.make(args.simulated, update)
+        with progress("making clips", eval_simulated.count()) as update:
+            eval_simulated.make(args.simulated, args.jobs, update)
     folder = args.folder or args.simulated
     if folder is None:
         return eval_clips.shared_clips(args.clips)

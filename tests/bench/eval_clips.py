@@ -18,7 +18,7 @@ from eval_plan import Clip
 from gait.errors import UserError
 from gait.events import strikes_of
 from gait.initial import DEFAULT_SD
-from gait.trackfile import read_truth
+from gait.trackfile import Joints, read_truth
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
@@ -54,7 +54,8 @@ def _clip(folder: Path) -> Clip:
     def known(name: str) -> Path | None:
         return folder / name if (folder / name).is_file() else None
 
-    subject = meta_of(folder).get("mocap_subject")
+    meta = meta_of(folder)
+    subject = meta.get("mocap_subject")
     return Clip(
         name=folder.name,
         folder=folder,
@@ -64,6 +65,8 @@ def _clip(folder: Path) -> Clip:
         truth=known("truth.csv"),
         init=None if known("truth.csv") else known("init.json"),
         subject=str(subject) if subject and (MOCAP / str(subject)).is_dir() else None,
+        steady=meta.get("steady", True),
+        empty=not meta.get("person", True),
     )
 
 
@@ -137,20 +140,23 @@ def noisy_start(clip: Clip, seed: int, stature_error: float) -> dict[str, Any]:
 
 
 def _noisy_truth(clip: Clip, seed: int) -> dict[str, Any]:
-    truth, meta = read_truth(clip.truth), meta_of(clip.folder)
-    cycles = strikes_of(truth, clip.folder / "meta.json").cycles(truth.frame[:2])
-    if cycles is None:
-        raise UserError(
-            f"{clip.folder}: too few heel strikes for a start; give init.json in place of truth.csv"
-        )
+    truth = read_truth(clip.truth)
     with open(clip.truth, newline="", encoding="utf-8") as file:
         heading = float(next(csv.DictReader(file))["heading_rad"])
-    rate = (cycles[1] - cycles[0]) / (truth.time[1] - truth.time[0])
     noise = np.random.default_rng(seed).standard_normal(7)
-    true = {"phase": cycles[0], "stride_hz": rate, "stature_m": meta["stature_m"], "heading_rad": heading}
-    start = {
-        key: float(value + SPREAD[key] * n) for (key, value), n in zip(true.items(), noise, strict=False)
-    }
-    start["phase"] %= 1.0
+    true = _cadence(clip, truth) | {"stature_m": meta_of(clip.folder)["stature_m"], "heading_rad": heading}
+    drawn = dict(zip(("phase", "stride_hz", "stature_m", "heading_rad"), noise, strict=False))
+    start = {key: float(value + SPREAD[key] * drawn[key]) for key, value in true.items()}
+    if "phase" in start:
+        start["phase"] %= 1.0
     pelvis = truth.places["pelvis"][0] + SPREAD["pelvis"] * noise[4:]
-    return {"frame": int(truth.frame[0]), **start, "pelvis": pelvis.tolist(), "sd": dict(SPREAD)}
+    spread = {key: SPREAD[key] for key in (*start, "pelvis")}
+    return {"frame": int(truth.frame[0]), **start, "pelvis": pelvis.tolist(), "sd": spread}
+
+
+def _cadence(clip: Clip, truth: Joints) -> dict[str, float]:
+    """Phase and stride rate at the first frame; nothing where nobody walks or steps are too few."""
+    cycles = strikes_of(truth, clip.folder / "meta.json").cycles(truth.frame[:2])
+    if cycles is None or not clip.steady:
+        return {}
+    return {"phase": cycles[0], "stride_hz": (cycles[1] - cycles[0]) / (truth.time[1] - truth.time[0])}

@@ -61,11 +61,13 @@ def write(
 
 def faults(row: dict[str, Any]) -> list[str]:
     """What is wrong with a run, worst first; paper mode is a baseline and only its losses count."""
-    found = [row["failure"]] if row["failure"] else []
+    found = [row["failure"]] if row["failure"] and not row["empty"] else []
     if row["lost_run"]:
         found.append("lost")
     if row["arm"].startswith("paper"):
         return found
+    if row["empty"]:
+        return [f"says tracking in {row['track_pct']:.0f} % of the frames"] if row["track_pct"] else []
     if row["side"] == "wrong":
         found.append("left and right exchanged under tracking")
     if row["locked"] is False:

@@ -31,6 +31,10 @@ class Clip:
         Stature that ``auto`` is told, metres.
     subject : str or None
         Left out of learning; None: the shipped model.
+    steady : bool
+        Somebody walks throughout, so that the phase means something.
+    empty : bool
+        Nobody is there.
     """
 
     name: str
@@ -45,6 +49,8 @@ class Clip:
     stop: int | None = None
     height: float | None = None
     subject: str | None = None
+    steady: bool = True
+    empty: bool = False
 
 
 @dataclass(frozen=True)

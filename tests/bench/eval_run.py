@@ -171,7 +171,9 @@ def _judge(job: Job, track: Track, camera: Camera) -> Result:
         result.series |= marks.series(track, camera)
     else:
         result.measures = {"status": eval_measures.shares(track)}
-    if strikes is not None:
+    if not clip.steady:
+        result.measures["phase"] = None
+    elif strikes is not None:
         result.measures["events"] = eval_measures.strike_errors(track, strikes)
         true_phase = strikes.phase(track.frame)
         if true_phase is not None:

@@ -83,7 +83,8 @@ LEGEND = (
     "true place (root); free: mean cycle running free from the true start (root); px: distance in the image, "
     "outdoor: near leg; clear: all clear marks; lost: root > 150 mm or said so; twice: the same, "
     "frames under tracking counted twice; c50 c90: share of joint coordinates inside the intervals; nees: "
-    "error in the particles' covariance, 1 is right; crps: mm; HS: heel strikes within 2 frames; from: first frame tracked; ms: a step."
+    "error in the particles' covariance, 1 is right; crps: mm; HS: heel strikes within 2 frames; from: first "
+    "frame tracked; ms: a step."
 )
 
 
@@ -99,8 +100,10 @@ def figures(result: Result) -> dict[str, Any]:
     row["locked"], row["side"] = start.get("locked"), start.get("side")
     row["lost_run"] = True if result.failure else lost_at_end(result.series)
     row["mediapipe_mm"] = MEDIAPIPE.get(job.clip.name)
-    row["failure"] = result.failure
-    if result.failure:  # who gives up has lost every frame
+    row["failure"], row["empty"] = result.failure, job.clip.empty
+    if job.clip.empty:  # nobody is there: to give up is right
+        row["lost_run"] = False
+    elif result.failure:  # who gives up has lost every frame
         row["lost_pct"] = row["lost2_pct"] = 100.0
     return row
 

@@ -1,0 +1,219 @@
+"""The parts of the evaluation (tests/bench/eval_*.py) that decide what counts as good."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_evaluate import FIRST_PHASE, RATE, STRIKES, TRUTH, track
+
+from gait import Camera, TrackerConfig
+from gait.trackfile import Joints
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
+import eval_ablate
+import eval_clips
+import eval_edits
+import eval_measures
+import eval_plan
+import eval_wanted
+from eval_marks import Marks
+
+PHASE = (FIRST_PHASE + RATE * TRUTH.frame / 30) % 1
+
+
+def row(clip, seed=1, arm=eval_plan.BASE, **values):
+    """Figures of a good run, changed by `values`."""
+    good = {
+        **{"root_mm": 40.0, "abs_mm": 50.0, "px": 3.0, "any_px": 3.0, "lost_pct": 0.0, "lost2_pct": 0.0},
+        **{"phase_pct": 1.0, "flips_pct": 0.0, "cover90": 0.9, "root12_mm": 45.0, "crps_mm": 20.0},
+        **{
+            "lost_run": False,
+            "failure": "",
+            "locked": True,
+            "side": "right",
+            "near_px": 9.0,
+            "clear_px": 12.0,
+        },
+        **{"strikes_pct": 100.0, "stride_pct": 1.0, "strike_worst": 1.0},
+    }
+    return {"clip": clip, "seed": seed, "arm": arm} | good | values
+
+
+def verdict(rows, words):
+    return next(v for v in eval_wanted.verdicts(rows) if words in v.measure)
+
+
+def test_a_swapped_start_is_wrong_only_while_it_says_tracking():
+    swapped = track(phase=(PHASE + 0.5) % 1)
+    silent = eval_measures.start_quality(swapped, PHASE)
+    assert silent["side"] == "wrong" and silent["locked"] and silent["flipped_silently"] == 1
+    honest = eval_measures.start_quality(replace(swapped, status=["ambiguous"] * 100), PHASE)
+    assert honest["side"] == "open"
+    late = np.where(np.arange(100) < 20, (PHASE + 0.5) % 1, PHASE)  # mended within the first second
+    assert eval_measures.start_quality(track(phase=late), PHASE)["side"] == "right"
+    drifting = eval_measures.start_quality(track(phase=(PHASE + 0.1) % 1), PHASE)
+    assert not drifting["locked"] and drifting["side"] == "right"
+
+
+def test_strikes_of_a_track_are_held_against_the_known_ones():
+    good = eval_measures.strike_errors(track(), STRIKES)
+    assert good["asked"] >= 4 and good["within"] == 1 and good["stride"] < 0.02
+    slow = Joints(TRUTH.frame + 5, TRUTH.time, TRUTH.places)
+    off = eval_measures.strike_errors(track(slow), STRIKES)
+    assert off["within"] == 0 and 3 < off["worst"] < 7 and off["stride"] < 0.02
+    still = {name: np.repeat(at[:1], 100, axis=0) for name, at in TRUTH.places.items()}
+    none = eval_measures.strike_errors(track(Joints(TRUTH.frame, TRUTH.time, still)), STRIKES)
+    assert none["within"] == 0 and none["worst"] == float("inf")
+
+
+def test_a_run_is_lost_by_its_end_or_by_its_half():
+    status = np.array(["tracking"] * 100)
+    root = np.full(100, 50.0)
+    assert not eval_measures.lost_at_end({"status": status, "root": root})
+    assert eval_measures.lost_at_end({"status": status, "root": np.where(np.arange(100) > 79, 200, root)})
+    assert not eval_measures.lost_at_end({"status": status, "root": np.where(np.arange(100) > 81, 200, root)})
+    assert eval_measures.lost_at_end({"status": np.where(np.arange(100) < 51, "lost", status), "root": root})
+
+
+def test_marks_count_the_near_leg_and_the_clear_joints(tmp_path):
+    view = Camera.looking((0.0, -9.0, 1.0), (0.0, 0.0, 1.0), (640, 480), 500.0)
+    names = ["neck", "l_hip", "l_knee", "l_ankle", "l_toe", "r_knee", "head_centre"]
+    places = [TRUTH.places[n] for n in names[:-1]]
+    places.append(0.5 * (TRUTH.places["neck"] + TRUTH.places["head_top"]))
+    frames = [10, 40, 95]
+    uv = view.project(np.stack(places, axis=1)[frames])
+    uv[:, 1:4] += [6.0, 0.0]  # the near leg
+    uv[:, 5] += [0.0, 400.0]  # hidden: does not count
+    seen = [[2, 1, 2, 2, 2, 0, 2]] * 3
+    data = {
+        **{"frame_numbers": frames, "joints": names, "uv": uv.tolist(), "vis": seen, "near_side": "left"},
+        "heel_strikes": {"right": STRIKES.right.tolist(), "left": STRIKES.left.tolist()},
+    }
+    (tmp_path / "marks.json").write_text(json.dumps(data))
+    measures = Marks.read(tmp_path / "marks.json").measure(track(), view)
+    assert measures["near_px"] == pytest.approx(6, abs=1e-6)
+    # clear: neck 0, knee 6, ankle 6, toe 0, head 0
+    assert measures["clear_px"] == pytest.approx(0, abs=1e-6) and measures["lost"] == 0
+    assert measures["phase"]["p90"] < 0.02
+    lost = Marks.read(tmp_path / "marks.json").measure(track(move=3.0), view)
+    assert lost["lost"] == 1 and lost["trust"] == {"wrong_tracking": 1.0, "weighted_lost": 2.0}
+
+
+def test_every_wanted_line_passes_on_good_runs_and_fails_on_bad_ones():
+    clips = ("a", "b", "toward300_08", "outdoor")
+    arms = (eval_plan.BASE, eval_wanted.AUTO, "stature +5 %", "background none", "every 2", "every 3")
+    good = [row(clip, seed, arm) for arm in arms for clip in clips for seed in (1, 2, 3)]
+    assert [v.passed for v in eval_wanted.verdicts(good)][:-1] == [True] * 12
+    bad = {
+        "root-aligned": {"root_mm": 66.0},
+        "absolute": {"abs_mm": 151.0},
+        "wrong stature": {"px": 4.0, "arm": "stature +5 %"},
+        "lost frames": {"lost2_pct": 30.0},
+        "phase error": {"flips_pct": 1.0},
+        "phase locked": {"locked": False, "arm": eval_wanted.AUTO},
+        "right leg": {"side": "wrong", "arm": eval_wanted.AUTO},
+        "coverage": {"cover90": 0.1},
+        "no background": {"root_mm": 45.0, "arm": "background none"},
+        "px to near": {"near_px": 11.5},
+        "heel strikes": {"strikes_pct": 80.0},
+        "frames/s": {"root_mm": 45.0, "arm": "every 3"},
+    }
+    for words, values in bad.items():
+        arm = values.get("arm", eval_plan.BASE)
+        rows = [r | values if r["arm"] == arm else r for r in good]
+        assert verdict(rows, words).passed is False, words
+
+
+def test_what_was_not_run_is_neither_passed_nor_failed():
+    told = {v.measure: v.passed for v in eval_wanted.verdicts([row("a")])}
+    assert told["auto: phase locked within 1 s"] is None and told["no background plate"] is None
+    half = verdict([row("a"), row("a", arm="every 2")], "frames/s")
+    assert half.passed is None and "every 2" in half.reached
+
+
+def test_a_run_that_gave_up_is_not_left_out():
+    rows = [row("a", seed, failure="no", root_mm=None, lost_run=True) for seed in (1, 2)] + [row("a", 3)]
+    assert verdict(rows, "root-aligned").passed is False
+    assert "2 of 3" in verdict(rows, "lost frames").reached
+
+
+def test_ablation_is_paired_and_its_interval_knows_noise_from_effect():
+    rng = np.random.default_rng(5)
+    rows = []
+    for clip in "abcdef":
+        hard = rng.uniform(20, 200)  # clips differ far more than the effect
+        for seed in (1, 2, 3):
+            base = hard + rng.normal(0, 2)
+            rows.append(row(clip, seed, root_mm=base))
+            rows.append(row(clip, seed, "no edges", root_mm=base + 8 + rng.normal(0, 2)))
+            rows.append(row(clip, seed, "no tilt", root_mm=base + rng.normal(0, 2)))
+    costs = {line["arm"]: line["root_mm"] for line in eval_ablate.costs(rows)}
+    mean, low, high = costs["no edges"]
+    assert 6 < low < mean < high < 10 and low < 8 < high
+    assert costs["no tilt"][1] < 0 < costs["no tilt"][2]
+
+
+def test_switches_turn_off_what_is_on():
+    config = TrackerConfig.default()
+    found = eval_ablate.switches(config)
+    assert {"silhouette", "edges"} <= set(found)
+    for name, changes in found.items():
+        assert any(getattr(config, key) != value for key, value in changes.items()), name
+        replace(config, **changes)  # each names settings that exist
+    off = replace(config, **found["edges"])
+    assert "edges" not in eval_ablate.switches(off)
+
+
+def test_arms_vary_one_thing_each():
+    arms = eval_plan.varied_arms(
+        seeds=2, stature_error=0.05, backgrounds=["none", "plate"], every=[1, 3], particles=[300]
+    )
+    assert [a.name for a in arms] == ["stature +5 %", "stature -5 %", "background none", "every 3", "N 300"]
+    assert {a.seeds for a in arms} == {2} and arms[-1].changes == (("particles", 300),)
+    assert [a.seeds for a in eval_plan.main_arms(["paper"], ["truth", "auto"], None)] == [3, 4]
+
+
+def test_noise_on_a_start_is_the_seeds_and_a_wrong_stature_is_believed(tmp_path):
+    with open(tmp_path / "truth.csv", "w") as file:
+        names = list(TRUTH.places)
+        file.write("frame,time,heading_rad," + ",".join(f"{n}_{a}" for n in names for a in "xyz") + "\n")
+        for i, frame in enumerate(TRUTH.frame):
+            numbers = np.concatenate([TRUTH.places[n][i] for n in names])
+            file.write(f"{frame},{TRUTH.time[i]},0.7," + ",".join(f"{v:.6f}" for v in numbers) + "\n")
+    events = {"r_heel_strike": STRIKES.right.tolist(), "l_heel_strike": STRIKES.left.tolist()}
+    (tmp_path / "meta.json").write_text(json.dumps({"stature_m": 1.7, "events_video_frames": events}))
+    clip = eval_plan.Clip("c", tmp_path, tmp_path / "v", tmp_path / "c", truth=tmp_path / "truth.csv")
+    starts = [eval_clips.noisy_start(clip, seed, 0.0) for seed in range(200)]
+    phase = np.array([s["phase"] for s in starts])
+    assert phase.mean() == pytest.approx(FIRST_PHASE, abs=0.01)
+    assert phase.std() == pytest.approx(eval_clips.SPREAD["phase"], rel=0.15)
+    assert starts[3] == eval_clips.noisy_start(clip, 3, 0.0)
+    wrong = eval_clips.noisy_start(clip, 3, -0.05)
+    assert wrong["stature_m"] == pytest.approx(0.95 * starts[3]["stature_m"])
+    assert wrong["sd"]["stature_m"] < 0.05 * 1.7 < 0.1  # nobody told the tracker
+    still = eval_clips.noisy_start(replace(clip, steady=False), 3, 0.0)
+    assert "phase" not in still and "stride_hz" not in still and "phase" not in still["sd"]
+
+
+def test_an_edited_clip_has_the_truth_of_its_frames(tmp_path):
+    from gait.simulate import Scenario, simulate
+
+    source, target = tmp_path / "walk", tmp_path / "back"
+    simulate(Scenario(frames=12, size=(160, 120), seed=3), source)
+    target.mkdir()
+    assert eval_edits.backwards([source], target)["steady"] is False
+    was, now = (eval_edits.read_truth(p / "truth.csv") for p in (source, target))
+    np.testing.assert_allclose(now.places["pelvis"], was.places["pelvis"][::-1])
+    np.testing.assert_allclose(now.time, was.time, atol=1e-5)
+    first, last = eval_edits._frames(target)[0], eval_edits._frames(source)[-1]
+    assert np.abs(first.astype(int) - last).mean() < 6
+    cut = tmp_path / "cut"
+    cut.mkdir()
+    eval_edits.leaves([source], cut)
+    views = [Camera.read(str(p / "camera.json")) for p in (source, cut)]
+    shift = views[0].project(was.places["neck"]) - views[1].project(was.places["neck"])
+    np.testing.assert_allclose(shift, [[40, 0]] * 12, atol=1e-9)
+    assert eval_edits._frames(cut)[0].shape == (120, 80, 3)
