@@ -22,6 +22,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import eval_ablate
@@ -49,7 +50,7 @@ def arguments() -> argparse.Namespace:
     add = parser.add_argument
     add("--modes", nargs="+", choices=("default", "paper"), default=["default", "paper"], help="(both)")
     add("--init", nargs="+", choices=("truth", "auto"), default=["truth", "auto"], help="(both)")
-    add("--seeds", type=int, metavar="N", help="runs of a clip in each arm (3; from auto 4)")
+    add("--seeds", type=int, metavar="N", help="runs of a clip in each arm (3; default mode from auto 4)")
     add("--clips", nargs="+", metavar="NAME", help="names of clips (all, and outdoor)")
     add("--folder", type=Path, metavar="DIR", help="evaluate the clips in DIR instead")
     add("--simulated", type=Path, metavar="DIR", help="make the hard cases in DIR if need be, evaluate them")
@@ -138,13 +139,15 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
             writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
 
 
-def tables(rows: list[dict[str, Any]], shape: Callable[[list[list[str]]], str]) -> list[tuple[str, str]]:
+def tables(rows: list[dict[str, Any]], shape: Callable[[list[list[str]], int], str]) -> list[tuple[str, str]]:
     """Headings and tables in the shape of `shape`."""
-    parts = [("Clips", shape(eval_table.grid(eval_table.summaries(rows))))]
+    parts = [("Clips", shape(eval_table.grid(eval_table.summaries(rows)), 2))]
     costs = eval_ablate.costs(rows)
     if costs:
-        parts.append(("Switched off: change of each measure, 95 % interval", shape(eval_ablate.grid(costs))))
-    parts.append(("Wanted and reached", shape(eval_wanted.grid(eval_wanted.verdicts(rows)))))
+        parts.append(
+            ("Switched off: change of each measure, 95 % interval", shape(eval_ablate.grid(costs), 2))
+        )
+    parts.append(("Wanted and reached", shape(eval_wanted.grid(eval_wanted.verdicts(rows)), 4)))
     return parts
 
 
@@ -155,7 +158,7 @@ def record(rows: list[dict[str, Any]], words: str) -> None:
     text = [f"# Evaluation of the tracker\n\nMade by `{words}`; a row for each run is in eval.csv.\n"]
     text += [f"## {heading}\n\n{table}\n" for heading, table in reversed(tables(rows, eval_table.markdown))]
     with replacing(RESULTS / "eval.md") as path:
-        path.write_text("\n".join([*text, eval_table.LEGEND, ""]), encoding="utf-8")
+        path.write_text("\n".join([*text, fill(eval_table.LEGEND, 110), ""]), encoding="utf-8")
 
 
 def evaluate(args: argparse.Namespace) -> list[dict[str, Any]]:
@@ -197,7 +200,7 @@ def main() -> int:
     else:
         for heading, table in tables(rows, eval_table.plain):
             print(f"\n{heading}\n{table}")
-        print(f"\n{eval_table.LEGEND}")
+        print("\n" + fill(eval_table.LEGEND, 110))
     if args.record:
         record(rows, f"make eval ARGS='{' '.join(sys.argv[1:])}'")
     if not args.no_pictures:

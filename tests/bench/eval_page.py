@@ -113,7 +113,7 @@ def _film(result: Result) -> str:
 
 
 def _table(lines: list[list[str]], kind: str = "", classes: list[str] | None = None) -> str:
-    kept = [k for k in range(len(lines[0])) if any(line[k] for line in lines[1:])]
+    kept = eval_table.filled(lines)
     head = "".join(f"<th>{escape(lines[0][k])}</th>" for k in kept)
     body = ""
     for i, line in enumerate(lines[1:]):

@@ -108,10 +108,10 @@ BASE = "default/truth"
 
 
 def main_arms(modes: Sequence[str], inits: Sequence[str], seeds: int | None) -> list[Arm]:
-    """Each mode from each kind of start: 3 seeds from the truth, 4 from ``auto``."""
-    usual = {"truth": 3, "auto": 4}
+    """Each mode from each kind of start: 3 seeds, 4 for the default mode from ``auto``."""
+    usual = {("default", "auto"): 4}
     return [
-        Arm(f"{mode}/{init}", init=init, mode=mode, seeds=seeds or usual[init])
+        Arm(f"{mode}/{init}", init=init, mode=mode, seeds=seeds or usual.get((mode, init), 3))
         for mode in modes
         for init in inits
     ]

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import table
 from eval_measures import lost_at_end
 from eval_run import Result
 
@@ -158,23 +159,22 @@ def grid(rows: list[dict[str, Any]]) -> list[list[str]]:
     return [head, *lines]
 
 
-def plain(lines: list[list[str]]) -> str:
-    """Columns aligned for a terminal; those that are empty throughout are left out."""
-    kept = [k for k in range(len(lines[0])) if any(line[k] for line in lines[1:])]
-    widths = [max(len(line[k]) for line in lines) for k in kept]
-    left = 2  # columns of words
-    return "\n".join(
-        "  ".join(
-            line[k].ljust(w) if i < left else line[k].rjust(w)
-            for i, (k, w) in enumerate(zip(kept, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    )
+def plain(lines: list[list[str]], words: int = 2) -> str:
+    """Lay the table out for a terminal; the first `words` columns are text, empty ones are left out."""
+    return table.aligned(*_filled(lines, words))
 
 
-def markdown(lines: list[list[str]]) -> str:
-    """The same as a table of Markdown."""
-    kept = [k for k in range(len(lines[0])) if any(line[k] for line in lines[1:])]
-    rule = "| " + " | ".join("---" for _ in kept) + " |"
-    body = ["| " + " | ".join(line[k].replace("|", "/") for k in kept) + " |" for line in lines]
-    return "\n".join([body[0], rule, *body[1:]])
+def markdown(lines: list[list[str]], words: int = 2) -> str:
+    """Return the same in Markdown."""
+    return table.markdown(*_filled(lines, words))
+
+
+def filled(lines: list[list[str]]) -> list[int]:
+    """Columns that are not empty throughout."""
+    return [k for k in range(len(lines[0])) if any(line[k] for line in lines[1:])]
+
+
+def _filled(lines: list[list[str]], words: int) -> tuple[list[str], list[list[str]], list[bool]]:
+    kept = filled(lines)
+    head, *cells = ([line[k] for k in kept] for line in lines)
+    return head, cells, [k >= words for k in kept]

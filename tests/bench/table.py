@@ -32,8 +32,8 @@ def publish(
         if len(row) != len(head):
             raise ValueError(f"{name}: {len(row)} cells {row} under {len(head)} columns")
     numbers = [all(_is_number(row[k]) for row in cells) for k in range(len(head))]
-    print(f"\n{title}\n\n{_aligned(head, cells, numbers)}\n", flush=True)
-    parts = [f"## {title}", note.strip(), _markdown(head, cells, numbers)]
+    print(f"\n{title}\n\n{aligned(head, cells, numbers)}\n", flush=True)
+    parts = [f"## {title}", note.strip(), markdown(head, cells, numbers)]
     RESULTS.mkdir(parents=True, exist_ok=True)
     _write(RESULTS / f"{name}.csv", _csv(head, cells))
     _write(RESULTS / f"{name}.md", "\n\n".join(filter(None, parts)) + "\n")
@@ -55,8 +55,8 @@ def _is_number(text: str) -> bool:
     return text == "-" or text[:1].isdigit() or text[:2].strip("-+<>")[:1].isdigit()
 
 
-def _aligned(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
-    """Columns padded with blanks, numbers to the right."""
+def aligned(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
+    """Columns padded with blanks, those of `numbers` to the right."""
     width = [max(map(len, column)) for column in zip(head, *cells, strict=True)]
     rule = ["-" * w for w in width]
     return "\n".join(
@@ -69,7 +69,8 @@ def _padded(text: str, width: int, right: bool) -> str:
     return text.rjust(width) if right else text.ljust(width)
 
 
-def _markdown(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
+def markdown(head: list[str], cells: list[list[str]], numbers: list[bool]) -> str:
+    """Return a table of Markdown, those of `numbers` to the right."""
     lines = [head, ["--:" if right else "---" for right in numbers], *cells]
     return "\n".join("| " + " | ".join(c.replace("|", "\\|") for c in line) + " |" for line in lines)
 

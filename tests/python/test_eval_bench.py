@@ -173,7 +173,7 @@ def test_arms_vary_one_thing_each():
     )
     assert [a.name for a in arms] == ["stature +5 %", "stature -5 %", "background none", "every 3", "N 300"]
     assert {a.seeds for a in arms} == {2} and arms[-1].changes == (("particles", 300),)
-    assert [a.seeds for a in eval_plan.main_arms(["paper"], ["truth", "auto"], None)] == [3, 4]
+    assert [a.seeds for a in eval_plan.main_arms(["default", "paper"], ["auto"], None)] == [4, 3]
 
 
 def test_noise_on_a_start_is_the_seeds_and_a_wrong_stature_is_believed(tmp_path):
