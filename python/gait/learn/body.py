@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,19 +15,30 @@ from gait.skeleton import SIDES
 
 Floats = npt.NDArray[np.float64]
 
-#: Role to the names it has in files; {S} = Left/Right, {s} = l/r.  Compared without case, blanks, '_', '-'
-#: and any prefix up to ':' (Mixamo).  CMU's ASF; cgspeed and Mixamo; Poser.
+#: Role to the names it has in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and any
+#: prefix up to ':' (Mixamo) or of a biped (3ds Max).  CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; bones
+#: named by the joint where they begin (Biovision, Xsens, SMPL).
 ALIASES = {
     "pelvis": ("root", "hips", "hip", "pelvis"),
     "neck": ("upperneck", "neck1", "neck", "lowerneck"),
     "head": ("head",),
-    "{s}_thigh": ("{s}femur", "{S}upleg", "{S}thigh", "{s}thigh"),
-    "{s}_shank": ("{s}tibia", "{S}leg", "{S}shin", "{s}shin", "{S}calf"),
-    "{s}_foot": ("{s}foot", "{S}foot"),
-    "{s}_upper_arm": ("{s}humerus", "{S}arm", "{S}shldr", "{s}shldr", "{S}upperarm"),
-    "{s}_forearm": ("{s}radius", "{S}forearm", "{s}forearm", "{S}lowerarm"),
-    "{s}_hand": ("{s}hand", "{S}hand"),
+    "{s}_thigh": ("{s}femur", "{S}upleg", "{S}upperleg", "{S}thigh", "{s}thigh", "{S}hip", "{s}hip"),
+    "{s}_shank": (
+        *("{s}tibia", "{S}leg", "{S}lowerleg", "{S}shin", "{s}shin", "{S}calf", "{s}calf"),
+        *("{S}knee", "{s}knee"),
+    ),
+    "{s}_foot": ("{S}ankle", "{s}ankle", "{s}foot", "{S}foot"),
+    "{s}_upper_arm": (
+        *("{s}humerus", "{S}arm", "{S}shldr", "{s}shldr", "{S}upperarm", "{s}upperarm"),
+        *("{S}shoulder", "{s}shoulder"),
+    ),
+    "{s}_forearm": (
+        *("{s}radius", "{S}forearm", "{s}forearm", "{S}lowerarm", "{s}lowerarm"),
+        *("{S}elbow", "{s}elbow"),
+    ),
+    "{s}_hand": ("{s}hand", "{S}hand", "{S}wrist"),
 }
+BIPED = re.compile(r"^bip0*\d*")
 
 
 @dataclass
@@ -83,7 +95,7 @@ def body(recording: Recording) -> Body:
 
 
 def _plain(name: str) -> str:
-    return name.split(":")[-1].lower().replace("_", "").replace("-", "").replace(" ", "")
+    return BIPED.sub("", "".join(c for c in name.rsplit(":", 1)[-1].lower() if c.isalnum()))
 
 
 def _roles(recording: Recording) -> dict[str, int]:

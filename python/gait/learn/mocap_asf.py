@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -16,7 +17,7 @@ from gait.learn.rotations import from_angles
 Floats = npt.NDArray[np.float64]
 
 INCH = 0.0254
-FPS = 120.0  # of the CMU database; the file does not say
+FPS = 120.0  # of the CMU database, whose files do not say
 AXES = "xyz"
 
 
@@ -49,7 +50,7 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
     path : Path
         The .amc; the .asf of its folder is used, the one of the same stem before '_' if there are several.
     fps : float, optional
-        Frames per second, 120 by default.
+        Frames per second; by default what the file says, else 120.
     zero_runs : bool
         Take runs of three or more exact zeros of a bone for missing data.
 
@@ -62,7 +63,9 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
     values = read_motion(path, skeleton)
     if zero_runs:
         values = {name: mask_zero_runs(columns) for name, columns in values.items()}
-    return assemble(path, skeleton, values, fps or FPS)
+    degrees, stated = _declared(path)
+    skeleton.degrees = skeleton.degrees if degrees is None else degrees
+    return assemble(path, skeleton, values, fps or stated or FPS)
 
 
 def find_skeleton(path: Path) -> Path:
@@ -78,14 +81,14 @@ def find_skeleton(path: Path) -> Path:
     )
 
 
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
+def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Numbered lines split into words, comments and empty lines left out."""
     try:
         text = path.read_text(encoding="latin-1")
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}; check the name") from error
     numbered = ((i, line.split("#")[0].split()) for i, line in enumerate(text.splitlines(), 1))
-    return [(i, words) for i, words in numbered if words]
+    return ((i, words) for i, words in numbered if words)
 
 
 def _numbers(words: list[str], path: Path, line: int, count: int | None = None) -> Floats:
@@ -115,11 +118,35 @@ def read_skeleton(path: Path) -> Skeleton:
         if name not in sections:
             raise UserError(f"{path}: no section {name}; this is not a whole .asf file, fetch it again")
     units = {words[0].lower(): (line, words[1:]) for line, words in sections[":units"]}
-    degrees = units.get("angle", (0, ["deg"]))[1][0].lower().startswith("deg")
+    degrees = _degrees(path, *units.get("angle", (0, ["deg"])))
     length = units.get("length", (0, ["1"]))
     scale = float(_numbers(length[1][:1], path, length[0], 1)[0])
     bones = [_root(sections[":root"], path, degrees)] + _bones(sections[":bonedata"], path, degrees)
     return Skeleton(_linked(bones, sections[":hierarchy"], path), INCH / scale, degrees)
+
+
+def _degrees(path: Path, line: int, words: list[str]) -> bool:
+    """Whether the unit of angles is degrees and not radians."""
+    unit = words[0].lower() if words else ""
+    if not unit.startswith(("deg", "rad")):
+        raise UserError(f"{path}:{line}: angles in {unit!r}; write 'angle deg' or 'angle rad'")
+    return unit.startswith("deg")
+
+
+def _declared(path: Path) -> tuple[bool | None, float | None]:
+    """Read what a motion's header says: degrees or radians, and frames per second; None where it does not."""
+    degrees, rate = None, None
+    for line, words in _lines(path):
+        if not words[0].startswith(":"):
+            break
+        key = words[0][1:].lower()
+        if key in ("degrees", "radians"):
+            degrees = key == "degrees"
+        elif key == "samples-per-second":
+            rate = float(_numbers(words[1:2], path, line, 1)[0])
+            if rate <= 0:
+                raise UserError(f"{path}:{line}: {rate:g} frames per second; correct it")
+    return degrees, rate
 
 
 def _turn(words: list[str], path: Path, line: int, degrees: bool) -> Floats:

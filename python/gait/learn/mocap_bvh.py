@@ -50,8 +50,19 @@ class _Words:
             raise UserError(f"{self.path}:{self.line}: {word!r} where {expected} belongs; restore the file")
         return word
 
-    def number(self) -> float:
-        word = self.next()
+    def after(self, label: str) -> float:
+        """Read the number behind a label and ':', with or without blanks between."""
+        text = self.next().upper()
+        while not text.startswith(f"{label}:"):
+            if not f"{label}:".startswith(text):
+                raise UserError(
+                    f"{self.path}:{self.line}: {text!r} where {label.title()!r} belongs; restore the file"
+                )
+            text += self.next().upper()
+        return self.number(text.removeprefix(f"{label}:"))
+
+    def number(self, word: str = "") -> float:
+        word = word or self.next()
         try:
             value = float(word)
         except ValueError:
@@ -134,11 +145,7 @@ def _channels(words: _Words) -> list[str]:
 def _motion(words: _Words, lines: list[str], width: int) -> tuple[Floats, float]:
     """Rows of channel values (T, width) and frames per second."""
     words.next("MOTION")
-    words.next("FRAMES:")
-    count = int(words.number())
-    words.next("FRAME")
-    words.next("TIME:")
-    interval = words.number()
+    count, interval = int(words.after("FRAMES")), words.after("FRAMETIME")
     if interval <= 0 or count < 2:
         raise UserError(f"{words.path}:{words.line}: {count} frames of {interval} s; restore the file")
     rows = [(i, line.split()) for i, line in enumerate(lines[words.line :], words.line + 1) if line.strip()]

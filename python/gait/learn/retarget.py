@@ -186,7 +186,7 @@ def own_proportions(m: Measures) -> Proportions:
 def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
     """Mean proportions of bodies, each divided by its stature; left and right made symmetric.
 
-    Every part is the mean over those bodies that have it, and generic if none does; None is a body without any.
+    Every part is the mean over those bodies that have it, generic if none does; None is a body without any.
     """
     generic, measured = Proportions(), [m for m in bodies if m is not None]
 
