@@ -201,6 +201,8 @@ def main() -> int:
         for heading, table in tables(rows, eval_table.plain):
             print(f"\n{heading}\n{table}")
         print("\n" + fill(eval_table.LEGEND, 110))
+        for words in eval_table.failures(rows):
+            print(f"gave up: {words}")
     if args.record:
         record(rows, f"make eval ARGS='{' '.join(sys.argv[1:])}'")
     if not args.no_pictures:

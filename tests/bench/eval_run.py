@@ -18,6 +18,7 @@ from eval_plan import Clip, Job
 
 from gait import Camera, Model, Start, Tracker, TrackerConfig, UserError, Video, blob
 from gait._abi import Mode
+from gait._lib import library
 from gait.autostart import find_start
 from gait.errors import GaitError
 from gait.evaluate import evaluate
@@ -77,6 +78,7 @@ class _Kept:
 def run(job: Job) -> Result:
     """Track and judge; an error of the user's kind is a result, not the end of the evaluation."""
     cv2.setNumThreads(1)  # jobs run side by side
+    library()  # a library that does not load is nobody's result
     try:
         return _run(job)
     except (UserError, GaitError) as exc:

@@ -133,6 +133,15 @@ def summaries(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
+def failures(rows: list[dict[str, Any]]) -> list[str]:
+    """Runs that gave up, with their one line; equal lines together."""
+    lines: dict[str, list[str]] = {}
+    for row in rows:
+        if row["failure"]:
+            lines.setdefault(row["failure"], []).append(f"{row['clip']} {row['arm']} seed {row['seed']}")
+    return [f"{', '.join(runs)}: {words}" for words, runs in lines.items()]
+
+
 def cells(summary: dict[str, Any]) -> list[str]:
     """Texts of one line of the table, without clip and arm."""
     out = []
