@@ -34,7 +34,7 @@ PHASES = 16  # offsets tried first, over a stride
 
 def true_joints(s: Sequence) -> Floats:
     """Joints (T, 14, 3) from the pelvis, metres, along the world's axes."""
-    j = dict(level_body(s.source).joints)
+    j = dict(level_body(s.source, kept=s.kept).joints)
     way = j["head"] - j["neck"]
     way /= np.linalg.norm(way, axis=1)[:, None]
     j["head_top"] = j["neck"] + way * retarget.HEAD * s.measures.stature
@@ -55,7 +55,7 @@ def error(s: Sequence, sections: dict[str, Any], channels: Floats, upright: bool
         turn = np.broadcast_to(np.eye(3), (len(channels), 3, 3))
     else:
         channels[:, [CHANNELS.index(f"root_{n}") for n in ("roll", "pitch", "yaw")]] = 0
-        turn = level_body(s.source).pelvis
+        turn = level_body(s.source, kept=s.kept).pelvis
     found = np.einsum("tij,tpj->tpi", turn, model_joints(sections, channels, s.measures.stature))
     return 1000 * np.asarray(np.linalg.norm(found - true_joints(s), axis=2)).mean(axis=0)
 

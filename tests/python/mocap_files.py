@@ -64,8 +64,8 @@ def toy_amc(frames=300, period=120.0, offset=10.0, speed=1.3, swing=1.0, seed=0)
     lines = [":FULLY-SPECIFIED", ":DEGREES"]
     for t in range(frames):
         neck, right, left = curve[t, :3], curve[t, 3:11], curve[t, 11:]
-        forward, bob = speed * t / 120.0 / unit, 0.02 * np.cos(4 * np.pi * phase[t]) / unit
-        values = {"root": [0.0, 17.4 + bob, forward, 0.0, 0.0, 0.0], "lowerback": [3.0, 0.5, 0.5]}
+        forward, height = speed * t / 120.0 / unit, 3.2 + max(_reach(right), _reach(left))
+        values = {"root": [0.0, height, forward, 0.0, 0.0, 0.0], "lowerback": [3.0, 0.5, 0.5]}
         values["lowerneck"] = values["head"] = list(neck / 2)
         for side, sign, a in (("l", 1, left), ("r", -1, right)):
             values[f"{side}femur"] = [-a[4], 2.0 * sign, -20.0 * sign + a[5] / 2]
@@ -77,6 +77,12 @@ def toy_amc(frames=300, period=120.0, offset=10.0, speed=1.3, swing=1.0, seed=0)
         lines.append(str(t + 1))
         lines += [f"{name} {' '.join(f'{v:.5f}' for v in row)}" for name, row in values.items()]
     return "\n".join(lines) + "\n"
+
+
+def _reach(angles):
+    """Hip over the ankle of a leg: the lower one stands on the ground."""
+    hip, knee = np.radians(angles[4]), np.radians(angles[7] + 5.0)
+    return 7.4 * np.cos(hip) + 7.8 * np.cos(knee - hip)
 
 
 def write_toy(folder, name="77_01", **motion):

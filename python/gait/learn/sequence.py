@@ -1,53 +1,62 @@
-"""One learning sequence: a recording read, levelled, retargeted and timed."""
+"""One learning sequence: a recording read, its steady part levelled, retargeted, timed and judged."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import period, readers, retarget, root
+from gait.learn import activity, period, readers, retarget, root, trim, verdict
+from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body
 from gait.learn.reading import DEFAULT, Reading
-from gait.skeleton import SIDES
+from gait.learn.rotations import unwrap
+from gait.skeleton import ANGLES, ROOTS, SIDES
 
 Floats = npt.NDArray[np.float64]
-
-#: Fewer than the three that a clean fold would want: the walks of CMU hold 1.7 to 3.5 strides, and their
-#: periods still agree with autocorrelation (tests/python/test_learn_period.py)
-LEAST_CYCLES = 1.5
 
 
 @dataclass
 class Sequence:
-    """A recording as the learner uses it.
+    """The steady part of a recording as the learner uses it, T frames.
 
     Attributes
     ----------
     name, subject : str
     source : Path
     fps : float
-    measures : retarget.Measures
+    measures : retarget.Measures or None
+        None where the file has angles alone.
     channels : (T, 30)
-        Angles and root channels, radians and statures.
+        Angles and root channels, radians and statures; NaN where missing.
     heading : (T,)
+        Radians; NaN where the file does not have it.
     period : period.Period
     strides : (n,)
-        Durations of the single strides between forward extremes of either ankle, seconds.
+        Durations of the single strides, seconds: between forward extremes of either ankle, or of either hip's
+        flexion where the file has angles alone.
+    kept : (start, stop)
+        The frames of the file that these are.
+    cut : (before, after)
+        Why frames before and after them were left out, in words; '' if none were.
+    verdict : verdict.Verdict
     """
 
     name: str
     subject: str
     source: Path
     fps: float
-    measures: retarget.Measures
+    measures: retarget.Measures | None
     channels: Floats
     heading: Floats
     period: period.Period
     strides: Floats
+    kept: tuple[int, int]
+    cut: tuple[str, str]
+    verdict: verdict.Verdict
 
     @property
     def cycles(self) -> float:
@@ -55,14 +64,39 @@ class Sequence:
         return len(self.channels) / self.period.frames
 
 
+@dataclass
+class _Motion:
+    """What is known of some frames before the period is used: see `Sequence`."""
+
+    angles: Floats
+    track: trim.Track
+    body: Body | None = None
+    measures: retarget.Measures | None = None
+    root: Floats | None = None
+
+
 def subject_of(path: Path) -> str:
     """Name the subject: the part of the file's stem before '_', else the folder."""
     return path.stem.split("_")[0] if "_" in path.stem else path.parent.name
 
 
-def level_body(path: Path, reading: Reading = DEFAULT) -> Body:
-    """Read a recording's joints, on a level floor, with the pelvis axes in their standard place."""
-    return root.align_pelvis(root.level(readers.read(path, reading))[0])
+def level_body(path: Path, reading: Reading = DEFAULT, kept: tuple[int, int] | None = None) -> Body:
+    """Read a recording's joints, on a level floor, with the pelvis axes in their standard place.
+
+    Parameters
+    ----------
+    kept : (start, stop), optional
+        Frames to use, all by default; the floor and the pelvis are those of these frames.
+
+    Raises
+    ------
+    UserError
+        If the file is malformed or holds angles alone.
+    """
+    read = readers.read(path, reading)
+    if isinstance(read, AngleTable):
+        raise UserError(f"{path}: angles without joints; name a file of joints")
+    return _levelled(read if kept is None else _part_of_body(read, *kept))
 
 
 def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
@@ -71,41 +105,108 @@ def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
     Raises
     ------
     UserError
-        If the file is malformed, or the motion is not cyclic or too short.
+        If the file is malformed, or the motion is not cyclic, too short or of another activity.
     """
-    walker = level_body(path, reading)
-    measures = retarget.measure(walker)
-    angles = retarget.angles(walker, measures)
-    found = period.find(angles, walker.fps, reading.mode)
-    if not found.cyclic:
-        raise UserError(
-            f"{path}: no cycle found (sharpness {found.sharpness:.1f}); leave it out of the sources"
-        )
-    if len(angles) < LEAST_CYCLES * found.frames:
-        raise UserError(
-            f"{path}: {len(angles) / found.frames:.1f} cycles, at least {LEAST_CYCLES} are needed"
-        )
-    channels, heading = root.channels(walker, measures, found.frames)
+    read = readers.read(path, reading)
+    motion = _motion(read)
+    kept, found = trim.Kept(0, read.frames), None
+    if reading.trim:
+        kept, found = trim.stretch(motion.angles, read.fps, reading.mode, motion.track)
+        if not kept.stop - kept.start >= period.CYCLES * found.frames:
+            raise _refused(path, reading.activity, _unsteady(kept, found, read.fps))
+    if found is None or kept.stop - kept.start < read.frames:
+        motion = _motion(_part(read, kept.start, kept.stop))
+        found = period.find(motion.angles, read.fps, reading.mode)
+    judged, channels, heading = _judge(motion, found, reading.activity)
+    if not judged.accepted:
+        raise _refused(path, reading.activity, judged.reason)
     return Sequence(
         name=path.stem if "_" in path.stem else f"{path.parent.name}/{path.stem}",
         subject=subject_of(path),
         source=path,
-        fps=walker.fps,
-        measures=measures,
-        channels=np.concatenate([angles, channels], axis=1),
+        fps=read.fps,
+        measures=motion.measures,
+        channels=channels,
         heading=heading,
         period=found,
-        strides=_strides(walker, heading, found.frames),
+        strides=_strides(motion, heading, found.frames) / read.fps,
+        kept=(kept.start, kept.stop),
+        cut=(kept.before, kept.after),
+        verdict=judged,
     )
 
 
-def _strides(walker: Body, heading: Floats, frames: float) -> Floats:
-    """Time successive forward extremes of each ankle about the pelvis, seconds."""
-    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+def _refused(path: Path, wanted: str, reason: str) -> UserError:
+    """Error of a recording that cannot be learnt as the activity."""
+    return UserError(f"{path}: not learnt as {wanted!r}: {reason}; leave it out")
+
+
+def _unsteady(kept: trim.Kept, found: period.Period, fps: float) -> str:
+    """Say why the stretch that was found is no use."""
+    if not np.isfinite(found.frames):
+        return "it holds no cycle"
+    held = kept.stop - kept.start
+    return (
+        f"no steady motion: at most {held / fps:.1f} s at a time, {held / found.frames:.1f} cycles "
+        f"(at least {period.CYCLES})"
+    )
+
+
+def _part(read: Body | AngleTable, start: int, stop: int) -> Body | AngleTable:
+    """Frames start to stop of what was read."""
+    if isinstance(read, AngleTable):
+        motion = None if read.root is None else read.root[start:stop]
+        return replace(read, angles=read.angles[start:stop], root=motion)
+    return _part_of_body(read, start, stop)
+
+
+def _part_of_body(read: Body, start: int, stop: int) -> Body:
+    joints = {name: places[start:stop] for name, places in read.joints.items()}
+    lateral = {name: axes[start:stop] for name, axes in read.lateral.items()}
+    return replace(read, joints=joints, pelvis=read.pelvis[start:stop], lateral=lateral)
+
+
+def _levelled(body: Body) -> Body:
+    return root.align_pelvis(root.level(body)[0])
+
+
+def _motion(read: Body | AngleTable) -> _Motion:
+    """Angles and what else is known of what was read."""
+    if isinstance(read, AngleTable):
+        return _Motion(read.angles, trim.Track(), root=read.root)
+    body = _levelled(read)
+    measures = retarget.measure(body)
+    yaw = np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0])
+    track = trim.Track(body.joints["pelvis"][:, :2], unwrap(yaw[:, None])[:, 0])
+    return _Motion(retarget.angles(body, measures), track, body, measures)
+
+
+def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.Verdict, Floats, Floats]:
+    """Verdict, channels (T, 30) and heading (T,); the last two are of use only if it is accepted."""
+    frames, feet = len(motion.angles), None
+    moving, heading = np.full((frames, len(ROOTS)), np.nan), np.full(frames, np.nan)
+    if motion.body is not None and motion.measures is not None and np.isfinite(found.frames):
+        feet = activity.of_body(motion.body, motion.measures.stature)
+        moving, heading = root.channels(motion.body, motion.measures, found.frames)
+    elif motion.root is not None:
+        moving = motion.root
+        feet = activity.of_channels(np.concatenate([motion.angles, moving], axis=1))
+    footing = activity.footing(feet, found.frames) if feet is not None else None
+    judged = verdict.judge(motion.angles, found, footing, wanted)
+    return judged, np.concatenate([motion.angles, moving], axis=1), heading
+
+
+def _strides(motion: _Motion, heading: Floats, frames: float) -> Floats:
+    """Time successive forward extremes of each leg, frames."""
     durations = [np.zeros(0)]
     for s in SIDES:
-        forward = np.sum((walker.joints[f"{s}_ankle"] - walker.joints["pelvis"])[:, :2] * along, axis=1)
-        durations.append(np.diff(_peaks(forward, frames)) / walker.fps)
+        if motion.body is None:
+            forward = motion.angles[:, ANGLES.index(f"{s}_hip_flexion")]
+        else:
+            along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+            joints = motion.body.joints
+            forward = np.sum((joints[f"{s}_ankle"] - joints["pelvis"])[:, :2] * along, axis=1)
+        durations.append(np.diff(_peaks(forward, frames)))
     return np.concatenate(durations)
 
 
