@@ -33,6 +33,7 @@ import eval_table
 import eval_wanted
 from eval_plan import Arm, Clip, Job, main_arms, varied_arms
 from eval_run import Result, run
+from facts import facts
 
 from gait import TrackerConfig, UserError
 from gait.files import replacing
@@ -155,7 +156,7 @@ def record(rows: list[dict[str, Any]], words: str) -> None:
     """Keep the figures of this run in the repository."""
     RESULTS.mkdir(exist_ok=True)
     write_csv(RESULTS / "eval.csv", rows)
-    text = [f"# Evaluation of the tracker\n\nMade by `{words}`; a row for each run is in eval.csv.\n"]
+    text = [f"# Evaluation of the tracker\n\n{facts(words)}  A row for each run is in eval.csv.\n"]
     text += [f"## {heading}\n\n{table}\n" for heading, table in reversed(tables(rows, eval_table.markdown))]
     with replacing(RESULTS / "eval.md") as path:
         path.write_text("\n".join([*text, fill(eval_table.LEGEND, 110), ""]), encoding="utf-8")
@@ -204,7 +205,7 @@ def main() -> int:
         for words in eval_table.failures(rows):
             print(f"gave up: {words}")
     if args.record:
-        record(rows, f"make eval ARGS='{' '.join(sys.argv[1:])}'")
+        record(rows, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")
     if not args.no_pictures:
         print(f"pictures and plots: {args.html / 'index.html'}", file=sys.stderr)
     return 0

@@ -9,22 +9,19 @@ Each part is a script of its own that publishes tables (table.py); a part that f
 from __future__ import annotations
 
 import argparse
-import os
-import platform
 import subprocess
 import sys
 import time
-from importlib.metadata import version
 from pathlib import Path
 
 import table
+from facts import facts
 
 from gait.files import replacing
 
 HERE = Path(__file__).resolve().parent
 PARTS = ("learn_period.py", "learn_impute.py", "learn_floor.py")
 WITH_MOCAP = ("learn_floor.py",)  # parts that want the folder of walks as argument
-PACKAGES = ("gait", "numpy", "scipy")
 JOINED = "learn.md"
 
 
@@ -42,7 +39,11 @@ def main() -> int:
             failed.append(part)
         tables += [path for path, stamp in _stamps().items() if before.get(path) != stamp]
     if not args.only:
-        head = ["# Evaluation of learning", facts(), f"Took {time.perf_counter() - begun:.0f} s."]
+        head = [
+            "# Evaluation of learning",
+            facts("make eval-learn"),
+            f"Took {time.perf_counter() - begun:.0f} s.",
+        ]
         head += [f"**Failed: {', '.join(failed)}.**"] if failed else []
         with replacing(table.RESULTS / JOINED) as path:
             path.write_text("\n\n".join([*head, *[t.read_text().strip() for t in tables]]) + "\n")
@@ -55,33 +56,6 @@ def _stamps() -> dict[Path, int]:
     """Published tables and when they were written, oldest first."""
     found = {p: p.stat().st_mtime_ns for p in table.RESULTS.glob("*.md") if p.name != JOINED}
     return dict(sorted(found.items(), key=lambda item: item[1]))
-
-
-def facts() -> str:
-    """Machine, versions and commit on which the numbers were made."""
-    versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
-    return (
-        f"`make eval-learn` at commit {_commit()}; {_processor()}, {os.cpu_count()} cores, "
-        f"{platform.system()} {platform.machine()}; Python {platform.python_version()}, {versions}."
-    )
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or "unknown processor"
-
-
-def _commit() -> str:
-    def git(*words: str) -> str:
-        done = subprocess.run(["git", "-C", str(HERE), *words], capture_output=True, text=True, check=False)
-        return done.stdout.strip()
-
-    dirty = git("status", "--porcelain", "--untracked-files=no", "--", ":/python", ":/tests/bench/*.py")
-    return (git("rev-parse", "--short", "HEAD") or "unknown") + (" with changes" if dirty else "")
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def grid(lines: list[Verdict]) -> list[list[str]]:
 
 
 def _of(rows: Rows, arm: str, outdoor: bool | None = False) -> Rows:
-    chosen = [row for row in rows if row["arm"] == arm]
+    chosen = [row for row in rows if row["arm"] == arm and not row["empty"]]
     return chosen if outdoor is None else [row for row in chosen if (row["clip"] == OUTDOOR) == outdoor]
 
 

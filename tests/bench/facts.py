@@ -1,0 +1,42 @@
+"""On what the numbers of an evaluation were made."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+PACKAGES = ("gait", "numpy", "scipy")
+
+
+def facts(command: str) -> str:
+    """What made the numbers: command, commit, machine and versions."""
+    versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    return (
+        f"`{command}` at commit {_commit()}; {_processor()}, {os.cpu_count()} cores, "
+        f"{platform.system()} {platform.machine()}; Python {platform.python_version()}, {versions}."
+    )
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown processor"
+
+
+def _commit() -> str:
+    def git(*words: str) -> str:
+        done = subprocess.run(
+            ["git", "-C", str(Path(__file__).parent), *words], capture_output=True, text=True, check=False
+        )
+        return done.stdout.strip()
+
+    dirty = git(
+        "status", "--porcelain", "--untracked-files=no", "--", ":/python", ":/libgait", ":/tests/bench/*.py"
+    )
+    return (git("rev-parse", "--short", "HEAD") or "unknown") + (" with changes" if dirty else "")
