@@ -39,11 +39,8 @@ def main() -> int:
             failed.append(part)
         tables += [path for path, stamp in _stamps().items() if before.get(path) != stamp]
     if not args.only:
-        head = [
-            "# Evaluation of learning",
-            facts("make eval-learn"),
-            f"Took {time.perf_counter() - begun:.0f} s.",
-        ]
+        took = f"Took {time.perf_counter() - begun:.0f} s."
+        head = ["# Evaluation of learning", facts("make eval-learn"), took]
         head += [f"**Failed: {', '.join(failed)}.**"] if failed else []
         with replacing(table.RESULTS / JOINED) as path:
             path.write_text("\n\n".join([*head, *[t.read_text().strip() for t in tables]]) + "\n")

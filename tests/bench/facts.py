@@ -8,6 +8,7 @@ import subprocess
 from importlib.metadata import version
 from pathlib import Path
 
+HERE = Path(__file__).resolve().parent
 PACKAGES = ("gait", "numpy", "scipy")
 
 
@@ -31,9 +32,7 @@ def _processor() -> str:
 
 def _commit() -> str:
     def git(*words: str) -> str:
-        done = subprocess.run(
-            ["git", "-C", str(Path(__file__).parent), *words], capture_output=True, text=True, check=False
-        )
+        done = subprocess.run(["git", "-C", str(HERE), *words], capture_output=True, text=True, check=False)
         return done.stdout.strip()
 
     dirty = git(

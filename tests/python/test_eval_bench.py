@@ -32,6 +32,7 @@ def row(clip, seed=1, arm=eval_plan.BASE, **values):
         **{
             "lost_run": False,
             "failure": "",
+            "empty": False,
             "locked": True,
             "side": "right",
             "near_px": 9.0,
