@@ -135,19 +135,6 @@ def test_a_wrong_number_of_components_is_a_usage_error(value):
     assert stop.value.code == 2
 
 
-def test_report_is_one_page_with_its_figures(walks, tmp_path):
-    folder = tmp_path / "report"
-    words = ("learn", walks, "-o", tmp_path / "m.gait", "--components", "auto", "--report", folder, "--quiet")
-    assert run(*words) == 0
-    page = (folder / "index.html").read_text()
-    pictures = sorted(p.name for p in folder.glob("*.png"))
-    assert pictures == [f"{n}.png" for n in (
-        "components", "convergence", "cycles", "missing", "residuals", "snr", "spectrum")]  # fmt: skip
-    assert all(p.read_bytes()[:4] == b"\x89PNG" and p.stat().st_size > 5000 for p in folder.glob("*.png"))
-    assert page.count("data:image/png;base64,") == 7 and 'src="' in page and "http" not in page
-    assert "02_99.amc" in page and "mocap.cs.cmu.edu" in page
-
-
 def test_info_tells_what_was_learnt(learned, capsys):
     assert run("info", learned, "--json") == 0
     info = json.loads(capsys.readouterr().out)

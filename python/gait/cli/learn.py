@@ -165,7 +165,10 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
         "bytes": len(data),
         "crc32": f"{blob.checksum(data):08x}",
         "subjects": learned.subjects,
-        "sequences": [dict(zip(model.SEQUENCE_COLUMNS, row, strict=True)) for row in table],
+        "sequences": [
+            dict(zip(model.SEQUENCE_COLUMNS, row, strict=True)) | _found(sequence)
+            for row, sequence in zip(table, learned.sequences, strict=True)
+        ],
         "left_out": refused,
         "cycles": len(learned.components.scores),
         "components": len(learned.components.sd),
@@ -181,14 +184,33 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
     }
 
 
+def _found(s: Sequence) -> dict[str, Any]:
+    """Where a sequence comes from and why it was taken."""
+    return {
+        "subject": s.subject,
+        "source": str(s.source),
+        "fps": s.fps,
+        "kept": list(s.kept),
+        "cut": list(s.cut),
+        "activity": s.verdict.activity,
+        "evidence": {e.name: round(e.value, 4) if np.isfinite(e.value) else None for e in s.verdict.evidence},
+    }
+
+
 def _text(path: str, s: dict[str, Any]) -> str:
     """Lay the figures out for people."""
     explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
-    left = f"; {len(s['left_out'])} files left out" if s["left_out"] else ""
+    left = f"; {_count(len(s['left_out']), 'file')} left out" if s["left_out"] else ""
     lines = [
-        f"{len(s['sequences'])} sequences of {len(s['subjects'])} subjects, {s['cycles']} cycles{left}",
+        f"{_count(len(s['sequences']), 'sequence')} of {_count(len(s['subjects']), 'subject')}, "
+        f"{_count(s['cycles'], 'cycle')}{left}",
         f"{s['stride_hz'][0]:.2f} strides/s of {s['stride_length_statures'][0]:.2f} statures",
-        f"{s['components']} components explain {explained} %; residual {s['residual_deg']:.1f} deg",
+        f"{_count(s['components'], 'component')}: {explained} % of the variance; "
+        f"residual {s['residual_deg']:.1f} deg",
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
     ]
     return "\n".join(lines)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

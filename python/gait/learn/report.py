@@ -10,15 +10,23 @@ from pathlib import Path
 from gait.errors import UserError
 from gait.files import replacing
 from gait.learn import model
-from gait.learn.figures import FIGURES
+from gait.learn.figures import drawings
+from gait.learn.figures_base import Drawing
 from gait.learn.fit import Learned
+from gait.learn.sequence import Sequence
+from gait.progress import progress
 
-STYLE = (
-    "body{font:15px/1.5 sans-serif;max-width:62em;margin:2em auto;padding:0 1em;color:#222}"
-    "img{max-width:100%}figure{margin:2em 0}figcaption{color:#555}"
-    "table{border-collapse:collapse}td,th{padding:.15em .8em;text-align:right;border-bottom:1px solid #ddd}"
-    "td:first-child,th:first-child{text-align:left}"
-)
+STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 64em; margin: 2em auto; padding: 0 1em; color: #222; }
+h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin: 2em 0 .3em; } nav a { margin-right: 1em; }
+img { max-width: 100%; height: auto; } figure { margin: 0; } figcaption { color: #555; margin: 0 0 .5em; }
+table { border-collapse: collapse; } td, th { padding: .1em .9em .1em 0; text-align: left; }
+tr { border-bottom: 1px solid #e4e4e4; }
+td { vertical-align: top; font-variant-numeric: tabular-nums; } .n { text-align: right; }
+td.w { font-size: 85%; color: #555; } .wide { overflow-x: auto; }
+"""
+DPI = 110
+RIGHT = ("period, ms", "cycles", "sharpness", "residual, °")  # columns of numbers
 
 
 def write(folder: Path, learned: Learned, activity: str, refused: list[str], quiet: bool = True) -> None:
@@ -33,42 +41,106 @@ def write(folder: Path, learned: Learned, activity: str, refused: list[str], qui
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"--report {folder}: {error.strerror}; choose another folder") from error
-    parts = [f"<h1>Cyclic model of {html.escape(activity)}</h1>", _summary(learned)]
-    for stem, caption, draw in FIGURES:
-        buffer = io.BytesIO()
-        draw(learned).savefig(buffer, format="png", dpi=110, metadata={"Software": None})
-        with replacing(folder / f"{stem}.png") as path:
-            path.write_bytes(buffer.getvalue())
-        data = base64.b64encode(buffer.getvalue()).decode()
-        parts.append(
-            f'<figure><img alt="{stem}" src="data:image/png;base64,{data}">'
-            f"<figcaption>{html.escape(caption)}</figcaption></figure>"
-        )
-    parts += [_table(learned), _left_out(refused), f"<p>{model.CMU}</p>" if model.from_cmu(learned) else ""]
-    page = f"<!doctype html><html lang=en><meta charset=utf-8><title>{html.escape(activity)}</title>"
+    parts, links = [], []
+    with progress("drawing the report", None, quiet) as update:
+        for number, drawing in enumerate(drawings(learned)):
+            update(number)
+            parts.append(_figure(folder, drawing))
+            links.append((drawing.stem, drawing.heading))
+    for old in folder.glob("strip-*.png"):  # of a run with more components
+        if old.stem not in dict(links):
+            old.unlink()
+    links += [("sequences", "Sequences"), *([("left-out", "Left out")] if refused else [])]
+    body = [
+        f"<h1>Cyclic model of {html.escape(activity)}</h1>",
+        _summary(learned, refused),
+        "<nav>" + " ".join(f'<a href="#{to}">{html.escape(words)}</a>' for to, words in links) + "</nav>",
+        *parts,
+        _sequences(learned),
+        _left_out(refused),
+        f"<p>{model.CMU}</p>" if model.from_cmu(learned) else "",
+    ]
+    head = f"<meta charset=utf-8><title>{html.escape(activity)}: gait learn</title><style>{STYLE}</style>"
     with replacing(folder / "index.html") as path:
         path.write_text(
-            f"{page}<style>{STYLE}</style><body>{''.join(parts)}</body></html>\n", encoding="utf-8"
+            f"<!doctype html><html lang=en><head>{head}</head><body>{''.join(body)}</body></html>\n",
+            encoding="utf-8",
         )
 
 
-def _summary(learned: Learned) -> str:
-    rate, rate_sd, variation, length, length_sd, *_ = model.gait_statistics(learned)
+def _figure(folder: Path, drawing: Drawing) -> str:
+    """Write a figure's PNG; its part of the page."""
+    buffer = io.BytesIO()
+    drawing.figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    with replacing(folder / f"{drawing.stem}.png") as path:
+        path.write_bytes(buffer.getvalue())
+    data = base64.b64encode(buffer.getvalue()).decode()
+    heading = html.escape(drawing.heading)
     return (
-        f"<p>{len(learned.sequences)} sequences of {len(learned.subjects)} subjects, "
-        f"{len(learned.components.scores)} cycles, {len(learned.components.sd)} components. "
-        f"{rate:.3f} &plusmn; {rate_sd:.3f} strides/s of {length:.3f} &plusmn; {length_sd:.3f} statures; "
+        f'<h2 id="{drawing.stem}">{heading}</h2>'
+        f"<figure><figcaption>{html.escape(drawing.caption)}</figcaption>"
+        f'<img alt="{heading}" src="data:image/png;base64,{data}"></figure>'
+    )
+
+
+def _summary(learned: Learned, refused: list[str]) -> str:
+    rate, rate_sd, variation, length, length_sd, *_ = model.gait_statistics(learned)
+    share = 100 * sum(learned.components.spectrum[: len(learned.components.sd)])
+    return (
+        f"<p>Sequences: {len(learned.sequences)}. Subjects: {len(learned.subjects)}. Files left out: "
+        f"{len(refused)}. Cycles: {len(learned.cycles.values)}, {100 - 100 * learned.cycles.mask.mean():.1f} "
+        f"% of their entries missing. Components kept: {len(learned.components.sd)}, with {share:.0f} % of "
+        "the variance.</p>"
+        f"<p>{rate:.3f} &plusmn; {rate_sd:.3f} strides/s of {length:.3f} &plusmn; {length_sd:.3f} statures; "
         f"stride time varies by {100 * variation:.1f} % within a sequence.</p>"
     )
 
 
-def _table(learned: Learned) -> str:
-    head = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in model.SEQUENCE_COLUMNS)
-    rows = model.sequence_table(learned)
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(str(v))}</td>" for v in row) + "</tr>" for row in rows)
-    return f"<h2>Sequences</h2><table><tr>{head}</tr>{body}</table>"
+def _sequences(learned: Learned) -> str:
+    """Table of the sequences: what was found, cut off, left by the model, and why it was taken."""
+    names = ("sequence", "subject", *RIGHT, "frames kept", "taken as", "evidence")
+    head = "".join(f"<th{_class(n)}>{n}</th>" for n in names)
+    rows = [
+        dict(zip(names, _row(s, found), strict=True))
+        for s, found in zip(learned.sequences, model.sequence_table(learned), strict=True)
+    ]
+    body = "".join(
+        "<tr>" + "".join(f"<td{_class(n)}>{html.escape(cell)}</td>" for n, cell in row.items()) + "</tr>"
+        for row in rows
+    )
+    return (
+        '<h2 id="sequences">Sequences</h2><p>Sharpness: largest over median ratio of the period. Residual: '
+        "rms of all angles. Evidence: repeats: correlation with the next cycle; legs: of each leg with the "
+        "other half a cycle later; flight: share of the time with both feet off the ground; lift and steps: "
+        "rise of the feet and of the ground, statures.</p>"
+        f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
+    )
+
+
+def _class(column: str) -> str:
+    return ' class="n"' if column in RIGHT else ' class="w"' if column == "evidence" else ""
+
+
+def _row(s: Sequence, found: list[object]) -> list[str]:
+    """Cells of one sequence; `found` is its row of `model.sequence_table`."""
+    _, period, cycles, sharpness, residual = found
+    cut = "; ".join(f"{side}: {why}" for side, why in zip(("before", "after"), s.cut, strict=True) if why)
+    evidence = [
+        f"{e.name} {e.value:.2g}" for e in s.verdict.evidence if e.name not in ("cycles", "sharpness")
+    ]
+    return [
+        s.name,
+        s.subject,
+        str(period),
+        str(cycles),
+        str(sharpness),
+        "-" if residual is None else str(residual),
+        f"{s.kept[0]} to {s.kept[1] - 1}" + (f" ({cut})" if cut else ""),
+        s.verdict.activity or "cyclic",
+        ", ".join(evidence),
+    ]
 
 
 def _left_out(refused: list[str]) -> str:
     items = "".join(f"<li>{html.escape(line)}</li>" for line in refused)
-    return f"<h2>Left out</h2><ul>{items}</ul>" if refused else ""
+    return f'<h2 id="left-out">Left out</h2><ul>{items}</ul>' if refused else ""

@@ -1,0 +1,181 @@
+"""Figures of the model: mean and components as curves and stick figures (Ormoneit 2000, Fig. 6), errors."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from gait.learn.figures_base import (
+    BLUE,
+    DARK,
+    GREY,
+    ORANGE,
+    PHASE,
+    PHASE_LABEL,
+    SHOWN,
+    Floats,
+    column,
+    grid,
+    line_legend,
+    observed,
+    plain,
+    say_unobserved,
+    whole_numbers,
+    words,
+)
+from gait.learn.fit import Learned
+from gait.skeleton import ANGLES, JOINTS, default_skeleton, points
+
+PHASES = 8  # of a strip
+TURNS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}
+STEP = 0.75  # statures from one figure of a strip to the next
+MOST_COMPONENTS = 8  # drawn as curves
+MOST_SPECTRUM = 20
+JOINT_ORDER = ("hip", "knee", "ankle", "shoulder", "elbow", "torso", "neck")
+_ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "toe")
+STICKS = {
+    "c": [["head_top", "neck", "pelvis"], ["l_shoulder", "neck", "r_shoulder"], ["l_hip", "pelvis", "r_hip"]],
+    **{
+        s: [[f"{s}_{j}" for j in _ARM], [f"{s}_{j}" for j in _LEG], [f"{s}_ankle", f"{s}_heel", f"{s}_toe"]]
+        for s in "lr"
+    },
+}
+
+
+def curves(learned: Learned) -> Figure:
+    """Mean and two standard deviations along each component, angle by angle."""
+    table = np.degrees(learned.curves)
+    count, seen = min(len(table) - 1, MOST_COMPONENTS), observed(learned)
+    figure = Figure(figsize=(11, 1.6 * max(count, 1) + 0.7), layout="constrained")
+    panels = figure.subplots(count, len(SHOWN), sharex=True, sharey="col", squeeze=False)
+    for k, row in enumerate(panels):
+        for axes, name in zip(row, SHOWN, strict=True):
+            plain(axes)
+            c = column(name)
+            if not seen[c]:
+                say_unobserved(axes)
+            else:
+                mean, turn = table[0, :, c], 2 * table[k + 1, :, c]
+                axes.fill_between(PHASE, mean - turn, mean + turn, color=GREY, alpha=0.2, lw=0)
+                axes.plot(PHASE, mean + turn, color=ORANGE, lw=1)
+                axes.plot(PHASE, mean, color=DARK, lw=1)
+                axes.plot(PHASE, mean - turn, color=BLUE, lw=1)
+            axes.set(xlim=(0, 1))
+            if k == 0:
+                axes.set_title(words(name), fontsize=9)
+        row[0].set_ylabel(f"component {k + 1}\ndegrees", fontsize=8)
+    line_legend(figure, {**TURNS, "mean": DARK})
+    figure.supxlabel(PHASE_LABEL, fontsize=9)
+    return figure
+
+
+def strip(learned: Learned, component: int | None) -> Figure:
+    """Walker over one cycle from the side and from the front.
+
+    Parameters
+    ----------
+    component : int, optional
+        Draw the mean plus and minus two standard deviations of this one over the mean; None: the mean alone.
+    """
+    figure, panels = grid(2, 1, 10, 4.6)
+    turns = [0.0] if component is None else [0.0, -2.0, 2.0]
+    top = 1.05
+    for turn in turns:
+        bodies = _bodies(learned, component, turn)
+        top = max(top, float(bodies[..., 2].max()))
+        colour = {0.0: DARK if component is None else GREY, -2.0: BLUE, 2.0: ORANGE}[turn]
+        for axes, across in zip(panels, (0, 1), strict=True):
+            _draw(axes, bodies, across, colour)
+    for axes, name in zip(panels, ("seen from the right", "seen from ahead"), strict=True):
+        axes.set_aspect("equal")
+        axes.grid(visible=False)
+        axes.axhline(0, color="#cccccc", lw=0.8, zorder=0)
+        axes.set(xlim=(-0.6 * STEP, (PHASES - 0.4) * STEP), ylim=(-0.04, top + 0.03), yticks=[], ylabel=name)
+        axes.spines[["left", "bottom"]].set_visible(False)
+        axes.set_xticks(STEP * np.arange(PHASES), [f"{i / PHASES:g}" for i in range(PHASES)])
+    panels[1].set_xlabel(PHASE_LABEL)
+    if component is not None:
+        line_legend(figure, TURNS)
+    return figure
+
+
+def _bodies(learned: Learned, component: int | None, turn: float) -> Floats:
+    """Joints (PHASES, P, 3) in statures, the lowest point on the ground."""
+    at = np.arange(PHASES) * len(PHASE) // PHASES
+    channels = learned.curves[0, at]
+    if component is not None:
+        channels = channels + turn * learned.curves[component + 1, at]
+    joints = points(default_skeleton(learned.proportions).sections(), channels)
+    joints[:, :, 2] -= joints[:, :, 2].min(axis=1, keepdims=True)
+    return joints
+
+
+def _draw(axes: Axes, bodies: Floats, across: int, colour: str) -> None:
+    """Stick figures side by side; what is nearer to the viewer (the right side) is bolder.
+
+    Parameters
+    ----------
+    across : int
+        Coordinate along the paper: 0 forward to the right, 1 seen from ahead (its left to the right).
+    """
+    for i, body in enumerate(bodies):
+        for side, chains in STICKS.items():
+            for chain in chains:
+                joints = body[[JOINTS.index(name) for name in chain]]
+                axes.plot(
+                    joints[:, across] + i * STEP, joints[:, 2], color=colour,
+                    lw=0.9 if side == "l" else 1.8, alpha=0.7 if side == "l" else 1,
+                    solid_capstyle="round",
+                )  # fmt: skip
+
+
+def spectrum(learned: Learned) -> Figure:
+    """Share of the variance that components explain; error on held-out data if it was asked for."""
+    held = np.degrees(learned.held_out)
+    figure, panels = grid(1, 2 if len(held) else 1, 8 if len(held) else 5, 3.4)
+    single, kept = 100 * learned.components.spectrum[:MOST_SPECTRUM], len(learned.components.sd)
+    numbers = np.arange(1, len(single) + 1)
+    panels[0].bar(numbers, single, color=BLUE, alpha=0.6, label="each")
+    panels[0].plot(numbers, np.cumsum(single), "o-", ms=3, color=DARK, label="together")
+    panels[0].axvline(kept + 0.5, color=ORANGE, lw=1, ls="--", label=f"kept: {kept}")
+    panels[0].set(xlabel="component", ylabel="variance explained, %", ylim=(0, 103))
+    panels[0].set_xlim(0.3, len(single) + 0.7)
+    panels[0].legend(fontsize=8, frameon=False, loc="center right")
+    if len(held):
+        panels[1].plot(np.arange(len(held)), held, "o-", ms=4, color=BLUE)
+        panels[1].plot(kept, held[min(kept, len(held) - 1)], "o", ms=7, color=ORANGE, label=f"chosen: {kept}")
+        panels[1].set(xlabel="components", ylabel="error on held-out data, degrees")
+        panels[1].legend(fontsize=8, frameon=False)
+    for axes in panels:
+        whole_numbers(axes)
+    return figure
+
+
+def residuals(learned: Learned) -> Figure:
+    """Root mean square of what the components leave of each angle."""
+    figure, (axes,) = grid(1, 1, 8, 3.8)
+    squares = learned.residuals[:, :, : len(ANGLES)] ** 2
+    count = np.isfinite(squares).sum(axis=(0, 1))
+    rest = np.degrees(np.sqrt(np.nansum(squares, axis=(0, 1)) / np.maximum(count, 1)))
+    order = sorted(range(len(ANGLES)), key=lambda i: [j in ANGLES[i] for j in JOINT_ORDER].index(True))
+    shades = [{"l_": GREY, "r_": BLUE}.get(ANGLES[i][:2], DARK) for i in order]
+    axes.bar(np.arange(len(order)), rest[order], color=shades)
+    axes.set_xticks(np.arange(len(order)), [words(ANGLES[i]) for i in order], rotation=90, fontsize=8)
+    axes.set(ylabel="residual, degrees (rms)", xlim=(-0.7, len(order) - 0.3))
+    axes.grid(visible=False, axis="x")
+    return figure
+
+
+def convergence(learned: Learned) -> Figure:
+    """Objectives of the alignment and of the filling of gaps against their passes."""
+    figure, (left, right) = grid(1, 2, 8, 3.2)
+    objective, rmse = np.array(learned.alignment.objective), np.array(learned.components.rmse)
+    left.plot(np.arange(1, len(objective) + 1), objective, "o-", ms=4, color=BLUE)
+    left.set(xlabel="pass", ylabel="weighted sum of squares, rad²", title="alignment")
+    right.plot(np.arange(1, len(rmse) + 1), np.degrees(rmse), "o-", ms=3, color=BLUE)
+    right.set(xlabel="pass", ylabel="error on observed entries, degrees", title="filling of gaps")
+    for axes in (left, right):
+        whole_numbers(axes)
+        axes.title.set_fontsize(10)
+    return figure

@@ -1,0 +1,194 @@
+"""The report of gait learn: its figures show the data, on ordinary and on odd input."""
+
+import json
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import mocap_files as files
+import numpy as np
+import pytest
+
+import gait.cli
+from gait.learn import figures_cycle, figures_model, figures_period, figures_subject, fit, report, sources
+from gait.learn.figures_base import SHOWN, column
+from gait.learn.stage import one_thread
+from gait.skeleton import ANGLES
+
+
+@pytest.fixture(scope="module", autouse=True)
+def as_the_command_does():
+    with one_thread():
+        yield
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory):
+    """Six toy walks of three subjects and a broken file."""
+    folder = tmp_path_factory.mktemp("walks")
+    for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 2)]):
+        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i}
+        files.write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", frames=400, **motion)
+    (folder / "02/02_99.amc").write_text(":DEGREES\n1\nroot 1 2\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sequences(walks):
+    return sources.load_all(sources.find([str(walks)]))[0]
+
+
+@pytest.fixture(scope="module")
+def learned(sequences):
+    return fit.fit(sequences, 3)
+
+
+class Page(HTMLParser):
+    """Checks that elements nest; collects texts, links and pictures."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.texts, self.links, self.ids, self.pictures, self.cells = [], [], [], [], [], 0
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        named = dict(attributes)
+        self.ids += [named["id"]] if "id" in named else []
+        self.links += [named["href"]] if tag == "a" else []
+        self.pictures += [named["src"]] if tag == "img" else []
+        self.cells += tag == "td"
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+def test_the_page_holds_everything_and_needs_nothing(walks, tmp_path, capsys):
+    folder = tmp_path / "deep" / "report"
+    folder.mkdir(parents=True)
+    (folder / "strip-9.png").write_bytes(b"of an earlier run")
+    words = [
+        "learn",
+        str(walks),
+        "-o",
+        str(tmp_path / "m.gait"),
+        "--components",
+        "auto",
+        "--report",
+        str(folder),
+    ]
+    assert gait.cli.main([*words, "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    page = Page((folder / "index.html").read_text())
+    stems = {p.stem for p in folder.glob("*.png")}
+    strips = {f"strip-{k + 1}" for k in range(summary["components"])}
+    assert stems == strips | {
+        "strip-mean", "alignment", "convergence", "components", "cycles", "missing", "periods", "residuals",
+        "snr", "spectrum", "subjects",
+    }  # fmt: skip
+    assert all(p.read_bytes()[:4] == b"\x89PNG" and p.stat().st_size > 5000 for p in folder.glob("*.png"))
+    assert len(page.pictures) == len(stems) and all(s.startswith("data:image/png") for s in page.pictures)
+    assert (
+        {link.removeprefix("#") for link in page.links} == set(page.ids) == stems | {"sequences", "left-out"}
+    )
+    assert page.cells == 9 * 6 and sum("02_99.amc:3" in t for t in page.texts) == 1
+    assert any("mocap.cs.cmu.edu" in t for t in page.texts)
+
+
+def test_the_table_says_what_was_cut_and_why_a_sequence_was_taken(learned):
+    first = replace(learned.sequences[0], kept=(120, 400), cut=("it stands <still>", ""))
+    odd = replace(learned, sequences=[first, *learned.sequences[1:]])
+    page = Page(report._sequences(odd))
+    assert "120 to 399 (before: it stands <still>)" in page.texts
+    assert any("repeats 0.9" in t or "repeats 1" in t for t in page.texts)
+
+
+def test_the_ratio_peaks_at_the_period_and_noise_is_flat(learned):
+    figure = figures_period.ratios(learned)
+    rows, total = figure.axes[:-1], figure.axes[-1]
+    assert [axes.get_ylabel() for axes in rows][:2] == ["white noise", "neck x"] and len(rows) == 25
+    noise = rows[0].lines[0].get_ydata()
+    assert 0.9 < np.nanmean(noise) < 1.1 and np.nanmax(noise) < rows[0].get_ylim()[1] / 2
+    best = total.lines[-1].get_xdata()[0]
+    assert best == pytest.approx(figures_period.richest(learned).period.frames, abs=1.5)
+
+
+def test_alignment_brings_the_curves_together(learned):
+    figure = figures_cycle.alignment(learned)
+    before, after = figure.axes[:2]
+
+    def spread(axes):
+        """Mean deviation of the drawn curves from the drawn mean."""
+        x, mean = axes.lines[-1].get_data()
+        parts = [
+            np.interp(np.asarray(line.get_xdata()), x, mean) - line.get_ydata() for line in axes.lines[:-1]
+        ]
+        return np.nanmean(np.abs(np.concatenate(parts)))
+
+    assert len(before.lines) == len(learned.sequences) + 1
+    assert spread(after) < 0.4 * spread(before)
+
+
+def test_a_strip_shows_the_walker_plus_and_minus_two_deviations(learned):
+    figure = figures_model.strip(learned, 0)
+    side = figure.axes[0]
+    assert len(side.lines) == 3 * 8 * 9 + 1  # turns, phases, chains; the ground
+    heights = np.concatenate([np.asarray(line.get_ydata()) for line in side.lines])
+    assert heights.min() == pytest.approx(0, abs=1e-9) and 0.9 < heights.max() < side.get_ylim()[1] < 1.2
+    mean, less, more = (figures_model._bodies(learned, 0, turn) for turn in (0.0, -2.0, 2.0))
+    assert np.abs(more - less).max() > 0.02
+    assert (more + less) / 2 == pytest.approx(mean, abs=0.05)
+
+
+def test_a_subject_left_out_is_followed_less_well(learned):
+    within, without = figures_subject.errors(learned).axes[0].lines
+    assert np.all(np.asarray(without.get_xdata()) > np.asarray(within.get_xdata()))
+
+
+def one_file(sequences):
+    return fit.fit(sequences[:1], 1)
+
+
+def lower_body(sequences):
+    """Only the legs were seen."""
+    legs = np.array([any(part in name for part in ("hip", "knee", "ankle")) for name in ANGLES])
+    cut = [replace(s, channels=s.channels.copy()) for s in sequences]
+    for s in cut:
+        s.channels[:, : len(ANGLES)][:, ~legs] = np.nan
+    return fit.fit(cut, 2)
+
+
+def many_subjects(sequences):
+    """More sequences than have names, more subjects than have a legend or a fit of their own."""
+    many = [replace(s, subject=f"{s.subject}{k}", name=f"{s.name}_{k}") for k in range(13) for s in sequences]
+    return fit.fit(many, 4)
+
+
+@pytest.mark.filterwarnings(
+    "ignore:(Mean of empty|All-NaN|Degrees of freedom):RuntimeWarning:gait.learn.model"
+)
+@pytest.mark.parametrize("make", [one_file, lower_body, many_subjects])
+def test_odd_input_gives_a_report_too(sequences, tmp_path, make):
+    odd = make(sequences)
+    report.write(tmp_path, odd, "walk & run", [])
+    page = Page((tmp_path / "index.html").read_text())
+    assert "Cyclic model of walk & run" in page.texts and "left-out" not in page.ids
+    assert len(page.pictures) >= 10 and page.cells == 9 * len(odd.sequences)
+    assert ("subjects" in page.ids) == (make is lower_body)
+    texts = [t.get_text() for axes in figures_cycle.cycles(odd).axes for t in axes.texts]
+    unseen = [name for name in SHOWN if not odd.cycles.mask[:, :, column(name)].any()]
+    assert texts == ["not observed"] * len(unseen) and bool(unseen) == (make is lower_body)
+
+
+@pytest.mark.parametrize("place", ["{tmp}/file", "{tmp}/file/below"])
+def test_a_place_that_is_no_folder_is_refused_before_the_work(walks, tmp_path, capsys, place):
+    (tmp_path / "file").write_text("")
+    words = ["learn", str(walks), "-o", str(tmp_path / "m.gait"), "--report", place.format(tmp=tmp_path)]
+    assert gait.cli.main(words) == 1
+    err = capsys.readouterr().err
+    assert "is not a folder to write in; choose another one" in err and err.count("\n") == 1
+    assert not (tmp_path / "m.gait").exists()
