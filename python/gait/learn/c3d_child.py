@@ -1,7 +1,7 @@
 """Reads one .c3d with ezc3d in a process of its own: damaged files can crash that library.
 
-Run by path with the file's name; writes labels, points (M, T, 3), rate, units and the frames that the header
-promises as .npz to stdout.  What it refuses is one line on stderr and exit code 1.
+Run by path with the file's name; writes labels, points (M, T, 3), rate and units as .npz to stdout.  What it
+refuses is one line on stderr and exit code 1.
 """
 
 import io
@@ -15,7 +15,6 @@ def main(path: str) -> None:
     """Read `path` and write the points to stdout."""
     c3d = ezc3d.c3d(path)
     parameters, points = c3d["parameters"]["POINT"], c3d["data"]["points"]
-    header = c3d["header"]["points"]
     units = parameters["UNITS"]["value"] if "UNITS" in parameters else []
     labels = [label for k in ("", *range(2, 100)) for label in _labels(parameters, f"LABELS{k}")]
     buffer = io.BytesIO()
@@ -23,9 +22,8 @@ def main(path: str) -> None:
         buffer,
         labels=np.array(labels[: points.shape[1]], str),
         points=np.moveaxis(points[:3], 0, 2),
-        rate=float(header["frame_rate"]),
+        rate=float(c3d["header"]["points"]["frame_rate"]),
         units=units[0] if len(units) else "mm",
-        frames=int(header["last_frame"]) - int(header["first_frame"]) + 1,
     )
     sys.stdout.buffer.write(buffer.getvalue())
 

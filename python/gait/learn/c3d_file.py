@@ -17,6 +17,9 @@ Floats = npt.NDArray[np.float64]
 
 CHILD = Path(__file__).with_name("c3d_child.py")
 PATIENCE = 120.0  # seconds for one file
+BLOCK = 512  # bytes; the first is the header, and its first byte says in which the parameters begin
+BIG_ENDIAN = 86  # kind of processor, fourth byte of the parameters
+MANY = 65535  # frames: more do not fit into the header
 
 
 def read(path: Path) -> tuple[list[str], Floats, float]:
@@ -56,13 +59,24 @@ def read(path: Path) -> tuple[list[str], Floats, float]:
 def _checked(path: Path, stored: bytes) -> tuple[list[str], Floats, float]:
     with np.load(io.BytesIO(stored)) as data:
         labels, points = [str(label).strip() for label in data["labels"]], data["points"]
-        rate, units, frames = float(data["rate"]), str(data["units"]).strip(), int(data["frames"])
+        rate, units = float(data["rate"]), str(data["units"]).strip()
     if len(labels) < len(points):
         raise UserError(f"{path}: {len(points)} points but {len(labels)} labels; export it again with labels")
     if units.lower() not in METRES:
         raise UserError(f"{path}: points in {units!r}; set POINT:UNITS to one of {' '.join(METRES)}")
     if not (np.isfinite(rate) and rate > 0):
         raise UserError(f"{path}: {rate} frames per second; set POINT:RATE")
-    if points.shape[1] < frames:
-        raise UserError(f"{path}: {points.shape[1]} of {frames} frames are there; fetch it again")
+    promised = _promised(path)
+    if points.shape[1] < promised:
+        raise UserError(f"{path}: {points.shape[1]} of {promised} frames are there; fetch it again")
     return labels, np.swapaxes(points, 0, 1) * METRES[units.lower()], rate
+
+
+def _promised(path: Path) -> int:
+    """Read how many frames the header promises, which the library corrects in silence; 0 if it cannot say."""
+    with path.open("rb") as file:
+        header = file.read(BLOCK)
+        file.seek((header[0] - 1) * BLOCK)
+        big = file.read(4)[3:] == bytes([BIG_ENDIAN])
+    first, last = (int.from_bytes(header[k : k + 2], "big" if big else "little") for k in (6, 8))
+    return 0 if last >= MANY else max(0, last - first + 1)

@@ -122,7 +122,7 @@ def _lines(path: Path) -> list[list[str]]:
 
 
 def _numbers(row: list[str], width: int, path: Path, line: int) -> Floats:
-    if len(row) < width:
+    if len(row) < width or any(cell.strip() for cell in row[width:]):
         raise UserError(f"{path}:{line}: {len(row)} cells where {width} belong; restore the file")
     return np.array([_number(cell, path, line) for cell in row[:width]])
 

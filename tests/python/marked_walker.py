@@ -1,0 +1,82 @@
+"""Markers on walkers: on the default skeleton in known poses, and on recorded bodies."""
+
+import numpy as np
+
+from gait.learn import articulated, retarget, rotations
+from gait.learn.articulated import SEGMENTS
+from gait.learn.marker_sets import LANDMARKS, SETS
+from gait.skeleton import ANGLES, SIDES, Proportions
+
+#: Labels of Plug-in-Gait's full body, as in Vicon's files.
+CENTRAL = ["SACR", "C7", "T10", "CLAV", "STRN"]
+LEG = ["ASI", "PSI", "THI", "KNE", "TIB", "ANK", "HEE", "TOE"]
+ARM = ["FHD", "BHD", "SHO", "UPA", "ELB", "FRA", "WRA", "WRB"]
+FULL = CENTRAL + [side + name for side in "LR" for name in LEG + ARM]
+LOWER = [side + name for side in "LR" for name in LEG] + ["SACR"]
+
+
+def landmarks(labels):
+    """Landmarks of Plug-in-Gait labels."""
+    return [LANDMARKS[SETS["plug-in-gait"][label.lower()]] for label in labels]
+
+
+def walk_angles(frames, period, seed=0):
+    """Smooth cyclic angles (T, 24), radians, of the size of a walk."""
+    rng, phase = np.random.default_rng(seed), 2 * np.pi * np.arange(frames) / period
+    angles = np.radians(rng.uniform(3, 8, len(ANGLES))) * np.sin(
+        phase[:, None] + rng.uniform(0, 6, len(ANGLES))
+    )
+    for s, lag in (("l", 0.0), ("r", np.pi)):
+        angles[:, ANGLES.index(f"{s}_hip_flexion")] = 0.1 + 0.45 * np.sin(phase + lag + 1)
+        angles[:, ANGLES.index(f"{s}_knee_flexion")] = 0.5 + 0.45 * np.sin(phase + lag)
+        angles[:, ANGLES.index(f"{s}_elbow_flexion")] = 0.5 + 0.25 * np.sin(phase + lag)
+    return angles
+
+
+def walker(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003, seed=0):
+    """Points (T, M, 3), metres, z up, and the true pose, of a walker of odd lengths and marker places."""
+    rng = np.random.default_rng(seed)
+    angles = walk_angles(frames, period, seed)
+    stretch = spread * rng.choice([-1.0, 1.0], articulated.STRETCH.shape[2])
+    stretch[0] = np.log(1.82)
+    stretch[-len(articulated.LIMBS) :] = 0  # both sides alike
+    time, phase = np.arange(frames) / fps, 2 * np.pi * np.arange(frames) / period
+    place = np.stack([1.3 * time, 0.02 * np.sin(phase), 0.97 + 0.02 * np.cos(2 * phase)], axis=1)
+    turn = articulated.turn_by(
+        np.stack([0.03 * np.sin(phase), 0.02 * np.cos(2 * phase), 0.1 * np.sin(phase)], 1)
+    )
+    pose = articulated.Pose(place, turn, angles)
+    marks = landmarks(labels)
+    segment = np.array([SEGMENTS.index(m.segment) for m in marks])
+    local = articulated.scales(stretch)[segment] * np.array([m.at for m in marks])
+    local = local + rng.normal(scale=0.006, size=local.shape)
+    points = articulated.posed(pose, articulated.origins(stretch)).points(local, segment)
+    return points + rng.normal(scale=noise, size=points.shape), pose
+
+
+def on_body(body, measures, labels):
+    """Points (T, M, 3) at the landmarks of a recorded body's own segments, whatever its joints do."""
+    j, generic = body.joints, Proportions()
+    frames = {"pelvis": (body.pelvis, j["pelvis"], measures.neck / generic.neck)}
+    frames["torso"] = (retarget.torso_frames(body), j["pelvis"], measures.neck / generic.neck)
+    head = rotations.frame_from(j["head"] - j["neck"], body.lateral["head"])
+    frames["head"] = (head, j["neck"], measures.stature)
+    for i, s in enumerate(SIDES):
+        for part, upper, lower, hinge in (
+            ("thigh", "hip", "knee", "knee"),
+            ("shank", "knee", "ankle", "knee"),
+            ("upper_arm", "shoulder", "elbow", "elbow"),
+            ("forearm", "elbow", "wrist", "elbow"),
+        ):
+            axes = rotations.frame_from(j[f"{s}_{upper}"] - j[f"{s}_{lower}"], body.lateral[f"{s}_{hinge}"])
+            scale = getattr(measures, part)[i] / getattr(generic, part)
+            frames[f"{s}_{part}"] = (axes, j[f"{s}_{upper}"], scale)
+        ahead = rotations.unit(j[f"{s}_toe"] - j[f"{s}_ankle"])
+        foot = rotations.frame_from(np.cross(ahead, body.lateral[f"{s}_knee"]), body.lateral[f"{s}_knee"])
+        pitch = rotations.from_angles(np.array([-measures.slope[i]]), (1,))
+        frames[f"{s}_foot"] = (foot @ pitch, j[f"{s}_ankle"], measures.stature)
+    points = []
+    for mark in landmarks(labels):
+        axes, origin, scale = frames[mark.segment]
+        points.append(origin + axes @ (np.array(mark.at) * (measures.stature, measures.stature, scale)))
+    return np.stack(points, axis=1)
