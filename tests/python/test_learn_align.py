@@ -4,7 +4,7 @@ import gait_generator as g
 import numpy as np
 import pytest
 
-from gait.learn import align
+from gait.learn import align, periodic
 
 
 def problem(rng, style, noise=3.0, count=8):
@@ -60,12 +60,72 @@ def test_a_common_shift_of_the_phases_changes_nothing_else():
     assert np.max(np.abs(moved)) < 0.6  # the 17 frames themselves are data
 
 
+HIPS = (7, 15)  # right and left hip flexion of the generator
+
+
+def test_a_constant_added_to_all_phases_gives_the_same_curves():
+    """L6: the gauge takes it out, so that model files of different runs agree."""
+    signals, periods, _ = problem(np.random.default_rng(3), 2.0)
+    begin = align.align(signals, periods).offsets
+    curves = []
+    for phase in (0.0, 0.123456, 0.5):
+        found = align.align(signals, periods, start=begin + phase * periods, hips=HIPS)
+        curves.append(align.common_curve(signals, periods, found.offsets))
+    for other in curves[1:]:
+        assert np.max(np.abs(other - curves[0])) < 1e-6
+
+
+def test_the_hips_gauge_is_a_cosine_of_right_minus_left():
+    signals, periods, _ = problem(np.random.default_rng(4), 0.0)
+    found = align.align(signals, periods, hips=HIPS)
+    curve = align.common_curve(signals, periods, found.offsets)
+    first = np.fft.fft(curve[:, HIPS[0]] - curve[:, HIPS[1]])[1]
+    assert abs(np.angle(first)) / (2 * np.pi) < 2e-3
+    wide = np.zeros((len(curve), 24))
+    wide[:, align.HIPS] = np.roll(curve[:, HIPS], 100, axis=0)
+    assert align.hip_phase(wide) == pytest.approx(100 / len(curve), abs=2e-3)
+
+
+def test_sequences_without_whole_angles_are_aligned_by_the_others():
+    """One has no upper body, one no legs, one nothing but the left knee; neck_z nobody has."""
+    signals, periods, true = problem(np.random.default_rng(5), 2.0)
+    legs = [7, 8, 9, 10, 15, 16, 17, 18]
+    signals[1][:, [k for k in range(19) if k not in legs]] = np.nan
+    signals[2][:, legs] = np.nan
+    signals[4][:, [k for k in range(19) if k != 18]] = np.nan
+    for z in signals:
+        z[:, 2] = np.nan
+    for start in ("xcorr", "zeros"):
+        found = align.align(signals, periods, start=start, hips=HIPS)
+        assert np.max(np.abs(gauge_free(found.offsets, true, periods))) < 3
+        assert np.isfinite(found.weights).all() and found.weights[2] == 0
+        assert np.all(np.diff(found.objective) <= 0)
+    curve = align.common_curve(signals, periods, found.offsets)
+    assert np.isnan(curve[:, 2]).all() and np.isfinite(np.delete(curve, 2, axis=1)).all()
+
+
+def test_a_first_sequence_of_trunk_alone_is_ambiguous_and_others_start_too():
+    """Seen by what repeats every step, a cycle and one shifted by half are alike; the others tell them apart."""
+    rng = np.random.default_rng(6)
+    signals, periods, true = problem(rng, 0.0)
+    signals[0][:, [k for k in range(19) if k not in (0, 3)]] = np.nan
+    turn = 4 * np.pi * (np.arange(len(signals[0])) - true[0]) / periods[0]
+    signals[0][:, 0] = 4 + np.cos(turn) + rng.normal(scale=0.1, size=len(turn))
+    for z, p, o in zip(signals[1:], periods[1:], true[1:], strict=True):
+        z[:, 0] = 4 + np.cos(4 * np.pi * (np.arange(len(z)) - o) / p)
+    signals[0][:, 3] *= 0.2  # the arm that tells the halves apart hardly swings
+    found = align.align(signals, periods)
+    assert np.max(np.abs(gauge_free(found.offsets[1:], true[1:], periods[1:]))) < 3
+    single = align._xcorr_start(align._Problem(signals, periods, None), found.weights, 0)
+    assert single[1], "the case is not ambiguous"
+
+
 def test_basis_is_periodic_smooth_and_a_partition_of_one():
-    basis = align.periodic_basis(np.array([0.0, 1.0, 0.31, 1.31, -0.69]))
+    basis = periodic.periodic_basis(np.array([0.0, 1.0, 0.31, 1.31, -0.69]))
     assert basis.sum(axis=1) == pytest.approx(1)
     assert basis[0] == pytest.approx(basis[1])
     assert basis[2] == pytest.approx(basis[3]) and basis[2] == pytest.approx(basis[4])
     step = 1e-3
-    around = align.periodic_basis(np.array([-2, -1, 0, 1, 2]) * step)
+    around = periodic.periodic_basis(np.array([-2, -1, 0, 1, 2]) * step)
     third = np.diff(around, 3, axis=0) / step**2
     assert np.max(np.abs(third)) < 50  # of second derivatives of order 20**2: no jump across the seam

@@ -1,25 +1,32 @@
 """Phases of several sequences brought to one cycle (Ormoneit 2000, section 3.2 and Fig. 3).
 
 Alternates a periodic cubic regression spline of all sequences together and the best offset of each; both
-steps lower one weighted sum of squares.  Phase of frame j of a sequence: frac((j - offset) / period).
+steps lower one weighted sum of squares.  Phase of frame j of a sequence: frac((j - offset) / period).  One
+sequence at a time is in memory.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import BSpline
+
+from gait.learn.periodic import Curve
+from gait.learn.shift import BINS, Shift
+from gait.skeleton import ANGLES
 
 Floats = npt.NDArray[np.float64]
 
-KNOTS = 20
-BINS = 256  # of the circular cross-correlation that starts the search
-TABLE = 1024
 ITERATIONS = 100
 TOLERANCE = 1e-6  # relative decrease of the objective at which to stop
 XCORR_ROUNDS = 3
+AMBIGUOUS = 0.75  # depth of a sequence's second best phase, of its best, at which other starts are tried
+APART = 0.1  # cycles between those phases, at least
+STARTS = 4  # most sequences whose curve serves as the first one
+#: Columns of right and left hip flexion: the phases are counted from where right minus left is largest.
+HIPS = (ANGLES.index("r_hip_flexion"), ANGLES.index("l_hip_flexion"))
 
 
 @dataclass
@@ -41,154 +48,158 @@ class Alignment:
     weights: Floats = field(default_factory=lambda: np.ones(1))
 
 
-def periodic_basis(phase: Floats, knots: int = KNOTS) -> Floats:
-    """Evaluate periodic cubic B-splines with uniform knots at phases (n,): (n, knots)."""
-    extended = np.arange(-3, knots + 4) / knots
-    basis = BSpline.design_matrix(np.mod(phase, 1.0), extended, 3).toarray()
-    basis[:, :3] += basis[:, knots:]
-    return np.asarray(basis[:, :knots])
+@dataclass(frozen=True)
+class _Problem:
+    signals: list[Floats]
+    periods: Floats
+    hips: tuple[int, int] | None
+
+    def sequences(self) -> Iterator[Shift]:
+        return (Shift(z, p) for z, p in zip(self.signals, self.periods, strict=True))
+
+    def curve(self, offsets: Floats) -> Curve:
+        """Spline of all sequences together."""
+        curve = Curve(self.signals[0].shape[1])
+        for s, offset in zip(self.sequences(), offsets, strict=True):
+            s.add_to(curve, offset)
+        return curve
+
+    def gauged(self, offsets: Floats) -> Floats:
+        """Offsets with the common phase fixed: the first harmonic of right minus left hip flexion a cosine.
+
+        It is found from the frames themselves, so that a common shift of all phases drops out exactly.
+        """
+        if self.hips is None:
+            return offsets
+        right, left = self.hips
+        total = sum(
+            s.first_harmonic(z[:, right] - z[:, left], offset)
+            for s, z, offset in zip(self.sequences(), self.signals, offsets, strict=True)
+        )
+        return np.asarray((offsets - np.angle(total) / (2 * np.pi) * self.periods) % self.periods)
 
 
 def align(
-    signals: list[Floats], periods: Floats, start: str = "xcorr", weights: Floats | None = None
+    signals: list[Floats],
+    periods: Floats,
+    start: str | Floats = "xcorr",
+    weights: Floats | None = None,
+    hips: tuple[int, int] | None = None,
 ) -> Alignment:
     """Find the offset of each sequence.
 
     Parameters
     ----------
     signals : list of (T_i, A)
-        NaN where missing.
+        NaN where missing; a sequence may lack whole angles and is then aligned by the others.
     periods : (n,)
         Frames.
-    start : "xcorr" or "zeros"
-        Zeros is the paper's start.
+    start : "xcorr", "zeros" or (n,)
+        Circular cross-correlation with the first sequence's curve (and with some others', if a phase is
+        ambiguous); the paper's start; or offsets.
     weights : (A,), optional
         By default one over each angle's noise variance; ones is the paper's choice.
+    hips : (right, left), optional
+        Columns of the hips' flexion, which fix the common phase.
     """
-    problem = [_Sequence(z, p) for z, p in zip(signals, periods, strict=True)]
+    problem = _Problem(signals, np.asarray(periods, float), hips)
     w = _noise_weights(problem) if weights is None else np.asarray(weights, float)
-    offsets = _xcorr_start(problem, w) if start == "xcorr" else np.zeros(len(problem))
-    result = Alignment(offsets, weights=w)
+    if not isinstance(start, str):
+        return _descend(problem, np.asarray(start, float), w)
+    if start == "zeros":
+        return _descend(problem, np.zeros(len(signals)), w)
+    found = [_descend(problem, offsets, w) for offsets in _xcorr_starts(problem, w)]
+    return min(found, key=lambda a: a.objective[-1])
+
+
+def common_curve(signals: list[Floats], periods: Floats, offsets: Floats) -> Floats:
+    """Mean curve (1024, A) of aligned sequences as a periodic spline; NaN in columns that nobody has."""
+    curve = _Problem(signals, periods, None).curve(offsets)
+    return np.where(curve.known, curve.table(), np.nan)
+
+
+def hip_phase(curve: Floats) -> float:
+    """Phase at which the first harmonic of right minus left hip flexion is largest in a curve (n, >= 24).
+
+    Where the feet are not known it stands in for the right heel strike: in the mean of CMU's walks they are
+    0.02 of a cycle apart.
+    """
+    right, left = HIPS
+    return float(-np.angle(np.fft.fft(curve[:, right] - curve[:, left])[1]) / (2 * np.pi) % 1.0)
+
+
+def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
+    """Alternate both steps until the objective stops falling."""
+    result = Alignment(problem.gauged(offsets), weights=weights)
     for _ in range(ITERATIONS):
-        table, cost = _common_curve(problem, result.offsets, w)
+        table = problem.curve(result.offsets).table()
+        cost = sum(
+            s.cost(table, weights, o) for s, o in zip(problem.sequences(), result.offsets, strict=True)
+        )
         if result.objective and cost > result.objective[-1] * (1 - TOLERANCE):
             break
         result.objective.append(cost)
         result.offsets = np.array(
-            [s.best_offset(table, w, o) for s, o in zip(problem, result.offsets, strict=True)]
+            [
+                s.best_offset(table, weights, o)
+                for s, o in zip(problem.sequences(), result.offsets, strict=True)
+            ]
         )
+    result.offsets = problem.gauged(result.offsets)
     return result
 
 
-class _Sequence:
-    """One sequence with its observed mask and its sums per phase bin."""
-
-    def __init__(self, signals: Floats, period: float) -> None:
-        self.period = float(period)
-        self.seen = np.isfinite(signals)
-        self.values = np.where(self.seen, signals, 0.0)
-        self.time = np.arange(len(signals))
-        bins = self.bins(0.0)
-        member = np.zeros((BINS, len(signals)))
-        member[bins, self.time] = 1
-        self.counts, self.sums = member @ self.seen, member @ self.values
-        self.counts_hat = np.fft.rfft(self.counts, axis=0)
-        self.sums_hat = np.fft.rfft(self.sums, axis=0)
-
-    def phase(self, offset: float) -> Floats:
-        """Phase (T,) of each frame."""
-        return np.mod((self.time - offset) / self.period, 1.0)
-
-    def bins(self, offset: float) -> npt.NDArray[np.intp]:
-        """Phase bin (T,) of each frame."""
-        return np.minimum((self.phase(offset) * BINS).astype(int), BINS - 1)
-
-    def cost(self, table: Floats, weights: Floats, offset: float) -> float:
-        """Weighted sum of squares against a tabulated curve."""
-        at = self.phase(offset) * TABLE
-        low = at.astype(int) % TABLE
-        part = (at - np.floor(at))[:, None]
-        curve = table[low] * (1 - part) + table[(low + 1) % TABLE] * part
-        return float(np.sum(((self.values - curve) * self.seen) ** 2 @ weights))
-
-    def correlation(self, table: Floats, weights: Floats) -> Floats:
-        """Approximate cost (BINS,) at offsets of whole bins, up to a constant, by circular correlation."""
-        curve = table.reshape(BINS, -1, table.shape[1]).mean(axis=1) * weights
-        square = curve * table.reshape(BINS, -1, table.shape[1]).mean(axis=1)
-        spectrum = np.conj(np.fft.rfft(square, axis=0)) * self.counts_hat
-        spectrum -= 2 * np.conj(np.fft.rfft(curve, axis=0)) * self.sums_hat
-        return np.asarray(np.fft.irfft(spectrum.sum(axis=1), BINS))
-
-    def best_offset(self, table: Floats, weights: Floats, now: float) -> float:
-        """Offset of least cost: by correlation, then smaller steps and a parabola; never worse than now."""
-        coarse = float(np.argmin(self.correlation(table, weights))) * self.period / BINS
-        best, cost = now, self.cost(table, weights, now)
-        rough = self.cost(table, weights, coarse)
-        if rough < cost:
-            best, cost = coarse, rough
-        step = self.period / BINS
-        while step > 0.01:
-            left, right = (self.cost(table, weights, best + d) for d in (-step, step))
-            bend = left - 2 * cost + right
-            shift = 0.5 * step * (left - right) / bend if bend > 0 else 0.0
-            options = [(cost, best), (left, best - step), (right, best + step)]
-            if 0 < abs(shift) < step:
-                options.append((self.cost(table, weights, best + shift), best + shift))
-            cost, best = min(options)
-            step /= 4 if abs(shift) < step else 1.5
-        return best % self.period
-
-
-def _noise_weights(problem: list[_Sequence]) -> Floats:
-    """One over the variance that a periodic spline of each sequence alone leaves, mean 1."""
-    rest = sum(_residual(s) for s in problem)
-    count = sum(s.seen.sum(axis=0) for s in problem)
-    variance = rest / np.maximum(count, 1)
+def _noise_weights(problem: _Problem) -> Floats:
+    """One over the variance that a periodic spline of each sequence alone leaves, mean 1; 0 if never seen."""
+    columns = problem.signals[0].shape[1]
+    rest, count = np.zeros(columns), np.zeros(columns)
+    for s in problem.sequences():
+        alone = Curve(columns)
+        s.add_to(alone, 0.0)
+        rest += s.squares(alone.table(), 0.0)
+        count += s.seen.sum(axis=0)
+    known = count > 0
+    variance = rest[known] / count[known]
     floor = 1e-3 * float(np.mean(variance)) + 1e-12
-    weights = 1 / np.maximum(variance, floor)
-    return np.asarray(weights / weights.mean())
+    weights = np.zeros(columns)
+    weights[known] = 1 / np.maximum(variance, floor)
+    return weights / weights[known].mean()
 
 
-def _residual(s: _Sequence) -> Floats:
-    """Sum of squares (A,) left by a periodic spline of one sequence."""
-    basis = periodic_basis(s.phase(0.0))
-    fitted = basis @ _solve(basis.T @ basis, basis.T @ s.values)
-    return np.asarray((((s.values - fitted) * s.seen) ** 2).sum(axis=0))
+def _xcorr_starts(problem: _Problem, weights: Floats) -> Iterator[Floats]:
+    """Offsets from the first sequence's curve, and from some others' if a sequence has an ambiguous phase."""
+    offsets, ambiguous = _xcorr_start(problem, weights, 0)
+    yield offsets
+    if ambiguous:
+        others = np.linspace(0, len(offsets), STARTS, endpoint=False)[1:].astype(int)
+        for first in sorted(set(others.tolist()) - {0}):
+            yield _xcorr_start(problem, weights, first)[0]
 
 
-def _solve(gram: Floats, right: Floats) -> Floats:
-    """Least squares from the normal equations with a trace of ridge, for phases that nobody saw."""
-    return np.linalg.solve(gram + 1e-9 * (np.trace(gram) / len(gram) + 1e-12) * np.eye(len(gram)), right)
+def _xcorr_start(problem: _Problem, weights: Floats, first: int) -> tuple[Floats, bool]:
+    """Offsets by circular cross-correlation in some rounds, the first against one sequence's curve.
 
-
-def _common_curve(problem: list[_Sequence], offsets: Floats, weights: Floats) -> tuple[Floats, float]:
-    """Periodic spline of all sequences, tabulated (TABLE, A), and its weighted sum of squares."""
-    angles = problem[0].values.shape[1]
-    gram, right = np.zeros((angles, KNOTS, KNOTS)), np.zeros((angles, KNOTS))
-    for s, offset in zip(problem, offsets, strict=True):
-        basis = periodic_basis(s.phase(offset))
-        right += (basis.T @ s.values).T
-        if s.seen.all():
-            gram += basis.T @ basis
-        else:
-            gram += np.einsum("tk,ta,tl->akl", basis, s.seen, basis, optimize=True)
-    curve = np.stack([_solve(g, r) for g, r in zip(gram, right, strict=True)], axis=1)
-    table = periodic_basis(np.arange(TABLE) / TABLE) @ curve
-    return table, sum(s.cost(table, weights, o) for s, o in zip(problem, offsets, strict=True))
-
-
-def common_curve(signals: list[Floats], periods: Floats, offsets: Floats) -> Floats:
-    """Mean curve (1024, A) of aligned sequences as a periodic spline."""
-    problem = [_Sequence(z, p) for z, p in zip(signals, periods, strict=True)]
-    return _common_curve(problem, offsets, np.ones(signals[0].shape[1]))[0]
-
-
-def _xcorr_start(problem: list[_Sequence], weights: Floats) -> Floats:
-    """Offsets against sequence 1, then against the mean of all, by circular cross-correlation."""
-    offsets = np.zeros(len(problem))
-    reference, _ = _common_curve(problem[:1], offsets[:1], weights)
+    Returns the offsets and whether some sequence fits another phase nearly as well.
+    """
+    offsets, ambiguous = np.zeros(len(problem.signals)), False
+    alone = _Problem([problem.signals[first]], problem.periods[[first]], None)
+    reference = alone.curve(np.zeros(1)).table()
     for _ in range(XCORR_ROUNDS):
-        for i, s in enumerate(problem):
-            offsets[i] = np.argmin(s.correlation(reference, weights)) * s.period / BINS
-        reference, _ = _common_curve(problem, offsets, weights)
-    return offsets
+        ambiguous = False
+        for i, s in enumerate(problem.sequences()):
+            cost = s.correlation(reference, weights)
+            offsets[i] = np.argmin(cost) * s.period / BINS
+            ambiguous |= _second(cost) > AMBIGUOUS
+        reference = problem.curve(offsets).table()
+    return offsets, ambiguous
+
+
+def _second(cost: Floats) -> float:
+    """Depth below the mean cost (BINS,) of the best valley away from the deepest, over the depth of that."""
+    reach, best = round(APART * BINS), int(np.argmin(cost))
+    far = np.roll(cost, -best)[reach : BINS - reach]
+    valley = int(np.argmin(far))
+    depth = float(cost.mean() - cost[best])
+    if depth <= 0 or valley in (0, len(far) - 1):
+        return 0.0
+    return float(cost.mean() - far[valley]) / depth

@@ -89,7 +89,7 @@ def fit(sequences: list[Sequence], components: int | str = DEFAULT_COMPONENTS, s
     proportions = _mean_body(sequences, index, len(subjects))
     signals = [s.channels for s in sequences]
     periods = np.array([s.period.frames for s in sequences])
-    alignment = align.align([z[:, : len(ANGLES)] for z in signals], periods)
+    alignment = align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIPS)
     start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
     alignment.offsets = (alignment.offsets + start * periods) % periods
     rows = cycles.slice_cycles(signals, periods, alignment.offsets, SAMPLES)
@@ -111,10 +111,15 @@ def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects:
 
 
 def heel_strike(curve: Floats, proportions: Proportions) -> float:
-    """Phase at which the right heel is farthest ahead of the pelvis in a mean curve (n, M)."""
+    """Phase at which the right heel is farthest ahead of the pelvis in a mean curve (n, M).
+
+    Where nobody has the angles of the right leg it is the phase at which the hips are farthest apart.
+    """
     sections = default_skeleton(proportions).sections()
     joints = default_skeleton(proportions).points
     forward = points(sections, curve)[:, joints.index("r_heel"), 0]
+    if not np.isfinite(forward).all():
+        return align.hip_phase(curve)
     n, top = len(forward), int(np.argmax(forward))
     left, peak, right = forward[[top - 1, top, (top + 1) % n]]
     return float((top + 0.5 * (left - right) / (left - 2 * peak + right)) / n)
