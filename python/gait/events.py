@@ -104,7 +104,14 @@ def _foot(truth: Joints, side: str) -> Array:
 
 
 def furthest(time: Array, reach: Array) -> Array:
-    """Return the times of the maxima of `reach` (n,) over `time`, refined by the parabola through three frames."""
+    """Return the times of the maxima of `reach`, refined by the parabola through three frames.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n,)
+    reach : ndarray of shape (n,)
+        Metres that a foot is ahead of the pelvis (or behind it, to find toe-offs).
+    """
     step = float(np.median(np.diff(time)))
     peaks, _ = find_peaks(reach, height=_REACH, distance=max(1, round(_APART / step)))
     before, top, after = reach[peaks - 1], reach[peaks], reach[peaks + 1]

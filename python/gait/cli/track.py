@@ -15,12 +15,13 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 
+from gait import blob
 from gait._abi import Mode, TrackStatus
 from gait.autostart import find_start
 from gait.camera import Camera
@@ -28,9 +29,11 @@ from gait.cli import defaults, values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
 from gait.initial import Start
-from gait.model import Model
+from gait.model import Model, read_blob
+from gait.modelcurves import ModelCurves
 from gait.overlay import Overlay
 from gait.progress import progress
+from gait.smoothed import Smoother
 from gait.tracker import Estimate, Tracker, TrackerConfig
 from gait.trackfile import TrackWriter
 from gait.trc import write_trc
@@ -82,6 +85,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--mode", choices=[m.name.lower() for m in Mode], default="default", help="set of settings"
     )
     parser.add_argument("--overlay", metavar="O.mp4", help="also draw the estimate into the video")
+    parser.add_argument(
+        "--smooth", action="store_true", help="estimates that know the whole clip, frames after them included"
+    )
+    parser.add_argument(
+        "--draws",
+        metavar="D.npz",
+        help="with --smooth: also write the motions drawn, for gait report track",
+    )
     parser.add_argument("--trc", metavar="O.trc", help="also write the joints for OpenSim (y up)")
 
 
@@ -89,7 +100,9 @@ def run(args: argparse.Namespace) -> int:
     """Track and report."""
     if args.stop is not None and args.stop <= (args.start or 0):
         raise UsageError(f"--stop {args.stop}: must be greater than --start {args.start or 0}")
-    for path in filter(None, (args.output, args.overlay, args.trc)):
+    if args.draws and not args.smooth:
+        raise UsageError("--draws: needs --smooth")
+    for path in filter(None, (args.output, args.overlay, args.trc, args.draws)):
         require_writable(path)
     video = Video(args.video)
     camera = Camera.read(args.camera, video.size)
@@ -151,10 +164,12 @@ class _Results:
         self.times: list[float] = []
         self.joints: list[np.ndarray[Any, Any]] = []
 
-    def add(self, frame: Frame, estimate: Estimate) -> None:
+    def step(self, frame: Frame, estimate: Estimate) -> None:
         self._steps.append(1000 * self._tracker.step_seconds)
-        self._statuses.append(estimate.status)
         self._wall = time.perf_counter() - self._begun
+
+    def add(self, frame: Frame, estimate: Estimate) -> None:
+        self._statuses.append(estimate.status)
         self.times.append(frame.time)
         self.joints.append(estimate.joints)
 
@@ -185,6 +200,7 @@ def _track(args: argparse.Namespace, video: Video, tracker: Tracker, start: Star
     with ExitStack() as stack:
         rows = TrackWriter(args.output, model.info.components, model.joint_names, model.angle_names)
         sinks: list[Sink] = [results.add, stack.enter_context(rows).write]
+        smoother = stack.enter_context(_smoother(args, tracker)) if args.smooth else None
         if args.overlay:
             film = stack.enter_context(VideoWriter(args.overlay, video.fps))
             overlay = Overlay(model, tracker.cameras[0])
@@ -193,12 +209,33 @@ def _track(args: argparse.Namespace, video: Video, tracker: Tracker, start: Star
             )
         update = stack.enter_context(progress("tracking", stop - start.frame, args.quiet))
         for done, (frame, estimate) in enumerate(tracker.follow(video, start, stop), 1):
-            for sink in sinks:
+            results.step(frame, estimate)
+            for sink in sinks if smoother is None else [smoother.add]:
                 sink(frame, estimate)
             update(done)
+        if smoother is not None and len(smoother):
+            _smooth(args, video, smoother, sinks)
         if not results.times:
             raise UserError(f"{video.path}: no frame from {start.frame} on can be decoded; convert it anew")
     return results
+
+
+def _smoother(args: argparse.Namespace, tracker: Tracker) -> Smoother:
+    return Smoother(tracker, ModelCurves(blob.decode(read_blob(args.model), str(args.model))))
+
+
+def _smooth(args: argparse.Namespace, video: Video, smoother: Smoother, sinks: list[Sink]) -> None:
+    """Give every frame with its smoothed estimate to the sinks, and write the draws."""
+    with progress("smoothing", len(smoother), args.quiet) as update:
+        rows, draws = smoother.finish(update=update)
+    if args.draws:
+        draws.write(args.draws)
+    frames: Iterable[Frame] = (frame for frame, _ in rows)
+    if args.overlay:  # the pictures once more
+        frames = video.frames(rows[0][0].number, rows[-1][0].number + 1)
+    for frame, (_, estimate) in zip(frames, rows, strict=True):
+        for sink in sinks:
+            sink(frame, estimate)
 
 
 def _text(summary: dict[str, Any]) -> str:
