@@ -4,6 +4,7 @@
     make eval ARGS='--modes default --init truth --seeds 1'
     make eval ARGS='--all'                     also wrong stature, no background, 15 and 10 frames a second
     make eval ARGS='--particles 300 1000 3000 --modes default --init truth'
+    make eval ARGS='--against old.json'        what changed since that results.json, with intervals
     make eval ARGS='--ablate --modes default --init truth'
     make eval ARGS='--folder DIR'              any folder of clips (video.mp4 camera.json truth.csv ...)
     make eval ARGS='--simulated DIR'           hard cases: made in DIR if absent, then evaluated
@@ -61,11 +62,12 @@ def arguments() -> argparse.Namespace:
     add("--particles", type=int, nargs="+", default=[], metavar="N", help="also with N particles")
     add("--ablate", action="store_true", help="also with each term and feature switched off")
     add("--all", action="store_true", help="--stature-error 0.05 --background none --every 2 3")
+    add("--against", type=Path, metavar="JSON", help="results.json of an earlier run: print what changed")
     add("--jobs", type=int, default=2, metavar="J", help="runs side by side, same results (2)")
     add("--json", action="store_true", help="print the figures of every run as JSON instead of tables")
     add("--html", type=Path, default=OUT, metavar="DIR", help="folder of the results (build/eval)")
     add("--no-pictures", action="store_true", help="neither overlays nor a page")
-    add("--record", action="store_true", help="also write tests/bench/results/eval.md and eval.csv")
+    add("--record", metavar="NAME", help="also write tests/bench/results/NAME.md and NAME.csv")
     args = parser.parse_args()
     if args.all:
         args.stature_error = args.stature_error or 0.05
@@ -140,25 +142,36 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
             writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
 
 
-def tables(rows: list[dict[str, Any]], shape: Callable[[list[list[str]], int], str]) -> list[tuple[str, str]]:
-    """Headings and tables in the shape of `shape`."""
-    parts = [("Clips", shape(eval_table.grid(eval_table.summaries(rows)), 2))]
+def tables(
+    rows: list[dict[str, Any]], before: list[dict[str, Any]], shape: Callable[[list[list[str]], int], str]
+) -> list[tuple[str, str]]:
+    """Headings and tables in the shape of `shape`; `before` is an earlier run's rows or empty."""
+    summaries = eval_table.summaries(rows)
+    parts = [("Clips", shape(eval_table.grid(summaries), 2))]
+    parts.append(("Intervals and status", shape(eval_table.honesty(summaries), 2)))
     costs = eval_ablate.costs(rows)
     if costs:
         parts.append(
             ("Switched off: change of each measure, 95 % interval", shape(eval_ablate.grid(costs), 2))
         )
+    changes = eval_ablate.changes(before, rows)
+    if changes:
+        parts.append(
+            ("Changed since: mean over the runs, 95 % interval", shape(eval_ablate.grid(changes), 2))
+        )
     parts.append(("Wanted and reached", shape(eval_wanted.grid(eval_wanted.verdicts(rows)), 4)))
     return parts
 
 
-def record(rows: list[dict[str, Any]], words: str) -> None:
+def record(name: str, rows: list[dict[str, Any]], words: str) -> None:
     """Keep the figures of this run in the repository."""
     RESULTS.mkdir(exist_ok=True)
-    write_csv(RESULTS / "eval.csv", rows)
-    text = [f"# Evaluation of the tracker\n\n{facts(words)}  A row for each run is in eval.csv.\n"]
-    text += [f"## {heading}\n\n{table}\n" for heading, table in reversed(tables(rows, eval_table.markdown))]
-    with replacing(RESULTS / "eval.md") as path:
+    write_csv(RESULTS / f"{name}.csv", rows)
+    text = [f"# Evaluation of the tracker\n\n{facts(words)}  A row for each run is in {name}.csv.\n"]
+    text += [
+        f"## {heading}\n\n{table}\n" for heading, table in reversed(tables(rows, [], eval_table.markdown))
+    ]
+    with replacing(RESULTS / f"{name}.md") as path:
         path.write_text("\n".join([*text, fill(eval_table.LEGEND, 110), ""]), encoding="utf-8")
 
 
@@ -185,6 +198,14 @@ def evaluate(args: argparse.Namespace) -> list[dict[str, Any]]:
     return rows
 
 
+def earlier(path: Path) -> list[dict[str, Any]]:
+    """Rows of another run's results.json."""
+    if not path.is_file():
+        raise UserError(f"--against {path}: no such file; keep the results.json of an earlier run")
+    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
+    return rows
+
+
 def main() -> int:
     """Evaluate and report."""
     args = arguments()
@@ -192,6 +213,7 @@ def main() -> int:
         print("eval: ../shared/data is absent: nothing to evaluate on", file=sys.stderr)
         return 0
     try:
+        before = [] if args.against is None else earlier(args.against)
         rows = evaluate(args)
     except UserError as exc:
         print(f"eval: {exc}", file=sys.stderr)
@@ -199,13 +221,13 @@ def main() -> int:
     if args.json:
         print(json.dumps(rows))
     else:
-        for heading, table in tables(rows, eval_table.plain):
+        for heading, table in tables(rows, before, eval_table.plain):
             print(f"\n{heading}\n{table}")
         print("\n" + fill(eval_table.LEGEND, 110))
         for words in eval_table.failures(rows):
             print(f"gave up: {words}")
     if args.record:
-        record(rows, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")
+        record(args.record, rows, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")
     if not args.no_pictures:
         print(f"pictures and plots: {args.html / 'index.html'}", file=sys.stderr)
     return 0

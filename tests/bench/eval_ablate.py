@@ -10,6 +10,7 @@ from eval_plan import BASE
 from gait import Term, TrackerConfig
 
 Rows = list[dict[str, Any]]
+Runs = dict[tuple[str, int], dict[str, Any]]
 
 # feature: settings that switch it off; those that this version lacks, or has off already, are passed over
 _FEATURES: dict[str, dict[str, Any]] = {
@@ -51,19 +52,32 @@ def switches(config: TrackerConfig) -> dict[str, dict[str, Any]]:
 
 def costs(rows: Rows) -> list[dict[str, Any]]:
     """For each arm that is not the base: mean change with a 95 % interval, worst first."""
-    base = {(r["clip"], r["seed"]): r for r in rows if r["arm"] == BASE}
-    out = []
-    for arm in dict.fromkeys(r["arm"] for r in rows if r["arm"].startswith("no ")):
-        runs = {(r["clip"], r["seed"]): r for r in rows if r["arm"] == arm}
-        line: dict[str, Any] = {"arm": arm, "refused": next((r["failure"] for r in runs.values()), "")}
-        for name in MEASURES:
-            table = _differences(base, runs, name)
-            line[name] = None if table is None else interval(table)
-        out.append(line)
+    base = _by_run(rows, BASE)
+    arms = dict.fromkeys(r["arm"] for r in rows if r["arm"].startswith("no "))
+    out = [_line(arm[3:], base, _by_run(rows, arm)) for arm in arms]
     return sorted(out, key=lambda line: -(line["root_mm"] or (-np.inf,))[0])
 
 
-def _differences(base: dict[Any, Any], runs: dict[Any, Any], name: str) -> np.ndarray | None:
+def changes(before: Rows, after: Rows) -> list[dict[str, Any]]:
+    """For each arm in both: what changed from one evaluation to another, clip by clip and seed by seed."""
+    arms = [a for a in dict.fromkeys(r["arm"] for r in after) if any(r["arm"] == a for r in before)]
+    return [_line(arm, _by_run(before, arm), _by_run(after, arm)) for arm in arms]
+
+
+def _by_run(rows: Rows, arm: str) -> Runs:
+    return {(r["clip"], r["seed"]): r for r in rows if r["arm"] == arm}
+
+
+def _line(name: str, base: Runs, runs: Runs) -> dict[str, Any]:
+    line: dict[str, Any] = {"name": name}
+    line["refused"] = next((r["failure"] for r in runs.values() if r["failure"]), "")
+    for measure in MEASURES:
+        table = _differences(base, runs, measure)
+        line[measure] = None if table is None else interval(table)
+    return line
+
+
+def _differences(base: Runs, runs: Runs, name: str) -> np.ndarray | None:
     """Run minus base, (clips, seeds), where both are known for every seed of a clip."""
     clips: dict[str, list[float]] = {}
     for (clip, seed), row in runs.items():
@@ -92,9 +106,9 @@ def interval(differences: np.ndarray) -> tuple[float, float, float]:
 
 
 def grid(lines: list[dict[str, Any]]) -> list[list[str]]:
-    """Head and lines: positive is worse without; a star where the interval excludes 0."""
-    head = ["switched off", "", *MEASURES.values()]
-    return [head, *([line["arm"][3:], line["refused"], *map(_cell, _values(line))] for line in lines)]
+    """Head and lines: positive is an increase; a star where the interval excludes 0."""
+    head = ["", "gave up", *MEASURES.values()]
+    return [head, *([line["name"], line["refused"], *map(_cell, _values(line))] for line in lines)]
 
 
 def _values(line: dict[str, Any]) -> list[tuple[float, float, float] | None]:

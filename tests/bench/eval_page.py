@@ -44,7 +44,9 @@ def write(
     if costs:
         parts += ["<h2>What each feature is worth (change when off; positive is worse)</h2>"]
         parts.append(_table(eval_ablate.grid(costs)))
-    parts += ["<h2>Clips</h2>", _table(eval_table.grid(eval_table.summaries(rows)))]
+    summaries = eval_table.summaries(rows)
+    parts += ["<h2>Clips</h2>", _table(eval_table.grid(summaries))]
+    parts += ["<h2>Intervals and status</h2>", _table(eval_table.honesty(summaries))]
     parts.append(f'<p class="dim">{escape(eval_table.LEGEND)}</p>')
     failed = {key: group for key, group in groups.items() if any(map(faults, (row for _, row in group)))}
     parts.append(f"<h2>Failures ({len(failed)})</h2>")

@@ -67,25 +67,40 @@ SHOWN = {  # column of the printed table: figure, decimals
     "lost%": ("lost_pct", 1),
     "twice%": ("lost2_pct", 1),
     "ambig%": ("ambig_pct", 0),
-    "c50": ("cover50", 2),
     "c90": ("cover90", 2),
-    "nees": ("nees", 1),
-    "crps": ("crps_mm", 0),
     "HS%": ("strikes_pct", 0),
     "from": ("first", 0),
     "ms": ("step_ms", 1),
 }
+HONESTY = {  # of the second table
+    "in 50 %": ("cover50", 2),
+    "in 90 %": ("cover90", 2),
+    "phase in 90 %": ("phase90", 2),
+    "PIT chi2": ("pit_chi2", 0),
+    "z2": ("z2", 1),
+    "NEES": ("nees", 1),
+    "CRPS mm": ("crps_mm", 1),
+    "width mm": ("width_mm", 0),
+    "init %": ("init_pct", 0),
+    "tracking %": ("track_pct", 0),
+    "ambiguous %": ("ambig_pct", 0),
+    "lost %": ("said_lost_pct", 0),
+    "silent %": ("silent_pct", 1),
+}
 _SPREAD = ("root", "abs", "px")  # columns that also show least and most over the seeds
 
 LEGEND = (
-    "Medians over the seeds of a clip's median over frames (least-most). root abs proc 12j: mm, "
-    "hips laid together, as it stands, after the best similarity of each frame (to compare with literature "
-    "only), root over 12 limb joints; MPipe: MediaPipe Pose in the measure of 12j; static: mean pose at the "
-    "true place (root); free: mean cycle running free from the true start (root); px: distance in the image, "
-    "outdoor: near leg; clear: all clear marks; lost: root > 150 mm or said so; twice: the same, "
-    "frames under tracking counted twice; c50 c90: share of joint coordinates inside the intervals; nees: "
-    "error in the particles' covariance, 1 is right; crps: mm; HS: heel strikes within 2 frames; from: first "
-    "frame tracked; ms: a step."
+    "Medians over the seeds of a clip's median over frames (least-most). root abs proc 12j: mm, hips laid "
+    "together, as it stands, after the best similarity of each frame (to compare with literature only), "
+    "root over 12 limb joints; MPipe: MediaPipe Pose in the measure of 12j; static: mean pose at the true "
+    "place (root); free: mean cycle running free from the true start (root); px: distance in the image, "
+    "outdoor: near leg; clear: all clear marks; lost: root > 150 mm or said so; twice: the same, frames "
+    "under tracking counted twice; c90: share of joint coordinates inside the 90 % intervals; HS: heel "
+    "strikes within 2 frames; from: first frame tracked; ms: a step. Intervals and status: PIT chi2: "
+    "probability integral transform against flat, 10 bins; z2: squared error in variances, 1 is right; "
+    "NEES: error of all joints in the particles' covariance per dimension, 1 is right; CRPS: score of the "
+    "intervals, lower is better; width: of the 90 % intervals; silent: frames more than 150 mm off under "
+    "tracking."
 )
 
 
@@ -142,10 +157,10 @@ def failures(rows: list[dict[str, Any]]) -> list[str]:
     return [f"{', '.join(runs)}: {words}" for words, runs in lines.items()]
 
 
-def cells(summary: dict[str, Any]) -> list[str]:
+def cells(summary: dict[str, Any], shown: dict[str, tuple[str, int]]) -> list[str]:
     """Texts of one line of the table, without clip and arm."""
     out = []
-    for column, (name, decimals) in SHOWN.items():
+    for column, (name, decimals) in shown.items():
         value = summary[name]
         if value is None:
             out.append("")
@@ -162,10 +177,15 @@ def grid(rows: list[dict[str, Any]]) -> list[list[str]]:
     """Head and lines of the table of `summaries`."""
     head = ["clip", "arm", "runs", *SHOWN, "lost runs"]
     lines = [
-        [s["clip"], s["arm"], str(s["runs"]), *cells(s), str(s["lost_runs"]) if s["lost_runs"] else ""]
+        [s["clip"], s["arm"], str(s["runs"]), *cells(s, SHOWN), str(s["lost_runs"]) if s["lost_runs"] else ""]
         for s in rows
     ]
     return [head, *lines]
+
+
+def honesty(rows: list[dict[str, Any]]) -> list[list[str]]:
+    """Head and lines of the table of intervals and status."""
+    return [["clip", "arm", *HONESTY], *([s["clip"], s["arm"], *cells(s, HONESTY)] for s in rows)]
 
 
 def plain(lines: list[list[str]], words: int = 2) -> str:

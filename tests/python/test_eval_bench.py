@@ -151,10 +151,14 @@ def test_ablation_is_paired_and_its_interval_knows_noise_from_effect():
             rows.append(row(clip, seed, root_mm=base))
             rows.append(row(clip, seed, "no edges", root_mm=base + 8 + rng.normal(0, 2)))
             rows.append(row(clip, seed, "no tilt", root_mm=base + rng.normal(0, 2)))
-    costs = {line["arm"]: line["root_mm"] for line in eval_ablate.costs(rows)}
-    mean, low, high = costs["no edges"]
+    costs = {line["name"]: line["root_mm"] for line in eval_ablate.costs(rows)}
+    mean, low, high = costs["edges"]
     assert 6 < low < mean < high < 10 and low < 8 < high
-    assert costs["no tilt"][1] < 0 < costs["no tilt"][2]
+    assert costs["tilt"][1] < 0 < costs["tilt"][2]
+    later = [r | {"root_mm": r["root_mm"] - 3} for r in rows]
+    assert {line["name"]: line["root_mm"] for line in eval_ablate.changes(rows, later)} == {
+        arm: pytest.approx((-3, -3, -3)) for arm in (eval_plan.BASE, "no edges", "no tilt")
+    }
 
 
 def test_switches_turn_off_what_is_on():
