@@ -57,7 +57,32 @@ def test_bones_keep_their_lengths_and_join(amc):
     )
 
 
-@pytest.mark.parametrize("rename", [None, CGSPEED, MIXAMO, POSER], ids=["cmu", "cgspeed", "mixamo", "poser"])
+BIOVISION = {
+    "root": "Hips", "lowerback": "Chest", "lowerneck": "Chest4", "upperneck": "Neck",
+    "lfemur": "LeftHip", "ltibia": "LeftKnee", "lfoot": "LeftAnkle",
+    "rfemur": "RightHip", "rtibia": "RightKnee", "rfoot": "RightAnkle",
+    "lclavicle": "LeftCollar", "lhumerus": "LeftShoulder", "lradius": "LeftElbow", "lhand": "LeftWrist",
+    "rclavicle": "RightCollar", "rhumerus": "RightShoulder", "rradius": "RightElbow", "rhand": "RightWrist",
+}  # fmt: skip
+BIPED = {
+    "root": "Bip01_Pelvis", "lowerback": "Bip01_Spine", "lowerneck": "Bip01_Spine3",
+    "upperneck": "Bip01_Neck", "head": "Bip01_Head",
+    **{f"{s}{old}": f"Bip01_{s.upper()}_{new}" for s in "lr" for old, new in (
+        ("femur", "Thigh"), ("tibia", "Calf"), ("foot", "Foot"), ("clavicle", "Clavicle"),
+        ("humerus", "UpperArm"), ("radius", "Forearm"), ("hand", "Hand"),
+    )},
+}  # fmt: skip
+NAMES = {
+    "cmu": None,
+    "cgspeed": CGSPEED,
+    "mixamo": MIXAMO,
+    "poser": POSER,
+    "biovision": BIOVISION,
+    "biped": BIPED,
+}
+
+
+@pytest.mark.parametrize("rename", NAMES.values(), ids=NAMES)
 def test_bvh_gives_the_angles_of_the_amc_it_was_made_from(amc, rename):
     path = amc.with_suffix(".bvh")
     path.write_text(files.bvh_from_amc(amc, rename, unit=0.01))
@@ -77,6 +102,53 @@ def test_bvh_of_a_real_walk(tmp_path):
     assert np.degrees(angles(mocap_bvh.read(path))) == pytest.approx(
         np.degrees(angles(mocap_asf.read(source))), abs=0.05
     )
+
+
+def test_blanks_about_the_colons_of_a_bvh_are_free(amc):
+    path, text = amc.with_suffix(".bvh"), files.bvh_from_amc(amc)
+    path.write_text(text)
+    known = mocap_bvh.read(path)
+    path.write_text(text.replace("Frames: ", "FRAMES:").replace("Frame Time: ", "FrameTime : "))
+    found = mocap_bvh.read(path)
+    assert found.fps == known.fps and (found.rotation == known.rotation).all()
+
+
+def test_radians_by_the_header_of_either_file(amc):
+    known = mocap_asf.read(amc)
+    lines = amc.read_text().splitlines()
+    for i, line in enumerate(lines):
+        name, *numbers = line.split()
+        if numbers:
+            place = 3 if name == "root" else 0
+            turned = [float(v) if k < place else np.radians(float(v)) for k, v in enumerate(numbers)]
+            lines[i] = " ".join([name, *(f"{v:.9f}" for v in turned)])
+    motion = "\n".join(lines) + "\n"
+    amc.write_text(motion.replace(":DEGREES", ":RADIANS"))
+    assert mocap_asf.read(amc).rotation == pytest.approx(known.rotation, abs=1e-7)
+    amc.write_text(motion.replace(":DEGREES\n", ""))
+    asf = amc.parent / "77.asf"
+    text = asf.read_text()
+    for axes in {bone[4] for bone in files.BONES}:
+        words = " ".join(f"{np.radians(v):.9f}" for v in axes)
+        text = text.replace(f"axis {' '.join(map(str, axes))} XYZ", f"axis {words} XYZ")
+    asf.write_text(text.replace("angle deg", "angle rad"))
+    assert mocap_asf.read(amc).rotation == pytest.approx(known.rotation, abs=1e-7)
+
+
+def test_the_rate_is_what_a_motion_says_unless_told(amc):
+    assert mocap_asf.read(amc).fps == 120
+    amc.write_text(":SAMPLES-PER-SECOND 60\n" + amc.read_text())
+    assert mocap_asf.read(amc).fps == 60 and mocap_asf.read(amc, 30.0).fps == 30
+    amc.write_text(amc.read_text().replace("SECOND 60", "SECOND 0"))
+    with pytest.raises(UserError, match="77_01.amc:1: 0 frames per second"):
+        mocap_asf.read(amc)
+
+
+def test_an_unknown_unit_of_angles_is_named(amc):
+    asf = amc.parent / "77.asf"
+    asf.write_text(asf.read_text().replace("angle deg", "angle turns"))
+    with pytest.raises(UserError, match=r"77.asf:4: angles in 'turns'; write 'angle deg' or 'angle rad'"):
+        mocap_asf.read(amc)
 
 
 def test_z_up_bvh_is_recognised(amc, tmp_path):

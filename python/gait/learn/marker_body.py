@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn import articulated, marker_map, marker_sets, skeleton_fit
-from gait.learn.articulated import SEGMENTS, Indices, Posed
+from gait.learn.articulated import SEGMENTS
 from gait.learn.body import Body
 from gait.learn.marker_sets import LANDMARKS, Landmark, plain
 from gait.skeleton import JOINTS, SIDES, default_skeleton
@@ -24,6 +24,13 @@ FEWEST_LABELS = 6
 JOINT_SD = 0.03  # metres beyond which a joint is not known
 AXIS_SD = np.radians(15)  # beyond which a direction is not known
 WORST_RMS = 0.05  # metres: markers in other places than their labels say
+#: Axes to the left that a body has, and the segments whose they are.
+HINGES = {"head": "head"} | {
+    f"{s}_{joint}": f"{s}_{part}"
+    for s in SIDES
+    for joint, part in (("knee", "thigh"), ("elbow", "upper_arm"))
+}
+CHUNK = 512  # frames worked on at once
 LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 
 
@@ -106,17 +113,9 @@ def _subject(label: str) -> str:
 
 def from_fit(name: str, fps: float, fit: skeleton_fit.Fit) -> Body:
     """Body of a fitted skeleton, turned to z up, without what is not determined."""
-    skeleton, posed = default_skeleton(), fit.posed()
-    segment = np.array(skeleton.point_frames, np.intp)
-    local = articulated.scales(fit.stretch)[segment] * skeleton.point_positions
-    positions = _known_points(posed, posed.points(local, segment), segment, fit.covariance)
+    positions, axes = _known(fit)
     joints = {joint: positions[:, k] for k, joint in enumerate(JOINTS)}
     joints["head"] = joints.pop("head_top")
-    hinges = {"head": "head"}
-    hinges |= {
-        f"{s}_{j}": f"{s}_{part}" for s in SIDES for j, part in (("knee", "thigh"), ("elbow", "upper_arm"))
-    }
-    axes = _known_axes(posed, np.array([SEGMENTS.index(part) for part in hinges.values()]), fit.covariance)
     turn_sd = np.sqrt(np.trace(fit.covariance[:, 3:6, 3:6], axis1=1, axis2=2))
     pelvis = np.where((turn_sd < AXIS_SD)[:, None, None], fit.pose.turn, np.nan)
     up = _upright(fit.pose.turn[np.isfinite(pelvis[:, 0, 0])])
@@ -126,22 +125,27 @@ def from_fit(name: str, fps: float, fit: skeleton_fit.Fit) -> Body:
         fps,
         {joint: place @ up.T for joint, place in joints.items()},
         up @ pelvis,
-        {hinge: axes[:, k] @ up.T for k, hinge in enumerate(hinges)},
+        {hinge: axes[:, k] @ up.T for k, hinge in enumerate(HINGES)},
         residual=rms,
     )
 
 
-def _known_points(posed: Posed, points: Floats, segment: Indices, covariance: Floats) -> Floats:
-    """Points (T, P, 3), NaN where their standard deviation is too large."""
-    return np.where(_sd(posed.by_pose(points, segment), covariance)[..., None] < JOINT_SD, points, np.nan)
-
-
-def _known_axes(posed: Posed, segment: Indices, covariance: Floats) -> Floats:
-    """Axes to the left (T, P, 3) of segments, NaN where their direction is uncertain."""
-    axes = posed.turns[:, segment][..., 1]
-    return np.where(
-        _sd(posed.directions_by_pose(axes, segment), covariance)[..., None] < AXIS_SD, axes, np.nan
-    )
+def _known(fit: skeleton_fit.Fit) -> tuple[Floats, Floats]:
+    """Joints (T, P, 3) and axes of `HINGES` (T, 5, 3), NaN where their standard deviation is too large."""
+    skeleton, offsets = default_skeleton(), articulated.origins(fit.stretch)
+    segment = np.array(skeleton.point_frames, np.intp)
+    local = articulated.scales(fit.stretch)[segment] * skeleton.point_positions
+    hinged = np.array([SEGMENTS.index(part) for part in HINGES.values()])
+    points, axes = [], []
+    for first in range(0, len(fit.pose), CHUNK):
+        chunk = slice(first, first + CHUNK)
+        posed, covariance = articulated.posed(fit.pose[chunk], offsets), fit.covariance[chunk]
+        place, left = posed.points(local, segment), posed.turns[:, hinged][..., 1]
+        unsure = _sd(posed.by_pose(place, segment), covariance) > JOINT_SD
+        points.append(np.where(unsure[..., None], np.nan, place))
+        unsure = _sd(posed.directions_by_pose(left, hinged), covariance) > AXIS_SD
+        axes.append(np.where(unsure[..., None], np.nan, left))
+    return np.concatenate(points), np.concatenate(axes)
 
 
 def _sd(slopes: Floats, covariance: Floats) -> Floats:

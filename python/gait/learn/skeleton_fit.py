@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.learn import articulated
-from gait.learn.articulated import FREEDOMS, ROOT, Indices, Pose, Posed
+from gait.learn.articulated import FREEDOMS, ROOT, Indices, Pose
 from gait.skeleton import ANGLES
 
 Floats = npt.NDArray[np.float64]
@@ -82,15 +82,6 @@ class Fit:
     pose: Pose
     residual: Floats
     covariance: Floats
-
-    @property
-    def stature(self) -> float:
-        """Stature in metres that the sizes suggest."""
-        return float(np.exp(self.stretch[0]))
-
-    def posed(self) -> Posed:
-        """Give the skeleton of the subject in all poses."""
-        return articulated.posed(self.pose, articulated.origins(self.stretch))
 
 
 @dataclass
