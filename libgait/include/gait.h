@@ -24,6 +24,7 @@
 #define GAIT_MAX_JOINTS 32     /* points of the skeleton whose positions are reported */
 #define GAIT_MAX_ANGLES 32     /* joint angles */
 #define GAIT_MAX_COMPONENTS 16 /* principal components of the cyclic model */
+#define GAIT_MAX_PROPORTIONS 8 /* ways in which limbs differ in length */
 #define GAIT_MAX_CAMERAS 4
 
 #if defined(__GNUC__)
@@ -90,6 +91,7 @@ typedef struct gait_state {          /* one hypothesis: everything that places a
     float pelvis[3];                 /* pelvis joint, metres, world */
     float coef[GAIT_MAX_COMPONENTS]; /* principal-component scores, in standard deviations; unused are 0 */
     float offset[GAIT_MAX_ANGLES];   /* posture: added to the model's joint angles, radians; unused are 0 */
+    float proportion[GAIT_MAX_PROPORTIONS]; /* scores of the limbs' proportions, standard deviations; unused are 0 */
 } gait_state;
 
 typedef struct gait_pose {
@@ -113,7 +115,7 @@ typedef struct gait_model_info {
     int32_t  components;       /* of the cyclic model */
     int32_t  phases;           /* samples per stride of its curves */
     int32_t  limbs;            /* drawn body parts */
-    int32_t  reserved;
+    int32_t  proportions;      /* ways in which limbs differ in length at the same stature */
     float    stride_hz;        /* mean of the training set, strides per second */
     float    stride_hz_sd;     /* between subjects */
     float    stride_length;    /* mean, as a fraction of stature */
@@ -158,7 +160,7 @@ typedef struct gait_tracker_config {
     int32_t  tasks;            /* pieces per step [1, 256], sizes the scratch; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
-    uint32_t reserved;
+    int32_t  proportions;      /* [0, the model's]; default -1: all (paper mode 0) */
     uint32_t terms;            /* GAIT_TERM_* in use */
     float    term_weight[4];   /* nats per unit cost of texture, silhouette, edges, template */
     float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
@@ -179,7 +181,9 @@ typedef struct gait_tracker_config {
     float    stature_noise;    /* fraction of stature, while settling */
     float    offset_noise;     /* posture of the angles in offset_angles, radians */
     float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
+    float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk */
+    uint32_t reserved;
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;

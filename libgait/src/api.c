@@ -78,6 +78,7 @@ gait_status gait_model_get_info(const gait_model *m, gait_model_info *out)
     *out = (gait_model_info){.joints = m->points,
                              .angles = m->angles,
                              .components = m->components,
+                             .proportions = m->proportions,
                              .phases = m->phases,
                              .limbs = m->limbs,
                              .stride_hz = m->stride_hz,

@@ -17,6 +17,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .seed = 1,
         .particles = paper ? 10000 : 1500,
         .components = -1,
+        .proportions = paper ? 0 : -1,
         .tasks = 8,
         .cameras = 1,
         .lag = 5,
@@ -41,6 +42,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .coef_noise = 0.66f,
         .coef_time = 4.5f,
         .stature_noise = 0.005f,
+        .proportion_noise = 0.15f,
         .offset_noise = 0.02f,
         .offset_sd = 0.07f,
         .offset_angles = GAIT_OFFSETS_TRUNK,
@@ -71,18 +73,19 @@ typedef struct range { /* one float of the configuration */
 static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err)
 {
     static const range RANGES[] = {
-        RANGE(term_weight[0], 0.0f, 1e6f),    RANGE(term_weight[1], 0.0f, 1e6f),
-        RANGE(term_weight[2], 0.0f, 1e6f),    RANGE(term_weight[3], 0.0f, 1e6f),
-        RANGE(missed_weight, 0.0f, 1.0f),     RANGE(girth, 0.5f, 2.0f),
-        RANGE(resample_ess, 0.0f, 1.0f),      RANGE(max_dt, 1e-3f, 10.0f),
-        RANGE(phase_noise, 0.0f, 10.0f),      RANGE(rate_noise, 0.0f, 10.0f),
-        RANGE(rate_noise_start, 0.0f, 10.0f), RANGE(settle_time, 0.0f, 1e6f),
-        RANGE(rate_time, 0.0f, 1e6f),         RANGE(forward_noise, 0.0f, 100.0f),
-        RANGE(lateral_noise, 0.0f, 100.0f),   RANGE(vertical_noise, 0.0f, 100.0f),
-        RANGE(heading_noise, 0.0f, 100.0f),   RANGE(tilt_noise, 0.0f, 100.0f),
-        RANGE(tilt_time, 0.0f, 1e6f),         RANGE(coef_noise, 0.0f, 100.0f),
-        RANGE(coef_time, 0.0f, 1e6f),         RANGE(stature_noise, 0.0f, 1.0f),
-        RANGE(offset_noise, 0.0f, 10.0f),     RANGE(offset_sd, 0.0f, 10.0f),
+        RANGE(term_weight[0], 0.0f, 1e6f),     RANGE(term_weight[1], 0.0f, 1e6f),
+        RANGE(term_weight[2], 0.0f, 1e6f),     RANGE(term_weight[3], 0.0f, 1e6f),
+        RANGE(missed_weight, 0.0f, 1.0f),      RANGE(girth, 0.5f, 2.0f),
+        RANGE(resample_ess, 0.0f, 1.0f),       RANGE(max_dt, 1e-3f, 10.0f),
+        RANGE(phase_noise, 0.0f, 10.0f),       RANGE(rate_noise, 0.0f, 10.0f),
+        RANGE(rate_noise_start, 0.0f, 10.0f),  RANGE(settle_time, 0.0f, 1e6f),
+        RANGE(rate_time, 0.0f, 1e6f),          RANGE(forward_noise, 0.0f, 100.0f),
+        RANGE(lateral_noise, 0.0f, 100.0f),    RANGE(vertical_noise, 0.0f, 100.0f),
+        RANGE(heading_noise, 0.0f, 100.0f),    RANGE(tilt_noise, 0.0f, 100.0f),
+        RANGE(tilt_time, 0.0f, 1e6f),          RANGE(coef_noise, 0.0f, 100.0f),
+        RANGE(coef_time, 0.0f, 1e6f),          RANGE(stature_noise, 0.0f, 1.0f),
+        RANGE(offset_noise, 0.0f, 10.0f),      RANGE(offset_sd, 0.0f, 10.0f),
+        RANGE(proportion_noise, 0.0f, 100.0f),
     };
     for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
         float v;
@@ -109,6 +112,9 @@ static gait_status check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->components < -1 || cfg->components > m->components)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d",
                          (int)cfg->components, (int)m->components);
+    if (cfg->proportions < -1 || cfg->proportions > m->proportions)
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config proportions = %d, the model has %d",
+                         (int)cfg->proportions, (int)m->proportions);
     if (cfg->tasks < 1 || cfg->tasks > 256)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config tasks = %d is outside [1, 256]", (int)cfg->tasks);
     if (cfg->cameras < 1 || cfg->cameras > GAIT_MAX_CAMERAS)
@@ -194,6 +200,8 @@ gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
                        .pelvis = {1.0f, 1.0f, 0.1f}};
     for (int32_t k = 0; k < m->components; k++)
         sd->coef[k] = 1.0f;
+    for (int32_t k = 0; k < m->proportions; k++)
+        sd->proportion[k] = 1.0f;
     for (int32_t a = 0; a < m->angles; a++)
         sd->offset[a] = 0.07f; /* 4 degrees */
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2]);

@@ -155,6 +155,14 @@ gait_status blob_open(const void *data, size_t bytes, blob *out, gait_error *err
     return s;
 }
 
+bool blob_has(const blob *b, const char tag[4])
+{
+    for (uint32_t i = 0; i < b->sections; i++)
+        if (memcmp(read_entry(b, i).tag, tag, 4) == 0)
+            return true;
+    return false;
+}
+
 const void *blob_section(const blob *b, const char tag[4], uint32_t dtype, uint32_t rank, uint32_t dims[4])
 {
     for (uint32_t i = 0; i < b->sections; i++) {

@@ -16,6 +16,8 @@ typedef struct blob {
 /* Check the whole container: magic, version, alignment, CRC, bounds, overlaps, unique tags. */
 gait_status blob_open(const void *data, size_t bytes, blob *out, gait_error *err);
 
+bool blob_has(const blob *b, const char tag[4]);
+
 /* Elements of the section with this tag, type and rank, and its dimensions (unused ones 1).
  * NULL if there is none.  An empty section gives a pointer that must not be read. */
 const void *blob_section(const blob *b, const char tag[4], uint32_t dtype, uint32_t rank, uint32_t dims[4]);

@@ -37,9 +37,11 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
     s.pelvis[1] += sd->pelvis[1] * n[7];
     for (int32_t k = 0; k < q; k++)
         s.coef[k] += sd->coef[k] * n[F_COEF + k];
+    for (int32_t k = 0; k < d->rule.proportions; k++)
+        s.proportion[k] += sd->proportion[k] * n[body_rule_proportion(&d->rule) + k];
     for (int32_t k = 0; k < d->rule.offsets; k++) {
         int32_t const a = d->rule.angle[k];
-        s.offset[a] += sd->offset[a] * n[F_COEF + q + k];
+        s.offset[a] += sd->offset[a] * n[body_rule_offset(&d->rule) + k];
     }
     walker w = walker_from_state(&d->rule, &s);
     /* The given height of the pelvis and the ground at z = 0 are two measurements of one level (paper:
@@ -59,6 +61,12 @@ static float relax(float x, float dt, float tau, float noise, float n)
     float const keep = m_exp(-dt / tau), a = 2.0f * dt / tau;
     float const share = a > 0.01f ? (1.0f - keep * keep) / a : 1.0f - 0.5f * a; /* (1 - exp(-a)) / a */
     return keep * x + noise * __builtin_sqrtf(share * dt) * n;
+}
+
+/* The time constant that keeps a deviation sd with so much noise. */
+static float time_for(float sd, float noise)
+{
+    return noise > 0.0f ? 2.0f * sd * sd / (noise * noise) : 0.0f;
 }
 
 walker dynamics_move(const dynamics *d, const walker *from, float dt, float age, uint32_t frame, int32_t i)
@@ -101,11 +109,10 @@ walker dynamics_move(const dynamics *d, const walker *from, float dt, float age,
         w.f[F_STATURE] = f_max(from->f[F_STATURE] * (1.0f + c->stature_noise * root_dt * n[8]), 0.3f);
     for (int32_t k = 0; k < q; k++)
         w.f[F_COEF + k] = relax(from->f[F_COEF + k], dt, c->coef_time, c->coef_noise, n[F_COEF + k]);
-    /* posture hardly changes: the time constant that keeps offset_sd with so little noise */
-    float const posture_time = c->offset_noise > 0.0f
-                                   ? 2.0f * c->offset_sd * c->offset_sd / (c->offset_noise * c->offset_noise)
-                                   : 0.0f;
-    for (int32_t k = F_COEF + q; k < body_rule_fields(&d->rule); k++)
-        w.f[k] = relax(from->f[k], dt, posture_time, c->offset_noise, n[k]);
+    /* proportions and posture hardly change */
+    for (int32_t k = body_rule_proportion(&d->rule); k < body_rule_offset(&d->rule); k++)
+        w.f[k] = relax(from->f[k], dt, time_for(1.0f, c->proportion_noise), c->proportion_noise, n[k]);
+    for (int32_t k = body_rule_offset(&d->rule); k < body_rule_fields(&d->rule); k++)
+        w.f[k] = relax(from->f[k], dt, time_for(c->offset_sd, c->offset_noise), c->offset_noise, n[k]);
     return w;
 }

@@ -144,8 +144,10 @@ static void spread(const gait_tracker *t, const walker *sd, float phase_sd, floa
         out->sd.pelvis[k] = out->joint_sd[0][k];
     for (int32_t k = 0; k < t->rule.components; k++)
         out->sd.coef[k] = sd->f[F_COEF + k];
+    for (int32_t k = 0; k < t->rule.proportions; k++)
+        out->sd.proportion[k] = sd->f[body_rule_proportion(&t->rule) + k];
     for (int32_t k = 0; k < t->rule.offsets; k++)
-        out->sd.offset[t->rule.angle[k]] = sd->f[F_COEF + t->rule.components + k];
+        out->sd.offset[t->rule.angle[k]] = sd->f[body_rule_offset(&t->rule) + k];
 }
 
 walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)

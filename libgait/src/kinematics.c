@@ -16,8 +16,7 @@ typedef struct bodies {
     const float *channel;                /* M x n */
     const float *heading, *pitch, *roll; /* n */
     const float *pelvis;                 /* 3 x n */
-    const float *scale;                  /* n */
-    float *R, *o;                        /* F x 9 x n, F x 3 x n */
+    float *R, *o, *scale;                /* F x 9 x n, F x 3 x n, F x n */
 } bodies;
 
 /* Channels first .. first + count - 1 of one body; component k's score is coef[k * stride]. */
@@ -84,6 +83,27 @@ LANES void place_root(const gait_model *m, const bodies *b, int n)
     memcpy(b->o, b->pelvis, 3 * (size_t)n * sizeof(float));
 }
 
+/* Metres per model length in every frame: stature, changed by the limbs' proportions. */
+LANES void scale_frames(const gait_model *m, const float *stature, const float *score, int32_t proportions,
+                        float *restrict scale, int n)
+{
+    for (int32_t f = 0; f < m->frames; f++)
+        for (int lane = 0; lane < n; lane++) {
+            float change = 1.0f;
+            for (int32_t k = 0; k < proportions; k++)
+                change += score[k * n + lane] * m->proportion[k * (m->frames + 1) + f];
+            scale[f * n + lane] = stature[lane] * change;
+        }
+}
+
+float kin_height_change(const gait_model *m, const float *score, int32_t proportions)
+{
+    float change = 0.0f;
+    for (int32_t k = 0; k < proportions; k++)
+        change += score[k] * m->proportion[k * (m->frames + 1) + m->frames];
+    return change;
+}
+
 /* World position (3 x n) of a point given in a frame, statures: o + scale R p. */
 LANES void place_point(const float *R, const float *o, const float *scale, const float p[3],
                        float *restrict out, int n)
@@ -102,7 +122,8 @@ LANES void place_frames(const gait_model *m, const bodies *b, int n)
         const int32_t *const info = m->frame_info + FRAME_INFO * f;
         float *const R = b->R + 9 * n * f;
         const float *const parent = b->R + 9 * n * info[0];
-        place_point(parent, b->o + 3 * n * info[0], b->scale, m->frame_origin + 3 * f, b->o + 3 * n * f, n);
+        place_point(parent, b->o + 3 * n * info[0], b->scale + n * info[0], m->frame_origin + 3 * f,
+                    b->o + 3 * n * f, n);
         memcpy(R, parent, 9 * (size_t)n * sizeof(float));
         for (int32_t k = 0; k < info[1]; k++) {
             int32_t const axis = info[2 + 2 * k];
@@ -128,25 +149,26 @@ void kin_curves(const gait_model *m, const float phase[BLOCK], const float coef[
     }
 }
 
-void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, kin_body *out)
+void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, int32_t proportions,
+              kin_body *out)
 {
     bodies const b = {.channel = ch->v[0],
                       .heading = in->heading,
                       .pitch = in->pitch,
                       .roll = in->roll,
                       .pelvis = in->pelvis[0],
-                      .scale = in->stature,
                       .R = out->R[0][0],
-                      .o = out->o[0][0]};
+                      .o = out->o[0][0],
+                      .scale = out->scale[0]};
+    scale_frames(m, in->stature, in->proportion[0], proportions, b.scale, BLOCK);
     place_frames(m, &b, BLOCK);
-    memcpy(out->scale, in->stature, sizeof out->scale);
 }
 
 void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK])
 {
     for (int32_t i = 0; i < m->points; i++) {
         int32_t const f = m->point_frame[i];
-        place_point(b->R[f][0], b->o[f][0], b->scale, m->point_offset + 3 * i, xyz[i][0], BLOCK);
+        place_point(b->R[f][0], b->o[f][0], b->scale[f], m->point_offset + 3 * i, xyz[i][0], BLOCK);
     }
 }
 
@@ -155,45 +177,48 @@ static bool state_usable(const gait_state *s)
     const float place[9] = {s->phase, s->stride_hz, s->stature,   s->heading,  s->pitch,
                             s->roll,  s->pelvis[0], s->pelvis[1], s->pelvis[2]};
     return f_finite(place, 9) && f_finite(s->coef, GAIT_MAX_COMPONENTS) &&
-           f_finite(s->offset, GAIT_MAX_ANGLES) && s->stature > 0.0f;
+           f_finite(s->offset, GAIT_MAX_ANGLES) && f_finite(s->proportion, GAIT_MAX_PROPORTIONS) &&
+           s->stature > 0.0f;
 }
 
 /* Curves of one body into channel, then its frames. */
-static void place_state(const gait_model *m, const gait_state *s, float *channel, float *R, float *o)
+static void place_state(const gait_model *m, const gait_state *s, float *channel, kin_frames *out)
 {
     bodies const b = {.channel = channel,
                       .heading = &s->heading,
                       .pitch = &s->pitch,
                       .roll = &s->roll,
                       .pelvis = s->pelvis,
-                      .scale = &s->stature,
-                      .R = R,
-                      .o = o};
+                      .R = out->R,
+                      .o = out->o,
+                      .scale = out->scale};
     curves_at(m, s->phase, s->coef, 1, m->components, channel);
     for (int32_t a = 0; a < m->angles; a++)
         channel[a] += s->offset[a];
+    scale_frames(m, &s->stature, s->proportion, m->proportions, b.scale, 1);
     place_frames(m, &b, 1);
 }
 
-gait_status model_place_state(const gait_model *m, const gait_state *s, float *R, float *o)
+gait_status model_place_state(const gait_model *m, const gait_state *s, kin_frames *out)
 {
     float channel[MODEL_MAX_CHANNELS];
     if (!state_usable(s))
         return GAIT_ERR_ARG;
-    place_state(m, s, channel, R, o);
+    place_state(m, s, channel, out);
     return GAIT_OK;
 }
 
 gait_status model_pose_state(const gait_model *m, const gait_state *s, gait_pose *out)
 {
-    float channel[MODEL_MAX_CHANNELS], R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
+    float channel[MODEL_MAX_CHANNELS];
+    kin_frames at;
     if (!state_usable(s))
         return GAIT_ERR_ARG;
-    place_state(m, s, channel, R, o);
+    place_state(m, s, channel, &at);
     memset(out, 0, sizeof *out);
     for (int32_t i = 0; i < m->points; i++) {
         int32_t const f = m->point_frame[i];
-        place_point(R + 9 * f, o + 3 * f, &s->stature, m->point_offset + 3 * i, out->joint[i], 1);
+        place_point(at.R + 9 * f, at.o + 3 * f, &at.scale[f], m->point_offset + 3 * i, out->joint[i], 1);
     }
     memcpy(out->angle, channel, (size_t)m->angles * sizeof(float));
     return GAIT_OK;
@@ -205,6 +230,7 @@ gait_status model_pelvis_height(const gait_model *m, const gait_state *s, float 
         return GAIT_ERR_ARG;
     float channel[MODEL_MAX_CHANNELS];
     curves_at(m, s->phase, s->coef, 1, m->components, channel);
-    *out = s->stature * channel[m->root_channel + ROOT_HEIGHT];
+    *out = s->stature * (1.0f + kin_height_change(m, s->proportion, m->proportions)) *
+           channel[m->root_channel + ROOT_HEIGHT];
     return GAIT_OK;
 }

@@ -7,12 +7,13 @@
 enum { BLOCK = 16, KIN_MAX_FRAMES = MODEL_MAX_FRAMES };
 
 typedef struct kin_input {
-    float phase[BLOCK];                     /* cycles; wrapped to [0, 1) */
-    float stature[BLOCK];                   /* metres */
-    float heading[BLOCK];                   /* radians */
-    float pitch[BLOCK], roll[BLOCK];        /* radians, added to the model's own */
-    float pelvis[3][BLOCK];                 /* metres, world */
-    float coef[GAIT_MAX_COMPONENTS][BLOCK]; /* score standard deviations */
+    float phase[BLOCK];                            /* cycles; wrapped to [0, 1) */
+    float stature[BLOCK];                          /* metres */
+    float heading[BLOCK];                          /* radians */
+    float pitch[BLOCK], roll[BLOCK];               /* radians, added to the model's own */
+    float pelvis[3][BLOCK];                        /* metres, world */
+    float coef[GAIT_MAX_COMPONENTS][BLOCK];        /* score standard deviations */
+    float proportion[GAIT_MAX_PROPORTIONS][BLOCK]; /* the same */
 } kin_input;
 
 typedef struct kin_channels {
@@ -20,9 +21,9 @@ typedef struct kin_channels {
 } kin_channels;
 
 typedef struct kin_body {
-    float R[KIN_MAX_FRAMES][9][BLOCK]; /* frame to world, row-major */
-    float o[KIN_MAX_FRAMES][3][BLOCK]; /* origin of the frame, metres, world */
-    float scale[BLOCK];                /* stature: metres per model length */
+    float R[KIN_MAX_FRAMES][9][BLOCK];  /* frame to world, row-major */
+    float o[KIN_MAX_FRAMES][3][BLOCK];  /* origin of the frame, metres, world */
+    float scale[KIN_MAX_FRAMES][BLOCK]; /* metres per model length in the frame */
 } kin_body;
 
 /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. (2000),
@@ -33,14 +34,23 @@ void kin_curves(const gait_model *m, const float phase[BLOCK], const float coef[
 /* One channel of one body: the same bits as kin_curves gives. */
 float kin_channel(const gait_model *m, int32_t channel, float phase, const float *coef, int32_t components);
 
-/* Place every frame in the world. */
-void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, kin_body *out);
+/* By how much the first `proportions` scores change the pelvis's height, relatively. */
+float kin_height_change(const gait_model *m, const float *score, int32_t proportions);
+
+/* Place every frame in the world; `proportions` scores of the limbs' lengths are in use. */
+void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, int32_t proportions,
+              kin_body *out);
 
 /* The reported points, metres, world: P x 3 x BLOCK. */
 void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK]);
 
-/* Frames of one body in the world: R (F x 9) and o (F x 3); errors as below. */
-gait_status model_place_state(const gait_model *m, const gait_state *s, float *R, float *o);
+typedef struct kin_frames { /* one body's frames in the world */
+    float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
+    float scale[KIN_MAX_FRAMES]; /* metres per model length */
+} kin_frames;
+
+/* Frames of one body; errors as below. */
+gait_status model_place_state(const gait_model *m, const gait_state *s, kin_frames *out);
 
 /* One body: curves, kinematics, points and angles; unused entries of out are 0.
  * GAIT_ERR_ARG, and out left alone, when a number in s is not finite or the stature is not positive. */

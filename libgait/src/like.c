@@ -114,7 +114,7 @@ void like_sample(const like_setup *s, const features *f, const gait_camera *cam,
         sample_set set;
         float M[9], t[3];
         frame_to_camera(body, s->geometry[l].frame, lane, cam, M, t);
-        place_samples(&s->surface[l], M, t, body->scale[lane], cam, &f->map, &set);
+        place_samples(&s->surface[l], M, t, body->scale[s->geometry[l].frame][lane], cam, &f->map, &set);
         for (int32_t i = 0; i < LIKE_SAMPLES; i++) {
             bool const visible = set.front[i] > 0.0f && layers_visible(mask, set.x[i], set.y[i]);
             seen[i] = visible ? surface_at(f->surface, set.x[i], set.y[i]) : TEXTURE_HIDDEN;

@@ -5,8 +5,9 @@
 
 #include <string.h>
 
-#define LARGEST_NUMBER 1e4f /* no length, angle or rate of a walker comes near it; products stay finite */
-#define ANY            UINT32_MAX
+#define LARGEST_NUMBER     1e4f /* no length, angle or rate of a walker comes near it; products stay finite */
+#define LARGEST_PROPORTION 0.1f /* per standard deviation */
+#define ANY                UINT32_MAX
 
 /* The first failure sticks; later calls do nothing. */
 typedef struct reader {
@@ -169,6 +170,21 @@ static void read_frames(reader *r, gait_model *m)
     }
 }
 
+/* Optional: models without it have one body for everybody. */
+static void read_proportions(reader *r, gait_model *m)
+{
+    uint32_t dims[4] = {ANY, (uint32_t)m->frames + 1};
+    if (r->status != GAIT_OK || !blob_has(&r->b, "PROP"))
+        return;
+    m->proportion = take_floats(r, "PROP", 2, dims);
+    if (dims[0] > GAIT_MAX_PROPORTIONS)
+        refuse(r, GAIT_ERR_LIMIT, "PROP", "has more rows than this build can hold");
+    for (uint32_t i = 0; r->status == GAIT_OK && i < dims[0] * dims[1]; i++)
+        require(r, fabsf(m->proportion[i]) <= LARGEST_PROPORTION, "PROP",
+                "changes a length by more than 10 %");
+    m->proportions = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
+}
+
 static void read_points(reader *r, gait_model *m)
 {
     m->point_name = take_names(r, "PTNM", GAIT_MAX_JOINTS, &m->points);
@@ -212,6 +228,7 @@ gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error
     read_curves(&r, &t);
     read_statistics(&r, &t);
     read_frames(&r, &t);
+    read_proportions(&r, &t);
     read_points(&r, &t);
     read_limbs(&r, &t);
     if (r.status != GAIT_OK)

@@ -21,11 +21,16 @@ struct gait_model {
     int32_t channels;     /* M = angles + MODEL_ROOT_CHANNELS */
     int32_t phases;       /* T */
     int32_t components;   /* q */
+    int32_t proportions;  /* p */
     int32_t root_channel; /* index of root_forward; the other ROOT_* follow */
 
     const float *curves;       /* (1 + q) x T x M: mean, then component k times its standard deviation */
     const float *channel_stat; /* M x 4: residual sd, smallest, largest, sd of the static offset */
     const float *score_stat;   /* q x 3: singular-value sd, between-subject sd, within-subject sd */
+
+    /* p x (F + 1): relative change of the lengths in each frame, then of the pelvis's height, per standard
+     * deviation; NULL if p is 0 */
+    const float *proportion;
 
     float stride_hz, stride_hz_sd;         /* strides per second: mean, sd between subjects */
     float stride_cv;                       /* variation of the stride time within a subject */

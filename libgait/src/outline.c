@@ -188,7 +188,7 @@ void outline_project(const limb_geometry *limbs, int32_t count, const kin_body *
                 R[k] = body->R[f][k][i];
             for (int32_t k = 0; k < 3; k++)
                 o[k] = body->o[f][k][i];
-            outline_limb(&limbs[l], R, o, body->scale[i], cam, map, &poly);
+            outline_limb(&limbs[l], R, o, body->scale[f][i], cam, map, &poly);
             for (int32_t k = 0; k < outline_vertices(&limbs[l]); k++) {
                 out->x[l][k][i] = poly.x[k];
                 out->y[l][k][i] = poly.y[k];

@@ -15,7 +15,10 @@ float root_channel(const gait_model *m, int32_t c, float phase, const float *coe
 
 body_rule body_rule_init(const gait_model *m, const gait_tracker_config *cfg)
 {
-    body_rule r = {.model = m, .components = cfg->components, .plain_root = cfg->mode == GAIT_MODE_PAPER};
+    body_rule r = {.model = m,
+                   .components = cfg->components < 0 ? m->components : cfg->components,
+                   .proportions = cfg->proportions < 0 ? m->proportions : cfg->proportions,
+                   .plain_root = cfg->mode == GAIT_MODE_PAPER};
     for (int32_t j = 0; j < m->phases; j++)
         r.mean_height += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
     for (int32_t a = 0; a < m->angles; a++)
@@ -45,8 +48,9 @@ static void pelvis_offset(const body_rule *r, const walker *w, float *sway, floa
     *sway = r->plain_root
                 ? 0.0f
                 : H * root_channel(r->model, ROOT_SWAY, w->f[F_PHASE], w->f + F_COEF, r->components);
-    *height = H * (r->plain_root
-                       ? r->mean_height
+    *height =
+        H * (1.0f + kin_height_change(r->model, w->f + body_rule_proportion(r), r->proportions)) *
+        (r->plain_root ? r->mean_height
                        : root_channel(r->model, ROOT_HEIGHT, w->f[F_PHASE], w->f + F_COEF, r->components));
 }
 
@@ -66,8 +70,10 @@ gait_state walker_state(const body_rule *r, const walker *w)
     s.pelvis[2] = w->f[F_Z] + height;
     for (int32_t k = 0; k < r->components; k++)
         s.coef[k] = w->f[F_COEF + k];
+    for (int32_t k = 0; k < r->proportions; k++)
+        s.proportion[k] = w->f[body_rule_proportion(r) + k];
     for (int32_t k = 0; k < r->offsets; k++)
-        s.offset[r->angle[k]] = w->f[F_COEF + r->components + k];
+        s.offset[r->angle[k]] = w->f[body_rule_offset(r) + k];
     return s;
 }
 
@@ -83,8 +89,10 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
     w.f[F_ROLL] = s->roll;
     for (int32_t k = 0; k < r->components; k++)
         w.f[F_COEF + k] = s->coef[k];
+    for (int32_t k = 0; k < r->proportions; k++)
+        w.f[body_rule_proportion(r) + k] = s->proportion[k];
     for (int32_t k = 0; k < r->offsets; k++)
-        w.f[F_COEF + r->components + k] = s->offset[r->angle[k]];
+        w.f[body_rule_offset(r) + k] = s->offset[r->angle[k]];
     pelvis_offset(r, &w, &sway, &height);
     m_sincos(s->heading, &sn, &cs);
     w.f[F_X] = s->pelvis[0] + sway * sn;
@@ -114,14 +122,17 @@ static void block_bodies(const body_rule *r, block *b, kin_body *out)
         root[ROOT_HEIGHT][i] = r->mean_height;
     }
     for (int32_t i = 0; i < BLOCK; i++) {
-        float sn, cs;
+        float sn, cs, score[GAIT_MAX_PROPORTIONS];
+        for (int32_t k = 0; k < r->proportions; k++)
+            score[k] = in->proportion[k][i];
         float const sway = in->stature[i] * root[ROOT_SWAY][i];
         m_sincos(in->heading[i], &sn, &cs);
         in->pelvis[0][i] -= sway * sn;
         in->pelvis[1][i] += sway * cs;
-        in->pelvis[2][i] += in->stature[i] * root[ROOT_HEIGHT][i];
+        in->pelvis[2][i] += in->stature[i] * (1.0f + kin_height_change(r->model, score, r->proportions)) *
+                            root[ROOT_HEIGHT][i];
     }
-    kin_pose(r->model, &ch, in, out);
+    kin_pose(r->model, &ch, in, r->proportions, out);
 }
 
 static void block_put(const body_rule *r, block *b, int32_t lane, const walker *w)
@@ -137,8 +148,10 @@ static void block_put(const body_rule *r, block *b, int32_t lane, const walker *
     in->pelvis[2][lane] = w->f[F_Z];
     for (int32_t k = 0; k < r->components; k++)
         in->coef[k][lane] = w->f[F_COEF + k];
+    for (int32_t k = 0; k < r->proportions; k++)
+        in->proportion[k][lane] = w->f[body_rule_proportion(r) + k];
     for (int32_t k = 0; k < r->offsets; k++)
-        b->offset[k][lane] = w->f[F_COEF + r->components + k];
+        b->offset[k][lane] = w->f[body_rule_offset(r) + k];
 }
 
 void population_bodies(const body_rule *r, const population *p, int32_t begin, kin_body *out)

@@ -15,8 +15,8 @@ enum {
     F_PITCH,
     F_ROLL,
     F_STATURE,
-    F_COEF, /* the scores, then the posture offsets of the angles that have one */
-    F_MAX = F_COEF + GAIT_MAX_COMPONENTS + GAIT_MAX_ANGLES
+    F_COEF, /* the scores, then the limbs' proportions, then the posture of the angles that have an offset */
+    F_MAX = F_COEF + GAIT_MAX_COMPONENTS + GAIT_MAX_PROPORTIONS + GAIT_MAX_ANGLES
 };
 
 typedef struct population {
@@ -34,20 +34,30 @@ population population_layout(arena *a, int32_t n, int32_t fields);
 /* Constants that turn fields into bodies. */
 typedef struct body_rule {
     const gait_model *model;
-    int32_t components;
+    int32_t components, proportions;
     int32_t offsets;                /* how many angles have a posture offset, */
     int32_t angle[GAIT_MAX_ANGLES]; /* and which */
     bool plain_root;                /* paper: no root motion within the stride, pelvis at its mean height */
     float mean_height;              /* statures */
 } body_rule;
 
-/* components of cfg must be resolved (>= 0). */
 body_rule body_rule_init(const gait_model *m, const gait_tracker_config *cfg);
+
+/* First field of the limbs' proportions and of the posture offsets. */
+static inline int32_t body_rule_proportion(const body_rule *r)
+{
+    return F_COEF + r->components;
+}
+
+static inline int32_t body_rule_offset(const body_rule *r)
+{
+    return body_rule_proportion(r) + r->proportions;
+}
 
 /* Fields of a particle. */
 static inline int32_t body_rule_fields(const body_rule *r)
 {
-    return F_COEF + r->components + r->offsets;
+    return body_rule_offset(r) + r->offsets;
 }
 
 /* One hypothesis as fields, in SI units. */

@@ -25,14 +25,14 @@ gait_status render_limbs(const gait_model *m, const gait_camera *cam, const gait
     limb_polygon poly[MODEL_MAX_LIMBS];
     float depth[MODEL_MAX_LIMBS];
     int32_t order[MODEL_MAX_LIMBS];
-    float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
-    gait_status const status = model_place_state(m, s, R, o);
+    kin_frames body;
+    gait_status const status = model_place_state(m, s, &body);
     if (status != GAIT_OK)
         return status;
     limb_geometry_init(m, 1.0f, limbs);
     for (int32_t l = 0; l < m->limbs; l++) {
         int32_t const f = limbs[l].frame;
-        outline_limb(&limbs[l], R + 9 * f, o + 3 * f, s->stature, cam, &whole, &poly[l]);
+        outline_limb(&limbs[l], body.R + 9 * f, body.o + 3 * f, body.scale[f], cam, &whole, &poly[l]);
         depth[l] = poly[l].depth;
     }
     for (int32_t row = 0; row < cam->height; row++)

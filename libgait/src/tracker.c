@@ -53,9 +53,9 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
 {
     gait_tracker *const self = TAKE(a, gait_tracker, 1);
     gait_tracker t = {.model = m, .cfg = *cfg};
-    if (t.cfg.components < 0)
-        t.cfg.components = m->components;
     t.rule = body_rule_init(m, &t.cfg);
+    t.cfg.components = t.rule.components;
+    t.cfg.proportions = t.rule.proportions;
     a->solid = true;
     layout_state(a, &t);
     a->solid = false;

@@ -25,7 +25,7 @@ from typing import Any
 
 ABI = 1
 ALIGN = 64
-MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_CAMERAS = 32, 32, 16, 4
+MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 
 
 class Status(IntEnum):
@@ -137,6 +137,7 @@ class StateC(ctypes.Structure):
         ("pelvis", c_float * 3),
         ("coef", c_float * MAX_COMPONENTS),
         ("offset", c_float * MAX_ANGLES),
+        ("proportion", c_float * MAX_PROPORTIONS),
     ]
 
 
@@ -165,7 +166,7 @@ class ModelInfoC(ctypes.Structure):
         ("components", c_int32),
         ("phases", c_int32),
         ("limbs", c_int32),
-        ("reserved", c_int32),
+        ("proportions", c_int32),
         ("stride_hz", c_float),
         ("stride_hz_sd", c_float),
         ("stride_length", c_float),
@@ -186,7 +187,7 @@ class TrackerConfigC(ctypes.Structure):
         ("tasks", c_int32),
         ("cameras", c_int32),
         ("lag", c_int32),
-        ("reserved", c_uint32),
+        ("proportions", c_int32),
         ("terms", c_uint32),
         ("term_weight", c_float * 4),
         ("missed_weight", c_float),
@@ -209,7 +210,9 @@ class TrackerConfigC(ctypes.Structure):
         ("stature_noise", c_float),
         ("offset_noise", c_float),
         ("offset_sd", c_float),
+        ("proportion_noise", c_float),
         ("offset_angles", c_uint32),
+        ("reserved", c_uint32),
         ("camera", CameraC * MAX_CAMERAS),
         ("exec", Tasks),
     ]

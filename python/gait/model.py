@@ -31,6 +31,8 @@ class ModelInfo:
         Reported points and joint angles.
     components : int
         Principal components of the cyclic motion.
+    proportions : int
+        Ways in which limbs differ in length at the same stature.
     phases : int
         Samples per stride of its curves.
     limbs : int
@@ -46,6 +48,7 @@ class ModelInfo:
     joints: int
     angles: int
     components: int
+    proportions: int
     phases: int
     limbs: int
     stride_hz: float

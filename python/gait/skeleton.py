@@ -222,6 +222,7 @@ def pose(
     pitch: npt.ArrayLike,
     roll: npt.ArrayLike,
     pelvis: npt.ArrayLike,
+    proportion: npt.ArrayLike = (),
 ) -> tuple[Floats, Floats]:
     """Joints of N hypotheses: curves (Ormoneit 2000, eq. 3), then forward kinematics.
 
@@ -235,6 +236,8 @@ def pose(
         Scores in standard deviations, k <= q; the rest are 0.
     pelvis : (N, 3) or (3,)
         Pelvis joint in the world, metres.
+    proportion : (N, l) or (l,)
+        Scores of the limbs' proportions, l <= p; the rest are 0.
 
     Returns
     -------
@@ -251,9 +254,9 @@ def pose(
     channels = curves(sections, phase, np.broadcast_to(coef, (n, coef.shape[1])))
     angles = channels.copy()
     angles[:, _root_columns(sections)] += np.stack([heading, pitch, roll], axis=1)
-    positions = points(sections, angles) * stature[:, None, None] + np.asarray(pelvis, float).reshape(
-        -1, 1, 3
-    )
+    positions = points(sections, angles, proportion) * stature[:, None, None] + np.asarray(
+        pelvis, float
+    ).reshape(-1, 1, 3)
     return positions, channels[:, : channels.shape[1] - len(ROOTS)]
 
 
@@ -271,27 +274,45 @@ def curves(sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLik
     return ends[0] * (1 - weight) + ends[1] * weight
 
 
-def points(sections: Mapping[str, Any], channels: Floats) -> Floats:
-    """Points (N, P, 3) relative to frame 0's origin in statures, for channel values (N, M)."""
-    rotations, origins = frames(sections, channels)
+def points(sections: Mapping[str, Any], channels: Floats, proportion: npt.ArrayLike = ()) -> Floats:
+    """Points (N, P, 3) relative to frame 0's origin in statures, for channel values (N, M).
+
+    proportion : scores (N, l) or (l,) of the limbs' proportions.
+    """
+    rotations, origins, scale = frames(sections, channels, proportion)
     frame = np.asarray(sections["PTNI"])
-    local = np.asarray(sections["PTNF"], float)
-    return origins[:, frame] + np.einsum("npij,pj->npi", rotations[:, frame], local)
+    local = np.asarray(sections["PTNF"], float) * scale[:, frame, None]
+    return origins[:, frame] + np.einsum("npij,npj->npi", rotations[:, frame], local)
 
 
-def frames(sections: Mapping[str, Any], channels: Floats) -> tuple[Floats, Floats]:
-    """Rotations (N, F, 3, 3) and origins (N, F, 3) of all frames, frame 0 at the origin, in statures."""
+def frames(
+    sections: Mapping[str, Any], channels: Floats, proportion: npt.ArrayLike = ()
+) -> tuple[Floats, Floats, Floats]:
+    """Rotations (N, F, 3, 3), origins (N, F, 3) in statures, and scales (N, F) of all frames.
+
+    Frame 0 lies at the origin; a scale is what the lengths given in a frame count for.
+    """
     links, offsets = np.asarray(sections["FRMI"]), np.asarray(sections["FRMF"], float)
     n = len(channels)
     rotations, origins = np.empty((n, len(links), 3, 3)), np.empty((n, len(links), 3))
+    scale = np.broadcast_to(length_change(sections, proportion)[:, :-1], (n, len(links)))
     for i, link in enumerate(links):
         parent = int(link[0])
         rotation = np.broadcast_to(np.eye(3), (n, 3, 3)) if parent < 0 else rotations[:, parent]
-        origins[:, i] = 0 if parent < 0 else origins[:, parent] + rotation @ offsets[i]
+        origins[:, i] = (
+            0 if parent < 0 else origins[:, parent] + scale[:, parent, None] * (rotation @ offsets[i])
+        )
         for axis, channel in link[2 : 2 + 2 * link[1]].reshape(-1, 2):
             rotation = rotation @ axis_rotation(abs(axis) - 1, np.sign(axis) * channels[:, channel])
         rotations[:, i] = rotation
-    return rotations, origins
+    return rotations, origins, scale
+
+
+def length_change(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Floats:
+    """Factors (N, F + 1) of the lengths in every frame and of the pelvis's height, for scores (N, l) or (l,)."""
+    score = np.atleast_2d(np.asarray(proportion, float))
+    table = np.asarray(sections.get("PROP", np.zeros((0, len(sections["FRMI"]) + 1))), float)
+    return np.asarray(1 + score @ table[: score.shape[1]])
 
 
 def axis_rotation(axis: int, angle: npt.ArrayLike) -> Floats:

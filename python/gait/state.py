@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gait import _abi
 
 Array = NDArray[np.float64]
+LIMITS = {"coef": _abi.MAX_COMPONENTS, "offset": _abi.MAX_ANGLES, "proportion": _abi.MAX_PROPORTIONS}
 SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
 
 
@@ -37,6 +38,8 @@ class State:
         Principal-component scores in standard deviations; missing ones are 0.
     offset : ndarray of shape (A,)
         Posture: added to the model's joint angles, radians; missing ones are 0.
+    proportion : ndarray of shape (p,)
+        Scores of the limbs' proportions in standard deviations; missing ones are 0.
     """
 
     phase: float = 0.0
@@ -48,11 +51,13 @@ class State:
     pelvis: Array = field(default_factory=lambda: np.zeros(3))
     coef: Array = field(default_factory=lambda: np.zeros(0))
     offset: Array = field(default_factory=lambda: np.zeros(0))
+    proportion: Array = field(default_factory=lambda: np.zeros(0))
 
     @staticmethod
     def from_c(c: _abi.StateC, components: int, angles: int) -> State:
         """Copy a ``gait_state``, keeping `components` scores and `angles` offsets."""
         arrays = {"pelvis": c.pelvis, "coef": c.coef[:components], "offset": c.offset[:angles]}
+        arrays["proportion"] = c.proportion[:]
         values: dict[str, Any] = {name: float(getattr(c, name)) for name in SCALARS}
         values |= {name: np.array(numbers, float) for name, numbers in arrays.items()}
         return State(**values)
@@ -63,16 +68,15 @@ class State:
         Raises
         ------
         ValueError
-            If `pelvis` is not of 3 numbers, or `coef` or `offset` has more than the library can hold.
+            If `pelvis` is not of 3 numbers, or another array has more than the library can hold.
         """
         pelvis: Sequence[float] = np.asarray(self.pelvis, float).tolist()
-        coef: Sequence[float] = np.asarray(self.coef, float).tolist()
-        offset: Sequence[float] = np.asarray(self.offset, float).tolist()
-        if len(pelvis) != 3 or len(coef) > _abi.MAX_COMPONENTS or len(offset) > _abi.MAX_ANGLES:
-            limits = f"coef at most {_abi.MAX_COMPONENTS}, offset at most {_abi.MAX_ANGLES}"
+        if len(pelvis) != 3 or any(np.size(getattr(self, name)) > most for name, most in LIMITS.items()):
+            limits = ", ".join(f"{name} at most {most}" for name, most in LIMITS.items())
             raise ValueError(f"state: pelvis has 3 numbers, {limits}")
         c = _abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
         c.pelvis[:] = pelvis
-        c.coef[: len(coef)] = coef
-        c.offset[: len(offset)] = offset
+        for name in LIMITS:
+            numbers: Sequence[float] = np.asarray(getattr(self, name), float).tolist()
+            getattr(c, name)[: len(numbers)] = numbers
         return c

@@ -33,6 +33,7 @@ class TrackerConfig:
     components: int
     tasks: int
     lag: int
+    proportions: int
     terms: Term
     term_weight: tuple[float, ...]
     missed_weight: float
@@ -55,6 +56,7 @@ class TrackerConfig:
     stature_noise: float
     offset_noise: float
     offset_sd: float
+    proportion_noise: float
     offset_angles: int
 
     @staticmethod
@@ -286,7 +288,10 @@ class Tracker:
         """
         out = _abi.EstimateC()
         status = self._lib.gait_tracker_lagged(
-            self._handle, self.config.lag if back is None else back, ctypes.byref(out), ctypes.byref(self._error)
+            self._handle,
+            self.config.lag if back is None else back,
+            ctypes.byref(out),
+            ctypes.byref(self._error),
         )
         if status == _abi.Status.STATE:
             return None

@@ -21,7 +21,7 @@ MODEL = skeleton.default_skeleton().sections() | {"CHNM": None}
 def body_of(channels, place=None, stature=1.7, fps=120.0):
     """A Body in the pose of channel values (T, 30), its pelvis at `place` (T, 3)."""
     place = np.zeros((len(channels), 3)) if place is None else place
-    turn, _ = skeleton.frames(MODEL, channels)
+    turn, _, _ = skeleton.frames(MODEL, channels)
     frame = {name: turn[:, i] for i, name in enumerate(skeleton.default_skeleton().frames)}
     position = skeleton.points(MODEL, channels) * stature + place[:, None]
     joints = {name: position[:, i] for i, name in enumerate(skeleton.JOINTS)}

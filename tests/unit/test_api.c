@@ -78,7 +78,7 @@ static void test_info(void)
     memset(&info, 0xff, sizeof info);
     CHECK(gait_model_get_info(m, &info) == GAIT_OK);
     CHECK(info.joints == TOY_POINTS && info.angles == TOY_ANGLES && info.limbs == TOY_LIMBS);
-    CHECK(info.reserved == 0);
+    CHECK(info.proportions == TOY_PROPORTIONS);
     CHECK(info.components == TOY_COMPONENTS && info.phases == TOY_PHASES && info.digest != 0);
     CHECK(info.stride_hz == 0.92f && info.stride_hz_sd == 0.07f);
     CHECK(info.stride_length == 0.80f && info.stride_length_sd == 0.06f);

@@ -3,7 +3,7 @@
 
 #include "fmath.h"
 
-enum { FIELDS = F_COEF + 3 };
+enum { FIELDS = F_COEF + 4 };
 
 static void noisy(void)
 {
@@ -17,6 +17,7 @@ static void noisy(void)
     cfg.tilt_noise = 0.033f;
     cfg.coef_noise = 0.66f;
     cfg.stature_noise = 0.005f;
+    cfg.proportion_noise = 0.3f;
     cfg.offset_noise = 0.02f;
 }
 
@@ -40,7 +41,8 @@ static void test_drift(void)
             w.f[F_PITCH] = 0.2f;
             w.f[F_ROLL] = -0.1f;
             w.f[F_COEF + 1] = 1.5f; /* the second component leaves the root alone */
-            w.f[F_COEF + 2] = 0.04f;
+            w.f[F_COEF + 2] = -0.7f;
+            w.f[F_COEF + 3] = 0.04f;
             for (int32_t k = 0; k < steps; k++)
                 w = dynamics_move(&d, &w, dt, 1.0f, (uint32_t)k, 3);
             double path = 0.0; /* statures: integral of the forward motion over phase */
@@ -58,7 +60,7 @@ static void test_drift(void)
             CHECK_NEAR(w.f[F_PITCH], 0.2 * exp(-1.2 / 1.1), 1e-6);
             CHECK_NEAR(w.f[F_ROLL], -0.1 * exp(-1.2 / 1.1), 1e-6);
             CHECK_NEAR(w.f[F_COEF + 1], 1.5 * exp(-1.2 / 4.5), 1e-5);
-            CHECK(w.f[F_COEF + 2] == 0.04f); /* without noise posture stays */
+            CHECK(w.f[F_COEF + 2] == -0.7f && w.f[F_COEF + 3] == 0.04f); /* without noise these stay */
         }
 }
 
@@ -137,7 +139,8 @@ static void test_spread(void)
     check_moments(moments_of(sampled[0][F_COEF], DRAWS), 0.0, coef, DRAWS);
     check_moments(moments_of(sampled[0][F_COEF + 1], DRAWS), 0.0, coef, DRAWS);
     double const tau = 2.0 * 0.07 * 0.07 / (0.02 * 0.02);
-    check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, 0.07 * sqrt(1.0 - exp(-2.0 * T / tau)),
+    check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, sqrt(1.0 - exp(-0.09 * T)), DRAWS);
+    check_moments(moments_of(sampled[0][F_COEF + 3], DRAWS), 0.0, 0.07 * sqrt(1.0 - exp(-2.0 * T / tau)),
                   DRAWS);
     moments const still = moments_of(sampled[0][F_STATURE], DRAWS);
     CHECK(still.var < 1e-12);                                /* settled: stature is fixed */
@@ -159,11 +162,13 @@ static void test_stationary(void)
         cfg.coef_time = 0.6f;
         cfg.rate_time = 0.5f;
         cfg.offset_noise = 0.1f; /* time constant 0.98 s */
+        cfg.proportion_noise = 1.5f;
         spread_after(&d, &from, steps[k], 4.0f, 9.0f, sampled[0]);
         check_moments(moments_of(sampled[0][F_PITCH], DRAWS), 0.0, 0.033 * sqrt(0.25), DRAWS);
         check_moments(moments_of(sampled[0][F_Z], DRAWS), 0.0, 0.0096 * sqrt(0.25), DRAWS);
         check_moments(moments_of(sampled[0][F_COEF], DRAWS), 0.0, 0.66 * sqrt(0.3), DRAWS);
-        check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, 0.07, DRAWS);
+        check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, 1.0, DRAWS);
+        check_moments(moments_of(sampled[0][F_COEF + 3], DRAWS), 0.0, 0.07, DRAWS);
         double const own = (double)toy_model()->stride_hz;
         check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.02 * own * sqrt(0.25), DRAWS);
     }

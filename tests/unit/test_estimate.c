@@ -231,7 +231,7 @@ static void test_joints(void)
 /* Means of the plain fields, the pelvis they imply, speed, and angles of the mean state. */
 static void test_fields(void)
 {
-    double mean[F_COEF + 3] = {0};
+    double mean[F_COEF + 4] = {0};
     reset();
     weigh(2);
     for (uint32_t i = 0; i < N; i++)
@@ -249,9 +249,10 @@ static void test_fields(void)
     CHECK_NEAR(e.mean.stride_hz, mean[F_RATE], 1e-6);
     CHECK_NEAR(e.mean.coef[0], mean[F_COEF], 1e-6);
     CHECK_NEAR(e.mean.coef[1], mean[F_COEF + 1], 1e-6);
-    CHECK_NEAR(e.mean.offset[TOY_TORSO], mean[F_COEF + 2], 1e-6);
-    CHECK(e.sd.coef[0] > 0.01f && e.sd.offset[TOY_TORSO] > 0.01f && e.sd.stride_hz > 0.01f &&
-          e.sd.coef[2] == 0.0f);
+    CHECK_NEAR(e.mean.proportion[0], mean[F_COEF + 2], 1e-6);
+    CHECK_NEAR(e.mean.offset[TOY_TORSO], mean[F_COEF + 3], 1e-6);
+    CHECK(e.sd.coef[0] > 0.01f && e.sd.offset[TOY_TORSO] > 0.01f && e.sd.proportion[0] > 0.01f &&
+          e.sd.stride_hz > 0.01f && e.sd.coef[2] == 0.0f);
     walker w = {{0}};
     for (int f = 0; f < people->fields; f++)
         w.f[f] = (float)mean[f];

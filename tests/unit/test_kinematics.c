@@ -39,12 +39,21 @@ static void twin_turn(double R[3][3], int axis, double angle)
     memcpy(R, out, sizeof out);
 }
 
-static void twin_point(const twin *t, int frame, const float p[3], double stature, double out[3])
+/* Metres per model length in a frame; frame F: of the pelvis's height. */
+static double twin_scale(const gait_model *m, const gait_state *s, int frame)
+{
+    double change = 1.0;
+    for (int k = 0; k < m->proportions; k++)
+        change += (double)s->proportion[k] * (double)m->proportion[k * (m->frames + 1) + frame];
+    return (double)s->stature * change;
+}
+
+static void twin_point(const twin *t, int frame, const float p[3], double scale, double out[3])
 {
     for (int i = 0; i < 3; i++) {
         out[i] = t->o[frame][i];
         for (int k = 0; k < 3; k++)
-            out[i] += stature * t->R[frame][i][k] * (double)p[k];
+            out[i] += scale * t->R[frame][i][k] * (double)p[k];
     }
 }
 
@@ -61,7 +70,7 @@ static void twin_pose(const gait_model *m, const gait_state *s, twin *t)
             twin_turn(t->R[f], abs(info[2 + 2 * k]), info[2 + 2 * k] < 0 ? -own : f ? own : own + given[k]);
         }
         if (f)
-            twin_point(t, info[0], m->frame_origin + 3 * f, (double)s->stature, t->o[f]);
+            twin_point(t, info[0], m->frame_origin + 3 * f, twin_scale(m, s, info[0]), t->o[f]);
         else
             for (int i = 0; i < 3; i++)
                 t->o[0][i] = (double)s->pelvis[i];
@@ -82,7 +91,8 @@ static gait_state random_state(uint32_t i)
                         .pitch = 0.1f * x[0],
                         .roll = 0.1f * x[1],
                         .pelvis = {3.0f * x[2], 3.0f * x[3], 1.0f + 0.1f * y[0]},
-                        .coef = {y[1], y[2]}};
+                        .coef = {y[1], y[2]},
+                        .proportion = {y[3]}};
 }
 
 static void put_lane(kin_input *in, int lane, const gait_state *s)
@@ -96,6 +106,8 @@ static void put_lane(kin_input *in, int lane, const gait_state *s)
         in->pelvis[k][lane] = s->pelvis[k];
     for (int k = 0; k < GAIT_MAX_COMPONENTS; k++)
         in->coef[k][lane] = s->coef[k];
+    for (int k = 0; k < GAIT_MAX_PROPORTIONS; k++)
+        in->proportion[k][lane] = s->proportion[k];
 }
 
 /* Everything of a block, from states first .. first + BLOCK - 1. */
@@ -114,7 +126,7 @@ static void run_block(const gait_model *m, uint32_t first, block *b)
     }
     const kin_input *const in = &filled;
     kin_curves(m, in->phase, in->coef, m->components, &b->ch);
-    kin_pose(m, &b->ch, in, &b->body);
+    kin_pose(m, &b->ch, in, m->proportions, &b->body);
     kin_points(m, &b->body, b->xyz);
 }
 
@@ -137,11 +149,13 @@ static void test_against_twin(void)
                     turn = fmax(turn, fabs(t.R[f][k / 3][k % 3] - (double)b.body.R[f][k][lane]));
             for (int i = 0; i < m->points; i++) {
                 double p[3];
-                twin_point(&t, m->point_frame[i], m->point_offset + 3 * i, (double)s.stature, p);
+                twin_point(&t, m->point_frame[i], m->point_offset + 3 * i,
+                           twin_scale(m, &s, m->point_frame[i]), p);
                 for (int k = 0; k < 3; k++)
                     worst = fmax(worst, fabs(p[k] - (double)b.xyz[i][k][lane]));
             }
-            CHECK(b.body.scale[lane] == s.stature);
+            for (int f = 0; f < m->frames; f++)
+                CHECK_NEAR(b.body.scale[f][lane], twin_scale(m, &s, f), 1e-6);
         }
     }
     CHECK_NEAR(angle, 0.0, 3e-6); /* phase x T in float */
@@ -310,7 +324,7 @@ static void test_shoulder_rotation(void)
         static kin_channels ch;
         static kin_body body;
         kin_curves(m, in->phase, in->coef, 1, &ch);
-        kin_pose(m, &ch, in, &body);
+        kin_pose(m, &ch, in, m->proportions, &body);
         CHECK_NEAR(body.R[3 + 5 * side][3][0], side ? sin(0.2) : -sin(0.2), 1e-6); /* y of its x axis */
     }
 }
@@ -345,7 +359,7 @@ static void test_pelvis_height(void)
         gait_state const s = random_state(i);
         float height = 0.0f;
         CHECK(model_pelvis_height(m, &s, &height) == GAIT_OK);
-        CHECK_NEAR(height, (double)s.stature * twin_channel(m, TOY_ROOT + ROOT_HEIGHT, &s), 1e-5);
+        CHECK_NEAR(height, twin_scale(m, &s, m->frames) * twin_channel(m, TOY_ROOT + ROOT_HEIGHT, &s), 1e-5);
     }
 }
 

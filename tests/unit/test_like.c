@@ -58,25 +58,25 @@ static void test_sample(void)
     toy_look *const v = toy_look_new(1, GAIT_MODE_DEFAULT);
     gait_state const s = toy_walk(0.6f);
     static uint8_t ids[SCENE_PIXELS];
-    float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
+    kin_frames frames;
     int32_t seen = 0, back = 0, wrong = 0, covered = 0, far = 0;
     toy_shot(1, 18, now);
     toy_look_aim(v, &s);
     toy_look_at(v, now, NULL);
     toy_look_body(v, &s);
-    CHECK(model_place_state(toy_model(), &s, R, o) == GAIT_OK);
+    CHECK(model_place_state(toy_model(), &s, &frames) == GAIT_OK);
     CHECK(gait_render(toy_model(), &v->cam, &s, ids, SCENE_W) == GAIT_OK);
     for (int32_t l = 0; l < TOY_LIMBS; l++)
         for (int i = 0; i < LIKE_SAMPLES; i++) {
             const like_surface *const f = &v->setup.surface[l];
             float p[3], uv[2] = {0}, facing = 0.0f, range = 0.0f;
             for (int k = 0; k < 3; k++) {
-                const float *const r = R + 9 * v->setup.geometry[l].frame + 3 * k;
+                const float *const r = frames.R + 9 * v->setup.geometry[l].frame + 3 * k;
                 const float *const eye = v->cam.R; /* camera centre: -R't */
                 float const centre =
                     -(eye[k] * v->cam.t[0] + eye[3 + k] * v->cam.t[1] + eye[6 + k] * v->cam.t[2]);
                 float const n = r[0] * f->normal[0][i] + r[1] * f->normal[1][i] + r[2] * f->normal[2][i];
-                p[k] = o[3 * v->setup.geometry[l].frame + k] +
+                p[k] = frames.o[3 * v->setup.geometry[l].frame + k] +
                        s.stature * (r[0] * f->point[0][i] + r[1] * f->point[1][i] + r[2] * f->point[2][i]);
                 facing += n * (centre - p[k]);
                 range += (centre - p[k]) * (centre - p[k]);

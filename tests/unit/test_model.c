@@ -35,6 +35,7 @@ static void test_views(void)
     CHECK(m.channel_stat[4 * TOY_ROOT] == 0.005f && m.score_stat[3] == 0.8f);
     CHECK(toy_find_point(&m, "r_heel") == 18 && toy_find_point(&m, "pelvis") == 0);
     CHECK(toy_find_point(&m, "tail") == -1);
+    CHECK(m.proportions == TOY_PROPORTIONS && m.proportion[TOY_FRAMES] == 0.025f);
     CHECK(m.curves[TOY_KNEE + 1] == toy_round(toy_interpolate(toy_curve[3].at, 0)));
 }
 
@@ -178,13 +179,13 @@ static void test_limits(void)
     toy_section(&f, "FRNM", 1, 2, MODEL_MAX_FRAMES + 1, 32, 1, names(MODEL_MAX_FRAMES + 1));
     CHECK(model_open(buf, toy_finish(&f), &m, &err) == GAIT_ERR_LIMIT && strstr(err.text, "FRNM"));
 
-    f = toy_begin(buf, 9);
+    f = toy_begin(buf, 10);
     toy_put_curves(&f, 8, 0);
     toy_put_skeleton(&f);
     toy_section(&f, "PTNM", 1, 2, GAIT_MAX_JOINTS + 1, 32, 1, names(GAIT_MAX_JOINTS + 1));
     CHECK(model_open(buf, toy_finish(&f), &m, &err) == GAIT_ERR_LIMIT && strstr(err.text, "PTNM"));
 
-    f = toy_begin(buf, 12);
+    f = toy_begin(buf, 13);
     toy_put_curves(&f, 8, 0);
     toy_put_skeleton(&f);
     toy_put_points(&f);
@@ -192,7 +193,7 @@ static void test_limits(void)
     CHECK(model_open(buf, toy_finish(&f), &m, &err) == GAIT_ERR_LIMIT && strstr(err.text, "LBNM"));
 }
 
-/* Every section but META is needed. */
+/* Every section but META is needed; without PROP everybody has the same proportions. */
 static void test_missing(void)
 {
     for (size_t i = 1; i < TOY_SECTIONS; i++) {
@@ -203,7 +204,10 @@ static void test_missing(void)
         toy_seal(buf, bytes);
         gait_model m;
         gait_error err = {0};
-        CHECK(model_open(buf, bytes, &m, &err) == GAIT_ERR_CORRUPT && strstr(err.text, tag));
+        if (strcmp(tag, "PROP") == 0)
+            CHECK(model_open(buf, bytes, &m, &err) == GAIT_OK && m.proportions == 0);
+        else
+            CHECK(model_open(buf, bytes, &m, &err) == GAIT_ERR_CORRUPT && strstr(err.text, tag));
     }
 }
 

@@ -281,10 +281,10 @@ static void test_walker(void)
         cam.fx = 1.4f * cam.fy;
         gait_state s = toy_walk(0.07f * (float)n);
         s.heading = 0.7f * (float)(n / 2);
-        float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
-        CHECK(model_place_state(m, &s, R, o) == GAIT_OK);
+        kin_frames at;
+        CHECK(model_place_state(m, &s, &at) == GAIT_OK);
         for (int32_t l = 0; l < m->limbs; l++) {
-            view_of_limb const v = {R + 9 * limbs[l].frame, o + 3 * limbs[l].frame, s.stature, &cam};
+            view_of_limb const v = {at.R + 9 * limbs[l].frame, at.o + 3 * limbs[l].frame, s.stature, &cam};
             limb_polygon p;
             outline_limb(&limbs[l], v.R, v.o, v.scale, &cam, &whole, &p);
             check_limb(&limbs[l], &v, &p, &f);
@@ -324,18 +324,19 @@ static void test_lanes(void)
     limb_geometry limbs[MODEL_MAX_LIMBS];
     gait_camera const cam = toy_camera(1);
     view_map const map = {.scale = 1.3f, .u0 = 33.0f, .v0 = 21.0f};
-    float R[BLOCK][KIN_MAX_FRAMES * 9], o[BLOCK][KIN_MAX_FRAMES * 3], scale[BLOCK];
+    static kin_frames at[BLOCK];
     limb_geometry_init(m, 1.1f, limbs);
     for (int lane = 0; lane < BLOCK; lane++) {
         gait_state s = toy_walk(0.1f * (float)lane);
-        s.stature = scale[lane] = 1.5f + 0.02f * (float)lane;
-        CHECK(model_place_state(m, &s, R[lane], o[lane]) == GAIT_OK);
-        body.scale[lane] = s.stature;
+        s.stature = 1.5f + 0.02f * (float)lane;
+        s.proportion[0] = 1.0f - 0.1f * (float)lane;
+        CHECK(model_place_state(m, &s, &at[lane]) == GAIT_OK);
         for (int f = 0; f < m->frames; f++) {
+            body.scale[f][lane] = at[lane].scale[f];
             for (int k = 0; k < 9; k++)
-                body.R[f][k][lane] = R[lane][9 * f + k];
+                body.R[f][k][lane] = at[lane].R[9 * f + k];
             for (int k = 0; k < 3; k++)
-                body.o[f][k][lane] = o[lane][3 * f + k];
+                body.o[f][k][lane] = at[lane].o[3 * f + k];
         }
     }
     outline_project(limbs, m->limbs, &body, &cam, &map, &block);
@@ -344,7 +345,8 @@ static void test_lanes(void)
         for (int32_t l = 0; l < m->limbs; l++) {
             int32_t const f = limbs[l].frame;
             limb_polygon p;
-            outline_limb(&limbs[l], R[lane] + 9 * f, o[lane] + 3 * f, scale[lane], &cam, &map, &p);
+            outline_limb(&limbs[l], at[lane].R + 9 * f, at[lane].o + 3 * f, at[lane].scale[f], &cam, &map,
+                         &p);
             for (int32_t k = 0; k < outline_vertices(&limbs[l]); k++)
                 wrong += block.x[l][k][lane] != p.x[k] || block.y[l][k][lane] != p.y[k];
             wrong += block.depth[l][lane] != p.depth || block.facing[l][lane] != p.facing;

@@ -30,6 +30,8 @@ static gait_state random_state(const body_rule *r, uint32_t i)
                     .pelvis = {3.0f * x[2], 3.0f * x[3], 0.9f + 0.1f * y[0]}};
     for (int32_t k = 0; k < r->components; k++)
         s.coef[k] = y[1 + k];
+    for (int32_t k = 0; k < r->proportions; k++)
+        s.proportion[k] = x[2 + k];
     for (int32_t k = 0; k < r->offsets; k++)
         s.offset[r->angle[k]] = 0.1f * y[3] * (float)(k + 1);
     return s;
@@ -40,7 +42,7 @@ static void test_rule(void)
     body_rule const r = make_rule(GAIT_MODE_DEFAULT, 1, 1u << 5 | 1u << 0 | 1u << 20 | 1u << 31);
     CHECK(r.components == 1 && !r.plain_root && r.model == toy_model());
     CHECK(r.offsets == 3 && r.angle[0] == 0 && r.angle[1] == 5 && r.angle[2] == 20); /* the model has no 31 */
-    CHECK(body_rule_fields(&r) == F_COEF + 1 + 3);
+    CHECK(body_rule_fields(&r) == F_COEF + 1 + TOY_PROPORTIONS + 3);
     double mean = 0.0;
     for (int j = 0; j < TOY_PHASES; j++)
         mean += (double)toy_model()->curves[j * TOY_CHANNELS + TOY_ROOT + ROOT_HEIGHT] / TOY_PHASES;
@@ -146,15 +148,16 @@ static void test_bodies(void)
         for (int32_t lane = 0; lane < BLOCK; lane++) {
             int32_t const i = i_min(begin + lane, N - 1);
             gait_state const s = random_state(&r, (uint32_t)i);
-            float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
-            CHECK(model_place_state(m, &s, R, o) == GAIT_OK);
+            kin_frames at;
+            CHECK(model_place_state(m, &s, &at) == GAIT_OK);
             for (int f = 0; f < m->frames; f++) {
                 for (int k = 0; k < 9; k++)
-                    turn = fmax(turn, fabs((double)(R[9 * f + k] - body.R[f][k][lane])));
+                    turn = fmax(turn, fabs((double)(at.R[9 * f + k] - body.R[f][k][lane])));
                 for (int k = 0; k < 3; k++)
-                    place = fmax(place, fabs((double)(o[3 * f + k] - body.o[f][k][lane])));
+                    place = fmax(place, fabs((double)(at.o[3 * f + k] - body.o[f][k][lane])));
             }
-            CHECK(body.scale[lane] == s.stature);
+            for (int f = 0; f < m->frames; f++)
+                CHECK_NEAR(body.scale[f][lane], at.scale[f], 1e-6);
             walker const w = walker_get(&p, i);
             walker_body(&r, &w, &single);
             for (int k = 0; k < 3; k++)

@@ -18,7 +18,7 @@
 #include <stdio.h>
 
 enum { TOY_FRAMES = 13, TOY_POINTS = 19, TOY_LIMBS = 13, TOY_ANGLES = 24, TOY_CHANNELS = 30 };
-enum { TOY_PHASES = 32, TOY_COMPONENTS = 2, TOY_SECTIONS = 15 };
+enum { TOY_PHASES = 32, TOY_COMPONENTS = 2, TOY_SECTIONS = 16, TOY_PROPORTIONS = 1 };
 /* Channels; a left one is followed by its right twin at + TOY_PAIR (ball joints) or + 1 (hinges). */
 enum {
     TOY_NECK,         /* x y z */
@@ -225,6 +225,10 @@ static inline void toy_put_skeleton(toy_file *f)
             axis[1] += info[i][1] == 3 ? TOY_PAIR : 1;
         }
     }
+    /* Long legs on a short trunk; the last column is the pelvis's height. */
+    static const float proportion[TOY_PROPORTIONS][TOY_FRAMES + 1] = {
+        {0.0f, -0.02f, 0.0f, 0.01f, 0.02f, 0.03f, 0.02f, 0.01f, 0.01f, 0.02f, 0.03f, 0.02f, 0.01f, 0.025f}};
+    toy_section(f, "PROP", 3, 2, TOY_PROPORTIONS, TOY_FRAMES + 1, 1, proportion);
     toy_section(f, "FRNM", 1, 2, TOY_FRAMES, 32, 1, name);
     toy_section(f, "FRMI", 2, 2, TOY_FRAMES, 8, 1, info);
     toy_section(f, "FRMF", 3, 2, TOY_FRAMES, 3, 1, origin);

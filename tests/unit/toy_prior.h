@@ -18,7 +18,7 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.offset_angles = 1u << OFFSET_ANGLE;
     cfg.phase_noise = cfg.rate_noise = cfg.rate_noise_start = cfg.stature_noise = 0.0f;
     cfg.forward_noise = cfg.lateral_noise = cfg.vertical_noise = 0.0f;
-    cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = 0.0f;
+    cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = cfg.proportion_noise = 0.0f;
     cfg.offset_sd = 0.07f;
     cfg.settle_time = 1.0f;
     cfg.rate_time = 5.0f;

@@ -86,8 +86,9 @@ static inline void toy_paint(const gait_camera *cam, const gait_state *s, uint8_
 {
     static uint8_t ids[SCENE_PIXELS];
     const gait_model *const m = toy_model();
-    float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3], end[TOY_LIMBS][2][2] = {{{0}}};
-    if (model_place_state(m, s, R, o) != GAIT_OK || gait_render(m, cam, s, ids, SCENE_W) != GAIT_OK)
+    float end[TOY_LIMBS][2][2] = {{{0}}};
+    kin_frames at;
+    if (model_place_state(m, s, &at) != GAIT_OK || gait_render(m, cam, s, ids, SCENE_W) != GAIT_OK)
         abort();
     for (int32_t l = 0; l < TOY_LIMBS; l++)
         for (int32_t e = 0; e < 2; e++) {
@@ -95,8 +96,9 @@ static inline void toy_paint(const gait_camera *cam, const gait_state *s, uint8_
             int32_t const f = m->limb_info[LIMB_INFO * l];
             float p[3];
             for (int32_t k = 0; k < 3; k++)
-                p[k] = o[3 * f + k] + s->stature * (R[9 * f + 3 * k] * v[0] + R[9 * f + 3 * k + 1] * v[1] +
-                                                    R[9 * f + 3 * k + 2] * v[2]);
+                p[k] = at.o[3 * f + k] +
+                       at.scale[f] * (at.R[9 * f + 3 * k] * v[0] + at.R[9 * f + 3 * k + 1] * v[1] +
+                                      at.R[9 * f + 3 * k + 2] * v[2]);
             camera_project(cam, p, end[l][e]);
         }
     for (int32_t i = 0; i < SCENE_PIXELS; i++)
