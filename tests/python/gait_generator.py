@@ -79,6 +79,39 @@ def walk(rng, period, frames, *, offset=0.0, noise=5.0, scores=None, modes=None,
     return remove_blocks(rng, angles, missing)
 
 
+@dataclass
+class Outing:
+    """Somebody who stands, starts, walks steadily, then turns and stops; frames [begin, end) are steady."""
+
+    angles: np.ndarray  # (T, 19) radians
+    place: np.ndarray  # (T, 2) metres
+    yaw: np.ndarray  # (T,) radians
+    begin: int
+    end: int
+
+
+def outing(rng, fps=100, period=110, strides=4, stand=1.0, start=1.0, turn=1.2, stop=1.0, noise=0.3):
+    """Stand, speed up, walk `strides` of `period` frames, turn right about while slowing down, stand.
+
+    stand, start, turn, stop : seconds of each part; noise in degrees.
+    """
+    begin = round((stand + start) * fps)
+    end = begin + round(strides * period)
+    frames = end + round((turn + stop) * fps)
+    t = np.arange(frames)
+    pace = np.interp(t, [stand * fps, begin, end, end + turn * fps], [0, 1, 1, 0])
+    sway = 4 * np.pi * np.cumsum(pace) / period
+    yaw = np.interp(t, [end, end + turn * fps], [0, np.pi]) + np.radians(4) * pace * np.sin(sway / 2)
+    speed = 1.3 / fps * pace * (1 + 0.1 * np.sin(sway))
+    direction = np.interp(t, [end, end + turn * fps], [0, np.pi])
+    place = np.cumsum(speed[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=1), axis=0)
+    phase = np.cumsum(pace) / period
+    rest = mean_curves(np.arange(GRID) / GRID).mean(axis=0)
+    swing = np.minimum(1, 1.5 * pace)[:, None]
+    angles = rest + swing * (mean_curves(phase) - rest) + rng.normal(scale=noise, size=(frames, 19))
+    return Outing(np.radians(angles), place, yaw, begin, end)
+
+
 def remove_blocks(rng, values, share, low=8, high=40):
     """Copy of (T, C) with NaN in blocks of one channel each until `share` is missing."""
     result = values.copy()

@@ -158,7 +158,8 @@ def _within(angles: Floats, fps: float, cycle: float, track: Track, limit: float
 
 def _words(*reasons: str) -> str:
     """Join reasons, each once, without empty ones."""
-    return " and ".join(dict.fromkeys(word for word in reasons if word))
+    words = " and ".join(word for word in reasons if word).split(" and ")
+    return " and ".join(dict.fromkeys(words))
 
 
 def _speed(angles: Floats, fps: float) -> tuple[Floats, Floats]:
