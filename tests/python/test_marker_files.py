@@ -85,6 +85,12 @@ def test_of_two_subjects_the_one_with_more_markers_is_taken(marked, tmp_path):
     assert found.joints["l_knee"] == pytest.approx(alone.joints["l_knee"], abs=1e-4)
 
 
+def test_wrong_units_are_said(marked, tmp_path):
+    path = write_c3d(tmp_path / "a.c3d", mw.LOWER, marked[0][:60], "m", 100.0)
+    with pytest.raises(UserError, match=r"a.c3d: the markers do not fit a body .*check labels and units"):
+        readers.read(path)
+
+
 def test_unknown_labels_are_named(marked, tmp_path):
     labels = [f"M{k}" for k in range(len(mw.LOWER))]
     with pytest.raises(UserError, match=r"a.c3d: 0 of 17 marker labels are known \(M0, M1.*--markers"):
