@@ -1,0 +1,269 @@
+"""Missing entries by variational Bayesian principal components in the Fourier domain.
+
+Model: row r is B' (mean + W' c_r) + noise, with c_r ~ N(0, I) and the coefficients of component k drawn from
+N(0, 1 / precision_k).  Scores and missing entries of a row are treated jointly and exactly given the
+components (Bishop 1999; Ilin and Raiko 2010, "Practical approaches to principal component analysis in the
+presence of missing values").  The precisions let components that the data do not support shrink to nothing,
+so too many components hurt little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.learn.accelerate import Mixer
+from gait.learn.fourier import decode, encode
+from gait.learn.impute import Filling
+
+Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+ITERATIONS = 500
+TOLERANCE = 1e-5  # rms change of the model between passes over the noise
+LEAST_NOISE = 1e-10  # variance relative to the data's
+
+
+@dataclass
+class Belief:
+    """What is held about the model.
+
+    Attributes
+    ----------
+    loadings : (1 + q, P)
+        Fourier coefficients of the mean and of the components.
+    spread : (q, q)
+        Posterior covariance of the components' values at one coefficient, the same for all P.
+    precision : (q,)
+        Of the components' prior.
+    noise : float
+        Variance of an entry about the model.
+    """
+
+    loadings: Floats
+    spread: Floats
+    precision: Floats
+    noise: float
+
+
+@dataclass
+class Rows:
+    """What a belief implies for the rows.
+
+    Attributes
+    ----------
+    scores : (R, q)
+        Posterior means.
+    covariance : (R, q, q)
+        Posterior covariances.
+    curves : (1 + q, T M)
+        The mean and the components over the cycle.
+    model : (R, T M)
+    bound : float
+        Lower bound of the log-likelihood of the observed entries.
+    """
+
+    scores: Floats
+    covariance: Floats
+    curves: Floats
+    model: Floats
+    bound: float
+
+
+class _Problem:
+    """The data, and the two half-steps that raise the bound."""
+
+    def __init__(self, values: Floats, mask: Mask, basis: Floats) -> None:
+        self.rows, self.shape = len(values), values.shape[1:]
+        self.basis = basis
+        self.seen = mask.reshape(self.rows, -1).astype(float)
+        self.values = np.where(mask, values, 0.0).reshape(self.rows, -1)
+        self.observed = float(self.seen.sum())
+
+    def encode(self, flat: Floats) -> Floats:
+        """Curves (n, T M) to coefficients (n, P)."""
+        return encode(flat.reshape(len(flat), *self.shape), self.basis)
+
+    def decode(self, coded: Floats) -> Floats:
+        """Coefficients (n, P) to curves (n, T M)."""
+        return decode(coded, self.basis, self.shape[1]).reshape(len(coded), self.values.shape[1])
+
+    def rmse(self, rows: Rows) -> float:
+        """Root mean square of data minus model over the observed entries."""
+        return float(np.sqrt(np.sum((self.seen * rows.model - self.values) ** 2) / self.observed))
+
+    def begin(self, start: Floats, components: int) -> Belief:
+        """Belief from the decomposition of the data filled with `start` (T, M)."""
+        filled = self.values + (1 - self.seen) * start.ravel()
+        coded = self.encode(filled)
+        mean = coded.mean(axis=0)
+        _, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
+        loadings = right[:components] * (singular[:components] / np.sqrt(max(self.rows - 1, 1)))[:, None]
+        rest = np.sum((filled - self.decode(mean[None])) ** 2) - np.sum(singular[:components] ** 2)
+        self.least = LEAST_NOISE * float(np.mean(filled**2)) + 1e-300
+        noise = max(float(rest) / filled.size, self.least)
+        spread = noise / self.rows * np.eye(components)
+        return Belief(np.vstack([mean, loadings]), spread, _precision(loadings, spread), noise)
+
+    def expect(self, belief: Belief) -> Rows:
+        """Scores of the rows from their observed entries, and the bound."""
+        q, size = len(belief.precision), belief.loadings.shape[1]
+        curves = self.decode(belief.loadings)
+        mean, parts = curves[0], curves[1:]
+        gram = (self.seen @ _products(parts).T).reshape(self.rows, q, q)
+        system = gram + size * belief.spread + belief.noise * np.eye(q)
+        inverse = np.linalg.inv(system)
+        off = self.values - self.seen * mean
+        pull = off @ parts.T
+        scores = np.einsum("rkl,rl->rk", inverse, pull)
+        fit = float(np.sum(off**2) - np.sum(pull * scores)) / belief.noise
+        volume = float(np.sum(np.linalg.slogdet(system)[1])) - self.rows * q * np.log(belief.noise)
+        bound = -0.5 * (self.observed * np.log(2 * np.pi * belief.noise) + volume + fit)
+        return Rows(
+            scores, belief.noise * inverse, curves, mean + scores @ parts, bound - _divergence(belief)
+        )
+
+    def maximise(self, belief: Belief, rows: Rows) -> Belief:
+        """Components, their precision and the noise from the rows' scores."""
+        q = len(belief.precision)
+        filled = self.values + (1 - self.seen) * rows.model
+        design = np.column_stack([np.ones(self.rows), rows.scores])
+        moment, cross = design.T @ design, design.T @ self.encode(filled)
+        moment[1:, 1:] += rows.covariance.sum(axis=0)
+        # A missing entry varies with its row's scores.
+        missing = (rows.covariance.reshape(self.rows, q * q).T @ (1 - self.seen)).reshape(
+            q, q, rows.model.shape[1]
+        )
+        varying = np.einsum("klp,lp->kp", missing, rows.curves[1:])
+        cross[1:] += self.encode(varying)
+        ridge = np.diag(np.concatenate([[0.0], belief.noise * belief.precision]))
+        loadings = np.linalg.solve(moment + ridge, cross)
+        spread = belief.noise * np.linalg.inv((moment + ridge)[1:, 1:])
+        size = loadings.shape[1]
+        # Expected sum of squares of data minus model, missing entries included.
+        total = float(np.sum(filled**2) + np.sum(varying * rows.curves[1:]))
+        total += (filled.size - self.observed) * belief.noise
+        total += float(
+            np.sum(loadings * (moment @ loadings - 2 * cross)) + size * np.sum(spread * moment[1:, 1:])
+        )
+        noise = max(total / filled.size, self.least)
+        loadings, spread = _standard(loadings, spread, moment / self.rows)
+        return Belief(loadings, spread, _precision(loadings[1:], spread), noise)
+
+
+def _standard(loadings: Floats, spread: Floats, moment: Floats) -> tuple[Floats, Floats]:
+    """Change units so that the scores have mean 0 and covariance 1 and the components are orthogonal.
+
+    The model stays the same, and the bound is the best of all such changes (Luttinen and Ilin 2010).
+
+    Parameters
+    ----------
+    moment : (1 + q, 1 + q)
+        Mean of (1, scores) (1, scores)' over the rows.
+    """
+    middle = moment[0, 1:]
+    root = np.linalg.cholesky(moment[1:, 1:] - np.outer(middle, middle))
+    mean, parts = loadings[0] + middle @ loadings[1:], loadings[1:]
+    inner = parts @ parts.T + loadings.shape[1] * spread
+    _, axes = np.linalg.eigh(root.T @ inner @ root)
+    turn = root @ axes[:, ::-1]
+    turn *= np.where(np.diag(turn) < 0, -1.0, 1.0)
+    return np.vstack([mean, turn.T @ parts]), turn.T @ spread @ turn
+
+
+def _products(parts: Floats) -> Floats:
+    """Products (q q, T M) of every two of q curves (q, T M)."""
+    return (parts[:, None] * parts[None]).reshape(-1, parts.shape[1])
+
+
+def _precision(components: Floats, spread: Floats) -> Floats:
+    size = components.shape[1]
+    return size / (np.sum(components**2, axis=1) + size * np.diag(spread) + 1e-300)
+
+
+def _divergence(belief: Belief) -> float:
+    """Kullback-Leibler divergence of the components' posterior from their prior."""
+    size = belief.loadings.shape[1]
+    second = np.sum(belief.loadings[1:] ** 2, axis=1) + size * np.diag(belief.spread)
+    volume = np.linalg.slogdet(belief.spread)[1] + np.sum(np.log(belief.precision)) + len(second)
+    return 0.5 * float(np.sum(belief.precision * second) - size * volume)
+
+
+def by_bayes(
+    values: Floats, mask: Mask, components: int, basis: Floats, start: Floats, tolerance: float = TOLERANCE
+) -> Filling:
+    """Fill by turns: scores of the rows, then components; steps are extrapolated while that raises the bound.
+
+    Parameters
+    ----------
+    values, mask : (R, T, M)
+        Data and where they are observed.
+    basis : (B, T)
+        Fourier basis of means and components.
+    start : (T, M)
+        Starting value of missing entries.
+    tolerance : float
+        Rms change of the model between two passes, over the noise, at which to stop.
+    """
+    problem = _Problem(values, mask, basis)
+    belief = problem.begin(start, components)
+    rows = problem.expect(belief)
+    rmse: list[float] = []
+    objective: list[float] = []
+    mixer, converged = Mixer(), False
+    while not converged and len(objective) < ITERATIONS:
+        after, found = _pass(problem, mixer, belief, rows)
+        change = float(np.sqrt(np.mean((found.model - rows.model) ** 2)))
+        converged = change <= tolerance * np.sqrt(after.noise)
+        if found.bound < rows.bound:  # by rounding: nothing is left to gain
+            converged = True
+        else:
+            belief, rows = after, found
+        rmse.append(problem.rmse(rows))
+        objective.append(-rows.bound / problem.observed)
+    filled = np.where(mask, values, rows.model.reshape(values.shape))
+    return Filling(filled, rmse, objective, float(np.sqrt(belief.noise)), converged)
+
+
+def _pass(problem: _Problem, mixer: Mixer, belief: Belief, rows: Rows) -> tuple[Belief, Rows]:
+    """Extrapolate, or take the plain step where that is better; drop a component that does not help."""
+    plain = problem.maximise(belief, rows)
+    after = _mixed(mixer, belief, plain)
+    found = problem.expect(after)
+    if not found.bound >= rows.bound:
+        mixer.forget()
+        after, found = plain, problem.expect(plain)
+    lesser = _without_weakest(after)
+    if lesser is not None and (fewer := problem.expect(lesser)).bound > found.bound:
+        mixer.forget()
+        after, found = lesser, fewer
+    return after, found
+
+
+def _without_weakest(belief: Belief) -> Belief | None:
+    """Drop the weakest component if it is weaker than the doubt about it, else None."""
+    energy = np.sum(belief.loadings[1:] ** 2, axis=1)
+    doubt = belief.loadings.shape[1] * np.diag(belief.spread)
+    if not len(energy) or np.min(energy / doubt) > 1:
+        return None
+    keep = np.flatnonzero(np.arange(len(energy)) != np.argmin(energy / doubt))
+    return Belief(
+        belief.loadings[np.concatenate([[0], 1 + keep])],
+        belief.spread[np.ix_(keep, keep)],
+        belief.precision[keep],
+        belief.noise,
+    )
+
+
+def _mixed(mixer: Mixer, before: Belief, after: Belief) -> Belief:
+    """Belief extrapolated from this step and those before it."""
+    vector = mixer.step(_vector(before), _vector(after), before.loadings.size)
+    loadings, logs = np.split(vector, [before.loadings.size])
+    precision, noise = np.exp(logs[:-1]), float(np.exp(logs[-1]))
+    return Belief(loadings.reshape(before.loadings.shape), after.spread, precision, noise)
+
+
+def _vector(belief: Belief) -> Floats:
+    return np.concatenate([belief.loadings.ravel(), np.log(belief.precision), [np.log(belief.noise)]])

@@ -1,0 +1,28 @@
+"""Curves over a cycle in the real orthonormal Fourier basis of their first harmonics (R9)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+HARMONICS = 19
+
+
+def fourier_basis(samples: int, harmonics: int = HARMONICS) -> Floats:
+    """Real orthonormal basis (1 + 2 harmonics, samples): constant, cosines and sines."""
+    j = np.arange(samples) / samples
+    angle = 2 * np.pi * np.outer(np.arange(1, harmonics + 1), j)
+    waves = np.stack([np.cos(angle), np.sin(angle)], axis=1).reshape(-1, samples)
+    return np.concatenate([np.full((1, samples), 1 / np.sqrt(samples)), waves * np.sqrt(2 / samples)])
+
+
+def encode(curves: Floats, basis: Floats) -> Floats:
+    """Curves (n, T, M) to Fourier coefficients (n, B M)."""
+    return np.matmul(basis, curves).reshape(len(curves), len(basis) * curves.shape[2])
+
+
+def decode(coded: Floats, basis: Floats, channels: int) -> Floats:
+    """Fourier coefficients (n, B M) to curves (n, T, M)."""
+    return np.matmul(basis.T, coded.reshape(len(coded), len(basis), channels))
