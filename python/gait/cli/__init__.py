@@ -30,6 +30,7 @@ COMMANDS = {
     "record": "record",
     "demo": "demo",
     "report": "report",
+    "report track": "report_track",
     "view": "view",
 }
 """Command to its module, in the order of ``gait --help``."""
@@ -38,6 +39,8 @@ COMMANDS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
+    if " ".join(words[:2]) in COMMANDS:  # a command of two words
+        words[:2] = [" ".join(words[:2])]
     args = _parser(words).parse_args(words)
     try:
         with _terminated_like_interrupted():

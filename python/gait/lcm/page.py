@@ -35,6 +35,12 @@ class Page:
         cells = "".join(f"<tr><td>{escape(k)}</td><td>{escape(v)}</td></tr>" for k, v in rows.items())
         self._parts.append(f"<h2>{escape(heading)}</h2><table>{cells}</table>")
 
+    def grid(self, heading: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Add a heading and a table of several columns."""
+        top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+        body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in rows)
+        self._parts.append(f"<h2>{escape(heading)}</h2><table><tr>{top}</tr>{body}</table>")
+
     def block(self, heading: str, text: str) -> None:
         """Add text as it stands."""
         self._parts.append(f"<h2>{escape(heading)}</h2><pre>{escape(text)}</pre>")
