@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait.errors import UserError
-from gait.learn import angle_file, readers
+from gait.learn import angle_file, readers, retarget
 from gait.learn.angle_file import AngleTable
 from gait.learn.articulated import posed
 from gait.learn.body import Body
@@ -90,7 +90,7 @@ def test_the_rate_of_a_file_without_times(tmp_path):
     assert angle_file.read(path, 50.0).fps == 50
 
 
-def test_what_a_track_writes_is_read_as_joints_without_what_was_lost(tmp_path):
+def test_what_a_track_writes_has_its_joints_and_its_angles_but_not_what_was_lost(tmp_path):
     _, pose = mw.walker(mw.LOWER, frames=60)
     names = header(2, tuple(ANGLES))
     skeleton = default_skeleton()
@@ -109,6 +109,12 @@ def test_what_a_track_writes_is_read_as_joints_without_what_was_lost(tmp_path):
     assert isinstance(found, Body) and found.fps == pytest.approx(30, rel=1e-3)
     assert found.joints["l_knee"][:50] == pytest.approx(joints[:50, JOINTS.index("l_knee")], abs=1e-5)
     assert np.isnan(found.joints["l_knee"][50:]).all()
+    angles = retarget.angles(found, retarget.measure(found))
+    assert np.isnan(angles[50:]).all()
+    error = np.degrees(angles - pose.angles)[
+        :50, :-2
+    ]  # these feet never stand flat, which gives the ankles' zero
+    assert np.abs(error).max() < 0.05
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,12 @@ def _moves() -> npt.NDArray[np.bool_]:
 
 MOVES = _moves()
 
+#: Axes to the left that `gait.learn.body.Body` has, and the segments whose they are.
+HINGES = {"head": "head"} | {
+    f"{s}_{joint}": f"{s}_{part}"
+    for s in SIDES
+    for joint, part in (("knee", "thigh"), ("elbow", "upper_arm"))
+}
 LIMBS = {"upper_arm": "z", "forearm": "z", "thigh": "z", "shank": "z", "foot": "x"}
 #: What may differ between bodies: the stature, then the logarithms of ratios, with the axes of the segments
 #: that they stretch (or shrink, -1).  A segment's stretch also moves the origins of its children.

@@ -2,20 +2,23 @@
 
 Orientations are not in such files: the pelvis is level across the hips, and a limb's hinge is across the bent
 limb, or across the body while the limb is straight.  Rotations about a limb's own axis are therefore rough.
+A track has the model's angles beside the joints, and they give the orientations.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import csv_table
+from gait.learn import csv_table, skeleton_fit
+from gait.learn.articulated import HINGES, ORIGINS, SEGMENTS, Pose, posed
 from gait.learn.body import Body
 from gait.learn.rotations import frame_from, unit
-from gait.skeleton import SIDES
+from gait.skeleton import ANGLES, JOINTS, SIDES, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 
@@ -44,7 +47,25 @@ def read_csv(path: Path, fps: float | None = None) -> Body:
         raise UserError(
             f"{path}:1: column {error.args[0].split()[0]} is missing; each joint needs x, y, z"
         ) from None
-    return body(path, places, table.fps)
+    walker = body(path, places, table.fps)
+    columns = [f"{name}_deg" for name in ANGLES]
+    if not set(columns) <= set(table.names):
+        return walker
+    return oriented(walker, np.radians(np.stack([table[column] for column in columns], axis=1)))
+
+
+def oriented(walker: Body, angles: Floats) -> Body:
+    """Body with the orientations that angles (T, 24) of the default skeleton, radians, give to its joints."""
+    skeleton, joints = default_skeleton(), {**walker.joints, "head_top": walker.joints["head"]}
+    used = [k for k, name in enumerate(JOINTS) if name in joints]
+    points = skeleton_fit.Points(
+        skeleton.point_frames[used].astype(np.intp), skeleton.point_positions[used], np.zeros(len(used))
+    )
+    observed = np.stack([joints[JOINTS[k]] for k in used], axis=1)
+    pose = Pose(joints["pelvis"], skeleton_fit.turned(angles, points, observed), angles)
+    turns = posed(pose, ORIGINS).turns
+    lateral = {hinge: turns[:, SEGMENTS.index(part), :, 1] for hinge, part in HINGES.items()}
+    return replace(walker, pelvis=pose.turn, lateral=lateral)
 
 
 def body(path: Path, places: dict[str, Floats], fps: float) -> Body:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn import articulated, marker_map, marker_sets, skeleton_fit
-from gait.learn.articulated import SEGMENTS
+from gait.learn.articulated import HINGES, SEGMENTS
 from gait.learn.body import Body
 from gait.learn.marker_sets import LANDMARKS, Landmark, plain
 from gait.skeleton import JOINTS, SIDES, default_skeleton
@@ -25,12 +25,6 @@ FARTHEST = 1000.0  # metres from the file's origin: what is beyond is damage and
 JOINT_SD = 0.03  # metres beyond which a joint is not known
 AXIS_SD = np.radians(15)  # beyond which a direction is not known
 WORST_RMS = 0.05  # metres: markers in other places than their labels say
-#: Axes to the left that a body has, and the segments whose they are.
-HINGES = {"head": "head"} | {
-    f"{s}_{joint}": f"{s}_{part}"
-    for s in SIDES
-    for joint, part in (("knee", "thigh"), ("elbow", "upper_arm"))
-}
 CHUNK = 512  # frames worked on at once
 LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 

@@ -85,6 +85,20 @@ class Fit:
     covariance: Floats
 
 
+def turned(angles: Floats, points: Points, observed: Floats) -> Floats:
+    """Find the turns (T, 3, 3) of the pelvis that lay bodies of given angles (T, 24) onto points.
+
+    `observed` is as for `fit`; turns are NaN where fewer than three points or not all angles are known.
+    """
+    seen = np.asarray(np.isfinite(observed).all(axis=2))
+    known = (seen.sum(axis=1) >= FEWEST) & np.isfinite(angles).all(axis=1)
+    pose = _rest(len(angles))
+    pose.angles[known] = angles[known]
+    data = _Data(np.where(seen[..., None], observed, 0.0), seen.astype(float), points.segment)
+    turn = _rooted(pose, points.at, articulated.ORIGINS, data)[0].turn
+    return np.where(known[:, None, None], turn, np.nan)
+
+
 @dataclass
 class _Data:
     """Observed points (T, M, 3), 0 where missing, their weights (T, M), and segments (M,)."""
