@@ -109,7 +109,7 @@ def _drawn_sd(draws: Draws, name: str, when: Array) -> Array:
 def _linear_sd(
     numbers: Mapping[str, Array], time: Array, name: str, curves: ModelCurves, when: Array
 ) -> Array:
-    """Deviation by linear propagation of phase and scores; the same error at the same point of every stride."""
+    """Deviation by linear propagation of phase and scores, an error being the same in every stride."""
     if "phase_sd" not in numbers:
         return np.full(len(PERCENT), np.nan)
     scores = sorted((n for n in numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)

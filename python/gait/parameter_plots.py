@@ -39,10 +39,11 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
         _tint(axes, track)
         for row, side in enumerate(SIDES):
             foot = contacts(track, parameters.events, side, stride)
-            ends = np.where(np.isfinite(foot.off), foot.off, track.time[-1])
-            axes.barh(
-                np.full(len(ends), row), ends - foot.strike, left=foot.strike, height=0.5, color=_COLOUR[side]
-            )
+            begin, ends = foot.strike, np.where(np.isfinite(foot.off), foot.off, track.time[-1])
+            first = parameters.events.off[side][:1]
+            if len(first) and (not len(begin) or first[0] < begin[0]):  # on the ground from the start
+                begin, ends = np.append(track.time[0], begin), np.append(first, ends)
+            axes.barh(np.full(len(ends), row), ends - begin, left=begin, height=0.5, color=_COLOUR[side])
             for times, sds, bottom in (
                 (parameters.events.strike[side], parameters.event_sd.strike[side], 0.32),
                 (parameters.events.off[side], parameters.event_sd.off[side], -0.32),

@@ -36,7 +36,7 @@ _SHRUNK = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("track", metavar="OUT.csv", help="from gait track or gait record")
-    parser.add_argument("-m", "--model", metavar="M.gait", help="the norm: the tracker's model (shipped one)")
+    parser.add_argument("-m", "--model", metavar="M.gait", help="the norm (the shipped model)")
     parser.add_argument("-o", "--output", metavar="DIR", help="folder for the page and tables (OUT_gait)")
     parser.add_argument("--draws", metavar="D.npz", help="motions of gait track --smooth --draws")
 
@@ -70,7 +70,8 @@ def _page(name: str, track: Track, parameters: Parameters, cycles: dict[str, Ang
     page.words(
         f"Frames {track.frame[0]} to {track.frame[-1]}. Means over strides without lost or ambiguous frames, "
         f"plus or minus one standard deviation of the mean; in brackets the deviation between strides. "
-        f"Where the deviations come from: {parameters.source}. Asymmetry is 200 (right - left) / (right + left)."
+        f"Where the deviations come from: {parameters.source}. "
+        "Asymmetry is 200 (right - left) / (right + left)."
     )
     page.grid("Parameters", ("", "right", "left", "both", "asymmetry, %"), _rows(parameters))
     page.figure("Contacts of the feet", footfall_plot(track, parameters))

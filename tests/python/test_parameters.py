@@ -1,0 +1,179 @@
+"""Gait parameters: against a walk by rule, against true clips, with and without draws."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from drawn_walker import DATA
+from walking_track import STANCE, STEP, walking_track
+
+from gait import Model, UserError, blob
+from gait.anglecycles import angle_cycles
+from gait.events import strikes_from_meta
+from gait.fields import read_json
+from gait.footfall_draws import Draws
+from gait.footfalls import SIDES, find_events, stride_time
+from gait.model import read_blob
+from gait.modelcurves import ModelCurves
+from gait.parameters import QUANTITIES, measure
+from gait.trackfile import read_truth
+
+MODEL = Model()
+CURVES = ModelCurves(blob.decode(read_blob(None)))
+CLIPS = sorted((DATA / "eval/dev").glob("*/meta.json"))
+
+
+def drawn(track, count=60, late=0.02, seed=0):
+    """Motions that are the track's, each late by a normal number of seconds and scaled about the origin."""
+    random = np.random.default_rng(seed)
+    names = tuple(track.places)
+    joints = np.empty((count, len(track.time), len(names), 3), np.float32)
+    for d in range(count):
+        shift, scale = late * random.standard_normal(), 1 + 0.02 * random.standard_normal()
+        for j, name in enumerate(names):
+            for k in range(3):
+                place = track.places[name][:, k]
+                joints[d, :, j, k] = scale * np.interp(track.time - shift, track.time, place)
+    angles = np.zeros((count, len(track.time), MODEL.info.angles), np.float32)
+    phase = np.zeros((count, len(track.time)), np.float32)
+    return Draws(track.frame, track.time, names, MODEL.angle_names, joints, angles, phase)
+
+
+def test_a_walk_by_rule_has_its_own_parameters():
+    summary = measure(walking_track()).summary()
+    want = {
+        "stride_time_s": (1 / 0.9, 0.002),
+        "cadence_spm": (108.0, 0.2),
+        "stride_length_m": (1.3, 0.004),
+        "speed_m_s": (1.17, 0.002),
+        "step_width_m": (0.12, 0.002),
+        "stance_percent": (100 * STANCE, 2.0),
+        "double_support_percent": (100 * (2 * STANCE - 1), 3.0),
+    }
+    for name, (value, tolerance) in want.items():
+        assert summary[name]["both"]["mean"] == pytest.approx(value, abs=tolerance), name
+    right, left = (summary["step_length_m"][side]["mean"] for side in SIDES)
+    assert right == pytest.approx(1.3 * (1 - STEP["left"]), abs=0.005)
+    assert left == pytest.approx(1.3 * STEP["left"], abs=0.005)
+    uneven = summary["step_length_m"]["asymmetry_percent"]
+    assert uneven["mean"] == pytest.approx(200 * (right - left) / (right + left)) and uneven["mean"] < -5
+    assert set(summary) == set(QUANTITIES)
+
+
+def test_deviations_follow_those_of_the_track():
+    once, twice = (measure(walking_track(phase_sd=s)) for s in (0.004, 0.008))
+    right = once.strides["right"]
+    expected = np.sqrt(2) * 0.004 / 0.9
+    np.testing.assert_allclose(right.sd["stride_time_s"], expected, rtol=0.15)
+    np.testing.assert_allclose(right.sd["stride_length_m"], np.sqrt(2) * 0.01, rtol=0.15)
+    np.testing.assert_allclose(once.event_sd.strike["left"], 0.004 / 0.9, rtol=1e-6)
+    ratio = twice.strides["right"].sd["stride_time_s"] / right.sd["stride_time_s"]
+    np.testing.assert_allclose(ratio, 2, rtol=1e-6)
+    both = once.summary()["stride_time_s"]["both"]["sd"]
+    assert both < right.sd["stride_time_s"].mean() / 2  # of a mean over seven strides
+
+
+def test_without_deviations_nothing_is_claimed():
+    track = walking_track()
+    del track.numbers["phase_sd"]
+    parameters = measure(track)
+    assert np.isnan(parameters.strides["right"].sd["stride_time_s"]).all()
+    assert np.isnan(parameters.event_sd.strike["left"]).all() and "unknown" in parameters.source
+    assert np.isnan(parameters.summary()["speed_m_s"]["both"]["sd"])
+    assert parameters.summary()["speed_m_s"]["both"]["mean"] == pytest.approx(1.17, abs=0.002)
+
+
+def test_errors_that_last_cancel_between_the_ends_of_a_stride():
+    """All events of a motion are late alike: its events are unsure by that much, its strides are not."""
+    track = walking_track()
+    parameters = measure(track, drawn(track))
+    late = 0.02 * 60**-0.5  # how well 60 draws know their deviation, roughly
+    assert np.abs(parameters.event_sd.strike["right"][1:-1] - 0.02).max() < 3 * late
+    right = parameters.strides["right"]
+    assert right.sd["stride_time_s"][1:-1].max() < 0.002
+    np.testing.assert_allclose(right.sd["stride_length_m"] / right.values["stride_length_m"], 0.02, rtol=0.35)
+
+
+def test_strides_with_lost_or_ambiguous_frames_do_not_count():
+    track = walking_track()
+    for word in ("lost", "ambiguous"):
+        status = list(track.status)
+        status[70] = word
+        parameters = measure(replace(track, status=status))
+        sure = np.concatenate([parameters.strides[side].sure for side in SIDES])
+        assert (~sure).sum() == 2
+    hidden = measure(replace(track, status=["lost"] * len(track.time)))
+    assert all(row["both"] is None for row in hidden.summary().values())
+    assert angle_cycles(track, hidden, CURVES) == {}
+
+
+def test_a_missed_strike_does_not_make_one_long_stride():
+    track = walking_track(seconds=8)
+    track.places["r_heel"][100:140] = track.places["pelvis"][100:140] - [0, 0, 0.9]
+    right = measure(track).strides["right"]
+    assert len(right.start) >= 3 and (right.values["stride_time_s"] < 1.6 / 0.9).all()
+
+
+def test_too_short_tracks_are_refused():
+    with pytest.raises(UserError, match="no whole stride in 0.97 s"):
+        measure(walking_track(seconds=1.0))
+    with pytest.raises(UserError, match="three frames"):
+        measure(walking_track(seconds=0.06))
+
+
+def test_angle_cycles_are_put_beside_the_norm():
+    track = walking_track(seconds=6)
+    scores = np.zeros((1, 5))
+    right, left = "r_hip_flexion", "l_hip_flexion"
+    for name, extra in ((right, 0.0), (left, 2.0)):
+        phase = track.phase - (STEP["left"] - 0.5 if name == left else 0.0)
+        mean, sd = CURVES.norm(name, phase)
+        track.numbers[f"{name}_deg"] = np.degrees(mean + extra * sd)
+    cycles = angle_cycles(track, measure(track), CURVES)
+    assert set(cycles) == {right, left}
+    assert np.abs(cycles[right].z).max() < 0.3
+    assert np.abs(cycles[left].z - 2.0).max() < 0.35
+    assert cycles[left].summary()["rms_z"] == pytest.approx(2.0, abs=0.1)
+    slope = np.degrees(
+        CURVES.channel(right, np.array([0.25]), scores) - CURVES.channel(right, np.array([0.2]), scores)
+    )
+    assert cycles[right].sd[22] > 0.9 * abs(slope[0] / 0.05 * 0.004)  # the phase alone gives that much
+    assert len(cycles[right].strides) == len(measure(track).strides["right"].start)
+
+
+def test_draws_give_the_cycles_their_deviation():
+    track = walking_track(seconds=6)
+    track.numbers["r_knee_flexion_deg"] = np.zeros(len(track.time))
+    draws = drawn(track, late=0.0)
+    draws.angles[:, :, MODEL.angle_names.index("r_knee_flexion")] = np.radians(
+        3 * np.random.default_rng(1).standard_normal(60)
+    )[:, None]
+    sd = angle_cycles(track, measure(track), CURVES, draws)["r_knee_flexion"].sd
+    np.testing.assert_allclose(sd, 3, rtol=0.3)
+
+
+def test_the_norm_is_wider_where_people_differ_and_periodic():
+    phase = np.linspace(0, 1, 50)
+    mean, sd = CURVES.norm("r_knee_flexion", phase)
+    np.testing.assert_allclose([mean[0], sd[0]], [mean[-1], sd[-1]], atol=1e-9)
+    at = CURVES.names.index("r_knee_flexion")
+    assert (sd > CURVES.residual[at]).all()
+    np.testing.assert_allclose(CURVES.norm("r_knee_flexion", phase + 3)[0], mean, atol=1e-9)
+
+
+@pytest.mark.skipif(not CLIPS, reason="../shared/data is absent")
+@pytest.mark.parametrize("meta", CLIPS, ids=lambda m: m.parent.name)
+def test_true_motions_have_their_listed_events_and_parameters(meta):
+    """The clips list their events by the same rule, from 120 frames a second."""
+    truth, told = read_truth(meta.parent / "truth.csv"), read_json(meta, "meta")
+    events, listed = find_events(truth), strikes_from_meta(meta)
+    for side in SIDES:
+        found = np.interp(events.strike[side], truth.time, truth.frame)
+        want = getattr(listed, side)
+        want = want[(want > 3) & (want < truth.frame[-1] - 3)]
+        assert all(np.abs(found - w).min() < 0.5 for w in want)
+        assert all(late > early for early, late in pairwise(events.off[side]))
+    assert stride_time(events) == pytest.approx(
+        told.number("stride_period_s", 0.3, 3.0, "give seconds"), rel=0.01
+    )

@@ -1,0 +1,107 @@
+"""`gait report track`: files, page, words, errors."""
+
+import csv
+import json
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from test_parameters import drawn
+from walking_track import walking_track, write_track
+
+from gait.cli import main
+from gait.parameters import QUANTITIES, measure
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A track of five seconds, and draws of it."""
+    here = tmp_path_factory.mktemp("report")
+    track = walking_track()
+    write_track(here / "walk.csv", track)
+    drawn(track, count=20).write(here / "draws.npz")
+    return here
+
+
+def table(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_files_say_the_same_as_the_library(folder, capsys):
+    assert main(["report", "track", str(folder / "walk.csv"), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    out = folder / "walk_gait"
+    assert json.loads((out / "parameters.json").read_text()) == printed
+    known = measure(walking_track())
+    speed = printed["summary"]["speed_m_s"]["both"]
+    assert speed["mean"] == pytest.approx(known.summary()["speed_m_s"]["both"]["mean"], abs=1e-4)
+    events = table(out / "events.csv")
+    assert len(events) == known.events.count and [e["event"] for e in events] == [
+        e["event"] for e in printed["events"]
+    ]
+    times = [float(e["time_s"]) for e in events]
+    assert times == sorted(times) and float(events[0]["frame"]) == pytest.approx(7 + 30 * times[0], abs=1e-3)
+    strides = table(out / "strides.csv")
+    assert len(strides) == sum(len(s.start) for s in known.strides.values())
+    assert set(QUANTITIES) <= set(strides[0]) and float(strides[0]["stride_time_s_sd"]) > 0
+    curves = table(out / "curves.csv")
+    assert len(curves) == 101 and float(curves[50]["l_hip_flexion_norm_sd_deg"]) > 1
+    assert set(printed["angles"]) == {"r_hip_flexion", "l_hip_flexion", "torso_x"}
+
+
+def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
+    assert main(["report", "track", str(folder / "walk.csv"), "-o", str(folder / "page")]) == 0
+    words = capsys.readouterr().out
+    assert "stride time, s" in words and "taken as independent" in words
+    page = (folder / "page/report.html").read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    assert len(drawings) == 6
+    for drawing in drawings:
+        ElementTree.fromstring(drawing.replace("xlink:href", "href"))
+    for heading in ("Parameters", "Contacts of the feet", "Strides", "Deviation from the norm"):
+        assert f"<h2>{heading}</h2>" in page
+
+
+def test_draws_are_used_where_given(folder, capsys):
+    command = ["report", "track", str(folder / "walk.csv"), "-o", str(folder / "d"), "--json"]
+    assert main([*command, "--draws", str(folder / "draws.npz")]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["uncertainty"].startswith("20 motions")
+    own = json.loads((folder / "walk_gait/parameters.json").read_text())
+    late = [e["sd_s"] for e in printed["events"]]
+    assert np.median(late) > 2 * np.median([e["sd_s"] for e in own["events"]])
+
+
+def test_a_track_that_was_lost_all_along_still_has_a_page(folder):
+    track = walking_track()
+    track.status[:] = ["lost"] * len(track.status)
+    write_track(folder / "lost.csv", track)
+    assert main(["report", "track", str(folder / "lost.csv"), "--quiet"]) == 0
+    assert "null" in (folder / "lost_gait/parameters.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda here: write_track(here / "x.csv", walking_track(seconds=0.9)), "no whole stride"),
+        (lambda here: (here / "x.csv").write_text("frame\n"), "x.csv: has no rows"),
+        (lambda here: (here / "x.csv").unlink(missing_ok=True), "x.csv: no such track file"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_line(folder, capsys, change, words):
+    change(folder)
+    assert main(["report", "track", str(folder / "x.csv")]) == 1
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1 and not (folder / "x_gait").exists()
+
+
+def test_the_other_report_is_still_there(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["report", "--help"])
+    assert stop.value.code == 0 and "E.log" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["report", "track", "--help"])
+    assert "usage: gait report track" in capsys.readouterr().out
