@@ -62,7 +62,7 @@ def test_a_bad_file_in_a_folder_is_named_and_the_rest_is_learnt(walks, tmp_path,
     assert summary["stride_hz"][0] == pytest.approx(
         np.mean([120 / 116, 120 / 131, 120 / 140, 120 / 125]), rel=0.01
     )
-    assert np.all(np.diff(summary["imputation"]) <= 0)
+    assert np.all(np.diff(summary["imputation_objective"]) <= 0)
 
 
 def test_the_same_input_gives_the_same_bytes(walks, learned, tmp_path):
@@ -113,6 +113,7 @@ def test_exclude_matches_the_tail_of_the_path(walks):
     [
         (["{walks}", "--exclude", "*"], "leaves none of 8 files"),
         (["{walks}/nowhere"], "no such file or folder"),
+        (["{walks}", "--markers", "{walks}/no.json"], "no.json: No such file or directory; check the name"),
         (["{walks}/01/01.asf"], "not learnt from; convert it to .amc .bvh"),
         (["{walks}/02/02_99.amc"], r"02_99.amc:3: 2 numbers where 6"),
         (["{walks}/01/01_01.amc"], "too few for 5 components; add recordings"),
@@ -128,11 +129,61 @@ def test_errors_are_one_line_with_exit_code_1(walks, tmp_path, capsys, words, me
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("value", ["0", "17", "many"])
-def test_a_wrong_number_of_components_is_a_usage_error(value):
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        *(("--components", value) for value in ("0", "17", "many")),
+        *(("--fps", value) for value in ("fast", "1", "nan")),
+        *(("--seed", value) for value in ("-1", "one")),
+        ("--jobs", "0"),
+    ],
+)
+def test_a_wrong_value_is_a_usage_error(capsys, option, value):
     with pytest.raises(SystemExit) as stop:
-        run("learn", "x", "-o", "y", "--components", value)
-    assert stop.value.code == 2
+        run("learn", "x", "-o", "y", option, value)
+    assert stop.value.code == 2 and value in capsys.readouterr().err
+
+
+def test_jobs_and_a_cluster_do_not_go_together(walks, tmp_path, capsys):
+    words = ("--jobs", 2, "--dask", "tcp://127.0.0.1:9")
+    assert run("learn", walks, "-o", tmp_path / "m.gait", *words) == 2
+    assert "give one of them" in capsys.readouterr().err
+
+
+def test_json_says_of_each_sequence_where_it_is_from_and_why_it_was_taken(walks, tmp_path, capsys):
+    assert run("learn", walks, "-o", tmp_path / "m.gait", "--components", 3, "--json", "--quiet") == 0
+    for s in json.loads(capsys.readouterr().out)["sequences"]:
+        assert (
+            Path(s["source"]).is_file() and s["subject"] == s["name"][:2] and s["fps"] == pytest.approx(120)
+        )
+        assert 0 <= s["kept"][0] < s["kept"][1] <= 420 and len(s["cut"]) == 2
+        assert s["evidence"]["repeats"] > 0.75 and s["activity"] in ("walk", "")
+
+
+def test_a_stand_before_the_walk_is_cut_off_unless_no_trim_keeps_it(tmp_path, capsys):
+    lines = files.toy_amc(frames=420, seed=4).splitlines()
+    at = lines.index("1")
+    still = lines[at + 1 : lines.index("2")]
+    frames = [line for k in range(150) for line in (str(k + 1), *still)]
+    walk = [str(int(line) + 150) if line.isdigit() else line for line in lines[at:]]
+    path = files.write_toy(tmp_path)
+    path.write_text("\n".join([*lines[:at], *frames, *walk]) + "\n")
+    words = ("learn", path, "-o", tmp_path / "m.gait", "--components", 1, "--json")
+    assert run(*words) == 0
+    (sequence,) = json.loads(capsys.readouterr().out)["sequences"]
+    assert 100 <= sequence["kept"][0] <= 200 and sequence["kept"][1] == 570
+    assert sequence["cut"][0] and not sequence["cut"][1]
+    assert run(*words, "--no-trim") == 1
+    assert "one cycle is not like the next" in capsys.readouterr().err
+
+
+def test_people_get_a_few_lines_however_many_files(walks, tmp_path, capsys):
+    for k in range(30):
+        (tmp_path / f"07_{k:02}.amc").write_text("nothing\n")
+    assert run("learn", walks, tmp_path, "-o", tmp_path / "m.gait", "--components", 3) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\n") == 4 and "7 sequences of 4 subjects" in out and "31 files left out" in out
+    assert err.count("\n") == 21 and "left out: 11 more" in err
 
 
 def test_info_tells_what_was_learnt(learned, capsys):

@@ -6,9 +6,9 @@ period; functional principal components of all cycles give the mean curves and t
 (Ormoneit and others, 2000).  In a folder, a file that cannot be used is named in one line and the rest is
 learnt.  gait info lists the sequences of a model, --report shows everything.
 
-The signals wait on disk, in the folder that TMPDIR names, so a corpus may be larger than memory.  The model
-does not depend on --jobs or --dask.  The workers of a Dask cluster (pip install 'gait[dask]') need this
-version of the package and the files under the same paths.
+Recordings are read a few at a time and their signals wait on disk, in the folder that TMPDIR names; in memory
+are their cycles alone.  The model does not depend on --jobs or --dask.  The workers of a Dask cluster
+(pip install 'gait[dask]') need this version of the package and the files under the same paths.
 
 The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
 """
@@ -28,7 +28,7 @@ from gait import blob
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
-from gait.learn import fit, model, sources
+from gait.learn import fit, marker_map, model, sources
 from gait.learn.reading import Reading
 from gait.learn.sequence import Sequence
 from gait.learn.stage import one_thread
@@ -44,7 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("sources", nargs="+", metavar="SRC", help="motion files or folders of them")
     parser.add_argument("-o", "--output", required=True, metavar="M.gait", help="the model")
-    parser.add_argument("--activity", default="walk", metavar="NAME", help="what the motion is called (walk)")
+    parser.add_argument(
+        "--activity",
+        default="walk",
+        metavar="NAME",
+        help="what the motion is called; walk leaves out runs and the reverse (walk)",
+    )
     parser.add_argument(
         "--components",
         type=_components,
@@ -127,8 +132,8 @@ def _check(args: argparse.Namespace) -> None:
     """Refuse before the work what would fail after it."""
     if args.dask and args.jobs:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
-    if args.markers and not args.markers.is_file():
-        raise UserError(f"--markers {args.markers}: no such file; check the name")
+    if args.markers:
+        marker_map.read(args.markers)
     require_writable(args.output)
     if args.report:
         folder = Path(args.report).absolute()
@@ -181,6 +186,7 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
         "fps": fps,
         "alignment": learned.alignment.objective,
         "imputation": learned.components.rmse,
+        "imputation_objective": learned.components.objective,
     }
 
 

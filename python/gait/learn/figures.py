@@ -51,7 +51,9 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
         "Cycles of the analysis, blue where observed; the rest is filled from the components.",
         figures_cycle.missing(learned),
     )
-    yield Drawing("convergence", "Convergence", "Neither may ever rise.", figures_model.convergence(learned))
+    yield Drawing(
+        "convergence", "Convergence", "The objectives may never rise.", figures_model.convergence(learned)
+    )
 
 
 def _model(learned: Learned) -> Iterator[Drawing]:

@@ -168,14 +168,17 @@ def residuals(learned: Learned) -> Figure:
 
 
 def convergence(learned: Learned) -> Figure:
-    """Objectives of the alignment and of the filling of gaps against their passes."""
-    figure, (left, right) = grid(1, 2, 8, 3.2)
-    objective, rmse = np.array(learned.alignment.objective), np.array(learned.components.rmse)
-    left.plot(np.arange(1, len(objective) + 1), objective, "o-", ms=4, color=BLUE)
-    left.set(xlabel="pass", ylabel="weighted sum of squares, rad²", title="alignment")
-    right.plot(np.arange(1, len(rmse) + 1), np.degrees(rmse), "o-", ms=3, color=BLUE)
-    right.set(xlabel="pass", ylabel="error on observed entries, degrees", title="filling of gaps")
-    for axes in (left, right):
+    """Objectives of the alignment and of the filling of gaps, and its error, against their passes."""
+    figure, panels = grid(1, 3, 10, 3.2)
+    filling = learned.components
+    courses: list[tuple[str, str, list[float] | Floats]] = [
+        ("alignment", "weighted sum of squares, rad²", learned.alignment.objective),
+        ("filling of gaps: objective", "- log-likelihood per entry", filling.objective),
+        ("filling of gaps: error", "on observed entries, degrees (rms)", np.degrees(filling.rmse)),
+    ]
+    for axes, (title, unit, values) in zip(panels, courses, strict=True):
+        axes.plot(np.arange(1, len(values) + 1), values, "o-", ms=3, color=BLUE)
+        axes.set(xlabel="pass", ylabel=unit)
+        axes.set_title(title, fontsize=10)
         whole_numbers(axes)
-        axes.title.set_fontsize(10)
     return figure

@@ -1,4 +1,4 @@
-"""Arrays kept on disk, so that a corpus may be larger than memory."""
+"""Arrays kept on disk, so that the signals of a corpus need no memory."""
 
 from __future__ import annotations
 
