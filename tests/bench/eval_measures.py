@@ -140,10 +140,14 @@ class Spread:
         self._true = None if self._truth is None else self._truth.eval15()
         self._model = model
         self._joints = [model.joint_names.index(name) for name in EVAL15]
+        self._next = APART  # the first frames are the start's doing
 
     def wants(self, frame: int) -> bool:
         """Is this one of the frames, far enough apart, that are measured?"""
-        return frame in self._rows and frame % APART == APART - 1
+        if frame not in self._rows or frame < self._next:
+            return False
+        self._next = frame + APART
+        return True
 
     def nees(self, frame: int, estimate: Estimate, states: np.ndarray, weights: np.ndarray) -> float:
         """Squared error per dimension in units of the covariance: 1 where it is right."""
