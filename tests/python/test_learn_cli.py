@@ -116,7 +116,7 @@ def test_exclude_matches_the_tail_of_the_path(walks):
         (["{walks}", "--markers", "{walks}/no.json"], "no.json: No such file or directory; check the name"),
         (["{walks}/01/01.asf"], "not learnt from; convert it to .amc .bvh"),
         (["{walks}/02/02_99.amc"], r"02_99.amc:3: 2 numbers where 6"),
-        (["{walks}/01/01_01.amc"], "too few for 5 components; add recordings"),
+        (["{walks}/01/01_01.amc", "--components", "5"], "too few for 5 components; add recordings"),
         (["{walks}", "--components", "5", "-o", "{walks}/no/where.gait"], "does not exist; create it"),
     ],
 )
