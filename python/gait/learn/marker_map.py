@@ -13,8 +13,8 @@
 `set` (optional) is a known set to start from; `markers` adds to it or overrides it.  A label is compared
 without the subject before ':', case, blanks and punctuation.  Its value is a landmark of
 `gait.learn.marker_sets`, or a segment of the skeleton (libgait/doc/model-format.md) with the place `at` in
-its axes (x forward, y left, z up, from the segment's upper joint) and `sd`, how far the marker may be from there,
-both in statures; without `at` it is anywhere on the segment.  null leaves a marker out.
+its axes (x forward, y left, z up, from the segment's upper joint) and `sd`, how far the marker may be from
+there, both in statures; without `at` it is anywhere on the segment.  null leaves a marker out.
 """
 
 from __future__ import annotations
