@@ -58,6 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"how many, 1 to {fit.MOST_COMPONENTS}; auto: by held-out data ({fit.DEFAULT_COMPONENTS})",
     )
     parser.add_argument(
+        "--prior",
+        choices=fit.KINDS,
+        default=fit.KINDS[0],
+        help="paper: components of the recorded cycles as they are, one body for all (people: reaches others)",
+    )
+    parser.add_argument(
         "--exclude",
         nargs="+",
         action="extend",
@@ -117,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     with one_thread():
         sequences, refused = _read(args)
-        learned = fit.fit(sequences, args.components, args.seed)
+        learned = fit.fit(sequences, args.components, args.seed, args.prior)
         data = blob.write(args.output, model.sections(learned, args.activity, args.seed))
         if args.report:
             from gait.learn import report  # matplotlib is slow to import

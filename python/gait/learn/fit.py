@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import align, cycles, fpca, retarget
+from gait.learn import align, cycles, fpca, lengths, prior, retarget
 from gait.learn.sequence import Sequence
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 
 SAMPLES = 128
-DEFAULT_COMPONENTS = 5
+DEFAULT_COMPONENTS = 8
+KINDS = ("people", "paper")  # of priors
 MOST_COMPONENTS = 16  # the library reads no more
 #: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as
 #: much as the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per
@@ -38,7 +39,11 @@ class Learned:
     cycles : cycles.Cycles
         Rows of the analysis, channels in their own units.
     components : fpca.Components
-        In scaled units; `scale` (M,) turns channels into them.
+        In the channels' own units; gaps are filled in units scaled by `scale` (M,), and `rmse` is in those.
+    lengths : (p, F + 1)
+        PROP: how limbs differ in length among people of one stature; no rows in the paper's model.
+    static : (M,)
+        Standard deviation over subjects of a person's constant offsets from the model.
     held_out : (n,)
         Error on held-out blocks for 0, 1 ... components, scaled units; empty unless chosen automatically.
     """
@@ -52,18 +57,19 @@ class Learned:
     components: fpca.Components
     scale: Floats
     held_out: Floats
+    lengths: Floats
+    static: Floats
 
     @property
     def curves(self) -> Floats:
         """CURV: mean, then components times their standard deviation, (1 + q, T, M), own units."""
         c = self.components
-        return np.concatenate([c.mean[None], c.curves * c.sd[:, None, None]]) / self.scale
+        return np.concatenate([c.mean[None], c.curves * c.sd[:, None, None]])
 
     @property
     def residuals(self) -> Floats:
         """Data minus reconstruction, own units; NaN where not observed, (R, T, M)."""
-        model = self.components.reconstruct() / self.scale
-        return np.where(self.cycles.mask, self.cycles.values - model, np.nan)
+        return np.where(self.cycles.mask, self.cycles.values - self.components.reconstruct(), np.nan)
 
     @property
     def row_subject(self) -> npt.NDArray[np.intp]:
@@ -76,8 +82,19 @@ def channel_scale() -> Floats:
     return np.array([ROOT_SCALE.get(name, 1.0) for name in CHANNELS])
 
 
-def fit(sequences: list[Sequence], components: int | str = DEFAULT_COMPONENTS, seed: int = 1) -> Learned:
+def fit(
+    sequences: list[Sequence],
+    components: int | str = DEFAULT_COMPONENTS,
+    seed: int = 1,
+    kind: str = "people",
+) -> Learned:
     """Learn the cyclic model of prepared sequences.
+
+    Parameters
+    ----------
+    kind : "people" or "paper"
+        The prior that reaches people who were not recorded (`gait.learn.prior`), or the paper's components
+        of the recorded cycles and one body for everybody.
 
     Raises
     ------
@@ -100,14 +117,34 @@ def fit(sequences: list[Sequence], components: int | str = DEFAULT_COMPONENTS, s
     scaled, held_out = rows.values * scale, np.zeros(0)
     if components == "auto":
         wanted, held_out = fpca.choose(scaled, rows.mask, np.random.default_rng(seed))
-    model = fpca.fit(scaled, rows.mask, wanted)
-    return Learned(sequences, subjects, index, proportions, alignment, rows, model, scale, held_out)
+    model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
+    row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
+    metric = prior.joint_metric(model.mean, proportions)
+    static = prior.static_spread(model.filled, row_subject, wanted, metric)
+    table = np.zeros((0, len(default_skeleton().frames) + 1))
+    if kind == "people":
+        model = prior.refine(model, row_subject, wanted, metric)
+        table = lengths.learn(_bodies(sequences, index, len(subjects)), proportions, model.mean)
+    return Learned(
+        sequences, subjects, index, proportions, alignment, rows, model, scale, held_out, table, static
+    )
+
+
+def _own_units(c: fpca.Components, scale: Floats) -> fpca.Components:
+    """Components of scaled channels in the channels' own units."""
+    return replace(c, mean=c.mean / scale, curves=c.curves / scale, filled=c.filled / scale)
 
 
 def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int) -> Proportions:
     """Average the proportions; every subject counts once."""
-    picked = [sequences[int(np.flatnonzero(index == i)[0])].measures for i in range(subjects)]
-    return retarget.generic_proportions(picked)
+    return retarget.generic_proportions(_bodies(sequences, index, subjects))
+
+
+def _bodies(
+    sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int
+) -> list[retarget.Measures | None]:
+    """One body of each subject."""
+    return [sequences[int(np.flatnonzero(index == i)[0])].measures for i in range(subjects)]
 
 
 def heel_strike(curve: Floats, proportions: Proportions) -> float:

@@ -36,6 +36,7 @@ def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array
         "SCST": _stored(score_statistics(learned)),
         "GAIT": _stored(gait_statistics(learned)),
         **default_skeleton(learned.proportions).sections(),
+        **({"PROP": _stored(learned.lengths)} if len(learned.lengths) else {}),
     }
 
 
@@ -48,14 +49,8 @@ def channel_statistics(learned: Learned) -> Floats:
     """CHST (M, 4): residual sd, least and largest value, sd over subjects of the mean residual."""
     residual, values = learned.residuals, np.where(learned.cycles.mask, learned.cycles.values, np.nan)
     sd = np.sqrt(np.nanmean(residual**2, axis=(0, 1)))
-    offsets = _means(residual, learned.row_subject, len(learned.subjects))
-    static = offsets.std(axis=0, ddof=1) if len(offsets) > 1 else np.zeros(len(sd))
-    return np.stack([sd, np.nanmin(values, axis=(0, 1)), np.nanmax(values, axis=(0, 1)), static], axis=1)
-
-
-def _means(rows: Floats, group: npt.NDArray[np.intp], groups: int) -> Floats:
-    """Mean over the rows and phases of each group, (groups, M)."""
-    return np.array([np.nanmean(rows[group == g], axis=(0, 1)) for g in range(groups)])
+    extremes = np.nanmin(values, axis=(0, 1)), np.nanmax(values, axis=(0, 1))
+    return np.stack([sd, *extremes, learned.static], axis=1)
 
 
 def score_statistics(learned: Learned) -> Floats:
@@ -110,17 +105,14 @@ def stride_variation(learned: Learned) -> float:
 def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
     """META: what people and tools may want to know; degrees, metres, seconds."""
     c = learned.components
-    statures = [
-        np.mean([s.measures.stature for s in learned.sequences if s.subject == name])
-        for name in learned.subjects
-    ]
+    statures = [_stature(learned, name) for name in learned.subjects]
     return {
         "activity": activity,
         "generator": GENERATOR,
         "seed": seed,
         **({"acknowledgement": CMU} if from_cmu(learned) else {}),
         "subjects": learned.subjects,
-        "statures_m": _rounded(statures, 3),
+        "statures_m": [None if h is None else round(h, 3) for h in statures],
         "sequences": {
             "count": len(learned.sequences),
             "columns": list(SEQUENCE_COLUMNS),
@@ -132,6 +124,12 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
         "residual_deg": _rounded(np.degrees(channel_statistics(learned)[: len(ANGLES), 0]), 1),
         "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
     }
+
+
+def _stature(learned: Learned, subject: str) -> float | None:
+    """Mean stature of a subject, metres; None if no recording shows it."""
+    bodies = [s.measures for s in learned.sequences if s.subject == subject and s.measures is not None]
+    return float(np.mean([b.stature for b in bodies])) if bodies else None
 
 
 def from_cmu(learned: Learned) -> bool:

@@ -1,0 +1,127 @@
+"""A prior over how people walk that reaches those who were not recorded.
+
+The paper's components (`fpca`) describe the recorded cycles as well as possible.  With few subjects that is
+not what a new person needs, so the completed cycles are taken up once more: each also mirrored (left and
+right exchanged, half a cycle later), every subject counting alike, and channels weighed by how far they move
+the joints.  What is left of a subject after the components of all others is the spread of static offsets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
+from gait.learn.fpca import Components
+from gait.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
+
+Floats = npt.NDArray[np.float64]
+Groups = npt.NDArray[np.intp]
+
+STEP = 1e-4  # of the numerical derivatives, radians and statures
+RIDGE = 1e-5  # squared statures per squared unit: channels that move no joint still count a little
+#: What root channels that displace the whole body count for, statures; forward speed is per stride.
+DISPLACING = {"root_forward": 0.3, "root_sway": 1.0, "root_height": 1.0}
+AGAINST = ("torso_x", "torso_z", "neck_x", "neck_z", "root_sway", "root_roll", "root_yaw")
+
+
+def mirrored(rows: Floats) -> Floats:
+    """Cycles (R, T, M) of the mirror image: left and right exchanged, half a cycle later."""
+    order, sign = [], []
+    for name in CHANNELS:
+        twin = f"{SIDES[1 - SIDES.index(name[0])]}{name[1:]}" if name[:2] in ("l_", "r_") else name
+        order.append(CHANNELS.index(twin))
+        sign.append(-1.0 if name in AGAINST else 1.0)
+    return np.roll(rows[:, :, order] * sign, rows.shape[1] // 2, axis=1)
+
+
+def joint_metric(mean: Floats, proportions: Proportions) -> Floats:
+    """Coordinates (M, M) in which distances of channels are displacements of the points.
+
+    Parameters
+    ----------
+    mean : (T, M)
+        Mean curves; the effect of each channel is averaged over them.
+
+    Returns
+    -------
+    metric : (M, M)
+        |x @ metric|^2 is the mean squared displacement of a point, squared statures, for a small x.
+    """
+    sections = default_skeleton(proportions).sections()
+    base = points(sections, mean)
+    moves = np.empty((len(CHANNELS), base.size))
+    for k, name in enumerate(CHANNELS):
+        moved = mean.copy()
+        moved[:, k] += STEP
+        moves[k] = ((points(sections, moved) - base) / STEP).ravel()
+        if name in DISPLACING:
+            moves[k] = DISPLACING[name] / np.sqrt(3)
+    gram = moves @ moves.T / (base.size / 3)
+    return np.linalg.cholesky(gram + RIDGE * np.eye(len(gram)))
+
+
+def components(
+    filled: Floats, subject: Groups, count: int, metric: Floats, harmonics: int = HARMONICS
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Components of completed cycles (R, T, M) and their mirror images, own units.
+
+    Returns
+    -------
+    mean : (T, M)
+    curves : (q, T, M)
+        Of unit length in the metric over all phases; the entry of largest magnitude is positive.
+    scores : (R, q)
+        Of the rows, not of their images.
+    sd : (q,)
+        With every subject counting alike.
+    spectrum : (n,)
+        Shares of the variance.
+    """
+    samples, channels = filled.shape[1:]
+    basis = fourier_basis(samples, harmonics)
+    coded = encode(np.concatenate([filled, mirrored(filled)]) @ metric, basis)
+    weight = np.tile(1 / np.bincount(subject)[subject], 2)
+    weight /= weight.sum()
+    mean = weight @ coded
+    _, singular, right = np.linalg.svd((coded - mean) * np.sqrt(weight)[:, None], full_matrices=False)
+    back = np.linalg.inv(metric)
+    curves = decode(right[:count], basis, channels) @ back
+    flat = curves.reshape(len(curves), samples * channels)
+    sign = np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(axis=1)])
+    return (
+        decode(mean[None], basis, channels)[0] @ back,
+        curves * sign[:, None, None],
+        (coded[: len(filled)] - mean) @ right[:count].T * sign,
+        singular[:count],
+        singular**2 / max(float(np.sum(singular**2)), 1e-300),
+    )
+
+
+def refine(plain: Components, subject: Groups, count: int, metric: Floats) -> Components:
+    """Replace the components of an analysis (own units) by those that reach further."""
+    mean, curves, scores, sd, spectrum = components(plain.filled, subject, count, metric)
+    return replace(plain, mean=mean, curves=curves, scores=scores, sd=sd, spectrum=spectrum)
+
+
+def static_spread(filled: Floats, subject: Groups, count: int, metric: Floats) -> Floats:
+    """Find how far a person is, on average over the cycle, from what all others explain: sd (M,) over people.
+
+    Zero if there are fewer than three subjects.
+    """
+    left = [
+        _left_over(filled, subject, count, metric, held) for held in np.unique(subject) if subject.max() > 1
+    ]
+    return np.sqrt(np.mean(np.square(left), axis=0)) if left else np.zeros(filled.shape[2])
+
+
+def _left_over(filled: Floats, subject: Groups, count: int, metric: Floats, held: int) -> Floats:
+    """Mean residual (M,) of one subject's cycles after the components of the others."""
+    own = subject == held
+    others = np.unique(subject[~own], return_inverse=True)[1]
+    mean, curves, *_ = components(filled[~own], others, count, metric)
+    rest = filled[own] - mean
+    scores = np.einsum("rtm,qtm->rq", rest @ metric, curves @ metric)
+    return np.asarray((rest - np.einsum("rq,qtm->rtm", scores, curves)).mean(axis=(0, 1)))
