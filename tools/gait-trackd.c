@@ -16,12 +16,13 @@
 static struct settings {
     char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
     char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
-    int32_t stream, particles, components, threads, tasks;
+    int32_t stream, particles, components, threads, tasks, lag;
     uint64_t seed;
     float max_gap;
     bool particles_channel, quiet, version;
     tracker_values tracker;
-} settings = {.mode = "default", .init = "auto", .components = -1, .threads = 1, .seed = 1, .max_gap = 2};
+} settings = {
+    .mode = "default", .init = "auto", .components = -1, .threads = 1, .lag = 5, .seed = 1, .max_gap = 2};
 
 #define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
@@ -51,6 +52,9 @@ static const option own_options[] = {
     {"particles", 'n', "N", particles_help, INT(particles, 16, 1 << 20)},
     {"components", 0, "Q", "principal components in use; default all of the model's",
      INT(components, 0, GAIT_MAX_COMPONENTS)},
+    {"lag", 0, "N",
+     "frames that GAIT_ESTIMATE_LAG and GAIT_STRIDE wait for, default 5; 0: no GAIT_ESTIMATE_LAG",
+     INT(lag, 0, 64)},
     {"seed", 0, "N", "of the random numbers, default 1", OPTION_U64, &settings.seed, 0, 0},
     {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, POOL_MAX)},
     {"tasks", 0, "N", tasks_help, INT(tasks, 1, 256)},
@@ -104,7 +108,11 @@ static void help(const option *table)
     printf(
         "usage: gait-trackd -m MODEL.gait [--camera CAMERA.json] [--init INIT.json|auto] [options]\n\n"
         "Track a walking person: frames come over LCM (GAIT_IMAGE_<i>), estimates go out (GAIT_ESTIMATE,\n"
-        "GAIT_STATUS once a second).  Live, the newest frame wins and the others are counted as dropped.\n"
+        "and GAIT_ESTIMATE_LAG: a few frames late, by what was seen since), each stride with its time, "
+        "length\n"
+        "and speed (GAIT_STRIDE), and GAIT_STATUS once a second.  Live, the newest frame wins and the "
+        "others\n"
+        "are counted as dropped.\n"
         "Commands START, STOP and RESET come over GAIT_COMMAND.  SIGINT or SIGTERM end the program with a\n"
         "summary.  Exit codes: 0 ok, 1 failed, 2 usage.\n\n");
     options_help(table, OPTIONS);
@@ -138,6 +146,7 @@ static void make_config(pool *threads, gait_tracker_config *c)
     c->particles = settings.particles ? settings.particles : c->particles;
     c->components = settings.components;
     c->seed = settings.seed;
+    c->lag = settings.lag;
     if (settings.tasks)
         c->tasks = settings.tasks;
     else if (c->tasks < settings.threads)

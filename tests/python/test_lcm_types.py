@@ -37,6 +37,7 @@ FINGERPRINTS = {
     "joint_t": "fc582328f6d14f63",
     "particles_t": "80014263d1a51319",
     "state_t": "a5ac537a18c75c25",
+    "stride_t": "2643e726b8fa972c",
     "status_t": "a0ea033100bad162",
     "track_t": "3bf4b97187897236",
     "tracks_t": "e04dceb9e672c2c6",

@@ -217,6 +217,8 @@ static bool begin(service *s, const image_view *v)
     s->dropped_before = s->counts.dropped;
     s->last_frame = v->frame;
     s->steps = 0;
+    memset(s->past, 0xff, sizeof s->past); /* no step has such a number */
+    s->meter.running = false;
     set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
     return true;
 }

@@ -7,6 +7,7 @@
 #include "gaitmsg_particles_t.h"
 #include "gaitmsg_status_t.h"
 #include "histogram.h"
+#include "strides.h"
 #include "tracking.h"
 
 #include <lcm/lcm.h>
@@ -16,6 +17,14 @@ typedef struct service_counts {
     int64_t frames, dropped, rejected;
     histogram step, latency; /* microseconds */
 } service_counts;
+
+enum { SERVICE_PAST = 65 }; /* more than the longest lag */
+
+typedef struct past_frame { /* what the source said of a frame that was tracked */
+    uint64_t step;          /* of the tracker */
+    int64_t frame, number, receive_utime;
+    int32_t step_us;
+} past_frame;
 
 typedef struct service {
     tracking track;
@@ -36,6 +45,8 @@ typedef struct service {
     double max_gap;          /* longest pause that is bridged by prediction, seconds */
     message text, complaint; /* what the status says; the last line on stderr */
     estimate_message estimate;
+    past_frame past[SERVICE_PAST];
+    stride_meter meter;
     uint8_t *particles; /* encoded particles_t; NULL: not sent */
     size_t particles_bytes;
     gait_state *hypothesis; /* [particles] */
