@@ -117,9 +117,8 @@ static void joints(const gait_tracker *t, gait_estimate *out)
     }
 }
 
-/* Metres per second along the ground: stride length (mean forward speed over the stride) times stride
- * rate. */
-static float ground_speed(const gait_tracker *t, const walker *w)
+/* The stride's length is the mean of its forward speed over the phase. */
+float estimate_speed(const gait_tracker *t, const walker *w)
 {
     const gait_model *const m = t->model;
     float sum = 0.0f;
@@ -156,7 +155,7 @@ walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
     const double *const weight = t->filter.weight;
     uint8_t *const use = t->mode;
     double const mass = dominant_mode(p, weight, best, use);
-    walker mean, sd;
+    walker mean = {{0}}, sd;
     for (int32_t f = 0; f < p->fields; f++)
         mean_and_sd(field(p, f), weight, use, mass, p->n, &mean.f[f], &sd.f[f]);
     circular const phase = resultant(field(p, F_PHASE), TWO_PI_F, weight, NULL, p->n);
@@ -174,6 +173,6 @@ walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
     out->phase_r = resultant_length(phase);
     out->mode_mass = (float)mass;
-    out->speed = ground_speed(t, &mean);
+    out->speed = estimate_speed(t, &mean);
     return mean;
 }

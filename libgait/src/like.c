@@ -135,12 +135,19 @@ int32_t like_compare(const like_setup *s, const int8_t *a, const int8_t *b, int3
     return both;
 }
 
+float like_one(const like_body *b, const like_term *term)
+{
+    for (int32_t k = 0; k < LIKE_TERMS; k++)
+        if (TERMS[k] == term && (b->setup->terms & term->flag))
+            return b->setup->weight[k] * term->log_likelihood(b);
+    return 0.0f;
+}
+
 float like_evaluate(const like_body *b)
 {
     float sum = 0.0f;
     for (int32_t k = 0; k < LIKE_TERMS; k++)
-        if (b->setup->terms & TERMS[k]->flag)
-            sum += b->setup->weight[k] * TERMS[k]->log_likelihood(b);
+        sum += like_one(b, TERMS[k]);
     return sum;
 }
 

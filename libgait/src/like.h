@@ -62,6 +62,9 @@ void like_sample(const like_setup *s, const features *f, const gait_camera *cam,
 /* Sum of the weighted terms in use. */
 float like_evaluate(const like_body *b);
 
+/* One term's part in it. */
+float like_one(const like_body *b, const like_term *term);
+
 /* Sum of the weighted terms over the hypothesis that nobody is there: positive if the frame shows this
  * body. */
 float like_support(const like_body *b);

@@ -58,6 +58,9 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     memcpy(&c, body, sizeof c);
     bool ok = (c.current == 0 || c.current == 1) && (c.started == 0 || c.started == 1);
     ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->cfg.particles;
+    ok &= c.modes.stage >= MODES_SINGLE && c.modes.stage <= MODES_FORKED && c.modes.since <= c.utime;
+    ok &=
+        c.modes.odds > -1e6 && c.modes.odds < 1e6 && c.modes.lead > -1e12 && c.modes.lead < 1e12; /* no NaN */
     ok &= c.start_utime <= c.utime && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
@@ -118,13 +121,15 @@ static bool past_plausible(const gait_tracker *t, const unsigned char *body)
 
 static bool template_plausible(const gait_tracker *t, const unsigned char *body)
 {
-    for (int32_t c = 0; c < t->cfg.cameras && t->template[c]; c++)
-        for (int32_t i = 0; i < t->model->limbs * LIKE_SAMPLES; i++) {
+    for (int32_t k = 0; k < 2 * t->cfg.cameras; k++) {
+        const int16_t *const known = t->template[k / t->cfg.cameras][k % t->cfg.cameras];
+        for (int32_t i = 0; known && i < t->model->limbs * LIKE_SAMPLES; i++) {
             int16_t v;
-            memcpy(&v, in_body(t, body, &t->template[c][i]), sizeof v);
+            memcpy(&v, in_body(t, body, &known[i]), sizeof v);
             if (v != TEMPLATE_EMPTY && (v < -127 * TEMPLATE_ONE || v > 127 * TEMPLATE_ONE))
                 return false;
         }
+    }
     return true;
 }
 

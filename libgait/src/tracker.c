@@ -1,7 +1,8 @@
 #include "tracker.h"
 #include "estimate.h"
 #include "fmath.h"
-#include "rng.h"
+#include "loss.h"
+#include "modes.h"
 #include "weigh.h"
 #include <string.h>
 
@@ -24,8 +25,8 @@ static void layout_state(arena *a, gait_tracker *t)
     }
     t->filter = pf_layout(a, n);
     t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
-    for (int32_t c = 0; c < cameras && wants_texture(&t->cfg); c++)
-        t->template[c] = TAKE(a, int16_t, samples);
+    for (int32_t c = 0; c < 2 * cameras && wants_texture(&t->cfg); c++)
+        t->template[c / cameras][c % cameras] = TAKE(a, int16_t, samples);
     lag_layout_state(&t->past, a, t->cfg.lag, n, body_rule_fields(&t->rule));
     t->state_end = TAKE(a, unsigned char, 1);
 }
@@ -41,6 +42,9 @@ static void layout_work(arena *a, gait_tracker *t)
     }
     t->like = TAKE(a, like_setup, 1);
     t->ll = TAKE(a, float, n);
+    t->used = TAKE(a, float, n);
+    t->inner = TAKE(a, float, n);
+    t->exchange = TAKE(a, exchange, 1);
     t->mode = TAKE(a, uint8_t, n);
     if (wants_texture(&t->cfg))
         t->seen = TAKE(a, int8_t, (size_t)t->cfg.cameras *samples);
@@ -63,6 +67,7 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     if (!self || a->overflow)
         return NULL;
     like_setup_init(t.like, m, &t.cfg);
+    exchange_init(t.exchange, &t.rule);
     *self = t;
     return self;
 }
@@ -72,8 +77,8 @@ void tracker_clear(gait_tracker *t)
     memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         t->camera[c].plate_stale = true;
-        if (t->template[c])
-            template_clear(t->template[c], t->model->limbs);
+        for (int32_t side = 0; side < 2 && t->template[side][c]; side++)
+            template_clear(t->template[side][c], t->model->limbs);
     }
     pf_uniform(&t->filter);
     pf_keep(&t->filter);
@@ -85,12 +90,22 @@ dynamics tracker_dynamics(const gait_tracker *t)
     return (dynamics){.cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed};
 }
 
+/* Standard deviation of the phase below which a start says which leg is which, strides. */
+static const float PHASE_KNOWN = 0.2f;
+
 void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime)
 {
     dynamics const d = tracker_dynamics(t);
     tracker_clear(t);
     t->core->started = 1;
     t->core->utime = t->core->start_utime = t->core->support_utime = utime;
+    if (sd->phase < PHASE_KNOWN)
+        modes_single(t);
+    else
+        modes_search(t);
+    t->core->last = walker_from_state(&t->rule, mean);
+    t->core->phase = mean->phase;
+    t->core->rate = mean->stride_hz;
     for (int32_t i = 0; i < t->cfg.particles; i++) {
         walker const w = dynamics_draw(&d, mean, sd, i);
         walker_put(&t->gen[0].people, i, &w);
@@ -100,23 +115,6 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
 static float seconds_since(const gait_tracker *t, int64_t utime)
 {
     return 1e-6f * (float)(t->core->utime - utime);
-}
-
-/* Ancestors of the next generation. */
-static bool resample(gait_tracker *t, uint32_t frame)
-{
-    pf *const f = &t->filter;
-    pf_keep(f);
-    if (t->core->ess >= (double)t->cfg.resample_ess * (double)t->cfg.particles && t->cfg.resample_ess < 1.0f)
-        return false;
-    if (t->cfg.mode == GAIT_MODE_PAPER) {
-        pf_resample_multinomial(f, t->cfg.seed, STREAM_RESAMPLE, frame);
-    } else {
-        uint32_t r[4];
-        rng_bits(t->cfg.seed, STREAM_RESAMPLE, frame, 0, 0, r);
-        pf_resample_systematic(f, r[0]);
-    }
-    return true;
 }
 
 typedef struct move_job {
@@ -149,14 +147,23 @@ static void predict(gait_tracker *t, float dt, uint32_t frame)
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
 }
 
-static int32_t judge(const gait_tracker *t, bool degenerate, const gait_estimate *e)
+/* Does the reported phase follow from the one before? */
+static bool phase_jumps(const gait_tracker *t, float dt, const gait_estimate *e)
 {
-    float const patience = 0.33f, acquire = 1.0f; /* seconds */
-    if (degenerate || seconds_since(t, t->core->support_utime) > patience)
+    float const jump = 0.2f, expected = t->core->phase + dt * t->core->rate; /* strides */
+    return fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - expected))) > TWO_PI_F * jump;
+}
+
+static int32_t judge(const gait_tracker *t, float dt, bool degenerate, const gait_estimate *e)
+{
+    float const acquire = 1.0f; /* seconds */
+    if (degenerate || loss_is_lost(t))
         return GAIT_STATUS_LOST;
+    if (modes_searching(t))
+        return GAIT_STATUS_INIT;
     if (e->mode_mass < 0.7f)
         return seconds_since(t, t->core->start_utime) < acquire ? GAIT_STATUS_INIT : GAIT_STATUS_AMBIGUOUS;
-    return GAIT_STATUS_TRACKING;
+    return modes_open(t) || phase_jumps(t, dt, e) ? GAIT_STATUS_AMBIGUOUS : GAIT_STATUS_TRACKING;
 }
 
 /* Which cameras saw this frame, as bits. */
@@ -172,37 +179,36 @@ static void remember_appearance(gait_tracker *t)
 {
     size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
     for (int32_t c = 0; c < t->cfg.cameras; c++)
-        if (t->camera[c].seen.seen && t->template[c])
-            template_update(t->template[c], t->model->limbs, t->seen + (size_t)c * samples);
+        if (t->camera[c].seen.seen && t->template[0][c])
+            template_update(t->template[0][c], t->model->limbs, t->seen + (size_t)c * samples);
 }
 
 /* Weigh the particles by the frame and fill in the estimate. */
-static void observe(gait_tracker *t, gait_estimate *out)
+static void observe(gait_tracker *t, float dt, gait_estimate *out)
 {
     weigh_particles(t);
-    pf_summary const s = pf_reweigh(&t->filter, t->ll);
+    loss_allow_hidden(t);
+    pf_summary const s = modes_reweigh(t, dt);
     t->core->ess = s.ess;
     t->core->textured = wants_texture(&t->cfg) ? seeing(t) : 0;
     out->log_evidence = s.log_evidence;
     out->flags |= s.degenerate || s.ess < 2.0 ? GAIT_EST_DEGENERATE : 0;
     walker const mean = estimate_fill(t, s.best, out);
-    /* Terms without an opinion on whether anybody is there give exactly zero. */
-    if (weigh_walker(t, &mean) >= 0.0f)
-        t->core->support_utime = t->core->utime;
-    out->status = judge(t, s.degenerate, out);
-    if (out->status == GAIT_STATUS_TRACKING)
+    loss_watch(t, &mean);
+    out->status = judge(t, dt, s.degenerate, out);
+    if (out->status == GAIT_STATUS_TRACKING && t->core->modes.stage == MODES_SINGLE)
         remember_appearance(t);
 }
 
 /* No camera saw anything: the prediction is the estimate. */
-static void coast(gait_tracker *t, gait_estimate *out)
+static void coast(gait_tracker *t, float dt, gait_estimate *out)
 {
     weigh_particles(t);                /* no camera: only the joints */
     t->core->ess = pf_ess(&t->filter); /* resampled weights are even */
     t->core->textured = 0;
     estimate_fill(t, pf_heaviest(&t->filter), out);
     out->flags |= GAIT_EST_NO_IMAGE;
-    out->status = judge(t, false, out);
+    out->status = judge(t, dt, false, out);
 }
 
 gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
@@ -211,17 +217,23 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
     float const dt = 1e-6f * (float)(frame->utime - core->utime);
     gait_estimate e = {.utime = frame->utime, .frame = core->frame};
     uint32_t const counter = (uint32_t)core->frame;
-    bool const resampled = core->frame > 0 && resample(t, counter);
     core->utime = frame->utime;
+    if (loss_is_lost(t))
+        core->ess = 0.0; /* particles drawn anew weigh what others do */
+    bool const resampled = core->frame > 0 && modes_resample(t, counter);
     predict(t, dt, counter);
+    modes_fork(t);
+    loss_search(t, counter);
     walker const place = estimate_place(&t->gen[core->current].people, t->filter.weight);
     if (weigh_look(t, frame, &place) > 0)
-        observe(t, &e);
+        observe(t, dt, &e);
     else
-        coast(t, &e);
+        coast(t, dt, &e);
     e.flags |= resampled ? GAIT_EST_RESAMPLED : 0;
     e.ess = (float)core->ess;
     lag_keep(t, &e);
+    core->phase = e.mean.phase;
+    core->rate = e.mean.stride_hz;
     core->frame++;
     *out = e;
     return GAIT_OK;

@@ -2,10 +2,21 @@
 #ifndef GAIT_TRACKER_H
 #define GAIT_TRACKER_H
 #include "dynamics.h"
+#include "exchange.h"
 #include "lag.h"
 #include "like_template.h"
 #include "pf.h"
 #include "task.h"
+
+/* What is known of left and right (modes.h). */
+enum { MODES_SINGLE, MODES_SEARCH, MODES_FORKED };
+typedef struct modes_state {
+    int32_t stage;
+    int32_t known; /* left and right were settled before */
+    int64_t since; /* when the stage began */
+    double odds;   /* forked: log odds of the second side over the first, */
+    double lead;   /* and by how much all terms have preferred it lately, nats */
+} modes_state;
 
 typedef struct tracker_core { /* small mutable state; saved and hashed with the arrays that follow it */
     int64_t utime, start_utime;
@@ -16,6 +27,9 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     uint32_t textured; /* bit c: that generation carries surface samples of camera c's previous frame */
     int32_t reserved;
     double ess;
+    modes_state modes;
+    walker last;       /* when the images last supported it */
+    float phase, rate; /* reported last: strides, strides per second */
     view_map map[GAIT_MAX_CAMERAS];
 } tracker_core;
 
@@ -47,18 +61,24 @@ struct gait_tracker {
     tracker_core *core;
     generation gen[2];
     pf filter;
-    float *joint; /* P x 3 x n, metres: of the current generation */
-    int16_t *template[GAIT_MAX_CAMERAS];
+    float *joint;                           /* P x 3 x n, metres: of the current generation */
+    int16_t *template[2][GAIT_MAX_CAMERAS]; /* of each side while forked; otherwise the first */
     lag past;
     unsigned char *state_end;
     /* Recomputed in every step. */
     camera_state camera[GAIT_MAX_CAMERAS];
-    float *ll;     /* n */
-    uint8_t *mode; /* n: particle belongs to the dominant mode */
-    int8_t *seen;  /* cameras x limbs x LIKE_SAMPLES: surface of the estimate */
+    float *used;        /* n: as much of ll as counts (loss.h, modes.h) */
+    float *ll;          /* n */
+    float *inner;       /* n: ll without the silhouette */
+    exchange *exchange; /* constant */
+    uint8_t *mode;      /* n: particle belongs to the dominant mode */
+    int8_t *seen;       /* cameras x limbs x LIKE_SAMPLES: surface of the estimate */
     features_scratch scratch;
     weigh_scratch *work; /* tasks */
 };
+
+/* Which of the two sides a particle belongs to. */
+int32_t modes_side(const gait_tracker *t, int32_t particle);
 
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg);
 void tracker_clear(gait_tracker *t);

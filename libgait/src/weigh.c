@@ -52,7 +52,8 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
 }
 
 /* One body of a block in one camera, ready for the terms. */
-static like_body look_at(const gait_tracker *t, int32_t c, int32_t lane, weigh_scratch *w, int8_t *seen)
+static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t lane, weigh_scratch *w,
+                         int8_t *seen)
 {
     like_body b = {.setup = t->like,
                    .features = &t->camera[c].seen,
@@ -60,15 +61,14 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t lane, weigh_s
                    .lane = lane,
                    .layers = &w->layers,
                    .seen = seen,
-                   .template = t->template[c]};
+                   .template = t->template[side][c]};
     layers_draw(&w->outline, t->like->geometry, t->like->limbs, lane, &w->layers);
     if (seen)
         like_sample(t->like, b.features, &t->cfg.camera[c], &w->body, lane, &w->layers, seen);
     return b;
 }
 
-/* Surface samples of particle i in camera c. */
-static int8_t *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c)
+int8_t *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c)
 {
     size_t const stride = (size_t)t->like->limbs * LIKE_SAMPLES;
     return g->texture ? g->texture + ((size_t)i * (size_t)t->cfg.cameras + (size_t)c) * stride : NULL;
@@ -85,7 +85,7 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
             for (int32_t lane = 0; lane < lanes; lane++)
                 t->joint[(size_t)(3 * p + k) * (size_t)n + (size_t)(begin + lane)] = w->points[p][k][lane];
     for (int32_t lane = 0; lane < lanes; lane++)
-        t->ll[begin + lane] = 0.0f;
+        t->ll[begin + lane] = t->inner[begin + lane] = 0.0f;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;
@@ -93,9 +93,12 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
                         &t->camera[c].seen.map, &w->outline);
         for (int32_t lane = 0; lane < lanes; lane++) {
             int32_t const i = begin + lane;
-            like_body b = look_at(t, c, lane, w, texture_of(t, now, i, c));
+            like_body b = look_at(t, c, modes_side(t, i), lane, w, texture_of(t, now, i, c));
             b.ancestor = t->core->textured >> c & 1u ? texture_of(t, then, t->filter.parent[i], c) : NULL;
-            t->ll[i] += like_evaluate(&b);
+            float const ll = like_evaluate(&b);
+            t->ll[i] += ll;
+            if (t->core->modes.stage == MODES_FORKED)
+                t->inner[i] += ll - like_one(&b, &like_silhouette);
         }
     }
 }
@@ -123,7 +126,7 @@ float weigh_walker(gait_tracker *t, const walker *person)
         outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c],
                         &t->camera[c].seen.map, &w->outline);
         int8_t *const seen = t->seen ? t->seen + (size_t)c * (size_t)t->like->limbs * LIKE_SAMPLES : NULL;
-        like_body const b = look_at(t, c, 0, w, seen);
+        like_body const b = look_at(t, c, 0, 0, w, seen);
         support += like_support(&b);
     }
     return support;

@@ -9,7 +9,7 @@
 #include <pthread.h>
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x3749fd04394adc3c)
+#define GOLDEN UINT64_C(0x235078eec45114fb)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 

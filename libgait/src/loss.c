@@ -1,0 +1,108 @@
+#include "loss.h"
+#include "estimate.h"
+#include "fmath.h"
+#include "modes.h"
+#include "weigh.h"
+
+static const float PATIENCE = 0.33f;   /* seconds without support until the walker is lost */
+static const float PHASE_KEEPS = 1.5f; /* seconds for which a lost walker's phase can be predicted */
+static const float SAME_PHASE = 0.15f; /* strides within which the prediction counts as met */
+static const float HIDDEN = -4.0f;     /* log probability of being hidden in a frame */
+static const double ELSEWHERE = 0.01; /* probability, in a frame, that a lost walker is not where predicted */
+enum { SEARCHERS = 8 };               /* one particle of so many looks there */
+
+static float seconds_unseen(const gait_tracker *t)
+{
+    return 1e-6f * (float)(t->core->utime - t->core->support_utime);
+}
+
+bool loss_is_lost(const gait_tracker *t)
+{
+    return seconds_unseen(t) > PATIENCE;
+}
+
+/* Where somebody may be who was last seen as `from`, `gap` seconds ago. */
+static void region(const gait_tracker *t, float gap, gait_state *mean, gait_state *sd)
+{
+    const walker *const from = &t->core->last;
+    float sn, cs;
+    *mean = walker_state(&t->rule, from);
+    float const way = gap * estimate_speed(t, from), far = f_min(0.1f + 0.4f * gap, 1.5f);
+    m_sincos(mean->heading, &sn, &cs);
+    mean->pelvis[0] += way * cs;
+    mean->pelvis[1] += way * sn;
+    *sd = (gait_state){.phase = 0.5f,
+                       .stride_hz = 0.05f * mean->stride_hz,
+                       .stature = 0.01f * mean->stature,
+                       .heading = f_min(0.1f + 0.3f * gap, PI_F),
+                       .pelvis = {far, far, 0.02f}};
+    for (int32_t k = 0; k < t->rule.components; k++)
+        sd->coef[k] = 0.3f;
+}
+
+void loss_search(gait_tracker *t, uint32_t frame)
+{
+    gait_state mean, sd;
+    dynamics d = tracker_dynamics(t);
+    if (!loss_is_lost(t))
+        return;
+    region(t, seconds_unseen(t), &mean, &sd);
+    d.seed += (uint64_t)(frame + 1) << 32; /* draws of its own in every frame */
+    int32_t const n = t->cfg.particles, drawn = (n + SEARCHERS - 1) / SEARCHERS;
+    double const follow = (1.0 - ELSEWHERE) / (double)(n - drawn), elsewhere = ELSEWHERE / (double)drawn;
+    for (int32_t i = 0; i < n; i++) {
+        bool const anew = i % SEARCHERS == 0;
+        t->filter.weight[i] = anew ? elsewhere : follow;
+        t->filter.log_weight[i] = m_log64(t->filter.weight[i]);
+        if (anew) {
+            walker const w = dynamics_draw(&d, &mean, &sd, i);
+            walker_put(&t->gen[t->core->current].people, i, &w);
+        }
+    }
+    t->core->textured = 0; /* the ancestors were elsewhere */
+}
+
+void loss_allow_hidden(gait_tracker *t)
+{
+    population const *const people = &t->gen[t->core->current].people;
+    int32_t const n = t->cfg.particles;
+    int32_t best = -1;
+    for (int32_t i = 0; i < n; i++) {
+        t->used[i] = t->ll[i];
+        if (f_finite(&t->ll[i], 1) && (best < 0 || t->ll[i] > t->ll[best]))
+            best = i;
+    }
+    if (t->cfg.mode == GAIT_MODE_PAPER || best < 0)
+        return;
+    walker const w = walker_get(people, best);
+    float const support = weigh_walker(t, &w), least = t->ll[best] - support + HIDDEN;
+    if (!(support != 0.0f)) /* no term has an opinion on whether anybody is there */
+        return;
+    for (int32_t i = 0; i < n; i++) {
+        float const more = f_max(t->ll[i], least), less = f_min(t->ll[i], least);
+        t->used[i] = more + m_log(1.0f + m_exp(less - more));
+    }
+}
+
+/* Did the walker go on walking while nobody saw it?  Then left and right are as they were. */
+static bool as_predicted(const gait_tracker *t, const walker *mean)
+{
+    float const gap = seconds_unseen(t), turn = gap * t->core->last.f[F_RATE];
+    float const off = m_wrap_pi(TWO_PI_F * (mean->f[F_PHASE] - t->core->last.f[F_PHASE] - turn)) / TWO_PI_F;
+    return gap < PHASE_KEEPS && fabsf(off) < SAME_PHASE;
+}
+
+void loss_watch(gait_tracker *t, const walker *mean)
+{
+    bool const lost = loss_is_lost(t);
+    /* Terms without an opinion on whether anybody is there give exactly zero. */
+    if (!(weigh_walker(t, mean) >= 0.0f)) {
+        if (lost)
+            modes_give_up(t);
+        return;
+    }
+    if (lost && !(t->core->modes.known && as_predicted(t, mean)))
+        modes_search(t);
+    t->core->support_utime = t->core->utime;
+    t->core->last = *mean;
+}

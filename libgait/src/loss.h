@@ -1,0 +1,23 @@
+/* loss.h - notice from the images that nobody is where the track is, and find the walker again.
+ *
+ * Nobody: the frame is explained better without the estimated body than with it.  Until that has lasted for a
+ * while nothing changes: whoever is hidden for a moment goes on as predicted, because the likelihood of being
+ * hidden bounds that of every particle from below.  After that some of the particles are drawn anew in every
+ * frame from a region round the last place that grows with time (after augmented Monte-Carlo localisation; Thrun,
+ * Burgard and Fox 2005, 8.3.3).  The transition is then a mixture of following and being elsewhere; more particles
+ * are drawn from its second part than its probability, and weigh that much less. */
+#ifndef GAIT_LOSS_H
+#define GAIT_LOSS_H
+#include "tracker.h"
+
+bool loss_is_lost(const gait_tracker *t);
+
+/* After the prediction: while lost, draw some particles anew.  The others are even, as resampled. */
+void loss_search(gait_tracker *t, uint32_t frame);
+
+/* Bound t->ll from below by that of a hidden walker. */
+void loss_allow_hidden(gait_tracker *t);
+
+/* Take note of whether the frame supports the estimated walker. */
+void loss_watch(gait_tracker *t, const walker *mean);
+#endif

@@ -1,0 +1,356 @@
+#include "modes.h"
+#include "fmath.h"
+#include "rng.h"
+#include "weigh.h"
+#include <string.h>
+
+static const float SEARCH = 0.5f; /* seconds until the phase is known modulo half a stride */
+static const float REFIT = 0.4f;  /* seconds in which both sides find their own best before evidence counts */
+static const float CORRELATION = 0.13f; /* seconds over which errors of the image terms last */
+static const float SPREAD_SCORE = 0.5f, SPREAD_HEADING = 0.1f, SPREAD_RATE = 0.02f;
+static const double ENOUGH = 0.2;  /* of the particles must keep weight while searching */
+static const double SURE = 4.5;    /* log odds from which one side is reported as the truth (0.99) */
+static const double DECIDED = 9.0; /* and from which the other is given up */
+
+static float seconds_in_stage(const gait_tracker *t)
+{
+    return 1e-6f * (float)(t->core->utime - t->core->modes.since);
+}
+
+static void enter(gait_tracker *t, int32_t stage)
+{
+    t->core->modes = (modes_state){.stage = stage, .since = t->core->utime, .known = stage == MODES_SINGLE};
+}
+
+void modes_search(gait_tracker *t)
+{
+    enter(t, t->cfg.mode == GAIT_MODE_PAPER ? MODES_SINGLE : MODES_SEARCH);
+}
+
+void modes_single(gait_tracker *t)
+{
+    enter(t, MODES_SINGLE);
+}
+
+void modes_give_up(gait_tracker *t)
+{
+    t->core->modes.stage = MODES_SINGLE;
+}
+
+/* First particle of a side; side 2: the end. */
+static int32_t first_of(const pf *f, int32_t side)
+{
+    return side == 0 ? 0 : side == 1 ? (f->n + 1) / 2 : f->n;
+}
+
+int32_t modes_side(const gait_tracker *t, int32_t particle)
+{
+    return t->core->modes.stage == MODES_FORKED && particle >= first_of(&t->filter, 1);
+}
+
+/* One side's particles as a filter of its own. */
+static pf side_of(const pf *f, int32_t side)
+{
+    int32_t const first = first_of(f, side);
+    return (pf){.n = first_of(f, side + 1) - first,
+                .log_weight = f->log_weight + first,
+                .weight = f->weight + first,
+                .parent = f->parent + first,
+                .ticket = f->ticket + first};
+}
+
+/* Log of the weight of a side: log of the logistic function of the odds for it. */
+static double log_share(const gait_tracker *t, int32_t side)
+{
+    double const odds = side == 1 ? t->core->modes.odds : -t->core->modes.odds;
+    return odds > 0.0 ? -m_log64(1.0 + m_exp64(-odds)) : odds - m_log64(1.0 + m_exp64(odds));
+}
+
+/* Make a side whose weights sum to 1 weigh what its odds say. */
+static void scale(pf *side, double log_factor)
+{
+    double const factor = m_exp64(log_factor);
+    for (int32_t i = 0; i < side->n; i++) {
+        side->weight[i] *= factor;
+        side->log_weight[i] += log_factor;
+    }
+}
+
+static double total(const pf *side)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < side->n; i++)
+        sum += side->weight[i];
+    return sum;
+}
+
+/* Draw one side anew if too few of its particles weigh anything. */
+static bool resample_side(gait_tracker *t, int32_t side, uint32_t u)
+{
+    pf h = side_of(&t->filter, side);
+    double const sum = total(&h);
+    if (pf_ess(&h) * sum * sum >= (double)t->cfg.resample_ess * (double)h.n)
+        return false;
+    pf_resample_systematic(&h, u);
+    for (int32_t i = 0; i < h.n; i++)
+        h.parent[i] += first_of(&t->filter, side);
+    scale(&h, log_share(t, side));
+    return true;
+}
+
+/* Give the loser up: its particles weigh nothing, and the next resampling replaces them. */
+static void close_fork(gait_tracker *t)
+{
+    int32_t const loser = t->core->modes.odds < 0.0;
+    pf gone = side_of(&t->filter, loser), left = side_of(&t->filter, 1 - loser);
+    for (int32_t i = 0; i < gone.n; i++) {
+        gone.weight[i] = 0.0;
+        gone.log_weight[i] = -1e300;
+    }
+    scale(&left, -log_share(t, 1 - loser));
+    for (int32_t c = 0; c < t->cfg.cameras && t->template[0][c]; c++)
+        if (loser == 0)
+            memcpy(t->template[0][c], t->template[1][c],
+                   (size_t)t->model->limbs * LIKE_SAMPLES * sizeof *t->template[0][c]);
+    enter(t, MODES_SINGLE);
+    t->core->ess = 0.0;
+}
+
+static bool search_is_over(const gait_tracker *t)
+{
+    return t->core->modes.stage == MODES_SEARCH && seconds_in_stage(t) >= SEARCH;
+}
+
+static bool resample_all(gait_tracker *t, const uint32_t u, uint32_t frame)
+{
+    double const least = (double)t->cfg.resample_ess * (double)t->cfg.particles;
+    if (t->core->ess >= least && t->cfg.resample_ess < 1.0f && !search_is_over(t))
+        return false;
+    if (t->cfg.mode == GAIT_MODE_PAPER)
+        pf_resample_multinomial(&t->filter, t->cfg.seed, STREAM_RESAMPLE, frame);
+    else
+        pf_resample_systematic(&t->filter, u);
+    return true;
+}
+
+bool modes_resample(gait_tracker *t, uint32_t frame)
+{
+    const modes_state *const m = &t->core->modes;
+    uint32_t r[4];
+    rng_bits(t->cfg.seed, STREAM_RESAMPLE, frame, 0, 0, r);
+    pf_keep(&t->filter);
+    if (m->stage == MODES_FORKED && (m->odds > DECIDED || m->odds < -DECIDED))
+        close_fork(t);
+    if (m->stage != MODES_FORKED)
+        return resample_all(t, r[0], frame);
+    bool const first = resample_side(t, 0, r[0]), second = resample_side(t, 1, r[1]);
+    return first || second;
+}
+
+/* Phase modulo half a stride that most particles agree on: the mean of the doubled angle. */
+static float half_phase(const population *p)
+{
+    const float *const phase = field(p, F_PHASE);
+    double c = 0.0, s = 0.0;
+    for (int32_t i = 0; i < p->n; i++) {
+        float sn, cs;
+        m_sincos(2.0f * TWO_PI_F * phase[i], &sn, &cs);
+        c += (double)cs;
+        s += (double)sn;
+    }
+    return 0.5f * m_atan2((float)s, (float)c) / TWO_PI_F;
+}
+
+/* Heading seen in a mirror that is square to the first camera's line of sight: far for near.  Without perspective
+ * the picture of a body and that of its reflection are the same. */
+static float reflected(const gait_tracker *t, const walker *w)
+{
+    const gait_camera *const cam = &t->cfg.camera[0];
+    float at[2];
+    for (int32_t k = 0; k < 2; k++)
+        at[k] = w->f[F_X + k] + cam->R[k] * cam->t[0] + cam->R[3 + k] * cam->t[1] + cam->R[6 + k] * cam->t[2];
+    return m_wrap_pi(2.0f * m_atan2(at[1], at[0]) + PI_F - w->f[F_HEADING]);
+}
+
+/* The other reading of the same picture.  Every second one also swaps near and far, where that turns the walker
+ * by less than a quarter: seen from in front the legs change places without it. */
+static walker other_side(const gait_tracker *t, const walker *w, int32_t i)
+{
+    walker to = exchange_apply(t->exchange, &t->rule, w);
+    float const heading = reflected(t, w);
+    if ((i & 1) && fabsf(m_wrap_pi(heading - w->f[F_HEADING])) < 0.5f * PI_F)
+        to.f[F_HEADING] = heading;
+    return to;
+}
+
+/* Spread a particle: its side must find its own best heading and gait, not those that suited the other. */
+static void spread(const gait_tracker *t, int32_t i, walker *w)
+{
+    float n[4];
+    for (int32_t k = 0; k < t->rule.components; k++) {
+        if (k % 4 == 0)
+            rng_normal4(t->cfg.seed, STREAM_FORK, (uint32_t)(k / 4 + 1), (uint32_t)i, 0, n);
+        w->f[F_COEF + k] += SPREAD_SCORE * n[k % 4];
+    }
+    rng_normal4(t->cfg.seed, STREAM_FORK, 0, (uint32_t)i, 0, n);
+    w->f[F_HEADING] = m_wrap_pi(w->f[F_HEADING] + SPREAD_HEADING * n[0]);
+    w->f[F_RATE] *= 1.0f + SPREAD_RATE * n[1];
+}
+
+/* The particles are even, as resampled.  All are first brought to one side, those of the other by the exchange,
+ * then dealt in turn to both: the odds begin even whatever the search made of left and right. */
+void modes_fork(gait_tracker *t)
+{
+    pf *const f = &t->filter;
+    population *const now = &t->gen[t->core->current].people, *const was =
+                                                                  &t->gen[1 - t->core->current].people;
+    float const middle = half_phase(now);
+    if (!search_is_over(t))
+        return;
+    memcpy(was->value, now->value, (size_t)now->fields * (size_t)now->n * sizeof *now->value);
+    for (int32_t i = 0; i < f->n; i++)
+        f->ticket[i] = (uint64_t)f->parent[i];
+    for (int32_t i = 0; i < f->n; i++) {
+        int32_t const side = i >= first_of(f, 1), from = 2 * (i - first_of(f, side)) + side;
+        walker w = walker_get(was, from);
+        bool const far = fabsf(m_wrap_pi(TWO_PI_F * (w.f[F_PHASE] - middle))) > 0.5f * PI_F;
+        if (far != (side == 1))
+            w = other_side(t, &w, i);
+        spread(t, i, &w);
+        walker_put(now, i, &w);
+        f->parent[i] = (int32_t)f->ticket[from];
+    }
+    t->core->textured = 0; /* what the ancestors looked like is not what their exchanged bodies would */
+    enter(t, MODES_FORKED);
+    for (int32_t side = 0; side < 2; side++) {
+        pf h = side_of(f, side);
+        pf_uniform(&h);
+        scale(&h, log_share(t, side));
+        for (int32_t c = 0; c < t->cfg.cameras && t->template[side][c]; c++)
+            template_clear(t->template[side][c], t->model->limbs);
+    }
+}
+
+/* log of the mean of exp(ll) under a side's weights; -1e300 if there is none. */
+static double evidence(const pf *side, const float *ll)
+{
+    double top = -1e300, sum = 0.0;
+    for (int32_t i = 0; i < side->n; i++)
+        top = (double)ll[i] > top ? (double)ll[i] : top;
+    for (int32_t i = 0; i < side->n; i++)
+        if (ll[i] > -1e30f)
+            sum += side->weight[i] * m_exp64((double)ll[i] - top);
+    return sum > 0.0 ? top + m_log64(sum / total(side)) : -1e300;
+}
+
+/* Effective sample size that the likelihood to a power would leave. */
+static double ess_after(const pf *f, const float *ll, float power)
+{
+    double top = -1e300, sum = 0.0, square = 0.0;
+    for (int32_t i = 0; i < f->n; i++) {
+        double const l = f->log_weight[i] + (double)(power * ll[i]);
+        top = l > top && l < 1e300 ? l : top;
+    }
+    for (int32_t i = 0; i < f->n; i++) {
+        double const l = f->log_weight[i] + (double)(power * ll[i]) - top, w = l > -700.0 ? m_exp64(l) : 0.0;
+        sum += w;
+        square += w * w;
+    }
+    return square > 0.0 ? sum * sum / square : 0.0;
+}
+
+/* Raise the likelihood to the largest power 1, 1/2, 1/4 ... that leaves enough particles: a start from a broad
+ * prior must not follow the first frame's luckiest few (annealing; Deutscher and Reid 2005). */
+static void soften(const pf *f, float *ll)
+{
+    float power = 1.0f;
+    while (power > 0.05f && ess_after(f, ll, power) < ENOUGH * (double)f->n)
+        power *= 0.5f;
+    for (int32_t i = 0; i < f->n; i++)
+        ll[i] *= power;
+}
+
+/* The looks of each side's heaviest particle. */
+static void remember(gait_tracker *t, int32_t side, int32_t best)
+{
+    const generation *const now = &t->gen[t->core->current];
+    for (int32_t c = 0; c < t->cfg.cameras; c++)
+        if (t->camera[c].seen.seen && t->template[side][c] && now->texture)
+            template_update(t->template[side][c], t->model->limbs, texture_of(t, now, best, c));
+}
+
+/* Sum of the sides' evidence, each times its weight. */
+static double joined(double a, double b)
+{
+    double const top = a > b ? a : b;
+    return top + m_log64(m_exp64(a - top) + m_exp64(b - top));
+}
+
+/* Move the sides' weights by what this frame says for the second over the first: of the terms that decide, and
+ * of all. */
+static void decide(gait_tracker *t, float dt, double inner, double all)
+{
+    modes_state *const m = &t->core->modes;
+    double const share = (double)f_min(1.0f, dt / CORRELATION);
+    bool const seen = 1e-6f * (float)(t->core->utime - t->core->support_utime) < 1.5f * dt;
+    m->lead += share * (all - m->lead);
+    if (seen && seconds_in_stage(t) >= REFIT)
+        m->odds += share * inner;
+}
+
+/* The side to report: the likelier one, or while that is open the one that explains the frames better. */
+static int32_t reported_side(const modes_state *m)
+{
+    return m->odds > 1.0 || (m->odds > -1.0 && m->lead > 0.0);
+}
+
+static pf_summary reweigh_sides(gait_tracker *t, float dt)
+{
+    pf_summary s[2], all;
+    double inner[2], whole[2];
+    for (int32_t side = 0; side < 2; side++) {
+        pf h = side_of(&t->filter, side);
+        int32_t const first = first_of(&t->filter, side);
+        inner[side] = evidence(&h, t->inner + first);
+        whole[side] = evidence(&h, t->ll + first);
+        if (modes_searching(t))
+            soften(&h, t->used + first);
+        s[side] = pf_reweigh(&h, t->used + first);
+        s[side].best += first;
+        if (s[side].degenerate)
+            scale(&h, -log_share(t, side));
+        remember(t, side, s[side].best);
+    }
+    if (!s[0].degenerate && !s[1].degenerate)
+        decide(t, dt, inner[1] - inner[0], whole[1] - whole[0]);
+    for (int32_t side = 0; side < 2; side++) {
+        pf h = side_of(&t->filter, side);
+        scale(&h, log_share(t, side));
+    }
+    all = s[reported_side(&t->core->modes)];
+    all.log_evidence = joined(s[0].log_evidence, s[1].log_evidence);
+    all.degenerate = s[0].degenerate && s[1].degenerate;
+    all.ess = pf_ess(&t->filter);
+    return all;
+}
+
+pf_summary modes_reweigh(gait_tracker *t, float dt)
+{
+    if (t->core->modes.stage == MODES_FORKED)
+        return reweigh_sides(t, dt);
+    if (t->core->modes.stage == MODES_SEARCH)
+        soften(&t->filter, t->used);
+    return pf_reweigh(&t->filter, t->used);
+}
+
+bool modes_open(const gait_tracker *t)
+{
+    const modes_state *const m = &t->core->modes;
+    return m->stage == MODES_SEARCH || (m->stage == MODES_FORKED && m->odds < SURE && m->odds > -SURE);
+}
+
+bool modes_searching(const gait_tracker *t)
+{
+    const modes_state *const m = &t->core->modes;
+    return m->stage == MODES_SEARCH || (m->stage == MODES_FORKED && seconds_in_stage(t) < REFIT);
+}
