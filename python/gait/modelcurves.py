@@ -30,6 +30,8 @@ class ModelCurves:
         Mean, then components times their standard deviations; radians or statures.
     residual, static : ndarray of shape (M,)
         Standard deviations of what the components leave, and of a person's constant offset.
+    height_change : ndarray of shape (p,)
+        Of the pelvis, relatively, by one standard deviation of each of the limbs' proportions.
     stride_hz, stride_length : float
         Means of the training set; per second, statures.
     """
@@ -42,6 +44,8 @@ class ModelCurves:
         self.samples = np.asarray(sections["CURV"], float)
         statistics = np.asarray(sections["CHST"], float)
         self.residual, self.static = statistics[:, 0], statistics[:, 3]
+        table = np.asarray(sections.get("PROP", np.zeros((0, 1))), float)
+        self.height_change = table[:, -1]
         self.stride_hz, self.stride_length = float(sections["GAIT"][0]), float(sections["GAIT"][3])
 
     def channel(self, name: str, phase: Array, coef: Array) -> Array:

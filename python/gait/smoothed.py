@@ -128,7 +128,11 @@ def smoothed(
     mean.heading, sd.heading = _circular(states["heading"], use, 2 * np.pi)
     mean.heading = float(wrap(np.array(mean.heading), 2 * np.pi))
     mean.pelvis, sd.pelvis = states["pelvis"][use].mean(axis=0), states["pelvis"].std(axis=0)
-    for name, count in (("coef", model.info.components), ("offset", model.info.angles)):
+    for name, count in (
+        ("coef", model.info.components),
+        ("offset", model.info.angles),
+        ("proportion", states["proportion"].shape[1]),
+    ):
         values = states[name][:, :count].astype(float)
         setattr(mean, name, values[use].mean(axis=0))
         setattr(sd, name, values.std(axis=0))

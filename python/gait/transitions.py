@@ -22,7 +22,7 @@ RATES = (1 / 2.1, 1 / 0.4)
 """Strides per second that a walker may have."""
 
 SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
-"""Columns of a table of states; then x, y, z of the track, the scores and the posture offsets in use."""
+"""Columns of a table of states; then x, y, z of the track, scores, proportions and posture offsets in use."""
 
 
 @dataclass(frozen=True)
@@ -56,43 +56,58 @@ class Transitions:
         most = len(curves.samples) - 1
         self._plain = config.mode == Mode.PAPER  # no root motion within the stride
         self._scores = most if config.components < 0 else config.components
+        every = len(curves.height_change)
+        self._proportions = every if config.proportions < 0 else config.proportions
         angles = len(curves.names) - 6
         self._offsets = [a for a in range(angles) if config.offset_angles >> a & 1]
         self._height = float(curves.samples[0, :, curves.names.index("root_height")].mean())
 
     @property
+    def _build(self) -> int:
+        """First column of the proportions."""
+        return 9 + self._scores
+
+    @property
+    def _posture(self) -> int:
+        """First column of the posture offsets."""
+        return self._build + self._proportions
+
+    @property
     def columns(self) -> int:
         """Of a table of states."""
-        return len(SCALARS) + 3 + self._scores + len(self._offsets)
+        return self._posture + len(self._offsets)
 
     def table(self, particles: NDArray[np.void]) -> Array:
         """States (N, columns) of the structured array of `gait.Tracker.particles`."""
         scalars = np.stack([particles[name] for name in SCALARS], axis=1).astype(float)
         coef = particles["coef"][:, : self._scores].astype(float)
-        track = particles["pelvis"].astype(float) - self._about(scalars, coef)
-        return np.hstack([scalars, track, coef, particles["offset"][:, self._offsets].astype(float)])
+        build = particles["proportion"][:, : self._proportions].astype(float)
+        track = particles["pelvis"].astype(float) - self._about(scalars, coef, build)
+        return np.hstack([scalars, track, coef, build, particles["offset"][:, self._offsets].astype(float)])
 
     def states(self, table: Array) -> NDArray[np.void]:
         """Give the inverse of `table`."""
         out = np.ctypeslib.as_array((_abi.StateC * len(table))())
-        coef = self._coef(table)
+        coef, build = self._coef(table), table[:, self._build : self._posture]
         for k, name in enumerate(SCALARS):
             out[name] = table[:, k]
-        out["pelvis"] = table[:, 6:9] + self._about(table, coef)
+        out["pelvis"] = table[:, 6:9] + self._about(table, coef, build)
         out["coef"][:, : self._scores] = coef
-        out["offset"][:, self._offsets] = table[:, 9 + self._scores :]
+        out["proportion"][:, : self._proportions] = build
+        out["offset"][:, self._offsets] = table[:, self._posture :]
         return out
 
     def _coef(self, table: Array) -> Array:
         return table[..., 9 : 9 + self._scores]
 
-    def _about(self, scalars: Array, coef: Array) -> Array:
+    def _about(self, scalars: Array, coef: Array, build: Array) -> Array:
         """Pelvis relative to its track, (N, 3): sway to the left and height, by phase."""
         phase, stature, heading = scalars[:, 0], scalars[:, 2], scalars[:, 3]
         sway, height = np.zeros(len(phase)), np.full(len(phase), self._height)
         if not self._plain:
             sway = self.curves.channel("root_sway", phase, coef)
             height = self.curves.channel("root_height", phase, coef)
+        height = height * (1 + build @ self.curves.height_change[: self._proportions])
         return (stature * np.stack([-sway * np.sin(heading), sway * np.cos(heading), height])).T
 
     def move(self, before: Array, step: Step, random: np.random.Generator) -> Array:
@@ -122,10 +137,12 @@ class Transitions:
         after[:, 6] += ahead * cos - aside * sin
         after[:, 7] += ahead * sin + aside * cos
         after[:, 8] = _relax(b[:, 8], dt, c.tilt_time, c.vertical_noise, noise[:, 8])
-        last = 9 + self._scores
-        after[:, 9:last] = _relax(b[:, 9:last], dt, c.coef_time, c.coef_noise, noise[:, 9:last])
-        posture = 2 * (c.offset_sd / c.offset_noise) ** 2 if c.offset_noise > 0 else 0.0
-        after[:, last:] = _relax(b[:, last:], dt, posture, c.offset_noise, noise[:, last:])
+        for first, last, tau, sd in (
+            (9, self._build, c.coef_time, c.coef_noise),
+            (self._build, self._posture, _time(1.0, c.proportion_noise), c.proportion_noise),
+            (self._posture, self.columns, _time(c.offset_sd, c.offset_noise), c.offset_noise),
+        ):
+            after[:, first:last] = _relax(b[:, first:last], dt, tau, sd, noise[:, first:last])
         return after
 
     def _ahead(self, before: Array, turn: Array, dt: float) -> Array:
@@ -146,6 +163,11 @@ class Transitions:
 def wrap(x: Array, turn: float) -> Array:
     """Fold into half a turn either way."""
     return np.asarray((x + turn / 2) % turn - turn / 2)
+
+
+def _time(sd: float, noise: float) -> float:
+    """Return the time constant that keeps a deviation with so much noise."""
+    return 2 * (sd / noise) ** 2 if noise > 0 else 0.0
 
 
 def _reflect(rate: Array) -> Array:

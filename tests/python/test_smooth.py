@@ -29,6 +29,7 @@ def coasting(mode, count):
     mean = state_at(MODEL, SECTIONS, 0.0)
     sd = State(phase=0.1, stride_hz=0.1, stature=0.05, heading=0.2, pitch=0.03, roll=0.03)
     sd.pelvis, sd.coef, sd.offset = np.full(3, 0.05), np.ones(MODEL.info.components), np.full(24, 0.05)
+    sd.proportion = np.full(MODEL.info.proportions, 0.5)
     tracker.start(mean, sd, 0)
     tables = []
     for i in range(count):

@@ -1,0 +1,82 @@
+"""What gait-trackd says of frames past and of strides, on logs."""
+
+import lcm_rig as rig
+import numpy as np
+import pytest
+
+from gait.lcm.messages import estimate_of
+from gait.lcm.types import gaitmsg
+
+FRAMES = 76
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """A log of two and a half strides."""
+    return rig.write_log(
+        tmp_path_factory.mktemp("strides") / "a.log", [*rig.opening(), *rig.frames(0, FRAMES)]
+    )
+
+
+def played(log, *options):
+    """Estimates, lagged estimates and strides that a run publishes."""
+    outcome, out = rig.play(log, "-n", 300, *options), log.with_suffix(".out")
+    lagged = rig.read_log(out, "GAIT_ESTIMATE_LAG", gaitmsg.estimate_t)
+    return outcome.estimates, lagged, rig.read_log(out, "GAIT_STRIDE", gaitmsg.stride_t)
+
+
+def places(messages):
+    """Joints (n, P, 3) of estimates."""
+    return np.array([[joint.position for joint in m.joints] for m in messages])
+
+
+def test_every_frame_comes_again_some_frames_later(walk):
+    now, past, _ = played(walk, "--lag", 4)
+    assert [m.frame for m in past] == list(range(FRAMES - 4)) == [m.step for m in past]
+    for then, again, newest in zip(now, past, now[4:], strict=False):
+        assert (again.utime, again.receive_utime) == (then.utime, then.receive_utime)
+        assert (again.step_us, again.log_evidence) == (then.step_us, then.log_evidence)
+        assert again.tracker_digest == newest.tracker_digest
+    assert estimate_of(past[0]).joint_names == estimate_of(now[0]).joint_names
+    sd = [np.mean([[j.sd for j in m.joints] for m in stream[10:]]) for stream in (now[:-4], past)]
+    assert sd[1] < sd[0]
+    assert 0 < np.abs(places(past) - places(now[:-4])).max() < 0.2
+
+
+def test_the_lag_changes_nothing_else(walk):
+    some, none = played(walk, "--lag", 4), played(walk, "--lag", 0)
+    assert none[1] == [] and len(some[0]) == len(none[0])
+    np.testing.assert_array_equal(places(some[0]), places(none[0]))
+
+
+@pytest.mark.parametrize("lag", [0, 5])
+def test_strides_of_the_drawn_walk_are_told(walk, lag):
+    """One stride a second at 1.2 m/s, from phase 0.1: right strikes at 0.9 and 1.9 s, left ones at 0.4 ..."""
+    strides = played(walk, "--lag", lag)[2]
+    right, left = gaitmsg.stride_t.RIGHT, gaitmsg.stride_t.LEFT
+    assert [s.side for s in strides] == [left, right, left][: len(strides)] and len(strides) >= 2
+    begun = rig.frame_message(0).utime
+    for s, end in zip(strides, (1.4, 1.9, 2.4), strict=False):
+        assert s.sure and s.start_utime < s.other_utime < s.utime
+        assert 1e-6 * (s.utime - begun) == pytest.approx(end, abs=0.1)
+        assert s.stride_time == pytest.approx(1.0, abs=0.06) and s.cadence == pytest.approx(
+            120 / s.stride_time
+        )
+        assert s.stride_length == pytest.approx(1.2, abs=0.12)
+        assert s.speed == pytest.approx(s.stride_length / s.stride_time, rel=1e-5)
+        assert 0 < s.stride_time_sd < 0.1 and 0 < s.stride_length_sd < 0.2
+        told = 1e6 * s.frame / rig.FPS
+        assert s.utime - begun <= told + 1 < s.utime - begun + 1e6 / rig.FPS + 1
+
+
+def test_pauses_bridged_by_prediction_are_not_frames(tmp_path):
+    """A gap of a second and more makes steps without a frame; those are not sent again."""
+    events = [*rig.opening(), *rig.frames(0, 12), *rig.frames(50, 62)]
+    now, past, _ = played(rig.write_log(tmp_path / "gap.log", events), "--lag", 3)
+    assert [m.frame for m in now] == [*range(12), *range(50, 62)]
+    assert {m.frame for m in past} <= {m.frame for m in now} and past[-1].frame == 58
+    assert all(m.utime == rig.frame_message(m.frame).utime for m in past)
+
+
+def test_a_lag_out_of_range_is_a_usage_error(walk):
+    assert rig.run(*rig.command("--url", f"file://{walk}?speed=0", "--lag", 65)[1:]).code == 2
