@@ -18,6 +18,7 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "score noise": {"coef_noise": 0.0},
     "score return": {"coef_time": 0.0},
     "posture": {"offset_angles": 0},
+    "limb proportions": {"proportions": 0},
     "stature search": {"stature_noise": 0.0},
     "tilt": {"tilt_noise": 0.0},
     "rate return": {"rate_time": 0.0},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,6 @@ from gait.calibration import APART
 from gait.evaluate import LOST_MM, root_errors
 from gait.events import Strikes, strikes_by_zeni
 from gait.skeleton import EVAL15
-from gait.state import SCALARS
 from gait.tracker import Estimate
 from gait.trackfile import STATUSES, Joints, Track, read_truth
 
@@ -162,5 +162,5 @@ class Spread:
 
 
 def _state(record: np.void) -> State:
-    scalars = {name: float(record[name]) for name in SCALARS}
-    return State(**scalars, **{name: np.array(record[name], float) for name in ("pelvis", "coef", "offset")})
+    values = {item.name: record[item.name] for item in fields(State)}
+    return State(**{name: float(v) if v.ndim == 0 else np.array(v, float) for name, v in values.items()})

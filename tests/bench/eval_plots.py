@@ -68,7 +68,7 @@ def _error(axes: Axes, runs: list[Result]) -> None:
     else:
         axes.set(ylabel="mean distance of the marks, px", ylim=(0, None))
     axes.set(title="Error; ground: grey init, yellow ambiguous, red lost", xlabel="frame")
-    if runs:
+    if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", ncols=2, framealpha=0.7, fontsize=7)
 
 
