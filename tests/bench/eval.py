@@ -143,7 +143,10 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def tables(
-    rows: list[dict[str, Any]], before: list[dict[str, Any]], shape: Callable[[list[list[str]], int], str]
+    rows: list[dict[str, Any]],
+    shape: Callable[[list[list[str]], int], str],
+    before: list[dict[str, Any]],
+    wanted: bool = True,
 ) -> list[tuple[str, str]]:
     """Headings and tables in the shape of `shape`; `before` is an earlier run's rows or empty."""
     summaries = eval_table.summaries(rows)
@@ -159,18 +162,18 @@ def tables(
         parts.append(
             ("Changed since: mean over the runs, 95 % interval", shape(eval_ablate.grid(changes), 2))
         )
-    parts.append(("Wanted and reached", shape(eval_wanted.grid(eval_wanted.verdicts(rows)), 4)))
+    if wanted:
+        parts.append(("Wanted and reached", shape(eval_wanted.grid(eval_wanted.verdicts(rows)), 4)))
     return parts
 
 
-def record(name: str, rows: list[dict[str, Any]], words: str) -> None:
+def record(name: str, rows: list[dict[str, Any]], parts: list[tuple[str, str]], words: str) -> None:
     """Keep the figures of this run in the repository."""
     RESULTS.mkdir(exist_ok=True)
     write_csv(RESULTS / f"{name}.csv", rows)
     text = [f"# Evaluation of the tracker\n\n{facts(words)}  A row for each run is in {name}.csv.\n"]
-    text += [
-        f"## {heading}\n\n{table}\n" for heading, table in reversed(tables(rows, [], eval_table.markdown))
-    ]
+    text += [f"## {heading}\n\n{table}\n" for heading, table in reversed(parts)]
+    text += [f"- gave up: {words}\n" for words in eval_table.failures(rows)]
     with replacing(RESULTS / f"{name}.md") as path:
         path.write_text("\n".join([*text, fill(eval_table.LEGEND, 110), ""]), encoding="utf-8")
 
@@ -221,13 +224,14 @@ def main() -> int:
     if args.json:
         print(json.dumps(rows))
     else:
-        for heading, table in tables(rows, before, eval_table.plain):
+        for heading, table in tables(rows, eval_table.plain, before, not args.simulated):
             print(f"\n{heading}\n{table}")
         print("\n" + fill(eval_table.LEGEND, 110))
         for words in eval_table.failures(rows):
             print(f"gave up: {words}")
     if args.record:
-        record(args.record, rows, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")
+        parts = tables(rows, eval_table.markdown, before, not args.simulated)
+        record(args.record, rows, parts, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")
     if not args.no_pictures:
         print(f"pictures and plots: {args.html / 'index.html'}", file=sys.stderr)
     return 0
