@@ -6,6 +6,7 @@ import pytest
 
 from gait.lcm.messages import estimate_of
 from gait.lcm.types import gaitmsg
+from gait.trackfile import read_track
 
 FRAMES = 76
 
@@ -80,3 +81,15 @@ def test_pauses_bridged_by_prediction_are_not_frames(tmp_path):
 
 def test_a_lag_out_of_range_is_a_usage_error(walk):
     assert rig.run(*rig.command("--url", f"file://{walk}?speed=0", "--lag", 65)[1:]).code == 2
+
+
+def test_lagged_estimates_can_be_recorded(walk, tmp_path):
+    _, past, _ = played(walk, "--lag", 4)
+    log = rig.write_log(tmp_path / "past.log", [("GAIT_ESTIMATE_LAG", m) for m in past])
+    words = ["record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--lagged", "--quiet"]
+    assert rig.gait(*words).returncode == 0
+    track = read_track(tmp_path / "t.csv")
+    assert track.frame.tolist() == [m.frame for m in past]
+    np.testing.assert_allclose(track.places["pelvis"], places(past)[:, 0], atol=1e-5)
+    nobody = rig.gait(*words[:-2], "--quiet")
+    assert nobody.returncode == 1 and "GAIT_ESTIMATE: no estimate" in nobody.stderr

@@ -18,7 +18,7 @@ from typing import Any
 
 from gait.files import require_writable
 from gait.lcm.link import lcm_url
-from gait.lcm.record import Recorder
+from gait.lcm.record import ESTIMATE, LAGGED, Recorder
 
 NAME = "record"
 HELP = "record the estimates of gait-trackd into a track file"
@@ -36,6 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--patience", type=float, metavar="S", help="fail if none has come at all after S seconds"
     )
     parser.add_argument(
+        "--lagged", action="store_true", help="each frame as it looked some frames later (gait-trackd --lag)"
+    )
+    parser.add_argument(
         "--log", metavar="E.log", help="also write the messages to an LCM log, for gait report"
     )
 
@@ -45,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     for path in filter(None, (args.output, args.log)):
         require_writable(path)
     url = lcm_url(args.url)
-    recorder = Recorder(url, args.output, args.log)
+    recorder = Recorder(url, args.output, args.log, LAGGED if args.lagged else ESTIMATE)
 
     def stop(number: int, frame: Any) -> None:
         recorder.stop = True

@@ -58,6 +58,9 @@ class Figures:
         }
 
 
+ESTIMATE, LAGGED = "GAIT_ESTIMATE", "GAIT_ESTIMATE_LAG"
+
+
 class Recorder:
     """Write estimates as they come.
 
@@ -66,6 +69,8 @@ class Recorder:
     url : str
     output : str
         Track file, as ``gait track`` writes it.
+    channel : str
+        ``GAIT_ESTIMATE``, or ``GAIT_ESTIMATE_LAG``: each frame some frames later, by what was seen since.
     log : str, optional
         LCM log of the messages themselves, each with the time it arrived here; `gait.lcm.results` reads it.
 
@@ -76,9 +81,9 @@ class Recorder:
         Set it to end `run` in good order.
     """
 
-    def __init__(self, url: str, output: str, log: str | None = None) -> None:
+    def __init__(self, url: str, output: str, log: str | None = None, channel: str = ESTIMATE) -> None:
         self._lcm, self._live = open_lcm(url), not is_log(url)
-        self._output, self._path = output, log
+        self._output, self._path, self._channel = output, log, channel
         self._waiting: list[Any] = []
         self._writer: TrackWriter | None = None
         self._log: Any = None
@@ -86,7 +91,7 @@ class Recorder:
         self._last = 0.0
         self.figures = Figures()
         self.stop = False
-        self._lcm.subscribe("GAIT_ESTIMATE", self._on_estimate).set_queue_capacity(_QUEUE)
+        self._lcm.subscribe(channel, self._on_estimate).set_queue_capacity(_QUEUE)
 
     def run(
         self, frames: int | None = None, idle: float | None = None, patience: float | None = None
@@ -114,7 +119,7 @@ class Recorder:
             self._flush()
             if not self.figures.utime:
                 raise UserError(
-                    "GAIT_ESTIMATE: no estimate was received; is gait-trackd tracking on this URL?"
+                    f"{self._channel}: no estimate was received; is gait-trackd tracking on this URL?"
                 )
 
     def summary(self) -> dict[str, Any]:
