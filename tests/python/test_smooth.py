@@ -17,8 +17,11 @@ from gait.smooth import Spool, draw_motions
 from gait.trackfile import read_track
 from gait.transitions import Step, Transitions
 
-MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
+if "PROP" not in SECTIONS:  # two ways in which limbs differ in length
+    random = np.random.default_rng(0)
+    SECTIONS["PROP"] = (0.03 * random.standard_normal((2, len(SECTIONS["FRMI"]) + 1))).astype(np.float32)
+MODEL = Model(blob.encode(SECTIONS))
 CURVES = ModelCurves(SECTIONS)
 
 
