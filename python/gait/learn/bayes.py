@@ -72,7 +72,7 @@ class Rows:
     bound: float
 
 
-class _Problem:
+class Problem:
     """The data, and the two half-steps that raise the bound."""
 
     def __init__(self, values: Floats, mask: Mask, basis: Floats) -> None:
@@ -191,10 +191,46 @@ def _divergence(belief: Belief) -> float:
     return 0.5 * float(np.sum(belief.precision * second) - size * volume)
 
 
+@dataclass
+class Climb:
+    """Where the passes led, and the Filling's figures on the way."""
+
+    belief: Belief
+    rows: Rows
+    rmse: list[float]
+    objective: list[float]
+    converged: bool
+
+
+def climb(problem: Problem, belief: Belief, tolerance: float, passes: int = ITERATIONS) -> Climb:
+    """Raise the bound by turns: scores of the rows, then components.
+
+    Parameters
+    ----------
+    tolerance : float
+        Rms change of the model between two passes, over the noise, at which to stop.
+    passes : int
+        At most.
+    """
+    at = Climb(belief, problem.expect(belief), [], [], False)
+    mixer = Mixer()
+    while not at.converged and len(at.rmse) < passes:
+        after, found = _pass(problem, mixer, at.belief, at.rows)
+        change = float(np.sqrt(np.mean((found.model - at.rows.model) ** 2)))
+        at.converged = change <= tolerance * np.sqrt(after.noise)
+        if found.bound < at.rows.bound:  # by rounding: nothing is left to gain
+            at.converged = True
+        else:
+            at.belief, at.rows = after, found
+        at.rmse.append(problem.rmse(at.rows))
+        at.objective.append(-at.rows.bound / problem.observed)
+    return at
+
+
 def by_bayes(
     values: Floats, mask: Mask, components: int, basis: Floats, start: Floats, tolerance: float = TOLERANCE
 ) -> Filling:
-    """Fill by turns: scores of the rows, then components; steps are extrapolated while that raises the bound.
+    """Fill with what is to be expected given the observed entries; see `climb`.
 
     Parameters
     ----------
@@ -207,27 +243,13 @@ def by_bayes(
     tolerance : float
         Rms change of the model between two passes, over the noise, at which to stop.
     """
-    problem = _Problem(values, mask, basis)
-    belief = problem.begin(start, components)
-    rows = problem.expect(belief)
-    rmse: list[float] = []
-    objective: list[float] = []
-    mixer, converged = Mixer(), False
-    while not converged and len(objective) < ITERATIONS:
-        after, found = _pass(problem, mixer, belief, rows)
-        change = float(np.sqrt(np.mean((found.model - rows.model) ** 2)))
-        converged = change <= tolerance * np.sqrt(after.noise)
-        if found.bound < rows.bound:  # by rounding: nothing is left to gain
-            converged = True
-        else:
-            belief, rows = after, found
-        rmse.append(problem.rmse(rows))
-        objective.append(-rows.bound / problem.observed)
-    filled = np.where(mask, values, rows.model.reshape(values.shape))
-    return Filling(filled, rmse, objective, float(np.sqrt(belief.noise)), converged)
+    problem = Problem(values, mask, basis)
+    end = climb(problem, problem.begin(start, components), tolerance)
+    filled = np.where(mask, values, end.rows.model.reshape(values.shape))
+    return Filling(filled, end.rmse, end.objective, float(np.sqrt(end.belief.noise)), end.converged)
 
 
-def _pass(problem: _Problem, mixer: Mixer, belief: Belief, rows: Rows) -> tuple[Belief, Rows]:
+def _pass(problem: Problem, mixer: Mixer, belief: Belief, rows: Rows) -> tuple[Belief, Rows]:
     """Extrapolate, or take the plain step where that is better; drop a component that does not help."""
     plain = problem.maximise(belief, rows)
     after = _mixed(mixer, belief, plain)
@@ -248,12 +270,14 @@ def _without_weakest(belief: Belief) -> Belief | None:
     doubt = belief.loadings.shape[1] * np.diag(belief.spread)
     if not len(energy) or np.min(energy / doubt) > 1:
         return None
-    keep = np.flatnonzero(np.arange(len(energy)) != np.argmin(energy / doubt))
+    return without(belief, int(np.argmin(energy / doubt)))
+
+
+def without(belief: Belief, k: int) -> Belief:
+    """Drop component k."""
+    spread = np.delete(np.delete(belief.spread, k, axis=0), k, axis=1)
     return Belief(
-        belief.loadings[np.concatenate([[0], 1 + keep])],
-        belief.spread[np.ix_(keep, keep)],
-        belief.precision[keep],
-        belief.noise,
+        np.delete(belief.loadings, 1 + k, axis=0), spread, np.delete(belief.precision, k), belief.noise
     )
 
 

@@ -110,13 +110,14 @@ def fit(
     start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
     alignment.offsets = (alignment.offsets + start * periods) % periods
     rows = cycles.slice_cycles(signals, periods, alignment.offsets, SAMPLES)
-    wanted = fpca.LARGEST if components == "auto" else int(components)
+    wanted = 1 if components == "auto" else int(components)
     if len(rows.values) <= wanted + 1:
         raise UserError(f"{len(rows.values)} cycles are too few for {wanted} components; add recordings")
     scale = channel_scale()
     scaled, held_out = rows.values * scale, np.zeros(0)
     if components == "auto":
-        wanted, held_out = fpca.choose(scaled, rows.mask, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        wanted, held_out = fpca.choose(scaled, rows.mask, rng, groups=index[rows.sequence])
     model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = prior.joint_metric(model.mean, proportions)

@@ -14,13 +14,14 @@ import numpy.typing as npt
 from gait.learn.bayes import by_bayes
 from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
 from gait.learn.impute import Filling, by_svd, column_mean
+from gait.learn.rank import LARGEST, choose
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+__all__ = ["HARMONICS", "LARGEST", "METHODS", "Components", "choose", "fit"]
+
 METHODS = {"bayes": by_bayes, "paper": by_svd}
-LARGEST = 8  # components that `choose` tries
-HELD_OUT = 0.05  # share of the observed entries held out to choose the number of components
 
 
 @dataclass
@@ -92,26 +93,3 @@ def fit(
         sd=singular[:components] / np.sqrt(max(rows - 1, 1)),
         spectrum=singular**2 / max(float(np.sum(singular**2)), 1e-300),
     )
-
-
-def hold_out(mask: Mask, share: float, rng: np.random.Generator) -> Mask:
-    """Choose blocks of observed entries, an eighth of a cycle of one channel and row each; `share` in all."""
-    rows, samples, channels = mask.shape
-    length = samples // 8
-    chosen = np.zeros_like(mask)
-    for _ in range(int(share * mask.sum() / length)):
-        r, m, t = int(rng.integers(rows)), int(rng.integers(channels)), int(rng.integers(samples))
-        chosen[r, (t + np.arange(length)) % samples, m] = True
-    return chosen & mask
-
-
-def choose(
-    values: Floats, mask: Mask, rng: np.random.Generator, harmonics: int = HARMONICS, largest: int = LARGEST
-) -> tuple[int, Floats]:
-    """Find the number of components with the least error on held-out blocks; errors for 0 ... largest."""
-    held = hold_out(mask, HELD_OUT, rng)
-    errors = []
-    for q in range(min(largest, len(values) - 1) + 1):
-        model = fit(values, mask & ~held, q, harmonics).reconstruct()
-        errors.append(float(np.sqrt(np.mean((model - values)[held] ** 2))))
-    return int(np.argmin(errors)), np.array(errors)
