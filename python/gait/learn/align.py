@@ -139,14 +139,24 @@ def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
         if result.objective and cost > result.objective[-1] * (1 - TOLERANCE):
             break
         result.objective.append(cost)
-        result.offsets = np.array(
+        moved = np.array(
             [
                 s.best_offset(table, weights, o)
                 for s, o in zip(problem.sequences(), result.offsets, strict=True)
             ]
         )
+        result.offsets = _without_drift(moved, result.offsets, problem.periods)
     result.offsets = problem.gauged(result.offsets)
     return result
+
+
+def _without_drift(offsets: Floats, before: Floats, periods: Floats) -> Floats:
+    """Take the common part of a change off the offsets.
+
+    It leaves the fit as it is but for the places of the knots, towards which all phases would creep for ever.
+    """
+    turn = np.angle(np.mean(np.exp(2j * np.pi * (offsets - before) / periods))) / (2 * np.pi)
+    return np.asarray((offsets - turn * periods) % periods)
 
 
 def _noise_weights(problem: _Problem) -> Floats:
