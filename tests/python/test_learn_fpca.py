@@ -1,105 +1,175 @@
 """Cycles and their components: imputation, closure, convergence (L7-L12)."""
 
 import gait_generator as g
+import learn_cases as cases
 import numpy as np
 import pytest
 
 from gait.learn import cycles, fpca
+from gait.learn.fourier import HARMONICS
+from gait.learn.model import anova
+
+METHODS = sorted(fpca.METHODS)
 
 
-def oracle(values, mask, modes, noise=1.0):
-    """Best linear prediction of the missing entries by one who knows the generator."""
-    phase = np.arange(g.GRID) / g.GRID
-    mean, curves = g.mean_curves(phase), modes.curves(phase)
-    result = values.copy()
-    for row, seen in zip(result, mask, strict=True):
-        design = curves[:, seen].T
-        precision = design.T @ design / noise**2 + np.diag(1 / np.square(g.SCORE_SD))
-        scores = np.linalg.solve(precision, design.T @ (row - mean)[seen] / noise**2)
-        row[~seen] = (mean + np.einsum("q,qtc->tc", scores, curves))[~seen]
-    return result
-
-
-def rms(a, b, where):
-    return float(np.sqrt(np.mean((a - b)[where] ** 2)))
-
-
-@pytest.fixture(scope="module", params=[(0.05, 1.05), (0.2, 1.05), (0.4, 1.10)], ids=["5%", "20%", "40%"])
+@pytest.fixture(
+    scope="module", params=[(0.05, 1.05), (0.1, 1.05), (0.2, 1.05), (0.4, 1.10)], ids=lambda p: f"{p[0]:.0%}"
+)
 def imputed(request):
     share, limit = request.param
-    rng = np.random.default_rng(10)
-    modes = g.random_modes(rng)
-    values, mask, scores = g.cycle_matrix(rng, 80, modes, missing=share)
-    return values, mask, scores, modes, fpca.fit(values, mask, 5), limit
+    case = cases.walks(np.random.default_rng(10), missing=share)
+    return case, fpca.fit(case.values, case.mask, 5), limit
 
 
 def test_imputation_is_near_the_oracle(imputed):
-    values, mask, _, modes, found, limit = imputed
-    best = rms(oracle(values, mask, modes), values, ~mask)
+    case, found, limit = imputed
+    best = case.error(case.oracle())
     assert best == pytest.approx(1.0, abs=0.1)
-    assert rms(found.filled, values, ~mask) <= limit * best
+    assert case.error(found.filled) <= limit * best
+    assert found.noise == pytest.approx(1.0, abs=0.02)
 
 
 def test_imputation_beats_mean_and_line(imputed):
-    values, mask, _, _, found, _ = imputed
-    error = rms(found.filled, values, ~mask)
+    case, found, _ = imputed
+    values, mask, error = case.values, case.mask, case.error(found.filled)
     column = np.broadcast_to(np.nanmean(np.where(mask, values, np.nan), axis=0), values.shape)
     line = values.copy()
     for r, c in np.ndindex(values.shape[0], values.shape[2]):
         seen = np.flatnonzero(mask[r, :, c])
         if len(seen):
             line[r, :, c] = np.interp(np.arange(g.GRID), seen, values[r, seen, c], period=g.GRID)
-    assert rms(column, values, ~mask) > 5 * error
-    assert rms(line, values, ~mask) > 5 * error
+    assert case.error(column) > 5 * error
+    assert case.error(line) > 5 * error
 
 
-def test_passes_descend_and_stop(imputed):
-    found = imputed[4]
-    assert np.all(np.diff(found.rmse) <= 1e-12)
-    assert len(found.rmse) < 100
+@pytest.mark.parametrize("method", METHODS)
+def test_passes_descend_and_stop(imputed, method):
+    case, *_ = imputed
+    found = fpca.fit(case.values, case.mask, 5, method=method)
+    assert np.all(np.diff(found.objective) <= 0)
+    assert found.converged and 1 < len(found.objective) == len(found.rmse) < 100
+    assert found.rmse[-1] < found.rmse[0]
+
+
+def test_start_of_the_missing_entries_does_not_matter(imputed):
+    case, by_mean, _ = imputed
+    by_zero = fpca.fit(case.values, case.mask, 5, start=np.zeros(case.values.shape[1:]))
+    assert np.max(np.abs(by_mean.filled - by_zero.filled)) < 1e-3
+
+
+def test_too_many_components_hurt_little(imputed):
+    case, found, _ = imputed
+    for count in (8, 12):
+        more = fpca.fit(case.values, case.mask, count)
+        assert case.error(more.filled) <= 1.005 * case.error(found.filled)
+        assert more.converged and np.all(np.diff(more.objective) <= 0)
 
 
 def test_components_span_the_modes(imputed):
-    _, _, scores, modes, found, _ = imputed
-    phase = np.arange(g.GRID) / g.GRID
-    truth, _ = np.linalg.qr(modes.curves(phase).reshape(5, -1).T)
-    cosines = np.linalg.svd(truth.T @ found.curves.reshape(5, -1).T, compute_uv=False)
-    angles = np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+    case, found, _ = imputed
+    angles = cases.principal_angles(case.modes, found.curves)
     assert angles.max() <= 5 and np.sort(angles)[2] <= 2
     unit = np.sqrt(g.GRID * 19)
-    realised = np.linalg.svd(scores - scores.mean(axis=0), compute_uv=False) / np.sqrt(len(scores) - 1)
+    centred = case.scores - case.scores.mean(axis=0)
+    realised = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(centred) - 1)
     assert found.sd / unit == pytest.approx(realised, rel=0.05)
 
 
 def test_components_are_orthonormal_with_fixed_signs(imputed):
-    flat = imputed[4].curves.reshape(5, -1)
+    flat = imputed[1].curves.reshape(5, -1)
     assert flat @ flat.T == pytest.approx(np.eye(5), abs=1e-9)
     assert np.all(flat[np.arange(5), np.abs(flat).argmax(axis=1)] > 0)
 
 
+def test_scores_are_the_generators_between_and_within_people():
+    case = cases.people(np.random.default_rng(18))
+    scores = cases.mode_scores(case, fpca.fit(case.values, case.mask, 5))
+    for k in range(5):
+        assert np.corrcoef(scores[:, k], case.scores[:, k])[0, 1] > 0.99
+    for found, true in zip(anova(scores, case.subject), anova(case.scores, case.subject), strict=True):
+        assert found == pytest.approx(true, rel=0.15)
+
+
+def test_reference_problem_is_within_a_twentieth_of_the_oracle():
+    ratios = []
+    for seed in range(5):
+        case = cases.reference(np.random.default_rng(seed))
+        best = case.error(case.oracle())
+        three, five = (case.error(fpca.fit(case.values, case.mask, q).filled) for q in (3, 5))
+        ratios.append(three / best)
+        assert five <= 1.05 * three
+    assert np.median(ratios) <= 1.05
+
+
+def test_whole_limbs_are_filled_from_the_others():
+    rng = np.random.default_rng(15)
+    case = cases.walks(rng, missing=0.1)
+    taken = cases.without_limbs(case, rng)
+    found = fpca.fit(case.values, case.mask, 5)
+    assert np.isfinite(found.filled).all()
+    assert case.error(found.filled, taken) <= 1.1 * case.error(case.oracle(), taken)
+
+
+@pytest.mark.parametrize(("channels", "limit"), [([10], 1.3), ([3, 4, 5, 6, 11, 12, 13, 14], 1.3)])
+def test_people_without_some_channels_are_filled(channels, limit):
+    case = cases.people(np.random.default_rng(17), missing=0.1)
+    taken = cases.without_channel(case, channels, np.flatnonzero(case.subject == 3))
+    found = fpca.fit(case.values, case.mask, 5)
+    assert np.isfinite(found.filled).all()
+    assert case.error(found.filled, taken) <= limit * case.error(case.oracle(), taken)
+
+
+def test_what_nobody_has_is_finite():
+    case = cases.walks(np.random.default_rng(19), rows=30)
+    case.mask[:, :, 4] = False  # a channel of nobody
+    case.mask[:, 30:60, 8] = False  # phases of nobody
+    case.mask[5] = False  # a row without anything
+    for count in (0, 5, 29):
+        found = fpca.fit(case.values, case.mask, count)
+        assert np.isfinite(found.filled).all() and np.isfinite(found.curves).all()
+        assert np.abs(found.filled).max() < 1.5 * np.abs(case.values).max()
+
+
+def test_data_without_noise_are_completed_exactly():
+    case = cases.walks(np.random.default_rng(20), rows=40, noise=0.0)
+    for count in (5, 7):
+        found = fpca.fit(case.values, case.mask, count)
+        assert case.error(found.filled) < 1e-3
+        assert np.all(np.diff(found.objective) <= 0)
+
+
 def test_automatic_number_of_components_is_the_generators():
-    rng = np.random.default_rng(11)
-    values, mask, _ = g.cycle_matrix(rng, 60, g.random_modes(rng), missing=0.2)
-    count, errors = fpca.choose(values, mask, np.random.default_rng(1))
-    assert abs(count - 5) <= 1
-    assert len(errors) == fpca.LARGEST + 1 and errors[0] > 4 * errors[count]
+    case = cases.people(np.random.default_rng(11))
+    for groups in (None, case.subject):
+        count, errors = fpca.choose(case.values, case.mask, np.random.default_rng(1), groups)
+        assert abs(count - 5) <= 1
+        assert len(errors) == fpca.LARGEST + 1 and errors[0] > 4 * errors[count]
 
 
-def test_start_of_the_missing_entries_does_not_matter():
-    rng = np.random.default_rng(12)
-    values, mask, _ = g.cycle_matrix(rng, 40, g.random_modes(rng), missing=0.2)
-    by_mean = fpca.fit(values, mask, 5, tolerance=1e-11)
-    by_zero = fpca.fit(values, mask, 5, start=np.zeros(values.shape[1:]), tolerance=1e-11)
-    assert np.max(np.abs(by_mean.filled - by_zero.filled)) < 1e-3
+def test_people_held_out_need_no_more_components_than_they_share():
+    """What only one person does helps to fill that person's cycles, not to describe others."""
+    rng = np.random.default_rng(21)
+    case = cases.people(rng, subjects=6)
+    own = g.random_modes(rng, 6).curves(np.arange(g.GRID) / g.GRID)
+    own_scores = 4 * rng.normal(size=len(case.values))
+    values = case.values + own_scores[:, None, None] * own[case.subject]
+    by_blocks, _ = fpca.choose(values, case.mask, np.random.default_rng(1))
+    by_people, _ = fpca.choose(values, case.mask, np.random.default_rng(1), case.subject)
+    assert by_blocks >= 10 and abs(by_people - 5) <= 2
+
+
+def test_few_cycles_limit_the_number_of_components():
+    case = cases.walks(np.random.default_rng(22), rows=5)
+    count, errors = fpca.choose(case.values, case.mask, np.random.default_rng(1), np.arange(5))
+    assert 1 <= count < 5 and len(errors) <= 5
 
 
 def test_without_gaps_it_is_the_truncated_svd_of_the_band_limited_data():
-    rng = np.random.default_rng(13)
-    values, mask, _ = g.cycle_matrix(rng, 30, g.random_modes(rng), missing=0.0)
-    found = fpca.fit(values, mask, 3)
-    assert len(found.rmse) == 1
+    values = cases.walks(np.random.default_rng(13), rows=30, missing=0.0).values
+    found = fpca.fit(values, np.ones(values.shape, bool), 3)
+    assert len(found.rmse) == 1 and found.converged
     spectrum = np.fft.rfft(values, axis=1)
-    spectrum[:, fpca.HARMONICS + 1 :] = 0
+    spectrum[:, HARMONICS + 1 :] = 0
     smooth = np.fft.irfft(spectrum, g.GRID, axis=1).reshape(30, -1)
     mean = smooth.mean(axis=0)
     u, s, v = np.linalg.svd(smooth - mean, full_matrices=False)
@@ -108,55 +178,29 @@ def test_without_gaps_it_is_the_truncated_svd_of_the_band_limited_data():
 
 
 def test_row_order_does_not_matter():
-    rng = np.random.default_rng(14)
-    values, mask, _ = g.cycle_matrix(rng, 30, g.random_modes(rng), missing=0.1)
-    order = rng.permutation(30)
-    first, second = fpca.fit(values, mask, 4), fpca.fit(values[order], mask[order], 4)
+    case, order = cases.walks(np.random.default_rng(14), rows=30), np.random.default_rng(14).permutation(30)
+    first = fpca.fit(case.values, case.mask, 4)
+    second = fpca.fit(case.values[order], case.mask[order], 4)
     assert second.curves == pytest.approx(first.curves, abs=1e-8)
 
 
-def test_a_channel_never_seen_in_a_row_is_filled_finitely():
-    rng = np.random.default_rng(15)
-    values, mask, _ = g.cycle_matrix(rng, 40, g.random_modes(rng), missing=0.1)
-    mask[3, :, 5] = False
-    mask[7, :, 4:12] = False
-    found = fpca.fit(values, mask, 5)
-    assert np.isfinite(found.filled).all()
-    assert rms(found.filled[[3, 7]], values[[3, 7]], ~mask[[3, 7]]) < 3.0
-
-
-def seam(curves):
-    """Worst step across the seam over the larger of the median step and its neighbours, per derivative."""
-    worst = 0.0
-    for _ in range(3):
-        step = np.abs(np.diff(curves, axis=0, append=curves[:1]))
-        usual = np.maximum(np.median(step, axis=0), np.maximum(step[-2], step[0]))
-        worst = max(worst, float(np.max(step[-1] / usual)))
-        curves = np.diff(curves, axis=0, append=curves[:1])
-    return worst
+def test_units_do_not_matter():
+    case = cases.walks(np.random.default_rng(23), rows=30)
+    degrees = fpca.fit(case.values, case.mask, 4)
+    radians = fpca.fit(np.radians(case.values), case.mask, 4)
+    assert np.degrees(radians.filled) == pytest.approx(degrees.filled, abs=1e-7)
 
 
 @pytest.fixture(scope="module")
 def drifting():
-    """Cycles of walkers whose angles creep by 6 degrees per cycle."""
-    rng = np.random.default_rng(16)
-    modes, signals, periods, offsets = g.random_modes(rng), [], [], []
-    for _ in range(12):
-        period, frames = rng.uniform(100, 140), 460
-        offset = rng.uniform(0, period)
-        scores = rng.normal(size=5) * g.SCORE_SD
-        z = g.walk(rng, period, frames, offset=offset, noise=0.5, scores=scores, modes=modes)
-        signals.append(z + 6.0 * np.arange(frames)[:, None] / period)
-        periods.append(period)
-        offsets.append(offset)
-    return cycles.slice_cycles(signals, np.array(periods), np.array(offsets), g.GRID)
+    return cases.drifting(np.random.default_rng(16))
 
 
 def test_curves_close_though_the_cycles_do_not(drifting):
     found = fpca.fit(drifting.values, drifting.mask, 5)
-    assert seam(found.mean) <= 2
+    assert cases.seam(found.mean) <= 2
     for curve in found.curves:
-        assert seam(curve) <= 2
+        assert cases.seam(curve) <= 2
 
 
 def test_ramp_is_taken_off_complete_cycles(drifting):

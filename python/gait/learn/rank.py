@@ -99,7 +99,7 @@ def _of_blocks(values: Floats, mask: Mask, rng: np.random.Generator, basis: Floa
 
 
 def hold_out(mask: Mask, share: float, rng: np.random.Generator) -> Groups:
-    """Draw blocks, a BLOCK-th of a cycle of one channel and row each: their numbers, -1 outside, (R, T, M)."""
+    """Draw blocks, a BLOCK-th of a cycle of a channel and row each: their numbers, -1 outside, (R, T, M)."""
     rows, samples, channels = mask.shape
     length = samples // BLOCK
     chosen = np.full(mask.shape, -1)
