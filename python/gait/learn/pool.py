@@ -1,10 +1,17 @@
-"""The per-file stage in several processes of this machine, in the order of the files."""
+"""The per-file stage in several processes of this machine, in the order of the files.
+
+Outcomes come from the workers as files, and only the files' names through the pipe: whoever reads half of a
+message of a worker that was killed waits for ever, but so short a message is written whole or not at all.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
+import shutil
 import signal
+import tempfile
 import threading
 import time
 from collections import deque
@@ -16,6 +23,7 @@ from pathlib import Path
 
 from gait.errors import UserError
 from gait.learn.reading import Reading
+from gait.learn.spool import no_room
 from gait.learn.stage import Outcome, prepare
 
 #: Seconds that starting the workers costs: they import the package anew (measured: 0.4 to 0.6).
@@ -52,15 +60,15 @@ def _size(path: Path) -> int:
 
 def _pooled(paths: Sequence[Path], reading: Reading, workers: int) -> Generator[Outcome, None, None]:
     """Outcomes from a pool; if a worker dies, the files then in flight are done one by one."""
-    waiting, flying = deque(paths), deque[tuple[Path, Future[Outcome]]]()
+    waiting, flying = deque(paths), deque[tuple[Path, Future[str]]]()
     while waiting:
         try:
-            with _pool(workers) as pool:
+            with _pool(workers) as (pool, folder):
                 while waiting or flying:
                     while waiting and len(flying) < AHEAD * workers:
-                        flying.append((waiting[0], _submit(pool, waiting[0], reading)))
+                        flying.append((waiting[0], _submit(pool, waiting[0], reading, folder)))
                         waiting.popleft()
-                    outcome = flying[0][1].result()
+                    outcome = _fetched(flying[0][1].result())
                     flying.popleft()
                     yield outcome
         except BrokenProcessPool:
@@ -71,8 +79,8 @@ def _pooled(paths: Sequence[Path], reading: Reading, workers: int) -> Generator[
 def _alone(path: Path, reading: Reading) -> Outcome:
     """Outcome of one file in a process of its own, so that its death has a name."""
     try:
-        with _pool(1) as pool:
-            return _submit(pool, path, reading).result()
+        with _pool(1) as (pool, folder):
+            return _fetched(_submit(pool, path, reading, folder).result())
     except BrokenProcessPool:
         return UserError(
             f"{path}: the process that read it was killed (out of memory?); "
@@ -81,38 +89,59 @@ def _alone(path: Path, reading: Reading) -> Outcome:
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes that are gone at the end, at once if the end is an exception."""
+def _pool(workers: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
+    """Worker processes and their folder, gone at the end, at once if the end is an exception."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([prepare.__module__])
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(workers, context, initializer=_follow_parent)
-    try:
-        yield pool
-    except BaseException:
-        for child in set(multiprocessing.active_children()) - others:
-            child.kill()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
+    with tempfile.TemporaryDirectory(prefix="gait-") as folder:
+        pool = ProcessPoolExecutor(workers, context, initializer=_follow_parent, initargs=(folder,))
+        try:
+            yield pool, folder
+        except BaseException:
+            for child in set(multiprocessing.active_children()) - others:
+                child.kill()
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
-def _submit(pool: ProcessPoolExecutor, path: Path, reading: Reading) -> Future[Outcome]:
+def _submit(pool: ProcessPoolExecutor, path: Path, reading: Reading, folder: str) -> Future[str]:
     """Submit a file; workers started by this inherit that Ctrl-C is not for them but for their parent."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        return pool.submit(prepare, path, reading)
+        return pool.submit(_stored, path, reading, folder)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _follow_parent() -> None:
-    """End this worker when its parent is gone, even if that was killed."""
+def _stored(path: Path, reading: Reading, folder: str) -> str:
+    """Prepare a file in a worker: name of the file in `folder` that holds the outcome."""
+    outcome = prepare(path, reading)
+    try:
+        with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
+            pickle.dump(outcome, file)
+    except OSError as error:
+        raise no_room(error) from error
+    return file.name
+
+
+def _fetched(name: str) -> Outcome:
+    """Take the outcome out of its file."""
+    with open(name, "rb") as file:
+        outcome: Outcome = pickle.load(file)
+    os.unlink(name)
+    return outcome
+
+
+def _follow_parent(folder: str) -> None:
+    """End this worker, and its folder, when its parent is gone, even if that was killed."""
 
     def watch() -> None:
         parent = multiprocessing.parent_process()
         if parent is not None:
             parent.join()
+            shutil.rmtree(folder, ignore_errors=True)
             os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

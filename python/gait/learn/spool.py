@@ -13,6 +13,14 @@ from gait.errors import UserError
 Floats = npt.NDArray[np.float64]
 
 
+def no_room(error: OSError) -> UserError:
+    """Make the error for temporary files that cannot be written."""
+    return UserError(
+        f"{tempfile.gettempdir()}: {error.strerror} while sequences were put there; "
+        "set TMPDIR to a folder with more room"
+    )
+
+
 class Spool:
     """A temporary file of arrays: a context in which they are put, then read as views that outlive it.
 
@@ -43,10 +51,7 @@ class Spool:
             self._file.write(np.ascontiguousarray(array, float).tobytes())
             self._file.flush()
         except OSError as error:
-            raise UserError(
-                f"{tempfile.gettempdir()}: {error.strerror} while sequences were put there; "
-                "set TMPDIR to a folder with more room"
-            ) from error
+            raise no_room(error) from error
 
     def views(self) -> list[Floats]:
         """All arrays in the order of `put`, read-only."""
