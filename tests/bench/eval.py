@@ -18,10 +18,11 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import signal
 import sys
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -115,6 +116,8 @@ def run_all(jobs: list[Job], workers: int, update: Callable[[int], None]) -> lis
                 update(done)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for worker in active_children():
+                worker.terminate()
             raise
     return [results[i] for i in range(len(jobs))]
 
@@ -212,6 +215,7 @@ def earlier(path: Path) -> list[dict[str, Any]]:
 def main() -> int:
     """Evaluate and report."""
     args = arguments()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the workers as well
     if not eval_clips.DATA.is_dir() and not (args.folder or args.simulated):
         print("eval: ../shared/data is absent: nothing to evaluate on", file=sys.stderr)
         return 0
@@ -221,6 +225,9 @@ def main() -> int:
     except UserError as exc:
         print(f"eval: {exc}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("eval: interrupted", file=sys.stderr)
+        return 130
     if args.json:
         print(json.dumps(rows))
     else:
