@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gait.errors import UserError
 from gait.learn.reading import Reading
 from gait.learn.sequence import load
+from gait.skeleton import ANGLES, CHANNELS
 
 FPS = 120.0
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
@@ -51,6 +53,46 @@ def test_every_walk_is_known_as_one(walks):
         value = {e.name: e.value for e in s.verdict.evidence}
         assert value["flight"] < 0.01 and value["repeats"] > 0.85 and value["legs"] > 0.9
         assert 0.05 < value["lift"] < 0.15 and value["steps"] < 0.015
+
+
+@pytest.mark.parametrize("root", [True, False])
+def test_angles_alone_are_timed_and_judged_alike(walks, tmp_path, root):
+    walk = walks[0]["16_16"]
+    names = CHANNELS if root else ANGLES
+    lengths = [name in ("root_forward", "root_sway", "root_height") for name in names]
+    table = np.where(lengths, walk.channels[:, : len(names)], np.degrees(walk.channels[:, : len(names)]))
+    head = [name if plain else f"{name}_deg" for name, plain in zip(names, lengths, strict=True)]
+    rows = [f"{t},{t / FPS:.6f}," + ",".join(f"{v:.5f}" for v in row) for t, row in enumerate(table)]
+    path = tmp_path / "16_angles.csv"
+    path.write_text("\n".join([",".join(["frame", "time", *head]), *rows]) + "\n")
+    again = load(path)
+    assert again.measures is None and again.kept == walk.kept
+    assert again.period.frames == pytest.approx(walk.period.frames, abs=0.01)
+    assert again.strides.mean() == pytest.approx(walk.strides.mean(), rel=0.01)
+    assert again.verdict.activity == ("walk" if root else "")
+    assert np.isfinite(again.channels).all(axis=0).tolist() == [True] * len(names) + [False] * (
+        30 - len(names)
+    )
+
+
+def test_standing_before_and_after_a_walk_is_cut(tmp_path):
+    """The first and the last frame of 35_01 held for a second."""
+    source = MOCAP / "cmu_walk/35"
+    if not source.is_dir():
+        pytest.skip(f"{source} is absent: the learning data are not part of the repository")
+    lines = (source / "35_01.amc").read_text().splitlines()
+    first, second = [i for i, line in enumerate(lines) if line.strip().isdigit()][:2]
+    size = second - first
+    frames = [lines[i + 1 : i + size] for i in range(first, len(lines), size)]
+    held = [frames[0]] * 120 + frames + [frames[-1]] * 120
+    numbered = [line for t, frame in enumerate(held, 1) for line in [str(t), *frame]]
+    (tmp_path / "35.asf").write_text((source / "35.asf").read_text())
+    path = tmp_path / "35_01.amc"
+    path.write_text("\n".join([*lines[:first], *numbered]) + "\n")
+    walk, whole = load(path), load(source / "35_01.amc")
+    assert abs(walk.kept[0] - 120) < 30 and abs(walk.kept[1] - (120 + len(frames))) < 30
+    assert "standing" in walk.cut[0] and "standing" in walk.cut[1]
+    assert walk.period.frames == pytest.approx(whole.period.frames, rel=0.03)
 
 
 @pytest.mark.parametrize(

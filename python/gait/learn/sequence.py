@@ -36,8 +36,8 @@ class Sequence:
         Radians; NaN where the file does not have it.
     period : period.Period
     strides : (n,)
-        Durations of the single strides, seconds: between forward extremes of either ankle, or of either hip's
-        flexion where the file has angles alone.
+        Durations of the single strides, seconds: between forward extremes of either ankle, or of either
+        knee's flexion where the file has angles alone.
     kept : (start, stop)
         The frames of the file that these are.
     cut : (before, after)
@@ -188,7 +188,7 @@ def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.
     if motion.body is not None and motion.measures is not None and np.isfinite(found.frames):
         feet = activity.of_body(motion.body, motion.measures.stature)
         moving, heading = root.channels(motion.body, motion.measures, found.frames)
-    elif motion.root is not None:
+    elif motion.root is not None and np.isfinite(found.frames):
         moving = motion.root
         feet = activity.of_channels(np.concatenate([motion.angles, moving], axis=1))
     footing = activity.footing(feet, found.frames) if feet is not None else None
@@ -197,11 +197,11 @@ def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.
 
 
 def _strides(motion: _Motion, heading: Floats, frames: float) -> Floats:
-    """Time successive forward extremes of each leg, frames."""
+    """Time successive extremes of each leg, frames."""
     durations = [np.zeros(0)]
     for s in SIDES:
         if motion.body is None:
-            forward = motion.angles[:, ANGLES.index(f"{s}_hip_flexion")]
+            forward = motion.angles[:, ANGLES.index(f"{s}_knee_flexion")]
         else:
             along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
             joints = motion.body.joints
