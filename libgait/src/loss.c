@@ -105,4 +105,5 @@ void loss_watch(gait_tracker *t, const walker *mean)
         modes_search(t);
     t->core->support_utime = t->core->utime;
     t->core->last = *mean;
+    t->core->met = 1;
 }

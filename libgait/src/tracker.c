@@ -159,7 +159,7 @@ static int32_t judge(const gait_tracker *t, float dt, bool degenerate, const gai
     float const acquire = 1.0f; /* seconds */
     if (degenerate || loss_is_lost(t))
         return GAIT_STATUS_LOST;
-    if (modes_searching(t))
+    if (modes_searching(t) || !t->core->met)
         return GAIT_STATUS_INIT;
     if (e->mode_mass < 0.7f)
         return seconds_since(t, t->core->start_utime) < acquire ? GAIT_STATUS_INIT : GAIT_STATUS_AMBIGUOUS;

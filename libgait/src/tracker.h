@@ -25,7 +25,7 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int32_t started;
     int32_t current;   /* which of the two generations holds the particles */
     uint32_t textured; /* bit c: that generation carries surface samples of camera c's previous frame */
-    int32_t reserved;
+    int32_t met; /* the images have supported it since the start */
     double ess;
     modes_state modes;
     walker last;       /* when the images last supported it */

@@ -23,6 +23,7 @@ from gait.video import Frame, Image, Video
 Array = NDArray[np.float64]
 
 WINDOW = 1.0  # seconds of sightings used
+KEEP = 1.5  # seconds after which a sighting is forgotten
 ENOUGH = 8  # sightings, at least
 _LEAD = 0.1  # statures by which the lowest foot is nearer to the camera than the pelvis, on average
 _DEPTH_SD = (0.10, 0.02)  # of the foot point along the viewing ray: metres, and share of the distance
@@ -69,7 +70,71 @@ def find_start(
     """
     if plate is None:
         raise UserError("--init auto: needs a background to see the person against; give --init FILE.json")
-    seen = _collect(video, camera, plate, first, stop)
+    spotter = Spotter(camera, plate, model, height)
+    for frame in video.frames(first, stop):
+        if spotter.full_second(frame):
+            break
+        spotter.see(frame)
+    if not spotter.enough():
+        raise UserError(
+            f"{video.path}: --init auto found nobody in full view for {ENOUGH} frames; give --init FILE.json"
+        )
+    return spotter.start()
+
+
+class Spotter:
+    """Watches frames for somebody to start with; keeps the latest sightings.
+
+    Parameters
+    ----------
+    camera, plate, model
+        `plate` is the empty scene, BGR.
+    height : float, optional
+        Known stature, metres.
+    """
+
+    def __init__(self, camera: Camera, plate: Image, model: Model, height: float | None = None) -> None:
+        self._camera, self._plate, self._model, self._height = camera, plate, model, height
+        self._seen: list[tuple[Frame, Sighting]] = []
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._seen.clear()
+
+    def see(self, frame: Frame) -> None:
+        """Look for the largest person in a frame."""
+        self._seen = [item for item in self._seen if frame.time - item[0].time < KEEP]
+        found = sightings(frame.image, self._plate, self._camera)
+        if found:
+            self._seen.append((Frame(frame.number, frame.time, self._plate[:0]), found[0]))
+
+    def enough(self) -> bool:
+        """Whether somebody was seen often enough."""
+        return len(self._seen) >= ENOUGH
+
+    def full_second(self, frame: Frame) -> bool:
+        """Whether somebody was seen often enough over the whole second before `frame`."""
+        return self.enough() and frame.time - self._seen[0][0].time >= WINDOW
+
+    def walks_in(self, frame: Frame) -> bool:
+        """Whether somebody was seen often enough and moved: who stands has no phase to find."""
+        if not self.full_second(frame):
+            return False
+        places = np.array([one.place[:2] for _, one in self._seen])
+        path = _fit(np.array([seen.time for seen, _ in self._seen]), places)
+        return float(np.hypot(*path.velocity)) >= _SLOW
+
+    def start(self, *, latest: bool = False) -> Start:
+        """First state at the first of the sightings, or at the latest."""
+        at = self._seen[-1 if latest else 0][0]
+        mean, sd = _state(self._seen, self._camera, self._model, self._height, at.time)
+        return Start(at.number, mean, sd)
+
+
+def _state(
+    seen: list[tuple[Frame, Sighting]], camera: Camera, model: Model, height: float | None, when: float
+) -> tuple[State, State]:
+    """Mean and deviation of the walker at a time, seconds."""
     mean, sd = model.prior()
     if height is not None:
         set_height(mean, sd, height)
@@ -78,31 +143,10 @@ def find_start(
     places = np.array([_place(camera, one, d) for (_, one), d in zip(seen, distances, strict=True)])
     path = _fit(times - times[0], places)
     _set_motion(mean, sd, path, model)
-    mean.pelvis[:2] = path.place
+    mean.pelvis[:2] = path.place + (when - times[0]) * path.velocity
     mean.pelvis[2] = model.pelvis_height(mean)
-    sd.pelvis[:] = _place_sd(camera, path.place)
-    return Start(seen[0][0].number, mean, sd)
-
-
-def _collect(
-    video: Video, camera: Camera, plate: Image, first: int, stop: int | None
-) -> list[tuple[Frame, Sighting]]:
-    """Largest sighting of each frame over the first WINDOW with enough of them."""
-    seen: list[tuple[Frame, Sighting]] = []
-    for frame in video.frames(first, stop):
-        found = sightings(frame.image, plate, camera)
-        if not found:
-            continue
-        if seen and frame.time - seen[0][0].time >= WINDOW:
-            if len(seen) >= ENOUGH:
-                return seen
-            seen = [item for item in seen if frame.time - item[0].time < WINDOW]
-        seen.append((Frame(frame.number, frame.time, plate[:0]), found[0]))
-    if len(seen) >= ENOUGH:
-        return seen
-    raise UserError(
-        f"{video.path}: --init auto found nobody in full view for {ENOUGH} frames; give --init FILE.json"
-    )
+    sd.pelvis[:] = _place_sd(camera, mean.pelvis[:2])
+    return mean, sd
 
 
 def _distances(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gait import _abi
 from gait._abi import Flag, Mode, Term, TrackStatus
 from gait._lib import aligned, check, library
+from gait.autostart import Spotter
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.initial import Start
@@ -298,7 +299,9 @@ class Tracker:
         self._check(status)
         return Estimate.from_c(out, self.model)
 
-    def follow(self, video: Video, start: Start, stop: int | None = None) -> Iterator[tuple[Frame, Estimate]]:
+    def follow(
+        self, video: Video, start: Start, stop: int | None = None, spotter: Spotter | None = None
+    ) -> Iterator[tuple[Frame, Estimate]]:
         """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
 
         Parameters
@@ -308,11 +311,21 @@ class Tracker:
         start : Start
         stop : int, optional
             First frame not to use.
+        spotter : Spotter, optional
+            Looks for the person while the tracker has lost them; where it finds one the track starts anew.
         """
         for frame in video.frames(start.frame, stop):
             if frame.number == start.frame:
                 self.start(start.mean, start.sd, frame.utime)
-            yield frame, self.step(frame.image, frame.utime)
+            estimate = self.step(frame.image, frame.utime)
+            yield frame, estimate
+            if spotter and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
+                spotter.forget()
+            elif spotter and estimate.status == TrackStatus.LOST:
+                spotter.see(frame)
+                if spotter.walks_in(frame):
+                    found = spotter.start(latest=True)
+                    self.start(found.mean, found.sd, frame.utime)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""

@@ -7,7 +7,7 @@ import pytest
 from drawn_walker import camera, clip, wall, write
 
 from gait import Model, Start, UserError, Video, blob
-from gait.autostart import find_start
+from gait.autostart import Spotter, find_start
 from gait.initial import DEFAULT_SD
 from gait.model import read_blob
 
@@ -187,3 +187,29 @@ def test_nobody_in_the_picture_is_told(tmp_path):
         find_start(Video(tmp_path / "empty.mp4"), camera(), wall(), MODEL)
     with pytest.raises(UserError, match="--init auto: needs a background"):
         find_start(Video(tmp_path / "empty.mp4"), camera(), None, MODEL)
+
+
+def test_a_spotter_starts_with_who_walks_in(tmp_path):
+    view = camera(place=(0.0, -6.0, 2.2))
+    pictures, _ = clip(MODEL, SECTIONS, 45, view=view)
+    write(tmp_path / "walk.mp4", pictures)
+    spotter = Spotter(view, wall(), MODEL)
+    for frame in Video(tmp_path / "walk.mp4").frames(0):
+        spotter.see(frame)
+        if spotter.walks_in(frame):
+            break
+    found = spotter.start(latest=True)
+    assert found.frame == frame.number and 25 <= frame.number <= 40
+    spotter.forget()
+    assert not spotter.enough() and not spotter.walks_in(frame)
+
+
+def test_a_spotter_does_not_start_with_who_stands(tmp_path):
+    view = camera(place=(0.0, -6.0, 2.2))
+    pictures, _ = clip(MODEL, SECTIONS, 1, view=view)
+    write(tmp_path / "stand.mp4", pictures * 45)
+    spotter = Spotter(view, wall(), MODEL)
+    for frame in Video(tmp_path / "stand.mp4").frames(0):
+        spotter.see(frame)
+        assert not spotter.walks_in(frame)
+    assert spotter.full_second(frame)

@@ -9,7 +9,7 @@
 #include <pthread.h>
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x235078eec45114fb)
+#define GOLDEN UINT64_C(0x40b91a3f9300e7e7)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 

@@ -3,8 +3,12 @@
 The start comes from --init: a JSON file that says where the person is and in which phase, or auto.
 auto compares a second of frames with the background, takes the person-sized blob and puts its foot
 point on the ground: this gives place, stature and heading, but not the phase, nor which leg is which.
-It needs a background and one person in full view, feet included; a strict side view may start with
-left and right exchanged, and a long shadow misplaces the start.  A JSON start is always better.
+It needs a background and one person in full view, feet included; a long shadow misplaces the start.
+Seen from the side, left and right look alike at first: the status is ambiguous until the picture tells them
+apart.  A JSON start is always better.
+
+Who is lost is looked for near the last place, then, with a background, anywhere in the picture: somebody
+who walks in full view for a second starts the track anew (not with --smooth).
 
 Writes one row per frame to OUT.csv: see interfaces.md, section 3.
 """
@@ -23,7 +27,7 @@ import numpy as np
 
 from gait import blob
 from gait._abi import Mode, TrackStatus
-from gait.autostart import find_start
+from gait.autostart import Spotter, find_start
 from gait.camera import Camera
 from gait.cli import defaults, values
 from gait.errors import UsageError, UserError
@@ -113,7 +117,8 @@ def run(args: argparse.Namespace) -> int:
     _require_frames(video, start.frame, args.stop)
     config = TrackerConfig.default(Mode[args.mode.upper()], **_given(args))
     tracker = Tracker(model, camera, config, background=plate, tasks=args.threads)
-    results = _track(args, video, tracker, start)
+    spotter = None if plate is None or args.smooth else Spotter(camera, plate, model, args.height)
+    results = _track(args, video, tracker, start, spotter)
     if args.trc:
         write_trc(args.trc, model.joint_names, np.array(results.times), np.array(results.joints), video.fps)
     summary = results.summary(args.threads)
@@ -193,7 +198,9 @@ class _Results:
         }
 
 
-def _track(args: argparse.Namespace, video: Video, tracker: Tracker, start: Start) -> _Results:
+def _track(
+    args: argparse.Namespace, video: Video, tracker: Tracker, start: Start, spotter: Spotter | None
+) -> _Results:
     """Run the tracker over the frames into all outputs, which appear together at the end."""
     model, results = tracker.model, _Results(tracker)
     stop = video.count if args.stop is None else min(args.stop, video.count)
@@ -208,7 +215,7 @@ def _track(args: argparse.Namespace, video: Video, tracker: Tracker, start: Star
                 lambda frame, estimate: film.write(overlay.draw(frame.image, estimate, frame.number))
             )
         update = stack.enter_context(progress("tracking", stop - start.frame, args.quiet))
-        for done, (frame, estimate) in enumerate(tracker.follow(video, start, stop), 1):
+        for done, (frame, estimate) in enumerate(tracker.follow(video, start, stop, spotter), 1):
             results.step(frame, estimate)
             for sink in sinks if smoother is None else [smoother.add]:
                 sink(frame, estimate)
