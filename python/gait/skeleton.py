@@ -50,7 +50,8 @@ class Proportions:
         0.0,
     )  #: foot of the spine from the pelvis joint, in the pelvis
     shoulder: tuple[float, float, float] = (0.0, 0.107, 0.283)  #: left shoulder, in the torso
-    neck: float = 0.320  #: foot of the spine to neck joint
+    neck: float = 0.320  #: neck joint over the foot of the spine
+    neck_ahead: float = 0.0  #: and before it
     head: tuple[float, float, float] = (0.0, 0.0, 0.143)  #: top of the head from the neck joint, in the head
     upper_arm: float = 0.168
     forearm: float = 0.155  #: elbow to wrist
@@ -133,7 +134,7 @@ def _frames(p: Proportions) -> tuple[list[str], npt.NDArray[np.int32], Floats]:
     rows: list[tuple[str, str, tuple[float, float, float], list[tuple[int, str]]]] = [
         ("pelvis", "", (0, 0, 0), [(3, "root_yaw"), (2, "root_pitch"), (1, "root_roll")]),
         ("torso", "pelvis", p.torso, [(3, "torso_z"), (2, "torso_y"), (1, "torso_x")]),
-        ("head", "torso", (0, 0, p.neck), [(3, "neck_z"), (2, "neck_y"), (1, "neck_x")]),
+        ("head", "torso", (p.neck_ahead, 0, p.neck), [(3, "neck_z"), (2, "neck_y"), (1, "neck_x")]),
     ]
     for s in SIDES:
         sign = 1 if s == "l" else -1
@@ -309,7 +310,7 @@ def frames(
 
 
 def length_change(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Floats:
-    """Factors (N, F + 1) of the lengths in every frame and of the pelvis's height, for scores (N, l) or (l,)."""
+    """Factors (N, F + 1) of the lengths in the frames and of the pelvis's height, for scores (N, l) or (l,)."""
     score = np.atleast_2d(np.asarray(proportion, float))
     table = np.asarray(sections.get("PROP", np.zeros((0, len(sections["FRMI"]) + 1))), float)
     return np.asarray(1 + score @ table[: score.shape[1]])

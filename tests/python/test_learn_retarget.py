@@ -55,11 +55,12 @@ def test_angles_survive_a_round_trip(seed, size):
     assert retarget.angles(walker, measures) == pytest.approx(channels[:, :24], abs=1e-6)
 
 
-def test_generic_proportions_stay_between_recordings_and_anatomy():
+def test_generic_proportions_move_the_recorded_trunk_towards_anatomy():
     channels = np.zeros((4, len(CHANNELS)))
     measures = retarget.measure(body_of(channels))
     own, generic = retarget.own_proportions(measures), retarget.generic_proportions([measures, measures])
-    assert generic.shoulder[2] == pytest.approx((own.shoulder[2] + retarget.SHOULDER_HEIGHT) / 2)
+    assert generic.shoulder == (own.shoulder[0] + retarget.AHEAD, own.shoulder[1], retarget.SHOULDER_HEIGHT)
+    assert (generic.neck, generic.neck_ahead, own.neck_ahead) == (own.neck, retarget.AHEAD, 0)
     assert min(own.upper_arm, retarget.UPPER_ARM) < generic.upper_arm < max(own.upper_arm, retarget.UPPER_ARM)
     assert np.linalg.norm(generic.head) == pytest.approx(retarget.HEAD, abs=1e-3)
     assert (generic.thigh, generic.forearm, generic.hip) == (own.thigh, own.forearm, own.hip)

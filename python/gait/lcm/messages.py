@@ -153,7 +153,7 @@ def _padded(values: Any, room: int) -> tuple[int, list[float]]:
 
 
 def state_of(message: Any) -> State:
-    """Read a ``state_t``."""
+    """Read a ``state_t``, which has no room for the limbs' proportions: they are those of the mean body."""
     state = State(pelvis=np.array(message.pelvis, float))
     for name in SCALARS:
         setattr(state, name, float(getattr(message, name)))

@@ -21,6 +21,7 @@ Floats = npt.NDArray[np.float64]
 HEAD = 0.141  # neck to head top, statures: files end the head's bone at different heights
 HEAD_TOP = (0.015, 0.0, 0.140)  # top of the head from the base of the neck, of the length HEAD
 SHOULDER_HEIGHT = 0.262  # centre of the shoulder's joint over the hips, statures
+AHEAD = 0.02  # neck and shoulders before the line from the hips to CMU's neck, statures
 UPPER_ARM = 0.156  # from there to the elbow
 BALL = 0.0235  # centre of the ball of the foot over the ground in stance, statures
 #: What the parts of a standing body that may be unknown take of its height, statures.
@@ -162,17 +163,19 @@ def _centred(table: Floats) -> Floats:
 def generic_proportions(bodies: Sequence[Measures | None]) -> Proportions:
     """Mean proportions for people who were not measured.
 
-    Recordings end the clavicle near the acromion; anatomical bodies (MakeHuman) have the joint's centre lower
-    and the elbow nearer, and the top of the head lies ahead of the base of the neck.  All three are set, by
-    hand, halfway towards the rendered bodies of the development clips of ../shared/data.  That gains 6 mm
-    there and costs 1.8 mm on CMU's walkers (tests/bench/learn_floor.py, q = 5, with the head); errors
-    measured on these clips are therefore no independent proof of it.
+    Recordings end the clavicle near the acromion and the spine near its back; anatomical bodies (MakeHuman)
+    have neck and shoulders further forward, the shoulder's centre lower, the elbow nearer, and the top of the
+    head ahead of the base of the neck.  These are set by hand towards the rendered bodies of the development
+    clips of ../shared/data: where hips and neck lie in a body is a matter of definition, and no image tells
+    which is meant.  Errors measured on these clips are therefore no independent proof of it; what it costs on
+    CMU's walkers tests/bench/learn_floor.py tells.
     """
     mean = mean_proportions(bodies)
-    x, y, z = mean.shoulder
+    x, y, _ = mean.shoulder
     return replace(
         mean,
-        shoulder=(x, y, (z + SHOULDER_HEIGHT) / 2),
+        shoulder=(x + AHEAD, y, SHOULDER_HEIGHT),
+        neck_ahead=AHEAD,
         upper_arm=(mean.upper_arm + UPPER_ARM) / 2,
         head=HEAD_TOP,
     )
