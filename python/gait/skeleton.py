@@ -310,7 +310,7 @@ def frames(
 
 
 def length_change(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Floats:
-    """Factors (N, F + 1) of the lengths in the frames and of the pelvis's height, for scores (N, l) or (l,)."""
+    """Factors (N, F + 1) of the lengths in the frames and of the pelvis's height, for scores (N, l), (l,)."""
     score = np.atleast_2d(np.asarray(proportion, float))
     table = np.asarray(sections.get("PROP", np.zeros((0, len(sections["FRMI"]) + 1))), float)
     return np.asarray(1 + score @ table[: score.shape[1]])
