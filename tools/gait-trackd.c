@@ -37,7 +37,9 @@ static const option own_options[] = {
      "        which also reads OpenCV YAML/XML and TOML",
      TEXT(camera)},
     {"background", 0, "FILE", "empty scene, PGM or PPM; without it GAIT_BACKGROUND_<i>", TEXT(background)},
-    {"init", 0, "FILE|auto", "where the walker is at one frame (JSON); auto: wait for START on GAIT_COMMAND",
+    {"init", 0, "FILE|auto",
+     "where the walker is at one frame (JSON); auto: start with whoever walks\n"
+     "        through the empty scene in full view for a second, or wait for START on GAIT_COMMAND",
      TEXT(init)},
     {"url", 0, "URL",
      "LCM to listen on, default $LCM_DEFAULT_URL or " LINK_DEFAULT_URL ";\n"

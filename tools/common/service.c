@@ -52,7 +52,11 @@ static void set_idle(service *s)
     else if (s->start.armed)
         set_state(s, GAITMSG_STATUS_T_ARMED, "waiting for the frame of the start");
     else
-        set_state(s, GAITMSG_STATUS_T_READY, "waiting for START");
+        set_state(s, GAITMSG_STATUS_T_READY,
+                  !s->seek ? "waiting for START"
+                  : s->track.background.data
+                      ? "looking for somebody who walks in, or waiting for START"
+                      : "waiting for the empty scene to look for somebody, or for START");
 }
 
 /* As after the program's start. */
@@ -63,6 +67,8 @@ static void rearm(service *s)
     s->last_frame = s->last_utime = -1;
     s->start = (arming){0};
     s->complaint.text[0] = '\0';
+    s->seek = !s->has_init;
+    spotter_forget(&s->spotter);
     if (s->has_init)
         arming_by_file(&s->start, &s->init);
     set_idle(s);
@@ -149,6 +155,8 @@ void service_background(service *s, const image_view *v)
         return; /* it is sent again every few seconds */
     if (!pixels_of(s, v, &plate, &why) || !tracking_set_background(&s->track, &plate, &why))
         reject(s, &why);
+    else if (first && s->state == GAITMSG_STATUS_T_READY)
+        set_idle(s);
     else
         s->news = s->news || first;
 }
@@ -163,6 +171,7 @@ static void command_start(service *s, const gaitmsg_command_t *msg)
         return;
     }
     arming_by_time(&s->start, &mean, &sd, msg->utime);
+    s->seek = !s->has_init;
     set_idle(s);
 }
 
@@ -176,7 +185,7 @@ void service_command(service *s, const gaitmsg_command_t *msg)
     if (msg->command == GAITMSG_COMMAND_T_START) {
         command_start(s, msg);
     } else if (msg->command == GAITMSG_COMMAND_T_STOP) {
-        s->start.armed = false;
+        s->start.armed = s->seek = false;
         set_idle(s);
     } else if (msg->command == GAITMSG_COMMAND_T_RESET) {
         rearm(s);
@@ -248,6 +257,27 @@ static bool in_time(service *s, const image_view *v)
     return true;
 }
 
+/* Look for somebody to start with; true when the tracker has begun with this frame. */
+static bool spot(service *s, const image_view *v, const gait_image *frame)
+{
+    gait_state mean = s->track.prior_mean, sd = s->track.prior_sd;
+    if (!s->seek || !s->track.background.data ||
+        !spotter_see(&s->spotter, frame, &s->track.background, &s->track.config.camera[0], s->track.model,
+                     v->utime, &mean, &sd))
+        return false;
+    spotter_forget(&s->spotter);
+    arming_by_time(&s->start, &mean, &sd, v->utime);
+    return begin(s, v);
+}
+
+/* Nobody is tracked: start with whoever walks in. */
+static bool spot_first(service *s, const image_view *v)
+{
+    gait_image frame;
+    message why;
+    return s->seek && pixels_of(s, v, &frame, &why) && spot(s, v, &frame);
+}
+
 /* Predict through a pause longer than one step may be, in equal steps without an image. */
 static gait_status bridge(service *s, int64_t utime, gait_estimate *out, gait_error *err)
 {
@@ -290,6 +320,10 @@ static bool step(service *s, const image_view *v, int64_t received)
     service_send_estimate(s, v, &estimate, received, step_us);
     s->steps++;
     histogram_add(&s->counts.latency, service_now() - v->utime);
+    if (estimate.status == GAIT_STATUS_LOST)
+        spot(s, v, &frame.image[0]);
+    else if (estimate.status != GAIT_STATUS_INIT)
+        spotter_forget(&s->spotter);
     return true;
 }
 
@@ -297,6 +331,8 @@ void service_frame(service *s, const image_view *v, bool newest, int64_t receive
 {
     count_gap(s, v);
     if (s->state == GAITMSG_STATUS_T_ARMED && !begin(s, v))
+        return;
+    if (s->state == GAITMSG_STATUS_T_READY && newest && !spot_first(s, v))
         return;
     if (s->state != GAITMSG_STATUS_T_RUNNING)
         return;

@@ -8,6 +8,7 @@
 #include "gaitmsg_status_t.h"
 #include "histogram.h"
 #include "strides.h"
+#include "spotter.h"
 #include "tracking.h"
 
 #include <lcm/lcm.h>
@@ -34,8 +35,10 @@ typedef struct service {
     bool has_init;
     init_state init; /* of --init FILE */
     arming start;
-    int8_t state; /* GAITMSG_STATUS_T_* */
-    bool news;    /* the state has changed since the last status */
+    bool seek;       /* start with whoever walks in, and again when lost */
+    spotter spotter; /* looks for them */
+    int8_t state;    /* GAITMSG_STATUS_T_* */
+    bool news;       /* the state has changed since the last status */
     int64_t command_id;
     service_counts counts;
     int64_t dropped_before;  /* value of counts.dropped at START */
