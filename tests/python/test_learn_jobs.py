@@ -49,14 +49,21 @@ def stuck(walks):
 
 
 def readers_of(path):
-    """Yield other processes that have `path` open."""
+    """Yield processes that have `path` open for reading alone, unlike the test and what it is starting."""
     for folder in Path("/proc").iterdir():
-        if folder.name.isdigit() and int(folder.name) != os.getpid():
+        if folder.name.isdigit():
             try:
-                if any(os.readlink(fd) == str(path) for fd in (folder / "fd").iterdir()):
+                if any(os.readlink(fd) == str(path) and reads(fd) for fd in (folder / "fd").iterdir()):
                     yield int(folder.name)
             except OSError:  # gone, or not ours
                 continue
+
+
+def reads(fd):
+    """Whether a descriptor, as its place in /proc, is for reading alone."""
+    info = (fd.parent.parent / "fdinfo" / fd.name).read_text()
+    flags = int(next(line.split()[1] for line in info.splitlines() if line.startswith("flags:")), 8)
+    return flags & os.O_ACCMODE == os.O_RDONLY
 
 
 def wait_for(condition, seconds=60):
