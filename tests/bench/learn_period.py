@@ -239,7 +239,7 @@ def main() -> int:
         COLUMNS,
         rows,
         "Generator G1 (tests/python/gait_generator.py). L1: 5 degrees of noise, 10 % missing in blocks; the "
-        "bound is Cramer and Rao's, and where it is above 0.125 frames the largest error may be four times it. "
+        "bound is Cramer and Rao's, and where it is above 0.125 frames the largest may be four times it. "
         "L2: random style, 3 degrees, 10 % missing. L5: eight walkers each, 3 degrees, styles of 0, 2 and 4.",
     )
     return 0 if good and all(row[5] != "NO" for row in rows) else 1
