@@ -3,28 +3,9 @@
 import gait_generator as g
 import numpy as np
 import pytest
+from learn_measures import gauge_free, walkers
 
 from gait.learn import align, periodic
-
-
-def problem(rng, style, noise=3.0, count=8):
-    """Signals, periods and true offsets of `count` walkers whose style has a standard deviation, degrees."""
-    periods = rng.uniform(90, 150, count)
-    offsets = rng.uniform(0, 1, count) * periods
-    signals = []
-    for period, offset in zip(periods, offsets, strict=True):
-        modes = g.random_modes(rng, 5)
-        scores = rng.normal(size=5) * style / np.sqrt(5)
-        frames = int(rng.integers(300, 500))
-        signals.append(g.walk(rng, period, frames, offset=offset, noise=noise, scores=scores, modes=modes))
-    return signals, periods, offsets
-
-
-def gauge_free(found, true, periods):
-    """Errors of the offsets in frames after removal of the common phase."""
-    phase = np.exp(2j * np.pi * (found - true) / periods)
-    phase /= phase.mean() / abs(phase.mean())
-    return np.angle(phase) / (2 * np.pi) * periods
 
 
 @pytest.mark.parametrize("start", ["xcorr", "zeros"])
@@ -33,7 +14,7 @@ def test_offsets_are_found_below_a_frame(start):
     for style in (0, 2, 4):
         errors[style] = []
         for seed in range(3):
-            signals, periods, true = problem(np.random.default_rng([seed, style]), float(style))
+            signals, periods, true = walkers(np.random.default_rng([seed, style]), float(style))
             found = align.align(signals, periods, start=start)
             errors[style].extend(np.abs(gauge_free(found.offsets, true, periods)))
             assert np.all(np.diff(found.objective) <= 0)
@@ -46,14 +27,14 @@ def test_offsets_are_found_below_a_frame(start):
 
 def test_missing_blocks_do_not_bias_the_offsets():
     rng = np.random.default_rng(1)
-    signals, periods, true = problem(rng, 2.0)
+    signals, periods, true = walkers(rng, 2.0)
     signals = [g.remove_blocks(rng, z, 0.3) for z in signals]
     found = align.align(signals, periods)
     assert np.max(np.abs(gauge_free(found.offsets, true, periods))) < 1.5
 
 
 def test_a_common_shift_of_the_phases_changes_nothing_else():
-    signals, periods, _ = problem(np.random.default_rng(2), 2.0)
+    signals, periods, _ = walkers(np.random.default_rng(2), 2.0)
     cut = [z[17:] for z in signals]
     first, second = align.align(signals, periods), align.align(cut, periods)
     moved = gauge_free(second.offsets, first.offsets - 17, periods)
@@ -65,7 +46,7 @@ HIPS = (7, 15)  # right and left hip flexion of the generator
 
 def test_a_constant_added_to_all_phases_gives_the_same_curves():
     """L6: the gauge takes it out, so that model files of different runs agree."""
-    signals, periods, _ = problem(np.random.default_rng(3), 2.0)
+    signals, periods, _ = walkers(np.random.default_rng(3), 2.0)
     begin = align.align(signals, periods).offsets
     curves = []
     for phase in (0.0, 0.123456, 0.5):
@@ -76,7 +57,7 @@ def test_a_constant_added_to_all_phases_gives_the_same_curves():
 
 
 def test_the_hips_gauge_is_a_cosine_of_right_minus_left():
-    signals, periods, _ = problem(np.random.default_rng(4), 0.0)
+    signals, periods, _ = walkers(np.random.default_rng(4), 0.0)
     found = align.align(signals, periods, hips=HIPS)
     curve = align.common_curve(signals, periods, found.offsets)
     first = np.fft.fft(curve[:, HIPS[0]] - curve[:, HIPS[1]])[1]
@@ -88,7 +69,7 @@ def test_the_hips_gauge_is_a_cosine_of_right_minus_left():
 
 def test_sequences_without_whole_angles_are_aligned_by_the_others():
     """One has no upper body, one no legs, one nothing but the left knee; neck_z nobody has."""
-    signals, periods, true = problem(np.random.default_rng(5), 2.0)
+    signals, periods, true = walkers(np.random.default_rng(5), 2.0)
     legs = [7, 8, 9, 10, 15, 16, 17, 18]
     signals[1][:, [k for k in range(19) if k not in legs]] = np.nan
     signals[2][:, legs] = np.nan
@@ -109,7 +90,7 @@ def test_a_first_sequence_of_trunk_alone_is_ambiguous_and_others_start_too():
     lower = 0
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        signals, periods, true = problem(rng, 0.0)
+        signals, periods, true = walkers(rng, 0.0)
         for z, p, o in zip(signals, periods, true, strict=True):
             z[:, 0] = 3 * np.cos(4 * np.pi * (np.arange(len(z)) - o) / p) + rng.normal(scale=0.5, size=len(z))
         signals[0][:, 1:] = np.nan
