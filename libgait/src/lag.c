@@ -1,5 +1,6 @@
 #include "lag.h"
 #include "estimate.h"
+#include "modes.h"
 #include <string.h>
 
 void lag_layout_state(lag *l, arena *a, int32_t frames, int32_t n, int32_t fields)
@@ -106,11 +107,11 @@ static void place_joints(gait_tracker *t)
 }
 
 /* What was lost stays lost; whether the modes are told apart is known better now. */
-static int32_t status_now(int32_t then, float mode_mass)
+static int32_t status_now(const gait_tracker *t, int32_t then, float mode_mass)
 {
     if (then == GAIT_STATUS_LOST)
         return then;
-    if (mode_mass >= 0.7f)
+    if (mode_mass >= 0.7f && !modes_open(t))
         return GAIT_STATUS_TRACKING;
     return then == GAIT_STATUS_INIT ? then : GAIT_STATUS_AMBIGUOUS;
 }
@@ -133,6 +134,6 @@ void lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
     estimate_fill(&past, pf_heaviest(&past.filter), &e);
     e.ess = (float)pf_ess(&past.filter);
     e.flags = note.flags;
-    e.status = status_now(note.status, e.mode_mass);
+    e.status = status_now(t, note.status, e.mode_mass);
     *out = e;
 }

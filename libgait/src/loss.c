@@ -44,7 +44,8 @@ void loss_search(gait_tracker *t, uint32_t frame)
 {
     gait_state mean, sd;
     dynamics d = tracker_dynamics(t);
-    if (!loss_is_lost(t))
+    if (!loss_is_lost(t) ||
+        t->core->modes.stage == MODES_FORKED) /* two sides go on as predicted for a while */
         return;
     region(t, seconds_unseen(t), &mean, &sd);
     d.seed += (uint64_t)(frame + 1) << 32; /* draws of its own in every frame */
@@ -97,11 +98,12 @@ void loss_watch(gait_tracker *t, const walker *mean)
     bool const lost = loss_is_lost(t);
     /* Terms without an opinion on whether anybody is there give exactly zero. */
     if (!(weigh_walker(t, mean) >= 0.0f)) {
-        if (lost)
+        if (lost && (t->core->modes.stage != MODES_FORKED || seconds_unseen(t) > PHASE_KEEPS))
             modes_give_up(t);
         return;
     }
-    if (lost && !(t->core->modes.known && as_predicted(t, mean)))
+    bool const keeps = t->core->modes.known || t->core->modes.stage == MODES_FORKED;
+    if (lost && !(keeps && as_predicted(t, mean)))
         modes_search(t);
     t->core->support_utime = t->core->utime;
     t->core->last = *mean;

@@ -1,0 +1,120 @@
+/* Left and right: two sides of the population that chance cannot end, and how one is given up. */
+#include "modes.h"
+
+#include "toy_film.h"
+
+#include "check.h"
+
+enum { N = 400, HALF = N / 2 };
+
+static gait_tracker *begin(float phase_sd)
+{
+    gait_tracker_config cfg = toy_config(1);
+    cfg.particles = N;
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    gait_state const mean = toy_walk(0.0f);
+    gait_state sd = toy_doubt(1.0f);
+    sd.phase = phase_sd;
+    CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
+    return t;
+}
+
+static double weight_of(const gait_tracker *t, int32_t from, int32_t to)
+{
+    double sum = 0.0;
+    for (int32_t i = from; i < to; i++)
+        sum += t->filter.weight[i];
+    return sum;
+}
+
+/* Mean phase of a side, as a vector in double precision. */
+static double phase_of(const gait_tracker *t, int32_t from)
+{
+    const float *const phase = field(&t->gen[t->core->current].people, F_PHASE);
+    double c = 0.0, s = 0.0;
+    for (int32_t i = from; i < from + HALF; i++) {
+        c += t->filter.weight[i] * cos(2 * TOY_PI * (double)phase[i]);
+        s += t->filter.weight[i] * sin(2 * TOY_PI * (double)phase[i]);
+    }
+    return atan2(s, c) / (2 * TOY_PI);
+}
+
+static void test_a_known_phase_is_never_split(void)
+{
+    gait_tracker *const t = begin(0.05f);
+    for (int n = 0; n < 40; n++) {
+        gait_estimate e;
+        film_step(t, 1, n, 0, &e);
+        CHECK(t->core->modes.stage == MODES_SINGLE && e.status == GAIT_STATUS_TRACKING);
+    }
+    toy_tracker_free(t);
+}
+
+/* Half a stride apart; nobody changes sides; a side weighs what its odds say, however its particles fare. */
+static void test_sides_live_on(void)
+{
+    gait_tracker *const t = begin(0.5f);
+    gait_estimate e;
+    for (int n = 0; n < 16; n++) {
+        CHECK(t->core->modes.stage == MODES_SEARCH);
+        film_step(t, 1, n, 0, &e);
+        CHECK(e.status == GAIT_STATUS_INIT);
+    }
+    CHECK(t->core->modes.stage == MODES_FORKED);
+    for (int n = 16; n < 40; n++) {
+        double const apart = phase_of(t, HALF) - phase_of(t, 0);
+        CHECK_NEAR(fabs(apart - floor(apart) - 0.5), 0.0, 0.1);
+        film_step(t, 1, n, 0, &e);
+        for (int32_t i = 0; i < N; i++)
+            CHECK((t->filter.parent[i] >= HALF) == (i >= HALF) && modes_side(t, i) == (i >= HALF));
+        double const share = 1.0 / (1.0 + exp(-t->core->modes.odds));
+        CHECK_NEAR(weight_of(t, HALF, N), share, 1e-9);
+        CHECK_NEAR(weight_of(t, 0, HALF), 1.0 - share, 1e-9);
+        t->core->modes.odds = n % 2 ? 3.0 : -3.5; /* far, but not decided; the weights must follow */
+    }
+    toy_tracker_free(t);
+}
+
+/* One side beyond doubt: the other's particles are replaced by its own. */
+static void test_the_loser_is_given_up(void)
+{
+    for (int32_t winner = 0; winner < 2; winner++) {
+        gait_tracker *const t = begin(0.5f);
+        gait_estimate e;
+        for (int n = 0; n < 20; n++)
+            film_step(t, 1, n, 0, &e);
+        t->core->modes.odds = winner ? 30.0 : -30.0;
+        double const phase = phase_of(t, winner * HALF);
+        film_step(t, 1, 20, 0, &e);
+        CHECK(t->core->modes.stage == MODES_SINGLE && e.flags & GAIT_EST_RESAMPLED);
+        for (int32_t i = 0; i < N; i++)
+            CHECK((t->filter.parent[i] >= HALF) == (winner == 1));
+        CHECK_NEAR(weight_of(t, 0, N), 1.0, 1e-9);
+        double const moved = (double)e.mean.phase - phase;
+        CHECK_NEAR(moved - floor(moved + 0.5), 0.0, 0.08);
+        toy_tracker_free(t);
+    }
+}
+
+/* Status: ambiguous while the odds are open, never tracking. */
+static void test_open_odds_are_ambiguous(void)
+{
+    gait_tracker *const t = begin(0.5f);
+    gait_estimate e;
+    for (int n = 0; n < 45; n++) {
+        t->core->modes.odds = 0.0;
+        film_step(t, 1, n, 0, &e);
+        CHECK(e.status != GAIT_STATUS_TRACKING && (e.status == GAIT_STATUS_INIT || n > 24));
+    }
+    toy_tracker_free(t);
+}
+
+int main(void)
+{
+    film_make(1, 46);
+    test_a_known_phase_is_never_split();
+    test_sides_live_on();
+    test_the_loser_is_given_up();
+    test_open_odds_are_ambiguous();
+    return CHECK_DONE();
+}
