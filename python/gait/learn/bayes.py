@@ -1,10 +1,10 @@
 """Missing entries by variational Bayesian principal components in the Fourier domain.
 
-Model: row r is B' (mean + W' c_r) + noise, with c_r ~ N(0, I) and the coefficients of component k drawn from
-N(0, 1 / precision_k).  Scores and missing entries of a row are treated jointly and exactly given the
-components (Bishop 1999; Ilin and Raiko 2010, "Practical approaches to principal component analysis in the
-presence of missing values").  The precisions let components that the data do not support shrink to nothing,
-so too many components hurt little.
+Model: row r is B' (mean + W' c_r) + noise, with c_r ~ N(0, I) and the coefficients of component k at harmonic
+h drawn from N(0, 1 / (precision_k roughness_h)).  Scores and missing entries of a row are treated jointly and
+exactly given the components (Bishop 1999; Ilin and Raiko 2010, "Practical approaches to principal component
+analysis in the presence of missing values").  The precisions let components and harmonics that the data do
+not support shrink to nothing, so too many of them hurt little.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ Mask = npt.NDArray[np.bool_]
 
 ITERATIONS = 500
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
+QUENCHED = 1e9  # roughness at which components have no part in a harmonic
 LEAST_NOISE = 1e-10  # variance relative to the data's
 
 
@@ -34,10 +35,12 @@ class Belief:
     ----------
     loadings : (1 + q, P)
         Fourier coefficients of the mean and of the components.
-    spread : (q, q)
-        Posterior covariance of the components' values at one coefficient, the same for all P.
+    spread : (B, q, q)
+        Posterior covariance of the components' coefficients of a basis function, the same for all channels.
     precision : (q,)
         Of the components' prior.
+    roughness : (B,)
+        Factor of the prior's precision for each basis function.
     noise : float
         Variance of an entry about the model.
     """
@@ -45,6 +48,7 @@ class Belief:
     loadings: Floats
     spread: Floats
     precision: Floats
+    roughness: Floats
     noise: float
 
 
@@ -102,18 +106,19 @@ class Problem:
         _, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
         loadings = right[:components] * (singular[:components] / np.sqrt(max(self.rows - 1, 1)))[:, None]
         rest = np.sum((filled - self.decode(mean[None])) ** 2) - np.sum(singular[:components] ** 2)
-        self.least = LEAST_NOISE * float(np.mean(filled**2)) + 1e-300
+        self.least = LEAST_NOISE * float(np.mean(filled**2)) + 1e-30
         noise = max(float(rest) / filled.size, self.least)
-        spread = noise / self.rows * np.eye(components)
-        return Belief(np.vstack([mean, loadings]), spread, _precision(loadings, spread), noise)
+        spread = np.tile(noise / self.rows * np.eye(components), (len(self.basis), 1, 1))
+        ones = np.ones(len(self.basis))
+        return _with_prior(Belief(np.vstack([mean, loadings]), spread, ones[:components], ones, noise))
 
     def expect(self, belief: Belief) -> Rows:
         """Scores of the rows from their observed entries, and the bound."""
-        q, size = len(belief.precision), belief.loadings.shape[1]
+        q = len(belief.precision)
         curves = self.decode(belief.loadings)
         mean, parts = curves[0], curves[1:]
         gram = (self.seen @ _products(parts).T).reshape(self.rows, q, q)
-        system = gram + size * belief.spread + belief.noise * np.eye(q)
+        system = gram + self.shape[1] * belief.spread.sum(axis=0) + belief.noise * np.eye(q)
         inverse = np.linalg.inv(system)
         off = self.values - self.seen * mean
         pull = off @ parts.T
@@ -121,9 +126,8 @@ class Problem:
         fit = float(np.sum(off**2) - np.sum(pull * scores)) / belief.noise
         volume = float(np.sum(np.linalg.slogdet(system)[1])) - self.rows * q * np.log(belief.noise)
         bound = -0.5 * (self.observed * np.log(2 * np.pi * belief.noise) + volume + fit)
-        return Rows(
-            scores, belief.noise * inverse, curves, mean + scores @ parts, bound - _divergence(belief)
-        )
+        bound -= _divergence(belief, self.shape[1])
+        return Rows(scores, belief.noise * inverse, curves, mean + scores @ parts, bound)
 
     def maximise(self, belief: Belief, rows: Rows) -> Belief:
         """Components, their precision and the noise from the rows' scores."""
@@ -138,39 +142,43 @@ class Problem:
         )
         varying = np.einsum("klp,lp->kp", missing, rows.curves[1:])
         cross[1:] += self.encode(varying)
-        ridge = np.diag(np.concatenate([[0.0], belief.noise * belief.precision]))
-        loadings = np.linalg.solve(moment + ridge, cross)
-        spread = belief.noise * np.linalg.inv((moment + ridge)[1:, 1:])
-        size = loadings.shape[1]
+        ridge = np.zeros((len(self.basis), 1 + q, 1 + q))
+        ridge[:, range(1, 1 + q), range(1, 1 + q)] = belief.noise * np.outer(
+            belief.roughness, belief.precision
+        )
+        by_function = cross.reshape(1 + q, *ridge.shape[:1], -1).swapaxes(0, 1)
+        loadings = np.linalg.solve(moment + ridge, by_function).swapaxes(0, 1).reshape(cross.shape)
+        spread = belief.noise * np.linalg.inv((moment + ridge)[:, 1:, 1:])
         # Expected sum of squares of data minus model, missing entries included.
         total = float(np.sum(filled**2) + np.sum(varying * rows.curves[1:]))
         total += (filled.size - self.observed) * belief.noise
-        total += float(
-            np.sum(loadings * (moment @ loadings - 2 * cross)) + size * np.sum(spread * moment[1:, 1:])
-        )
+        total += float(np.sum(loadings * (moment @ loadings - 2 * cross)))
+        total += self.shape[1] * float(np.sum(spread.sum(axis=0) * moment[1:, 1:]))
         noise = max(total / filled.size, self.least)
-        loadings, spread = _standard(loadings, spread, moment / self.rows)
-        return Belief(loadings, spread, _precision(loadings[1:], spread), noise)
+        loadings, spread = self._standard(loadings, spread, moment / self.rows, belief.roughness)
+        return _with_prior(Belief(loadings, spread, belief.precision, belief.roughness, noise))
 
+    def _standard(
+        self, loadings: Floats, spread: Floats, moment: Floats, roughness: Floats
+    ) -> tuple[Floats, Floats]:
+        """Change units so that the scores have mean 0 and covariance 1 and the components are orthogonal.
 
-def _standard(loadings: Floats, spread: Floats, moment: Floats) -> tuple[Floats, Floats]:
-    """Change units so that the scores have mean 0 and covariance 1 and the components are orthogonal.
+        The model stays the same, and the bound is the best of all such changes (Luttinen and Ilin 2010).
 
-    The model stays the same, and the bound is the best of all such changes (Luttinen and Ilin 2010).
-
-    Parameters
-    ----------
-    moment : (1 + q, 1 + q)
-        Mean of (1, scores) (1, scores)' over the rows.
-    """
-    middle = moment[0, 1:]
-    root = np.linalg.cholesky(moment[1:, 1:] - np.outer(middle, middle))
-    mean, parts = loadings[0] + middle @ loadings[1:], loadings[1:]
-    inner = parts @ parts.T + loadings.shape[1] * spread
-    _, axes = np.linalg.eigh(root.T @ inner @ root)
-    turn = root @ axes[:, ::-1]
-    turn *= np.where(np.diag(turn) < 0, -1.0, 1.0)
-    return np.vstack([mean, turn.T @ parts]), turn.T @ spread @ turn
+        Parameters
+        ----------
+        moment : (1 + q, 1 + q)
+            Mean of (1, scores) (1, scores)' over the rows.
+        """
+        middle = moment[0, 1:]
+        root = np.linalg.cholesky(moment[1:, 1:] - np.outer(middle, middle))
+        mean, parts = loadings[0] + middle @ loadings[1:], loadings[1:]
+        inner = (parts * np.repeat(roughness, self.shape[1])) @ parts.T
+        inner += self.shape[1] * np.tensordot(roughness, spread, 1)
+        _, axes = np.linalg.eigh(root.T @ inner @ root)
+        turn = root @ axes[:, ::-1]
+        turn *= np.where(np.diag(turn) < 0, -1.0, 1.0)
+        return np.vstack([mean, turn.T @ parts]), turn.T @ spread @ turn
 
 
 def _products(parts: Floats) -> Floats:
@@ -178,17 +186,40 @@ def _products(parts: Floats) -> Floats:
     return (parts[:, None] * parts[None]).reshape(-1, parts.shape[1])
 
 
-def _precision(components: Floats, spread: Floats) -> Floats:
-    size = components.shape[1]
-    return size / (np.sum(components**2, axis=1) + size * np.diag(spread) + 1e-300)
+def _strength(belief: Belief) -> Floats:
+    """Give the squares (q, B) of the components' coefficients, summed over channels."""
+    q, functions = len(belief.precision), len(belief.roughness)
+    channels = belief.loadings.shape[1] // functions
+    return np.sum(belief.loadings[1:].reshape(q, functions, channels) ** 2, axis=2)
 
 
-def _divergence(belief: Belief) -> float:
+def _doubt(belief: Belief) -> Floats:
+    """Give the posterior variances (q, B) of the components' coefficients, summed over channels."""
+    channels = belief.loadings.shape[1] // len(belief.roughness)
+    return channels * np.diagonal(belief.spread, axis1=1, axis2=2).T
+
+
+def _with_prior(belief: Belief) -> Belief:
+    """Replace the precisions by the best for these components, then the roughness."""
+    q, size = len(belief.precision), belief.loadings.shape[1]
+    if not q:
+        return belief
+    second, functions = _strength(belief) + _doubt(belief), len(belief.roughness)
+    precision = size / (second @ belief.roughness + 1e-300)
+    harmonic = (np.arange(functions) + 1) // 2
+    mean = np.bincount(harmonic, precision @ second) / np.bincount(harmonic)
+    roughness = q * (size // functions) / (mean[harmonic] + 1e-300)
+    return Belief(belief.loadings, belief.spread, precision, roughness, belief.noise)
+
+
+def _divergence(belief: Belief, channels: int) -> float:
     """Kullback-Leibler divergence of the components' posterior from their prior."""
-    size = belief.loadings.shape[1]
-    second = np.sum(belief.loadings[1:] ** 2, axis=1) + size * np.diag(belief.spread)
-    volume = np.linalg.slogdet(belief.spread)[1] + np.sum(np.log(belief.precision)) + len(second)
-    return 0.5 * float(np.sum(belief.precision * second) - size * volume)
+    q, size = len(belief.precision), belief.loadings.shape[1]
+    second = _strength(belief) + _doubt(belief)
+    volume = channels * np.sum(np.linalg.slogdet(belief.spread)[1])
+    volume += size * (np.sum(np.log(belief.precision)) + q)
+    volume += q * channels * np.sum(np.log(belief.roughness))
+    return 0.5 * float(belief.precision @ second @ belief.roughness - volume)
 
 
 @dataclass
@@ -257,37 +288,57 @@ def _pass(problem: Problem, mixer: Mixer, belief: Belief, rows: Rows) -> tuple[B
     if not found.bound >= rows.bound:
         mixer.forget()
         after, found = plain, problem.expect(plain)
-    lesser = _without_weakest(after)
-    if lesser is not None and (fewer := problem.expect(lesser)).bound > found.bound:
-        mixer.forget()
-        after, found = lesser, fewer
+    for lesser in (_without_weakest(after), _smoother(after)):
+        if lesser is not None and (fewer := problem.expect(lesser)).bound > found.bound:
+            mixer.forget()
+            after, found = lesser, fewer
     return after, found
 
 
 def _without_weakest(belief: Belief) -> Belief | None:
     """Drop the weakest component if it is weaker than the doubt about it, else None."""
-    energy = np.sum(belief.loadings[1:] ** 2, axis=1)
-    doubt = belief.loadings.shape[1] * np.diag(belief.spread)
-    if not len(energy) or np.min(energy / doubt) > 1:
+    ratio = _strength(belief).sum(axis=1) / _doubt(belief).sum(axis=1)
+    return without(belief, int(np.argmin(ratio))) if len(ratio) and ratio.min() < 1 else None
+
+
+def _smoother(belief: Belief) -> Belief | None:
+    """Quench the harmonics of the components that are weaker than the doubt about them; None if none are."""
+    harmonic = (np.arange(len(belief.roughness)) + 1) // 2
+    strength, doubt = (
+        np.bincount(harmonic, part.sum(axis=0)) for part in (_strength(belief), _doubt(belief))
+    )
+    weak = (strength < doubt)[harmonic] & (belief.roughness < QUENCHED)
+    if not weak.any() or not len(belief.precision):
         return None
-    return without(belief, int(np.argmin(energy / doubt)))
+    loadings, spread, roughness = belief.loadings.copy(), belief.spread.copy(), belief.roughness.copy()
+    roughness[weak] = 1e3 * QUENCHED
+    loadings[1:].reshape(len(belief.precision), len(weak), -1)[:, weak] = 0
+    spread[weak] = np.diag(1 / (belief.precision * 1e3 * QUENCHED))
+    return Belief(loadings, spread, belief.precision, roughness, belief.noise)
 
 
 def without(belief: Belief, k: int) -> Belief:
     """Drop component k."""
-    spread = np.delete(np.delete(belief.spread, k, axis=0), k, axis=1)
-    return Belief(
-        np.delete(belief.loadings, 1 + k, axis=0), spread, np.delete(belief.precision, k), belief.noise
-    )
+    spread = np.delete(np.delete(belief.spread, k, axis=1), k, axis=2)
+    loadings, precision = np.delete(belief.loadings, 1 + k, axis=0), np.delete(belief.precision, k)
+    return Belief(loadings, spread, precision, belief.roughness, belief.noise)
 
 
 def _mixed(mixer: Mixer, before: Belief, after: Belief) -> Belief:
     """Belief extrapolated from this step and those before it."""
     vector = mixer.step(_vector(before), _vector(after), before.loadings.size)
-    loadings, logs = np.split(vector, [before.loadings.size])
-    precision, noise = np.exp(logs[:-1]), float(np.exp(logs[-1]))
-    return Belief(loadings.reshape(before.loadings.shape), after.spread, precision, noise)
+    loadings, precision, roughness, noise = np.split(
+        vector, np.cumsum([before.loadings.size, len(before.precision), len(before.roughness)])
+    )
+    return Belief(
+        loadings.reshape(before.loadings.shape),
+        after.spread,
+        np.exp(precision),
+        np.exp(roughness),
+        float(np.exp(noise[0])),
+    )
 
 
 def _vector(belief: Belief) -> Floats:
-    return np.concatenate([belief.loadings.ravel(), np.log(belief.precision), [np.log(belief.noise)]])
+    logs = np.log([*belief.precision, *belief.roughness, belief.noise])
+    return np.concatenate([belief.loadings.ravel(), logs])

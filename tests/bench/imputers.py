@@ -1,0 +1,107 @@
+"""Ways to fill missing entries of cycles (R, T, M), functions of values, mask and number of components."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from gait.learn import fpca
+from gait.learn.impute import by_svd, column_mean
+
+Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Imputer = Callable[[Floats, Mask, int], Floats]
+
+PPCA_PASSES, PPCA_TOLERANCE = 200, 1e-5
+
+
+def mean(values: Floats, mask: Mask, components: int) -> Floats:
+    """Mean of the other rows at the same phase."""
+    del components
+    return np.where(mask, values, column_mean(values, mask))
+
+
+def line(values: Floats, mask: Mask, components: int) -> Floats:
+    """Straight lines across the gaps of each curve, round the cycle."""
+    del components
+    return _interpolated(values, mask, lambda at, known, y, n: np.interp(at, known, y, period=n))
+
+
+def cubic(values: Floats, mask: Mask, components: int) -> Floats:
+    """Periodic cubic splines across the gaps of each curve."""
+    del components
+
+    def spline(at: Floats, known: Floats, y: Floats, n: int) -> Floats:
+        if len(known) < 3:
+            return np.full(len(at), y.mean())
+        curve = CubicSpline([*known, known[0] + n], [*y, y[0]], bc_type="periodic")
+        return np.asarray(curve(known[0] + (at - known[0]) % n))
+
+    return _interpolated(values, mask, spline)
+
+
+def _interpolated(values: Floats, mask: Mask, between: Callable[..., Floats]) -> Floats:
+    result, samples = mean(values, mask, 0), values.shape[1]
+    for r, m in np.ndindex(values.shape[0], values.shape[2]):
+        known, gaps = np.flatnonzero(mask[r, :, m]), np.flatnonzero(~mask[r, :, m])
+        if len(known) and len(gaps):
+            result[r, gaps, m] = between(gaps, known, values[r, known, m], samples)
+    return result
+
+
+def svd(values: Floats, mask: Mask, components: int) -> Floats:
+    """Singular value decomposition and filling by turns, without Fourier basis (SVDimpute)."""
+    start = column_mean(values, mask)
+    return by_svd(values, mask, components, np.eye(values.shape[1]), start).filled
+
+
+def ppca(values: Floats, mask: Mask, components: int) -> Floats:
+    """Probabilistic principal components by maximum likelihood (EM), without Fourier basis (Roweis 1998)."""
+    x, seen = values.reshape(len(values), -1), mask.reshape(len(values), -1)
+    filled = mean(values, mask, 0).reshape(x.shape)
+    center = filled.mean(axis=0)
+    _, s, v = np.linalg.svd(filled - center, full_matrices=False)
+    load, noise = v[:components].T * s[:components] / np.sqrt(len(x)), 1.0
+    for _ in range(PPCA_PASSES):
+        scores, spread = np.zeros((len(x), components)), np.zeros((len(x), components, components))
+        for r, known in enumerate(seen):
+            part = load[known]
+            spread[r] = noise * np.linalg.inv(part.T @ part + noise * np.eye(components))
+            scores[r] = spread[r] @ part.T @ (x[r] - center)[known] / noise
+        before, model = filled, center + scores @ load.T
+        # Each entry's row of loadings from the rows that have it.
+        second = (spread + scores[:, :, None] * scores[:, None]).reshape(len(x), -1)
+        gram = (seen.T @ second).reshape(-1, components, components) + 1e-9 * np.eye(components)
+        cross = (seen * (x - center)).T @ scores
+        load = np.linalg.solve(gram, cross[..., None])[..., 0]
+        center = (seen * (x - scores @ load.T)).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+        doubt = np.einsum("rkl,rp,pk,pl->", spread, seen, load, load, optimize=True)
+        noise = float(np.sum((seen * (x - center - scores @ load.T)) ** 2) + doubt) / seen.sum()
+        filled = np.where(seen, x, model)
+        if np.sqrt(np.mean((filled - before) ** 2)) <= PPCA_TOLERANCE * np.sqrt(noise):
+            break
+    return filled.reshape(values.shape)
+
+
+def paper(values: Floats, mask: Mask, components: int) -> Floats:
+    """Functional components as in the paper."""
+    return fpca.fit(values, mask, components, method="paper").filled
+
+
+def ours(values: Floats, mask: Mask, components: int) -> Floats:
+    """Functional components as `gait learn` finds them."""
+    return fpca.fit(values, mask, components).filled
+
+
+IMPUTERS: dict[str, Imputer] = {
+    "column mean": mean,
+    "linear": line,
+    "cubic spline": cubic,
+    "PPCA, EM": ppca,
+    "iterative SVD": svd,
+    "functional PCA as in the paper": paper,
+    "gait (functional PCA, Bayesian)": ours,
+}
