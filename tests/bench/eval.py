@@ -70,6 +70,8 @@ def arguments() -> argparse.Namespace:
     add("--no-pictures", action="store_true", help="neither overlays nor a page")
     add("--record", metavar="NAME", help="also write tests/bench/results/NAME.md and NAME.csv")
     args = parser.parse_args()
+    if args.record and args.against:
+        parser.error("--record: leave --against out, kept figures stand for themselves")
     if args.all:
         args.stature_error = args.stature_error or 0.05
         args.background, args.every = args.background or ["none"], args.every or [2, 3]
@@ -237,7 +239,7 @@ def main() -> int:
         for words in eval_table.failures(rows):
             print(f"gave up: {words}")
     if args.record:
-        parts = tables(rows, eval_table.markdown, before, not args.simulated)
+        parts = tables(rows, eval_table.markdown, [], not args.simulated)
         record(args.record, rows, parts, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")
     if not args.no_pictures:
         print(f"pictures and plots: {args.html / 'index.html'}", file=sys.stderr)

@@ -116,7 +116,8 @@ def figures(result: Result) -> dict[str, Any]:
     row["locked"], row["side"] = start.get("locked"), start.get("side")
     row["lost_run"] = True if result.failure else lost_at_end(result.series)
     row["mediapipe_mm"] = MEDIAPIPE.get(job.clip.name)
-    row["failure"], row["empty"] = result.failure, job.clip.empty
+    row["failure"] = result.failure.replace(f"{job.clip.folder}/", "")
+    row["empty"] = job.clip.empty
     if job.clip.empty:  # nobody is there: to give up is right
         row["lost_run"] = False
     elif result.failure:  # who gives up has lost every frame
