@@ -146,6 +146,7 @@ GAIT_API gait_status gait_render(const gait_model *m, const gait_camera *cam, co
 typedef struct gait_tracker gait_tracker;
 enum { GAIT_MODE_DEFAULT = 0, GAIT_MODE_PAPER = 1 };
 #define GAIT_OFFSETS_TRUNK ((1u << 19) | (1u << 20)) /* torso_x, torso_y of the contract's order of angles */
+#define GAIT_OFFSETS_ARMS  ((1u << 3) | (1u << 6) | (1u << 9) | (1u << 10)) /* flexion of shoulders and elbows */
 #define GAIT_TERM_TEXTURE    0x1u /* previous frame's texture moved by each particle, eqs. 10-13 */
 #define GAIT_TERM_SILHOUETTE 0x2u /* foreground both ways; needs a background plate */
 #define GAIT_TERM_EDGES      0x4u /* image gradient along the limbs' outlines */
@@ -160,7 +161,7 @@ typedef struct gait_tracker_config {
     int32_t  tasks;            /* pieces per step [1, 256], sizes the scratch; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
-    int32_t  proportions;      /* [0, the model's]; default -1: all (paper mode 0) */
+    int32_t  proportions;      /* [0, the model's]; -1: all; default 0 (doc/design.md says why) */
     uint32_t terms;            /* GAIT_TERM_* in use */
     float    term_weight[4];   /* nats per unit cost of texture, silhouette, edges, template */
     float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
@@ -182,7 +183,7 @@ typedef struct gait_tracker_config {
     float    offset_noise;     /* posture of the angles in offset_angles, radians */
     float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
     float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
-    uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk */
+    uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
     uint32_t reserved;
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */

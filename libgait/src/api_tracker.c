@@ -17,7 +17,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .seed = 1,
         .particles = paper ? 10000 : 1500,
         .components = -1,
-        .proportions = paper ? 0 : -1,
+        .proportions = 0,
         .tasks = 8,
         .cameras = 1,
         .lag = 5,
@@ -45,7 +45,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .proportion_noise = 0.15f,
         .offset_noise = 0.02f,
         .offset_sd = 0.07f,
-        .offset_angles = GAIT_OFFSETS_TRUNK,
+        .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
     };
     if (paper) { /* random walks of eqs. 5-9 (spec 1.4), rates that the papers left open */
         cfg->phase_noise = 0.022f;

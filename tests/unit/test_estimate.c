@@ -286,6 +286,7 @@ int main(void)
     gait_tracker_config cfg = toy_config(1);
     cfg.particles = N;
     cfg.offset_angles = 1u << TOY_TORSO;
+    cfg.proportions = -1;
     t = toy_tracker_new(&cfg);
     test_phase();
     test_heading();

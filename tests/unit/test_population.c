@@ -12,6 +12,7 @@ static body_rule make_rule(int32_t mode, int32_t components, uint32_t offsets)
     gait_tracker_default(&cfg, mode);
     cfg.components = components;
     cfg.offset_angles = offsets;
+    cfg.proportions = mode == GAIT_MODE_PAPER ? 0 : -1;
     return body_rule_init(toy_model(), &cfg);
 }
 

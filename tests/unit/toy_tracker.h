@@ -45,6 +45,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.offset_noise = 0.02f;
     c.offset_sd = 0.07f;
     c.offset_angles = 0;
+    c.proportions = -1; /* so that they are tested */
     for (int k = 0; k < GAIT_MAX_CAMERAS; k++)
         c.camera[k] = toy_camera(k);
     return c;
