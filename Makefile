@@ -189,7 +189,14 @@ bench: $(B)/bench/step ## time a step by particles and threads (ARGS='-n 1000 -t
 eval: setup lib ## errors on the clips of ../shared/data
 	@$(PY) tests/bench/eval.py $(ARGS)
 
-eval-learn: setup ## learning beside other packages: tests/bench/results/learn.md
+# Other packages to compare with, in an environment of their own; without a network they are left out.
+PEERS := build/peers/.ready
+$(PEERS): tests/bench/requirements-peers.txt | $(READY)
+	@$(PY) -m venv --clear $(@D) && \
+	    $(@D)/bin/pip install --quiet --disable-pip-version-check -r $< && touch $@ || \
+	    { rm -rf $(@D); echo 'eval-learn: other packages cannot be installed and are left out' >&2; }
+
+eval-learn: setup $(PEERS) ## learning beside other packages: tests/bench/results/learn.md
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from gait.files import replacing
 
 HERE = Path(__file__).resolve().parent
 PARTS = ("learn_period.py", "learn_impute.py", "learn_floor.py")
-WITH_MOCAP = ("learn_floor.py",)  # parts that want the folder of walks as argument
+WITH_MOCAP = ("learn_impute.py", "learn_floor.py")  # parts that want the folder of walks as argument
 JOINED = "learn.md"
 
 
