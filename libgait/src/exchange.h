@@ -1,9 +1,9 @@
 /* exchange.h - left for right: the body that shows the same outline half a stride later, mirrored.
  *
- * Seen from the side a walker and its mirror image half a cycle on look alike but for what hides what.  With
- * M the mirror at the body's plane of symmetry, the image of (phase, c) is (phase + 1/2, c') with the scores
- * c' whose curves come nearest to M of the curves, in the model's own inner product.  Place, heading, rate and
- * stature stay. */
+ * Seen from the side a walker and its mirror image half a cycle on look alike but for what hides what.
+ * With M the mirror at the body's plane of symmetry, the image of (phase, c) is (phase + 1/2, c') with
+ * the scores c' whose curves come nearest to M of the curves, in the model's own inner product.  Place,
+ * heading, rate and stature stay. */
 #ifndef GAIT_EXCHANGE_H
 #define GAIT_EXCHANGE_H
 #include "population.h"

@@ -1,11 +1,12 @@
 /* loss.h - notice from the images that nobody is where the track is, and find the walker again.
  *
- * Nobody: the frame is explained better without the estimated body than with it.  Until that has lasted for a
- * while nothing changes: whoever is hidden for a moment goes on as predicted, because the likelihood of being
- * hidden bounds that of every particle from below.  After that some of the particles are drawn anew in every
- * frame from a region round the last place that grows with time (after augmented Monte-Carlo localisation; Thrun,
- * Burgard and Fox 2005, 8.3.3).  The transition is then a mixture of following and being elsewhere; more particles
- * are drawn from its second part than its probability, and weigh that much less. */
+ * Nobody: the frame is explained better without the estimated body than with it.  Until that has lasted
+ * for a while nothing changes: whoever is hidden for a moment goes on as predicted, because the
+ * likelihood of being hidden bounds that of every particle from below.  After that some of the particles
+ * are drawn anew in every frame from a region round the last place that grows with time (after augmented
+ * Monte-Carlo localisation; Thrun, Burgard and Fox 2005, 8.3.3).  The transition is then a mixture of
+ * following and being elsewhere; more particles are drawn from its second part than its probability, and
+ * weigh that much less. */
 #ifndef GAIT_LOSS_H
 #define GAIT_LOSS_H
 #include "tracker.h"

@@ -161,8 +161,8 @@ static float half_phase(const population *p)
     return 0.5f * m_atan2((float)s, (float)c) / TWO_PI_F;
 }
 
-/* Heading seen in a mirror that is square to the first camera's line of sight: far for near.  Without perspective
- * the picture of a body and that of its reflection are the same. */
+/* Heading seen in a mirror that is square to the first camera's line of sight: far for near.  Without
+ * perspective the picture of a body and that of its reflection are the same. */
 static float reflected(const gait_tracker *t, const walker *w)
 {
     const gait_camera *const cam = &t->cfg.camera[0];
@@ -172,8 +172,8 @@ static float reflected(const gait_tracker *t, const walker *w)
     return m_wrap_pi(2.0f * m_atan2(at[1], at[0]) + PI_F - w->f[F_HEADING]);
 }
 
-/* The other reading of the same picture.  Every second one also swaps near and far, where that turns the walker
- * by less than a quarter: seen from in front the legs change places without it. */
+/* The other reading of the same picture.  Every second one also swaps near and far, where that turns the
+ * walker by less than a quarter: seen from in front the legs change places without it. */
 static walker other_side(const gait_tracker *t, const walker *w, int32_t i)
 {
     walker to = exchange_apply(t->exchange, &t->rule, w);
@@ -197,8 +197,8 @@ static void spread(const gait_tracker *t, int32_t i, walker *w)
     w->f[F_RATE] *= 1.0f + SPREAD_RATE * n[1];
 }
 
-/* The particles are even, as resampled.  All are first brought to one side, those of the other by the exchange,
- * then dealt in turn to both: the odds begin even whatever the search made of left and right. */
+/* The particles are even, as resampled.  All are first brought to one side, those of the other by the
+ * exchange, then dealt in turn to both: the odds begin even whatever the search made of left and right. */
 void modes_fork(gait_tracker *t)
 {
     pf *const f = &t->filter;
@@ -259,8 +259,8 @@ static double ess_after(const pf *f, const float *ll, float power)
     return square > 0.0 ? sum * sum / square : 0.0;
 }
 
-/* Raise the likelihood to the largest power 1, 1/2, 1/4 ... that leaves enough particles: a start from a broad
- * prior must not follow the first frame's luckiest few (annealing; Deutscher and Reid 2005). */
+/* Raise the likelihood to the largest power 1, 1/2, 1/4 ... that leaves enough particles: a start from a
+ * broad prior must not follow the first frame's luckiest few (annealing; Deutscher and Reid 2005). */
 static void soften(const pf *f, float *ll)
 {
     float power = 1.0f;
@@ -286,8 +286,8 @@ static double joined(double a, double b)
     return top + m_log64(m_exp64(a - top) + m_exp64(b - top));
 }
 
-/* Move the sides' weights by what this frame says for the second over the first: of the terms that decide, and
- * of all. */
+/* Move the sides' weights by what this frame says for the second over the first: of the terms that decide,
+ * and of all. */
 static void decide(gait_tracker *t, float dt, double inner, double all)
 {
     modes_state *const m = &t->core->modes;

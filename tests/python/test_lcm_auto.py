@@ -1,4 +1,4 @@
-"""gait-trackd --init auto: it starts with whoever walks through the empty scene, and again after losing them."""
+"""gait-trackd --init auto: starts with whoever walks through the empty scene, and again after losing them."""
 
 import lcm_rig as rig
 import numpy as np

@@ -76,7 +76,7 @@ typedef struct patch {
     int32_t x0, x1, y0, y1, area; /* the last ones belong to it */
 } patch;
 
-/* All cells that hang together with `from`, over gaps of up to GAP cells up and down; they are in f->queue. */
+/* All cells that hang together with `from`, over gaps of up to GAP cells up and down, into f->queue. */
 static patch flood(blob_finder *f, int32_t from)
 {
     patch p = {f->width, 0, f->height, 0, 0};

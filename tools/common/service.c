@@ -238,7 +238,8 @@ static void stop(service *s, const message *why)
     service_complain(s, why);
 }
 
-/* Can this frame follow the last one?  A pause that is too long stops the tracker, or it would wait for ever. */
+/* Can this frame follow the last one?  A pause that is too long stops the tracker, or it would wait for
+ * ever. */
 static bool in_time(service *s, const image_view *v)
 {
     message why;

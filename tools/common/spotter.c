@@ -123,7 +123,8 @@ typedef struct path { /* straight, over the ground */
     double end[2], velocity[2], velocity_sd;
 } path;
 
-/* One coordinate of the line through the places: the median of the slopes of all pairs well apart (Theil 1950). */
+/* One coordinate of the line through the places: the median of the slopes of all pairs well apart (Theil
+ * 1950). */
 static void fit(const double *time, const double *place, int32_t n, double *end, double *velocity)
 {
     static double slope[SPOTTER_SIGHTINGS * SPOTTER_SIGHTINGS / 2];
