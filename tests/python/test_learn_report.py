@@ -168,9 +168,7 @@ def many_subjects(sequences):
     return fit.fit(many, 4)
 
 
-@pytest.mark.filterwarnings(
-    "ignore:(Mean of empty|All-NaN|Degrees of freedom):RuntimeWarning:gait.learn.model"
-)
+@pytest.mark.filterwarnings("error::RuntimeWarning:gait.learn.model")
 @pytest.mark.parametrize("make", [one_file, lower_body, many_subjects])
 def test_odd_input_gives_a_report_too(sequences, tmp_path, make):
     odd = make(sequences)

@@ -53,15 +53,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--components",
         type=_components,
-        default=fit.DEFAULT_COMPONENTS,
         metavar="auto|N",
-        help=f"how many, 1 to {fit.MOST_COMPONENTS}; auto: by held-out data ({fit.DEFAULT_COMPONENTS})",
+        help=f"how many, 1 to {fit.MOST_COMPONENTS}; auto: by held-out data "
+        f"({fit.DEFAULT_COMPONENTS}, fewer with fewer than {fit.DEFAULT_COMPONENTS + 2} cycles)",
     )
     parser.add_argument(
         "--prior",
         choices=fit.KINDS,
         default=fit.KINDS[0],
-        help="paper: components of the recorded cycles as they are, one body for all (people: reaches others)",
+        help="paper: components of the recorded cycles alone, one body for all (people: reaches others)",
     )
     parser.add_argument(
         "--exclude",
@@ -124,6 +124,8 @@ def run(args: argparse.Namespace) -> int:
     with one_thread():
         sequences, refused = _read(args)
         learned = fit.fit(sequences, args.components, args.seed, args.prior)
+        if args.components is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS and not args.quiet:
+            print(_few(learned), file=sys.stderr)
         data = blob.write(args.output, model.sections(learned, args.activity, args.seed))
         if args.report:
             from gait.learn import report  # matplotlib is slow to import
@@ -194,6 +196,12 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
         "imputation": learned.components.rmse,
         "imputation_objective": learned.components.objective,
     }
+
+
+def _few(learned: fit.Learned) -> str:
+    """Say why there are fewer components than usual."""
+    cycles, kept = len(learned.components.scores), len(learned.components.sd)
+    return f"{cycles} cycles allow {_count(kept, 'component')} instead of {fit.DEFAULT_COMPONENTS}"
 
 
 def _found(s: Sequence) -> dict[str, Any]:

@@ -14,7 +14,7 @@ Mask = npt.NDArray[np.bool_]
 INTERVALS = 16  # knot intervals per cycle
 PENALTY = 1e-3  # of the second differences, relative to the data's trace
 BRACKET = 0.75  # knot intervals within which an observed sample must lie on both sides
-OBSERVED = 0.4  # share of entries a cycle must have to be used
+OBSERVED = 0.4  # share of entries a cycle must have to be used, of the channels that its sequence has
 END = 0.05  # share of the cycle over which its end levels are estimated
 
 
@@ -47,14 +47,15 @@ def slice_cycles(
     """Cut sequences (T_i, M) into cycles and resample each on `samples` phases.
 
     Slice k covers frames from offset + (k - 1) period to offset + k period; slices with less than the share
-    `observed` of their entries are dropped.
+    `observed` of their entries, in the channels that the sequence has, are dropped.
     """
     rows: list[tuple[Floats, Mask, Floats, int, int]] = []
     for i, (z, period, offset) in enumerate(zip(signals, periods, offsets, strict=True)):
+        channels = int(np.isfinite(z).any(axis=0).sum())
         for k in range(int(np.ceil((len(z) - offset) / period)) + 1):
             u = (np.arange(len(z)) - offset) / period - (k - 1)
             values, mask = resample(u, z, samples)
-            if mask.mean() >= observed:
+            if channels and mask.sum() >= observed * samples * channels:
                 flat, ramp = _close(values, mask)
                 rows.append((flat, mask, ramp, i, k))
     columns = list(zip(*rows, strict=True)) if rows else [(), (), (), (), ()]

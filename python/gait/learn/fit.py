@@ -84,7 +84,7 @@ def channel_scale() -> Floats:
 
 def fit(
     sequences: list[Sequence],
-    components: int | str = DEFAULT_COMPONENTS,
+    components: int | str | None = None,
     seed: int = 1,
     kind: str = "people",
 ) -> Learned:
@@ -92,6 +92,8 @@ def fit(
 
     Parameters
     ----------
+    components : int, "auto" or None
+        None: DEFAULT_COMPONENTS, or two less than there are cycles if that is fewer.
     kind : "people" or "paper"
         The prior that reaches people who were not recorded (`gait.learn.prior`), or the paper's components
         of the recorded cycles and one body for everybody.
@@ -110,14 +112,12 @@ def fit(
     start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
     alignment.offsets = (alignment.offsets + start * periods) % periods
     rows = cycles.slice_cycles(signals, periods, alignment.offsets, SAMPLES)
-    wanted = 1 if components == "auto" else int(components)
-    if len(rows.values) <= wanted + 1:
-        raise UserError(f"{len(rows.values)} cycles are too few for {wanted} components; add recordings")
+    wanted = most_components(len(rows.values), components)
     scale = channel_scale()
     scaled, held_out = rows.values * scale, np.zeros(0)
     if components == "auto":
         rng = np.random.default_rng(seed)
-        wanted, held_out = fpca.choose(scaled, rows.mask, rng, groups=index[rows.sequence])
+        wanted, held_out = fpca.choose(scaled, rows.mask, rng, index[rows.sequence], largest=wanted)
     model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = prior.joint_metric(model.mean, proportions)
@@ -129,6 +129,26 @@ def fit(
     return Learned(
         sequences, subjects, index, proportions, alignment, rows, model, scale, held_out, table, static
     )
+
+
+def most_components(cycles: int, wanted: int | str | None) -> int:
+    """Components to learn from so many cycles; with "auto", to try.
+
+    Raises
+    ------
+    UserError
+        If there are too few cycles for the number asked for, or for any.
+    """
+    allowed = cycles - 2
+    if isinstance(wanted, int):
+        least = wanted
+    else:
+        least, wanted = 1, min(fpca.LARGEST if wanted == "auto" else DEFAULT_COMPONENTS, allowed)
+    if allowed < least:
+        what = "1 component" if least == 1 else f"{least} components"
+        remedy = "add recordings" if allowed < 1 else f"add recordings or ask for {allowed} at most"
+        raise UserError(f"{cycles} cycles are too few for {what}; {remedy}")
+    return wanted
 
 
 def _own_units(c: fpca.Components, scale: Floats) -> fpca.Components:

@@ -46,17 +46,23 @@ def _stored(values: Floats) -> npt.NDArray[np.float32]:
 
 
 def channel_statistics(learned: Learned) -> Floats:
-    """CHST (M, 4): residual sd, least and largest value, sd over subjects of the mean residual."""
-    residual, values = learned.residuals, np.where(learned.cycles.mask, learned.cycles.values, np.nan)
-    sd = np.sqrt(np.nanmean(residual**2, axis=(0, 1)))
-    extremes = np.nanmin(values, axis=(0, 1)), np.nanmax(values, axis=(0, 1))
-    return np.stack([sd, *extremes, learned.static], axis=1)
+    """CHST (M, 4): residual sd, least and largest value, sd of a held-out subject's static offset.
+
+    Zeros for channels that no recording has.
+    """
+    mask, values = learned.cycles.mask, learned.cycles.values
+    count = mask.sum(axis=(0, 1))
+    squares = np.where(mask, values - learned.components.reconstruct(), 0.0) ** 2
+    sd = np.sqrt(squares.sum(axis=(0, 1)) / np.maximum(count, 1))
+    least = np.where(mask, values, np.inf).min(axis=(0, 1))
+    largest = np.where(mask, values, -np.inf).max(axis=(0, 1))
+    return np.where(count[:, None] > 0, np.stack([sd, least, largest, learned.static], axis=1), 0.0)
 
 
 def score_statistics(learned: Learned) -> Floats:
     """SCST (q, 3): singular-value sd, then between- and within-subject sd relative to it (one-way ANOVA)."""
     c = learned.components
-    between, within = anova(c.scores / c.sd, learned.row_subject)
+    between, within = anova(c.scores / np.maximum(c.sd, 1e-12), learned.row_subject)
     return np.stack([c.sd, between, within], axis=1)
 
 
@@ -79,17 +85,24 @@ def anova(values: Floats, group: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
 
 
 def gait_statistics(learned: Learned) -> Floats:
-    """GAIT (8,): stride rate, stride length, sample rate and stature of the training set."""
+    """GAIT (8,): stride rate, stride length, sample rate and stature of the training set.
+
+    A stride is 0 long where no recording tells.
+    """
     rates = np.array([s.fps / s.period.frames for s in learned.sequences])
     column = CHANNELS.index("root_forward")
-    lengths = np.array([np.nanmean(s.channels[:, column]) for s in learned.sequences])
+    speeds = [s.channels[np.isfinite(s.channels[:, column]), column] for s in learned.sequences]
+    lengths = np.array([speed.mean() if len(speed) else np.nan for speed in speeds])
     fps = float(np.median([s.fps for s in learned.sequences]))
     rate, length = (_by_subject(v, learned.subject_index) for v in (rates, lengths))
     return np.array([*rate, stride_variation(learned), *length, fps, *ADULT_STATURE])
 
 
 def _by_subject(values: Floats, group: npt.NDArray[np.intp]) -> tuple[float, float]:
-    """Mean and sd of the subjects' means; the sd over sequences if there is one subject only."""
+    """Mean and sd of the subjects' means, or sd of a single subject's sequences; without those of NaN."""
+    group, values = group[np.isfinite(values)], values[np.isfinite(values)]
+    if not len(values):
+        return 0.0, 0.0
     means = np.array([values[group == g].mean() for g in np.unique(group)])
     spread = means if len(means) > 1 else values
     return float(means.mean()), float(spread.std(ddof=1)) if len(spread) > 1 else 0.0

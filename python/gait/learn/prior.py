@@ -72,7 +72,8 @@ def components(
     -------
     mean : (T, M)
     curves : (q, T, M)
-        Of unit length in the metric over all phases; the entry of largest magnitude is positive.
+        Of unit length in the metric over all phases; the entry of largest magnitude in the first half of the
+        cycle is positive.
     scores : (R, q)
         Of the rows, not of their images.
     sd : (q,)
@@ -89,8 +90,7 @@ def components(
     _, singular, right = np.linalg.svd((coded - mean) * np.sqrt(weight)[:, None], full_matrices=False)
     back = np.linalg.inv(metric)
     curves = decode(right[:count], basis, channels) @ back
-    flat = curves.reshape(len(curves), samples * channels)
-    sign = np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(axis=1)])
+    sign = _sign(curves)
     return (
         decode(mean[None], basis, channels)[0] @ back,
         curves * sign[:, None, None],
@@ -98,6 +98,15 @@ def components(
         singular[:count],
         singular**2 / max(float(np.sum(singular**2)), 1e-300),
     )
+
+
+def _sign(curves: Floats) -> Floats:
+    """Signs (q,) that make the largest entry of the first half positive.
+
+    In the other half lies its mirror image, as large and perhaps of the other sign.
+    """
+    half = curves[:, : curves.shape[1] // 2].reshape(len(curves), -1)
+    return np.asarray(np.where(half[np.arange(len(half)), np.abs(half).argmax(axis=1)] < 0, -1.0, 1.0))
 
 
 def refine(plain: Components, subject: Groups, count: int, metric: Floats) -> Components:

@@ -1,0 +1,164 @@
+"""Proportions: how limbs differ in length among people of one stature, learnt and posed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gait import Model, State, blob, skeleton
+from gait.learn import lengths, retarget
+from gait.learn.retarget import Measures
+from gait.model import read_blob
+from gait.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
+
+MEAN = Proportions()
+FRAMES = default_skeleton(MEAN).frames
+GROUP = {name: k for k, name in enumerate(lengths.GROUPS)}
+POSE = np.zeros((8, len(CHANNELS)))
+POSE[:, CHANNELS.index("l_hip_flexion")] = 0.4 * np.sin(2 * np.pi * np.arange(8) / 8)
+POSE[:, CHANNELS.index("r_hip_flexion")] = -POSE[:, CHANNELS.index("l_hip_flexion")]
+FEET = [JOINTS.index(f"{s}_{p}") for s in "lr" for p in ("heel", "toe")]
+SHIPPED = blob.decode(read_blob(None))
+
+
+def body(stature=1.7, **factor):
+    """A person with lengths of groups multiplied."""
+    f = {name: factor.get(name, 1.0) for name in lengths.GROUPS}
+    both = np.ones(2)
+    toe = np.array([MEAN.toe[0], MEAN.toe[2]])
+    return Measures(
+        stature=stature,
+        hip=stature * f["pelvis"] * np.array([MEAN.hip, np.array(MEAN.hip) * (1, -1, 1)]),
+        shoulder=stature * f["torso"] * np.array([MEAN.shoulder, np.array(MEAN.shoulder) * (1, -1, 1)]),
+        neck=stature * f["torso"] * MEAN.neck,
+        upper_arm=stature * f["upper_arm"] * MEAN.upper_arm * both,
+        forearm=stature * f["forearm"] * MEAN.forearm * both,
+        thigh=stature * f["thigh"] * MEAN.thigh * both,
+        shank=stature * f["shank"] * MEAN.shank * both,
+        foot=stature * f["foot"] * np.hypot(*toe) * both,
+        slope=np.arctan2(-toe[1], toe[0]) * both,
+        sole=stature * MEAN.sole,
+    )
+
+
+def people(count, rng, spread):
+    """Bodies whose groups' factors are 1 + scores @ spread, (k, 7)."""
+    factors = 1 + rng.normal(size=(count, len(spread))) @ spread
+    factors -= factors.mean(axis=0) - 1
+    return [body(rng.uniform(1.5, 1.9), **dict(zip(lengths.GROUPS, f, strict=True))) for f in factors]
+
+
+def test_spans_are_the_lengths_of_the_groups():
+    np.testing.assert_allclose(
+        lengths.spans(retarget.own_proportions(body(thigh=1.1, foot=0.9))) / lengths.spans(MEAN),
+        [1, 1, 1, 1, 1.1, 1, 0.9],
+    )
+
+
+def test_planted_components_of_lengths_are_found():
+    """Legs long in thigh and short in shank, and long arms: two components span what was planted."""
+    planted = np.zeros((2, len(lengths.GROUPS)))
+    planted[0, [GROUP["thigh"], GROUP["shank"]]] = 0.05, -0.05
+    planted[1, [GROUP["upper_arm"], GROUP["forearm"]]] = 0.06, 0.04
+    table = lengths.learn(people(40, np.random.default_rng(1), planted), MEAN, POSE, count=3)
+    assert table.shape == (3, len(FRAMES) + 1)
+    assert np.abs(table[2]).max() < 1e-6
+    each = np.array([[name.endswith(group) for name in FRAMES] for group in lengths.GROUPS], float)
+    group_rows = table[:2, :-1] @ each.T / each.sum(axis=1)
+    left = group_rows - group_rows @ np.linalg.pinv(planted) @ planted
+    assert np.abs(left).max() < 1e-6
+    covariance, wanted = group_rows.T @ group_rows, planted.T @ planted
+    assert np.trace(covariance) == pytest.approx(np.trace(wanted), rel=0.35)  # forty people
+
+
+def test_left_and_right_change_together_and_the_sign_is_fixed():
+    table = lengths.learn(people(9, np.random.default_rng(2), 0.03 * np.eye(7)), MEAN, POSE)
+    assert table.shape == (lengths.COUNT, len(FRAMES) + 1)
+    for name in FRAMES:
+        if name.startswith("l_"):
+            twin = FRAMES.index("r_" + name[2:])
+            np.testing.assert_array_equal(table[:, FRAMES.index(name)], table[:, twin])
+    assert np.all(table[np.arange(len(table)), np.abs(table).argmax(axis=1)] > 0)
+    assert not table[:, FRAMES.index("head")].any()
+
+
+def test_changes_are_bounded():
+    table = lengths.learn(people(5, np.random.default_rng(3), 0.5 * np.eye(7)), MEAN, POSE)
+    assert np.abs(table).max() == lengths.LARGEST
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_too_few_whole_bodies_give_no_components(count):
+    unseen = replace(body(), forearm=np.full(2, np.nan))
+    given = [body(1.5 + 0.1 * k, thigh=1 + 0.05 * k) for k in range(count)]
+    assert lengths.learn([*given, None, unseen, unseen], MEAN, POSE).shape == (0, len(FRAMES) + 1)
+
+
+def test_bodies_not_seen_whole_are_left_out():
+    whole = people(5, np.random.default_rng(4), 0.03 * np.eye(7))
+    unseen = replace(body(thigh=1.4), forearm=np.full(2, np.nan))
+    np.testing.assert_array_equal(
+        lengths.learn([*whole, None, unseen], MEAN, POSE), lengths.learn(whole, MEAN, POSE)
+    )
+
+
+def lowest(sections, coef, proportion):
+    """Height (n,) of the lowest foot point over the ground at phases of a stride, statures."""
+    phase = np.arange(32) / 32
+    channels = skeleton.curves(sections, phase, np.tile(coef, (32, 1)))
+    height = channels[:, CHANNELS.index("root_height")]
+    height = height * skeleton.length_change(sections, proportion)[0, -1]
+    return (points(sections, channels, proportion)[:, FEET, 2] + height[:, None]).min(axis=1)
+
+
+@pytest.mark.parametrize("score", [-2, 2])
+def test_feet_stay_on_the_ground_with_longer_and_shorter_legs(score):
+    """The shipped walk on legs a twentieth longer or shorter: within 3 mm of the mean body's ground."""
+    legs = np.zeros((1, len(lengths.GROUPS)))
+    legs[0, [GROUP["thigh"], GROUP["shank"]]] = 0.025
+    table = lengths.learn(people(6, np.random.default_rng(5), legs), MEAN, POSE, count=1)
+    sections = {**SHIPPED, **default_skeleton(MEAN).sections(), "PROP": table}
+    own, changed = (lowest(sections, np.zeros(1), [s]) for s in (0, score))
+    reach = points(sections, POSE, [score])[:, FEET, 2] - points(sections, POSE)[:, FEET, 2]
+    assert np.abs(reach).max() > 0.01  # 17 mm: the legs do differ
+    assert np.abs(changed - own).max() * 1.7 < 0.003
+
+
+def test_feet_of_the_shipped_model_stay_on_the_ground():
+    if "PROP" not in SHIPPED:
+        pytest.fail("the shipped model has no proportions; make model")
+    zero = np.zeros(len(SHIPPED["CURV"]) - 1)
+    own = lowest(SHIPPED, zero, [])
+    for score in 2 * np.concatenate([np.eye(len(SHIPPED["PROP"])), -np.eye(len(SHIPPED["PROP"]))]):
+        assert np.abs(lowest(SHIPPED, zero, score) - own).max() * 1.7 < 0.008
+
+
+def test_c_and_numpy_agree_on_poses_with_proportions():
+    model, rng = Model(), np.random.default_rng(6)
+    info = model.info
+    assert info.proportions == len(SHIPPED["PROP"])
+    for _ in range(50):
+        state = State(
+            phase=rng.uniform(),
+            stature=rng.uniform(1.5, 2.0),
+            heading=rng.uniform(-3, 3),
+            coef=rng.normal(size=info.components),
+            proportion=rng.normal(size=info.proportions),
+        )
+        joints, angles = model.pose(state)
+        expected, expected_angles = skeleton.pose(
+            SHIPPED,
+            state.phase,
+            state.coef,
+            state.stature,
+            state.heading,
+            0.0,
+            0.0,
+            np.zeros(3),
+            state.proportion,
+        )
+        assert joints == pytest.approx(expected[0], abs=1e-5)
+        assert angles == pytest.approx(expected_angles[0], abs=1e-5)
+        height = skeleton.curves(SHIPPED, [state.phase], [state.coef])[0, CHANNELS.index("root_height")]
+        height *= skeleton.length_change(SHIPPED, state.proportion)[0, -1] * state.stature
+        assert model.pelvis_height(state) == pytest.approx(height, abs=1e-5)

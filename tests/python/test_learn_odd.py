@@ -1,0 +1,136 @@
+"""gait learn on little or partial data: few cycles, one subject, legs alone, angles alone."""
+
+import json
+import warnings
+from dataclasses import replace
+
+import gait_generator as g
+import mocap_files as files
+import numpy as np
+import pytest
+
+import gait.cli
+from gait import Model, blob
+from gait.errors import UserError
+from gait.learn import fit, fpca, model, sources
+from gait.skeleton import ANGLES, CHANNELS
+
+LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for name in ANGLES])
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory):
+    """Folder of six toy walks of three subjects."""
+    folder = tmp_path_factory.mktemp("walks")
+    for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 2)]):
+        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i}
+        files.write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", frames=400, **motion)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sequences(walks):
+    return sources.load_all(sources.find([str(walks)]))[0]
+
+
+def sections(learned):
+    """Sections of the blob, made without a warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made = model.sections(learned, "walk", 1)
+    for tag, values in made.items():
+        assert values.dtype.kind != "f" or np.isfinite(values).all(), tag
+    return made
+
+
+def run(*words):
+    return gait.cli.main([str(w) for w in words])
+
+
+@pytest.mark.parametrize(
+    ("cycles", "wanted", "count"),
+    [(3, None, 1), (6, None, 4), (10, None, 8), (90, None, 8), (6, 4, 4), (90, 16, 16), (6, "auto", 4)],
+)
+def test_components_are_no_more_than_cycles_allow(cycles, wanted, count):
+    assert fit.most_components(cycles, wanted) == count
+
+
+@pytest.mark.parametrize(
+    ("cycles", "wanted", "message"),
+    [
+        (6, 5, "6 cycles are too few for 5 components; add recordings or ask for 4 at most"),
+        (2, None, "2 cycles are too few for 1 component; add recordings"),
+        (0, "auto", "0 cycles are too few for 1 component; add recordings"),
+    ],
+)
+def test_more_components_than_cycles_allow_are_an_error(cycles, wanted, message):
+    with pytest.raises(UserError, match=f"^{message}$"):
+        fit.most_components(cycles, wanted)
+
+
+def test_few_cycles_give_fewer_components_and_a_line_says_so(walks, tmp_path, capsys):
+    output = tmp_path / "m.gait"
+    assert run("learn", walks / "01", "-o", output, "--json") == 0
+    out, err = capsys.readouterr()
+    cycles = json.loads(out)["cycles"]
+    assert cycles < 10 and blob.read(output)["CURV"].shape[0] == cycles - 1
+    assert err == f"{cycles} cycles allow {cycles - 2} components instead of 8\n"
+    assert run("learn", walks / "01", "-o", output, "--components", 3) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_one_subject_has_neither_proportions_nor_a_static_spread(sequences):
+    made = sections(fit.fit([s for s in sequences if s.subject == "01"], 2))
+    assert "PROP" not in made and not made["CHST"][:, 3].any() and not made["SCST"][:, 1].any()
+    assert Model(blob.encode(made)).info.proportions == 0
+
+
+def test_three_subjects_have_proportions(sequences):
+    """Toy walkers are of one skeleton: lengths change by what swing does to the stature, next to nothing."""
+    made = sections(fit.fit(sequences, 2))
+    assert made["PROP"].shape == (1, len(made["FRMI"]) + 1)
+    assert np.abs(made["PROP"]).max() < 2e-3 and made["CHST"][:, 3].max() > 0
+
+
+def test_paper_prior_has_the_plain_components_and_one_body(sequences):
+    learned = fit.fit(sequences, 2, kind="paper")
+    assert "PROP" not in sections(learned)
+    scale, c = fit.channel_scale(), learned.components
+    plain = fpca.fit(learned.cycles.values * scale, learned.cycles.mask, 2)
+    np.testing.assert_allclose(c.curves * scale, plain.curves, atol=1e-12)
+    np.testing.assert_allclose(c.sd, plain.sd)
+
+
+@pytest.mark.parametrize("kind", fit.KINDS)
+def test_legs_alone_leave_the_rest_at_rest(sequences, kind):
+    cut = [replace(s, channels=s.channels.copy()) for s in sequences]
+    for s in cut:
+        s.channels[:, : len(ANGLES)][:, ~LEGS] = np.nan
+    made = sections(fit.fit(cut, 2, kind=kind))
+    unseen = np.flatnonzero(~LEGS)
+    assert not made["CHST"][unseen].any() and np.abs(made["CURV"][:, :, unseen]).max() < 1e-6
+    seen = np.flatnonzero(LEGS)
+    assert np.all(made["CHST"][seen, 1] < made["CHST"][seen, 2]) and np.ptp(made["CURV"][0][:, seen]) > 0.5
+
+
+@pytest.mark.parametrize("kind", fit.KINDS)
+def test_angles_of_the_legs_alone_are_learnt(tmp_path, kind):
+    """The least that a .csv of angles may hold: no joints, no root, hips and knees."""
+    names = [f"{s}_{a}_flexion" for s in "rl" for a in ("hip", "knee")]
+    columns = [3 + g.SIDE.index("hip_flexion"), 3 + g.SIDE.index("knee")]
+    columns += [c + len(g.SIDE) for c in columns]
+    for k in range(4):
+        angles = (1 + 0.1 * k) * g.mean_curves(np.arange(400) / (105.0 + 4 * k))[:, columns]
+        angles += np.random.default_rng(k).normal(scale=0.5, size=angles.shape)
+        lines = [",".join(["frame", "time", *(f"{n}_deg" for n in names)])]
+        lines += [f"{t},{t / 100:.2f}," + ",".join(f"{v:.3f}" for v in row) for t, row in enumerate(angles)]
+        (tmp_path / f"{k:02}_01.csv").write_text("\n".join(lines) + "\n")
+    read, refused = sources.load_all(sources.find([str(tmp_path)]))
+    assert len(read) == 4 and not refused and all(s.measures is None for s in read)
+    made = sections(fit.fit(read, 2, kind=kind))
+    assert "PROP" not in made and made["GAIT"][3] == 0
+    assert made["GAIT"][0] == pytest.approx(np.mean([100 / (105 + 4 * k) for k in range(4)]), rel=0.01)
+    knee = np.degrees(made["CURV"][0, :, CHANNELS.index("r_knee_flexion")])
+    assert np.ptp(knee) == pytest.approx(1.15 * 58, rel=0.1)
+    assert json.loads(made["META"].tobytes())["statures_m"] == [None] * 4
+    assert Model(blob.encode(made)).info.components == 2
