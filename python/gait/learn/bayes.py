@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.learn.accelerate import Mixer
+from gait.learn.belief import Belief, divergence, mixed, smoother, with_prior, without_weakest
 from gait.learn.fourier import decode, encode
 from gait.learn.impute import Filling
 
@@ -23,33 +24,7 @@ Mask = npt.NDArray[np.bool_]
 
 ITERATIONS = 500
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
-QUENCHED = 1e9  # roughness at which components have no part in a harmonic
 LEAST_NOISE = 1e-10  # variance relative to the data's
-
-
-@dataclass
-class Belief:
-    """What is held about the model.
-
-    Attributes
-    ----------
-    loadings : (1 + q, P)
-        Fourier coefficients of the mean and of the components.
-    spread : (B, q, q)
-        Posterior covariance of the components' coefficients of a basis function, the same for all channels.
-    precision : (q,)
-        Of the components' prior.
-    roughness : (B,)
-        Factor of the prior's precision for each basis function.
-    noise : float
-        Variance of an entry about the model.
-    """
-
-    loadings: Floats
-    spread: Floats
-    precision: Floats
-    roughness: Floats
-    noise: float
 
 
 @dataclass
@@ -85,6 +60,7 @@ class Problem:
         self.seen = mask.reshape(self.rows, -1).astype(float)
         self.values = np.where(mask, values, 0.0).reshape(self.rows, -1)
         self.observed = float(self.seen.sum())
+        self.least = LEAST_NOISE * float(np.sum(self.values**2)) / max(self.observed, 1.0) + 1e-30
 
     def encode(self, flat: Floats) -> Floats:
         """Curves (n, T M) to coefficients (n, P)."""
@@ -101,16 +77,16 @@ class Problem:
     def begin(self, start: Floats, components: int) -> Belief:
         """Belief from the decomposition of the data filled with `start` (T, M)."""
         filled = self.values + (1 - self.seen) * start.ravel()
-        coded = self.encode(filled)
+        coded, components = self.encode(filled), min(components, self.rows - 1)
         mean = coded.mean(axis=0)
         _, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
-        loadings = right[:components] * (singular[:components] / np.sqrt(max(self.rows - 1, 1)))[:, None]
-        rest = np.sum((filled - self.decode(mean[None])) ** 2) - np.sum(singular[:components] ** 2)
-        self.least = LEAST_NOISE * float(np.mean(filled**2)) + 1e-30
+        singular, right = singular[:components], right[:components]
+        loadings = right * (singular / np.sqrt(max(self.rows - 1, 1)))[:, None]
+        rest = np.sum((filled - self.decode(mean[None])) ** 2) - np.sum(singular**2)
         noise = max(float(rest) / filled.size, self.least)
-        spread = np.tile(noise / self.rows * np.eye(components), (len(self.basis), 1, 1))
-        ones = np.ones(len(self.basis))
-        return _with_prior(Belief(np.vstack([mean, loadings]), spread, ones[:components], ones, noise))
+        spread = np.tile(noise / self.rows * np.eye(len(right)), (len(self.basis), 1, 1))
+        prior = np.ones(len(right)), np.ones(len(self.basis))
+        return with_prior(Belief(np.vstack([mean, loadings]), spread, *prior, noise))
 
     def expect(self, belief: Belief) -> Rows:
         """Scores of the rows from their observed entries, and the bound."""
@@ -126,7 +102,7 @@ class Problem:
         fit = float(np.sum(off**2) - np.sum(pull * scores)) / belief.noise
         volume = float(np.sum(np.linalg.slogdet(system)[1])) - self.rows * q * np.log(belief.noise)
         bound = -0.5 * (self.observed * np.log(2 * np.pi * belief.noise) + volume + fit)
-        bound -= _divergence(belief, self.shape[1])
+        bound -= divergence(belief)
         return Rows(scores, belief.noise * inverse, curves, mean + scores @ parts, bound)
 
     def maximise(self, belief: Belief, rows: Rows) -> Belief:
@@ -142,13 +118,12 @@ class Problem:
         )
         varying = np.einsum("klp,lp->kp", missing, rows.curves[1:])
         cross[1:] += self.encode(varying)
-        ridge = np.zeros((len(self.basis), 1 + q, 1 + q))
-        ridge[:, range(1, 1 + q), range(1, 1 + q)] = belief.noise * np.outer(
-            belief.roughness, belief.precision
-        )
-        by_function = cross.reshape(1 + q, *ridge.shape[:1], -1).swapaxes(0, 1)
-        loadings = np.linalg.solve(moment + ridge, by_function).swapaxes(0, 1).reshape(cross.shape)
-        spread = belief.noise * np.linalg.inv((moment + ridge)[:, 1:, 1:])
+        system = np.tile(moment, (len(self.basis), 1, 1))
+        diagonal = np.arange(1, 1 + q)
+        system[:, diagonal, diagonal] += belief.noise * np.outer(belief.roughness, belief.precision)
+        by_function = cross.reshape(1 + q, len(self.basis), -1).swapaxes(0, 1)
+        loadings = np.linalg.solve(system, by_function).swapaxes(0, 1).reshape(cross.shape)
+        spread = belief.noise * np.linalg.inv(system[:, 1:, 1:])
         # Expected sum of squares of data minus model, missing entries included.
         total = float(np.sum(filled**2) + np.sum(varying * rows.curves[1:]))
         total += (filled.size - self.observed) * belief.noise
@@ -156,7 +131,7 @@ class Problem:
         total += self.shape[1] * float(np.sum(spread.sum(axis=0) * moment[1:, 1:]))
         noise = max(total / filled.size, self.least)
         loadings, spread = self._standard(loadings, spread, moment / self.rows, belief.roughness)
-        return _with_prior(Belief(loadings, spread, belief.precision, belief.roughness, noise))
+        return with_prior(Belief(loadings, spread, belief.precision, belief.roughness, noise))
 
     def _standard(
         self, loadings: Floats, spread: Floats, moment: Floats, roughness: Floats
@@ -186,42 +161,6 @@ def _products(parts: Floats) -> Floats:
     return (parts[:, None] * parts[None]).reshape(-1, parts.shape[1])
 
 
-def _strength(belief: Belief) -> Floats:
-    """Give the squares (q, B) of the components' coefficients, summed over channels."""
-    q, functions = len(belief.precision), len(belief.roughness)
-    channels = belief.loadings.shape[1] // functions
-    return np.sum(belief.loadings[1:].reshape(q, functions, channels) ** 2, axis=2)
-
-
-def _doubt(belief: Belief) -> Floats:
-    """Give the posterior variances (q, B) of the components' coefficients, summed over channels."""
-    channels = belief.loadings.shape[1] // len(belief.roughness)
-    return channels * np.diagonal(belief.spread, axis1=1, axis2=2).T
-
-
-def _with_prior(belief: Belief) -> Belief:
-    """Replace the precisions by the best for these components, then the roughness."""
-    q, size = len(belief.precision), belief.loadings.shape[1]
-    if not q:
-        return belief
-    second, functions = _strength(belief) + _doubt(belief), len(belief.roughness)
-    precision = size / (second @ belief.roughness + 1e-300)
-    harmonic = (np.arange(functions) + 1) // 2
-    mean = np.bincount(harmonic, precision @ second) / np.bincount(harmonic)
-    roughness = q * (size // functions) / (mean[harmonic] + 1e-300)
-    return Belief(belief.loadings, belief.spread, precision, roughness, belief.noise)
-
-
-def _divergence(belief: Belief, channels: int) -> float:
-    """Kullback-Leibler divergence of the components' posterior from their prior."""
-    q, size = len(belief.precision), belief.loadings.shape[1]
-    second = _strength(belief) + _doubt(belief)
-    volume = channels * np.sum(np.linalg.slogdet(belief.spread)[1])
-    volume += size * (np.sum(np.log(belief.precision)) + q)
-    volume += q * channels * np.sum(np.log(belief.roughness))
-    return 0.5 * float(belief.precision @ second @ belief.roughness - volume)
-
-
 @dataclass
 class Climb:
     """Where the passes led, and the Filling's figures on the way."""
@@ -249,7 +188,7 @@ def climb(problem: Problem, belief: Belief, tolerance: float, passes: int = ITER
         after, found = _pass(problem, mixer, at.belief, at.rows)
         change = float(np.sqrt(np.mean((found.model - at.rows.model) ** 2)))
         at.converged = change <= tolerance * np.sqrt(after.noise)
-        if found.bound < at.rows.bound:  # by rounding: nothing is left to gain
+        if not found.bound >= at.rows.bound:  # by rounding: nothing is left to gain
             at.converged = True
         else:
             at.belief, at.rows = after, found
@@ -283,62 +222,14 @@ def by_bayes(
 def _pass(problem: Problem, mixer: Mixer, belief: Belief, rows: Rows) -> tuple[Belief, Rows]:
     """Extrapolate, or take the plain step where that is better; drop a component that does not help."""
     plain = problem.maximise(belief, rows)
-    after = _mixed(mixer, belief, plain)
+    after = mixed(mixer, belief, plain)
     found = problem.expect(after)
     if not found.bound >= rows.bound:
         mixer.forget()
         after, found = plain, problem.expect(plain)
-    for lesser in (_without_weakest(after), _smoother(after)):
+    for less in (without_weakest, smoother):
+        lesser = less(after)
         if lesser is not None and (fewer := problem.expect(lesser)).bound > found.bound:
             mixer.forget()
             after, found = lesser, fewer
     return after, found
-
-
-def _without_weakest(belief: Belief) -> Belief | None:
-    """Drop the weakest component if it is weaker than the doubt about it, else None."""
-    ratio = _strength(belief).sum(axis=1) / _doubt(belief).sum(axis=1)
-    return without(belief, int(np.argmin(ratio))) if len(ratio) and ratio.min() < 1 else None
-
-
-def _smoother(belief: Belief) -> Belief | None:
-    """Quench the harmonics of the components that are weaker than the doubt about them; None if none are."""
-    harmonic = (np.arange(len(belief.roughness)) + 1) // 2
-    strength, doubt = (
-        np.bincount(harmonic, part.sum(axis=0)) for part in (_strength(belief), _doubt(belief))
-    )
-    weak = (strength < doubt)[harmonic] & (belief.roughness < QUENCHED)
-    if not weak.any() or not len(belief.precision):
-        return None
-    loadings, spread, roughness = belief.loadings.copy(), belief.spread.copy(), belief.roughness.copy()
-    roughness[weak] = 1e3 * QUENCHED
-    loadings[1:].reshape(len(belief.precision), len(weak), -1)[:, weak] = 0
-    spread[weak] = np.diag(1 / (belief.precision * 1e3 * QUENCHED))
-    return Belief(loadings, spread, belief.precision, roughness, belief.noise)
-
-
-def without(belief: Belief, k: int) -> Belief:
-    """Drop component k."""
-    spread = np.delete(np.delete(belief.spread, k, axis=1), k, axis=2)
-    loadings, precision = np.delete(belief.loadings, 1 + k, axis=0), np.delete(belief.precision, k)
-    return Belief(loadings, spread, precision, belief.roughness, belief.noise)
-
-
-def _mixed(mixer: Mixer, before: Belief, after: Belief) -> Belief:
-    """Belief extrapolated from this step and those before it."""
-    vector = mixer.step(_vector(before), _vector(after), before.loadings.size)
-    loadings, precision, roughness, noise = np.split(
-        vector, np.cumsum([before.loadings.size, len(before.precision), len(before.roughness)])
-    )
-    return Belief(
-        loadings.reshape(before.loadings.shape),
-        after.spread,
-        np.exp(precision),
-        np.exp(roughness),
-        float(np.exp(noise[0])),
-    )
-
-
-def _vector(belief: Belief) -> Floats:
-    logs = np.log([*belief.precision, *belief.roughness, belief.noise])
-    return np.concatenate([belief.loadings.ravel(), logs])

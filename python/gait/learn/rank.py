@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from gait.learn.bayes import Belief, Problem, climb, without
+from gait.learn.bayes import Problem, climb
+from gait.learn.belief import Belief, without
 from gait.learn.fourier import HARMONICS, fourier_basis
 from gait.learn.impute import column_mean
 
