@@ -41,13 +41,13 @@ SHARES, SHARE_SEEDS = (0.05, 0.1, 0.2, 0.4), 3
 OURS = "gait (functional PCA, Bayesian)"
 Run = tuple[Floats, Floats, str]  # errors and seconds by problem, version
 REFERENCE_NOTE = (
-    "RMSE on the missing entries against the noisy truth, median over problems; ratios to the oracle are of "
-    "the same problems, `worst` is the largest. Generator: `reference` in tests/python/learn_cases.py (three "
-    "random modes of four harmonics, scores of sd 2, 1.2 and 0.7, noise 0.45, blocks of 6-20 phases). Wanted "
-    "of gait: no worse than any other, at most 1.05 of the oracle, and with 5 components at most 1.1 of its "
-    "RMSE with 3. Slow packages get fewer problems, the first ones. scikit-fda is given the true "
-    "four harmonics as basis (gait uses 19); IterativeImputer uses all phases, 25 rounds. One thread each, seconds "
-    "of the wall clock."
+    "RMSE on the missing entries against the noisy truth, median over problems; ratios to the oracle are "
+    "of the same problems, `worst` is the largest. Generator: `reference` in tests/python/learn_cases.py "
+    "(three random modes of four harmonics, scores of sd 2, 1.2 and 0.7, noise 0.45, blocks of 6-20 "
+    "phases). Wanted of gait: no worse than any other, at most 1.05 of the oracle, and with 5 components "
+    "at most 1.1 of its RMSE with 3. Slow packages get fewer problems, the first ones. scikit-fda is "
+    "given the true four harmonics as basis (gait uses 19); IterativeImputer uses all phases, 25 rounds. "
+    "One thread each, seconds of the wall clock."
 )
 
 
