@@ -51,8 +51,8 @@ def evaluate(
         ``phase`` (cycles; see `phase_errors`) and ``px`` are None where strikes or camera are unknown;
         ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines;
         ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D
-        pose networks have; ``proc``: after the best rotation, scale and shift of every frame, for comparison
-        with literature only; ``status`` and ``trust`` (see `trust`); ``calibration`` (see `gait.calibration`).
+        pose networks have; ``proc``: after the best rotation, scale and shift of every frame, to compare
+        with literature only; ``status``, ``trust`` (see `trust`); ``calibration`` (see `gait.calibration`).
 
     Raises
     ------
