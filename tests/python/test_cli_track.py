@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import os
 import re
 import subprocess
@@ -203,7 +204,7 @@ def test_the_list_of_commands(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     text = capsys.readouterr().out
-    assert all(f"    {command} " in text for command in COMMANDS)
+    assert all(re.search(rf"^    {command}\s", text, re.MULTILINE) for command in COMMANDS)
 
 
 def test_the_module_runs_and_passes_the_exit_code(tmp_path):

@@ -35,6 +35,8 @@ static const struct {
     {"coef-noise", FIELD(coef_noise), 0, 100, "score standard deviations per sqrt(second)"},
     {"coef-time", FIELD(coef_time), 0, 1e6, "seconds in which the scores return to the mean; 0: never"},
     {"stature-noise", FIELD(stature_noise), 0, 1, "fraction of stature per sqrt(second), while settling"},
+    {"proportion-noise", FIELD(proportion_noise), 0, 100,
+     "standard deviations of the limbs' proportions per sqrt(second)"},
     {"offset-noise", FIELD(offset_noise), 0, 10, "radians of posture per sqrt(second)"},
     {"offset-sd", FIELD(offset_sd), 0, 10, "radians by which people differ in posture"},
 };
