@@ -99,6 +99,9 @@ static void test_refused(void)
         {"FRMI", 8 * 2 + 3, 1, -1},
         {"FRMF", 1, 0, 0.1}, /* the root off its joint */
         {"FRMF", 7, 0, NAN},
+        {"PROP", 3, 0, 0.101}, /* a length changed by more than a tenth */
+        {"PROP", TOY_FRAMES, 0, -0.101},
+        {"PROP", 0, 0, NAN},
         {"PTNI", 5, 1, TOY_FRAMES},
         {"PTNI", 5, 1, -1},
         {"PTNF", 5, 0, NAN},
@@ -193,6 +196,38 @@ static void test_limits(void)
     CHECK(model_open(buf, toy_finish(&f), &m, &err) == GAIT_ERR_LIMIT && strstr(err.text, "LBNM"));
 }
 
+/* PROP of `rows` by `columns` numbers in an otherwise sound model. */
+static gait_status open_proportions(uint32_t rows, uint32_t columns, gait_model *m, gait_error *err)
+{
+    static unsigned char name[TOY_FRAMES][32], info[TOY_FRAMES][32], origin[TOY_FRAMES][12];
+    static const float zero[(GAIT_MAX_PROPORTIONS + 1) * (TOY_FRAMES + 2)];
+    (void)toy_write(buf, 8, 1);
+    memcpy(name, section("FRNM"), sizeof name);
+    memcpy(info, section("FRMI"), sizeof info);
+    memcpy(origin, section("FRMF"), sizeof origin);
+    toy_file f = toy_begin(buf, TOY_SECTIONS - 1);
+    toy_put_curves(&f, 8, 1);
+    toy_section(&f, "PROP", 3, 2, rows, columns, 1, zero);
+    toy_section(&f, "FRNM", 1, 2, TOY_FRAMES, 32, 1, name);
+    toy_section(&f, "FRMI", 2, 2, TOY_FRAMES, 8, 1, info);
+    toy_section(&f, "FRMF", 3, 2, TOY_FRAMES, 3, 1, origin);
+    toy_put_points(&f);
+    toy_put_limbs(&f);
+    return model_open(buf, toy_finish(&f), m, err);
+}
+
+static void test_proportions(void)
+{
+    gait_model m;
+    gait_error err = {0};
+    for (uint32_t rows = 1; rows <= GAIT_MAX_PROPORTIONS; rows++)
+        CHECK(open_proportions(rows, TOY_FRAMES + 1, &m, &err) == GAIT_OK && m.proportions == (int32_t)rows);
+    CHECK(open_proportions(GAIT_MAX_PROPORTIONS + 1, TOY_FRAMES + 1, &m, &err) == GAIT_ERR_LIMIT &&
+          strstr(err.text, "PROP"));
+    for (uint32_t columns = TOY_FRAMES; columns <= TOY_FRAMES + 2; columns += 2)
+        CHECK(open_proportions(1, columns, &m, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "PROP"));
+}
+
 /* Every section but META is needed; without PROP everybody has the same proportions. */
 static void test_missing(void)
 {
@@ -219,6 +254,7 @@ int main(void)
     test_refused();
     test_names();
     test_limits();
+    test_proportions();
     test_missing();
     return CHECK_DONE();
 }
