@@ -37,7 +37,8 @@ def main() -> int:
         command = [sys.executable, str(HERE / part), *([str(args.mocap)] if part in WITH_MOCAP else [])]
         if subprocess.run(command, check=False).returncode:
             failed.append(part)
-        tables += [path for path, stamp in _stamps().items() if before.get(path) != stamp]
+        fresh = [path for path, stamp in _stamps().items() if before.get(path) != stamp]
+        tables = [path for path in tables if path not in fresh] + fresh
     if not args.only:
         took = f"Took {time.perf_counter() - begun:.0f} s."
         head = ["# Evaluation of learning", facts("make eval-learn"), took]
