@@ -15,6 +15,8 @@ import numpy.typing as npt
 
 from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
 from gait.learn.fpca import Components
+from gait.learn.singular import right_singular
+from gait.learn.spool import by_rows
 from gait.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
@@ -48,19 +50,19 @@ def joint_metric(mean: Floats, proportions: Proportions) -> Floats:
     Returns
     -------
     metric : (M, M)
-        |x @ metric|^2 is the mean squared displacement of a point, squared statures, for a small x.
+        |x @ metric|^2 is the mean squared displacement of a point about the pelvis plus that of the pelvis,
+        squared statures, for a small x.
     """
     sections = default_skeleton(proportions).sections()
     base = points(sections, mean)
     moves = np.empty((len(CHANNELS), base.size))
-    for k, name in enumerate(CHANNELS):
+    for k in range(len(CHANNELS)):
         moved = mean.copy()
         moved[:, k] += STEP
         moves[k] = ((points(sections, moved) - base) / STEP).ravel()
-        if name in DISPLACING:
-            moves[k] = DISPLACING[name] / np.sqrt(3)
-    gram = moves @ moves.T / (base.size / 3)
-    return np.linalg.cholesky(gram + RIDGE * np.eye(len(gram)))
+    whole = np.array([DISPLACING.get(name, 0.0) ** 2 for name in CHANNELS])
+    gram = moves @ moves.T / (base.size / 3) + np.diag(whole + RIDGE)
+    return np.asarray(np.linalg.cholesky(gram), float)
 
 
 def components(
@@ -83,21 +85,30 @@ def components(
     """
     samples, channels = filled.shape[1:]
     basis = fourier_basis(samples, harmonics)
-    coded = encode(np.concatenate([filled, mirrored(filled)]) @ metric, basis)
+    coded = _with_images(filled, metric, basis)
     weight = np.tile(1 / np.bincount(subject)[subject], 2)
     weight /= weight.sum()
     mean = weight @ coded
-    _, singular, right = np.linalg.svd((coded - mean) * np.sqrt(weight)[:, None], full_matrices=False)
+    singular, right = right_singular(coded, mean, np.sqrt(weight))
     back = np.linalg.inv(metric)
     curves = decode(right[:count], basis, channels) @ back
     sign = _sign(curves)
     return (
         decode(mean[None], basis, channels)[0] @ back,
         curves * sign[:, None, None],
-        (coded[: len(filled)] - mean) @ right[:count].T * sign,
+        (coded[: len(filled)] @ right[:count].T - mean @ right[:count].T) * sign,
         singular[:count],
         singular**2 / max(float(np.sum(singular**2)), 1e-300),
     )
+
+
+def _with_images(filled: Floats, metric: Floats, basis: Floats) -> Floats:
+    """Coefficients (2 R, P) in the metric of cycles and, below them, of their mirror images."""
+    coded = np.empty((2, len(filled), basis.shape[0] * filled.shape[2]))
+    for part in by_rows(filled):
+        coded[0, part] = encode(filled[part] @ metric, basis)
+        coded[1, part] = encode(mirrored(filled[part]) @ metric, basis)
+    return coded.reshape(-1, coded.shape[2])
 
 
 def _sign(curves: Floats) -> Floats:
