@@ -21,6 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 ITERATIONS = 100
 TOLERANCE = 1e-6  # relative decrease of the objective at which to stop
+ROUNDING = 1e-9  # relative; the objective may rise by no more
 XCORR_ROUNDS = 3
 AMBIGUOUS = 0.75  # depth of a sequence's second best phase, of its best, at which other starts are tried
 APART = 0.1  # cycles between those phases, at least
@@ -38,14 +39,17 @@ class Alignment:
     offsets : (n,)
         Frames, in [0, period).
     objective : list of float
-        Weighted sum of squares after each iteration; never increases.
+        Weighted sum of squares of each iteration as it came out; falls but for rounding.
     weights : (A,)
         Of the angles: one over the variance left by a smooth curve per sequence.
+    converged : bool
+        Whether the objective ceased to fall; not if it rose or the iterations ran out.
     """
 
     offsets: Floats
     objective: list[float] = field(default_factory=list)
     weights: Floats = field(default_factory=lambda: np.ones(1))
+    converged: bool = False
 
 
 @dataclass(frozen=True)
@@ -129,24 +133,21 @@ def hip_phase(curve: Floats) -> float:
 
 
 def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
-    """Alternate both steps until the objective stops falling."""
-    result = Alignment(problem.gauged(offsets), weights=weights)
+    """Alternate both steps until the objective stops falling; keep the better offsets if it rises."""
+    now = before = problem.gauged(offsets)
+    result = Alignment(now, weights=weights)
     for _ in range(ITERATIONS):
-        table = problem.curve(result.offsets).table()
-        cost = sum(
-            s.cost(table, weights, o) for s, o in zip(problem.sequences(), result.offsets, strict=True)
-        )
-        if result.objective and cost > result.objective[-1] * (1 - TOLERANCE):
-            break
+        table = problem.curve(now).table()
+        cost = sum(s.cost(table, weights, o) for s, o in zip(problem.sequences(), now, strict=True))
         result.objective.append(cost)
-        moved = np.array(
-            [
-                s.best_offset(table, weights, o)
-                for s, o in zip(problem.sequences(), result.offsets, strict=True)
-            ]
-        )
-        result.offsets = _without_drift(moved, result.offsets, problem.periods)
-    result.offsets = problem.gauged(result.offsets)
+        if len(result.objective) > 1 and cost > result.objective[-2] * (1 - TOLERANCE):
+            result.converged = cost <= result.objective[-2] * (1 + ROUNDING)
+            now = before if cost > result.objective[-2] else now
+            break
+        steps = zip(problem.sequences(), now, strict=True)
+        moved = np.array([s.best_offset(table, weights, o) for s, o in steps])
+        before, now = now, _without_drift(moved, now, problem.periods)
+    result.offsets = problem.gauged(now)
     return result
 
 
