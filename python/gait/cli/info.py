@@ -73,6 +73,8 @@ def text(name: str, s: Mapping[str, Any]) -> str:
         ]
     if "sequences" in meta:
         lines += sequence_lines(meta["sequences"]["rows"])
+        more = meta["sequences"]["count"] - len(meta["sequences"]["rows"])
+        lines += [f"and {more} more"] if more > 0 else []
     if "variance_explained" in meta:
         lines.append("variance explained: " + " ".join(f"{v:.3f}" for v in meta["variance_explained"]))
     if "acknowledgement" in meta:
