@@ -25,6 +25,7 @@ Mask = npt.NDArray[np.bool_]
 ITERATIONS = 500
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
 LEAST_NOISE = 1e-10  # variance relative to the data's
+ROUNDING = 1e-9  # relative; the bound may fall by no more
 
 
 @dataclass
@@ -163,7 +164,7 @@ def _products(parts: Floats) -> Floats:
 
 @dataclass
 class Climb:
-    """Where the passes led, and the Filling's figures on the way."""
+    """The best that the passes led to, and the Filling's figures on the way, each pass as it came out."""
 
     belief: Belief
     rows: Rows
@@ -188,12 +189,15 @@ def climb(problem: Problem, belief: Belief, tolerance: float, passes: int = ITER
         after, found = _pass(problem, mixer, at.belief, at.rows)
         change = float(np.sqrt(np.mean((found.model - at.rows.model) ** 2)))
         at.converged = change <= tolerance * np.sqrt(after.noise)
-        if not found.bound >= at.rows.bound:  # by rounding: nothing is left to gain
-            at.converged = True
+        at.objective.append(-found.bound / problem.observed)
+        falls = not found.bound >= at.rows.bound
+        if falls:  # by rounding nothing is left to gain; more than that is a mistake
+            at.converged = at.rows.bound - found.bound <= ROUNDING * abs(at.rows.bound)
         else:
             at.belief, at.rows = after, found
         at.rmse.append(problem.rmse(at.rows))
-        at.objective.append(-at.rows.bound / problem.observed)
+        if falls:
+            break
     return at
 
 
@@ -223,6 +227,7 @@ def _pass(problem: Problem, mixer: Mixer, belief: Belief, rows: Rows) -> tuple[B
     """Extrapolate, or take the plain step where that is better; drop a component that does not help."""
     plain = problem.maximise(belief, rows)
     after = mixed(mixer, belief, plain)
+    after.noise = max(after.noise, problem.least)
     found = problem.expect(after)
     if not found.bound >= rows.bound:
         mixer.forget()
