@@ -172,7 +172,7 @@ def _read(args: argparse.Namespace) -> tuple[list[Sequence], list[str]]:
 def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str, Any]:
     """Figures of what was learnt."""
     rate, rate_sd, variation, length, length_sd, fps = model.gait_statistics(learned)[:6].tolist()
-    residual = np.sqrt(np.nanmean(learned.residuals[:, :, : len(ANGLES)] ** 2))
+    residual = learned.residuals.rms(columns=slice(len(ANGLES)))
     table = model.sequence_table(learned)
     return {
         "bytes": len(data),

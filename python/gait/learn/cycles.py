@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline
+
+from gait.learn.spool import release, stored
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -14,6 +17,7 @@ Mask = npt.NDArray[np.bool_]
 INTERVALS = 16  # knot intervals per cycle
 PENALTY = 1e-3  # of the second differences, relative to the data's trace
 BRACKET = 0.75  # knot intervals within which an observed sample must lie on both sides
+NEXT = 1.05  # frame intervals that this is at least: at low rates a frame's neighbours are farther away
 OBSERVED = 0.4  # share of entries a cycle must have to be used, of the channels that its sequence has
 END = 0.05  # share of the cycle over which its end levels are estimated
 
@@ -25,7 +29,7 @@ class Cycles:
     Attributes
     ----------
     values : (R, T, M)
-        Channel values, defined where observed.
+        Channel values, defined where observed; on disk, read-only.
     mask : (R, T, M)
         Whether observed.
     ramp : (R, M)
@@ -49,22 +53,35 @@ def slice_cycles(
     Slice k covers frames from offset + (k - 1) period to offset + k period; slices with less than the share
     `observed` of their entries, in the channels that the sequence has, are dropped.
     """
-    rows: list[tuple[Floats, Mask, Floats, int, int]] = []
-    for i, (z, period, offset) in enumerate(zip(signals, periods, offsets, strict=True)):
-        channels = int(np.isfinite(z).any(axis=0).sum())
-        for k in range(int(np.ceil((len(z) - offset) / period)) + 1):
-            u = (np.arange(len(z)) - offset) / period - (k - 1)
-            values, mask = resample(u, z, samples)
-            if channels and mask.sum() >= observed * samples * channels:
+    channels, rest = signals[0].shape[1], list[tuple[Mask, Floats, int, int]]()
+
+    def closed() -> Iterator[Floats]:
+        for i, (z, period, offset) in enumerate(zip(signals, periods, offsets, strict=True)):
+            for k, values, mask in _slices(z, float(period), float(offset), samples, observed):
                 flat, ramp = _close(values, mask)
-                rows.append((flat, mask, ramp, i, k))
-    columns = list(zip(*rows, strict=True)) if rows else [(), (), (), (), ()]
-    values, mask, ramp = (np.array(column) for column in columns[:3])
-    sequence, cycle = (np.array(column, int) for column in columns[3:])
-    return Cycles(values, mask, ramp, sequence, cycle)
+                rest.append((mask, ramp, i, k))
+                yield flat
+            release(z)
+
+    values = stored(closed(), (samples, channels))
+    mask = np.array([row[0] for row in rest], bool).reshape(values.shape)
+    ramp = np.array([row[1] for row in rest], float).reshape(-1, channels)
+    return Cycles(values, mask, ramp, *(np.array([row[k] for row in rest], int) for k in (2, 3)))
 
 
-def resample(u: Floats, z: Floats, samples: int) -> tuple[Floats, Mask]:
+def _slices(
+    z: Floats, period: float, offset: float, samples: int, observed: float
+) -> Iterator[tuple[int, Floats, Mask]]:
+    """Give the slices of one sequence that are used: number, values and mask."""
+    channels = int(np.isfinite(z).any(axis=0).sum())
+    for k in range(int(np.ceil((len(z) - offset) / period)) + 1):
+        u = np.asarray((np.arange(len(z)) - offset) / period - (k - 1), float)
+        values, mask = resample(u, z, samples, 1 / period)
+        if channels and mask.sum() >= observed * samples * channels:
+            yield k, values, mask
+
+
+def resample(u: Floats, z: Floats, samples: int, interval: float = 0.0) -> tuple[Floats, Mask]:
     """Penalised cubic splines of one cycle at phases j / samples.
 
     Parameters
@@ -73,6 +90,8 @@ def resample(u: Floats, z: Floats, samples: int) -> tuple[Floats, Mask]:
         Positions in the cycle, increasing; those a little outside [0, 1) support its ends.
     z : (T, M)
         NaN where missing.
+    interval : float
+        Share of the cycle between two frames.
 
     Returns
     -------
@@ -80,13 +99,15 @@ def resample(u: Floats, z: Floats, samples: int) -> tuple[Floats, Mask]:
     mask : (samples, M)
         True where an observed sample lies near on both sides.
     """
-    near = (u > -1 / INTERVALS) & (u < 1 + 1 / INTERVALS)
+    reach = max(BRACKET / INTERVALS, NEXT * interval)
+    margin = int(np.ceil(reach * INTERVALS))
+    near = (u > -margin / INTERVALS) & (u < 1 + margin / INTERVALS)
     u, z = u[near], z[near]
     grid = np.arange(samples) / samples
     values, mask = np.zeros((samples, z.shape[1])), np.zeros((samples, z.shape[1]), bool)
     if not len(u):
         return values, mask
-    basis, at_grid = _basis(u), _basis(grid)
+    basis, at_grid = _basis(u, margin), _basis(grid, margin)
     seen = np.isfinite(z)
     for columns in _same_columns(seen):
         rows = seen[:, columns[0]]
@@ -94,12 +115,13 @@ def resample(u: Floats, z: Floats, samples: int) -> tuple[Floats, Mask]:
             continue
         x, y = basis[rows], z[rows][:, columns]
         values[:, columns] = at_grid @ np.linalg.solve(x.T @ x + _penalty(x), x.T @ y)
-        mask[:, columns] = _bracketed(grid, u[rows])[:, None]
+        mask[:, columns] = _bracketed(grid, u[rows], reach)[:, None]
     return values, mask
 
 
-def _basis(u: Floats) -> Floats:
-    knots = np.arange(-4, INTERVALS + 5) / INTERVALS
+def _basis(u: Floats, margin: int) -> Floats:
+    """Cubic B-splines (T, n) on the cycle and `margin` intervals to either side of it."""
+    knots = np.arange(-3 - margin, INTERVALS + margin + 4) / INTERVALS
     return np.asarray(BSpline.design_matrix(u, knots, 3).toarray())
 
 
@@ -118,9 +140,8 @@ def _same_columns(seen: Mask) -> list[list[int]]:
     return list(groups.values())
 
 
-def _bracketed(grid: Floats, u: Floats) -> Mask:
-    """Grid points with an observed sample within BRACKET knot intervals on both sides."""
-    reach = BRACKET / INTERVALS
+def _bracketed(grid: Floats, u: Floats, reach: float) -> Mask:
+    """Grid points with an observed sample within reach on both sides."""
     after = np.searchsorted(u, grid, side="left")
     left = grid - u[np.maximum(np.searchsorted(u, grid, side="right") - 1, 0)]
     right = u[np.minimum(after, len(u) - 1)] - grid

@@ -155,9 +155,8 @@ def spectrum(learned: Learned) -> Figure:
 def residuals(learned: Learned) -> Figure:
     """Root mean square of what the components leave of each angle."""
     figure, (axes,) = grid(1, 1, 8, 3.8)
-    squares = learned.residuals[:, :, : len(ANGLES)] ** 2
-    count = np.isfinite(squares).sum(axis=(0, 1))
-    rest = np.degrees(np.sqrt(np.nansum(squares, axis=(0, 1)) / np.maximum(count, 1)))
+    squares, count = learned.residuals.squares.sum(axis=0), learned.residuals.count.sum(axis=0)
+    rest = np.degrees(np.sqrt(squares / np.maximum(count, 1)))[: len(ANGLES)]
     order = sorted(range(len(ANGLES)), key=lambda i: [j in ANGLES[i] for j in JOINT_ORDER].index(True))
     shades = [{"l_": GREY, "r_": BLUE}.get(ANGLES[i][:2], DARK) for i in order]
     axes.bar(np.arange(len(order)), rest[order], color=shades)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +12,7 @@ import numpy.typing as npt
 from gait.errors import UserError
 from gait.learn import align, cycles, fpca, lengths, prior, retarget
 from gait.learn.sequence import Sequence
+from gait.learn.spool import by_rows, release, stored
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
@@ -22,6 +25,27 @@ MOST_COMPONENTS = 16  # the library reads no more
 #: much as the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per
 #: radian).
 ROOT_SCALE = {"root_forward": 1.0, "root_sway": 3.3, "root_height": 3.3}
+
+
+@dataclass
+class Residuals:
+    """What the components leave of the cycles.
+
+    Attributes
+    ----------
+    squares : (R, M)
+        Sum of the squares over the phases observed.
+    count : (R, M)
+        How many these are.
+    """
+
+    squares: Floats
+    count: npt.NDArray[np.intp]
+
+    def rms(self, rows: Any = slice(None), columns: Any = slice(None)) -> float:
+        """Root mean square over all entries of some rows and channels; NaN if there are none."""
+        count = int(self.count[rows][:, columns].sum())
+        return float(np.sqrt(np.sum(self.squares[rows][:, columns]) / count)) if count else float("nan")
 
 
 @dataclass
@@ -66,10 +90,15 @@ class Learned:
         c = self.components
         return np.concatenate([c.mean[None], c.curves * c.sd[:, None, None]])
 
-    @property
-    def residuals(self) -> Floats:
-        """Data minus reconstruction, own units; NaN where not observed, (R, T, M)."""
-        return np.where(self.cycles.mask, self.cycles.values - self.components.reconstruct(), np.nan)
+    @cached_property
+    def residuals(self) -> Residuals:
+        """Data minus reconstruction over the observed phases, own units."""
+        values, mask = self.cycles.values, self.cycles.mask
+        squares = np.empty((len(values), values.shape[2]))
+        for part in by_rows(values):
+            rest = np.where(mask[part], values[part] - self.components.reconstruct(part), 0.0)
+            squares[part] = np.sum(rest**2, axis=1)
+        return Residuals(squares, mask.sum(axis=1))
 
     @property
     def row_subject(self) -> npt.NDArray[np.intp]:
@@ -111,10 +140,11 @@ def fit(
     alignment = align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIPS)
     start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
     alignment.offsets = (alignment.offsets + start * periods) % periods
+    release(*signals)
     rows = cycles.slice_cycles(signals, periods, alignment.offsets, SAMPLES)
     wanted = most_components(len(rows.values), components)
     scale = channel_scale()
-    scaled, held_out = rows.values * scale, np.zeros(0)
+    scaled, held_out = _times(rows.values, scale), np.zeros(0)
     if components == "auto":
         rng = np.random.default_rng(seed)
         wanted, held_out = fpca.choose(scaled, rows.mask, rng, index[rows.sequence], largest=wanted)
@@ -153,7 +183,12 @@ def most_components(cycles: int, wanted: int | str | None) -> int:
 
 def _own_units(c: fpca.Components, scale: Floats) -> fpca.Components:
     """Components of scaled channels in the channels' own units."""
-    return replace(c, mean=c.mean / scale, curves=c.curves / scale, filled=c.filled / scale)
+    return replace(c, mean=c.mean / scale, curves=c.curves / scale, filled=_times(c.filled, 1 / scale))
+
+
+def _times(rows: Floats, scale: Floats) -> Floats:
+    """Put rows (R, T, M) times the scale (M,) of their channels on disk."""
+    return stored((rows[part] * scale for part in by_rows(rows)), rows.shape[1:])
 
 
 def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int) -> Proportions:
@@ -164,8 +199,11 @@ def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects:
 def _bodies(
     sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int
 ) -> list[retarget.Measures | None]:
-    """One body of each subject."""
-    return [sequences[int(np.flatnonzero(index == i)[0])].measures for i in range(subjects)]
+    """One body of each subject: of the recordings, the first that shows most of it."""
+    return [
+        max((s.measures for s, k in zip(sequences, index, strict=True) if k == i), key=retarget.known_parts)
+        for i in range(subjects)
+    ]
 
 
 def heel_strike(curve: Floats, proportions: Proportions) -> float:

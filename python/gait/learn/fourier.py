@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from gait.learn.spool import by_rows
+
 Floats = npt.NDArray[np.float64]
 
 HARMONICS = 19
@@ -21,6 +23,14 @@ def fourier_basis(samples: int, harmonics: int = HARMONICS) -> Floats:
 def encode(curves: Floats, basis: Floats) -> Floats:
     """Curves (n, T, M) to Fourier coefficients (n, B M)."""
     return np.matmul(basis, curves).reshape(len(curves), len(basis) * curves.shape[2])
+
+
+def encode_all(curves: Floats, basis: Floats) -> Floats:
+    """Encode curves (n, T, M) that lie on disk."""
+    coded = np.empty((len(curves), len(basis) * curves.shape[2]))
+    for part in by_rows(curves):
+        coded[part] = encode(curves[part], basis)
+    return coded
 
 
 def decode(coded: Floats, basis: Floats, channels: int) -> Floats:

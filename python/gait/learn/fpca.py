@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.learn.bayes import by_bayes
-from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
+from gait.learn.fourier import HARMONICS, decode, encode_all, fourier_basis
 from gait.learn.impute import Filling, by_svd, column_mean
 from gait.learn.rank import LARGEST, choose
+from gait.learn.singular import right_singular
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -46,9 +47,9 @@ class Components(Filling):
     sd: Floats
     spectrum: Floats
 
-    def reconstruct(self) -> Floats:
+    def reconstruct(self, rows: slice = slice(None)) -> Floats:
         """Rows from their scores, (R, T, M)."""
-        return self.mean + np.einsum("rk,ktm->rtm", self.scores, self.curves)
+        return self.mean + np.einsum("rk,ktm->rtm", self.scores[rows], self.curves)
 
 
 def fit(
@@ -79,9 +80,9 @@ def fit(
     filling = how(
         values, mask, components, basis, column_mean(values, mask) if start is None else start, **options
     )
-    coded = encode(filling.filled, basis)
+    coded = encode_all(filling.filled, basis)
     mean = coded.mean(axis=0)
-    left, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
+    singular, right = right_singular(coded, mean)
     curves = decode(right[:components], basis, channels)
     flat = curves.reshape(len(curves), samples * channels)
     sign = np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(axis=1)])
@@ -89,7 +90,7 @@ def fit(
         **vars(filling),
         mean=decode(mean[None], basis, channels)[0],
         curves=curves * sign[:, None, None],
-        scores=left[:, :components] * singular[:components] * sign,
+        scores=(coded @ right[:components].T - mean @ right[:components].T) * sign,
         sd=singular[:components] / np.sqrt(max(rows - 1, 1)),
         spectrum=singular**2 / max(float(np.sum(singular**2)), 1e-300),
     )

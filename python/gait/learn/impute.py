@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
-from gait.learn.fourier import decode, encode
+from gait.learn.fourier import decode, encode_all
+from gait.learn.singular import right_singular
+from gait.learn.spool import by_rows, stored
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -23,7 +27,7 @@ class Filling:
     Attributes
     ----------
     filled : (R, T, M)
-        The data where observed, the model elsewhere.
+        The data where observed, the model elsewhere; on disk, read-only.
     rmse : list of float
         Data minus model over the observed entries, after each pass.
     objective : list of float
@@ -44,7 +48,10 @@ class Filling:
 def column_mean(values: Floats, mask: Mask) -> Floats:
     """Mean (T, M) over the rows where observed; a line across phases never seen, 0 in channels never seen."""
     count = mask.sum(axis=0)
-    mean = np.where(mask, values, 0).sum(axis=0) / np.maximum(count, 1)
+    total = np.zeros(values.shape[1:])
+    for part in by_rows(values):
+        total += np.where(mask[part], values[part], 0).sum(axis=0)
+    mean = total / np.maximum(count, 1)
     phases = np.arange(len(mean))
     for m in np.flatnonzero((count == 0).any(axis=0) & (count > 0).any(axis=0)):
         seen = np.flatnonzero(count[:, m])
@@ -70,16 +77,33 @@ def by_svd(
     tolerance : float
         Relative decrease of the error at which to stop.
     """
-    filled, channels = np.where(mask, values, start), values.shape[2]
     rmse: list[float] = []
     complete, converged = bool(mask.all()), False
+    filled = completed(values, mask, lambda _: start)
     while not converged and len(rmse) < ITERATIONS:
-        coded = encode(filled, basis)
+        coded = encode_all(filled, basis)
         mean = coded.mean(axis=0)
-        _, vectors = np.linalg.eigh((coded - mean) @ (coded - mean).T)
-        leading = vectors[:, ::-1][:, :components]
-        model = decode(mean + leading @ (leading.T @ (coded - mean)), basis, channels)
-        rmse.append(float(np.sqrt(np.mean((values - model)[mask] ** 2))))
-        filled = np.where(mask, values, model)
+        leading = right_singular(coded, mean)[1][:components]
+        scores = (coded - mean) @ leading.T
+        curves = decode(np.vstack([mean, leading]), basis, values.shape[2])
+        model = partial(_model, curves[0], curves[1:], scores)
+        rmse.append(_rmse(values, mask, model))
+        filled = filled if complete else completed(values, mask, model)
         converged = complete or (len(rmse) > 1 and rmse[-2] - rmse[-1] <= tolerance * rmse[-2])
     return Filling(filled, rmse, list(rmse), rmse[-1], converged)
+
+
+def completed(values: Floats, mask: Mask, model: Callable[[slice], Floats]) -> Floats:
+    """Put the data (R, T, M) on disk, with what `model` gives of a slice of the rows where not observed."""
+    parts = (np.where(mask[part], values[part], model(part)) for part in by_rows(values))
+    return stored(parts, values.shape[1:])
+
+
+def _model(mean: Floats, curves: Floats, scores: Floats, part: slice) -> Floats:
+    """Rows from their scores, (n, T, M)."""
+    return np.asarray(mean + np.tensordot(scores[part], curves, 1))
+
+
+def _rmse(values: Floats, mask: Mask, model: Callable[[slice], Floats]) -> float:
+    total = sum(float(np.sum((values[part] - model(part))[mask[part]] ** 2)) for part in by_rows(values))
+    return float(np.sqrt(total / mask.sum()))

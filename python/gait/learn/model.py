@@ -11,11 +11,12 @@ import numpy.typing as npt
 from gait import blob
 from gait._version import __version__
 from gait.learn.fit import Learned
+from gait.learn.spool import by_rows
 from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 
-MOST_ROWS = 60  # of the table of sequences in META, which would outgrow the curves
+MOST_ROWS = 40  # of the table of sequences in META: five components stay under 100 kB
 GENERATOR = f"gait {__version__}"
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not this training set
 CMU = (
@@ -52,15 +53,16 @@ def channel_statistics(learned: Learned) -> Floats:
     """
     mask, values = learned.cycles.mask, learned.cycles.values
     count = mask.sum(axis=(0, 1))
-    squares = np.where(mask, values - learned.components.reconstruct(), 0.0) ** 2
-    sd = np.sqrt(squares.sum(axis=(0, 1)) / np.maximum(count, 1))
-    least = np.where(mask, values, np.inf).min(axis=(0, 1))
-    largest = np.where(mask, values, -np.inf).max(axis=(0, 1))
+    sd = np.sqrt(learned.residuals.squares.sum(axis=0) / np.maximum(count, 1))
+    least, largest = np.full(len(count), np.inf), np.full(len(count), -np.inf)
+    for part in by_rows(values):
+        np.minimum(least, np.where(mask[part], values[part], np.inf).min(axis=(0, 1)), out=least)
+        np.maximum(largest, np.where(mask[part], values[part], -np.inf).max(axis=(0, 1)), out=largest)
     return np.where(count[:, None] > 0, np.stack([sd, least, largest, learned.static], axis=1), 0.0)
 
 
 def score_statistics(learned: Learned) -> Floats:
-    """SCST (q, 3): singular-value sd, then between- and within-subject sd relative to it (one-way ANOVA)."""
+    """SCST (q, 3): sd of the score, then between- and within-subject sd relative to it (one-way ANOVA)."""
     c = learned.components
     between, within = anova(c.scores / np.maximum(c.sd, 1e-12), learned.row_subject)
     return np.stack([c.sd, between, within], axis=1)
@@ -133,7 +135,7 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
         },
         "cycles": len(c.scores),
         "missing": round(float(1 - learned.cycles.mask.mean()), 3),
-        "variance_explained": _rounded(np.cumsum(c.spectrum)[:8], 3),
+        "variance_explained": _rounded(np.cumsum(c.spectrum)[: len(c.sd)], 3),
         "residual_deg": _rounded(np.degrees(channel_statistics(learned)[: len(ANGLES), 0]), 1),
         "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
     }
@@ -155,12 +157,11 @@ SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")
 
 def sequence_table(learned: Learned) -> list[list[Any]]:
     """Rows of SEQUENCE_COLUMNS; sharpness: peak over median SNR; residual: rms of all angles."""
-    residuals, table = learned.residuals[:, :, : len(ANGLES)], []
+    table = []
     for i, s in enumerate(learned.sequences):
-        own = residuals[learned.cycles.sequence == i]
-        rms = float(np.degrees(np.sqrt(np.nanmean(own**2)))) if own.size else float("nan")
+        rms = learned.residuals.rms(learned.cycles.sequence == i, slice(len(ANGLES)))
         row = [round(1000 * s.period.frames / s.fps), round(s.cycles, 1), round(s.period.sharpness)]
-        table.append([s.name, *row, round(rms, 1) if own.size else None])
+        table.append([s.name, *row, round(float(np.degrees(rms)), 1) if np.isfinite(rms) else None])
     return table
 
 

@@ -131,17 +131,18 @@ def static_spread(filled: Floats, subject: Groups, count: int, metric: Floats) -
 
     Zero if there are fewer than three subjects.
     """
-    left = [
-        _left_over(filled, subject, count, metric, held) for held in np.unique(subject) if subject.max() > 1
-    ]
-    return np.sqrt(np.mean(np.square(left), axis=0)) if left else np.zeros(filled.shape[2])
-
-
-def _left_over(filled: Floats, subject: Groups, count: int, metric: Floats, held: int) -> Floats:
-    """Mean residual (M,) of one subject's cycles after the components of the others."""
-    own = subject == held
-    others = np.unique(subject[~own], return_inverse=True)[1]
-    mean, curves, *_ = components(filled[~own], others, count, metric)
-    rest = filled[own] - mean
-    scores = np.einsum("rtm,qtm->rq", rest @ metric, curves @ metric)
-    return np.asarray((rest - np.einsum("rq,qtm->rtm", scores, curves)).mean(axis=(0, 1)))
+    if subject.max() < 2:
+        return np.zeros(filled.shape[2])
+    basis = fourier_basis(filled.shape[1], HARMONICS)
+    coded, image = _with_images(filled, metric, basis), np.tile(subject, 2)
+    left = []
+    for held in np.unique(subject):
+        weight = np.where(image == held, 0.0, 1 / np.bincount(subject)[image])
+        weight /= weight.sum()
+        mean = weight @ coded
+        right = right_singular(coded, mean, np.sqrt(weight))[1][:count]
+        # The mean over a cycle is its first coefficient, and the residual of the mean that of the cycles.
+        rest = coded[: len(subject)][subject == held].mean(axis=0) - mean
+        rest -= (right @ rest) @ right
+        left.append(rest[: filled.shape[2]] / np.sqrt(filled.shape[1]) @ np.linalg.inv(metric))
+    return np.sqrt(np.mean(np.square(left), axis=0))

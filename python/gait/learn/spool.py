@@ -1,9 +1,11 @@
-"""Arrays kept on disk, so that the signals of a corpus need no memory."""
+"""Arrays kept on disk, so that the signals and cycles of a corpus need no memory."""
 
 from __future__ import annotations
 
 import mmap
 import tempfile
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +13,8 @@ import numpy.typing as npt
 from gait.errors import UserError
 
 Floats = npt.NDArray[np.float64]
+
+ROWS = 64  # cycles that are in memory at a time
 
 
 def no_room(error: OSError) -> UserError:
@@ -62,3 +66,45 @@ class Spool:
             np.frombuffer(pages, float, int(np.prod(shape)), start).reshape(shape)
             for start, shape in self._places
         ]
+
+
+def stored(parts: Iterable[Floats], row: tuple[int, ...]) -> Floats:
+    """Put blocks of rows, one below the other, on disk; row: the shape of one.
+
+    Returns
+    -------
+    rows : (R, ...)
+        Read-only, as the views of a Spool.
+    """
+    with Spool() as spool:
+        for part in parts:
+            spool.put(part)
+        views = spool.views()
+    if not views:
+        return np.zeros((0, *row))
+    pages = _pages(views[0])
+    return np.zeros((0, *row)) if pages is None else np.frombuffer(pages, float).reshape(-1, *row)
+
+
+def by_rows(*arrays: npt.NDArray[Any]) -> Iterator[slice]:
+    """Give slices of ROWS rows of arrays of one length; after each, see `release`."""
+    for first in range(0, len(arrays[0]), ROWS):
+        yield slice(first, first + ROWS)
+        release(*arrays)
+
+
+def release(*arrays: npt.NDArray[Any]) -> None:
+    """Take what lies on disk out of this process's memory until it is read again."""
+    for array in arrays:
+        pages = _pages(array)
+        if pages is not None and hasattr(mmap, "MADV_DONTNEED"):
+            pages.madvise(mmap.MADV_DONTNEED)
+
+
+def _pages(array: npt.NDArray[Any]) -> mmap.mmap | None:
+    """Find the file's pages that an array is a view of; None if it lies in memory."""
+    base: Any = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    base = base.obj if isinstance(base, memoryview) else base
+    return base if isinstance(base, mmap.mmap) else None
