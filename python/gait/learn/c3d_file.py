@@ -51,9 +51,14 @@ def read(path: Path) -> tuple[list[str], Floats, float]:
         ) from None
     if child.returncode:
         words = child.stderr.decode(errors="replace").strip().splitlines()
-        reason = words[-1] if child.returncode > 0 and words else "the reader crashed on it"
+        reason = _first_sentence(words[-1]) if child.returncode > 0 and words else "the reader crashed on it"
         raise UserError(f"{path}: not a readable .c3d ({reason}); export it again")
     return _checked(path, child.stdout)
+
+
+def _first_sentence(words: str) -> str:
+    """Say what is wrong without the library's advice to programmers that follows."""
+    return words.split(". ")[0].rstrip(".")
 
 
 def _checked(path: Path, stored: bytes) -> tuple[list[str], Floats, float]:

@@ -1,7 +1,7 @@
 """The per-file stage on a Dask cluster, in the order of the files.
 
 The workers read the files themselves, so they need the same paths as this machine: a shared file system.
-They also need this package, and the same versions of it, numpy and scipy, or the results would differ.
+They also need this package, and the same versions of it, numpy, scipy and ezc3d, or the results would differ.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ADDRESS = re.compile(r"(tcp://|tls://)?[^/\s]+:\d{1,5}")
 CONNECT = 5.0  # seconds that a scheduler gets to answer and to have a worker
 PATIENCE = 10.0  # seconds between looks at whether there still are workers
 AHEAD = 4  # files in flight per thread of the workers
-SAME = ("gait", "numpy", "scipy")  # packages on which the results depend
+SAME = ("gait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
 
 
 def prepared(paths: Sequence[Path], reading: Reading, address: str) -> Generator[Outcome, None, None]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
+from gait.learn.recording import require_frames
 
 Floats = npt.NDArray[np.float64]
 
@@ -48,7 +49,7 @@ def header(path: Path) -> list[str]:
     UserError
         If the file cannot be read or is empty.
     """
-    return [name.strip() for name in _lines(path)[0]]
+    return [name.strip() for name in _lines(path)[0][1]]
 
 
 def read(path: Path, fps: float | None = None) -> Table:
@@ -61,45 +62,45 @@ def read(path: Path, fps: float | None = None) -> Table:
     UserError
         Naming file, line and remedy.
     """
-    lines = _lines(path)
-    names = [name.strip() for name in lines[0]]
+    (_, first), *rows = _lines(path)
+    names = [name.strip() for name in first]
     if "time" not in names and not fps:
         raise UserError(f"{path}:1: no column 'time'; the header must be frame,time,... (or give --fps)")
     twice = next((name for name in names if name and names.count(name) > 1), None)
     if twice is not None:
         raise UserError(f"{path}:1: column {twice!r} is there twice; remove one")
-    values = np.array([_numbers(row, len(names), path, i) for i, row in enumerate(lines[1:], 2) if any(row)])
-    if len(values) < 3:
-        raise UserError(f"{path}: {len(values)} frames; a recording of a few seconds is needed")
+    values = np.array([_numbers(row, len(names), path, line) for line, row in rows])
+    require_frames(path, len(values))
     if "status" in names:
-        status = [row[names.index("status")].strip() for row in lines[1:] if any(row)]
+        status = [row[names.index("status")].strip() for _, row in rows]
         values[[k for k, word in enumerate(status) if word == LOST]] = np.nan
     if "time" not in names:
         return Table(names, values, float(fps or 0))
-    times = np.array(
-        [_number(row[names.index("time")], path, i) for i, row in enumerate(lines[1:], 2) if any(row)]
-    )
-    place, rate = _places(path, times)
+    times = np.array([_number(row[names.index("time")], path, line) for line, row in rows])
+    place, rate = _places(path, times, [line for line, _ in rows])
     even = np.full((place[-1] + 1, len(names)), np.nan)
     even[place] = values
     return Table(names, even, fps or rate)
 
 
-def _places(path: Path, times: Floats) -> tuple[npt.NDArray[np.intp], float]:
+def _places(path: Path, times: Floats, lines: list[int]) -> tuple[npt.NDArray[np.intp], float]:
     """Frames that rows belong to, and the rate."""
     steps = np.diff(times)
     if not (steps > 0).all():  # also if one is NaN
-        line = int(np.argmin(np.nan_to_num(steps, nan=-1.0) > 0)) + 3
+        line = lines[1 + int(np.argmin(np.nan_to_num(steps, nan=-1.0) > 0))]
         raise UserError(f"{path}:{line}: the times do not increase; correct column 'time'")
     frames = np.maximum(1.0, np.round(steps / np.median(steps)))
     if frames.sum() > LONGEST * len(times):
-        line = int(np.argmax(frames)) + 3
-        raise UserError(f"{path}:{line}: {steps[line - 3]:.3g} s after the row before; cut the file there")
+        jump = int(np.argmax(frames))
+        raise UserError(
+            f"{path}:{lines[1 + jump]}: {steps[jump]:.3g} s after the row before; cut the file there"
+        )
     place = np.concatenate([[0], np.cumsum(frames)]).astype(np.intp)
     return place, float(place[-1] / (times[-1] - times[0]))
 
 
-def _lines(path: Path) -> list[list[str]]:
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Read the header and the rows that are not blank, each with its line number."""
     try:
         raw = path.read_bytes()
     except OSError as error:
@@ -111,14 +112,15 @@ def _lines(path: Path) -> list[list[str]]:
     first = text.split("\n", 1)[0]
     delimiter = max(DELIMITERS, key=first.count)
     try:
-        lines = list(csv.reader(text.splitlines(), delimiter=delimiter))
+        reader = csv.reader(text.splitlines(), delimiter=delimiter)
+        lines = [(reader.line_num, row) for row in reader]
     except csv.Error as error:
         raise UserError(f"{path}: not a .csv ({error}); export it again") from None
-    if not lines or not any(lines[0]):
+    if not lines or not any(lines[0][1]):
         raise UserError(f"{path}: the file is empty; export it again")
     if delimiter == ";":  # where numbers have decimal commas
-        lines[1:] = [[cell.replace(",", ".") for cell in row] for row in lines[1:]]
-    return lines
+        lines[1:] = [(line, [cell.replace(",", ".") for cell in row]) for line, row in lines[1:]]
+    return [lines[0], *((line, row) for line, row in lines[1:] if any(row))]
 
 
 def _numbers(row: list[str], width: int, path: Path, line: int) -> Floats:

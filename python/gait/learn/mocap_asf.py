@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn.recording import Y_UP, Recording, mask_zero_runs
+from gait.learn.recording import Y_UP, Recording, mask_zero_runs, require_frames
 from gait.learn.rotations import from_angles
 
 Floats = npt.NDArray[np.float64]
@@ -238,8 +238,7 @@ def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
         else:
             rows[words[0]].append(_row(words[1:], path, line, len(moving[words[0]].dof)))
     _check_frame(rows, frame, path, line)
-    if frame < 2:
-        raise UserError(f"{path}: {frame} frames; a recording of a few seconds is needed")
+    require_frames(path, frame)
     return {name: np.array(values) for name, values in rows.items() if values}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn.recording import Y_UP, Recording, mask_zero_runs
+from gait.learn.recording import Y_UP, Recording, mask_zero_runs, require_frames
 from gait.learn.rotations import from_angles
 
 Floats = npt.NDArray[np.float64]
@@ -146,8 +146,9 @@ def _motion(words: _Words, lines: list[str], width: int) -> tuple[Floats, float]
     """Rows of channel values (T, width) and frames per second."""
     words.next("MOTION")
     count, interval = int(words.after("FRAMES")), words.after("FRAMETIME")
-    if interval <= 0 or count < 2:
-        raise UserError(f"{words.path}:{words.line}: {count} frames of {interval} s; restore the file")
+    require_frames(words.path, count)
+    if interval <= 0:
+        raise UserError(f"{words.path}:{words.line}: frames of {interval} s; restore the file")
     rows = [(i, line.split()) for i, line in enumerate(lines[words.line :], words.line + 1) if line.strip()]
     if len(rows) < count:
         raise UserError(

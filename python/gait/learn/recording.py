@@ -8,11 +8,27 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait.errors import UserError
+
 Floats = npt.NDArray[np.float64]
 
 Y_UP = np.array(
     [[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]
 )  # x left, y up, z forward (ASF, BVH) to x forward, y left, z up
+
+
+FEWEST = 3  # frames from which speeds are had
+
+
+def require_frames(path: Path, frames: int) -> None:
+    """Refuse a file of hardly any frames, whatever its kind.
+
+    Raises
+    ------
+    UserError
+    """
+    if frames < FEWEST:
+        raise UserError(f"{path}: {frames} frames; a recording of a few seconds is needed")
 
 
 @dataclass

@@ -7,7 +7,7 @@ of neighbours (model-format.md), continuous in time.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -87,6 +87,11 @@ def measure(body: Body) -> Measures:
         slope=np.arcsin(np.clip(rise / foot, -1, 1)),
         sole=parts["rise"] + BALL * stature,
     )
+
+
+def known_parts(m: Measures | None) -> int:
+    """Count the lengths of a body that are known; 0 of none."""
+    return 0 if m is None else sum(int(np.isfinite(getattr(m, part.name)).sum()) for part in fields(m))
 
 
 def mean(values: Floats) -> float:

@@ -120,12 +120,13 @@ def channels(body: Body, measures: Measures, period: float) -> tuple[Floats, Flo
         root_forward ... root_yaw: statures per stride, statures, statures, radians; NaN where the pelvis is
         not seen.
     heading : (T,)
-        Direction of travel, radians; before the pelvis is first seen and after the last time, as then.
+        Direction of travel, radians; before the pelvis is first seen and after the last time, as then.  NaN
+        if it is not seen.
     """
     path, frames = body.joints["pelvis"], body.frames
     seen = np.isfinite(path[:, 0])
     if seen.sum() < 3:
-        return np.full((frames, 6), np.nan), np.zeros(frames)
+        return np.full((frames, 6), np.nan), np.full(frames, np.nan)
     ground = _ground(body, measures.stature)
     smooth, velocity, fitted = _smooth_path(path[:, :2], period)
     first, last = np.flatnonzero(seen)[[0, -1]]
