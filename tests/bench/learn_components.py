@@ -13,7 +13,7 @@ import table
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import learn_cases as cases
 
-from gait.learn import fit, fpca
+from gait.learn import fit, fpca, rank
 from gait.learn.model import anova
 from gait.learn.sequence import load
 from gait.progress import progress
@@ -143,8 +143,8 @@ def _numbers() -> Iterator[Row]:
     by_blocks, by_people = [], []
     for seed in range(SEEDS):
         case = cases.people(_rng(13, seed))
-        by_blocks.append(fpca.choose(case.values, case.mask, _rng(14, seed))[0])
-        by_people.append(fpca.choose(case.values, case.mask, _rng(14, seed), case.subject)[0])
+        by_blocks.append(rank.choose(case.values, case.mask, _rng(14, seed))[0])
+        by_people.append(rank.choose(case.values, case.mask, _rng(14, seed), case.subject)[0])
     for name, counts in (("blocks held out", by_blocks), ("people held out", by_people)):
         yield _row("auto", f"5 modes, {name}", "fewest components", min(counts), 6, 4)
         yield _row("auto", f"5 modes, {name}", "most components", max(counts), 6, 4)
@@ -160,9 +160,9 @@ def _recorded(mocap: Path) -> list[Row]:
     values, mask = learned.cycles.values * learned.scale, learned.cycles.mask
     rows: list[Any] = []
     for name, groups in (("blocks held out", None), ("people held out", learned.row_subject)):
-        count, errors = fpca.choose(values, mask, np.random.default_rng(1), groups)
+        count, errors = rank.choose(values, mask, np.random.default_rng(1), groups)
         where = f"{len(files)} walks of CMU, {name}"
         rows.append(("auto", where, "components", count, "", ""))
-        for q in (0, 2, 5, 8, fpca.LARGEST):
+        for q in (0, 2, 5, 8, rank.LARGEST):
             rows.append(("auto", where, f"RMSE with {q}, degrees", float(np.degrees(errors[q])), "", ""))
     return rows

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import align, cycles, fpca, lengths, prior, retarget
+from gait.learn import align, cycles, fpca, lengths, prior, rank, retarget
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
@@ -147,7 +147,7 @@ def fit(
     scaled, held_out = _times(rows.values, scale), np.zeros(0)
     if components == "auto":
         rng = np.random.default_rng(seed)
-        wanted, held_out = fpca.choose(scaled, rows.mask, rng, index[rows.sequence], largest=wanted)
+        wanted, held_out = rank.choose(scaled, rows.mask, rng, index[rows.sequence], largest=wanted)
     model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = prior.joint_metric(model.mean, proportions)
@@ -173,7 +173,7 @@ def most_components(cycles: int, wanted: int | str | None) -> int:
     if isinstance(wanted, int):
         least = wanted
     else:
-        least, wanted = 1, min(fpca.LARGEST if wanted == "auto" else DEFAULT_COMPONENTS, allowed)
+        least, wanted = 1, min(rank.LARGEST if wanted == "auto" else DEFAULT_COMPONENTS, allowed)
     if allowed < least:
         what = "1 component" if least == 1 else f"{least} components"
         remedy = "add recordings" if allowed < 1 else f"add recordings or ask for {allowed} at most"

@@ -14,13 +14,10 @@ import numpy.typing as npt
 from gait.learn.bayes import by_bayes
 from gait.learn.fourier import HARMONICS, decode, encode_all, fourier_basis
 from gait.learn.impute import Filling, by_svd, column_mean
-from gait.learn.rank import LARGEST, choose
 from gait.learn.singular import right_singular
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
-
-__all__ = ["HARMONICS", "LARGEST", "METHODS", "Components", "choose", "fit"]
 
 METHODS = {"bayes": by_bayes, "paper": by_svd}
 
