@@ -28,7 +28,7 @@ from gait import blob
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
-from gait.learn import fit, marker_map, model, sources
+from gait.learn import fit, marker_map, model, sources, subjects
 from gait.learn.reading import Reading
 from gait.learn.sequence import Sequence
 from gait.learn.stage import one_thread
@@ -38,6 +38,7 @@ from gait.skeleton import ANGLES
 NAME = "learn"
 HELP = "learn a cyclic model from motion capture"
 MOST_LINES = 20  # about files left out
+MOST_NAMES = 8  # of subjects
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,17 +52,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the motion is called; walk leaves out runs and the reverse (walk)",
     )
     parser.add_argument(
+        "--subjects",
+        choices=subjects.RULES,
+        default=subjects.RULES[0],
+        help="which files are of one person. prefix: those whose names begin alike up to '_'. folder: those "
+        "of one folder. file: each alone. auto (the default): prefix; but folder for files without '_', and "
+        "for all if one prefix is in several folders, such as Anna/walk_01 and Ben/walk_01",
+    )
+    parser.add_argument(
         "--components",
         type=_components,
         metavar="auto|N",
-        help=f"how many, 1 to {fit.MOST_COMPONENTS}; auto: by held-out data "
-        f"({fit.DEFAULT_COMPONENTS}, fewer with fewer than {fit.DEFAULT_COMPONENTS + 2} cycles)",
+        help="in how many ways the model can differ from the mean walk. N: so many, from 1 to "
+        f"{fit.MOST_COMPONENTS}. auto: as many as describe data that were held out best. Without the option "
+        f"{fit.DEFAULT_COMPONENTS}, or two less than there are cycles if that is fewer",
     )
     parser.add_argument(
         "--prior",
         choices=fit.KINDS,
         default=fit.KINDS[0],
-        help="paper: components of the recorded cycles alone, one body for all (people: reaches others)",
+        help="people (the default): also allow for people who were not recorded, with lengths of limbs and "
+        "postures of their own. paper: only what the recorded cycles show, and one body for everybody",
     )
     parser.add_argument(
         "--exclude",
@@ -160,7 +171,9 @@ def _read(args: argparse.Namespace) -> tuple[list[Sequence], list[str]]:
     )
     jobs = args.jobs or len(os.sched_getaffinity(0))
     with progress("reading motion", len(files), args.quiet) as update:
-        sequences, refused = sources.load_all(files, reading, update, jobs=jobs, dask=args.dask)
+        sequences, refused = sources.load_all(
+            files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects
+        )
     if not args.quiet:
         for line in refused[:MOST_LINES]:
             print(f"left out: {line}", file=sys.stderr)
@@ -222,7 +235,8 @@ def _text(path: str, s: dict[str, Any]) -> str:
     explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
     left = f"; {_count(len(s['left_out']), 'file')} left out" if s["left_out"] else ""
     lines = [
-        f"{_count(len(s['sequences']), 'sequence')} of {_count(len(s['subjects']), 'subject')}, "
+        f"{_count(len(s['sequences']), 'sequence')} of {_count(len(s['subjects']), 'subject')} "
+        f"({_listed(s['subjects'])}), "
         f"{_count(s['cycles'], 'cycle')}{left}",
         f"{s['stride_hz'][0]:.2f} strides/s of {s['stride_length_statures'][0]:.2f} statures",
         f"{_count(s['components'], 'component')}: {explained} % of the variance; "
@@ -230,6 +244,11 @@ def _text(path: str, s: dict[str, Any]) -> str:
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
     ]
     return "\n".join(lines)
+
+
+def _listed(names: list[str]) -> str:
+    """Name the first few."""
+    return " ".join(names[:MOST_NAMES]) + (" ..." if len(names) > MOST_NAMES else "")
 
 
 def _count(number: int, what: str) -> str:

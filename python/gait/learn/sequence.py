@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import activity, period, readers, retarget, root, trim, verdict
+from gait.learn import activity, period, readers, retarget, root, subjects, trim, verdict
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body
 from gait.learn.reading import DEFAULT, Reading
@@ -75,11 +75,6 @@ class _Motion:
     root: Floats | None = None
 
 
-def subject_of(path: Path) -> str:
-    """Name the subject: the part of the file's stem before '_', else the folder."""
-    return path.stem.split("_")[0] if "_" in path.stem else path.parent.name
-
-
 def level_body(path: Path, reading: Reading = DEFAULT, kept: tuple[int, int] | None = None) -> Body:
     """Read a recording's joints, on a level floor, with the pelvis axes in their standard place.
 
@@ -100,7 +95,7 @@ def level_body(path: Path, reading: Reading = DEFAULT, kept: tuple[int, int] | N
 
 
 def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
-    """Read and prepare one file.
+    """Read and prepare one file; it is named as if it were alone.
 
     Raises
     ------
@@ -121,8 +116,8 @@ def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
     if not judged.accepted:
         raise _refused(path, reading.activity, judged.reason)
     return Sequence(
-        name=path.stem if "_" in path.stem else f"{path.parent.name}/{path.stem}",
-        subject=subject_of(path),
+        name=subjects.names([path])[0],
+        subject=subjects.subjects([path])[0],
         source=path,
         fps=read.fps,
         measures=motion.measures,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gait.errors import UserError
-from gait.learn import cluster, pool
+from gait.learn import cluster, pool, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import DEFAULT, Reading
 from gait.learn.sequence import Sequence
@@ -61,6 +61,7 @@ def load_all(
     *,
     jobs: int = 1,
     dask: str | None = None,
+    people: str = "auto",
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
 
@@ -75,6 +76,8 @@ def load_all(
         Processes at most.
     dask : str, optional
         Address of the scheduler of a Dask cluster that shall do it.
+    people : one of subjects.RULES
+        Which files are of one person.
 
     Raises
     ------
@@ -83,12 +86,13 @@ def load_all(
     """
     paths = [path for path, _ in files]
     outcomes = cluster.prepared(paths, reading, dask) if dask else pool.prepared(paths, reading, jobs)
+    names, persons = subjects.names(paths), subjects.subjects(paths, people)
     sequences, refused = [], []
     with closing(outcomes), Spool() as spool:
         for i, outcome in enumerate(outcomes):
             if not isinstance(outcome, UserError):
                 spool.put(outcome.channels)
-                sequences.append(replace(outcome, channels=NOT_YET))
+                sequences.append(replace(outcome, name=names[i], subject=persons[i], channels=NOT_YET))
             elif files[i][1]:
                 refused.append(str(outcome))
             else:
