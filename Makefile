@@ -196,7 +196,7 @@ $(PEERS): tests/bench/requirements-peers.txt | $(READY)
 	    $(@D)/bin/pip install --quiet --disable-pip-version-check -r $< && touch $@ || \
 	    { rm -rf $(@D); echo 'eval-learn: other packages cannot be installed and are left out' >&2; }
 
-eval-learn: setup $(PEERS) ## learning beside other packages: tests/bench/results/learn.md
+eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/results/learn.md
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------

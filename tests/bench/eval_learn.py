@@ -3,15 +3,18 @@
 
     make eval-learn
 
-Each part is a script of its own that publishes tables (table.py); a part that fails is named at the end.
+Each part is a script of its own that publishes tables (table.py) and fails if a bound is missed.  All parts
+are run; those that fail are named in learn.md and at the end.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import table
@@ -20,8 +23,8 @@ from facts import facts
 from gait.files import replacing
 
 HERE = Path(__file__).resolve().parent
-PARTS = ("learn_period.py", "learn_impute.py", "learn_floor.py")
-WITH_MOCAP = ("learn_impute.py", "learn_floor.py")  # parts that want the folder of walks as argument
+PARTS = ("learn_period.py", "learn_impute.py", "learn_floor.py", "learn_speed.py")
+WITH_MOCAP = PARTS[1:]  # parts that want the folder of walks as argument
 JOINED = "learn.md"
 
 
@@ -30,24 +33,43 @@ def main() -> int:
     parser.add_argument("mocap", type=Path, help="folder of .amc walks")
     parser.add_argument("--only", choices=PARTS, action="append", help="run this part only (may be repeated)")
     args = parser.parse_args()
-    begun, tables, failed = time.perf_counter(), [], []
+    tables: list[Path] = []
+    missed: list[str] = []
+    took: list[str] = []
     for part in args.only or PARTS:
         print(f"== {part}", flush=True)
-        before = _stamps()
+        before, begun = _stamps(), time.perf_counter()
         command = [sys.executable, str(HERE / part), *([str(args.mocap)] if part in WITH_MOCAP else [])]
-        if subprocess.run(command, check=False).returncode:
-            failed.append(part)
+        code = subprocess.run(command, check=False).returncode
+        took.append(f"{part} {time.perf_counter() - begun:.0f} s")
         fresh = [path for path, stamp in _stamps().items() if before.get(path) != stamp]
         tables = [path for path in tables if path not in fresh] + fresh
+        if code:
+            missed.append(f"{part} ({'a bound is missed' if fresh else 'no table: run it by itself'})")
     if not args.only:
-        took = f"Took {time.perf_counter() - begun:.0f} s."
-        head = ["# Evaluation of learning", facts("make eval-learn"), took]
-        head += [f"**Failed: {', '.join(failed)}.**"] if failed else []
+        head = ["# Evaluation of learning", facts("make eval-learn"), f"Took: {', '.join(took)}."]
+        head += [f"**Failed: {', '.join(missed)}.**"] if missed else []
+        pages = [*head, _summary(tables), *[t.read_text().strip() for t in tables]]
         with replacing(table.RESULTS / JOINED) as path:
-            path.write_text("\n\n".join([*head, *[t.read_text().strip() for t in tables]]) + "\n")
-    if failed:
-        print(f"eval-learn: failed: {', '.join(failed)}; run that script by itself", file=sys.stderr)
-    return bool(failed)
+            path.write_text("\n\n".join(pages) + "\n")
+    if missed:
+        print(f"eval-learn: failed: {', '.join(missed)}", file=sys.stderr)
+    return bool(missed)
+
+
+def _summary(tables: list[Path]) -> str:
+    """Bounds kept and missed by measure, from the tables that have a column `met`."""
+    counts: dict[str, Counter[str]] = {}
+    for path in tables:
+        with path.with_suffix(".csv").open(newline="") as file:
+            for row in csv.DictReader(file):
+                name = row.get("measure") or path.stem.removeprefix("learn_")
+                if row.get("met") in ("yes", "NO"):
+                    counts.setdefault(name, Counter())[row["met"]] += 1
+    order = sorted(counts, key=lambda name: (name[0] != "L", int(name[1:]) if name[0] == "L" else 0))
+    cells = [[name, str(counts[name]["yes"]), str(counts[name]["NO"])] for name in order]
+    head = ["measure", "bounds kept", "missed"]
+    return "## Bounds by measure\n\n" + table.markdown(head, cells, [False, True, True])
 
 
 def _stamps() -> dict[Path, int]:

@@ -41,6 +41,7 @@ JOINTS, ANGLES = "joints", "angles"  # what the projection makes small
 PROJECT: dict[str, Project] = {JOINTS: floor_fit.in_joints, ANGLES: floor_fit.in_angles}
 BASELINE = "paper"
 OURS_NAME = "libgait"
+GOAL = 25.0  # per cent below the paper's model
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,9 @@ CASES = [
     *(Case(name, SHIPPED, JOINTS) for name in (BASELINE, OURS_NAME)),
     *(Case(name, body, ANGLES) for body in (MEAN, SHIPPED) for name in (BASELINE, OURS_NAME)),
 ]
+#: The comparison that the goal is judged by: like for like, and nothing but the models differs.
+FAIR = Case(OURS_NAME, MEAN, JOINTS)
+PAPERS_WAY = Case(BASELINE, MEAN, ANGLES)
 MEAN_CYCLE, EXACT = Case("own mean cycle", OWN, JOINTS), Case("own angles, every frame", OWN, "none")
 
 NOTE = """\
@@ -72,7 +76,12 @@ Mean distance of 14 joints after alignment of the pelvis, mm, averaged over a su
   (`generic_proportions`), which these recordings do not know, so that both models are far off.
 - projection: *joints*, nonlinear least squares of the joints, the best the model can do; *angles*, least
   squares of the angles as in the paper, then of the joints for the lengths.
-- less: median below that of the paper's model with the same body and projection.
+- less: median below that of the paper's model with the same body and projection; wanted: {goal:g} %.
+
+**The goal of {goal:g} % is {verdict}** where it is judged, with the mean body of the learners and joints
+projected for both models: {fair:.1f} % less.  With the body as shipped it is {shipped:.1f} %.  The best
+description by libgait (joints) against the paper's model projected the paper's way (angles), same body:
+{ours:.1f} against {papers:.1f} mm, {way:.1f} %.
 """
 
 Result = dict[Case, list[floor_fit.Found]]
@@ -130,30 +139,60 @@ def own_cycle(s: Sequence) -> Sections:
     return {"CURV": mean[None], **default_skeleton(retarget.own_proportions(s.measures)).sections()}
 
 
-def rows_of(found: dict[str, Result]) -> Iterable[list[Any]]:
+def per_subject(found: dict[str, Result], case: Case) -> list[float]:
+    """Mean distances of the subjects' walks, mm."""
+    return [float(np.mean([f.joints_mm for f in result[case]])) for result in found.values()]
+
+
+def less(medians: dict[Case, float], case: Case, base: Case | None = None) -> float:
+    """Per cent below the paper's model with the same body and projection, or below another case."""
+    return 100 * (1 - medians[case] / medians[base or Case(BASELINE, case.body, case.projection)])
+
+
+def rows_of(found: dict[str, Result], medians: dict[Case, float]) -> Iterable[list[Any]]:
     """Cells of the table."""
-    medians: dict[Case, float] = {}
-    for case in [*CASES, MEAN_CYCLE, EXACT]:
-        each = [float(np.mean([f.joints_mm for f in result[case]])) for result in found.values()]
+    shape = {
+        BASELINE: f"{PAPER}",
+        OURS_NAME: f"{OURS} + {MOST - OURS}",
+        **dict.fromkeys(STEPS, f"{MOST}"),
+    }
+    for case, median in medians.items():
         angles = [np.mean([f.angles_deg for f in result[case]]) for result in found.values()]
-        medians[case] = float(np.median(each))
-        base = medians.get(Case(BASELINE, case.body, case.projection))
-        less = None if base is None or case.model == BASELINE else f"{100 * (1 - medians[case] / base):.1f} %"
-        shape = {
-            BASELINE: f"{PAPER}",
-            OURS_NAME: f"{OURS} + {MOST - OURS}",
-            **dict.fromkeys(STEPS, f"{MOST}"),
-        }
+        compared = case.model not in (BASELINE, MEAN_CYCLE.model, EXACT.model)
+        judged = case.model == OURS_NAME
         yield [
             case.model,
             shape.get(case.model),
             case.body,
             case.projection,
-            *(f"{value:.1f}" for value in each),
-            f"{medians[case]:.1f}",
-            less,
+            *(f"{value:.1f}" for value in per_subject(found, case)),
+            f"{median:.1f}",
+            f"{less(medians, case):.1f} %" if compared else None,
+            f">= {GOAL:g} %" if judged else None,
+            ("yes" if less(medians, case) >= GOAL else "NO") if judged else None,
             None if case == EXACT else f"{float(np.median(angles)):.1f}",
         ]
+
+
+def publish(found: dict[str, Result], walks: int) -> bool:
+    """Publish the table; False if the goal is missed where it is judged."""
+    medians = {case: float(np.median(per_subject(found, case))) for case in [*CASES, MEAN_CYCLE, EXACT]}
+    fair = less(medians, FAIR)
+    note = NOTE.format(
+        walks=walks,
+        subjects=len(found),
+        goal=GOAL,
+        verdict="reached" if fair >= GOAL else "missed",
+        fair=fair,
+        shipped=less(medians, Case(OURS_NAME, SHIPPED, JOINTS)),
+        ours=medians[FAIR],
+        papers=medians[PAPERS_WAY],
+        way=less(medians, FAIR, PAPERS_WAY),
+    )
+    columns = ["model", "dimensions", "body", "projection", *found, "median", "less", "wanted", "met"]
+    title = "Floor under unseen walkers, mm"
+    table.publish("learn_floor", title, [*columns, "angles, deg"], rows_of(found, medians), note)
+    return fair >= GOAL
 
 
 def main() -> int:
@@ -178,10 +217,7 @@ def main() -> int:
             for subject, result in pool.map(hold_out, [sequences] * len(subjects), subjects):
                 found[subject] = result
                 update(len(found))
-    columns = ["model", "dimensions", "body", "projection", *subjects, "median", "less", "angles, deg"]
-    note = NOTE.format(walks=len(sequences), subjects=len(subjects))
-    table.publish("learn_floor", "Floor under unseen walkers, mm", columns, rows_of(found), note)
-    return 0
+    return 0 if publish(found, len(sequences)) else 1
 
 
 def _load(path: Path) -> Sequence:

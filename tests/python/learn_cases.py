@@ -132,15 +132,26 @@ def drifting(rng, sequences=12, rise=6.0):
     return cycles.slice_cycles(signals, np.array(periods), np.array(offsets), g.GRID)
 
 
-def seam(curves):
-    """Worst step across the seam over the larger of the median step and its neighbours, per derivative."""
-    worst = 0.0
-    for _ in range(3):
+def seams(curves, neighbours=True):
+    """Worst step across the seam over the usual step, for curves (T, M) and their first two differences (3,).
+
+    The usual step is the median, as in the measure's definition; with `neighbours` no less than the steps
+    beside the seam, for where a smooth curve is steep at phase 0 the median alone tells nothing of a jump.
+    """
+    worst = np.zeros(3)
+    for order in range(3):
         step = np.abs(np.diff(curves, axis=0, append=curves[:1]))
-        usual = np.maximum(np.median(step, axis=0), np.maximum(step[-2], step[0]))
-        worst = max(worst, float(np.max(step[-1] / usual)))
+        usual = np.median(step, axis=0)
+        if neighbours:
+            usual = np.maximum(usual, np.maximum(step[-2], step[0]))
+        worst[order] = np.max(step[-1] / usual)
         curves = np.diff(curves, axis=0, append=curves[:1])
     return worst
+
+
+def seam(curves):
+    """Worst of `seams`."""
+    return float(np.max(seams(curves)))
 
 
 def principal_angles(modes, curves):

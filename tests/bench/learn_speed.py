@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""`gait learn` as a whole process: seconds, memory, and whether the model is always the same (L14).
+
+.venv/bin/python tests/bench/learn_speed.py ../shared/data/mocap/cmu_walk
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import table
+
+from gait import blob, skeleton
+from gait.errors import UserError
+from gait.model import Model
+from gait.progress import progress
+from gait.state import State
+
+RUNS, JOBS = 3, (1, 2)
+SECONDS = 20  # wanted on two cores
+POSES = 1000  # on which C and Python are compared
+COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
+Row = tuple[str, str, str, float | int, str, str]
+
+
+def learn(mocap: Path, jobs: int, model: Path) -> tuple[float, float]:
+    """Seconds of a run and the memory of its largest process, MB."""
+    command = ["-m", "gait", "learn", str(mocap), "-o", str(model), "--jobs", str(jobs), "--quiet"]
+    begun = time.perf_counter()
+    run = subprocess.Popen([sys.executable, *command], stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(run.pid, 0)
+    seconds = time.perf_counter() - begun
+    run.returncode = os.waitstatus_to_exitcode(status)
+    if run.returncode:
+        raise subprocess.CalledProcessError(run.returncode, run.args)
+    return seconds, usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def difference(path: Path) -> float:
+    """Largest difference of an angle between C and Python, radians, over phases, mean and components."""
+    sections, rng = blob.read(path), np.random.default_rng(14)
+    model, components, worst = Model(path), len(sections["CURV"]) - 1, 0.0
+    for k in range(POSES):
+        phase, scores = float(rng.uniform()), np.eye(1 + components)[k % (1 + components), 1:]
+        _, found = model.pose(State(phase=phase, stride_hz=0.9, stature=1.7, coef=scores))
+        known = skeleton.curves(sections, [phase], scores[None])[0, : len(found)]
+        worst = max(worst, float(np.max(np.abs(found - known))))
+    return worst
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("source", type=Path, help="folder of .amc walks")
+    args = parser.parse_args()
+    walks = len(list(args.source.rglob("*.amc")))
+    if not walks:
+        print(f"learn_speed: {args.source}: no .amc files; name the folder of walks", file=sys.stderr)
+        return 1
+    rows: list[Row] = []
+    digests = set()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        progress("learning", RUNS * len(JOBS), False) as update,
+    ):
+        model = Path(folder) / "walk.gait"
+        for k, jobs in enumerate(JOBS):
+            found = []
+            for run in range(RUNS):
+                found.append(learn(args.source, jobs, model))
+                digests.add(hashlib.sha256(model.read_bytes()).hexdigest())
+                update(k * RUNS + run + 1)
+            seconds, memory = np.median(found, axis=0)
+            case, met = f"{walks} walks, --jobs {jobs}", "yes" if seconds < SECONDS else "NO"
+            rows.append(("speed", case, "wall clock, s", float(seconds), f"< {SECONDS}", met))
+            rows.append(("speed", case, "memory of the largest process, MB", float(memory), "", ""))
+        worst = difference(model)
+    case, same = f"{RUNS * len(JOBS)} runs, --jobs {' and '.join(map(str, JOBS))}", len(digests)
+    rows.append(("L14", case, "different files", same, "1", "yes" if same == 1 else "NO"))
+    case, met = f"{POSES} poses, mean and each component", "yes" if worst <= 1e-5 else "NO"
+    rows.append(("L14", case, "C less Python, radians", worst, "<= 1e-5", met))
+    table.publish(
+        "learn_speed",
+        "Speed and sameness of gait learn (L14)",
+        COLUMNS,
+        rows,
+        f"`gait learn` from start to end of the process, median of {RUNS} runs, nothing set aside for it on "
+        "the machine. Two machines have not been compared; the model is rounded to a millionth so that the "
+        "last bits of their algebra do not show.",
+    )
+    return 0 if all(row[5] != "NO" for row in rows) else 1
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except UserError as error:
+        sys.exit(f"learn_speed: {error}")
