@@ -257,7 +257,7 @@ def main() -> int:
         rows,
         "Generator G1 (tests/python/gait_generator.py). L1: 5 degrees of noise, 10 % missing in blocks; the "
         "bound is Cramer and Rao's. The largest error wanted is below 0.5 frames; but where the bound is "
-        "above 0.125 frames (p = 240.2, T = 600: 2.5 cycles) no method can keep that, so four times the bound is. "
+        "above 0.125 frames (p = 240.2, T = 600: 2.5 cycles) no method can keep that, so four times it. "
         "L2: random style, 3 degrees, 10 % missing. L5: eight walkers each, 3 degrees, styles of 0, "
         "2 and 4; an objective rises if any pass ends above the one before by more than rounding (1e-9). L6: "
         "the constant is added to the phases at which the alignment begins.",
