@@ -9,6 +9,7 @@ not support shrink to nothing, so too many of them hurt little.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,9 @@ import numpy.typing as npt
 from gait.learn.accelerate import Mixer
 from gait.learn.belief import Belief, divergence, mixed, smoother, with_prior, without_weakest
 from gait.learn.fourier import decode, encode
-from gait.learn.impute import Filling
+from gait.learn.impute import Filling, completed
+from gait.learn.singular import right_singular
+from gait.learn.spool import by_rows
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -40,7 +43,6 @@ class Rows:
         Posterior covariances.
     curves : (1 + q, T M)
         The mean and the components over the cycle.
-    model : (R, T M)
     bound : float
         Lower bound of the log-likelihood of the observed entries.
     """
@@ -48,8 +50,16 @@ class Rows:
     scores: Floats
     covariance: Floats
     curves: Floats
-    model: Floats
     bound: float
+
+    @property
+    def model(self) -> Floats:
+        """All rows, (R, T M)."""
+        return self.some(slice(None))
+
+    def some(self, part: slice) -> Floats:
+        """Give some rows of the model, (n, T M)."""
+        return self.curves[0] + self.scores[part] @ self.curves[1:]
 
 
 class Problem:
@@ -58,10 +68,16 @@ class Problem:
     def __init__(self, values: Floats, mask: Mask, basis: Floats) -> None:
         self.rows, self.shape = len(values), values.shape[1:]
         self.basis = basis
-        self.seen = mask.reshape(self.rows, -1).astype(float)
-        self.values = np.where(mask, values, 0.0).reshape(self.rows, -1)
-        self.observed = float(self.seen.sum())
-        self.least = LEAST_NOISE * float(np.sum(self.values**2)) / max(self.observed, 1.0) + 1e-30
+        self.values, self.mask = values.reshape(self.rows, -1), mask.reshape(self.rows, -1)
+        self.observed = float(mask.sum())
+        squares = sum(float(np.sum(known**2)) for _, known, _ in self.parts())
+        self.least = LEAST_NOISE * squares / max(self.observed, 1.0) + 1e-30
+
+    def parts(self) -> Iterator[tuple[slice, Floats, Floats]]:
+        """Give blocks of rows: which, their data (n, T M), 0 where missing, and 1 where seen, else 0."""
+        for part in by_rows(self.values):
+            mask = self.mask[part]
+            yield part, np.where(mask, self.values[part], 0.0), mask.astype(float)
 
     def encode(self, flat: Floats) -> Floats:
         """Curves (n, T M) to coefficients (n, P)."""
@@ -73,18 +89,29 @@ class Problem:
 
     def rmse(self, rows: Rows) -> float:
         """Root mean square of data minus model over the observed entries."""
-        return float(np.sqrt(np.sum((self.seen * rows.model - self.values) ** 2) / self.observed))
+        total = sum(float(np.sum((seen * rows.some(p) - known) ** 2)) for p, known, seen in self.parts())
+        return float(np.sqrt(total / self.observed))
+
+    def change(self, before: Rows, after: Rows) -> float:
+        """Root mean square of the change of the model over all entries."""
+        parts = by_rows(self.values)
+        total = sum(float(np.sum((after.some(part) - before.some(part)) ** 2)) for part in parts)
+        return float(np.sqrt(total / self.values.size))
 
     def begin(self, start: Floats, components: int) -> Belief:
         """Belief from the decomposition of the data filled with `start` (T, M)."""
-        filled = self.values + (1 - self.seen) * start.ravel()
-        coded, components = self.encode(filled), min(components, self.rows - 1)
+        components = min(components, self.rows - 1)
+        coded = np.empty((self.rows, len(self.basis) * self.shape[1]))
+        for part, known, seen in self.parts():
+            coded[part] = self.encode(known + (1 - seen) * start.ravel())
         mean = coded.mean(axis=0)
-        _, singular, right = np.linalg.svd(coded - mean, full_matrices=False)
-        singular, right = singular[:components], right[:components]
+        singular, right = (found[:components] for found in right_singular(coded, mean))
         loadings = right * (singular / np.sqrt(max(self.rows - 1, 1)))[:, None]
-        rest = np.sum((filled - self.decode(mean[None])) ** 2) - np.sum(singular**2)
-        noise = max(float(rest) / filled.size, self.least)
+        curve = self.decode(mean[None])
+        rest = -float(np.sum(singular**2))
+        for _, known, seen in self.parts():
+            rest += float(np.sum((known + (1 - seen) * start.ravel() - curve) ** 2))
+        noise = max(rest / self.values.size, self.least)
         spread = np.tile(noise / self.rows * np.eye(len(right)), (len(self.basis), 1, 1))
         prior = np.ones(len(right)), np.ones(len(self.basis))
         return with_prior(Belief(np.vstack([mean, loadings]), spread, *prior, noise))
@@ -94,30 +121,36 @@ class Problem:
         q = len(belief.precision)
         curves = self.decode(belief.loadings)
         mean, parts = curves[0], curves[1:]
-        gram = (self.seen @ _products(parts).T).reshape(self.rows, q, q)
-        system = gram + self.shape[1] * belief.spread.sum(axis=0) + belief.noise * np.eye(q)
+        products, squares = _products(parts).T, 0.0
+        gram, pull = np.empty((self.rows, q * q)), np.empty((self.rows, q))
+        for part, known, seen in self.parts():
+            off = known - seen * mean
+            squares += float(np.sum(off**2))
+            gram[part], pull[part] = seen @ products, off @ parts.T
+        around = self.shape[1] * belief.spread.sum(axis=0) + belief.noise * np.eye(q)
+        system = gram.reshape(self.rows, q, q) + around
         inverse = np.linalg.inv(system)
-        off = self.values - self.seen * mean
-        pull = off @ parts.T
         scores = np.einsum("rkl,rl->rk", inverse, pull)
-        fit = float(np.sum(off**2) - np.sum(pull * scores)) / belief.noise
+        fit = (squares - float(np.sum(pull * scores))) / belief.noise
         volume = float(np.sum(np.linalg.slogdet(system)[1])) - self.rows * q * np.log(belief.noise)
         bound = -0.5 * (self.observed * np.log(2 * np.pi * belief.noise) + volume + fit)
         bound -= divergence(belief)
-        return Rows(scores, belief.noise * inverse, curves, mean + scores @ parts, bound)
+        return Rows(scores, belief.noise * inverse, curves, bound)
 
     def maximise(self, belief: Belief, rows: Rows) -> Belief:
         """Components, their precision and the noise from the rows' scores."""
         q = len(belief.precision)
-        filled = self.values + (1 - self.seen) * rows.model
-        design = np.column_stack([np.ones(self.rows), rows.scores])
-        moment, cross = design.T @ design, design.T @ self.encode(filled)
-        moment[1:, 1:] += rows.covariance.sum(axis=0)
+        design, covariance = np.column_stack([np.ones(self.rows), rows.scores]), rows.covariance
+        moment, cross, squares = design.T @ design, np.zeros(belief.loadings.shape), 0.0
+        moment[1:, 1:] += covariance.sum(axis=0)
+        missing = np.zeros((q * q, rows.curves.shape[1]))
+        for part, known, seen in self.parts():
+            filled = known + (1 - seen) * rows.some(part)
+            squares += float(np.sum(filled**2))
+            cross += design[part].T @ self.encode(filled)
+            missing += covariance[part].reshape(len(seen), q * q).T @ (1 - seen)
         # A missing entry varies with its row's scores.
-        missing = (rows.covariance.reshape(self.rows, q * q).T @ (1 - self.seen)).reshape(
-            q, q, rows.model.shape[1]
-        )
-        varying = np.einsum("klp,lp->kp", missing, rows.curves[1:])
+        varying = np.einsum("klp,lp->kp", missing.reshape(q, *rows.curves[1:].shape), rows.curves[1:])
         cross[1:] += self.encode(varying)
         system = np.tile(moment, (len(self.basis), 1, 1))
         diagonal = np.arange(1, 1 + q)
@@ -126,11 +159,11 @@ class Problem:
         loadings = np.linalg.solve(system, by_function).swapaxes(0, 1).reshape(cross.shape)
         spread = belief.noise * np.linalg.inv(system[:, 1:, 1:])
         # Expected sum of squares of data minus model, missing entries included.
-        total = float(np.sum(filled**2) + np.sum(varying * rows.curves[1:]))
-        total += (filled.size - self.observed) * belief.noise
+        total = squares + float(np.sum(varying * rows.curves[1:]))
+        total += (self.values.size - self.observed) * belief.noise
         total += float(np.sum(loadings * (moment @ loadings - 2 * cross)))
         total += self.shape[1] * float(np.sum(spread.sum(axis=0) * moment[1:, 1:]))
-        noise = max(total / filled.size, self.least)
+        noise = max(total / self.values.size, self.least)
         loadings, spread = self._standard(loadings, spread, moment / self.rows, belief.roughness)
         return with_prior(Belief(loadings, spread, belief.precision, belief.roughness, noise))
 
@@ -187,8 +220,7 @@ def climb(problem: Problem, belief: Belief, tolerance: float, passes: int = ITER
     mixer = Mixer()
     while not at.converged and len(at.rmse) < passes:
         after, found = _pass(problem, mixer, at.belief, at.rows)
-        change = float(np.sqrt(np.mean((found.model - at.rows.model) ** 2)))
-        at.converged = change <= tolerance * np.sqrt(after.noise)
+        at.converged = problem.change(at.rows, found) <= tolerance * np.sqrt(after.noise)
         at.objective.append(-found.bound / problem.observed)
         falls = not found.bound >= at.rows.bound
         if falls:  # by rounding nothing is left to gain; more than that is a mistake
@@ -219,7 +251,7 @@ def by_bayes(
     """
     problem = Problem(values, mask, basis)
     end = climb(problem, problem.begin(start, components), tolerance)
-    filled = np.where(mask, values, end.rows.model.reshape(values.shape))
+    filled = completed(values, mask, lambda part: end.rows.some(part).reshape(-1, *problem.shape))
     return Filling(filled, end.rmse, end.objective, float(np.sqrt(end.belief.noise)), end.converged)
 
 
