@@ -185,6 +185,9 @@ typedef struct gait_tracker_config {
     float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
     uint32_t reserved;
+    /* Reported joint_sd: the particles' deviation times this, because frames err alike, */
+    float    joint_sd_factor;
+    float    joint_sd_model;   /* and, in quadrature, what the model cannot express, fraction of stature */
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;
@@ -206,7 +209,7 @@ typedef struct gait_estimate {
     gait_state sd;          /* over all particles, field by field; circular for phase and heading */
     gait_state best;        /* heaviest particle */
     gait_pose  pose;        /* joints: posterior mean (paper mode: no root motion); angles: of the mode */
-    float      joint_sd[GAIT_MAX_JOINTS][3]; /* posterior standard deviation, metres */
+    float      joint_sd[GAIT_MAX_JOINTS][3]; /* standard deviation, metres: config joint_sd_* */
     float      ess;         /* effective sample size after weighting */
     float      phase_r;     /* resultant length of the phase, [0, 1]: 1 = certain */
     float      mode_mass;   /* weight of the dominant mode, [0, 1] */

@@ -43,6 +43,8 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .coef_time = 4.5f,
         .stature_noise = 0.005f,
         .proportion_noise = 0.15f,
+        .joint_sd_factor = 2.7f,
+        .joint_sd_model = 0.018f,
         .offset_noise = 0.02f,
         .offset_sd = 0.07f,
         .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
@@ -58,6 +60,8 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->stature_noise = 0.0f;
         cfg->offset_angles = 0;
         cfg->girth = 1.0f;
+        cfg->joint_sd_factor = 1.0f;
+        cfg->joint_sd_model = 0.0f;
         cfg->term_weight[0] = 1.0f;
     }
 }
@@ -85,7 +89,8 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(tilt_time, 0.0f, 1e6f),          RANGE(coef_noise, 0.0f, 100.0f),
         RANGE(coef_time, 0.0f, 1e6f),          RANGE(stature_noise, 0.0f, 1.0f),
         RANGE(offset_noise, 0.0f, 10.0f),      RANGE(offset_sd, 0.0f, 10.0f),
-        RANGE(proportion_noise, 0.0f, 100.0f),
+        RANGE(proportion_noise, 0.0f, 100.0f), RANGE(joint_sd_factor, 0.0f, 100.0f),
+        RANGE(joint_sd_model, 0.0f, 1.0f),
     };
     for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
         float v;

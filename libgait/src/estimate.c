@@ -100,9 +100,10 @@ static void mean_rotation(const population *p, const double *weight, const uint8
     w->f[F_ROLL] = m_atan2(2.0f * (q[0] * q[1] + q[2] * q[3]), 1.0f - 2.0f * (q[1] * q[1] + q[2] * q[2]));
 }
 
-/* Posterior mean and deviation of every joint over all particles. */
-static void joints(const gait_tracker *t, gait_estimate *out)
+/* Posterior mean of every joint over all particles, and its deviation as it is reported. */
+static void joints(const gait_tracker *t, float stature, gait_estimate *out)
 {
+    double const factor = (double)t->cfg.joint_sd_factor, model = (double)(t->cfg.joint_sd_model * stature);
     int32_t const n = t->cfg.particles;
     const double *const weight = t->filter.weight;
     for (int32_t p = 0; p < 3 * t->model->points; p++) {
@@ -113,7 +114,7 @@ static void joints(const gait_tracker *t, gait_estimate *out)
         for (int32_t i = 0; i < n; i++)
             square += weight[i] * ((double)v[i] - sum) * ((double)v[i] - sum);
         out->pose.joint[p / 3][p % 3] = (float)sum;
-        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(square);
+        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(factor * factor * square + model * model);
     }
 }
 
@@ -162,7 +163,7 @@ walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
     circular const mode = resultant(field(p, F_PHASE), TWO_PI_F, weight, use, p->n);
     mean.f[F_PHASE] = m_wrap1(m_atan2((float)mode.s, (float)mode.c) / TWO_PI_F);
     mean_rotation(p, weight, use, &mean);
-    joints(t, out);
+    joints(t, mean.f[F_STATURE], out);
     spread(t, &sd, resultant_sd(phase) / TWO_PI_F,
            resultant_sd(resultant(field(p, F_HEADING), 1.0f, weight, NULL, p->n)), out);
     walker const heaviest = walker_get(p, best);

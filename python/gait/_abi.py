@@ -213,6 +213,8 @@ class TrackerConfigC(ctypes.Structure):
         ("proportion_noise", c_float),
         ("offset_angles", c_uint32),
         ("reserved", c_uint32),
+        ("joint_sd_factor", c_float),
+        ("joint_sd_model", c_float),
         ("camera", CameraC * MAX_CAMERAS),
         ("exec", Tasks),
     ]

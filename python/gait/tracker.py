@@ -59,6 +59,8 @@ class TrackerConfig:
     offset_sd: float
     proportion_noise: float
     offset_angles: int
+    joint_sd_factor: float
+    joint_sd_model: float
 
     @staticmethod
     def default(mode: Mode | int = Mode.DEFAULT, **changes: Any) -> TrackerConfig:

@@ -75,7 +75,8 @@ static void test_floats(void)
         FLOAT(tilt_time, -1e-3f, 1e9f),        FLOAT(coef_noise, -1e-3f, 1e9f),
         FLOAT(coef_time, -1e-3f, 1e9f),        FLOAT(stature_noise, -1e-3f, 1e9f),
         FLOAT(offset_noise, -1e-3f, 1e9f),     FLOAT(offset_sd, -1e-3f, 1e9f),
-        FLOAT(proportion_noise, -1e-3f, 1e9f),
+        FLOAT(proportion_noise, -1e-3f, 1e9f), FLOAT(joint_sd_factor, -1e-3f, 1e9f),
+        FLOAT(joint_sd_model, -1e-3f, 1.1f),
     };
 #undef FLOAT
     size_t floats = 0; /* none is forgotten: the config has as many floats as stand here */

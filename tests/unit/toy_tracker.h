@@ -46,6 +46,8 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.offset_sd = 0.07f;
     c.offset_angles = 0;
     c.proportions = -1; /* so that they are tested */
+    c.joint_sd_factor = 1.0f;
+    c.joint_sd_model = 0.0f;
     for (int k = 0; k < GAIT_MAX_CAMERAS; k++)
         c.camera[k] = toy_camera(k);
     return c;

@@ -37,6 +37,9 @@ static const struct {
     {"stature-noise", FIELD(stature_noise), 0, 1, "fraction of stature per sqrt(second), while settling"},
     {"proportion-noise", FIELD(proportion_noise), 0, 100,
      "standard deviations of the limbs' proportions per sqrt(second)"},
+    {"joint-sd-factor", FIELD(joint_sd_factor), 0, 100,
+     "of the joints' deviations over the particles, in reports"},
+    {"joint-sd-model", FIELD(joint_sd_model), 0, 1, "what the model cannot express, fraction of stature"},
     {"offset-noise", FIELD(offset_noise), 0, 10, "radians of posture per sqrt(second)"},
     {"offset-sd", FIELD(offset_sd), 0, 10, "radians by which people differ in posture"},
 };
