@@ -128,6 +128,18 @@ def test_other_activities_must_be_cyclic_too(activity, reason):
         load(path, Reading(activity=activity))
 
 
+def test_a_lame_walk_with_gaps_is_a_walk():
+    """The right hip swings over 55 degrees and the left over 11; both ends and some markers are not seen."""
+    path = MOCAP / "c3d/PlugInC3D.c3d"
+    if not path.is_file():
+        pytest.skip(f"{path} is absent: the learning data are not part of the repository")
+    sequence = load(path)
+    assert sequence.verdict.activity == "walk" and sequence.cycles > 3
+    assert sequence.period.frames / sequence.fps == pytest.approx(1.19, rel=0.01)
+    evidence = {e.name: e.value for e in sequence.verdict.evidence}
+    assert evidence["legs"] == pytest.approx(0.86, abs=0.05) and evidence["repeats"] > 0.9
+
+
 def test_a_run_is_no_walk_and_a_walk_no_run():
     run, walk = (MOCAP / f"trc/motion_capture_{kind}.trc" for kind in ("run", "walk"))
     if not run.is_file():

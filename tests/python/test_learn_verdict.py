@@ -76,6 +76,22 @@ def test_hopping_is_no_walk_but_cyclic():
     assert judge(gait(lag=0.0), wanted="hop").accepted
 
 
+@pytest.mark.parametrize("lag", [0.42, 0.5, 0.58])
+def test_who_limps_takes_turns_though_the_legs_are_not_alike(lag):
+    angles = gait(frames=440, lag=lag)
+    stiff = [ANGLES.index(f"l_{name}") for name in ("hip_flexion", "knee_flexion")]
+    angles[:, stiff] *= (0.2, 0.5)
+    angles[:, stiff[0]] += 0.1 * np.sin(4 * np.pi * np.arange(len(angles)) / PERIOD)
+    assert verdict.legs(angles, PERIOD) == pytest.approx(-np.cos(2 * np.pi * lag), abs=0.03)
+    assert judge(angles).accepted
+
+
+def test_legs_that_are_not_seen_say_nothing():
+    angles = gait()
+    angles[:, [ANGLES.index(f"l_{name}") for name in ("hip_flexion", "knee_flexion")]] = np.nan
+    assert np.isnan(verdict.legs(angles, PERIOD))
+
+
 def test_noise_and_wandering_are_not_cyclic():
     rng = np.random.default_rng(1)
     for angles in (rng.normal(size=(500, 24)), np.cumsum(rng.normal(size=(500, 24)), axis=0)):

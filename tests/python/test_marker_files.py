@@ -225,7 +225,9 @@ def test_malformed_trc_is_named(marked, tmp_path, change, words):
 
 
 def test_the_real_file_with_a_wrong_header_is_one_line():
-    with pytest.raises(UserError, match=r"Dance.c3d: not a readable .c3d \(OFFSET .*\); export it again"):
+    with pytest.raises(
+        UserError, match=r"Dance.c3d: not a readable .c3d \(OFFSET parameter is not an INT\); export it again"
+    ):
         c3d_file.read(real("c3d/Dance.c3d"))
 
 

@@ -17,7 +17,7 @@ Mask = npt.NDArray[np.bool_]
 INTERVALS = 16  # knot intervals per cycle
 PENALTY = 1e-3  # of the second differences, relative to the data's trace
 BRACKET = 0.75  # knot intervals within which an observed sample must lie on both sides
-NEXT = 1.05  # frame intervals that this is at least: at low rates a frame's neighbours are farther away
+NEXT = 1 + 1e-9  # frame intervals that this is at least: at low rates the next frame is farther away
 OBSERVED = 0.4  # share of entries a cycle must have to be used, of the channels that its sequence has
 END = 0.05  # share of the cycle over which its end levels are estimated
 
