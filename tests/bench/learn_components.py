@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import gait_generator as g
 import learn_cases as cases
 
-from gait.learn import bayes, fit, fpca, rank
+from gait.learn import fit, fpca, impute, rank
 from gait.learn.model import anova
 from gait.learn.sequence import load
 from gait.learn.stage import one_thread_for_good
@@ -169,7 +169,7 @@ def _passes() -> Iterator[Row]:
             difference.append(np.abs(found.filled - other.filled).max())
         name = f"{share:.0%} missing"
         yield _row("L12", name, "passes", max(passes), 99)
-        yield _row("L12", name, "largest rise of the objective, relative", max(rise), bayes.ROUNDING)
+        yield _row("L12", name, "largest rise of the objective, relative", max(rise), impute.ROUNDING)
         yield _row("L12", name, "mean or zero as start, degrees", max(difference), 1e-3)
 
 

@@ -5,7 +5,7 @@ import learn_cases as cases
 import numpy as np
 import pytest
 
-from gait.learn import bayes, cycles, fpca
+from gait.learn import bayes, cycles, fpca, impute
 from gait.learn.fourier import HARMONICS
 from gait.learn.model import anova
 from gait.learn.rank import LARGEST, choose
@@ -16,7 +16,7 @@ METHODS = sorted(fpca.METHODS)
 def falls(objective):
     """Whether it never rises by more than rounding."""
     values = np.array(objective)
-    return bool(np.all(np.diff(values) <= bayes.ROUNDING * np.abs(values[:-1])))
+    return bool(np.all(np.diff(values) <= impute.ROUNDING * np.abs(values[:-1])))
 
 
 @pytest.fixture(
@@ -75,6 +75,22 @@ def test_a_pass_that_makes_it_worse_is_shown_and_not_called_convergence(monkeypa
     assert len(found.objective) == len(found.rmse) == 5
     assert found.rmse[-1] == found.rmse[-2]  # the better is kept
     assert case.error(found.filled) < 1.2 * case.error(case.oracle())
+
+
+def test_a_worse_pass_of_the_papers_way_is_shown_too(monkeypatch):
+    case, passes = cases.walks(np.random.default_rng(25), rows=30), []
+    right_singular = impute.right_singular
+
+    def spoiled(coded, mean):
+        singular, right = right_singular(coded, mean)
+        passes.append(len(right))
+        return singular, right[::-1] if len(passes) >= 4 else right
+
+    monkeypatch.setattr(impute, "right_singular", spoiled)
+    found = fpca.fit(case.values, case.mask, 5, method="paper")
+    assert not falls(found.objective) and not found.converged
+    assert len(found.objective) == 4 and found.noise == found.rmse[2]
+    assert case.error(found.filled) < 2 * case.error(case.oracle())  # of the third pass
 
 
 def test_start_of_the_missing_entries_does_not_matter(imputed):

@@ -19,6 +19,7 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,9 @@ def run(args: argparse.Namespace) -> int:
         learned = fit.fit(sequences, args.components, args.seed, args.prior)
         if args.components is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS and not args.quiet:
             print(_few(learned), file=sys.stderr)
+        if not args.quiet:
+            for words in _unsettled(learned):
+                print(words, file=sys.stderr)
         data = blob.write(args.output, model.sections(learned, args.activity, args.seed))
         if args.report:
             from gait.learn import report  # matplotlib is slow to import
@@ -209,6 +213,13 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
         "imputation": learned.components.rmse,
         "imputation_objective": learned.components.objective,
     }
+
+
+def _unsettled(learned: fit.Learned) -> Iterator[str]:
+    """Say what stopped before nothing was left to gain."""
+    for name, part in (("alignment", learned.alignment), ("filling of gaps", learned.components)):
+        if not part.converged:
+            yield f"the {name} did not converge in {len(part.objective)} passes; look at the report's curves"
 
 
 def _few(learned: fit.Learned) -> str:

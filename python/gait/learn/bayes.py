@@ -18,7 +18,7 @@ import numpy.typing as npt
 from gait.learn.accelerate import Mixer
 from gait.learn.belief import Belief, divergence, mixed, smoother, with_prior, without_weakest
 from gait.learn.fourier import decode, encode
-from gait.learn.impute import Filling, completed
+from gait.learn.impute import ROUNDING, Filling, completed
 from gait.learn.singular import right_singular
 from gait.learn.spool import by_rows
 
@@ -28,7 +28,6 @@ Mask = npt.NDArray[np.bool_]
 ITERATIONS = 500
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
 LEAST_NOISE = 1e-10  # variance relative to the data's
-ROUNDING = 1e-9  # relative; the bound may fall by no more
 
 
 @dataclass

@@ -18,6 +18,7 @@ Mask = npt.NDArray[np.bool_]
 
 ITERATIONS = 500
 TOLERANCE = 1e-6  # relative decrease of the error
+ROUNDING = 1e-9  # relative; what is made smaller may rise by no more
 
 
 @dataclass
@@ -31,11 +32,11 @@ class Filling:
     rmse : list of float
         Data minus model over the observed entries, after each pass.
     objective : list of float
-        What the passes make smaller; never increases.
+        What the passes make smaller, each as it came out; falls but for rounding.
     noise : float
         Standard deviation of the data about the model.
     converged : bool
-        Whether the passes ended by themselves.
+        Whether nothing was left to gain; not if the objective rose or the passes ran out.
     """
 
     filled: Floats
@@ -80,7 +81,7 @@ def by_svd(
     rmse: list[float] = []
     complete, converged = bool(mask.all()), False
     filled = completed(values, mask, lambda _: start)
-    while not converged and len(rmse) < ITERATIONS:
+    while len(rmse) < ITERATIONS:
         coded = encode_all(filled, basis)
         mean = coded.mean(axis=0)
         leading = right_singular(coded, mean)[1][:components]
@@ -88,9 +89,15 @@ def by_svd(
         curves = decode(np.vstack([mean, leading]), basis, values.shape[2])
         model = partial(_model, curves[0], curves[1:], scores)
         rmse.append(_rmse(values, mask, model))
-        filled = filled if complete else completed(values, mask, model)
-        converged = complete or (len(rmse) > 1 and rmse[-2] - rmse[-1] <= tolerance * rmse[-2])
-    return Filling(filled, rmse, list(rmse), rmse[-1], converged)
+        before = rmse[-2] if len(rmse) > 1 else np.inf
+        if complete or rmse[-1] > before:
+            converged = complete or rmse[-1] <= before * (1 + ROUNDING)
+            break
+        filled = completed(values, mask, model)
+        if rmse[-1] >= before * (1 - tolerance):
+            converged = True
+            break
+    return Filling(filled, rmse, list(rmse), min(rmse), converged)
 
 
 def completed(values: Floats, mask: Mask, model: Callable[[slice], Floats]) -> Floats:
