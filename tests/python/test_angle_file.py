@@ -131,6 +131,8 @@ def test_what_a_track_writes_has_its_joints_and_its_angles_but_not_what_was_lost
         (lambda s: s.replace("neck_y_deg", "neck_x_deg"), "a.csv:1: column 'neck_x_deg' is there twice"),
         (lambda s: s.replace("\n50,", "\n50,,"), "a.csv:52: 27 cells where 26 belong"),
         (lambda s: s.replace("\n50,0.5000", "\n50,0.4"), "a.csv:52: the times do not increase"),
+        (lambda s: s.replace("\n50,0.5000", "\n\n50,0.4"), "a.csv:53: the times do not increase"),
+        (lambda s: s.replace("\n40,", "\n\n\n40,").replace("\n50,", "\n50,,"), "a.csv:54: 27 cells where"),
         (lambda s: s.replace("\n239,2.3900", "\n239,99.0"), r"a.csv:241: 96.6 s after the row before; cut"),
         (lambda s: s.replace("\n50,0.5000", "\n50,"), "a.csv:52: the times do not increase"),
         (lambda s: "\n".join(s.split("\n")[:3]), "a.csv: 2 frames"),

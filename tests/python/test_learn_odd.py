@@ -92,6 +92,17 @@ def test_three_subjects_have_proportions(sequences):
     assert np.abs(made["PROP"]).max() < 2e-3 and made["CHST"][:, 3].max() > 0
 
 
+def test_the_body_of_a_person_is_of_the_recording_that_shows_most(sequences):
+    """Angles alone and a body without arms come first: arms are learnt from the third recording."""
+    own = [s for s in sequences if s.subject == "01"]
+    unseen = np.full(2, np.nan)
+    armless = replace(own[0].measures, upper_arm=unseen, forearm=unseen)
+    mixed = [replace(own[0], measures=None), replace(own[0], measures=armless), own[1]]
+    arms = [fit.fit(some, 1).proportions.forearm for some in (mixed, own[1:], mixed[:2])]
+    assert arms[0] == pytest.approx(arms[1], rel=1e-9)
+    assert arms[0] != pytest.approx(arms[2], rel=1e-3)  # nobody's, so those of the default body
+
+
 def test_paper_prior_has_the_plain_components_and_one_body(sequences):
     learned = fit.fit(sequences, 2, kind="paper")
     assert "PROP" not in sections(learned)

@@ -136,6 +136,14 @@ def test_root_channels_of_a_known_walk(heading):
     assert found[60:-60, 5] == pytest.approx(channels[60:-60, column("root_yaw")], abs=0.02)
 
 
+def test_a_pelvis_that_is_not_seen_has_no_heading():
+    walker = body_of(walk_channels()[0])
+    measures = retarget.measure(walker)
+    walker.joints["pelvis"] = np.full_like(walker.joints["pelvis"], np.nan)
+    found, direction = root.channels(walker, measures, 120.0)
+    assert np.isnan(found).all() and np.isnan(direction).all()
+
+
 @pytest.mark.parametrize("slope", [-1.5, 1.1])
 def test_a_sloping_floor_is_found_and_levelled(slope):
     channels, phase = walk_channels()
