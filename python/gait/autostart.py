@@ -214,6 +214,8 @@ def _set_motion(mean: State, sd: State, path: _Path, model: Model) -> None:
     mean.heading = float(np.arctan2(path.velocity[1], path.velocity[0]))
     sd.heading = float(np.hypot(_HEADING_SD, doubt))
     info = model.info
+    if not (info.stride_length > 0 and sd.stride_hz > 0):  # the model has no stride, or knows its rate
+        return
     rate = speed / (info.stride_length * mean.stature)
     rate_sd = rate * float(np.hypot(doubt, info.stride_length_sd / info.stride_length))
     known, seen = 1 / sd.stride_hz**2, 1 / rate_sd**2

@@ -29,7 +29,7 @@ from gait import blob
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
-from gait.learn import fit, marker_map, model, sources, subjects
+from gait.learn import fit, ground, marker_map, model, sources, subjects
 from gait.learn.reading import Reading
 from gait.learn.sequence import Sequence
 from gait.learn.stage import one_thread
@@ -141,6 +141,9 @@ def run(args: argparse.Namespace) -> int:
         if not args.quiet:
             for words in _unsettled(learned):
                 print(words, file=sys.stderr)
+        made_up = ground.unseen(learned.cycles.seen)
+        if made_up and not args.quiet:
+            print(_made_up(made_up), file=sys.stderr)
         data = blob.write(args.output, model.sections(learned, args.activity, args.seed))
         if args.report:
             from gait.learn import report  # matplotlib is slow to import
@@ -220,6 +223,10 @@ def _unsettled(learned: fit.Learned) -> Iterator[str]:
     for name, part in (("alignment", learned.alignment), ("filling of gaps", learned.components)):
         if not part.converged:
             yield f"the {name} did not converge in {len(part.objective)} passes; look at the report's curves"
+
+
+def _made_up(channels: list[str]) -> str:
+    return f"no recording shows {' or '.join(channels)}: taken from the motion of the legs"
 
 
 def _few(learned: fit.Learned) -> str:

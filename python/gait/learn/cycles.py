@@ -44,6 +44,11 @@ class Cycles:
     sequence: npt.NDArray[np.intp]
     cycle: npt.NDArray[np.intp]
 
+    @property
+    def seen(self) -> Mask:
+        """Channels (M,) that some cycle shows."""
+        return np.asarray(self.mask.any(axis=(0, 1)))
+
 
 def slice_cycles(
     signals: list[Floats], periods: Floats, offsets: Floats, samples: int, observed: float = OBSERVED

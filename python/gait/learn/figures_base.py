@@ -85,7 +85,7 @@ def whole_numbers(axes: Axes) -> None:
 
 def observed(learned: Learned) -> npt.NDArray[np.bool_]:
     """Channels (M,) that any cycle holds."""
-    return np.asarray(learned.cycles.mask.any(axis=(0, 1)))
+    return learned.cycles.seen
 
 
 def say_unobserved(axes: Axes) -> None:

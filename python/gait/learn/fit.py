@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import align, cycles, fpca, lengths, prior, rank, retarget
+from gait.learn import align, cycles, fpca, ground, lengths, prior, rank, retarget
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
@@ -155,6 +155,8 @@ def fit(
     table = np.zeros((0, len(default_skeleton().frames) + 1))
     if kind == "people":
         model = prior.refine(model, row_subject, wanted, metric)
+    model = ground.grounded(model, rows.seen, proportions)
+    if kind == "people":
         table = lengths.learn(_bodies(sequences, index, len(subjects)), proportions, model.mean)
     return Learned(
         sequences, subjects, index, proportions, alignment, rows, model, scale, held_out, table, static
