@@ -96,8 +96,7 @@ def gait_statistics(learned: Learned) -> Floats:
     """
     rates = np.array([s.fps / s.period.frames for s in learned.sequences])
     column = CHANNELS.index("root_forward")
-    speeds = [s.channels[np.isfinite(s.channels[:, column]), column] for s in learned.sequences]
-    release(*(s.channels for s in learned.sequences))
+    speeds = [_observed(s.channels, column) for s in learned.sequences]
     lengths = np.array([speed.mean() if len(speed) else np.nan for speed in speeds])
     fps = float(np.median([s.fps for s in learned.sequences]))
     rate = _by_subject(rates, learned.subject_index, RATE_SD)
@@ -106,6 +105,13 @@ def gait_statistics(learned: Learned) -> Floats:
         made_up = float(learned.components.mean[:, column].mean())
         length = made_up, 2 * LENGTH_SD * made_up
     return np.array([*rate, stride_variation(learned), *length, fps, *ADULT_STATURE])
+
+
+def _observed(channels: Floats, column: int) -> Floats:
+    """Observed values of one of the channels (T, M) of a sequence, which lies on disk."""
+    values = channels[np.isfinite(channels[:, column]), column]
+    release(channels)
+    return values
 
 
 def _by_subject(values: Floats, group: npt.NDArray[np.intp], usual: float) -> tuple[float, float]:

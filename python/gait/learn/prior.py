@@ -140,7 +140,7 @@ def static_spread(filled: Floats, subject: Groups, count: int, metric: Floats) -
         weight = np.where(image == held, 0.0, 1 / np.bincount(subject)[image])
         weight /= weight.sum()
         mean = weight @ coded
-        right = right_singular(coded, mean, np.sqrt(weight))[1][:count]
+        right = right_singular(coded, mean, np.sqrt(weight))[1][:count].copy()
         # The mean over a cycle is its first coefficient, and the residual of the mean that of the cycles.
         rest = coded[: len(subject)][subject == held].mean(axis=0) - mean
         rest -= (right @ rest) @ right
