@@ -1,0 +1,51 @@
+"""Outputs that appear whole or not at all, and places where none may be put."""
+
+import os
+
+import pytest
+
+from gait.errors import UserError
+from gait.files import replacing, require_writable
+
+
+def test_a_link_stays_and_its_file_is_written(tmp_path):
+    (tmp_path / "deep").mkdir()
+    link = tmp_path / "link.csv"
+    link.symlink_to("deep/real.csv")
+    for text in ("new", "again"):
+        with replacing(link) as temporary:
+            temporary.write_text(text)
+        assert link.is_symlink() and (tmp_path / "deep/real.csv").read_text() == text
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["deep", "link.csv", "real.csv"]
+
+
+def test_a_failure_leaves_what_was_there(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise KeyboardInterrupt
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_pipes_and_devices_are_refused(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in (pipe, os.devnull):
+        with pytest.raises(UserError, match="not a file"), replacing(path):
+            pass
+    assert pipe.is_fifo() and not os.path.isfile(os.devnull)
+
+
+def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "a.csv"
+    path.write_text("mine")
+    path.chmod(0o444)
+    if os.geteuid() == 0:  # whom no permission stops: ask the bits instead
+        monkeypatch.setattr(os, "access", lambda p, mode: bool(os.stat(p).st_mode & 0o200))
+    with pytest.raises(UserError, match=r"a\.csv: is read-only; choose"):
+        require_writable(path)
+    with pytest.raises(UserError, match="does not exist"):
+        require_writable(tmp_path / "no" / "b.csv")
+    with pytest.raises(UserError, match="is a folder"):
+        require_writable(tmp_path)
