@@ -41,23 +41,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if " ".join(words[:2]) in COMMANDS:  # a command of two words
         words[:2] = [" ".join(words[:2])]
-    args = _parser(words).parse_args(words)
+    command = f" {words[0]}" if words and words[0] in COMMANDS else ""
     try:
         with _terminated_like_interrupted():
+            args = _parser(words).parse_args(words)
             return int(args.run(args))
     except UsageError as exc:
-        _failed(args.command, str(exc))
+        _failed(command, str(exc))
         return 2
     except (UserError, GaitError) as exc:
-        return _failed(args.command, str(exc))
+        return _failed(command, str(exc))
     except BrokenPipeError:  # the reader of our output has left, which is its right
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as exc:
-        return _failed(args.command, f"{exc.filename or 'file'}: {exc.strerror or exc}")
+        return _failed(command, f"{exc.filename or 'file'}: {exc.strerror or exc}")
     except KeyboardInterrupt:
-        return _failed(args.command, "interrupted")
+        return _failed(command, "interrupted")
 
 
 @contextlib.contextmanager
@@ -79,7 +80,7 @@ def _interrupted(number: int, frame: FrameType | None) -> None:
 
 
 def _failed(command: str, text: str) -> int:
-    print(f"gait {command}: {' '.join(text.split())}", file=sys.stderr)
+    print(f"gait{command}: {' '.join(text.split())}", file=sys.stderr)
     return 1
 
 

@@ -30,6 +30,7 @@ from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
 from gait.learn import fit, ground, marker_map, model, sources, subjects
+from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
 from gait.learn.sequence import Sequence
 from gait.learn.stage import one_thread
@@ -148,7 +149,11 @@ def run(args: argparse.Namespace) -> int:
         if args.report:
             from gait.learn import report  # matplotlib is slow to import
 
-            report.write(Path(args.report), learned, args.activity, refused, args.quiet)
+            try:
+                report.write(Path(args.report), learned, args.activity, refused, args.quiet)
+            except BaseException:
+                print(f"{args.output}: the model is written; the report is not", file=sys.stderr)
+                raise
     summary = _summary(learned, data, refused)
     print(json.dumps(summary) if args.json else _text(args.output, summary))
     return 0
@@ -160,6 +165,7 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
     if args.markers:
         marker_map.read(args.markers)
+    _check_output(args)
     require_writable(args.output)
     if args.report:
         folder = Path(args.report).absolute()
@@ -167,6 +173,23 @@ def _check(args: argparse.Namespace) -> None:
         if not (there.is_dir() and os.access(there, os.W_OK)):
             raise UserError(
                 f"--report {args.report}: {there} is not a folder to write in; choose another one"
+            )
+
+
+def _check_output(args: argparse.Namespace) -> None:
+    """Refuse to write the model over what is read, or where the report shall be."""
+    output = Path(os.path.realpath(args.output))
+    if output.suffix.lower() in (*KINDS, ".asf"):
+        raise UsageError(
+            f"-o {args.output}: is named like a recording; name the model M.gait, and sources before -o"
+        )
+    if any(os.path.realpath(p) == str(output) for p in (*args.sources, args.markers) if p):
+        raise UsageError(f"-o {args.output}: is also read; name the model otherwise")
+    if args.report:
+        folder = Path(os.path.realpath(args.report))
+        if output in (folder, *folder.parents):
+            raise UsageError(
+                f"--report {args.report}: the model is to be at {args.output}; name another folder"
             )
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 import html
 import io
+import os
+import tempfile
 from pathlib import Path
 
 from gait.errors import UserError
-from gait.files import replacing
 from gait.learn import model
 from gait.learn.figures import drawings
 from gait.learn.figures_base import Drawing
@@ -30,26 +31,37 @@ RIGHT = ("period, ms", "cycles", "sharpness", "residual, °")  # columns of numb
 
 
 def write(folder: Path, learned: Learned, activity: str, refused: list[str], quiet: bool = True) -> None:
-    """Write `folder`/*.png and `folder`/index.html, which needs no other file.
+    """Write `folder`/*.png and `folder`/index.html, which needs no other file; all of them or none.
 
     Raises
     ------
     UserError
-        If the folder cannot be made.
+        If the folder cannot be made or written.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        beside = folder if folder.is_dir() else folder.parent
+        beside.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=beside) as name:
+            stems = _write_all(Path(name), learned, activity, refused, quiet)
+            folder.mkdir(exist_ok=True)
+            for old in folder.glob("strip-*.png"):  # of a run with more components
+                if old.stem not in stems:
+                    old.unlink()
+            for path in sorted(Path(name).iterdir(), key=lambda p: p.suffix == ".html"):  # the page last
+                os.replace(path, folder / path.name)
     except OSError as error:
         raise UserError(f"--report {folder}: {error.strerror}; choose another folder") from error
+
+
+def _write_all(folder: Path, learned: Learned, activity: str, refused: list[str], quiet: bool) -> set[str]:
+    """Write the files into an empty folder; stems of the figures."""
     parts, links = [], []
     with progress("drawing the report", None, quiet) as update:
         for number, drawing in enumerate(drawings(learned)):
             update(number)
             parts.append(_figure(folder, drawing))
             links.append((drawing.stem, drawing.heading))
-    for old in folder.glob("strip-*.png"):  # of a run with more components
-        if old.stem not in dict(links):
-            old.unlink()
+    stems = {stem for stem, _ in links}
     links += [("sequences", "Sequences"), *([("left-out", "Left out")] if refused else [])]
     body = [
         f"<h1>Cyclic model of {html.escape(activity)}</h1>",
@@ -61,19 +73,16 @@ def write(folder: Path, learned: Learned, activity: str, refused: list[str], qui
         f"<p>{model.CMU}</p>" if model.from_cmu(learned) else "",
     ]
     head = f"<meta charset=utf-8><title>{html.escape(activity)}: gait learn</title><style>{STYLE}</style>"
-    with replacing(folder / "index.html") as path:
-        path.write_text(
-            f"<!doctype html><html lang=en><head>{head}</head><body>{''.join(body)}</body></html>\n",
-            encoding="utf-8",
-        )
+    page = f"<!doctype html><html lang=en><head>{head}</head><body>{''.join(body)}</body></html>\n"
+    (folder / "index.html").write_text(page, encoding="utf-8")
+    return stems
 
 
 def _figure(folder: Path, drawing: Drawing) -> str:
     """Write a figure's PNG; its part of the page."""
     buffer = io.BytesIO()
     drawing.figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-    with replacing(folder / f"{drawing.stem}.png") as path:
-        path.write_bytes(buffer.getvalue())
+    (folder / f"{drawing.stem}.png").write_bytes(buffer.getvalue())
     data = base64.b64encode(buffer.getvalue()).decode()
     heading = html.escape(drawing.heading)
     return (
