@@ -137,7 +137,7 @@ def test_what_a_track_writes_has_its_joints_and_its_angles_but_not_what_was_lost
         (lambda s: s.replace("\n50,0.5000", "\n50,"), "a.csv:52: the times do not increase"),
         (lambda s: "\n".join(s.split("\n")[:3]), "a.csv: 2 frames"),
         (lambda s: s[:-30], r"a.csv:241: \d+ cells where 26 belong"),
-        (lambda s: s.replace("\n7,0.0700,", "\n7,0.0700,1e"), "a.csv:9: '1e.*' is not a number"),
+        (lambda s: s.replace("\n7,0.0700,", "\n7,0.0700,1e"), "a.csv:9: neck_x_deg: '1e.*' is not a number"),
         (lambda s: "", "a.csv: the file is empty"),
     ],
 )

@@ -91,7 +91,7 @@ def test_empty_cells_are_missing(walker, tmp_path):
         (lambda s: s.replace("l_knee", "left_knie"), "a.csv: no joint 'l_knee'"),
         (lambda s: s.replace("time", "zeit", 1), "a.csv:1: no column 'time'"),
         (lambda s: s[:-20] + "\n", r"a.csv:401: \d+ cells where"),
-        (lambda s: s.rsplit(",", 1)[0] + ",1.2.3\n", r"a.csv:401: '1.2.3' is not a number"),
+        (lambda s: s.rsplit(",", 1)[0] + ",1.2.3\n", r"a.csv:401: r_toe_z: '1.2.3' is not a number"),
         (lambda s: s.split("\n")[0] + "\n", "a.csv: 0 frames"),
         (lambda s: "", "a.csv: the file is empty"),
     ],

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn import csv_table, joint_file
+from gait.learn.recording import DEGREES, require_range
 from gait.learn.rotations import unwrap
 from gait.skeleton import ANGLES, ROOTS, SIDES
 
@@ -27,6 +28,8 @@ Floats = npt.NDArray[np.float64]
 SUFFIXES = ("_deg", "_rad", "")
 RADIANS = 4.0  # in a walk some joint turns by more degrees than that, and none by more radians
 LEGS = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]
+LEAST_RANGE = 4.0  # degrees: a range of a radian or so under the name of degrees is less
+LONGEST = 100.0  # statures that the root may be away or move in a cycle
 LENGTHS = ("root_forward", "root_sway", "root_height")
 
 
@@ -89,6 +92,12 @@ def read(path: Path, fps: float | None = None) -> AngleTable:
     if twice is not None:
         raise UserError(f"{path}:1: {twice} is there as {' and '.join(columns[twice])}; remove one")
     values = _in_radians(table, {name: found[0] for name, found in columns.items()})
+    for name, column in values.items():
+        if name in LENGTHS:
+            require_range(path, name, column, LONGEST, "statures")
+        else:
+            require_range(path, name, np.degrees(column), DEGREES, "degrees")
+    _require_plausible(path, columns, values)
     empty = next((name for name in LEGS if not np.isfinite(values[name]).any()), None)
     if empty is not None:
         raise UserError(f"{path}: column {columns[empty][0]} is empty; leave the file out")
@@ -102,6 +111,18 @@ def read(path: Path, fps: float | None = None) -> AngleTable:
         root if any(name in values for name in ROOTS) else None,
         float(np.nanmedian(stature)) if np.isfinite(stature).any() else None,
     )
+
+
+def _require_plausible(path: Path, columns: dict[str, list[str]], values: dict[str, Floats]) -> None:
+    """Refuse radians in columns of degrees: no knee that cycles bends so little."""
+    knees = [name for name in LEGS if "knee" in name and np.isfinite(values[name]).any()]
+    ranges = {name: float(np.degrees(np.ptp(values[name][np.isfinite(values[name])]))) for name in knees}
+    if ranges and max(ranges.values()) < LEAST_RANGE:
+        name = max(ranges, key=lambda knee: ranges[knee])
+        raise UserError(
+            f"{path}: {columns[name][0]} has a range of {ranges[name]:.2g} degrees; if it is in radians, "
+            f"name it {name}_rad"
+        )
 
 
 def _columns(names: list[str], wanted: Sequence[str]) -> dict[str, list[str]]:

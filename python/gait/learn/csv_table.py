@@ -10,13 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn.recording import require_frames
+from gait.learn.recording import DEGREES, FARTHEST, require_frames
+from gait.skeleton import ANGLES, ROOTS
 
 Floats = npt.NDArray[np.float64]
 
 DELIMITERS = ",;\t"
 LONGEST = 10.0  # a table may grow to so many times its rows by the frames that are missing in it
 LOST = "lost"  # status of rows of a track in which nobody was followed
+#: End of a column's name to the largest amount and the unit.
+LIMITS = dict.fromkeys(("_x", "_y", "_z"), (FARTHEST, "metres"))
+LIMITS |= {"_deg": (DEGREES, "degrees"), "_rad": (float(np.radians(DEGREES)), "radians")}
+QUANTITIES = {"time", "stature_m", *ANGLES, *ROOTS}  # other columns of numbers that are learnt from
 
 
 @dataclass
@@ -28,7 +33,8 @@ class Table:
     names : list of str
         As in the header.
     values : (T, n)
-        NaN where cells are empty or words, in rows left out, and in rows of a track that is lost.
+        NaN where cells are empty, or words in columns that are not learnt from; in rows left out, and in
+        rows of a track that is lost.
     fps : float
         Rows per second.
     """
@@ -69,18 +75,32 @@ def read(path: Path, fps: float | None = None) -> Table:
     twice = next((name for name in names if name and names.count(name) > 1), None)
     if twice is not None:
         raise UserError(f"{path}:1: column {twice!r} is there twice; remove one")
-    values = np.array([_numbers(row, len(names), path, line) for line, row in rows])
+    values = np.array([_numbers(row, names, path, line) for line, row in rows])
     require_frames(path, len(values))
+    _require_ranges(path, names, values, [line for line, _ in rows])
     if "status" in names:
         status = [row[names.index("status")].strip() for _, row in rows]
         values[[k for k, word in enumerate(status) if word == LOST]] = np.nan
     if "time" not in names:
         return Table(names, values, float(fps or 0))
-    times = np.array([_number(row[names.index("time")], path, line) for line, row in rows])
+    times = np.array([_number(row[names.index("time")], "time", path, line) for line, row in rows])
     place, rate = _places(path, times, [line for line, _ in rows])
     even = np.full((place[-1] + 1, len(names)), np.nan)
     even[place] = values
     return Table(names, even, fps or rate)
+
+
+def _require_ranges(path: Path, names: list[str], values: Floats, lines: list[int]) -> None:
+    """Refuse angles and places that no walker reaches; what a column is its name tells."""
+    for name, column in zip(names, values.T, strict=True):
+        limit, unit = next((limits for end, limits in LIMITS.items() if name.endswith(end)), (np.inf, ""))
+        beyond = np.abs(column) > limit
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            raise UserError(
+                f"{path}:{lines[row]}: {name} is {column[row]:.4g}, at most {limit:.0f} {unit} are plausible;"
+                " correct it, or the file's units"
+            )
 
 
 def _places(path: Path, times: Floats, lines: list[int]) -> tuple[npt.NDArray[np.intp], float]:
@@ -123,18 +143,20 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     return [lines[0], *((line, row) for line, row in lines[1:] if any(row))]
 
 
-def _numbers(row: list[str], width: int, path: Path, line: int) -> Floats:
-    if len(row) < width or any(cell.strip() for cell in row[width:]):
-        raise UserError(f"{path}:{line}: {len(row)} cells where {width} belong; restore the file")
-    return np.array([_number(cell, path, line) for cell in row[:width]])
+def _numbers(row: list[str], names: list[str], path: Path, line: int) -> Floats:
+    if len(row) < len(names) or any(cell.strip() for cell in row[len(names) :]):
+        raise UserError(f"{path}:{line}: {len(row)} cells where {len(names)} belong; restore the file")
+    return np.array([_number(cell, name, path, line) for cell, name in zip(row, names, strict=False)])
 
 
-def _number(cell: str, path: Path, line: int) -> float:
-    """Read the number of a cell; NaN if it is empty, a word or infinite."""
+def _number(cell: str, name: str, path: Path, line: int) -> float:
+    """Read the number of a cell; NaN if it is empty or nan, or a word in a column that is not learnt from."""
     try:
-        value = float(cell)
+        value = float(cell.strip() or "nan")
     except ValueError:
-        if any(c.isdigit() for c in cell):
-            raise UserError(f"{path}:{line}: {cell!r} is not a number; restore the file") from None
-        return float("nan")
-    return value if np.isfinite(value) else float("nan")
+        value = np.inf
+    if not np.isinf(value):
+        return value
+    if name in QUANTITIES or name.endswith(tuple(LIMITS)):
+        raise UserError(f"{path}:{line}: {name}: {cell.strip()!r} is not a number; correct it or empty it")
+    return float("nan")

@@ -21,7 +21,6 @@ from gait.skeleton import JOINTS, SIDES, default_skeleton
 Floats = npt.NDArray[np.float64]
 
 FEWEST_LABELS = 6
-FARTHEST = 1000.0  # metres from the file's origin: what is beyond is damage and not a marker
 JOINT_SD = 0.03  # metres beyond which a joint is not known
 AXIS_SD = np.radians(15)  # beyond which a direction is not known
 WORST_RMS = 0.05  # metres: markers in other places than their labels say
@@ -48,7 +47,7 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
     UserError
         If too few labels are known, or the markers do not fit a walker.
     """
-    missing = (points == 0).all(axis=2) | ~(np.abs(points) < FARTHEST).all(axis=2)
+    missing = (points == 0).all(axis=2) | ~np.isfinite(points).all(axis=2)
     points = np.where(missing[..., None], np.nan, points)
     places = assign(path, labels, points, markers)
     columns = list(places)

@@ -11,7 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn.recording import Y_UP, Recording, mask_zero_runs, require_frames
+from gait.learn.recording import (
+    DEGREES,
+    FARTHEST,
+    Y_UP,
+    Recording,
+    mask_zero_runs,
+    require_frames,
+    require_range,
+)
 from gait.learn.rotations import from_angles
 
 Floats = npt.NDArray[np.float64]
@@ -65,7 +73,20 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
         values = {name: mask_zero_runs(columns) for name, columns in values.items()}
     degrees, stated = _declared(path)
     skeleton.degrees = skeleton.degrees if degrees is None else degrees
+    _require_ranges(path, skeleton, values)
     return assemble(path, skeleton, values, fps or stated or FPS)
+
+
+def _require_ranges(path: Path, skeleton: Skeleton, values: dict[str, Floats]) -> None:
+    """Refuse places and angles that no walker reaches."""
+    turn = 1.0 if skeleton.degrees else np.degrees(1.0)
+    for bone in skeleton.bones:
+        for k, name in enumerate(bone.dof if bone.name in values else []):
+            column, what = values[bone.name][:, k : k + 1], f"{bone.name} {name}"
+            if name[0] == "r":
+                require_range(path, what, turn * column, DEGREES, "degrees")
+            else:
+                require_range(path, what, skeleton.metres * column, FARTHEST, "metres")
 
 
 def find_skeleton(path: Path) -> Path:

@@ -10,7 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn.recording import Y_UP, Recording, mask_zero_runs, require_frames
+from gait.learn.recording import (
+    DEGREES,
+    FARTHEST,
+    Y_UP,
+    Recording,
+    mask_zero_runs,
+    require_frames,
+    require_range,
+)
 from gait.learn.rotations import from_angles
 
 Floats = npt.NDArray[np.float64]
@@ -169,7 +177,9 @@ def assemble(
     path: Path, joints: list[Joint], values: Floats, fps: float, zero_runs: bool = False
 ) -> Recording:
     """Forward kinematics of the file's own skeleton, turned to z up and metres."""
-    rest = np.zeros((2, len(joints), 3))
+    rest = _rest(joints)
+    turn_up, metres = _upright(rest)
+    _require_ranges(path, joints, values, metres)
     start, end = np.empty((2, len(values), len(joints), 3))
     rotation = np.empty((len(values), len(joints), 3, 3))
     column, heirs = 0, _ends(joints)
@@ -183,9 +193,6 @@ def assemble(
             place if parent < 0 else start[:, parent] + np.einsum("tij,tj->ti", rotation[:, parent], place)
         )
         end[:, i] = start[:, i] + rotation[:, i] @ heirs[i]
-        rest[0, i] = joint.offset * (parent >= 0) + (rest[0, parent] if parent >= 0 else 0)
-        rest[1, i] = rest[0, i] + heirs[i]
-    turn_up, metres = _upright(rest)
     return Recording(
         name=path.stem,
         source=path,
@@ -197,6 +204,27 @@ def assemble(
         rest_start=rest[0] @ turn_up.T * metres,
         rest_end=rest[1] @ turn_up.T * metres,
     )
+
+
+def _rest(joints: list[Joint]) -> Floats:
+    """Begin and end (2, B, 3) of the bones in the rest pose, units of the file, from the root."""
+    rest = np.zeros((2, len(joints), 3))
+    for i, (joint, heir) in enumerate(zip(joints, _ends(joints), strict=True)):
+        if joint.parent >= 0:
+            rest[0, i] = rest[0, joint.parent] + joint.offset
+        rest[1, i] = rest[0, i] + heir
+    return rest
+
+
+def _require_ranges(path: Path, joints: list[Joint], values: Floats, metres: float) -> None:
+    """Refuse places and angles that no walker reaches."""
+    named = [(joint.name, channel) for joint in joints for channel in joint.channels]
+    for k, (name, channel) in enumerate(named):
+        column, what = values[:, k : k + 1], f"{name} {channel}"
+        if channel.endswith("rotation"):
+            require_range(path, what, column, DEGREES, "degrees")
+        else:
+            require_range(path, what, metres * column, FARTHEST, "metres")
 
 
 def _ends(joints: list[Joint]) -> Floats:

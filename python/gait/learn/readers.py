@@ -8,7 +8,7 @@ from gait.learn import angle_file, c3d_file, joint_file, marker_body, mocap_asf,
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body, body
 from gait.learn.reading import DEFAULT, Reading
-from gait.learn.recording import Y_UP, require_frames
+from gait.learn.recording import FARTHEST, Y_UP, require_frames, require_range
 from gait.trc import read_trc
 
 RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
@@ -40,6 +40,8 @@ def _points(path: Path, reading: Reading) -> Body:
     """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
     labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else c3d_file.read)(path)
     require_frames(path, len(points))
+    for k, label in enumerate(labels):
+        require_range(path, f"point {label!r} at", points[:, k], FARTHEST, "metres")
     fps = reading.fps or rate
     if reading.markers is None and set(joint_file.NEEDED) <= set(joint_file.find(labels)):
         upright = points @ Y_UP.T

@@ -18,6 +18,8 @@ Y_UP = np.array(
 
 
 FEWEST = 3  # frames from which speeds are had
+FARTHEST = 1000.0  # metres from the file's origin: what is beyond is damage, or not in metres
+DEGREES = 3600.0  # no walker turns a joint that often
 
 
 def require_frames(path: Path, frames: int) -> None:
@@ -29,6 +31,23 @@ def require_frames(path: Path, frames: int) -> None:
     """
     if frames < FEWEST:
         raise UserError(f"{path}: {frames} frames; a recording of a few seconds is needed")
+
+
+def require_range(path: Path, what: str, values: Floats, limit: float, unit: str) -> None:
+    """Refuse values (T, ...) whose amount is beyond a limit, naming the first frame; NaN is missing.
+
+    Raises
+    ------
+    UserError
+    """
+    beyond = np.abs(values.reshape(len(values), -1)) > limit
+    if beyond.any():
+        frame = int(np.argmax(beyond.any(axis=1)))
+        value = values.reshape(len(values), -1)[frame, int(np.argmax(beyond[frame]))]
+        raise UserError(
+            f"{path}: frame {frame + 1}: {what} {value:.4g} {unit}, at most {limit:.0f} are plausible; "
+            "correct it, or the file's units"
+        )
 
 
 @dataclass
