@@ -139,7 +139,7 @@ def test_angles_of_the_legs_alone_are_learnt(tmp_path, kind):
     read, refused = sources.load_all(sources.find([str(tmp_path)]))
     assert len(read) == 4 and not refused and all(s.measures is None for s in read)
     made = sections(fit.fit(read, 2, kind=kind))
-    assert "PROP" not in made and made["GAIT"][3] == 0
+    assert "PROP" not in made and 0.3 < made["GAIT"][3] < 1.6
     assert made["GAIT"][0] == pytest.approx(np.mean([100 / (105 + 4 * k) for k in range(4)]), rel=0.01)
     knee = np.degrees(made["CURV"][0, :, CHANNELS.index("r_knee_flexion")])
     assert np.ptp(knee) == pytest.approx(1.15 * 58, rel=0.1)

@@ -8,7 +8,8 @@ learnt.  gait info lists the sequences of a model, --report shows everything.
 
 Recordings are read a few at a time and their signals wait on disk, in the folder that TMPDIR names; in memory
 are their cycles alone.  The model does not depend on --jobs or --dask.  The workers of a Dask cluster
-(pip install 'gait[dask]') need this version of the package and the files under the same paths.
+(.venv/bin/pip install -e 'python[dask]' in the repository) need this version of the package and the files
+under the same paths.
 
 The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
 """
@@ -82,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="GLOB",
-        help="leave out files whose path ends like this, such as 'cmu_walk/02/*'",
+        help="leave out files whose path ends like this, such as 'cmu_walk/02/*', and folders so named",
     )
     parser.add_argument(
         "--period-mode",
@@ -195,21 +196,34 @@ def _check_output(args: argparse.Namespace) -> None:
 
 def _read(args: argparse.Namespace) -> tuple[list[Sequence], list[str]]:
     """Find and prepare the files; say which were left out."""
-    files = sources.find(args.sources, args.exclude)
+    idle: list[str] = []
+    files = sources.find(args.sources, args.exclude, idle.append)
+    for glob in idle if not args.quiet else ():
+        print(f"--exclude {glob}: no file's path ends like this", file=sys.stderr)
     reading = Reading(
         args.period_mode, args.fps, args.zeros_missing, args.activity, args.markers, not args.no_trim
     )
     jobs = args.jobs or len(os.sched_getaffinity(0))
     with progress("reading motion", len(files), args.quiet) as update:
-        sequences, refused = sources.load_all(
-            files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects
-        )
-    if not args.quiet:
-        for line in refused[:MOST_LINES]:
-            print(f"left out: {line}", file=sys.stderr)
-        if len(refused) > MOST_LINES:
-            print(f"left out: {len(refused) - MOST_LINES} more (see --json or --report)", file=sys.stderr)
+        try:
+            sequences, refused = sources.load_all(
+                files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects
+            )
+        except sources.NothingLeft as error:
+            _tell(error.refused[1:], args.quiet, "")
+            raise
+    _tell(refused, args.quiet, " (see --json or --report)")
     return sequences, refused
+
+
+def _tell(refused: list[str], quiet: bool, more: str) -> None:
+    """Say which files were left out."""
+    if quiet:
+        return
+    for line in refused[:MOST_LINES]:
+        print(f"left out: {line}", file=sys.stderr)
+    if len(refused) > MOST_LINES:
+        print(f"left out: {len(refused) - MOST_LINES} more{more}", file=sys.stderr)
 
 
 def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -19,13 +19,29 @@ from gait.learn.spool import Spool
 NOT_YET = np.zeros((0, 0))  # channels of a sequence while they go to disk
 
 
-def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path, bool]]:
+class NothingLeft(UserError):
+    """No file can be used; `refused` has one line about each."""
+
+    def __init__(self, refused: list[str]) -> None:
+        others = f" (and none of the other {len(refused) - 1} files can be used)" if refused[1:] else ""
+        super().__init__(refused[0] + others)
+        self.refused = refused
+
+
+def find(
+    sources: Iterable[str],
+    exclude: Iterable[str] = (),
+    idle: Callable[[str], None] = lambda glob: None,
+) -> list[tuple[Path, bool]]:
     """Motion files of files and folders, sorted; whether each was found in a folder.
 
     Parameters
     ----------
     exclude : iterable of str
-        Globs that the tail of a file's path matches, such as '02_*.amc' or 'cmu_walk/02/*'.
+        Globs that the tail of a file's path matches, such as '02_*.amc' or 'cmu_walk/02/*'; names of folders
+        without wildcards, such as 'cmu_walk/02', for all that is inside.
+    idle : callable
+        Gets each glob that no file matches.
 
     Raises
     ------
@@ -33,14 +49,19 @@ def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path
         If a source is missing, of an unknown kind, or nothing is left.
     """
     found: dict[Path, bool] = {}
-    for source in map(Path, sources):
+    for name in sources:
+        source = Path(name)
+        if not name:
+            raise UserError("'': is no name of a file or folder; use . for this folder")
         if source.is_dir():
-            inside = sorted(p for p in source.rglob("*") if p.suffix.lower() in KINDS and p.is_file())
+            inside = sorted(_inside(source))
             if not inside:
                 raise UserError(f"{source}: no motion files ({_kinds()}) in this folder; name another one")
             found.update((path, True) for path in inside if path not in found)
         elif not source.is_file():
             raise UserError(f"{source}: no such file or folder; check the name")
+        elif source.suffix.lower() == ".asf":
+            raise UserError(f"{source}: is a skeleton without motion; name the .amc files beside it")
         elif source.suffix.lower() not in KINDS:
             raise UserError(
                 f"{source}: {source.suffix or 'no suffix'} is not learnt from; convert it to {_kinds()}"
@@ -48,10 +69,29 @@ def find(sources: Iterable[str], exclude: Iterable[str] = ()) -> list[tuple[Path
         else:
             found[source] = False
     globs = list(exclude)
-    kept = [(p, inside) for p, inside in found.items() if not any(p.match(glob) for glob in globs)]
+    for glob in globs:
+        if not any(_matches(path, glob) for path in found):
+            idle(glob)
+    kept = [(p, inside) for p, inside in found.items() if not any(_matches(p, glob) for glob in globs)]
     if not kept:
         raise UserError(f"--exclude {' '.join(globs)}: leaves none of {len(found)} files; exclude less")
     return kept
+
+
+def _inside(folder: Path) -> Iterator[Path]:
+    """Motion files of a folder and those in it, but for hidden ones."""
+    for path in folder.rglob("*"):
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if not hidden and path.suffix.lower() in KINDS and path.is_file():
+            yield path
+
+
+def _matches(path: Path, glob: str) -> bool:
+    """Whether a glob leaves a file out."""
+    folder = glob.rstrip("/")
+    return bool(folder) and (
+        path.match(folder) or (not set(folder) & set("*?[") and any(p.match(folder) for p in path.parents))
+    )
 
 
 def load_all(
@@ -100,8 +140,7 @@ def load_all(
             progress(i + 1)
         views = spool.views()
     if not sequences:
-        others = f" (and none of the other {len(refused) - 1} files can be used)" if refused[1:] else ""
-        raise UserError(refused[0] + others)
+        raise NothingLeft(refused)
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels
     return sequences, refused
