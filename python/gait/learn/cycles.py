@@ -86,6 +86,20 @@ def _slices(
             yield k, values, mask
 
 
+def fewest(z: Floats, period: float, samples: int) -> int:
+    """Count the cycles that `slice_cycles` finds in a sequence (T, M) at least, wherever they begin."""
+    u, seen = np.arange(len(z)) / period, np.isfinite(z)
+    channels, reach = int(seen.any(axis=0).sum()), max(BRACKET / INTERVALS, NEXT / period)
+    grid = np.arange(-samples, (int(np.ceil(u[-1])) + 1) * samples) / samples
+    entries = np.zeros(len(grid))
+    for columns in _same_columns(seen):
+        if seen[:, columns[0]].any():
+            entries += len(columns) * _bracketed(grid, u[seen[:, columns[0]]], reach)
+    total = np.concatenate([[0.0], np.cumsum(entries)])
+    enough = total[samples:] - total[:-samples] >= OBSERVED * samples * max(channels, 1)
+    return min(int(enough[first::samples].sum()) for first in range(samples))
+
+
 def resample(u: Floats, z: Floats, samples: int, interval: float = 0.0) -> tuple[Floats, Mask]:
     """Penalised cubic splines of one cycle at phases j / samples.
 

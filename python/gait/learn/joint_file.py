@@ -17,6 +17,7 @@ from gait.errors import UserError
 from gait.learn import csv_table, skeleton_fit
 from gait.learn.articulated import HINGES, ORIGINS, SEGMENTS, Pose, posed
 from gait.learn.body import Body
+from gait.learn.gaps import bridged
 from gait.learn.rotations import frame_from, unit
 from gait.skeleton import ANGLES, JOINTS, SIDES, default_skeleton
 
@@ -69,7 +70,7 @@ def oriented(walker: Body, angles: Floats) -> Body:
 
 
 def body(path: Path, places: dict[str, Floats], fps: float) -> Body:
-    """Body of named joint positions (T, 3), z up, metres.
+    """Body of named joint positions (T, 3), z up, metres, short gaps bridged.
 
     Raises
     ------
@@ -80,7 +81,7 @@ def body(path: Path, places: dict[str, Floats], fps: float) -> Body:
     lacking = next((joint for joint in NEEDED if joint not in columns), None)
     if lacking is not None:
         raise UserError(f"{path}: no joint {lacking!r}; name one of its columns so, or leave the file out")
-    joints = {joint: places[columns[joint]] for joint in NEEDED}
+    joints = {joint: bridged(places[columns[joint]], fps) for joint in NEEDED}
     legs = [joint for joint in NEEDED if joint.split("_")[-1] in ("hip", "knee", "ankle")]
     empty = next((joint for joint in legs if not np.isfinite(joints[joint]).any()), None)
     if empty is not None:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import activity, period, readers, retarget, root, subjects, trim, verdict
+from gait.learn import activity, cycles, period, readers, retarget, root, subjects, trim, verdict
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body
 from gait.learn.reading import DEFAULT, Reading
@@ -17,6 +17,8 @@ from gait.learn.rotations import unwrap
 from gait.skeleton import ANGLES, ROOTS, SIDES
 
 Floats = npt.NDArray[np.float64]
+
+PHASES = 64  # at which it is counted how much of a cycle is seen
 
 
 @dataclass
@@ -114,7 +116,10 @@ def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
         found = period.find(motion.angles, read.fps, reading.mode)
     judged, channels, heading = _judge(motion, found, reading.activity)
     if not judged.accepted:
-        raise _refused(path, reading.activity, judged.reason)
+        other = judged.activity if {judged.activity, reading.activity} == {"walk", "run"} else ""
+        raise _refused(path, reading.activity, judged.reason, other)
+    if not cycles.fewest(channels, found.frames, PHASES):
+        raise _refused(path, reading.activity, "too little is seen of each cycle")
     return Sequence(
         name=subjects.names([path])[0],
         subject=subjects.subjects([path])[0],
@@ -131,9 +136,10 @@ def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
     )
 
 
-def _refused(path: Path, wanted: str, reason: str) -> UserError:
-    """Error of a recording that cannot be learnt as the activity."""
-    return UserError(f"{path}: not learnt as {wanted!r}: {reason}; leave it out")
+def _refused(path: Path, wanted: str, reason: str, other: str = "") -> UserError:
+    """Error of a recording that cannot be learnt as the activity, but perhaps as another."""
+    remedy = f"; leave it out, or give --activity {other}" if other else "; leave it out"
+    return UserError(f"{path}: not learnt as {wanted!r}: {reason}{remedy}")
 
 
 def _unsteady(kept: trim.Kept, found: period.Period, fps: float) -> str:
