@@ -15,6 +15,12 @@ class LibraryError(UserError):
     """libgait could not be loaded, or the file found is of another version or layout than this package."""
 
 
+def unreadable(path: object, error: OSError) -> UserError:
+    """Error about a file that the system does not let us read."""
+    what = "its permissions" if isinstance(error, PermissionError) else "the name"
+    return UserError(f"{path}: {error.strerror}; check {what}")
+
+
 class GaitError(Exception):
     """A C call failed.
 

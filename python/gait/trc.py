@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 from gait.files import replacing
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def read_trc(path: Path) -> tuple[list[str], Array, float]:
     try:
         lines = path.read_text(encoding="latin-1").splitlines()
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; check the name") from error
+        raise unreadable(path, error) from error
     try:
         head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
         rate, scale, count = float(head["DataRate"]), METRES[head["Units"].lower()], int(head["NumMarkers"])

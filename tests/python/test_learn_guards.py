@@ -131,3 +131,18 @@ def test_ctrl_c_while_a_command_is_imported_is_one_line(capsys, monkeypatch):
     monkeypatch.setattr(gait.cli, "import_module", interrupted)
     assert run("learn", "x", "-o", "m.gait") == 1
     assert capsys.readouterr().err == "gait learn: interrupted\n"
+
+
+@pytest.mark.parametrize("name", ["a.bvh", "a.amc", "a.csv", "a.trc"])
+def test_a_file_that_may_not_be_read_says_so(tmp_path, capsys, monkeypatch, name):
+    path = tmp_path / name
+    path.write_text("x")
+    path.with_suffix(".asf").write_text("x")  # of the .amc
+
+    def denied(*_args, **_options):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    for method in ("read_text", "read_bytes"):
+        monkeypatch.setattr(Path, method, denied)
+    assert run("learn", path, "-o", tmp_path / "m.gait", "--quiet") == 1
+    assert "Permission denied; check its permissions" in capsys.readouterr().err

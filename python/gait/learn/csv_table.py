@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 from gait.learn.recording import DEGREES, FARTHEST, require_frames
 from gait.skeleton import ANGLES, ROOTS
 
@@ -124,7 +124,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     try:
         raw = path.read_bytes()
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; check the name") from error
+        raise unreadable(path, error) from error
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:

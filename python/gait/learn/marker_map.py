@@ -26,7 +26,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 from gait.learn.articulated import SEGMENTS
 from gait.learn.marker_sets import BONE, LANDMARKS, LOOSE, SETS, Landmark, plain
 
@@ -75,7 +75,7 @@ def _content(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=unique)
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; check the name") from error
+        raise unreadable(path, error) from error
     except (UnicodeDecodeError, json.JSONDecodeError) as error:
         raise UserError(f"{path}: not JSON ({error}); correct it") from None
     if not isinstance(content, dict):

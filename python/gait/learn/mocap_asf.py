@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 from gait.learn.recording import (
     DEGREES,
     FARTHEST,
@@ -107,7 +107,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     try:
         text = path.read_text(encoding="latin-1")
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; check the name") from error
+        raise unreadable(path, error) from error
     numbered = ((i, line.split("#")[0].split()) for i, line in enumerate(text.splitlines(), 1))
     return ((i, words) for i, words in numbered if words)
 

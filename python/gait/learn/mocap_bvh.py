@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 from gait.learn.recording import (
     DEGREES,
     FARTHEST,
@@ -98,7 +98,7 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
     try:
         lines = path.read_text(encoding="latin-1").splitlines()
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; check the name") from error
+        raise unreadable(path, error) from error
     words = _Words(path, lines)
     joints = _hierarchy(words)
     values, stated = _motion(words, lines, sum(len(j.channels) for j in joints))
