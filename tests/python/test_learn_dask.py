@@ -13,7 +13,7 @@ import gait.cli
 from gait.errors import UserError
 from gait.learn import cluster, sources
 
-distributed = pytest.importorskip("distributed", reason="dask is not installed: pip install 'gait[dask]'")
+distributed = pytest.importorskip("distributed", reason="dask is not installed: pip install -e 'python[dask]'")
 pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
 
 
