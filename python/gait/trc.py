@@ -51,7 +51,26 @@ def read_trc(path: Path) -> tuple[list[str], Array, float]:
     rows = [_row(line, 2 + 3 * count, f"{path}:{i}") for i, line in numbered]
     if len(rows) < 3:
         raise UserError(f"{path}: {len(rows)} frames; a recording of a few seconds is needed")
+    _require_consistent(path, head, labels, [(i, row[1]) for (i, _), row in zip(numbered, rows, strict=True)])
     return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, rate
+
+
+def _require_consistent(
+    path: Path, head: dict[str, str], labels: list[str], times: list[tuple[int, float]]
+) -> None:
+    """Refuse labels that are not unique, frames that are not all there, and times that fall."""
+    twice = next((label for label in labels if labels.count(label) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path}:4: label {twice!r} is there twice; rename or remove one")
+    promised = head.get("NumFrames", str(len(times)))
+    if promised != str(len(times)):
+        raise UserError(
+            f"{path}:3: NumFrames is {promised} but {len(times)} frames are there; fetch the file "
+            "again or correct it"
+        )
+    late = next((k for k in range(1, len(times)) if times[k][1] <= times[k - 1][1]), None)
+    if late is not None:
+        raise UserError(f"{path}:{times[late][0]}: the times do not increase; correct column Time")
 
 
 def _row(line: str, width: int, where: str) -> list[float]:

@@ -66,6 +66,8 @@ def test_components_are_no_more_than_cycles_allow(cycles, wanted, count):
 def test_more_components_than_cycles_allow_are_an_error(cycles, wanted, message):
     with pytest.raises(UserError, match=f"^{message}$"):
         fit.most_components(cycles, wanted)
+    with pytest.raises(UserError, match=f"^a.csv b.csv: {message}$"):
+        fit.most_components(cycles, wanted, ["a.csv", "b.csv"])
 
 
 def test_few_cycles_give_fewer_components_and_a_line_says_so(walks, tmp_path, capsys):

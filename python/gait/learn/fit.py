@@ -18,6 +18,7 @@ from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, point
 Floats = npt.NDArray[np.float64]
 
 SAMPLES = 128
+MOST_NAMES = 4  # of files in a message
 DEFAULT_COMPONENTS = 8
 KINDS = ("people", "paper")  # of priors
 MOST_COMPONENTS = 16  # the library reads no more
@@ -142,7 +143,7 @@ def fit(
     alignment.offsets = (alignment.offsets + start * periods) % periods
     release(*signals)
     rows = cycles.slice_cycles(signals, periods, alignment.offsets, SAMPLES)
-    wanted = most_components(len(rows.values), components)
+    wanted = most_components(len(rows.values), components, [str(s.source) for s in sequences])
     scale = channel_scale()
     scaled, held_out = _times(rows.values, scale), np.zeros(0)
     if components == "auto":
@@ -163,8 +164,8 @@ def fit(
     )
 
 
-def most_components(cycles: int, wanted: int | str | None) -> int:
-    """Components to learn from so many cycles; with "auto", to try.
+def most_components(cycles: int, wanted: int | str | None, files: list[str] | None = None) -> int:
+    """Components to learn from so many cycles of these files; with "auto", to try.
 
     Raises
     ------
@@ -179,7 +180,9 @@ def most_components(cycles: int, wanted: int | str | None) -> int:
     if allowed < least:
         what = "1 component" if least == 1 else f"{least} components"
         remedy = "add recordings" if allowed < 1 else f"add recordings or ask for {allowed} at most"
-        raise UserError(f"{cycles} cycles are too few for {what}; {remedy}")
+        named = " ".join((files or [])[:MOST_NAMES]) + (" ..." if len(files or []) > MOST_NAMES else "")
+        held = "1 cycle is" if cycles == 1 else f"{cycles} cycles are"
+        raise UserError(f"{named}{': ' * bool(named)}{held} too few for {what}; {remedy}")
     return wanted
 
 
