@@ -114,13 +114,15 @@ def test_exclude_matches_the_tail_of_the_path(walks):
         (["{walks}", "--exclude", "*"], "leaves none of 8 files"),
         (["{walks}/nowhere"], "no such file or folder"),
         (["{walks}", "--markers", "{walks}/no.json"], "no.json: No such file or directory; check the name"),
-        (["{walks}/01/01.asf"], "not learnt from; convert it to .amc .bvh"),
+        (["{walks}/01/01.asf"], "a skeleton without motion; name the .amc files"),
+        (["{walks}/notes.txt"], "not learnt from; convert it to .amc .bvh"),
         (["{walks}/02/02_99.amc"], r"02_99.amc:3: 2 numbers where 6"),
         (["{walks}/01/01_01.amc", "--components", "5"], "too few for 5 components; add recordings"),
         (["{walks}", "--components", "5", "-o", "{walks}/no/where.gait"], "does not exist; create it"),
     ],
 )
 def test_errors_are_one_line_with_exit_code_1(walks, tmp_path, capsys, words, message):
+    (walks / "notes.txt").write_text("of no motion\n")
     words = [w.format(walks=walks) for w in words]
     output = [] if "-o" in words else ["-o", tmp_path / "m.gait"]
     assert run("learn", *words, *output) == 1
