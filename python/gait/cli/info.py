@@ -75,8 +75,11 @@ def text(name: str, s: Mapping[str, Any]) -> str:
         lines += sequence_lines(meta["sequences"]["rows"])
         more = meta["sequences"]["count"] - len(meta["sequences"]["rows"])
         lines += [f"and {more} more"] if more > 0 else []
+    if meta.get("unobserved"):
+        lines.append("never observed, in the rest pose: " + " ".join(meta["unobserved"]))
     if "variance_explained" in meta:
-        lines.append("variance explained: " + " ".join(f"{v:.3f}" for v in meta["variance_explained"]))
+        shares = meta["variance_explained"][: s.get("components")]
+        lines.append("variance explained: " + " ".join(f"{100 * v:.1f}" for v in shares) + " %")
     if "acknowledgement" in meta:
         lines.append(meta["acknowledgement"])
     return "\n".join(lines)

@@ -11,6 +11,8 @@ are their cycles alone.  The model does not depend on --jobs or --dask.  The wor
 (.venv/bin/pip install -e 'python[dask]' in the repository) need this version of the package and the files
 under the same paths.
 
+What the columns of .csv and the marker names of .c3d and .trc must be: libgait/doc/mocap-formats.md.
+
 The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
 """
 
@@ -140,6 +142,8 @@ def run(args: argparse.Namespace) -> int:
         learned = fit.fit(sequences, args.components, args.seed, args.prior)
         if args.components is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS and not args.quiet:
             print(_few(learned), file=sys.stderr)
+        if (parts := model.unobserved(learned)) and not args.quiet:
+            print(f"no recording shows {_words(parts)}: these stay in the rest pose", file=sys.stderr)
         if not args.quiet:
             for words in _unsettled(learned):
                 print(words, file=sys.stderr)
@@ -299,6 +303,11 @@ def _text(path: str, s: dict[str, Any]) -> str:
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
     ]
     return "\n".join(lines)
+
+
+def _words(names: list[str]) -> str:
+    """Join names as in a sentence."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _listed(names: list[str]) -> str:

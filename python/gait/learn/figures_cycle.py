@@ -27,7 +27,9 @@ from gait.skeleton import CHANNELS
 ALIGNED = ("r_hip_flexion", "r_knee_flexion", "l_shoulder_flexion")
 MOST_SEQUENCES = 40  # drawn before and after
 MOST_CYCLES = 300  # drawn
-BINS = 64  # of the mean curve before alignment
+BINS, FEWEST_BINS = 64, 20  # of the mean curve of what is folded
+IN_BIN = 5  # samples that a bin should have
+SCATTERED = 0.9  # observed share below which samples are dotted
 MOST_TICKS = 20  # subjects named in the map
 
 
@@ -69,19 +71,31 @@ def _folded(axes: Axes, learned: Learned, picked: object, k: int, after: bool) -
         wraps = np.flatnonzero(np.diff(phase) < 0) + 1  # a line must not run back over the panel
         axes.plot(
             np.insert(phase, wraps, np.nan), np.insert(curve, wraps, np.nan),
-            color=shades[learned.subject_index[i]], lw=0.5, alpha=0.6,
+            color=shades[learned.subject_index[i]], lw=0.5, alpha=0.6, marker=".", ms=_dot(curve), mew=0,
         )  # fmt: skip
     centres, mean = _binned(np.concatenate(phases), np.concatenate(values))
     axes.plot(centres, mean, "k", lw=2)
 
 
+def _dot(curve: Floats) -> float:
+    """Size of the dots on a curve: samples without neighbours make no line; 0 where there are none."""
+    seen = np.isfinite(curve)
+    return 2.0 if seen.any() and np.mean(seen) < SCATTERED else 0.0
+
+
 def _binned(phase: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Mean of values over bins of the phase, closed to a whole cycle."""
     seen = np.isfinite(values)
-    bins = np.minimum((phase[seen] * BINS).astype(int), BINS - 1)
-    count = np.bincount(bins, minlength=BINS)
-    mean = np.bincount(bins, values[seen], BINS) / np.where(count, count, np.nan)
-    centres = (np.arange(-1, BINS + 1) + 0.5) / BINS
+    if not seen.any():
+        return np.zeros(0), np.zeros(0)
+    number = int(np.clip(seen.sum() // IN_BIN, FEWEST_BINS, BINS))
+    bins = np.minimum((phase[seen] * number).astype(int), number - 1)
+    count = np.bincount(bins, minlength=number)
+    middles, filled = np.arange(number), np.flatnonzero(count)  # empty bins are bridged
+    mean = np.interp(
+        middles, filled, (np.bincount(bins, values[seen], number)[filled] / count[filled]), period=number
+    )
+    centres = (np.arange(-1, number + 1) + 0.5) / number
     return centres, np.concatenate([mean[-1:], mean, mean[:1]])
 
 

@@ -154,12 +154,21 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
             "columns": list(SEQUENCE_COLUMNS),
             "rows": sequence_table(learned)[:MOST_ROWS],
         },
+        **({"unobserved": missing} if (missing := unobserved(learned)) else {}),
         "cycles": len(c.scores),
         "missing": round(float(1 - learned.cycles.mask.mean()), 3),
         "variance_explained": _rounded(np.cumsum(c.spectrum)[: len(c.sd)], 3),
         "residual_deg": _rounded(np.degrees(channel_statistics(learned)[: len(ANGLES), 0]), 1),
         "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
     }
+
+
+def unobserved(learned: Learned) -> list[str]:
+    """Parts of the body, such as 'l_shoulder', of which no recording has any angle."""
+    seen = dict.fromkeys((name.rsplit("_", 1)[0] for name in ANGLES), False)
+    for name, observed in zip(ANGLES, learned.cycles.mask.any(axis=(0, 1)), strict=False):
+        seen[name.rsplit("_", 1)[0]] |= bool(observed)
+    return [part for part, observed in seen.items() if not observed]
 
 
 def _stature(learned: Learned, subject: str) -> float | None:
