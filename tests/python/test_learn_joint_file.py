@@ -1,5 +1,7 @@
 """Joint positions in .csv and .trc as a source of learning."""
 
+from dataclasses import replace
+
 import mocap_files as files
 import numpy as np
 import pytest
@@ -112,3 +114,20 @@ def test_malformed_trc_is_named(walker, tmp_path, change):
     path.write_text(change(path.read_text()))
     with pytest.raises(UserError, match="not a .trc header"):
         readers.read(path)
+
+
+def turned(walker, turn):
+    return replace(walker, joints={name: place @ turn.T for name, place in walker.joints.items()})
+
+
+def test_y_up_is_seen(walker, tmp_path):
+    found = joint_file.read_csv(write_csv(tmp_path / "a.csv", turned(walker, Y_UP.T)))
+    assert found.joints["r_knee"] == pytest.approx(walker.joints["r_knee"], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("turn", "words"), [(np.diag([1.0, -1, -1]), "-z is up; z must be"), (Y_UP, "x is up; z must be")]
+)
+def test_any_other_up_is_named(walker, tmp_path, turn, words):
+    with pytest.raises(UserError, match=f"a.csv: {words}"):
+        joint_file.read_csv(write_csv(tmp_path / "a.csv", turned(walker, turn)))

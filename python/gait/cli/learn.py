@@ -297,7 +297,7 @@ def _text(path: str, s: dict[str, Any]) -> str:
         f"{_count(len(s['sequences']), 'sequence')} of {_count(len(s['subjects']), 'subject')} "
         f"({_listed(s['subjects'])}), "
         f"{_count(s['cycles'], 'cycle')}{left}",
-        f"{s['stride_hz'][0]:.2f} strides/s of {s['stride_length_statures'][0]:.2f} statures",
+        f"{s['stride_hz'][0]:.2f} strides/s, stride length {s['stride_length_statures'][0]:.2f} statures",
         f"{_count(s['components'], 'component')}: {explained} % of the variance; "
         f"residual {s['residual_deg']:.1f} deg",
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",

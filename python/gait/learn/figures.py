@@ -39,7 +39,7 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
     yield Drawing(
         "residuals",
         "What the components leave",
-        "By angle; blue: right, grey: left, black: trunk and neck.",
+        "Of each angle over all observed cycles, rms; blue: right, grey: left, black: trunk and neck.",
         figures_model.residuals(learned),
     )
     subjects = figures_subject.errors(learned)
@@ -71,4 +71,9 @@ def _model(learned: Learned) -> Iterator[Drawing]:
         yield Drawing(
             "components", "Components as curves", "Right side of the body.", figures_model.curves(learned)
         )
-    yield Drawing("spectrum", "Number of components", "", figures_model.spectrum(learned))
+    yield Drawing(
+        "spectrum",
+        "Number of components",
+        "Share of the variance that each explains.",
+        figures_model.spectrum(learned),
+    )

@@ -160,7 +160,7 @@ def residuals(learned: Learned) -> Figure:
     order = sorted(range(len(ANGLES)), key=lambda i: [j in ANGLES[i] for j in JOINT_ORDER].index(True))
     shades = [{"l_": GREY, "r_": BLUE}.get(ANGLES[i][:2], DARK) for i in order]
     axes.bar(np.arange(len(order)), rest[order], color=shades)
-    for place in np.flatnonzero(count[order] == 0):
+    for place in np.flatnonzero(count[order] == 0).tolist():
         axes.text(place, 0, " not observed", rotation=90, ha="center", va="bottom", fontsize=7, color=GREY)
     axes.set_xticks(np.arange(len(order)), [words(ANGLES[i]) for i in order], rotation=90, fontsize=8)
     axes.set(ylabel="residual, degrees (rms)", xlim=(-0.7, len(order) - 0.3))

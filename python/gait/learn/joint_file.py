@@ -18,6 +18,7 @@ from gait.learn import csv_table, skeleton_fit
 from gait.learn.articulated import HINGES, ORIGINS, SEGMENTS, Pose, posed
 from gait.learn.body import Body
 from gait.learn.gaps import bridged
+from gait.learn.recording import Y_UP
 from gait.learn.rotations import frame_from, unit
 from gait.skeleton import ANGLES, JOINTS, SIDES, default_skeleton
 
@@ -33,7 +34,7 @@ STRAIGHT = (
 
 
 def read_csv(path: Path, fps: float | None = None) -> Body:
-    """Read `frame,time,<joint>_x,<joint>_y,<joint>_z,...`: metres, z up; empty cells are missing.
+    """Read `frame,time,<joint>_x,<joint>_y,<joint>_z,...`: metres, z (or y) up; empty cells are missing.
 
     Raises
     ------
@@ -48,11 +49,28 @@ def read_csv(path: Path, fps: float | None = None) -> Body:
         raise UserError(
             f"{path}:1: column {error.args[0].split()[0]} is missing; each joint needs x, y, z"
         ) from None
-    walker = body(path, places, table.fps)
+    walker = body(path, _upright(path, places), table.fps)
     columns = [f"{name}_deg" for name in ANGLES]
     if not set(columns) <= set(table.names):
         return walker
     return oriented(walker, np.radians(np.stack([table[column] for column in columns], axis=1)))
+
+
+def _upright(path: Path, places: dict[str, Floats]) -> dict[str, Floats]:
+    """Turn positions with y up to z up: up is from the ankles to the neck."""
+    found = find(list(places))
+    ends = [found.get(joint) for joint in ("neck", "l_ankle", "r_ankle")]
+    if None in ends:
+        return places  # `body` names the joint
+    neck, *ankles = (places[name] for name in ends if name is not None)
+    rise = neck - sum(ankles) / 2
+    if not np.isfinite(rise).all(axis=1).any():
+        return places
+    up = np.nanmean(rise, axis=0)
+    axis = int(np.argmax(np.abs(up)))
+    if axis == 0 or up[axis] < 0:
+        raise UserError(f"{path}: {'-' * bool(up[axis] < 0)}{'xyz'[axis]} is up; z must be, rotate the data")
+    return {name: place @ Y_UP.T for name, place in places.items()} if axis == 1 else places
 
 
 def oriented(walker: Body, angles: Floats) -> Body:

@@ -166,7 +166,7 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
 def unobserved(learned: Learned) -> list[str]:
     """Parts of the body, such as 'l_shoulder', of which no recording has any angle."""
     seen = dict.fromkeys((name.rsplit("_", 1)[0] for name in ANGLES), False)
-    for name, observed in zip(ANGLES, learned.cycles.mask.any(axis=(0, 1)), strict=False):
+    for name, observed in zip(ANGLES, np.atleast_1d(learned.cycles.mask.any(axis=(0, 1))), strict=False):
         seen[name.rsplit("_", 1)[0]] |= bool(observed)
     return [part for part, observed in seen.items() if not observed]
 

@@ -100,7 +100,7 @@ def _summary(learned: Learned, refused: list[str]) -> str:
         f"{len(refused)}. Cycles: {len(learned.cycles.values)}, {100 - 100 * learned.cycles.mask.mean():.1f} "
         f"% of their entries missing. Components kept: {len(learned.components.sd)}, with {share:.0f} % of "
         "the variance.</p>"
-        f"<p>{rate:.3f} &plusmn; {rate_sd:.3f} strides/s of {length:.3f} &plusmn; {length_sd:.3f} statures; "
+        f"<p>{rate:.3f} &plusmn; {rate_sd:.3f} strides/s, stride length {length:.3f} &plusmn; {length_sd:.3f} statures; "
         f"stride time varies by {100 * variation:.1f} % within a sequence.</p>"
     )
 
