@@ -1,13 +1,18 @@
 """Scattered missing cells of joint positions: what is lost by them and what is not."""
 
+from pathlib import Path
+
+import marked_walker as mw
 import mocap_files as files
 import numpy as np
 import pytest
 
+import gait.cli
 from gait.errors import UserError
-from gait.learn import body, cycles, gaps, joint_file, mocap_asf, retarget, sequence
+from gait.learn import body, cycles, gaps, joint_file, marker_map, mocap_asf, retarget, sequence
 from gait.learn.fit import SAMPLES
 from gait.learn.reading import Reading
+from gait.skeleton import ANGLES
 
 RATE = 120
 
@@ -70,3 +75,27 @@ def test_the_fewest_cycles_are_those_of_the_worst_beginning(missing):
     z[rng.random(250) < missing] = np.nan
     made = [len(cycles.slice_cycles([z], [100.0], [o], 50).values) for o in np.arange(0, 100, 2.0)]
     assert cycles.fewest(z, 100.0, 50) == min(made)
+
+
+def test_what_no_recording_shows_is_said(tmp_path, capsys):
+    legs = [k for k, name in enumerate(ANGLES) if "hip" in name or "knee" in name]
+    rows = [",".join(["time", *(f"{ANGLES[k]}_deg" for k in legs)])]
+    for t, pose in enumerate(np.degrees(mw.walk_angles(480, 100.0))):
+        rows.append(",".join([f"{t / 100:.2f}", *(f"{pose[k]:.4f}" for k in legs)]))
+    (tmp_path / "legs.csv").write_text("\n".join(rows) + "\n")
+    model = tmp_path / "legs.gait"
+    assert gait.cli.main(["learn", str(tmp_path / "legs.csv"), "-o", str(model)]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    line = next(x for x in lines if x.endswith("these stay in the rest pose"))
+    assert "l_shoulder" in line and "torso" in line and "l_hip" not in line
+    assert gait.cli.main(["info", str(model)]) == 0
+    line = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("never observed"))
+    assert "l_shoulder" in line and "l_hip" not in line
+
+
+def test_the_example_of_a_mapping_is_read(tmp_path):
+    page = Path(__file__).parents[2] / "libgait/doc/mocap-formats.md"
+    example = page.read_text(encoding="utf-8").split("```json")[1].split("```")[0]
+    (tmp_path / "map.json").write_text(example)
+    table = marker_map.read(tmp_path / "map.json")
+    assert table["clustera"].segment == "l_thigh" and "lwra" not in table

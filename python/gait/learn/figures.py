@@ -38,8 +38,8 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
     yield from _model(learned)
     yield Drawing(
         "residuals",
-        "What the components leave",
-        "Of each angle over all observed cycles, rms; blue: right, grey: left, black: trunk and neck.",
+        "Residual by angle",
+        "What the components leave of each angle in all cycles, rms; blue: right, grey: left, black: trunk and neck.",
         figures_model.residuals(learned),
     )
     subjects = figures_subject.errors(learned)

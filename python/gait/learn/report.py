@@ -100,7 +100,8 @@ def _summary(learned: Learned, refused: list[str]) -> str:
         f"{len(refused)}. Cycles: {len(learned.cycles.values)}, {100 - 100 * learned.cycles.mask.mean():.1f} "
         f"% of their entries missing. Components kept: {len(learned.components.sd)}, with {share:.0f} % of "
         "the variance.</p>"
-        f"<p>{rate:.3f} &plusmn; {rate_sd:.3f} strides/s, stride length {length:.3f} &plusmn; {length_sd:.3f} statures; "
+        f"<p>{rate:.3f} &plusmn; {rate_sd:.3f} strides/s, stride length {length:.3f} "
+        f"&plusmn; {length_sd:.3f} statures; "
         f"stride time varies by {100 * variation:.1f} % within a sequence.</p>"
     )
 
@@ -119,8 +120,8 @@ def _sequences(learned: Learned) -> str:
     )
     return (
         '<h2 id="sequences">Sequences</h2><p>Sharpness: largest over median ratio of the period. Residual: '
-        "rms of all angles. Evidence: repeats: correlation with the next cycle; legs: of each leg with the "
-        "other half a cycle later; flight: share of the time with both feet off the ground; lift and steps: "
+        "what the components leave of the sequence, rms of all its angles. Evidence: repeats: correlation "
+        "with the next cycle; legs: of each leg with the other half a cycle later; flight: share of the time with both feet off the ground; lift and steps: "
         "rise of the feet and of the ground, statures.</p>"
         f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
     )
