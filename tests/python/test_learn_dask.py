@@ -13,7 +13,9 @@ import gait.cli
 from gait.errors import UserError
 from gait.learn import cluster, sources
 
-distributed = pytest.importorskip("distributed", reason="dask is not installed: pip install -e 'python[dask]'")
+distributed = pytest.importorskip(
+    "distributed", reason="dask is not installed: pip install -e 'python[dask]'"
+)
 pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
 
 

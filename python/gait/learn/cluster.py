@@ -66,7 +66,9 @@ def _connected(address: str) -> Iterator[Client]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise UserError("--dask: dask is not installed; pip install -e 'python[dask]' in the repository") from error
+        raise UserError(
+            "--dask: dask is not installed; pip install -e 'python[dask]' in the repository"
+        ) from error
     log = logging.getLogger("distributed")
     before = log.level
     log.setLevel(logging.CRITICAL)  # a lost connection is one line of ours, not its tracebacks
