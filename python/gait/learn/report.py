@@ -122,7 +122,8 @@ def _sequences(learned: Learned) -> str:
         '<h2 id="sequences">Sequences</h2><p>Sharpness: largest over median ratio of the period. Residual: '
         "what the components leave of the sequence, rms of all its angles. Evidence: repeats: correlation "
         "with the next cycle; legs: of each leg with the other half a cycle later; flight: share "
-        "of the time with both feet off the ground; lift and steps: rise of the feet and of the ground, statures.</p>"
+        "of the time with both feet off the ground; lift and steps: rise of the feet and of the ground, "
+        "statures.</p>"
         f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
     )
 
