@@ -1,6 +1,7 @@
 """Files read in several processes: the same result, one line for what fails, nothing left behind."""
 
 import errno
+import gc
 import multiprocessing
 import os
 import signal
@@ -190,6 +191,7 @@ def test_signals_that_were_read_are_not_held_in_memory(walks):
     tracemalloc.start()
     for count in (1, 9, 17):  # the first fills caches
         sequences, _ = sources.load_all([(path, True)] * count)
+        gc.collect()
         held.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert held[2] - held[1] < 8 * 0.5 * sequences[0].channels.nbytes
