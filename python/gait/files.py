@@ -1,4 +1,4 @@
-"""Output files appear complete or not at all: written beside their place, then renamed."""
+"""Files: text read as lines; outputs complete or not at all, written beside their place, then renamed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 
 
 @contextmanager
@@ -47,3 +47,17 @@ def require_writable(path: str | os.PathLike[str]) -> None:
         raise UserError(f"{path}: folder {target.parent} cannot be written; choose another place")
     if target.exists() and not os.access(target, os.W_OK):
         raise UserError(f"{path}: is read-only; choose another name, or change its permissions")
+
+
+def text_lines(path: Path) -> list[str]:
+    """Lines of a text file in any encoding that keeps ASCII.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read.
+    """
+    try:
+        return path.read_text(encoding="latin-1").splitlines()
+    except OSError as error:
+        raise unreadable(path, error) from error

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.errors import UserError, unreadable
-from gait.files import replacing
+from gait.errors import UserError
+from gait.files import replacing, text_lines
 
 Array = NDArray[np.float64]
 
@@ -35,10 +35,7 @@ def read_trc(path: Path) -> tuple[list[str], Array, float]:
     UserError
         Naming file, line and remedy.
     """
-    try:
-        lines = path.read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        raise unreadable(path, error) from error
+    lines = text_lines(path)
     try:
         head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
         rate, scale, count = float(head["DataRate"]), METRES[head["Units"].lower()], int(head["NumMarkers"])

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError, unreadable
+from gait.errors import UserError
+from gait.files import text_lines
 from gait.learn.recording import (
     DEGREES,
     FARTHEST,
@@ -95,10 +96,7 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
     UserError
         Naming file, line and remedy.
     """
-    try:
-        lines = path.read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        raise unreadable(path, error) from error
+    lines = text_lines(path)
     words = _Words(path, lines)
     joints = _hierarchy(words)
     values, stated = _motion(words, lines, sum(len(j.channels) for j in joints))
