@@ -128,3 +128,22 @@ def bvh_from_amc(path, rename=None, unit=0.0254 / 0.45):
     rows = np.concatenate(columns, axis=1)
     lines += ["MOTION", f"Frames: {len(rows)}", f"Frame Time: {1 / motion.fps:.8f}"]
     return "\n".join([*lines, *(" ".join(f"{v:.6f}" for v in row) for row in rows)]) + "\n"
+
+
+def write_people(folder):
+    """Six toy walks of three subjects in a folder each."""
+    for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 2)]):
+        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i}
+        write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", frames=400, **motion)
+    return folder
+
+
+def write_trials(folder, count):
+    """Toy walks of one subject and a broken file in their midst."""
+    for i in range(count):
+        write_toy(folder, f"01_{i:02}", period=110.0 + 5 * i, seed=i, frames=300 + 20 * i)
+    (folder / "01_02x.amc").write_text(BROKEN)
+    return folder
+
+
+BROKEN = ":DEGREES\n1\nroot 1 2\n"

@@ -22,11 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are no
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):
     """Six toy walks and a broken file in their midst."""
-    folder = tmp_path_factory.mktemp("walks")
-    for i in range(6):
-        files.write_toy(folder, f"01_{i:02}", period=110.0 + 5 * i, seed=i, frames=300 + 20 * i)
-    (folder / "01_02x.amc").write_text(":DEGREES\n1\nroot 1 2\n")
-    return folder
+    return files.write_trials(tmp_path_factory.mktemp("walks"), 6)
 
 
 @pytest.fixture(scope="module")

@@ -25,11 +25,7 @@ from gait.learn.spool import Spool
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):
     """Five toy walks and a broken file in their midst."""
-    folder = tmp_path_factory.mktemp("walks")
-    for i in range(5):
-        files.write_toy(folder, f"01_{i:02}", period=110.0 + 5 * i, seed=i, frames=300 + 20 * i)
-    (folder / "01_02x.amc").write_text(":DEGREES\n1\nroot 1 2\n")
-    return folder
+    return files.write_trials(tmp_path_factory.mktemp("walks"), 5)
 
 
 @pytest.fixture

@@ -21,11 +21,7 @@ LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for na
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):
     """Folder of six toy walks of three subjects."""
-    folder = tmp_path_factory.mktemp("walks")
-    for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 2)]):
-        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i}
-        files.write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", frames=400, **motion)
-    return folder
+    return files.write_people(tmp_path_factory.mktemp("walks"))
 
 
 @pytest.fixture(scope="module")

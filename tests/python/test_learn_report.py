@@ -24,11 +24,8 @@ def as_the_command_does():
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory):
     """Six toy walks of three subjects and a broken file."""
-    folder = tmp_path_factory.mktemp("walks")
-    for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 2)]):
-        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i}
-        files.write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", frames=400, **motion)
-    (folder / "02/02_99.amc").write_text(":DEGREES\n1\nroot 1 2\n")
+    folder = files.write_people(tmp_path_factory.mktemp("walks"))
+    (folder / "02/02_99.amc").write_text(files.BROKEN)
     return folder
 
 
