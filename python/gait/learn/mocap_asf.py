@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError, unreadable
+from gait.errors import UserError
+from gait.files import text_lines
 from gait.learn.recording import (
     DEGREES,
     FARTHEST,
@@ -104,11 +105,7 @@ def find_skeleton(path: Path) -> Path:
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Numbered lines split into words, comments and empty lines left out."""
-    try:
-        text = path.read_text(encoding="latin-1")
-    except OSError as error:
-        raise unreadable(path, error) from error
-    numbered = ((i, line.split("#")[0].split()) for i, line in enumerate(text.splitlines(), 1))
+    numbered = ((i, line.split("#")[0].split()) for i, line in enumerate(text_lines(path), 1))
     return ((i, words) for i, words in numbered if words)
 
 
