@@ -1,0 +1,30 @@
+"""A segment prior as sections of a blob (libgait/doc/model-format.md)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gait import blob
+from gait.lift.prior import SegmentPrior
+
+
+def sections(prior: SegmentPrior) -> dict[str, blob.Array]:
+    """Sections SGNM ... SGPS, in the order of the file."""
+    components, size, frames, markers = prior.modes.shape[:4]
+    counts = [frames, prior.hop, prior.headings, components, size, prior.segments, prior.recordings, 0]
+    return {
+        "SGNM": blob.pack_names(list(prior.names)),
+        "SGIN": np.array(counts, np.int32),
+        "SGRT": np.array([prior.fps, prior.gamma, prior.stature, 0, 0, 0, 0, 0], np.float32),
+        "SGWT": prior.weights.astype(np.float32),
+        "SGMN": _stored(prior.mean),
+        "SGMD": _stored(prior.modes.reshape(components, size, frames, 3 * markers)),
+        "SGSD": prior.sd.astype(np.float32),
+        "SGPS": prior.residual.astype(np.float32),
+    }
+
+
+def _stored(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+    """Round to a millionth, so that the last bits of another machine's algebra do not show."""
+    return np.round(values, 6).astype(np.float32)
