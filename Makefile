@@ -44,7 +44,17 @@ LIBGAIT := $(COMMON) -fPIC -fvisibility=hidden -fstack-usage -Wframe-larger-than
 EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_NO_IO
 NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
 
-OBJ := $(patsubst libgait/src/%,$(B)/src/%.o,$(sort $(wildcard libgait/src/*.c libgait/src/*.cpp)))
+# Kernels (libgait/src/kernels.h) are compiled once per instruction set; `scalar` defines their results.
+FLAGS_scalar := -fno-tree-vectorize -fno-tree-slp-vectorize
+FLAGS_base   :=
+FLAGS_avx2   := -mavx2 -mpopcnt -mbmi -mbmi2
+FLAGS_avx512 := $(FLAGS_avx2) -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vpopcntdq \
+                -mavx512bitalg -mprefer-vector-width=512
+KERNEL_ISAS := scalar base $(if $(findstring x86_64,$(shell $(CC) -dumpmachine)),avx2 avx512)
+KERNEL_SRC := $(sort $(wildcard libgait/src/*_kernel.c))
+KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(KERNEL_SRC:libgait/src/%.c=$(B)/src/%.$(isa).o))
+SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*.c libgait/src/*.cpp)))
+OBJ := $(SRC:libgait/src/%=$(B)/src/%.o) $(KERNEL_OBJ)
 UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_*.c)))
 TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
 LIBS := $(B)/libgait.so $(B)/libgait.a
@@ -101,6 +111,12 @@ $(B)/src/%.c.o: libgait/src/%.c Makefile | $(B)/src/
 
 $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
 	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) $(NO_RUNTIME) $(EIGEN_FLAGS) $(WARN) $(CXXFLAGS) -c $< -o $@
+
+define kernel_rule
+$(B)/src/%.$(1).o: libgait/src/%.c Makefile | $(B)/src/
+	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
+endef
+$(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 
 %/:
 	@mkdir -p $@

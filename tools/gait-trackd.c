@@ -16,13 +16,19 @@
 static struct settings {
     char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
     char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
-    int32_t stream, particles, components, threads, tasks, lag;
+    int32_t stream, particles, components, threads, tasks, lag, cpu_mask;
     uint64_t seed;
     float max_gap;
     bool particles_channel, quiet, version;
     tracker_values tracker;
-} settings = {
-    .mode = "default", .init = "auto", .components = -1, .threads = 1, .lag = 5, .seed = 1, .max_gap = 2};
+} settings = {.mode = "default",
+              .init = "auto",
+              .components = -1,
+              .threads = 1,
+              .lag = 5,
+              .cpu_mask = -1,
+              .seed = 1,
+              .max_gap = 2};
 
 #define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
@@ -60,6 +66,10 @@ static const option own_options[] = {
     {"seed", 0, "N", "of the random numbers, default 1", OPTION_U64, &settings.seed, 0, 0},
     {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, POOL_MAX)},
     {"tasks", 0, "N", tasks_help, INT(tasks, 1, 256)},
+    {"cpu-mask", 0, "N",
+     "instruction sets that may be used, added up: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none;\n"
+     "        default all that the CPU has; results do not depend on it",
+     INT(cpu_mask, 0, INT32_MAX)},
     {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
      OPTION_FLOAT, &settings.max_gap, 0, 60},
     {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
@@ -149,6 +159,7 @@ static void make_config(pool *threads, gait_tracker_config *c)
     c->components = settings.components;
     c->seed = settings.seed;
     c->lag = settings.lag;
+    c->cpu_mask = (uint32_t)settings.cpu_mask;
     if (settings.tasks)
         c->tasks = settings.tasks;
     else if (c->tasks < settings.threads)

@@ -66,6 +66,13 @@ GAIT_API uint32_t              gait_version(void);               /* of the libra
 GAIT_API uint32_t              gait_abi(void);
 GAIT_API const gait_abi_field *gait_abi_fields(uint32_t *count); /* bindings check themselves on import */
 
+/* Instruction sets.  The best of those that the CPU and a tracker's config cpu_mask have is used. */
+#define GAIT_CPU_BASE   0x1u /* of every CPU of the architecture: SSE2, NEON */
+#define GAIT_CPU_AVX2   0x2u /* and POPCNT, BMI2 */
+#define GAIT_CPU_AVX512 0x4u /* F, BW, DQ, VL, VBMI, VPOPCNTDQ, BITALG */
+GAIT_API uint32_t    gait_cpu_features(void);      /* GAIT_CPU_* of this CPU and build */
+GAIT_API const char *gait_cpu_name(uint32_t mask); /* what cpu_mask gives here: "scalar", "base", "avx2" or "avx512" */
+
 /* ---- plain data -------------------------------------------------------------------------------------- */
 enum { GAIT_GREY8 = 1, GAIT_RGB8 = 2, GAIT_BGR8 = 3 };
 typedef struct gait_image { /* borrowed view */
@@ -184,7 +191,7 @@ typedef struct gait_tracker_config {
     float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
     float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
-    uint32_t reserved;
+    uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
     /* Reported joint_sd: the particles' deviation times this, because frames err alike, */
     float    joint_sd_factor;
     float    joint_sd_model;   /* and, in quadrature, what the model cannot express, fraction of stature */

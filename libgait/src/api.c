@@ -1,4 +1,6 @@
 /* api.c - public functions of the library and of models: check the arguments, then one call down. */
+#include "cpu.h"
+#include "kernels.h"
 #include "kinematics.h"
 
 uint32_t gait_version(void)
@@ -9,6 +11,16 @@ uint32_t gait_version(void)
 uint32_t gait_abi(void)
 {
     return GAIT_ABI;
+}
+
+uint32_t gait_cpu_features(void)
+{
+    return cpu_features();
+}
+
+const char *gait_cpu_name(uint32_t mask)
+{
+    return kernels_choose(mask)->isa;
 }
 
 const char *gait_status_name(gait_status s)

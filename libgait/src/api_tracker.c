@@ -48,6 +48,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .offset_noise = 0.02f,
         .offset_sd = 0.07f,
         .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
+        .cpu_mask = ~0u,
     };
     if (paper) { /* random walks of eqs. 5-9 (spec 1.4), rates that the papers left open */
         cfg->phase_noise = 0.022f;

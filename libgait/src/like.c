@@ -44,6 +44,7 @@ static void cost_init(int16_t *cost)
 
 void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg)
 {
+    s->run = kernels_choose(cfg->cpu_mask);
     s->limbs = m->limbs;
     s->paper = cfg->mode == GAIT_MODE_PAPER;
     s->terms = cfg->terms;

@@ -6,6 +6,7 @@
 #ifndef GAIT_LIKE_H
 #define GAIT_LIKE_H
 #include "features.h"
+#include "kernels.h"
 #include "layers.h"
 
 enum {
@@ -23,6 +24,7 @@ typedef struct like_surface { /* fixed points on one limb (spec 1.6.2), statures
 } like_surface;
 
 typedef struct like_setup { /* constant while a tracker lives */
+    const kernels *run;
     int32_t limbs;
     bool paper;     /* literal eqs. 10-13 */
     uint32_t terms; /* GAIT_TERM_* */

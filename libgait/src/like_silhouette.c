@@ -4,20 +4,7 @@
 /* Area of the body (in FG_ONE per cell) and the foreground under it, over cells that the camera sees. */
 static void count(const like_body *b, int32_t *area, int32_t *covered)
 {
-    const features *const f = b->features;
-    const rast_mask *const whole = &b->layers->whole;
-    int32_t a = 0, c = 0;
-    for (int32_t y = whole->first; y < whole->last; y++)
-        for (int32_t w = 0; w < RAST_WORDS; w++) {
-            uint64_t const m = whole->row[y][w] & f->inside[y][w];
-            if (!m)
-                continue;
-            a += rast_popcount(m);
-            for (int32_t k = 0; k < FG_PLANES; k++)
-                c += rast_popcount(m & f->fg[k][y][w]) << k;
-        }
-    *area = FG_ONE * a;
-    *covered = c;
+    b->setup->run->silhouette_count(b->features, &b->layers->whole, area, covered);
 }
 
 /* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */

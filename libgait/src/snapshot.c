@@ -17,14 +17,15 @@ static size_t state_bytes(const gait_tracker *t)
     return (size_t)(t->state_end - (unsigned char *)t->core);
 }
 
-/* The configuration without pointers: where threads come from and how many pieces they get does not
- * matter. */
+/* The configuration without pointers: where threads come from, how many pieces they get and what the CPU can do
+ * does not matter. */
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;
     memset(&c.camera[c.cameras], 0, (size_t)(GAIT_MAX_CAMERAS - c.cameras) * sizeof *c.camera);
     memset(&c.exec, 0, sizeof c.exec);
     c.tasks = 0;
+    c.cpu_mask = 0;
     return hash_fnv1a(HASH_INIT, &c, sizeof c);
 }
 

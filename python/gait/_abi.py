@@ -212,7 +212,7 @@ class TrackerConfigC(ctypes.Structure):
         ("offset_sd", c_float),
         ("proportion_noise", c_float),
         ("offset_angles", c_uint32),
-        ("reserved", c_uint32),
+        ("cpu_mask", c_uint32),
         ("joint_sd_factor", c_float),
         ("joint_sd_model", c_float),
         ("camera", CameraC * MAX_CAMERAS),
@@ -267,6 +267,8 @@ _SIZE, _STATE = POINTER(c_size_t), POINTER(StateC)
 FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_status_name", [_STATUS], c_char_p),
     ("gait_version", [], c_uint32),
+    ("gait_cpu_features", [], c_uint32),
+    ("gait_cpu_name", [c_uint32], c_char_p),
     ("gait_abi", [], c_uint32),
     ("gait_abi_fields", [POINTER(c_uint32)], POINTER(AbiField)),
     ("gait_model_bytes", [c_void_p, c_size_t, _SIZE, _ERR], _STATUS),

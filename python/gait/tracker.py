@@ -59,6 +59,7 @@ class TrackerConfig:
     offset_sd: float
     proportion_noise: float
     offset_angles: int
+    cpu_mask: int
     joint_sd_factor: float
     joint_sd_model: float
 

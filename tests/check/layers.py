@@ -7,7 +7,7 @@ from pathlib import Path
 
 PUBLIC = {"gait.h"}
 SYSTEM = {
-    "assert.h", "float.h", "limits.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h", "stdint.h", "stdio.h",
+    "assert.h", "cpuid.h", "float.h", "limits.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h", "stdint.h", "stdio.h",
     "string.h", "sanitizer/asan_interface.h",
 }  # fmt: skip
 

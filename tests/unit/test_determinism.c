@@ -1,7 +1,8 @@
-/* The same bits always: one golden digest, whatever the threads, the pieces, the address or a stop in between.
+/* The same bits always: one golden digest, whatever the threads, the pieces, the address, the instruction set or a
+ * stop in between.
  *
- * Prints `digest <hex>` for tests/check/golden.sh, which compares compilers and optimisation levels; with an
- * argument it does only that. */
+ * Prints `digest <hex>` for tests/check/golden.sh, which compares compilers and optimisation levels; with the argument
+ * `digest` it does only that, with `digest MASK` for the instruction sets in MASK (GAIT_CPU_*). */
 #include "toy_film.h"
 
 #include "check.h"
@@ -107,11 +108,16 @@ int main(int argc, char **argv)
     _Static_assert(sizeof(gait_estimate) % 8 == 0, "hashed in words of 8 bytes");
     film_make(SCENE_CAMERAS, STEPS);
     cfg.tasks = 8;
+    if (argc > 2)
+        cfg.cpu_mask = (uint32_t)strtoul(argv[2], NULL, 0);
     uint64_t const digest = run(&cfg, 0);
     printf("digest %016llx\n", (unsigned long long)digest);
     if (argc > 1)
         return strcmp(argv[1], "digest") != 0;
     CHECK(digest == GOLDEN);
+    for (cfg.cpu_mask = 0; cfg.cpu_mask <= GAIT_CPU_AVX512; cfg.cpu_mask = 2 * cfg.cpu_mask + !cfg.cpu_mask)
+        CHECK(run(&cfg, 0) == digest);
+    cfg.cpu_mask = config().cpu_mask;
     for (size_t k = 0; k < sizeof pieces / sizeof *pieces; k++) {
         cfg.tasks = pieces[k];
         CHECK(run(&cfg, 0) == digest);

@@ -115,9 +115,10 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
     if (!tracking_set_camera(&s->track, camera, why))
         return false;
-    fprintf(stderr, "gait-trackd: model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %zu bytes\n",
+    fprintf(stderr,
+            "gait-trackd: model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes\n",
             s->track.info.digest, camera->width, camera->height, s->track.config.particles, s->threads,
-            s->threads == 1 ? "" : "s", s->track.memory_bytes);
+            s->threads == 1 ? "" : "s", gait_cpu_name(s->track.config.cpu_mask), s->track.memory_bytes);
     set_idle(s);
     return true;
 }

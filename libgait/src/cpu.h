@@ -1,0 +1,8 @@
+/* cpu.h - what this CPU can do. */
+#ifndef GAIT_CPU_H
+#define GAIT_CPU_H
+#include "base.h"
+
+/* GAIT_CPU_* bits that this CPU and its operating system support, for the instruction sets of this build. */
+uint32_t cpu_features(void);
+#endif

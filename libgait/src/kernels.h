@@ -1,0 +1,43 @@
+/* kernels.h - inner loops compiled once per instruction set (ISA); a tracker chooses one when it is made.
+ *
+ * A kernel is a plain C function in a file NAME_kernel.c, written KERNEL(name) and listed in KERNELS below.
+ * The Makefile compiles the file for each ISA; `scalar`, without any vector code, is the definition, and the
+ * others must give the same bits: + - * / and square roots per element, sums of integers, and sums of floats
+ * only in an order that the source fixes.  A kernel file has no external names but its kernels. */
+#ifndef GAIT_KERNELS_H
+#define GAIT_KERNELS_H
+#include "base.h"
+
+/* Types of higher layers, which a kernel's own file includes. */
+struct features;
+struct rast_mask;
+
+/* Result, name, parameters. */
+#define KERNELS(K)                                                                                           \
+    K(void, silhouette_count,                                                                                \
+      (const struct features *f, const struct rast_mask *whole, int32_t *area, int32_t *covered))
+
+/* Those of this build, best last, with the bit that a CPU mask must have. */
+#if defined(__x86_64__)
+#define KERNEL_ISAS(S) S(scalar, 0) S(base, GAIT_CPU_BASE) S(avx2, GAIT_CPU_AVX2) S(avx512, GAIT_CPU_AVX512)
+#else
+#define KERNEL_ISAS(S) S(scalar, 0) S(base, GAIT_CPU_BASE)
+#endif
+
+#define KERNEL_MEMBER(result, name, parameters) result(*name) parameters;
+typedef struct kernels {
+    const char *isa; /* "scalar", "base", "avx2" or "avx512" */
+    KERNELS(KERNEL_MEMBER)
+} kernels;
+
+/* The best of those in the mask (GAIT_CPU_*) that this CPU can run; mask 0: scalar. */
+const kernels *kernels_choose(uint32_t mask);
+
+#ifdef KERNEL_ISA /* in a kernel's file: what it is being compiled for */
+#define KERNEL_JOIN(name, isa)                     name##_##isa
+#define KERNEL_NAME(name, isa)                     KERNEL_JOIN(name, isa)
+#define KERNEL(name)                               KERNEL_NAME(name, KERNEL_ISA)
+#define KERNEL_PROTOTYPE(result, name, parameters) result KERNEL(name) parameters;
+KERNELS(KERNEL_PROTOTYPE)
+#endif
+#endif
