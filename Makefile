@@ -17,15 +17,34 @@ VENV  := .venv
 READY := $(VENV)/.ready
 SITE  := $(VENV)/site
 PY    := $(VENV)/bin/python
-B     := build/$(config)
-BIN   := $(if $(filter release,$(config)),build/bin,$(B)/bin)
 HEADER := libgait/include/gait.h
+HEADERS := $(sort $(wildcard libgait/include/*.h))
 define_of = $(shell awk '$$2 == "$(1)" { print $$3 }' $(HEADER))
 ABI     := $(call define_of,GAIT_ABI)
 VERSION := $(call define_of,GAIT_VERSION_MAJOR).$(call define_of,GAIT_VERSION_MINOR).$(call define_of,GAIT_VERSION_PATCH)
 
-# Eigen's headers; another copy: make lib EIGEN=/usr/include/eigen3
-EIGEN ?= $(SITE)/cmeel.prefix/include/eigen3
+# Another compiler brings its own tools (CC=aarch64-linux-gnu-gcc) and, for another CPU, its own folder.
+found_or = $(if $(shell command -v $(1) 2>/dev/null),$(1),$(2))
+CROSS   := $(shell printf '%s\n' $(CC) | sed -n 's/^\(.*-\)g\{0,1\}cc\(-[0-9.]*\)\{0,1\}$$/\1/p')
+OBJCOPY := $(or $(OBJCOPY),$(call found_or,$(CROSS)objcopy,objcopy))
+ifeq ($(origin AR),default)
+AR := $(call found_or,$(CROSS)ar,ar)
+endif
+ifeq ($(origin CXX),default)
+CXX := $(if $(findstring gcc,$(CC))$(findstring clang,$(CC)),$(call found_or,$(subst clang,clang++,$(subst gcc,g++,$(CC))),$(CXX)),$(CXX))
+endif
+MACHINE := $(shell $(CC) -dumpmachine)
+cpu_of   = $(firstword $(subst -, ,$(1)))
+FOREIGN := $(filter-out $(call cpu_of,$(shell cc -dumpmachine 2>/dev/null || uname -m)),$(call cpu_of,$(MACHINE)))
+B       := build/$(if $(FOREIGN),$(MACHINE)-)$(config)
+BIN     := $(if $(filter build/release,$(B)),build/bin,$(B)/bin)
+
+# Eigen's headers: EIGEN=FOLDER, those of .venv if it is there, the system's, else .venv is made for them.
+VENV_EIGEN := $(SITE)/cmeel.prefix/include/eigen3
+ifndef EIGEN
+EIGEN := $(firstword $(wildcard $(VENV_EIGEN)) $(patsubst -I%,%,$(shell pkg-config --cflags-only-I eigen3 2>/dev/null)) \
+         $(wildcard /usr/include/eigen3 /usr/local/include/eigen3) $(VENV_EIGEN))
+endif
 
 # ---- flags ---------------------------------------------------------------------------------------------------
 # Same bits everywhere: baseline instruction set, no fused multiply-add, no -ffast-math, Eigen not vectorised.
@@ -50,7 +69,7 @@ FLAGS_base   :=
 FLAGS_avx2   := -mavx2 -mpopcnt -mbmi -mbmi2
 FLAGS_avx512 := $(FLAGS_avx2) -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vpopcntdq \
                 -mavx512bitalg -mprefer-vector-width=512
-KERNEL_ISAS := scalar base $(if $(findstring x86_64,$(shell $(CC) -dumpmachine)),avx2 avx512)
+KERNEL_ISAS := scalar base $(if $(findstring x86_64,$(MACHINE)),avx2 avx512)
 KERNEL_SRC := $(sort $(wildcard libgait/src/*_kernel.c))
 KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(KERNEL_SRC:libgait/src/%.c=$(B)/src/%.$(isa).o))
 SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*.c libgait/src/*.cpp)))
@@ -73,6 +92,8 @@ setup: $(READY) ## make .venv with the pinned packages (once; later builds work 
 
 # The stamp comes last: without it the environment is made anew, with an old one only changed pins are fetched.
 $(READY): python/requirements.txt python/requirements-dev.txt python/pyproject.toml
+	@command -v $(PYTHON) >/dev/null || { echo 'setup: no $(PYTHON): install it or set PYTHON= (the library alone' \
+	    'needs only Eigen: install libeigen3-dev or set EIGEN=)' >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "setup: needs Python >= 3.10: set PYTHON=")'
 	@$(PYTHON) -c 'import venv, ensurepip' || \
 	    { echo 'setup: $(PYTHON) cannot make environments: install python3-venv or set PYTHON=' >&2; exit 1; }
@@ -95,14 +116,14 @@ lib: $(LIBS) ## libgait.so and libgait.a in build/<config>
 
 # Linked by the C compiler: a C++ runtime dependency would not link.
 $(B)/libgait.so: $(OBJ)
-	$(call say,LD   $@)$(CC) $(OPT) -shared -Wl,--no-undefined -Wl,-soname,$(@F).$(ABI) $(LDFLAGS) -o $@.tmp $(OBJ) -lm
+	$(call say,LD   $@)$(CC) $(OPT) -shared -Wl,--no-undefined -Wl,-soname,$(@F).$(ABI) $(LDFLAGS) -o $@.tmp $(OBJ) -lm -pthread
 	@mv $@.tmp $@.$(ABI)
 	@ln -sf $(@F).$(ABI) $@
 
 # One object whose internal names are local, so that nothing unprefixed meets the user's own names.
 $(B)/libgait.a: $(OBJ)
 	$(call say,AR   $@)$(CC) -r -nostdlib -o $(B)/libgait.o $(OBJ)
-	@objcopy --localize-hidden $(B)/libgait.o
+	@$(OBJCOPY) --localize-hidden $(B)/libgait.o
 	@rm -f $@
 	@$(AR) rcs $@ $(B)/libgait.o
 
@@ -194,7 +215,7 @@ MOCAP ?= ../shared/data/mocap/cmu_walk
 model: setup lib ## learn the default model from MOCAP=
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 
-BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file histogram message options pool)
+BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file histogram message options workers)
 $(B)/bench/step: tests/bench/step.c $(BENCH_PARTS) $(B)/libgait.a Makefile | $(B)/bench/
 	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread \
 	    -Ilibgait/include -Itools $(CFLAGS) $(LDFLAGS) -o $@ $< $(BENCH_PARTS) $(B)/libgait.a -lm
@@ -238,13 +259,13 @@ install: lib ## DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=
 	install -m 755 $(B)/libgait.so.$(ABI) $(DESTDIR)$(LIBDIR)/
 	ln -sf libgait.so.$(ABI) $(DESTDIR)$(LIBDIR)/libgait.so
 	install -m 644 $(B)/libgait.a $(DESTDIR)$(LIBDIR)/
-	install -m 644 $(HEADER) $(DESTDIR)$(INCLUDEDIR)/
+	install -m 644 $(HEADERS) $(DESTDIR)$(INCLUDEDIR)/
 	sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
 	    libgait/gait.pc.in > $(DESTDIR)$(LIBDIR)/pkgconfig/gait.pc
 
 uninstall: ## remove what install put there
 	rm -f $(addprefix $(DESTDIR)$(LIBDIR)/,libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc) \
-	    $(DESTDIR)$(INCLUDEDIR)/gait.h
+	    $(HEADERS:libgait/include/%=$(DESTDIR)$(INCLUDEDIR)/%)
 
 clean: ## remove build/ (not .venv)
 	rm -rf build

@@ -3,9 +3,9 @@
 #include "common/jpeg.h"
 #include "common/link.h"
 #include "common/pnm.h"
-#include "common/pool.h"
 #include "common/receiver.h"
 #include "common/tracker_options.h"
+#include "common/workers.h"
 
 #include <inttypes.h>
 #include <signal.h>
@@ -64,7 +64,7 @@ static const option own_options[] = {
      "frames that GAIT_ESTIMATE_LAG and GAIT_STRIDE wait for, default 5; 0: no GAIT_ESTIMATE_LAG",
      INT(lag, 0, 64)},
     {"seed", 0, "N", "of the random numbers, default 1", OPTION_U64, &settings.seed, 0, 0},
-    {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, POOL_MAX)},
+    {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, GAIT_POOL_MAX)},
     {"tasks", 0, "N", tasks_help, INT(tasks, 1, 256)},
     {"cpu-mask", 0, "N",
      "instruction sets that may be used, added up: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none;\n"
@@ -152,7 +152,7 @@ static option_result read_settings(int argc, char **argv, const option *table, m
     return ok ? OPTION_OK : OPTION_BAD;
 }
 
-static void make_config(pool *threads, gait_tracker_config *c)
+static void make_config(workers *threads, gait_tracker_config *c)
 {
     gait_tracker_default(c, strcmp(settings.mode, "paper") == 0 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT);
     c->particles = settings.particles ? settings.particles : c->particles;
@@ -164,7 +164,7 @@ static void make_config(pool *threads, gait_tracker_config *c)
         c->tasks = settings.tasks;
     else if (c->tasks < settings.threads)
         c->tasks = settings.threads;
-    c->exec = pool_tasks(threads);
+    c->exec = gait_pool_tasks(threads->pool);
     tracker_options_apply(&settings.tracker, c);
 }
 
@@ -184,7 +184,7 @@ static bool read_background(service *s, message *why)
 }
 
 /* Model, start, camera and empty scene, as far as the command line gives them. */
-static bool load(service *s, pool *threads, lcm_t *out, message *why)
+static bool load(service *s, workers *threads, lcm_t *out, message *why)
 {
     gait_tracker_config config;
     gait_camera camera;
@@ -218,7 +218,7 @@ static void print_summary(const service *s, bool live)
 }
 
 /* Everything between the settings and the exit code. */
-static bool serve(service *s, pool *threads, const sigset_t *unblocked, message *why)
+static bool serve(service *s, workers *threads, const sigset_t *unblocked, message *why)
 {
     const char *const url = link_url(settings.url);
     bool const log = link_is_log(url);
@@ -241,7 +241,7 @@ static bool serve(service *s, pool *threads, const sigset_t *unblocked, message 
 int main(int argc, char **argv)
 {
     static service s;
-    static pool threads;
+    static workers threads;
     option table[OPTIONS];
     sigset_t unblocked;
     message why;
@@ -261,10 +261,10 @@ int main(int argc, char **argv)
         return 0;
     }
     set_signals(&unblocked);
-    bool ok = pool_start(&threads, settings.threads, &why);
+    bool ok = workers_start(&threads, settings.threads, &why);
     if (ok) {
         ok = serve(&s, &threads, &unblocked, &why);
-        pool_stop(&threads);
+        workers_stop(&threads);
         service_close(&s);
     }
     if (!ok)

@@ -3,7 +3,7 @@
 #include "common/file.h"
 #include "common/histogram.h"
 #include "common/options.h"
-#include "common/pool.h"
+#include "common/workers.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -114,7 +114,7 @@ static gait_status run(gait_tracker *t, const scene *s, int32_t frames, histogra
 static bool measure(const gait_model *model, const scene *s, int32_t n, int threads, int32_t frames,
                     uint64_t *digest, message *why)
 {
-    static pool workers;
+    workers crew;
     histogram times = {0};
     gait_tracker_config cfg;
     gait_error err = {.text = ""};
@@ -125,16 +125,16 @@ static bool measure(const gait_model *model, const scene *s, int32_t n, int thre
     cfg.camera[0] = s->camera;
     if (gait_tracker_bytes(model, &cfg, &bytes, &err) != GAIT_OK)
         return message_set(why, "%s", err.text);
-    if (!pool_start(&workers, threads, why))
+    if (!workers_start(&crew, threads, why))
         return false;
-    cfg.exec = pool_tasks(&workers);
+    cfg.exec = gait_pool_tasks(crew.pool);
     void *const memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
     gait_status status =
         memory ? gait_tracker_init(memory, bytes, model, &cfg, &tracker, &err) : GAIT_ERR_MEMORY;
     if (status == GAIT_OK)
         status = run(tracker, s, frames, &times, &err);
     uint64_t const have = status == GAIT_OK ? gait_tracker_digest(tracker) : 0;
-    pool_stop(&workers);
+    workers_stop(&crew);
     free(memory);
     if (status != GAIT_OK)
         return message_set(why, "%s: %s", gait_status_name(status), err.text);
@@ -168,7 +168,7 @@ static bool bench(const settings *set, message *why)
     static scene s;
     int32_t particles[MAX_SWEEP], threads[MAX_SWEEP];
     int const sizes = numbers(set->particles, 1 << 20, particles),
-              counts = numbers(set->threads, POOL_MAX, threads);
+              counts = numbers(set->threads, GAIT_POOL_MAX, threads);
     file_bytes blob;
     gait_error err = {.text = ""};
     gait_model *model = NULL;

@@ -10,10 +10,11 @@ check() {
     fi
 }
 cd "$(dirname "$0")/../.." || exit 1
-here=tests/check header=libgait/include/gait.h
+here=tests/check
 check no_heap     $here/no_heap.sh "$B"/src/*.o "$B/libgait.so"
 check deps        $here/deps.sh "$B/libgait.so"
-check symbols     python3 $here/symbols.py $header "$B/libgait.so" "$B/libgait.a"
+check symbols     python3 $here/symbols.py libgait/include/*.h "$B/libgait.so" "$B/libgait.a"
+check threads     $here/threads.sh "$B"/src/*.o
 check static_init $here/static_init.sh "$B"/src/*.o
 check headers     $here/headers.sh libgait/include/*.h
 check layers      python3 $here/layers.py libgait/LAYERS libgait/src

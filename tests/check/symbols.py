@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""symbols.py HEADER LIBRARY ARCHIVE: both define for others exactly what HEADER marks GAIT_API."""
+"""symbols.py HEADER... LIBRARY ARCHIVE: both define for others exactly what the headers mark GAIT_API."""
 
 import re
 import subprocess
@@ -23,12 +23,15 @@ def defined(path: str, *options: str) -> set[str]:
 
 
 def main() -> int:
-    header, library, archive = sys.argv[1:]
-    want = declared(header)
-    if not want:
-        print(f"{header}: no GAIT_API function found")
-        return 1
+    *headers, library, archive = sys.argv[1:]
+    want: set[str] = set()
     failed = False
+    for header in headers:
+        names = declared(header)
+        if not names:
+            print(f"{header}: no GAIT_API function found")
+            failed = True
+        want |= names
     for path, have in ((library, defined(library, "-D")), (archive, defined(archive, "-g"))):
         for what, names in (
             ("declared but not defined", want - have),
