@@ -1,6 +1,6 @@
 """The C interface in ctypes: structures, enumerations and one table of functions.
 
-Mirrors libgait/include/gait.h; `verify` compares every size and offset with those of the compiled library.
+Mirrors the headers of libgait/include; `verify` compares every size and offset with those of the compiled library.
 """
 
 from __future__ import annotations
@@ -296,6 +296,10 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_tracker_digest", [_HANDLE], c_uint64),
     ("gait_tracker_save", [_HANDLE, c_void_p, c_size_t, _SIZE], _STATUS),
     ("gait_tracker_restore", [_HANDLE, c_void_p, c_size_t, _ERR], _STATUS),
+    ("gait_pool_bytes", [c_int32, _SIZE, _ERR], _STATUS),
+    ("gait_pool_init", [c_void_p, c_size_t, c_int32, POINTER(_HANDLE), _ERR], _STATUS),
+    ("gait_pool_tasks", [_HANDLE], Tasks),
+    ("gait_pool_stop", [_HANDLE], None),
 )
 """Every C function: name, argument types, result type."""
 

@@ -1,12 +1,15 @@
-"""Threads for the tracker: anything with a ``gait_tasks`` structure serves; these are Python's."""
+"""Threads for the tracker: the library's own, or anything that runs numbered tasks."""
 
 from __future__ import annotations
 
+import ctypes
+import os
+import weakref
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol
 
 from gait import _abi
+from gait._lib import aligned, check, library
 
 Runner = Callable[[Callable[[int], None], int], None]
 """Called with (task, count): must call ``task(i)`` once for each i in range(count) and then return."""
@@ -59,19 +62,32 @@ class PythonTasks:
                 function(context, i)
 
 
-def threads(count: int) -> PythonTasks | None:
-    """Tasks on `count` threads; None for 1, where the calling thread does the work.
+class PoolTasks:
+    """Threads of the library (``gait_pool``); they end with this object or with the program."""
 
-    The threads really run side by side: ctypes lets go of the interpreter's lock during each task.
-    """
+    def __init__(self, count: int) -> None:
+        lib = library()
+        size, handle, err = ctypes.c_size_t(), ctypes.c_void_p(), _abi.Error()
+        check(lib.gait_pool_bytes(count, ctypes.byref(size), ctypes.byref(err)), err)
+        self._memory = aligned(size.value)
+        where = (self._memory.ctypes.data, size.value)
+        check(lib.gait_pool_init(*where, count, ctypes.byref(handle), ctypes.byref(err)), err)
+        self.struct: _abi.Tasks = lib.gait_pool_tasks(handle)
+        # The memory must outlive the threads: the finaliser holds it as well.
+        weakref.finalize(self, _stop, lib, handle, self._memory, os.getpid())
+
+    def reraise(self) -> None:
+        """Nothing of Python runs in these threads."""
+
+
+def _stop(lib: ctypes.CDLL, handle: ctypes.c_void_p, memory: object, owner: int) -> None:
+    if os.getpid() == owner:  # a forked process has no threads to wait for
+        lib.gait_pool_stop(handle)
+    del memory  # held until here
+
+
+def threads(count: int) -> PoolTasks | None:
+    """Tasks on `count` threads; None for 1, where the calling thread does the work."""
     if count < 1:
         raise ValueError("threads: at least 1")
-    if count == 1:
-        return None
-    pool = ThreadPoolExecutor(count, thread_name_prefix="gait")
-
-    def run(task: Callable[[int], None], tasks: int) -> None:
-        for _ in pool.map(task, range(tasks)):
-            pass
-
-    return PythonTasks(run)
+    return PoolTasks(count) if count > 1 else None

@@ -33,7 +33,7 @@ def installed(tmp_path):
 def test_install_puts_everything_and_uninstall_removes_it(installed):
     names = {str(p.relative_to(installed / "opt/gait")) for p in installed.rglob("*") if not p.is_dir()}
     libraries = {"lib/libgait.so", f"lib/libgait.so.{ABI}", "lib/libgait.a"}
-    assert names == libraries | {"lib/pkgconfig/gait.pc", "include/gait.h"}
+    assert names == libraries | {"lib/pkgconfig/gait.pc", "include/gait.h", "include/gait_pool.h"}
     make("uninstall", installed)
     assert not [p for p in installed.rglob("*") if not p.is_dir()]
 
