@@ -1,0 +1,137 @@
+"""2-D observations of markers, and the rows of the linear model that they are: direction . X + noise = value.
+
+Orthographic views are linear in the markers' places.  A perspective one is too when it is multiplied by the
+depth: with R, t of the camera and (a, b) the ideal image coordinates of a point X,
+
+    (R_x - a R_z) . X = a t_z - t_x,    (R_y - b R_z) . X = b t_z - t_y,
+
+and only the noise, sd Z / f, depends on where the point is: it is taken at a guess and iterated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.camera import Camera
+from gait.errors import UserError
+
+Floats = npt.NDArray[np.float64]
+
+AXES = {"x": 0, "y": 1, "z": 2}
+NEAREST = 0.1  # metres before the lens: noise is not taken nearer
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Where markers were seen in T pictures.
+
+    Attributes
+    ----------
+    uv : (T, J, 2)
+        Pixels, or metres along the axes of an orthographic view.
+    sd : (T, J)
+        Standard deviation of each coordinate, in the same unit; infinite or NaN where a marker was not seen.
+    """
+
+    uv: Floats
+    sd: Floats
+
+    @property
+    def seen(self) -> npt.NDArray[np.bool_]:
+        """Which were seen, (T, J)."""
+        return np.asarray(np.isfinite(self.sd) & np.isfinite(self.uv).all(axis=2))
+
+    def part(self, start: int, stop: int) -> Observations:
+        """Frames start to stop."""
+        return Observations(self.uv[start:stop], self.sd[start:stop])
+
+    def among(self, index: npt.NDArray[np.intp], count: int) -> Observations:
+        """Take them for the markers `index` among `count`, of which the others were not seen."""
+        frames = len(self.uv)
+        uv, sd = np.full((frames, count, 2), np.nan), np.full((frames, count), np.inf)
+        uv[:, index], sd[:, index] = self.uv, self.sd
+        return Observations(uv, sd)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Two linear measurements of each of n points: direction @ X[frame, marker] + noise = value.
+
+    Attributes
+    ----------
+    frame, marker : (n,)
+    direction : (n, 2, 3)
+    value : (n, 2)
+    variance : (n, 2)
+        Of the noise, which is independent; in units of `value` squared.
+    """
+
+    frame: npt.NDArray[np.intp]
+    marker: npt.NDArray[np.intp]
+    direction: Floats
+    value: Floats
+    variance: Floats
+
+    def without(self, gone: npt.NDArray[np.bool_]) -> Rows:
+        """Rows but for the points flagged (n,)."""
+        kept = ~gone
+        return Rows(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
+
+    def shifted(self, places: Floats) -> Rows:
+        """Rows that measure displacements from `places` (T, J, 3)."""
+        at = places[self.frame, self.marker]
+        return replace(self, value=self.value - np.einsum("nai,ni->na", self.direction, at))
+
+
+def image_axes(axis: str) -> Floats:
+    """Axes (2, 3), to the right and up, of a picture taken along +x, +y or +z; z is up, or +y if along z.
+
+    Raises
+    ------
+    UserError
+        If there is no such axis.
+    """
+    if axis not in AXES:
+        raise UserError(f"{axis!r} is no axis to look along; give x, y or z")
+    ahead = np.eye(3)[AXES[axis]]
+    up = np.eye(3)[1 if axis == "z" else 2]
+    return np.stack([np.cross(ahead, up), up])
+
+
+def orthographic(seen: Observations, axes: Floats) -> Rows:
+    """Rows of a view that leaves depth out.
+
+    Parameters
+    ----------
+    seen : Observations
+        Metres along `axes`.
+    axes : (2, 3)
+        Unit vectors of the picture; see `image_axes`.
+    """
+    frame, marker = np.nonzero(seen.seen)
+    variance = seen.sd[frame, marker, None] ** 2 * np.ones(2)
+    direction = np.broadcast_to(axes, (len(frame), 2, 3))
+    return Rows(frame, marker, direction, seen.uv[frame, marker], variance)
+
+
+def perspective(seen: Observations, camera: Camera, about: Floats) -> Rows:
+    """Rows of a calibrated view, the noise being that at the places `about`.
+
+    Parameters
+    ----------
+    seen : Observations
+        Pixels; the lens distortion is taken out of them here.
+    about : (T, J, 3) or (3,)
+        Guess of the places, metres, world.
+    """
+    frame, marker = np.nonzero(seen.seen)
+    rays = camera.rays(seen.uv[frame, marker]) @ camera.R.T
+    ideal = rays[:, :2] / rays[:, 2:]
+    places = np.broadcast_to(about, (*seen.sd.shape, 3))[frame, marker]
+    depth = np.maximum(camera.depth(places), NEAREST)
+    sd = seen.sd[frame, marker, None] * depth[:, None] / (camera.fx, camera.fy)
+    direction = camera.R[:2] - ideal[:, :, None] * camera.R[2]
+    return Rows(frame, marker, direction, ideal * camera.t[2] - camera.t[:2], sd**2)

@@ -1,0 +1,289 @@
+"""Posterior of a segment given 2-D observations (Leventon and Freeman 1998, eqs. 5 and 6).
+
+With alpha ~ N(0, I) (the modes are given times their standard deviations), measurements y = G alpha + noise
+about the mean and noise of covariance R:
+
+    alpha = G' (G G' + R)^-1 y = (I + G' R^-1 G)^-1 G' R^-1 y,    Q = (I + G' R^-1 G)^-1.
+
+The first is the paper's form (dual), the second the information form; they are equal.  R holds the noise of
+the observations and the markers' variance outside the modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.lift.observe import Rows
+from gait.lift.prior import SegmentPrior
+from gait.skeleton import axis_rotation
+
+Floats = npt.NDArray[np.float64]
+
+GROUND_SD = 10.0  # metres, of where somebody stands
+HEIGHT_SD = 0.05  # metres, of the floor's height
+LN10 = float(np.log(10))
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Segments in the world: mean + sum_i alpha_i modes_i + residual, alpha ~ N(0, I); metres.
+
+    Attributes
+    ----------
+    mean : (F, J, 3)
+    modes : (m, F, J, 3)
+        Times their standard deviations.
+    residual : (J,)
+        Variance of each coordinate outside the modes.
+    rigid : int
+        How many of the modes, the last ones, move the body as a whole.
+    """
+
+    mean: Floats
+    modes: Floats
+    residual: Floats
+    rigid: int = 0
+
+    @cached_property
+    def _factors(self) -> tuple[Floats, Floats]:
+        """Orthonormal directions (D, r) and R (r, m) with modes = directions R."""
+        q, r = np.linalg.qr(self.modes.reshape(len(self.modes), -1).T)
+        return q, r
+
+    def draw(self, rng: np.random.Generator, residual: bool = True) -> Floats:
+        """Segment (F, J, 3) from the prior."""
+        x = self.mean + np.tensordot(rng.normal(size=len(self.modes)), self.modes, 1)
+        return x + rng.normal(size=x.shape) * np.sqrt(self.residual)[:, None] * residual
+
+
+def place(
+    prior: SegmentPrior,
+    component: int = 0,
+    *,
+    stature: float | None = None,
+    stature_sd: float = 0.0,
+    heading: float = 0.0,
+    at: npt.ArrayLike = (0.0, 0.0),
+    ground_sd: float = GROUND_SD,
+    height_sd: float = HEIGHT_SD,
+) -> Gaussian:
+    """Put a component of the prior into the world; where it stands becomes three rigid modes.
+
+    Parameters
+    ----------
+    stature, stature_sd : float
+        Metres, by default the mean of the people learnt from, exactly; an sd adds a mode of size.
+    heading : float
+        Turn about z, radians.
+    at : (x, y)
+        Mean of where the pelvis is in the first frame, metres.
+    ground_sd, height_sd : float
+        Of that place along x and y, and of the height, metres; 0 leaves the modes out.
+    """
+    size = prior.stature if stature is None else stature
+    turn = size * axis_rotation(2, heading).T
+    mean = prior.mean[component] @ turn
+    used = prior.modes[component][prior.sd[component] > 0]
+    moves = [sd * np.broadcast_to(axis, mean.shape) for sd, axis in _moves(ground_sd, height_sd)]
+    if stature_sd:
+        moves.append(mean * (stature_sd / size))
+    modes = np.concatenate([used @ turn, *(move[None] for move in moves)])
+    residual = size**2 * prior.gamma * prior.residual[component]
+    return Gaussian(mean + np.append(np.asarray(at, float), 0.0), modes, residual, len(moves))
+
+
+def _moves(ground_sd: float, height_sd: float) -> list[tuple[float, Floats]]:
+    """Give standard deviations and axes of the rigid displacements."""
+    moves = zip((ground_sd, ground_sd, height_sd), np.eye(3), strict=True)
+    return [(sd, axis) for sd, axis in moves if sd]
+
+
+@dataclass(frozen=True)
+class System:
+    """Measurements of a Gaussian: y = design alpha + noise, the noise white and of unit variance.
+
+    Attributes
+    ----------
+    design : (2n, m)
+    y : (2n,)
+    whiten : (n, 2, 2)
+        L^-1 of each point's noise covariance L L'.
+    direction : (n, 2, 3)
+        As in the rows.
+    """
+
+    design: Floats
+    y: Floats
+    whiten: Floats
+    direction: Floats
+
+
+def system(gaussian: Gaussian, rows: Rows) -> System:
+    """Whiten the measurements: the residual of a point makes its two rows' noise correlated."""
+    cross = rows.direction @ rows.direction.transpose(0, 2, 1)
+    noise = cross * gaussian.residual[rows.marker, None, None]
+    noise[:, (0, 1), (0, 1)] += rows.variance
+    whiten = np.linalg.inv(np.linalg.cholesky(noise))
+    reduced = whiten @ rows.direction
+    design = np.einsum("nai,mni->nam", reduced, gaussian.modes[:, rows.frame, rows.marker])
+    y = np.einsum("nab,nb->na", whiten, rows.shifted(gaussian.mean).value)
+    return System(design.reshape(-1, len(gaussian.modes)), y.ravel(), whiten, rows.direction)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What the measurements leave of a Gaussian.
+
+    Attributes
+    ----------
+    gaussian, rows, system
+        What it was made from.
+    alpha : (m,)
+        Mean of the scores.
+    covariance : (m, m)
+        Q, theirs.
+    log_evidence : float
+        Log density of the measurements.
+    """
+
+    gaussian: Gaussian
+    rows: Rows
+    system: System
+    alpha: Floats
+    covariance: Floats
+    log_evidence: float
+
+    @property
+    def subspace(self) -> Floats:
+        """Mean + modes alpha (F, J, 3): the paper's estimate, in the span of the modes."""
+        return np.asarray(self.gaussian.mean + np.tensordot(self.alpha, self.gaussian.modes, 1))
+
+    @cached_property
+    def _gain(self) -> Floats:
+        """Residual of a measured point by its whitened measurements, (n, 3, 2)."""
+        psi = self.gaussian.residual[self.rows.marker, None, None]
+        return np.asarray(psi * (self.system.whiten @ self.system.direction).transpose(0, 2, 1))
+
+    @property
+    def points(self) -> Floats:
+        """Posterior mean of the markers (F, J, 3), what lies outside the modes included."""
+        rest = (self.system.y - self.system.design @ self.alpha).reshape(-1, 2)
+        x = self.subspace
+        np.add.at(x, (self.rows.frame, self.rows.marker), np.einsum("nia,na->ni", self._gain, rest))
+        return x
+
+    @property
+    def covariances(self) -> Floats:
+        """Posterior covariance of each marker in each frame, (F, J, 3, 3)."""
+        by_scores = np.moveaxis(self.gaussian.modes, 0, -1).copy()  # (F, J, 3, m)
+        frames, markers = self.gaussian.mean.shape[:2]
+        outside = np.eye(3) * np.broadcast_to(self.gaussian.residual, (frames, markers))[..., None, None]
+        at, gain = (self.rows.frame, self.rows.marker), self._gain
+        count = len(self.alpha)
+        np.subtract.at(by_scores, at, gain @ self.system.design.reshape(-1, 2, count))
+        np.subtract.at(outside, at, gain @ gain.transpose(0, 2, 1))
+        return np.asarray(by_scores @ self.covariance @ by_scores.swapaxes(-1, -2) + outside)
+
+    @property
+    def sd(self) -> Floats:
+        """Posterior standard deviation of each coordinate, (F, J, 3)."""
+        return np.sqrt(np.maximum(np.diagonal(self.covariances, axis1=2, axis2=3), 0))
+
+    @property
+    def subspace_sd(self) -> Floats:
+        """Square root of diag(U Q U') + gamma psi, (F, J, 3): deviations of `subspace`."""
+        modes = self.gaussian.modes
+        variance = np.einsum("mfji,mn,nfji->fji", modes, self.covariance, modes, optimize=True)
+        return np.sqrt(np.maximum(variance, 0) + self.gaussian.residual[:, None])
+
+    @property
+    def log10_volume(self) -> float:
+        """log10 of sqrt(det Q / det Lambda): how much smaller the posterior is than the prior."""
+        return float(np.linalg.slogdet(self.covariance)[1] / (2 * LN10))
+
+    def uncertain_modes(self, count: int = 3) -> tuple[Floats, Floats]:
+        """Directions of largest posterior deviation, within the modes.
+
+        Returns
+        -------
+        sd : (count,)
+            Metres, along the unit vectors below, largest first.
+        modes : (count, F, J, 3)
+            Unit vectors over all coordinates.
+        """
+        q, r = self.gaussian._factors
+        values, vectors = np.linalg.eigh(r @ self.covariance @ r.T)
+        order = np.argsort(values)[::-1][:count]
+        modes = (q @ vectors[:, order]).T.reshape(-1, *self.gaussian.mean.shape)
+        return np.sqrt(np.maximum(values[order], 0)), modes
+
+
+def infer(gaussian: Gaussian, rows: Rows, dual: bool = False) -> Posterior:
+    """Posterior of a Gaussian given measurements.
+
+    Parameters
+    ----------
+    dual : bool
+        Use eqs. 5 and 6 as the paper prints them, with a matrix of the measurements' size, instead of the
+        information form.
+    """
+    s = system(gaussian, rows)
+    scores, measured = np.eye(len(gaussian.modes)), np.eye(len(s.y))
+    if dual:
+        wide = s.design @ s.design.T + measured
+        gain = np.linalg.solve(wide, s.design).T
+        alpha, covariance = gain @ s.y, scores - gain @ s.design
+        spread = np.linalg.slogdet(wide)[1]
+    else:
+        precision = scores + s.design.T @ s.design
+        covariance = _inverse(precision)
+        alpha = covariance @ (s.design.T @ s.y)
+        spread = np.linalg.slogdet(precision)[1]
+    fit = s.y @ (s.y - s.design @ alpha)
+    spread -= 2 * np.log(np.linalg.det(s.whiten)).sum()
+    evidence = -0.5 * float(fit + spread + len(s.y) * np.log(2 * np.pi))
+    return Posterior(gaussian, rows, s, alpha, (covariance + covariance.T) / 2, evidence)
+
+
+def _inverse(precision: Floats) -> Floats:
+    """Invert a positive definite matrix whose rows may be of very different size."""
+    scale = 1 / np.sqrt(np.diagonal(precision))
+    root = np.linalg.inv(np.linalg.cholesky(precision * np.outer(scale, scale))) * scale
+    return np.asarray(root.T @ root)
+
+
+def log10_volume(gaussian: Gaussian, rows: Rows) -> float:
+    """log10 sqrt(det Q / det Lambda) in closed form: -1/2 sum log10(1 + s_i^2), s of the whitened design."""
+    s = np.linalg.svd(system(gaussian, rows).design, compute_uv=False)
+    return float(-0.5 * np.log10(1 + s**2).sum())
+
+
+def likelihood_only(gaussian: Gaussian, rows: Rows) -> Floats:
+    """Segment (F, J, 3) in the span of the modes that fits the measurements best, whatever the prior says.
+
+    Of all that do, the one nearest to the mean (least squares of minimum norm); the deviations of the
+    observations weigh them, the prior has no part.
+    """
+    norm = np.linalg.norm(gaussian.modes.reshape(len(gaussian.modes), -1), axis=1)
+    unit = gaussian.modes / norm[:, None, None, None]
+    weight = 1 / np.sqrt(rows.variance)
+    design = np.einsum("nai,mni->nam", rows.direction, unit[:, rows.frame, rows.marker])
+    y = weight * rows.shifted(gaussian.mean).value
+    flat = (design * weight[..., None]).reshape(y.size, -1)
+    scores = np.linalg.lstsq(flat, y.ravel(), rcond=1e-10)[0]
+    return np.asarray(gaussian.mean + np.tensordot(scores, unit, 1))
+
+
+def share_along(mode: Floats, axis: Floats) -> float:
+    """Share of a mode's energy (F, J, 3) that is along a unit vector (3,)."""
+    return float(np.sum((mode @ axis) ** 2) / np.sum(mode**2))
+
+
+def share_rigid(mode: Floats) -> float:
+    """Share of a mode's energy (F, J, 3) that is one displacement of all markers in all frames."""
+    points = mode.reshape(-1, 3)
+    return float(len(points) * np.sum(points.mean(axis=0) ** 2) / np.sum(points**2))
