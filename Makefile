@@ -59,7 +59,8 @@ endif
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 COMMON := $(OPT) -g -MMD -MP -ffp-contract=off
-LIBGAIT := $(COMMON) -fPIC -fvisibility=hidden -fstack-usage -Wframe-larger-than=16384 -Ilibgait/include
+CALLS := $(shell $(CC) -fcallgraph-info=su -E -x c /dev/null >/dev/null 2>&1 && echo -fcallgraph-info=su)
+LIBGAIT := $(COMMON) -fPIC -fvisibility=hidden -fstack-usage $(CALLS) -Wframe-larger-than=16384 -Ilibgait/include
 EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_NO_IO
 NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
 
@@ -173,7 +174,7 @@ $(B)/tools/%.c.o: tools/%.c Makefile build/lcm/.stamp | $(B)/tools/common/
 # ---- tests ---------------------------------------------------------------------------------------------------
 test: setup lib tools check unit python-test ## everything below that can fail
 
-check: lib ## symbols, heap, globals, layers, stack, headers, hygiene
+check: lib ## symbols, heap, threads, globals, layers, stack, recursion, headers, hygiene
 	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
 
 unit: $(UNIT) ## C tests

@@ -172,6 +172,45 @@ def test_stack_sees_a_large_frame_and_a_variable_one(tmp_path, code):
     assert fails(run("stack.py", 16384), "was the library built")
 
 
+GRAPH = ("-c", "-O0", "-fcallgraph-info=su")
+DEEP = "void g(char *); static void k(void) { char b[9000]; g(b); } "
+
+
+def graphs() -> bool:
+    """Does the compiler write call graphs?"""
+    return subprocess.run([CC, *GRAPH[2:], "-E", "-xc", "/dev/null"], capture_output=True).returncode == 0
+
+
+@pytest.mark.skipif(not graphs(), reason="call graphs are gcc's")
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("int f(int n) { return n ? 1 + f(n - 1) : 0; }", "recursion: f -> f"),
+        (
+            "static int b(int); int a(int n) { return b(n); } int b(int n) { return n ? a(n - 1) : 0; }",
+            "recursion: a -> a:b -> a",
+        ),
+        (DEEP + "void f(void) { char b[9000]; g(b); k(); }", "f > a:k"),
+        (
+            DEEP + "void *p(void) { return k; } void gait_f(void (*h)(void)) { char b[9000]; g(b); h(); }",
+            "gait_f > a:k",
+        ),
+    ],
+)
+def test_calls_sees_recursion_and_a_deep_path(tmp_path, code, words):
+    build(tmp_path, CLEAN, *GRAPH)
+    assert run("calls.py", 16384, next(tmp_path.glob("*.ci"))).returncode == 0
+    build(tmp_path, code, *GRAPH)
+    assert fails(run("calls.py", 16384, next(tmp_path.glob("*.ci"))), words)
+    assert fails(run("calls.py", 16384), "no call graphs")
+
+
+def test_threads_sees_a_lock_outside_the_pool(tmp_path):
+    code = "#include <pthread.h>\nvoid f(pthread_mutex_t *m) { pthread_mutex_lock(m); }"
+    assert run("threads.sh", build(tmp_path, CLEAN), build(tmp_path, code, out="pool.c.o")).returncode == 0
+    assert fails(run("threads.sh", build(tmp_path, code)), "a.o:", "pthread_mutex_lock")
+
+
 @pytest.fixture
 def checkout(tmp_path):
     """A git checkout that passes."""

@@ -1,58 +1,26 @@
-/* The same bits always: one golden digest, whatever the threads, the pieces, the address, the instruction set or a
- * stop in between.
+/* The same bits always: one golden digest, whatever the threads, the pieces, their order, the address, the instruction
+ * set or a stop in between.
  *
- * Prints `digest <hex>` for tests/check/golden.sh, which compares compilers and optimisation levels; with the argument
- * `digest` it does only that, with `digest MASK` for the instruction sets in MASK (GAIT_CPU_*). */
+ * With the argument `digest` it only prints `digest HEX ISA` for each instruction set of this CPU, for
+ * tests/check/golden.sh, which compares compilers and optimisation levels. */
+#include "gait_pool.h"
 #include "toy_film.h"
 
 #include "check.h"
-
-#include <pthread.h>
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
 #define GOLDEN UINT64_C(0x40b91a3f9300e7e7)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 
-/* ---- threads ---- */
-typedef struct crew {
-    gait_task_fn *fn;
-    void *ctx;
-    int32_t count, next, threads;
-    bool backwards;
-    pthread_mutex_t lock;
-} crew;
-
-static void *work(void *arg)
+/* gait_tasks that does the last piece first. */
+static void run_backwards(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 {
-    crew *const c = arg;
-    for (;;) {
-        pthread_mutex_lock(&c->lock);
-        int32_t const i = c->next++;
-        pthread_mutex_unlock(&c->lock);
-        if (i >= c->count)
-            return NULL;
-        c->fn(c->ctx, c->backwards ? c->count - 1 - i : i);
-    }
+    (void)user;
+    while (count-- > 0)
+        fn(ctx, count);
 }
 
-/* gait_tasks on as many threads as the crew has. */
-static void run_crew(void *user, gait_task_fn *fn, void *ctx, int32_t count)
-{
-    crew *const c = user;
-    pthread_t id[8];
-    c->fn = fn;
-    c->ctx = ctx;
-    c->count = count;
-    c->next = 0;
-    for (int32_t k = 0; k < c->threads; k++)
-        if (pthread_create(&id[k], NULL, work, c))
-            abort();
-    for (int32_t k = 0; k < c->threads; k++)
-        pthread_join(id[k], NULL);
-}
-
-/* ---- one run ---- */
 static gait_tracker_config config(void)
 {
     gait_tracker_config cfg = toy_config(2);
@@ -101,37 +69,80 @@ static uint64_t run(const gait_tracker_config *cfg, int save_at)
     return hash;
 }
 
+/* Every instruction set of this CPU, lowest first: masks 0 (scalar), 1, 3, 7. */
+static const uint32_t MASK[] = {0, GAIT_CPU_BASE, GAIT_CPU_BASE | GAIT_CPU_AVX2,
+                                GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512};
+enum { MASKS = sizeof MASK / sizeof *MASK };
+
+static bool runs_here(uint32_t mask)
+{
+    return (mask & ~gait_cpu_features()) == 0;
+}
+
+static int print_digests(void)
+{
+    for (int k = 0; k < MASKS; k++) {
+        gait_tracker_config cfg = config();
+        cfg.cpu_mask = MASK[k];
+        if (runs_here(MASK[k]))
+            printf("digest %016llx %s\n", (unsigned long long)run(&cfg, 0), gait_cpu_name(MASK[k]));
+    }
+    return 0;
+}
+
+/* Pieces 1 .. 64 and more on 1 .. 16 threads; the instruction set and a stop in between change along. */
+static void test_pieces_and_threads(void)
+{
+    static unsigned char memory[16384] __attribute__((aligned(GAIT_ALIGN)));
+    for (int32_t tasks = 1; tasks <= 65; tasks++) {
+        gait_tracker_config cfg = config();
+        gait_pool *pool = NULL;
+        CHECK(gait_pool_init(memory, sizeof memory, 1 + (tasks - 1) % 16, &pool, NULL) == GAIT_OK);
+        cfg.tasks = tasks <= 64 ? tasks : 256;
+        cfg.exec = gait_pool_tasks(pool);
+        cfg.cpu_mask = MASK[(tasks / 16 + tasks) % MASKS];
+        CHECK(run(&cfg, tasks % 5 ? 0 : SAVE_AT) == GOLDEN);
+        gait_pool_stop(pool);
+    }
+}
+
+static void test_instruction_sets(void)
+{
+    for (int k = 0; k < MASKS; k++) {
+        gait_tracker_config cfg = config();
+        cfg.cpu_mask = MASK[k];
+        CHECK(run(&cfg, 0) == GOLDEN && run(&cfg, SAVE_AT) == GOLDEN);
+    }
+}
+
+static void test_order(void)
+{
+    gait_tracker_config cfg = config();
+    cfg.exec.run = run_backwards;
+    CHECK(run(&cfg, 0) == GOLDEN);
+    CHECK(run(&cfg, 41) == GOLDEN); /* stopped right after a frame that nobody saw */
+}
+
+static void test_another_seed(void)
+{
+    gait_tracker_config cfg = config();
+    cfg.seed++;
+    CHECK(run(&cfg, 0) != GOLDEN);
+}
+
 int main(int argc, char **argv)
 {
-    static const int32_t pieces[] = {1, 3, 64, 256};
-    gait_tracker_config cfg = config();
+    gait_tracker_config const cfg = config();
     _Static_assert(sizeof(gait_estimate) % 8 == 0, "hashed in words of 8 bytes");
     film_make(SCENE_CAMERAS, STEPS);
-    cfg.tasks = 8;
-    if (argc > 2)
-        cfg.cpu_mask = (uint32_t)strtoul(argv[2], NULL, 0);
+    if (argc > 1)
+        return strcmp(argv[1], "digest") == 0 ? print_digests() : 2;
     uint64_t const digest = run(&cfg, 0);
     printf("digest %016llx\n", (unsigned long long)digest);
-    if (argc > 1)
-        return strcmp(argv[1], "digest") != 0;
     CHECK(digest == GOLDEN);
-    for (cfg.cpu_mask = 0; cfg.cpu_mask <= GAIT_CPU_AVX512; cfg.cpu_mask = 2 * cfg.cpu_mask + !cfg.cpu_mask)
-        CHECK(run(&cfg, 0) == digest);
-    cfg.cpu_mask = config().cpu_mask;
-    for (size_t k = 0; k < sizeof pieces / sizeof *pieces; k++) {
-        cfg.tasks = pieces[k];
-        CHECK(run(&cfg, 0) == digest);
-    }
-    for (int32_t threads = 1; threads <= 8; threads++) {
-        crew c = {.threads = threads, .backwards = threads == 4, .lock = PTHREAD_MUTEX_INITIALIZER};
-        cfg.tasks = threads % 2 ? 16 : 5;
-        cfg.exec = (gait_tasks){run_crew, &c};
-        CHECK(run(&cfg, 0) == digest);
-    }
-    cfg = config();
-    CHECK(run(&cfg, SAVE_AT) == digest);
-    CHECK(run(&cfg, 41) == digest); /* right after a frame that nobody saw */
-    cfg.seed++;
-    CHECK(run(&cfg, 0) != digest);
+    test_instruction_sets();
+    test_pieces_and_threads();
+    test_order();
+    test_another_seed();
     return CHECK_DONE();
 }
