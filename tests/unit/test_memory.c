@@ -46,7 +46,7 @@ static void test_refused(void)
     free(memory);
 }
 
-/* Three hundred steps through every path write nothing outside; the memory's old contents do not matter. */
+/* A thousand steps through every path write nothing outside; the memory's old contents do not matter. */
 static void test_canaries(void)
 {
     uint64_t digest[2];
@@ -67,7 +67,7 @@ static void test_canaries(void)
             CHECK(gait_tracker_set_background(t, k, &plate) == GAIT_OK);
         }
         toy_tracker_start(t, 0, 1.0f);
-        for (int n = 0; n < 300; n++) {
+        for (int n = 0; n < 1000; n++) {
             gait_frame f = toy_frame(n);
             gait_estimate e;
             for (int k = 0; k < 2; k++) /* back and forth; now and then a camera or both miss */
