@@ -245,6 +245,9 @@ GAIT_API gait_status gait_tracker_step(gait_tracker *t, const gait_frame *frame,
  * present.  GAIT_ERR_ARG: back is not in [0, config lag]; GAIT_ERR_STATE: not so many steps since start.  ess counts
  * the ancestors that are left; status is LOST if it was, else the mode's mass as known now decides. */
 GAIT_API gait_status gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err);
+/* Go on with so many particles [16, config particles], drawn in the next step from those there are by their weights;
+ * while the two readings of left and right are weighed against each other the change waits.  A start keeps it. */
+GAIT_API gait_status gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_error *err);
 /* Copy up to cap particles with normalised weights; returns how many there are, or a negative status. */
 GAIT_API int32_t     gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap);
 GAIT_API uint64_t    gait_tracker_digest(const gait_tracker *t); /* hash of the whole state, for replay */

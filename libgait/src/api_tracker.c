@@ -290,6 +290,17 @@ gait_status gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *ou
     return GAIT_OK;
 }
 
+gait_status gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_error *err)
+{
+    if (!t)
+        return base_fail(err, GAIT_ERR_ARG, -1, "tracker is NULL");
+    if (particles < 16 || particles > t->room)
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "%d particles are outside [16, %d], the tracker's room",
+                         (int)particles, (int)t->room);
+    t->wanted = particles;
+    return GAIT_OK;
+}
+
 int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap)
 {
     if (!t || cap < 0 || (cap > 0 && (!s || !weight)))

@@ -31,6 +31,7 @@ static size_t slot_of(const lag *l, uint64_t step)
 static population kept_people(const gait_tracker *t, size_t slot)
 {
     population p = t->gen[0].people;
+    p.n = t->room; /* of which as many are in use as were then */
     p.value = t->past.value + slot * (size_t)p.fields * (size_t)p.n;
     return p;
 }
@@ -41,9 +42,10 @@ void lag_keep(gait_tracker *t, const gait_estimate *e)
     if (l->depth == 0)
         return;
     size_t const slot = slot_of(l, e->frame), n = (size_t)t->cfg.particles;
-    population const now = t->gen[t->core->current].people;
-    memcpy(kept_people(t, slot).value, now.value, (size_t)now.fields * n * sizeof *now.value);
-    memcpy(l->parent + slot * n, t->filter.parent, n * sizeof *l->parent);
+    population const now = t->gen[t->core->current].people, kept = kept_people(t, slot);
+    for (int32_t f = 0; f < now.fields; f++)
+        memcpy(field(&kept, f), field(&now, f), n * sizeof *now.value);
+    memcpy(l->parent + slot * (size_t)t->room, t->filter.parent, n * sizeof *l->parent);
     l->note[slot] = (lag_note){.age = e->utime - t->core->start_utime,
                                .frame = e->frame,
                                .log_evidence = e->log_evidence,
@@ -57,17 +59,16 @@ int32_t lag_reach(const gait_tracker *t)
     return (int32_t)(steps < depth ? steps : depth) - 1;
 }
 
-/* Sum the weights of today's particles on their ancestors `back` steps ago: weight[n]. */
+/* Sum the weights of today's particles on their ancestors `back` steps ago: weight[room]. */
 static void weigh_ancestors(gait_tracker *t, int32_t back, double *weight)
 {
-    int32_t const n = t->cfg.particles;
     uint64_t const last = t->core->frame - 1;
-    for (int32_t i = 0; i < n; i++)
+    for (int32_t i = 0; i < t->room; i++)
         weight[i] = 0.0;
-    for (int32_t i = 0; i < n; i++) {
+    for (int32_t i = 0; i < t->cfg.particles; i++) {
         int32_t a = i;
         for (uint64_t k = 0; k < (uint64_t)back; k++)
-            a = t->past.parent[slot_of(&t->past, last - k) * (size_t)n + (size_t)a];
+            a = t->past.parent[slot_of(&t->past, last - k) * (size_t)t->room + (size_t)a];
         weight[a] += t->filter.weight[i];
     }
 }

@@ -141,6 +141,10 @@ bool modes_resample(gait_tracker *t, uint32_t frame)
     pf_keep(&t->filter);
     if (m->stage == MODES_FORKED && (m->odds > DECIDED || m->odds < -DECIDED))
         close_fork(t);
+    if (m->stage != MODES_FORKED && t->wanted != t->filter.n) {
+        pf_resize(&t->filter, t->wanted, r[0]);
+        return true;
+    }
     if (m->stage != MODES_FORKED)
         return resample_all(t, r[0], frame);
     bool const first = resample_side(t, 0, r[0]), second = resample_side(t, 1, r[1]);
@@ -207,6 +211,7 @@ void modes_fork(gait_tracker *t)
     float const middle = half_phase(now);
     if (!search_is_over(t))
         return;
+    was->n = now->n;
     memcpy(was->value, now->value, (size_t)now->fields * (size_t)now->n * sizeof *now->value);
     for (int32_t i = 0; i < f->n; i++)
         f->ticket[i] = (uint64_t)f->parent[i];

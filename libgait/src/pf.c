@@ -93,9 +93,9 @@ static uint64_t make_tickets(pf *p)
     return total;
 }
 
-void pf_resample_systematic(pf *p, uint32_t u)
+void pf_resize(pf *p, int32_t count, uint32_t u)
 {
-    uint64_t const n = (uint64_t)p->n, total = make_tickets(p), step = total / n, rest = total % n;
+    uint64_t const n = (uint64_t)count, total = make_tickets(p), step = total / n, rest = total % n;
     uint64_t const start = (uint64_t)u * step >> 32;
     int32_t from = 0;
     for (uint64_t i = 0; i < n; i++) {
@@ -104,7 +104,13 @@ void pf_resample_systematic(pf *p, uint32_t u)
             from++;
         p->parent[i] = from;
     }
+    p->n = count;
     pf_uniform(p);
+}
+
+void pf_resample_systematic(pf *p, uint32_t u)
+{
+    pf_resize(p, p->n, u);
 }
 
 void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t frame)

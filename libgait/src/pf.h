@@ -33,6 +33,9 @@ int32_t pf_heaviest(const pf *p);
  * step. */
 void pf_resample_systematic(pf *p, uint32_t u);
 
+/* The same for another number of particles, which becomes p->n; the arrays must have room for it. */
+void pf_resize(pf *p, int32_t count, uint32_t u);
+
 /* n independent draws (Ormoneit et al. 2000, 4.4). */
 void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t frame);
 

@@ -22,6 +22,7 @@ static size_t state_bytes(const gait_tracker *t)
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;
+    c.particles = t->room;
     memset(&c.camera[c.cameras], 0, (size_t)(GAIT_MAX_CAMERAS - c.cameras) * sizeof *c.camera);
     memset(&c.exec, 0, sizeof c.exec);
     c.tasks = 0;
@@ -58,7 +59,7 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     tracker_core c;
     memcpy(&c, body, sizeof c);
     bool ok = (c.current == 0 || c.current == 1) && (c.started == 0 || c.started == 1);
-    ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->cfg.particles;
+    ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->room && c.fewer >= 0 && c.fewer < t->room;
     ok &= c.modes.stage >= MODES_SINGLE && c.modes.stage <= MODES_FORKED && c.modes.since <= c.utime;
     ok &=
         c.modes.odds > -1e6 && c.modes.odds < 1e6 && c.modes.lead > -1e12 && c.modes.lead < 1e12; /* no NaN */
@@ -72,15 +73,16 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
 
 static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
 {
+    tracker_core c;
     double sum = 0.0;
-    for (int32_t i = 0; i < t->filter.n; i++) {
+    memcpy(&c, body, sizeof c);
+    for (int32_t i = 0; i < t->room - c.fewer; i++) {
         double weight, log_weight;
         int32_t parent;
         memcpy(&weight, in_body(t, body, &t->filter.weight[i]), sizeof weight);
         memcpy(&log_weight, in_body(t, body, &t->filter.log_weight[i]), sizeof log_weight);
         memcpy(&parent, in_body(t, body, &t->filter.parent[i]), sizeof parent);
-        if (!(weight >= 0.0 && log_weight <= 1.0 && log_weight >= -2e300) || parent < 0 ||
-            parent >= t->filter.n)
+        if (!(weight >= 0.0 && log_weight <= 1.0 && log_weight >= -2e300) || parent < 0 || parent >= t->room)
             return false;
         sum += weight;
     }
@@ -89,7 +91,7 @@ static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
 
 static bool people_plausible(const gait_tracker *t, const unsigned char *body)
 {
-    size_t const count = (size_t)t->gen[0].people.fields * (size_t)t->gen[0].people.n;
+    size_t const count = (size_t)t->gen[0].people.fields * (size_t)t->room;
     for (int32_t g = 0; g < 2; g++)
         for (size_t i = 0; i < count; i++) {
             float v;
@@ -104,11 +106,11 @@ static bool people_plausible(const gait_tracker *t, const unsigned char *body)
 static bool past_plausible(const gait_tracker *t, const unsigned char *body)
 {
     const lag *const l = &t->past;
-    size_t const n = (size_t)t->cfg.particles, values = n * (size_t)t->gen[0].people.fields;
+    size_t const n = (size_t)t->room, values = n * (size_t)t->gen[0].people.fields;
     for (size_t i = 0; i < (size_t)l->depth * n; i++) {
         int32_t parent;
         memcpy(&parent, in_body(t, body, &l->parent[i]), sizeof parent);
-        if (parent < 0 || parent >= t->cfg.particles)
+        if (parent < 0 || parent >= t->room)
             return false;
     }
     for (size_t i = 0; i < (size_t)l->depth * values; i++) {
@@ -156,6 +158,8 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
         !past_plausible(t, body) || !template_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot holds a number outside its range");
     memcpy(t->core, body, state_bytes(t));
+    t->wanted = t->room - t->core->fewer;
+    tracker_set_count(t, t->wanted);
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         t->camera[c].plate_stale = true;
     return GAIT_OK;

@@ -56,7 +56,7 @@ static void layout_work(arena *a, gait_tracker *t)
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg)
 {
     gait_tracker *const self = TAKE(a, gait_tracker, 1);
-    gait_tracker t = {.model = m, .cfg = *cfg};
+    gait_tracker t = {.model = m, .cfg = *cfg, .room = cfg->particles, .wanted = cfg->particles};
     t.rule = body_rule_init(m, &t.cfg);
     t.cfg.components = t.rule.components;
     t.cfg.proportions = t.rule.proportions;
@@ -72,9 +72,17 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     return self;
 }
 
+void tracker_set_count(gait_tracker *t, int32_t particles)
+{
+    t->cfg.particles = t->filter.n = particles;
+    t->gen[t->core->current].people.n = particles;
+    t->core->fewer = t->room - particles;
+}
+
 void tracker_clear(gait_tracker *t)
 {
     memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
+    tracker_set_count(t, t->wanted);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         t->camera[c].plate_stale = true;
         for (int32_t side = 0; side < 2 && t->template[side][c]; side++)
@@ -144,6 +152,7 @@ static void predict(gait_tracker *t, float dt, uint32_t frame)
     move_job j = {.t = t, .d = tracker_dynamics(t), .dt = dt, .frame = frame};
     j.age = seconds_since(t, t->core->start_utime);
     t->core->current = 1 - t->core->current;
+    tracker_set_count(t, t->filter.n);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
 }
 

@@ -25,12 +25,13 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int32_t started;
     int32_t current;   /* which of the two generations holds the particles */
     uint32_t textured; /* bit c: that generation carries surface samples of camera c's previous frame */
-    int32_t met; /* the images have supported it since the start */
+    int32_t met;       /* the images have supported it since the start */
     double ess;
     modes_state modes;
     walker last;       /* when the images last supported it */
     float phase, rate; /* reported last: strides, strides per second */
     view_map map[GAIT_MAX_CAMERAS];
+    int32_t fewer; /* particles than there is room for */
 } tracker_core;
 
 typedef struct generation {
@@ -54,7 +55,9 @@ typedef struct weigh_scratch { /* one per task */
 
 struct gait_tracker {
     const gait_model *model;
-    gait_tracker_config cfg;
+    gait_tracker_config cfg; /* particles: those in use now */
+    int32_t room;            /* particles that there is memory for: the caller's config */
+    int32_t wanted;          /* particles from the next step on that can change their number */
     body_rule rule;
     like_setup *like;
     /* Mutable state: one stretch of memory from core to state_end. */
@@ -82,6 +85,8 @@ int32_t modes_side(const gait_tracker *t, int32_t particle);
 
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg);
 void tracker_clear(gait_tracker *t);
+/* From now on so many particles are in use. */
+void tracker_set_count(gait_tracker *t, int32_t particles);
 dynamics tracker_dynamics(const gait_tracker *t);
 void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime);
 gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out);

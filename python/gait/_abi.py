@@ -292,6 +292,7 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_tracker_start", [_HANDLE, _STATE, _STATE, c_int64, _ERR], _STATUS),
     ("gait_tracker_step", [_HANDLE, POINTER(FrameC), POINTER(EstimateC), _ERR], _STATUS),
     ("gait_tracker_lagged", [_HANDLE, c_int32, POINTER(EstimateC), _ERR], _STATUS),
+    ("gait_tracker_set_particles", [_HANDLE, c_int32, _ERR], _STATUS),
     ("gait_tracker_particles", [_HANDLE, _STATE, POINTER(c_float), c_int32], c_int32),
     ("gait_tracker_digest", [_HANDLE], c_uint64),
     ("gait_tracker_save", [_HANDLE, c_void_p, c_size_t, _SIZE], _STATUS),
