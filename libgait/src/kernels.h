@@ -10,10 +10,18 @@
 
 /* Types of higher layers, which a kernel's own file includes. */
 struct features;
+struct kin_body;
+struct limb_geometry;
+struct outline_block;
 struct rast_mask;
+struct view_map;
 
 /* Result, name, parameters. */
 #define KERNELS(K)                                                                                           \
+    /* The limbs of a block of bodies in one camera's working image. */                                      \
+    K(void, outline_project,                                                                                 \
+      (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \
+       const gait_camera *cam, const struct view_map *map, struct outline_block *out))                       \
     K(void, silhouette_count,                                                                                \
       (const struct features *f, const struct rast_mask *whole, int32_t *area, int32_t *covered))
 

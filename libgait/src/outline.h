@@ -39,7 +39,4 @@ static inline int32_t outline_vertices(const limb_geometry *g)
 /* R, o, scale: the limb's frame in the world and metres per stature. */
 void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale,
                   const gait_camera *cam, const view_map *map, limb_polygon *out);
-
-void outline_project(const limb_geometry *limbs, int32_t count, const kin_body *body, const gait_camera *cam,
-                     const view_map *map, outline_block *out);
 #endif

@@ -51,6 +51,14 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
     return count;
 }
 
+/* The block's limbs in one camera's working image and grid. */
+static void outline_limbs(const gait_tracker *t, int32_t c, weigh_scratch *w)
+{
+    const like_setup *const s = t->like;
+    s->run->outline_project(s->geometry, s->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map,
+                            &w->outline);
+}
+
 /* One body of a block in one camera, ready for the terms. */
 static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t lane, weigh_scratch *w,
                          int8_t *seen)
@@ -89,8 +97,7 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;
-        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c],
-                        &t->camera[c].seen.map, &w->outline);
+        outline_limbs(t, c, w);
         for (int32_t lane = 0; lane < lanes; lane++) {
             int32_t const i = begin + lane;
             like_body b = look_at(t, c, modes_side(t, i), lane, w, texture_of(t, now, i, c));
@@ -123,8 +130,7 @@ float weigh_walker(gait_tracker *t, const walker *person)
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;
-        outline_project(t->like->geometry, t->like->limbs, &w->body, &t->cfg.camera[c],
-                        &t->camera[c].seen.map, &w->outline);
+        outline_limbs(t, c, w);
         int8_t *const seen = t->seen ? t->seen + (size_t)c * (size_t)t->like->limbs * LIKE_SAMPLES : NULL;
         like_body const b = look_at(t, c, 0, 0, w, seen);
         support += like_support(&b);

@@ -2,6 +2,7 @@
 #include "layers.h"
 
 #include "population.h"
+#include "toy_draw.h"
 #include "toy_scene.h"
 
 #include "check.h"
@@ -125,7 +126,7 @@ static void test_walker(void)
         gait_state const s = toy_walk(0.05f * (float)n);
         walker const w = walker_from_state(&rule, &s);
         walker_body(&rule, &w, &body);
-        outline_project(limbs, m->limbs, &body, &cam, &map, &outline);
+        toy_project(limbs, m->limbs, &body, &cam, &map, &outline);
         int32_t const lane = n % BLOCK;
         layers_draw(&outline, limbs, m->limbs, lane, &drawn);
         static rast_mask alone[MODEL_MAX_LIMBS];

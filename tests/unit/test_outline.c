@@ -1,6 +1,7 @@
 /* Limbs in the image: against the projection of their ends, of their surface, and against sizes known beforehand. */
 #include "outline.h"
 
+#include "toy_draw.h"
 #include "toy_scene.h"
 
 #include "check.h"
@@ -339,7 +340,7 @@ static void test_lanes(void)
                 body.o[f][k][lane] = at[lane].o[3 * f + k];
         }
     }
-    outline_project(limbs, m->limbs, &body, &cam, &map, &block);
+    toy_project(limbs, m->limbs, &body, &cam, &map, &block);
     int wrong = 0;
     for (int lane = 0; lane < BLOCK; lane++)
         for (int32_t l = 0; l < m->limbs; l++) {

@@ -1,5 +1,6 @@
 /* gait_render: the picture that the layers draw, in bands of any image. */
 #include "layers.h"
+#include "toy_draw.h"
 #include "toy_scene.h"
 
 #include "check.h"
@@ -40,7 +41,7 @@ static void test_against_layers(void)
         s.pelvis[0] = 0.0f;
         walker const w = walker_from_state(&rule, &s);
         walker_body(&rule, &w, &body);
-        outline_project(limbs, m->limbs, &body, &cam, &map, &outline);
+        toy_project(limbs, m->limbs, &body, &cam, &map, &outline);
         layers_draw(&outline, limbs, m->limbs, 0, &drawn);
         CHECK(gait_render(m, &cam, &s, ids, SIDE) == GAIT_OK);
         for (int32_t y = 0; y < RAST_SIZE; y++)

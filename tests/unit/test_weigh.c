@@ -100,7 +100,7 @@ static const outline_block *outline_of(const gait_tracker *t, int32_t i)
     static outline_block out;
     walker const w = walker_get(&t->gen[t->core->current].people, i);
     walker_body(&t->rule, &w, &body);
-    outline_project(t->like->geometry, TOY_LIMBS, &body, &t->cfg.camera[0], &t->camera[0].seen.map, &out);
+    toy_project(t->like->geometry, TOY_LIMBS, &body, &t->cfg.camera[0], &t->camera[0].seen.map, &out);
     return &out;
 }
 

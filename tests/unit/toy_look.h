@@ -7,6 +7,7 @@
 #ifndef TOY_LOOK_H
 #define TOY_LOOK_H
 #include "like.h"
+#include "toy_draw.h"
 #include "toy_scene.h"
 
 typedef struct toy_look {
@@ -70,7 +71,7 @@ static inline like_body toy_look_body(toy_look *v, const gait_state *s)
     enum { LANE = 5 };
     walker const w = walker_from_state(&v->rule, s);
     walker_body(&v->rule, &w, &v->body);
-    outline_project(v->setup.geometry, v->setup.limbs, &v->body, &v->cam, &v->f.map, &v->outline);
+    toy_project(v->setup.geometry, v->setup.limbs, &v->body, &v->cam, &v->f.map, &v->outline);
     layers_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
     like_sample(&v->setup, &v->f, &v->cam, &v->body, LANE, &v->drawn, v->seen);
     return (like_body){.setup = &v->setup,
