@@ -11,6 +11,8 @@
 /* Types of higher layers, which a kernel's own file includes. */
 struct features;
 struct kin_body;
+struct layers;
+struct layers_block;
 struct limb_geometry;
 struct outline_block;
 struct rast_mask;
@@ -22,6 +24,11 @@ struct view_map;
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \
        const gait_camera *cam, const struct view_map *map, struct outline_block *out))                       \
+    /* The same as edges in the grid, with their depth order; then one of these bodies as masks. */          \
+    K(void, layers_prepare,                                                                                  \
+      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
+       struct layers_block *out))                                                                            \
+    K(void, layers_draw, (const struct layers_block *block, int32_t lane, struct layers *out))               \
     K(void, silhouette_count,                                                                                \
       (const struct features *f, const struct rast_mask *whole, int32_t *area, int32_t *covered))
 

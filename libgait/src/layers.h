@@ -3,21 +3,30 @@
 #define GAIT_LAYERS_H
 #include "outline.h"
 
+enum { LAYERS_ROWS = 8 }; /* the grid is drawn in bands of so many rows */
+
 typedef struct layers {
-    rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; rows outside its [first, last) are not written */
+    rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; [first, last) are whole bands, others are not written */
     rast_mask whole;                    /* the body; every row of the grid is written */
 } layers;
+
+typedef struct layers_limb { /* a limb's polygon in the grid, in the bodies of a block */
+    uint32_t at[RAST_MAX_VERTICES][BLOCK], slope[RAST_MAX_VERTICES][BLOCK]; /* its edges as in rast_edge; */
+    int32_t first[RAST_MAX_VERTICES][BLOCK], rows[RAST_MAX_VERTICES][BLOCK];
+    int32_t top[BLOCK], end[BLOCK]; /* the bands that it meets */
+} layers_limb;
+
+typedef struct layers_block {
+    layers_limb limb[MODEL_MAX_LIMBS];
+    int32_t vertices[MODEL_MAX_LIMBS];
+    int32_t count;                         /* limbs */
+    int32_t drawn[BLOCK];                  /* of them in front of the camera */
+    uint8_t order[BLOCK][MODEL_MAX_LIMBS]; /* from near to far; equal depths by index */
+} layers_block;
 
 /* Limb indices from near to far by depth[l * stride]; limbs behind the camera (depth 0) are left out.
  * Returns how many there are. */
 int32_t layers_order(const float *depth, int32_t stride, int32_t limbs, int32_t *order);
-
-/* Polygon of one limb of one lane in grid cells (two working pixels each). */
-void layers_polygon(const outline_block *outline, int32_t limb, int32_t vertices, int32_t lane, float *x,
-                    float *y);
-
-void layers_draw(const outline_block *outline, const limb_geometry *limbs, int32_t count, int32_t lane,
-                 layers *out);
 
 /* Is the limb visible at this working pixel? */
 static inline bool layers_visible(const rast_mask *mask, float wx, float wy)

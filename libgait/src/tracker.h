@@ -49,6 +49,7 @@ typedef struct camera_state {
 typedef struct weigh_scratch { /* one per task */
     kin_body body;
     outline_block outline;
+    layers_block edges;
     layers layers;
     float points[GAIT_MAX_JOINTS][3][BLOCK];
 } weigh_scratch;

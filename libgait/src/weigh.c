@@ -57,6 +57,7 @@ static void outline_limbs(const gait_tracker *t, int32_t c, weigh_scratch *w)
     const like_setup *const s = t->like;
     s->run->outline_project(s->geometry, s->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map,
                             &w->outline);
+    s->run->layers_prepare(&w->outline, s->geometry, s->limbs, &w->edges);
 }
 
 /* One body of a block in one camera, ready for the terms. */
@@ -70,7 +71,7 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t
                    .layers = &w->layers,
                    .seen = seen,
                    .template = t->template[side][c]};
-    layers_draw(&w->outline, t->like->geometry, t->like->limbs, lane, &w->layers);
+    t->like->run->layers_draw(&w->edges, lane, &w->layers);
     if (seen)
         like_sample(t->like, b.features, &t->cfg.camera[c], &w->body, lane, &w->layers, seen);
     return b;

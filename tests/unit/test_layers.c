@@ -26,6 +26,11 @@ static bool bit(const rast_mask *m, int32_t x, int32_t y)
     return y >= m->first && y < m->last && (m->row[y][x >> 6] >> (x & 63) & 1);
 }
 
+static bool covers(const rast_spans *s, int32_t x, int32_t y)
+{
+    return y >= s->first && y < s->last && x >= s->begin[y] && x < s->end[y];
+}
+
 static int32_t count(const rast_mask *m)
 {
     int32_t n = 0;
@@ -54,7 +59,7 @@ static void test_cells(void)
     int32_t wrong = 0;
     memset(&drawn, 0xff, sizeof drawn);
     rectangle(0, 3, 20, 40, 60, 100, 2.0f);
-    layers_draw(&outline, flat, 1, 3, &drawn);
+    toy_draw(&outline, flat, 1, 3, &drawn);
     for (int32_t y = 0; y < RAST_SIZE; y++)
         for (int32_t x = 0; x < RAST_SIZE; x++) {
             bool const in = x >= 10 && x < 30 && y >= 20 && y < 50;
@@ -62,7 +67,7 @@ static void test_cells(void)
             wrong += (drawn.whole.row[y][x >> 6] >> (x & 63) & 1) != in; /* every row is written */
         }
     CHECK(wrong == 0);
-    CHECK(drawn.whole.first == 20 && drawn.whole.last == 50);
+    CHECK(drawn.whole.first <= 20 && drawn.whole.last >= 50);
     const rast_mask *const m = &drawn.visible[0];
     CHECK(layers_visible(m, 20.0f, 40.0f) && layers_visible(m, 59.9f, 99.9f));
     CHECK(!layers_visible(m, 19.9f, 40.0f) && !layers_visible(m, 60.0f, 50.0f));
@@ -70,7 +75,7 @@ static void test_cells(void)
     CHECK(!layers_visible(m, NAN, 50.0f) && !layers_visible(m, 30.0f, NAN));
     CHECK(!layers_visible(m, 1e30f, 50.0f) && !layers_visible(m, -1e30f, 50.0f));
     rectangle(0, 3, -100, -100, 400, 400, 2.0f); /* the whole grid, and not a cell more */
-    layers_draw(&outline, flat, 1, 3, &drawn);
+    toy_draw(&outline, flat, 1, 3, &drawn);
     CHECK(count(m) == RAST_SIZE * RAST_SIZE);
     CHECK(layers_visible(m, 0.0f, 0.0f) && layers_visible(m, 255.9f, 255.9f));
     CHECK(!layers_visible(m, -0.1f, 5.0f) && !layers_visible(m, 5.0f, -0.1f));
@@ -93,7 +98,7 @@ static void test_hiding(void)
         rectangle(3, 0, 0, 0, 200, 200, 0.0f);     /* behind the camera */
         rectangle(4, 0, 300, 10, 400, 30, 1.0f);   /* outside */
         rectangle(5, 0, 120, 200, 140, 210, 3.0f); /* apart */
-        layers_draw(&outline, flat, 6, 0, &drawn);
+        toy_draw(&outline, flat, 6, 0, &drawn);
         CHECK(count(&drawn.visible[near]) == 20 * 20);
         CHECK(count(&drawn.visible[far]) == 20 * 40 - 10 * 20);
         CHECK(bit(&drawn.visible[near], 35, 30) && !bit(&drawn.visible[far], 35, 30));
@@ -104,7 +109,7 @@ static void test_hiding(void)
         CHECK(count(&drawn.whole) == 400 + 600 + 50);
         CHECK(drawn.whole.first <= 10 && drawn.whole.last >= 105);
     }
-    layers_draw(&outline, flat, 0, 0, &drawn);
+    toy_draw(&outline, flat, 0, 0, &drawn);
     CHECK(drawn.whole.first == drawn.whole.last && count(&drawn.whole) == 0 && drawn.whole.row[35][0] == 0);
 }
 
@@ -128,23 +133,21 @@ static void test_walker(void)
         walker_body(&rule, &w, &body);
         toy_project(limbs, m->limbs, &body, &cam, &map, &outline);
         int32_t const lane = n % BLOCK;
-        layers_draw(&outline, limbs, m->limbs, lane, &drawn);
-        static rast_mask alone[MODEL_MAX_LIMBS];
+        toy_draw(&outline, limbs, m->limbs, lane, &drawn);
+        static rast_spans alone[MODEL_MAX_LIMBS];
         for (int32_t l = 0; l < m->limbs; l++) {
             float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES];
-            rast_spans spans;
             for (int32_t k = 0; k < outline_vertices(&limbs[l]); k++) {
                 x[k] = (outline.x[l][k][lane] - 0.5f) / 2.0f;
                 y[k] = (outline.y[l][k][lane] - 0.5f) / 2.0f;
             }
-            rast_convex(x, y, outline_vertices(&limbs[l]), 0, RAST_SIZE, &spans);
-            rast_fill(&spans, &alone[l]);
+            rast_convex(x, y, outline_vertices(&limbs[l]), 0, RAST_SIZE, &alone[l]);
         }
         for (int32_t y = 0; y < RAST_SIZE; y++)
             for (int32_t x = 0; x < RAST_SIZE; x++) {
                 int32_t top = -1, covering = 0;
                 for (int32_t l = 0; l < m->limbs; l++)
-                    if (bit(&alone[l], x, y)) {
+                    if (covers(&alone[l], x, y)) {
                         covering++;
                         top = top < 0 || outline.depth[l][lane] < outline.depth[top][lane] ? l : top;
                     }

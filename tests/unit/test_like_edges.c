@@ -17,7 +17,7 @@ static like_body one_limb(int32_t shape, const float *x, const float *y)
         v->outline.y[0][k][LANE] = y[k];
     }
     v->outline.depth[0][LANE] = 3.0f;
-    layers_draw(&v->outline, v->setup.geometry, 1, LANE, &drawn);
+    toy_draw(&v->outline, v->setup.geometry, 1, LANE, &drawn);
     return (like_body){
         .setup = &v->setup, .features = &v->f, .outline = &v->outline, .lane = LANE, .layers = &drawn};
 }
@@ -123,7 +123,7 @@ static void test_hidden(void)
         }
         v->outline.depth[l][LANE] = l < 2 ? 4.0f : 2.0f; /* the third hides the second */
     }
-    layers_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
+    toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
     like_body const b = {
         .setup = &v->setup, .features = &v->f, .outline = &v->outline, .lane = LANE, .layers = &drawn};
     edge_field(0.0, 0.0, false);
@@ -133,10 +133,10 @@ static void test_hidden(void)
             v->f.edge[i * VIEW_SIZE + column[k]] = (edge_cell){.trace = EDGE_ONE, .xx_yy = EDGE_ONE};
     CHECK_NEAR(like_edges.log_likelihood(&b), 0.0, 0.03); /* all that is visible has an edge */
     v->outline.depth[2][LANE] = 5.0f; /* now it lies behind: the second is seen, without edges */
-    layers_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
+    toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
     CHECK_NEAR(like_edges.log_likelihood(&b), -1.0 / 3.0, 0.03);
     v->outline.depth[1][LANE] = 0.0f; /* behind the camera: no part of the average */
-    layers_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
+    toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
     CHECK_NEAR(like_edges.log_likelihood(&b), 0.0, 0.03);
 }
 
@@ -176,7 +176,7 @@ static void test_beyond(void)
             v->outline.y[1][i][b.lane] = y[k][i] - 20.0f;
         }
         v->outline.depth[1][b.lane] = 3.0f;
-        layers_draw(&v->outline, v->setup.geometry, 2, b.lane, &drawn);
+        toy_draw(&v->outline, v->setup.geometry, 2, b.lane, &drawn);
         CHECK_NEAR(like_edges.support(&b), -0.005, 1e-6); /* enough points, no edges */
         CHECK(like_edges.log_likelihood(&b) == -1.0f);
     }

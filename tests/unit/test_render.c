@@ -42,7 +42,7 @@ static void test_against_layers(void)
         walker const w = walker_from_state(&rule, &s);
         walker_body(&rule, &w, &body);
         toy_project(limbs, m->limbs, &body, &cam, &map, &outline);
-        layers_draw(&outline, limbs, m->limbs, 0, &drawn);
+        toy_draw(&outline, limbs, m->limbs, 0, &drawn);
         CHECK(gait_render(m, &cam, &s, ids, SIDE) == GAIT_OK);
         for (int32_t y = 0; y < RAST_SIZE; y++)
             for (int32_t x = 0; x < RAST_SIZE; x++) {

@@ -72,7 +72,7 @@ static inline like_body toy_look_body(toy_look *v, const gait_state *s)
     walker const w = walker_from_state(&v->rule, s);
     walker_body(&v->rule, &w, &v->body);
     toy_project(v->setup.geometry, v->setup.limbs, &v->body, &v->cam, &v->f.map, &v->outline);
-    layers_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
+    toy_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
     like_sample(&v->setup, &v->f, &v->cam, &v->body, LANE, &v->drawn, v->seen);
     return (like_body){.setup = &v->setup,
                        .features = &v->f,

@@ -1,0 +1,125 @@
+/* Outlines, edges and masks of every instruction set against the scalar ones: walkers, and any bits as coordinates. */
+#include "kernel_check.h"
+#include "layers.h"
+
+#include "population.h"
+#include "rng.h"
+#include "toy_scene.h"
+
+#include "check.h"
+
+static outline_block outline;
+static layers_block edges;
+static layers drawn[BLOCK];
+static unsigned char memory[sizeof(layers_block) + sizeof(outline_block) + sizeof(layers) + 2 * GUARD];
+
+/* Each other set draws the block as `outline`, `edges` and `drawn` say. */
+static void compare_layers(const limb_geometry *limbs, int32_t count)
+{
+    memset(&edges, 0xa5, sizeof edges);
+    isa_scalar()->layers_prepare(&outline, limbs, count, &edges);
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        memset(&drawn[lane], 0xa5, sizeof drawn[lane]);
+        isa_scalar()->layers_draw(&edges, lane, &drawn[lane]);
+    }
+    for (int k = 0; k < isa_count(); k++) {
+        guarded g = guard_fill(memory, sizeof edges);
+        isa_at(k)->layers_prepare(&outline, limbs, count, (layers_block *)(void *)g.begin);
+        CHECK(guard_whole(&g) && memcmp(g.begin, &edges, sizeof edges) == 0);
+        for (int32_t lane = 0; lane < BLOCK; lane++) {
+            g = guard_fill(memory, sizeof(layers));
+            isa_at(k)->layers_draw(&edges, lane, (layers *)(void *)g.begin);
+            CHECK(guard_whole(&g) && memcmp(g.begin, &drawn[lane], sizeof(layers)) == 0);
+        }
+    }
+}
+
+/* Bodies of a block, each lane another, some of them at or behind the camera. */
+static void walkers(int round, const body_rule *rule, population *p)
+{
+    for (int32_t i = 0; i < BLOCK; i++) {
+        gait_state s = toy_walk(0.13f * (float)round + 0.21f * (float)i);
+        s.heading += 0.4f * (float)i;
+        s.stature *= 1.0f + 0.02f * (float)i;
+        s.pelvis[0] += round % 3 ? 0.05f * (float)i : 0.9f * (float)(i - 8);
+        s.pelvis[1] += round % 3 ? 0.0f : 0.7f * (float)(i - 8);
+        walker const w = walker_from_state(rule, &s);
+        walker_put(p, i, &w);
+    }
+}
+
+static void test_walkers(void)
+{
+    const gait_model *const m = toy_model();
+    gait_tracker_config cfg;
+    gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
+    body_rule const rule = body_rule_init(m, &cfg);
+    static float value[F_MAX * BLOCK];
+    population p = {.n = BLOCK, .fields = body_rule_fields(&rule), .value = value};
+    static kin_body body;
+    limb_geometry limbs[MODEL_MAX_LIMBS];
+    limb_geometry_init(m, 1.05f, limbs);
+    for (int round = 0; round < 30; round++) {
+        gait_camera const cam = toy_camera(round % 2);
+        view_map const map = {.scale = 1.4f, .u0 = 85.0f + (float)round, .v0 = 60.0f};
+        walkers(round, &rule, &p);
+        population_bodies(&rule, &p, 0, &body);
+        memset(&outline, 0xa5, sizeof outline);
+        isa_scalar()->outline_project(limbs, m->limbs, &body, &cam, &map, &outline);
+        for (int k = 0; k < isa_count(); k++) {
+            guarded const g = guard_fill(memory, sizeof outline);
+            isa_at(k)->outline_project(limbs, m->limbs, &body, &cam, &map, (outline_block *)(void *)g.begin);
+            CHECK(guard_whole(&g) && memcmp(g.begin, &outline, sizeof outline) == 0);
+        }
+        compare_layers(limbs, m->limbs);
+    }
+}
+
+/* Any bits, and the numbers at which something changes. */
+static float odd(uint32_t index, uint32_t draw)
+{
+    static const float numbers[] = {NAN,   INFINITY, -INFINITY, 1e30f,  FLT_MAX, 0.0f,  -0.0f,
+                                    31999, -32001,   127.5f,    128.0f, 256.5f,  1e-40f};
+    uint32_t r[4];
+    float any;
+    rng_bits(31, 0, 0, index, draw, r);
+    memcpy(&any, &r[0], sizeof any);
+    return r[1] % 8 == 0   ? any
+           : r[1] % 8 == 1 ? numbers[r[2] % (sizeof numbers / sizeof *numbers)]
+           : r[1] % 8 == 2 ? 0.5f * (float)(r[2] % 600)
+                           : (float)(r[2] % 300000) / 1000.0f - 20.0f;
+}
+
+static void test_garbage(void)
+{
+    static limb_geometry limbs[MODEL_MAX_LIMBS];
+    float *const x = &outline.x[0][0][0], *const y = &outline.y[0][0][0], *const depth = &outline.depth[0][0];
+    for (uint32_t round = 0; round < 40; round++) {
+        int32_t const count = (int32_t)(round * 7 % (MODEL_MAX_LIMBS + 1));
+        for (uint32_t i = 0; i < MODEL_MAX_LIMBS * RAST_MAX_VERTICES * BLOCK; i++) {
+            x[i] = odd(i, 4 * round);
+            y[i] = odd(i, 4 * round + 1);
+        }
+        for (uint32_t i = 0; i < MODEL_MAX_LIMBS * BLOCK; i++)
+            depth[i] =
+                round % 2 ? f_min(odd(i, 4 * round + 2), 1e30f) : (float)(i * 7 % 5); /* many are equal */
+        for (uint32_t l = 0; l < MODEL_MAX_LIMBS; l++)
+            limbs[l].shape = (l + round) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
+        compare_layers(limbs, count);
+        int32_t wrong = 0;
+        for (int32_t lane = 0; lane < BLOCK; lane++) {
+            int32_t order[MODEL_MAX_LIMBS];
+            wrong += layers_order(&depth[lane], BLOCK, count, order) != edges.drawn[lane];
+            for (int32_t k = 0; k < edges.drawn[lane]; k++)
+                wrong += edges.order[lane][k] != order[k];
+        }
+        CHECK(wrong == 0);
+    }
+}
+
+int main(void)
+{
+    test_walkers();
+    test_garbage();
+    return CHECK_DONE();
+}
