@@ -16,9 +16,9 @@
 static struct settings {
     char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
     char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
-    int32_t stream, particles, components, threads, tasks, lag, cpu_mask;
+    int32_t stream, particles, adapt_particles, components, threads, tasks, lag, cpu_mask;
     uint64_t seed;
-    float max_gap;
+    float max_gap, budget_ms;
     bool particles_channel, quiet, version;
     tracker_values tracker;
 } settings = {.mode = "default",
@@ -58,6 +58,15 @@ static const option own_options[] = {
     {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
     {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
     {"particles", 'n', "N", particles_help, INT(particles, 16, 1 << 20)},
+    {"budget-ms", 0, "MS",
+     "live: an estimate comes within so many milliseconds of its frame's capture; frames that\n"
+     "        are older already, less what a step takes, are dropped and counted; default: none",
+     OPTION_FLOAT, &settings.budget_ms, 1, 10000},
+    {"adapt-particles", 0, "LOW",
+     "with --budget-ms: halve the particles, down to LOW, when steps are too slow or frames are\n"
+     "        dropped, and double them, up to --particles, when there is time to spare; results\n"
+     "        then depend on time; default: their number never changes",
+     INT(adapt_particles, 16, 1 << 20)},
     {"components", 0, "Q", "principal components in use; default all of the model's",
      INT(components, 0, GAIT_MAX_COMPONENTS)},
     {"lag", 0, "N",
@@ -130,6 +139,18 @@ static void help(const option *table)
     options_help(table, OPTIONS);
 }
 
+static int32_t mode(void)
+{
+    return strcmp(settings.mode, "paper") == 0 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT;
+}
+
+static int32_t particles(void)
+{
+    gait_tracker_config usual;
+    gait_tracker_default(&usual, mode());
+    return settings.particles ? settings.particles : usual.particles;
+}
+
 /* Command line over configuration file over defaults. */
 static option_result read_settings(int argc, char **argv, const option *table, message *why)
 {
@@ -147,6 +168,13 @@ static option_result read_settings(int argc, char **argv, const option *table, m
          message_set(why, "--mode %.100s: give default or paper", settings.mode)) &&
         (strncmp(link_url(settings.url), "memq://", 7) != 0 ||
          message_set(why, "--url memq://: reaches nobody outside one process; give udpm:// or file://")) &&
+        (settings.budget_ms == 0 || !link_is_log(link_url(settings.url)) ||
+         message_set(why, "--budget-ms: a log is played without loss; leave it out")) &&
+        (!settings.adapt_particles || settings.budget_ms > 0 ||
+         message_set(why, "--adapt-particles needs --budget-ms to adapt to")) &&
+        (settings.adapt_particles <= particles() ||
+         message_set(why, "--adapt-particles %d: at most the %d of --particles",
+                     (int)settings.adapt_particles, (int)particles())) &&
         (!settings.background[0] || settings.camera[0] ||
          message_set(why, "--background needs --camera, or leave both to `gait capture`"));
     return ok ? OPTION_OK : OPTION_BAD;
@@ -154,8 +182,8 @@ static option_result read_settings(int argc, char **argv, const option *table, m
 
 static void make_config(workers *threads, gait_tracker_config *c)
 {
-    gait_tracker_default(c, strcmp(settings.mode, "paper") == 0 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT);
-    c->particles = settings.particles ? settings.particles : c->particles;
+    gait_tracker_default(c, mode());
+    c->particles = particles();
     c->components = settings.components;
     c->seed = settings.seed;
     c->lag = settings.lag;
@@ -196,6 +224,11 @@ static bool load(service *s, workers *threads, lcm_t *out, message *why)
     if (has_init && !init_file_read(settings.init, s->track.model, &init, why))
         return false;
     s->max_gap = (double)settings.max_gap;
+    s->budget = (budget){.limit_us = (int64_t)(1e3f * settings.budget_ms),
+                         .low = settings.adapt_particles,
+                         .high = config.particles};
+    s->pool_bytes = threads->bytes;
+    s->track.memory_bytes += threads->bytes;
     if (!service_open(s, out, settings.stream, settings.threads, has_init ? &init : NULL,
                       settings.particles_channel, why))
         return false;
@@ -214,6 +247,9 @@ static void print_summary(const service *s, bool live)
     if (live)
         printf(" latency_ms median %.2f p99 %.2f", histogram_quantile(&c->latency, 0.5) / 1e3,
                histogram_quantile(&c->latency, 0.99) / 1e3);
+    if (s->budget.limit_us)
+        printf(" late %" PRId64 " over_budget %" PRId64 " particles %d", s->budget.late, s->budget.over,
+               (int)(s->wanted ? s->wanted : s->track.config.particles));
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }
 

@@ -31,7 +31,7 @@ static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
     image_view v;
     bool const newest = r->log || lcm_subscription_get_queue_size(r->frames) == 0;
     if (open_view(r->service, buf, channel, &v))
-        service_frame(r->service, &v, newest, service_now());
+        service_frame(r->service, &v, newest, buf->recv_utime);
 }
 
 static void on_background(const lcm_recv_buf_t *buf, const char *channel, void *user)

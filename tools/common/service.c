@@ -63,6 +63,7 @@ static void set_idle(service *s)
 static void rearm(service *s)
 {
     memset(&s->counts, 0, sizeof s->counts);
+    s->budget.late = s->budget.over = 0;
     s->dropped_before = 0;
     s->last_frame = s->last_utime = -1;
     s->start = (arming){0};
@@ -115,10 +116,15 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
     if (!tracking_set_camera(&s->track, camera, why))
         return false;
+    const tracking *const t = &s->track;
     fprintf(stderr,
-            "gait-trackd: model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes\n",
-            s->track.info.digest, camera->width, camera->height, s->track.config.particles, s->threads,
-            s->threads == 1 ? "" : "s", gait_cpu_name(s->track.config.cpu_mask), s->track.memory_bytes);
+            "gait-trackd: model %016" PRIx64
+            ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
+            "tracker %zu, pool %zu, pictures %zu)\n",
+            t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
+            s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), t->memory_bytes, t->model_bytes,
+            t->tracker_bytes, s->pool_bytes, t->picture_bytes);
+    s->wanted = s->track.config.particles;
     set_idle(s);
     return true;
 }
@@ -294,8 +300,20 @@ static gait_status bridge(service *s, int64_t utime, gait_estimate *out, gait_er
     return GAIT_OK;
 }
 
+/* Go on with another number of particles if the budget says so. */
+static void adapt(service *s, int64_t birth, int64_t step_us)
+{
+    int32_t const had = s->wanted;
+    s->wanted = budget_stepped(&s->budget, birth, service_now(), step_us, had);
+    if (s->wanted == had || gait_tracker_set_particles(s->track.tracker, s->wanted, NULL) != GAIT_OK)
+        return;
+    fprintf(stderr, "gait-trackd: %d particles instead of %d: a step took %.1f ms of %.1f\n", (int)s->wanted,
+            (int)had, (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
+    s->news = true;
+}
+
 /* Track the frame; false: it could not be used. */
-static bool step(service *s, const image_view *v, int64_t received)
+static bool step(service *s, const image_view *v, int64_t received, int64_t birth)
 {
     gait_frame frame = {.utime = v->utime};
     gait_estimate estimate;
@@ -322,6 +340,7 @@ static bool step(service *s, const image_view *v, int64_t received)
     service_send_estimate(s, v, &estimate, received, step_us);
     s->steps++;
     histogram_add(&s->counts.latency, service_now() - v->utime);
+    adapt(s, birth, step_us);
     if (estimate.status == GAIT_STATUS_LOST)
         spot(s, v, &frame.image[0]);
     else if (estimate.status != GAIT_STATUS_INIT)
@@ -329,8 +348,25 @@ static bool step(service *s, const image_view *v, int64_t received)
     return true;
 }
 
-void service_frame(service *s, const image_view *v, bool newest, int64_t receive_utime)
+/* May this frame be tracked, or is there a newer one, or is it too old? */
+static bool fresh(service *s, bool newest, int64_t birth, int64_t now)
 {
+    message why;
+    if (!newest)
+        budget_missed(&s->budget);
+    else if (budget_allows(&s->budget, birth, now))
+        return true;
+    else {
+        message_set(&why, "frames too old for a budget of %.1f ms are dropped",
+                    (double)s->budget.limit_us / 1e3);
+        service_complain(s, &why);
+    }
+    return false;
+}
+
+void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
+{
+    int64_t const now = service_now(), birth = budget_birth(v->utime, arrival_utime);
     count_gap(s, v);
     if (s->state == GAITMSG_STATUS_T_ARMED && !begin(s, v))
         return;
@@ -338,7 +374,7 @@ void service_frame(service *s, const image_view *v, bool newest, int64_t receive
         return;
     if (s->state != GAITMSG_STATUS_T_RUNNING)
         return;
-    if (!newest || !in_time(s, v) || !step(s, v, receive_utime))
+    if (!fresh(s, newest, birth, now) || !in_time(s, v) || !step(s, v, now, birth))
         s->counts.dropped++;
 }
 

@@ -2,6 +2,7 @@
 #ifndef TOOLS_SERVICE_H
 #define TOOLS_SERVICE_H
 #include "arming.h"
+#include "budget.h"
 #include "convert.h"
 #include "gaitmsg_command_t.h"
 #include "gaitmsg_particles_t.h"
@@ -45,6 +46,9 @@ typedef struct service {
     int64_t last_frame;      /* number of the last frame that came; -1: none */
     int64_t last_utime;      /* capture time of the last frame tracked, or of the start */
     int64_t steps;           /* frames tracked since START */
+    budget budget;           /* limit 0 in a log, which is played without loss */
+    int32_t wanted;          /* particles asked for last; 0 before there is a tracker */
+    size_t pool_bytes;       /* of the threads */
     double max_gap;          /* longest pause that is bridged by prediction, seconds */
     message text, complaint; /* what the status says; the last line on stderr */
     estimate_message estimate;
@@ -65,8 +69,8 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why);
 void service_camera(service *s, const gaitmsg_camera_t *msg);
 void service_background(service *s, const image_view *v);
 void service_command(service *s, const gaitmsg_command_t *msg);
-/* One frame, received at `receive_utime`; not the `newest`: another waits behind it, this one is dropped. */
-void service_frame(service *s, const image_view *v, bool newest, int64_t receive_utime);
+/* One frame that arrived at `arrival_utime`; not the `newest`: another waits behind it, this one is dropped. */
+void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime);
 /* Say in the status, and once on stderr, what is wrong with the input. */
 void service_complain(service *s, const message *why);
 void service_send_status(service *s);

@@ -118,7 +118,7 @@ void service_send_status(service *s)
         .frames = s->counts.frames,
         .dropped = s->counts.dropped,
         .rejected = s->counts.rejected,
-        .particles = s->track.config.particles,
+        .particles = s->wanted ? s->wanted : s->track.config.particles,
         .threads = s->threads,
         .step_us_median = histogram_quantile(st, 0.5),
         .step_us_p99 = histogram_quantile(st, 0.99),

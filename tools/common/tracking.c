@@ -26,7 +26,7 @@ bool tracking_open(tracking *t, const char *model_path, const gait_tracker_confi
         status = gait_model_get_info(t->model, &t->info);
     if (status == GAIT_OK)
         status = gait_tracker_prior(t->model, &t->prior_mean, &t->prior_sd);
-    t->memory_bytes = t->blob.size + bytes;
+    t->memory_bytes = t->model_bytes = t->blob.size + bytes;
     return status == GAIT_OK ||
            message_set(why, "%.100s: not a usable model: %s (%s); learn it anew or give another", model_path,
                        err.text, gait_status_name(status));
@@ -57,6 +57,8 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
         return message_set(why, "cannot make the tracker: %s (%s)", err.text, gait_status_name(status));
     t->plate = t->block + padded(bytes);
     t->pixels = t->plate + picture;
+    t->tracker_bytes = bytes;
+    t->picture_bytes = 2 * picture;
     t->memory_bytes += padded(bytes) + 2 * picture;
     return true;
 }

@@ -15,7 +15,9 @@ typedef struct tracking {
     unsigned char *block;  /* tracker, background plate, pixels of a decoded JPEG frame */
     uint8_t *plate, *pixels;
     gait_image background; /* data NULL: none */
-    size_t memory_bytes;   /* blob, model and block */
+    size_t model_bytes;    /* blob and model */
+    size_t tracker_bytes, picture_bytes;
+    size_t memory_bytes; /* all of them and the pictures */
 } tracking;
 
 /* Load the model.  `config` is complete but for camera[0]. */

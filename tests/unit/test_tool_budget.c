@@ -1,0 +1,87 @@
+/* Which frames a latency budget lets through, and how the number of particles follows it. */
+#include "../../tools/common/budget.c"
+#include "check.h"
+
+enum { MS = 1000 };
+
+static void test_birth(void)
+{
+    CHECK(budget_birth(5000 * MS, 5030 * MS) == 5000 * MS);
+    CHECK(budget_birth(5000 * MS, 6000 * MS) == 5000 * MS);
+    CHECK(budget_birth(5000 * MS, 6001 * MS) == 6001 * MS); /* replayed: another clock */
+    CHECK(budget_birth(5000 * MS, 4999 * MS) == 4999 * MS); /* the camera's clock is ahead */
+    CHECK(budget_birth(7, INT64_C(1790000000000000)) == INT64_C(1790000000000000));
+}
+
+static void test_age(void)
+{
+    budget none = {0}, b = {.limit_us = 40 * MS};
+    CHECK(budget_allows(&none, 0, 99999999) && none.late == 0);
+    CHECK(budget_allows(&b, 100, 100 + 40 * MS));
+    CHECK(!budget_allows(&b, 100, 101 + 40 * MS) && b.late == 1);
+    b.step_us = 15 * MS; /* leaves 25 */
+    CHECK(budget_allows(&b, 0, 25 * MS) && !budget_allows(&b, 0, 25 * MS + 1));
+    b.step_us = 90 * MS; /* leaves nothing: a quarter is for the way */
+    CHECK(budget_allows(&b, 0, 10 * MS) && !budget_allows(&b, 0, 10 * MS + 1));
+    CHECK(b.late == 3 && b.dropped == 3);
+}
+
+static void test_late_estimates_are_counted(void)
+{
+    budget b = {.limit_us = 40 * MS};
+    CHECK(budget_stepped(&b, 0, 40 * MS, 20 * MS, 500) == 500 && b.over == 0);
+    CHECK(budget_stepped(&b, 0, 41 * MS, 20 * MS, 500) == 500 && b.over == 1);
+}
+
+/* Steps whose time is in proportion to the particles; returns their number in the end. */
+static int32_t settle(budget *b, int32_t particles, double us_per_particle, int steps)
+{
+    for (int i = 0; i < steps; i++)
+        particles = budget_stepped(b, 0, 0, (int64_t)(us_per_particle * particles), particles);
+    return particles;
+}
+
+static void test_the_number_follows_the_time(void)
+{
+    budget b = {.limit_us = 30 * MS, .low = 100, .high = 4000};
+    CHECK(settle(&b, 4000, 20, 1) == 4000); /* one slow step is no reason */
+    CHECK(settle(&b, 4000, 20, 100) == 1000);
+    CHECK(settle(&b, 1000, 20, 1000) == 1000); /* 20 of 30 ms: neither too slow nor idle */
+    CHECK(settle(&b, 1000, 1000, 1000) == 100);
+    CHECK(settle(&b, 100, 5, 80) == 100);
+    CHECK(settle(&b, 100, 5, 100 * 9) == 1600); /* 8 ms: over a quarter */
+    CHECK(settle(&b, 1600, 1, 2000) == 4000);
+}
+
+static void test_dropped_frames_halve_it(void)
+{
+    budget b = {.limit_us = 100 * MS, .low = 100, .high = 4000};
+    for (int i = 0; i < 3; i++)
+        budget_missed(&b);
+    CHECK(settle(&b, 4000, 10, 7) == 4000);
+    CHECK(settle(&b, 4000, 10, 1) == 2000);
+    CHECK(settle(&b, 2000, 10, 60) == 2000);
+    for (int i = 0; i < 60; i++) { /* one now and then does not */
+        if (i % 20 == 0)
+            budget_missed(&b);
+        CHECK(settle(&b, 2000, 20, 1) == 2000);
+    }
+}
+
+static void test_without_adapting_it_stays(void)
+{
+    budget b = {.limit_us = 10 * MS, .high = 4000};
+    CHECK(settle(&b, 4000, 100, 500) == 4000);
+    CHECK(settle(&b, 500, 0.1, 500) == 500);
+}
+
+int main(void)
+{
+    test_birth();
+    test_age();
+    test_late_estimates_are_counted();
+    test_the_number_follows_the_time();
+    test_dropped_frames_halve_it();
+    test_without_adapting_it_stays();
+    return CHECK_DONE();
+}

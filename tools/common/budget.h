@@ -1,0 +1,30 @@
+/* budget.h - how old an estimate may be: which frames are dropped for it, and how many particles keep it. */
+#ifndef TOOLS_BUDGET_H
+#define TOOLS_BUDGET_H
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct budget {
+    int64_t limit_us;   /* from capture to estimate; 0: none, and every frame is allowed */
+    int32_t low, high;  /* particles between which it chooses; low 0: their number stays */
+    int64_t step_us;    /* what a step has taken lately */
+    int32_t steps;      /* since the last choice or look at `dropped` */
+    int32_t dropped;    /* frames since then */
+    int32_t calm;       /* steps in a row that took less than a quarter of the limit */
+    int64_t late, over; /* frames dropped for their age; estimates that came later than the limit */
+} budget;
+
+/* Since when a frame is old: its capture; or, where its source has another clock (a replay), its arrival. */
+int64_t budget_birth(int64_t capture_utime, int64_t arrival_utime);
+
+/* Can a frame that was born at `birth` still be tracked in time?  At least a quarter of the limit is left for the
+ * way to here, so that something is tracked even where a step takes longer than the limit. */
+bool budget_allows(budget *b, int64_t birth, int64_t now);
+
+/* A frame was dropped because another waits behind it. */
+void budget_missed(budget *b);
+
+/* A frame was tracked.  Returns the number of particles to go on with: half as many when steps are too slow or frames
+ * are dropped, twice as many after a while with time to spare. */
+int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, int32_t particles);
+#endif
