@@ -1,0 +1,185 @@
+"""The segments of a clip: which frames each covers, and its energy there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import make_interp_spline
+
+from gait.lift import sensors
+from gait.lift.energy import GAIN, HEADING, LEVEL, PLACE, Anchor, Energy, Reading, Shape, Springs
+from gait.lift.prior import SegmentPrior
+from gait.lift.sensors import Film
+from gait.lift.springs import HEIGHT_SD, Correction, Placement
+from gait.lift.stick import Sticks
+from gait.lift.views import View
+
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+FAR = 10.0  # metres: a segment may start anywhere on the ground
+TURN = 10.0  # radians: and look anywhere
+CORRELATED = 10.0  # root of the sensors that count as one independent reading
+FIRST_SD = 1.0  # of a sensor, before anything is known
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How sensors count and segments are joined.
+
+    Attributes
+    ----------
+    sensor_sd : float, optional
+        Deviation of a sensor; infinite leaves the sensors out.  If not given it is found from the clip:
+        `CORRELATED` times the rms difference of the sensors and the figure, because neighbours in the grid
+        and in time err alike.
+    gain, level : (float, float)
+        Mean and deviation of the logarithm of what a figure adds to a sensor, and of what the scene does.
+    joined : bool
+        Segments are solved together; else one after the other, as in the paper.
+    """
+
+    sensor_sd: float | None = None
+    gain: tuple[float, float] = (-0.2, 0.4)
+    level: tuple[float, float] = (0.5, 1.0)
+    joined: bool = True
+
+
+@dataclass(frozen=True)
+class ClipSegments:
+    """Segments every hop that cover a film, the first of them (`origin`) at the placement's frame.
+
+    Attributes
+    ----------
+    prior : SegmentPrior
+    view : View
+    film : Film
+        Frame times count even where the sensors are left out.
+    placement : Placement
+    corrections : sequence of Correction
+    settings : Settings
+    """
+
+    prior: SegmentPrior
+    view: View
+    film: Film
+    placement: Placement
+    corrections: Sequence[Correction]
+    settings: Settings
+    shapes: list[Shape] = field(init=False)
+    sticks: Sticks = field(init=False)
+    starts: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        prior, film = self.prior, self.film
+        shapes = [Shape.of(prior, c, self.placement.stature) for c in range(prior.components)]
+        placed = film.times[self.placement.frame - film.first]
+        before = np.ceil((placed - film.times[0]) / self.hop - 1e-6)
+        after = max(0.0, np.ceil((film.times[-1] - placed - self.span) / self.hop - 1e-6))
+        object.__setattr__(self, "shapes", shapes)
+        object.__setattr__(self, "sticks", Sticks.of(prior.names))
+        object.__setattr__(self, "starts", placed + self.hop * np.arange(-before, after + 1))
+
+    @property
+    def hop(self) -> float:
+        """Seconds from one segment to the next."""
+        return self.prior.hop / self.prior.fps
+
+    @property
+    def span(self) -> float:
+        """Seconds of a segment."""
+        return (self.prior.frames - 1) / self.prior.fps
+
+    @property
+    def origin(self) -> int:
+        """Index of the segment that starts at the placement's frame."""
+        placed = self.film.times[self.placement.frame - self.film.first]
+        return int(np.argmin(np.abs(self.starts - placed)))
+
+    @property
+    def sensor_sd(self) -> float:
+        """Deviation of a sensor."""
+        return FIRST_SD if self.settings.sensor_sd is None else self.settings.sensor_sd
+
+    def frames(self, segment: int) -> Indices:
+        """Frames of the film (from its first) within a segment."""
+        since = self.film.times - self.starts[segment]
+        return np.flatnonzero((since > -1e-6) & (since < self.span + 1e-6))
+
+    def weights(self, segment: int) -> Floats:
+        """Interpolate (T, F) the segment's frames at those of the film: cubic splines."""
+        times = (self.film.times[self.frames(segment)] - self.starts[segment]) * self.prior.fps
+        count = self.prior.frames
+        if count == 1:
+            return np.ones((len(times), 1))
+        spline = make_interp_spline(np.arange(count), np.eye(count), k=min(3, count - 1))
+        return np.asarray(spline(np.clip(times, 0, count - 1)))
+
+    def mean_state(self) -> Floats:
+        """State that the placement and the prior's mean say."""
+        state = np.zeros(self.shapes[0].size)
+        state[PLACE] = [*self.placement.ground, 0.0]
+        state[HEADING] = self.placement.heading if self.shapes[0].turning else 0.0
+        state[[GAIN, LEVEL]] = self.settings.gain[0], self.settings.level[0]
+        return state
+
+    def energy(
+        self,
+        segment: int,
+        component: int,
+        near: Floats,
+        *,
+        anchor: Anchor | None = None,
+        looking: bool = True,
+    ) -> Energy:
+        """Energy of a segment.
+
+        Parameters
+        ----------
+        segment, component : int
+        near : (k + 6,)
+            State about which the sensors are laid and the springs' strength is found.
+        anchor : Anchor, optional
+        looking : bool
+            Whether there are sensors.
+        """
+        mean = self.mean_state()
+        sd = np.ones(len(mean))
+        placement, first = self.placement, segment == self.origin
+        sd[PLACE] = [*[placement.ground_sd if first else FAR] * 2, HEIGHT_SD]
+        sd[HEADING] = placement.heading_sd if first else TURN
+        sd[[GAIN, LEVEL]] = self.settings.gain[1], self.settings.level[1]
+        shape, weights = self.shapes[component], self.weights(segment)
+        energy = Energy(shape, self.view, self.sticks, weights, mean, sd, anchor=anchor)
+        reading = self._reading(segment, energy, near) if looking else None
+        return replace(energy, reading=reading, springs=self._springs(segment, shape, near))
+
+    def _reading(self, segment: int, energy: Energy, near: Floats) -> Reading | None:
+        """Sensors about the figure of a state; a state behind the lens sees nothing."""
+        if not np.isfinite(self.sensor_sd) or not len(energy.weights) or not energy.visible(near):
+            return None
+        places, _ = energy.shape.positions(near, energy.weights, self.sticks.markers)
+        uv, _ = self.view.project(places)
+        middle = (uv.min(axis=1) + uv.max(axis=1)) / 2
+        size = [self.placement.stature * self.view.scale(body.mean(axis=0)) for body in places]
+        grid = sensors.grid(middle, np.array(size))
+        value = self.film.read(self.frames(segment), grid)
+        return Reading(value, grid, np.full(len(grid), self.film.blur), self.sensor_sd)
+
+    def _springs(self, segment: int, shape: Shape, near: Floats) -> Springs | None:
+        """Corrections in a segment's frames; the prior's residual at the marker weakens them."""
+        frames = (self.frames(segment) + self.film.first).tolist()
+        held = [c for c in self.corrections if c.frame in frames]
+        if not held:
+            return None
+        marker = self.prior.index([c.joint for c in held])
+        skin = self.view.scale(near[PLACE]) * shape.residual[marker]
+        return Springs(
+            frame=np.array([frames.index(c.frame) for c in held], np.intp),
+            marker=marker,
+            uv=np.array([c.uv for c in held]),
+            sd=np.hypot([c.sd_px for c in held], skin),
+        )

@@ -1,0 +1,197 @@
+"""The energy of a segment seen in a clip (Leventon & Freeman 1998, eq. 7), as rows of least squares.
+
+    E = ||R - f(alpha)||^2 + lambda_1 alpha' Lambda^-1 alpha + lambda_2 sum_i ||I_i - P_i x_i(alpha)||^2
+
+R are the sensors, f the stick figure's responses, I the user's springs.  Here every row is divided by its
+own standard deviation, so E is minus two log posterior: lambda_1 is the variance of a sensor, lambda_2 the
+ratio of that to a spring's variance.  The modes carry their standard deviations, so Lambda is 1.
+
+The state of a segment: alpha (k), place (3) of the first frame's pelvis on the ground and over it, heading
+(1), and the sensors' logarithm of gain and level: R = level + exp(gain) f.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.lift.prior import SegmentPrior
+from gait.lift.stick import Sticks
+from gait.lift.views import View
+
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+EXTRA = 6  # entries of the state after alpha
+PLACE, HEADING, GAIN, LEVEL = slice(-6, -3), -3, -2, -1
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One Gaussian of the prior for a person of known stature, in metres.
+
+    Attributes
+    ----------
+    mean : (F, J, 3)
+    modes : (F, J, 3, k)
+    residual : (J,)
+        Standard deviation of each coordinate outside the modes, inflated as held-out people ask for.
+    turning : bool
+        Whether the heading is part of the state; else segments are in the world's axes.
+    """
+
+    mean: Floats
+    modes: Floats
+    residual: Floats
+    turning: bool
+
+    @staticmethod
+    def of(prior: SegmentPrior, component: int, stature: float) -> Shape:
+        """Take a component of a prior."""
+        return Shape(
+            mean=stature * prior.mean[component],
+            modes=stature * np.moveaxis(prior.modes[component], 0, -1),
+            residual=stature * np.sqrt(prior.gamma * prior.residual[component]),
+            turning=prior.headings == 0,
+        )
+
+    @property
+    def size(self) -> int:
+        """Entries of the state."""
+        return self.modes.shape[-1] + EXTRA
+
+    def positions(self, state: Floats, weights: Floats, markers: Indices | slice) -> tuple[Floats, Floats]:
+        """Markers at T instants and their slopes by the state.
+
+        Parameters
+        ----------
+        state : (k + 6,)
+        weights : (T, F)
+            Rows that interpolate the segment's frames.
+        markers : indices of M markers
+
+        Returns
+        -------
+        places : (T, M, 3)
+            World, metres.
+        slope : (T, M, 3, k + 6)
+        """
+        modes = np.tensordot(weights, self.modes[:, markers], axes=1)
+        body = np.tensordot(weights, self.mean[:, markers], axes=1) + modes @ state[:-EXTRA]
+        heading = state[HEADING] if self.turning else 0.0
+        c, s = np.cos(heading), np.sin(heading)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        by_turn = np.array([[-s, -c, 0], [c, -s, 0], [0, 0, 0]])
+        slope = np.zeros((*body.shape, self.size))
+        slope[..., :-EXTRA] = turn @ modes
+        slope[..., PLACE] = np.eye(3)
+        if self.turning:
+            slope[..., HEADING] = body @ by_turn.T
+        return body @ turn.T + state[PLACE], slope
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Sensors of T frames: values (T, S), places (T, S, 2) and blur (T,) in pixels, deviation of a value."""
+
+    value: Floats
+    places: Floats
+    blur: Floats
+    sd: float
+
+
+@dataclass(frozen=True)
+class Springs:
+    """C springs: frames (C,) among the T instants, markers (C,), pixels (C, 2), deviations (C,) in pixels."""
+
+    frame: Indices
+    marker: Indices
+    uv: Floats
+    sd: Floats
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """Places (A, J, 3) that all markers had in A frames of the segment, and deviations (J,), metres."""
+
+    frames: slice
+    places: Floats
+    sd: Floats
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The energy of one segment.
+
+    Attributes
+    ----------
+    shape : Shape
+    view : View
+    sticks : Sticks
+    weights : (T, F)
+        Rows that interpolate the segment's frames at the instants of the video.
+    mean, sd : (k + 6,)
+        Normal prior of the state.
+    reading : Reading, optional
+    springs : Springs, optional
+    anchor : Anchor, optional
+    """
+
+    shape: Shape
+    view: View
+    sticks: Sticks
+    weights: Floats
+    mean: Floats
+    sd: Floats
+    reading: Reading | None = None
+    springs: Springs | None = None
+    anchor: Anchor | None = None
+
+    def visible(self, state: Floats) -> bool:
+        """Whether the whole body is before the lens."""
+        places, _ = self.shape.positions(state, np.eye(self.weights.shape[1]), slice(None))
+        return self.view.visible(places)
+
+    def rows(self, state: Floats) -> tuple[Floats, Floats]:
+        """Residuals (R,) in standard deviations, and their slopes (R, k + 6) by the state."""
+        parts = [((state - self.mean) / self.sd, np.diag(1 / self.sd))]
+        if self.reading is not None and len(self.reading.value):
+            parts.append(self._sensor_rows(self.reading, state))
+        if self.springs is not None and len(self.springs.frame):
+            parts.append(self._spring_rows(self.springs, state))
+        if self.anchor is not None:
+            parts.append(self._anchor_rows(self.anchor, state))
+        return np.concatenate([r for r, _ in parts]), np.concatenate([slope for _, slope in parts])
+
+    def misfit(self, state: Floats) -> Floats:
+        """Difference (T * S,) of what the figure gives and what the sensors read; empty without sensors."""
+        if self.reading is None:
+            return np.zeros(0)
+        return self._sensor_rows(self.reading, state)[0] * self.reading.sd
+
+    def _sensor_rows(self, reading: Reading, state: Floats) -> tuple[Floats, Floats]:
+        places, by_state = self.shape.positions(state, self.weights, self.sticks.markers)
+        uv, by_place = self.view.project(places)
+        response, by_uv = self.sticks.responses(uv, reading.places, reading.blur)
+        drawn = (by_place @ by_state).reshape(len(uv), -1, len(state))  # (T, M * 2, n)
+        gain = np.exp(state[GAIN])
+        slope = gain * (by_uv.reshape(*response.shape, -1) @ drawn)
+        slope[..., GAIN], slope[..., LEVEL] = gain * response, 1.0
+        residual = state[LEVEL] + gain * response - reading.value
+        return residual.ravel() / reading.sd, slope.reshape(-1, len(state)) / reading.sd
+
+    def _spring_rows(self, springs: Springs, state: Floats) -> tuple[Floats, Floats]:
+        places, by_state = self.shape.positions(state, self.weights[springs.frame], slice(None))
+        each = np.arange(len(springs.frame))
+        uv, by_place = self.view.project(places[each, springs.marker])
+        slope = by_place @ by_state[each, springs.marker]
+        residual = (uv - springs.uv) / springs.sd[:, None]
+        return residual.ravel(), (slope / springs.sd[:, None, None]).reshape(-1, len(state))
+
+    def _anchor_rows(self, anchor: Anchor, state: Floats) -> tuple[Floats, Floats]:
+        first = np.eye(self.weights.shape[1])[anchor.frames]
+        places, slope = self.shape.positions(state, first, slice(None))
+        sd = anchor.sd[:, None]
+        return ((places - anchor.places) / sd).ravel(), (slope / sd[..., None]).reshape(-1, len(state))

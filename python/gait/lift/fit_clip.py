@@ -1,0 +1,236 @@
+"""The motion of a clip: segments every hop, each the minimum of its energy, joined to one sequence.
+
+Each segment starts from the one before (Leventon & Freeman 1998).  By default all are then solved together,
+neighbours tied where they overlap, so that a correction in one helps the others.  The paper's way
+(`Settings.joined` False) leaves them as they are and moves each in depth until it goes on where the one
+before ended.  Either way the segments are blended linearly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.lift.clip_segments import CORRELATED, ClipSegments
+from gait.lift.descent import Link, descend, information
+from gait.lift.energy import HEADING, PLACE, Anchor, Energy
+
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+Update = Callable[[int], None]
+
+LOOSE = 0.03  # statures that the segment before may be wrong, when the next one starts from it
+START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean and from +- so many sd of these modes
+LOOKS = 2  # times the sensors are laid anew about the figure found
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """Chosen components (B,) and states (B, k + 6) of the segments of a clip, and their energy."""
+
+    components: Indices
+    states: Floats
+    energy: float
+
+
+@dataclass(frozen=True)
+class ClipFit:
+    """Estimate of a clip.
+
+    Attributes
+    ----------
+    frame : (T,)
+        Numbers of the video's frames.
+    time : (T,)
+        Seconds.
+    places : (T, J, 3)
+        Markers, metres.
+    sd : (T, J, 3)
+        Posterior standard deviations.
+    sequence : Sequence
+    covariance : (B, k + 6, k + 6)
+        Of the segments' states.
+    """
+
+    frame: Indices
+    time: Floats
+    places: Floats
+    sd: Floats
+    sequence: Sequence
+    covariance: Floats
+
+
+def fit_clip(clip: ClipSegments, known: Sequence | None = None, update: Update | None = None) -> ClipFit:
+    """Estimate the motion of a clip.
+
+    Parameters
+    ----------
+    clip : ClipSegments
+    known : Sequence, optional
+        Estimate with other corrections, to start from as well.
+    update : callable, optional
+        Called with the count of segments done, of `len(clip.starts)`.
+    """
+    found = _one_after_the_other(clip, update)
+    if clip.settings.sensor_sd is None:
+        clip = _with_noise(clip, found)
+    if not clip.settings.joined:
+        return _finished(clip, _continuous(clip, _one_after_the_other(clip, None)))
+    starts = [found] if known is None else [found, known]
+    if clip.corrections:  # nearly linear without the sensors: no wrong valley to fall into
+        starts.append(_together(clip, found, looking=False))
+    tried = [_together(clip, start) for start in starts]
+    return _finished(clip, min(tried, key=lambda t: t.energy))
+
+
+def _one_after_the_other(clip: ClipSegments, update: Update | None) -> Sequence:
+    """Segments from the placement on, then back before it, each started from its neighbour."""
+    count = len(clip.starts)
+    components, states = np.zeros(count, np.intp), np.zeros((count, clip.shapes[0].size))
+    energy = 0.0
+    for done, segment in enumerate([*range(clip.origin, count), *reversed(range(clip.origin))], 1):
+        tried: list[tuple[float, int, Floats]] = []
+        for component in range(len(clip.shapes)):
+            if segment == clip.origin:
+                starts, anchor = _first_starts(clip), None
+            else:
+                step = 1 if segment > clip.origin else -1
+                old = segment - step
+                start, anchor = _continued(clip, component, int(components[old]), states[old], step)
+                starts = [start]
+            held = anchor if clip.settings.joined else None
+            tried += [_settled(clip, segment, component, start, held) for start in starts]
+        cost, components[segment], states[segment] = min(tried, key=lambda t: t[0])
+        energy += cost
+        if update is not None:
+            update(done)
+    return Sequence(components, states, energy)
+
+
+def _first_starts(clip: ClipSegments) -> list[Floats]:
+    """Where the first segment's descent starts: the mean, and along the first modes to both sides."""
+    starts = [clip.mean_state()]
+    for mode in range(min(START_MODES, clip.prior.size)):
+        for side in (-START_SD, START_SD):
+            starts.append(clip.mean_state())
+            starts[-1][mode] = side
+    return starts
+
+
+def _continued(
+    clip: ClipSegments, component: int, old: int, state: Floats, step: int
+) -> tuple[Floats, Anchor]:
+    """Start of the segment after (step 1) or before (-1) a known one, and what holds it to that one."""
+    frames, hop = clip.prior.frames, clip.prior.hop
+    places, _ = clip.shapes[old].positions(state, np.eye(frames), slice(None))
+    sd = np.hypot(clip.shapes[component].residual, LOOSE * clip.placement.stature)
+    shared = slice(hop, None) if step > 0 else slice(frames - hop)
+    there = slice(frames - hop) if step > 0 else slice(hop, None)
+    anchor = Anchor(there, places[shared], sd)
+    start = state.copy()
+    start[: PLACE.start] = 0.0
+    pelvis = places[:, clip.prior.names.index("pelvis")]
+    start[PLACE][:2] = pelvis[hop, :2] if step > 0 else 2 * pelvis[0, :2] - pelvis[hop % frames, :2]
+    blind = Energy(
+        clip.shapes[component],
+        clip.view,
+        clip.sticks,
+        np.zeros((0, frames)),
+        start,
+        _broad(clip),
+        anchor=anchor,
+    )
+    return descend([blind], None, start[None])[0][0], anchor
+
+
+def _broad(clip: ClipSegments) -> Floats:
+    """Deviations of a state of which only the shape is known."""
+    sd = np.ones(clip.shapes[0].size)
+    sd[PLACE], sd[HEADING] = 1.0, 1.0
+    return sd
+
+
+def _settled(
+    clip: ClipSegments, segment: int, component: int, state: Floats, anchor: Anchor | None
+) -> tuple[float, int, Floats]:
+    """Energy, component and state of one segment; the sensors follow it."""
+    cost = np.inf
+    for _ in range(LOOKS):
+        energy = clip.energy(segment, component, state, anchor=anchor)
+        (state,), cost = descend([energy], None, state[None])
+    return cost - 2 * float(np.log(clip.prior.weights[component])), component, state
+
+
+def _with_noise(clip: ClipSegments, sequence: Sequence) -> ClipSegments:
+    """Clip whose sensors have the deviation that an estimate shows."""
+    chain, _ = _chain(clip, sequence, looking=True)
+    misfit = [energy.misfit(state) for energy, state in zip(chain, sequence.states, strict=True)]
+    rms = float(np.sqrt(np.mean(np.concatenate(misfit) ** 2))) if any(map(len, misfit)) else np.inf
+    return replace(clip, settings=replace(clip.settings, sensor_sd=CORRELATED * rms))
+
+
+def _chain(clip: ClipSegments, sequence: Sequence, looking: bool) -> tuple[list[Energy], Link]:
+    """Energies of all segments about their states, and what ties them."""
+    chain = [
+        clip.energy(s, int(c), state, looking=looking)
+        for s, (c, state) in enumerate(zip(sequence.components, sequence.states, strict=True))
+    ]
+    residual = np.sqrt(np.mean([clip.shapes[int(c)].residual ** 2 for c in sequence.components], axis=0))
+    return chain, Link(clip.prior.hop, np.sqrt(2) * residual)
+
+
+def _together(clip: ClipSegments, start: Sequence, looking: bool = True) -> Sequence:
+    """All segments of least energy near a start, tied to their neighbours."""
+    states, cost = start.states, np.inf
+    for _ in range(LOOKS if looking else 1):
+        chain, link = _chain(clip, Sequence(start.components, states, cost), looking)
+        states, cost = descend(chain, link, states)
+    return Sequence(start.components, states, cost)
+
+
+def _continuous(clip: ClipSegments, sequence: Sequence) -> Sequence:
+    """Move each segment along the line of sight by the mean difference in depth where it meets the last."""
+    hop, frames = clip.prior.hop, clip.prior.frames
+    states = sequence.states.copy()
+    for segment in [*range(clip.origin + 1, len(states)), *reversed(range(clip.origin))]:
+        step = 1 if segment > clip.origin else -1
+        pair = sorted((segment, segment - step))
+        early, late = (
+            clip.shapes[int(sequence.components[s])].positions(states[s], np.eye(frames), slice(None))[0]
+            for s in pair
+        )
+        away = clip.view.away(states[segment][PLACE])
+        gap = step * float(((early[hop:] - late[: frames - hop]) @ away).mean())
+        states[segment, PLACE] += gap * away
+    return Sequence(sequence.components, states, sequence.energy)
+
+
+def _finished(clip: ClipSegments, sequence: Sequence) -> ClipFit:
+    """Blend the segments linearly; deviations from the information of all of them."""
+    chain, link = _chain(clip, sequence, looking=True)
+    factor = information(chain, link if clip.settings.joined else None, sequence.states)
+    overlap = clip.prior.frames / clip.prior.hop  # every frame counts in so many segments
+    covariance = overlap * factor.covariance()[0]
+    count, markers = len(clip.film.times), len(clip.prior.names)
+    places, variance, total = np.zeros((count, markers, 3)), np.zeros((count, markers, 3)), np.zeros(count)
+    for s, energy in enumerate(chain):
+        frames = clip.frames(s)
+        since = (clip.film.times[frames] - clip.starts[s]) / max(clip.span, 1e-9)
+        share = 1.0 + 1e-3 - np.abs(2 * since - 1)
+        found, slope = energy.shape.positions(sequence.states[s], energy.weights, slice(None))
+        spread = np.einsum("tjin,nm,tjim->tji", slope, covariance[s], slope, optimize=True)
+        places[frames] += share[:, None, None] * found
+        variance[frames] += share[:, None, None] * (spread + energy.shape.residual[:, None] ** 2)
+        total[frames] += share
+    frame = clip.film.first + np.arange(count)
+    return ClipFit(
+        frame=frame,
+        time=clip.film.times,
+        places=places / total[:, None, None],
+        sd=np.sqrt(variance / total[:, None, None]),
+        sequence=sequence,
+        covariance=covariance,
+    )

@@ -1,0 +1,144 @@
+"""Sensors of the picture: gradient magnitude over local contrast, blurred, read on a grid about the person.
+
+Spec 1.11.1 (Leventon & Freeman 1998).  The blurred fields vary slowly, so they are kept at a lower
+resolution: a clip of any size takes little memory, and the grid may move while the estimate is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gait.video import Frame, Image
+
+Floats = npt.NDArray[np.float64]
+Field = npt.NDArray[np.float32]
+
+ROWS, COLUMNS = 10, 8
+REACH = 1.15  # height of the grid, statures
+CONTRAST = 0.035  # deviation of the window of local contrast, statures: 8 pixels of a person of 230
+BLUR = 0.6  # deviation of the sensors' blur, steps of the grid
+GRAIN = 4.0  # grey levels added to the contrast: noise of the camera
+SAMPLES = 3.0  # stored per deviation of the blur
+CHANGE = 6.0  # deviations of the difference to the empty scene at which a gradient counts half
+
+
+def grid(middle: Floats, stature: Floats) -> Floats:
+    """Places (T, 80, 2) of the sensors about middles of persons (T, 2) of so many pixels (T,)."""
+    step = REACH / ROWS * stature
+    rows, columns = np.arange(ROWS) - (ROWS - 1) / 2, np.arange(COLUMNS) - (COLUMNS - 1) / 2
+    lattice = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    return np.asarray(middle[:, None] + step[:, None, None] * lattice)
+
+
+def blur_of(stature: float) -> float:
+    """Deviation of the blur, pixels, for a person of so many pixels."""
+    return BLUR * REACH / ROWS * stature
+
+
+@dataclass(frozen=True)
+class Film:
+    """Sensor fields of a stretch of video.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first frame.
+    times : (T,)
+        Seconds from the start of the video.
+    fields : (T, h, w)
+        Blurred normalised gradients.
+    step : (2,)
+        Columns and rows of the picture from one of their values to the next, pixels.
+    blur : float
+        Deviation of the blur, pixels.
+    """
+
+    first: int
+    times: Floats
+    fields: Field
+    step: Floats
+    blur: float
+
+    def read(self, frames: npt.NDArray[np.intp], places: Floats) -> Floats:
+        """Sensors (T, S) at places (T, S, 2), pixels, of frames (T,), counted from the first of the film.
+
+        Beyond the picture's edge a sensor reads what the edge shows.
+        """
+        at = ((places + 0.5) / self.step - 0.5).astype(np.float32)
+        rows = [
+            cv2.remap(self.fields[k], x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
+            for k, x, y in zip(frames, at[..., :1].swapaxes(1, 2), at[..., 1:].swapaxes(1, 2), strict=True)
+        ]
+        return np.asarray(rows, np.float64)
+
+    @staticmethod
+    def make(
+        frames: Iterable[Frame],
+        stature: float,
+        plate: Image | None = None,
+        update: Callable[[int], None] | None = None,
+    ) -> Film:
+        """Run the filters over frames.
+
+        Parameters
+        ----------
+        frames : iterable of Frame
+            At least one, consecutive.
+        stature : float
+            Height of the person in the picture, pixels.
+        plate : Image, optional
+            The empty scene: gradients where nothing has changed are left out.
+        update : callable, optional
+            Called with the count of frames done.
+        """
+        blur, numbers, times, fields = blur_of(stature), [], [], []
+        for done, frame in enumerate(frames, 1):
+            edges = normalised_gradient(_grey(frame.image), CONTRAST * stature)
+            if plate is not None:
+                edges *= changed(frame.image, plate, 0.5 * CONTRAST * stature)
+            fields.append(_reduced(edges, blur))
+            numbers.append(frame.number)
+            times.append(frame.time)
+            if update is not None:
+                update(done)
+        height, width = fields[0].shape
+        step = np.array([edges.shape[1] / width, edges.shape[0] / height])
+        return Film(numbers[0], np.array(times), np.stack(fields), step, blur)
+
+
+def _grey(image: Image) -> Field:
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    return np.asarray(grey, np.float32)
+
+
+def normalised_gradient(grey: Field, window: float) -> Field:
+    """Magnitude of the gradient over the deviation of the grey values in a Gaussian window, (h, w)."""
+    smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
+    slope = cv2.magnitude(
+        cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / 8)
+    )
+    mean, square = (cv2.GaussianBlur(x, (0, 0), window) for x in (grey, grey * grey))
+    contrast = np.sqrt(np.maximum(square - mean * mean, 0)) + GRAIN
+    return np.asarray(window * slope / contrast, np.float32)
+
+
+def changed(image: Image, plate: Image, window: float) -> Field:
+    """How much of each pixel's neighbourhood differs from the empty scene, 0 to 1, (h, w)."""
+    difference = np.abs(_grey(image) - _grey(plate))
+    noise = float(np.median(difference)) / 0.6745 + 1.0
+    square = cv2.GaussianBlur(difference, (0, 0), max(window, 0.5)) ** 2
+    return np.asarray(square / (square + (CHANGE * noise) ** 2), np.float32)
+
+
+def _reduced(edges: Field, blur: float) -> Field:
+    """Blurred field, sampled `SAMPLES` times per deviation of the blur."""
+    height, width = edges.shape
+    step = max(blur / SAMPLES, 1.0)
+    count = max(2, round(width / step)), max(2, round(height / step))
+    smooth = cv2.GaussianBlur(edges, (0, 0), blur)
+    return np.asarray(cv2.resize(smooth, count, interpolation=cv2.INTER_AREA), np.float32)
