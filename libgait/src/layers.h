@@ -7,7 +7,7 @@ enum { LAYERS_ROWS = 8 }; /* the grid is drawn in bands of so many rows */
 
 typedef struct layers {
     rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; [first, last) are whole bands, others are not written */
-    rast_mask whole;                    /* the body; every row of the grid is written */
+    rast_mask whole;                    /* the body; the same */
 } layers;
 
 typedef struct layers_limb { /* a limb's polygon in the grid, in the bodies of a block */

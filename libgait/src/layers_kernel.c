@@ -80,64 +80,105 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
 /* ---- masks, lanes are the words of a band's rows ---- */
 enum { BAND = LAYERS_ROWS * RAST_WORDS };
 
-/* Where a limb of n edges begins and ends in the row of each word; begin >= end: it is not there. */
-static inline void band_spans(const layers_limb *limb, int32_t n, int32_t lane, int32_t top,
-                              int32_t begin[BAND], int32_t end[BAND])
+typedef struct edge { /* of one body, in a band: at its first row, and by how many rows it has begun there */
+    uint32_t at, slope, below, rows;
+} edge;
+
+static inline edge edge_at(const layers_limb *limb, int32_t k, int32_t lane, int32_t top)
 {
+    return (edge){.at = limb->at[k][lane] + limb->slope[k][lane] * (uint32_t)top,
+                  .slope = limb->slope[k][lane],
+                  .below = (uint32_t)(top - limb->first[k][lane]),
+                  .rows = (uint32_t)limb->rows[k][lane]};
+}
+
+/* Stretch the span of a row of the band to an edge that crosses it. */
+static inline void stretch(edge e, int32_t row, int32_t *begin, int32_t *end)
+{
+    int32_t const column = rast_column(e.at, e.slope, row);
+    bool const crosses = e.below + (uint32_t)row < e.rows;
+    *begin = i_min(*begin, crosses ? column : RAST_SIZE);
+    *end = i_max(*end, crosses ? column : 0);
+}
+
+/* The limb's bits of word i of the band go behind those of `whole`. */
+static inline void cover(int32_t i, int32_t begin, int32_t end, uint64_t *restrict whole,
+                         uint64_t *restrict seen)
+{
+    int32_t const base = i % RAST_WORDS * 64;
+    uint64_t const mine = rast_bits(i_clamp(begin - base, 0, 64), i_clamp(end - base, 0, 64));
+    uint64_t const nearer = whole[i];
+    whole[i] = nearer | mine;
+    seen[i] = mine & ~nearer;
+}
+
+static inline void draw_cone(const layers_limb *limb, int32_t lane, int32_t top, uint64_t *restrict whole,
+                             uint64_t *restrict seen)
+{
+    edge const a = edge_at(limb, 0, lane, top), b = edge_at(limb, 1, lane, top);
+    edge const c = edge_at(limb, 2, lane, top), d = edge_at(limb, 3, lane, top);
+    for (int32_t i = 0; i < BAND; i++) {
+        int32_t begin = RAST_SIZE, end = 0;
+        stretch(a, i / RAST_WORDS, &begin, &end);
+        stretch(b, i / RAST_WORDS, &begin, &end);
+        stretch(c, i / RAST_WORDS, &begin, &end);
+        stretch(d, i / RAST_WORDS, &begin, &end);
+        cover(i, begin, end, whole, seen);
+    }
+}
+
+static inline void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t top,
+                                  uint64_t *restrict whole, uint64_t *restrict seen)
+{
+    int32_t begin[BAND], end[BAND];
     for (int32_t i = 0; i < BAND; i++) {
         begin[i] = RAST_SIZE;
         end[i] = 0;
     }
-    for (int32_t k = 0; k < n; k++) {
-        uint32_t const at = limb->at[k][lane], slope = limb->slope[k][lane];
-        uint32_t const below = (uint32_t)(top - limb->first[k][lane]), rows = (uint32_t)limb->rows[k][lane];
+    for (int32_t k = 0; k < RAST_MAX_VERTICES; k += 2) {
+        edge const a = edge_at(limb, k, lane, top), b = edge_at(limb, k + 1, lane, top);
         for (int32_t i = 0; i < BAND; i++) {
-            int32_t const row = i / RAST_WORDS, column = rast_column(at, slope, top + row);
-            bool const crosses = below + (uint32_t)row < rows;
-            begin[i] = i_min(begin[i], crosses ? column : RAST_SIZE);
-            end[i] = i_max(end[i], crosses ? column : 0);
+            stretch(a, i / RAST_WORDS, &begin[i], &end[i]);
+            stretch(b, i / RAST_WORDS, &begin[i], &end[i]);
         }
     }
+    for (int32_t i = 0; i < BAND; i++)
+        cover(i, begin[i], end[i], whole, seen);
 }
 
 /* Draw a limb behind `whole`, and add it there. */
-static void draw_limb(const layers_limb *limb, int32_t n, int32_t lane, rast_mask *restrict whole,
+static void draw_limb(const layers_limb *limb, int32_t vertices, int32_t lane, rast_mask *restrict whole,
                       rast_mask *restrict out)
 {
     out->first = limb->top[lane];
     out->last = limb->end[lane];
-    for (int32_t y = out->first; y < out->last; y += LAYERS_ROWS) {
-        uint64_t *const body = (uint64_t *)whole->row + y * RAST_WORDS;
-        uint64_t *const seen = (uint64_t *)out->row + y * RAST_WORDS;
-        int32_t begin[BAND], end[BAND];
-        band_spans(limb, n, lane, y, begin, end);
-        for (int32_t i = 0; i < BAND; i++) {
-            int32_t const base = i % RAST_WORDS * 64;
-            uint64_t const mine = rast_bits(i_clamp(begin[i] - base, 0, 64), i_clamp(end[i] - base, 0, 64));
-            uint64_t const nearer = body[i];
-            body[i] = nearer | mine;
-            seen[i] = mine & ~nearer;
-        }
+    for (int32_t top = out->first; top < out->last; top += LAYERS_ROWS) {
+        uint64_t *const body = (uint64_t *)whole->row + top * RAST_WORDS;
+        uint64_t *const seen = (uint64_t *)out->row + top * RAST_WORDS;
+        if (vertices == 4)
+            draw_cone(limb, lane, top, body, seen);
+        else
+            draw_ellipsoid(limb, lane, top, body, seen);
     }
 }
 
 void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restrict out)
 {
     rast_mask *const whole = &out->whole;
-    memset(whole->row, 0, sizeof whole->row);
-    whole->first = RAST_SIZE;
-    whole->last = 0;
+    int32_t first = RAST_SIZE, last = 0;
     for (int32_t l = 0; l < block->count; l++)
         out->visible[l].first = out->visible[l].last = 0;
     for (int32_t k = 0; k < block->drawn[lane]; k++) {
-        int32_t const l = block->order[lane][k];
-        rast_mask *const mask = &out->visible[l];
-        draw_limb(&block->limb[l], block->vertices[l], lane, whole, mask);
-        if (mask->first < mask->last) {
-            whole->first = i_min(whole->first, mask->first);
-            whole->last = i_max(whole->last, mask->last);
-        }
+        const layers_limb *const limb = &block->limb[block->order[lane][k]];
+        bool const met = limb->top[lane] < limb->end[lane];
+        first = met ? i_min(first, limb->top[lane]) : first;
+        last = met ? i_max(last, limb->end[lane]) : last;
     }
-    if (whole->first > whole->last)
-        whole->first = whole->last = 0;
+    whole->first = i_min(first, last);
+    whole->last = last;
+    memset(whole->row[whole->first], 0, (size_t)(last - whole->first) * sizeof whole->row[0]);
+    for (int32_t k = 0; k < block->drawn[lane]; k++) {
+        int32_t const l = block->order[lane][k];
+        draw_limb(&block->limb[l], block->vertices[l], lane, whole, &out->visible[l]);
+    }
 }
