@@ -26,15 +26,3 @@ bool camera_distorted(const gait_camera *c)
         any |= c->distortion[i] != 0.0f;
     return any;
 }
-
-void camera_distort(const gait_camera *c, float u, float v, float *ud, float *vd)
-{
-    const float *const d = c->distortion; /* k1 k2 p1 p2 k3 */
-    float const x = (u - c->cx) / c->fx, y = (v - c->cy) / c->fy;
-    float const r2 = x * x + y * y, xy2 = 2.0f * x * y;
-    float const radial = 1.0f + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
-    float const xd = x * radial + d[2] * xy2 + d[3] * (r2 + 2.0f * x * x);
-    float const yd = y * radial + d[2] * (r2 + 2.0f * y * y) + d[3] * xy2;
-    *ud = c->fx * xd + c->cx;
-    *vd = c->fy * yd + c->cy;
-}

@@ -12,7 +12,17 @@ bool camera_valid(const gait_camera *c);
 bool camera_distorted(const gait_camera *c);
 
 /* Ideal pixel (u, v) to the pixel of the captured image (OpenCV's k1 k2 p1 p2 k3). */
-void camera_distort(const gait_camera *c, float u, float v, float *ud, float *vd);
+static inline void camera_distort(const gait_camera *c, float u, float v, float *ud, float *vd)
+{
+    const float *const d = c->distortion; /* k1 k2 p1 p2 k3 */
+    float const x = (u - c->cx) / c->fx, y = (v - c->cy) / c->fy;
+    float const r2 = x * x + y * y, xy2 = 2.0f * x * y;
+    float const radial = 1.0f + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+    float const xd = x * radial + d[2] * xy2 + d[3] * (r2 + 2.0f * x * x);
+    float const yd = y * radial + d[2] * (r2 + 2.0f * y * y) + d[3] * xy2;
+    *ud = c->fx * xd + c->cx;
+    *vd = c->fy * yd + c->cy;
+}
 
 /* World point to ideal pixel; returns its depth Z.  uv is left alone when Z <= CAMERA_NEAR. */
 static inline float camera_project(const gait_camera *c, const float p[3], float uv[2])

@@ -1,6 +1,7 @@
 /* features.h - what the likelihood terms look up: maps computed once per frame inside one camera's region. */
 #ifndef GAIT_FEATURES_H
 #define GAIT_FEATURES_H
+#include "kernels.h"
 #include "rast.h"
 #include "view.h"
 
@@ -24,30 +25,31 @@ typedef struct features {
     int8_t *surface;  /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
     int32_t fg_total; /* sum of foreground over the grid, FG_ONE = 1 */
     uint64_t (*fg)[RAST_SIZE][RAST_WORDS]; /* FG_PLANES bit planes of the foreground probability */
-    uint64_t (*inside)[RAST_WORDS];        /* cells that the camera sees */
+    uint64_t (*inside)[RAST_WORDS];        /* cells that the camera sees, */
+    view_map inside_map;                   /* found for this place of the region */
 } features;
+
+enum { EDGE_SIZES = 32, EDGE_SOFT = 4 }; /* rows kept, by row number modulo this */
+
+typedef struct edge_rows { /* of the edge tensor on its way: rings of rows */
+    uint16_t size[EDGE_SIZES][VIEW_SIZE];
+    int16_t once[3][EDGE_SOFT][VIEW_SIZE], twice[3][EDGE_SOFT][VIEW_SIZE];
+} edge_rows;
 
 typedef struct features_scratch { /* shared by the cameras */
     view_planes planes;
-    uint8_t *grey;      /* VIEW_PIXELS */
-    int16_t *gx, *gy;   /* VIEW_PIXELS */
-    int32_t *sum, *tmp; /* VIEW_PIXELS */
-    int16_t *tensor;    /* 3 x VIEW_PIXELS */
+    uint8_t *grey; /* VIEW_PIXELS */
+    edge_rows *rows;
 } features_scratch;
 
 features features_layout(arena *a);
 features_scratch features_scratch_layout(arena *a);
 
 /* All maps of one frame.  plate: resampled empty scene, with colour only if the frame has, or NULL; raw:
- * surface keeps grey levels (paper mode). */
-void features_compute(features *f, const gait_camera *cam, const gait_image *im, const view_planes *plate,
-                      bool raw, features_scratch *s);
-
-/* The parts, for tests. */
-void features_foreground(features *f, const view_planes *im, const view_planes *plate);
-void features_edges(const uint8_t *grey, edge_cell *out, features_scratch *s);
-void features_contrast(const uint8_t *grey, int8_t *out, features_scratch *s);
-
-/* Sum over a (2 radius + 1)^2 box with replicated borders. */
-void features_box(const int32_t *in, int32_t *out, int32_t radius, int32_t *tmp);
+ * surface keeps grey levels (paper mode).  Kernels (kernels.h), each one map:
+ *   features_foreground  fg and fg_total where inside
+ *   features_edges       edge tensors of a grey plane
+ *   features_contrast    local contrast of a grey plane */
+void features_compute(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
+                      const view_planes *plate, bool raw, features_scratch *s);
 #endif

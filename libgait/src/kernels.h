@@ -9,6 +9,8 @@
 #include "base.h"
 
 /* Types of higher layers, which a kernel's own file includes. */
+struct edge_cell;
+struct edge_rows;
 struct features;
 struct kin_body;
 struct layers;
@@ -17,9 +19,19 @@ struct limb_geometry;
 struct outline_block;
 struct rast_mask;
 struct view_map;
+struct view_planes;
 
 /* Result, name, parameters. */
 #define KERNELS(K)                                                                                           \
+    /* A captured frame in the region's working image, and its maps. */                                      \
+    K(void, view_sample,                                                                                     \
+      (const struct view_map *map, const gait_camera *cam, const gait_image *im, struct view_planes *out))   \
+    K(void, view_inside, (const struct view_map *map, const gait_camera *cam, uint64_t (*inside)[2]))        \
+    K(void, view_grey, (const struct view_planes *in, uint8_t *grey))                                        \
+    K(void, features_foreground,                                                                             \
+      (struct features * f, const struct view_planes *im, const struct view_planes *plate))                  \
+    K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))               \
+    K(void, features_contrast, (const uint8_t *grey, int8_t *out))                                           \
     /* The limbs of a block of bodies in one camera's working image. */                                      \
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \
@@ -49,6 +61,8 @@ typedef struct kernels {
 const kernels *kernels_choose(uint32_t mask);
 
 #ifdef KERNEL_ISA /* in a kernel's file: what it is being compiled for */
+/* A loop over one row, kept apart from the loops about it: of some nests compilers make no vector code. */
+#define KERNEL_ROW                                 static __attribute__((noinline))
 #define KERNEL_JOIN(name, isa)                     name##_##isa
 #define KERNEL_NAME(name, isa)                     KERNEL_JOIN(name, isa)
 #define KERNEL(name)                               KERNEL_NAME(name, KERNEL_ISA)

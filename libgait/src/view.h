@@ -25,15 +25,10 @@ typedef struct view_planes { /* resampled planes: R, G, B, or grey in the first 
  * resampled differently from frame to frame. */
 bool view_follow(view_map *map, const float uv[2], float tall);
 
-/* Resample one captured frame (bilinear, or a box of pixels where the working image is coarser), undoing
- * the lens distortion. */
-void view_sample(const view_map *map, const gait_camera *cam, const gait_image *im, view_planes *out);
-
-/* Working pixels whose source lies inside the frame, as bits of the RAST grid. */
-void view_inside(const view_map *map, const gait_camera *cam, uint64_t (*inside)[2]);
-
-/* Luma of the planes: (77 R + 150 G + 29 B) / 256. */
-void view_grey(const view_planes *in, uint8_t *grey);
-
+/* Kernels (kernels.h):
+ *   view_sample  one captured frame (bilinear, or a box of pixels where the working image is coarser), undoing
+ *                the lens distortion
+ *   view_inside  working pixels whose source lies inside the frame, as bits of the RAST grid
+ *   view_grey    luma of the planes: (77 R + 150 G + 29 B) / 256; grey may be one of them */
 view_planes view_planes_layout(arena *a, int32_t channels);
 #endif

@@ -24,9 +24,9 @@ static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
     bool const colour = s->background.format != GAIT_GREY8;
     if (!s->plate_stale && s->plate.channels == (colour && !grey ? 3 : 1))
         return;
-    view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
+    t->like->run->view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
     if (colour && grey) {
-        view_grey(&s->plate, s->plate.channel[0]);
+        t->like->run->view_grey(&s->plate, s->plate.channel[0]);
         s->plate.channels = 1;
     }
     s->plate_stale = false;
@@ -44,8 +44,8 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
         bool const plate = s->plate.channel[0] && s->background.data && im.data;
         if (plate)
             refresh_plate(t, c, im.format == GAIT_GREY8);
-        features_compute(&s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL, t->like->paper,
-                         &t->scratch);
+        features_compute(t->like->run, &s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL,
+                         t->like->paper, &t->scratch);
         count += s->seen.seen;
     }
     return count;

@@ -9,6 +9,7 @@
 
 enum { MEMORY = 8 << 20 };
 
+static const kernels *run;
 static features f;
 static features_scratch scratch;
 static view_planes frame, plate;
@@ -54,47 +55,13 @@ static int32_t fg_at(int32_t x, int32_t y)
     return p;
 }
 
-/* ---- box sums ---- */
-
-/* A coordinate near the low border, near the high one or anywhere. */
-static int32_t some_place(uint32_t n, uint32_t where)
-{
-    int32_t const near = (int32_t)(noise(n) % 16);
-    return where == 0 ? near : where == 1 ? VIEW_SIZE - 1 - near : (int32_t)(noise(n) % VIEW_SIZE);
-}
-
-static void test_box(void)
-{
-    static int32_t in[VIEW_PIXELS], out[VIEW_PIXELS];
-    static const int32_t radius[] = {0, 1, 9, 12, 40};
-    for (size_t k = 0; k < sizeof radius / sizeof *radius; k++) {
-        int32_t const r = radius[k];
-        int32_t wrong = 0;
-        for (int32_t i = 0; i < VIEW_PIXELS; i++)
-            in[i] = (int32_t)(noise((uint32_t)i) % 1000) - 300;
-        features_box(in, out, r, scratch.tmp);
-        for (uint32_t n = 0; n < 300; n++) {
-            int32_t const x = some_place(2 * n, n % 3), y = some_place(2 * n + 1, n / 3 % 3);
-            int32_t sum = 0;
-            for (int32_t dy = -r; dy <= r; dy++)
-                for (int32_t dx = -r; dx <= r; dx++)
-                    sum +=
-                        in[i_clamp(y + dy, 0, VIEW_SIZE - 1) * VIEW_SIZE + i_clamp(x + dx, 0, VIEW_SIZE - 1)];
-            wrong += out[y * VIEW_SIZE + x] != sum;
-        }
-        CHECK(wrong == 0);
-        features_box(in, in, r, scratch.tmp); /* in place, as the callers do */
-        CHECK(memcmp(in, out, sizeof in) == 0);
-    }
-}
-
 /* ---- foreground ---- */
 static void test_no_change(void)
 {
     for (int32_t channels = 1; channels <= 3; channels += 2) {
         make_scene(channels);
         memset(f.fg, 0xff, FG_PLANES * sizeof *f.fg); /* of the frame before */
-        features_foreground(&f, &frame, &plate);
+        run->features_foreground(&f, &frame, &plate);
         int32_t set = 0;
         for (int32_t k = 0; k < FG_PLANES; k++)
             for (int32_t y = 0; y < RAST_SIZE; y++)
@@ -112,7 +79,7 @@ static void test_exposure(void)
             for (int32_t c = 0; c < channels; c++)
                 for (int32_t i = 0; i < VIEW_PIXELS; i++)
                     frame.channel[c][i] = (uint8_t)(plate.channel[c][i] * gain / 16);
-            features_foreground(&f, &frame, &plate);
+            run->features_foreground(&f, &frame, &plate);
             CHECK(f.fg_total < RAST_SIZE * RAST_SIZE * FG_ONE / 200);
         }
 }
@@ -133,7 +100,7 @@ static void test_square(void)
         for (int32_t c = 0; c < channels; c++) /* and the light falls a little */
             for (int32_t i = 0; i < VIEW_PIXELS; i++)
                 frame.channel[c][i] = (uint8_t)(frame.channel[c][i] * 31 / 32);
-        features_foreground(&f, &frame, &plate);
+        run->features_foreground(&f, &frame, &plate);
         for (int32_t y = 0; y < RAST_SIZE; y++)
             for (int32_t x = 0; x < RAST_SIZE; x++) {
                 bool const in = x >= 40 && x < 70 && y >= 50 && y < 90;
@@ -159,7 +126,7 @@ static void test_channels(void)
             memcpy(plate.channel[c], plate.channel[0], VIEW_PIXELS);
         }
         frame.channels = plate.channels = k ? 3 : 1;
-        features_foreground(&f, &frame, &plate);
+        run->features_foreground(&f, &frame, &plate);
         total[k] = f.fg_total;
     }
     CHECK(total[0] == total[1] && total[0] > 15 * RAST_SIZE * FG_ONE / 2);
@@ -177,7 +144,7 @@ static void test_shadow(void)
                     int32_t const i = y * VIEW_SIZE + x, b = plate.channel[c][i], dark = 3 * b / 16;
                     frame.channel[c][i] = (uint8_t)(painted && c == 1 ? b + dark : b - dark);
                 }
-        features_foreground(&f, &frame, &plate);
+        run->features_foreground(&f, &frame, &plate);
         total[painted] = 0;
         for (int32_t y = 0; y < 8; y++)
             for (int32_t x = 0; x < RAST_SIZE; x++)
@@ -196,7 +163,7 @@ static void test_unseen(void)
         f.inside[y][0] = y < 100 ? ~UINT64_C(0) << 20 : 0;
         f.inside[y][1] = 0;
     }
-    features_foreground(&f, &frame, &plate);
+    run->features_foreground(&f, &frame, &plate);
     for (int32_t y = 0; y < RAST_SIZE; y++)
         for (int32_t x = 0; x < RAST_SIZE; x++)
             outside += fg_at(x, y) > 0 && !(x >= 20 && x < 64 && y < 100);
@@ -231,7 +198,7 @@ static void test_edges(void)
         for (int step = 0; step < 24; step++) {
             double const angle = 6.283185307 * step / 24.0;
             make_step(128.0, 120.0, angle, 60.0, 60.0 + height[k]);
-            features_edges(grey, f.edge, &scratch);
+            run->features_edges(grey, f.edge, scratch.rows);
             const edge_cell *const e = &f.edge[120 * VIEW_SIZE + 128];
             least = fmin(least, response(e, angle));
             most = fmax(most, response(e, angle));
@@ -255,7 +222,7 @@ static void test_edges_crowd(void)
         for (int32_t y = 0; y < VIEW_SIZE; y++)
             for (int32_t x = 0; x < VIEW_SIZE; x++)
                 grey[y * VIEW_SIZE + x] = (stripes ? x / 5 % 2 : x >= 125) ? 60 : 160;
-        features_edges(grey, f.edge, &scratch);
+        run->features_edges(grey, f.edge, scratch.rows);
         have[stripes] = response(&f.edge[120 * VIEW_SIZE + 125], 0.0);
     }
     CHECK(have[1] > 0.2 && have[1] < 0.85 * have[0]);
@@ -267,13 +234,13 @@ static void test_edges_none(void)
     int32_t any = 0;
     double trace = 0.0, xx_yy = 0.0, xy2 = 0.0;
     memset(grey, 200, sizeof grey);
-    features_edges(grey, f.edge, &scratch);
+    run->features_edges(grey, f.edge, scratch.rows);
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
         any += f.edge[i].trace != 0 || f.edge[i].xx_yy != 0 || f.edge[i].xy2 != 0;
     CHECK(any == 0);
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
         grey[i] = (uint8_t)(noise((uint32_t)i) >> 24);
-    features_edges(grey, f.edge, &scratch);
+    run->features_edges(grey, f.edge, scratch.rows);
     int32_t wrong = 0;
     for (int32_t i = 0; i < VIEW_PIXELS; i++) {
         const edge_cell *const e = &f.edge[i];
@@ -297,7 +264,7 @@ static void test_contrast(void)
     for (int32_t y = 0; y < VIEW_SIZE; y++) /* blocks of 3 x 3, sd about 35 */
         for (int32_t x = 0; x < VIEW_SIZE; x++)
             grey[y * VIEW_SIZE + x] = (uint8_t)(60 + noise((uint32_t)(y / 3 * 100 + x / 3)) % 121);
-    features_contrast(grey, plain, &scratch);
+    run->features_contrast(grey, plain);
     double sum = 0.0, square = 0.0;
     for (int32_t i = 0; i < VIEW_PIXELS; i++) {
         sum += plain[i];
@@ -310,7 +277,7 @@ static void test_contrast(void)
         double worst = 0.0, ratio = 0.0;
         for (int32_t i = 0; i < VIEW_PIXELS; i++)
             other[i] = (uint8_t)(gain[k] * grey[i] + shift[k] + 0.5);
-        features_contrast(other, changed, &scratch);
+        run->features_contrast(other, changed);
         for (int32_t i = 0; i < VIEW_PIXELS; i++) {
             worst = fmax(worst, fabs((double)(changed[i] - plain[i])));
             ratio += (double)(changed[i] * plain[i]) / square;
@@ -319,15 +286,42 @@ static void test_contrast(void)
         CHECK(worst < 6.0);
     }
     memset(grey, 77, sizeof grey);
-    features_contrast(grey, plain, &scratch);
+    run->features_contrast(grey, plain);
     int32_t any = 0;
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
         any += plain[i] != 0;
     CHECK(any == 0);
     grey[100 * VIEW_SIZE + 100] = 255; /* lone pixels saturate, never wrap, never look hidden */
     grey[150 * VIEW_SIZE + 150] = 0;
-    features_contrast(grey, plain, &scratch);
+    run->features_contrast(grey, plain);
     CHECK(plain[100 * VIEW_SIZE + 100] == 127 && plain[150 * VIEW_SIZE + 150] == -127);
+}
+
+/* The box is a square about the pixel, and the image's border is replicated: at borders, corners and inside. */
+static void test_contrast_box(void)
+{
+    enum { RADIUS = 9, AREA = (2 * RADIUS + 1) * (2 * RADIUS + 1) };
+    static const int32_t place[] = {0, 1, 8, 9, 10, 100, 245, 246, 247, 254, 255};
+    enum { PLACES = sizeof place / sizeof *place };
+    static int8_t out[VIEW_PIXELS];
+    for (int32_t i = 0; i < VIEW_PIXELS; i++)
+        grey[i] = (uint8_t)(noise((uint32_t)i) % (1 + noise((uint32_t)(i >> 12)) % 255));
+    run->features_contrast(grey, out);
+    int32_t wrong = 0;
+    for (int32_t n = 0; n < PLACES * PLACES; n++) {
+        int32_t const x = place[n % PLACES], y = place[n / PLACES];
+        double sum = 0.0, square = 0.0;
+        for (int32_t k = 0; k < AREA; k++) {
+            int32_t const u = i_clamp(x + k % (2 * RADIUS + 1) - RADIUS, 0, VIEW_SIZE - 1);
+            int32_t const v = i_clamp(y + k / (2 * RADIUS + 1) - RADIUS, 0, VIEW_SIZE - 1);
+            sum += grey[v * VIEW_SIZE + u];
+            square += (double)grey[v * VIEW_SIZE + u] * grey[v * VIEW_SIZE + u];
+        }
+        double const mean = sum / AREA, sd = sqrt(square / AREA - mean * mean + 36.0);
+        double const z = (grey[y * VIEW_SIZE + x] - mean) * CONTRAST_UNIT / sd;
+        wrong += fabs(out[y * VIEW_SIZE + x] - fmin(fmax(z, -127.0), 127.0)) > 1.01;
+    }
+    CHECK(wrong == 0);
 }
 
 /* ---- all together ---- */
@@ -341,15 +335,15 @@ static void test_compute(void)
     for (int32_t i = 0; i < W * H * 3; i++)
         pixels[i] = (uint8_t)(noise((uint32_t)(i / 3)) % 251);
     f.map = (view_map){.scale = 1.0f, .u0 = -100.0f, .v0 = -50.0f};
-    view_sample(&f.map, &cam, &im, &plate);
-    features_compute(&f, &cam, &im, &plate, false, &scratch);
+    run->view_sample(&f.map, &cam, &im, &plate);
+    features_compute(run, &f, &cam, &im, &plate, false, &scratch);
     CHECK(f.seen && f.has_fg && f.fg_total == 0);
     int32_t cells = 0;
     for (int32_t y = 0; y < RAST_SIZE; y++)
         cells += rast_popcount(f.inside[y][0]) + rast_popcount(f.inside[y][1]);
     CHECK(cells == W / 2 * (H / 2));
     CHECK(f.edge[20 * VIEW_SIZE + 20].trace == 0 && f.edge[120 * VIEW_SIZE + 180].trace > 5);
-    features_compute(&f, &cam, &im, NULL, true, &scratch); /* no plate; grey levels in paper mode */
+    features_compute(run, &f, &cam, &im, NULL, true, &scratch); /* no plate; grey levels in paper mode */
     CHECK(f.seen && !f.has_fg);
     int32_t wrong = 0;
     for (int32_t y = 0; y < H; y++)
@@ -358,18 +352,18 @@ static void test_compute(void)
     CHECK(wrong == 0);
     im.format = GAIT_RGB8;
     im.stride = 3 * W;
-    features_compute(&f, &cam, &im, &plate, false, &scratch); /* a grey plate: its luma is compared */
+    features_compute(run, &f, &cam, &im, &plate, false, &scratch); /* a grey plate: its luma is compared */
     CHECK(f.seen && f.has_fg && f.fg_total > 0);
     im.data = NULL;
     f.has_fg = true;
-    features_compute(&f, &cam, &im, &plate, false, &scratch);
+    features_compute(run, &f, &cam, &im, &plate, false, &scratch);
     CHECK(!f.seen && !f.has_fg);
 }
 
 int main(void)
 {
+    run = kernels_choose(~0u); /* the others give the same: test_image_kernels.c */
     make_maps();
-    test_box();
     test_no_change();
     test_exposure();
     test_square();
@@ -380,6 +374,7 @@ int main(void)
     test_edges_crowd();
     test_edges_none();
     test_contrast();
+    test_contrast_box();
     test_compute();
     return CHECK_DONE();
 }

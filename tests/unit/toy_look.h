@@ -61,9 +61,9 @@ static inline void toy_look_at(toy_look *v, const uint8_t *grey, const uint8_t *
     gait_image const im = toy_image(grey);
     if (wall) {
         gait_image const empty = toy_image(wall);
-        view_sample(&v->f.map, &v->cam, &empty, &v->plate);
+        v->setup.run->view_sample(&v->f.map, &v->cam, &empty, &v->plate);
     }
-    features_compute(&v->f, &v->cam, &im, wall ? &v->plate : NULL, v->setup.paper, &v->scratch);
+    features_compute(v->setup.run, &v->f, &v->cam, &im, wall ? &v->plate : NULL, v->setup.paper, &v->scratch);
 }
 
 static inline like_body toy_look_body(toy_look *v, const gait_state *s)
