@@ -238,7 +238,7 @@ eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/re
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------
-C_FILES := $(sort $(wildcard libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.c tests/fuzz/*.[ch] tools/*.[ch] \
+C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.c tests/fuzz/*.[ch] tools/*.[ch] \
            tools/common/*.[ch]))
 lint: export PATH := $(abspath $(VENV)/bin):$(PATH)
 lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed

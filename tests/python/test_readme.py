@@ -6,11 +6,9 @@ import re
 import subprocess
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
-
-import gait
+from example_scene import drawn_walk
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = ROOT / ".venv" / "bin"
@@ -108,31 +106,12 @@ def example(tmp_path_factory):
     return folder / "example"
 
 
-def drawn_walk(frames: int) -> tuple[bytes, list[float]]:
-    """Grey frames of the scene that the example describes, and the true x of the pelvis."""
-    model = gait.Model()
-    rotation = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
-    camera = gait.Camera(640, 480, 800.0, 800.0, 320.0, 240.0, rotation, np.array([0, 1.4, 8]))
-    rng = np.random.default_rng(1)
-    plate = cv2.resize(rng.integers(40, 200, (96, 128)).astype(np.uint8), (640, 480))
-    cloth = cv2.resize(rng.integers(0, 40, (160, 213)).astype(np.uint8), (640, 480))
-    walker, _ = model.prior()
-    walker.phase, walker.pelvis[0] = 0.3, -1.0
-    pictures, places = [], []
-    for _ in range(frames):
-        walker.pelvis[2] = model.pelvis_height(walker)
-        ids = model.render(camera, walker)
-        pictures.append(np.where(ids > 0, 30 + ids * 12 % 160 + cloth, plate).astype(np.uint8).tobytes())
-        places.append(float(walker.pelvis[0]))
-        walker.phase = (walker.phase + walker.stride_hz / 30) % 1
-        walker.pelvis[0] += walker.stature * walker.stride_hz * model.info.stride_length / 30
-    return b"".join(pictures), places
-
-
 def test_the_c_example_follows_a_drawn_walker(example):
-    pictures, places = drawn_walk(60)
+    _, pictures, places = drawn_walk(60)
     shipped = ROOT / "python/gait/data/walk.gait"
-    done = subprocess.run([example, shipped], input=pictures, capture_output=True, timeout=300)
+    done = subprocess.run(
+        [example, shipped], input=b"".join(p.tobytes() for p in pictures), capture_output=True, timeout=300
+    )
     assert done.returncode == 0, done.stdout
     found = [float(line.split()[0]) for line in done.stdout.decode().splitlines()]
     assert len(found) == 60

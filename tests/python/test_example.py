@@ -1,0 +1,102 @@
+"""The C example follows a drawn walker: built by pkg-config's flags, and for another CPU under emulation."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from example_scene import drawn_walk
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "libgait/doc/example.c"
+MODEL = ROOT / "python/gait/data/walk.gait"
+FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+ARM = "aarch64-linux-gnu"
+FRAMES = 60
+
+
+def make(*words: str) -> None:
+    """Run make on its own, not as part of the make that may run these tests."""
+    env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE")}
+    subprocess.run(
+        ["make", "-s", *words], cwd=ROOT, env=env, check=True, stdout=subprocess.DEVNULL, timeout=600
+    )
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """Folder of PGM pictures, and the true x of the pelvis in each."""
+    folder = tmp_path_factory.mktemp("pgm")
+    plate, pictures, places = drawn_walk(FRAMES)
+    cv2.imwrite(str(folder / "empty.pgm"), plate)
+    for i, picture in enumerate(pictures):
+        cv2.imwrite(str(folder / f"frame{i:02d}.pgm"), picture)
+    return folder, places
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    """Start of the command that runs the example, built against an installed library."""
+    if not shutil.which("pkg-config"):
+        pytest.skip("pkg-config is not installed")
+    there = tmp_path_factory.mktemp("root")
+    make("install", f"DESTDIR={there}", "PREFIX=/opt/gait")
+    env = {
+        "PATH": "/usr/bin:/bin",
+        "PKG_CONFIG_PATH": str(there / "opt/gait/lib/pkgconfig"),
+        "PKG_CONFIG_SYSROOT_DIR": str(there),
+    }
+    command = ["pkg-config", "--cflags", "--libs", "gait"]
+    told = subprocess.run(command, env=env, check=True, capture_output=True, text=True).stdout.split()
+    rpath = f"-Wl,-rpath,{there}/opt/gait/lib"
+    subprocess.run(["cc", *FLAGS, SOURCE, "-o", there / "example", *told, rpath], check=True)
+    return [there / "example"]
+
+
+def track(program, folder) -> str:
+    """What the example prints."""
+    pictures = sorted(folder.glob("frame*.pgm"))
+    done = subprocess.run(
+        [*program, MODEL, folder / "empty.pgm", *pictures], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_example_follows_a_drawn_walker(program, walk):
+    folder, places = walk
+    *rows, digest = track(program, folder).splitlines()
+    found = np.array([float(row.split()[2]) for row in rows])
+    assert len(found) == FRAMES and digest.startswith("digest ")
+    assert np.abs(found - places)[30:].max() < 0.1
+    assert rows[-1].endswith("status 1")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ([], 2, "usage: example MODEL.gait EMPTY.pgm FRAME.pgm..."),
+        (["/nonexistent", "a", "b"], 1, "/nonexistent: "),
+        ([MODEL, "/dev/null", "b"], 1, "/dev/null: not a binary PGM of 640 x 480"),
+    ],
+)
+def test_the_example_says_what_is_wrong(program, words, code, said):
+    done = subprocess.run([*program, *words], capture_output=True, text=True, timeout=60)
+    assert done.returncode == code and done.stderr.startswith(said)
+
+
+def test_another_cpu_gives_the_same_bits(program, walk, tmp_path):
+    needed = [f"{ARM}-gcc", f"{ARM}-g++", "qemu-aarch64"]
+    missing = [name for name in needed if not shutil.which(name)]
+    if missing:
+        pytest.skip(f"not installed: {' '.join(missing)}")
+    make("lib", f"CC={ARM}-gcc")
+    library = ROOT / f"build/{ARM}-release/libgait.a"
+    include = f"-I{ROOT}/libgait/include"
+    options = ["-static", *FLAGS, include, SOURCE, library, "-lm", "-pthread", "-o", tmp_path / "example"]
+    subprocess.run([f"{ARM}-gcc", *options], check=True)
+    folder, _ = walk
+    assert track(["qemu-aarch64", tmp_path / "example"], folder) == track(program, folder)
