@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
@@ -81,17 +81,7 @@ class Overlay:
         ids = self.model.render(self.camera, state)
         if self._lens is not None:
             ids = np.asarray(cv2.remap(ids, *self._lens, cv2.INTER_NEAREST), np.uint8)
-        colours = [side_colour(name) for name in self.model.limb_names]
-        table = np.array([(0, 0, 0), *colours], np.float32)
-        inside = ids > 0
-        out = canvas.copy()
-        out[inside] = np.rint((1 - _FILL) * canvas[inside] + _FILL * table[ids[inside]]).astype(np.uint8)
-        width = max(1, round(1.5 * self._size(state.pelvis)))
-        for limb, colour in enumerate(colours, 1):
-            mask = (ids == limb).astype(np.uint8)
-            contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-            cv2.drawContours(out, contours, -1, colour, width, cv2.LINE_AA)
-        return out
+        return tinted(canvas, ids, self.model.limb_names, max(1, round(1.5 * self._size(state.pelvis))))
 
     def skeleton(self, canvas: Image, joints: Array) -> None:
         """Draw bones and joints (P, 3) in place; what is behind the camera is left out."""
@@ -109,9 +99,7 @@ class Overlay:
     def sticks(self, canvas: Image, joints: Array, thick: int, colour: Colour | None = None) -> None:
         """Draw bones as lines of `thick` pixels in place, in one colour or that of their side."""
         uv = dict(zip(self.model.joint_names, self.camera.project(joints), strict=True))
-        for a, b in BONES:
-            if np.isfinite([uv[a], uv[b]]).all():
-                _line(canvas, [uv[a], uv[b]], colour or _brighter(side_colour(b)), thick)
+        draw_bones(canvas, uv, thick, colour)
 
     def _ellipses(self, canvas: Image, estimate: Estimate) -> None:
         """Draw the 90 % ellipse of wrists and ankles from the axis-wise deviations."""
@@ -133,6 +121,27 @@ class Overlay:
         """Scale of lines for a person at `place`: 1 where 1.7 m are 400 pixels."""
         depth = max(float(self.camera.depth(place)), 0.1)
         return float(np.clip(1.7 * self.camera.fy / depth / 400, 0.3, 4.0))
+
+
+def tinted(canvas: Image, ids: NDArray[np.uint8], limbs: Sequence[str], width: int) -> Image:
+    """Return `canvas` (h, w, 3) with limbs tinted and outlined; `ids` (h, w) holds limb index + 1, or 0."""
+    colours = [side_colour(name) for name in limbs]
+    table = np.array([(0, 0, 0), *colours], np.float32)
+    inside = ids > 0
+    out = canvas.copy()
+    out[inside] = np.rint((1 - _FILL) * canvas[inside] + _FILL * table[ids[inside]]).astype(np.uint8)
+    for limb, colour in enumerate(colours, 1):
+        mask = (ids == limb).astype(np.uint8)
+        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(out, contours, -1, colour, width, cv2.LINE_AA)
+    return out
+
+
+def draw_bones(canvas: Image, uv: Mapping[str, Array], thick: int, colour: Colour | None = None) -> None:
+    """Draw bones between joints at pixels `uv` in place, in one colour or that of their side."""
+    for a, b in BONES:
+        if np.isfinite([uv[a], uv[b]]).all():
+            _line(canvas, [uv[a], uv[b]], colour or _brighter(side_colour(b)), thick)
 
 
 def _lens_map(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from toy_segments import toy_prior
+
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.lift import sensors
@@ -15,7 +17,6 @@ from gait.lift.stick import Sticks, stick_responses
 from gait.lift.views import CameraView, FlatView
 from gait.skeleton import JOINTS
 from gait.video import Frame
-from toy_segments import toy_prior
 
 CAMERA = replace(
     Camera.looking((6, -1, 1.4), (0, 0, 0.9), (640, 480), 500.0),

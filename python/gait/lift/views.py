@@ -31,6 +31,10 @@ class View(Protocol):
         """Whether all points are before the lens."""
         ...
 
+    def depth(self, points: Floats) -> Floats:
+        """Distance (...) along the direction of view, metres."""
+        ...
+
     def scale(self, point: Floats) -> float:
         """Pixels per metre at a point (3,)."""
         ...
@@ -59,7 +63,11 @@ class CameraView:
 
     def visible(self, points: Floats) -> bool:
         """Whether all points are before the lens."""
-        return bool((self.camera.depth(points) > NEAREST).all())
+        return bool((self.depth(points) > NEAREST).all())
+
+    def depth(self, points: Floats) -> Floats:
+        """Distance before the lens along its axis."""
+        return self.camera.depth(points)
 
     def scale(self, point: Floats) -> float:
         """Pixels per metre at a point."""
@@ -95,6 +103,10 @@ class FlatView:
     def visible(self, points: Floats) -> bool:
         """Nothing is behind a flat view."""
         return True
+
+    def depth(self, points: Floats) -> Floats:
+        """Distance from the point (0, 0, 0) away from the viewer."""
+        return np.asarray(points[..., 1])
 
     def scale(self, point: Floats) -> float:
         """Pixels per metre, the same everywhere."""

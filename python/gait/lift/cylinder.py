@@ -1,0 +1,125 @@
+"""The cylinder figure: one body of constant bone lengths laid on markers by least squares, frame by frame.
+
+The last step of Leventon & Freeman 1998; the fit is that of `gait.learn.skeleton_fit`, which motion capture
+goes through as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.errors import UserError
+from gait.learn import articulated, skeleton_fit
+from gait.learn.articulated import Pose
+from gait.learn.virtual_markers import MARKERS, SKIN, marked_skeleton
+from gait.skeleton import ELLIPSOID, JOINTS, default_skeleton
+
+Floats = npt.NDArray[np.float64]
+
+JOINT_SD, SKIN_SD = 0.01, 0.02  # statures that a joint or a marker on the skin may lie elsewhere in its limb
+FEWEST = 8  # markers
+_BODY = default_skeleton()
+LIMBS = tuple(_BODY.limbs)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A body of limbs that keep their lengths, in T poses.
+
+    Attributes
+    ----------
+    stretch : (S,)
+        Logarithms of the body's stretches (`gait.learn.articulated.STRETCHES`).
+    pose : Pose
+    residual : (T, M)
+        Distance from the markers used, metres.
+    """
+
+    stretch: Floats
+    pose: Pose
+    residual: Floats
+
+    @staticmethod
+    def fit(places: Floats, names: Sequence[str]) -> Figure:
+        """Lay a body on markers (T, J, 3), metres, world with z up; markers of other bodies are left out.
+
+        Raises
+        ------
+        UserError
+            If hardly any marker is one of `gait.learn.virtual_markers.MARKERS`.
+        """
+        used = [name for name in names if name in MARKERS]
+        if len(used) < FEWEST:
+            raise UserError(f"the cylinder figure needs {FEWEST} markers of {' '.join(MARKERS)}")
+        body = marked_skeleton()
+        row = [body.points.index(name) for name in used]
+        points = skeleton_fit.Points(
+            segment=body.point_frames[row].astype(np.intp),
+            at=body.point_positions[row],
+            sd=np.array([SKIN_SD if name in SKIN else JOINT_SD for name in used]),
+        )
+        found = skeleton_fit.fit(places[:, [list(names).index(name) for name in used]], points)
+        return Figure(found.stretch, found.pose, found.residual)
+
+    @property
+    def stature(self) -> float:
+        """Height of the body, metres, as if all its parts were of usual proportions."""
+        return float(np.exp(self.stretch[0]))
+
+    def joints(self) -> Floats:
+        """Places (T, 19, 3) of `gait.skeleton.JOINTS`, metres."""
+        segment = _BODY.point_frames.astype(np.intp)
+        local = articulated.scales(self.stretch)[segment] * _BODY.point_positions
+        posed = articulated.posed(self.pose, articulated.origins(self.stretch))
+        return posed.points(local, segment)
+
+    def lengths(self) -> dict[str, float]:
+        """Lengths of thighs, shanks, upper arms and forearms, metres."""
+        place = dict(zip(JOINTS, self.joints()[0], strict=True))
+        ends = {
+            "thigh": ("hip", "knee"), "shank": ("knee", "ankle"),
+            "upper_arm": ("shoulder", "elbow"), "forearm": ("elbow", "wrist"),
+        }  # fmt: skip
+        return {
+            f"{side}_{bone}": float(np.linalg.norm(place[f"{side}_{a}"] - place[f"{side}_{b}"]))
+            for side in "lr"
+            for bone, (a, b) in ends.items()
+        }
+
+    def surfaces(self) -> Floats:
+        """Points (T, L, P, 3) on the limbs' surfaces whose hulls are the limbs, metres; in order of `LIMBS`."""
+        posed = articulated.posed(self.pose, articulated.origins(self.stretch))
+        segment = np.repeat(_BODY.limb_frames[:, 0], RING * SLICES).astype(np.intp)
+        local = articulated.scales(self.stretch)[segment] * _SURFACE.reshape(-1, 3)
+        points = posed.points(local, segment)
+        return points.reshape(len(points), len(LIMBS), -1, 3)
+
+
+RING, SLICES = 20, 7  # points around a limb, and places along it
+
+
+def _surface(shape: int, row: Floats) -> Floats:
+    """Points (RING * SLICES, 3) on a limb in its segment, statures: LIMI and LIMF of model-format.md."""
+    start, end, (a0, b0, a1, b1) = row[:3], row[3:6], row[6:]
+    axis = (end - start) / np.linalg.norm(end - start)
+    first = np.array([0.0, 1.0, 0.0]) - axis[1] * axis
+    first /= np.linalg.norm(first)
+    third = np.cross(first, axis)
+    turn = 2 * np.pi * np.arange(RING) / RING
+    rings = []
+    for share in 0.5 - 0.5 * np.cos(np.pi * np.arange(SLICES) / (SLICES - 1)):
+        a, b = a0 + share * (a1 - a0), b0 + share * (b1 - b0)
+        if shape == ELLIPSOID:
+            a, b = (r * np.sqrt(max(0.0, 1 - (2 * share - 1) ** 2)) for r in (a0, b0))
+        ring = start + share * (end - start)
+        rings.append(ring + np.outer(a * np.cos(turn), first) + np.outer(b * np.sin(turn), third))
+    return np.concatenate(rings)
+
+
+_SURFACE = np.stack(
+    [_surface(int(s), row) for (_, s), row in zip(_BODY.limb_frames, _BODY.limb_shapes, strict=True)]
+)
