@@ -41,3 +41,22 @@ double m_log64(double x)
         r = r * z + 2.0 / n;
     return k * LN2_HI - ((half - (s * (half + r * z) + k * LN2_LO)) - f);
 }
+
+void m_sincos64(double x, double *s, double *c)
+{
+    double const magic = 6755399441055744.0; /* 1.5 * 2^52 */
+    double const k = (x * 0.63661977236758134308 + magic) - magic;
+    /* pi/2 in three parts of 33 bits: products with a small k are exact */
+    double const r =
+        ((x - k * 1.57079632673412561417) - k * 6.07710050630396597660e-11) - k * 2.02226624879595063154e-21;
+    double const z = r * r;
+    double sn = 1.0, cs = 1.0; /* Taylor series: |r| <= pi/4, so the first terms left out are below 1e-18 */
+    for (int n = 18; n > 1; n -= 2) {
+        sn = 1.0 - sn * z / (n * (n + 1));
+        cs = 1.0 - cs * z / (n * (n - 1));
+    }
+    sn *= r;
+    int32_t const quadrant = fabs(k) < 1e9 ? (int32_t)k & 3 : 0;
+    *s = quadrant == 0 ? sn : quadrant == 1 ? cs : quadrant == 2 ? -sn : -cs;
+    *c = quadrant == 0 ? cs : quadrant == 1 ? -sn : quadrant == 2 ? -cs : sn;
+}

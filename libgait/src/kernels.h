@@ -23,6 +23,14 @@ struct view_planes;
 
 /* Result, name, parameters. */
 #define KERNELS(K)                                                                                           \
+    /* A[i][j] += sign sum_r W[r][i] W[r][j], i in [first, last), from the lane of i on; rows of ld */       \
+    K(void, dense_rank,                                                                                      \
+      (double *A, int32_t ld, int32_t first, int32_t last, const double *W, int32_t rows, double sign))      \
+    /* Z = U^-T Z, the first `width` (a multiple of DENSE_LANES) columns of rows of ldz numbers */           \
+    K(void, dense_forward, (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))  \
+    /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
+    K(void, lift_sum,                                                                                        \
+      (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
     /* A captured frame in the region's working image, and its maps. */                                      \
     K(void, view_sample,                                                                                     \
       (const struct view_map *map, const gait_camera *cam, const gait_image *im, struct view_planes *out))   \

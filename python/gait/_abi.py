@@ -1,6 +1,7 @@
 """The C interface in ctypes: structures, enumerations and one table of functions.
 
-Mirrors the headers of libgait/include; `verify` compares every size and offset with those of the compiled library.
+Mirrors the headers of libgait/include; `verify` compares every size and offset with those of the compiled
+library.
 """
 
 from __future__ import annotations
@@ -8,7 +9,6 @@ from __future__ import annotations
 import ctypes
 from ctypes import (
     POINTER,
-    c_char,
     c_char_p,
     c_double,
     c_float,
@@ -20,141 +20,38 @@ from ctypes import (
     c_uint64,
     c_void_p,
 )
-from enum import IntEnum, IntFlag
 from typing import Any
 
-ABI = 1
-ALIGN = 64
-MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
-
-
-class Status(IntEnum):
-    """Outcome of a call, ``gait_status``."""
-
-    OK = 0
-    ARG = -1
-    STRUCT = -2
-    MEMORY = -3
-    LIMIT = -4
-    MAGIC = -5
-    VERSION = -6
-    CORRUPT = -7
-    STATE = -8
-    NUMERIC = -9
-
-
-class PixelFormat(IntEnum):
-    """Layout of an image, ``GAIT_GREY8`` and so on."""
-
-    GREY8 = 1
-    RGB8 = 2
-    BGR8 = 3
-
-
-class Mode(IntEnum):
-    """Set of defaults: the product's, or the paper's own likelihood and dynamics."""
-
-    DEFAULT = 0
-    PAPER = 1
-
-
-class Term(IntFlag):
-    """Terms of the likelihood."""
-
-    TEXTURE = 1
-    SILHOUETTE = 2
-    EDGES = 4
-    TEMPLATE = 8
-
-
-class TrackStatus(IntEnum):
-    """What an estimate is worth."""
-
-    INIT = 0
-    TRACKING = 1
-    AMBIGUOUS = 2
-    LOST = 3
-
-
-class Flag(IntFlag):
-    """What happened in a step."""
-
-    RESAMPLED = 1
-    NO_IMAGE = 2
-    DEGENERATE = 4
-
-
-class Error(ctypes.Structure):
-    """``gait_error``."""
-
-    _fields_ = [("status", c_int32), ("index", c_int32), ("text", c_char * 120)]
-
-
-class AbiField(ctypes.Structure):
-    """``gait_abi_field``."""
-
-    _fields_ = [("type", c_char_p), ("field", c_char_p), ("offset", c_uint32), ("size", c_uint32)]
-
-
-class ImageView(ctypes.Structure):
-    """``gait_image``."""
-
-    _fields_ = [
-        ("data", c_void_p),
-        ("width", c_int32),
-        ("height", c_int32),
-        ("stride", c_int32),
-        ("format", c_int32),
-    ]
-
-
-class CameraC(ctypes.Structure):
-    """``gait_camera``."""
-
-    _fields_ = [
-        ("width", c_int32),
-        ("height", c_int32),
-        ("fx", c_float),
-        ("fy", c_float),
-        ("cx", c_float),
-        ("cy", c_float),
-        ("R", c_float * 9),
-        ("t", c_float * 3),
-        ("distortion", c_float * 5),
-    ]
-
-
-class StateC(ctypes.Structure):
-    """``gait_state``."""
-
-    _fields_ = [
-        ("phase", c_float),
-        ("stride_hz", c_float),
-        ("stature", c_float),
-        ("heading", c_float),
-        ("pitch", c_float),
-        ("roll", c_float),
-        ("pelvis", c_float * 3),
-        ("coef", c_float * MAX_COMPONENTS),
-        ("offset", c_float * MAX_ANGLES),
-        ("proportion", c_float * MAX_PROPORTIONS),
-    ]
-
-
-class PoseC(ctypes.Structure):
-    """``gait_pose``."""
-
-    _fields_ = [("joint", c_float * 3 * MAX_JOINTS), ("angle", c_float * MAX_ANGLES)]
-
-
-TaskFn = ctypes.CFUNCTYPE(None, c_void_p, c_int32)
-RunFn = ctypes.CFUNCTYPE(None, c_void_p, TaskFn, c_void_p, c_int32)
-
-
-class Tasks(ctypes.Structure):
-    """``gait_tasks``."""
-
-    _fields_ = [("run", RunFn), ("user", c_void_p)]
+from gait import _abi_lift
+from gait._abi_lift import LiftConfigC as LiftConfigC
+from gait._abi_lift import LiftFitC as LiftFitC
+from gait._abi_lift import LiftFrameC as LiftFrameC
+from gait._abi_lift import LiftInfoC as LiftInfoC
+from gait._abi_plain import ABI as ABI
+from gait._abi_plain import ALIGN as ALIGN
+from gait._abi_plain import MAX_ANGLES as MAX_ANGLES
+from gait._abi_plain import MAX_CAMERAS as MAX_CAMERAS
+from gait._abi_plain import MAX_COMPONENTS as MAX_COMPONENTS
+from gait._abi_plain import MAX_JOINTS as MAX_JOINTS
+from gait._abi_plain import MAX_MARKERS as MAX_MARKERS
+from gait._abi_plain import MAX_PROPORTIONS as MAX_PROPORTIONS
+from gait._abi_plain import AbiField as AbiField
+from gait._abi_plain import CameraC as CameraC
+from gait._abi_plain import Error as Error
+from gait._abi_plain import Flag as Flag
+from gait._abi_plain import ImageView as ImageView
+from gait._abi_plain import LiftFlag as LiftFlag
+from gait._abi_plain import Mode as Mode
+from gait._abi_plain import PixelFormat as PixelFormat
+from gait._abi_plain import PoseC as PoseC
+from gait._abi_plain import Projection as Projection
+from gait._abi_plain import RunFn as RunFn
+from gait._abi_plain import StateC as StateC
+from gait._abi_plain import Status as Status
+from gait._abi_plain import TaskFn as TaskFn
+from gait._abi_plain import Tasks as Tasks
+from gait._abi_plain import Term as Term
+from gait._abi_plain import TrackStatus as TrackStatus
 
 
 class ModelInfoC(ctypes.Structure):
@@ -259,6 +156,7 @@ STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_tracker_config": TrackerConfigC,
     "gait_frame": FrameC,
     "gait_estimate": EstimateC,
+    **_abi_lift.STRUCTS,
 }
 
 _STATUS, _HANDLE, _ERR = c_int32, c_void_p, POINTER(Error)
@@ -301,6 +199,7 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_pool_init", [c_void_p, c_size_t, c_int32, POINTER(_HANDLE), _ERR], _STATUS),
     ("gait_pool_tasks", [_HANDLE], Tasks),
     ("gait_pool_stop", [_HANDLE], None),
+    *_abi_lift.FUNCTIONS,
 )
 """Every C function: name, argument types, result type."""
 

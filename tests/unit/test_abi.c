@@ -29,6 +29,10 @@ int main(void)
         {"gait_tracker_config", sizeof(gait_tracker_config)},
         {"gait_frame", sizeof(gait_frame)},
         {"gait_estimate", sizeof(gait_estimate)},
+        {"gait_lift_info", sizeof(gait_lift_info)},
+        {"gait_lift_config", sizeof(gait_lift_config)},
+        {"gait_lift_fit", sizeof(gait_lift_fit)},
+        {"gait_lift_frame", sizeof(gait_lift_frame)},
     };
     uint32_t count = 0;
     const gait_abi_field *const table = gait_abi_fields(&count);

@@ -1,0 +1,104 @@
+#include "eye.h"
+
+#include "fmath.h"
+
+#define NEAREST 0.1 /* metres before the lens: nothing is taken to be nearer */
+
+void eye_open(eye *e, const gait_lift_config *cfg)
+{
+    const gait_camera *const c = &cfg->camera;
+    *e = (eye){.perspective = cfg->projection == GAIT_LIFT_PERSPECTIVE};
+    for (int32_t i = 0; i < 6; i++)
+        e->axis[i / 3][i % 3] = cfg->axis[i / 3][i % 3];
+    for (int32_t i = 0; i < 9; i++)
+        e->R[i] = (double)c->R[i];
+    for (int32_t i = 0; i < 3; i++)
+        e->t[i] = (double)c->t[i];
+    for (int32_t i = 0; i < 5; i++)
+        e->lens[i] = (double)c->distortion[i];
+    e->focal[0] = (double)c->fx;
+    e->focal[1] = (double)c->fy;
+    e->centre[0] = (double)c->cx;
+    e->centre[1] = (double)c->cy;
+}
+
+/* Fixed point of ideal = (distorted - tangential) / radial; a lens within its picture contracts it. */
+void eye_ideal(const eye *e, const double uv[2], double ideal[2])
+{
+    enum { PASSES = 40 };
+    const double *const d = e->lens;
+    double const xd = (uv[0] - e->centre[0]) / e->focal[0], yd = (uv[1] - e->centre[1]) / e->focal[1];
+    double x = xd, y = yd;
+    bool const lens =
+        e->perspective && (d[0] != 0.0 || d[1] != 0.0 || d[2] != 0.0 || d[3] != 0.0 || d[4] != 0.0);
+    for (int32_t i = 0; lens && i < PASSES; i++) {
+        double const r2 = x * x + y * y, xy2 = 2.0 * x * y;
+        double const radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+        x = (xd - d[2] * xy2 - d[3] * (r2 + 2.0 * x * x)) / radial;
+        y = (yd - d[2] * (r2 + 2.0 * y * y) - d[3] * xy2) / radial;
+    }
+    ideal[0] = lens ? e->focal[0] * x + e->centre[0] : uv[0];
+    ideal[1] = lens ? e->focal[1] * y + e->centre[1] : uv[1];
+}
+
+static double dot3(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void eye_rows_near(const eye *e, const double ideal[2], const double about[3], eye_rows *out)
+{
+    double const depth = dot3(e->R + 6, about) + e->t[2], z = depth > NEAREST ? depth : NEAREST;
+    for (int32_t a = 0; a < 2; a++) {
+        const double *const R = e->R + 3 * a;
+        double const x = (dot3(R, about) + e->t[a]) / z;
+        for (int32_t i = 0; i < 3; i++)
+            out->g[a][i] = e->perspective ? (R[i] - x * e->R[6 + i]) * (e->focal[a] / z) : e->axis[a][i];
+        double const miss = ideal[a] - (x * e->focal[a] + e->centre[a]);
+        out->y[a] = e->perspective ? miss + dot3(out->g[a], about) : ideal[a];
+    }
+}
+
+void eye_rows_ray(const eye *e, const double ideal[2], double depth, eye_rows *out)
+{
+    for (int32_t a = 0; a < 2; a++) {
+        double const x = (ideal[a] - e->centre[a]) / e->focal[a], scale = e->focal[a] / depth;
+        for (int32_t i = 0; i < 3; i++)
+            out->g[a][i] = e->perspective ? (e->R[3 * a + i] - x * e->R[6 + i]) * scale : e->axis[a][i];
+        out->y[a] = e->perspective ? (x * e->t[2] - e->t[a]) * scale : ideal[a];
+    }
+}
+
+/* Lower triangle of the noise's Cholesky factor. */
+static void noise_root(const eye_rows *r, double sd, double residual, double *l11, double *l21, double *l22)
+{
+    double const variance = sd * sd;
+    *l11 = sqrt(variance + residual * dot3(r->g[0], r->g[0]));
+    *l21 = residual * dot3(r->g[0], r->g[1]) / *l11;
+    double const rest = variance + residual * dot3(r->g[1], r->g[1]) - *l21 * *l21;
+    *l22 = sqrt(rest > DBL_MIN ? rest : DBL_MIN);
+}
+
+double eye_whiten(eye_rows *r, double sd, double residual)
+{
+    double l11, l21, l22;
+    noise_root(r, sd, residual, &l11, &l21, &l22);
+    for (int32_t i = 0; i < 3; i++) {
+        r->g[0][i] /= l11;
+        r->g[1][i] = (r->g[1][i] - l21 * r->g[0][i]) / l22;
+    }
+    r->y[0] /= l11;
+    r->y[1] = (r->y[1] - l21 * r->y[0]) / l22;
+    return 2.0 * m_log64(l11 * l22);
+}
+
+void eye_gain(const eye_rows *r, double sd, double residual, double K[3][2])
+{
+    double l11, l21, l22;
+    noise_root(r, sd, residual, &l11, &l21, &l22);
+    for (int32_t i = 0; i < 3; i++) {
+        double const w0 = r->g[0][i] / l11, w1 = (r->g[1][i] - l21 * w0) / l22;
+        K[i][1] = residual * w1 / l22;
+        K[i][0] = residual * (w0 - l21 * (w1 / l22)) / l11;
+    }
+}

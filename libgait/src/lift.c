@@ -1,0 +1,139 @@
+#include "lift.h"
+
+#include "fmath.h"
+
+#include <string.h>
+
+void lift_clear(const lift_table *t, lift_belief *b)
+{
+    memset(b->A, 0, (size_t)(t->n + 1) * (size_t)t->ld * sizeof *b->A);
+    for (int32_t i = 0; i < t->n; i++)
+        b->A[i * (t->ld + 1)] = 1.0;
+    b->observed = 0;
+    b->log_noise = b->miss = 0.0;
+}
+
+/* Mean of marker j, statures, and in t->shape its modes. */
+static void marker_shape(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
+                         double mean[3])
+{
+    const segment_prior *const p = &t->prior;
+    const float *const m0 = segment_mean(p, b->component, m->f) + 3 * j;
+    const float *const m1 = segment_mean(p, b->component, m->next) + 3 * j;
+    size_t const J = (size_t)p->markers, first = (size_t)b->component * (size_t)p->frames;
+    const float *const s0 = t->row + ((first + (size_t)m->f) * J + (size_t)j) * 3 * (size_t)t->lanes;
+    const float *const s1 = t->row + ((first + (size_t)m->next) * J + (size_t)j) * 3 * (size_t)t->lanes;
+    double const w1 = m->part, w0 = 1.0 - w1;
+    for (int32_t i = 0; i < 3; i++)
+        mean[i] = w0 * (double)m0[i] + w1 * (double)m1[i];
+    for (int32_t i = 0; i < 3 * t->lanes; i++)
+        t->shape[i] = w0 * (double)s0[i] + w1 * (double)s1[i];
+}
+
+/* Sum over modes of a row and theta, in eight chains. */
+static double along_modes(const lift_table *t, const double *row, const double *theta)
+{
+    double s[DENSE_LANES] = {0.0};
+    int32_t const whole = t->prior.modes / DENSE_LANES * DENSE_LANES;
+    for (int32_t i = 0; i < whole; i += DENSE_LANES)
+        for (int32_t k = 0; k < DENSE_LANES; k++)
+            s[k] += row[i + k] * theta[i + k];
+    for (int32_t i = whole; i < t->prior.modes; i++)
+        s[i - whole] += row[i] * theta[i];
+    return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
+}
+
+/* The white row g . X = y of a marker as a row of the unknowns, with y last. */
+static void put_row(const lift_table *t, const lift_belief *b, const lift_axes *f, const double mean[3],
+                    const double spin[2], const double g[3], double y, double *w)
+{
+    int32_t const k = t->prior.modes, lanes = t->lanes;
+    const double q[3] = {f->c * g[0] + f->s * g[1], f->c * g[1] - f->s * g[0], f->z * g[2]};
+    double base[3];
+    lift_to_world(f, mean, base);
+    for (int32_t i = 0; i < lanes; i++) /* the lanes past k are written again below */
+        w[i] = (q[0] * t->shape[i] + q[1] * t->shape[lanes + i]) + q[2] * t->shape[2 * lanes + i];
+    for (int32_t i = 0; i < 3; i++)
+        w[k + i] = g[i] * t->cfg.place_sd[i];
+    double rest = y - ((g[0] * base[0] + g[1] * base[1]) + g[2] * base[2]);
+    if (t->turn >= 0) {
+        double const turn = g[0] * spin[0] + g[1] * spin[1];
+        w[t->turn] = b->turn_sd * turn;
+        rest -= turn * (b->centre - b->heading);
+    }
+    w[t->n] = rest;
+}
+
+typedef struct adding { /* what is the same for all markers of a frame */
+    lift_axes prior, now;
+    double depth;
+} adding;
+
+/* Two white rows of marker j. */
+static void add_marker(const lift_table *t, lift_belief *b, const adding *a, const double *ideal, double sd,
+                       int32_t j, const double mean[3], const double *about, double *w)
+{
+    eye_rows r;
+    double spin[2] = {-(about[1] - a->now.place[1]), about[0] - a->now.place[0]};
+    if (a->depth > 0.0) {
+        eye_rows_ray(&t->eye, ideal, a->depth, &r);
+        spin[0] = spin[1] = 0.0; /* what is turned is not known yet */
+    } else {
+        eye_rows_near(&t->eye, ideal, about, &r);
+    }
+    b->log_noise += eye_whiten(&r, sd, lift_residual(t, b, j));
+    for (int32_t i = 0; i < 2; i++) {
+        double const miss = r.y[i] - ((r.g[i][0] * about[0] + r.g[i][1] * about[1]) + r.g[i][2] * about[2]);
+        b->miss += miss * miss;
+        put_row(t, b, &a->prior, mean, spin, r.g[i], r.y[i], w + (size_t)i * (size_t)t->ld);
+    }
+}
+
+int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
+                  double depth, double *said)
+{
+    lift_moment const m = lift_find_moment(t, at);
+    adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
+    int32_t rows = 0;
+    for (int32_t j = 0; j < t->prior.markers; j++) {
+        double mean[3], x[3], own[3];
+        if (!lift_seen_at(seen, j))
+            continue;
+        marker_shape(t, b, &m, j, mean);
+        for (int32_t i = 0; i < 3; i++)
+            x[i] = mean[i] + along_modes(t, t->shape + i * t->lanes, b->theta);
+        lift_to_world(&a.now, x, own);
+        if (said)
+            memcpy(said + 3 * j, own, sizeof own);
+        add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, mean, guess ? guess + 3 * j : own,
+                   t->W + (size_t)rows * (size_t)t->ld);
+        rows += 2;
+    }
+    b->observed += rows;
+    return rows;
+}
+
+void lift_add(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
+              double depth, double *said)
+{
+    int32_t const rows = lift_rows(t, b, at, seen, guess, depth, said);
+    t->run->dense_rank(b->A, t->ld, 0, t->n + 1, t->W, rows, 1.0);
+}
+
+bool lift_solve(const lift_table *t, lift_belief *b)
+{
+    memcpy(b->U, b->A, (size_t)(t->n + 1) * (size_t)t->ld * sizeof *b->U);
+    if (!dense_factor(t->run, b->U, t->n, t->ld))
+        return false;
+    dense_solve(b->U, t->n, t->ld, b->theta);
+    bool ok = true;
+    for (int32_t i = 0; i < t->n; i++)
+        ok &= fabs(b->theta[i]) <= DBL_MAX;
+    return ok;
+}
+
+double lift_evidence(const lift_table *t, const lift_belief *b)
+{
+    double const log_two_pi = 1.83787706640934548356, left = b->U[t->n * (t->ld + 1)];
+    return -0.5 * (log_two_pi * b->observed + b->log_noise + left) - dense_log_det(b->U, t->n, t->ld);
+}

@@ -1,0 +1,22 @@
+/* lift.h - normal equations of one segment and their solution.
+ *
+ * Leventon and Freeman (1998), eqs. 5 and 6 in information form: (I + G'R^-1 G) theta = G'R^-1 (y - P m). */
+#ifndef GAIT_LIFT_H
+#define GAIT_LIFT_H
+#include "lift_table.h"
+
+/* Normal equations of the prior alone. */
+void lift_clear(const lift_table *t, lift_belief *b);
+/* White rows t->W of a frame at moment `at`, in frames [0, F - 1]; returns how many. They are linearised
+ * about guess (J x 3, what is unseen is not read); NULL: about what theta says; depth > 0: about nothing
+ * but a rough depth. said (J x 3, may be NULL) receives where theta puts those seen. */
+int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
+                  double depth, double *said);
+/* The same, added to the equations. */
+void lift_add(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
+              double depth, double *said);
+/* Solve for theta; false: not positive definite (numbers out of range). */
+bool lift_solve(const lift_table *t, lift_belief *b);
+/* log p(observations), nats. */
+double lift_evidence(const lift_table *t, const lift_belief *b);
+#endif

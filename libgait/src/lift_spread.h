@@ -1,0 +1,16 @@
+/* lift_spread.h - what the observations alone say, and what they leave open. */
+#ifndef GAIT_LIFT_SPREAD_H
+#define GAIT_LIFT_SPREAD_H
+#include "lift_fit.h"
+
+/* theta of minimum norm over unit displacements that fits best whatever the prior says, in spare->theta;
+ * the heading is b's. spare->A and U are lost. */
+void lift_likelihood_only(const lift_table *t, const lift_window *w, const lift_belief *b,
+                          lift_belief *spare);
+/* The `count` most uncertain displacements, one deviation long (count x F x J x 3, metres; entry of largest
+ * magnitude positive), and their deviations over all markers and frames. spare is lost. */
+void lift_uncertain(const lift_table *t, const lift_belief *b, lift_belief *spare, int32_t count,
+                    double *mode, double *sd);
+/* Q, n x n. */
+void lift_covariance(const lift_table *t, const lift_belief *b, lift_belief *spare, double *Q);
+#endif

@@ -1,0 +1,247 @@
+#include "lift_stream.h"
+
+#include "fmath.h"
+#include "lift_continue.h"
+#include "lift_read.h"
+
+#include <string.h>
+
+#define SLOWEST 10.0 /* frames per second down to which `lag` frames are kept */
+
+static int32_t round_up(double x)
+{
+    return (int32_t)x + ((double)(int32_t)x < x);
+}
+
+void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s)
+{
+    const segment_prior *const p = &t->prior;
+    size_t const J = (size_t)p->markers, K = (size_t)p->components;
+    s->span = (double)(p->frames - 1) / (double)p->fps;
+    s->step = (double)p->hop / (double)p->fps;
+    s->past.room = i_max(round_up(s->span * t->cfg.max_rate) + 2, t->cfg.lag + 1);
+    s->parts = round_up((double)p->frames / (double)p->hop) + round_up(t->cfg.lag / SLOWEST / s->step) + 1;
+    size_t const room = (size_t)s->past.room;
+    s->past.utime = TAKE(a, int64_t, room);
+    s->past.uv = TAKE(a, double, room * J * 2);
+    s->past.sd = TAKE(a, double, room *J);
+    s->at = TAKE(a, double, room);
+    s->uv = TAKE(a, double, room * J * 2);
+    s->sd = TAKE(a, double, room *J);
+    s->guess = TAKE(a, double, J * 3);
+    s->mean = TAKE(a, double, J * 3);
+    s->var = TAKE(a, double, J * 3);
+    s->new_uv = TAKE(a, double, J * 2);
+    s->new_sd = TAKE(a, double, J);
+    s->part = TAKE(a, lift_part, (size_t)s->parts);
+    for (int32_t i = 0; i < s->parts; i++) {
+        lift_belief *const belief = TAKE(a, lift_belief, K);
+        if (s->part)
+            s->part[i].belief = belief;
+        for (size_t c = 0; c < K; c++) {
+            lift_belief placed;
+            lift_belief_layout(a, t, &placed);
+            if (belief)
+                belief[c] = placed;
+        }
+    }
+}
+
+void lift_stream_reset(lift_stream *s)
+{
+    s->pushed = 0;
+    s->origin = s->last = -1;
+    s->next = 0;
+    s->misfit = false;
+}
+
+/* First frame that is still there. */
+static uint64_t oldest(const lift_stream *s)
+{
+    uint64_t const room = (uint64_t)s->past.room;
+    return s->pushed > room ? s->pushed - room : 0;
+}
+
+static void keep_frame(const lift_table *t, lift_stream *s, int64_t utime, const lift_seen *seen)
+{
+    size_t const i = (size_t)(s->pushed % (uint64_t)s->past.room), J = (size_t)t->prior.markers;
+    s->past.utime[i] = s->last = utime;
+    memcpy(s->past.uv + i * J * 2, seen->uv, J * 2 * sizeof(double));
+    memcpy(s->past.sd + i * J, seen->sd, J * sizeof(double));
+    s->pushed++;
+}
+
+/* Fit segment `index` to the frames that fall into it, whatever was thought of it before. */
+static bool fit_part(const lift_table *t, lift_search *search, lift_stream *s, int64_t index)
+{
+    size_t const J = (size_t)t->prior.markers;
+    lift_window w = {.at = s->at, .uv = s->uv, .sd = s->sd};
+    lift_part *const part = lift_stream_part(s, index);
+    lift_outcome outcome;
+    for (uint64_t f = oldest(s); f < s->pushed; f++) {
+        lift_seen const seen = lift_stream_frame(t, s, f);
+        if (!lift_stream_covers(s, index, lift_stream_time(s, f)))
+            continue;
+        s->at[w.frames] = lift_stream_moment(t, s, index, lift_stream_time(s, f));
+        memcpy(s->uv + (size_t)w.frames * J * 2, seen.uv, J * 2 * sizeof(double));
+        memcpy(s->sd + (size_t)w.frames * J, seen.sd, J * sizeof(double));
+        w.frames++;
+    }
+    lift_belief *const b = &part->belief[0];
+    memcpy(b->place, t->cfg.place, sizeof b->place);
+    if (!lift_fit(t, search, &w, b, &outcome))
+        return false;
+    int32_t const c = b->component;
+    if (c != 0) { /* every component has a belief of its own */
+        lift_belief const found = *b;
+        part->belief[0] = part->belief[c];
+        part->belief[c] = found;
+    }
+    part->index = index;
+    part->best = c;
+    part->closed = true; /* the other components are not followed in this segment */
+    return true;
+}
+
+/* Add a frame to every component of a segment.  Its first frames are linearised about the guess. */
+static void add_frame(const lift_table *t, const lift_stream *s, lift_part *part, uint64_t frame,
+                      const double *guess, double *said)
+{
+    lift_seen const seen = lift_stream_frame(t, s, frame);
+    for (int32_t c = 0; c < t->prior.components; c++)
+        lift_add(t, &part->belief[c], lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)),
+                 &seen, guess, 0.0, c == part->best ? said : NULL);
+}
+
+static bool solve_part(const lift_table *t, lift_part *part)
+{
+    double best = -DBL_MAX;
+    bool ok = true;
+    for (int32_t c = 0; c < t->prior.components; c++) {
+        lift_belief *const b = &part->belief[c];
+        ok &= lift_solve(t, b);
+        if (t->prior.components == 1 || !ok)
+            continue;
+        double const evidence = lift_evidence(t, b) + m_log64((double)t->prior.weight[c]);
+        if (evidence > best) {
+            best = evidence;
+            part->best = c;
+        }
+    }
+    return ok;
+}
+
+/* Begin segment `index` where the one before it will be, and add the frames that fall into it. */
+static bool open_part(const lift_table *t, lift_stream *s, int64_t index)
+{
+    const lift_part *const before = lift_stream_part(s, index - 1);
+    lift_part *const part = lift_stream_part(s, index);
+    *part = (lift_part){.index = index, .best = before->best, .belief = part->belief};
+    for (int32_t c = 0; c < t->prior.components; c++)
+        lift_continue(t, &before->belief[before->best], c, &part->belief[c], s->guess, s->mean);
+    lift_query q = {.count = t->prior.markers};
+    int32_t all[GAIT_MAX_MARKERS];
+    for (int32_t j = 0; j < t->prior.markers; j++)
+        all[j] = j;
+    q.marker = all;
+    for (uint64_t f = oldest(s); f < s->pushed; f++) {
+        double const time = lift_stream_time(s, f);
+        if (!lift_stream_covers(s, index, time))
+            continue;
+        q.at = lift_stream_moment(t, s, index - 1, time);
+        lift_read(t, &before->belief[before->best], &q, s->guess, NULL);
+        add_frame(t, s, part, f, s->guess, NULL);
+    }
+    return solve_part(t, part);
+}
+
+/* Begin all segments whose time has come. */
+static bool open_parts(const lift_table *t, lift_stream *s)
+{
+    double const now = lift_stream_time(s, s->pushed - 1);
+    bool ok = true;
+    while (ok && (double)s->next * s->step <= now + 1e-9)
+        ok = open_part(t, s, s->next++);
+    return ok;
+}
+
+/* A segment is over. Nobody seen in it: start anew with the next who is. It does not fit: search for it,
+ * and begin those after it again. */
+static bool close_part(const lift_table *t, lift_search *search, lift_stream *s, lift_part *part)
+{
+    part->closed = true;
+    const lift_belief *const b = &part->belief[part->best];
+    if (b->observed == 0) {
+        lift_stream_reset(s);
+        return true;
+    }
+    s->misfit =
+        t->cfg.misfit > 0.0 && t->cfg.heading_sd < 0.0 && lift_misfit(t, b) > t->cfg.misfit * b->observed;
+    if (!s->misfit)
+        return true;
+    bool ok = fit_part(t, search, s, part->index);
+    int64_t const opened = s->next;
+    for (s->next = part->index + 1; ok && s->next < opened; s->next++)
+        ok = open_part(t, s, s->next);
+    return ok;
+}
+
+/* Add the newest frame to the segments it falls into, the oldest first: it says where the next is to be
+ * linearised. */
+static bool follow(const lift_table *t, lift_search *search, lift_stream *s)
+{
+    uint64_t const frame = s->pushed - 1;
+    double const now = lift_stream_time(s, frame);
+    bool ok = true, first = true;
+    for (int64_t i = s->next > s->parts ? s->next - s->parts : 0; ok && i < s->next; i++) {
+        lift_part *const part = lift_stream_part(s, i);
+        if (part->closed)
+            continue;
+        if (!lift_stream_covers(s, i, now)) {
+            ok = close_part(t, search, s, part);
+            if (s->origin < 0 || s->misfit)
+                return ok; /* begun anew: the frame has been added, or there is nobody */
+            continue;
+        }
+        add_frame(t, s, part, frame, first ? NULL : s->guess, first ? s->guess : NULL);
+        ok = ok && solve_part(t, part);
+        first = false;
+    }
+    return ok;
+}
+
+static bool anybody(const lift_table *t, const lift_seen *seen)
+{
+    bool any = false;
+    for (int32_t j = 0; j < t->prior.markers; j++)
+        any |= lift_seen_at(seen, j);
+    return any;
+}
+
+bool lift_stream_push(const lift_table *t, lift_search *search, lift_stream *s, int64_t utime,
+                      const lift_seen *seen)
+{
+    if (s->last >= 0 && (double)(utime - s->last) > 1e6 * t->cfg.max_gap)
+        lift_stream_reset(s);
+    if (s->origin < 0) {
+        s->pushed = 0;
+        s->last = utime;
+        if (!anybody(t, seen))
+            return true;
+        s->origin = utime;
+    }
+    keep_frame(t, s, utime, seen);
+    bool ok = true;
+    if (s->next == 0) {
+        if (lift_stream_time(s, s->pushed - 1) < s->span - 1e-9)
+            return true;
+        ok = fit_part(t, search, s, 0);
+        s->next = 1;
+    } else {
+        ok = follow(t, search, s);
+    }
+    ok = ok && (s->origin < 0 || open_parts(t, s));
+    if (!ok)
+        lift_stream_reset(s);
+    return ok;
+}

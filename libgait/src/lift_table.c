@@ -1,0 +1,79 @@
+#include "lift_table.h"
+
+#include "fmath.h"
+
+#include <string.h>
+
+void lift_table_layout(arena *a, lift_table *t)
+{
+    const segment_prior *const p = &t->prior;
+    size_t const points = (size_t)p->components * (size_t)p->frames * (size_t)p->markers;
+    t->turn = t->cfg.heading_sd == 0.0 ? -1 : p->modes + 3;
+    t->n = p->modes + 3 + (t->turn >= 0);
+    t->ld = dense_padded(t->n + 1);
+    t->lanes = dense_padded(p->modes);
+    t->width = dense_padded(3 * p->markers);
+    t->row = TAKE(a, float, points * 3 * (size_t)t->lanes);
+    t->W = TAKE(a, double, 2 * (size_t)p->markers * (size_t)t->ld);
+    t->shape = TAKE(a, double, 3 * (size_t)t->lanes);
+    t->Z = TAKE(a, double, (size_t)t->n *(size_t)t->width);
+}
+
+void lift_table_fill(lift_table *t)
+{
+    const segment_prior *const p = &t->prior;
+    int32_t const J3 = 3 * p->markers;
+    t->stature = t->cfg.stature > 0.0 ? t->cfg.stature : (double)p->stature;
+    t->gamma = t->cfg.residual < 0.0 ? (double)p->gamma : t->cfg.residual;
+    memset(t->W, 0, 2 * (size_t)p->markers * (size_t)t->ld * sizeof *t->W);
+    memset(t->Z, 0, (size_t)t->n * (size_t)t->width * sizeof *t->Z);
+    float *to = t->row;
+    for (int32_t c = 0; c < p->components; c++)
+        for (int32_t f = 0; f < p->frames; f++)
+            for (int32_t x = 0; x < J3; x++, to += t->lanes)
+                for (int32_t i = 0; i < t->lanes; i++)
+                    to[i] = i < p->modes ? segment_mode(p, c, i, f)[x] : 0.0f;
+}
+
+void lift_belief_layout(arena *a, const lift_table *t, lift_belief *b)
+{
+    size_t const square = (size_t)(t->n + 1) * (size_t)t->ld;
+    b->theta = TAKE(a, double, (size_t)t->n);
+    b->A = TAKE(a, double, square);
+    b->U = TAKE(a, double, square);
+}
+
+double lift_heading(const lift_table *t, const lift_belief *b)
+{
+    return t->turn < 0 ? b->heading : b->centre + b->turn_sd * b->theta[t->turn];
+}
+
+lift_moment lift_find_moment(const lift_table *t, double at)
+{
+    int32_t const last = t->prior.frames - 1;
+    double const x = at > 0.0 ? (at < last ? at : last) : 0.0;
+    int32_t const f = (int32_t)x;
+    return (lift_moment){.f = f, .next = i_min(f + 1, last), .part = x - f};
+}
+
+static lift_axes axes_at(const lift_table *t, double heading, const double place[3])
+{
+    lift_axes f = {.z = t->stature, .place = {place[0], place[1], place[2]}};
+    m_sincos64(heading, &f.s, &f.c);
+    f.s *= t->stature;
+    f.c *= t->stature;
+    return f;
+}
+
+lift_axes lift_axes_prior(const lift_table *t, const lift_belief *b)
+{
+    return axes_at(t, b->heading, b->place);
+}
+
+lift_axes lift_axes_now(const lift_table *t, const lift_belief *b)
+{
+    double place[3];
+    for (int32_t i = 0; i < 3; i++)
+        place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
+    return axes_at(t, lift_heading(t, b), place);
+}
