@@ -6,6 +6,7 @@ features features_layout(arena *a)
     features f = {0};
     f.edge = TAKE(a, edge_cell, VIEW_PIXELS);
     f.surface = TAKE(a, int8_t, VIEW_PIXELS);
+    f.quads = TAKE(a, uint32_t, VIEW_PIXELS);
     f.fg = (uint64_t (*)[RAST_SIZE][RAST_WORDS])arena_take(a, sizeof *f.fg, FG_PLANES);
     f.inside = (uint64_t (*)[RAST_WORDS])arena_take(a, sizeof *f.inside, RAST_SIZE);
     return f;
@@ -30,6 +31,15 @@ static void refresh_inside(const kernels *run, features *f, const gait_camera *c
     f->inside_map = *now;
 }
 
+/* Neighbours for bilinear look-up in one word.  Those of the last row are missing; nobody looks there. */
+static void pack_quads(const int8_t *surface, uint32_t *quads)
+{
+    const uint8_t *const p = (const uint8_t *)surface;
+    for (int32_t i = 0; i < VIEW_PIXELS - VIEW_SIZE - 1; i++)
+        quads[i] = p[i] | (uint32_t)p[i + 1] << 8 | (uint32_t)p[i + VIEW_SIZE] << 16 |
+                   (uint32_t)p[i + VIEW_SIZE + 1] << 24;
+}
+
 void features_compute(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
                       const view_planes *plate, bool raw, features_scratch *s)
 {
@@ -51,4 +61,5 @@ void features_compute(const kernels *run, features *f, const gait_camera *cam, c
             f->surface[i] = (int8_t)i_max(s->grey[i] - 128, -127);
     else
         run->features_contrast(s->grey, f->surface);
+    pack_quads(f->surface, f->quads);
 }

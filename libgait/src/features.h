@@ -19,11 +19,13 @@ typedef struct edge_cell { /* smoothed, contrast-normalised edge tensor: n'Tn is
 
 typedef struct features {
     view_map map;
-    bool seen;        /* this frame had an image */
-    bool has_fg;      /* and a background plate */
-    edge_cell *edge;  /* VIEW_PIXELS */
-    int8_t *surface;  /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
-    int32_t fg_total; /* sum of foreground over the grid, FG_ONE = 1 */
+    bool seen;       /* this frame had an image */
+    bool has_fg;     /* and a background plate */
+    edge_cell *edge; /* VIEW_PIXELS */
+    int8_t *surface; /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
+    uint32_t
+        *quads; /* VIEW_PIXELS: each with its right, lower and lower right neighbours in the bytes above it */
+    int32_t fg_total;                      /* sum of foreground over the grid, FG_ONE = 1 */
     uint64_t (*fg)[RAST_SIZE][RAST_WORDS]; /* FG_PLANES bit planes of the foreground probability */
     uint64_t (*inside)[RAST_WORDS];        /* cells that the camera sees, */
     view_map inside_map;                   /* found for this place of the region */

@@ -15,6 +15,10 @@ struct features;
 struct kin_body;
 struct layers;
 struct layers_block;
+struct like_body;
+struct like_patch;
+struct like_pose;
+struct like_setup;
 struct limb_geometry;
 struct outline_block;
 struct rast_mask;
@@ -50,7 +54,16 @@ struct view_planes;
        struct layers_block *out))                                                                            \
     K(void, layers_draw, (const struct layers_block *block, int32_t lane, struct layers *out))               \
     K(void, silhouette_count,                                                                                \
-      (const struct features *f, const struct rast_mask *whole, int32_t *area, int32_t *covered))
+      (const struct features *f, const struct rast_mask *whole, int32_t *area, int32_t *covered))            \
+    /* The limbs of a block before a camera, what one body's surface shows, and how that compares. */        \
+    K(void, surface_pose,                                                                                    \
+      (const struct like_setup *s, const gait_camera *cam, const struct kin_body *body,                      \
+       struct like_pose *out))                                                                               \
+    K(void, surface_sample,                                                                                  \
+      (const struct like_setup *s, const struct features *f, const gait_camera *cam,                         \
+       const struct like_pose *pose, int32_t lane, const struct layers *drawn, struct like_patch *seen))     \
+    K(void, texture_logs, (const struct like_body *b, float *log))                                           \
+    K(int64_t, template_cost, (const struct like_body *b))
 
 /* Those of this build, best last, with the bit that a CPU mask must have. */
 #if defined(__x86_64__)

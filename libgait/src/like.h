@@ -13,15 +13,41 @@ enum {
     LIKE_ROWS = 4,
     LIKE_AZIMUTHS = 8,
     LIKE_SAMPLES = LIKE_ROWS * LIKE_AZIMUTHS, /* surface points of a limb */
+    LIKE_DIRECTIONS =
+        2 * LIKE_AZIMUTHS,          /* rings are staggered by half a step: two points face each of these */
+    LIKE_FACING = LIKE_SAMPLES / 2, /* points of the half turned to the camera */
+    LIKE_RING = LIKE_SAMPLES + LIKE_FACING, /* once around and on, so that every half is in one piece */
+    LIKE_FEW = 8, /* points seen in both frames below which a limb counts as occluded (R19, R20) */
     LIKE_TERMS = 4,
-    LIKE_COSTS = 256,   /* entries of the robust cost table */
-    LIKE_COST_ONE = 256 /* 1 nat in that table */
+    LIKE_COSTS = 256,        /* entries of a cost table */
+    LIKE_COST_ONE = 256,     /* 1 nat in the robust one */
+    LIKE_COUNT_ONE = 1 << 24 /* in every entry: a sum of costs counts the points as well */
 };
 
-typedef struct like_surface { /* fixed points on one limb (spec 1.6.2), statures; same for every particle */
-    float point[3][LIKE_SAMPLES];
-    float normal[3][LIKE_SAMPLES];
+#define LIKE_PAPER_OCCLUDED (-6.3200f) /* log 0.0018 per grey level (R18) */
+
+/* Fixed points on one limb (spec 1.6.2), statures; same for every particle.  Points 2 d and 2 d + 1 face
+ * direction d; direction d + LIKE_AZIMUTHS is the opposite one. */
+typedef struct like_surface {
+    float point[3][LIKE_RING];
+    float normal[3][LIKE_RING];
+    float middle[3];              /* of the limb's axis */
+    float side[3][LIKE_AZIMUTHS]; /* the first half of the directions */
 } like_surface;
+
+/* Limbs of BLOCK bodies before one camera. */
+typedef struct like_pose {
+    float R[MODEL_MAX_LIMBS][9][BLOCK]; /* limb's frame to camera */
+    float t[MODEL_MAX_LIMBS][3][BLOCK]; /* its origin in the camera, metres */
+    float scale[MODEL_MAX_LIMBS][BLOCK];
+    int32_t turn[MODEL_MAX_LIMBS][BLOCK]; /* first of the LIKE_AZIMUTHS directions that can face the camera */
+} like_pose;
+
+/* What the half of a limb that is turned to the camera looks like. */
+typedef struct like_patch {
+    uint8_t turn;              /* its first direction; modulo LIKE_DIRECTIONS */
+    int8_t value[LIKE_FACING]; /* or TEXTURE_HIDDEN; as the surface points from 2 turn on */
+} like_patch;
 
 typedef struct like_setup { /* constant while a tracker lives */
     const kernels *run;
@@ -32,7 +58,8 @@ typedef struct like_setup { /* constant while a tracker lives */
     float missed_weight;
     limb_geometry geometry[MODEL_MAX_LIMBS];
     like_surface surface[MODEL_MAX_LIMBS];
-    int16_t cost[LIKE_COSTS]; /* robust cost of a surface difference, LIKE_COST_ONE = 1 nat */
+    int32_t robust[LIKE_COSTS]; /* Student-t cost of a surface difference, LIKE_COST_ONE = 1 nat */
+    int32_t square[LIKE_COSTS]; /* the difference squared */
 } like_setup;
 
 typedef struct like_body { /* one body in one camera, as the terms see it */
@@ -41,10 +68,16 @@ typedef struct like_body { /* one body in one camera, as the terms see it */
     const outline_block *outline;
     int32_t lane;
     const layers *layers;
-    const int8_t *seen;      /* limbs x LIKE_SAMPLES: its surface in this frame, or TEXTURE_HIDDEN */
-    const int8_t *ancestor;  /* the same of its ancestor in the previous frame, or NULL */
-    const int16_t *template; /* running appearance (like_template.h), or NULL */
+    const like_patch *seen;     /* by limb: its surface in this frame */
+    const like_patch *ancestor; /* the same of its ancestor in the previous frame, or NULL */
+    const int8_t *known;        /* limbs x LIKE_RING: running appearance (like_template.h), or NULL */
 } like_body;
+
+typedef struct like_edge_tally {
+    int32_t response; /* sum of n'Tn over the visible points, 128 x EDGE_ONE at most each */
+    int32_t chance;   /* the same for a normal of random direction: half the trace */
+    int32_t points;
+} like_edge_tally;
 
 typedef struct like_term {
     const char *name;
@@ -57,9 +90,12 @@ extern const like_term like_texture, like_silhouette, like_edges, like_template;
 
 void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg);
 
-/* Look up the surface of every limb in the frame: limbs x LIKE_SAMPLES. */
-void like_sample(const like_setup *s, const features *f, const gait_camera *cam, const kin_body *body,
-                 int32_t lane, const layers *drawn, int8_t *seen);
+/* Look up the surface of every limb of one lane in the frame. */
+static inline void like_sample(const like_setup *s, const features *f, const gait_camera *cam,
+                               const like_pose *pose, int32_t lane, const layers *drawn, like_patch *seen)
+{
+    s->run->surface_sample(s, f, cam, pose, lane, drawn, seen);
+}
 
 /* Sum of the weighted terms in use. */
 float like_evaluate(const like_body *b);
@@ -71,6 +107,4 @@ float like_one(const like_body *b, const like_term *term);
  * body. */
 float like_support(const like_body *b);
 
-/* Mean robust cost between two sets of surface samples of a limb; returns how many were seen in both. */
-int32_t like_compare(const like_setup *s, const int8_t *a, const int8_t *b, int32_t *cost);
 #endif

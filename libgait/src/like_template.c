@@ -6,34 +6,42 @@ void template_clear(int16_t *template, int32_t limbs)
         template[i] = TEMPLATE_EMPTY;
 }
 
-void template_update(int16_t *template, int32_t limbs, const int8_t *seen)
+static int16_t approach(int16_t known, int32_t seen)
 {
-    int32_t const slow = 10; /* frames (prototype.md: rate 0.1) */
-    for (int32_t i = 0; i < limbs * LIKE_SAMPLES; i++) {
-        if (seen[i] == TEXTURE_HIDDEN)
-            continue;
-        int32_t const now = seen[i] * TEMPLATE_ONE;
-        template[i] =
-            (int16_t)(template[i] == TEMPLATE_EMPTY ? now : template[i] + (now - template[i]) / slow);
-    }
+    int32_t const slow = 10, now = seen * TEMPLATE_ONE; /* frames (prototype.md: rate 0.1) */
+    return (int16_t)(known == TEMPLATE_EMPTY ? now : known + (now - known) / slow);
+}
+
+void template_update(int16_t *template, int32_t limbs, const like_patch *seen)
+{
+    for (int32_t l = 0; l < limbs; l++)
+        for (int32_t i = 0; i < LIKE_FACING; i++) {
+            int16_t *const point = template + l * LIKE_SAMPLES + (2 * seen[l].turn + i) % LIKE_SAMPLES;
+            if (seen[l].value[i] != TEXTURE_HIDDEN)
+                *point = approach(*point, seen[l].value[i]);
+        }
+}
+
+void template_ring(const int16_t *template, int32_t limbs, int8_t *ring)
+{
+    for (int32_t l = 0; l < limbs; l++)
+        for (int32_t i = 0; i < LIKE_RING; i++) {
+            int16_t const known = template[l * LIKE_SAMPLES + i % LIKE_SAMPLES];
+            ring[l * LIKE_RING + i] =
+                (int8_t)(known == TEMPLATE_EMPTY ? TEXTURE_HIDDEN : known / TEMPLATE_ONE);
+        }
 }
 
 /* Mean robust cost over all points that the template knows and the body shows. */
 static float log_likelihood(const like_body *b)
 {
-    int32_t const enough = 32, total = b->setup->limbs * LIKE_SAMPLES;
-    int32_t both = 0, sum = 0;
-    if (!b->template)
+    int32_t const enough = 32;
+    if (!b->known)
         return 0.0f;
-    for (int32_t i = 0; i < total; i++) {
-        if (b->seen[i] == TEXTURE_HIDDEN || b->template[i] == TEMPLATE_EMPTY)
-            continue;
-        int32_t const d = b->seen[i] - b->template[i] / TEMPLATE_ONE;
-        sum += b->setup->cost[d < 0 ? -d : d];
-        both++;
-    }
+    int64_t const sum = b->setup->run->template_cost(b);
+    int32_t const both = (int32_t)(sum / LIKE_COUNT_ONE), cost = (int32_t)(sum % LIKE_COUNT_ONE);
     float const unknown = -1.5f; /* as bad as a typical mismatch */
-    return both < enough ? unknown : -(float)sum / (float)(both * LIKE_COST_ONE);
+    return both < enough ? unknown : -(float)cost / (float)(both * LIKE_COST_ONE);
 }
 
 const like_term like_template = {"template", GAIT_TERM_TEMPLATE, log_likelihood, NULL};

@@ -21,7 +21,7 @@ static void layout_state(arena *a, gait_tracker *t)
     for (int32_t g = 0; g < 2; g++) {
         t->gen[g].people = population_layout(a, n, body_rule_fields(&t->rule));
         if (wants_texture(&t->cfg))
-            t->gen[g].texture = TAKE(a, int8_t, (size_t)n *(size_t)cameras *samples);
+            t->gen[g].texture = TAKE(a, like_patch, (size_t)n * (size_t)(cameras * t->model->limbs));
     }
     t->filter = pf_layout(a, n);
     t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
@@ -34,7 +34,7 @@ static void layout_state(arena *a, gait_tracker *t)
 static void layout_work(arena *a, gait_tracker *t)
 {
     int32_t const n = t->cfg.particles;
-    size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
+    size_t const limbs = (size_t)t->model->limbs;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         t->camera[c].seen = features_layout(a);
         if (t->cfg.terms & GAIT_TERM_SILHOUETTE)
@@ -47,7 +47,9 @@ static void layout_work(arena *a, gait_tracker *t)
     t->exchange = TAKE(a, exchange, 1);
     t->mode = TAKE(a, uint8_t, n);
     if (wants_texture(&t->cfg))
-        t->seen = TAKE(a, int8_t, (size_t)t->cfg.cameras *samples);
+        t->seen = TAKE(a, like_patch, (size_t)t->cfg.cameras * limbs);
+    for (int32_t c = 0; c < 2 * t->cfg.cameras && wants_texture(&t->cfg); c++)
+        t->known[c / t->cfg.cameras][c % t->cfg.cameras] = TAKE(a, int8_t, LIKE_RING *limbs);
     lag_layout_work(&t->past, a, n, body_rule_fields(&t->rule), t->model->points);
     t->scratch = features_scratch_layout(a);
     t->work = TAKE(a, weigh_scratch, t->cfg.tasks);
@@ -186,10 +188,9 @@ static uint32_t seeing(const gait_tracker *t)
 
 static void remember_appearance(gait_tracker *t)
 {
-    size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         if (t->camera[c].seen.seen && t->template[0][c])
-            template_update(t->template[0][c], t->model->limbs, t->seen + (size_t)c * samples);
+            template_update(t->template[0][c], t->model->limbs, t->seen + c * t->model->limbs);
 }
 
 /* Weigh the particles by the frame and fill in the estimate. */

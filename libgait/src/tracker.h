@@ -36,7 +36,7 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
 
 typedef struct generation {
     population people;
-    int8_t *texture; /* n x cameras x limbs x LIKE_SAMPLES, or NULL */
+    like_patch *texture; /* n x cameras x limbs, or NULL */
 } generation;
 
 typedef struct camera_state {
@@ -50,6 +50,7 @@ typedef struct weigh_scratch { /* one per task */
     kin_body body;
     outline_block outline;
     layers_block edges;
+    like_pose pose;
     layers layers;
     float points[GAIT_MAX_JOINTS][3][BLOCK];
 } weigh_scratch;
@@ -71,12 +72,13 @@ struct gait_tracker {
     unsigned char *state_end;
     /* Recomputed in every step. */
     camera_state camera[GAIT_MAX_CAMERAS];
-    float *used;        /* n: as much of ll as counts (loss.h, modes.h) */
-    float *ll;          /* n */
-    float *inner;       /* n: ll without the silhouette */
-    exchange *exchange; /* constant */
-    uint8_t *mode;      /* n: particle belongs to the dominant mode */
-    int8_t *seen;       /* cameras x limbs x LIKE_SAMPLES: surface of the estimate */
+    float *used;                        /* n: as much of ll as counts (loss.h, modes.h) */
+    float *ll;                          /* n */
+    float *inner;                       /* n: ll without the silhouette */
+    exchange *exchange;                 /* constant */
+    uint8_t *mode;                      /* n: particle belongs to the dominant mode */
+    like_patch *seen;                   /* cameras x limbs: surface of the estimate */
+    int8_t *known[2][GAIT_MAX_CAMERAS]; /* template as compared in this frame: limbs x LIKE_RING */
     features_scratch scratch;
     weigh_scratch *work; /* tasks */
 };

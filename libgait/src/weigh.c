@@ -51,18 +51,19 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
     return count;
 }
 
-/* The block's limbs in one camera's working image and grid. */
+/* The block's limbs in one camera, and in its working image and grid. */
 static void outline_limbs(const gait_tracker *t, int32_t c, weigh_scratch *w)
 {
     const like_setup *const s = t->like;
     s->run->outline_project(s->geometry, s->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map,
                             &w->outline);
     s->run->layers_prepare(&w->outline, s->geometry, s->limbs, &w->edges);
+    s->run->surface_pose(s, &t->cfg.camera[c], &w->body, &w->pose);
 }
 
 /* One body of a block in one camera, ready for the terms. */
 static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t lane, weigh_scratch *w,
-                         int8_t *seen)
+                         like_patch *seen)
 {
     like_body b = {.setup = t->like,
                    .features = &t->camera[c].seen,
@@ -70,17 +71,17 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t
                    .lane = lane,
                    .layers = &w->layers,
                    .seen = seen,
-                   .template = t->template[side][c]};
+                   .known = t->known[side][c]};
     t->like->run->layers_draw(&w->edges, lane, &w->layers);
     if (seen)
-        like_sample(t->like, b.features, &t->cfg.camera[c], &w->body, lane, &w->layers, seen);
+        like_sample(t->like, b.features, &t->cfg.camera[c], &w->pose, lane, &w->layers, seen);
     return b;
 }
 
-int8_t *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c)
+like_patch *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c)
 {
-    size_t const stride = (size_t)t->like->limbs * LIKE_SAMPLES;
-    return g->texture ? g->texture + ((size_t)i * (size_t)t->cfg.cameras + (size_t)c) * stride : NULL;
+    size_t const at = ((size_t)i * (size_t)t->cfg.cameras + (size_t)c) * (size_t)t->like->limbs;
+    return g->texture ? g->texture + at : NULL;
 }
 
 static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scratch *w)
@@ -120,6 +121,9 @@ static void weigh_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 
 void weigh_particles(gait_tracker *t)
 {
+    for (int32_t c = 0; c < t->cfg.cameras; c++)
+        for (int32_t side = 0; side < 2 && t->known[side][c]; side++)
+            template_ring(t->template[side][c], t->like->limbs, t->known[side][c]);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, weigh_range, t);
 }
 
@@ -132,7 +136,7 @@ float weigh_walker(gait_tracker *t, const walker *person)
         if (!t->camera[c].seen.seen)
             continue;
         outline_limbs(t, c, w);
-        int8_t *const seen = t->seen ? t->seen + (size_t)c * (size_t)t->like->limbs * LIKE_SAMPLES : NULL;
+        like_patch *const seen = t->seen ? t->seen + c * t->like->limbs : NULL;
         like_body const b = look_at(t, c, 0, 0, w, seen);
         support += like_support(&b);
     }

@@ -11,8 +11,8 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
 /* Log-likelihoods t->ll, joints and surface samples of all particles. */
 void weigh_particles(gait_tracker *t);
 
-/* Surface samples of particle i in camera c, NULL if none are kept: limbs x LIKE_SAMPLES. */
-int8_t *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c);
+/* Surface samples of particle i in camera c by limb, NULL if none are kept. */
+like_patch *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c);
 
 /* Surface samples of one walker into t->seen; returns how much better it explains the frame than nobody,
  * nats. */

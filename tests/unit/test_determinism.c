@@ -9,7 +9,7 @@
 #include "check.h"
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x49fc17d7fdcf43ea)
+#define GOLDEN UINT64_C(0x7b697150f9c2b416)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 

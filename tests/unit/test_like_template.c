@@ -4,40 +4,76 @@
 
 #include "check.h"
 
-enum { SAMPLES = 2 * LIKE_SAMPLES };
+enum { LIMBS = 2, SAMPLES = LIMBS * LIKE_SAMPLES };
 
 static int16_t template[SAMPLES];
-static int8_t seen[SAMPLES];
+static int8_t ring[LIMBS * LIKE_RING];
+static like_patch seen[LIMBS];
+
+static void hide_all(void)
+{
+    for (int l = 0; l < LIMBS; l++)
+        memset(seen[l].value, TEXTURE_HIDDEN, LIKE_FACING);
+}
 
 static void test_update(void)
 {
-    template_clear(template, 2);
+    template_clear(template, LIMBS);
     for (int i = 0; i < SAMPLES; i++)
         CHECK(template[i] == TEMPLATE_EMPTY);
-    memset(seen, TEXTURE_HIDDEN, sizeof seen);
-    seen[3] = 50;
-    seen[40] = -127;
-    template_update(template, 2, seen);
+    hide_all();
+    seen[0].value[3] = 50;
+    seen[1].turn = 2;
+    seen[1].value[4] = -127; /* point 8 of the second limb */
+    template_update(template, LIMBS, seen);
     CHECK(template[3] == 50 * TEMPLATE_ONE && template[40] == -127 * TEMPLATE_ONE); /* at once */
     CHECK(template[0] == TEMPLATE_EMPTY && template[63] == TEMPLATE_EMPTY);
-    seen[3] = 0;
-    seen[40] = TEXTURE_HIDDEN;
+    seen[0].value[3] = 0;
+    seen[1].value[4] = TEXTURE_HIDDEN;
     double want = 50.0;
     for (int n = 1; n <= 60; n++) {
-        template_update(template, 2, seen);
+        template_update(template, LIMBS, seen);
         want *= 0.9;
         CHECK_NEAR(template[3] / (double)TEMPLATE_ONE, want, 0.16); /* 10 / 64: where integers stop */
         CHECK(template[40] == -127 * TEMPLATE_ONE);                 /* hidden: kept */
     }
-    seen[3] = 127; /* from end to end without overflow, and to the top */
+    seen[0].value[3] = 127; /* from end to end without overflow, and to the top */
     for (int n = 0; n < 200; n++)
-        template_update(template, 2, seen);
+        template_update(template, LIMBS, seen);
     CHECK_NEAR(template[3] / (double)TEMPLATE_ONE, 127.0, 0.16);
-    seen[3] = -127;
-    template_update(template, 2, seen);
+    seen[0].value[3] = -127;
+    template_update(template, LIMBS, seen);
     CHECK_NEAR(template[3] / (double)TEMPLATE_ONE, 127.0 - 25.4, 0.16);
+    seen[1].value[4] = 0;
     template_update(template, 1, seen); /* one limb only */
     CHECK(template[40] == -127 * TEMPLATE_ONE);
+}
+
+/* Every half of a limb teaches the points it shows, and finds what it taught. */
+static void test_turns(void)
+{
+    toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    v->setup.limbs = LIMBS;
+    for (int turn = 0; turn < LIKE_DIRECTIONS; turn++) {
+        template_clear(template, LIMBS);
+        for (int l = 0; l < LIMBS; l++) {
+            seen[l].turn = (uint8_t)((turn + 5 * l) % LIKE_DIRECTIONS);
+            for (int i = 0; i < LIKE_FACING; i++)
+                seen[l].value[i] = (int8_t)(5 * i - 40 + l);
+        }
+        template_update(template, LIMBS, seen);
+        for (int l = 0; l < LIMBS; l++)
+            for (int i = 0; i < LIKE_SAMPLES; i++) {
+                int const at = (i - 2 * seen[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
+                int const want = at < LIKE_FACING ? (5 * at - 40 + l) * TEMPLATE_ONE : TEMPLATE_EMPTY;
+                CHECK(template[l * LIKE_SAMPLES + i] == want);
+            }
+        template_ring(template, LIMBS, ring);
+        like_body const b = {.setup = &v->setup, .seen = seen, .known = ring};
+        CHECK(like_template.log_likelihood(&b) == 0.0f);
+        seen[0].turn = (uint8_t)((seen[0].turn + 1) % LIKE_DIRECTIONS);
+        CHECK(like_template.log_likelihood(&b) == -1.5f); /* two points less */
+    }
 }
 
 /* Mean Student-t cost over all samples known and seen, at least 32 of them; else as bad as a typical mismatch. */
@@ -45,37 +81,43 @@ static void test_term(void)
 {
     toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
     like_body b = {.setup = &v->setup, .seen = seen};
-    v->setup.limbs = 2;
+    v->setup.limbs = LIMBS;
     CHECK(like_template.log_likelihood(&b) == 0.0f); /* no template at all */
-    b.template = template;
-    template_clear(template, 2);
-    memset(seen, 10, sizeof seen);
+    b.known = ring;
+    template_clear(template, LIMBS);
+    seen[0].turn = seen[1].turn = 0;
+    memset(seen[0].value, 10, LIKE_FACING);
+    memset(seen[1].value, 10, LIKE_FACING);
+    template_ring(template, LIMBS, ring);
     CHECK(like_template.log_likelihood(&b) == -1.5f);
-    for (int i = 0; i < SAMPLES; i++) {
-        template[i] = (int16_t)(i < 20 || i > 50 ? TEMPLATE_EMPTY : 10 * TEMPLATE_ONE);
-        CHECK(i <= 50 || like_template.log_likelihood(&b) == -1.5f); /* 31 */
-    }
-    template[51] = 10 * TEMPLATE_ONE;
+    for (int i = 0; i < SAMPLES; i++)
+        template[i] = (int16_t)(i == 0 ? TEMPLATE_EMPTY : 10 * TEMPLATE_ONE);
+    template_ring(template, LIMBS, ring);
+    CHECK(like_template.log_likelihood(&b) == -1.5f); /* 31 */
+    template[0] = 10 * TEMPLATE_ONE;
+    template_ring(template, LIMBS, ring);
     CHECK(like_template.log_likelihood(&b) == 0.0f);
-    seen[51] = TEXTURE_HIDDEN; /* 31 again */
-    CHECK(like_template.log_likelihood(&b) == -1.5f);
     double want = 0.0;
-    for (int i = 0; i < SAMPLES; i++) {
-        int const d = i - 30;
-        seen[i] = (int8_t)(i < 4 ? TEXTURE_HIDDEN : 10 + d);
-        template[i] = 10 * TEMPLATE_ONE;
-        want += i < 4 ? 0.0 : 2.5 * log(1.0 + d * d / 1024.0) / (SAMPLES - 4);
-    }
+    for (int l = 0; l < LIMBS; l++)
+        for (int i = 0; i < LIKE_FACING; i++) {
+            int const d = l * LIKE_FACING + i - 15;
+            seen[l].value[i] = (int8_t)(10 + d);
+            want += 2.5 * log(1.0 + d * d / 1024.0) / (LIMBS * LIKE_FACING);
+        }
     CHECK_NEAR(like_template.log_likelihood(&b), -want, 0.01);
-    seen[63] = 127;
-    template[63] = -127 * TEMPLATE_ONE; /* the largest difference there is */
+    seen[1].value[15] = 127;
+    template[47] = -127 * TEMPLATE_ONE; /* the largest difference there is */
+    template_ring(template, LIMBS, ring);
     CHECK(like_template.log_likelihood(&b) < (float)-want);
+    seen[1].value[15] = TEXTURE_HIDDEN; /* 31 again */
+    CHECK(like_template.log_likelihood(&b) == -1.5f);
     CHECK(like_template.flag == GAIT_TERM_TEMPLATE && !like_template.support);
 }
 
 int main(void)
 {
     test_update();
+    test_turns();
     test_term();
     return CHECK_DONE();
 }

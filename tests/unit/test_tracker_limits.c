@@ -205,9 +205,11 @@ static void test_appearance(void)
     CHECK(known[1][0] >= known[0][0] && known[1][1] > 100);
     for (int c = 0; c < 2; c++) { /* each its own */
         int32_t near = 0, both = 0;
-        for (int i = 0; i < TOY_LIMBS * LIKE_SAMPLES; i++) {
-            int32_t const now = t->seen[c * TOY_LIMBS * LIKE_SAMPLES + i],
-                          mean = t->template[0][c][i] / TEMPLATE_ONE;
+        for (int i = 0; i < TOY_LIMBS * LIKE_FACING; i++) {
+            const like_patch *const p = &t->seen[c * TOY_LIMBS + i / LIKE_FACING];
+            int32_t const now = p->value[i % LIKE_FACING],
+                          point = (2 * p->turn + i % LIKE_FACING) % LIKE_SAMPLES;
+            int32_t const mean = t->template[0][c][i / LIKE_FACING * LIKE_SAMPLES + point] / TEMPLATE_ONE;
             both += now != TEXTURE_HIDDEN;
             near += now != TEXTURE_HIDDEN && abs(now - mean) < 25;
         }

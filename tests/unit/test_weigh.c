@@ -108,7 +108,6 @@ static const outline_block *outline_of(const gait_tracker *t, int32_t i)
 static void test_ancestor(void)
 {
     gait_tracker *const t = tracker(1, 0, GAIT_TERM_TEXTURE);
-    size_t const stride = TOY_LIMBS * LIKE_SAMPLES;
     const uint8_t *see[] = {shot[0][0], NULL};
     gait_estimate e;
     toy_tracker_step(t, 20, see, &e);
@@ -128,18 +127,18 @@ static void test_ancestor(void)
         int32_t shared = 0;
         CHECK(t->filter.parent[i] == parent);
         for (int32_t l = 0; l < TOY_LIMBS; l++) {
-            int32_t cost;
-            size_t const at = (size_t)l * LIKE_SAMPLES;
-            shared += like_compare(t->like, now->texture + (size_t)i * stride + at,
-                                   then->texture + (size_t)parent * stride + at, &cost);
+            const like_patch *const a = &now->texture[i * TOY_LIMBS + l];
+            const like_patch *const b = &then->texture[parent * TOY_LIMBS + l];
+            for (int32_t k = 0; k < LIKE_FACING && a->turn == b->turn; k++)
+                shared += a->value[k] != TEXTURE_HIDDEN && b->value[k] != TEXTURE_HIDDEN;
         }
         CHECK(shared > 60);      /* the same walker a frame later */
         if (i == 5 || i == 25) { /* worked out again from the samples */
             like_body const b = {.setup = t->like,
                                  .features = &t->camera[0].seen,
                                  .outline = outline_of(t, i),
-                                 .seen = now->texture + (size_t)i * stride,
-                                 .ancestor = then->texture + (size_t)parent * stride};
+                                 .seen = now->texture + i * TOY_LIMBS,
+                                 .ancestor = then->texture + parent * TOY_LIMBS};
             CHECK_NEAR(t->ll[i], like_evaluate(&b), 1e-5);
         }
     }
@@ -149,9 +148,9 @@ static void test_ancestor(void)
 /* Make every sample that camera 1 took for the current particles a constant. */
 static void spoil(gait_tracker *t, int value)
 {
-    size_t const stride = TOY_LIMBS * LIKE_SAMPLES;
     for (size_t i = 0; i < N; i++)
-        memset(t->gen[t->core->current].texture + (2 * i + 1) * stride, value, stride);
+        memset(t->gen[t->core->current].texture + (2 * i + 1) * TOY_LIMBS, value,
+               TOY_LIMBS * sizeof(like_patch));
 }
 
 /* What a camera saw before it missed a frame does not count when it is back; what it sees then does. */

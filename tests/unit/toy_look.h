@@ -20,8 +20,9 @@ typedef struct toy_look {
     view_planes plate;
     kin_body body;
     outline_block outline;
+    like_pose pose;
     layers drawn;
-    int8_t seen[TOY_LIMBS * LIKE_SAMPLES];
+    like_patch seen[TOY_LIMBS];
 } toy_look;
 
 static inline toy_look *toy_look_new(int camera, int32_t mode)
@@ -73,7 +74,8 @@ static inline like_body toy_look_body(toy_look *v, const gait_state *s)
     walker_body(&v->rule, &w, &v->body);
     toy_project(v->setup.geometry, v->setup.limbs, &v->body, &v->cam, &v->f.map, &v->outline);
     toy_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
-    like_sample(&v->setup, &v->f, &v->cam, &v->body, LANE, &v->drawn, v->seen);
+    v->setup.run->surface_pose(&v->setup, &v->cam, &v->body, &v->pose);
+    like_sample(&v->setup, &v->f, &v->cam, &v->pose, LANE, &v->drawn, v->seen);
     return (like_body){.setup = &v->setup,
                        .features = &v->f,
                        .outline = &v->outline,

@@ -1,0 +1,103 @@
+/* What limbs look like and looked like (Ormoneit et al. 2000, eqs. 10-13; spec R11-R20). */
+#include "fmath.h"
+#include "kernels.h"
+#include "like.h"
+#include "lanes.h"
+#include <string.h>
+
+/* Sum of costs over one half of a limb; LIKE_COUNT_ONE for each point seen in both. */
+static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b, const int32_t *cost)
+{
+    int32_t x[LIKE_FACING], y[LIKE_FACING], difference[LIKE_FACING], both[LIKE_FACING], one[LIKE_FACING],
+        sum = 0;
+    widen(a, x);
+    widen(b, y);
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LIKE_FACING; i++) {
+        difference[i] = i_max(x[i] - y[i], y[i] - x[i]);
+        both[i] = -((x[i] != TEXTURE_HIDDEN) & (y[i] != TEXTURE_HIDDEN));
+    }
+    lookup(cost, difference, both, one);
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LIKE_FACING; i++)
+        sum += one[i];
+    return sum;
+}
+
+/* The ancestor's half may begin elsewhere: its values are laid among hidden ones and read from where `now`
+ * begins. */
+static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs, const int32_t *cost,
+                          int32_t *sum)
+{
+    int8_t wide[MODEL_MAX_LIMBS][3 * LIKE_FACING];
+    for (int32_t l = 0; l < limbs; l++) {
+        memset(wide[l], TEXTURE_HIDDEN, sizeof wide[l]);
+        memcpy(wide[l] + LIKE_FACING, then[l].value, LIKE_FACING);
+    }
+    for (int32_t l = 0; l < limbs; l++) {
+        int32_t const ahead = (now[l].turn - then[l].turn + LIKE_AZIMUTHS) & (LIKE_DIRECTIONS - 1);
+        sum[l] = compare(now[l].value, wide[l] + 2 * ahead, cost);
+    }
+}
+
+/* Share of the about LIKE_SAMPLES / 2 points facing the camera that both frames show. */
+static inline float visible_share(int32_t both)
+{
+    return f_min((float)both / (0.4f * (float)LIKE_SAMPLES), 1.0f);
+}
+
+/* Mixture of "visible and constant" and "occluded" for one limb (eq. 12), as a log. */
+static inline float mixture(float q, float log_visible, float log_occluded)
+{
+    float const d = log_visible - log_occluded;
+    /* log(q e^v + (1 - q) e^o) with e^o taken out; beyond 30 nats more does not matter. */
+    return log_occluded + m_log(q * m_exp(f_clamp(d, -30.0f, 30.0f)) + (1.0f - q));
+}
+
+/* Robust, contrast-normalised form: mean Student-t cost. */
+static inline float robust(int32_t both, int32_t cost, float facing)
+{
+    float const log_occluded = -1.6f; /* as bad as a typical mismatch */
+    float const mean = (float)cost / (float)(i_max(both, 1) * LIKE_COST_ONE);
+    float const seen = mixture(facing * visible_share(both), -mean, log_occluded);
+    return both < LIKE_FEW ? log_occluded : seen;
+}
+
+/* Literal form: mean squared grey-level difference, normal density, sigma growing with the viewing angle. */
+static inline float literal(int32_t both, int32_t squares, float facing)
+{
+    float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared (R14, R17) */
+    float const tan2 = f_min((1.0f - facing * facing) / f_max(facing * facing, 1e-3f), 9.0f);
+    float const var = 2.0f * image_var + model_var * (1.0f + tan2);
+    float const log_visible =
+        -0.5f * m_log(TWO_PI_F * var) - (float)squares / (2.0f * var * (float)i_max(both, 1));
+    float const seen = mixture(facing * visible_share(both), log_visible, LIKE_PAPER_OCCLUDED);
+    return both < LIKE_FEW ? LIKE_PAPER_OCCLUDED : seen;
+}
+
+void KERNEL(texture_logs)(const like_body *b, float *restrict log)
+{
+    int32_t const limbs = b->setup->limbs,
+                  whole = (limbs + 15) & ~15; /* in full vectors; the rest says nothing */
+    int32_t sum[MODEL_MAX_LIMBS] = {0};
+    float facing[MODEL_MAX_LIMBS] = {0};
+    compare_limbs(b->seen, b->ancestor, limbs, b->setup->paper ? b->setup->square : b->setup->robust, sum);
+    for (int32_t l = 0; l < limbs; l++)
+        facing[l] = b->outline->facing[l][b->lane];
+    if (b->setup->paper)
+        for (int32_t l = 0; l < whole; l++)
+            log[l] = literal(sum[l] / LIKE_COUNT_ONE, sum[l] % LIKE_COUNT_ONE, facing[l]);
+    else
+        for (int32_t l = 0; l < whole; l++)
+            log[l] = robust(sum[l] / LIKE_COUNT_ONE, sum[l] % LIKE_COUNT_ONE, facing[l]);
+}
+
+int64_t KERNEL(template_cost)(const like_body *b)
+{
+    int64_t sum = 0;
+    for (int32_t l = 0; l < b->setup->limbs; l++)
+        sum += compare(b->seen[l].value,
+                       b->known + l * LIKE_RING + 2 * (b->seen[l].turn & (LIKE_DIRECTIONS - 1)),
+                       b->setup->robust);
+    return sum;
+}

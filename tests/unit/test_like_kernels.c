@@ -1,0 +1,223 @@
+/* Kernels of the surface: every instruction set against the scalar one, and that one against all points of a
+ * limb looked at one by one. */
+#include "kernel_check.h"
+#include "rng.h"
+#include "toy_look.h"
+
+#include "check.h"
+
+enum { LIMBS = MODEL_MAX_LIMBS };
+
+static toy_look *v;
+
+static uint32_t draw(uint32_t index, uint32_t what)
+{
+    uint32_t r[4];
+    rng_bits(5, 0, 0, index, what, r);
+    return r[0];
+}
+
+/* In [-1, 1). */
+static float uniform(uint32_t index, uint32_t what)
+{
+    return (float)(int32_t)draw(index, what) / 2147483648.0f;
+}
+
+/* ---- points of a limb ---- */
+
+/* Bodies of a block: about the walker, turned anyhow, some near the camera or behind it. */
+static void bodies(uint32_t round)
+{
+    gait_state s = toy_walk(0.5f);
+    toy_look_aim(v, &s);
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        static kin_body one;
+        uint32_t const at = round * BLOCK + (uint32_t)lane;
+        float const near = at % 7 == 3    ? -5.2f
+                           : at % 11 == 5 ? -7.0f
+                                          : 0.0f; /* the camera stands 5.5 m off */
+        s = toy_walk(0.5f + 0.5f * uniform(at, 0));
+        s.heading = PI_F * uniform(at, 1);
+        s.pitch = at % 3 ? 0.2f * uniform(at, 2) : PI_F * uniform(at, 2);
+        s.roll = 0.5f * uniform(at, 3);
+        s.pelvis[0] += (at % 5 ? 0.1f : 1.5f) * uniform(at, 4);
+        s.pelvis[1] += near;
+        walker const w = walker_from_state(&v->rule, &s);
+        walker_body(&v->rule, &w, &one);
+        for (int32_t f = 0; f < KIN_MAX_FRAMES; f++) {
+            for (int32_t k = 0; k < 9; k++)
+                v->body.R[f][k][lane] = one.R[f][k][0];
+            for (int32_t k = 0; k < 3; k++)
+                v->body.o[f][k][lane] = one.o[f][k][0];
+            v->body.scale[f][lane] = one.scale[f][0];
+        }
+    }
+}
+
+/* One surface point of one lane as it was written down first: no half is left out. */
+static int8_t look(int32_t l, int32_t i, int32_t lane)
+{
+    const like_surface *const s = &v->setup.surface[l];
+    int32_t const f = v->setup.geometry[l].frame;
+    float M[9], t[3], p[3], n[3], at[3], dot = 0.0f;
+    for (int32_t r = 0; r < 3; r++) {
+        const float *const c = v->cam.R + 3 * r;
+        for (int32_t k = 0; k < 3; k++)
+            M[3 * r + k] = c[0] * v->body.R[f][k][lane] + c[1] * v->body.R[f][3 + k][lane] +
+                           c[2] * v->body.R[f][6 + k][lane];
+        t[r] = c[0] * v->body.o[f][0][lane] + c[1] * v->body.o[f][1][lane] + c[2] * v->body.o[f][2][lane] +
+               v->cam.t[r];
+    }
+    for (int32_t k = 0; k < 3; k++) {
+        p[k] = v->body.scale[f][lane] * s->point[k][i];
+        n[k] = s->normal[k][i];
+    }
+    for (int32_t r = 0; r < 3; r++)
+        at[r] = M[3 * r] * p[0] + M[3 * r + 1] * p[1] + M[3 * r + 2] * p[2] + t[r];
+    at[2] = f_max(at[2], CAMERA_NEAR);
+    for (int32_t r = 0; r < 3; r++)
+        dot += (M[3 * r] * n[0] + M[3 * r + 1] * n[1] + M[3 * r + 2] * n[2]) * at[r];
+    float const inv = 1.0f / at[2];
+    float const x = (v->cam.fx * (at[0] * inv) + v->cam.cx - v->f.map.u0) * v->f.map.scale;
+    float const y = (v->cam.fy * (at[1] * inv) + v->cam.cy - v->f.map.v0) * v->f.map.scale;
+    float const range = __builtin_sqrtf(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
+    if (!(-dot - 0.2f * range > 0.0f) || !layers_visible(&v->drawn.visible[l], x, y))
+        return TEXTURE_HIDDEN;
+    int32_t const a = i_min((int32_t)(x * 256.0f), 255 * 256 - 1),
+                  b = i_min((int32_t)(y * 256.0f), 255 * 256 - 1);
+    const int8_t *const m = v->f.surface + (b >> 8) * VIEW_SIZE + (a >> 8);
+    int32_t const top = m[0] * (256 - (a & 255)) + m[1] * (a & 255);
+    int32_t const low = m[VIEW_SIZE] * (256 - (a & 255)) + m[VIEW_SIZE + 1] * (a & 255);
+    return (int8_t)((top * (256 - (b & 255)) + low * (b & 255)) / 65536);
+}
+
+/* The region turned so that the walker leaves it on one side, or is small in it. */
+static void shift_region(uint32_t round)
+{
+    static const float scale[] = {1.4f, 0.4f, 2.0f};
+    v->f.map.u0 += round % 4 == 1 ? 90.0f : round % 4 == 2 ? -120.0f : 0.0f;
+    v->f.map.v0 += round % 5 == 1 ? 60.0f : 0.0f;
+    v->f.map.scale = scale[round % 3];
+}
+
+static void test_sample(void)
+{
+    static uint8_t frame[SCENE_PIXELS];
+    static unsigned char memory[LIMBS * sizeof(like_patch) + 2 * GUARD];
+    static like_pose pose;
+    static like_patch want[LIMBS];
+    int32_t seen = 0, hidden = 0, wrong = 0, missing = 0, differ = 0, broken = 0;
+    toy_shot(0, 15, frame);
+    for (uint32_t round = 0; round < 24; round++) {
+        bodies(round);
+        shift_region(round);
+        toy_look_at(v, frame, NULL);
+        for (int32_t i = 0; i < VIEW_PIXELS && round % 6 == 5; i++) { /* the extremes */
+            v->f.surface[i] = (int8_t)(draw((uint32_t)i, round) & 1 ? 127 : -127);
+            v->f.quads[i] = 0;
+        }
+        for (int32_t i = 0; i < VIEW_PIXELS - VIEW_SIZE - 1; i++)
+            for (int32_t k = 0; k < 4; k++) {
+                uint32_t const value = (uint8_t)v->f.surface[i + k / 2 * VIEW_SIZE + k % 2];
+                if (round % 6 == 5)
+                    v->f.quads[i] |= value << 8 * k;
+                wrong += (v->f.quads[i] >> 8 * k & 255) != value;
+            }
+        toy_project(v->setup.geometry, TOY_LIMBS, &v->body, &v->cam, &v->f.map, &v->outline);
+        isa_scalar()->surface_pose(&v->setup, &v->cam, &v->body, &v->pose);
+        for (int k = 0; k < isa_count(); k++) {
+            memset(&pose, 0, sizeof pose);
+            isa_at(k)->surface_pose(&v->setup, &v->cam, &v->body, &pose);
+            differ += memcmp(pose.R, v->pose.R, sizeof(float[TOY_LIMBS][9][BLOCK])) != 0;
+            differ += memcmp(pose.t, v->pose.t, sizeof(float[TOY_LIMBS][3][BLOCK])) != 0;
+            differ += memcmp(pose.scale, v->pose.scale, sizeof(float[TOY_LIMBS][BLOCK])) != 0;
+            differ += memcmp(pose.turn, v->pose.turn, sizeof(int32_t[TOY_LIMBS][BLOCK])) != 0;
+        }
+        for (int32_t lane = 0; lane < BLOCK; lane++) {
+            toy_draw(&v->outline, v->setup.geometry, TOY_LIMBS, lane, &v->drawn);
+            isa_scalar()->surface_sample(&v->setup, &v->f, &v->cam, &v->pose, lane, &v->drawn, want);
+            for (int32_t l = 0; l < TOY_LIMBS; l++)
+                for (int32_t i = 0; i < LIKE_SAMPLES; i++) {
+                    int32_t const at = (i - 2 * want[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
+                    int8_t const value = look(l, i, lane);
+                    missing += at >= LIKE_FACING && value != TEXTURE_HIDDEN;
+                    wrong += at < LIKE_FACING && value != want[l].value[at];
+                    seen += value != TEXTURE_HIDDEN;
+                    hidden += value == TEXTURE_HIDDEN;
+                }
+            for (int k = 0; k < isa_count(); k++) {
+                guarded const g = guard_fill(memory, TOY_LIMBS * sizeof *want);
+                isa_at(k)->surface_sample(&v->setup, &v->f, &v->cam, &v->pose, lane, &v->drawn,
+                                          (like_patch *)g.begin);
+                differ += memcmp(g.begin, want, g.bytes) != 0;
+                broken += !guard_whole(&g);
+            }
+        }
+    }
+    CHECK(seen > 20000 && hidden > 50000);
+    CHECK(missing == 0); /* no point of the other half would have been seen */
+    CHECK(wrong == 0);
+    CHECK(differ == 0);
+    CHECK(broken == 0);
+}
+
+/* ---- comparison ---- */
+
+/* Values near those of another patch, of any kind, or the extremes; some hidden. */
+static void fill(like_patch *p, uint32_t round, uint32_t salt)
+{
+    for (uint32_t l = 0; l < LIMBS; l++) {
+        p[l].turn = (uint8_t)(draw(l, 4 * round + salt) >> (round % 3 ? 6 : 0));
+        for (uint32_t i = 0; i < LIKE_FACING; i++) {
+            uint32_t const r = draw(l * LIKE_FACING + i, 4 * round + salt + 1);
+            int32_t const value = round % 4 == 0   ? (int32_t)(r % 255) - 127
+                                  : round % 4 == 1 ? (r & 1 ? 127 : -127)
+                                                   : (int32_t)(r % 9);
+            p[l].value[i] = (int8_t)(r >> 8 & (round % 5) ? value : TEXTURE_HIDDEN);
+        }
+    }
+}
+
+static void test_compare(void)
+{
+    static like_patch now[LIMBS], then[LIMBS];
+    static int8_t known[LIMBS * LIKE_RING];
+    static unsigned char memory[LIMBS * sizeof(float) + 2 * GUARD];
+    int32_t differ = 0, broken = 0;
+    for (uint32_t round = 0; round < 600; round++) {
+        like_body const b = {.setup = &v->setup,
+                             .outline = &v->outline,
+                             .lane = (int32_t)(round % BLOCK),
+                             .seen = now,
+                             .ancestor = then,
+                             .known = known};
+        float want[LIMBS] = {0};
+        v->setup.limbs = (int32_t)(1 + round % LIMBS);
+        v->setup.paper = round & 1;
+        fill(now, round, 0);
+        fill(then, round, 2);
+        for (uint32_t i = 0; i < sizeof known; i++)
+            known[i] = (int8_t)draw(i, round);
+        for (int32_t l = 0; l < LIMBS; l++)
+            v->outline.facing[l][b.lane] = fabsf(uniform((uint32_t)l, round));
+        isa_scalar()->texture_logs(&b, want);
+        int64_t const cost = isa_scalar()->template_cost(&b);
+        for (int k = 0; k < isa_count(); k++) {
+            guarded const g = guard_fill(memory, LIMBS * sizeof(float));
+            isa_at(k)->texture_logs(&b, (float *)(void *)g.begin);
+            differ += memcmp(g.begin, want, sizeof(float[1]) * (size_t)v->setup.limbs) != 0;
+            broken += !guard_whole(&g);
+            differ += isa_at(k)->template_cost(&b) != cost;
+        }
+    }
+    CHECK(differ == 0);
+    CHECK(broken == 0);
+}
+
+int main(void)
+{
+    v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    test_sample();
+    test_compare();
+    return CHECK_DONE();
+}
