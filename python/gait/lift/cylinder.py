@@ -91,7 +91,7 @@ class Figure:
         }
 
     def surfaces(self) -> Floats:
-        """Points (T, L, P, 3) on the limbs' surfaces whose hulls are the limbs, metres; in order of `LIMBS`."""
+        """Points (T, L, P, 3), metres, on the surfaces of `LIMBS`: each limb is the hull of its points."""
         posed = articulated.posed(self.pose, articulated.origins(self.stretch))
         segment = np.repeat(_BODY.limb_frames[:, 0], RING * SLICES).astype(np.intp)
         local = articulated.scales(self.stretch)[segment] * _SURFACE.reshape(-1, 3)

@@ -22,6 +22,7 @@ ROWS, COLUMNS = 10, 8
 REACH = 1.15  # height of the grid, statures
 CONTRAST = 0.035  # deviation of the window of local contrast, statures: 8 pixels of a person of 230
 BLUR = 0.6  # deviation of the sensors' blur, steps of the grid
+TALL = 240.0  # pixels of a person; larger pictures are made smaller first
 GRAIN = 4.0  # grey levels added to the contrast: noise of the camera
 SAMPLES = 3.0  # stored per deviation of the blur
 CHANGE = 6.0  # deviations of the difference to the empty scene at which a gradient counts half
@@ -96,23 +97,29 @@ class Film:
         update : callable, optional
             Called with the count of frames done.
         """
-        blur, numbers, times, fields = blur_of(stature), [], [], []
+        shrink = min(1.0, TALL / stature)
+        window, numbers, times, fields = CONTRAST * stature * shrink, [], [], []
+        scene = None if plate is None else _grey(plate, shrink)
         for done, frame in enumerate(frames, 1):
-            edges = normalised_gradient(_grey(frame.image), CONTRAST * stature)
-            if plate is not None:
-                edges *= changed(frame.image, plate, 0.5 * CONTRAST * stature)
-            fields.append(_reduced(edges, blur))
+            grey = _grey(frame.image, shrink)
+            edges = normalised_gradient(grey, window)
+            if scene is not None:
+                edges *= changed(grey, scene, 0.5 * window)
+            fields.append(_blurred(edges, blur_of(stature * shrink)))
             numbers.append(frame.number)
             times.append(frame.time)
+            size = frame.image.shape
             if update is not None:
                 update(done)
         height, width = fields[0].shape
-        step = np.array([edges.shape[1] / width, edges.shape[0] / height])
-        return Film(numbers[0], np.array(times), np.stack(fields), step, blur)
+        step = np.array([size[1] / width, size[0] / height])
+        return Film(numbers[0], np.array(times), np.stack(fields), step, blur_of(stature))
 
 
-def _grey(image: Image) -> Field:
+def _grey(image: Image, shrink: float) -> Field:
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    if shrink < 1:
+        grey = cv2.resize(grey, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
     return np.asarray(grey, np.float32)
 
 
@@ -127,18 +134,19 @@ def normalised_gradient(grey: Field, window: float) -> Field:
     return np.asarray(window * slope / contrast, np.float32)
 
 
-def changed(image: Image, plate: Image, window: float) -> Field:
+def changed(grey: Field, plate: Field, window: float) -> Field:
     """How much of each pixel's neighbourhood differs from the empty scene, 0 to 1, (h, w)."""
-    difference = np.abs(_grey(image) - _grey(plate))
+    difference = np.abs(grey - plate)
     noise = float(np.median(difference)) / 0.6745 + 1.0
     square = cv2.GaussianBlur(difference, (0, 0), max(window, 0.5)) ** 2
     return np.asarray(square / (square + (CHANGE * noise) ** 2), np.float32)
 
 
-def _reduced(edges: Field, blur: float) -> Field:
+def _blurred(edges: Field, blur: float) -> Field:
     """Blurred field, sampled `SAMPLES` times per deviation of the blur."""
     height, width = edges.shape
     step = max(blur / SAMPLES, 1.0)
     count = max(2, round(width / step)), max(2, round(height / step))
-    smooth = cv2.GaussianBlur(edges, (0, 0), blur)
-    return np.asarray(cv2.resize(smooth, count, interpolation=cv2.INTER_AREA), np.float32)
+    means = cv2.resize(edges, count, interpolation=cv2.INTER_AREA)  # their square adds step^2 / 12
+    left = np.sqrt(max(blur**2 - step**2 / 12, 0.01)) / step
+    return np.asarray(cv2.GaussianBlur(means, (0, 0), left, borderType=cv2.BORDER_REPLICATE), np.float32)

@@ -1,0 +1,208 @@
+"""The part of ``gait lift`` that starts from a video: sensors, corrections, cylinder figure."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.camera import Camera
+from gait.cli import values
+from gait.errors import UsageError, UserError
+from gait.files import require_writable
+from gait.lift import lifted_file, suggest
+from gait.lift.clip_segments import ClipSegments, Settings
+from gait.lift.cylinder import Figure
+from gait.lift.cylinder_picture import draw_figure
+from gait.lift.fit_clip import ClipFit, fit_clip
+from gait.lift.prior import SegmentPrior
+from gait.lift.sensors import Film
+from gait.lift.springs import Correction, Placement, read_corrections, read_placement
+from gait.lift.views import CameraView, FlatView, View
+from gait.progress import progress
+from gait.skeleton import JOINTS
+from gait.video import Video, VideoWriter, background
+
+Floats = npt.NDArray[np.float64]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that only a video has."""
+    group = parser.add_argument_group("from a video")
+    group.add_argument("--placement", metavar="P.json", help="where the person roughly is in one frame")
+    group.add_argument("--corrections", metavar="C.json", help="joints pointed at in any frames")
+    group.add_argument(
+        "--background",
+        default="auto",
+        metavar="PNG|auto|none",
+        help="empty scene that the sensors leave out: an image, the median of the clip, or none (auto)",
+    )
+    group.add_argument("--start", type=values.whole(0), metavar="F", help="first frame (the placement's)")
+    group.add_argument("--stop", type=values.whole(0), metavar="F", help="first frame not to use")
+    group.add_argument(
+        "--alone", action="store_true", help="segments one after the other, as in the paper, not together"
+    )
+    group.add_argument("--overlay", metavar="O.mp4", help="draw the cylinder figure into the video")
+    group.add_argument(
+        "--suggest",
+        type=values.whole(0),
+        default=0,
+        metavar="N",
+        help="name the N corrections that would tell most",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Estimate the motion in a video and report."""
+    if not args.placement:
+        raise UsageError("--placement: a video needs it; say where the person roughly is in one frame")
+    for path in filter(None, (args.output, args.overlay)):
+        require_writable(path)
+    video, prior = Video(args.input), SegmentPrior.load(args.model)
+    camera = Camera.read(args.camera, video.size) if args.camera else None
+    placement = read_placement(args.placement, prior, camera is not None)
+    first, stop = _frames(args, video, placement)
+    corrections = read_corrections(args.corrections, prior, video.count) if args.corrections else []
+    view = CameraView(camera) if camera else _flat(placement, prior)
+    film = _film(args, video, view, placement, prior, (first, stop))
+    used = [c for c in corrections if first <= c.frame < first + len(film.times)]
+    if len(used) < len(corrections) and not args.quiet:
+        print(f"{len(corrections) - len(used)} corrections of frames that are not used", file=sys.stderr)
+    clip = ClipSegments(prior, view, film, placement, used, Settings(joined=not args.alone))
+    free, fit = _fits(clip, args.quiet)
+    figure = Figure.fit(fit.places, prior.names)
+    shown = [i for i, name in enumerate(prior.names) if name in JOINTS or args.all_markers]
+    names = [prior.names[i] for i in shown]
+    lifted_file.write(args.output, fit.frame, fit.time, names, fit.places[:, shown], fit.sd[:, shown])
+    if args.overlay:
+        _draw(args, video, clip, fit, figure)
+    summary = _summary(clip, free, fit, figure, args.suggest)
+    print(json.dumps(summary) if args.json else _text(summary))
+    return 0
+
+
+def _frames(args: argparse.Namespace, video: Video, placement: Placement) -> tuple[int, int]:
+    """First frame, and the first not used."""
+    first = placement.frame if args.start is None else args.start
+    stop = video.count if args.stop is None else min(args.stop, video.count)
+    if not first <= placement.frame < stop:
+        raise UserError(
+            f"{args.placement}: frame {placement.frame} is not among the frames {first} to {stop - 1}; "
+            "place the person in one of them"
+        )
+    return first, stop
+
+
+def _flat(placement: Placement, prior: SegmentPrior) -> FlatView:
+    """View without a camera: as many pixels per metre as the placement says."""
+    assert placement.pelvis_px is not None and placement.height_px is not None
+    pixels = placement.height_px / placement.stature
+    pelvis = placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
+    return FlatView(pixels, (placement.pelvis_px[0], placement.pelvis_px[1] + pixels * pelvis))
+
+
+def _film(
+    args: argparse.Namespace,
+    video: Video,
+    view: View,
+    placement: Placement,
+    prior: SegmentPrior,
+    frames: tuple[int, int],
+) -> Film:
+    """Sensors of the frames used."""
+    with progress("background", video.count, args.quiet) as update:
+        plate = background(args.background, video, update)
+    pelvis = np.append(placement.ground, placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2])
+    if not view.visible(pelvis):
+        raise UserError(
+            f"{args.placement}: pelvis is behind the camera; give its place in the camera's world"
+        )
+    with progress("sensors", frames[1] - frames[0], args.quiet) as update:
+        return Film.make(video.frames(*frames), placement.stature * view.scale(pelvis), plate, update)
+
+
+def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:
+    """Estimates without and with the corrections."""
+    with progress("segments", len(clip.starts), quiet) as update:
+        free = fit_clip(replace(clip, corrections=()), update=update)
+    if not clip.corrections:
+        return free, free
+    with progress("corrections", len(clip.starts), quiet) as update:
+        return free, fit_clip(clip, free.sequence, update)
+
+
+def _marker(clip: ClipSegments, fit: ClipFit, correction: Correction) -> Floats:
+    """Place (3,) of a correction's marker in an estimate."""
+    found = fit.places[correction.frame - clip.film.first, clip.prior.index([correction.joint])[0]]
+    return np.asarray(found)
+
+
+def _draw(args: argparse.Namespace, video: Video, clip: ClipSegments, fit: ClipFit, figure: Figure) -> None:
+    """Write the overlay."""
+    surfaces, joints, first = figure.surfaces(), figure.joints(), clip.film.first
+    with (
+        VideoWriter(args.overlay, video.fps) as film,
+        progress("drawing", len(fit.frame), args.quiet) as update,
+    ):
+        for k, frame in enumerate(video.frames(first, first + len(fit.frame))):
+            springs = [(c, _marker(clip, fit, c)) for c in clip.corrections if c.frame == frame.number]
+            film.write(draw_figure(frame.image, clip.view, surfaces[k], joints[k], springs))
+            update(k + 1)
+
+
+def _misses(clip: ClipSegments, fit: ClipFit) -> Floats:
+    """Distances (C,) in pixels of the corrections' markers from where they were pointed at."""
+    seen = [clip.view.project(_marker(clip, fit, c)[None])[0][0] - c.uv for c in clip.corrections]
+    return np.linalg.norm(np.reshape(seen, (-1, 2)), axis=1)
+
+
+def _summary(clip: ClipSegments, free: ClipFit, fit: ClipFit, figure: Figure, most: int) -> dict[str, Any]:
+    """Figures of ``--json``."""
+    frames, given = len(fit.frame), len(clip.corrections)
+    pixels = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
+    enough = suggest.ENOUGH * clip.placement.stature * pixels
+    before, after = _misses(clip, free), _misses(clip, fit)
+    wanted = suggest.suggest(clip, fit)
+    joints = clip.prior.index([j for j in JOINTS if j in clip.prior.names])
+    return {
+        "frames": frames,
+        "segments": len(clip.starts),
+        "corrections": {
+            "given": given,
+            "per_frame": given / frames,
+            "needed": int((before > enough).sum()),
+            "within_px": float(enough),
+            "miss_px": {
+                "without": float(np.median(before)) if given else None,
+                "with": float(np.median(after)) if given else None,
+            },
+            "wanted": len(wanted),
+            "wanted_per_frame": len(wanted) / frames,
+        },
+        "sd_mm": 1000 * float(np.median(fit.sd[:, joints])),
+        "figure": {
+            "stature_m": figure.stature,
+            "residual_mm": 1000 * float(np.nanmedian(figure.residual)),
+            "bones_m": figure.lengths(),
+        },
+        "suggest": [{"frame": s.frame, "joint": s.joint, "sd_px": s.sd_px} for s in wanted[:most]],
+    }
+
+
+def _text(summary: dict[str, Any]) -> str:
+    c, figure = summary["corrections"], summary["figure"]
+    lines = [
+        f"{summary['frames']} frames in {summary['segments']} segments, median sd {summary['sd_mm']:.0f} mm",
+        f"{c['given']} corrections ({c['per_frame']:.2f} per frame), {c['needed']} of them more than "
+        f"{c['within_px']:.0f} px from where the picture alone puts the joint",
+        f"{c['wanted']} more ({c['wanted_per_frame']:.2f} per frame) would make every joint sure to "
+        f"{c['within_px']:.0f} px",
+        f"figure: stature {figure['stature_m']:.2f} m, {figure['residual_mm']:.0f} mm from the markers",
+    ]
+    asked = [f"frame {s['frame']:5d}  {s['joint']:<11} +- {s['sd_px']:.0f} px" for s in summary["suggest"]]
+    return "\n".join([*lines, *asked])
