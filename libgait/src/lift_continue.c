@@ -24,19 +24,29 @@ static void middle(const double *x, int32_t count, double out[2])
     }
 }
 
-/* Turn about z that takes x to y best, their middles aside (least squares), radians. */
-static double turn_between(const double *x, const double *y, int32_t count)
+/* Index of a marker, -1: the prior does not know it. */
+static int32_t marker_named(const lift_table *t, const char *name)
 {
-    double a[2], b[2], along = 0.0, across = 0.0;
-    middle(x, count, a);
-    middle(y, count, b);
-    for (int32_t j = 0; j < count; j++) {
-        double const px = x[3 * j] - a[0], py = x[3 * j + 1] - a[1];
-        double const qx = y[3 * j] - b[0], qy = y[3 * j + 1] - b[1];
-        along += px * qx + py * qy;
-        across += px * qy - py * qx;
+    for (int32_t j = 0; j < t->prior.markers; j++)
+        if (strcmp(t->prior.name[j], name) == 0)
+            return j;
+    return -1;
+}
+
+/* Turn of the trunk about z from x to y, radians: of the lines through hips and shoulders together, because
+ * limbs that swing turn most of all. 0 if the prior knows neither. */
+static double turn_between(const lift_table *t, const double *x, const double *y)
+{
+    static const char *const pair[2][2] = {{"r_hip", "l_hip"}, {"r_shoulder", "l_shoulder"}};
+    double a[2] = {0.0}, b[2] = {0.0};
+    for (int32_t k = 0; k < 2; k++) {
+        int32_t const from = marker_named(t, pair[k][0]), to = marker_named(t, pair[k][1]);
+        for (int32_t i = 0; from >= 0 && to >= 0 && i < 2; i++) {
+            a[i] += x[3 * to + i] - x[3 * from + i];
+            b[i] += y[3 * to + i] - y[3 * from + i];
+        }
     }
-    return (double)m_atan2((float)across, (float)along);
+    return (double)m_atan2((float)(a[0] * b[1] - a[1] * b[0]), (float)(a[0] * b[0] + a[1] * b[1]));
 }
 
 void lift_continue(const lift_table *t, const lift_belief *before, int32_t c, lift_belief *next,
@@ -47,7 +57,7 @@ void lift_continue(const lift_table *t, const lift_belief *before, int32_t c, li
     all_markers(t, before, 0.0, first);
     all_markers(t, before, t->prior.hop, then);
     next->component = c;
-    next->heading = lift_heading(t, before) + (t->turn < 0 ? 0.0 : turn_between(first, then, J));
+    next->heading = lift_heading(t, before) + (t->turn < 0 ? 0.0 : turn_between(t, first, then));
     next->centre = next->heading;
     next->turn_sd = t->cfg.turn_sd;
     memcpy(next->place, t->cfg.place, sizeof next->place);
