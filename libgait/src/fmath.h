@@ -105,10 +105,11 @@ static inline float m_log(float x)
     return (f + y) + e * 0.693359375f;
 }
 
-/* Absolute error < 1e-7 for |x| <= 8192; beyond, and for NaN, some value in [-1, 1]. */
+/* Absolute error < 1e-7 for |x| <= 8192; beyond, and for NaN, some value in [-1, 1].  (Not f_clamp: where x comes
+ * from memory the compiler makes branches of it, and the loop no vector code.) */
 static inline void m_sincos(float x, float *s, float *c)
 {
-    float const y = f_clamp(x, -8192.0f, 8192.0f);
+    float const y = m_select(m_less(fabsf(x), 8193.0f), x, 0.0f);
     float const k = m_round(y * (2.0f / PI_F));
     float const r = ((y - k * 1.5703125f) - k * 4.837512969970703125e-4f) - k * 7.54978995489188216e-8f;
     float const z = r * r;

@@ -13,6 +13,8 @@ struct edge_cell;
 struct edge_rows;
 struct features;
 struct kin_body;
+struct kin_channels;
+struct kin_input;
 struct layers;
 struct layers_block;
 struct like_body;
@@ -35,6 +37,14 @@ struct view_planes;
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
     K(void, lift_sum,                                                                                        \
       (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
+    /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. */    \
+    K(void, kin_curves,                                                                                      \
+      (const struct gait_model *m, const struct kin_input *in, int32_t components,                           \
+       struct kin_channels *out))                                                                            \
+    /* Every frame in the world; `proportions` scores of the limbs' lengths are in use. */                   \
+    K(void, kin_pose,                                                                                        \
+      (const struct gait_model *m, const struct kin_channels *ch, const struct kin_input *in,                \
+       int32_t proportions, struct kin_body *out))                                                           \
     /* A captured frame in the region's working image, and its maps. */                                      \
     K(void, view_sample,                                                                                     \
       (const struct view_map *map, const gait_camera *cam, const gait_image *im, struct view_planes *out))   \

@@ -26,20 +26,11 @@ typedef struct kin_body {
     float scale[KIN_MAX_FRAMES][BLOCK]; /* metres per model length in the frame */
 } kin_body;
 
-/* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. (2000),
- * linear between samples, wrapping.  (Strict C wants coef from a const kin_input.) */
-void kin_curves(const gait_model *m, const float phase[BLOCK], const float coef[][BLOCK], int32_t components,
-                kin_channels *out);
-
-/* One channel of one body: the same bits as kin_curves gives. */
+/* One channel of one body: the same bits as the kernel kin_curves gives. */
 float kin_channel(const gait_model *m, int32_t channel, float phase, const float *coef, int32_t components);
 
 /* By how much the first `proportions` scores change the pelvis's height, relatively. */
 float kin_height_change(const gait_model *m, const float *score, int32_t proportions);
-
-/* Place every frame in the world; `proportions` scores of the limbs' lengths are in use. */
-void kin_pose(const gait_model *m, const kin_channels *ch, const kin_input *in, int32_t proportions,
-              kin_body *out);
 
 /* The reported points, metres, world: P x 3 x BLOCK. */
 void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK]);

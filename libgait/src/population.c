@@ -1,5 +1,6 @@
 #include "population.h"
 #include "fmath.h"
+#include <string.h>
 
 population population_layout(arena *a, int32_t n, int32_t fields)
 {
@@ -16,6 +17,7 @@ float root_channel(const gait_model *m, int32_t c, float phase, const float *coe
 body_rule body_rule_init(const gait_model *m, const gait_tracker_config *cfg)
 {
     body_rule r = {.model = m,
+                   .run = kernels_choose(cfg->cpu_mask),
                    .components = cfg->components < 0 ? m->components : cfg->components,
                    .proportions = cfg->proportions < 0 ? m->proportions : cfg->proportions,
                    .plain_root = cfg->mode == GAIT_MODE_PAPER};
@@ -111,7 +113,7 @@ static void block_bodies(const body_rule *r, block *b, kin_body *out)
 {
     kin_channels ch;
     kin_input *const in = &b->in;
-    kin_curves(r->model, in->phase, (const float (*)[BLOCK])in->coef, r->components, &ch);
+    r->run->kin_curves(r->model, in, r->components, &ch);
     float (*const root)[BLOCK] = ch.v + r->model->root_channel;
     for (int32_t k = 0; k < r->offsets; k++)
         for (int32_t i = 0; i < BLOCK; i++)
@@ -132,34 +134,48 @@ static void block_bodies(const body_rule *r, block *b, kin_body *out)
         in->pelvis[2][i] += in->stature[i] * (1.0f + kin_height_change(r->model, score, r->proportions)) *
                             root[ROOT_HEIGHT][i];
     }
-    kin_pose(r->model, &ch, in, r->proportions, out);
+    r->run->kin_pose(r->model, &ch, in, r->proportions, out);
 }
 
-static void block_put(const body_rule *r, block *b, int32_t lane, const walker *w)
+/* Where field f of a block's walkers goes; NULL: the body does not depend on it. */
+static float *block_field(const body_rule *r, block *b, int32_t f)
 {
     kin_input *const in = &b->in;
-    in->phase[lane] = w->f[F_PHASE];
-    in->stature[lane] = w->f[F_STATURE];
-    in->heading[lane] = w->f[F_HEADING];
-    in->pitch[lane] = w->f[F_PITCH];
-    in->roll[lane] = w->f[F_ROLL];
-    in->pelvis[0][lane] = w->f[F_X];
-    in->pelvis[1][lane] = w->f[F_Y];
-    in->pelvis[2][lane] = w->f[F_Z];
-    for (int32_t k = 0; k < r->components; k++)
-        in->coef[k][lane] = w->f[F_COEF + k];
-    for (int32_t k = 0; k < r->proportions; k++)
-        in->proportion[k][lane] = w->f[body_rule_proportion(r) + k];
-    for (int32_t k = 0; k < r->offsets; k++)
-        b->offset[k][lane] = w->f[body_rule_offset(r) + k];
+    switch (f) {
+    case F_PHASE:
+        return in->phase;
+    case F_RATE:
+        return NULL;
+    case F_X:
+    case F_Y:
+    case F_Z:
+        return in->pelvis[f - F_X];
+    case F_HEADING:
+        return in->heading;
+    case F_PITCH:
+        return in->pitch;
+    case F_ROLL:
+        return in->roll;
+    case F_STATURE:
+        return in->stature;
+    default:
+        return f < body_rule_proportion(r) ? in->coef[f - F_COEF]
+               : f < body_rule_offset(r)   ? in->proportion[f - body_rule_proportion(r)]
+                                           : b->offset[f - body_rule_offset(r)];
+    }
 }
 
 void population_bodies(const body_rule *r, const population *p, int32_t begin, kin_body *out)
 {
     block b;
-    for (int32_t lane = 0; lane < BLOCK; lane++) {
-        walker const w = walker_get(p, i_min(begin + lane, p->n - 1));
-        block_put(r, &b, lane, &w);
+    int32_t const whole = i_min(BLOCK, p->n - begin);
+    for (int32_t f = 0; f < body_rule_fields(r); f++) {
+        float *const to = block_field(r, &b, f);
+        if (!to)
+            continue;
+        memcpy(to, field(p, f) + begin, (size_t)whole * sizeof *to);
+        for (int32_t lane = whole; lane < BLOCK; lane++)
+            to[lane] = to[whole - 1];
     }
     block_bodies(r, &b, out);
 }
@@ -167,7 +183,10 @@ void population_bodies(const body_rule *r, const population *p, int32_t begin, k
 void walker_body(const body_rule *r, const walker *w, kin_body *out)
 {
     block b;
-    for (int32_t lane = 0; lane < BLOCK; lane++)
-        block_put(r, &b, lane, w);
+    for (int32_t f = 0; f < body_rule_fields(r); f++) {
+        float *const to = block_field(r, &b, f);
+        for (int32_t lane = 0; to && lane < BLOCK; lane++)
+            to[lane] = w->f[f];
+    }
     block_bodies(r, &b, out);
 }

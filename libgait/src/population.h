@@ -1,6 +1,7 @@
 /* population.h - the particles as structure of arrays, and their bodies in blocks. */
 #ifndef GAIT_POPULATION_H
 #define GAIT_POPULATION_H
+#include "kernels.h"
 #include "kinematics.h"
 
 /* One float array per field.  (X, Y) is the smooth track over the ground and Z the ground's height under
@@ -34,6 +35,7 @@ population population_layout(arena *a, int32_t n, int32_t fields);
 /* Constants that turn fields into bodies. */
 typedef struct body_rule {
     const gait_model *model;
+    const kernels *run;
     int32_t components, proportions;
     int32_t offsets;                /* how many angles have a posture offset, */
     int32_t angle[GAIT_MAX_ANGLES]; /* and which */

@@ -1,5 +1,6 @@
 /* Curves and forward kinematics against a plain double-precision twin, and against what the words mean. */
 #include "kinematics.h"
+#include "kernel_check.h"
 
 #include "rng.h"
 #include "toy_model.h"
@@ -124,9 +125,9 @@ static void run_block(const gait_model *m, uint32_t first, block *b)
         gait_state const s = random_state(first + (uint32_t)lane);
         put_lane(&filled, lane, &s);
     }
-    const kin_input *const in = &filled;
-    kin_curves(m, in->phase, in->coef, m->components, &b->ch);
-    kin_pose(m, &b->ch, in, m->proportions, &b->body);
+    const kernels *const run = kernels_choose(~0u);
+    run->kin_curves(m, &filled, m->components, &b->ch);
+    run->kin_pose(m, &b->ch, &filled, m->proportions, &b->body);
     kin_points(m, &b->body, b->xyz);
 }
 
@@ -194,8 +195,7 @@ static const float *mean_at(float phase, int32_t components, const float score[2
     filled.phase[3] = phase;
     filled.coef[0][3] = score[0];
     filled.coef[1][3] = score[1];
-    const kin_input *const in = &filled;
-    kin_curves(toy_model(), in->phase, in->coef, components, &ch);
+    kernels_choose(~0u)->kin_curves(toy_model(), &filled, components, &ch);
     for (int i = 0; i < TOY_CHANNELS; i++)
         value[i] = ch.v[i][3];
     return value;
@@ -320,11 +320,10 @@ static void test_shoulder_rotation(void)
         kin_input filled = {0};
         filled.coef[0][0] = 0.2f;
         filled.stature[0] = 1.7f;
-        const kin_input *const in = &filled;
         static kin_channels ch;
         static kin_body body;
-        kin_curves(m, in->phase, in->coef, 1, &ch);
-        kin_pose(m, &ch, in, m->proportions, &body);
+        kernels_choose(~0u)->kin_curves(m, &filled, 1, &ch);
+        kernels_choose(~0u)->kin_pose(m, &ch, &filled, m->proportions, &body);
         CHECK_NEAR(body.R[3 + 5 * side][3][0], side ? sin(0.2) : -sin(0.2), 1e-6); /* y of its x axis */
     }
 }
@@ -378,6 +377,37 @@ static void test_ground(void)
     }
 }
 
+/* Every instruction set gives the scalar bits, and writes nothing else. */
+static void test_kernels(void)
+{
+    static kin_channels ch;
+    static kin_body body;
+    static unsigned char memory[sizeof body + 2 * GUARD];
+    const gait_model *const m = toy_model();
+    for (uint32_t first = 0; first < 40 * BLOCK; first += BLOCK) {
+        kin_input in = {0};
+        int32_t const components = (int32_t)(first / BLOCK) % (m->components + 1);
+        int32_t const proportions = (int32_t)(first / BLOCK) % (m->proportions + 1);
+        for (int lane = 0; lane < BLOCK; lane++) {
+            gait_state const s = random_state(first + (uint32_t)lane);
+            put_lane(&in, lane, &s);
+        }
+        in.heading[first / BLOCK % BLOCK] = first % 3 ? NAN : 1e30f;
+        memset(&ch, 0xa5, sizeof ch);
+        memset(&body, 0xa5, sizeof body);
+        isa_scalar()->kin_curves(m, &in, components, &ch);
+        isa_scalar()->kin_pose(m, &ch, &in, proportions, &body);
+        for (int k = 0; k < isa_count(); k++) {
+            guarded g = guard_fill(memory, sizeof ch);
+            isa_at(k)->kin_curves(m, &in, components, (kin_channels *)(void *)g.begin);
+            CHECK(guard_whole(&g) && memcmp(g.begin, &ch, sizeof ch) == 0);
+            g = guard_fill(memory, sizeof body);
+            isa_at(k)->kin_pose(m, &ch, &in, proportions, (kin_body *)(void *)g.begin);
+            CHECK(guard_whole(&g) && memcmp(g.begin, &body, sizeof body) == 0);
+        }
+    }
+}
+
 int main(void)
 {
     test_against_twin();
@@ -389,5 +419,6 @@ int main(void)
     test_placement();
     test_pelvis_height();
     test_ground();
+    test_kernels();
     return CHECK_DONE();
 }

@@ -112,13 +112,12 @@ static void test_root_channel(void)
         filled.phase[0] = i < 3 ? 0.999999f : s.phase;
         filled.coef[0][0] = s.coef[0];
         filled.coef[1][0] = s.coef[1];
-        const kin_input *const in = &filled;
         for (int32_t q = 0; q <= 2; q++) {
-            kin_curves(m, in->phase, in->coef, q, &ch);
+            r.run->kin_curves(m, &filled, q, &ch);
             for (int32_t c = ROOT_FORWARD; c <= ROOT_YAW; c++) {
                 float const want = ch.v[m->root_channel + c][0];
-                CHECK_NEAR(root_channel(m, c, in->phase[0], s.coef, q), want, 1e-6);
-                CHECK_NEAR(root_channel(m, c, in->phase[0] - 7.0f, s.coef, q), want, 1e-5);
+                CHECK_NEAR(root_channel(m, c, filled.phase[0], s.coef, q), want, 1e-6);
+                CHECK_NEAR(root_channel(m, c, filled.phase[0] - 7.0f, s.coef, q), want, 1e-5);
             }
         }
     }
