@@ -5,7 +5,9 @@ depth: with R, t of the camera and (a, b) the ideal image coordinates of a point
 
     (R_x - a R_z) . X = a t_z - t_x,    (R_y - b R_z) . X = b t_z - t_y,
 
-and only the noise, sd Z / f, depends on where the point is: it is taken at a guess and iterated.
+and only the noise, sd Z / f, depends on where the point is: it is taken at a guess and iterated.  These rows
+hold the observation's own noise, which draws bodies towards the camera (by the square of noise over extent);
+so near a guess the derivatives of the projection there are taken instead, as the C core does.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ Floats = npt.NDArray[np.float64]
 
 AXES = {"x": 0, "y": 1, "z": 2}
 NEAREST = 0.1  # metres before the lens: noise is not taken nearer
+NEAR = 0.5  # metres beside the ray: a guess is good enough to take the projection's derivatives there
 
 
 @dataclass(frozen=True)
@@ -133,5 +136,9 @@ def perspective(seen: Observations, camera: Camera, about: Floats) -> Rows:
     places = np.broadcast_to(about, (*seen.sd.shape, 3))[frame, marker]
     depth = np.maximum(camera.depth(places), NEAREST)
     sd = seen.sd[frame, marker, None] * depth[:, None] / (camera.fx, camera.fy)
-    direction = camera.R[:2] - ideal[:, :, None] * camera.R[2]
-    return Rows(frame, marker, direction, ideal * camera.t[2] - camera.t[:2], sd**2)
+    guessed = (places @ camera.R[:2].T + camera.t[:2]) / depth[:, None]
+    miss = (ideal - guessed) * depth[:, None]
+    near = np.linalg.norm(miss, axis=1, keepdims=True) < NEAR
+    direction = camera.R[:2] - np.where(near, guessed, ideal)[:, :, None] * camera.R[2]
+    tangent = miss + np.einsum("nai,ni->na", direction, places)
+    return Rows(frame, marker, direction, np.where(near, tangent, ideal * camera.t[2] - camera.t[:2]), sd**2)
