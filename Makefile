@@ -216,13 +216,27 @@ MOCAP ?= ../shared/data/mocap/cmu_walk
 model: setup lib ## learn the default model from MOCAP=
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 
-BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file histogram message options workers)
-$(B)/bench/step: tests/bench/step.c $(BENCH_PARTS) $(B)/libgait.a Makefile | $(B)/bench/
-	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread \
-	    -Ilibgait/include -Itools $(CFLAGS) $(LDFLAGS) -o $@ $< $(BENCH_PARTS) $(B)/libgait.a -lm
+# The bench calls internal functions, and the linker puts its clocks round those that __wrap_ names.
+BENCH_ISA := $(foreach isa,$(KERNEL_ISAS),$(B)/bench/bench_limit_kernel.$(isa).o)
+BENCH_OBJ := $(patsubst tests/bench/%.c,$(B)/bench/%.o,$(filter-out %_kernel.c,$(sort $(wildcard tests/bench/*.c)))) $(BENCH_ISA)
+BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file message options workers)
+BENCH_WRAP := $(shell sed -n 's/^WRAP.[^,]*, \([a-z_]*\),.*/-Wl,--wrap=\1/p' tests/bench/bench_stages.c)
+BENCH_CC = $(CC) -std=c11 -D_DEFAULT_SOURCE -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -Ilibgait/include -iquote libgait/src -Itools $(CFLAGS)
+define bench_isa_rule
+$(B)/bench/%_kernel.$(1).o: tests/bench/%_kernel.c Makefile | $(B)/bench/
+	$$(call say,CC   $$< ($(1)))$$(BENCH_CC) -DKERNEL_ISA=$(1) $(FLAGS_$(1)) -c $$< -o $$@
+endef
+$(foreach isa,$(KERNEL_ISAS),$(eval $(call bench_isa_rule,$(isa))))
+$(B)/bench/%.o: tests/bench/%.c Makefile | $(B)/bench/
+	$(call say,CC   $<)$(BENCH_CC) -c $< -o $@
+$(B)/bench/step: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
+	$(call say,LD   $@)$(CC) $(OPT) $(BENCH_WRAP) $(LDFLAGS) -o $@ $^ -lm -pthread
 
-bench: $(B)/bench/step ## time a step by particles and threads (ARGS='-n 1000 -t 1,2,4')
-	@$< $(ARGS)
+CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null | head -n 1 | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9-')
+BENCH_CSV = tests/bench/results/$(or $(CPU_NAME),$(MACHINE)).csv
+bench: setup $(B)/bench/step ## speed by particles, threads, instruction set and stage: tests/bench/results/<cpu>.csv (ARGS='-s 40')
+	@$< --csv $(BENCH_CSV) $(ARGS)
+	@$(PY) tests/bench/bench_plot.py $(BENCH_CSV) build/bench/speed.png
 
 eval: setup lib ## errors on the clips of ../shared/data
 	@$(PY) tests/bench/eval.py $(ARGS)

@@ -1,0 +1,29 @@
+/* bench_limit.h - the limit of any texture likelihood on this machine: nothing but affine sample places, bilinear
+ * look-ups and squared differences (the kernel that issue texts and doc/design.md call the texture-only roofline). */
+#ifndef BENCH_LIMIT_H
+#define BENCH_LIMIT_H
+#include "common/message.h"
+
+#include <stdint.h>
+
+enum { LIMIT_PARTICLES = 10000, LIMIT_LIMBS = 10, LIMIT_SAMPLES = 64, LIMIT_SIZE = 256 };
+
+typedef struct limit_limb { /* x = at[0] + s * along[0] + t * across[0], y likewise; pixels */
+    float at[2], along[2], across[2];
+} limit_limb;
+
+typedef struct limit_work {
+    const uint32_t *now, *then; /* LIMIT_SIZE^2 pixels, each with its three neighbours: one word a look-up */
+    const limit_limb *limb;     /* [particles][limbs] */
+    const int32_t *parent;      /* [particles], ascending */
+    uint8_t *seen;              /* [particles][limbs][samples] of the present */
+    const uint8_t *known;       /* the same of the ancestors, in the previous frame */
+    float *cost;                /* [particles][limbs] */
+} limit_work;
+
+typedef void limit_kernel(const limit_work *w);
+
+/* Milliseconds of CPU for all particles, the best of some runs: with both frames looked up, and with the ancestor's
+ * samples kept from the previous frame, with the best instruction set in the mask (GAIT_CPU_*). */
+bool bench_limit(uint32_t cpu_mask, double *both_ms, double *kept_ms, message *why);
+#endif

@@ -1,0 +1,97 @@
+#include "bench_report.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MAX_RESULTS = 128, MAX_OTHERS = 16 };
+
+static bench_result results[MAX_RESULTS];
+static int count;
+static struct {
+    const char *what, *isa;
+    double ms;
+} others[MAX_OTHERS];
+static int other_count;
+
+const bench_result *bench_report_measure(const gait_model *model, const bench_scene *s,
+                                         const bench_plan *plan, message *why)
+{
+    if (count == MAX_RESULTS)
+        return message_set(why, "more than %d measurements", MAX_RESULTS) ? NULL : NULL;
+    return bench_measure(model, s, plan, &results[count], why) ? &results[count++] : NULL;
+}
+
+void bench_report_add(const char *what, const char *isa, double ms)
+{
+    if (other_count < MAX_OTHERS) {
+        others[other_count].what = what;
+        others[other_count].isa = isa;
+        others[other_count++].ms = ms;
+    }
+}
+
+static const char *mode_of(const bench_result *r)
+{
+    return r->plan.mode == GAIT_MODE_PAPER ? "paper" : "default";
+}
+
+void bench_report_head(const char *title)
+{
+    printf(
+        "\n%s\nmode    isa         size  particles threads memory_MB median_ms   p99_ms   cpu_ms      fps\n",
+        title);
+}
+
+void bench_report_row(const bench_result *r)
+{
+    printf("%-7s %-7s %4dx%-4d %9d %7d %9.1f %9.2f %8.2f %8.2f %8.1f\n", mode_of(r), r->isa, (int)r->width,
+           (int)r->height, (int)r->plan.particles, (int)r->plan.threads, (double)r->bytes / 1e6, r->median_ms,
+           r->p99_ms, r->cpu_ms, 1e3 / r->median_ms);
+    fflush(stdout);
+}
+
+void bench_report_stages(const bench_result *const *runs, int n)
+{
+    printf("\nstages, CPU ns per particle (the step's fixed parts in ms)\n%-12s", "");
+    for (int k = 0; k < n; k++)
+        printf("%12s", runs[k]->isa);
+    printf("\n");
+    for (int stage = 0; stage < BENCH_STAGES; stage++) {
+        printf("%s%-*s", bench_stage_is_part(stage) ? "  " : "", bench_stage_is_part(stage) ? 10 : 12,
+               bench_stage_name[stage]);
+        for (int k = 0; k < n; k++)
+            if (stage == STAGE_FEATURES)
+                printf("%9.3f ms", runs[k]->stage_ms[stage]);
+            else
+                printf("%12.1f", runs[k]->stage_ms[stage] * 1e6 / runs[k]->plan.particles);
+        printf("\n");
+    }
+}
+
+bool bench_report_csv(const char *path, message *why)
+{
+    FILE *const f = fopen(path, "w");
+    if (!f)
+        return message_set(why, "%.120s: cannot be written: %s", path, strerror(errno));
+    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms");
+    for (int k = 0; k < BENCH_STAGES; k++)
+        fprintf(f, ",%s_ms", bench_stage_name[k]);
+    fprintf(f, "\n");
+    for (int i = 0; i < count; i++) {
+        const bench_result *const r = &results[i];
+        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f", mode_of(r), r->isa, (int)r->width, (int)r->height,
+                (int)r->plan.particles, (int)r->plan.threads, r->bytes, r->median_ms, r->p99_ms, r->cpu_ms);
+        for (int k = 0; k < BENCH_STAGES; k++)
+            r->plan.stages ? fprintf(f, ",%.4f", r->stage_ms[k]) : fprintf(f, ",");
+        fprintf(f, "\n");
+    }
+    for (int i = 0; i < other_count; i++) {
+        fprintf(f, "%s,%s,,,,1,,,,%.4f", others[i].what, others[i].isa, others[i].ms);
+        for (int k = 0; k < BENCH_STAGES; k++)
+            fprintf(f, ",");
+        fprintf(f, "\n");
+    }
+    return fclose(f) == 0 || message_set(why, "%.120s: cannot be written: %s", path, strerror(errno));
+}

@@ -1,0 +1,19 @@
+/* bench_scene.h - a drawn walker who crosses a textured scene, in colour, at the same size whatever the picture's. */
+#ifndef BENCH_SCENE_H
+#define BENCH_SCENE_H
+#include "common/message.h"
+#include "gait.h"
+
+typedef struct bench_scene {
+    gait_camera camera;
+    gait_state start;
+    int32_t frames;
+    uint8_t *plate, *pixels; /* BGR: empty scene; frames */
+} bench_scene;
+
+bool bench_scene_make(bench_scene *s, const gait_model *model, int32_t width, int32_t height, int32_t frames,
+                      message *why);
+void bench_scene_free(bench_scene *s);
+gait_image bench_scene_plate(const bench_scene *s);
+gait_image bench_scene_frame(const bench_scene *s, int32_t frame);
+#endif

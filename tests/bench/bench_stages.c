@@ -1,0 +1,257 @@
+#include "bench_stages.h"
+#include "bench_clock.h"
+#include "estimate.h"
+#include "loss.h"
+#include "modes.h"
+#include "weigh.h"
+
+const char *const bench_stage_name[BENCH_STAGES] = {
+    [STAGE_FEATURES] = "features",     [STAGE_RESAMPLE] = "resample",     [STAGE_PROPAGATE] = "propagate",
+    [STAGE_LIKELIHOOD] = "likelihood", [STAGE_KINEMATICS] = "kinematics", [STAGE_PROJECTION] = "projection",
+    [STAGE_RASTER] = "raster",         [STAGE_SAMPLES] = "samples",       [STAGE_TEXTURE] = "texture",
+    [STAGE_SILHOUETTE] = "silhouette", [STAGE_EDGES] = "edges",           [STAGE_TEMPLATE] = "template",
+    [STAGE_WEIGHTS] = "weights",       [STAGE_ESTIMATE] = "estimate",     [STAGE_LAG] = "lag",
+};
+
+static struct {
+    bool on, weighing;          /* weighing: on, and inside the particles' likelihood */
+    const kernels *plain;       /* of the tracker */
+    kernels timed;              /* the same with the functions below */
+    double ms_per_tick, cost;   /* a tick; ticks that timing takes */
+    double ns[BENCH_STAGES];    /* of whole stages, */
+    double ticks[BENCH_STAGES]; /* and of parts of the likelihood */
+    double cells, bodies;       /* of the silhouettes counted */
+} b;
+
+/* ---- clocks: the thread's for whole stages, the CPU's counter for their parts, which are short ---- */
+static uint64_t now(void)
+{
+#if defined(__x86_64__)
+    return __builtin_ia32_rdtsc();
+#elif defined(__aarch64__)
+    uint64_t ticks;
+    __asm__ volatile("mrs %0, cntvct_el0" : "=r"(ticks));
+    return ticks;
+#else
+    return (uint64_t)bench_wall_ns();
+#endif
+}
+
+/* Time that another program had in between does not count. */
+static void add(int stage, uint64_t begin)
+{
+    double const ticks = (double)(now() - begin) - b.cost;
+    if (ticks * b.ms_per_tick < 0.2)
+        b.ticks[stage] += ticks;
+}
+
+static void calibrate(void)
+{
+    enum { ROUNDS = 1000 };
+    int64_t const wall = bench_wall_ns();
+    uint64_t const begin = now();
+    while (bench_wall_ns() - wall < 20000000)
+        ;
+    b.ms_per_tick = (double)(bench_wall_ns() - wall) * 1e-6 / (double)(now() - begin);
+    b.cost = 1e9;
+    for (int i = 0; i < ROUNDS; i++) {
+        uint64_t const start = now();
+        double const ticks = (double)(now() - start);
+        b.cost = ticks < b.cost ? ticks : b.cost;
+    }
+}
+
+/* `call`, timed as part of the likelihood. */
+#define PART(stage, call)                                                                                    \
+    do {                                                                                                     \
+        uint64_t const since_ = b.weighing ? now() : 0;                                                      \
+        call;                                                                                                \
+        if (b.weighing)                                                                                      \
+            add(stage, since_);                                                                              \
+    } while (0)
+
+/* ---- kernels ---- */
+static void outline_project(const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,
+                            const gait_camera *cam, const struct view_map *map, struct outline_block *out)
+{
+    PART(STAGE_PROJECTION, b.plain->outline_project(limbs, count, body, cam, map, out));
+}
+
+static void layers_prepare(const struct outline_block *outline, const struct limb_geometry *limbs,
+                           int32_t count, struct layers_block *out)
+{
+    PART(STAGE_PROJECTION, b.plain->layers_prepare(outline, limbs, count, out));
+}
+
+static void layers_draw(const struct layers_block *block, int32_t lane, struct layers *out)
+{
+    PART(STAGE_RASTER, b.plain->layers_draw(block, lane, out));
+}
+
+static void silhouette_count(const struct features *f, const struct rast_mask *whole, int32_t *area,
+                             int32_t *covered)
+{
+    PART(STAGE_SILHOUETTE, b.plain->silhouette_count(f, whole, area, covered));
+    b.cells += (double)(*area / FG_ONE);
+    b.bodies++;
+}
+
+static void surface_pose(const struct like_setup *s, const gait_camera *cam, const struct kin_body *body,
+                         struct like_pose *out)
+{
+    PART(STAGE_SAMPLES, b.plain->surface_pose(s, cam, body, out));
+}
+
+static void surface_sample(const struct like_setup *s, const struct features *f, const gait_camera *cam,
+                           const struct like_pose *pose, int32_t lane, const struct layers *drawn,
+                           struct like_patch *seen)
+{
+    PART(STAGE_SAMPLES, b.plain->surface_sample(s, f, cam, pose, lane, drawn, seen));
+}
+
+static void texture_logs(const struct like_body *body, float *log)
+{
+    PART(STAGE_TEXTURE, b.plain->texture_logs(body, log));
+}
+
+static int64_t template_cost(const struct like_body *body)
+{
+    int64_t sum;
+    PART(STAGE_TEMPLATE, sum = b.plain->template_cost(body));
+    return sum;
+}
+
+void bench_stages_enable(gait_tracker *t, bool on)
+{
+    if (on && b.ms_per_tick == 0.0)
+        calibrate();
+    if (on == b.on)
+        return;
+    b.on = on;
+    if (on) {
+        b.plain = t->like->run;
+        b.timed = *b.plain;
+        b.timed.outline_project = outline_project;
+        b.timed.layers_prepare = layers_prepare;
+        b.timed.layers_draw = layers_draw;
+        b.timed.silhouette_count = silhouette_count;
+        b.timed.surface_pose = surface_pose;
+        b.timed.surface_sample = surface_sample;
+        b.timed.texture_logs = texture_logs;
+        b.timed.template_cost = template_cost;
+    }
+    t->like->run = on ? &b.timed : b.plain;
+}
+
+double bench_stages_take(int stage)
+{
+    double const ms = b.ns[stage] * 1e-6 + b.ticks[stage] * b.ms_per_tick;
+    b.ns[stage] = b.ticks[stage] = 0.0;
+    return ms;
+}
+
+double bench_stages_cells(void)
+{
+    return b.bodies > 0.0 ? b.cells / b.bodies : 0.0;
+}
+
+/* ---- functions of the library (-Wl,--wrap) ---- */
+#define WHOLE(stage, call)                                                                                   \
+    do {                                                                                                     \
+        int64_t const since_ = b.on ? bench_cpu_ns() : 0;                                                    \
+        call;                                                                                                \
+        b.ns[stage] += b.on ? (double)(bench_cpu_ns() - since_) : 0.0;                                       \
+    } while (0)
+#define WRAP(result, name, parameters)                                                                       \
+    result __real_##name parameters;                                                                         \
+    result __wrap_##name parameters;                                                                         \
+    result __wrap_##name parameters
+
+WRAP(int32_t, weigh_look, (gait_tracker * t, const gait_frame *frame, const walker *predicted))
+{
+    int32_t cameras;
+    WHOLE(STAGE_FEATURES, cameras = __real_weigh_look(t, frame, predicted));
+    return cameras;
+}
+
+WRAP(bool, modes_resample, (gait_tracker * t, uint32_t frame))
+{
+    bool done;
+    WHOLE(STAGE_RESAMPLE, done = __real_modes_resample(t, frame));
+    return done;
+}
+
+WRAP(void, weigh_particles, (gait_tracker * t))
+{
+    b.weighing = b.on;
+    WHOLE(STAGE_LIKELIHOOD, __real_weigh_particles(t));
+    b.weighing = false;
+}
+
+/* Outside the likelihood there is one such loop over the particles: their motion. */
+WRAP(void, task_run,
+     (const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn, void *ctx))
+{
+    if (b.weighing)
+        __real_task_run(exec, tasks, items, block, fn, ctx);
+    else
+        WHOLE(STAGE_PROPAGATE, __real_task_run(exec, tasks, items, block, fn, ctx));
+}
+
+WRAP(pf_summary, modes_reweigh, (gait_tracker * t, float dt))
+{
+    pf_summary s;
+    WHOLE(STAGE_WEIGHTS, s = __real_modes_reweigh(t, dt));
+    return s;
+}
+
+WRAP(void, loss_allow_hidden, (gait_tracker * t))
+{
+    WHOLE(STAGE_WEIGHTS, __real_loss_allow_hidden(t));
+}
+
+WRAP(walker, estimate_place, (const population *people, const double *weight))
+{
+    walker w;
+    WHOLE(STAGE_ESTIMATE, w = __real_estimate_place(people, weight));
+    return w;
+}
+
+WRAP(walker, estimate_fill, (gait_tracker * t, int32_t best, gait_estimate *out))
+{
+    walker w;
+    WHOLE(STAGE_ESTIMATE, w = __real_estimate_fill(t, best, out));
+    return w;
+}
+
+WRAP(void, loss_watch, (gait_tracker * t, const walker *mean))
+{
+    WHOLE(STAGE_ESTIMATE, __real_loss_watch(t, mean));
+}
+
+WRAP(void, lag_keep, (gait_tracker * t, const gait_estimate *e))
+{
+    WHOLE(STAGE_LAG, __real_lag_keep(t, e));
+}
+
+/* Parts of the likelihood that are no kernels. */
+WRAP(void, population_bodies, (const body_rule *r, const population *p, int32_t begin, kin_body *out))
+{
+    PART(STAGE_KINEMATICS, __real_population_bodies(r, p, begin, out));
+}
+
+WRAP(void, kin_points, (const gait_model *m, const kin_body *body, float (*xyz)[3][BLOCK]))
+{
+    PART(STAGE_KINEMATICS, __real_kin_points(m, body, xyz));
+}
+
+/* The terms: what the kernels of the others do not take is that of the edges. */
+WRAP(float, like_evaluate, (const like_body *body))
+{
+    double const others = b.ticks[STAGE_TEXTURE] + b.ticks[STAGE_SILHOUETTE] + b.ticks[STAGE_TEMPLATE];
+    float ll;
+    PART(STAGE_EDGES, ll = __real_like_evaluate(body));
+    b.ticks[STAGE_EDGES] +=
+        others - b.ticks[STAGE_TEXTURE] - b.ticks[STAGE_SILHOUETTE] - b.ticks[STAGE_TEMPLATE];
+    return ll;
+}

@@ -1,0 +1,106 @@
+#include "bench_verdict.h"
+#include "like.h"
+#include "model.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+/* PARSEC bodytrack, one camera, 10,000 particles x 1 layer, one core of such a machine: quoted, not measured here. */
+static const double PARSEC_MS[2] = {43, 58};
+enum { PARSEC_SAMPLES = 481 };
+
+/* Per particle, CPU; what does not depend on the particles is left out. */
+static double particle_ns(const bench_result *r)
+{
+    return (r->cpu_ms - r->stage_ms[STAGE_FEATURES]) * 1e6 / r->plan.particles;
+}
+
+void verdict_size(verdict *v, const bench_result *r)
+{
+    double const ns = particle_ns(r);
+    if (r->plan.particles < 1000 || r->plan.particles > 100000)
+        return;
+    v->least_ns = v->least_ns == 0.0 || ns < v->least_ns ? ns : v->least_ns;
+    v->most_ns = ns > v->most_ns ? ns : v->most_ns;
+}
+
+/* Points of the picture that one likelihood looks up: surface and edges. */
+static int32_t points(const gait_model *m)
+{
+    int32_t const cone = 2 * 10, ellipsoid = 8 * 3; /* edge points: like_edges */
+    int32_t count = m->limbs * LIKE_FACING;
+    for (int32_t l = 0; l < m->limbs; l++)
+        count += m->limb_info[l * LIMB_INFO + 1] == LIMB_ELLIPSOID ? ellipsoid : cone;
+    return count;
+}
+
+/* One line; `more`: more is better. */
+static void line(const char *what, double wanted, double reached, bool more, const char *unit)
+{
+    bool const ok = more ? reached >= wanted : reached <= wanted;
+    printf("%-62s %s %8.2f %10.2f %-8s %s\n", what, more ? ">=" : "<=", wanted, reached, unit,
+           ok ? "reached" : "MISSED");
+}
+
+static double fps(const bench_result *r)
+{
+    return 1e3 / r->median_ms;
+}
+
+static void speed_lines(const verdict *v)
+{
+    const bench_result *const one = v->many[0][0], *const two = v->many[0][1];
+    line("default mode, 10,000 particles, one core", 30, fps(one), true, "fps");
+    line("default mode, 10,000 particles, two cores", 55, fps(two), true, "fps");
+    line("paper mode, 10,000 particles, one core", 30, fps(v->many[1][0]), true, "fps");
+    line("paper mode, 10,000 particles, two cores", 55, fps(v->many[1][1]), true, "fps");
+    line("default number of particles, one core", 200, fps(v->usual), true, "fps");
+    line("two threads against one, 10,000 particles", 1.8, one->median_ms / two->median_ms, true, "times");
+    line("p99 of a step against its median", 1.3, one->p99_ms / one->median_ms, false, "times");
+    line("the same one-core steps by CPU time: default mode", 30, 1e3 / one->cpu_ms, true, "fps");
+    line("    paper mode", 30, 1e3 / v->many[1][0]->cpu_ms, true, "fps");
+    line("    default number of particles", 200, 1e3 / v->usual->cpu_ms, true, "fps");
+}
+
+static void kernel_lines(const verdict *v)
+{
+    const bench_result *const best = v->isa[v->isas - 1];
+    double const stage = best->stage_ms[STAGE_LIKELIHOOD];
+    line("likelihood stage, scalar against the best instruction set", 5,
+         v->isa[0]->stage_ms[STAGE_LIKELIHOOD] / stage, true, "times");
+    line("likelihood stage against the texture-only limit", 2, stage / v->limit_ms, false, "times");
+}
+
+static void parsec_lines(const verdict *v, const gait_model *m)
+{
+    const bench_result *const best = v->isa[v->isas - 1];
+    double const looked = points(m), cells = bench_stages_cells(), ours = looked + cells;
+    double const stage = best->stage_ms[STAGE_LIKELIHOOD], step = v->many[0][0]->cpu_ms;
+    double const rate = 1e-3 * best->plan.particles, ns = 1e6 * stage / best->plan.particles;
+    line("a step against PARSEC bodytrack's 43 ms (quoted)", 0.5, step / PARSEC_MS[0], false, "times");
+    line("samples per likelihood against PARSEC's", PARSEC_SAMPLES, ours, true, "");
+    printf("    %.0f of surface and edges, %.0f cells of the silhouette\n", looked, cells);
+    printf(
+        "    million samples a second: %.0f in a step (%.0f without the silhouette's); PARSEC %.0f to %.0f\n",
+        rate * ours / step, rate * looked / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],
+        rate * PARSEC_SAMPLES / PARSEC_MS[0]);
+    printf("    likelihood stage: %.0f ns a particle, %.2f ns a sample of surface and edges\n", ns,
+           ns / looked);
+    printf("    whole step: %.0f thousand particles a second and core\n", best->plan.particles / step);
+}
+
+void verdict_print(const verdict *v, const gait_model *model)
+{
+    double load = 0.0;
+    printf("\n%-65s %8s %10s\n", "", "wanted", "this run");
+    speed_lines(v);
+    kernel_lines(v);
+    parsec_lines(v, model);
+    line("cost of a particle, most against least, by their number", 1.15, v->most_ns / v->least_ns, false,
+         "times");
+    line("cost of a particle, 1920x1080 against 640x480", 1.1,
+         particle_ns(v->picture[2]) / particle_ns(v->picture[0]), false, "times");
+    line("memory of the tracker, 10,000 particles", 12, (double)v->many[0][0]->bytes / 1e6, false, "MB");
+    if (getloadavg(&load, 1) == 1 && load > 2.5)
+        printf("the machine was busy (load %.1f): only CPU times and their ratios mean something\n", load);
+}
