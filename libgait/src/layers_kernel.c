@@ -77,88 +77,96 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
     depth_order(outline->depth, count, out);
 }
 
-/* ---- masks, lanes are the words of a band's rows ---- */
-enum { BAND = LAYERS_ROWS * RAST_WORDS };
+/* ---- masks, lanes are the rows of a band, or their words ---- */
+_Static_assert(RAST_WORDS == 2, "a lane has one word of a row or both");
+#if defined(__AVX2__)
+enum { LANE_WORDS = 1 }; /* so that a band's spans fill a vector */
+#else
+enum { LANE_WORDS = 2 };
+#endif
+enum { BAND = LAYERS_ROWS * RAST_WORDS / LANE_WORDS }; /* lanes */
 
-typedef struct edge { /* of one body, in a band: at its first row, and by how many rows it has begun there */
-    uint32_t at, slope, below, rows;
+typedef struct edge { /* of one body */
+    uint32_t at, slope, first, rows;
 } edge;
 
-static inline edge edge_at(const layers_limb *limb, int32_t k, int32_t lane, int32_t top)
+static inline edge edge_of(const layers_limb *limb, int32_t k, int32_t lane)
 {
-    return (edge){.at = limb->at[k][lane] + limb->slope[k][lane] * (uint32_t)top,
+    return (edge){.at = limb->at[k][lane],
                   .slope = limb->slope[k][lane],
-                  .below = (uint32_t)(top - limb->first[k][lane]),
+                  .first = (uint32_t)limb->first[k][lane],
                   .rows = (uint32_t)limb->rows[k][lane]};
 }
 
-/* Stretch the span of a row of the band to an edge that crosses it. */
-static inline void stretch(edge e, int32_t row, int32_t *begin, int32_t *end)
+/* Stretch the span of row y to an edge that crosses it. */
+static inline void stretch(edge e, int32_t y, int32_t *begin, int32_t *end)
 {
-    int32_t const column = rast_column(e.at, e.slope, row);
-    bool const crosses = e.below + (uint32_t)row < e.rows;
+    int32_t const column = rast_column(e.at, e.slope, y);
+    bool const crosses = (uint32_t)y - e.first < e.rows;
     *begin = i_min(*begin, crosses ? column : RAST_SIZE);
     *end = i_max(*end, crosses ? column : 0);
 }
 
-/* The limb's bits of word i of the band go behind those of `whole`. */
+/* The limb's bits in one word of the band go behind those of `whole`. */
+static inline void cover_word(int32_t word, int32_t begin, int32_t end, uint64_t *restrict whole,
+                              uint64_t *restrict seen)
+{
+    int32_t const base = word % RAST_WORDS * 64;
+    uint64_t const mine = rast_bits(i_clamp(begin - base, 0, 64), i_clamp(end - base, 0, 64));
+    uint64_t const nearer = whole[word];
+    whole[word] = nearer | mine;
+    seen[word] = mine & ~nearer;
+}
+
+/* The same in the words of lane i. */
 static inline void cover(int32_t i, int32_t begin, int32_t end, uint64_t *restrict whole,
                          uint64_t *restrict seen)
 {
-    int32_t const base = i % RAST_WORDS * 64;
-    uint64_t const mine = rast_bits(i_clamp(begin - base, 0, 64), i_clamp(end - base, 0, 64));
-    uint64_t const nearer = whole[i];
-    whole[i] = nearer | mine;
-    seen[i] = mine & ~nearer;
+    cover_word(i * LANE_WORDS, begin, end, whole, seen);
+    if (LANE_WORDS == 2)
+        cover_word(i * LANE_WORDS + 1, begin, end, whole, seen);
 }
 
-static inline void draw_cone(const layers_limb *limb, int32_t lane, int32_t top, uint64_t *restrict whole,
-                             uint64_t *restrict seen)
-{
-    edge const a = edge_at(limb, 0, lane, top), b = edge_at(limb, 1, lane, top);
-    edge const c = edge_at(limb, 2, lane, top), d = edge_at(limb, 3, lane, top);
-    for (int32_t i = 0; i < BAND; i++) {
-        int32_t begin = RAST_SIZE, end = 0;
-        stretch(a, i / RAST_WORDS, &begin, &end);
-        stretch(b, i / RAST_WORDS, &begin, &end);
-        stretch(c, i / RAST_WORDS, &begin, &end);
-        stretch(d, i / RAST_WORDS, &begin, &end);
-        cover(i, begin, end, whole, seen);
-    }
-}
-
-static inline void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t top,
-                                  uint64_t *restrict whole, uint64_t *restrict seen)
-{
-    int32_t begin[BAND], end[BAND];
-    for (int32_t i = 0; i < BAND; i++) {
-        begin[i] = RAST_SIZE;
-        end[i] = 0;
-    }
-    for (int32_t k = 0; k < RAST_MAX_VERTICES; k += 2) {
-        edge const a = edge_at(limb, k, lane, top), b = edge_at(limb, k + 1, lane, top);
-        for (int32_t i = 0; i < BAND; i++) {
-            stretch(a, i / RAST_WORDS, &begin[i], &end[i]);
-            stretch(b, i / RAST_WORDS, &begin[i], &end[i]);
-        }
-    }
-    for (int32_t i = 0; i < BAND; i++)
-        cover(i, begin[i], end[i], whole, seen);
-}
-
-/* Draw a limb behind `whole`, and add it there. */
-static void draw_limb(const layers_limb *limb, int32_t vertices, int32_t lane, rast_mask *restrict whole,
+static void draw_cone(const layers_limb *limb, int32_t lane, rast_mask *restrict whole,
                       rast_mask *restrict out)
 {
-    out->first = limb->top[lane];
-    out->last = limb->end[lane];
+    edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
+    edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
     for (int32_t top = out->first; top < out->last; top += LAYERS_ROWS) {
         uint64_t *const body = (uint64_t *)whole->row + top * RAST_WORDS;
         uint64_t *const seen = (uint64_t *)out->row + top * RAST_WORDS;
-        if (vertices == 4)
-            draw_cone(limb, lane, top, body, seen);
-        else
-            draw_ellipsoid(limb, lane, top, body, seen);
+        for (int32_t i = 0; i < BAND; i++) {
+            int32_t const y = top + i * LANE_WORDS / RAST_WORDS;
+            int32_t begin = RAST_SIZE, end = 0;
+            stretch(a, y, &begin, &end);
+            stretch(b, y, &begin, &end);
+            stretch(c, y, &begin, &end);
+            stretch(d, y, &begin, &end);
+            cover(i, begin, end, body, seen);
+        }
+    }
+}
+
+static void draw_ellipsoid(const layers_limb *limb, int32_t lane, rast_mask *restrict whole,
+                           rast_mask *restrict out)
+{
+    for (int32_t top = out->first; top < out->last; top += LAYERS_ROWS) {
+        uint64_t *const body = (uint64_t *)whole->row + top * RAST_WORDS;
+        uint64_t *const seen = (uint64_t *)out->row + top * RAST_WORDS;
+        int32_t begin[BAND], end[BAND];
+        for (int32_t i = 0; i < BAND; i++) {
+            begin[i] = RAST_SIZE;
+            end[i] = 0;
+        }
+        for (int32_t k = 0; k < RAST_MAX_VERTICES; k += 2) {
+            edge const a = edge_of(limb, k, lane), b = edge_of(limb, k + 1, lane);
+            for (int32_t i = 0; i < BAND; i++) {
+                stretch(a, top + i * LANE_WORDS / RAST_WORDS, &begin[i], &end[i]);
+                stretch(b, top + i * LANE_WORDS / RAST_WORDS, &begin[i], &end[i]);
+            }
+        }
+        for (int32_t i = 0; i < BAND; i++)
+            cover(i, begin[i], end[i], body, seen);
     }
 }
 
@@ -179,6 +187,13 @@ void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restri
     memset(whole->row[whole->first], 0, (size_t)(last - whole->first) * sizeof whole->row[0]);
     for (int32_t k = 0; k < block->drawn[lane]; k++) {
         int32_t const l = block->order[lane][k];
-        draw_limb(&block->limb[l], block->vertices[l], lane, whole, &out->visible[l]);
+        const layers_limb *const limb = &block->limb[l];
+        rast_mask *const mask = &out->visible[l];
+        mask->first = limb->top[lane];
+        mask->last = limb->end[lane];
+        if (block->vertices[l] == 4)
+            draw_cone(limb, lane, whole, mask);
+        else
+            draw_ellipsoid(limb, lane, whole, mask);
     }
 }
