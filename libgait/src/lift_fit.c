@@ -166,9 +166,10 @@ static int32_t best_trial(const lift_search *s, int32_t component, int32_t other
 /* Probability of the component of the best trial: the best heading stands for each. */
 static double share_of(const lift_table *t, const lift_search *s, int32_t best)
 {
-    double sum = 0.0;
+    double sum = 1.0;
     for (int32_t c = 0; c < t->prior.components; c++)
-        sum += m_exp64(s->trial[best_trial(s, c, -1)].evidence - s->trial[best].evidence);
+        if (c != s->trial[best].component)
+            sum += m_exp64(s->trial[best_trial(s, c, -1)].evidence - s->trial[best].evidence);
     return 1.0 / sum;
 }
 

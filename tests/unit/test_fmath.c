@@ -169,8 +169,22 @@ static void test_bits(void)
     CHECK(h == FMATH_BITS);
 }
 
+static void test_sincos64(void)
+{
+    double worst = 0.0, s, c;
+    for (int i = -40000; i <= 40000; i++) {
+        double const x = 0.0237 * i;
+        m_sincos64(x, &s, &c);
+        worst = fmax(worst, fmax(fabs(s - sin(x)), fabs(c - cos(x))));
+    }
+    CHECK_NEAR(worst, 0.0, 3e-16);
+    m_sincos64(NAN, &s, &c);
+    CHECK(isnan(s) && isnan(c));
+}
+
 int main(void)
 {
+    test_sincos64();
     test_exp_log();
     test_sincos();
     test_inverse();

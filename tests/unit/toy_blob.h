@@ -66,12 +66,12 @@ static inline size_t toy_finish(toy_file *f)
     return f->used;
 }
 
-/* Append a section: type 1 = u8, 2 = i32, 3 = f32; unused dimensions 1. */
-static inline void toy_section(toy_file *f, const char *tag, uint32_t type, uint32_t rank, uint32_t d0,
-                               uint32_t d1, uint32_t d2, const void *data)
+/* Append a section of four dimensions: type 1 = u8, 2 = i32, 3 = f32; unused ones 1. */
+static inline void toy_section4(toy_file *f, const char *tag, uint32_t type, uint32_t rank,
+                                const uint32_t d[4], const void *data)
 {
-    const uint32_t field[] = {type, rank, d0, d1, d2, 1, 0};
-    size_t const bytes = (type == 1 ? 1u : 4u) * (size_t)d0 * d1 * d2;
+    const uint32_t field[] = {type, rank, d[0], d[1], d[2], d[3], 0};
+    size_t const bytes = (type == 1 ? 1u : 4u) * (size_t)d[0] * d[1] * d[2] * d[3];
     unsigned char *const e = f->at + 64 + 48 * (size_t)f->sections++;
     memcpy(e, tag, 4);
     for (int i = 0; i < 7; i++)
@@ -82,5 +82,13 @@ static inline void toy_section(toy_file *f, const char *tag, uint32_t type, uint
         abort();
     memcpy(f->at + f->used, data, bytes);
     f->used = (f->used + bytes + 63) & ~(size_t)63;
+}
+
+/* The same of up to three. */
+static inline void toy_section(toy_file *f, const char *tag, uint32_t type, uint32_t rank, uint32_t d0,
+                               uint32_t d1, uint32_t d2, const void *data)
+{
+    const uint32_t d[4] = {d0, d1, d2, 1};
+    toy_section4(f, tag, type, rank, d, data);
 }
 #endif

@@ -1,0 +1,262 @@
+/* One segment through the public interface: bodies drawn from the prior are found again, with honest
+ * deviations. The algebra itself is compared with numpy's in tests/python/test_lifter.py. */
+#include "gait.h"
+
+#include <stdbool.h>
+
+#include "toy_lift.h"
+
+static double X[TOY_SEGMENT][3], uv[TOY_SEGMENT * 2], mean[TOY_SEGMENT * 3], sd[TOY_SEGMENT * 3];
+static double seen[TOY_SEGMENT];
+
+static void see_all(double deviation)
+{
+    for (int i = 0; i < TOY_SEGMENT; i++)
+        seen[i] = deviation;
+}
+
+static double largest_error(void)
+{
+    double largest = 0.0;
+    for (int i = 0; i < TOY_SEGMENT; i++)
+        largest = fmax(largest, toy_distance(mean + 3 * i, X[i]));
+    return largest;
+}
+
+/* Without noise the body is found, wherever it looks and stands. */
+static void test_exact(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.residual = 0.0; /* the draws have none */
+    gait_lift *const l = toy_lift_open(&c);
+    see_all(0.02);
+    for (int k = 0; k < 6; k++) {
+        double const heading = 1.1 * k, place[3] = {0.4 * k - 1.0, 0.5 * k - 1.0, 0.02};
+        gait_lift_fit fit;
+        toy_draw(&toy_lift_prior, 0, (uint32_t)k, heading, place, X);
+        toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.0, 1, uv);
+        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK && fit.converged);
+        CHECK(gait_lift_positions(l, mean, sd) == GAIT_OK);
+        CHECK_NEAR(largest_error(), 0.0, 5e-3);
+        CHECK_NEAR(cos(fit.heading - heading), 1.0, 1e-4);
+        CHECK_NEAR(fit.place[0], place[0], 1e-2);
+        CHECK_NEAR(fit.place[1], place[1], 1e-2);
+        CHECK(fit.observed == 2 * TOY_SEGMENT && fit.share == 1.0 && fit.log10_volume < -3.0);
+        CHECK(fit.heading_sd > 0.0 && fit.heading_sd < 0.05);
+    }
+}
+
+/* Drawn from the prior: errors have the deviations that are reported (chi-square, 90 % interval). */
+static void test_coverage(int projection, double noise)
+{
+    gait_lift_config c = toy_lift_config(projection);
+    c.heading_sd = 0.0;
+    c.residual = 0.0;
+    c.place_sd[1] = 0.3;
+    gait_lift *const l = toy_lift_open(&c);
+    double square = 0.0;
+    int within = 0, count = 0;
+    see_all(noise);
+    for (uint32_t k = 0; k < 200; k++) {
+        uint32_t seed = 1000 + k;
+        double z[4];
+        for (int i = 0; i < 4; i++) { /* near enough to normal */
+            z[i] = 0.0;
+            for (int n = 0; n < 12; n++)
+                z[i] += 0.5 * toy_random(&seed);
+        }
+        const double place[3] = {0.3 * z[0], 0.3 * z[1], 0.05 * z[2]};
+        gait_lift_fit fit;
+        toy_draw(&toy_lift_prior, 0, seed, 0.0, place, X);
+        toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, noise, seed + 1, uv);
+        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_positions(l, mean, sd) == GAIT_OK);
+        for (int i = 0; i < 3 * TOY_SEGMENT; i++) {
+            double const e = (mean[i] - X[i / 3][i % 3]) / sd[i];
+            square += e * e;
+            within += fabs(e) < 1.645;
+            count++;
+        }
+    }
+    /* toy_draw's alphas are uniform with a variance of 0.75: a little less than the prior says */
+    CHECK_NEAR(square / count, 0.97, 0.12);
+    CHECK_NEAR((double)within / count, 0.905, 0.03);
+}
+
+/* Points that are not seen are not read, and cost certainty. */
+static void test_missing(void)
+{
+    gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_lift *const l = toy_lift_open(&c);
+    const double place[3] = {0.1, 0.2, 0.0};
+    double all_sd = 0.0, some_sd = 0.0;
+    gait_lift_fit fit;
+    toy_draw(&toy_lift_prior, 0, 5, 0.4, place, X);
+    toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 3, uv);
+    see_all(1.0);
+    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK &&
+          gait_lift_positions(l, mean, sd) == GAIT_OK);
+    for (int i = 0; i < 3 * TOY_SEGMENT; i++)
+        all_sd += sd[i];
+    for (int i = 0; i < TOY_SEGMENT; i += 3)
+        seen[i] = i % 2 ? INFINITY : i % 4 ? NAN : -1.0;
+    uv[2 * 3] = uv[2 * 6 + 1] = NAN;
+    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK &&
+          gait_lift_positions(l, mean, sd) == GAIT_OK);
+    CHECK(fit.observed == 2 * (TOY_SEGMENT - TOY_SEGMENT / 3) && largest_error() < 0.2);
+    for (int i = 0; i < 3 * TOY_SEGMENT; i++)
+        some_sd += sd[i];
+    CHECK(some_sd > 1.05 * all_sd && some_sd < 3.0 * all_sd);
+    for (int i = 0; i < TOY_SEGMENT; i++)
+        seen[i] = INFINITY;
+    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK && fit.observed == 0);
+    CHECK_NEAR(fit.log10_volume, 0.0, 1e-12);
+    CHECK_NEAR(fit.log_evidence, 0.0, 1e-12);
+}
+
+/* The component that made a body explains it. */
+static void test_mixture(void)
+{
+    toy_lift_model(2, 0);
+    gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_lift *const l = toy_lift_open(&c);
+    see_all(1.0);
+    for (int k = 0; k < 6; k++) {
+        const double place[3] = {0.2, 0.1, 0.0};
+        gait_lift_fit fit;
+        toy_draw(&toy_lift_prior, k % 2, (uint32_t)k, 0.7 * k, place, X);
+        toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 9, uv);
+        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        CHECK(fit.component == k % 2 && fit.share > 0.9 && fit.share <= 1.0);
+    }
+    toy_lift_model(1, 0);
+}
+
+/* Many at once are as each alone. */
+static void test_batch(void)
+{
+    enum { MANY = 3 };
+    static double many[MANY][TOY_SEGMENT * 2], batch[MANY][TOY_SEGMENT * 3];
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
+    c.heading = 0.9;
+    c.heading_sd = 0.0;
+    gait_lift *const l = toy_lift_open(&c);
+    const double place[3] = {0.5, -0.2, 0.01};
+    gait_lift_fit fit;
+    CHECK(gait_lift_batch(l, 1, many[0], batch[0]) == GAIT_ERR_STATE);
+    see_all(0.02);
+    for (int i = 0; i < TOY_SEGMENT; i += 5)
+        seen[i] = INFINITY;
+    for (uint32_t k = 0; k < MANY; k++) {
+        toy_draw(&toy_lift_prior, 0, 40 + k, c.heading, place, X);
+        toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.02, k, many[k]);
+    }
+    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK && gait_lift_batch(l, MANY, many[0], batch[0]) == GAIT_OK);
+    for (int k = 0; k < MANY; k++) {
+        CHECK(gait_lift_segment(l, many[k], seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_positions(l, mean, sd) == GAIT_OK);
+        for (int i = 0; i < 3 * TOY_SEGMENT; i++)
+            CHECK_NEAR(batch[k][i], mean[i], 1e-12);
+    }
+    c.heading_sd = -1.0;
+    CHECK(gait_lift_fix(toy_lift_open(&c), seen, NULL) == GAIT_ERR_STATE);
+}
+
+/* Depth is what an orthographic view leaves open: the least certain displacement is along it. */
+static void test_uncertain(void)
+{
+    static double mode[2][TOY_SEGMENT][3];
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
+    c.heading_sd = 0.0;
+    gait_lift *const l = toy_lift_open(&c);
+    const double place[3] = {0.0};
+    double deviation[2], along = 0.0, all = 0.0;
+    gait_lift_fit fit;
+    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation) == GAIT_ERR_STATE);
+    toy_draw(&toy_lift_prior, 0, 2, 0.0, place, X);
+    toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.01, 1, uv);
+    see_all(0.01);
+    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation) == GAIT_OK);
+    for (int i = 0; i < TOY_SEGMENT; i++)
+        for (int a = 0; a < 3; a++) {
+            along += a == 1 ? mode[0][i][a] * mode[0][i][a] : 0.0;
+            all += mode[0][i][a] * mode[0][i][a];
+        }
+    CHECK(along > 0.9999 * all && deviation[0] > deviation[1]);
+    CHECK_NEAR(sqrt(all), deviation[0], 1e-9 * deviation[0]);
+    CHECK_NEAR(deviation[0], 10.0 * sqrt(TOY_SEGMENT), 0.1);
+    CHECK(gait_lift_uncertain(l, gait_lift_unknowns(l) + 1, mode[0][0], deviation) == GAIT_ERR_ARG);
+}
+
+static void test_arguments(void)
+{
+    gait_lift_config const good = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_lift *l = NULL;
+    gait_error err = {0};
+    gait_lift_fit fit;
+    size_t bytes = 0;
+    CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, &good, &bytes, NULL) == GAIT_OK &&
+          bytes > 1000);
+    CHECK(gait_lift_init(toy_lift_memory, bytes - 1, toy_lift_blob, toy_lift_blob_bytes, &good, &l, &err) ==
+          GAIT_ERR_MEMORY);
+    CHECK(gait_lift_init(toy_lift_memory + 8, bytes, toy_lift_blob, toy_lift_blob_bytes, &good, &l, &err) ==
+          GAIT_ERR_MEMORY);
+    CHECK(gait_lift_bytes(NULL, 0, &good, &bytes, &err) == GAIT_ERR_ARG && !l);
+    CHECK(gait_lift_segment(NULL, uv, NULL, &fit, NULL) == GAIT_ERR_ARG);
+    gait_lift_config bad[14];
+    for (int i = 0; i < 14; i++)
+        bad[i] = good;
+    bad[0].projection = 2;
+    bad[1].stature = -1;
+    bad[2].sd = 0;
+    bad[3].residual = NAN;
+    bad[4].place_sd[2] = -0.1;
+    bad[5].heading_sd = -0.5;
+    bad[6].max_iterations = 0;
+    bad[7].lag = 65;
+    bad[8].max_rate = 0;
+    bad[9].camera.fx = 0;
+    bad[10].turn_sd = 0;
+    bad[11].misfit = -1;
+    bad[12].place[0] = INFINITY;
+    bad[13].projection = GAIT_LIFT_ORTHOGRAPHIC;
+    bad[13].axis[0][1] = 0.1;
+    for (int i = 0; i < 14; i++) {
+        err.text[0] = '\0';
+        CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, &bad[i], &bytes, &err) == GAIT_ERR_ARG);
+        CHECK(strstr(err.text, "lift config") != NULL);
+    }
+    bad[0].struct_size = 0;
+    CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, &bad[0], &bytes, &err) == GAIT_ERR_STRUCT);
+    l = toy_lift_open(&good);
+    CHECK(strcmp(gait_lift_marker_name(l, 3), "l_shoulder") == 0 && !gait_lift_marker_name(l, TOY_MARKERS));
+    CHECK(gait_lift_positions(l, mean, sd) == GAIT_ERR_STATE);
+    CHECK(gait_lift_least_squares(l, mean) == GAIT_ERR_STATE);
+}
+
+/* A prior with turned copies lies in the axes of the world: its heading is not looked for. */
+static void test_world_axes(void)
+{
+    toy_lift_model(1, 8);
+    gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_lift *const l = toy_lift_open(&c);
+    CHECK(gait_lift_unknowns(l) == TOY_MODES + 3);
+    toy_lift_model(1, 0);
+    CHECK(gait_lift_unknowns(toy_lift_open(&c)) == TOY_MODES + 4);
+}
+
+int main(void)
+{
+    toy_lift_model(1, 0);
+    test_exact();
+    test_coverage(GAIT_LIFT_PERSPECTIVE, 2.0);
+    test_coverage(GAIT_LIFT_ORTHOGRAPHIC, 0.02);
+    test_missing();
+    test_mixture();
+    test_batch();
+    test_uncertain();
+    test_arguments();
+    test_world_axes();
+    return CHECK_DONE();
+}

@@ -1,0 +1,225 @@
+/* A stream through the public interface: a body that walks through the picture is followed; starts, pauses,
+ * order of time, and the same bits on every run and instruction set. */
+#include "gait.h"
+
+#include <stdbool.h>
+
+#include "hash.h"
+#include "toy_lift.h"
+
+enum { STREAM = 120, RATE = 30 };
+
+static gait_lift_frame out;
+static double uv[TOY_MARKERS * 2], seen[TOY_MARKERS];
+
+/* A prior under which whoever walks goes on walking: a pose that stays, moved by as much every frame. */
+static void steady_model(void)
+{
+    toy_segments_fill(&toy_lift_prior, 1, 0);
+    for (int i = TOY_MARKERS; i < TOY_SEGMENT; i++)
+        for (int a = 0; a < 3; a++) {
+            int const first = i % TOY_MARKERS, frame = i / TOY_MARKERS;
+            toy_lift_prior.mean[0][i][a] =
+                toy_lift_prior.mean[0][first][a] + (a == 0 ? 0.03f * (float)frame : 0.0f);
+            for (int k = 0; k < TOY_MODES; k++)
+                toy_lift_prior.mode[0][k][i][a] = toy_lift_prior.mode[0][k][first][a];
+        }
+    toy_lift_blob_bytes = toy_segments_write(toy_lift_blob, &toy_lift_prior);
+}
+
+static int64_t utime_of(int frame)
+{
+    return 1000000 + (int64_t)frame * 1000000 / RATE;
+}
+
+/* Places of the markers in a frame of the film: on a straight way through (0, 0), heading 0.3. */
+static void body(int frame, double (*X)[3])
+{
+    static double segment[TOY_SEGMENT][3];
+    double const since = (double)frame / RATE * (double)TOY_FPS - 40.0,
+                 step = 0.03 * (double)TOY_STATURE * since;
+    const double place[3] = {step * cos(0.3), step * sin(0.3), 0.01};
+    toy_draw(&toy_lift_prior, 0, 21, 0.3, place, segment);
+    memcpy(X, segment, TOY_MARKERS * sizeof *X);
+}
+
+/* Push a frame; returns what the call did. */
+static gait_status push(gait_lift *l, const gait_lift_config *c, int frame, double noise)
+{
+    double X[TOY_MARKERS][3];
+    uint32_t seed = 77u + (uint32_t)frame;
+    body(frame, X);
+    toy_lift_see(c, (const double (*)[3])X, TOY_MARKERS, noise, seed, uv);
+    for (int j = 0; j < TOY_MARKERS; j++)
+        seen[j] = toy_random(&seed) > 0.7 ? INFINITY : noise;
+    return gait_lift_push(l, utime_of(frame), uv, seen, NULL);
+}
+
+static double error_of(const gait_lift_frame *f, double *worst_z)
+{
+    double X[TOY_MARKERS][3], sum = 0.0;
+    body((int)((f->utime - 1000000) * RATE / 1000000 + ((f->utime - 1000000) * RATE % 1000000 > 500000)), X);
+    for (int j = 0; j < TOY_MARKERS; j++) {
+        sum += toy_distance(f->marker[j], X[j]) / TOY_MARKERS;
+        for (int a = 0; a < 3; a++)
+            *worst_z = fmax(*worst_z, fabs(f->marker[j][a] - X[j][a]) / f->sd[j][a]);
+    }
+    return sum;
+}
+
+static void test_follows(int32_t lag)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.lag = lag;
+    gait_lift *const l = toy_lift_open(&c);
+    int const span =
+        (TOY_FRAMES_SEEN - 1) * RATE / (int)TOY_FPS + 1; /* frames until a first segment is whole */
+    double error = 0.0, worst = 0.0;
+    int count = 0;
+    for (int i = 0; i < STREAM; i++) {
+        CHECK(push(l, &c, i, 1.0) == GAIT_OK);
+        gait_status const s = gait_lift_estimate(l, &out);
+        CHECK((s == GAIT_OK) == (i >= lag));
+        if (s != GAIT_OK)
+            continue;
+        CHECK(out.utime == utime_of(i - lag) && out.frame == (uint64_t)(i - lag));
+        CHECK((out.status == GAIT_STATUS_TRACKING) == (i >= span));
+        if (out.status != GAIT_STATUS_TRACKING)
+            continue;
+        error += error_of(&out, &worst);
+        count++;
+        CHECK(out.flags == 0 && out.misfit < 3.0);
+    }
+    CHECK(count > STREAM - 3 * span);
+    CHECK_NEAR(error / count, 0.0, 0.035);
+    CHECK(worst < 6.0);
+}
+
+/* Nobody seen: the prior goes on alone and says so; a long pause starts anew. */
+static void test_pauses(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.lag = 0;
+    gait_lift *const l = toy_lift_open(&c);
+    double before = 0.0, worst = 0.0;
+    for (int j = 0; j < TOY_MARKERS; j++)
+        seen[j] = -1.0;
+    CHECK(gait_lift_push(l, 1000, uv, seen, NULL) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_ERR_STATE); /* nobody yet */
+    for (int i = 0; i < 40; i++)
+        CHECK(push(l, &c, i, 1.0) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING);
+    before = out.sd[3][1];
+    for (int j = 0; j < TOY_MARKERS; j++)
+        seen[j] = INFINITY;
+    for (int i = 40; i < 46; i++)
+        CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING);
+    CHECK(out.sd[3][1] > 1.2 * before);
+    for (int i = 46; i < 70; i++)
+        CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out) != GAIT_OK || out.status == GAIT_STATUS_INIT);
+    for (int i = 90; i < STREAM; i++)
+        CHECK(push(l, &c, i, 1.0) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING && out.frame < 30);
+    CHECK(error_of(&out, &worst) < 0.06);
+    CHECK(push(l, &c, STREAM + 60, 1.0) == GAIT_OK); /* two seconds later */
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_INIT && out.frame == 0);
+}
+
+static void test_order(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    gait_error err = {0};
+    gait_lift *l = toy_lift_open(&c);
+    CHECK(push(l, &c, 3, 1.0) == GAIT_OK && push(l, &c, 3, 1.0) == GAIT_ERR_STATE);
+    CHECK(gait_lift_push(l, utime_of(2), uv, NULL, &err) == GAIT_ERR_STATE && strstr(err.text, "utime"));
+    CHECK(gait_lift_push(l, utime_of(4), NULL, NULL, NULL) == GAIT_ERR_ARG);
+    gait_lift_reset(l);
+    CHECK(push(l, &c, 0, 1.0) == GAIT_OK);
+    c.lag = -1;
+    l = toy_lift_open(&c);
+    CHECK(push(l, &c, 0, 1.0) == GAIT_ERR_STATE && gait_lift_estimate(l, &out) == GAIT_ERR_STATE);
+}
+
+/* Only what is asked for is estimated. */
+static void test_report(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.report = 0x6;
+    c.lag = 0;
+    gait_lift *const l = toy_lift_open(&c);
+    for (int i = 0; i < 20; i++)
+        CHECK(push(l, &c, i, 1.0) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK);
+    CHECK(out.marker[0][2] == 0.0 && out.sd[3][0] == 0.0 && out.marker[1][2] > 0.1 && out.sd[2][1] > 0.0);
+}
+
+/* A segment that does not fit is looked for anew: somebody else walks the other way. */
+static void test_misfit(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.lag = 0;
+    c.misfit = 4.0;
+    c.sd = 0.5;
+    gait_lift *const l = toy_lift_open(&c);
+    double worst = 0.0;
+    int flagged = 0;
+    for (int i = 0; i < STREAM; i++) {
+        double X[TOY_MARKERS][3];
+        body(i < 60 ? i : STREAM - i, X);
+        for (int j = 0; i >= 60 && j < TOY_MARKERS; j++) /* turned about by half a turn, too */
+            for (int a = 0; a < 2; a++)
+                X[j][a] = -X[j][a];
+        toy_lift_see(&c, (const double (*)[3])X, TOY_MARKERS, 0.5, (uint32_t)i, uv);
+        CHECK(gait_lift_push(l, utime_of(i), uv, NULL, NULL) == GAIT_OK);
+        CHECK(i < 20 || gait_lift_estimate(l, &out) == GAIT_OK);
+        flagged += (out.flags & GAIT_LIFT_MISFIT) != 0;
+    }
+    CHECK(flagged > 0 && out.status == GAIT_STATUS_TRACKING && isfinite(out.marker[1][0]));
+    CHECK(error_of(&out, &worst) < 10.0);
+}
+
+/* Hash of every estimate of the film. */
+static uint64_t digest(uint32_t mask)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.lag = 4;
+    c.cpu_mask = mask;
+    gait_lift *const l = toy_lift_open(&c);
+    uint64_t h = HASH_INIT;
+    for (int i = 0; i < STREAM; i++) {
+        (void)push(l, &c, i, 1.0);
+        if (gait_lift_estimate(l, &out) == GAIT_OK)
+            h = hash_fnv1a(h, &out, sizeof out);
+    }
+    return h;
+}
+
+/* One line for each instruction set of this CPU, for tests/check/golden.sh. */
+static int print_digests(void)
+{
+    for (uint32_t mask = 0; mask <= 7; mask = 2 * mask + 1)
+        if ((mask & ~gait_cpu_features()) == 0)
+            printf("digest %016llx %s\n", (unsigned long long)digest(mask), gait_cpu_name(mask));
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    steady_model();
+    if (argc == 2)
+        return strcmp(argv[1], "digest") == 0 ? print_digests() : 2;
+    test_follows(0);
+    test_follows(5);
+    test_follows(20);
+    test_pauses();
+    test_order();
+    test_report();
+    test_misfit();
+    uint64_t const first = digest(0);
+    for (uint32_t mask = 1; mask <= 7; mask = 2 * mask + 1)
+        CHECK(digest(mask) == first);
+    printf("digest %016llx\n", (unsigned long long)first);
+    return CHECK_DONE();
+}
