@@ -19,7 +19,7 @@ from gait.lift import lifted_file, suggest
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.cylinder import Figure
 from gait.lift.cylinder_picture import draw_figure
-from gait.lift.fit_clip import ClipFit, fit_clip
+from gait.lift.fit_clip import ClipFit, fit_clip, work
 from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_corrections, read_placement
@@ -128,11 +128,11 @@ def _film(
 
 def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:
     """Estimates without and with the corrections."""
-    with progress("segments", len(clip.starts), quiet) as update:
+    with progress("segments", work(clip), quiet) as update:
         free = fit_clip(replace(clip, corrections=()), update=update)
     if not clip.corrections:
         return free, free
-    with progress("corrections", len(clip.starts), quiet) as update:
+    with progress("corrections", work(clip, free.sequence), quiet) as update:
         return free, fit_clip(clip, free.sequence, update)
 
 

@@ -22,7 +22,8 @@ Indices = npt.NDArray[np.intp]
 
 FAR = 10.0  # metres: a segment may start anywhere on the ground
 TURN = 10.0  # radians: and look anywhere
-CORRELATED = 10.0  # root of the sensors that count as one independent reading
+CORRELATED = 6.0  # root of the sensors that count as one independent reading
+BODY = 0.02  # metres: where a joint is in a clothed body is seen no better
 FIRST_SD = 1.0  # of a sensor, before anything is known
 
 
@@ -170,13 +171,13 @@ class ClipSegments:
         return Reading(value, grid, np.full(len(grid), self.film.blur), self.sensor_sd)
 
     def _springs(self, segment: int, shape: Shape, near: Floats) -> Springs | None:
-        """Corrections in a segment's frames; the prior's residual at the marker weakens them."""
+        """Corrections in a segment's frames; what the prior leaves out at the marker weakens them."""
         frames = (self.frames(segment) + self.film.first).tolist()
         held = [c for c in self.corrections if c.frame in frames]
         if not held:
             return None
         marker = self.prior.index([c.joint for c in held])
-        skin = self.view.scale(near[PLACE]) * shape.residual[marker]
+        skin = self.view.scale(near[PLACE]) * np.hypot(BODY, shape.residual[marker])
         return Springs(
             frame=np.array([frames.index(c.frame) for c in held], np.intp),
             marker=marker,

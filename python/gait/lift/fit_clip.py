@@ -21,8 +21,11 @@ from gait.lift.energy import HEADING, PLACE, Anchor, Energy
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 Update = Callable[[int], None]
+Settled = tuple[float, int, Floats]  # energy, component and state of a segment
 
 LOOSE = 0.03  # statures that the segment before may be wrong, when the next one starts from it
+BEGINNINGS = 3  # explanations of the first segment that are followed through the clip
+DIFFERENT = 0.03  # statures: mean distance of markers in explanations that differ
 START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean and from +- so many sd of these modes
 LOOKS = 2  # times the sensors are laid anew about the figure found
 
@@ -72,37 +75,64 @@ def fit_clip(clip: ClipSegments, known: Sequence | None = None, update: Update |
     known : Sequence, optional
         Estimate with other corrections, to start from as well.
     update : callable, optional
-        Called with the count of segments done, of `len(clip.starts)`.
+        Called with the count of segments done, of `work(clip, known)`.
     """
-    found = _one_after_the_other(clip, update)
+    firsts = _first_segments(clip)[: BEGINNINGS if known is None else 1]
+    chains = [_one_after_the_other(clip, first, _part(update, k, clip)) for k, first in enumerate(firsts)]
+    found = min(chains, key=lambda c: c.energy)
     if clip.settings.sensor_sd is None:
         clip = _with_noise(clip, found)
     if not clip.settings.joined:
-        return _finished(clip, _continuous(clip, _one_after_the_other(clip, None)))
-    starts = [found] if known is None else [found, known]
+        first = _first_segments(clip)[0]
+        return _finished(clip, _continuous(clip, _one_after_the_other(clip, first, None)))
+    starts = chains if known is None else [*chains, known]
     if clip.corrections:  # nearly linear without the sensors: no wrong valley to fall into
         starts.append(_together(clip, found, looking=False))
     tried = [_together(clip, start) for start in starts]
     return _finished(clip, min(tried, key=lambda t: t.energy))
 
 
-def _one_after_the_other(clip: ClipSegments, update: Update | None) -> Sequence:
-    """Segments from the placement on, then back before it, each started from its neighbour."""
-    count = len(clip.starts)
+def work(clip: ClipSegments, known: Sequence | None = None) -> int:
+    """Count of segments that `fit_clip` tells its `update` when it is done with them, at most."""
+    return len(clip.starts) * (BEGINNINGS if known is None else 1)
+
+
+def _part(update: Update | None, chain: int, clip: ClipSegments) -> Update:
+    """Progress of one chain of several."""
+    return lambda done: None if update is None else update(chain * len(clip.starts) + done)
+
+
+def _first_segments(clip: ClipSegments) -> list[Settled]:
+    """Explanations of the segment at the placement, different ones, least energy first."""
+    tried = [
+        _settled(clip, clip.origin, component, start, None)
+        for component in range(len(clip.shapes))
+        for start in _first_starts(clip)
+    ]
+    kept: list[Settled] = []
+    places: list[Floats] = []
+    for found in sorted(tried, key=lambda t: t[0]):
+        body, _ = clip.shapes[found[1]].positions(found[2], np.eye(clip.prior.frames), slice(None))
+        apart = [np.linalg.norm(body - other, axis=-1).mean() for other in places]
+        if min(apart, default=np.inf) > DIFFERENT * clip.placement.stature:
+            kept.append(found)
+            places.append(body)
+    return kept
+
+
+def _one_after_the_other(clip: ClipSegments, first: Settled, update: Update | None) -> Sequence:
+    """Segments from a first one on, then back before it, each started from its neighbour."""
+    count, origin = len(clip.starts), clip.origin
     components, states = np.zeros(count, np.intp), np.zeros((count, clip.shapes[0].size))
-    energy = 0.0
-    for done, segment in enumerate([*range(clip.origin, count), *reversed(range(clip.origin))], 1):
-        tried: list[tuple[float, int, Floats]] = []
+    energy, components[origin], states[origin] = first
+    for done, segment in enumerate([*range(origin + 1, count), *reversed(range(origin))], 1):
+        step = 1 if segment > origin else -1
+        old = segment - step
+        tried = []
         for component in range(len(clip.shapes)):
-            if segment == clip.origin:
-                starts, anchor = _first_starts(clip), None
-            else:
-                step = 1 if segment > clip.origin else -1
-                old = segment - step
-                start, anchor = _continued(clip, component, int(components[old]), states[old], step)
-                starts = [start]
+            start, anchor = _continued(clip, component, int(components[old]), states[old], step)
             held = anchor if clip.settings.joined else None
-            tried += [_settled(clip, segment, component, start, held) for start in starts]
+            tried.append(_settled(clip, segment, component, start, held))
         cost, components[segment], states[segment] = min(tried, key=lambda t: t[0])
         energy += cost
         if update is not None:
@@ -155,7 +185,7 @@ def _broad(clip: ClipSegments) -> Floats:
 
 def _settled(
     clip: ClipSegments, segment: int, component: int, state: Floats, anchor: Anchor | None
-) -> tuple[float, int, Floats]:
+) -> Settled:
     """Energy, component and state of one segment; the sensors follow it."""
     cost = np.inf
     for _ in range(LOOKS):

@@ -1,0 +1,85 @@
+"""A user who corrects the estimate of a clip: the worst joints first, pointed at with some noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.evaluate import root_errors
+from gait.lift.clip_segments import ClipSegments
+from gait.lift.fit_clip import ClipFit, fit_clip
+from gait.lift.springs import Correction
+from gait.skeleton import EVAL15
+
+Array = NDArray[np.float64]
+
+POINTING = 3.0  # pixels, standard deviation of a click
+SHARE = 0.1  # of the frames get a correction before the user looks again
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of an estimate: corrections so far, root (mm), abs (mm) and distance in the picture (px)."""
+
+    corrections: int
+    root: float
+    absolute: float
+    pixels: float
+
+
+def score(clip: ClipSegments, fit: ClipFit, truth: Array, joints: list[str]) -> Score:
+    """Medians over frames; truth: (T, P, 3) of `joints`, which hold EVAL15."""
+    body = [joints.index(name) for name in EVAL15]
+    found, true = fit.places[:, clip.prior.index(EVAL15)], truth[:, body]
+    off = np.linalg.norm(clip.view.project(found)[0] - clip.view.project(true)[0], axis=2)
+    return Score(
+        len(clip.corrections),
+        float(np.median(root_errors(found, true))),
+        float(np.median(1000 * np.linalg.norm(found - true, axis=2).mean(axis=1))),
+        float(np.median(off.mean(axis=1))),
+    )
+
+
+def corrected(
+    clip: ClipSegments, truth: Array, joints: list[str], most: int, seed: int = 0
+) -> Iterator[tuple[ClipSegments, ClipFit]]:
+    """Yield the clip with its estimate after each round of corrections, first without any.
+
+    Parameters
+    ----------
+    clip : ClipSegments
+    truth : (T, P, 3)
+        Of `joints`, metres.
+    most : int
+        Corrections altogether.
+    """
+    rng = np.random.default_rng(seed)
+    uv = clip.view.project(truth)[0]
+    markers = clip.prior.index(joints)
+    fit = fit_clip(clip)
+    yield clip, fit
+    while len(clip.corrections) < most:
+        off = np.linalg.norm(clip.view.project(fit.places[:, markers])[0] - uv, axis=2)
+        for old in clip.corrections:
+            off[old.frame - clip.film.first, joints.index(old.joint)] = -1.0
+        count = min(max(1, round(SHARE * len(off))), most - len(clip.corrections))
+        worst = np.argmax(off, axis=1)
+        new = []
+        for frame in _apart(off.max(axis=1), count):
+            joint = int(worst[frame])
+            at = uv[frame, joint] + POINTING * rng.standard_normal(2)
+            new.append(
+                Correction(clip.film.first + frame, joints[joint], (float(at[0]), float(at[1])), POINTING)
+            )
+        clip = replace(clip, corrections=(*clip.corrections, *new))
+        fit = fit_clip(clip, fit.sequence)
+        yield clip, fit
+
+
+def _apart(off: Array, count: int) -> list[int]:
+    """Frames of the largest errors, each the worst of its stretch of the clip."""
+    stretches = np.array_split(np.arange(len(off)), count)
+    return [int(part[np.argmax(off[part])]) for part in stretches if len(part)]
