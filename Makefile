@@ -79,7 +79,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test check unit python-test demo model bench eval eval-learn asan fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test check unit python-test demo model bench bench-lift eval eval-learn asan fuzz fuzz-run golden-check \
         lint format install uninstall clean
 
 help: ## list the targets
@@ -231,6 +231,12 @@ $(B)/bench/%.o: tests/bench/%.c Makefile | $(B)/bench/
 	$(call say,CC   $<)$(BENCH_CC) -c $< -o $@
 $(B)/bench/step: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
 	$(call say,LD   $@)$(CC) $(OPT) $(BENCH_WRAP) $(LDFLAGS) -o $@ $^ -lm -pthread
+
+$(B)/bench/lift: $(B)/bench/lift.o $(BENCH_PARTS) $(OBJ)
+	$(call say,LD   $@)$(CC) $(OPT) $(LDFLAGS) -o $@ $^ -lm -pthread
+
+bench-lift: $(B)/bench/lift ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait')
+	@$< $(ARGS)
 
 CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null | head -n 1 | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9-')
 BENCH_CSV = tests/bench/results/$(or $(CPU_NAME),$(MACHINE)).csv
