@@ -15,6 +15,31 @@ typedef struct dynamics {
 /* Particle i of the prior: independent normals about mean (gait_tracker_start). */
 walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state *sd, int32_t i);
 
-/* One interval of dt seconds; age: seconds since start, frame: counter of the random numbers. */
-walker dynamics_move(const dynamics *d, const walker *from, float dt, float age, uint32_t frame, int32_t i);
+typedef struct relaxing { /* x -> keep x + noise n over an interval, n standard normal */
+    float keep, noise;
+} relaxing;
+
+typedef struct dynamics_step { /* constants of one interval; noise: standard deviations over it */
+    const gait_model *model;
+    uint64_t seed;
+    uint32_t frame; /* counter of the random numbers */
+    bool plain_root, settling;
+    int32_t fields, components, proportion, offset; /* how many, and the first of the last two kinds */
+    float dt, mean_rate;                            /* seconds, strides per second */
+    float phase_noise, forward_noise, lateral_noise, heading_noise, stature_noise;
+    relaxing rate, level, tilt, score, shape, posture;
+} dynamics_step;
+
+/* An interval of dt seconds; age: seconds since start. */
+dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_t frame);
+
+/* Fold a stride rate back into its range. */
+static inline float dynamics_reflect_rate(float x)
+{
+    float const lo = 1.0f / 2.1f, hi = 1.0f / 0.4f; /* strides per second (spec, eq. 7) */
+    float const y = x < lo ? 2.0f * lo - x : x > hi ? 2.0f * hi - x : x;
+    return f_clamp(y, lo, hi);
+}
+
+/* Kernel dynamics_move: particles first .. first + BLOCK - 1 over one interval. */
 #endif

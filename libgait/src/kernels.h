@@ -9,6 +9,7 @@
 #include "base.h"
 
 /* Types of higher layers, which a kernel's own file includes. */
+struct dynamics_step;
 struct edge_cell;
 struct edge_rows;
 struct features;
@@ -26,6 +27,7 @@ struct outline_block;
 struct rast_mask;
 struct view_map;
 struct view_planes;
+struct walker_block;
 
 /* Result, name, parameters. */
 #define KERNELS(K)                                                                                           \
@@ -54,6 +56,10 @@ struct view_planes;
       (struct features * f, const struct view_planes *im, const struct view_planes *plate))                  \
     K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))               \
     K(void, features_contrast, (const uint8_t *grey, int8_t *out))                                           \
+    /* A block of particles over one interval, and their weights. */                                         \
+    K(void, dynamics_move,                                                                                   \
+      (const struct dynamics_step *s, int32_t first, const struct walker_block *from,                        \
+       struct walker_block *to))                                                                             \
     /* The limbs of a block of bodies in one camera's working image. */                                      \
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \

@@ -43,6 +43,21 @@ void walker_put(population *p, int32_t i, const walker *w)
         field(p, f)[i] = w->f[f];
 }
 
+void walker_block_get(const population *p, const int32_t *index, int32_t lanes, walker_block *out)
+{
+    for (int32_t f = 0; f < p->fields; f++) {
+        const float *const v = field(p, f);
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            out->f[f][lane] = v[index[i_min(lane, lanes - 1)]];
+    }
+}
+
+void walker_block_put(population *p, int32_t first, int32_t lanes, const walker_block *w)
+{
+    for (int32_t f = 0; f < p->fields; f++)
+        memcpy(field(p, f) + first, w->f[f], (size_t)lanes * sizeof(float));
+}
+
 /* Sway to the left and height of the pelvis over the track, metres. */
 static void pelvis_offset(const body_rule *r, const walker *w, float *sway, float *height)
 {
@@ -103,7 +118,7 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
     return w;
 }
 
-typedef struct block { /* fields of BLOCK walkers */
+typedef struct block { /* fields of BLOCK walker_block */
     kin_input in;
     float offset[GAIT_MAX_ANGLES][BLOCK];
 } block;

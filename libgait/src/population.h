@@ -67,6 +67,15 @@ typedef struct walker {
     float f[F_MAX];
 } walker;
 
+typedef struct walker_block { /* BLOCK of them, a lane each */
+    float f[F_MAX][BLOCK];
+} walker_block;
+
+/* Particles index[0 .. lanes); lanes beyond repeat the last. */
+void walker_block_get(const population *p, const int32_t *index, int32_t lanes, walker_block *out);
+/* The first lanes become particles first .. first + lanes - 1. */
+void walker_block_put(population *p, int32_t first, int32_t lanes, const walker_block *w);
+
 walker walker_get(const population *p, int32_t i);
 void walker_put(population *p, int32_t i, const walker *w);
 gait_state walker_state(const body_rule *r, const walker *w);

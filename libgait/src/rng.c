@@ -1,51 +1,19 @@
 #include "rng.h"
 
-#include "fmath.h"
-
 void rng_bits(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, uint32_t out[4])
 {
-    uint32_t c0 = index, c1 = draw, c2 = frame, c3 = stream;
-    uint32_t k0 = (uint32_t)seed, k1 = (uint32_t)(seed >> 32);
-    for (int round = 0; round < 10; round++) {
-        uint64_t const p0 = (uint64_t)0xD2511F53u * c0, p1 = (uint64_t)0xCD9E8D57u * c2;
-        c0 = (uint32_t)(p1 >> 32) ^ c1 ^ k0;
-        c1 = (uint32_t)p1;
-        c2 = (uint32_t)(p0 >> 32) ^ c3 ^ k1;
-        c3 = (uint32_t)p0;
-        k0 += 0x9E3779B9u; /* golden ratio */
-        k1 += 0xBB67AE85u; /* sqrt(3) - 1 */
-    }
-    out[0] = c0;
-    out[1] = c1;
-    out[2] = c2;
-    out[3] = c3;
-}
-
-/* The 24 high bits as a float in [0, 1). */
-static float unit(uint32_t bits)
-{
-    return (float)(int32_t)(bits >> 8) * 0x1p-24f;
+    rng_words(seed, stream, frame, index, draw, out);
 }
 
 void rng_uniform4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, float out[4])
 {
     uint32_t bits[4];
-    rng_bits(seed, stream, frame, index, draw, bits);
+    rng_words(seed, stream, frame, index, draw, bits);
     for (int i = 0; i < 4; i++)
-        out[i] = unit(bits[i]);
+        out[i] = rng_unit(bits[i]);
 }
 
 void rng_normal4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, float out[4])
 {
-    uint32_t bits[4];
-    rng_bits(seed, stream, frame, index, draw, bits);
-    for (int i = 0; i < 4; i += 2) {
-        /* All 32 bits in (0, 1]: with 24 the tail would end at 5.8. */
-        float const u = ((float)bits[i] + 1.0f) * 0x1p-32f;
-        float const radius = sqrtf(-2.0f * m_log(u));
-        float s, c;
-        m_sincos(TWO_PI_F * unit(bits[i + 1]), &s, &c);
-        out[i] = radius * c;
-        out[i + 1] = radius * s;
-    }
+    rng_normals(seed, stream, frame, index, draw, out);
 }

@@ -2,7 +2,7 @@
  * A number is a pure function of (seed, stream, frame, index, draw): who asks, and when, does not matter. */
 #ifndef GAIT_RNG_H
 #define GAIT_RNG_H
-#include "base.h"
+#include "fmath.h"
 
 /* Key = seed (low word first), counter = (index, draw, frame, stream). */
 void rng_bits(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, uint32_t out[4]);
@@ -13,4 +13,48 @@ void rng_uniform4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index
 
 /* Four standard normals, |x| < 6.7 (Box-Muller). */
 void rng_normal4(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw, float out[4]);
+
+/* ---- the same inline: a loop over the index becomes vector code ---- */
+
+static inline void rng_words(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw,
+                             uint32_t out[4])
+{
+    uint32_t c0 = index, c1 = draw, c2 = frame, c3 = stream;
+    uint32_t k0 = (uint32_t)seed, k1 = (uint32_t)(seed >> 32);
+    for (int round = 0; round < 10; round++) {
+        uint64_t const p0 = (uint64_t)0xD2511F53u * c0, p1 = (uint64_t)0xCD9E8D57u * c2;
+        c0 = (uint32_t)(p1 >> 32) ^ c1 ^ k0;
+        c1 = (uint32_t)p1;
+        c2 = (uint32_t)(p0 >> 32) ^ c3 ^ k1;
+        c3 = (uint32_t)p0;
+        k0 += 0x9E3779B9u; /* golden ratio */
+        k1 += 0xBB67AE85u; /* sqrt(3) - 1 */
+    }
+    out[0] = c0;
+    out[1] = c1;
+    out[2] = c2;
+    out[3] = c3;
+}
+
+/* The 24 high bits as a float in [0, 1). */
+static inline float rng_unit(uint32_t bits)
+{
+    return (float)(int32_t)(bits >> 8) * 0x1p-24f;
+}
+
+static inline void rng_normals(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw,
+                               float out[4])
+{
+    uint32_t bits[4];
+    rng_words(seed, stream, frame, index, draw, bits);
+    for (int i = 0; i < 4; i += 2) {
+        /* All 32 bits in (0, 1]: with 24 the tail would end at 5.8. */
+        float const u = ((float)bits[i] + 1.0f) * 0x1p-32f;
+        float const radius = __builtin_sqrtf(-2.0f * m_log(u));
+        float s, c;
+        m_sincos(TWO_PI_F * rng_unit(bits[i + 1]), &s, &c);
+        out[i] = radius * c;
+        out[i + 1] = radius * s;
+    }
+}
 #endif

@@ -129,30 +129,32 @@ static float seconds_since(const gait_tracker *t, int64_t utime)
 
 typedef struct move_job {
     gait_tracker *t;
-    dynamics d;
-    float dt, age;
-    uint32_t frame;
+    dynamics_step step;
 } move_job;
 
 static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     const move_job *const j = ctx;
-    const generation *const from = &j->t->gen[1 - j->t->core->current];
-    generation *const to = &j->t->gen[j->t->core->current];
+    const gait_tracker *const t = j->t;
+    const population *const from = &t->gen[1 - t->core->current].people;
+    population to = t->gen[t->core->current].people;
+    walker_block then, now;
     (void)task;
-    for (int32_t i = begin; i < end; i++) {
-        walker w = walker_get(&from->people, j->t->filter.parent[i]);
-        if (j->dt > 0.0f)
-            w = dynamics_move(&j->d, &w, j->dt, j->age, j->frame, i);
-        walker_put(&to->people, i, &w);
+    for (int32_t i = begin; i < end; i += BLOCK) {
+        int32_t const lanes = i_min(BLOCK, end - i);
+        walker_block_get(from, t->filter.parent + i, lanes, &then);
+        if (j->step.dt > 0.0f)
+            t->like->run->dynamics_move(&j->step, i, &then, &now);
+        walker_block_put(&to, i, lanes, j->step.dt > 0.0f ? &now : &then);
     }
 }
 
 /* Move every particle from its ancestor into the other generation, which becomes the current one. */
 static void predict(gait_tracker *t, float dt, uint32_t frame)
 {
-    move_job j = {.t = t, .d = tracker_dynamics(t), .dt = dt, .frame = frame};
-    j.age = seconds_since(t, t->core->start_utime);
+    dynamics const d = tracker_dynamics(t);
+    move_job j = {.t = t};
+    j.step = dynamics_step_init(&d, dt, seconds_since(t, t->core->start_utime), frame);
     t->core->current = 1 - t->core->current;
     tracker_set_count(t, t->filter.n);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);

@@ -1,7 +1,9 @@
 /* How particles move: every field's mean and spread against closed forms (spec 1.4, 3.4 K6). */
+#include "kernel_check.h"
 #include "toy_prior.h"
 
 #include "fmath.h"
+#include "rng.h"
 
 enum { FIELDS = F_COEF + 4 };
 
@@ -44,7 +46,7 @@ static void test_drift(void)
             w.f[F_COEF + 2] = -0.7f;
             w.f[F_COEF + 3] = 0.04f;
             for (int32_t k = 0; k < steps; k++)
-                w = dynamics_move(&d, &w, dt, 1.0f, (uint32_t)k, 3);
+                w = move_one(&d, &w, dt, 1.0f, (uint32_t)k, 3);
             double path = 0.0; /* statures: integral of the forward motion over phase */
             for (int k = 0; k < 4000; k++)
                 path += (double)root_channel(m, ROOT_FORWARD,
@@ -73,7 +75,7 @@ static void test_rate(void)
         walker w = {.f = {[F_RATE] = 1.3f, [F_STATURE] = 1.7f}};
         cfg.rate_time = never ? 0.0f : 5.0f;
         for (uint32_t k = 0; k < 60; k++)
-            w = dynamics_move(&d, &w, 0.05f, 2.0f, k, 0);
+            w = move_one(&d, &w, 0.05f, 2.0f, k, 0);
         CHECK_NEAR(w.f[F_RATE], never ? 1.3 : own + (1.3 - own) * exp(-3.0 / 5.0), 1e-4);
     }
 }
@@ -85,7 +87,7 @@ static void test_paper_way(void)
     walker const from = {.f = {[F_RATE] = 1.0f, [F_STATURE] = 1.7f}};
     cfg.phase_noise = 0.05f;
     for (int32_t i = 0; i < 5; i++)
-        CHECK_NEAR(dynamics_move(&d, &from, 0.1f, 0.0f, 0, i).f[F_X], 1.7f * 0.80f * 0.1f, 1e-6);
+        CHECK_NEAR(move_one(&d, &from, 0.1f, 0.0f, 0, i).f[F_X], 1.7f * 0.80f * 0.1f, 1e-6);
 }
 
 /* ---- motion with noise ---- */
@@ -100,7 +102,7 @@ static void spread_after(const dynamics *d, const walker *from, float dt, float 
         double cycles = 0.0; /* unwrapped phase */
         for (int32_t k = 0; k < steps; k++) {
             float const before = w.f[F_PHASE];
-            w = dynamics_move(d, &w, dt, age + (float)k * dt, (uint32_t)k, i);
+            w = move_one(d, &w, dt, age + (float)k * dt, (uint32_t)k, i);
             double const turn = (double)w.f[F_PHASE] - (double)before;
             cycles += turn - floor(turn + 0.5);
         }
@@ -225,7 +227,7 @@ static void test_reflect(void)
     for (int32_t i = 0; i < 500; i++) {
         walker w = {.f = {[F_RATE] = i % 2 ? 2.45f : 0.5f, [F_STATURE] = 1.7f}};
         for (uint32_t k = 0; k < 20; k++) {
-            w = dynamics_move(&d, &w, 0.1f, 2.0f, k, i);
+            w = move_one(&d, &w, 0.1f, 2.0f, k, i);
             wrong += !(w.f[F_RATE] >= 1.0f / 2.1f && w.f[F_RATE] <= 2.5f);
             wrong += !(w.f[F_PHASE] >= 0.0f && w.f[F_PHASE] < 1.0f);
             high += w.f[F_RATE] == 2.5f;
@@ -269,14 +271,43 @@ static void test_independent(void)
                 cov += (sampled[0][a][i] - x.mean) * (sampled[0][b][i] - y.mean) / DRAWS;
             CHECK_NEAR(cov / sqrt(x.var * y.var), 0.0, 4.5 / sqrt(DRAWS));
         }
-    walker const w = dynamics_move(&d, &from, 0.04f, 0.0f, 3, 7);
-    walker const same = dynamics_move(&d, &from, 0.04f, 0.0f, 3, 7);
-    walker const frame = dynamics_move(&d, &from, 0.04f, 0.0f, 4, 7);
-    walker const index = dynamics_move(&d, &from, 0.04f, 0.0f, 3, 8);
-    walker const seed = dynamics_move(&other, &from, 0.04f, 0.0f, 3, 7);
+    walker const w = move_one(&d, &from, 0.04f, 0.0f, 3, 7);
+    walker const same = move_one(&d, &from, 0.04f, 0.0f, 3, 7);
+    walker const frame = move_one(&d, &from, 0.04f, 0.0f, 4, 7);
+    walker const index = move_one(&d, &from, 0.04f, 0.0f, 3, 8);
+    walker const seed = move_one(&other, &from, 0.04f, 0.0f, 3, 7);
     CHECK(memcmp(&w, &same, sizeof w) == 0);
     for (int f = 0; f < FIELDS; f++)
         CHECK(w.f[f] != frame.f[f] && w.f[f] != index.f[f] && w.f[f] != seed.f[f]);
+}
+
+/* Every instruction set moves every lane to the same bits, and writes only the fields there are. */
+static void test_instruction_sets(void)
+{
+    static _Alignas(GAIT_ALIGN) unsigned char memory[2][sizeof(walker_block) + 2 * GUARD];
+    static walker_block from;
+    static const float extreme[] = {0.0f, -0.0f, 1e-30f, 0.999999f, -3.2f, 3.1415927f, 40.0f, -1e6f};
+    for (uint32_t round = 0; round < 60; round++) {
+        dynamics const d = quiet(round % 2 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT, round);
+        noisy();
+        dynamics_step const s =
+            dynamics_step_init(&d, 0.002f * (float)(1 + round), 0.03f * (float)round, round);
+        for (uint32_t f = 0; f < (uint32_t)s.fields; f++)
+            for (uint32_t lane = 0; lane < BLOCK; lane += 4) {
+                float n[4];
+                rng_normal4(7, 0, round, f, lane, n);
+                for (uint32_t k = 0; k < 4; k++)
+                    from.f[f][lane + k] =
+                        (round + 3 * f + lane + k) % 9 == 0 ? extreme[(f + round) % 8] : n[k];
+            }
+        for (int k = -1; k < isa_count(); k++) {
+            guarded const g = guard_fill(memory[k >= 0], sizeof(walker_block));
+            const kernels *const run = k < 0 ? isa_scalar() : isa_at(k);
+            run->dynamics_move(&s, (int32_t)(round * BLOCK), &from, (walker_block *)(void *)g.begin);
+            CHECK(guard_whole(&g));
+            CHECK(k < 0 || memcmp(memory[0], memory[1], sizeof memory[0]) == 0);
+        }
+    }
 }
 
 int main(void)
@@ -291,5 +322,6 @@ int main(void)
     test_reflect();
     test_settling();
     test_independent();
+    test_instruction_sets();
     return CHECK_DONE();
 }

@@ -2,6 +2,7 @@
 #ifndef TOY_PRIOR_H
 #define TOY_PRIOR_H
 #include "dynamics.h"
+#include "kernels.h"
 #include "toy_model.h"
 
 #include "check.h"
@@ -26,6 +27,22 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.tilt_time = 1.1f;
     cfg.coef_time = 4.5f;
     return (dynamics){.cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed};
+}
+
+/* Particle i over one interval of dt seconds at an age, moved with its block. */
+static inline walker move_one(const dynamics *d, const walker *from, float dt, float age, uint32_t frame,
+                              int32_t i)
+{
+    static walker_block block, moved; /* the other lanes stand at 0 */
+    dynamics_step const s = dynamics_step_init(d, dt, age, frame);
+    int32_t const lane = i % BLOCK;
+    walker w = *from;
+    for (int32_t f = 0; f < s.fields; f++)
+        block.f[f][lane] = from->f[f];
+    kernels_choose(~0u)->dynamics_move(&s, i - lane, &block, &moved);
+    for (int32_t f = 0; f < s.fields; f++)
+        w.f[f] = moved.f[f][lane];
+    return w;
 }
 
 typedef struct moments {

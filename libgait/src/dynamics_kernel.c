@@ -1,0 +1,113 @@
+/* One interval of BLOCK walkers, a lane each: eqs. 5-9 as resolved in the design document. */
+#include "dynamics.h"
+#include "fmath.h"
+#include "kernels.h"
+#include "rng.h"
+
+enum { NORMALS = 4 * ((F_MAX + 3) / 4) };
+
+/* Four standard normals of each of BLOCK particles from `first` on. */
+KERNEL_ROW void normals(uint64_t seed, uint32_t frame, uint32_t first, uint32_t draw,
+                        float (*restrict out)[BLOCK])
+{
+    for (uint32_t lane = 0; lane < BLOCK; lane++) {
+        float n[4];
+        rng_normals(seed, STREAM_MOVE, frame, first + lane, draw, n);
+        for (int32_t k = 0; k < 4; k++)
+            out[k][lane] = n[k];
+    }
+}
+
+KERNEL_ROW void relax(relaxing r, const float *restrict x, const float *restrict n, float *restrict out)
+{
+    for (int32_t lane = 0; lane < BLOCK; lane++)
+        out[lane] = r.keep * x[lane] + r.noise * n[lane];
+}
+
+/* Eqs. 6 and 7: the phase advances by the previous rate; the rate diffuses. */
+KERNEL_ROW void advance(const dynamics_step *s, const walker_block *restrict from,
+                        const float (*restrict n)[BLOCK], float *restrict turn, walker_block *restrict to)
+{
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        float const rate = from->f[F_RATE][lane];
+        turn[lane] = rate * s->dt + s->phase_noise * n[0][lane];
+        to->f[F_PHASE][lane] = m_wrap1(from->f[F_PHASE][lane] + turn[lane]);
+        float const off = s->rate.keep * (rate - s->mean_rate) + s->rate.noise * n[1][lane];
+        to->f[F_RATE][lane] = dynamics_reflect_rate(s->mean_rate + off);
+    }
+}
+
+/* Forward speed of the stride halfway through the interval, statures per stride: eq. 3 for one function. */
+KERNEL_ROW void speeds(const dynamics_step *s, const walker_block *restrict from, const float *restrict turn,
+                       float *restrict out)
+{
+    const gait_model *const m = s->model;
+    int32_t const T = m->phases, M = m->channels;
+    int32_t here[BLOCK], next[BLOCK];
+    float w[BLOCK];
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        float const at = m_wrap1(from->f[F_PHASE][lane] + 0.5f * turn[lane]) * (float)T;
+        int32_t const j = i_min((int32_t)at, T - 1);
+        here[lane] = j * M;
+        next[lane] = (j + 1 < T ? j + 1 : 0) * M;
+        w[lane] = at - (float)j;
+        out[lane] = 0.0f;
+    }
+    for (int32_t k = 0; k <= s->components; k++) {
+        const float *const curve =
+            m->curves + (size_t)k * (size_t)T * (size_t)M + m->root_channel + ROOT_FORWARD;
+        for (int32_t lane = 0; lane < BLOCK; lane++) {
+            float const c = k ? from->f[F_COEF + k - 1][lane] : 1.0f;
+            out[lane] += c * (1.0f - w[lane]) * curve[here[lane]] + c * w[lane] * curve[next[lane]];
+        }
+    }
+}
+
+/* Eq. 8: forward along the previous heading by the stride's own speed; paper mode: by the rate. */
+KERNEL_ROW void walk(const dynamics_step *s, const walker_block *restrict from,
+                     const float (*restrict n)[BLOCK], const float *restrict turn,
+                     const float *restrict speed, walker_block *restrict to)
+{
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        float const strides = s->plain_root ? from->f[F_RATE][lane] * s->dt : turn[lane];
+        float const ahead = from->f[F_STATURE][lane] * speed[lane] * strides + s->forward_noise * n[2][lane];
+        float const aside = s->lateral_noise * n[3][lane];
+        float sn, cs;
+        m_sincos(from->f[F_HEADING][lane], &sn, &cs);
+        to->f[F_X][lane] = from->f[F_X][lane] + (ahead * cs - aside * sn);
+        to->f[F_Y][lane] = from->f[F_Y][lane] + (ahead * sn + aside * cs);
+        to->f[F_HEADING][lane] = m_wrap_pi(from->f[F_HEADING][lane] + s->heading_noise * n[5][lane]);
+    }
+}
+
+KERNEL_ROW void grow(const dynamics_step *s, const float *restrict x, const float *restrict n,
+                     float *restrict out)
+{
+    for (int32_t lane = 0; lane < BLOCK; lane++)
+        out[lane] = s->settling ? f_max(x[lane] * (1.0f + s->stature_noise * n[lane]), 0.3f) : x[lane];
+}
+
+void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const walker_block *from, walker_block *to)
+{
+    float n[NORMALS][BLOCK], turn[BLOCK], speed[BLOCK];
+    for (int32_t k = 0; k < s->fields; k += 4)
+        normals(s->seed, s->frame, (uint32_t)first, (uint32_t)(k / 4), n + k);
+    advance(s, from, (const float (*)[BLOCK])n, turn, to);
+    if (s->plain_root)
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            speed[lane] = s->model->stride_length;
+    else
+        speeds(s, from, turn, speed);
+    walk(s, from, (const float (*)[BLOCK])n, turn, speed, to);
+    /* eq. 9, and the level of the ground: tilt and level return to the model's own */
+    relax(s->level, from->f[F_Z], n[4], to->f[F_Z]);
+    relax(s->tilt, from->f[F_PITCH], n[6], to->f[F_PITCH]);
+    relax(s->tilt, from->f[F_ROLL], n[7], to->f[F_ROLL]);
+    grow(s, from->f[F_STATURE], n[8], to->f[F_STATURE]);
+    /* the scores relax to the population (eq. 5); proportions and posture hardly change */
+    for (int32_t k = F_COEF; k < s->fields; k++)
+        relax(k < s->proportion ? s->score
+              : k < s->offset   ? s->shape
+                                : s->posture,
+              from->f[k], n[k], to->f[k]);
+}
