@@ -1,0 +1,280 @@
+"""The C lifter against the numpy one, term by term, and against the exact posterior of a perspective view."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from toy_segments import toy_blob, toy_prior
+
+from gait import blob
+from gait.camera import Camera
+from gait.errors import GaitError
+from gait.lift import heading, observe, posterior
+from gait.lift.prior import SegmentPrior
+from gait.lifter import LiftConfig, Lifter, LiftFlag
+from gait.skeleton import axis_rotation
+
+FRAMES, MARKERS = 10, 19
+AXES = observe.image_axes("y")
+CAMERA = Camera(
+    width=1280,
+    height=720,
+    fx=900.0,
+    fy=905.0,
+    cx=640.0,
+    cy=350.0,
+    R=Camera.looking([0.0, -7.0, 1.5], [0.0, 0.0, 1.0], (1280, 720), 900.0).R,
+    t=Camera.looking([0.0, -7.0, 1.5], [0.0, 0.0, 1.0], (1280, 720), 900.0).t,
+    distortion=np.array([-0.2, 0.05, 0.001, -0.002, 0.0]),
+)
+
+
+@cache
+def model(size: int = 50, headings: int = 0, components: int = 1) -> tuple[bytes, SegmentPrior]:
+    """A toy prior as a blob, and as the blob holds it."""
+    prior = toy_prior(FRAMES, MARKERS, size, seed=1, components=components, headings=headings)
+    contents = toy_blob(prior)
+    return contents, SegmentPrior.from_sections(blob.decode(contents, "toy"))
+
+
+def deviations(rng: np.random.Generator, low: float, high: float, missing: float = 0.2) -> np.ndarray:
+    """Deviations of all observations, infinite where nothing is seen."""
+    sd = rng.uniform(low, high, (FRAMES, MARKERS))
+    sd[rng.random(sd.shape) < missing] = np.inf
+    return sd
+
+
+def noisy(uv: np.ndarray, sd: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    return uv + rng.normal(size=uv.shape) * np.where(np.isfinite(sd), sd, 0)[..., None]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 2.5])
+def test_every_figure_equals_the_numpy_posterior(angle: float) -> None:
+    contents, prior = model()
+    rng = np.random.default_rng(0)
+    gaussian = posterior.place(prior, heading=angle)
+    truth = gaussian.draw(rng)
+    sd = deviations(rng, 0.01, 0.05)
+    uv = noisy(truth @ AXES.T, sd, rng)
+    rows = observe.orthographic(observe.Observations(uv, sd), AXES)
+    want = posterior.infer(gaussian, rows)
+    dual = posterior.infer(gaussian, rows, dual=True)
+    lifter = Lifter(contents, AXES, LiftConfig.default(heading=angle, heading_sd=0.0))
+    fit = lifter.segment(uv, sd)
+    assert fit.log_evidence == pytest.approx(want.log_evidence, rel=1e-9)
+    assert fit.log10_volume == pytest.approx(posterior.log10_volume(gaussian, rows), rel=1e-11)
+    mean, deviation = lifter.positions()
+    np.testing.assert_allclose(mean, want.points, atol=1e-10)
+    np.testing.assert_allclose(deviation, want.sd, rtol=1e-9)
+    alpha, covariance = lifter.posterior()
+    np.testing.assert_allclose(alpha, want.alpha, atol=1e-9)
+    np.testing.assert_allclose(alpha, dual.alpha, atol=1e-7)  # the paper's own form
+    np.testing.assert_allclose(covariance, want.covariance, atol=1e-12)
+    assert np.linalg.eigvalsh(np.eye(len(alpha)) - covariance).min() > -1e-12  # Q <= Lambda
+    np.testing.assert_allclose(lifter.least_squares(), posterior.likelihood_only(gaussian, rows), atol=1e-8)
+
+
+def test_uncertain_displacements_equal_the_numpy_ones() -> None:
+    contents, prior = model()
+    rng = np.random.default_rng(3)
+    gaussian = posterior.place(prior)
+    sd = deviations(rng, 0.01, 0.05)
+    uv = noisy(gaussian.draw(rng) @ AXES.T, sd, rng)
+    want_sd, want = posterior.infer(
+        gaussian, observe.orthographic(observe.Observations(uv, sd), AXES)
+    ).uncertain_modes(4)
+    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0))
+    lifter.segment(uv, sd)
+    got_sd, got = lifter.uncertain(4)
+    np.testing.assert_allclose(got_sd, want_sd, rtol=1e-8)
+    for one, other, size in zip(got, want, want_sd, strict=True):
+        assert abs(np.sum(one * other)) == pytest.approx(size, rel=1e-6)
+    assert posterior.share_along(got[0], np.array([0.0, 1, 0])) > 0.99  # rigid translation in depth
+    assert posterior.share_rigid(got[0]) > 0.98
+
+
+def test_drawn_from_the_prior_intervals_cover_what_they_say() -> None:
+    contents, prior = model(size=20)
+    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0))
+    rng = np.random.default_rng(7)
+    gaussian = posterior.place(prior)
+    inside, squares, count = [], 0.0, 0
+    for _ in range(400):
+        truth = gaussian.draw(rng)
+        lifter.segment(truth @ AXES.T + rng.normal(size=(FRAMES, MARKERS, 2)) * 0.03, 0.03)
+        mean, sd = lifter.positions()
+        inside.append(np.abs(mean - truth) < 1.6449 * sd)
+        alpha, covariance = lifter.posterior()
+        off = alpha - _scores(gaussian, truth)
+        squares += off @ np.linalg.solve(covariance, off)
+        count += len(alpha)
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.01)
+    assert squares / count == pytest.approx(1.0, abs=3 * np.sqrt(2 / count) + 0.05)
+
+
+def _scores(gaussian: posterior.Gaussian, truth: np.ndarray) -> np.ndarray:
+    """Scores of a draw: least squares over all its coordinates, which have little residual."""
+    flat = gaussian.modes.reshape(len(gaussian.modes), -1)
+    return np.linalg.lstsq(flat.T, (truth - gaussian.mean).ravel(), rcond=None)[0]
+
+
+def test_a_perspective_fit_is_the_maximum_of_the_posterior() -> None:
+    """The derivative of the negative log posterior, the lens included, vanishes at the solution."""
+    contents, prior = model(size=12)
+    rng = np.random.default_rng(5)
+    truth = posterior.place(prior, heading=1.2, ground_sd=0.8).draw(rng, residual=False)
+    sd = deviations(rng, 2.0, 4.0)
+    uv = noisy(CAMERA.project(truth), sd, rng)
+    # without residual the noise does not depend on the depth
+    lifter = Lifter(contents, CAMERA, LiftConfig.default(residual=0.0))
+    fit = lifter.segment(uv, sd)
+    assert fit.converged
+    theta, _ = lifter.posterior()
+    unknowns = np.append(theta[:-1], fit.heading)
+
+    def cost(x: np.ndarray) -> float:
+        local = prior.mean[0] + np.tensordot(x[:12], prior.modes[0], 1)
+        place = x[12:15] * lifter.config.place_sd
+        points = prior.stature * local @ axis_rotation(2, x[15]).T + place
+        miss = (CAMERA.project(points) - uv) / sd[..., None]
+        return 0.5 * float(np.nansum(miss[np.isfinite(sd)] ** 2) + x[:15] @ x[:15])
+
+    steps = 1e-4 * np.eye(len(unknowns))
+    slope = [(cost(unknowns + s) - cost(unknowns - s)) / 2e-4 for s in steps]
+    curvature = [(cost(unknowns + s) - 2 * cost(unknowns) + cost(unknowns - s)) / 1e-8 for s in steps]
+    assert np.max(np.abs(np.array(slope) / np.sqrt(curvature))) < 0.02  # deviations from the maximum
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0, 3.0, -2.0])
+def test_an_unknown_heading_is_found_as_in_numpy(angle: float) -> None:
+    contents, prior = model(size=20)
+    rng = np.random.default_rng(int(10 * abs(angle)))
+    truth = posterior.place(prior, heading=angle, ground_sd=1.0).draw(rng)
+    sd = np.full((FRAMES, MARKERS), 0.01)
+    uv = noisy(truth @ AXES.T, sd, rng)
+    seen = observe.Observations(uv, sd)
+    want = heading.explain(prior, lambda _: observe.orthographic(seen, AXES))[0]
+    lifter = Lifter(contents, AXES)
+    fit = lifter.segment(uv, sd)
+    assert np.cos(fit.heading - angle) > 0.999
+    assert np.cos(fit.heading - want.heading) > 1 - 1e-8
+    np.testing.assert_allclose(lifter.positions()[0], want.posterior.points, atol=1e-4)
+
+
+def test_the_component_of_a_mixture_is_chosen_by_evidence() -> None:
+    contents, prior = model(size=8, components=3)
+    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0))
+    rng = np.random.default_rng(2)
+    for component in range(3):
+        gaussian = posterior.place(prior, component)
+        uv = gaussian.draw(rng) @ AXES.T
+        fit = lifter.segment(uv, 0.05)
+        rows = observe.orthographic(observe.Observations(uv, np.full(uv.shape[:2], 0.05)), AXES)
+        score = [
+            posterior.infer(posterior.place(prior, c), rows).log_evidence + np.log(prior.weights[c])
+            for c in range(3)
+        ]
+        assert fit.component == component == int(np.argmax(score))
+        assert fit.share == pytest.approx(1 / np.exp(np.subtract(score, max(score))).sum(), rel=1e-6)
+
+
+def test_a_batch_is_each_segment_alone() -> None:
+    contents, _ = model()
+    rng = np.random.default_rng(4)
+    lifter = Lifter(contents, AXES, LiftConfig.default(heading=0.5, heading_sd=0.0))
+    sd = deviations(rng, 0.01, 0.05)
+    uv = rng.normal(size=(7, FRAMES, MARKERS, 2))
+    with pytest.raises(GaitError):
+        lifter.batch(uv)
+    lifter.fix(sd)
+    together, fixed_sd = lifter.batch(uv), lifter.positions()[1]
+    for one, mean in zip(uv, together, strict=True):
+        lifter.segment(one, sd)
+        np.testing.assert_allclose(mean, lifter.positions()[0], atol=1e-11)
+        np.testing.assert_allclose(fixed_sd, lifter.positions()[1], rtol=1e-12)
+
+
+def test_a_prior_in_the_axes_of_the_world_has_no_heading_to_find() -> None:
+    contents, prior = model(size=6, headings=8)
+    lifter = Lifter(contents, AXES)
+    lifter.segment(np.zeros((FRAMES, MARKERS, 2)), np.inf)
+    assert lifter.info.headings == 8 and len(lifter.posterior()[0]) == prior.size + 3
+
+
+def test_missing_markers_cost_what_the_deviations_say() -> None:
+    contents, prior = model(size=20)
+    rng = np.random.default_rng(9)
+    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0, place_sd=(10.0, 0.0, 0.05)))
+    gaussian = posterior.place(prior, ground_sd=0.0)
+    found: dict[float, list[tuple[float, float]]] = {0.0: [], 0.3: [], 0.5: []}
+    for _ in range(60):
+        truth = gaussian.draw(rng)
+        for missing, errors in found.items():
+            sd = deviations(rng, 0.02, 0.02, missing)
+            lifter.segment(noisy(truth @ AXES.T, sd, rng), sd)
+            mean, spread = lifter.positions()
+            errors.append((float(np.mean((mean - truth) ** 2)), float(np.mean(spread**2))))
+    rms = {k: np.sqrt(np.mean(v, axis=0)) for k, v in found.items()}
+    for error, said in rms.values():
+        assert error == pytest.approx(said, rel=0.1)
+    assert rms[0.3][0] < 1.15 * rms[0.0][0]
+    assert rms[0.5][0] > rms[0.0][0]
+
+
+def test_wrong_shapes_and_settings_are_refused() -> None:
+    contents, _ = model(size=6)
+    lifter = Lifter(contents, CAMERA)
+    with pytest.raises(ValueError, match="shape"):
+        lifter.segment(np.zeros((FRAMES, MARKERS)))
+    with pytest.raises(ValueError, match="shape"):
+        lifter.push(1, np.zeros((3, 2)))
+    with pytest.raises(GaitError, match="stature"):
+        Lifter(contents, CAMERA, LiftConfig.default(stature=-1.0))
+    with pytest.raises(GaitError, match="axis"):
+        Lifter(contents, [[1, 0, 0], [1, 0, 0]])
+    with pytest.raises(TypeError):
+        LiftConfig.default(nothing=1)
+    damaged = bytearray(contents)
+    damaged[-1] ^= 1
+    with pytest.raises(GaitError, match="checksum"):
+        Lifter(bytes(damaged), CAMERA)
+
+
+def _walk(prior: SegmentPrior, times: np.ndarray, speed: float) -> np.ndarray:
+    """The mean's first pose carried along x: under a prior made steady it goes on so for ever."""
+    start = prior.stature * prior.mean[0, 0]
+    return start + np.outer(speed * times, [1.0, 0, 0])[:, None]
+
+
+def test_a_stream_follows_and_waits_as_told() -> None:
+    _, prior = model(size=6)
+    drift = 0.03 * np.arange(FRAMES)[None, :, None, None] * np.array([1.0, 0, 0])
+    prior = replace(
+        prior,
+        mean=prior.mean[:, :1] + drift,
+        modes=np.repeat(prior.modes[:, :, :1], FRAMES, axis=2),
+        residual=np.full_like(prior.residual, 1e-6),
+    )
+    lifter = Lifter(toy_blob(prior), CAMERA, LiftConfig.default(lag=3))
+    rng = np.random.default_rng(1)
+    times = np.arange(90) / 30.0
+    truth = _walk(prior, times - 1.5, 0.03 * prior.stature * prior.fps)
+    errors, inside = [], []
+    for i, uv in enumerate(CAMERA.project(truth)):
+        sd = np.where(rng.random(MARKERS) < 0.2, np.inf, 2.0)
+        lifter.push(5000 + round(1e6 * times[i]), uv + 2.0 * rng.normal(size=uv.shape), sd)
+        frame = lifter.estimate()
+        assert (frame is None) == (i < 3)
+        if frame is None or frame.status.name == "INIT":
+            continue
+        assert frame.frame == i - 3 and not frame.flags & LiftFlag.MISFIT
+        errors.append(np.linalg.norm(frame.markers - truth[i - 3], axis=1).mean())
+        inside.append(np.abs(frame.markers - truth[i - 3]) < 1.645 * frame.sd)
+    assert len(errors) == 90 - 14
+    assert np.median(errors) < 0.05
+    assert 0.8 < np.mean(inside) < 1.0
+    lifter.reset()
+    assert lifter.estimate() is None
