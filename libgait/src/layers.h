@@ -3,7 +3,7 @@
 #define GAIT_LAYERS_H
 #include "outline.h"
 
-enum { LAYERS_ROWS = 8 }; /* the grid is drawn in bands of so many rows */
+enum { LAYERS_ROWS = 4 }; /* the grid is drawn in bands of so many rows */
 
 typedef struct layers {
     rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; [first, last) are whole bands, others are not written */

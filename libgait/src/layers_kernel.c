@@ -77,14 +77,14 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
     depth_order(outline->depth, count, out);
 }
 
-/* ---- masks, lanes are the rows of a band, or their words ---- */
+/* ---- masks, lanes are rows, or their words where that fills a vector better ---- */
 _Static_assert(RAST_WORDS == 2, "a lane has one word of a row or both");
 #if defined(__AVX2__)
-enum { LANE_WORDS = 1 }; /* so that a band's spans fill a vector */
+enum { LANE_WORDS = 1 };
 #else
 enum { LANE_WORDS = 2 };
 #endif
-enum { BAND = LAYERS_ROWS * RAST_WORDS / LANE_WORDS }; /* lanes */
+enum { BAND = LAYERS_ROWS * RAST_WORDS / LANE_WORDS }; /* lanes of a band */
 
 typedef struct edge { /* of one body */
     uint32_t at, slope, first, rows;
@@ -107,12 +107,12 @@ static inline void stretch(edge e, int32_t y, int32_t *begin, int32_t *end)
     *end = i_max(*end, crosses ? column : 0);
 }
 
-/* The limb's bits in one word of the band go behind those of `whole`. */
+/* The limb's bits in one word go behind those of `whole`. */
 static inline void cover_word(int32_t word, int32_t begin, int32_t end, uint64_t *restrict whole,
                               uint64_t *restrict seen)
 {
-    int32_t const base = word % RAST_WORDS * 64;
-    uint64_t const mine = rast_bits(i_clamp(begin - base, 0, 64), i_clamp(end - base, 0, 64));
+    int32_t const base = (word & 1) * 64;
+    uint64_t const mine = rast_bits(i_max(begin - base, 0), i_min(end - base, 64));
     uint64_t const nearer = whole[word];
     whole[word] = nearer | mine;
     seen[word] = mine & ~nearer;
@@ -127,47 +127,57 @@ static inline void cover(int32_t i, int32_t begin, int32_t end, uint64_t *restri
         cover_word(i * LANE_WORDS + 1, begin, end, whole, seen);
 }
 
-static void draw_cone(const layers_limb *limb, int32_t lane, rast_mask *restrict whole,
-                      rast_mask *restrict out)
+/* Rows from `top` on in whole bands, of which the compiler sees that they need no remainder. */
+static void draw_cone(const layers_limb *limb, int32_t lane, int32_t top, int32_t bands,
+                      uint64_t *restrict whole, uint64_t *restrict seen)
 {
     edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
     edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
-    for (int32_t top = out->first; top < out->last; top += LAYERS_ROWS) {
-        uint64_t *const body = (uint64_t *)whole->row + top * RAST_WORDS;
-        uint64_t *const seen = (uint64_t *)out->row + top * RAST_WORDS;
-        for (int32_t i = 0; i < BAND; i++) {
-            int32_t const y = top + i * LANE_WORDS / RAST_WORDS;
-            int32_t begin = RAST_SIZE, end = 0;
-            stretch(a, y, &begin, &end);
-            stretch(b, y, &begin, &end);
-            stretch(c, y, &begin, &end);
-            stretch(d, y, &begin, &end);
-            cover(i, begin, end, body, seen);
-        }
+    for (int32_t i = 0; i < bands * BAND; i++) {
+        int32_t const y = top + (i * LANE_WORDS >> 1);
+        int32_t begin = RAST_SIZE, end = 0;
+        stretch(a, y, &begin, &end);
+        stretch(b, y, &begin, &end);
+        stretch(c, y, &begin, &end);
+        stretch(d, y, &begin, &end);
+        cover(i, begin, end, whole, seen);
     }
 }
 
-static void draw_ellipsoid(const layers_limb *limb, int32_t lane, rast_mask *restrict whole,
-                           rast_mask *restrict out)
+static void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t top, int32_t bands,
+                           uint64_t *restrict whole, uint64_t *restrict seen)
 {
-    for (int32_t top = out->first; top < out->last; top += LAYERS_ROWS) {
-        uint64_t *const body = (uint64_t *)whole->row + top * RAST_WORDS;
-        uint64_t *const seen = (uint64_t *)out->row + top * RAST_WORDS;
-        int32_t begin[BAND], end[BAND];
-        for (int32_t i = 0; i < BAND; i++) {
-            begin[i] = RAST_SIZE;
-            end[i] = 0;
-        }
-        for (int32_t k = 0; k < RAST_MAX_VERTICES; k += 2) {
-            edge const a = edge_of(limb, k, lane), b = edge_of(limb, k + 1, lane);
-            for (int32_t i = 0; i < BAND; i++) {
-                stretch(a, top + i * LANE_WORDS / RAST_WORDS, &begin[i], &end[i]);
-                stretch(b, top + i * LANE_WORDS / RAST_WORDS, &begin[i], &end[i]);
-            }
-        }
-        for (int32_t i = 0; i < BAND; i++)
-            cover(i, begin[i], end[i], body, seen);
+    edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
+    edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
+    edge const e = edge_of(limb, 4, lane), f = edge_of(limb, 5, lane);
+    edge const g = edge_of(limb, 6, lane), h = edge_of(limb, 7, lane);
+    for (int32_t i = 0; i < bands * BAND; i++) {
+        int32_t const y = top + (i * LANE_WORDS >> 1);
+        int32_t begin = RAST_SIZE, end = 0;
+        stretch(a, y, &begin, &end);
+        stretch(b, y, &begin, &end);
+        stretch(c, y, &begin, &end);
+        stretch(d, y, &begin, &end);
+        stretch(e, y, &begin, &end);
+        stretch(f, y, &begin, &end);
+        stretch(g, y, &begin, &end);
+        stretch(h, y, &begin, &end);
+        cover(i, begin, end, whole, seen);
     }
+}
+
+static void draw_limb(const layers_limb *limb, int32_t vertices, int32_t lane, rast_mask *whole,
+                      rast_mask *out)
+{
+    int32_t const top = limb->top[lane], bands = (limb->end[lane] - top) / LAYERS_ROWS;
+    uint64_t *const body = (uint64_t *)whole->row + top * RAST_WORDS;
+    uint64_t *const seen = (uint64_t *)out->row + top * RAST_WORDS;
+    out->first = top;
+    out->last = limb->end[lane];
+    if (vertices == 4)
+        draw_cone(limb, lane, top, bands, body, seen);
+    else
+        draw_ellipsoid(limb, lane, top, bands, body, seen);
 }
 
 void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restrict out)
@@ -187,13 +197,6 @@ void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restri
     memset(whole->row[whole->first], 0, (size_t)(last - whole->first) * sizeof whole->row[0]);
     for (int32_t k = 0; k < block->drawn[lane]; k++) {
         int32_t const l = block->order[lane][k];
-        const layers_limb *const limb = &block->limb[l];
-        rast_mask *const mask = &out->visible[l];
-        mask->first = limb->top[lane];
-        mask->last = limb->end[lane];
-        if (block->vertices[l] == 4)
-            draw_cone(limb, lane, whole, mask);
-        else
-            draw_ellipsoid(limb, lane, whole, mask);
+        draw_limb(&block->limb[l], block->vertices[l], lane, whole, &out->visible[l]);
     }
 }

@@ -74,7 +74,7 @@ static inline int32_t rast_column(uint32_t at, uint32_t slope, int32_t y)
  * 0. */
 void rast_convex(const float *x, const float *y, int32_t n, int32_t top, int32_t width, rast_spans *out);
 
-/* Bits [begin, end) of a word, both in [0, 64]; begin >= end: none.  No branch: a loop becomes vector code. */
+/* Bits [begin, end) of a word, begin >= 0, end <= 64; begin >= end: none.  No branch: a loop becomes vector code. */
 static inline uint64_t rast_bits(int32_t begin, int32_t end)
 {
     uint64_t const ones = 0 - (uint64_t)(begin < end);
