@@ -29,12 +29,13 @@ from typing import Any
 import numpy as np
 
 from gait import blob
-from gait.cli import values
+from gait.cli import learn_segments, values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
-from gait.learn import fit, ground, marker_map, model, sources, subjects
+from gait.learn import fit, ground, marker_map, model, segment_sections, sources, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
+from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
 from gait.learn.stage import one_thread
 from gait.progress import progress
@@ -113,6 +114,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the held-out data (1)"
     )
     parser.add_argument("--report", metavar="DIR", help="also write figures and index.html into this folder")
+    learn_segments.add_arguments(parser)
 
 
 def _components(text: str) -> int | str:
@@ -137,8 +139,11 @@ def _rate(text: str) -> float:
 def run(args: argparse.Namespace) -> int:
     """Read, learn, write, report."""
     _check(args)
-    with one_thread():
-        sequences, refused = _read(args)
+    wanted = learn_segments.options(args)
+    with one_thread(), Corpus() as corpus:
+        sequences, refused = _read(args, corpus)
+        if wanted.source == "only":
+            return learn_segments.write_alone(args, corpus, wanted, refused)
         learned = fit.fit(sequences, args.components, args.seed, args.prior)
         if args.components is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS and not args.quiet:
             print(_few(learned), file=sys.stderr)
@@ -150,7 +155,9 @@ def run(args: argparse.Namespace) -> int:
         made_up = ground.unseen(learned.cycles.seen)
         if made_up and not args.quiet:
             print(_made_up(made_up), file=sys.stderr)
-        data = blob.write(args.output, model.sections(learned, args.activity, args.seed))
+        prior = learn_segments.learn(corpus, wanted, args.quiet)
+        sections = model.sections(learned, args.activity, args.seed)
+        data = blob.write(args.output, sections | (segment_sections.sections(prior) if prior else {}))
         if args.report:
             from gait.learn import report  # matplotlib is slow to import
 
@@ -159,7 +166,7 @@ def run(args: argparse.Namespace) -> int:
             except BaseException:
                 print(f"{args.output}: the model is written; the report is not", file=sys.stderr)
                 raise
-    summary = _summary(learned, data, refused)
+    summary = _summary(learned, data, refused) | {"segments": learn_segments.summary(prior)}
     print(json.dumps(summary) if args.json else _text(args.output, summary))
     return 0
 
@@ -170,6 +177,8 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
     if args.markers:
         marker_map.read(args.markers)
+    if args.report and args.segments == "only":
+        raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
     _check_output(args)
     require_writable(args.output)
     if args.report:
@@ -198,20 +207,26 @@ def _check_output(args: argparse.Namespace) -> None:
             )
 
 
-def _read(args: argparse.Namespace) -> tuple[list[Sequence], list[str]]:
+def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], list[str]]:
     """Find and prepare the files; say which were left out."""
     idle: list[str] = []
     files = sources.find(args.sources, args.exclude, idle.append)
     for glob in idle if not args.quiet else ():
         print(f"--exclude {glob}: no file's path ends like this", file=sys.stderr)
     reading = Reading(
-        args.period_mode, args.fps, args.zeros_missing, args.activity, args.markers, not args.no_trim
+        args.period_mode,
+        args.fps,
+        args.zeros_missing,
+        args.activity,
+        args.markers,
+        not args.no_trim,
+        learn_segments.options(args),
     )
     jobs = args.jobs or len(os.sched_getaffinity(0))
     with progress("reading motion", len(files), args.quiet) as update:
         try:
             sequences, refused = sources.load_all(
-                files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects
+                files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects, corpus=corpus
             )
         except sources.NothingLeft as error:
             _tell(error.refused[1:], args.quiet, "")
@@ -300,6 +315,7 @@ def _text(path: str, s: dict[str, Any]) -> str:
         f"{s['stride_hz'][0]:.2f} strides/s, stride length {s['stride_length_statures'][0]:.2f} statures",
         f"{_count(s['components'], 'component')}: {explained} % of the variance; "
         f"residual {s['residual_deg']:.1f} deg",
+        *([learn_segments.text(s["segments"])] if s["segments"] else []),
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
     ]
     return "\n".join(lines)

@@ -38,6 +38,7 @@ ALIASES = {
     ),
     "{s}_hand": ("{s}hand", "{S}hand", "{S}wrist"),
 }
+RECORDED = "marker "  # begins the names of joints that are markers as a file has them
 BIPED = re.compile(r"^bip0*\d*")
 
 
@@ -51,7 +52,8 @@ class Body:
         Of the recording.
     joints : dict of str to (T, 3)
         pelvis (the middle of the hips), neck, head, {l,r}_{shoulder,elbow,wrist,hip,knee,ankle,toe};
-        head is any point above the neck on the head's axis.
+        head is any point above the neck on the head's axis.  Markers of a file, if it has any, are there as
+        RECORDED and their label.
     pelvis : (T, 3, 3)
         Pelvis axes forward, left, up as columns.
     lateral : dict of str to (T, 3)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from gait.errors import UsageError, UserError
 from gait.learn.reading import Reading
-from gait.learn.stage import Outcome, one_thread_for_good, prepare
+from gait.learn.stage import Prepared, one_thread_for_good, prepare
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -30,7 +30,7 @@ AHEAD = 4  # files in flight per thread of the workers
 SAME = ("gait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
 
 
-def prepared(paths: Sequence[Path], reading: Reading, address: str) -> Generator[Outcome, None, None]:
+def prepared(paths: Sequence[Path], reading: Reading, address: str) -> Generator[Prepared, None, None]:
     """Outcomes of the files in their order, from the workers of the scheduler at `address`.
 
     Raises
@@ -52,7 +52,7 @@ def prepared(paths: Sequence[Path], reading: Reading, address: str) -> Generator
             yield _as_named(_result(client, address, path, future), path)
 
 
-def _task(path: Path, reading: Reading) -> Outcome | None:
+def _task(path: Path, reading: Reading) -> Prepared | None:
     """Prepare a file on a worker; None if the worker does not see it."""
     one_thread_for_good()
     return prepare(path, reading) if path.is_file() else None
@@ -99,7 +99,7 @@ def _require_same_versions(client: Client, address: str) -> None:
                 )
 
 
-def _result(client: Client, address: str, path: Path, future: Future) -> Outcome | None:
+def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | None:
     """Wait for a result while there are workers."""
     from distributed import CancelledError, KilledWorker
     from distributed.comm import CommClosedError
@@ -107,13 +107,14 @@ def _result(client: Client, address: str, path: Path, future: Future) -> Outcome
     lost = UserError(f"--dask {address}: the connection was lost at {path}; start again")
     while True:
         try:
-            outcome: Outcome | None = future.result(timeout=PATIENCE)
+            outcome: Prepared | None = future.result(timeout=PATIENCE)
             return outcome
         except KilledWorker:
-            return UserError(
+            killed = UserError(
                 f"{path}: the workers that read it were killed (out of memory?); "
                 "leave it out with --exclude or cut the recording"
             )
+            return Prepared(refused=killed)
         except TimeoutError as error:
             if client.status != "running" or not client.nthreads():
                 raise lost from error
@@ -121,13 +122,16 @@ def _result(client: Client, address: str, path: Path, future: Future) -> Outcome
             raise lost from error
 
 
-def _as_named(outcome: Outcome | None, path: Path) -> Outcome:
+def _as_named(outcome: Prepared | None, path: Path) -> Prepared:
     """Outcome as if the file had been read by the name it has here."""
     if outcome is None:
         raise UserError(
             f"{path}: a worker does not see {path.absolute()}; put the files where all workers find them "
             "under the same path"
         )
-    if isinstance(outcome, UserError):
-        return type(outcome)(str(outcome).replace(str(path.absolute()), str(path)))
-    return replace(outcome, source=path)
+    if outcome.refused:
+        words = str(outcome.refused).replace(str(path.absolute()), str(path))
+        outcome = replace(outcome, refused=type(outcome.refused)(words))
+    if outcome.sequence:
+        outcome = replace(outcome, sequence=replace(outcome.sequence, source=path))
+    return outcome

@@ -6,6 +6,7 @@ deviation by the fit's covariance is too large is NaN.  Nothing is interpolated.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from gait.errors import UserError
 from gait.learn import articulated, marker_map, marker_sets, skeleton_fit
 from gait.learn.articulated import HINGES, SEGMENTS
-from gait.learn.body import Body
+from gait.learn.body import RECORDED, Body
 from gait.learn.marker_sets import LANDMARKS, Landmark, plain
 from gait.skeleton import JOINTS, SIDES, default_skeleton
 
@@ -60,7 +61,9 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
         fit = skeleton_fit.fit(points[:, columns], found)
     except ValueError:
         raise UserError(f"{path}: fewer than three known markers in every frame; see --markers") from None
-    walker = from_fit(path.stem, fps, fit)
+    subject = _subject(labels[columns[0]])
+    own = {plain_label(k): points[:, i] for i, k in enumerate(labels) if _subject(k) == subject}
+    walker = from_fit(path.stem, fps, fit, own)
     if not walker.residual or not walker.residual < WORST_RMS:
         worst = labels[columns[int(np.nanargmax(np.nanmedian(fit.residual, axis=0)))]]
         rms = 1000 * (walker.residual or 0)
@@ -106,11 +109,19 @@ def _subject(label: str) -> str:
     return label.rsplit(":", 1)[0] if ":" in label else ""
 
 
-def from_fit(name: str, fps: float, fit: skeleton_fit.Fit) -> Body:
-    """Body of a fitted skeleton, turned to z up, without what is not determined."""
+def plain_label(label: str) -> str:
+    """Label of a marker without its subject."""
+    return label.rsplit(":", 1)[-1]
+
+
+def from_fit(
+    name: str, fps: float, fit: skeleton_fit.Fit, markers: Mapping[str, Floats] | None = None
+) -> Body:
+    """Body of a fitted skeleton and a file's markers (T, 3), turned to z up, without what is unsure."""
     positions, axes = _known(fit)
     joints = {joint: positions[:, k] for k, joint in enumerate(JOINTS)}
     joints["head"] = joints.pop("head_top")
+    joints |= {RECORDED + label: places for label, places in (markers or {}).items()}
     turn_sd = np.sqrt(np.trace(fit.covariance[:, 3:6, 3:6], axis1=1, axis2=2))
     pelvis = np.where((turn_sd < AXIS_SD)[:, None, None], fit.pose.turn, np.nan)
     up = _upright(fit.pose.turn[np.isfinite(pelvis[:, 0, 0])])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,9 +33,7 @@ CMU = (
 def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array]:
     """All sections of the blob, META first."""
     return {
-        "META": np.frombuffer(
-            json.dumps(meta(learned, activity, seed), separators=(",", ":")).encode(), np.uint8
-        ),
+        "META": meta_section(meta(learned, activity, seed)),
         "CHNM": blob.pack_names(CHANNELS),
         "CURV": _stored(learned.curves),
         "CHST": _stored(channel_statistics(learned)),
@@ -42,6 +42,22 @@ def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array
         **default_skeleton(learned.proportions).sections(),
         **({"PROP": _stored(learned.lengths)} if len(learned.lengths) else {}),
     }
+
+
+def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
+    """META as it is stored."""
+    return np.frombuffer(json.dumps(meta, separators=(",", ":")).encode(), np.uint8)
+
+
+def origin(activity: str, seed: int, sources: Iterable[Path]) -> dict[str, Any]:
+    """Entries of META that say what a blob is and where it comes from."""
+    made = {"activity": activity, "generator": GENERATOR, "seed": seed}
+    return made | ({"acknowledgement": CMU} if from_cmu(sources) else {})
+
+
+def from_cmu(sources: Iterable[Path]) -> bool:
+    """Whether any recording is in the CMU database's form, whose terms ask for an acknowledgement."""
+    return any(source.suffix.lower() == ".amc" for source in sources)
 
 
 def _stored(values: Floats) -> npt.NDArray[np.float32]:
@@ -143,10 +159,7 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
     c = learned.components
     statures = [_stature(learned, name) for name in learned.subjects]
     return {
-        "activity": activity,
-        "generator": GENERATOR,
-        "seed": seed,
-        **({"acknowledgement": CMU} if from_cmu(learned) else {}),
+        **origin(activity, seed, [s.source for s in learned.sequences]),
         "subjects": learned.subjects,
         "statures_m": [None if h is None else round(h, 3) for h in statures],
         "sequences": {
@@ -175,11 +188,6 @@ def _stature(learned: Learned, subject: str) -> float | None:
     """Mean stature of a subject, metres; None if no recording shows it."""
     bodies = [s.measures for s in learned.sequences if s.subject == subject and s.measures is not None]
     return float(np.mean([b.stature for b in bodies])) if bodies else None
-
-
-def from_cmu(learned: Learned) -> bool:
-    """Whether any recording is in the CMU database's form, whose terms ask for an acknowledgement."""
-    return any(s.source.suffix.lower() == ".amc" for s in learned.sequences)
 
 
 SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")

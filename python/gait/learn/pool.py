@@ -24,14 +24,14 @@ from pathlib import Path
 from gait.errors import UserError
 from gait.learn.reading import Reading
 from gait.learn.spool import no_room
-from gait.learn.stage import Outcome, prepare
+from gait.learn.stage import Prepared, prepare
 
 #: Seconds that starting the workers costs: they import the package anew (measured: 0.4 to 0.6).
 START = 0.6
 AHEAD = 4  # files in flight per worker: what waits its turn stays little
 
 
-def prepared(paths: Sequence[Path], reading: Reading, jobs: int) -> Generator[Outcome, None, None]:
+def prepared(paths: Sequence[Path], reading: Reading, jobs: int) -> Generator[Prepared, None, None]:
     """Outcomes of the files in their order.
 
     Files are prepared here until their time says that the rest would gain from a pool of up to `jobs`
@@ -58,7 +58,7 @@ def _size(path: Path) -> int:
         return 1
 
 
-def _pooled(paths: Sequence[Path], reading: Reading, workers: int) -> Generator[Outcome, None, None]:
+def _pooled(paths: Sequence[Path], reading: Reading, workers: int) -> Generator[Prepared, None, None]:
     """Outcomes from a pool; if a worker dies, the files then in flight are done one by one."""
     waiting, flying = deque(paths), deque[tuple[Path, Future[str]]]()
     while waiting:
@@ -76,16 +76,17 @@ def _pooled(paths: Sequence[Path], reading: Reading, workers: int) -> Generator[
             flying.clear()
 
 
-def _alone(path: Path, reading: Reading) -> Outcome:
+def _alone(path: Path, reading: Reading) -> Prepared:
     """Outcome of one file in a process of its own, so that its death has a name."""
     try:
         with _pool(1) as (pool, folder):
             return _fetched(_submit(pool, path, reading, folder).result())
     except BrokenProcessPool:
-        return UserError(
+        killed = UserError(
             f"{path}: the process that read it was killed (out of memory?); "
             "leave it out with --exclude or cut the recording"
         )
+        return Prepared(refused=killed)
 
 
 @contextmanager
@@ -126,10 +127,10 @@ def _stored(path: Path, reading: Reading, folder: str) -> str:
     return file.name
 
 
-def _fetched(name: str) -> Outcome:
+def _fetched(name: str) -> Prepared:
     """Take the outcome out of its file."""
     with open(name, "rb") as file:
-        outcome: Outcome = pickle.load(file)
+        outcome: Prepared = pickle.load(file)
     os.unlink(name)
     return outcome
 

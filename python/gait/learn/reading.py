@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from gait.learn.segment_options import Segments
+
+NO_SEGMENTS = Segments(source="none")
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -24,6 +28,8 @@ class Reading:
         Mapping of the marker names of .c3d and .trc files, for sets that are not known by themselves.
     trim : bool
         Cut starts, stops and turns off the ends of a recording.
+    segments : Segments
+        What the prior over segments is made from.
     """
 
     mode: str = "refined"
@@ -32,6 +38,7 @@ class Reading:
     activity: str = "walk"
     markers: Path | None = None
     trim: bool = True
+    segments: Segments = NO_SEGMENTS
 
 
 DEFAULT = Reading()

@@ -70,7 +70,7 @@ def _write_all(folder: Path, learned: Learned, activity: str, refused: list[str]
         *parts,
         _sequences(learned),
         _left_out(refused),
-        f"<p>{model.CMU}</p>" if model.from_cmu(learned) else "",
+        f"<p>{model.CMU}</p>" if model.from_cmu(s.source for s in learned.sequences) else "",
     ]
     head = f"<meta charset=utf-8><title>{html.escape(activity)}: gait learn</title><style>{STYLE}</style>"
     page = f"<!doctype html><html lang=en><head>{head}</head><body>{''.join(body)}</body></html>\n"

@@ -127,7 +127,7 @@ def channels(body: Body, measures: Measures, period: float) -> tuple[Floats, Flo
     seen = np.isfinite(path[:, 0])
     if seen.sum() < 3:
         return np.full((frames, 6), np.nan), np.full(frames, np.nan)
-    ground = _ground(body, measures.stature)
+    ground = ground_height(body, measures.stature)
     smooth, velocity, fitted = _smooth_path(path[:, :2], period)
     first, last = np.flatnonzero(seen)[[0, -1]]
     speed = np.linalg.norm(smooth[last] - smooth[first]) / (last + 1 - first) * body.fps
@@ -148,7 +148,7 @@ def channels(body: Body, measures: Measures, period: float) -> tuple[Floats, Flo
     return result, heading
 
 
-def _ground(body: Body, stature: float) -> float:
+def ground_height(body: Body, stature: float) -> float:
     """Height of the ground under the feet in stance, by their balls, else by their ankles."""
     for joint, height in (("toe", BALL), ("ankle", Proportions().sole)):
         lowest = median(np.array([median(body.joints[f"{s}_{joint}"][stance(body, s), 2]) for s in SIDES]))

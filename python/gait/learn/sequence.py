@@ -104,7 +104,17 @@ def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
     UserError
         If the file is malformed, or the motion is not cyclic, too short or of another activity.
     """
-    read = readers.read(path, reading)
+    return prepare(path, readers.read(path, reading), reading)
+
+
+def prepare(path: Path, read: Body | AngleTable, reading: Reading = DEFAULT) -> Sequence:
+    """Prepare what was read from a file, as `load` does.
+
+    Raises
+    ------
+    UserError
+        If the motion is not cyclic, too short or of another activity.
+    """
     motion = _motion(read)
     kept, found = trim.Kept(0, read.frames), None
     if reading.trim:

@@ -13,6 +13,7 @@ from gait.errors import UserError
 from gait.learn import cluster, pool, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import DEFAULT, Reading
+from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
 from gait.learn.spool import Spool
 
@@ -102,6 +103,7 @@ def load_all(
     jobs: int = 1,
     dask: str | None = None,
     people: str = "auto",
+    corpus: Corpus | None = None,
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
 
@@ -118,6 +120,8 @@ def load_all(
         Address of the scheduler of a Dask cluster that shall do it.
     people : one of subjects.RULES
         Which files are of one person.
+    corpus : Corpus, optional
+        Gets the motions for the prior over segments; a file that gave one is no error.
 
     Raises
     ------
@@ -127,19 +131,23 @@ def load_all(
     paths = [path for path, _ in files]
     outcomes = cluster.prepared(paths, reading, dask) if dask else pool.prepared(paths, reading, jobs)
     names, persons = subjects.names(paths), subjects.subjects(paths, people)
-    sequences, refused = [], []
+    sequences, refused, used = [], [], False
     with closing(outcomes), Spool() as spool:
         for i, outcome in enumerate(outcomes):
-            if not isinstance(outcome, UserError):
-                spool.put(outcome.channels)
-                sequences.append(replace(outcome, name=names[i], subject=persons[i], channels=NOT_YET))
-            elif files[i][1]:
-                refused.append(str(outcome))
-            else:
-                raise outcome
+            found, told = outcome.sequence, outcome.refused
+            if corpus is not None and outcome.motion is not None:
+                corpus.put(names[i], persons[i], paths[i], outcome.motion)
+                used = True
+            if found is not None:
+                spool.put(found.channels)
+                sequences.append(replace(found, name=names[i], subject=persons[i], channels=NOT_YET))
+            elif told is not None and (files[i][1] or outcome.motion is not None):
+                refused.append(str(told))
+            elif told is not None:
+                raise told
             progress(i + 1)
         views = spool.views()
-    if not sequences:
+    if not sequences and not (used and reading.segments.source == "only"):
         raise NothingLeft(refused)
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels

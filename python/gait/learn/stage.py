@@ -1,28 +1,61 @@
-"""The per-file stage of learning: one file to a sequence or to the reason why not, wherever it runs."""
+"""The per-file stage of learning: a file to a sequence and its markers, or to the reason why not."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from threadpoolctl import ThreadpoolController
 
 from gait.errors import UserError
+from gait.learn import readers, segment_motion, sequence
+from gait.learn.angle_file import AngleTable
+from gait.learn.body import Body
 from gait.learn.reading import DEFAULT, Reading
-from gait.learn.sequence import Sequence, load
+from gait.learn.segment_motion import Motion
+from gait.learn.segment_options import Segments
+from gait.learn.sequence import Sequence
 
-Outcome = Sequence | UserError
+
+@dataclass(frozen=True)
+class Prepared:
+    """What a file gave: a sequence, or why none; and markers for the prior over segments."""
+
+    sequence: Sequence | None = None
+    refused: UserError | None = None
+    motion: Motion | None = None
 
 
-def prepare(path: Path, reading: Reading = DEFAULT) -> Outcome:
+def prepare(path: Path, reading: Reading = DEFAULT) -> Prepared:
     """Read and prepare one file; what its user can mend comes back as a value, so that it can travel."""
     with one_thread():
         try:
-            return load(path, reading)
+            read = readers.read(path, reading)
         except UserError as error:
-            return error
+            return Prepared(refused=error)
+        found, refused = None, None
+        try:
+            if reading.segments.source != "only":
+                found = sequence.prepare(path, read, reading)
+        except UserError as error:
+            refused = error
+        try:
+            motion = _motion(path, read, reading.segments, found)
+        except UserError as error:
+            return Prepared(found, None if found else refused or error)
+        return Prepared(found, refused, motion)
+
+
+def _motion(path: Path, read: Body | AngleTable, wanted: Segments, found: Sequence | None) -> Motion | None:
+    """Markers of what was read: of all of it, or of the part that the cyclic model learns from."""
+    if wanted.whole:
+        return segment_motion.of(path, read, wanted)
+    if wanted.source == "learnt" and found is not None:
+        return segment_motion.of(path, read, wanted, found.kept)
+    return None
 
 
 @contextmanager

@@ -1,0 +1,162 @@
+"""Options of gait learn for the prior over segments, and what is said of it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+import numpy as np
+
+from gait import blob
+from gait.cli import values
+from gait.errors import UserError
+from gait.learn import model, segment_fit, segment_options, segment_sections
+from gait.learn.segment_corpus import Corpus
+from gait.learn.segment_options import Segments
+from gait.lift.prior import SegmentPrior
+
+FRAMES, FPS, MODES, MIXTURE = (2, 60), (5, 240), (1, 120), (1, 16)  # what can be asked for
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    usual = Segments()
+    parser.add_argument(
+        "--segments",
+        choices=segment_options.SOURCES,
+        default=usual.source,
+        help="of what the prior over short segments is learnt, which gait lift uses. learnt (the default): "
+        "the recordings of the cyclic model; all: whole recordings, also those that it refuses; none: no "
+        "prior; only: as all, but without a cyclic model, so that gait track cannot use the file",
+    )
+    add = parser.add_argument
+    add(
+        "--segment-frames", type=values.whole(*FRAMES), default=usual.frames, metavar="F", help="of each (10)"
+    )
+    add("--segment-hop", type=values.whole(1, FRAMES[1]), metavar="H", help="frames between them (half of F)")
+    add(
+        "--segment-fps",
+        type=values.whole(*FPS),
+        default=round(usual.fps),
+        metavar="R",
+        help="per second (20)",
+    )
+    add("--segment-modes", type=values.whole(*MODES), default=usual.modes, metavar="K", help="at most (50)")
+    add(
+        "--segment-headings",
+        choices=list(segment_options.TURNS),
+        default=segment_options.FREE,
+        help="free (the default): gait lift finds the heading. 2: every segment also turned by 90 degrees, "
+        "as in the paper; 8: by each of 45; people's headings in the world are then part of the prior",
+    )
+    add(
+        "--segment-mixture",
+        type=_components,
+        default=usual.mixture,
+        metavar="auto|K",
+        help="Gaussians in the prior (1); auto: as many as describe people left out best",
+    )
+    add(
+        "--segment-markers",
+        choices=segment_options.MARKERS,
+        default=usual.markers,
+        help="virtual (the default): 37 of the default skeleton; recorded: those that most of the files hold "
+        "(.c3d, .trc)",
+    )
+
+
+def _components(text: str) -> int | None:
+    return None if text == "auto" else values.whole(*MIXTURE)(text)
+
+
+def options(args: argparse.Namespace) -> Segments:
+    """Options as the learner takes them."""
+    hop = args.segment_hop or max(1, args.segment_frames // 2)
+    return Segments(
+        source=args.segments,
+        frames=args.segment_frames,
+        hop=min(hop, args.segment_frames),
+        fps=float(args.segment_fps),
+        modes=args.segment_modes,
+        headings=segment_options.TURNS[args.segment_headings],
+        mixture=args.segment_mixture,
+        markers=args.segment_markers,
+        people=args.prior == "people",
+    )
+
+
+def learn(corpus: Corpus, wanted: Segments, quiet: bool) -> SegmentPrior | None:
+    """Learn the prior beside a cyclic model; if there is none, say why instead of failing."""
+    if wanted.source == "none":
+        return None
+    try:
+        return segment_fit.fit(corpus.recordings(), wanted)
+    except UserError as error:
+        if not quiet:
+            print(f"no prior over segments: {error}", file=sys.stderr)
+        return None
+
+
+def write_alone(args: argparse.Namespace, corpus: Corpus, wanted: Segments, refused: list[str]) -> int:
+    """Learn and write a blob that holds the prior alone, and say what it is."""
+    recordings = corpus.recordings()
+    prior = segment_fit.fit(recordings, wanted)
+    names = [r.name for r in recordings]
+    sources = [r.source for r in recordings]
+    meta = model.meta_section(model.origin(args.activity, args.seed, sources) | {"recordings": names})
+    data = blob.write(args.output, {"META": meta, **segment_sections.sections(prior)})
+    figures, size, crc = summary(prior), len(data), f"{blob.checksum(data):08x}"
+    if args.json:
+        print(json.dumps({"bytes": size, "crc32": crc, "left_out": refused, "segments": figures}))
+    elif figures:
+        print(f"{text(figures)}\n{args.output}: {size} bytes, checksum {crc}")
+    return 0
+
+
+def summary(prior: SegmentPrior | None) -> dict[str, Any] | None:
+    """Figures of the prior; None without."""
+    if prior is None:
+        return None
+    return {
+        "recordings": prior.recordings,
+        "segments": prior.segments,
+        "frames": prior.frames,
+        "hop": prior.hop,
+        "fps": prior.fps,
+        "markers": list(prior.names),
+        "headings": prior.headings,
+        "components": prior.components,
+        "weights": np.round(prior.weights, 4).tolist(),
+        "modes": prior.size,
+        "modes_for_91_percent": modes_for(prior, 0.91),
+        "variance_explained": round(float(explained(prior)[-1]), 4),
+        "gamma": round(prior.gamma, 3),
+        "stature_m": round(prior.stature, 3),
+    }
+
+
+def explained(prior: SegmentPrior) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Share of the variance within the components that the first modes hold, (k,)."""
+    inside = np.cumsum(prior.weights @ prior.sd**2)
+    outside = 3 * prior.frames * float(prior.weights @ prior.residual.sum(axis=1))
+    return np.asarray(inside / (inside[-1] + outside))
+
+
+def modes_for(prior: SegmentPrior, share: float) -> int | None:
+    """How many modes hold a share of the variance; None if all do not."""
+    enough = np.flatnonzero(explained(prior) >= share)
+    return int(enough[0]) + 1 if len(enough) else None
+
+
+def text(s: dict[str, Any]) -> str:
+    """Lay the figures out for people."""
+    turned = "" if not s["headings"] else f", {s['headings']} headings"
+    mixed = "" if s["components"] == 1 else f", {s['components']} Gaussians"
+    return (
+        f"segment prior: {s['segments']} segments of {s['frames']} frames at {s['fps']:g}/s from "
+        f"{s['recordings']} recordings, {len(s['markers'])} markers{turned}{mixed}; "
+        f"{s['modes']} modes hold {100 * s['variance_explained']:.1f} % of the variance, "
+        f"gamma {s['gamma']:.2f}"
+    )
