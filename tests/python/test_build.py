@@ -1,0 +1,87 @@
+"""What `make lib` needs elsewhere: no Python, Eigen from wherever it is, a cross compiler's own tools."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TOOLS = "sh sed tr cat mkdir dirname uname printf test awk expr ls head cut realpath make"
+
+
+@pytest.fixture
+def bare(tmp_path):
+    """Copy of what the library is built from, and a folder of programs without Python and compilers."""
+    for name in ("Makefile", "libgait", "python/requirements.txt", "python/requirements-dev.txt"):
+        target = tmp_path / "gait" / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, target)
+    shutil.copy(ROOT / "python/pyproject.toml", tmp_path / "gait/python/pyproject.toml")
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    for name in TOOLS.split():
+        if found := shutil.which(name):
+            (programs / name).symlink_to(found)
+    return tmp_path
+
+
+def program(bare, name: str, says: str) -> None:
+    """Put a program there that only says something."""
+    path = bare / "bin" / name
+    path.write_text(f"#!/bin/sh\necho '{says}'\n")
+    path.chmod(0o755)
+
+
+def make(bare, *words: str) -> subprocess.CompletedProcess[str]:
+    env = {
+        k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k not in ("EIGEN", "CC", "CXX")
+    }
+    env["PATH"] = str(bare / "bin")
+    return subprocess.run(
+        [bare / "bin/make", *words], cwd=bare / "gait", env=env, capture_output=True, text=True, timeout=120
+    )
+
+
+def test_the_library_needs_no_python(bare):
+    for name in ("gcc", "g++", "cc"):
+        program(bare, name, "x86_64-linux-gnu")
+    done = make(bare, "-n", "lib", "CC=gcc", "EIGEN=/opt/eigen")
+    assert done.returncode == 0, done.stderr
+    assert "isystem /opt/eigen" in done.stdout and "linalg.cpp" in done.stdout
+    assert "pip" not in done.stdout and "python" not in done.stdout
+
+
+def test_eigen_of_the_system_is_found(bare):
+    for name in ("gcc", "g++", "cc"):
+        program(bare, name, "x86_64-linux-gnu")
+    program(bare, "pkg-config", "-I/opt/from/pkgconfig/eigen3")
+    assert "-isystem /opt/from/pkgconfig/eigen3" in make(bare, "-n", "lib", "CC=gcc").stdout
+
+
+def test_without_eigen_and_python_the_remedy_is_told(bare):
+    done = make(bare, ".venv/.ready")
+    assert done.returncode != 0
+    assert "install libeigen3-dev or set EIGEN=" in done.stderr
+
+
+def test_a_cross_compiler_brings_its_tools_and_has_its_own_folder(bare):
+    program(bare, "cc", "x86_64-linux-gnu")
+    for name in ("gcc", "g++", "ar", "objcopy"):
+        program(bare, f"armv8x-none-linux-{name}", "armv8x-none-linux")
+    done = make(bare, "-n", "lib", "CC=armv8x-none-linux-gcc", "EIGEN=/opt/eigen")
+    assert done.returncode == 0, done.stderr
+    for name in ("gcc -std=c11", "g++ -std=c++14", "ar rcs", "objcopy --localize-hidden"):
+        assert f"armv8x-none-linux-{name}" in done.stdout
+    assert "build/armv8x-none-linux-release/libgait.so" in done.stdout and "build/release" not in done.stdout
+    assert "avx" not in done.stdout
+
+
+def test_a_library_without_threads_needs_none(tmp_path):
+    """GAIT_NO_THREADS leaves the pool out: nothing of it, and no threads of the system, in the object."""
+    source = ROOT / "libgait/src/pool.c"
+    options = ["-std=c11", "-Wpedantic", "-Werror", "-DGAIT_NO_THREADS", f"-I{ROOT}/libgait/include", "-c"]
+    subprocess.run(["cc", *options, source, "-o", tmp_path / "pool.o"], check=True)
+    said = subprocess.run(["nm", tmp_path / "pool.o"], capture_output=True, text=True, check=True).stdout
+    assert "pthread" not in said and "gait_pool" not in said
