@@ -34,6 +34,7 @@ static struct settings {
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
 #define FLAG(field)           OPTION_FLAG, &settings.field, 0, 0
 
+enum { PIECES = 4 };                             /* for each thread, so that none waits long for another */
 static char particles_help[80], tasks_help[120]; /* written by say_defaults() */
 
 static const option own_options[] = {
@@ -118,9 +119,9 @@ static void say_defaults(void)
     snprintf(particles_help, sizeof particles_help, "hypotheses; default %d, paper mode %d",
              (int)usual.particles, (int)paper.particles);
     snprintf(tasks_help, sizeof tasks_help,
-             "pieces of a step for the threads, default %d or, if more, one per thread;\n"
+             "pieces of a step for the threads, default %d or, if more, %d per thread;\n"
              "        results do not depend on it",
-             (int)usual.tasks);
+             (int)usual.tasks, PIECES);
 }
 
 static void help(const option *table)
@@ -190,8 +191,8 @@ static void make_config(workers *threads, gait_tracker_config *c)
     c->cpu_mask = (uint32_t)settings.cpu_mask;
     if (settings.tasks)
         c->tasks = settings.tasks;
-    else if (c->tasks < settings.threads)
-        c->tasks = settings.threads;
+    else if (c->tasks < PIECES * settings.threads)
+        c->tasks = PIECES * settings.threads < 256 ? PIECES * settings.threads : 256;
     c->exec = gait_pool_tasks(threads->pool);
     tracker_options_apply(&settings.tracker, c);
 }
