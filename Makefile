@@ -218,7 +218,8 @@ model: setup lib ## learn the default model from MOCAP=
 
 # The bench calls internal functions, and the linker puts its clocks round those that __wrap_ names.
 BENCH_ISA := $(foreach isa,$(KERNEL_ISAS),$(B)/bench/bench_limit_kernel.$(isa).o)
-BENCH_OBJ := $(patsubst tests/bench/%.c,$(B)/bench/%.o,$(filter-out %_kernel.c,$(sort $(wildcard tests/bench/*.c)))) $(BENCH_ISA)
+BENCH_SRC := tests/bench/step.c $(filter-out %_kernel.c,$(sort $(wildcard tests/bench/bench_*.c)))
+BENCH_OBJ := $(BENCH_SRC:tests/bench/%.c=$(B)/bench/%.o) $(BENCH_ISA)
 BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file message options workers)
 BENCH_WRAP := $(shell sed -n 's/^WRAP.[^,]*, \([a-z_]*\),.*/-Wl,--wrap=\1/p' tests/bench/bench_stages.c)
 BENCH_CC = $(CC) -std=c11 -D_DEFAULT_SOURCE -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -Ilibgait/include -iquote libgait/src -Itools $(CFLAGS)
@@ -258,7 +259,7 @@ eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/re
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------
-C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.c tests/fuzz/*.[ch] tools/*.[ch] \
+C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] tools/*.[ch] \
            tools/common/*.[ch]))
 lint: export PATH := $(abspath $(VENV)/bin):$(PATH)
 lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed
