@@ -1,0 +1,214 @@
+"""The segment prior over a whole sequence: a Markov chain of half segments.
+
+Frames of the prior's rate are cut into blocks of half a segment.  Two neighbouring blocks are a segment, so the
+prior gives p(first, second) and, by division, p(second | first): the sequence has the density
+p(X_0, X_1) prod_s p(X_s+1 | X_s), in which every overlap counts once.  Its information matrix is
+block-tridiagonal.  In the world a segment is X = stature Rz(heading) x + shift; shift, heading and stature are
+unknown too and enter by their linear effects around the present estimate (`Around`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy import linalg
+
+from gait.lift.prior import SegmentPrior
+
+Floats = npt.NDArray[np.float64]
+
+GROUND_SD = 10.0  # metres, where on the ground
+LASTING = 0.7  # share of the variance outside the modes that stays as it is within a segment
+OFFSET_SD = 0.006  # statures, of where somebody's joints are taken to be
+HEADING_SD = 2.0  # radians around the present estimate: as good as unknown
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """What the sequence may do beyond the prior's modes.
+
+    Attributes
+    ----------
+    stature, stature_sd : float
+        Metres.
+    height_sd : float
+        Of the floor under the person, metres.
+    """
+
+    stature: float
+    stature_sd: float
+    height_sd: float
+
+
+@dataclass(frozen=True)
+class Around:
+    """Estimate that the chain is linearised around, S segments of 2 b frames.
+
+    Attributes
+    ----------
+    heading : (S,)
+        Radians.
+    component : (S,)
+        Of the prior's mixture.
+    stature : float
+        Metres.
+    places : (S, 2 b, J, 3)
+        Markers in the world, metres.
+    """
+
+    heading: Floats
+    component: npt.NDArray[np.intp]
+    stature: float
+    places: Floats
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Information form of the chain, B blocks of n = 3 b J numbers.
+
+    Attributes
+    ----------
+    diagonal : (B, n, n)
+    below : (B - 1, n, n)
+    vector : (B, n)
+        Information times mean.
+    constant : float
+        Mean' information mean, summed over the factors.
+    log_det : float
+        Of the information matrix.
+    """
+
+    diagonal: Floats
+    below: Floats
+    vector: Floats
+    constant: float
+    log_det: float
+
+
+def restricted(prior: SegmentPrior, names: tuple[str, ...]) -> SegmentPrior:
+    """Prior of some of the markers over an even number of frames."""
+    at, frames = prior.index(names), prior.frames // 2 * 2
+    return replace(
+        prior,
+        names=names,
+        mean=prior.mean[:, :frames, at],
+        modes=prior.modes[:, :, :frames, at],
+        residual=prior.residual[:, at],
+    )
+
+
+def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
+    """Make the chain of a prior (`restricted`) with 2 b frames a segment."""
+    segments, frames, markers = around.places.shape[:3]
+    size = 3 * markers * frames // 2
+    diagonal, below = np.zeros((segments + 1, size, size)), np.zeros((segments, size, size))
+    vector, constant, log_det = np.zeros((segments + 1, size)), 0.0, 0.0
+    for s in range(segments):
+        whole = Segment(prior, around, freedom, s)
+        factors = [(1.0, whole)] if s == 0 else [(1.0, whole), (-1.0, whole.first_half())]
+        for sign, part in factors:
+            information = sign * part.information()
+            product = information @ part.mean
+            constant += float(part.mean @ product)
+            log_det += sign * part.log_det()
+            diagonal[s] += information[:size, :size]
+            vector[s] += product[:size]
+            if sign > 0:
+                below[s] += information[size:, :size]
+                diagonal[s + 1] += information[size:, size:]
+                vector[s + 1] += product[size:]
+    return Chain(diagonal, below, vector, constant, log_det)
+
+
+def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats) -> Around:
+    """Linearise around new places (S, 2 b, J, 3): headings, stature and shapes that they say under the prior.
+
+    The shapes leave out what the prior takes for noise of single frames.  With it a larger body would have more
+    noise in metres, and the fit would shrink the body to get rid of it.
+    """
+    headings, statures, shapes = [], [], []
+    for s, place in enumerate(places):
+        turn, stature, shape = Segment(prior, around, freedom, s).explained(place.ravel())
+        headings.append(around.heading[s] + turn)
+        statures.append(stature)
+        shapes.append(shape.reshape(place.shape))
+    return Around(np.array(headings), around.component, float(np.mean(statures)), np.stack(shapes))
+
+
+def rotation(heading: float) -> Floats:
+    """Rotation (3, 3) about z."""
+    c, s = np.cos(heading), np.sin(heading)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+class Segment:
+    """Gaussian over one segment in the world: N(mean, diag(variance) + loads loads')."""
+
+    def __init__(self, prior: SegmentPrior, around: Around, freedom: Freedom, s: int) -> None:
+        component, place = around.component[s], around.places[s]
+        turn, stature = rotation(around.heading[s]), around.stature
+        shape = place - _over_ground(place)
+        self.own = stature * prior.mean[component] @ turn.T
+        middle = _over_ground(place) - _over_ground(self.own)
+        growth = shape / stature
+        self.mean = (self.own + middle + (freedom.stature - stature) * growth).ravel()
+        outside = stature**2 * prior.gamma * prior.residual[component]
+        self.variance = np.broadcast_to(((1 - LASTING) * outside)[None, :, None], place.shape).ravel()
+        modes = stature * prior.modes[component] @ turn.T
+        size, markers = len(modes), place.shape[1]
+        loads = np.zeros((size + 5 + 3 * markers, *place.shape))
+        loads[:size] = modes
+        loads[size, ..., 0] = loads[size + 1, ..., 1] = GROUND_SD
+        loads[size + 2, ..., 2] = freedom.height_sd
+        if prior.headings == 0:
+            loads[size + 3, ..., 0], loads[size + 3, ..., 1] = -shape[..., 1], shape[..., 0]
+        loads[size + 3] *= HEADING_SD
+        loads[size + 4] = freedom.stature_sd * growth
+        column = np.arange(3 * markers)
+        lasting = np.sqrt(LASTING * outside + (stature * OFFSET_SD) ** 2)
+        loads.reshape(len(loads), len(place), -1)[size + 5 + column, :, column] = np.repeat(lasting, 3)[
+            :, None
+        ]
+        self.rigid = size
+        self.loads = loads.reshape(len(loads), -1)
+        self.freedom = freedom
+        self._prepare()
+
+    def _prepare(self) -> None:
+        self._scaled = self.loads / self.variance
+        inner = np.eye(len(self.loads)) + self._scaled @ self.loads.T
+        self._lower = np.linalg.cholesky(inner)
+
+    def first_half(self) -> Segment:
+        """Marginal of the first half."""
+        half = object.__new__(Segment)
+        keep = len(self.mean) // 2
+        half.mean, half.variance = self.mean[:keep], self.variance[:keep]
+        half.loads, half.freedom, half.rigid = self.loads[:, :keep], self.freedom, self.rigid
+        half._prepare()
+        return half
+
+    def information(self) -> Floats:
+        """Inverse of the covariance."""
+        thin = linalg.solve_triangular(self._lower, self._scaled, lower=True, check_finite=False)
+        result = -(thin.T @ thin)
+        result[np.diag_indices_from(result)] += 1 / self.variance
+        return result
+
+    def log_det(self) -> float:
+        """Logarithm of the determinant of the information."""
+        return -float(np.log(self.variance).sum() + 2 * np.log(np.diag(self._lower)).sum())
+
+    def explained(self, places: Floats) -> tuple[float, float, Floats]:
+        """Turn in radians and stature in metres that places say, and the places without noise."""
+        values = linalg.cho_solve((self._lower, True), self._scaled @ (places - self.mean), check_finite=False)
+        stature = self.freedom.stature + self.freedom.stature_sd * values[self.rigid + 4]
+        turn = HEADING_SD * values[self.rigid + 3]
+        return float(turn), float(stature), self.mean + values @ self.loads
+
+
+def _over_ground(places: Floats) -> Floats:
+    """Middle of the first frame over the ground: x, y, 0."""
+    return np.array([*places[0, :, :2].mean(axis=0), 0.0])

@@ -1,0 +1,221 @@
+"""From tracks of points in one view to motion in space, by any of the three methods.
+
+smooth: one Gaussian over the whole sequence (`gait.lift.sequence`).  blend: overlapping segments estimated
+alone and mixed by triangular weights (Leventon and Freeman 1998).  segment: segments one after another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.errors import UserError
+from gait.lift import sequence, start
+from gait.lift.chain import Freedom, restricted
+from gait.lift.equations import Parallel, View
+from gait.lift.heading import Explanation, Person
+from gait.lift.observe import Observations
+from gait.lift.prior import SegmentPrior
+from gait.lift.sequence import Grid, Seen, Start
+from gait.lift.tracks_file import Tracks
+from gait.skeleton import JOINTS
+
+Floats = npt.NDArray[np.float64]
+
+METHODS = ("smooth", "blend", "segment")
+KNOWN_SD, PEOPLE_SD = 0.02, 0.09  # metres, of a stature that is given, and among people
+FLOOR_SD, ANY_HEIGHT = 0.03, 10.0  # metres, of the floor's height under a camera, and without one
+LONGEST_GAP = 0.15  # seconds over which a track is interpolated for a segment's own estimate
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to lift.
+
+    Attributes
+    ----------
+    method : one of METHODS
+    stature : float or None
+        Metres; None: unknown.
+    pixel_sd : float
+        Noise of points seen with full confidence.
+    contact, bones : bool
+        Feet stay put; bones keep their length.
+    """
+
+    method: str = "smooth"
+    stature: float | None = None
+    pixel_sd: float = 3.0
+    contact: bool = True
+    bones: bool = True
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Lifted tracks.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The J markers.
+    places, sd : (T, J, 3)
+        Metres, and posterior standard deviations.
+    error : (T, P)
+        Distance in the picture from what was seen, pixels; NaN where nothing was.
+    stature : float
+    steps : int
+        Iterations over the whole sequence; 0 for segments alone.
+    settled : bool
+    log_volume_ratio : float
+        Logarithm to base 10 of the posterior's volume over the prior's; of segments alone, their mean.
+    """
+
+    names: tuple[str, ...]
+    places: Floats
+    sd: Floats
+    error: Floats
+    stature: float
+    steps: int
+    settled: bool
+    log_volume_ratio: float
+
+
+def output_names(prior: SegmentPrior, tracks: Tracks, everything: bool = False) -> tuple[str, ...]:
+    """Markers to estimate, in the prior's order: joints, those in the tracks, or all."""
+    return tuple(n for n in prior.names if everything or n in JOINTS or n in tracks.names)
+
+
+def lift(
+    prior: SegmentPrior,
+    tracks: Tracks,
+    view: View,
+    options: Options,
+    names: tuple[str, ...],
+    update: Callable[[int], None] = lambda done: None,
+) -> Motion:
+    """Estimate markers of a prior over all frames of tracks.
+
+    Raises
+    ------
+    UserError
+        If segments are too short, or too little is seen.
+    """
+    if prior.frames < 4:
+        raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
+    prior = restricted(prior, names)
+    markers = prior.index(tracks.names)
+    points = Observations(tracks.uv, tracks.deviations(options.pixel_sd))
+    grid = Grid.over(tracks.time, prior)
+    resampled = _resampled(points, tracks.time, grid).among(markers, len(names))
+    stature = options.stature or prior.stature
+    stature_sd = KNOWN_SD if options.stature else PEOPLE_SD
+    lengths = np.ones(len(grid.time))
+    if isinstance(view, Parallel):
+        lengths = view.lengths(resampled, prior.mean[0].mean(axis=0), stature)
+    person = Person(stature=stature, stature_sd=stature_sd)
+    found = start.explanations(prior, resampled, view, lengths, person, update)
+    chosen = start.course(found)
+    if options.method != "smooth":
+        return _alone(prior, chosen, tracks, view, grid, lengths, stature, options.method == "blend")
+    first = Start(
+        heading=np.array([e.heading for e in chosen]),
+        component=np.array([e.component for e in chosen]),
+        stature=stature,
+        places=start.blended(np.stack([e.posterior.points for e in chosen]), grid.frames),
+        lengths=lengths,
+    )
+    freedom = Freedom(stature, stature_sd, FLOOR_SD if view.grounded else ANY_HEIGHT)
+    seen = Seen(tracks.time, points, markers)
+    found_motion = sequence.smooth(
+        prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
+    )
+    places = found_motion.places
+    error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
+    return Motion(
+        names,
+        places if view.grounded else _on_floor(places, prior),
+        found_motion.sd,
+        error,
+        found_motion.stature,
+        found_motion.steps,
+        found_motion.settled,
+        found_motion.log_volume_ratio,
+    )
+
+
+def _resampled(points: Observations, time: Floats, grid: Grid) -> Observations:
+    """Interpolate what is seen to the frames of the grid; across longer gaps nothing is seen."""
+    count = points.uv.shape[1]
+    uv, sd = np.full((len(grid.time), count, 2), np.nan), np.full((len(grid.time), count), np.inf)
+    for j, seen in enumerate(points.seen.T):
+        known = np.flatnonzero(seen)
+        if len(known) < 2:
+            continue
+        after = np.clip(np.searchsorted(time[known], grid.time), 1, len(known) - 1)
+        a, b = known[after - 1], known[after]
+        gap = time[b] - time[a]
+        share = (grid.time - time[a]) / gap
+        near = (share > -1e-6) & (share < 1 + 1e-6) & (gap < LONGEST_GAP)
+        uv[near, j] = (points.uv[a, j] + share[:, None] * (points.uv[b, j] - points.uv[a, j]))[near]
+        sd[near, j] = np.hypot((1 - share) * points.sd[a, j], share * points.sd[b, j])[near]
+    return Observations(uv, sd)
+
+
+def _alone(
+    prior: SegmentPrior,
+    chosen: list[Explanation],
+    tracks: Tracks,
+    view: View,
+    grid: Grid,
+    lengths: Floats,
+    stature: float,
+    blend: bool,
+) -> Motion:
+    """Segments estimated alone, mixed or one after another."""
+    places = np.stack([e.posterior.points for e in chosen])
+    spread = np.stack([e.posterior.sd for e in chosen])
+    join = start.blended if blend else _in_turn
+    frames, weights = grid.between(tracks.time)
+    at_video = [
+        np.einsum("tw,tw...->t...", weights, values[frames])
+        for values in (join(places, grid.frames), lengths)
+    ]
+    markers = prior.index(tracks.names)
+    return Motion(
+        names=prior.names,
+        places=at_video[0],
+        # neighbours see the same points, so that mixing them does not make the estimate surer
+        sd=np.einsum("tw,tw...->t...", np.abs(weights), join(spread, grid.frames)[frames]),
+        error=_error(view, at_video[0][:, markers], at_video[1], tracks.uv),
+        stature=stature,
+        steps=0,
+        settled=True,
+        log_volume_ratio=float(np.mean([e.posterior.log10_volume for e in chosen])),
+    )
+
+
+def _in_turn(segments: Floats, half: int) -> Floats:
+    """Every second of overlapping segments (S, F, ...) after the other; the last block from the last one."""
+    last = len(segments) - 1
+    owner = [min(block - block % 2, last) for block in range(last + 2)]
+    return np.concatenate(
+        [segments[s][(block - s) * half : (block - s + 1) * half] for block, s in enumerate(owner)]
+    )
+
+
+def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:
+    """Distance of places (T, P, 3) in the picture from uv (T, P, 2)."""
+    return np.asarray(np.linalg.norm(view.project(places, lengths) - uv, axis=2))
+
+
+def _on_floor(places: Floats, prior: SegmentPrior) -> Floats:
+    """Shift a motion of unknown height so that its lowest feet are on the floor."""
+    feet = [i for i, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
+    if not feet:
+        return places
+    lowest = prior.stature * prior.mean[:, :, feet, 2].min()
+    drop = np.quantile(places[:, feet, 2].min(axis=1), 0.1) - lowest
+    return places - np.array([0.0, 0.0, drop])

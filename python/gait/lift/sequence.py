@@ -1,0 +1,282 @@
+"""Motion of a whole sequence from 2-D tracks: the exact Gaussian smoother over overlapping segments.
+
+The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints (`gait.lift.soft`), all
+linear in the places of the markers on a time grid of the prior's rate; places between its frames are
+interpolated.  What is not linear (perspective, headings, stature, lengths of bones) is linearised again around
+each estimate until it stays (Gauss-Newton).  Standard deviations are those of the last linear problem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.lift import soft, tridiagonal
+from gait.lift.chain import Around, Chain, Freedom, chain, moved
+from gait.lift.equations import Parallel, View, scale_free
+from gait.lift.observe import Observations
+from gait.lift.prior import SegmentPrior
+from gait.lift.soft import Layout, Rows
+from gait.lift.start import blended
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+MOST_STEPS = 25
+SETTLED = 5e-4  # metres, rms change of the places at which the iteration stops
+FREE_STEPS = 3  # first steps, without constraints on feet and bones
+DRIFT = 5e-4  # relative change of the scale's change from one frame to the next
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen of a sequence.
+
+    Attributes
+    ----------
+    time : (T,)
+        Seconds.
+    points : Observations
+        Of T frames and P points.
+    markers : (P,)
+        Which marker of the prior each point is.
+    """
+
+    time: Floats
+    points: Observations
+    markers: Ints
+
+
+@dataclass(frozen=True)
+class Start:
+    """First guess on the grid of B blocks: see `Around`; `lengths` (grid,) of a unit of the picture."""
+
+    heading: Floats
+    component: Ints
+    stature: float
+    places: Floats
+    lengths: Floats
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """Estimated motion.
+
+    Attributes
+    ----------
+    places, sd : (T, J, 3)
+        Metres at the frames of the video, and standard deviations.
+    grid : (grid, J, 3)
+        Places at the frames of the prior's rate.
+    heading : (S,)
+        Of the segments, radians.
+    stature : float
+    lengths : (T,)
+        Metres of a unit of the picture, where the view has a scale.
+    contact : (grid - 1, feet)
+        How sure feet are to stand.
+    steps : int
+        Iterations.
+    settled : bool
+        Whether they came to rest.
+    log_volume_ratio : float
+        Logarithm to base 10 of the posterior's volume over the prior's.
+    evidence : float
+        Logarithm of the density of what is seen, without the soft constraints.
+    """
+
+    places: Floats
+    sd: Floats
+    grid: Floats
+    heading: Floats
+    stature: float
+    lengths: Floats
+    contact: Floats
+    steps: int
+    settled: bool
+    log_volume_ratio: float
+    evidence: float
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Frames of the prior's rate that cover a sequence, in whole blocks.
+
+    Attributes
+    ----------
+    begin, rate : float
+        Seconds, frames per second.
+    blocks, frames : int
+        Blocks B of b frames.
+    """
+
+    begin: float
+    rate: float
+    blocks: int
+    frames: int
+
+    @classmethod
+    def over(cls, time: Floats, prior: SegmentPrior) -> Grid:
+        """Cover times (T,) with at least one segment."""
+        half = prior.frames // 2
+        needed = int(np.ceil((time[-1] - time[0]) * prior.fps - 1e-6)) + 1
+        return cls(float(time[0]), prior.fps, max(2, -(-needed // half)), half)
+
+    @property
+    def time(self) -> Floats:
+        """Seconds of the frames."""
+        return self.begin + np.arange(self.blocks * self.frames) / self.rate
+
+    def between(self, time: Floats) -> tuple[Ints, Floats]:
+        """Frames (T, w) and weights (T, w) that interpolate at times: cubic, linear if blocks are short."""
+        width = 4 if self.frames >= 3 else 2
+        at = (time - self.begin) * self.rate
+        first = np.clip(np.floor(at).astype(int) - (width // 2 - 1), 0, self.blocks * self.frames - width)
+        frames = first[:, None] + np.arange(width)
+        weights = np.ones(frames.shape)
+        for i in range(width):
+            for k in range(width):
+                if k != i:
+                    weights[:, i] *= (at - frames[:, k]) / (i - k)
+        return frames, weights
+
+
+def smooth(
+    prior: SegmentPrior,
+    seen: Seen,
+    view: View,
+    freedom: Freedom,
+    start: Start,
+    *,
+    contact: bool = True,
+    bones: bool = True,
+) -> Lifted:
+    """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
+    problem = _Problem(prior, seen, view, freedom, contact, bones)
+    around = problem.around(start.heading, start.component, start.stature, start.places)
+    places, lengths, settled, steps = start.places, start.lengths, False, 0
+    while not settled and steps < MOST_STEPS:
+        constrained = steps >= FREE_STEPS
+        system = problem.system(around, lengths, constrained)
+        values = system.factor.solve(system.vector)
+        fresh = problem.layout.places(values)
+        settled = constrained and float(np.sqrt(np.mean((fresh - places) ** 2))) < SETTLED
+        places, steps = fresh, steps + 1
+        lengths = problem.layout.lengths(values) if problem.layout.scaled else lengths
+        around = moved(prior, around, freedom, problem.segments(places))
+    return problem.result(around, places, lengths, steps, settled)
+
+
+@dataclass(frozen=True)
+class _System:
+    """One linear problem."""
+
+    factor: tridiagonal.Factor
+    vector: Floats
+    chain: Chain
+    fit: float  #: y' W y of what is seen
+    log_weight: float
+
+
+class _Problem:
+    """Prior, observations and constraints of one sequence."""
+
+    def __init__(
+        self, prior: SegmentPrior, seen: Seen, view: View, freedom: Freedom, contact: bool, bones: bool
+    ) -> None:
+        self.prior, self.seen, self.view, self.freedom = prior, seen, view, freedom
+        self.contact, self.bones = contact, bones
+        self.grid = Grid.over(seen.time, prior)
+        self.at = self.grid.between(seen.time)
+        self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), view.scaled)
+
+    def segments(self, places: Floats) -> Floats:
+        """Places of overlapping segments (S, 2 b, J, 3) out of (grid, J, 3)."""
+        half = self.grid.frames
+        return np.stack([places[s * half : (s + 2) * half] for s in range(self.grid.blocks - 1)])
+
+    def around(self, heading: Floats, component: Ints, stature: float, places: Floats) -> Around:
+        """What the chain is linearised around."""
+        return Around(heading, component, stature, self.segments(places))
+
+    def system(self, around: Around, lengths: Floats, constrained: bool) -> _System:
+        """Linear problem around an estimate."""
+        prior = chain(self.prior, around, self.freedom)
+        places = blended(around.places, self.grid.frames)
+        rows = Rows(self.layout)
+        self._observe(rows, places, lengths)
+        if constrained and self.contact:
+            soft.contacts(rows, self.prior.names, places, self.grid.rate)
+        if constrained and self.bones:
+            soft.bones(rows, self.prior.names, places)
+        diagonal, below, vector, fit, log_weight = rows.normal()
+        used = prior.diagonal.shape[1]
+        diagonal[:, :used, :used] += prior.diagonal
+        below[:, :used, :used] += prior.below
+        vector[:, :used] += prior.vector
+        return _System(tridiagonal.factor(diagonal, below), vector, prior, fit, log_weight)
+
+    def _observe(self, rows: Rows, places: Floats, lengths: Floats) -> None:
+        near, scale = self._at_video(places), self._at_video(lengths)
+        seen = self.view.rows(self.seen.points, near[:, self.seen.markers], scale)
+        factors = None
+        if isinstance(self.view, Parallel) and self.view.scaled:
+            seen, factors = scale_free(seen, self.seen.points.uv, self.view.origin)
+            soft.steady_lengths(rows, lengths, None if self.view.steady else DRIFT)
+        soft.observe(rows, seen, self.seen.markers, self.at, factors)
+
+    def _at_video(self, values: Floats) -> Floats:
+        """Interpolate values (grid, ...) at the frames of the video."""
+        frames, weights = self.at
+        return np.asarray(np.einsum("tw,tw...->t...", weights, values[frames]))
+
+    def result(self, around: Around, places: Floats, lengths: Floats, steps: int, settled: bool) -> Lifted:
+        """Covariances and figures of the last estimate."""
+        system = self.system(around, lengths, constrained=True)
+        diagonal, across = system.factor.covariance()
+        sure = soft.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
+        return Lifted(
+            places=self._at_video(places),
+            sd=np.sqrt(self._variances(diagonal, across)),
+            grid=places,
+            heading=around.heading,
+            stature=around.stature,
+            lengths=self._at_video(lengths),
+            contact=sure if self.contact else np.zeros_like(sure),
+            steps=steps,
+            settled=settled,
+            log_volume_ratio=(system.chain.log_det - system.factor.log_det) / 2 / np.log(10),
+            evidence=self._evidence(around, lengths),
+        )
+
+    def _variances(self, diagonal: Floats, across: Floats) -> Floats:
+        """Variances (T, J, 3) of the interpolated places."""
+        frames, weights = self.at
+        layout, axes = self.layout, np.arange(3)
+        marker = np.arange(layout.markers)
+        total = np.zeros((len(frames), layout.markers, 3))
+        for i in range(frames.shape[1]):
+            for k in range(frames.shape[1]):
+                (s, row), (o, column) = (
+                    np.divmod(layout.place(f[:, None], marker)[..., None] + axes, layout.size)
+                    for f in (frames[:, i], frames[:, k])
+                )
+                low, high = np.minimum(s, o), np.maximum(s, o)
+                first, second = np.where(s >= o, row, column), np.where(s >= o, column, row)
+                value = np.where(
+                    low == high,
+                    diagonal[high, first, second],
+                    across[np.minimum(low, len(across) - 1), first, second],
+                )
+                total += (weights[:, i] * weights[:, k])[:, None, None] * value
+        return total
+
+    def _evidence(self, around: Around, lengths: Floats) -> float:
+        """Log density of what is seen, by Laplace's method."""
+        bare = _Problem(self.prior, self.seen, self.view, self.freedom, contact=False, bones=False)
+        system = bare.system(around, lengths, constrained=False)
+        mean = system.factor.solve(system.vector)
+        square = system.fit + system.chain.constant - float((system.vector * mean).sum())
+        return 0.5 * (system.chain.log_det + system.log_weight - system.factor.log_det - square)

@@ -1,0 +1,86 @@
+"""Where the sequence estimate starts: every segment alone, and the most probable course of their headings.
+
+A segment seen from far away fits nearly as well when it is mirrored in depth; its neighbours tell which it is
+(Viterbi over the explanations of all segments).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.lift.equations import View
+from gait.lift.heading import Explanation, Person, explain
+from gait.lift.observe import Observations, Rows
+from gait.lift.prior import SegmentPrior
+
+Floats = npt.NDArray[np.float64]
+
+TURN_SD = 0.7  # radians by which the heading changes in half a segment
+
+
+def explanations(
+    prior: SegmentPrior,
+    seen: Observations,
+    view: View,
+    lengths: Floats,
+    person: Person,
+    update: Callable[[int], None] = lambda done: None,
+) -> list[list[Explanation]]:
+    """Explain every segment of a grid alone.
+
+    Parameters
+    ----------
+    seen : Observations
+        Of the prior's markers on whole blocks of half a segment.
+    lengths : (grid,)
+        Metres of a unit of the picture.
+    """
+    half = prior.frames // 2
+    found = []
+    for s in range(len(seen.uv) // half - 1):
+        begin, end = s * half, s * half + prior.frames
+        part = seen.part(begin, end)
+
+        def measure(places: Floats, part: Observations = part, begin: int = begin, end: int = end) -> Rows:
+            return view.rows(part, places, lengths[begin:end])
+
+        found.append(explain(prior, measure, person))
+        update(s + 1)
+    return found
+
+
+def course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
+    """Choose one explanation of every segment: probable, and with headings that change little."""
+    score = _evidence(found[0])
+    back = []
+    for before, now in zip(found, found[1:], strict=False):
+        turn = np.subtract.outer([e.heading for e in now], [e.heading for e in before])
+        turn = (turn + np.pi) % (2 * np.pi) - np.pi
+        table = score - 0.5 * (turn / TURN_SD) ** 2
+        back.append(table.argmax(axis=1))
+        # segments overlap by half: what one says is half known from its neighbour
+        score = table.max(axis=1) + 0.5 * _evidence(now)
+    chosen = [int(score.argmax())]
+    for best in reversed(back):
+        chosen.append(int(best[chosen[-1]]))
+    return [choices[i] for choices, i in zip(found, reversed(chosen), strict=True)]
+
+
+def _evidence(choices: Sequence[Explanation]) -> Floats:
+    return np.log(np.maximum([e.share for e in choices], 1e-300))
+
+
+def blended(segments: Floats, half: int) -> Floats:
+    """Overlapping segments (S, F, ...), each `half` frames after the one before, by triangular weights."""
+    count, frames = segments.shape[:2]
+    weight = 1 - np.abs((np.arange(frames) + 0.5) / frames * 2 - 1)
+    weight = weight.reshape(-1, *[1] * (segments.ndim - 2))
+    total = np.zeros(((count - 1) * half + frames, *segments.shape[2:]))
+    norm = np.zeros((len(total), *[1] * (segments.ndim - 2)))
+    for s, segment in enumerate(segments):
+        total[s * half : s * half + frames] += weight * segment
+        norm[s * half : s * half + frames] += weight
+    return total / norm
