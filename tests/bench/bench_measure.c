@@ -70,6 +70,7 @@ static gait_status track(gait_tracker *t, const bench_scene *s, const bench_plan
     out->median_ms = quantile(all.wall, all.count, 0.5);
     out->p99_ms = quantile(all.wall, all.count, 0.99);
     out->cpu_ms = quantile(all.cpu, all.count, 0.5);
+    out->cpu_p99_ms = quantile(all.cpu, all.count, 0.99);
     for (int k = 0; k < BENCH_STAGES; k++)
         out->stage_ms[k] = plan->stages ? quantile(all.stage[k], all.count, 0.5) : 0.0;
     return status;

@@ -17,7 +17,7 @@ typedef struct bench_result {
     const char *isa;
     size_t bytes;                  /* of the tracker */
     double median_ms, p99_ms;      /* of a step, time of day */
-    double cpu_ms;                 /* median; of the calling thread, which other programs do not lengthen */
+    double cpu_ms, cpu_p99_ms;     /* of the calling thread, which other programs do not lengthen */
     double stage_ms[BENCH_STAGES]; /* median, CPU; 0 without stages */
     uint64_t digest;               /* after the first round */
 } bench_result;
