@@ -189,6 +189,8 @@ class Tracker:
     ----------
     memory_bytes : int
         All the memory the filter uses, particles and scratch together.
+    isa : str
+        Instruction set in use: scalar, base, avx2 or avx512 (``config.cpu_mask``); results do not depend on it.
     step_seconds : float
         Time that the last `step` spent in the C library.
 
@@ -217,6 +219,7 @@ class Tracker:
         settings, err = ctypes.byref(c), ctypes.byref(self._error)
         self._check(self._lib.gait_tracker_bytes(model.handle, settings, ctypes.byref(size), err))
         self.memory_bytes = size.value
+        self.isa: str = self._lib.gait_cpu_name(c.cpu_mask).decode()
         self._memory = aligned(size.value)
         where = (self._memory.ctypes.data, size.value)
         self._check(self._lib.gait_tracker_init(*where, model.handle, settings, ctypes.byref(handle), err))

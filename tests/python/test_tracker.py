@@ -136,6 +136,19 @@ def test_threads_and_any_task_order_give_the_same_bits():
     assert len(digests) == 1
 
 
+def test_every_instruction_set_gives_the_same_bits_and_takes_up_the_others_snapshot():
+    trackers = [started(replace(SMALL, cpu_mask=mask)) for mask in (0, 1, 2, 4, SMALL.cpu_mask)]
+    assert [t.isa for t in trackers[:2]] == ["scalar", "base"]
+    assert trackers[-1].isa in {t.isa for t in trackers[1:-1]}
+    for tracker in trackers:
+        run(tracker, 0, 5)
+    assert len({t.digest() for t in trackers}) == 1
+    trackers[0].restore(trackers[-1].save())
+    for tracker in trackers:
+        run(tracker, 5, 8)
+    assert len({t.digest() for t in trackers}) == 1
+
+
 def test_an_exception_in_a_task_runner_is_raised_after_the_call():
     fail = []
 
