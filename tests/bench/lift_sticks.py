@@ -1,0 +1,71 @@
+"""Pictures of walking stick figures with known truth, for the estimate from images (F9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.camera import Camera
+from gait.lift.clip_segments import ClipSegments, Settings
+from gait.lift.prior import SegmentPrior
+from gait.lift.sensors import Film
+from gait.lift.springs import Placement
+from gait.lift.views import CameraView
+from gait.overlay import BONES
+from gait.video import Frame, Image
+
+Array = NDArray[np.float64]
+
+SIZE, FOCAL = (640, 480), 1000.0
+DISTANCE, HEIGHT = 6.5, 1.4  # metres
+GROUND, INK, NOISE = 150, 40, 3.0  # grey levels
+PLACED = 0.1  # metres and radians, standard deviation of a rough placement
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Joints (T, P, 3) of `names` at `fps`; heading at frame 0 and stature; metres, radians."""
+
+    names: list[str]
+    joints: Array
+    fps: float
+    heading: float
+    stature: float
+
+
+def camera(walk: Walk, angle: float) -> Camera:
+    """Camera that sees the middle of a walk from `angle`, radians: 0 from ahead, a right angle from the left."""
+    middle = walk.joints[:, walk.names.index("pelvis")].mean(axis=0)
+    turn = walk.heading + angle
+    place = middle + DISTANCE * np.array([np.cos(turn), np.sin(turn), 0.0])
+    return Camera.looking([*place[:2], HEIGHT], [*middle[:2], 0.9], SIZE, FOCAL)
+
+
+def pictures(walk: Walk, view: Camera, seed: int) -> list[Frame]:
+    """Draw the sticks on a plain ground with noise."""
+    rng = np.random.default_rng(seed)
+    uv = view.project(walk.joints)
+    return [
+        Frame(k, k / walk.fps, _drawn(dict(zip(walk.names, at, strict=True)), rng)) for k, at in enumerate(uv)
+    ]
+
+
+def _drawn(uv: dict[str, Array], rng: np.random.Generator) -> Image:
+    image = np.full((SIZE[1], SIZE[0]), GROUND, np.uint8)
+    for a, b in BONES:
+        ends = [tuple(np.rint(uv[joint] * 16).astype(int).tolist()) for joint in (a, b)]
+        cv2.line(image, *ends, INK, 5, cv2.LINE_AA, 4)
+    return np.asarray(np.clip(image + NOISE * rng.standard_normal(image.shape), 0, 255), np.uint8)
+
+
+def stick_clip(prior: SegmentPrior, walk: Walk, angle: float, seed: int = 0) -> ClipSegments:
+    """Clip of a stick figure, roughly placed."""
+    rng, view = np.random.default_rng(seed), CameraView(camera(walk, angle))
+    pelvis = walk.joints[0, walk.names.index("pelvis")]
+    noise = PLACED * rng.standard_normal(3)
+    placed = Placement(0, pelvis[:2] + noise[:2], walk.heading + noise[2], walk.stature)
+    film = Film.make(pictures(walk, view.camera, seed), walk.stature * view.scale(pelvis))
+    return ClipSegments(prior, view, film, placed, (), Settings())
