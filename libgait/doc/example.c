@@ -11,7 +11,7 @@
 enum { WIDTH = 640, HEIGHT = 480 };
 static const gait_camera camera = {WIDTH,        HEIGHT, 800, 800, 320, 240, {1, 0, 0, 0, 0, -1, 0, 1, 0},
                                    {0, 1.4f, 8}, {0}};
-static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 18], model_memory[1 << 16], memory[16 << 20];
+static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 19], model_memory[1 << 16], memory[16 << 20];
 static uint8_t empty[HEIGHT][WIDTH], picture[HEIGHT][WIDTH];
 
 static size_t read_file(const char *name, void *to, size_t room)
