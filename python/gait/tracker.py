@@ -190,7 +190,7 @@ class Tracker:
     memory_bytes : int
         All the memory the filter uses, particles and scratch together.
     isa : str
-        Instruction set in use: scalar, base, avx2 or avx512 (``config.cpu_mask``); results do not depend on it.
+        Instruction set in use, by ``config.cpu_mask``: scalar, base, avx2 or avx512.
     step_seconds : float
         Time that the last `step` spent in the C library.
 
