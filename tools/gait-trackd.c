@@ -19,7 +19,10 @@ static struct settings {
     int32_t stream, particles, adapt_particles, components, threads, tasks, lag, cpu_mask;
     uint64_t seed;
     float max_gap, budget_ms;
-    bool particles_channel, quiet, version;
+    char lift_model[OPTION_TEXT];
+    float lift_stature, lift_sd;
+    int32_t lift_lag;
+    bool particles_channel, quiet, version, lift;
     tracker_values tracker;
 } settings = {.mode = "default",
               .init = "auto",
@@ -28,7 +31,9 @@ static struct settings {
               .lag = 5,
               .cpu_mask = -1,
               .seed = 1,
-              .max_gap = 2};
+              .max_gap = 2,
+              .lift_sd = 3,
+              .lift_lag = 5};
 
 #define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
@@ -83,6 +88,16 @@ static const option own_options[] = {
     {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
      OPTION_FLOAT, &settings.max_gap, 0, 60},
     {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
+    {"lift", 0, "",
+     "also lift 2-D tracks of joints, GAIT_TRACKS_<i>, to 3-D joints with standard deviations on\n"
+     "        GAIT_LIFT, by the segment prior of the model",
+     FLAG(lift)},
+    {"lift-model", 0, "FILE", "blob with that segment prior, default --model", TEXT(lift_model)},
+    {"lift-height", 0, "M", "height of the person lifted, default the mean of those learnt from",
+     OPTION_FLOAT, &settings.lift_stature, 0.5, 2.5},
+    {"lift-sd", 0, "PX", "standard deviation of a point with confidence 1, default 3 pixels", OPTION_FLOAT,
+     &settings.lift_sd, 0.01, 1000},
+    {"lift-lag", 0, "N", "frames that GAIT_LIFT waits for later ones, default 5", INT(lift_lag, 0, 64)},
     {"version", 0, "", "say the version, and whether JPEG frames are understood", FLAG(version)},
     {"quiet", 'q', "", "no summary at the end", FLAG(quiet)},
 };
@@ -212,8 +227,25 @@ static bool read_background(service *s, message *why)
     return ok;
 }
 
+/* The second service, if it is asked for. */
+static bool load_lift(service *s, lift_service *lift, lcm_t *out, message *why)
+{
+    lift_settings const set = {.stature = settings.lift_stature,
+                               .sd = settings.lift_sd,
+                               .lag = settings.lift_lag,
+                               .cpu_mask = (uint32_t)settings.cpu_mask};
+    const char *const model = settings.lift_model[0] ? settings.lift_model : settings.model;
+    if (!settings.lift)
+        return true;
+    if (!lift_service_open(lift, model, &set, out, why))
+        return false;
+    s->lift = lift;
+    s->track.memory_bytes += lift->blob.size + lift->memory_bytes;
+    return true;
+}
+
 /* Model, start, camera and empty scene, as far as the command line gives them. */
-static bool load(service *s, workers *threads, lcm_t *out, message *why)
+static bool load(service *s, lift_service *lift, workers *threads, lcm_t *out, message *why)
 {
     gait_tracker_config config;
     gait_camera camera;
@@ -222,7 +254,8 @@ static bool load(service *s, workers *threads, lcm_t *out, message *why)
     make_config(threads, &config);
     if (!tracking_open(&s->track, settings.model, &config, why))
         return false;
-    if (has_init && !init_file_read(settings.init, s->track.model, &init, why))
+    if ((has_init && !init_file_read(settings.init, s->track.model, &init, why)) ||
+        !load_lift(s, lift, out, why))
         return false;
     s->max_gap = (double)settings.max_gap;
     s->budget = (budget){.limit_us = (int64_t)(1e3f * settings.budget_ms),
@@ -234,7 +267,8 @@ static bool load(service *s, workers *threads, lcm_t *out, message *why)
                       settings.particles_channel, why))
         return false;
     if (settings.camera[0] &&
-        (!camera_file_read(settings.camera, &camera, why) || !service_set_camera(s, &camera, why)))
+        (!camera_file_read(settings.camera, &camera, why) || !service_set_camera(s, &camera, why) ||
+         (s->lift && !lift_service_camera(s->lift, &camera, why))))
         return false;
     return read_background(s, why);
 }
@@ -251,18 +285,23 @@ static void print_summary(const service *s, bool live)
     if (s->budget.limit_us)
         printf(" late %" PRId64 " over_budget %" PRId64 " particles %d", s->budget.late, s->budget.over,
                (int)(s->wanted ? s->wanted : s->track.config.particles));
+    if (s->lift)
+        printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
+               " lift_ms median %.3f p99 %.3f",
+               s->lift->frames, s->lift->lifted, s->lift->rejected,
+               histogram_quantile(&s->lift->step, 0.5) / 1e3, histogram_quantile(&s->lift->step, 0.99) / 1e3);
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }
 
 /* Everything between the settings and the exit code. */
-static bool serve(service *s, workers *threads, const sigset_t *unblocked, message *why)
+static bool serve(service *s, lift_service *lift, workers *threads, const sigset_t *unblocked, message *why)
 {
     const char *const url = link_url(settings.url);
     bool const log = link_is_log(url);
     const char *const to = settings.out[0] ? settings.out : log ? NULL : url;
     receiver r = {0};
     lcm_t *const out = to ? link_open(to, why) : NULL;
-    bool const ok = (!to || out) && load(s, threads, out, why) && receiver_open(&r, s, url, why) &&
+    bool const ok = (!to || out) && load(s, lift, threads, out, why) && receiver_open(&r, s, url, why) &&
                     receiver_run(&r, &quit, unblocked, why);
     if (ok) {
         service_send_status(s);
@@ -278,6 +317,7 @@ static bool serve(service *s, workers *threads, const sigset_t *unblocked, messa
 int main(int argc, char **argv)
 {
     static service s;
+    static lift_service lift;
     static workers threads;
     option table[OPTIONS];
     sigset_t unblocked;
@@ -300,9 +340,10 @@ int main(int argc, char **argv)
     set_signals(&unblocked);
     bool ok = workers_start(&threads, settings.threads, &why);
     if (ok) {
-        ok = serve(&s, &threads, &unblocked, &why);
+        ok = serve(&s, &lift, &threads, &unblocked, &why);
         workers_stop(&threads);
         service_close(&s);
+        lift_service_close(&lift);
     }
     if (!ok)
         fprintf(stderr, "gait-trackd: %s\n", why.text);

@@ -49,14 +49,38 @@ static void damaged(receiver *r, const char *channel)
     service_complain(r->service, &why);
 }
 
+static void on_tracks(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    tracks_view v;
+    message why, line;
+    if (tracks_view_open(&v, buf->data, buf->data_size, &why) &&
+        lift_service_tracks(r->service->lift, &v, buf->recv_utime, &why))
+        return;
+    message_set(&line, "%.40s: %.180s", channel, why.text);
+    service_complain(r->service, &line);
+}
+
+/* The same camera for the lifter. */
+static void lift_camera(receiver *r, const gaitmsg_camera_t *msg)
+{
+    gait_camera camera;
+    message why;
+    if (convert_camera_message(msg, &camera, &why) && !lift_service_camera(r->service->lift, &camera, &why))
+        service_complain(r->service, &why);
+}
+
 static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
     gaitmsg_camera_t msg;
     if (gaitmsg_camera_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
         damaged(r, channel);
-    else
+    else {
         service_camera(r->service, &msg);
+        if (r->service->lift)
+            lift_camera(r, &msg);
+    }
 }
 
 static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -72,12 +96,15 @@ static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *use
 static bool subscribe(receiver *r, message *why)
 {
     int const camera = r->service->stream;
-    char name[3][32];
+    char name[4][32];
     snprintf(name[0], sizeof name[0], "GAIT_IMAGE_%d", camera);
     snprintf(name[1], sizeof name[1], "GAIT_CAMERA_%d", camera);
     snprintf(name[2], sizeof name[2], "GAIT_BACKGROUND_%d", camera);
+    snprintf(name[3], sizeof name[3], "GAIT_TRACKS_%d", camera);
     r->frames = link_subscribe(r->images, name[0], on_frame, r, FRAMES_WAITING, why);
-    return r->frames && link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
+    return r->frames &&
+           (!r->service->lift || link_subscribe(r->others, name[3], on_tracks, r, OTHERS_WAITING, why)) &&
+           link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why);
 }

@@ -8,6 +8,7 @@
 #include "gaitmsg_particles_t.h"
 #include "gaitmsg_status_t.h"
 #include "histogram.h"
+#include "lift_service.h"
 #include "strides.h"
 #include "spotter.h"
 #include "tracking.h"
@@ -30,7 +31,8 @@ typedef struct past_frame { /* what the source said of a frame that was tracked 
 
 typedef struct service {
     tracking track;
-    lcm_t *out; /* where messages go; NULL: nowhere */
+    lift_service *lift; /* the second service; NULL: not asked for */
+    lcm_t *out;         /* where messages go; NULL: nowhere */
     int threads;
     int stream; /* number of the camera, [0, 30] */
     bool has_init;

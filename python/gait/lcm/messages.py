@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gait._abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
 from gait.camera import Camera
@@ -73,6 +74,36 @@ def image_message(image: Image, utime: int, frame: int, jpeg: int | None = None)
         entry = gaitmsg.image_metadata_t()
         entry.key, entry.value, entry.n = _FRAME_KEY, frame.to_bytes(8, "big"), 8
         message.metadata, message.nmetadata = [entry], 1
+    return message
+
+
+def tracks_message(
+    names: Sequence[str], uv: ArrayLike, utime: int, frame: int = -1, confidence: ArrayLike = 1.0
+) -> Any:
+    """Make a ``tracks_t``, joints located in one picture, from any detector's points.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The J joints, as the model names them.
+    uv : array_like of shape (J, 2)
+        Pixels; NaN where a joint was not seen.
+    utime : int
+        Capture time of the picture, microseconds.
+    frame : int
+        Its running number at the source; negative: none.
+    confidence : array_like that broadcasts to (J,)
+        From 0, not seen, to 1.
+    """
+    points = np.asarray(uv, float)
+    seen = np.isfinite(points).all(axis=1)
+    sure = np.where(seen, np.broadcast_to(confidence, len(points)), 0.0)
+    message = gaitmsg.tracks_t()
+    message.utime, message.frame, message.ntracks = utime, frame, len(points)
+    for name, (u, v), c in zip(names, np.where(seen[:, None], points, 0.0), sure, strict=True):
+        track = gaitmsg.track_t()
+        track.name, track.u, track.v, track.confidence = name, float(u), float(v), float(c)
+        message.tracks.append(track)
     return message
 
 

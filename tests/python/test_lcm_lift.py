@@ -1,0 +1,161 @@
+"""gait-trackd --lift: 2-D tracks from a log come out as 3-D joints, the same that the library gives."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import lcm_rig as rig
+import numpy as np
+import pytest
+from toy_segments import toy_blob, toy_prior
+
+from gait.camera import Camera
+from gait.lcm.messages import camera_message, tracks_message
+from gait.lcm.types import gaitmsg
+from gait.lifter import LiftConfig, Lifter
+
+CAMERA = Camera.looking([0.0, -6.0, 1.4], [0.0, 0.0, 1.0], (640, 480), 700.0)
+NAMES_SEEN, FRAMES, LAG, SD = 15, 45, 4, 2.0
+
+
+@cache
+def model() -> tuple[bytes, tuple[str, ...]]:
+    """A prior under which a pose goes on along x for ever."""
+    prior = toy_prior(10, 19, 8, seed=2)
+    drift = 0.03 * np.arange(10)[None, :, None, None] * np.array([1.0, 0, 0])
+    steady = np.repeat(prior.modes[:, :, :1], 10, axis=2)
+    prior = replace(prior, mean=prior.mean[:, :1] + drift, modes=steady, residual=prior.residual * 0.1)
+    return toy_blob(prior), prior.names
+
+
+def camera() -> Camera:
+    """The camera as a message holds it, and as the daemon reads that: in float."""
+    return replace(
+        CAMERA, R=CAMERA.R.astype(np.float32).astype(float), t=CAMERA.t.astype(np.float32).astype(float)
+    )
+
+
+def observations() -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Capture time, uv and confidence of every frame."""
+    rng = np.random.default_rng(8)
+    prior = toy_prior(10, 19, 8, seed=2)
+    found = []
+    for i in range(FRAMES):
+        points = 1.7 * prior.mean[0, 0] + np.array([1.02 * (i / rig.FPS - 0.7), 0, 0])
+        uv = CAMERA.project(points)[:NAMES_SEEN] + rng.normal(size=(NAMES_SEEN, 2)) * SD
+        uv[rng.random(NAMES_SEEN) < 0.15] = np.nan
+        found.append((rig.utime(i), uv, rng.uniform(0.4, 1.0, NAMES_SEEN)))
+    return found
+
+
+def events(start: int = 0) -> list[rig.Event]:
+    names = model()[1][:NAMES_SEEN]
+    tracks = [
+        ("GAIT_TRACKS_0", tracks_message(names, uv, utime, 100 + i, confidence))
+        for i, (utime, uv, confidence) in enumerate(observations())
+    ]
+    return [("GAIT_CAMERA_0", camera_message(CAMERA, rig.utime(0))), *tracks[start:]]
+
+
+def lift(tmp_path: Path, happenings: list[rig.Event], *options: object) -> tuple[rig.Outcome, list]:
+    blob = tmp_path / "lift.gait"
+    blob.write_bytes(model()[0])
+    log = rig.write_log(tmp_path / "a.log", happenings)
+    outcome = rig.play(log, "--lift", "--lift-model", blob, "--lift-lag", LAG, "--lift-sd", SD, *options)
+    return outcome, rig.read_log(log.with_suffix(".out"), "GAIT_LIFT", gaitmsg.estimate_t)
+
+
+def test_joints_are_those_of_the_library(tmp_path: Path) -> None:
+    outcome, lifted = lift(tmp_path, events())
+    lifter = Lifter(model()[0], camera(), LiftConfig.default(lag=LAG, sd=SD))
+    assert len(lifted) == FRAMES - LAG
+    assert f"lift_frames {FRAMES} lifted {FRAMES - LAG} lift_rejected 0" in outcome.printed
+    tracking = 0
+    messages = iter(lifted)
+    for i, (utime, uv, confidence) in enumerate(observations()):
+        pixels, sd = np.full((19, 2), np.nan), np.full(19, np.inf)
+        pixels[:NAMES_SEEN] = uv.astype(np.float32)
+        sd[:NAMES_SEEN] = SD / confidence.astype(np.float32).astype(float)
+        lifter.push(utime, pixels, sd)
+        want = lifter.estimate()
+        assert (want is None) == (i < LAG)
+        if want is None:
+            continue
+        got = next(messages)
+        assert (got.utime, got.frame, got.status) == (rig.utime(i - LAG), 100 + i - LAG, want.status)
+        assert tuple(j.name for j in got.joints) == lifter.names
+        np.testing.assert_array_equal([j.position for j in got.joints], want.markers.astype(np.float32))
+        np.testing.assert_array_equal([j.sd for j in got.joints], want.sd.astype(np.float32))
+        tracking += got.status == got.TRACKING
+    assert tracking > FRAMES - 20
+
+
+def test_the_lifter_alone_costs_the_tracker_nothing(tmp_path: Path) -> None:
+    """Frames and tracks in one log: the tracker's digest is what it is without them."""
+    film = [*rig.opening(), *rig.frames(0, 6)]
+    plain = rig.play(rig.write_log(tmp_path / "b.log", film))
+    names = model()[1][:NAMES_SEEN]
+    tracks = [("GAIT_TRACKS_0", tracks_message(names, uv, t)) for t, uv, _ in observations()[:6]]
+    both, lifted = lift(tmp_path, [*film, *tracks])
+    assert both.digest == plain.digest and both.frames == 6
+    assert len(lifted) == 6 - LAG
+
+
+def test_memory_does_not_grow_with_the_stream(tmp_path: Path) -> None:
+    short, _ = lift(tmp_path, events()[:10])
+    long, _ = lift(tmp_path, events())
+    size = [o.printed.split("memory_bytes ")[1].split()[0] for o in (short, long)]
+    assert size[0] == size[1]
+
+
+def damaged() -> list[tuple[str, bytes, str]]:
+    good = events()[3][1].encode()
+    count = struct.calcsize(">qqq")
+    return [
+        ("cut", good[:-5], "shorter"),
+        ("empty", b"", "another type"),
+        ("other", camera_message(CAMERA, 1).encode(), "another type"),
+        ("count", good[:count] + struct.pack(">i", 1 << 30) + good[count + 4 :], "shorter"),
+        ("negative", good[:count] + struct.pack(">i", -2) + good[count + 4 :], "shorter"),
+        ("name", good[: count + 4] + struct.pack(">i", -9) + good[count + 8 :], "shorter"),
+    ]
+
+
+@pytest.mark.parametrize(("name", "data", "words"), damaged(), ids=lambda x: x if isinstance(x, str) else "")
+def test_damaged_tracks_are_named_and_passed_over(tmp_path: Path, name: str, data: bytes, words: str) -> None:
+    happenings = events()
+    happenings[5] = ("GAIT_TRACKS_0", data)
+    outcome, lifted = lift(tmp_path, happenings)
+    assert words in outcome.words and "GAIT_TRACKS_0" in outcome.words
+    assert len(lifted) == FRAMES - 1 - LAG
+
+
+def test_tracks_out_of_order_or_of_strangers_are_named(tmp_path: Path) -> None:
+    happenings = events()
+    happenings.insert(20, happenings[10])
+    outcome, _ = lift(tmp_path, happenings)
+    assert "does not follow" in outcome.words and "lift_rejected 1" in outcome.printed
+    happenings = events()
+    happenings.insert(20, ("GAIT_TRACKS_0", tracks_message(["tail"], [[1.0, 2.0]], rig.utime(3))))
+    outcome, _ = lift(tmp_path, happenings)
+    assert "no point that the model knows" in outcome.words
+
+
+def test_a_model_without_the_prior_is_refused_with_the_remedy(tmp_path: Path) -> None:
+    prior_less = tmp_path / "cyclic.gait"
+    prior_less.write_bytes(_cyclic_only())
+    outcome = rig.run(
+        "-m", rig.MODEL, "--lift", "--lift-model", prior_less, "--url", "file:///dev/null?speed=0"
+    )
+    assert outcome.code == 1
+    assert "--lift" in outcome.words and "gait learn" in outcome.words
+
+
+def _cyclic_only() -> bytes:
+    from gait import blob
+
+    sections = blob.decode(rig.MODEL.read_bytes(), "walk.gait")
+    return blob.encode({k: v for k, v in sections.items() if not k.startswith("SG")})

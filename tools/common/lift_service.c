@@ -1,0 +1,158 @@
+#include "lift_service.h"
+
+#include "gaitmsg_estimate_t.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define LEAST_CONFIDENCE 0.1f /* the deviation of a point grows to ten times that of a sure one, no further */
+
+enum { MESSAGE_ROOM = 1 << 14 }; /* an estimate of all markers, with room to spare */
+
+static int64_t monotonic_us(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000;
+}
+
+bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, lcm_t *out, message *why)
+{
+    gait_error err = {.text = ""};
+    gait_lift_config *const c = &s->config;
+    s->out = out;
+    gait_lift_default(c);
+    c->stature = (double)set->stature;
+    c->sd = (double)set->sd;
+    c->lag = set->lag;
+    c->cpu_mask = set->cpu_mask;
+    /* any camera asks for as much memory */
+    c->camera = (gait_camera){.width = 1, .height = 1, .fx = 1, .fy = 1, .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    if (!file_read(model, "model", &s->blob, why))
+        return false;
+    if (gait_lift_get_info(s->blob.data, s->blob.size, &s->info, &err) != GAIT_OK ||
+        gait_lift_bytes(s->blob.data, s->blob.size, c, &s->memory_bytes, &err) != GAIT_OK)
+        return message_set(why, "--lift: %.100s: %.120s", model, err.text);
+    size_t const padded = (s->memory_bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
+    s->memory = aligned_alloc(GAIT_ALIGN, padded);
+    return s->memory || message_set(why, "--lift: not enough memory for %zu bytes", padded);
+}
+
+void lift_service_close(lift_service *s)
+{
+    free(s->memory);
+    free(s->blob.data);
+    *s = (lift_service){0};
+}
+
+bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why)
+{
+    gait_error err = {.text = ""};
+    if (s->lift)
+        return memcmp(camera, &s->config.camera, sizeof *camera) == 0 ||
+               message_set(why,
+                           "another camera than the one in use was announced and is ignored; restart for it");
+    gait_lift_config c = s->config;
+    c.camera = *camera;
+    if (gait_lift_init(s->memory, s->memory_bytes, s->blob.data, s->blob.size, &c, &s->lift, &err) != GAIT_OK)
+        return message_set(why, "--lift: %s", err.text);
+    s->config = c;
+    return true;
+}
+
+/* Index of a marker by name, -1: the prior does not know it. */
+static int32_t find(const lift_service *s, const char *name)
+{
+    for (int32_t j = 0; j < s->info.markers; j++)
+        if (strcmp(gait_lift_marker_name(s->lift, j), name) == 0)
+            return j;
+    return -1;
+}
+
+/* Observations by marker; tracks of others are left out.  Returns how many points were known. */
+static int32_t take(lift_service *s, tracks_view *v)
+{
+    track_view track;
+    int32_t known = 0;
+    for (int32_t j = 0; j < s->info.markers; j++)
+        s->sd[j] = -1.0;
+    while (tracks_view_next(v, &track)) {
+        int32_t const j = find(s, track.name);
+        known += j >= 0;
+        if (j < 0 || !(track.confidence > 0.0f))
+            continue;
+        float const confidence = track.confidence < 1.0f ? fmaxf(track.confidence, LEAST_CONFIDENCE) : 1.0f;
+        s->uv[2 * j] = (double)track.u;
+        s->uv[2 * j + 1] = (double)track.v;
+        s->sd[j] = s->config.sd / (double)confidence;
+    }
+    return known;
+}
+
+/* What the source said of the frame captured at `utime`, one of the last. */
+static const lift_past *past_of(const lift_service *s, int64_t utime)
+{
+    for (int32_t i = 0; i < LIFT_SERVICE_PAST; i++)
+        if (s->past[i].utime == utime)
+            return &s->past[i];
+    return &s->past[s->frames % LIFT_SERVICE_PAST];
+}
+
+static void send(lift_service *s, int64_t step_us)
+{
+    static uint8_t room[MESSAGE_ROOM];
+    const gait_lift_frame *const e = &s->estimate;
+    const lift_past *const past = past_of(s, e->utime);
+    gaitmsg_estimate_t m = {.utime = e->utime,
+                            .frame = past->frame,
+                            .step = (int64_t)e->frame,
+                            .receive_utime = past->receive_utime,
+                            .step_us = (int32_t)step_us,
+                            .status = (int8_t)e->status,
+                            .model_digest = (int64_t)s->info.digest,
+                            .njoints = s->info.markers,
+                            .joints = s->joint};
+    m.flags = e->flags & GAIT_LIFT_UNSEEN ? GAITMSG_ESTIMATE_T_FLAG_NO_IMAGE : 0;
+    m.mean.heading = (float)e->heading;
+    m.mean.stature = (float)(s->config.stature > 0.0 ? s->config.stature : (double)s->info.stature);
+    for (int32_t j = 0; j < s->info.markers; j++) {
+        s->joint[j].name =
+            (char *)gait_lift_marker_name(s->lift, j); /* LCM's strings lack const; read only */
+        for (int32_t i = 0; i < 3; i++) {
+            s->joint[j].position[i] = (float)e->marker[j][i];
+            s->joint[j].sd[i] = (float)e->sd[j][i];
+        }
+    }
+    int const size = gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &m);
+    if (s->out && size > 0)
+        lcm_publish(s->out, "GAIT_LIFT", room, (unsigned)size);
+    s->lifted++;
+}
+
+bool lift_service_tracks(lift_service *s, tracks_view *v, int64_t receive_utime, message *why)
+{
+    gait_error err = {.text = ""};
+    if (!s->lift)
+        return true; /* the camera is announced every few seconds */
+    s->frames++;
+    int32_t const announced = v->count;
+    if (take(s, v) == 0 && announced > 0) {
+        s->rejected++;
+        return message_set(why,
+                           "tracks of no point that the model knows; name them pelvis, l_knee and so on");
+    }
+    int64_t const before = monotonic_us();
+    if (gait_lift_push(s->lift, v->utime, s->uv, s->sd, &err) != GAIT_OK) {
+        s->rejected++;
+        return message_set(why, "tracks: %s", err.text);
+    }
+    s->past[s->frames % LIFT_SERVICE_PAST] = (lift_past){v->utime, v->frame, receive_utime};
+    bool const there = gait_lift_estimate(s->lift, &s->estimate) == GAIT_OK;
+    int64_t const step_us = monotonic_us() - before;
+    histogram_add(&s->step, step_us);
+    if (there)
+        send(s, step_us);
+    return true;
+}

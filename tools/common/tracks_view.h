@@ -1,0 +1,22 @@
+/* tracks_view.h - look into an encoded gaitmsg.tracks_t where it lies: every length is checked, nothing is copied. */
+#ifndef TOOLS_TRACKS_VIEW_H
+#define TOOLS_TRACKS_VIEW_H
+#include "byte_reader.h"
+#include "message.h"
+
+typedef struct tracks_view {
+    int64_t utime, frame;
+    int32_t count;
+    byte_reader tracks; /* what tracks_view_next() goes through */
+} tracks_view;
+
+typedef struct track_view {
+    const char *name; /* in the message */
+    float u, v, confidence;
+} track_view;
+
+/* false, with the reason: another type, or shorter than its lengths say. */
+bool tracks_view_open(tracks_view *v, const void *message_bytes, size_t size, message *why);
+/* The next track; false: there are no more. */
+bool tracks_view_next(tracks_view *v, track_view *out);
+#endif
