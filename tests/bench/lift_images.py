@@ -83,10 +83,11 @@ def _sticks(mocap: Path, priors: dict[str, SegmentPrior]) -> bool:
         "From images: rendered stick figures (F9, F10)",
         ["walk and view", "known mm", "0 mm", "0.5 mm", "1 mm", "1 / known", "jump %", "met"],
         rows,
-        "Root-aligned error of EVAL15 (median over frames, mm) of held-out people drawn as sticks, 20 frames/s, "
-        "camera 6.5 m away, no background plate. known: all 15 joints in every frame; 0, 0.5, 1: corrections "
-        f"per frame by a simulated user (worst joints first, {POINTING:g} px). jump: the paper's way, largest "
-        "second difference of a joint at the joins over that elsewhere, beyond it, in percent of the stature.",
+        "Root-aligned error of EVAL15 (median over frames, mm) of held-out people drawn as sticks, 20"
+        " frames/s, camera 6.5 m away, no background plate. known: all 15 joints in every frame; 0, 0.5, 1:"
+        f" corrections per frame by a simulated user (worst joints first, {POINTING:g} px). jump: the paper's"
+        " way; how much larger the second differences of joints are at the joins than elsewhere, in percent of"
+        " the stature.",
     )
     return all(ok)
 
@@ -207,8 +208,8 @@ def _outdoor(prior: SegmentPrior) -> bool:
         "From images: the real clip",
         ["corrections", "median px", "mean px", "largest px"],
         rows,
-        f"Distance of {len(names)} joints marked by hand in {len(frames)} of {len(film.times)} frames; she is "
-        "about 415 px tall. Each round corrects the worst joint of every marked frame by its mark.",
+        f"Distance of {len(names)} joints marked by hand in {len(frames)} of {len(film.times)} frames; she is"
+        " about 415 px tall. Each round corrects the worst joint of every marked frame by its mark.",
     )
     return True
 

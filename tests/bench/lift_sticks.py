@@ -37,7 +37,7 @@ class Walk:
 
 
 def camera(walk: Walk, angle: float) -> Camera:
-    """Camera that sees the middle of a walk from `angle`, radians: 0 from ahead, a right angle from the left."""
+    """Camera that sees the middle of a walk from an angle: 0 from ahead, pi / 2 from the left."""
     middle = walk.joints[:, walk.names.index("pelvis")].mean(axis=0)
     turn = walk.heading + angle
     place = middle + DISTANCE * np.array([np.cos(turn), np.sin(turn), 0.0])

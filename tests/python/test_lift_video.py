@@ -1,0 +1,226 @@
+"""Whole clips lifted from pictures: stick figures of the shipped model's walk, and the command."""
+
+import argparse
+import csv
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gait.cli import lift_video
+from gait.errors import UsageError, UserError
+from gait.evaluate import root_errors
+from gait.lift.clip_segments import Settings
+from gait.lift.cylinder import LIMBS, Figure
+from gait.lift.cylinder_picture import draw_figure
+from gait.lift.fit_clip import fit_clip
+from gait.lift.prior import SegmentPrior
+from gait.lift.springs import Correction, as_json
+from gait.lift.suggest import suggest
+from gait.model import read_blob
+from gait.skeleton import EVAL15, JOINTS, pose
+from gait.video import Video, VideoWriter
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
+import lift_clicks
+import lift_sticks
+
+FPS, STATURE, SPEED = 20.0, 1.7, 1.2
+EVAL = [JOINTS.index(name) for name in EVAL15]
+
+
+@pytest.fixture(scope="module")
+def prior():
+    return SegmentPrior.load()
+
+
+def walk(frames=24, coef=(0.7, -0.5)):
+    """Walk of the shipped cyclic model with proportions and a way of its own."""
+    from gait import blob
+
+    time = np.arange(frames) / FPS
+    place = np.column_stack([SPEED * time, np.zeros(frames), np.full(frames, 0.9)])
+    joints, _ = pose(
+        blob.decode(read_blob(None), "walk.gait"), 0.9 * time, coef, STATURE, 0.0, 0.0, 0.0, place
+    )
+    joints[..., 2] -= joints[..., 2].min() - 0.01
+    return lift_sticks.Walk(list(JOINTS), joints, FPS, 0.0, STATURE)
+
+
+@pytest.fixture(scope="module")
+def clip(prior):
+    return lift_sticks.stick_clip(prior, walk(), np.radians(60), seed=1)
+
+
+def root(fit, prior):
+    return float(np.median(root_errors(fit.places[:, prior.index(EVAL15)], walk().joints[:, EVAL])))
+
+
+@pytest.fixture(scope="module")
+def corrected(clip):
+    """The clip and its estimate: without corrections, then after some."""
+    return list(lift_clicks.corrected(clip, walk().joints[:, EVAL], EVAL15, 12))
+
+
+def test_sensors_alone_follow_a_stick_figure(corrected, prior):
+    _, fit = corrected[0]
+    assert root(fit, prior) < 70
+    assert fit.places.shape == (24, len(prior.names), 3) and np.isfinite(fit.sd).all()
+
+
+def test_corrections_help_and_are_kept(corrected, prior):
+    (_, free), (some, fit) = corrected[0], corrected[-1]
+    assert len(some.corrections) == 12
+    assert root(fit, prior) < min(45, root(free, prior))
+    misses = lift_video._misses(some, fit)
+    assert np.median(misses) < 8
+    assert np.median(misses) < np.median(lift_video._misses(some, free))
+
+
+def test_corrections_make_the_estimate_surer(corrected, clip):
+    (_, free), (some, fit) = corrected[0], corrected[-1]
+    assert np.median(fit.sd) < np.median(free.sd)
+    assert len(suggest(some, fit)) <= len(suggest(clip, free))
+
+
+def test_what_is_suggested_is_the_least_certain(corrected, clip):
+    _, fit = corrected[0]
+    asked = suggest(clip, fit)
+    assert asked[0].sd_px == max(s.sd_px for s in asked)
+    frame, joint = asked[0].frame, clip.prior.index([asked[0].joint])[0]
+    assert clip.view.scale(fit.places[frame, joint]) * fit.sd[frame, joint].max() > 0.3 * asked[0].sd_px
+    assert len({(s.frame, s.joint) for s in asked}) == len(asked)
+
+
+def test_known_markers_without_sensors_give_the_motion(clip, prior):
+    truth = walk().joints[:, EVAL]
+    uv = clip.view.project(truth)[0]
+    known = [
+        Correction(k, name, tuple(uv[k, j].tolist()), 1.0) for k in range(24) for j, name in enumerate(EVAL15)
+    ]
+    fit = fit_clip(replace(clip, corrections=known, settings=Settings(sensor_sd=np.inf)))
+    assert root(fit, prior) < 25
+
+
+def test_the_papers_way_is_continuous_in_depth(clip):
+    """F10: no jump where segments join."""
+    fit = fit_clip(replace(clip, settings=Settings(joined=False)))
+    ends = np.concatenate([clip.starts, clip.starts + clip.span])
+    bend = np.linalg.norm(np.diff(fit.places, 2, axis=0), axis=2)
+    near = np.abs(fit.time[1:-1, None] - ends).min(axis=1) < 1e-3
+    assert near.any() and bend[near].max() < bend[~near].max() + 0.01 * STATURE
+
+
+def test_a_placement_in_the_middle_works_both_ways(clip, prior):
+    pelvis = walk().joints[12, JOINTS.index("pelvis")]
+    placed = replace(clip.placement, frame=12, ground=pelvis[:2] + 0.05)
+    middle = replace(clip, placement=placed)
+    assert middle.origin > 0
+    assert root(fit_clip(middle), prior) < 70
+
+
+def test_the_cylinder_figure_keeps_its_bones(corrected, prior):
+    _, fit = corrected[-1]
+    figure = Figure.fit(fit.places, prior.names)
+    joints = dict(zip(JOINTS, np.moveaxis(figure.joints(), 1, 0), strict=True))
+    for bone, length in figure.lengths().items():
+        a, b = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}.get(bone[2:], ("elbow", "wrist"))
+        if bone.endswith("upper_arm"):
+            a, b = "shoulder", "elbow"
+        each = np.linalg.norm(joints[f"{bone[:2]}{a}"] - joints[f"{bone[:2]}{b}"], axis=1)
+        assert each == pytest.approx(np.full(24, length), abs=1e-9)
+    assert np.nanmedian(figure.residual) < 0.02
+    assert abs(figure.stature / STATURE - 1) < 0.1
+    assert figure.surfaces().shape[:2] == (24, len(LIMBS))
+
+
+def test_the_figure_is_drawn_where_the_body_is(corrected, clip, prior):
+    _, fit = corrected[-1]
+    figure = Figure.fit(fit.places, prior.names)
+    blank = np.zeros((480, 640, 3), np.uint8)
+    drawn = draw_figure(blank, clip.view, figure.surfaces()[5], figure.joints()[5])
+    rows, columns = np.nonzero(drawn.any(axis=2))
+    uv = clip.view.project(figure.joints()[5])[0]
+    assert abs(columns.mean() - uv[:, 0].mean()) < 20
+    assert rows.min() < uv[:, 1].min() + 5 and rows.max() > uv[:, 1].max() - 5
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory, clip):
+    """Video, camera and placement of the stick figure."""
+    folder = tmp_path_factory.mktemp("sticks")
+    with VideoWriter(folder / "video.mp4", FPS) as film:
+        for frame in lift_sticks.pictures(walk(), clip.view.camera, 1):
+            film.write(frame.image)
+    (folder / "camera.json").write_text(json.dumps(clip.view.camera.to_dict()))
+    placed = {"frame": 0, "pelvis": [*clip.placement.ground, 0.9], "heading_rad": clip.placement.heading}
+    (folder / "placement.json").write_text(json.dumps(placed | {"stature_m": STATURE}))
+    return folder
+
+
+def lift(*words):
+    """Run the command on words."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("input")
+    for option in ("--model", "--camera", "--output"):
+        parser.add_argument(option)
+    for switch in ("--json", "--quiet", "--all-markers"):
+        parser.add_argument(switch, action="store_true")
+    lift_video.add_arguments(parser)
+    return lift_video.run(parser.parse_args([str(w) for w in words]))
+
+
+def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
+    some, _ = corrected[-1]
+    (tmp_path / "clicks.json").write_text(json.dumps(as_json(some.corrections)))
+    words = [files / "video.mp4", "--camera", files / "camera.json", "--placement", files / "placement.json"]
+    words += ["--corrections", tmp_path / "clicks.json", "--background", "none", "--json", "--quiet"]
+    words += ["--overlay", tmp_path / "o.mp4", "--suggest", 3, "--output", tmp_path / "out.csv"]
+    assert lift(*words) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["frames"] == 24 and figures["corrections"]["given"] == 12
+    assert figures["corrections"]["miss_px"]["with"] < figures["corrections"]["miss_px"]["without"]
+    assert len(figures["suggest"]) <= 3
+    assert Video(tmp_path / "o.mp4").count == 24
+    with open(tmp_path / "out.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 24 and set(rows[0]) == {"frame", "time"} | {
+        f"{name}_{axis}" for name in JOINTS for axis in ("x", "y", "z", "sx", "sy", "sz")
+    }
+    found = np.array([[[float(r[f"{n}_{a}"]) for a in "xyz"] for n in EVAL15] for r in rows])
+    assert np.median(root_errors(found, walk().joints[:, EVAL])) < 45
+
+
+def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsys):
+    uv = clip.view.project(walk().joints)[0]
+    pelvis = uv[0, JOINTS.index("pelvis")]
+    across = (uv[-1] - uv[0])[JOINTS.index("pelvis"), 0]
+    placed = {"frame": 0, "pelvis_px": pelvis.tolist(), "height_px": 260, "stature_m": STATURE}
+    heading = np.pi if across < 0 else 0.0
+    (tmp_path / "p.json").write_text(json.dumps(placed | {"heading_rad": heading}))
+    words = [files / "video.mp4", "--placement", tmp_path / "p.json", "--background", "none", "--quiet"]
+    assert lift(*words, "--stop", 20, "--output", tmp_path / "out.csv") == 0
+    assert "figure: stature" in capsys.readouterr().out
+    with open(tmp_path / "out.csv", newline="") as file:
+        x = [float(row["pelvis_x"]) for row in csv.DictReader(file)]
+    assert len(x) == 20 and np.sign(x[-1] - x[0]) == np.sign(across)
+
+
+def test_faults_are_named(files, tmp_path):
+    video, placement = files / "video.mp4", files / "placement.json"
+    out = ["--output", tmp_path / "out.csv", "--quiet", "--background", "none"]
+    with pytest.raises(UsageError, match="--placement"):
+        lift(video, *out)
+    with pytest.raises(UserError, match="pelvis_px is missing"):
+        lift(video, "--placement", placement, *out)
+    camera = ["--camera", files / "camera.json", "--placement", placement]
+    with pytest.raises(UserError, match="frame 0 is not among the frames 5 to 23"):
+        lift(video, *camera, "--start", 5, *out)
+    behind = json.loads(placement.read_text()) | {"pelvis": [50 * x for x in (1, 10)]}
+    (tmp_path / "behind.json").write_text(json.dumps(behind))
+    with pytest.raises(UserError, match="behind the camera"):
+        lift(video, "--camera", files / "camera.json", "--placement", tmp_path / "behind.json", *out)
+    assert not (tmp_path / "out.csv").exists()
