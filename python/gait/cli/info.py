@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from gait import blob
+from gait.cli import segment_text
+from gait.lift.prior import TAGS, SegmentPrior
 
 NAME = "info"
 HELP = "what a model holds"
@@ -29,13 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read and print."""
     sections = blob.read(args.model)
-    summary = describe(sections, os.path.getsize(args.model), blob.stored_checksum(args.model))
+    summary = describe(sections, os.path.getsize(args.model), blob.stored_checksum(args.model), args.model)
     print(json.dumps(summary) if args.json else text(args.model, summary))
     return 0
 
 
-def describe(sections: Mapping[str, Any], size: int, crc: int) -> dict[str, Any]:
-    """Figures of a model; a section that is absent gives no entry."""
+def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob") -> dict[str, Any]:
+    """Figures of a model, called `name` in errors; a section that is absent gives no entry."""
     result: dict[str, Any] = {
         "bytes": size,
         "crc32": f"{crc:08x}",
@@ -50,6 +52,8 @@ def describe(sections: Mapping[str, Any], size: int, crc: int) -> dict[str, Any]
         result["gait"] = dict(zip(GAIT, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
     if "SCST" in sections:
         result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
+    if any(tag in sections for tag in TAGS):
+        result["segments"] = segment_text.summary(SegmentPrior.from_sections(sections, name))
     if "META" in sections:
         result["meta"] = json.loads(sections["META"].tobytes().decode())
     return result
@@ -80,6 +84,8 @@ def text(name: str, s: Mapping[str, Any]) -> str:
     if "variance_explained" in meta:
         shares = meta["variance_explained"][: s.get("components")]
         lines.append("variance explained: " + " ".join(f"{100 * v:.1f}" for v in shares) + " %")
+    if "segments" in s:
+        lines += segment_text.lines(s["segments"])
     if "acknowledgement" in meta:
         lines.append(meta["acknowledgement"])
     return "\n".join(lines)

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from gait import blob
-from gait.cli import learn_segments, values
+from gait.cli import learn_segments, segment_text, values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
 from gait.learn import fit, ground, marker_map, model, segment_sections, sources, subjects
@@ -166,7 +166,7 @@ def run(args: argparse.Namespace) -> int:
             except BaseException:
                 print(f"{args.output}: the model is written; the report is not", file=sys.stderr)
                 raise
-    summary = _summary(learned, data, refused) | {"segments": learn_segments.summary(prior)}
+    summary = _summary(learned, data, refused) | {"segments": segment_text.summary(prior) if prior else None}
     print(json.dumps(summary) if args.json else _text(args.output, summary))
     return 0
 
@@ -315,7 +315,7 @@ def _text(path: str, s: dict[str, Any]) -> str:
         f"{s['stride_hz'][0]:.2f} strides/s, stride length {s['stride_length_statures'][0]:.2f} statures",
         f"{_count(s['components'], 'component')}: {explained} % of the variance; "
         f"residual {s['residual_deg']:.1f} deg",
-        *([learn_segments.text(s["segments"])] if s["segments"] else []),
+        *([segment_text.text(s["segments"])] if s["segments"] else []),
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
     ]
     return "\n".join(lines)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import Any
-
-import numpy as np
 
 from gait import blob
-from gait.cli import values
+from gait.cli import segment_text, values
 from gait.errors import UserError
 from gait.learn import model, segment_fit, segment_options, segment_sections
 from gait.learn.segment_corpus import Corpus
@@ -107,56 +104,9 @@ def write_alone(args: argparse.Namespace, corpus: Corpus, wanted: Segments, refu
     sources = [r.source for r in recordings]
     meta = model.meta_section(model.origin(args.activity, args.seed, sources) | {"recordings": names})
     data = blob.write(args.output, {"META": meta, **segment_sections.sections(prior)})
-    figures, size, crc = summary(prior), len(data), f"{blob.checksum(data):08x}"
+    figures, size, crc = segment_text.summary(prior), len(data), f"{blob.checksum(data):08x}"
     if args.json:
         print(json.dumps({"bytes": size, "crc32": crc, "left_out": refused, "segments": figures}))
-    elif figures:
-        print(f"{text(figures)}\n{args.output}: {size} bytes, checksum {crc}")
+    else:
+        print(f"{segment_text.text(figures)}\n{args.output}: {size} bytes, checksum {crc}")
     return 0
-
-
-def summary(prior: SegmentPrior | None) -> dict[str, Any] | None:
-    """Figures of the prior; None without."""
-    if prior is None:
-        return None
-    return {
-        "recordings": prior.recordings,
-        "segments": prior.segments,
-        "frames": prior.frames,
-        "hop": prior.hop,
-        "fps": prior.fps,
-        "markers": list(prior.names),
-        "headings": prior.headings,
-        "components": prior.components,
-        "weights": np.round(prior.weights, 4).tolist(),
-        "modes": prior.size,
-        "modes_for_91_percent": modes_for(prior, 0.91),
-        "variance_explained": round(float(explained(prior)[-1]), 4),
-        "gamma": round(prior.gamma, 3),
-        "stature_m": round(prior.stature, 3),
-    }
-
-
-def explained(prior: SegmentPrior) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Share of the variance within the components that the first modes hold, (k,)."""
-    inside = np.cumsum(prior.weights @ prior.sd**2)
-    outside = 3 * prior.frames * float(prior.weights @ prior.residual.sum(axis=1))
-    return np.asarray(inside / (inside[-1] + outside))
-
-
-def modes_for(prior: SegmentPrior, share: float) -> int | None:
-    """How many modes hold a share of the variance; None if all do not."""
-    enough = np.flatnonzero(explained(prior) >= share)
-    return int(enough[0]) + 1 if len(enough) else None
-
-
-def text(s: dict[str, Any]) -> str:
-    """Lay the figures out for people."""
-    turned = "" if not s["headings"] else f", {s['headings']} headings"
-    mixed = "" if s["components"] == 1 else f", {s['components']} Gaussians"
-    return (
-        f"segment prior: {s['segments']} segments of {s['frames']} frames at {s['fps']:g}/s from "
-        f"{s['recordings']} recordings, {len(s['markers'])} markers{turned}{mixed}; "
-        f"{s['modes']} modes hold {100 * s['variance_explained']:.1f} % of the variance, "
-        f"gamma {s['gamma']:.2f}"
-    )
