@@ -1,0 +1,135 @@
+"""gait learn with its prior over segments, from end to end on toy walks; the shipped one."""
+
+import json
+
+import mocap_files as files
+import numpy as np
+import pytest
+
+import gait.cli
+from gait import blob
+from gait.lift.observe import Observations, image_axes, orthographic
+from gait.lift.posterior import infer, place, share_along, share_rigid
+from gait.lift.prior import TAGS, SegmentPrior
+from gait.skeleton import EVAL15, JOINTS
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory):
+    """Toy walks of three people, and somebody who stands still, which is no walk."""
+    folder = tmp_path_factory.mktemp("walks")
+    for i, (subject, trial) in enumerate([(1, 1), (1, 2), (2, 1), (3, 1)]):
+        motion = {"period": 110.0 + 6 * i, "swing": 0.85 + 0.05 * i, "seed": i, "frames": 420}
+        files.write_toy(folder / f"{subject:02}", f"{subject:02}_{trial:02}", speed=1.1 + 0.05 * i, **motion)
+    files.write_toy(folder / "04", "04_01", swing=0.02, speed=0.0, frames=200)
+    return folder
+
+
+def run(*words):
+    return gait.cli.main([str(w) for w in words])
+
+
+def learn(walks, path, *words):
+    return run("learn", walks, "-o", path, "--components", 2, "--jobs", 1, "--quiet", *words)
+
+
+def cyclic(path):
+    return {tag: array.tobytes() for tag, array in blob.read(path).items() if tag not in TAGS}
+
+
+def test_the_prior_is_learnt_beside_the_cyclic_model_which_stays_the_same(walks, tmp_path, capsys):
+    both, without = tmp_path / "both.gait", tmp_path / "without.gait"
+    assert learn(walks, both, "--json") == 0
+    told = json.loads(capsys.readouterr().out)["segments"]
+    assert learn(walks, without, "--segments", "none") == 0
+    assert cyclic(both) == cyclic(without) and not set(TAGS) & set(blob.read(without))
+    prior = SegmentPrior.load(both)
+    assert (prior.frames, prior.hop, prior.fps, prior.headings) == (10, 5, 20.0, 0)
+    assert prior.recordings == told["recordings"] == 4 and prior.segments == told["segments"] > 20
+    assert len(prior.names) == 37 and prior.names[:19] == tuple(JOINTS)
+    assert run("info", both) == 0
+    assert f"{prior.segments} segments of 10 frames at 20/s from 4 recordings" in capsys.readouterr().out
+    assert run("info", both, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["segments"]["gamma"] == told["gamma"]
+    assert learn(walks, tmp_path / "again.gait") == 0
+    assert (tmp_path / "again.gait").read_bytes() == both.read_bytes()
+
+
+def test_options_say_what_a_segment_is(walks, tmp_path):
+    path = tmp_path / "m.gait"
+    words = "--segment-frames 8 --segment-hop 2 --segment-fps 25 --segment-modes 12 --segment-headings 2"
+    assert learn(walks, path, "--segment-mixture", 2, *words.split()) == 0
+    prior = SegmentPrior.load(path)
+    assert (prior.frames, prior.hop, prior.fps, prior.size) == (8, 2, 25.0, 12)
+    assert prior.headings == 2 and prior.components == 2
+
+
+def test_whole_recordings_alone_give_a_blob_that_tracks_nothing(walks, tmp_path, capsys):
+    path = tmp_path / "only.gait"
+    assert learn(walks, path, "--segments", "only", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["segments"]["recordings"] == 5 and not told["left_out"]
+    assert set(blob.read(path)) == {"META", *TAGS}
+    assert run("info", path) == 0 and "segment prior" in capsys.readouterr().out
+    (tmp_path / "c.json").write_text("{}")
+    assert run("track", "v.mp4", "--camera", tmp_path / "c.json", "-o", tmp_path / "t.csv", "-m", path) == 1
+
+
+def test_all_also_learns_from_what_is_no_walk(walks, tmp_path, capsys):
+    path = tmp_path / "all.gait"
+    assert learn(walks, path, "--segments", "all", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["sequences"]) == 4 and told["segments"]["recordings"] == 5
+    assert any("04_01" in line for line in told["left_out"])
+
+
+def test_recorded_markers_need_files_that_have_them(walks, tmp_path, capsys):
+    path = tmp_path / "m.gait"
+    words = ("learn", walks, "-o", path, "--segment-markers", "recorded", "--segments")
+    assert run(*words, "only", "--jobs", 1) == 1
+    assert "holds no recorded markers; leave out --segment-markers" in capsys.readouterr().err
+    assert not path.exists()
+    assert run(*words, "learnt", "--components", 2, "--jobs", 1) == 0
+    assert "no prior over segments: the recordings hold 0 segments" in capsys.readouterr().err
+    assert not set(TAGS) & set(blob.read(path))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--segment-frames", "1"],
+        ["--segment-mixture", "many"],
+        ["--segment-headings", "4"],
+        ["--segments", "only", "--report", "r"],
+    ],
+)
+def test_bad_options_are_usage_errors(walks, tmp_path, words, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = run("learn", walks, "-o", tmp_path / "m.gait", *words)
+    except SystemExit as stop:
+        status = stop.code
+    assert status == 2
+
+
+def test_the_shipped_prior_is_of_its_walks():
+    prior = SegmentPrior.load()
+    assert prior.recordings == 51 and prior.segments > 500 and prior.size == 50
+    assert set(EVAL15) <= set(prior.names) and len(prior.names) == 37
+    share = np.cumsum(prior.sd[0] ** 2)
+    assert share[-1] / (share[-1] + 30 * prior.residual.sum()) > 0.99
+    assert 1 < prior.gamma < 10 and 1.5 < prior.stature < 1.9
+    pelvis = prior.index(["pelvis"])[0]
+    assert np.abs(prior.mean[0, 0, pelvis, :2]).max() < 0.01  # over the origin
+    assert prior.mean[0, -1, pelvis, 0] > 0.2  # and off along +x
+
+
+def test_of_a_walker_seen_flat_depth_is_least_certain():
+    """F6: the five least certain modes are along depth, the first moves the whole body."""
+    prior, axes, depth = SegmentPrior.load(), image_axes("y"), np.array([0.0, 1, 0])
+    gaussian = place(prior)
+    seen = Observations(gaussian.mean @ axes.T, np.full(gaussian.mean.shape[:2], 0.02))
+    sd, modes = infer(gaussian, orthographic(seen, axes)).uncertain_modes(5)
+    assert share_along(modes[0], depth) >= 0.99 and share_rigid(modes[0]) >= 0.98
+    assert all(share_along(mode, depth) >= 0.95 for mode in modes)
+    assert sd[0] > 5 > 0.5 > sd[1]
