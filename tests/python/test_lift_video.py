@@ -1,6 +1,5 @@
 """Whole clips lifted from pictures: stick figures of the shipped model's walk, and the command."""
 
-import argparse
 import csv
 import json
 import sys
@@ -10,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gait.cli import lift_video
-from gait.errors import UsageError, UserError
+from gait.cli import lift_video, main
 from gait.evaluate import root_errors
 from gait.lift.clip_segments import Settings
 from gait.lift.cylinder import LIMBS, Figure
@@ -163,14 +161,7 @@ def files(tmp_path_factory, clip):
 
 def lift(*words):
     """Run the command on words."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("input")
-    for option in ("--model", "--camera", "--output"):
-        parser.add_argument(option)
-    for switch in ("--json", "--quiet", "--all-markers"):
-        parser.add_argument(switch, action="store_true")
-    lift_video.add_arguments(parser)
-    return lift_video.run(parser.parse_args([str(w) for w in words]))
+    return main(["lift", *map(str, words)])
 
 
 def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
@@ -209,18 +200,27 @@ def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsy
     assert len(x) == 20 and np.sign(x[-1] - x[0]) == np.sign(across)
 
 
-def test_faults_are_named(files, tmp_path):
-    video, placement = files / "video.mp4", files / "placement.json"
-    out = ["--output", tmp_path / "out.csv", "--quiet", "--background", "none"]
-    with pytest.raises(UsageError, match="--placement"):
-        lift(video, *out)
-    with pytest.raises(UserError, match="pelvis_px is missing"):
-        lift(video, "--placement", placement, *out)
-    camera = ["--camera", files / "camera.json", "--placement", placement]
-    with pytest.raises(UserError, match="frame 0 is not among the frames 5 to 23"):
-        lift(video, *camera, "--start", 5, *out)
-    behind = json.loads(placement.read_text()) | {"pelvis": [50 * x for x in (1, 10)]}
+@pytest.fixture
+def refused(files, tmp_path, capsys):
+    """Run the command with options of a video and give what it says; it must fail and write nothing."""
+
+    def run(*words, code=1):
+        out = tmp_path / "out.csv"
+        assert lift(files / "video.mp4", *words, "--output", out, "--quiet", "--background", "none") == code
+        assert not out.exists()
+        return capsys.readouterr().err
+
+    return run
+
+
+def test_faults_are_named(files, tmp_path, refused):
+    placed = ["--placement", files / "placement.json"]
+    assert "--placement" in refused(code=2)
+    assert "pelvis_px is missing" in refused(*placed)
+    camera = ["--camera", files / "camera.json"]
+    assert "frame 0 is not among the frames 5 to 23" in refused(*camera, *placed, "--start", 5)
+    behind = json.loads((files / "placement.json").read_text()) | {"pelvis": [50, 500]}
     (tmp_path / "behind.json").write_text(json.dumps(behind))
-    with pytest.raises(UserError, match="behind the camera"):
-        lift(video, "--camera", files / "camera.json", "--placement", tmp_path / "behind.json", *out)
-    assert not (tmp_path / "out.csv").exists()
+    assert "behind the camera" in refused(*camera, "--placement", tmp_path / "behind.json")
+    (tmp_path / "c.json").write_text('{"corrections": [{"frame": 99, "joint": "l_knee", "uv": [1, 2]}]}')
+    assert "frame is 99" in refused(*camera, *placed, "--corrections", tmp_path / "c.json")

@@ -15,6 +15,7 @@ from gait.camera import Camera
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
+from gait.learn.stage import one_thread
 from gait.lift import lifted_file, suggest
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.cylinder import Figure
@@ -128,11 +129,11 @@ def _film(
 
 def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:
     """Estimates without and with the corrections."""
-    with progress("segments", work(clip), quiet) as update:
+    with one_thread(), progress("segments", work(clip), quiet) as update:
         free = fit_clip(replace(clip, corrections=()), update=update)
     if not clip.corrections:
         return free, free
-    with progress("corrections", work(clip, free.sequence), quiet) as update:
+    with one_thread(), progress("corrections", work(clip, free.sequence), quiet) as update:
         return free, fit_clip(clip, free.sequence, update)
 
 
