@@ -48,4 +48,21 @@ static inline void widen(const int8_t *in, int32_t *out)
         out[i] = in[i];
 #endif
 }
+
+/* Words to bytes, which they fit. */
+static inline void narrow(const int32_t *in, int8_t *out)
+{
+#if defined(__AVX512F__)
+    _mm_storeu_si128((__m128i_u *)out, _mm512_cvtepi32_epi8(_mm512_loadu_si512(in)));
+#elif defined(__AVX2__)
+    __m256i const low = _mm256_loadu_si256((const __m256i_u *)in);
+    __m256i const high = _mm256_loadu_si256((const __m256i_u *)(in + 8));
+    __m256i const half = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xd8);
+    _mm_storeu_si128((__m128i_u *)out,
+                     _mm_packs_epi16(_mm256_castsi256_si128(half), _mm256_extracti128_si256(half, 1)));
+#else
+    for (int32_t i = 0; i < LANES; i++)
+        out[i] = (int8_t)in[i];
+#endif
+}
 #endif

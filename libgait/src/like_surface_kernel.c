@@ -121,14 +121,12 @@ static inline void look_up(const features *f, const spots *p, int8_t *restrict v
         uint32_t const four = (uint32_t)quad[i];
         int32_t const left_top = (int32_t)(four << 24) >> 24, right_top = (int32_t)(four << 16) >> 24;
         int32_t const left_low = (int32_t)(four << 8) >> 24, right_low = (int32_t)four >> 24;
-        int32_t const top = left_top * (256 - fx) + right_top * fx,
-                      low = left_low * (256 - fx) + right_low * fx;
-        int32_t const grey = (top * (256 - fy) + low * fy) / 65536;
+        int32_t const top = left_top * 256 + (right_top - left_top) * fx;
+        int32_t const low = left_low * 256 + (right_low - left_low) * fx;
+        int32_t const grey = (top * 256 + (low - top) * fy) / 65536;
         all[i] = p->shown[i] ? grey : TEXTURE_HIDDEN;
     }
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++)
-        value[i] = (int8_t)all[i];
+    narrow(all, value);
 }
 
 /* One step for all limbs after the other: what a limb waits for is filled with the next one's work. */

@@ -84,6 +84,15 @@ like_patch *texture_of(const gait_tracker *t, const generation *g, int32_t i, in
     return g->texture ? g->texture + at : NULL;
 }
 
+/* An ancestor's samples lie anywhere in memory: they are asked for before the body is drawn. */
+static void fetch(const like_patch *samples, int32_t limbs)
+{
+    enum { LINE = 64 };
+    const char *const end = (const char *)(samples + limbs);
+    for (const char *p = (const char *)samples; samples && p < end; p += LINE)
+        __builtin_prefetch(p);
+}
+
 static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scratch *w)
 {
     const generation *const now = &t->gen[t->core->current], *const then = &t->gen[1 - t->core->current];
@@ -102,8 +111,11 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
         outline_limbs(t, c, w);
         for (int32_t lane = 0; lane < lanes; lane++) {
             int32_t const i = begin + lane;
+            const like_patch *const ancestor =
+                t->core->textured >> c & 1u ? texture_of(t, then, t->filter.parent[i], c) : NULL;
+            fetch(ancestor, t->like->limbs);
             like_body b = look_at(t, c, modes_side(t, i), lane, w, texture_of(t, now, i, c));
-            b.ancestor = t->core->textured >> c & 1u ? texture_of(t, then, t->filter.parent[i], c) : NULL;
+            b.ancestor = ancestor;
             float const ll = like_evaluate(&b);
             t->ll[i] += ll;
             if (t->core->modes.stage == MODES_FORKED)
