@@ -17,7 +17,6 @@ from gait.skeleton import EVAL15
 Array = NDArray[np.float64]
 
 POINTING = 3.0  # pixels, standard deviation of a click
-SHARE = 0.1  # of the frames get a correction before the user looks again
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ def score(clip: ClipSegments, fit: ClipFit, truth: Array, joints: list[str]) -> 
 
 
 def corrected(
-    clip: ClipSegments, truth: Array, joints: list[str], most: int, seed: int = 0
+    clip: ClipSegments, truth: Array, joints: list[str], most: int, share: float = 0.1, seed: int = 0
 ) -> Iterator[tuple[ClipSegments, ClipFit]]:
     """Yield the clip with its estimate after each round of corrections, first without any.
 
@@ -55,6 +54,8 @@ def corrected(
         Of `joints`, metres.
     most : int
         Corrections altogether.
+    share : float
+        Of the frames that get a correction before the user looks again.
     """
     rng = np.random.default_rng(seed)
     uv = clip.view.project(truth)[0]
@@ -65,7 +66,7 @@ def corrected(
         off = np.linalg.norm(clip.view.project(fit.places[:, markers])[0] - uv, axis=2)
         for old in clip.corrections:
             off[old.frame - clip.film.first, joints.index(old.joint)] = -1.0
-        count = min(max(1, round(SHARE * len(off))), most - len(clip.corrections))
+        count = min(max(1, round(share * len(off))), most - len(clip.corrections))
         worst = np.argmax(off, axis=1)
         new = []
         for frame in _apart(off.max(axis=1), count):

@@ -133,8 +133,8 @@ def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:
         free = fit_clip(replace(clip, corrections=()), update=update)
     if not clip.corrections:
         return free, free
-    with one_thread(), progress("corrections", work(clip, free.sequence), quiet) as update:
-        return free, fit_clip(clip, free.sequence, update)
+    with one_thread(), progress("corrections", work(clip), quiet) as update:
+        return free, fit_clip(clip, update=update)
 
 
 def _marker(clip: ClipSegments, fit: ClipFit, correction: Correction) -> Floats:

@@ -73,28 +73,33 @@ def fit_clip(clip: ClipSegments, known: Sequence | None = None, update: Update |
     ----------
     clip : ClipSegments
     known : Sequence, optional
-        Estimate with other corrections, to start from as well.
+        Estimate with other corrections to start from, which is quicker.
     update : callable, optional
-        Called with the count of segments done, of `work(clip, known)`.
+        Called with the count of segments done, of `work(clip)`.
     """
-    firsts = _first_segments(clip)[: BEGINNINGS if known is None else 1]
-    chains = [_one_after_the_other(clip, first, _part(update, k, clip)) for k, first in enumerate(firsts)]
+    chains = [known] if known is not None else _chains(clip, update)
     found = min(chains, key=lambda c: c.energy)
     if clip.settings.sensor_sd is None:
         clip = _with_noise(clip, found)
     if not clip.settings.joined:
         first = _first_segments(clip)[0]
         return _finished(clip, _continuous(clip, _one_after_the_other(clip, first, None)))
-    starts = chains if known is None else [*chains, known]
+    starts = list(chains)
     if clip.corrections:  # nearly linear without the sensors: no wrong valley to fall into
         starts.append(_together(clip, found, looking=False))
     tried = [_together(clip, start) for start in starts]
     return _finished(clip, min(tried, key=lambda t: t.energy))
 
 
-def work(clip: ClipSegments, known: Sequence | None = None) -> int:
+def work(clip: ClipSegments) -> int:
     """Count of segments that `fit_clip` tells its `update` when it is done with them, at most."""
-    return len(clip.starts) * (BEGINNINGS if known is None else 1)
+    return len(clip.starts) * BEGINNINGS
+
+
+def _chains(clip: ClipSegments, update: Update | None) -> list[Sequence]:
+    """Sequences that go on from different explanations of the first segment."""
+    firsts = _first_segments(clip)[:BEGINNINGS]
+    return [_one_after_the_other(clip, first, _part(update, k, clip)) for k, first in enumerate(firsts)]
 
 
 def _part(update: Update | None, chain: int, clip: ClipSegments) -> Update:
