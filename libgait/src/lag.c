@@ -13,13 +13,12 @@ void lag_layout_state(lag *l, arena *a, int32_t frames, int32_t n, int32_t field
     l->parent = TAKE(a, int32_t, (size_t)l->depth *(size_t)n);
 }
 
-void lag_layout_work(lag *l, arena *a, int32_t n, int32_t fields, int32_t points)
+void lag_layout_work(lag *l, arena *a, int32_t n, int32_t fields)
 {
     if (l->depth == 0)
         return;
     l->people = population_layout(a, n, fields);
     l->weight = TAKE(a, double, n);
-    l->joint = TAKE(a, float, (size_t)(3 * points) * (size_t)n);
 }
 
 /* Where step number `step` since start is kept. */
@@ -103,7 +102,7 @@ static void place_joints(gait_tracker *t)
         kin_points(t->model, &w->body, w->points);
         for (size_t p = 0; p < (size_t)t->model->points; p++)
             for (size_t k = 0; k < 3; k++)
-                memcpy(l->joint + (3 * p + k) * n + (size_t)begin, w->points[p][k], lanes * sizeof(float));
+                memcpy(t->joint + (3 * p + k) * n + (size_t)begin, w->points[p][k], lanes * sizeof(float));
     }
 }
 
@@ -130,7 +129,6 @@ void lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
     past.filter.n = past.cfg.particles = gather(l, &then);
     past.filter.weight = l->weight;
     past.gen[t->core->current].people = l->people;
-    past.joint = l->joint;
     place_joints(t);
     estimate_fill(&past, pf_heaviest(&past.filter), &e);
     e.ess = (float)pf_ess(&past.filter);

@@ -20,12 +20,11 @@ typedef struct lag {
     /* Recomputed in every call. */
     population people; /* ancestors that still have descendants */
     double *weight;    /* n */
-    float *joint;      /* P x 3 x n, metres */
 } lag;
 
 /* The part that is saved and hashed; then the rest.  frames: how far back estimates reach, 0 for never. */
 void lag_layout_state(lag *l, arena *a, int32_t frames, int32_t n, int32_t fields);
-void lag_layout_work(lag *l, arena *a, int32_t n, int32_t fields, int32_t points);
+void lag_layout_work(lag *l, arena *a, int32_t n, int32_t fields);
 
 /* Keep the current generation, whose estimate is e. */
 void lag_keep(gait_tracker *t, const gait_estimate *e);

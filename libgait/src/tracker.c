@@ -24,7 +24,6 @@ static void layout_state(arena *a, gait_tracker *t)
             t->gen[g].texture = TAKE(a, like_patch, (size_t)n * (size_t)(cameras * t->model->limbs));
     }
     t->filter = pf_layout(a, n);
-    t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
     for (int32_t c = 0; c < 2 * cameras && wants_texture(&t->cfg); c++)
         t->template[c / cameras][c % cameras] = TAKE(a, int16_t, samples);
     lag_layout_state(&t->past, a, t->cfg.lag, n, body_rule_fields(&t->rule));
@@ -44,13 +43,14 @@ static void layout_work(arena *a, gait_tracker *t)
     t->ll = TAKE(a, float, n);
     t->used = TAKE(a, float, n);
     t->inner = TAKE(a, float, n);
+    t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
     t->exchange = TAKE(a, exchange, 1);
     t->mode = TAKE(a, uint8_t, n);
     if (wants_texture(&t->cfg))
         t->seen = TAKE(a, like_patch, (size_t)t->cfg.cameras * limbs);
     for (int32_t c = 0; c < 2 * t->cfg.cameras && wants_texture(&t->cfg); c++)
         t->known[c / t->cfg.cameras][c % t->cfg.cameras] = TAKE(a, int8_t, LIKE_RING *limbs);
-    lag_layout_work(&t->past, a, n, body_rule_fields(&t->rule), t->model->points);
+    lag_layout_work(&t->past, a, n, body_rule_fields(&t->rule));
     t->scratch = features_scratch_layout(a);
     t->work = TAKE(a, weigh_scratch, t->cfg.tasks);
 }

@@ -66,18 +66,18 @@ struct gait_tracker {
     tracker_core *core;
     generation gen[2];
     pf filter;
-    float *joint;                           /* P x 3 x n, metres: of the current generation */
     int16_t *template[2][GAIT_MAX_CAMERAS]; /* of each side while forked; otherwise the first */
     lag past;
     unsigned char *state_end;
     /* Recomputed in every step. */
     camera_state camera[GAIT_MAX_CAMERAS];
-    float *used;                        /* n: as much of ll as counts (loss.h, modes.h) */
-    float *ll;                          /* n */
-    float *inner;                       /* n: ll without the silhouette */
-    exchange *exchange;                 /* constant */
-    uint8_t *mode;                      /* n: particle belongs to the dominant mode */
-    like_patch *seen;                   /* cameras x limbs: surface of the estimate */
+    float *used;        /* n: as much of ll as counts (loss.h, modes.h) */
+    float *ll;          /* n */
+    float *inner;       /* n: ll without the silhouette */
+    float *joint;       /* P x 3 x n, metres: of the particles, or of those that lag_estimate() gathers */
+    exchange *exchange; /* constant */
+    uint8_t *mode;      /* n: particle belongs to the dominant mode */
+    like_patch *seen;   /* cameras x limbs: surface of the estimate */
     int8_t *known[2][GAIT_MAX_CAMERAS]; /* template as compared in this frame: limbs x LIKE_RING */
     features_scratch scratch;
     weigh_scratch *work; /* tasks */
