@@ -65,7 +65,7 @@ EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGE
 NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
 
 # Kernels (libgait/src/kernels.h) are compiled once per instruction set; `scalar` defines their results.
-FLAGS_scalar := -fno-tree-vectorize -fno-tree-slp-vectorize
+FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
 FLAGS_base   :=
 FLAGS_avx2   := -mavx2 -mpopcnt -mbmi -mbmi2
 FLAGS_avx512 := $(FLAGS_avx2) -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vpopcntdq \

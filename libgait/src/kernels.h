@@ -97,6 +97,17 @@ typedef struct kernels {
 /* The best of those in the mask (GAIT_CPU_*) that this CPU can run; mask 0: scalar. */
 const kernels *kernels_choose(uint32_t mask);
 
+/* Before a loop whose passes do not depend on one another, where the compiler cannot see that. */
+#if defined(KERNEL_SCALAR)
+#define KERNEL_LANES
+#elif defined(__clang__)
+#define KERNEL_LANES _Pragma("clang loop vectorize(assume_safety)")
+#elif defined(__GNUC__)
+#define KERNEL_LANES _Pragma("GCC ivdep")
+#else
+#define KERNEL_LANES
+#endif
+
 #ifdef KERNEL_ISA /* in a kernel's file: what it is being compiled for */
 /* A loop over one row, kept apart from the loops about it: of some nests compilers make no vector code. */
 #define KERNEL_ROW                                 static __attribute__((noinline))

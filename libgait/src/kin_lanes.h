@@ -3,6 +3,7 @@
 #ifndef GAIT_KIN_LANES_H
 #define GAIT_KIN_LANES_H
 #include "fmath.h"
+#include "kernels.h"
 #include "kinematics.h"
 
 #include <string.h>
@@ -59,15 +60,8 @@ LANES void turn_columns(float *R, int a, int b, const float *s, const float *c, 
 }
 
 /* R = R Rot(axis, angle): it mixes the two columns other than axis (0..2). */
-LANES void rotate(float *R, int axis, const float *angle, int n)
+LANES void rotate(float *R, int axis, const float *s, const float *c, int n)
 {
-    float s[BLOCK], c[BLOCK];
-    for (int lane = 0; lane < n; lane++) {
-        float sine, cosine;
-        m_sincos(angle[lane], &sine, &cosine);
-        s[lane] = sine;
-        c[lane] = cosine;
-    }
     if (axis == 0)
         turn_columns(R, 1, 2, s, c, n);
     else if (axis == 1)
@@ -86,10 +80,11 @@ LANES void place_root(const gait_model *m, const bodies *b, int n)
         for (int lane = 0; lane < n; lane++)
             b->R[i * n + lane] = i % 4 ? 0.0f : 1.0f;
     for (int axis = 2; axis >= 0; axis--) {
-        float angle[BLOCK];
+        float s[BLOCK], c[BLOCK];
+        KERNEL_LANES
         for (int lane = 0; lane < n; lane++)
-            angle[lane] = given[axis][lane] + own[axis][lane];
-        rotate(b->R, axis, angle, n);
+            m_sincos(given[axis][lane] + own[axis][lane], &s[lane], &c[lane]);
+        rotate(b->R, axis, s, c, n);
     }
     memcpy(b->o, b->pelvis, 3 * (size_t)n * sizeof(float));
 }
@@ -135,10 +130,11 @@ LANES void place_frames(const gait_model *m, const bodies *b, int n)
             int32_t const axis = info[2 + 2 * k];
             float const sense = axis < 0 ? -1.0f : 1.0f;
             const float *const v = b->channel + info[3 + 2 * k] * n;
-            float angle[BLOCK];
+            float s[BLOCK], c[BLOCK];
+            KERNEL_LANES
             for (int lane = 0; lane < n; lane++)
-                angle[lane] = sense * v[lane];
-            rotate(R, (axis < 0 ? -axis : axis) - 1, angle, n);
+                m_sincos(sense * v[lane], &s[lane], &c[lane]);
+            rotate(R, (axis < 0 ? -axis : axis) - 1, s, c, n);
         }
     }
 }

@@ -31,20 +31,22 @@ void KERNEL(outline_project)(const limb_geometry *limbs, int32_t count, const ki
 {
     gait_camera const eye = *cam;
     view_map const window = *map;
-    limb_polygon q;
     for (int32_t l = 0; l < count; l++) {
         limb_geometry const g = limbs[l];
         if (g.shape == LIMB_ELLIPSOID)
-            for (int32_t i = 0; i < BLOCK; i++) {
-                part const p = part_of(&g, body, i, &eye, &window);
-                part_ellipsoid(&p, &q);
-                store(&q, l, 8, i, out);
-            }
-        else
-            for (int32_t i = 0; i < BLOCK; i++) {
-                part const p = part_of(&g, body, i, &eye, &window);
-                part_cone(&p, &q);
-                store(&q, l, 4, i, out);
-            }
+            KERNEL_LANES
+        for (int32_t i = 0; i < BLOCK; i++) {
+            part const p = part_of(&g, body, i, &eye, &window);
+            limb_polygon q;
+            part_ellipsoid(&p, &q);
+            store(&q, l, 8, i, out);
+        }
+        else KERNEL_LANES for (int32_t i = 0; i < BLOCK; i++)
+        {
+            part const p = part_of(&g, body, i, &eye, &window);
+            limb_polygon q;
+            part_cone(&p, &q);
+            store(&q, l, 4, i, out);
+        }
     }
 }
