@@ -24,6 +24,7 @@ COMMANDS = {
     "info": "info",
     "track": "track",
     "eval": "evaluate",
+    "lift": "lift",
     "render": "render",
     "simulate": "simulate",
     "capture": "capture",

@@ -1,10 +1,10 @@
 """The segment prior over a whole sequence: a Markov chain of half segments.
 
-Frames of the prior's rate are cut into blocks of half a segment.  Two neighbouring blocks are a segment, so the
-prior gives p(first, second) and, by division, p(second | first): the sequence has the density
+Frames of the prior's rate are cut into blocks of half a segment.  Two neighbouring blocks are a segment, so
+that the prior gives p(first, second) and, by division, p(second | first): the sequence has the density
 p(X_0, X_1) prod_s p(X_s+1 | X_s), in which every overlap counts once.  Its information matrix is
-block-tridiagonal.  In the world a segment is X = stature Rz(heading) x + shift; shift, heading and stature are
-unknown too and enter by their linear effects around the present estimate (`Around`).
+block-tridiagonal.  In the world a segment is X = stature Rz(heading) x + shift; shift, heading and stature
+are unknown too and enter by their linear effects around the present estimate (`Around`).
 """
 
 from __future__ import annotations
@@ -123,18 +123,39 @@ def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
 
 
 def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats) -> Around:
-    """Linearise around new places (S, 2 b, J, 3): headings, stature and shapes that they say under the prior.
+    """Linearise around new places (grid, J, 3): headings, stature and shapes that they say under the prior.
 
-    The shapes leave out what the prior takes for noise of single frames.  With it a larger body would have more
-    noise in metres, and the fit would shrink the body to get rid of it.
+    The shapes leave out what the prior takes for noise of single frames.  With it a larger body would have
+    more noise in metres, and the fit would shrink the body to get rid of it.  All segments and all views are
+    linearised around the same shapes, so that a change of size about the lens costs nothing by itself.
     """
     headings, statures, shapes = [], [], []
-    for s, place in enumerate(places):
+    half = around.places.shape[1] // 2
+    for s, place in enumerate(overlapping(places, half)):
         turn, stature, shape = Segment(prior, around, freedom, s).explained(place.ravel())
         headings.append(around.heading[s] + turn)
         statures.append(stature)
         shapes.append(shape.reshape(place.shape))
-    return Around(np.array(headings), around.component, float(np.mean(statures)), np.stack(shapes))
+    common = overlapping(blended(np.stack(shapes), half), half)
+    return Around(np.array(headings), around.component, float(np.mean(statures)), common)
+
+
+def overlapping(values: Floats, half: int) -> Floats:
+    """Segments (S, 2 half, ...) of a sequence (grid, ...), each `half` frames after the one before."""
+    return np.stack([values[at : at + 2 * half] for at in range(0, len(values) - half, half)])
+
+
+def blended(segments: Floats, half: int) -> Floats:
+    """Overlapping segments (S, F, ...), each `half` frames after the one before, by triangular weights."""
+    count, frames = segments.shape[:2]
+    weight = 1 - np.abs((np.arange(frames) + 0.5) / frames * 2 - 1)
+    weight = weight.reshape(-1, *[1] * (segments.ndim - 2))
+    total = np.zeros(((count - 1) * half + frames, *segments.shape[2:]))
+    norm = np.zeros((len(total), *[1] * (segments.ndim - 2)))
+    for s, segment in enumerate(segments):
+        total[s * half : s * half + frames] += weight * segment
+        norm[s * half : s * half + frames] += weight
+    return total / norm
 
 
 def rotation(heading: float) -> Floats:
@@ -168,9 +189,8 @@ class Segment:
         loads[size + 4] = freedom.stature_sd * growth
         column = np.arange(3 * markers)
         lasting = np.sqrt(LASTING * outside + (stature * OFFSET_SD) ** 2)
-        loads.reshape(len(loads), len(place), -1)[size + 5 + column, :, column] = np.repeat(lasting, 3)[
-            :, None
-        ]
+        by_frame = loads.reshape(len(loads), len(place), -1)
+        by_frame[size + 5 + column, :, column] = np.repeat(lasting, 3)[:, None]
         self.rigid = size
         self.loads = loads.reshape(len(loads), -1)
         self.freedom = freedom
@@ -203,7 +223,9 @@ class Segment:
 
     def explained(self, places: Floats) -> tuple[float, float, Floats]:
         """Turn in radians and stature in metres that places say, and the places without noise."""
-        values = linalg.cho_solve((self._lower, True), self._scaled @ (places - self.mean), check_finite=False)
+        values = linalg.cho_solve(
+            (self._lower, True), self._scaled @ (places - self.mean), check_finite=False
+        )
         stature = self.freedom.stature + self.freedom.stature_sd * values[self.rigid + 4]
         turn = HEADING_SD * values[self.rigid + 3]
         return float(turn), float(stature), self.mean + values @ self.loads

@@ -1,7 +1,7 @@
 """Views whose scale may be unknown, as rows that are linear in the markers and in the scale.
 
-A calibrated camera and a parallel view of known scale give the rows of `gait.lift.observe`.  Where the scale is
-unknown, the length l of one unit of the picture is one more number per frame: a point seen at (u, v) obeys
+A calibrated camera and a parallel view of known scale give the rows of `gait.lift.observe`.  Where the scale
+is unknown, the length l of one unit of the picture is one more number per frame: a point seen at (u, v) obeys
 right . X - u l = 0 and down . X - v l = 0, with the noise sd l.
 """
 
@@ -80,7 +80,7 @@ class Parallel:
         return np.asarray(places @ self.axes[:2].T / lengths[:, None, None] + self.origin)
 
     def lengths(self, seen: Observations, mean: Floats, stature: float) -> Floats:
-        """Guess the lengths (T,) of a unit from the extent of what is seen and of a mean body (J, 3), statures."""
+        """Guess the lengths (T,) of a unit from the extents of what is seen and of a mean body (J, 3)."""
         if self.metres is not None:
             return np.full(len(seen.uv), self.metres)
         flat = stature * mean @ self.axes[:2].T
@@ -105,14 +105,14 @@ def _extent(points: Floats) -> float:
 
 
 def _smoothed(values: Floats, reach: int = 15) -> Floats:
-    """Running median."""
+    """Take the running median."""
     return np.array(
         [np.median(values[max(0, i - reach) : i + reach + 1]) for i in range(len(values))], np.float64
     )
 
 
 def scale_free(rows: Rows, uv: Floats, origin: Floats) -> tuple[Rows, Floats]:
-    """Rows in which the length of a unit is unknown, and its factors (n, 2), from those of `Parallel.rows`."""
+    """Take rows of `Parallel.rows` with the length of a unit unknown; its factors (n, 2)."""
     return replace(rows, value=np.zeros_like(rows.value)), origin - uv[rows.frame, rows.marker]
 
 

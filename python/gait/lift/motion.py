@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.lift import sequence, start
-from gait.lift.chain import Freedom, restricted
+from gait.lift.chain import Freedom, blended, restricted
 from gait.lift.equations import Parallel, View
 from gait.lift.heading import Explanation, Person
 from gait.lift.observe import Observations
@@ -88,6 +88,11 @@ def output_names(prior: SegmentPrior, tracks: Tracks, everything: bool = False) 
     return tuple(n for n in prior.names if everything or n in JOINTS or n in tracks.names)
 
 
+def segments_of(prior: SegmentPrior, tracks: Tracks) -> int:
+    """Count the overlapping segments of tracks."""
+    return Grid.over(tracks.time, prior).blocks - 1
+
+
 def lift(
     prior: SegmentPrior,
     tracks: Tracks,
@@ -124,7 +129,7 @@ def lift(
         heading=np.array([e.heading for e in chosen]),
         component=np.array([e.component for e in chosen]),
         stature=stature,
-        places=start.blended(np.stack([e.posterior.points for e in chosen]), grid.frames),
+        places=blended(np.stack([e.posterior.points for e in chosen]), grid.frames),
         lengths=lengths,
     )
     freedom = Freedom(stature, stature_sd, FLOOR_SD if view.grounded else ANY_HEIGHT)
@@ -177,7 +182,7 @@ def _alone(
     """Segments estimated alone, mixed or one after another."""
     places = np.stack([e.posterior.points for e in chosen])
     spread = np.stack([e.posterior.sd for e in chosen])
-    join = start.blended if blend else _in_turn
+    join = blended if blend else _in_turn
     frames, weights = grid.between(tracks.time)
     at_video = [
         np.einsum("tw,tw...->t...", weights, values[frames])

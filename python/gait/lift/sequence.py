@@ -2,8 +2,8 @@
 
 The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints (`gait.lift.soft`), all
 linear in the places of the markers on a time grid of the prior's rate; places between its frames are
-interpolated.  What is not linear (perspective, headings, stature, lengths of bones) is linearised again around
-each estimate until it stays (Gauss-Newton).  Standard deviations are those of the last linear problem.
+interpolated.  What is not linear (perspective, headings, stature, lengths of bones) is linearised again
+around each estimate until it stays (Gauss-Newton).  Standard deviations are those of the last linear problem.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.lift import soft, tridiagonal
-from gait.lift.chain import Around, Chain, Freedom, chain, moved
+from gait.lift.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
 from gait.lift.equations import Parallel, View, scale_free
 from gait.lift.observe import Observations
 from gait.lift.prior import SegmentPrior
 from gait.lift.soft import Layout, Rows
-from gait.lift.start import blended
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
@@ -165,7 +164,7 @@ def smooth(
         settled = constrained and float(np.sqrt(np.mean((fresh - places) ** 2))) < SETTLED
         places, steps = fresh, steps + 1
         lengths = problem.layout.lengths(values) if problem.layout.scaled else lengths
-        around = moved(prior, around, freedom, problem.segments(places))
+        around = moved(prior, around, freedom, places)
     return problem.result(around, places, lengths, steps, settled)
 
 
@@ -192,14 +191,9 @@ class _Problem:
         self.at = self.grid.between(seen.time)
         self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), view.scaled)
 
-    def segments(self, places: Floats) -> Floats:
-        """Places of overlapping segments (S, 2 b, J, 3) out of (grid, J, 3)."""
-        half = self.grid.frames
-        return np.stack([places[s * half : (s + 2) * half] for s in range(self.grid.blocks - 1)])
-
     def around(self, heading: Floats, component: Ints, stature: float, places: Floats) -> Around:
-        """What the chain is linearised around."""
-        return Around(heading, component, stature, self.segments(places))
+        """Say what the chain is linearised around."""
+        return Around(heading, component, stature, overlapping(places, self.grid.frames))
 
     def system(self, around: Around, lengths: Floats, constrained: bool) -> _System:
         """Linear problem around an estimate."""

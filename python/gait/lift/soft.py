@@ -44,7 +44,7 @@ BONE_SD = 0.01  # relative change of a length from one frame to the next
 
 @dataclass(frozen=True)
 class Layout:
-    """Where numbers of a sequence are: blocks of b frames of J markers, then b lengths if the scale is unknown.
+    """Where numbers of a sequence are: blocks of b frames of J markers, then b lengths if the scale is open.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Rows:
         self._count += len(columns)
 
     def normal(self) -> tuple[Floats, Floats, Floats, float, float]:
-        """Blocks of A' W A on (B, n, n) and below (B-1, n, n) the diagonal, A' W y (B, n), y' W y, sum log W."""
+        """Blocks of A' W A (B, n, n), those below (B - 1, n, n), A' W y (B, n), y' W y, and sum log W."""
         layout = self.layout
         total = layout.blocks * layout.size
         diagonal = np.zeros((layout.blocks, layout.size, layout.size))

@@ -7,6 +7,7 @@ A segment seen from far away fits nearly as well when it is mirrored in depth; i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -45,11 +46,17 @@ def explanations(
         part = seen.part(begin, end)
 
         def measure(places: Floats, part: Observations = part, begin: int = begin, end: int = end) -> Rows:
-            return view.rows(part, places, lengths[begin:end])
+            rows = view.rows(part, places, lengths[begin:end])
+            return rows if view.grounded else _centred(rows, places)
 
         found.append(explain(prior, measure, person))
         update(s + 1)
     return found
+
+
+def _centred(rows: Rows, places: Floats) -> Rows:
+    """Rows of a picture shifted to where places (F, J, 3) are, as its height over the floor is not known."""
+    return replace(rows, value=rows.value - rows.shifted(places).value.mean(axis=0))
 
 
 def course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
@@ -71,16 +78,3 @@ def course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
 
 def _evidence(choices: Sequence[Explanation]) -> Floats:
     return np.log(np.maximum([e.share for e in choices], 1e-300))
-
-
-def blended(segments: Floats, half: int) -> Floats:
-    """Overlapping segments (S, F, ...), each `half` frames after the one before, by triangular weights."""
-    count, frames = segments.shape[:2]
-    weight = 1 - np.abs((np.arange(frames) + 0.5) / frames * 2 - 1)
-    weight = weight.reshape(-1, *[1] * (segments.ndim - 2))
-    total = np.zeros(((count - 1) * half + frames, *segments.shape[2:]))
-    norm = np.zeros((len(total), *[1] * (segments.ndim - 2)))
-    for s, segment in enumerate(segments):
-        total[s * half : s * half + frames] += weight * segment
-        norm[s * half : s * half + frames] += weight
-    return total / norm

@@ -49,7 +49,7 @@ class Tracks:
         return np.asarray(np.isfinite(self.uv).all(axis=2))
 
     def deviations(self, sd: float) -> Array:
-        """Standard deviations (T, J) of points seen with `sd` at full confidence; inf where not seen."""
+        """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
         return np.where(self.seen, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
 
 

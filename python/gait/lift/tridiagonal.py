@@ -48,7 +48,7 @@ class Factor:
         return result
 
     def covariance(self) -> tuple[Floats, Floats]:
-        """Blocks of the covariance: on the diagonal (B, n, n), and of each with the one before (B-1, n, n)."""
+        """Blocks of the covariance: on the diagonal (B, n, n), of each with the one before (B - 1, n, n)."""
         count, size = self.lower.shape[:2]
         diagonal, across = np.empty_like(self.lower), np.empty_like(self.below)
         unit = np.eye(size)

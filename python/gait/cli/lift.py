@@ -1,0 +1,167 @@
+"""2-D tracks of joints, or a video, to motion in space with standard deviations.
+
+TRACKS.csv has the columns frame,time,<joint>_u,<joint>_v and, if known, <joint>_c: pixels (u to the right,
+v down, centres at integers) and a confidence from 0 to 1 that divides the noise; empty cells are not seen.
+Joints are those of the model's segment prior (gait info M.gait).  The prior over short segments of motion
+fills in the depth and what is not seen (Leventon and Freeman 1998).
+
+Views: --camera gives places in the camera's world.  --orthographic looks along an axis of a world with z
+up from far away; the scale comes from the person's stature unless --metres-per-unit gives it.  Without either
+the camera is taken to be level and far away (along y), its scale slowly changing.  Both leave out the place
+along the line of sight, and the lowest feet are put on the floor.
+
+OUT.csv: frame,time and for each joint _x,_y,_z (metres) and _sx,_sy,_sz (posterior standard deviations).
+
+A VIDEO instead of tracks needs --placement: see the options under "from a video".
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gait.camera import Camera
+from gait.cli import lift_video, values
+from gait.errors import UsageError
+from gait.files import require_writable
+from gait.learn.stage import one_thread
+from gait.lift import lifted_file, motion, tracks_file
+from gait.lift.equations import Parallel, Perspective, View, looking_along
+from gait.lift.prior import SegmentPrior
+from gait.lift.tracks_file import Tracks
+from gait.progress import progress
+from gait.trc import write_trc
+
+NAME = "lift"
+HELP = "2-D joint tracks, or a video, to 3-D"
+
+_ONLY_TRACKS = ("orthographic", "metres_per_unit", "trc", "ignore_unknown", "height")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("input", metavar="TRACKS.csv|VIDEO", help="2-D tracks, or a video with --placement")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT.csv", help="places and deviations")
+    parser.add_argument("-m", "--model", metavar="M.gait", help="with a segment prior (the shipped model)")
+    parser.add_argument("--camera", metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name")
+    parser.add_argument("--all-markers", action="store_true", help="write all markers of the prior")
+    group = parser.add_argument_group("from tracks")
+    group.add_argument(
+        "--orthographic", metavar="AXIS", help="view along x, y, z, -x, -y, -z or X,Y,Z from far away"
+    )
+    group.add_argument(
+        "--metres-per-unit", type=_positive, metavar="M", help="scale of u and v with --orthographic"
+    )
+    group.add_argument("--height", type=values.stature, metavar="M", help="stature (unknown: of most people)")
+    group.add_argument(
+        "--pixel-sd", type=_positive, default=3.0, metavar="SD", help="noise of u and v, in their unit (3)"
+    )
+    group.add_argument(
+        "--method",
+        choices=motion.METHODS,
+        default=motion.METHODS[0],
+        help="smooth (the default): one Gaussian over the whole sequence; blend: overlapping segments alone, "
+        "mixed as in the paper; segment: one after another",
+    )
+    group.add_argument("--no-contact", action="store_true", help="smooth: feet on the ground may slide")
+    group.add_argument("--no-bones", action="store_true", help="smooth: bones may change their length")
+    group.add_argument("--ignore-unknown", action="store_true", help="leave out points the model has not")
+    group.add_argument("--trc", metavar="O.trc", help="also write the places for OpenSim")
+    lift_video.add_arguments(parser)
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text}: give a number above 0")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Lift tracks, or pass a video on."""
+    if args.placement or Path(args.input).suffix.lower() not in (".csv", ".txt", ""):
+        for option in _ONLY_TRACKS:
+            if getattr(args, option):
+                raise UsageError(f"--{option.replace('_', '-')} is for tracks, and {args.input} is a video")
+        return lift_video.run(args)
+    _check(args)
+    prior = SegmentPrior.load(args.model)
+    tracks, ignored = tracks_file.read(args.input, prior.names, args.ignore_unknown)
+    if ignored and not args.quiet:
+        print(f"left out: {' '.join(ignored)}", file=sys.stderr)
+    names = motion.output_names(prior, tracks, args.all_markers)
+    options = motion.Options(args.method, args.height, args.pixel_sd, not args.no_contact, not args.no_bones)
+    with one_thread(), progress("segments", motion.segments_of(prior, tracks), args.quiet) as update:
+        found = motion.lift(prior, tracks, _view(args, tracks), options, names, update)
+    if not found.settled and not args.quiet:
+        print(f"the estimate did not come to rest in {found.steps} iterations", file=sys.stderr)
+    lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
+    if args.trc:
+        write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
+    summary = _summary(args, tracks, found)
+    print(json.dumps(summary) if args.json else _text(summary))
+    return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse before the work what would fail after it."""
+    if args.camera and args.orthographic:
+        raise UsageError("--camera and --orthographic are two views; give one of them")
+    if args.metres_per_unit and not args.orthographic:
+        raise UsageError("--metres-per-unit goes with --orthographic")
+    if args.method != "smooth" and (args.no_contact or args.no_bones):
+        raise UsageError("--no-contact and --no-bones go with --method smooth")
+    for path in filter(None, (args.output, args.trc)):
+        require_writable(path)
+
+
+def _view(args: argparse.Namespace, tracks: Tracks) -> View:
+    if args.camera:
+        return Perspective(Camera.read(args.camera))
+    middle = np.nanmean(tracks.uv, axis=(0, 1))
+    axes = looking_along(args.orthographic or "y")
+    return Parallel(axes, args.metres_per_unit, middle, steady=bool(args.orthographic))
+
+
+def _rate(tracks: Tracks) -> float:
+    """Frames per second."""
+    return float((len(tracks.time) - 1) / (tracks.time[-1] - tracks.time[0])) if len(tracks.time) > 1 else 1.0
+
+
+def _summary(args: argparse.Namespace, tracks: Tracks, found: motion.Motion) -> dict[str, Any]:
+    """Figures of ``--json``."""
+    return {
+        "frames": len(tracks.frame),
+        "method": args.method,
+        "markers": {"seen": list(tracks.names), "estimated": list(found.names)},
+        "seen_share": float(tracks.seen.mean()),
+        "reprojection_px": float(np.nanmedian(found.error)),
+        "sd_mm": 1000 * float(np.median(found.sd)),
+        "stature_m": found.stature,
+        "iterations": found.steps,
+        "settled": found.settled,
+        "log10_volume_ratio": found.log_volume_ratio,
+    }
+
+
+def _text(s: dict[str, Any]) -> str:
+    markers = s["markers"]
+    lines = [
+        f"{s['frames']} frames, {len(markers['seen'])} points seen in {s['seen_share']:.0%} of them, "
+        f"{len(markers['estimated'])} estimated",
+        f"{s['reprojection_px']:.2f} from what was seen, median sd {s['sd_mm']:.0f} mm, "
+        f"stature {s['stature_m']:.2f} m",
+    ]
+    if s["method"] == "smooth":
+        lines.append(
+            f"{s['iterations']} iterations; posterior volume 1e{s['log10_volume_ratio']:.0f} of the prior's"
+        )
+    return "\n".join(lines)
