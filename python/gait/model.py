@@ -84,9 +84,12 @@ class Model:
         if isinstance(source, bytes):
             self._load(source)
             return
+        contents = read_blob(source)
         try:
-            self._load(read_blob(source))
+            self._load(contents)
         except GaitError as exc:
+            if not {"CURV", "CHNM"} & set(decode(contents)):
+                raise UserError(f"{source}: holds no cyclic model; learn it without --segments only") from exc
             raise UserError(f"{source or 'walk.gait'}: {exc.text}; copy or learn it again") from exc
 
     def _load(self, blob: bytes) -> None:

@@ -8,9 +8,11 @@ import pytest
 
 import gait.cli
 from gait import blob
+from gait.errors import UserError
 from gait.lift.observe import Observations, image_axes, orthographic
 from gait.lift.posterior import infer, place, share_along, share_rigid
 from gait.lift.prior import TAGS, SegmentPrior
+from gait.model import Model
 from gait.skeleton import EVAL15, JOINTS
 
 
@@ -71,8 +73,10 @@ def test_whole_recordings_alone_give_a_blob_that_tracks_nothing(walks, tmp_path,
     assert told["segments"]["recordings"] == 5 and not told["left_out"]
     assert set(blob.read(path)) == {"META", *TAGS}
     assert run("info", path) == 0 and "segment prior" in capsys.readouterr().out
-    (tmp_path / "c.json").write_text("{}")
-    assert run("track", "v.mp4", "--camera", tmp_path / "c.json", "-o", tmp_path / "t.csv", "-m", path) == 1
+    with pytest.raises(
+        UserError, match=r"only.gait: holds no cyclic model; learn it without --segments only"
+    ):
+        Model(path)
 
 
 def test_all_also_learns_from_what_is_no_walk(walks, tmp_path, capsys):

@@ -253,19 +253,19 @@ def test_a_prior_of_motions_has_their_mean_and_unit(motion):
             places = motion.places + 0.002 * k
             corpus.put(f"{k}_1", str(k), None, replace(motion, places=places))
         recordings = corpus.recordings()
-    prior = segment_fit.fit(recordings, Segments(modes=20))
-    assert prior.segments == 4 * 13 and prior.recordings == 4 and prior.size == 20
+    prior = segment_fit.fit(recordings, Segments(modes=12))
+    assert prior.segments == 4 * 13 and prior.recordings == 4 and prior.size == 12
     assert prior.stature == pytest.approx(motion.stature) and prior.names == MARKERS
     assert np.all(np.diff(prior.sd[0]) <= 0) and (prior.residual > 0).all()
-    norm = np.linalg.norm(prior.modes[0].reshape(20, -1), axis=1)
+    norm = np.linalg.norm(prior.modes[0].reshape(12, -1), axis=1)
     assert np.allclose(norm, prior.sd[0])
-    flat = prior.modes[0].reshape(20, -1)
-    assert (flat[np.arange(20), np.abs(flat).argmax(axis=1)] > 0).all()
+    flat = prior.modes[0].reshape(12, -1)
+    assert (flat[np.arange(12), np.abs(flat).argmax(axis=1)] > 0).all()
     cut = segment_corpus.segments(recordings[0], MARKERS, Segments())
     assert np.abs(cut.mean(axis=0) - prior.mean[0]).max() < 0.05
-    again = segment_fit.fit(recordings, Segments(modes=20))
+    again = segment_fit.fit(recordings, Segments(modes=12))
     assert np.array_equal(again.modes, prior.modes) and again.gamma == prior.gamma
-    copies = segment_fit.fit(recordings, Segments(modes=20, headings=8))
+    copies = segment_fit.fit(recordings, Segments(modes=12, headings=8))
     assert copies.segments == prior.segments
     assert np.abs(copies.mean[0, 0, :, :2]).max() < 1e-9  # all round: nobody looks anywhere
     mixed = segment_fit.fit(recordings, Segments(modes=10, mixture=2))

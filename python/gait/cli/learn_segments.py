@@ -40,7 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="R",
         help="per second (20)",
     )
-    add("--segment-modes", type=values.whole(*MODES), default=usual.modes, metavar="K", help="at most (50)")
+    add(
+        "--segment-modes",
+        type=values.whole(*MODES),
+        default=usual.modes,
+        metavar="K",
+        help="at most (50, a quarter of the segments)",
+    )
     add(
         "--segment-headings",
         choices=list(segment_options.TURNS),

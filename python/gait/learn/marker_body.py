@@ -61,8 +61,7 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
         fit = skeleton_fit.fit(points[:, columns], found)
     except ValueError:
         raise UserError(f"{path}: fewer than three known markers in every frame; see --markers") from None
-    subject = _subject(labels[columns[0]])
-    own = {plain_label(k): points[:, i] for i, k in enumerate(labels) if _subject(k) == subject}
+    own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
     walker = from_fit(path.stem, fps, fit, own)
     if not walker.residual or not walker.residual < WORST_RMS:
         worst = labels[columns[int(np.nanargmax(np.nanmedian(fit.residual, axis=0)))]]
@@ -109,15 +108,10 @@ def _subject(label: str) -> str:
     return label.rsplit(":", 1)[0] if ":" in label else ""
 
 
-def plain_label(label: str) -> str:
-    """Label of a marker without its subject."""
-    return label.rsplit(":", 1)[-1]
-
-
 def from_fit(
     name: str, fps: float, fit: skeleton_fit.Fit, markers: Mapping[str, Floats] | None = None
 ) -> Body:
-    """Body of a fitted skeleton and a file's markers (T, 3), turned to z up, without what is unsure."""
+    """Body of a fitted skeleton and the markers (T, 3) by label, turned to z up, without what is unsure."""
     positions, axes = _known(fit)
     joints = {joint: positions[:, k] for k, joint in enumerate(JOINTS)}
     joints["head"] = joints.pop("head_top")

@@ -17,7 +17,8 @@ from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 
-FEWEST = 3  # segments
+FEWEST = 8  # segments
+EACH = 4  # segments that a mode needs: with more modes they are learnt by heart
 USUAL_STATURE = 1.70  # metres, where no recording shows one
 
 
@@ -36,7 +37,7 @@ def fit(recordings: Sequence[Recorded], wanted: Segments) -> SegmentPrior:
         raise UserError(
             f"the recordings hold {real} segments of {seconds:g} s; add recordings, or --segments none"
         )
-    modes = min(wanted.modes, len(table.rows) - 1)
+    modes = min(wanted.modes, max(1, real // EACH))
     found = basis(filled(table.rows, modes), len(table.names))
     everyone = segment_heldout.fitted(found, np.ones(len(table.rows), bool), modes)
     held_out = [

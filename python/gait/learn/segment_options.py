@@ -27,7 +27,7 @@ class Segments:
     fps : float
         Frames per second of the segments.
     modes : int
-        At most so many.
+        At most so many; a quarter of the segments if that is fewer.
     headings : 0, 2 or 8
         See `gait.lift.prior.SegmentPrior`.
     mixture : int or None

@@ -78,11 +78,6 @@ class Rows:
     value: Floats
     variance: Floats
 
-    def without(self, gone: npt.NDArray[np.bool_]) -> Rows:
-        """Rows but for the points flagged (n,)."""
-        kept = ~gone
-        return Rows(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
-
     def shifted(self, places: Floats) -> Rows:
         """Rows that measure displacements from `places` (T, J, 3)."""
         at = places[self.frame, self.marker]
