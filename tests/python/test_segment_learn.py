@@ -204,6 +204,10 @@ def test_gamma_is_what_people_left_out_ask_for():
 
     assert 1 < gamma(segment_basis.basis(rows, 5)) < 1.4  # modes fit the noise of those learnt from
     assert gamma(segment_basis.basis(rows + own[subject], 5)) > 3
+    still = np.tile(own[:, None, :15], (1, 4, 1)).reshape(6, -1)  # the same in all four frames
+    assert gamma(segment_basis.basis(rows + still[subject], 5)) > 2 * gamma(
+        segment_basis.basis(rows + own[subject], 5)
+    )
     assert segment_heldout.gamma([]) == 1
     assert segment_heldout.groups(np.zeros(5, int), np.zeros(5, int)) == []
 

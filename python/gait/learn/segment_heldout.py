@@ -1,7 +1,9 @@
 """How well segments of people who were left out are expected: what the rest outside the modes is for them.
 
-The residuals of everybody else are too small for another person: the factor `gamma` of their variance is
-fitted to the likelihood of the people left out in turn.
+The residuals of everybody else are too small for another person: a factor of their variance is fitted to the
+likelihood of the people left out in turn.  And what lies outside the modes hardly changes within a segment,
+while the prior takes it for new in every frame: ten frames of it would count ten times.  So `gamma` is that
+factor times the number of frames that tell the same.
 """
 
 from __future__ import annotations
@@ -62,6 +64,8 @@ class Fold:
         Number of coordinates D.
     units : float
         Log determinant of the residual variances.
+    alike : float
+        Frames that tell the same: 1 if the rest is new in each, F if it stays.
     """
 
     signal: Floats
@@ -69,6 +73,7 @@ class Fold:
     beside: float
     size: int
     units: float
+    alike: float
 
     def loss(self, gamma: float) -> float:
         """Twice the negative log likelihood of a segment, without constants."""
@@ -84,11 +89,15 @@ def fold(basis: Basis, model: Fitted, rows: npt.NDArray[np.bool_]) -> Fold:
     modes = (basis.directions @ (model.vectors * np.sqrt(model.variance))) * scale[:, None]
     left, singular, _ = np.linalg.svd(modes, full_matrices=False)
     x = (basis.scores[rows] - model.mean) @ (basis.directions * scale[:, None]).T
-    along = np.mean((x @ left) ** 2, axis=0)
+    inside = x @ left
+    along = np.mean(inside**2, axis=0)
+    rest = (x - inside @ left.T).reshape(len(x), entries, 3 * markers)
+    alike = entries**2 * np.sum(rest.mean(axis=1) ** 2) / max(float(np.sum(rest**2)), 1e-300)
     outside = basis.rest[rows] @ (1 / model.residual)
     total = np.mean(np.sum(x**2, axis=1) + outside)
     units = 3 * entries * float(np.log(model.residual).sum())
-    return Fold(singular**2, along, float(total - along.sum()), 3 * markers * entries, units)
+    beside = float(total - along.sum())
+    return Fold(singular**2, along, beside, 3 * markers * entries, units, float(max(alike, 1.0)))
 
 
 def groups(subject: npt.NDArray[np.intp], recording: npt.NDArray[np.intp]) -> list[npt.NDArray[np.bool_]]:
@@ -101,7 +110,7 @@ def groups(subject: npt.NDArray[np.intp], recording: npt.NDArray[np.intp]) -> li
 
 
 def gamma(folds: list[Fold]) -> float:
-    """Factor of most likelihood, every fold counting alike; 1 without folds."""
+    """Factor of the residual variance, every fold counting alike; 1 without folds."""
     if not folds:
         return 1.0
 
@@ -109,4 +118,4 @@ def gamma(folds: list[Fold]) -> float:
         return float(np.mean([f.loss(np.exp(x)) for f in folds]))
 
     found = minimize_scalar(loss, bounds=np.log(RANGE), method="bounded", options={"xatol": 1e-6})
-    return float(np.exp(found.x))
+    return float(np.exp(found.x) * np.mean([f.alike for f in folds]))

@@ -26,7 +26,7 @@ POSTURE = {
     "neck": 6.0, "torso": 3.0, "shoulder_rotation": 12.0, "shoulder": 4.0, "elbow": 6.0, "hip_rotation": 4.0,
     "hip": 2.0, "knee": 3.0, "ankle": 3.0,
 }  # fmt: skip
-LENGTH = 0.04  # relative, of each length at the same stature
+LENGTH = 0.05  # relative, of each length at the same stature
 FEET = [MARKERS.index(f"{s}_{part}") for s in SIDES for part in ("toe", "heel")]
 
 
