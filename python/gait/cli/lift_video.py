@@ -32,9 +32,19 @@ from gait.video import Video, VideoWriter, background
 Floats = npt.NDArray[np.float64]
 
 
+FILES = """\
+P.json says where the person roughly is in one frame, with --camera as --init of gait track does:
+  {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65}
+and without a camera in the picture; places are then in its axes (x to the right, y away, z up):
+  {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
+C.json says where joints (or other markers of the model) are, and if wanted how exactly (4 pixels):
+  {"corrections": [{"frame": 70, "joint": "l_knee", "uv": [1285.5, 812], "sd_px": 5}]}
+"""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that only a video has."""
-    group = parser.add_argument_group("from a video")
+    group = parser.add_argument_group("from a video", FILES)
     group.add_argument("--placement", metavar="P.json", help="where the person roughly is in one frame")
     group.add_argument("--corrections", metavar="C.json", help="joints pointed at in any frames")
     group.add_argument(

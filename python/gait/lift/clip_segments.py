@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -70,19 +71,30 @@ class ClipSegments:
     placement: Placement
     corrections: Sequence[Correction]
     settings: Settings
-    shapes: list[Shape] = field(init=False)
-    sticks: Sticks = field(init=False)
-    starts: Floats = field(init=False)
 
-    def __post_init__(self) -> None:
-        prior, film = self.prior, self.film
-        shapes = [Shape.of(prior, c, self.placement.stature) for c in range(prior.components)]
-        placed = film.times[self.placement.frame - film.first]
-        before = np.ceil((placed - film.times[0]) / self.hop - 1e-6)
-        after = max(0.0, np.ceil((film.times[-1] - placed - self.span) / self.hop - 1e-6))
-        object.__setattr__(self, "shapes", shapes)
-        object.__setattr__(self, "sticks", Sticks.of(prior.names))
-        object.__setattr__(self, "starts", placed + self.hop * np.arange(-before, after + 1))
+    @cached_property
+    def shapes(self) -> list[Shape]:
+        """Gaussians of the prior for this person."""
+        stature = self.placement.stature
+        return [Shape.of(self.prior, c, stature) for c in range(self.prior.components)]
+
+    @cached_property
+    def sticks(self) -> Sticks:
+        """Stick figure of the prior's markers."""
+        return Sticks.of(self.prior.names)
+
+    @cached_property
+    def starts(self) -> Floats:
+        """Times (B,) at which segments start, seconds."""
+        film = self.film
+        before = np.ceil((self.placed - film.times[0]) / self.hop - 1e-6)
+        after = max(0.0, np.ceil((film.times[-1] - self.placed - self.span) / self.hop - 1e-6))
+        return np.asarray(self.placed + self.hop * np.arange(-before, after + 1))
+
+    @property
+    def placed(self) -> float:
+        """Time of the placement's frame."""
+        return float(self.film.times[self.placement.frame - self.film.first])
 
     @property
     def hop(self) -> float:
@@ -97,8 +109,7 @@ class ClipSegments:
     @property
     def origin(self) -> int:
         """Index of the segment that starts at the placement's frame."""
-        placed = self.film.times[self.placement.frame - self.film.first]
-        return int(np.argmin(np.abs(self.starts - placed)))
+        return int(np.argmin(np.abs(self.starts - self.placed)))
 
     @property
     def sensor_sd(self) -> float:
@@ -108,7 +119,7 @@ class ClipSegments:
     def frames(self, segment: int) -> Indices:
         """Frames of the film (from its first) within a segment."""
         since = self.film.times - self.starts[segment]
-        return np.flatnonzero((since > -1e-6) & (since < self.span + 1e-6))
+        return np.flatnonzero((since > -1e-6) & (since < max(self.span, self.hop) + 1e-6))
 
     def weights(self, segment: int) -> Floats:
         """Interpolate (T, F) the segment's frames at those of the film: cubic splines."""

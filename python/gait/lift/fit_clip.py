@@ -168,7 +168,8 @@ def _continued(
     start = state.copy()
     start[: PLACE.start] = 0.0
     pelvis = places[:, clip.prior.names.index("pelvis")]
-    start[PLACE][:2] = pelvis[hop, :2] if step > 0 else 2 * pelvis[0, :2] - pelvis[hop % frames, :2]
+    ahead = pelvis[min(hop, frames - 1), :2]
+    start[PLACE][:2] = ahead if step > 0 else 2 * pelvis[0, :2] - ahead
     blind = Energy(
         clip.shapes[component],
         clip.view,
