@@ -2,12 +2,12 @@
 
 A calibrated camera and a parallel view of known scale give the rows of `gait.lift.observe`.  Where the scale
 is unknown, the length l of one unit of the picture is one more number per frame: a point seen at (u, v) obeys
-right . X - u l = 0 and down . X - v l = 0, with the noise sd l.
+right . X - u l = 0 and down . X - v l = 0, with the noise sd l.  Near a guess this is linearised there.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -111,9 +111,25 @@ def _smoothed(values: Floats, reach: int = 15) -> Floats:
     )
 
 
-def scale_free(rows: Rows, uv: Floats, origin: Floats) -> tuple[Rows, Floats]:
-    """Take rows of `Parallel.rows` with the length of a unit unknown; its factors (n, 2)."""
-    return replace(rows, value=np.zeros_like(rows.value)), origin - uv[rows.frame, rows.marker]
+def scale_free(rows: Rows, places: Floats, lengths: Floats) -> tuple[Rows, Floats]:
+    """Let the length of a unit of the picture be unknown.
+
+    Parameters
+    ----------
+    rows : Rows
+        From `Parallel.rows` with `lengths` (T,).
+    places : (T, J, 3)
+        What the rows are linearised at: the picture of these, and not the noisy one, is scaled.
+
+    Returns
+    -------
+    rows : Rows
+    factors : (n, 2)
+        Of the frame's length.
+    """
+    rows = rows.shifted(places)
+    at = np.einsum("nai,ni->na", rows.direction, places[rows.frame, rows.marker])
+    return rows, -at / lengths[rows.frame, None]
 
 
 def looking_along(text: str) -> Floats:

@@ -153,7 +153,8 @@ def smooth(
     bones: bool = True,
 ) -> Lifted:
     """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
-    problem = _Problem(prior, seen, view, freedom, contact, bones)
+    unit = float(np.mean(start.lengths)) if view.scaled else None
+    problem = _Problem(prior, seen, view, freedom, unit, contact, bones)
     around = problem.around(start.heading, start.component, start.stature, start.places)
     places, lengths, settled, steps = start.places, start.lengths, False, 0
     while not settled and steps < MOST_STEPS:
@@ -161,9 +162,9 @@ def smooth(
         system = problem.system(around, lengths, constrained)
         values = system.factor.solve(system.vector)
         fresh = problem.layout.places(values)
-        settled = constrained and float(np.sqrt(np.mean((fresh - places) ** 2))) < SETTLED
+        settled = constrained and _change(fresh - places) < SETTLED
         places, steps = fresh, steps + 1
-        lengths = problem.layout.lengths(values) if problem.layout.scaled else lengths
+        lengths = problem.layout.lengths(values) if view.scaled else lengths
         around = moved(prior, around, freedom, places)
     return problem.result(around, places, lengths, steps, settled)
 
@@ -178,18 +179,38 @@ class _System:
     fit: float  #: y' W y of what is seen
     log_weight: float
 
+    @property
+    def log_volume_ratio(self) -> float:
+        """Logarithm to base 10 of the posterior's volume over the prior's."""
+        return (self.chain.log_det - self.factor.log_det) / 2 / float(np.log(10))
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the density of what is seen, by Laplace's method."""
+        mean = self.factor.solve(self.vector)
+        square = self.fit + self.chain.constant - float((self.vector * mean).sum())
+        spread = self.chain.log_det + self.log_weight - self.factor.log_det
+        return 0.5 * (spread - square)
+
 
 class _Problem:
     """Prior, observations and constraints of one sequence."""
 
     def __init__(
-        self, prior: SegmentPrior, seen: Seen, view: View, freedom: Freedom, contact: bool, bones: bool
+        self,
+        prior: SegmentPrior,
+        seen: Seen,
+        view: View,
+        freedom: Freedom,
+        unit: float | None,
+        contact: bool = False,
+        bones: bool = False,
     ) -> None:
         self.prior, self.seen, self.view, self.freedom = prior, seen, view, freedom
         self.contact, self.bones = contact, bones
         self.grid = Grid.over(seen.time, prior)
         self.at = self.grid.between(seen.time)
-        self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), view.scaled)
+        self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit)
 
     def around(self, heading: Floats, component: Ints, stature: float, places: Floats) -> Around:
         """Say what the chain is linearised around."""
@@ -217,7 +238,7 @@ class _Problem:
         seen = self.view.rows(self.seen.points, near[:, self.seen.markers], scale)
         factors = None
         if isinstance(self.view, Parallel) and self.view.scaled:
-            seen, factors = scale_free(seen, self.seen.points.uv, self.view.origin)
+            seen, factors = scale_free(seen, near[:, self.seen.markers], scale)
             soft.steady_lengths(rows, lengths, None if self.view.steady else DRIFT)
         soft.observe(rows, seen, self.seen.markers, self.at, factors)
 
@@ -229,6 +250,7 @@ class _Problem:
     def result(self, around: Around, places: Floats, lengths: Floats, steps: int, settled: bool) -> Lifted:
         """Covariances and figures of the last estimate."""
         system = self.system(around, lengths, constrained=True)
+        bare = self.system(around, lengths, constrained=False)
         diagonal, across = system.factor.covariance()
         sure = soft.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
         return Lifted(
@@ -241,8 +263,8 @@ class _Problem:
             contact=sure if self.contact else np.zeros_like(sure),
             steps=steps,
             settled=settled,
-            log_volume_ratio=(system.chain.log_det - system.factor.log_det) / 2 / np.log(10),
-            evidence=self._evidence(around, lengths),
+            log_volume_ratio=bare.log_volume_ratio,
+            evidence=bare.evidence,
         )
 
     def _variances(self, diagonal: Floats, across: Floats) -> Floats:
@@ -267,10 +289,7 @@ class _Problem:
                 total += (weights[:, i] * weights[:, k])[:, None, None] * value
         return total
 
-    def _evidence(self, around: Around, lengths: Floats) -> float:
-        """Log density of what is seen, by Laplace's method."""
-        bare = _Problem(self.prior, self.seen, self.view, self.freedom, contact=False, bones=False)
-        system = bare.system(around, lengths, constrained=False)
-        mean = system.factor.solve(system.vector)
-        square = system.fit + system.chain.constant - float((system.vector * mean).sum())
-        return 0.5 * (system.chain.log_det + system.log_weight - system.factor.log_det - square)
+
+def _change(difference: Floats) -> float:
+    """Rms of a change (grid, J, 3) but for that of the whole sequence, which a far view does not tell."""
+    return float(np.sqrt(np.mean((difference - difference.mean(axis=(0, 1))) ** 2)))

@@ -36,7 +36,7 @@ BONES = (
     ("l_shoulder", "r_shoulder"),
 )
 WEAK = 10.0  # relative deviation of a scale from its guess: as good as free
-FIXED = 1e-5  # relative change of a scale that does not change
+FIXED = 1e-4  # relative change of a scale that does not change
 LEAST_SURE = 0.05  # that a foot stands, to matter
 SHORTEST = 0.02  # metres, of a bone
 BONE_SD = 0.01  # relative change of a length from one frame to the next
@@ -50,19 +50,19 @@ class Layout:
     ----------
     blocks, frames, markers : int
         B, b, J.
-    scaled : bool
-        Whether every frame has a length of a unit of the picture.
+    unit : float or None
+        Metres in which lengths of a unit of the picture count, one per frame; None: there are none.
     """
 
     blocks: int
     frames: int
     markers: int
-    scaled: bool
+    unit: float | None
 
     @property
     def size(self) -> int:
         """Numbers of a block."""
-        return self.frames * (3 * self.markers + self.scaled)
+        return self.frames * (3 * self.markers + (self.unit is not None))
 
     @property
     def grid(self) -> int:
@@ -85,8 +85,9 @@ class Layout:
         return values[:, :used].reshape(self.grid, self.markers, 3)
 
     def lengths(self, values: Floats) -> Floats:
-        """Lengths (grid,) out of values (B, size)."""
-        return values[:, 3 * self.frames * self.markers :].reshape(-1)
+        """Lengths (grid,) out of values (B, size), metres; `unit` must be known."""
+        assert self.unit is not None
+        return self.unit * values[:, 3 * self.frames * self.markers :].reshape(-1)
 
 
 class Rows:
@@ -152,7 +153,7 @@ def observe(
     for k in range(2):
         factors = (weights[..., None] * seen.direction[:, k, None]).reshape(len(frames), -1)
         if scale is not None:
-            factors = np.hstack([factors, weights * scale[:, k, None]])
+            factors = np.hstack([factors, weights * scale[:, k, None] * (rows.layout.unit or 1.0)])
         rows.add(columns, factors, seen.value[:, k], np.sqrt(seen.variance[:, k]))
 
 
@@ -231,10 +232,10 @@ def steady_lengths(rows: Rows, lengths: Floats, drift: float | None) -> None:
     drift : float or None
         Relative standard deviation of the change of their change from frame to frame; None: all are equal.
     """
-    grid, typical = rows.layout.grid, float(np.mean(lengths))
+    grid, guess = rows.layout.grid, lengths / (rows.layout.unit or 1.0)
     at = rows.layout.length(np.arange(grid))
-    rows.add(at[:, None], np.ones((grid, 1)), lengths, np.full(grid, WEAK * typical))
+    rows.add(at[:, None], np.ones((grid, 1)), guess, np.full(grid, WEAK))
     factors, sd = ([-1.0, 1.0], FIXED) if drift is None else ([1.0, -2.0, 1.0], drift)
     count = grid - len(factors) + 1
     columns = np.stack([at[i : i + count] for i in range(len(factors))], axis=1)
-    rows.add(columns, np.tile(factors, (count, 1)), np.zeros(count), np.full(count, sd * typical))
+    rows.add(columns, np.tile(factors, (count, 1)), np.zeros(count), np.full(count, sd))
