@@ -1,5 +1,6 @@
 #include "estimate.h"
 #include "fmath.h"
+#include "kernels.h"
 #include "linalg.h"
 #include <string.h>
 
@@ -17,83 +18,48 @@ walker estimate_place(const population *p, const double *weight)
     return w;
 }
 
-typedef struct circular { /* resultant of unit vectors */
-    double c, s;
-} circular;
-
-static circular resultant(const float *angle, float turn, const double *weight, const uint8_t *use, int32_t n)
+/* Resultant of unit vectors. */
+static float resultant_length(double c, double s)
 {
-    circular r = {0.0, 0.0};
-    for (int32_t i = 0; i < n; i++) {
-        float sn, cs;
-        if (use && !use[i])
-            continue;
-        m_sincos(turn * angle[i], &sn, &cs);
-        r.c += weight[i] * (double)cs;
-        r.s += weight[i] * (double)sn;
-    }
-    return r;
-}
-
-static float resultant_length(circular r)
-{
-    return f_min((float)__builtin_sqrt(r.c * r.c + r.s * r.s), 1.0f);
+    return f_min((float)__builtin_sqrt(c * c + s * s), 1.0f);
 }
 
 /* Circular standard deviation, radians: sqrt(-2 log R). */
-static float resultant_sd(circular r)
+static float resultant_sd(double c, double s)
 {
-    return __builtin_sqrtf(f_max(-2.0f * m_log(f_max(resultant_length(r), 1e-6f)), 0.0f));
+    return __builtin_sqrtf(f_max(-2.0f * m_log(f_max(resultant_length(c, s), 1e-6f)), 0.0f));
 }
 
-/* Particles near the heaviest one in phase and heading; returns their weight. */
-static double dominant_mode(const population *p, const double *weight, int32_t best, uint8_t *use)
-{
-    float const near_phase = 0.15f, near_heading = 0.5f;
-    const float *const phase = field(p, F_PHASE), *const heading = field(p, F_HEADING);
-    double mass = 0.0;
-    for (int32_t i = 0; i < p->n; i++) {
-        float const dp = TWO_PI_F * (phase[i] - phase[best]), dh = heading[i] - heading[best];
-        use[i] = fabsf(m_wrap_pi(dp)) < TWO_PI_F * near_phase && fabsf(m_wrap_pi(dh)) < near_heading;
-        mass += use[i] ? weight[i] : 0.0;
-    }
-    return mass;
-}
+/* The particles of an estimate and what belongs to it. */
+typedef struct crowd {
+    const kernels *run;
+    const population *people;
+    const double *weight;
+    const uint8_t *use; /* those of the mode, */
+    double mass;        /* which weigh this much */
+    int32_t best;
+} crowd;
 
-static void mean_and_sd(const float *v, const double *weight, const uint8_t *use, double mass, int32_t n,
-                        float *mean, float *sd)
+/* Mean and variance of one number per particle, and its mean in the mode. */
+static void moments(const crowd *c, const float *v, double *mean, double *var, double *mode)
 {
-    double sum = 0.0, all = 0.0, square = 0.0;
-    for (int32_t i = 0; i < n; i++) {
-        sum += use[i] ? weight[i] * (double)v[i] : 0.0;
-        all += weight[i] * (double)v[i];
-    }
-    for (int32_t i = 0; i < n; i++) {
-        double const d = (double)v[i] - all;
-        square += weight[i] * d * d;
-    }
-    *mean = (float)(sum / mass);
-    *sd = (float)__builtin_sqrt(square);
+    double const about = (double)v[c->best];
+    double sum[3];
+    c->run->estimate_moments(v, c->weight, c->use, c->people->n, about, sum);
+    double const square = sum[1] - sum[0] * sum[0];
+    *mean = about + sum[0];
+    *var = square > 0.0 ? square : 0.0;
+    *mode = about + sum[2] / c->mass;
 }
 
 /* Chordal mean of Rz(heading) Ry(pitch) Rx(roll) over the mode, back as the three angles. */
-static void mean_rotation(const population *p, const double *weight, const uint8_t *use, walker *w)
+static void mean_rotation(const crowd *c, walker *w)
 {
-    double qq[16] = {0};
+    const population *const p = c->people;
+    double qq[16];
     float q[4];
-    for (int32_t i = 0; i < p->n; i++) {
-        float sh, ch, sp, cp, sr, cr;
-        if (!use[i])
-            continue;
-        m_sincos(0.5f * field(p, F_HEADING)[i], &sh, &ch);
-        m_sincos(0.5f * field(p, F_PITCH)[i], &sp, &cp);
-        m_sincos(0.5f * field(p, F_ROLL)[i], &sr, &cr);
-        float const v[4] = {ch * cp * cr + sh * sp * sr, ch * cp * sr - sh * sp * cr,
-                            ch * sp * cr + sh * cp * sr, sh * cp * cr - ch * sp * sr};
-        for (int32_t a = 0; a < 4; a++)
-            for (int32_t b = 0; b < 4; b++)
-                qq[4 * a + b] += weight[i] * (double)(v[a] * v[b]);
-    }
+    c->run->estimate_rotations(field(p, F_HEADING), field(p, F_PITCH), field(p, F_ROLL), c->weight, c->use,
+                               p->n, qq);
     la_rotation_mean(qq, q);
     w->f[F_HEADING] = m_atan2(2.0f * (q[0] * q[3] + q[1] * q[2]), 1.0f - 2.0f * (q[2] * q[2] + q[3] * q[3]));
     w->f[F_PITCH] = m_asin(f_clamp(2.0f * (q[0] * q[2] - q[3] * q[1]), -1.0f, 1.0f));
@@ -101,20 +67,14 @@ static void mean_rotation(const population *p, const double *weight, const uint8
 }
 
 /* Posterior mean of every joint over all particles, and its deviation as it is reported. */
-static void joints(const gait_tracker *t, float stature, gait_estimate *out)
+static void joints(const gait_tracker *t, const crowd *c, float stature, gait_estimate *out)
 {
     double const factor = (double)t->cfg.joint_sd_factor, model = (double)(t->cfg.joint_sd_model * stature);
-    int32_t const n = t->cfg.particles;
-    const double *const weight = t->filter.weight;
     for (int32_t p = 0; p < 3 * t->model->points; p++) {
-        const float *const v = t->joint + (size_t)p * (size_t)n;
-        double sum = 0.0, square = 0.0;
-        for (int32_t i = 0; i < n; i++)
-            sum += weight[i] * (double)v[i];
-        for (int32_t i = 0; i < n; i++)
-            square += weight[i] * ((double)v[i] - sum) * ((double)v[i] - sum);
-        out->pose.joint[p / 3][p % 3] = (float)sum;
-        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(factor * factor * square + model * model);
+        double mean, var, mode;
+        moments(c, t->joint + (size_t)p * (size_t)t->cfg.particles, &mean, &var, &mode);
+        out->pose.joint[p / 3][p % 3] = (float)mean;
+        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(factor * factor * var + model * model);
     }
 }
 
@@ -150,30 +110,39 @@ static void spread(const gait_tracker *t, const walker *sd, float phase_sd, floa
         out->sd.offset[t->rule.angle[k]] = sd->f[body_rule_offset(&t->rule) + k];
 }
 
+/* Means of the mode and deviations of all, field by field; phase and directions: along the line. */
+static void fields(const crowd *c, walker *mean, walker *sd)
+{
+    for (int32_t f = 0; f < c->people->fields; f++) {
+        double all, var, mode;
+        moments(c, field(c->people, f), &all, &var, &mode);
+        mean->f[f] = (float)mode;
+        sd->f[f] = (float)__builtin_sqrt(var);
+    }
+}
+
 walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
 {
     const population *const p = &t->gen[t->core->current].people;
-    const double *const weight = t->filter.weight;
-    uint8_t *const use = t->mode;
-    double const mass = dominant_mode(p, weight, best, use);
+    crowd c = {.run = t->like->run, .people = p, .weight = t->filter.weight, .use = t->mode, .best = best};
     walker mean = {{0}}, sd;
-    for (int32_t f = 0; f < p->fields; f++)
-        mean_and_sd(field(p, f), weight, use, mass, p->n, &mean.f[f], &sd.f[f]);
-    circular const phase = resultant(field(p, F_PHASE), TWO_PI_F, weight, NULL, p->n);
-    circular const mode = resultant(field(p, F_PHASE), TWO_PI_F, weight, use, p->n);
-    mean.f[F_PHASE] = m_wrap1(m_atan2((float)mode.s, (float)mode.c) / TWO_PI_F);
-    mean_rotation(p, weight, use, &mean);
-    joints(t, mean.f[F_STATURE], out);
-    spread(t, &sd, resultant_sd(phase) / TWO_PI_F,
-           resultant_sd(resultant(field(p, F_HEADING), 1.0f, weight, NULL, p->n)), out);
-    walker const heaviest = walker_get(p, best);
+    double phase[4], heading[4]; /* cosine and sine of all, and of the mode */
     gait_pose pose;
+    c.mass = c.run->estimate_mode(field(p, F_PHASE), field(p, F_HEADING), c.weight, p->n, best, t->mode);
+    fields(&c, &mean, &sd);
+    c.run->estimate_resultant(field(p, F_PHASE), TWO_PI_F, c.weight, c.use, p->n, phase);
+    c.run->estimate_resultant(field(p, F_HEADING), 1.0f, c.weight, c.use, p->n, heading);
+    mean.f[F_PHASE] = m_wrap1(m_atan2((float)phase[3], (float)phase[2]) / TWO_PI_F);
+    mean_rotation(&c, &mean);
+    joints(t, &c, mean.f[F_STATURE], out);
+    spread(t, &sd, resultant_sd(phase[0], phase[1]) / TWO_PI_F, resultant_sd(heading[0], heading[1]), out);
+    walker const heaviest = walker_get(p, best);
     out->mean = walker_state(&t->rule, &mean);
     out->best = walker_state(&t->rule, &heaviest);
     if (model_pose_state(t->model, &out->mean, &pose) == GAIT_OK)
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
-    out->phase_r = resultant_length(phase);
-    out->mode_mass = (float)mass;
+    out->phase_r = resultant_length(phase[0], phase[1]);
+    out->mode_mass = (float)c.mass;
     out->speed = estimate_speed(t, &mean);
     return mean;
 }

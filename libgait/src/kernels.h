@@ -60,6 +60,18 @@ struct walker_block;
     K(void, dynamics_move,                                                                                   \
       (const struct dynamics_step *s, int32_t first, const struct walker_block *from,                        \
        struct walker_block *to))                                                                             \
+    /* Sums over weighted particles, d = v - about: w d, w d^2 and, over those in use, w d; cosines and */   \
+    /* sines over all and those in use; who is near the best, and their weight; products of quaternions. */  \
+    K(void, estimate_moments,                                                                                \
+      (const float *v, const double *weight, const uint8_t *use, int32_t n, double about, double out[3]))    \
+    K(void, estimate_resultant,                                                                              \
+      (const float *angle, float turn, const double *weight, const uint8_t *use, int32_t n, double out[4]))  \
+    K(double, estimate_mode,                                                                                 \
+      (const float *phase, const float *heading, const double *weight, int32_t n, int32_t best,              \
+       uint8_t *use))                                                                                        \
+    K(void, estimate_rotations,                                                                              \
+      (const float *heading, const float *pitch, const float *roll, const double *weight,                    \
+       const uint8_t *use, int32_t n, double out[16]))                                                       \
     /* The limbs of a block of bodies in one camera's working image. */                                      \
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \

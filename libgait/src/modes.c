@@ -208,9 +208,9 @@ void modes_fork(gait_tracker *t)
     pf *const f = &t->filter;
     population *const now = &t->gen[t->core->current].people, *const was =
                                                                   &t->gen[1 - t->core->current].people;
-    float const middle = half_phase(now);
     if (!search_is_over(t))
         return;
+    float const middle = half_phase(now);
     was->n = now->n;
     memcpy(was->value, now->value, (size_t)now->fields * (size_t)now->n * sizeof *now->value);
     for (int32_t i = 0; i < f->n; i++)

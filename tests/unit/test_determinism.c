@@ -9,7 +9,7 @@
 #include "check.h"
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x8047574148f3f296)
+#define GOLDEN UINT64_C(0xd8f2ce08c1d3f296)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 

@@ -1,6 +1,7 @@
 /* What is reported of weighted particles, against direct sums in double precision. */
 #include "estimate.h"
 
+#include "kernel_check.h"
 #include "rng.h"
 #include "toy_tracker.h"
 
@@ -282,8 +283,56 @@ static void test_fields(void)
     CHECK_NEAR(place.f[F_STATURE], mean[F_STATURE], 1e-6);
 }
 
+/* Sums of any number of particles at any address: every instruction set gives the same bits, whoever is in use
+ * is marked and nothing else written; and they are what plain sums are. */
+static void test_sums(void)
+{
+    enum { MOST = 300 };
+    static float v[3][MOST + 4];
+    static double weight[MOST + 4];
+    static unsigned char memory[2][MOST + 2 * GUARD];
+    for (int32_t n = 1; n <= MOST; n += n < 40 ? 1 : 37) {
+        int32_t const off = n % 4;
+        double plain[3] = {0.0}, mass = 0.0;
+        for (int32_t i = 0; i < n; i++) {
+            float x[4];
+            rng_normal4(77, 0, (uint32_t)n, (uint32_t)i, 0, x);
+            for (int32_t k = 0; k < 3; k++)
+                v[k][off + i] = x[k];
+            weight[off + i] = (double)(x[3] * x[3]);
+        }
+        double out[2][24];
+        for (int k = -1; k < isa_count(); k++) {
+            const kernels *const run = k < 0 ? isa_scalar() : isa_at(k);
+            double *const to = out[k >= 0];
+            const double *const w = weight + off;
+            guarded const g = guard_fill(memory[k >= 0], (size_t)n);
+            to[0] = run->estimate_mode(v[0] + off, v[1] + off, w, n, n / 2, g.begin);
+            run->estimate_moments(v[2] + off, w, g.begin, n, 0.25, to + 1);
+            run->estimate_resultant(v[1] + off, 1.5f, w, g.begin, n, to + 4);
+            run->estimate_rotations(v[0] + off, v[1] + off, v[2] + off, w, g.begin, n, to + 8);
+            CHECK(guard_whole(&g));
+            CHECK(k < 0 || memcmp(out[0], out[1], sizeof out[0]) == 0);
+            CHECK(k < 0 || memcmp(memory[0], memory[1], sizeof memory[0]) == 0);
+        }
+        for (int32_t i = 0; i < n; i++) {
+            double const d = (double)v[2][off + i] - 0.25;
+            plain[0] += weight[off + i] * d;
+            plain[1] += weight[off + i] * d * d;
+            plain[2] += memory[0][GUARD + i] ? weight[off + i] * d : 0.0;
+            mass += memory[0][GUARD + i] ? weight[off + i] : 0.0;
+        }
+        CHECK(memory[0][GUARD + n / 2] == 1);
+        CHECK_NEAR(out[0][0], mass, 1e-9);
+        for (int k = 0; k < 3; k++)
+            CHECK_NEAR(out[0][1 + k], plain[k], 1e-9);
+        CHECK_NEAR(out[0][8] + out[0][13] + out[0][18] + out[0][23], mass, 1e-5 * (1.0 + mass)); /* unit */
+    }
+}
+
 int main(void)
 {
+    test_sums();
     gait_tracker_config cfg = toy_config(1);
     cfg.particles = N;
     cfg.offset_angles = 1u << TOY_TORSO;

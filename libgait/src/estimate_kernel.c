@@ -1,0 +1,171 @@
+/* Sums over the weighted particles: of every LANES-th one, then over the lanes in order.  Those not in use are
+ * multiplied by 0: of a choice gcc 12 makes masked loads, with AVX2 under the wrong
+ * mask.  LANES: below 32 it unrolls the loops over them first and then finds less to do at once. */
+#include "fmath.h"
+#include "kernels.h"
+#include <string.h>
+
+enum { LANES = 64 };
+
+typedef struct ends { /* the particles after the last whole LANES, and none that weigh anything */
+    float v[3][LANES];
+    double weight[LANES];
+    uint8_t use[LANES];
+} ends;
+
+static double total(const double *lane)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < LANES; i++)
+        sum += lane[i];
+    return sum;
+}
+
+/* Particles first .. n - 1; use may be NULL. */
+static ends ends_of(int32_t n, int32_t count, const float *const v[], const double *weight,
+                    const uint8_t *use)
+{
+    int32_t const first = n - n % LANES;
+    ends e;
+    memset(&e, 0, sizeof e);
+    for (int32_t k = 0; k < count; k++)
+        memcpy(e.v[k], v[k] + first, (size_t)(n - first) * sizeof(float));
+    memcpy(e.weight, weight + first, (size_t)(n - first) * sizeof(double));
+    if (use)
+        memcpy(e.use, use + first, (size_t)(n - first));
+    return e;
+}
+
+/* ---- moments ---- */
+KERNEL_ROW void moments_add(const float *restrict v, const double *restrict weight,
+                            const uint8_t *restrict use, int32_t n, double about,
+                            double (*restrict sum)[LANES])
+{
+    for (int32_t i = 0; i < n; i += LANES)
+        for (int32_t lane = 0; lane < LANES; lane++) {
+            double const d = (double)v[i + lane] - about, wd = weight[i + lane] * d;
+            sum[0][lane] += wd;
+            sum[1][lane] += wd * d;
+            sum[2][lane] += (double)use[i + lane] * wd;
+        }
+}
+
+void KERNEL(estimate_moments)(const float *v, const double *weight, const uint8_t *use, int32_t n,
+                              double about, double out[3])
+{
+    ends const e = ends_of(n, 1, &v, weight, use);
+    double sum[3][LANES] = {{0.0}};
+    moments_add(v, weight, use, n - n % LANES, about, sum);
+    moments_add(e.v[0], e.weight, e.use, LANES, about, sum);
+    for (int32_t k = 0; k < 3; k++)
+        out[k] = total(sum[k]);
+}
+
+/* ---- directions ---- */
+KERNEL_ROW void resultant_add(const float *restrict angle, float turn, const double *restrict weight,
+                              const uint8_t *restrict use, int32_t n, double (*restrict sum)[LANES])
+{
+    for (int32_t i = 0; i < n; i += LANES)
+        for (int32_t lane = 0; lane < LANES; lane++) {
+            float sn, cs;
+            m_sincos(turn * angle[i + lane], &sn, &cs);
+            double const c = weight[i + lane] * (double)cs, s = weight[i + lane] * (double)sn;
+            sum[0][lane] += c;
+            sum[1][lane] += s;
+            sum[2][lane] += (double)use[i + lane] * c;
+            sum[3][lane] += (double)use[i + lane] * s;
+        }
+}
+
+void KERNEL(estimate_resultant)(const float *angle, float turn, const double *weight, const uint8_t *use,
+                                int32_t n, double out[4])
+{
+    ends const e = ends_of(n, 1, &angle, weight, use);
+    double sum[4][LANES] = {{0.0}};
+    resultant_add(angle, turn, weight, use, n - n % LANES, sum);
+    resultant_add(e.v[0], turn, e.weight, e.use, LANES, sum);
+    for (int32_t k = 0; k < 4; k++)
+        out[k] = total(sum[k]);
+}
+
+KERNEL_ROW void near_to(const float *restrict phase, const float *restrict heading, int32_t n, float phase0,
+                        float heading0, uint8_t *restrict use)
+{
+    float const near_phase = 0.15f * TWO_PI_F, near_heading = 0.5f;
+    for (int32_t i = 0; i < n; i++) {
+        float const dp = fabsf(m_wrap_pi(TWO_PI_F * (phase[i] - phase0)));
+        float const dh = fabsf(m_wrap_pi(heading[i] - heading0));
+        use[i] = (uint8_t)((dp < near_phase) & (dh < near_heading));
+    }
+}
+
+KERNEL_ROW void mass_add(const double *restrict weight, const uint8_t *restrict use, int32_t n,
+                         double *restrict sum)
+{
+    for (int32_t i = 0; i < n; i += LANES)
+        for (int32_t lane = 0; lane < LANES; lane++)
+            sum[lane] += (double)use[i + lane] * weight[i + lane];
+}
+
+double KERNEL(estimate_mode)(const float *phase, const float *heading, const double *weight, int32_t n,
+                             int32_t best, uint8_t *use)
+{
+    double sum[LANES] = {0.0};
+    near_to(phase, heading, n, phase[best], heading[best], use);
+    ends const e = ends_of(n, 0, NULL, weight, use);
+    mass_add(weight, use, n - n % LANES, sum);
+    mass_add(e.weight, e.use, LANES, sum);
+    return total(sum);
+}
+
+/* ---- rotations ---- */
+enum { PAIRS = 10 };
+
+/* Products of the components of the quaternion of Rz(heading) Ry(pitch) Rx(roll), w x y z. */
+KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pitch,
+                         const float *restrict roll, float (*restrict pair)[LANES])
+{
+    for (int32_t i = 0; i < LANES; i++) {
+        float sh, ch, sp, cp, sr, cr;
+        m_sincos(0.5f * heading[i], &sh, &ch);
+        m_sincos(0.5f * pitch[i], &sp, &cp);
+        m_sincos(0.5f * roll[i], &sr, &cr);
+        float const w = ch * cp * cr + sh * sp * sr, x = ch * cp * sr - sh * sp * cr;
+        float const y = ch * sp * cr + sh * cp * sr, z = sh * cp * cr - ch * sp * sr;
+        pair[0][i] = w * w;
+        pair[1][i] = w * x;
+        pair[2][i] = w * y;
+        pair[3][i] = w * z;
+        pair[4][i] = x * x;
+        pair[5][i] = x * y;
+        pair[6][i] = x * z;
+        pair[7][i] = y * y;
+        pair[8][i] = y * z;
+        pair[9][i] = z * z;
+    }
+}
+
+KERNEL_ROW void pairs_add(const float (*restrict pair)[LANES], const double *restrict weight,
+                          const uint8_t *restrict use, double (*restrict sum)[LANES])
+{
+    for (int32_t k = 0; k < PAIRS; k++)
+        for (int32_t lane = 0; lane < LANES; lane++)
+            sum[k][lane] += (double)use[lane] * weight[lane] * (double)pair[k][lane];
+}
+
+void KERNEL(estimate_rotations)(const float *heading, const float *pitch, const float *roll,
+                                const double *weight, const uint8_t *use, int32_t n, double out[16])
+{
+    static const uint8_t place[16] = {0, 1, 2, 3, 1, 4, 5, 6, 2, 5, 7, 8, 3, 6, 8, 9};
+    ends const e = ends_of(n, 3, (const float *const[]){heading, pitch, roll}, weight, use);
+    double sum[PAIRS][LANES] = {{0.0}};
+    float pair[PAIRS][LANES];
+    for (int32_t i = 0; i < n - n % LANES; i += LANES) {
+        pairs_of(heading + i, pitch + i, roll + i, pair);
+        pairs_add((const float (*)[LANES])pair, weight + i, use + i, sum);
+    }
+    pairs_of(e.v[0], e.v[1], e.v[2], pair);
+    pairs_add((const float (*)[LANES])pair, e.weight, e.use, sum);
+    for (int32_t k = 0; k < 16; k++)
+        out[k] = total(sum[place[k]]);
+}
