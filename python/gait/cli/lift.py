@@ -149,6 +149,7 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: motion.Motion) -> 
         "iterations": found.steps,
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
+        "log_evidence": found.evidence if np.isfinite(found.evidence) else None,
     }
 
 

@@ -26,7 +26,7 @@ from gait.skeleton import JOINTS
 Floats = npt.NDArray[np.float64]
 
 METHODS = ("smooth", "blend", "segment")
-KNOWN_SD, PEOPLE_SD = 0.02, 0.09  # metres, of a stature that is given, and among people
+KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
 FLOOR_SD, ANY_HEIGHT = 0.03, 10.0  # metres, of the floor's height under a camera, and without one
 LONGEST_GAP = 0.15  # seconds over which a track is interpolated for a segment's own estimate
 
@@ -71,6 +71,8 @@ class Motion:
     settled : bool
     log_volume_ratio : float
         Logarithm to base 10 of the posterior's volume over the prior's; of segments alone, their mean.
+    evidence : float
+        Logarithm of the density of what is seen; NaN for segments alone.
     """
 
     names: tuple[str, ...]
@@ -81,6 +83,7 @@ class Motion:
     steps: int
     settled: bool
     log_volume_ratio: float
+    evidence: float = float("nan")
 
 
 def output_names(prior: SegmentPrior, tracks: Tracks, everything: bool = False) -> tuple[str, ...]:
@@ -148,6 +151,7 @@ def lift(
         found_motion.steps,
         found_motion.settled,
         found_motion.log_volume_ratio,
+        found_motion.evidence,
     )
 
 
@@ -212,8 +216,13 @@ def _in_turn(segments: Floats, half: int) -> Floats:
 
 
 def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:
-    """Distance of places (T, P, 3) in the picture from uv (T, P, 2)."""
-    return np.asarray(np.linalg.norm(view.project(places, lengths) - uv, axis=2))
+    """Distance of places (T, P, 3) in the picture from uv (T, P, 2); without a camera but for a shift."""
+    miss = view.project(places, lengths) - uv
+    if not view.grounded:
+        seen = np.isfinite(miss).all(axis=2, keepdims=True)
+        total = np.where(seen, miss, 0).sum(axis=1, keepdims=True)
+        miss = miss - total / np.maximum(seen.sum(axis=1, keepdims=True), 1)
+    return np.asarray(np.linalg.norm(miss, axis=2))
 
 
 def _on_floor(places: Floats, prior: SegmentPrior) -> Floats:

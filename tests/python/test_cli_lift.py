@@ -1,0 +1,96 @@
+"""`gait lift` of tracks, end to end."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from toy_segments import toy_blob, toy_prior
+
+from gait.camera import Camera
+from gait.cli import main
+from gait.lift.tracks_file import Tracks, write
+from gait.trc import read_trc
+
+FRAMES, MARKERS = 6, 12
+VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "none": []}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A model, a camera, tracks of the mean motion with noise, and the truth."""
+    monkeypatch.chdir(tmp_path)
+    prior = toy_prior(FRAMES, MARKERS, 4, seed=5)
+    (tmp_path / "m.gait").write_bytes(toy_blob(prior))
+    camera = Camera.looking((0, -6, 1.0), (0, 0, 1.0), (640, 480), 600)
+    (tmp_path / "cam.json").write_text(json.dumps(camera.to_dict()))
+    rng = np.random.default_rng(0)
+    drift = np.arange(15)[:, None, None] * (prior.mean[0, 1] - prior.mean[0, 0])
+    places = 1.7 * (prior.mean[0, 0] + drift)
+    uv = camera.project(places) + rng.normal(size=(len(places), MARKERS, 2))
+    uv[rng.random(uv.shape[:2]) < 0.1] = np.nan
+    time = np.arange(len(places)) / 20
+    write("t.csv", Tracks(np.arange(len(places)), time, prior.names, uv, np.ones(uv.shape[:2])))
+    np.save("truth.npy", places)
+    return tmp_path
+
+
+def lifted(path, names):
+    with open(path, newline="") as file:
+        rows = list(csv.DictReader(file))
+    return np.array([[[float(row[f"{n}_{a}"]) for a in "xyz"] for n in names] for row in rows])
+
+
+@pytest.mark.parametrize("method", ["smooth", "blend", "segment"])
+@pytest.mark.parametrize("view", VIEWS)
+def test_lifts(folder, capsys, view, method):
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--height", "1.7", "--pixel-sd", "1"]
+    assert main([*command, "--method", method, "--json", *VIEWS[view]]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["frames"] == 15 and said["settled"]
+    assert said["reprojection_px"] < 4  # 1 of noise; without a camera the picture has perspective
+    assert said["log10_volume_ratio"] < 0
+    names = said["markers"]["estimated"]
+    assert len(names) == MARKERS
+    found, truth = lifted("out.csv", names), np.load("truth.npy")
+    shape, true = (p - p.mean(axis=1, keepdims=True) for p in (found, truth))
+    across = np.linalg.norm((shape - true)[..., [0, 2]], axis=2)
+    assert np.median(across) < 0.03  # what the picture shows
+
+
+def test_trc_and_sd(folder, capsys):
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--trc", "o.trc"]
+    assert main([*command, "--quiet"]) == 0
+    labels, points, rate = read_trc(folder / "o.trc")
+    assert rate == pytest.approx(20)
+    np.testing.assert_allclose(points[:, :, [2, 0, 1]], lifted("out.csv", labels), atol=2e-5)
+    with open("out.csv", newline="") as file:
+        row = next(csv.DictReader(file))
+    assert all(float(row[f"{labels[0]}_{axis}"]) > 0 for axis in ("sx", "sy", "sz"))
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["--orthographic", "w"], 2, "give x, y, z"),
+        (["--orthographic", "0,0,0"], 2, "give x, y, z"),
+        (["--orthographic", "y", "--camera", "cam.json"], 2, "two views"),
+        (["--metres-per-unit", "1"], 2, "goes with --orthographic"),
+        (["--method", "blend", "--no-bones"], 2, "go with --method smooth"),
+        (["-o", "nowhere/out.csv"], 1, "does not exist"),
+        (["--camera", "no.json"], 1, "no.json"),
+    ],
+)
+def test_faults(folder, capsys, options, code, words):
+    assert main(["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", *options]) == code
+    assert words in capsys.readouterr().err
+    assert not (folder / "out.csv").exists()
+
+
+def test_video_needs_placement(folder, capsys):
+    assert main(["lift", "clip.mp4", "-m", "m.gait", "-o", "out.csv"]) == 2
+    assert "--placement" in capsys.readouterr().err
+    assert main(["lift", "clip.mp4", "-o", "out.csv", "--height", "1.7"]) == 2
+    assert "--height is for tracks" in capsys.readouterr().err

@@ -1,0 +1,218 @@
+"""The smoother over a sequence of 2-D tracks against dense algebra, and what it promises."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy_segments import toy_prior
+
+from gait.camera import Camera
+from gait.lift import chain as chains
+from gait.lift import motion, sequence, soft, tridiagonal
+from gait.lift.chain import Around, Freedom, Segment, overlapping, restricted
+from gait.lift.equations import Parallel, Perspective, looking_along
+from gait.lift.observe import Observations
+from gait.lift.sequence import Grid, Seen, Start, smooth
+from gait.lift.tracks_file import Tracks
+
+FRAMES, MARKERS, BLOCKS = 6, 5, 4
+
+
+@pytest.fixture
+def prior():
+    """World-fixed prior, so that the whole problem is linear."""
+    return toy_prior(FRAMES, MARKERS, 5, headings=2)
+
+
+FREEDOM = Freedom(stature=1.7, stature_sd=1e-3, height_sd=0.05)
+
+
+def around(prior, blocks=BLOCKS):
+    """The mean motion, standing at the origin."""
+    half = FRAMES // 2
+    places = np.concatenate([1.7 * prior.mean[0], *[1.7 * prior.mean[0, half:]] * (blocks - 2)])
+    return Around(np.zeros(blocks - 1), np.zeros(blocks - 1, int), 1.7, overlapping(places, half))
+
+
+def dense(diagonal, below):
+    """Whole matrix of its blocks."""
+    count, size = diagonal.shape[:2]
+    full = np.zeros((count, size, count, size))
+    for s in range(count):
+        full[s, :, s] = diagonal[s]
+    for s in range(count - 1):
+        full[s + 1, :, s], full[s, :, s + 1] = below[s], below[s].T
+    return full.reshape(count * size, -1)
+
+
+def test_tridiagonal_is_dense_algebra():
+    rng = np.random.default_rng(1)
+    base = rng.normal(size=(3, 8, 20))
+    diagonal = np.zeros((4, 4, 4))
+    below = np.zeros((3, 4, 4))
+    for s, rows in enumerate(base):  # each ties two neighbours
+        square = rows @ rows.T
+        diagonal[s] += square[:4, :4]
+        diagonal[s + 1] += square[4:, 4:]
+        below[s] += square[4:, :4]
+    vector = rng.normal(size=(4, 4))
+    full = dense(diagonal, below)
+    factor = tridiagonal.factor(diagonal, below)
+    np.testing.assert_allclose(factor.solve(vector).ravel(), np.linalg.solve(full, vector.ravel()), rtol=1e-9)
+    assert factor.log_det == pytest.approx(np.linalg.slogdet(full)[1])
+    inverse = np.linalg.inv(full).reshape(4, 4, 4, 4)
+    same, across = factor.covariance()
+    np.testing.assert_allclose(same, [inverse[s, :, s] for s in range(4)], atol=1e-12)
+    np.testing.assert_allclose(across, [inverse[s + 1, :, s] for s in range(3)], atol=1e-12)
+
+
+def test_tridiagonal_refuses_indefinite():
+    with pytest.raises(np.linalg.LinAlgError, match="block 1"):
+        tridiagonal.factor(np.stack([np.eye(2), -np.eye(2)]), np.zeros((1, 2, 2)))
+
+
+def test_chain_holds_each_overlap_once(prior):
+    """Its first segment has the segment's own covariance, its determinant is that of the factors."""
+    there = around(prior)
+    found = chains.chain(prior, there, FREEDOM)
+    full = dense(found.diagonal, found.below)
+    assert found.log_det == pytest.approx(np.linalg.slogdet(full)[1])
+    segment = Segment(prior, there, FREEDOM, 0)
+    wanted = np.diag(segment.variance) + segment.loads.T @ segment.loads
+    size = len(wanted)
+    np.testing.assert_allclose(np.linalg.inv(full)[:size, :size], wanted, rtol=1e-5, atol=1e-6)
+    mean = np.linalg.solve(full, found.vector.ravel())
+    np.testing.assert_allclose(mean[:size], segment.mean, atol=1e-6)
+    assert found.constant == pytest.approx(mean @ full @ mean, rel=1e-6)
+
+
+def drawn(prior, rng):
+    """Motion drawn from the chain, (grid, J, 3)."""
+    found = chains.chain(prior, around(prior), FREEDOM)
+    covariance = np.linalg.inv(dense(found.diagonal, found.below))
+    mean = covariance @ found.vector.ravel()
+    x = mean + np.linalg.cholesky((covariance + covariance.T) / 2) @ rng.normal(size=len(mean))
+    return x.reshape(-1, MARKERS, 3)
+
+
+def observed(prior, places, view, sd, rng, missing=0.1):
+    """Tracks between the frames of the grid, and what was seen there."""
+    grid = Grid(0.0, prior.fps, BLOCKS, FRAMES // 2)
+    time = np.arange(0.0, grid.time[-1], 1 / 30)
+    frames, weights = grid.between(time)
+    truth = np.einsum("tw,twjc->tjc", weights, places[frames])
+    uv = view.project(truth, np.ones(len(time))) + sd * rng.normal(size=(len(time), MARKERS, 2))
+    noise = np.where(rng.random(uv.shape[:2]) < missing, np.inf, sd)
+    return truth, Seen(time, Observations(uv, noise), np.arange(MARKERS))
+
+
+def test_smoother_covers_what_is_drawn_from_its_prior(prior):
+    """90 % intervals hold 90 % of the coordinates, depth included; the posterior is the smaller volume."""
+    rng = np.random.default_rng(3)
+    view = Parallel(looking_along("y"), 1.0, np.zeros(2))
+    inside, ratios = [], []
+    there = around(prior)
+    start = Start(
+        there.heading, there.component, 1.7, chains.blended(there.places, FRAMES // 2), np.ones(BLOCKS * 3)
+    )
+    for _ in range(40):
+        truth, seen = observed(prior, drawn(prior, rng), view, 0.01, rng)
+        found = smooth(prior, seen, view, FREEDOM, start, contact=False, bones=False)
+        assert found.settled
+        inside.append(np.abs(found.places - truth) < 1.645 * found.sd)
+        ratios.append(found.log_volume_ratio)
+    assert 0.87 < np.mean(inside) < 0.93
+    assert 0.85 < np.mean(np.array(inside)[..., 1]) < 0.95  # the depth
+    assert max(ratios) < 0
+
+
+def test_places_between_frames_are_cubic():
+    grid = Grid(0.0, 20.0, 4, 3)
+    time = np.linspace(0, grid.time[-1], 31)
+    frames, weights = grid.between(time)
+    np.testing.assert_allclose(np.sum(weights * grid.time[frames] ** 3, axis=1), time**3, atol=1e-12)
+
+
+def test_scale_does_not_drift_with_noise():
+    """A body is not drawn towards the camera by noise: without it known, its size stays near the truth."""
+    prior = toy_prior(FRAMES, 12, 4, seed=5)
+    rng = np.random.default_rng(0)
+    camera = Camera.looking((0, -6, 1.4), (0, 0, 0.9), (640, 480), 600)
+    body = 1.7 * prior.mean[0]
+    time = np.arange(FRAMES * 2) / 20
+    places = body[np.minimum(np.arange(FRAMES * 2), FRAMES - 1)]
+    uv = camera.project(places) + 3 * rng.normal(size=(*places.shape[:2], 2))
+    tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
+    found = motion.lift(
+        prior, tracks, Perspective(camera), motion.Options(contact=False, bones=False), prior.names
+    )
+    size = np.linalg.norm(found.places - found.places.mean(axis=1, keepdims=True))
+    true = np.linalg.norm(places - places.mean(axis=1, keepdims=True))
+    assert size / true == pytest.approx(1, abs=0.05)
+
+
+def rows_of(prior):
+    layout = soft.Layout(BLOCKS, FRAMES // 2, len(prior.names), None)
+    return soft.Rows(layout)
+
+
+def residual(rows, places):
+    """A x - y of collected rows, squared and summed, with x = places."""
+    diagonal, below, vector, square, _ = rows.normal()
+    x = places.ravel()
+    return float(x @ dense(diagonal, below) @ x - 2 * x @ vector.ravel() + square)
+
+
+def test_bones_cost_nothing_to_a_rigid_or_resized_body():
+    prior = toy_prior(FRAMES, 19, 4)
+    rng = np.random.default_rng(2)
+    body = rng.normal(size=(19, 3))
+    turns = [chains.rotation(0.1 * t) for t in range(BLOCKS * FRAMES // 2)]
+    places = np.stack([body @ turn.T for turn in turns])
+    rows = rows_of(prior)
+    soft.bones(rows, prior.names, places)
+    assert residual(rows, places) == pytest.approx(0, abs=1e-6)
+    assert residual(rows, 1.1 * places) == pytest.approx(0, abs=1e-6)
+    stretched = places * np.linspace(1, 1.2, len(places))[:, None, None]
+    assert residual(rows, stretched) > 10
+
+
+def test_contacts_hold_slow_low_feet_only():
+    prior = toy_prior(FRAMES, 19, 4)
+    names = list(prior.names)
+    places = np.tile(np.random.default_rng(2).normal(size=(19, 3)) + (0, 0, 2), (BLOCKS * 3, 1, 1))
+    still, moving = names.index("l_toe"), names.index("r_toe")
+    places[:, [still, moving], 2] = 0.0
+    places[:, moving, 0] += np.arange(BLOCKS * 3) * 0.1  # 2 m/s
+    rows = rows_of(prior)
+    sure = soft.contacts(rows, prior.names, places, 20.0)
+    feet = [name for name in soft.FEET if name in names]
+    assert sure[:, feet.index("l_toe")].min() > 0.9
+    assert sure[:, feet.index("r_toe")].max() < 0.01
+    slid = places.copy()
+    slid[:, still, 0] += np.arange(BLOCKS * 3) * 0.02
+    assert residual(rows, slid) > residual(rows, places) + 1
+
+
+def test_blending_keeps_what_segments_agree_on():
+    values = np.arange(12.0)[:, None]
+    np.testing.assert_allclose(chains.blended(overlapping(values, 3), 3), values)
+
+
+def test_lifting_needs_four_frames():
+    prior = toy_prior(3, 4, 3)
+    tracks = Tracks(np.arange(9), np.arange(9) / 20, prior.names, np.ones((9, 4, 2)), np.ones((9, 4)))
+    view = Parallel(looking_along("y"), 1.0, np.zeros(2))
+    with pytest.raises(motion.UserError, match="4 or more"):
+        motion.lift(prior, tracks, view, motion.Options(), prior.names)
+
+
+def test_restricted_prior_is_its_marginal(prior):
+    part = restricted(prior, prior.names[1:3])
+    assert part.mean.shape == (1, FRAMES, 2, 3)
+    np.testing.assert_array_equal(part.modes, prior.modes[:, :, :, 1:3])
+    odd = replace(toy_prior(7, 4, 3))
+    assert restricted(odd, odd.names).frames == 6
+    assert sequence.Grid.over(np.array([0.0, 1.0]), restricted(odd, odd.names)).blocks == 7
