@@ -158,6 +158,7 @@ enum { GAIT_MODE_DEFAULT = 0, GAIT_MODE_PAPER = 1 };
 #define GAIT_TERM_SILHOUETTE 0x2u /* foreground both ways; needs a background plate */
 #define GAIT_TERM_EDGES      0x4u /* image gradient along the limbs' outlines */
 #define GAIT_TERM_TEMPLATE   0x8u /* running appearance of each limb */
+#define GAIT_TERM_TRACKS     0x10u /* joints found in the images by somebody else, gait_frame tracks; default off */
 
 typedef struct gait_tracker_config {
     uint32_t struct_size;      /* set by gait_tracker_default() */
@@ -170,7 +171,7 @@ typedef struct gait_tracker_config {
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
     int32_t  proportions;      /* [0, the model's]; -1: all; default 0 (doc/design.md says why) */
     uint32_t terms;            /* GAIT_TERM_* in use */
-    float    term_weight[4];   /* nats per unit cost of texture, silhouette, edges, template */
+    float    term_weight[5];   /* nats per unit cost of texture, silhouette, edges, template, tracks */
     float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
     float    girth;            /* limb radii against the model's (clothes) [0.5, 2] */
     float    resample_ess;     /* resample below this fraction of particles [0, 1] */
@@ -196,12 +197,21 @@ typedef struct gait_tracker_config {
     float    joint_sd_factor;
     float    joint_sd_model;   /* and, in quadrature, what the model cannot express, fraction of stature */
     gait_camera camera[GAIT_MAX_CAMERAS];
+    uint32_t reserved;
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;
+
+typedef struct gait_track { /* one joint located in an image */
+    float u, v; /* pixels, as captured (distorted) */
+    float sd;   /* standard deviation, pixels, what the model's joints miss the detector's by included; not a positive
+                 * number: not seen */
+} gait_track;
 
 typedef struct gait_frame {
     int64_t    utime;                   /* capture time; must increase */
     gait_image image[GAIT_MAX_CAMERAS]; /* data NULL: that camera missed this frame */
+    const gait_track *tracks[GAIT_MAX_CAMERAS]; /* the model's joints in order, for GAIT_TERM_TRACKS; NULL: none.  They
+                                                 * count where the camera has an image */
 } gait_frame;
 
 enum { GAIT_STATUS_INIT = 0, GAIT_STATUS_TRACKING = 1, GAIT_STATUS_AMBIGUOUS = 2, GAIT_STATUS_LOST = 3 };

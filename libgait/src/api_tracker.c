@@ -23,7 +23,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .lag = 5,
         .terms = paper ? GAIT_TERM_TEXTURE
                        : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
-        .term_weight = {0.2f, 25.0f, 40.0f, 4.0f},
+        .term_weight = {0.2f, 25.0f, 40.0f, 4.0f, 8.0f},
         .missed_weight = 0.4f,
         .girth = 1.05f,
         .resample_ess = paper ? 1.0f : 0.5f,
@@ -78,19 +78,33 @@ typedef struct range { /* one float of the configuration */
 static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err)
 {
     static const range RANGES[] = {
-        RANGE(term_weight[0], 0.0f, 1e6f),     RANGE(term_weight[1], 0.0f, 1e6f),
-        RANGE(term_weight[2], 0.0f, 1e6f),     RANGE(term_weight[3], 0.0f, 1e6f),
-        RANGE(missed_weight, 0.0f, 1.0f),      RANGE(girth, 0.5f, 2.0f),
-        RANGE(resample_ess, 0.0f, 1.0f),       RANGE(max_dt, 1e-3f, 10.0f),
-        RANGE(phase_noise, 0.0f, 10.0f),       RANGE(rate_noise, 0.0f, 10.0f),
-        RANGE(rate_noise_start, 0.0f, 10.0f),  RANGE(settle_time, 0.0f, 1e6f),
-        RANGE(rate_time, 0.0f, 1e6f),          RANGE(forward_noise, 0.0f, 100.0f),
-        RANGE(lateral_noise, 0.0f, 100.0f),    RANGE(vertical_noise, 0.0f, 100.0f),
-        RANGE(heading_noise, 0.0f, 100.0f),    RANGE(tilt_noise, 0.0f, 100.0f),
-        RANGE(tilt_time, 0.0f, 1e6f),          RANGE(coef_noise, 0.0f, 100.0f),
-        RANGE(coef_time, 0.0f, 1e6f),          RANGE(stature_noise, 0.0f, 1.0f),
-        RANGE(offset_noise, 0.0f, 10.0f),      RANGE(offset_sd, 0.0f, 10.0f),
-        RANGE(proportion_noise, 0.0f, 100.0f), RANGE(joint_sd_factor, 0.0f, 100.0f),
+        RANGE(term_weight[0], 0.0f, 1e6f),
+        RANGE(term_weight[1], 0.0f, 1e6f),
+        RANGE(term_weight[2], 0.0f, 1e6f),
+        RANGE(term_weight[3], 0.0f, 1e6f),
+        RANGE(term_weight[4], 0.0f, 1e6f),
+        RANGE(missed_weight, 0.0f, 1.0f),
+        RANGE(girth, 0.5f, 2.0f),
+        RANGE(resample_ess, 0.0f, 1.0f),
+        RANGE(max_dt, 1e-3f, 10.0f),
+        RANGE(phase_noise, 0.0f, 10.0f),
+        RANGE(rate_noise, 0.0f, 10.0f),
+        RANGE(rate_noise_start, 0.0f, 10.0f),
+        RANGE(settle_time, 0.0f, 1e6f),
+        RANGE(rate_time, 0.0f, 1e6f),
+        RANGE(forward_noise, 0.0f, 100.0f),
+        RANGE(lateral_noise, 0.0f, 100.0f),
+        RANGE(vertical_noise, 0.0f, 100.0f),
+        RANGE(heading_noise, 0.0f, 100.0f),
+        RANGE(tilt_noise, 0.0f, 100.0f),
+        RANGE(tilt_time, 0.0f, 1e6f),
+        RANGE(coef_noise, 0.0f, 100.0f),
+        RANGE(coef_time, 0.0f, 1e6f),
+        RANGE(stature_noise, 0.0f, 1.0f),
+        RANGE(offset_noise, 0.0f, 10.0f),
+        RANGE(offset_sd, 0.0f, 10.0f),
+        RANGE(proportion_noise, 0.0f, 100.0f),
+        RANGE(joint_sd_factor, 0.0f, 100.0f),
         RANGE(joint_sd_model, 0.0f, 1.0f),
     };
     for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
@@ -105,7 +119,8 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
 
 static gait_status check_config(const gait_model *m, const gait_tracker_config *cfg, gait_error *err)
 {
-    uint32_t const known = GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE;
+    uint32_t const known =
+        GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE | GAIT_TERM_TRACKS;
     if (!m || !cfg)
         return base_fail(err, GAIT_ERR_ARG, -1, "model or config is NULL");
     if (cfg->struct_size != sizeof *cfg)

@@ -26,3 +26,27 @@ bool camera_distorted(const gait_camera *c)
         any |= c->distortion[i] != 0.0f;
     return any;
 }
+
+/* ideal = (distorted - tangential) / radial, again and again. */
+void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2])
+{
+    enum { PASSES = 40 };
+    double d[5];
+    for (int32_t i = 0; i < 5; i++)
+        d[i] = (double)c->distortion[i];
+    double const fx = (double)c->fx, fy = (double)c->fy, cx = (double)c->cx, cy = (double)c->cy;
+    double const xd = (distorted[0] - cx) / fx, yd = (distorted[1] - cy) / fy;
+    double x = xd, y = yd;
+    ideal[0] = distorted[0];
+    ideal[1] = distorted[1];
+    if (!camera_distorted(c))
+        return;
+    for (int32_t i = 0; i < PASSES; i++) {
+        double const r2 = x * x + y * y, xy2 = 2.0 * x * y;
+        double const radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+        x = (xd - d[2] * xy2 - d[3] * (r2 + 2.0 * x * x)) / radial;
+        y = (yd - d[2] * (r2 + 2.0 * y * y) - d[3] * xy2) / radial;
+    }
+    ideal[0] = fx * x + cx;
+    ideal[1] = fy * y + cy;
+}

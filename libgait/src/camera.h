@@ -24,6 +24,10 @@ static inline void camera_distort(const gait_camera *c, float u, float v, float 
     *vd = c->fy * yd + c->cy;
 }
 
+/* The other way: a pixel of the captured image to the ideal one, by a fixed point that a lens contracts within its
+ * picture. */
+void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2]);
+
 /* World point to ideal pixel; returns its depth Z.  uv is left alone when Z <= CAMERA_NEAR. */
 static inline float camera_project(const gait_camera *c, const float p[3], float uv[2])
 {

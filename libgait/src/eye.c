@@ -1,5 +1,6 @@
 #include "eye.h"
 
+#include "camera.h"
 #include "fmath.h"
 
 #define NEAREST 0.1 /* metres before the lens: nothing is taken to be nearer */
@@ -7,38 +8,25 @@
 void eye_open(eye *e, const gait_lift_config *cfg)
 {
     const gait_camera *const c = &cfg->camera;
-    *e = (eye){.perspective = cfg->projection == GAIT_LIFT_PERSPECTIVE};
+    *e = (eye){.perspective = cfg->projection == GAIT_LIFT_PERSPECTIVE, .camera = *c};
     for (int32_t i = 0; i < 6; i++)
         e->axis[i / 3][i % 3] = cfg->axis[i / 3][i % 3];
     for (int32_t i = 0; i < 9; i++)
         e->R[i] = (double)c->R[i];
     for (int32_t i = 0; i < 3; i++)
         e->t[i] = (double)c->t[i];
-    for (int32_t i = 0; i < 5; i++)
-        e->lens[i] = (double)c->distortion[i];
     e->focal[0] = (double)c->fx;
     e->focal[1] = (double)c->fy;
     e->centre[0] = (double)c->cx;
     e->centre[1] = (double)c->cy;
 }
 
-/* Fixed point of ideal = (distorted - tangential) / radial; a lens within its picture contracts it. */
 void eye_ideal(const eye *e, const double uv[2], double ideal[2])
 {
-    enum { PASSES = 40 };
-    const double *const d = e->lens;
-    double const xd = (uv[0] - e->centre[0]) / e->focal[0], yd = (uv[1] - e->centre[1]) / e->focal[1];
-    double x = xd, y = yd;
-    bool const lens =
-        e->perspective && (d[0] != 0.0 || d[1] != 0.0 || d[2] != 0.0 || d[3] != 0.0 || d[4] != 0.0);
-    for (int32_t i = 0; lens && i < PASSES; i++) {
-        double const r2 = x * x + y * y, xy2 = 2.0 * x * y;
-        double const radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
-        x = (xd - d[2] * xy2 - d[3] * (r2 + 2.0 * x * x)) / radial;
-        y = (yd - d[2] * (r2 + 2.0 * y * y) - d[3] * xy2) / radial;
-    }
-    ideal[0] = lens ? e->focal[0] * x + e->centre[0] : uv[0];
-    ideal[1] = lens ? e->focal[1] * y + e->centre[1] : uv[1];
+    ideal[0] = uv[0];
+    ideal[1] = uv[1];
+    if (e->perspective)
+        camera_ideal(&e->camera, uv, ideal);
 }
 
 static double dot3(const double a[3], const double b[3])

@@ -6,7 +6,8 @@
 typedef struct eye {
     bool perspective;
     double axis[2][3]; /* orthographic */
-    double R[9], t[3], focal[2], centre[2], lens[5];
+    double R[9], t[3], focal[2], centre[2];
+    gait_camera camera; /* for its lens */
 } eye;
 
 typedef struct eye_rows { /* of one point; pixels or metres */

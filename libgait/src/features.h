@@ -17,6 +17,12 @@ typedef struct edge_cell { /* smoothed, contrast-normalised edge tensor: n'Tn is
     int8_t trace, xx_yy, xy2, zero;
 } edge_cell;
 
+typedef struct features_tracks {                  /* joints located in the frame by somebody else */
+    int32_t seen;                                 /* how many are; 0: the term is silent */
+    float u[GAIT_MAX_JOINTS], v[GAIT_MAX_JOINTS]; /* pixels without the lens's distortion */
+    float inverse_sd[GAIT_MAX_JOINTS];            /* 0: not seen */
+} features_tracks;
+
 typedef struct features {
     view_map map;
     bool seen;       /* this frame had an image */
@@ -29,6 +35,7 @@ typedef struct features {
     uint64_t (*fg)[RAST_SIZE][RAST_WORDS]; /* FG_PLANES bit planes of the foreground probability */
     uint64_t (*inside)[RAST_WORDS];        /* cells that the camera sees, */
     view_map inside_map;                   /* found for this place of the region */
+    features_tracks tracks;
 } features;
 
 enum { EDGE_SIZES = 32, EDGE_SOFT = 4 }; /* rows kept, by row number modulo this */

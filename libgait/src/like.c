@@ -2,7 +2,7 @@
 #include "fmath.h"
 
 static const like_term *const TERMS[LIKE_TERMS] = {&like_texture, &like_silhouette, &like_edges,
-                                                   &like_template};
+                                                   &like_template, &like_joints};
 
 /* Point and outward normal on one ring, at this angle from the lateral axis; z from 0 at the start to 1. */
 static void surface_point(const limb_geometry *g, float z, float angle, float point[3], float normal[3])

@@ -18,7 +18,7 @@ enum {
     LIKE_FACING = LIKE_SAMPLES / 2, /* points of the half turned to the camera */
     LIKE_RING = LIKE_SAMPLES + LIKE_FACING, /* once around and on, so that every half is in one piece */
     LIKE_FEW = 8, /* points seen in both frames below which a limb counts as occluded (R19, R20) */
-    LIKE_TERMS = 4,
+    LIKE_TERMS = 5,
     LIKE_COSTS = 256,        /* entries of a cost table */
     LIKE_COST_ONE = 256,     /* 1 nat in the robust one */
     LIKE_COUNT_ONE = 1 << 24 /* in every entry: a sum of costs counts the points as well */
@@ -70,7 +70,9 @@ typedef struct like_body { /* one body in one camera, as the terms see it */
     const layers *layers;
     const like_patch *seen;     /* by limb: its surface in this frame */
     const like_patch *ancestor; /* the same of its ancestor in the previous frame, or NULL */
-    const int8_t *known;        /* limbs x LIKE_RING: running appearance (like_template.h), or NULL */
+    const gait_camera *camera;
+    const float (*points)[3][BLOCK]; /* joints in the world, metres; read if the features have tracks */
+    const int8_t *known;             /* limbs x LIKE_RING: running appearance (like_template.h), or NULL */
 } like_body;
 
 typedef struct like_edge_tally {
@@ -86,7 +88,7 @@ typedef struct like_term {
     float (*support)(const like_body *b);        /* the same over "nobody is there"; NULL: no opinion */
 } like_term;
 
-extern const like_term like_texture, like_silhouette, like_edges, like_template;
+extern const like_term like_texture, like_silhouette, like_edges, like_template, like_joints;
 
 void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg);
 

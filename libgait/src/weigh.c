@@ -32,6 +32,25 @@ static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
     s->plate_stale = false;
 }
 
+/* Tracks of one camera without the lens's distortion. */
+static void take_tracks(const gait_tracker *t, int32_t c, const gait_track *track, features_tracks *out)
+{
+    *out = (features_tracks){0};
+    for (int32_t p = 0; track && (t->cfg.terms & GAIT_TERM_TRACKS) && p < t->model->points; p++) {
+        const gait_track *const one = &track[p];
+        bool const seen =
+            one->sd > 0.0f && one->sd <= FLT_MAX && f_finite(&one->u, 1) && f_finite(&one->v, 1);
+        if (!seen)
+            continue;
+        double ideal[2];
+        camera_ideal(&t->cfg.camera[c], (const double[2]){(double)one->u, (double)one->v}, ideal);
+        out->u[p] = (float)ideal[0];
+        out->v[p] = (float)ideal[1];
+        out->inverse_sd[p] = 1.0f / one->sd;
+        out->seen++;
+    }
+}
+
 int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted)
 {
     int32_t count = 0;
@@ -46,6 +65,7 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
             refresh_plate(t, c, im.format == GAIT_GREY8);
         features_compute(t->like->run, &s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL,
                          t->like->paper, &t->scratch);
+        take_tracks(t, c, frame->tracks[c], &s->seen.tracks);
         count += s->seen.seen;
     }
     return count;
@@ -71,6 +91,8 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t
                    .lane = lane,
                    .layers = &w->layers,
                    .seen = seen,
+                   .camera = &t->cfg.camera[c],
+                   .points = (const float (*)[3][BLOCK])w->points,
                    .known = t->known[side][c]};
     t->like->run->layers_draw(&w->edges, lane, &w->layers);
     if (seen)
@@ -144,6 +166,8 @@ float weigh_walker(gait_tracker *t, const walker *person)
     weigh_scratch *const w = &t->work[0];
     float support = 0.0f;
     walker_body(&t->rule, person, &w->body);
+    if (t->cfg.terms & GAIT_TERM_TRACKS)
+        kin_points(t->model, &w->body, w->points);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;

@@ -86,7 +86,7 @@ class TrackerConfigC(ctypes.Structure):
         ("lag", c_int32),
         ("proportions", c_int32),
         ("terms", c_uint32),
-        ("term_weight", c_float * 4),
+        ("term_weight", c_float * 5),
         ("missed_weight", c_float),
         ("girth", c_float),
         ("resample_ess", c_float),
@@ -113,14 +113,25 @@ class TrackerConfigC(ctypes.Structure):
         ("joint_sd_factor", c_float),
         ("joint_sd_model", c_float),
         ("camera", CameraC * MAX_CAMERAS),
+        ("reserved", c_uint32),
         ("exec", Tasks),
     ]
+
+
+class TrackC(ctypes.Structure):
+    """``gait_track``."""
+
+    _fields_ = [("u", c_float), ("v", c_float), ("sd", c_float)]
 
 
 class FrameC(ctypes.Structure):
     """``gait_frame``."""
 
-    _fields_ = [("utime", c_int64), ("image", ImageView * MAX_CAMERAS)]
+    _fields_ = [
+        ("utime", c_int64),
+        ("image", ImageView * MAX_CAMERAS),
+        ("tracks", POINTER(TrackC) * MAX_CAMERAS),
+    ]
 
 
 class EstimateC(ctypes.Structure):
@@ -154,6 +165,7 @@ STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_tasks": Tasks,
     "gait_model_info": ModelInfoC,
     "gait_tracker_config": TrackerConfigC,
+    "gait_track": TrackC,
     "gait_frame": FrameC,
     "gait_estimate": EstimateC,
     **_abi_lift.STRUCTS,

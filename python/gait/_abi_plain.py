@@ -56,6 +56,7 @@ class Term(IntFlag):
     SILHOUETTE = 2
     EDGES = 4
     TEMPLATE = 8
+    TRACKS = 16
 
 
 class TrackStatus(IntEnum):

@@ -17,6 +17,7 @@ from gait._lib import aligned, check, library
 from gait.autostart import Spotter
 from gait.camera import Camera
 from gait.errors import UserError
+from gait.frame import Joints, image_view, per_camera, track_array
 from gait.initial import Start
 from gait.model import Model, camera_c, pose_arrays
 from gait.state import Array, State
@@ -226,7 +227,7 @@ class Tracker:
         self._handle = handle
         self._plates: dict[int, Image] = {}
         self.step_seconds = 0.0
-        for i, plate in enumerate(_per_camera(background)):
+        for i, plate in enumerate(per_camera(background)):
             self.set_background(plate, i)
 
     def set_background(self, plate: Image | None, camera: int = 0) -> None:
@@ -234,7 +235,7 @@ class Tracker:
         view = None
         if plate is not None:
             plate = np.ascontiguousarray(plate)
-            view = ctypes.byref(_image_view(plate, self.cameras[camera], "background"))
+            view = ctypes.byref(image_view(plate, self.cameras[camera], "background"))
         check(self._lib.gait_tracker_set_background(self._handle, camera, view))
         if plate is None:
             self._plates.pop(camera, None)
@@ -255,7 +256,12 @@ class Tracker:
         err = ctypes.byref(self._error)
         self._check(self._lib.gait_tracker_start(self._handle, means, sds, utime, err))
 
-    def step(self, frames: Image | Sequence[Image | None] | None, utime: int) -> Estimate:
+    def step(
+        self,
+        frames: Image | Sequence[Image | None] | None,
+        utime: int,
+        joints: Joints | Sequence[Joints | None] | None = None,
+    ) -> Estimate:
         """Take in one frame and estimate.
 
         Parameters
@@ -264,14 +270,20 @@ class Tracker:
             (h, w) grey or (h, w, 3) BGR uint8 of each camera; None where a camera missed this frame.
         utime : int
             Capture time, microseconds; must increase.
+        joints : Joints, or sequence of Joints or None, optional
+            Joints found in each camera's picture; they count if ``config.terms`` has ``Term.TRACKS``.
         """
-        images = [None if image is None else np.ascontiguousarray(image) for image in _per_camera(frames)]
+        images = [None if image is None else np.ascontiguousarray(image) for image in per_camera(frames)]
         if len(images) > len(self.cameras):
             raise ValueError(f"{len(images)} images for {len(self.cameras)} cameras")
         frame = _abi.FrameC(utime=utime)
         for i, image in enumerate(images):
             if image is not None:
-                frame.image[i] = _image_view(image, self.cameras[i], "frame")
+                frame.image[i] = image_view(image, self.cameras[i], "frame")
+        found = [one and track_array(one, self.model.joint_names) for one in per_camera(joints)]
+        for i, array in enumerate(found[: len(self.cameras)]):
+            if array is not None:
+                frame.tracks[i] = array
         out = _abi.EstimateC()
         arguments = (ctypes.byref(frame), ctypes.byref(out), ctypes.byref(self._error))
         begun = time.perf_counter()
@@ -383,20 +395,3 @@ def _task_source(tasks: int | Runner | TaskSource) -> TaskSource | None:
     if isinstance(tasks, int):
         return threads(tasks)
     return PythonTasks(tasks) if callable(tasks) else tasks
-
-
-def _per_camera(images: Image | Sequence[Image | None] | None) -> list[Image | None]:
-    if images is None:
-        return [None]
-    return [images] if isinstance(images, np.ndarray) else list(images)
-
-
-def _image_view(image: Image, camera: Camera, what: str) -> _abi.ImageView:
-    """View of a contiguous picture that must fit the camera."""
-    if image.dtype != np.uint8 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
-        raise ValueError(f"{what}: {image.dtype} {image.shape}; give uint8 (h, w) grey or (h, w, 3) BGR")
-    height, width = image.shape[:2]
-    if (width, height) != camera.size:
-        raise ValueError(f"{what}: {width}x{height}, the camera is {camera.width}x{camera.height}")
-    form = _abi.PixelFormat.GREY8 if image.ndim == 2 else _abi.PixelFormat.BGR8
-    return _abi.ImageView(image.ctypes.data, width, height, image.strides[0], form)

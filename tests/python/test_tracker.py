@@ -76,11 +76,11 @@ def _abi_library():
 
 
 def test_changes_reach_the_library_and_unknown_ones_fail():
-    c = TrackerConfig.default(particles=77, girth=1.25, term_weight=(1.0, 2.0, 3.0, 4.0)).to_c()
-    assert (c.particles, c.girth, list(c.term_weight)) == (77, 1.25, [1, 2, 3, 4])
+    c = TrackerConfig.default(particles=77, girth=1.25, term_weight=(1.0, 2.0, 3.0, 4.0, 5.0)).to_c()
+    assert (c.particles, c.girth, list(c.term_weight)) == (77, 1.25, [1, 2, 3, 4, 5])
     with pytest.raises(TypeError, match="particels"):
         TrackerConfig.default(particels=77)
-    with pytest.raises(ValueError, match="term_weight: give 4"):
+    with pytest.raises(ValueError, match="term_weight: give 5"):
         replace(SMALL, term_weight=(1.0,)).to_c()
 
 

@@ -42,7 +42,7 @@ static void test_integers(void)
         {offsetof(gait_tracker_config, lag), -1, GAIT_ERR_LIMIT, "lag"},
         {offsetof(gait_tracker_config, lag), 65, GAIT_ERR_LIMIT, "lag"},
         {offsetof(gait_tracker_config, terms), 0, GAIT_ERR_ARG, "terms"},
-        {offsetof(gait_tracker_config, terms), 0x11, GAIT_ERR_ARG, "terms"},
+        {offsetof(gait_tracker_config, terms), 0x21, GAIT_ERR_ARG, "terms"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
         gait_tracker_config cfg = toy_config(2);
@@ -63,20 +63,20 @@ static void test_floats(void)
         const char *name;
         float low, high;
     } number[] = {
-        FLOAT(term_weight[0], -1e-3f, 2e6f),   FLOAT(term_weight[1], -1e-3f, 2e6f),
-        FLOAT(term_weight[2], -1e-3f, 2e6f),   FLOAT(term_weight[3], -1e-3f, 2e6f),
-        FLOAT(missed_weight, -0.01f, 1.01f),   FLOAT(girth, 0.49f, 2.01f),
-        FLOAT(resample_ess, -0.01f, 1.01f),    FLOAT(max_dt, 0.0f, 11.0f),
-        FLOAT(phase_noise, -1e-3f, 1e9f),      FLOAT(rate_noise, -1e-3f, 1e9f),
-        FLOAT(rate_noise_start, -1e-3f, 1e9f), FLOAT(settle_time, -1e-3f, 1e9f),
-        FLOAT(rate_time, -1e-3f, 1e9f),        FLOAT(forward_noise, -1e-3f, 1e9f),
-        FLOAT(lateral_noise, -1e-3f, 1e9f),    FLOAT(vertical_noise, -1e-3f, 1e9f),
-        FLOAT(heading_noise, -1e-3f, 1e9f),    FLOAT(tilt_noise, -1e-3f, 1e9f),
-        FLOAT(tilt_time, -1e-3f, 1e9f),        FLOAT(coef_noise, -1e-3f, 1e9f),
-        FLOAT(coef_time, -1e-3f, 1e9f),        FLOAT(stature_noise, -1e-3f, 1e9f),
-        FLOAT(offset_noise, -1e-3f, 1e9f),     FLOAT(offset_sd, -1e-3f, 1e9f),
-        FLOAT(proportion_noise, -1e-3f, 1e9f), FLOAT(joint_sd_factor, -1e-3f, 1e9f),
-        FLOAT(joint_sd_model, -1e-3f, 1.1f),
+        FLOAT(term_weight[0], -1e-3f, 2e6f),  FLOAT(term_weight[1], -1e-3f, 2e6f),
+        FLOAT(term_weight[2], -1e-3f, 2e6f),  FLOAT(term_weight[3], -1e-3f, 2e6f),
+        FLOAT(term_weight[4], -1e-3f, 2e6f),  FLOAT(missed_weight, -0.01f, 1.01f),
+        FLOAT(girth, 0.49f, 2.01f),           FLOAT(resample_ess, -0.01f, 1.01f),
+        FLOAT(max_dt, 0.0f, 11.0f),           FLOAT(phase_noise, -1e-3f, 1e9f),
+        FLOAT(rate_noise, -1e-3f, 1e9f),      FLOAT(rate_noise_start, -1e-3f, 1e9f),
+        FLOAT(settle_time, -1e-3f, 1e9f),     FLOAT(rate_time, -1e-3f, 1e9f),
+        FLOAT(forward_noise, -1e-3f, 1e9f),   FLOAT(lateral_noise, -1e-3f, 1e9f),
+        FLOAT(vertical_noise, -1e-3f, 1e9f),  FLOAT(heading_noise, -1e-3f, 1e9f),
+        FLOAT(tilt_noise, -1e-3f, 1e9f),      FLOAT(tilt_time, -1e-3f, 1e9f),
+        FLOAT(coef_noise, -1e-3f, 1e9f),      FLOAT(coef_time, -1e-3f, 1e9f),
+        FLOAT(stature_noise, -1e-3f, 1e9f),   FLOAT(offset_noise, -1e-3f, 1e9f),
+        FLOAT(offset_sd, -1e-3f, 1e9f),       FLOAT(proportion_noise, -1e-3f, 1e9f),
+        FLOAT(joint_sd_factor, -1e-3f, 1e9f), FLOAT(joint_sd_model, -1e-3f, 1.1f),
     };
 #undef FLOAT
     size_t floats = 0; /* none is forgotten: the config has as many floats as stand here */
