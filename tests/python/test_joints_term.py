@@ -26,20 +26,21 @@ def found(i: int, noise: float = 1.0) -> Joints:
 
 
 def follow(terms: Term, joints: bool) -> tuple[str, float]:
-    """Digest, and mean error of the joints in the last frame, metres."""
+    """Digest, and mean distance of the joints in the pictures of the second half, pixels."""
     tracker = Tracker(MODEL, VIEW, TrackerConfig.default(particles=300, terms=terms))
     sd = State(phase=0.05, stride_hz=0.05, stature=0.02, heading=0.15, pelvis=np.full(3, 0.1))
     tracker.start(TRUE[0], sd, 0)
+    off = []
     for i, image in enumerate(FRAMES):
-        last = tracker.step(image, round(1e6 * i / FPS), found(i) if joints else None)
-    off = last.joints - MODEL.pose(TRUE[len(FRAMES) - 1])[0]
-    return f"{tracker.digest():016x}", float(np.linalg.norm(off, axis=1).mean())
+        joint = tracker.step(image, round(1e6 * i / FPS), found(i) if joints else None).joints
+        off.append(VIEW.project(joint) - VIEW.project(MODEL.pose(TRUE[i])[0]))
+    return f"{tracker.digest():016x}", float(np.linalg.norm(off[len(off) // 2 :], axis=2).mean())
 
 
 def test_joints_help() -> None:
     _, without = follow(Term.TEXTURE, joints=False)
     _, helped = follow(Term.TEXTURE | Term.TRACKS, joints=True)
-    assert helped < 0.7 * without and helped < 0.06
+    assert helped < 0.7 * without and helped < 2.0
 
 
 def test_joints_are_not_read_while_the_term_is_off() -> None:
