@@ -88,7 +88,7 @@ class Model:
         try:
             self._load(contents)
         except GaitError as exc:
-            if not {"CURV", "CHNM"} & set(decode(contents)):
+            if {"SGNM", "CURV"} & set(decode(contents)) == {"SGNM"}:
                 raise UserError(f"{source}: holds no cyclic model; learn it without --segments only") from exc
             raise UserError(f"{source or 'walk.gait'}: {exc.text}; copy or learn it again") from exc
 

@@ -185,7 +185,7 @@ def test_people_get_a_few_lines_however_many_files(walks, tmp_path, capsys):
         (tmp_path / f"07_{k:02}.amc").write_text("nothing\n")
     assert run("learn", walks, tmp_path, "-o", tmp_path / "m.gait", "--components", 3) == 0
     out, err = capsys.readouterr()
-    assert out.count("\n") == 4 and "7 sequences of 4 subjects" in out and "31 files left out" in out
+    assert out.count("\n") == 5 and "7 sequences of 4 subjects" in out and "31 files left out" in out
     assert err.count("\n") == 21 and "left out: 11 more" in err
 
 
