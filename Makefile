@@ -79,7 +79,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test check unit python-test demo model bench bench-lift eval eval-learn asan fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan fuzz fuzz-run golden-check \
         lint format install uninstall clean
 
 help: ## list the targets
@@ -257,6 +257,9 @@ $(PEERS): tests/bench/requirements-peers.txt | $(READY)
 
 eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/results/learn.md
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
+
+eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md
+	@$(PY) tests/bench/eval_lift.py $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] tools/*.[ch] \

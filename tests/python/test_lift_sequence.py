@@ -216,3 +216,21 @@ def test_restricted_prior_is_its_marginal(prior):
     odd = replace(toy_prior(7, 4, 3))
     assert restricted(odd, odd.names).frames == 6
     assert sequence.Grid.over(np.array([0.0, 1.0]), restricted(odd, odd.names)).blocks == 7
+
+
+def test_deviations_about_the_hips_are_those_of_differences():
+    """About the hips the common displacement, which a far view does not tell, drops out."""
+    prior = toy_prior(FRAMES, 12, 4, seed=5)
+    time = np.arange(FRAMES * 2) / 20
+    drift = np.arange(len(time))[:, None, None] * (prior.mean[0, 1] - prior.mean[0, 0])
+    places = 1.7 * (prior.mean[0, 0] + drift)
+    view = Parallel(looking_along("y"), 1.0, np.zeros(2))
+    uv = view.project(places, np.ones(len(time)))
+    tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
+    options = motion.Options(stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    found = motion.lift(prior, tracks, view, options, prior.names)
+    assert found.sd[..., 1].min() > 5  # metres of depth
+    assert found.rooted_sd[..., 1].max() < 1
+    hips = [prior.names.index(name) for name in sequence.HIPS]
+    both = found.rooted_sd[:, hips]
+    np.testing.assert_allclose(both[:, 0], both[:, 1], rtol=1e-4)  # opposite ends of one difference

@@ -63,6 +63,8 @@ class Motion:
         The J markers.
     places, sd : (T, J, 3)
         Metres, and posterior standard deviations.
+    rooted_sd : (T, J, 3)
+        Deviations of the places about the middle of the hips; of segments alone, as `sd`.
     error : (T, P)
         Distance in the picture from what was seen, pixels; NaN where nothing was.
     stature : float
@@ -78,6 +80,7 @@ class Motion:
     names: tuple[str, ...]
     places: Floats
     sd: Floats
+    rooted_sd: Floats
     error: Floats
     stature: float
     steps: int
@@ -146,6 +149,7 @@ def lift(
         names,
         places if view.grounded else _on_floor(places, prior),
         found_motion.sd,
+        found_motion.rooted_sd,
         error,
         found_motion.stature,
         found_motion.steps,
@@ -193,11 +197,13 @@ def _alone(
         for values in (join(places, grid.frames), lengths)
     ]
     markers = prior.index(tracks.names)
+    # neighbours see the same points, so that mixing them does not make the estimate surer
+    sd = np.einsum("tw,tw...->t...", np.abs(weights), join(spread, grid.frames)[frames])
     return Motion(
         names=prior.names,
         places=at_video[0],
-        # neighbours see the same points, so that mixing them does not make the estimate surer
-        sd=np.einsum("tw,tw...->t...", np.abs(weights), join(spread, grid.frames)[frames]),
+        sd=sd,
+        rooted_sd=sd,
         error=_error(view, at_video[0][:, markers], at_video[1], tracks.uv),
         stature=stature,
         steps=0,

@@ -23,6 +23,7 @@ from gait.lift.soft import Layout, Rows
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
+HIPS = ("l_hip", "r_hip")
 MOST_STEPS = 25
 SETTLED = 5e-4  # metres, rms change of the places at which the iteration stops
 FREE_STEPS = 3  # first steps, without constraints on feet and bones
@@ -67,6 +68,8 @@ class Lifted:
     ----------
     places, sd : (T, J, 3)
         Metres at the frames of the video, and standard deviations.
+    rooted_sd : (T, J, 3)
+        Standard deviations of the places about the middle of the hips.
     grid : (grid, J, 3)
         Places at the frames of the prior's rate.
     heading : (S,)
@@ -88,6 +91,7 @@ class Lifted:
 
     places: Floats
     sd: Floats
+    rooted_sd: Floats
     grid: Floats
     heading: Floats
     stature: float
@@ -252,10 +256,12 @@ class _Problem:
         system = self.system(around, lengths, constrained=True)
         bare = self.system(around, lengths, constrained=False)
         diagonal, across = system.factor.covariance()
+        every = np.arange(self.layout.markers)
         sure = soft.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
         return Lifted(
             places=self._at_video(places),
-            sd=np.sqrt(self._variances(diagonal, across)),
+            sd=np.sqrt(self._covariances(diagonal, across, every, every)),
+            rooted_sd=np.sqrt(self._rooted(diagonal, across)),
             grid=places,
             heading=around.heading,
             stature=around.stature,
@@ -267,24 +273,36 @@ class _Problem:
             evidence=bare.evidence,
         )
 
-    def _variances(self, diagonal: Floats, across: Floats) -> Floats:
-        """Variances (T, J, 3) of the interpolated places."""
+    def _rooted(self, diagonal: Floats, across: Floats) -> Floats:
+        """Variances (T, J, 3) of places about the middle of the hips; of places if there are no hips."""
+        every = np.arange(self.layout.markers)
+        own = self._covariances(diagonal, across, every, every)
+        if not set(HIPS) <= set(self.prior.names):
+            return own
+        left, right = self.prior.index(HIPS)
+        with_hips = [
+            self._covariances(diagonal, across, every, np.full_like(every, h)) for h in (left, right)
+        ]
+        middle = sum(with_hips)[:, [left, right]].sum(axis=1, keepdims=True) / 4
+        return np.maximum(own + middle - sum(with_hips), 0)
+
+    def _covariances(self, diagonal: Floats, across: Floats, first: Ints, second: Ints) -> Floats:
+        """Covariances (T, n, 3) by coordinate of interpolated places of markers (n,) with others (n,)."""
         frames, weights = self.at
         layout, axes = self.layout, np.arange(3)
-        marker = np.arange(layout.markers)
-        total = np.zeros((len(frames), layout.markers, 3))
+        total = np.zeros((len(frames), len(first), 3))
         for i in range(frames.shape[1]):
             for k in range(frames.shape[1]):
                 (s, row), (o, column) = (
-                    np.divmod(layout.place(f[:, None], marker)[..., None] + axes, layout.size)
-                    for f in (frames[:, i], frames[:, k])
+                    np.divmod(layout.place(frames[:, [at]], markers)[..., None] + axes, layout.size)
+                    for at, markers in ((i, first), (k, second))
                 )
                 low, high = np.minimum(s, o), np.maximum(s, o)
-                first, second = np.where(s >= o, row, column), np.where(s >= o, column, row)
+                later, sooner = np.where(s >= o, row, column), np.where(s >= o, column, row)
                 value = np.where(
                     low == high,
-                    diagonal[high, first, second],
-                    across[np.minimum(low, len(across) - 1), first, second],
+                    diagonal[high, later, sooner],
+                    across[np.minimum(low, len(across) - 1), later, sooner],
                 )
                 total += (weights[:, i] * weights[:, k])[:, None, None] * value
         return total
