@@ -193,8 +193,15 @@ def _segments(clip: Clip, prior: SegmentPrior, plated: bool) -> tuple[ClipSegmen
     """Clip with its truth (T, 15, 3)."""
     start, view = eval_clips.noisy_start(clip, 1, 0.0), CameraView(Camera.read(str(clip.camera)))
     truth, video = read_truth(str(clip.truth)), Video(clip.video)
+    spread = start["sd"]
     placed = Placement(
-        start["frame"], np.array(start["pelvis"][:2]), start["heading_rad"], start["stature_m"]
+        frame=start["frame"],
+        ground=np.array(start["pelvis"][:2]),
+        heading=start["heading_rad"],
+        stature=start["stature_m"],
+        ground_sd=spread["pelvis"],
+        heading_sd=spread["heading_rad"],
+        stature_sd=spread["stature_m"],
     )
     size = placed.stature * view.scale(np.array(start["pelvis"]))
     plate = read_plate(str(clip.plate), video.size) if plated else None

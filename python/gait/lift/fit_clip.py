@@ -27,6 +27,7 @@ LOOSE = 0.03  # statures that the segment before may be wrong, when the next one
 BEGINNINGS = 3  # explanations of the first segment that are followed through the clip
 DIFFERENT = 0.03  # statures: mean distance of markers in explanations that differ
 START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean and from +- so many sd of these modes
+LEAST = 1e-3  # share of a segment in the blend at its ends
 LOOKS = 2  # times the sensors are laid anew about the figure found
 
 
@@ -255,18 +256,20 @@ def _finished(clip: ClipSegments, sequence: Sequence) -> ClipFit:
     for s, energy in enumerate(chain):
         frames = clip.frames(s)
         since = (clip.film.times[frames] - clip.starts[s]) / max(clip.span, 1e-9)
-        share = 1.0 + 1e-3 - np.abs(2 * since - 1)
+        share = np.maximum(1 - np.abs(2 * since - 1), LEAST)
         found, slope = energy.shape.positions(sequence.states[s], energy.weights, slice(None))
         spread = np.einsum("tjin,nm,tjim->tji", slope, covariance[s], slope, optimize=True)
         places[frames] += share[:, None, None] * found
         variance[frames] += share[:, None, None] * (spread + energy.shape.residual[:, None] ** 2)
         total[frames] += share
     frame = clip.film.first + np.arange(count)
+    places /= total[:, None, None]
+    size = clip.placement.stature_sd / clip.placement.stature * clip.view.growth(places)
     return ClipFit(
         frame=frame,
         time=clip.film.times,
-        places=places / total[:, None, None],
-        sd=np.sqrt(variance / total[:, None, None]),
+        places=places,
+        sd=np.sqrt(variance / total[:, None, None] + size**2),
         sequence=sequence,
         covariance=covariance,
     )

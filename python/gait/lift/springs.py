@@ -34,6 +34,7 @@ Floats = npt.NDArray[np.float64]
 CLICK_SD = 4.0  # pixels, where a correction does not say
 PLACE_SD = 0.3  # metres on the ground, and radians of heading, where a placement does not say
 HEADING_SD = 0.3
+STATURE_SD = 0.03  # metres
 HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 0
 FURTHEST = 1e6  # pixels or metres
 _KNOWN = ("frame", "pelvis", "pelvis_px", "height_px", "heading_rad", "stature_m", "phase", "stride_hz", "sd")
@@ -73,7 +74,7 @@ class Placement:
         Radians about z.
     stature : float
         Metres.
-    ground_sd, heading_sd : float
+    ground_sd, heading_sd, stature_sd : float
     pelvis_px : (float, float), optional
         Without a camera: the pelvis in the picture.
     height_px : float, optional
@@ -86,6 +87,7 @@ class Placement:
     stature: float
     ground_sd: float = PLACE_SD
     heading_sd: float = HEADING_SD
+    stature_sd: float = STATURE_SD
     pelvis_px: tuple[float, float] | None = None
     height_px: float | None = None
 
@@ -111,6 +113,7 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
         stature=stature,
         ground_sd=_deviation(spread, "pelvis", PLACE_SD),
         heading_sd=_deviation(spread, "heading_rad", HEADING_SD),
+        stature_sd=_deviation(spread, "stature_m", STATURE_SD),
     )
     return placed if calibrated else replace(placed, **_in_picture(fields))
 

@@ -39,6 +39,10 @@ class View(Protocol):
         """Pixels per metre at a point (3,)."""
         ...
 
+    def growth(self, points: Floats) -> Floats:
+        """How points (..., 3) move, per share that the person is larger, without moving in the picture."""
+        ...
+
     def away(self, point: Floats) -> Floats:
         """Direction (3,) along which a point moves away without moving in the picture."""
         ...
@@ -72,6 +76,10 @@ class CameraView:
     def scale(self, point: Floats) -> float:
         """Pixels per metre at a point."""
         return self.camera.fy / max(float(self.camera.depth(point)), NEAREST)
+
+    def growth(self, points: Floats) -> Floats:
+        """Away from the lens: a larger person is further away."""
+        return np.asarray(points - self.camera.centre)
 
     def away(self, point: Floats) -> Floats:
         """Direction of the ray through a point."""
@@ -111,6 +119,10 @@ class FlatView:
     def scale(self, point: Floats) -> float:
         """Pixels per metre, the same everywhere."""
         return self.pixels
+
+    def growth(self, points: Floats) -> Floats:
+        """Nowhere: the placement's stature is the unit of length."""
+        return np.zeros_like(points)
 
     def away(self, point: Floats) -> Floats:
         """Direction of depth."""
