@@ -19,6 +19,7 @@ struct kin_input;
 struct layers;
 struct layers_block;
 struct like_body;
+struct like_edge_tally;
 struct like_patch;
 struct like_pose;
 struct like_setup;
@@ -91,7 +92,8 @@ struct walker_block;
       (const struct like_setup *s, const struct features *f, const gait_camera *cam,                         \
        const struct like_pose *pose, int32_t lane, const struct layers *drawn, struct like_patch *seen))     \
     K(void, texture_logs, (const struct like_body *b, float *log))                                           \
-    K(int64_t, template_cost, (const struct like_body *b))
+    K(int64_t, template_cost, (const struct like_body *b))                                                   \
+    K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
 
 /* Those of this build, best last, with the bit that a CPU mask must have. */
 #if defined(__x86_64__)

@@ -9,7 +9,7 @@
 #include "check.h"
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0xd8f2ce08c1d3f296)
+#define GOLDEN UINT64_C(0x61e9de98e0fcd822)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 

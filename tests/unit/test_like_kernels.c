@@ -1,5 +1,5 @@
-/* Kernels of the surface: every instruction set against the scalar one, and that one against all points of a
- * limb looked at one by one. */
+/* Kernels of surface and edges: every instruction set against the scalar one, and that one against points
+ * looked at one by one. */
 #include "kernel_check.h"
 #include "rng.h"
 #include "toy_look.h"
@@ -214,10 +214,122 @@ static void test_compare(void)
     CHECK(broken == 0);
 }
 
+/* ---- edges ---- */
+
+/* The points of one side. */
+static void walk(const rast_mask *mask, const float from[2], const float to[2], const float mid[2], int32_t n,
+                 like_edge_tally *t)
+{
+    float const dx = to[0] - from[0], dy = to[1] - from[1], len2 = dx * dx + dy * dy;
+    if (!(len2 > 1.0f && len2 < 1e12f))
+        return;
+    int32_t const cos2 = (int32_t)(64.0f * (dy * dy - dx * dx) / len2);
+    int32_t const sin2 = (int32_t)(64.0f * (-2.0f * dx * dy) / len2);
+    for (int32_t i = 0; i < n; i++) {
+        float const s = ((float)i + 0.5f) / (float)n, x = from[0] + s * dx, y = from[1] + s * dy;
+        if (!layers_visible(mask, x + 0.3f * (mid[0] - x), y + 0.3f * (mid[1] - y)))
+            continue;
+        if (!(x >= 0.0f && y >= 0.0f && x < (float)VIEW_SIZE && y < (float)VIEW_SIZE))
+            continue;
+        edge_cell const e = v->f.edge[(int32_t)y * VIEW_SIZE + (int32_t)x];
+        t->response += e.trace * 64 + e.xx_yy * cos2 + e.xy2 * sin2;
+        t->chance += e.trace * 64;
+        t->points++;
+    }
+}
+
+static like_edge_tally walk_limbs(int32_t lane)
+{
+    like_edge_tally t = {0, 0, 0};
+    for (int32_t l = 0; l < v->setup.limbs; l++) {
+        bool const round = v->setup.geometry[l].shape == LIMB_ELLIPSOID;
+        float at[8][2], mid[2] = {0};
+        for (int32_t k = 0; k < 8; k++) {
+            at[k][0] = v->outline.x[l][k][lane];
+            at[k][1] = v->outline.y[l][k][lane];
+            for (int32_t a = 0; a < 2 && !round && k < 4; a++)
+                mid[a] += 0.25f * at[k][a];
+        }
+        for (int32_t a = 0; a < 2 && round; a++)
+            mid[a] = 0.5f * (at[0][a] + at[4][a]);
+        const rast_mask *const mask = &v->drawn.visible[l];
+        if (!(v->outline.depth[l][lane] > 0.0f))
+            continue;
+        for (int32_t k = 0; k < 8 && round; k++)
+            walk(mask, at[k], at[(k + 1) & 7], mid, 2, &t);
+        if (!round)
+            walk(mask, at[0], at[1], mid, 8, &t);
+        if (!round)
+            walk(mask, at[3], at[2], mid, 8, &t);
+    }
+    return t;
+}
+
+/* Corners in the image, about it, far off, all in one place, or no numbers at all. */
+static float corner(uint32_t round, uint32_t at)
+{
+    static const float wide[] = {128.0f, 300.0f, 1e5f, 1e7f, 0.2f, 128.0f};
+    static const float odd[] = {NAN, INFINITY, -INFINITY, 256.0f, 0.0f, -0.0f};
+    uint32_t const pick = draw(at, round + 9000);
+    return round % 8 == 7 && pick % 5 == 0 ? odd[pick / 5 % 6]
+                                           : 128.0f + wide[round % 6] * uniform(at, round + 5000);
+}
+
+static void test_edges(void)
+{
+    int32_t points = 0, differ = 0, wrong = 0, broken = 0;
+    for (uint32_t round = 0; round < 300; round++) {
+        int32_t const lane = (int32_t)(round % BLOCK);
+        unsigned char memory[sizeof(like_edge_tally) + 2 * GUARD];
+        like_body const b = {
+            .setup = &v->setup, .features = &v->f, .outline = &v->outline, .lane = lane, .layers = &v->drawn};
+        like_edge_tally want = {-1, -1, -1};
+        v->setup.limbs = (int32_t)(1 + round * 7 % LIMBS);
+        for (uint32_t i = 0; i < VIEW_PIXELS && round % 20 == 0; i++) {
+            int32_t const r = (int32_t)draw(i, round);
+            v->f.edge[i] =
+                (edge_cell){.trace = (int8_t)r, .xx_yy = (int8_t)(r >> 8), .xy2 = (int8_t)(r >> 16)};
+            if (round % 40) /* the extremes */
+                v->f.edge[i] = (edge_cell){
+                    .trace = r & 1 ? 127 : -128, .xx_yy = r & 2 ? 127 : -128, .xy2 = r & 4 ? 127 : -128};
+        }
+        for (uint32_t l = 0; l < LIMBS; l++) {
+            rast_mask *const mask = &v->drawn.visible[l];
+            v->setup.geometry[l].shape = draw(l, round + 100) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
+            v->outline.depth[l][lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
+            mask->first = (int32_t)(draw(l, round + 300) % 5 * 16);
+            mask->last = mask->first + (int32_t)(draw(l, round + 400) % 5 * 16);
+            for (uint32_t y = 0; y < RAST_SIZE; y++)
+                for (uint32_t w = 0; w < RAST_WORDS; w++)
+                    mask->row[y][w] = round % 3 ? ~UINT64_C(0)
+                                                : (uint64_t)draw(4 * y + w, l) << 32 | draw(4 * y + w + 2, l);
+            for (uint32_t k = 0; k < 8; k++) {
+                v->outline.x[l][k][lane] = corner(round, 16 * l + k);
+                v->outline.y[l][k][lane] = corner(round, 16 * l + 8 + k);
+            }
+        }
+        like_edge_tally const reference = walk_limbs(lane);
+        isa_scalar()->edges_count(&b, &want);
+        wrong += memcmp(&want, &reference, sizeof want) != 0;
+        points += want.points;
+        for (int k = 0; k < isa_count(); k++) {
+            guarded const g = guard_fill(memory, sizeof want);
+            isa_at(k)->edges_count(&b, (like_edge_tally *)(void *)g.begin);
+            differ += memcmp(g.begin, &want, sizeof want) != 0;
+            broken += !guard_whole(&g);
+        }
+    }
+    CHECK(points > 2000);
+    CHECK(wrong == 0);
+    CHECK(differ == 0);
+    CHECK(broken == 0);
+}
+
 int main(void)
 {
     v = toy_look_new(0, GAIT_MODE_DEFAULT);
     test_sample();
     test_compare();
+    test_edges();
     return CHECK_DONE();
 }

@@ -1,0 +1,140 @@
+/* Points along the visible outlines of the limbs, and the image gradient there (prototype.md 5.3). */
+#include "kernels.h"
+#include "lanes.h"
+#include "like.h"
+
+/* A limb has LANES points: eight along each side of a cone, two along each side of an ellipsoid's octagon. */
+typedef struct sides { /* of each point's side, from 0 to 1, and how far along it lies */
+    float x0[LANES], y0[LANES], x1[LANES], y1[LANES], share[LANES];
+    float middle_x, middle_y; /* inside the limb */
+} sides;
+
+static inline void cone(const outline_block *o, int32_t l, int32_t lane, sides *restrict out)
+{
+    float x[4], y[4], mx = 0.0f, my = 0.0f;
+    for (int32_t k = 0; k < 4; k++) {
+        x[k] = o->x[l][k][lane];
+        y[k] = o->y[l][k][lane];
+        mx += 0.25f * x[k];
+        my += 0.25f * y[k];
+    }
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LANES; i++) {
+        out->x0[i] = i < 8 ? x[0] : x[3];
+        out->y0[i] = i < 8 ? y[0] : y[3];
+        out->x1[i] = i < 8 ? x[1] : x[2];
+        out->y1[i] = i < 8 ? y[1] : y[2];
+        out->share[i] = ((float)(i & 7) + 0.5f) / 8.0f;
+    }
+    out->middle_x = mx;
+    out->middle_y = my;
+}
+
+static inline void ellipsoid(const outline_block *o, int32_t l, int32_t lane, sides *restrict out)
+{
+    for (int32_t i = 0; i < LANES; i++) {
+        out->x0[i] = o->x[l][i & 7][lane];
+        out->y0[i] = o->y[l][i & 7][lane];
+        out->x1[i] = o->x[l][(i + 1) & 7][lane];
+        out->y1[i] = o->y[l][(i + 1) & 7][lane];
+        out->share[i] = i < 8 ? 0.25f : 0.75f;
+    }
+    out->middle_x = 0.5f * (out->x0[0] + out->x0[4]);
+    out->middle_y = 0.5f * (out->y0[0] + out->y0[4]);
+}
+
+typedef struct spots {                /* points of one limb's outline */
+    int32_t cell[LANES];              /* of the edge map, */
+    int32_t word[LANES];              /* of the limb's mask, */
+    int32_t bit[LANES];               /* and in that */
+    int32_t shown[LANES];             /* -1: on a side of some length, in the image; otherwise 0 */
+    int32_t cos2[LANES], sin2[LANES]; /* double-angle form of the side's normal (dy, -dx), 64 = 1 */
+} spots;
+
+static inline int32_t inside(float x, float y)
+{
+    return (x >= 0.0f) & (y >= 0.0f) & (x < (float)VIEW_SIZE) & (y < (float)VIEW_SIZE);
+}
+
+static inline void place(const sides *s, const rast_mask *mask, spots *restrict out)
+{
+    int32_t const first = mask->first, last = mask->last;
+    float const mx = s->middle_x, my = s->middle_y;
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LANES; i++) {
+        float const dx = s->x1[i] - s->x0[i], dy = s->y1[i] - s->y0[i], len2 = dx * dx + dy * dy;
+        float const x = s->x0[i] + s->share[i] * dx, y = s->y0[i] + s->share[i] * dy;
+        /* A little inside the limb its own mask tells whether something nearer hides this point. */
+        float const ix = x + 0.3f * (mx - x), iy = y + 0.3f * (my - y);
+        /* Neither a point nor beyond all pictures. */
+        int32_t const real = (len2 > 1.0f) & (len2 < 1e12f) & inside(x, y) & inside(ix, iy);
+        int32_t const u = real ? (int32_t)x : 0, v = real ? (int32_t)y : 0;
+        int32_t const c = real ? (int32_t)ix >> 1 : 0, r = real ? (int32_t)iy >> 1 : 0;
+        out->cos2[i] = real ? (int32_t)(64.0f * (dy * dy - dx * dx) / len2) : 0;
+        out->sin2[i] = real ? (int32_t)(64.0f * (-2.0f * dx * dy) / len2) : 0;
+        out->cell[i] = v * VIEW_SIZE + u;
+        out->word[i] = r << 2 | c >> 5;
+        out->bit[i] = c & 31;
+        out->shown[i] = -(real & (r >= first) & (r < last));
+    }
+}
+
+static inline void hide(const rast_mask *mask, spots *restrict p)
+{
+    int32_t bits[LANES];
+    lookup(mask->row, p->word, p->shown, bits);
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LANES; i++)
+        p->shown[i] = -((int32_t)((uint32_t)bits[i] >> p->bit[i]) & 1);
+}
+
+typedef struct sums {
+    int32_t response[LANES], chance[LANES], points[LANES];
+} sums;
+
+/* n'Tn = (trace + (xx - yy) cos 2a + 2 xy sin 2a) / 2, doubled; nothing where nothing is shown. */
+static inline void respond(const edge_cell *edge, const spots *p, sums *restrict out)
+{
+    int32_t cell[LANES];
+    lookup(edge, p->cell, p->shown, cell);
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LANES; i++) {
+        uint32_t const e = (uint32_t)cell[i];
+        int32_t const trace = (int32_t)(e << 24) >> 24, xx_yy = (int32_t)(e << 16) >> 24;
+        int32_t const xy2 = (int32_t)(e << 8) >> 24;
+        out->response[i] += trace * 64 + xx_yy * p->cos2[i] + xy2 * p->sin2[i];
+        out->chance[i] += trace * 64;
+        out->points[i] -= p->shown[i];
+    }
+}
+
+void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
+{
+    const outline_block *const o = b->outline;
+    const rast_mask *mask[MODEL_MAX_LIMBS];
+    spots p[MODEL_MAX_LIMBS];
+    sums sum = {{0}, {0}, {0}};
+    int32_t n = 0;
+    for (int32_t l = 0; l < b->setup->limbs; l++) {
+        sides s;
+        if (!(o->depth[l][b->lane] > 0.0f))
+            continue;
+        if (b->setup->geometry[l].shape == LIMB_ELLIPSOID)
+            ellipsoid(o, l, b->lane, &s);
+        else
+            cone(o, l, b->lane, &s);
+        mask[n] = &b->layers->visible[l];
+        place(&s, mask[n], &p[n]);
+        n++;
+    }
+    for (int32_t k = 0; k < n; k++)
+        hide(mask[k], &p[k]);
+    for (int32_t k = 0; k < n; k++)
+        respond(b->features->edge, &p[k], &sum);
+    *out = (like_edge_tally){0, 0, 0};
+    for (int32_t i = 0; i < LANES; i++) {
+        out->response += sum.response[i];
+        out->chance += sum.chance[i];
+        out->points += sum.points[i];
+    }
+}
