@@ -133,6 +133,7 @@ static void draw_cone(const layers_limb *limb, int32_t lane, int32_t top, int32_
 {
     edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
     edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
+    KERNEL_LANES
     for (int32_t i = 0; i < bands * BAND; i++) {
         int32_t const y = top + (i * LANE_WORDS >> 1);
         int32_t begin = RAST_SIZE, end = 0;
@@ -151,6 +152,7 @@ static void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t top, i
     edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
     edge const e = edge_of(limb, 4, lane), f = edge_of(limb, 5, lane);
     edge const g = edge_of(limb, 6, lane), h = edge_of(limb, 7, lane);
+    KERNEL_LANES
     for (int32_t i = 0; i < bands * BAND; i++) {
         int32_t const y = top + (i * LANE_WORDS >> 1);
         int32_t begin = RAST_SIZE, end = 0;

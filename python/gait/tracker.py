@@ -188,10 +188,8 @@ class Tracker:
 
     Attributes
     ----------
-    memory_bytes : int
-        All the memory the filter uses, particles and scratch together.
-    isa : str
-        Instruction set in use, by ``config.cpu_mask``: scalar, base, avx2 or avx512.
+    memory_bytes, isa : int, str
+        All the memory the filter uses; the instruction set in use: scalar, base, avx2 or avx512.
     step_seconds : float
         Time that the last `step` spent in the C library.
 

@@ -1,6 +1,6 @@
 /* Curves and forward kinematics against a plain double-precision twin, and against what the words mean. */
 #include "kinematics.h"
-#include "kernel_check.h"
+#include "kernels.h"
 
 #include "rng.h"
 #include "toy_model.h"
@@ -377,37 +377,6 @@ static void test_ground(void)
     }
 }
 
-/* Every instruction set gives the scalar bits, and writes nothing else. */
-static void test_kernels(void)
-{
-    static kin_channels ch;
-    static kin_body body;
-    static unsigned char memory[sizeof body + 2 * GUARD];
-    const gait_model *const m = toy_model();
-    for (uint32_t first = 0; first < 40 * BLOCK; first += BLOCK) {
-        kin_input in = {0};
-        int32_t const components = (int32_t)(first / BLOCK) % (m->components + 1);
-        int32_t const proportions = (int32_t)(first / BLOCK) % (m->proportions + 1);
-        for (int lane = 0; lane < BLOCK; lane++) {
-            gait_state const s = random_state(first + (uint32_t)lane);
-            put_lane(&in, lane, &s);
-        }
-        in.heading[first / BLOCK % BLOCK] = first % 3 ? NAN : 1e30f;
-        memset(&ch, 0xa5, sizeof ch);
-        memset(&body, 0xa5, sizeof body);
-        isa_scalar()->kin_curves(m, &in, components, &ch);
-        isa_scalar()->kin_pose(m, &ch, &in, proportions, &body);
-        for (int k = 0; k < isa_count(); k++) {
-            guarded g = guard_fill(memory, sizeof ch);
-            isa_at(k)->kin_curves(m, &in, components, (kin_channels *)(void *)g.begin);
-            CHECK(guard_whole(&g) && memcmp(g.begin, &ch, sizeof ch) == 0);
-            g = guard_fill(memory, sizeof body);
-            isa_at(k)->kin_pose(m, &ch, &in, proportions, (kin_body *)(void *)g.begin);
-            CHECK(guard_whole(&g) && memcmp(g.begin, &body, sizeof body) == 0);
-        }
-    }
-}
-
 int main(void)
 {
     test_against_twin();
@@ -419,6 +388,5 @@ int main(void)
     test_placement();
     test_pelvis_height();
     test_ground();
-    test_kernels();
     return CHECK_DONE();
 }

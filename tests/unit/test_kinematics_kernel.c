@@ -1,0 +1,55 @@
+/* Curves and kinematics of every instruction set against the scalar ones. */
+#include "kernel_check.h"
+#include "kinematics.h"
+
+#include "rng.h"
+#include "toy_model.h"
+
+#include "check.h"
+
+/* Any phases, scores and angles; now and then a huge one. */
+static kin_input random_input(uint32_t round)
+{
+    static const float odd[] = {1e30f, -1e30f, 9000.0f, 1e38f};
+    kin_input in;
+    float *const v = (float *)(void *)&in;
+    for (uint32_t i = 0; i < sizeof in / sizeof *v; i++) {
+        float x[4];
+        rng_normal4(41, 0, 0, i, round, x);
+        v[i] = x[1] > 2.5f && round % 2 ? odd[i % 4] : x[0];
+    }
+    for (int lane = 0; lane < BLOCK; lane++)
+        in.stature[lane] = 1.5f + 0.01f * (float)lane;
+    return in;
+}
+
+static void test_bits(void)
+{
+    static kin_channels ch;
+    static kin_body body;
+    static unsigned char memory[sizeof body + 2 * GUARD];
+    const gait_model *const m = toy_model();
+    for (uint32_t round = 0; round < 60; round++) {
+        kin_input const in = random_input(round);
+        int32_t const components = (int32_t)round % (m->components + 1);
+        int32_t const proportions = (int32_t)round % (m->proportions + 1);
+        memset(&ch, 0xa5, sizeof ch);
+        memset(&body, 0xa5, sizeof body);
+        isa_scalar()->kin_curves(m, &in, components, &ch);
+        isa_scalar()->kin_pose(m, &ch, &in, proportions, &body);
+        for (int k = 0; k < isa_count(); k++) {
+            guarded g = guard_fill(memory, sizeof ch);
+            isa_at(k)->kin_curves(m, &in, components, (kin_channels *)(void *)g.begin);
+            CHECK(guard_whole(&g) && memcmp(g.begin, &ch, sizeof ch) == 0);
+            g = guard_fill(memory, sizeof body);
+            isa_at(k)->kin_pose(m, &ch, &in, proportions, (kin_body *)(void *)g.begin);
+            CHECK(guard_whole(&g) && memcmp(g.begin, &body, sizeof body) == 0);
+        }
+    }
+}
+
+int main(void)
+{
+    test_bits();
+    return CHECK_DONE();
+}
