@@ -54,7 +54,8 @@ def main() -> int:
     rows, missing = [], []
     with progress("held-out sequences", len(SEQUENCES)) as update, tempfile.TemporaryDirectory() as name:
         for done, (title, file) in enumerate(SEQUENCES.items(), 1):
-            prior = learnt_without(MOCAP / file, Path(name) / "m.gait")
+            sources = ("cmu_walk",) if file.startswith("cmu_walk") else ("cmu_misc",)
+            prior = learnt_without(MOCAP / file, Path(name) / "m.gait", sources)
             segments = held_out(MOCAP / file)
             rows += [_row(title, prior, segments, sd) for sd in NOISE]
             missing.append([title, *_gaps(prior, segments)])
@@ -63,10 +64,10 @@ def main() -> int:
     return any("NO" in row for row in [*rows, *missing])
 
 
-def learnt_without(file: Path, model: Path) -> SegmentPrior:
-    """Prior of all recordings but one."""
+def learnt_without(file: Path, model: Path, sources: tuple[str, ...]) -> SegmentPrior:
+    """Prior of all recordings of folders but one."""
     out = f"{file.parent.name}/{file.name}"
-    command = ["learn", str(MOCAP / "cmu_walk"), str(MOCAP / "cmu_misc"), "--segments", "only"]
+    command = ["learn", *(str(MOCAP / source) for source in sources), "--segments", "only"]
     command += ["--exclude", out, "-o", str(model), "--jobs", "1", "--quiet"]
     subprocess.run([sys.executable, "-m", "gait", *command], check=True, stdout=subprocess.DEVNULL)
     return SegmentPrior.load(model)
@@ -151,8 +152,8 @@ def _gaps(prior: SegmentPrior, cut: tuple[Floats, float]) -> list[object]:
 def _publish(rows: list[list[object]], missing: list[list[object]]) -> None:
     note = (
         "One parallel view of 37 markers per segment of half a second. mm per marker: of the prior's mean, "
-        "of least squares in the modes (likelihood only), of the posterior mean (Bayes). Coverage: of the 90 % "
-        "intervals of the depth. Volume: log10 of the posterior's over the prior's. Wanted: Bayes better at "
+        "of least squares in the modes (likelihood only), of the posterior mean (Bayes). "
+        "Coverage: of the 90 % intervals of the depth. Volume: log10 of the posterior's over the prior's. Wanted: Bayes better at "
         f"every noise, by {RATIO} at 50 mm; coverage {COVERAGE[0]} to {COVERAGE[1]}."
     )
     head = ["measure", "left out", "noise mm", "segments", "mean", "likelihood", "Bayes", "ratio"]

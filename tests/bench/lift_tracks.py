@@ -139,7 +139,8 @@ def _clips() -> list[list[object]]:
     note = (
         f"True joints in the picture, {NOISE:g} px of noise, {GAPS:.0%} missing, stature unknown; "
         "root-aligned median mm over 15 joints. blend: overlapping segments mixed as in the paper. "
-        "no camera: only the tracks; the view is taken to be level and far away (above is not). mean pose: at the true heading. "
+        "no camera: only the tracks; the view is taken to be level and far away (above is not). "
+        "mean pose: at the true heading. "
         "Coverage of the 90 % intervals: of places in the world, and about the hips. "
         f"Wanted: below {TARGET:g} mm with the camera."
     )
@@ -190,7 +191,9 @@ def _balancing() -> None:
     joints, cameras = balancing()
     rows: list[list[object]] = []
     with tempfile.TemporaryDirectory() as name, progress("balancing", 2 * len(cameras)) as update:
-        everything = lift_mocap.learnt_without(Path("nothing/at_all.amc"), Path(name) / "m.gait")
+        everything = lift_mocap.learnt_without(
+            Path("nothing/at_all.amc"), Path(name) / "m.gait", ("cmu_walk", "cmu_misc")
+        )
         for title, prior in (("walks", SegmentPrior.load()), ("all motions", everything)):
             for camera_name, camera in cameras.items():
                 tracks = tracked(joints, camera, BALANCING_NOISE, 0.0)
@@ -212,8 +215,8 @@ def _balancing() -> None:
     note = (
         "A man nearly falls from a beam: the reference of four views in one of them, "
         f"{BALANCING_NOISE:g} px of noise, stature unknown; root-aligned median mm over 14 "
-        "joints. No prior has seen such a motion, and the floor is not where he stands: nothing is wanted but that the coverage of the 90 % intervals "
-        "says so."
+        "joints. No prior has seen such a motion, and the floor is not where he stands: nothing is wanted "
+        "but that the coverage of the 90 % intervals says so."
     )
     head = ["prior of", "camera", "smooth", "blend", "mean pose", "median sd mm", "coverage", "about hips"]
     table.publish("lift_balancing", "A real motion that no prior knows", head, rows, note)

@@ -32,6 +32,7 @@ COMMANDS = {
     "demo": "demo",
     "report": "report",
     "report track": "report_track",
+    "report lift": "report_lift",
     "view": "view",
 }
 """Command to its module, in the order of ``gait --help``."""

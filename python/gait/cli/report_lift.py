@@ -1,0 +1,146 @@
+"""Figures of the segment prior and of what it makes of a view, after Leventon and Freeman (1998).
+
+Writes into DIR: report.html (needs nothing else) and the figures as PNG.  spectrum: variances of the modes
+before and after something was seen (fig. 3); synthesis: a segment from 40 modes (2); draws from the prior
+(4); estimates: original, projection, likelihood only, Bayes (5); what is least certain (6); and a clip (7) if
+--clip gives its 2-D tracks.  The segment is the one with most motion of --mocap, which should not be one that
+the model was learnt from; without it, a draw from the prior.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import html
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.camera import Camera
+from gait.cli import values
+from gait.errors import UserError
+from gait.files import replacing
+from gait.lcm.page import Page
+from gait.learn import readers, segment_corpus, segment_motion
+from gait.learn.figures_base import Drawing
+from gait.learn.segment_corpus import Corpus
+from gait.learn.segment_options import Segments
+from gait.lift import figures_clip, motion, tracks_file
+from gait.lift.equations import Parallel, Perspective, View, looking_along
+from gait.lift.figures_segment import Case, case, drawings
+from gait.lift.prior import SegmentPrior
+from gait.progress import progress
+
+Floats = npt.NDArray[np.float64]
+
+NAME = "report lift"
+HELP = "figures of the segment prior and of lifting"
+DPI = 110
+FIGURES = 5  # besides that of a clip
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("-m", "--model", metavar="M.gait", help="with a segment prior (the shipped model)")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for page and figures")
+    parser.add_argument("--mocap", metavar="FILE", help="recording (.amc .bvh .c3d .trc .csv) to look at")
+    parser.add_argument("--clip", metavar="TRACKS.csv", help="2-D tracks of a clip, as for gait lift")
+    parser.add_argument("--camera", metavar="CAM", help="of the clip (level and far away)")
+    parser.add_argument(
+        "--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of noise and draws (1)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw, write, print."""
+    prior = SegmentPrior.load(args.model)
+    segment = _segment(args.mocap, prior) if args.mocap else None
+    truth, stature = segment or (None, prior.stature)
+    what = f"a segment of {Path(args.mocap).name}" if args.mocap else "a draw from the prior"
+    shown = case(prior, truth, stature, what, args.seed)
+    folder = Path(args.output)
+    folder.mkdir(parents=True, exist_ok=True)
+    page = Page(f"{Path(args.model).name if args.model else 'Shipped model'}: segments of motion")
+    page.table("Prior", _facts(prior))
+    with progress("figures", FIGURES + bool(args.clip), args.quiet) as update:
+        for done, drawing in enumerate(_drawings(args, prior, shown), 1):
+            page.figure(drawing.heading, _written(folder, drawing))
+            update(done)
+    with replacing(folder / "report.html") as path:
+        path.write_text(page.text(), encoding="utf-8")
+    figures = _figures(shown)
+    print(json.dumps(figures) if args.json else "\n".join(f"{k}: {v:.4g}" for k, v in figures.items()))
+    return 0
+
+
+def _drawings(args: argparse.Namespace, prior: SegmentPrior, shown: Case) -> Iterator[Drawing]:
+    yield from drawings(shown, args.seed)
+    if args.clip:
+        tracks, _ = tracks_file.read(args.clip, prior.names, ignore_unknown=True)
+        middle = np.nanmean(tracks.uv, axis=(0, 1))
+        view: View = Parallel(looking_along("y"), None, middle, steady=False)
+        if args.camera:
+            view = Perspective(Camera.read(args.camera))
+        names = motion.output_names(prior, tracks)
+        found = motion.lift(prior, tracks, view, motion.Options(), names)
+        yield figures_clip.clip(tracks, found, view, Path(args.clip).name)
+
+
+def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
+    """Segment (F, J, 3) of a recording with the most motion, and the stature; metres."""
+    wanted = Segments(source="only", frames=prior.frames, hop=prior.hop, fps=prior.fps, people=False)
+    read = segment_motion.of(Path(path), readers.read(Path(path)), wanted)
+    unknown = [name for name in prior.names if name not in read.names]
+    if unknown:
+        raise UserError(
+            f"{path}: has no marker {unknown[0]!r} of the model's prior; choose another recording"
+        )
+    with Corpus() as corpus:
+        corpus.put(Path(path).stem, "", Path(path), read)
+        cut = segment_corpus.segments(corpus.recordings()[0], prior.names, wanted)
+    cut = cut[np.isfinite(cut).all(axis=(1, 2, 3))]
+    if not len(cut):
+        raise UserError(f"{path}: no whole segment of {prior.frames / prior.fps:g} s; choose another file")
+    stature = read.stature if np.isfinite(read.stature) else prior.stature
+    return cut[cut.var(axis=1).sum(axis=(1, 2)).argmax()] * stature, stature
+
+
+def _written(folder: Path, drawing: Drawing) -> str:
+    """Write a figure's PNG; its part of the page."""
+    buffer = io.BytesIO()
+    drawing.figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    with replacing(folder / f"{drawing.stem}.png") as path:
+        path.write_bytes(buffer.getvalue())
+    data = base64.b64encode(buffer.getvalue()).decode()
+    caption = html.escape(drawing.caption)
+    return f'<p>{caption}</p><img style="max-width: 100%" alt="{caption}" src="data:image/png;base64,{data}">'
+
+
+def _facts(prior: SegmentPrior) -> dict[str, str]:
+    return {
+        "markers": f"{len(prior.names)}",
+        "segment": f"{prior.frames} frames at {prior.fps:g} per second",
+        "learnt from": f"{prior.segments} segments of {prior.recordings} recordings",
+        "modes": f"{prior.size}" + (f" of each of {prior.components}" if prior.components > 1 else ""),
+        "headings": "unknown" if prior.headings == 0 else f"{prior.headings} copies in the world's axes",
+        "inflation of what is outside the modes": f"{prior.gamma:.2f}",
+    }
+
+
+def _figures(c: Case) -> dict[str, Any]:
+    """Figures of ``--json``: errors in mm per marker."""
+
+    def apart(found: Floats) -> float:
+        return 1000 * float(np.linalg.norm(found - c.truth, axis=2).mean())
+
+    return {
+        "mean_mm": apart(c.gaussian.mean),
+        "likelihood_mm": apart(c.likelihood),
+        "bayes_mm": apart(c.posterior.points),
+        "log10_volume_ratio": c.posterior.log10_volume,
+    }

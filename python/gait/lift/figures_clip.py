@@ -1,0 +1,49 @@
+"""Figure of a lifted clip: what was seen, and the motion from another side (Leventon and Freeman, fig. 7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from gait.learn.figures_base import BLUE, GREY, ORANGE, Drawing, plain
+from gait.learn.figures_model import STICKS
+from gait.lift.equations import View
+from gait.lift.figures_base import SHOWN
+from gait.lift.motion import Motion
+from gait.lift.tracks_file import Tracks
+
+
+def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
+    """Frames of a clip: its points with the estimate over them, and the estimate turned by 90 degrees."""
+    frames = np.linspace(0, len(tracks.frame) - 1, min(SHOWN, len(tracks.frame))).round().astype(int)
+    figure = Figure(figsize=(9, 4.8), layout="constrained")
+    panels = figure.subplots(2, len(frames), squeeze=False)
+    right, down, ahead = view.axes
+    index = {marker: k for k, marker in enumerate(motion.names)}
+    for column, frame in enumerate(frames):
+        body = motion.places[frame] - motion.places[frame].mean(axis=0)
+        sides = [np.column_stack([body @ axis, body @ -down]) for axis in (right, ahead)]
+        for axes, flat in zip(panels[:, column], sides, strict=True):
+            plain(axes)
+            axes.grid(visible=False)
+            axes.set_aspect("equal")
+            axes.set(xticks=[], yticks=[])
+            axes.spines[["left", "bottom"]].set_visible(False)
+            for side, chains in STICKS.items():
+                for chain in chains:
+                    known = [index[joint] for joint in chain if joint in index]
+                    axes.plot(*flat[known].T, color=BLUE if side == "l" else ORANGE, lw=1.6)
+        depth = body @ ahead
+        sd = motion.rooted_sd[frame] @ np.abs(ahead)
+        panels[1, column].errorbar(
+            depth, sides[1][:, 1], xerr=np.minimum(sd, 1.0), fmt="none", ecolor=GREY, lw=0.8
+        )
+        panels[0, column].set_title(f"frame {tracks.frame[frame]}", fontsize=9)
+    panels[0, 0].set_ylabel("as seen", fontsize=9)
+    panels[1, 0].set_ylabel("from the side", fontsize=9)
+    error = float(np.nanmedian(motion.error))
+    caption = (
+        f"{name}: the estimate as the view sees it, {error:.1f} px from the tracks (median), and from the "
+        "side, with one deviation of the depth about the hips. Left limbs blue, right ones orange."
+    )
+    return Drawing("clip", "A clip", caption, figure)

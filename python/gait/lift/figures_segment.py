@@ -1,0 +1,171 @@
+"""Figures of Leventon and Freeman (1998) for a learnt prior: spectrum, synthesis, draws, estimates, modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.learn.figures_base import BLUE, DARK, GREY, ORANGE, Drawing, grid, line_legend
+from gait.lift.figures_base import AHEAD, SIDE, rows, strip
+from gait.lift.observe import Observations, orthographic
+from gait.lift.posterior import Gaussian, Posterior, infer, likelihood_only, place
+from gait.lift.prior import SegmentPrior
+
+Floats = npt.NDArray[np.float64]
+
+SYNTHESIS = 40  # modes of the paper's fig. 2
+NOISE = 0.02  # metres, of the points seen in figs. 3, 5 and 6
+DRAWS = MODES = 3
+SWING = 2.0  # deviations by which uncertain modes are drawn
+
+
+@dataclass(frozen=True)
+class Case:
+    """A segment, seen along x (from behind) without its depth.
+
+    Attributes
+    ----------
+    prior : SegmentPrior
+    truth : (F, J, 3)
+        Metres, placed as in the prior.
+    what : str
+        Where it is from.
+    gaussian, posterior
+        The prior at its stature, and given what is seen.
+    likelihood : (F, J, 3)
+        Least squares in the modes.
+    """
+
+    prior: SegmentPrior
+    truth: Floats
+    what: str
+    gaussian: Gaussian
+    posterior: Posterior
+    likelihood: Floats
+
+
+def case(prior: SegmentPrior, truth: Floats | None, stature: float, what: str, seed: int) -> Case:
+    """See a segment, or one drawn from the prior if `truth` is None, from behind with noise."""
+    rng = np.random.default_rng(seed)
+    gaussian = place(prior, stature=stature, ground_sd=0.0, height_sd=0.0)
+    x = gaussian.draw(rng) if truth is None else truth
+    axes = np.stack([AHEAD, [0.0, 0.0, 1.0]])
+    uv = x @ axes.T + NOISE * rng.normal(size=(*x.shape[:2], 2))
+    seen = orthographic(Observations(uv, np.full(uv.shape[:2], NOISE)), axes)
+    return Case(prior, x, what, gaussian, infer(gaussian, seen), likelihood_only(gaussian, seen))
+
+
+def drawings(c: Case, seed: int) -> Iterator[Drawing]:
+    """All figures of a case."""
+    yield spectrum(c)
+    yield synthesis(c)
+    yield draws(c, seed)
+    yield estimates(c)
+    yield uncertain(c)
+
+
+def spectrum(c: Case) -> Drawing:
+    """Variances of the modes before and after the segment was seen (fig. 3)."""
+    figure, panels = grid(1, 2, 9, 3.4)
+    lengths = np.linalg.norm(c.gaussian.modes.reshape(len(c.gaussian.modes), -1), axis=1) ** 2
+    after = lengths * np.diag(c.posterior.covariance)
+    number = np.arange(1, len(lengths) + 1)
+    panels[0].semilogy(number, lengths, "o-", ms=3, color=BLUE)
+    panels[0].semilogy(number, after, "o-", ms=3, color=ORANGE)
+    panels[0].set(xlabel="mode", ylabel="variance, m²")
+    share = 100 * np.cumsum(lengths) / (lengths.sum() + 3 * c.truth.shape[0] * c.gaussian.residual.sum())
+    panels[1].plot(number, share, color=DARK)
+    panels[1].set(xlabel="modes", ylabel="variance explained, %", ylim=(0, 102))
+    line_legend(figure, {"prior": BLUE, "posterior": ORANGE})
+    ratio = c.posterior.log10_volume
+    return Drawing(
+        "spectrum",
+        "Spectrum",
+        f"Variances of the modes, and what is left of them when {c.what} was seen from behind with "
+        f"{1000 * NOISE:.0f} mm of noise: the volume shrinks to 10^{ratio:.1f} of the prior's.",
+        figure,
+    )
+
+
+def synthesis(c: Case) -> Drawing:
+    """Draw the segment beside its projection on the first modes (fig. 2)."""
+    used = c.gaussian.modes[:SYNTHESIS]
+    projected, error = _projection(c, used)
+    figure, panels = rows(2, ("from the side", "from ahead"))
+    for axes, across in zip(panels, (SIDE, AHEAD), strict=True):
+        strip(axes, c.truth, c.prior.names, across, DARK, ghost=True, size=c.prior.stature)
+        strip(axes, projected, c.prior.names, across, ORANGE, size=c.prior.stature, path=c.truth)
+    line_legend(figure, {"original": GREY, f"{len(used)} modes": ORANGE})
+    caption = f"{c.what.capitalize()} (grey) and its projection on {len(used)} modes: {error:.0f} mm off."
+    return Drawing("synthesis", "Synthesis", caption, figure)
+
+
+def _projection(c: Case, modes: Floats) -> tuple[Floats, float]:
+    """Nearest segment in the span of modes, and its mean distance in mm."""
+    flat = modes.reshape(len(modes), -1).T
+    apart = (c.truth - c.gaussian.mean).ravel()
+    scores = np.linalg.lstsq(flat, apart, rcond=None)[0]
+    found = c.gaussian.mean + (flat @ scores).reshape(c.truth.shape)
+    return found, _apart(found, c.truth)
+
+
+def _apart(found: Floats, truth: Floats) -> float:
+    return 1000 * float(np.linalg.norm(found - truth, axis=2).mean())
+
+
+def draws(c: Case, seed: int) -> Drawing:
+    """Segments drawn from the prior (fig. 4)."""
+    rng = np.random.default_rng(seed)
+    figure, panels = rows(DRAWS, [f"draw {k + 1}" for k in range(DRAWS)])
+    for axes in panels:
+        x = c.gaussian.draw(rng, residual=False)
+        strip(axes, x, c.prior.names, SIDE, BLUE, size=c.prior.stature)
+    caption = f"{DRAWS} segments drawn from the prior, seen from the side."
+    return Drawing("draws", "Random draws", caption, figure)
+
+
+def estimates(c: Case) -> Drawing:
+    """Original, projection, likelihood alone and Bayes, from where the depth shows (fig. 5)."""
+    projected, floor = _projection(c, c.gaussian.modes)
+    found = {
+        "original": (c.truth, DARK),
+        f"projection\n{floor:.0f} mm": (projected, DARK),
+        f"likelihood only\n{_apart(c.likelihood, c.truth):.0f} mm": (c.likelihood, BLUE),
+        f"Bayes\n{_apart(c.posterior.points, c.truth):.0f} mm": (c.posterior.points, ORANGE),
+    }
+    figure, panels = rows(len(found), list(found))
+    for axes, (x, colour) in zip(panels, found.values(), strict=True):
+        if x is not c.truth:
+            strip(axes, c.truth, c.prior.names, SIDE, DARK, ghost=True, size=c.prior.stature)
+        strip(axes, x, c.prior.names, SIDE, colour, size=c.prior.stature, path=c.truth)
+    return Drawing(
+        "estimates",
+        "Estimates",
+        f"{c.what.capitalize()} was seen from behind, with {1000 * NOISE:.0f} mm of noise; drawn from the "
+        "side, where what was not seen shows. Grey: original. Mean distance of all markers.",
+        figure,
+    )
+
+
+def uncertain(c: Case) -> Drawing:
+    """Least certain displacements, from where they show most (fig. 6)."""
+    sd, modes = c.posterior.uncertain_modes(MODES)
+    titles = [f"mode {k + 1}\n{1000 * s / np.sqrt(c.truth[..., 0].size):.0f} mm" for k, s in enumerate(sd)]
+    figure, panels = rows(MODES, titles)
+    for axes, deviation, mode in zip(panels, sd, modes, strict=True):
+        strip(axes, c.posterior.points, c.prior.names, SIDE, DARK, ghost=True, size=c.prior.stature)
+        for sign, colour in ((1, ORANGE), (-1, BLUE)):
+            moved = c.posterior.points + sign * SWING * deviation * mode
+            strip(axes, moved, c.prior.names, SIDE, colour, size=c.prior.stature, path=c.posterior.points)
+    depth = [float(np.sum(mode[..., 0] ** 2)) for mode in modes]
+    line_legend(figure, {f"+{SWING:g} sd": ORANGE, f"-{SWING:g} sd": BLUE})
+    return Drawing(
+        "uncertain",
+        "What is least certain",
+        "Largest posterior deviations, rms per marker, seen from the side. Shares of the energy along the "
+        f"line of sight: {', '.join(f'{100 * share:.0f} %' for share in depth)}.",
+        figure,
+    )

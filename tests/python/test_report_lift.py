@@ -1,0 +1,54 @@
+"""`gait report lift`: figures and page, with and without a recording and a clip."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toy_segments import toy_blob, toy_prior
+
+from gait.cli import main
+from gait.lift.tracks_file import Tracks, write
+
+MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
+FIGURES = {"spectrum", "synthesis", "draws", "estimates", "uncertain"}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    prior = toy_prior(6, 19, 4, seed=5)
+    (tmp_path / "m.gait").write_bytes(toy_blob(prior))
+    uv = 200 * np.repeat(prior.mean[0, :1, :, [0, 2]].transpose(1, 2, 0), 12, axis=0) * (1, -1)
+    write("t.csv", Tracks(np.arange(12), np.arange(12) / 20, prior.names, uv, np.ones(uv.shape[:2])))
+    return tmp_path
+
+
+def test_figures_of_a_draw(folder, capsys):
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["bayes_mm"] < found["likelihood_mm"]
+    assert found["bayes_mm"] < found["mean_mm"]
+    assert {p.stem for p in (folder / "r").glob("*.png")} == FIGURES | {"clip"}
+    page = (folder / "r" / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == len(FIGURES) + 1
+    assert 'src="http' not in page
+
+
+def test_markers_must_be_known(folder, capsys):
+    path = MOCAP / "cmu_walk" / "35" / "35_01.amc"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    (folder / "m.gait").write_bytes(toy_blob(toy_prior(6, 21, 4)))
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--mocap", str(path)]) == 1
+    assert "has no marker 'm19'" in capsys.readouterr().err
+
+
+def test_a_recording(folder, capsys):
+    path = MOCAP / "cmu_walk" / "35" / "35_01.amc"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--mocap", str(path), "--quiet"]) == 0
+    assert "a segment of 35_01.amc" in (folder / "r" / "report.html").read_text()
