@@ -97,18 +97,26 @@ static void spread_after(const dynamics *d, const walker *from, float dt, float 
                          double v[FIELDS][DRAWS])
 {
     int32_t const steps = (int32_t)(seconds / dt + 0.5f);
-    for (int32_t i = 0; i < DRAWS; i++) {
-        walker w = *from;
-        double cycles = 0.0; /* unwrapped phase */
+    for (int32_t i = 0; i < DRAWS; i += BLOCK) {
+        walker w[BLOCK];
+        double cycles[BLOCK] = {0.0}; /* unwrapped phase */
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            w[lane] = *from;
         for (int32_t k = 0; k < steps; k++) {
-            float const before = w.f[F_PHASE];
-            w = move_one(d, &w, dt, age + (float)k * dt, (uint32_t)k, i);
-            double const turn = (double)w.f[F_PHASE] - (double)before;
-            cycles += turn - floor(turn + 0.5);
+            float before[BLOCK];
+            for (int32_t lane = 0; lane < BLOCK; lane++)
+                before[lane] = w[lane].f[F_PHASE];
+            move_block(d, w, dt, age + (float)k * dt, (uint32_t)k, i);
+            for (int32_t lane = 0; lane < BLOCK; lane++) {
+                double const turn = (double)w[lane].f[F_PHASE] - (double)before[lane];
+                cycles[lane] += turn - floor(turn + 0.5);
+            }
         }
-        for (int f = 0; f < FIELDS; f++)
-            v[f][i] = (double)w.f[f];
-        v[F_PHASE][i] = cycles;
+        for (int32_t lane = 0; lane < BLOCK; lane++) {
+            for (int f = 0; f < FIELDS; f++)
+                v[f][i + lane] = (double)w[lane].f[f];
+            v[F_PHASE][i + lane] = cycles[lane];
+        }
     }
 }
 

@@ -29,20 +29,29 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     return (dynamics){.cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed};
 }
 
-/* Particle i over one interval of dt seconds at an age, moved with its block. */
+/* Particles first .. first + BLOCK - 1 over one interval of dt seconds at an age. */
+static inline void move_block(const dynamics *d, walker w[BLOCK], float dt, float age, uint32_t frame,
+                              int32_t first)
+{
+    static walker_block from, to;
+    dynamics_step const s = dynamics_step_init(d, dt, age, frame);
+    for (int32_t f = 0; f < s.fields; f++)
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            from.f[f][lane] = w[lane].f[f];
+    kernels_choose(~0u)->dynamics_move(&s, first, &from, &to);
+    for (int32_t f = 0; f < s.fields; f++)
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            w[lane].f[f] = to.f[f][lane];
+}
+
+/* Particle i alone. */
 static inline walker move_one(const dynamics *d, const walker *from, float dt, float age, uint32_t frame,
                               int32_t i)
 {
-    static walker_block block, moved; /* the other lanes stand at 0 */
-    dynamics_step const s = dynamics_step_init(d, dt, age, frame);
-    int32_t const lane = i % BLOCK;
-    walker w = *from;
-    for (int32_t f = 0; f < s.fields; f++)
-        block.f[f][lane] = from->f[f];
-    kernels_choose(~0u)->dynamics_move(&s, i - lane, &block, &moved);
-    for (int32_t f = 0; f < s.fields; f++)
-        w.f[f] = moved.f[f][lane];
-    return w;
+    walker block[BLOCK] = {{{0}}};
+    block[i % BLOCK] = *from;
+    move_block(d, block, dt, age, frame, i - i % BLOCK);
+    return block[i % BLOCK];
 }
 
 typedef struct moments {
