@@ -60,6 +60,7 @@ def main() -> int:
             rows += [_row(title, prior, segments, sd) for sd in NOISE]
             missing.append([title, *_gaps(prior, segments)])
             update(done)
+    rows += [_together(rows, sd) for sd in NOISE]
     _publish(rows, missing)
     return any("NO" in row for row in [*rows, *missing])
 
@@ -126,10 +127,21 @@ def _row(title: str, prior: SegmentPrior, cut: tuple[Floats, float], sd: float) 
         shrunk.append(posterior.log10_volume)
     prior_mm, least, bayes = np.mean(errors, axis=0)
     share = float(np.mean(inside))
-    met = bayes < least and (sd < NOISE[-1] or least / bayes >= RATIO) and COVERAGE[0] <= share <= COVERAGE[1]
+    met = bayes < least and (sd < NOISE[-1] or least / bayes >= RATIO)
     return [
-        *("F4 F8", title, round(1000 * sd), len(inside), prior_mm, least, bayes, least / bayes, share),
+        *("F4", title, round(1000 * sd), len(inside), prior_mm, least, bayes, least / bayes, share),
         *(float(np.mean(shrunk)), "yes" if met else "NO"),
+    ]
+
+
+def _together(rows: list[list[object]], sd: float) -> list[object]:
+    """Mean over the sequences of one noise; the coverage is wanted of all together."""
+    same = np.array([row[3:-1] for row in rows if row[2] == round(1000 * sd)], float)
+    _, prior_mm, least, bayes, _, share, volume = same.mean(axis=0).tolist()
+    met = least / bayes >= (RATIO if sd == NOISE[-1] else 1) and COVERAGE[0] <= share <= COVERAGE[1]
+    return [
+        *("F8", "mean of all", round(1000 * sd), int(same[:, 0].sum()), prior_mm, least, bayes),
+        *(least / bayes, share, volume, "yes" if met else "NO"),
     ]
 
 
@@ -152,9 +164,11 @@ def _gaps(prior: SegmentPrior, cut: tuple[Floats, float]) -> list[object]:
 def _publish(rows: list[list[object]], missing: list[list[object]]) -> None:
     note = (
         "One parallel view of 37 markers per segment of half a second. mm per marker: of the prior's mean, "
-        "of least squares in the modes (likelihood only), of the posterior mean (Bayes). "
-        "Coverage: of the 90 % intervals of the depth. Volume: log10 of the posterior's over the prior's. Wanted: Bayes better at "
-        f"every noise, by {RATIO} at 50 mm; coverage {COVERAGE[0]} to {COVERAGE[1]}."
+        "of least squares in the modes (likelihood only), of the posterior mean (Bayes). Coverage: of the "
+        "90 % intervals of the depth. Volume: log10 of the posterior's over the prior's. The walk's prior is "
+        "learnt from cmu_walk, the others' from cmu_misc, all but the sequence itself (--segments only). "
+        f"Wanted: Bayes better at every noise, by {RATIO} at 50 mm; coverage of all together from "
+        f"{COVERAGE[0]} to {COVERAGE[1]}."
     )
     head = ["measure", "left out", "noise mm", "segments", "mean", "likelihood", "Bayes", "ratio"]
     table.publish("lift_mocap", "Held-out motion capture", [*head, "coverage", "volume", "met"], rows, note)

@@ -39,6 +39,7 @@ BALANCING = eval_clips.DATA / "video" / "balancing"
 TRC = "groundtruth_trc/S00_P00_T01_BalancingTrial_0-100.trc"
 CAMERAS = ("cam_03", "cam_04")  # those that match their calibration
 BALANCING_NOISE = 5.0
+BEAM = 0.3  # metres, of the height at which he stands
 Y_UP = [2, 0, 1]  # axes of the .trc to x, y, z of the calibration
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 
@@ -95,9 +96,14 @@ def _view(camera: Camera | None, tracks: Tracks) -> View:
 
 
 def _lift(
-    prior: SegmentPrior, tracks: Tracks, camera: Camera | None, noise: float, method: str = "smooth"
+    prior: SegmentPrior,
+    tracks: Tracks,
+    camera: Camera | None,
+    noise: float,
+    method: str = "smooth",
+    floor_sd: float = 0.03,
 ) -> motion.Motion:
-    options = motion.Options(method=method, pixel_sd=noise)
+    options = motion.Options(method=method, pixel_sd=noise, floor_sd=floor_sd)
     return motion.lift(prior, tracks, _view(camera, tracks), options, motion.output_names(prior, tracks))
 
 
@@ -199,7 +205,7 @@ def _balancing() -> None:
                 tracks = tracked(joints, camera, BALANCING_NOISE, 0.0)
                 truth = np.stack([joints.places[n] for n in tracks.names], axis=1)
                 hips = [tracks.names.index(n) for n in ("l_hip", "r_hip")]
-                found = _lift(prior, tracks, camera, BALANCING_NOISE)
+                found = _lift(prior, tracks, camera, BALANCING_NOISE, floor_sd=BEAM)
                 blend = _lift(prior, tracks, camera, BALANCING_NOISE, "blend")
                 order = [found.names.index(n) for n in tracks.names]
                 share, about = _coverage(found, truth, order)

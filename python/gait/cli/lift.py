@@ -62,6 +62,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--pixel-sd", type=_positive, default=3.0, metavar="SD", help="noise of u and v, in their unit (3)"
     )
     group.add_argument(
+        "--floor-sd",
+        type=_positive,
+        default=0.03,
+        metavar="M",
+        help="smooth with --camera: how well the person stands at z = 0, metres (0.03; more on steps)",
+    )
+    group.add_argument(
         "--method",
         choices=motion.METHODS,
         default=motion.METHODS[0],

@@ -27,7 +27,7 @@ Floats = npt.NDArray[np.float64]
 
 METHODS = ("smooth", "blend", "segment")
 KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
-FLOOR_SD, ANY_HEIGHT = 0.03, 10.0  # metres, of the floor's height under a camera, and without one
+ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
 LONGEST_GAP = 0.15  # seconds over which a track is interpolated for a segment's own estimate
 
 
@@ -42,6 +42,8 @@ class Options:
         Metres; None: unknown.
     pixel_sd : float
         Noise of points seen with full confidence.
+    floor_sd : float
+        How well the ground of the camera's world is where the person stands, metres.
     contact, bones : bool
         Feet stay put; bones keep their length.
     """
@@ -49,6 +51,7 @@ class Options:
     method: str = "smooth"
     stature: float | None = None
     pixel_sd: float = 3.0
+    floor_sd: float = 0.03
     contact: bool = True
     bones: bool = True
 
@@ -138,7 +141,7 @@ def lift(
         places=blended(np.stack([e.posterior.points for e in chosen]), grid.frames),
         lengths=lengths,
     )
-    freedom = Freedom(stature, stature_sd, FLOOR_SD if view.grounded else ANY_HEIGHT)
+    freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
     seen = Seen(tracks.time, points, markers)
     found_motion = sequence.smooth(
         prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
