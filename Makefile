@@ -56,14 +56,10 @@ OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug or sanitize)
 endif
-# gcc unrolls loops less than it likes to, but for the particles' motion: as fast, and the library a fifth smaller.
-# What no step waits for is made smaller as well.
-ifeq ($(OPT),$(OPT_release))
-PEEL := $(shell $(CC) --param=max-completely-peeled-insns=100 -E -x c /dev/null >/dev/null 2>&1 && \
-        echo --param=max-completely-peeled-insns=100)
-COLD := abi% api% blob% camera% dense.c exchange% eye% image% lift% model% render% section% segment% snapshot%
-endif
-size_of = $(if $(findstring dynamics,$(1)),,$(PEEL)) $(if $(filter-out %_kernel.c,$(filter $(COLD),$(notdir $(1)))),-O2)
+# What no step waits for is made small.
+COLD := $(if $(filter -O3,$(OPT)),abi% api% blob% camera% dense.c exchange% eye% image% lift% model% render% section% \
+        segment% snapshot%)
+if_cold = $(if $(filter $(COLD),$(notdir $(1))),-O2)
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 COMMON := $(OPT) -g -MMD -MP -ffp-contract=off
@@ -73,6 +69,8 @@ EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGE
 NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
 
 # Kernels (libgait/src/kernels.h) are compiled once per instruction set; `scalar` defines their results.
+# gcc would unroll every loop over 16 lanes besides making vector code of it: half as large again, no faster.
+KERNEL_FLAGS := $(if $(findstring clang,$(shell $(CC) --version)),,--param=max-completely-peel-times=8)
 FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
 FLAGS_base   :=
 FLAGS_avx2   := -mavx2 -mpopcnt -mbmi -mbmi2
@@ -137,14 +135,14 @@ $(B)/libgait.a: $(OBJ)
 	@$(AR) rcs $@ $(B)/libgait.o
 
 $(B)/src/%.c.o: libgait/src/%.c Makefile | $(B)/src/
-	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(call size_of,$<) $(CFLAGS) -c $< -o $@
+	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(call if_cold,$<) $(CFLAGS) -c $< -o $@
 
 $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
 	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) $(NO_RUNTIME) $(EIGEN_FLAGS) $(WARN) $(CXXFLAGS) -c $< -o $@
 
 define kernel_rule
 $(B)/src/%.$(1).o: libgait/src/%.c Makefile | $(B)/src/
-	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) $$(call size_of,$$<) -DKERNEL_ISA=$(1) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
+	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $(KERNEL_FLAGS) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 
@@ -233,7 +231,7 @@ BENCH_WRAP := $(shell sed -n 's/^WRAP.[^,]*, \([a-z_]*\),.*/-Wl,--wrap=\1/p' tes
 BENCH_CC = $(CC) -std=c11 -D_DEFAULT_SOURCE -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -Ilibgait/include -iquote libgait/src -Itools $(CFLAGS)
 define bench_isa_rule
 $(B)/bench/%_kernel.$(1).o: tests/bench/%_kernel.c Makefile | $(B)/bench/
-	$$(call say,CC   $$< ($(1)))$$(BENCH_CC) -DKERNEL_ISA=$(1) $(FLAGS_$(1)) -c $$< -o $$@
+	$$(call say,CC   $$< ($(1)))$$(BENCH_CC) -DKERNEL_ISA=$(1) $(KERNEL_FLAGS) $(FLAGS_$(1)) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call bench_isa_rule,$(isa))))
 $(B)/bench/%.o: tests/bench/%.c Makefile | $(B)/bench/
