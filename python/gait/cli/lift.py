@@ -105,7 +105,9 @@ def run(args: argparse.Namespace) -> int:
     if ignored and not args.quiet:
         print(f"left out: {' '.join(ignored)}", file=sys.stderr)
     names = motion.output_names(prior, tracks, args.all_markers)
-    options = motion.Options(args.method, args.height, args.pixel_sd, not args.no_contact, not args.no_bones)
+    options = motion.Options(
+        args.method, args.height, args.pixel_sd, args.floor_sd, not args.no_contact, not args.no_bones
+    )
     with one_thread(), progress("segments", motion.segments_of(prior, tracks), args.quiet) as update:
         found = motion.lift(prior, tracks, _view(args, tracks), options, names, update)
     if not found.settled and not args.quiet:
