@@ -27,11 +27,8 @@ void verdict_size(verdict *v, const bench_result *r)
 /* Points of the picture that one likelihood looks up: surface and edges. */
 static int32_t points(const gait_model *m)
 {
-    int32_t const cone = 2 * 10, ellipsoid = 8 * 3; /* edge points: like_edges */
-    int32_t count = m->limbs * LIKE_FACING;
-    for (int32_t l = 0; l < m->limbs; l++)
-        count += m->limb_info[l * LIMB_INFO + 1] == LIMB_ELLIPSOID ? ellipsoid : cone;
-    return count;
+    enum { EDGE_POINTS = 16 }; /* of a limb: edges_count */
+    return m->limbs * (LIKE_FACING + EDGE_POINTS);
 }
 
 /* One line; `more`: more is better. */
