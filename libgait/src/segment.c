@@ -5,6 +5,10 @@
 
 enum { COUNTS = 8, RATES = 8 };
 
+#define SLOWEST 1.0f /* frames per second, so that times and the memory for them stay in range */
+#define FASTEST 1000.0f
+#define TALLEST 10.0f /* metres */
+
 static void read_counts(sections *s, segment_prior *p)
 {
     p->name = sections_names(s, "SGNM", GAIT_MAX_MARKERS, &p->markers);
@@ -32,8 +36,8 @@ static void read_rates(sections *s, segment_prior *p)
     p->fps = r[0];
     p->gamma = r[1];
     p->stature = r[2];
-    sections_require(s, r[0] > 0.0f && r[1] > 0.0f && r[2] > 0.0f, "SGRT",
-                     "holds a rate, factor or stature that is not positive");
+    sections_require(s, r[0] >= SLOWEST && r[0] <= FASTEST && r[1] > 0.0f && r[2] > 0.0f && r[2] <= TALLEST,
+                     "SGRT", "holds a rate, factor or stature out of range");
 }
 
 static void read_weights(sections *s, segment_prior *p)

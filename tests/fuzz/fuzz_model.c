@@ -1,27 +1,16 @@
 /* fuzz_model.c - a damaged model is refused, or else can be used: pose, picture, tracking. */
 #include "fuzz.h"
-#include "hash.h"
 
 #include <stdlib.h>
-#include <string.h>
 
-enum { CRC_AT = 20, WIDTH = 64, HEIGHT = 48 };
-
-static void repair(uint8_t *data, size_t size)
-{
-    if (size < CRC_AT + 4)
-        return;
-    memset(data + CRC_AT, 0, 4);
-    uint32_t const crc = hash_crc32(0, data, size);
-    memcpy(data + CRC_AT, &crc, sizeof crc);
-}
+enum { WIDTH = 64, HEIGHT = 48 };
 
 void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size)
 {
     if (blob_size > cap)
         abort();
     memcpy(out, blob, blob_size);
-    repair(out, blob_size);
+    fuzz_repair(out, blob_size);
     if (memcmp(out, blob, blob_size) != 0) /* else every damaged model would be refused for its checksum */
         abort();
     *size = blob_size;
@@ -54,7 +43,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     uint8_t *const blob = fuzz_aligned(data, size, &copy);
     size_t bytes = 0;
     gait_model *m = NULL;
-    repair(blob, size);
+    fuzz_repair(blob, size);
     if (gait_model_bytes(blob, size, &bytes, NULL) == GAIT_OK) {
         void *const memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN) / GAIT_ALIGN * GAIT_ALIGN);
         if (memory && gait_model_init(memory, bytes, blob, size, &m, NULL) == GAIT_OK)
