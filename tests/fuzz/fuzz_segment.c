@@ -17,7 +17,7 @@ void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, 
     *size = blob_size;
 }
 
-static void use(const uint8_t *blob, size_t size, int32_t projection)
+static void use(const uint8_t *blob, size_t size, uint64_t choice)
 {
     static double uv[2 * POINTS], mean[3 * POINTS], sd[3 * POINTS];
     static gait_lift_frame out;
@@ -26,7 +26,8 @@ static void use(const uint8_t *blob, size_t size, int32_t projection)
     gait_lift *l = NULL;
     size_t bytes = 0;
     gait_lift_default(&c);
-    c.projection = projection;
+    c.projection = choice % 2 ? GAIT_LIFT_PERSPECTIVE : GAIT_LIFT_ORTHOGRAPHIC;
+    c.heading_sd = choice / 2 % 4 ? 0.3 : -1.0; /* looking all round takes long */
     c.max_iterations = 4;
     c.camera = (gait_camera){96, 64, 100, 100, 48, 32, {1, 0, 0, 0, 0, -1, 0, 1, 0}, {0, 1, 5}, {0}};
     if (gait_lift_bytes(blob, size, &c, &bytes, NULL) != GAIT_OK || bytes > 1u << 27)
@@ -52,7 +53,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     gait_lift_info info;
     fuzz_repair(blob, size);
     if (gait_lift_get_info(blob, size, &info, NULL) == GAIT_OK)
-        use(blob, size, info.digest % 2 ? GAIT_LIFT_PERSPECTIVE : GAIT_LIFT_ORTHOGRAPHIC);
+        use(blob, size, info.digest);
     free(copy);
     return 0;
 }
