@@ -69,7 +69,8 @@ EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGE
 NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
 
 # Kernels (libgait/src/kernels.h) are compiled once per instruction set; `scalar` defines their results.
-# gcc would unroll every loop over 16 lanes besides making vector code of it: half as large again, no faster.
+# gcc would unroll every loop over 16 lanes besides making vector code of it: half as large again, no faster, but for
+# the particles' motion.
 KERNEL_FLAGS := $(if $(findstring clang,$(shell $(CC) --version)),,--param=max-completely-peel-times=8)
 FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
 FLAGS_base   :=
@@ -142,7 +143,7 @@ $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%
 
 define kernel_rule
 $(B)/src/%.$(1).o: libgait/src/%.c Makefile | $(B)/src/
-	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $(KERNEL_FLAGS) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
+	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(if $$(findstring dynamics,$$<),,$(KERNEL_FLAGS)) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 
@@ -247,7 +248,7 @@ bench-lift: $(B)/bench/lift ## time lifting a frame, a segment, by instruction s
 
 CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null | head -n 1 | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9-')
 BENCH_CSV = tests/bench/results/$(or $(CPU_NAME),$(MACHINE)).csv
-bench: setup $(B)/bench/step ## speed by particles, threads, instruction set and stage: tests/bench/results/<cpu>.csv (ARGS='-s 40')
+bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage: tests/bench/results/<cpu>.csv (ARGS='-s 40')
 	@$< --csv $(BENCH_CSV) $(ARGS)
 	@$(PY) tests/bench/bench_plot.py $(BENCH_CSV) build/bench/speed.png
 

@@ -1,34 +1,34 @@
 #include "task.h"
 
-typedef struct split {
+#include <stdatomic.h>
+
+enum { SHARES = 8 }; /* of a task, on average: so that none waits long for another */
+
+typedef struct work {
     task_range_fn *fn;
     void *ctx;
-    int32_t tasks, items, block;
-} split;
+    int32_t items, share;
+    atomic_int next; /* share to hand out */
+} work;
 
-/* First item of a task's range; of task `tasks`: the end. */
-static int32_t range_begin(const split *s, int32_t task)
-{
-    int64_t const blocks = ((int64_t)s->items + s->block - 1) / s->block;
-    int64_t const first = blocks * task / s->tasks * s->block;
-    return first < s->items ? (int32_t)first : s->items;
-}
-
+/* Take shares until none is left. */
 static void run_one(void *ctx, int32_t task)
 {
-    const split *const s = ctx;
-    s->fn(s->ctx, range_begin(s, task), range_begin(s, task + 1), task);
+    work *const w = ctx;
+    for (int64_t begin; (begin = (int64_t)atomic_fetch_add(&w->next, 1) * w->share) < w->items;) {
+        int64_t const end = begin + w->share;
+        w->fn(w->ctx, (int32_t)begin, end < w->items ? (int32_t)end : w->items, task);
+    }
 }
 
 void task_run(const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn,
               void *ctx)
 {
     GAIT_ASSERT(tasks > 0 && items >= 0 && block > 0);
-    split s = {.fn = fn, .ctx = ctx, .tasks = tasks, .items = items, .block = block};
-    if (exec->run) {
-        exec->run(exec->user, run_one, &s, tasks);
-        return;
-    }
-    for (int32_t task = 0; task < tasks; task++)
-        run_one(&s, task);
+    int32_t const blocks = items / block + (items % block > 0), least = blocks / (tasks * SHARES);
+    work w = {.fn = fn, .ctx = ctx, .items = items, .share = block * i_max(least, 1)};
+    if (exec->run)
+        exec->run(exec->user, run_one, &w, tasks);
+    else
+        run_one(&w, 0);
 }

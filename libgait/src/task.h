@@ -6,9 +6,9 @@
 /* Work on items [begin, end) as piece `task`: its scratch is indexed by task. */
 typedef void task_range_fn(void *ctx, int32_t begin, int32_t end, int32_t task);
 
-/* Split [0, items) into `tasks` contiguous ranges that begin at multiples of block, and call fn once for each
- * task, also when its range is empty.  The split depends on the arguments alone, not on threads.
- * exec->run NULL: the calling thread does them in order. */
+/* Cut [0, items) into ranges that begin at multiples of block and let `tasks` tasks take them one by one until none is
+ * left: which task gets which depends on time, so what is done to an item must not depend on it.
+ * exec->run NULL: the calling thread does all as task 0. */
 void task_run(const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn,
               void *ctx);
 #endif

@@ -10,7 +10,7 @@ SYSTEM = {
     "assert.h", "cpuid.h", "float.h", "immintrin.h", "limits.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h",
     "stdint.h", "stdio.h", "string.h", "sanitizer/asan_interface.h",
 }  # fmt: skip
-THREADS = {"pthread.h", "signal.h", "stdatomic.h"}  # for pool.c only
+THREADS = {"pool.c": {"pthread.h", "signal.h", "stdatomic.h"}, "task.c": {"stdatomic.h"}}
 
 
 def read_layers(path: Path) -> dict[str, int]:
@@ -39,7 +39,7 @@ def faults(source: Path, order: dict[str, int]) -> list[str]:
         below = place(order, name)
         if kind == "<":
             eigen = name.startswith("Eigen/") and source.suffix == ".cpp"
-            threads = name in THREADS and source.name == "pool.c"
+            threads = name in THREADS.get(source.name, ())
             if name not in SYSTEM and not eigen and not threads:
                 found.append(f"{source}: <{name}> is not for the library")
         elif name not in PUBLIC and (below is None or below > own):
