@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.camera import Camera
 from gait.cli import main
-from gait.lift.tracks_file import Tracks, write
+from gait.lift.tracks_file import Tracks, read, write
 from gait.trc import read_trc
 
 FRAMES, MARKERS = 6, 12
@@ -94,3 +95,45 @@ def test_video_needs_placement(folder, capsys):
     assert "--placement" in capsys.readouterr().err
     assert main(["lift", "clip.mp4", "-o", "out.csv", "--height", "1.7"]) == 2
     assert "--height is for tracks" in capsys.readouterr().err
+
+
+def damaged(change):
+    """Rewrite t.csv with its pixels changed."""
+    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
+    uv = tracks.uv.copy()
+    change(uv)
+    write("t.csv", replace(tracks, uv=uv))
+
+
+def test_a_gap_is_bridged_with_larger_deviations(folder):
+    def hide(uv):
+        uv[3:12] = np.nan
+
+    damaged(hide)
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--quiet"]
+    assert main(command) == 0
+    with open("out.csv", newline="") as file:
+        sd = np.array([float(row["l_hip_sx"]) for row in csv.DictReader(file)])
+    assert sd[7] > sd[1]
+
+
+@pytest.mark.parametrize("method", ["smooth", "blend"])
+def test_too_little_is_said(folder, capsys, method):
+    def hide(uv):
+        uv[:] = np.nan
+        uv[0, 0] = 100
+
+    damaged(hide)
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--method", method]
+    assert main(command) == 1
+    assert "fewer than 4 points" in capsys.readouterr().err
+
+
+def test_blending_needs_every_segment(folder, capsys):
+    def hide(uv):
+        uv[6:] = np.nan
+
+    damaged(hide)
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--method", "blend"]
+    assert main(command) == 1
+    assert "use --method smooth" in capsys.readouterr().err

@@ -160,7 +160,7 @@ def rows_of(prior):
 
 def residual(rows, places):
     """A x - y of collected rows, squared and summed, with x = places."""
-    diagonal, below, vector, square, _ = rows.normal()
+    diagonal, below, vector, square = rows.normal()
     x = places.ravel()
     return float(x @ dense(diagonal, below) @ x - 2 * x @ vector.ravel() + square)
 

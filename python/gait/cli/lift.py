@@ -110,6 +110,8 @@ def run(args: argparse.Namespace) -> int:
     )
     with one_thread(), progress("segments", motion.segments_of(prior, tracks), args.quiet) as update:
         found = motion.lift(prior, tracks, _view(args, tracks), options, names, update)
+    if found.wider > 1 and not args.quiet:
+        print(f"not a motion like those learnt: the prior was widened {found.wider:g} times", file=sys.stderr)
     if not found.settled and not args.quiet:
         print(f"the estimate did not come to rest in {found.steps} iterations", file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
@@ -158,7 +160,8 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: motion.Motion) -> 
         "iterations": found.steps,
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
-        "log_evidence": found.evidence if np.isfinite(found.evidence) else None,
+        "misfit": found.misfit if np.isfinite(found.misfit) else None,
+        "prior_widened": found.wider,
     }
 
 

@@ -7,7 +7,7 @@ alone and mixed by triangular weights (Leventon and Freeman 1998).  segment: seg
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ Floats = npt.NDArray[np.float64]
 METHODS = ("smooth", "blend", "segment")
 KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
 ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
+WIDER = (1.0, 2.0, 4.0, 8.0)  # factors of the prior's deviations, tried in turn while the tracks ask for it
+MISFIT = 1.3  # squared deviations per number seen from which a wider prior is tried
 LONGEST_GAP = 0.15  # seconds over which a track is interpolated for a segment's own estimate
 
 
@@ -77,7 +79,11 @@ class Motion:
     log_volume_ratio : float
         Logarithm to base 10 of the posterior's volume over the prior's; of segments alone, their mean.
     evidence : float
-        Logarithm of the density of what is seen; NaN for segments alone.
+        Logarithm of the density of what is seen, but for a constant; NaN for segments alone.
+    misfit : float
+        Squared deviations per number seen, about 1; NaN for segments alone.
+    wider : float
+        Factor of the prior's deviations that the tracks asked for; 1 for motions like those learnt.
     """
 
     names: tuple[str, ...]
@@ -90,6 +96,8 @@ class Motion:
     settled: bool
     log_volume_ratio: float
     evidence: float = float("nan")
+    misfit: float = float("nan")
+    wider: float = 1.0
 
 
 def output_names(prior: SegmentPrior, tracks: Tracks, everything: bool = False) -> tuple[str, ...]:
@@ -120,17 +128,47 @@ def lift(
     if prior.frames < 4:
         raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
     prior = restricted(prior, names)
+    grid = Grid.over(tracks.time, prior)
+    best: Motion | None = None
+    for wider in WIDER if options.method == "smooth" else WIDER[:1]:
+        found = _lift(widened(prior, wider), tracks, view, options, grid, update)
+        if best is not None and found.evidence <= best.evidence:
+            break
+        best = replace(found, wider=wider)
+        if not found.misfit > MISFIT:
+            break
+    assert best is not None
+    return best
+
+
+def widened(prior: SegmentPrior, factor: float) -> SegmentPrior:
+    """Prior with `factor` times the deviations from its mean, for motions it was not learnt from."""
+    return replace(
+        prior, modes=factor * prior.modes, sd=factor * prior.sd, residual=factor**2 * prior.residual
+    )
+
+
+def _lift(
+    prior: SegmentPrior,
+    tracks: Tracks,
+    view: View,
+    options: Options,
+    grid: Grid,
+    update: Callable[[int], None],
+) -> Motion:
+    """Estimate all markers of a prior."""
     markers = prior.index(tracks.names)
     points = Observations(tracks.uv, tracks.deviations(options.pixel_sd))
-    grid = Grid.over(tracks.time, prior)
-    resampled = _resampled(points, tracks.time, grid).among(markers, len(names))
+    resampled = _resampled(points, tracks.time, grid).among(markers, len(prior.names))
     stature = options.stature or prior.stature
     stature_sd = KNOWN_SD if options.stature else PEOPLE_SD
     lengths = np.ones(len(grid.time))
     if isinstance(view, Parallel):
         lengths = view.lengths(resampled, prior.mean[0].mean(axis=0), stature)
-    person = Person(stature=stature, stature_sd=stature_sd)
+    # a start must not shrink a motion that does not fit: its noise in the picture would grow
+    person = Person(stature=stature, stature_sd=0.0 if options.method == "smooth" else stature_sd)
     found = start.explanations(prior, resampled, view, lengths, person, update)
+    _require_seen(found, options, grid)
     chosen = start.course(found)
     if options.method != "smooth":
         return _alone(prior, chosen, tracks, view, grid, lengths, stature, options.method == "blend")
@@ -143,13 +181,19 @@ def lift(
     )
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
     seen = Seen(tracks.time, points, markers)
-    found_motion = sequence.smooth(
-        prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
-    )
+    try:
+        found_motion = sequence.smooth(
+            prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
+        )
+    except np.linalg.LinAlgError:
+        raise UserError(
+            "the tracks look like no motion that the model knows; check the camera, the points' names and "
+            "that v points down"
+        ) from None
     places = found_motion.places
     error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
     return Motion(
-        names,
+        prior.names,
         places if view.grounded else _on_floor(places, prior),
         found_motion.sd,
         found_motion.rooted_sd,
@@ -159,7 +203,20 @@ def lift(
         found_motion.settled,
         found_motion.log_volume_ratio,
         found_motion.evidence,
+        found_motion.misfit,
     )
+
+
+def _require_seen(found: list[list[Explanation]], options: Options, grid: Grid) -> None:
+    """Refuse tracks that show next to nothing, or nothing in a segment that is estimated alone."""
+    if not any(found):
+        raise UserError(
+            f"fewer than {start.FEWEST} points are seen in every segment; give more of the tracks"
+        )
+    empty = next((s for s, choices in enumerate(found) if not choices), None)
+    if options.method != "smooth" and empty is not None:
+        at = grid.time[empty * grid.frames]
+        raise UserError(f"next to nothing is seen from {at:.2f} s on; use --method smooth across the gap")
 
 
 def _resampled(points: Observations, time: Floats, grid: Grid) -> Observations:

@@ -86,7 +86,9 @@ class Lifted:
     log_volume_ratio : float
         Logarithm to base 10 of the posterior's volume over the prior's.
     evidence : float
-        Logarithm of the density of what is seen, without the soft constraints.
+        Logarithm of the density of what is seen, without the soft constraints, but for a constant.
+    misfit : float
+        Squared deviations per number seen; about 1 if the motion is of the prior's kind, more if it is not.
     """
 
     places: Floats
@@ -101,6 +103,7 @@ class Lifted:
     settled: bool
     log_volume_ratio: float
     evidence: float
+    misfit: float
 
 
 @dataclass(frozen=True)
@@ -181,7 +184,6 @@ class _System:
     vector: Floats
     chain: Chain
     fit: float  #: y' W y of what is seen
-    log_weight: float
 
     @property
     def log_volume_ratio(self) -> float:
@@ -189,12 +191,15 @@ class _System:
         return (self.chain.log_det - self.factor.log_det) / 2 / float(np.log(10))
 
     @property
-    def evidence(self) -> float:
-        """Logarithm of the density of what is seen, by Laplace's method."""
+    def square(self) -> float:
+        """Squared deviations of what is seen and of the motion from the prior, at the mean."""
         mean = self.factor.solve(self.vector)
-        square = self.fit + self.chain.constant - float((self.vector * mean).sum())
-        spread = self.chain.log_det + self.log_weight - self.factor.log_det
-        return 0.5 * (spread - square)
+        return self.fit + self.chain.constant - float((self.vector * mean).sum())
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the density of what is seen but for a constant, by Laplace's method."""
+        return 0.5 * (self.chain.log_det - self.factor.log_det - self.square)
 
 
 class _Problem:
@@ -230,12 +235,12 @@ class _Problem:
             soft.contacts(rows, self.prior.names, places, self.grid.rate)
         if constrained and self.bones:
             soft.bones(rows, self.prior.names, places)
-        diagonal, below, vector, fit, log_weight = rows.normal()
+        diagonal, below, vector, fit = rows.normal()
         used = prior.diagonal.shape[1]
         diagonal[:, :used, :used] += prior.diagonal
         below[:, :used, :used] += prior.below
         vector[:, :used] += prior.vector
-        return _System(tridiagonal.factor(diagonal, below), vector, prior, fit, log_weight)
+        return _System(tridiagonal.factor(diagonal, below), vector, prior, fit)
 
     def _observe(self, rows: Rows, places: Floats, lengths: Floats) -> None:
         near, scale = self._at_video(places), self._at_video(lengths)
@@ -271,6 +276,7 @@ class _Problem:
             settled=settled,
             log_volume_ratio=bare.log_volume_ratio,
             evidence=bare.evidence,
+            misfit=bare.square / max(2 * int(self.seen.points.seen.sum()), 1),
         )
 
     def _rooted(self, diagonal: Floats, across: Floats) -> Floats:

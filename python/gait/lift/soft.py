@@ -108,14 +108,14 @@ class Rows:
         self._weight.append(1 / sd**2)
         self._count += len(columns)
 
-    def normal(self) -> tuple[Floats, Floats, Floats, float, float]:
-        """Blocks of A' W A (B, n, n), those below (B - 1, n, n), A' W y (B, n), y' W y, and sum log W."""
+    def normal(self) -> tuple[Floats, Floats, Floats, float]:
+        """Blocks of A' W A (B, n, n), those below (B - 1, n, n), A' W y (B, n), and y' W y."""
         layout = self.layout
         total = layout.blocks * layout.size
         diagonal = np.zeros((layout.blocks, layout.size, layout.size))
         below = np.zeros((layout.blocks - 1, layout.size, layout.size))
         if not self._count:
-            return diagonal, below, np.zeros((layout.blocks, layout.size)), 0.0, 0.0
+            return diagonal, below, np.zeros((layout.blocks, layout.size)), 0.0
         rows, columns, factors = (np.concatenate(part) for part in zip(*self._entries, strict=True))
         right, weight = np.concatenate(self._right), np.concatenate(self._weight)
         matrix = sparse.csr_matrix((factors, (rows, columns)), shape=(self._count, total))
@@ -126,7 +126,7 @@ class Rows:
         diagonal[at[same], inside[same], across[same]] = normal.data[same]
         below[other[next_], inside[next_], across[next_]] = normal.data[next_]
         vector = (weighted.T @ right).reshape(layout.blocks, layout.size)
-        return diagonal, below, vector, float(right @ (weight * right)), float(np.log(weight).sum())
+        return diagonal, below, vector, float(right @ (weight * right))
 
 
 def observe(

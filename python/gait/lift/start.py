@@ -19,6 +19,7 @@ from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 
+FEWEST = 4  # points that must be seen of a segment for an estimate of its own
 TURN_SD = 0.7  # radians by which the heading changes in half a segment
 
 
@@ -30,7 +31,7 @@ def explanations(
     person: Person,
     update: Callable[[int], None] = lambda done: None,
 ) -> list[list[Explanation]]:
-    """Explain every segment of a grid alone.
+    """Explain every segment of a grid alone; none where next to nothing is seen.
 
     Parameters
     ----------
@@ -40,10 +41,13 @@ def explanations(
         Metres of a unit of the picture.
     """
     half = prior.frames // 2
-    found = []
+    found: list[list[Explanation]] = []
     for s in range(len(seen.uv) // half - 1):
         begin, end = s * half, s * half + prior.frames
         part = seen.part(begin, end)
+        if part.seen.sum() < FEWEST:
+            found.append([])
+            continue
 
         def measure(places: Floats, part: Observations = part, begin: int = begin, end: int = end) -> Rows:
             rows = view.rows(part, places, lengths[begin:end])
@@ -60,7 +64,17 @@ def _centred(rows: Rows, places: Floats) -> Rows:
 
 
 def course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
-    """Choose one explanation of every segment: probable, and with headings that change little."""
+    """Choose one explanation of every segment: probable, and with headings that change little.
+
+    Segments without any take that of the nearest one before or after.
+    """
+    known = [s for s, choices in enumerate(found) if choices]
+    chosen = dict(zip(known, _course([found[s] for s in known]), strict=True))
+    return [chosen[min(known, key=lambda k: abs(k - s))] for s in range(len(found))]
+
+
+def _course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
+    """Choose among explanations of segments that all have some."""
     score = _evidence(found[0])
     back = []
     for before, now in zip(found, found[1:], strict=False):
