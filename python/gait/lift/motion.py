@@ -131,7 +131,12 @@ def lift(
     grid = Grid.over(tracks.time, prior)
     best: Motion | None = None
     for wider in WIDER if options.method == "smooth" else WIDER[:1]:
-        found = _lift(widened(prior, wider), tracks, view, options, grid, update)
+        try:
+            found = _lift(widened(prior, wider), tracks, view, options, grid, update)
+        except UserError:
+            if best is None:
+                raise
+            break
         if best is not None and found.evidence <= best.evidence:
             break
         best = replace(found, wider=wider)
