@@ -231,11 +231,11 @@ def _balancing() -> None:
     note = (
         "A man nearly falls from a beam: the reference of four views in one of them, "
         f"{BALANCING_NOISE:g} px of noise, stature unknown; root-aligned median mm over 14 joints. "
-        "No prior has seen such a motion. Misfit: squared deviations per number seen, about 1 for motions of "
-        "the prior's kind; widened: factor of the prior's deviations that was used. Read: it fails. In a "
-        "motion so unlike and a camera so near (3 m) a small body close to the lens costs the chain less "
-        "than the misfit of a whole one, and the intervals do not say so; only the misfit does. Nothing is wanted "
-        "here."
+        "No prior has seen such a motion. Misfit: squared deviations per number seen, about 1 for motions "
+        "of the prior's kind; widened: factor of the prior's deviations that was used. Read: it fails. In "
+        "a motion so unlike and a camera so near (3 m) a small body close to the lens costs the chain "
+        "less than the misfit of a whole one, and the intervals do not say so; only the misfit does. "
+        "Nothing is wanted here."
     )
     head = ["prior of", "camera", "smooth", "blend", "mean pose", "median sd mm", "coverage", "about hips"]
     head += ["misfit", "widened"]

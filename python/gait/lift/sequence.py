@@ -286,11 +286,12 @@ class _Problem:
         if not set(HIPS) <= set(self.prior.names):
             return own
         left, right = self.prior.index(HIPS)
-        with_hips = [
-            self._covariances(diagonal, across, every, np.full_like(every, h)) for h in (left, right)
-        ]
-        middle = sum(with_hips)[:, [left, right]].sum(axis=1, keepdims=True) / 4
-        return np.maximum(own + middle - sum(with_hips), 0)
+        with_left, with_right = (
+            self._covariances(diagonal, across, every, np.full_like(every, hip)) for hip in (left, right)
+        )
+        with_both = with_left + with_right
+        middle = with_both[:, [left, right]].sum(axis=1, keepdims=True) / 4
+        return np.maximum(own + middle - with_both, 0)
 
     def _covariances(self, diagonal: Floats, across: Floats, first: Ints, second: Ints) -> Floats:
         """Covariances (T, n, 3) by coordinate of interpolated places of markers (n,) with others (n,)."""
