@@ -30,6 +30,7 @@ KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and amon
 ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
 WIDER = (1.0, 2.0, 4.0, 8.0)  # factors of the prior's deviations, tried in turn while the tracks ask for it
 MISFIT = 1.3  # squared deviations per number seen from which a wider prior is tried
+SIZES = (0.6, 1.6)  # of the usual extent: no person is smaller or larger
 LONGEST_GAP = 0.15  # seconds over which a track is interpolated for a segment's own estimate
 
 
@@ -196,6 +197,7 @@ def _lift(
             "that v points down"
         ) from None
     places = found_motion.places
+    _require_size(places, prior, stature)
     error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
     return Motion(
         prior.names,
@@ -210,6 +212,22 @@ def _lift(
         found_motion.evidence,
         found_motion.misfit,
     )
+
+
+def _require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
+    """Refuse an estimate that shrank or grew to fit a motion unlike the prior's."""
+    ratio = _extent(places) / (stature * _extent(prior.mean[0]))
+    if not SIZES[0] < ratio < SIZES[1]:
+        raise UserError(
+            f"the estimate came out {ratio:.2f} times a person's size: the motion is unlike the model's, or "
+            "the camera wrong; learn a model with such motions, or use --method blend"
+        )
+
+
+def _extent(places: Floats) -> float:
+    """Mean distance of markers (T, J, 3) from their middle."""
+    apart = places - places.mean(axis=1, keepdims=True)
+    return float(np.linalg.norm(apart, axis=2).mean())
 
 
 def _require_seen(found: list[list[Explanation]], options: Options, grid: Grid) -> None:
