@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -304,19 +304,21 @@ class Tracker:
             None if there were not so many steps since the start.
         """
         out = _abi.EstimateC()
-        status = self._lib.gait_tracker_lagged(
-            self._handle,
-            self.config.lag if back is None else back,
-            ctypes.byref(out),
-            ctypes.byref(self._error),
-        )
+        steps = self.config.lag if back is None else back
+        arguments = (ctypes.byref(out), ctypes.byref(self._error))
+        status = self._lib.gait_tracker_lagged(self._handle, steps, *arguments)
         if status == _abi.Status.STATE:
             return None
         self._check(status)
         return Estimate.from_c(out, self.model)
 
     def follow(
-        self, video: Video, start: Start, stop: int | None = None, spotter: Spotter | None = None
+        self,
+        video: Video,
+        start: Start,
+        stop: int | None = None,
+        spotter: Spotter | None = None,
+        joints: Mapping[int, Joints] | None = None,
     ) -> Iterator[tuple[Frame, Estimate]]:
         """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
 
@@ -329,19 +331,22 @@ class Tracker:
             First frame not to use.
         spotter : Spotter, optional
             Looks for the person while the tracker has lost them; where it finds one the track starts anew.
+        joints : mapping of int to Joints, optional
+            Joints found in frames, by number; see `step`.
         """
+        found = joints or {}
         for frame in video.frames(start.frame, stop):
             if frame.number == start.frame:
                 self.start(start.mean, start.sd, frame.utime)
-            estimate = self.step(frame.image, frame.utime)
+            estimate = self.step(frame.image, frame.utime, found.get(frame.number))
             yield frame, estimate
             if spotter and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
                 spotter.forget()
             elif spotter and estimate.status == TrackStatus.LOST:
                 spotter.see(frame)
                 if spotter.walks_in(frame):
-                    found = spotter.start(latest=True)
-                    self.start(found.mean, found.sd, frame.utime)
+                    anew = spotter.start(latest=True)
+                    self.start(anew.mean, anew.sd, frame.utime)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""

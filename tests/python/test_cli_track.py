@@ -14,6 +14,7 @@ from drawn_walker import DATA, camera, clip, state_at, wall, write
 
 from gait import Model, Video, blob
 from gait.cli import COMMANDS, main
+from gait.lift import tracks_file
 from gait.model import read_blob
 from gait.tracker import TrackerConfig
 
@@ -115,6 +116,48 @@ def test_paper_mode_and_no_background(scene, capsys):
     assert json.loads(capsys.readouterr().out)["frames"] == 20
 
 
+@pytest.fixture(scope="module")
+def tracks(scene):
+    """What a detector says of the clip: 2 px of noise, one joint in five missing, and a point of its own."""
+    rng = np.random.default_rng(3)
+    uv = np.array([camera().project(MODEL.pose(s)[0]) for s in clip(MODEL, SECTIONS, 20)[1]])
+    uv += rng.normal(scale=2.0, size=uv.shape)
+    uv[rng.random(uv.shape[:2]) < 0.2] = np.nan
+    names = (*MODEL.joint_names, "nose")
+    uv = np.concatenate([uv, np.full((20, 1, 2), 100.0)], axis=1)
+    frame = np.arange(20)
+    found = tracks_file.Tracks(frame, frame / 30, names, uv, np.ones(uv.shape[:2]))
+    tracks_file.write(scene / "tracks.csv", found)
+    return scene / "tracks.csv"
+
+
+def root_error(scene, capsys, *options):
+    """Median error of a track of the clip, mm, and its digest."""
+    assert track(scene, "--json", "--mode", "paper", "--background", "none", *options) == 0
+    digest = json.loads(capsys.readouterr().out)["digest"]
+    assert main(["eval", str(scene / "out.csv"), "--truth", str(scene / "truth.csv"), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)["abs"]["median"], digest
+
+
+def test_tracks_of_a_detector_help(scene, tracks, capsys):
+    without, plain = root_error(scene, capsys)
+    helped, found = root_error(scene, capsys, "--tracks", tracks)
+    assert helped < 0.7 * without and found != plain
+    _, vague = root_error(scene, capsys, "--tracks", tracks, "--tracks-sd", 40)
+    assert vague not in (plain, found)
+    assert track(scene, "--tracks", tracks) == 0
+    assert "left out: nose\n" in capsys.readouterr().err
+
+
+def test_tracks_of_other_frames_are_refused(scene, tracks, capsys):
+    text = tracks.read_text().splitlines()
+    late = [text[0], *(f"{i + 700}{row[row.index(',') :]}" for i, row in enumerate(text[1:]))]
+    (scene / "late.csv").write_text("\n".join(late) + "\n")
+    assert track(scene, "--tracks", scene / "late.csv", out="fault.csv") == 1
+    assert "late.csv: has no frame that is tracked; number frames as in the" in capsys.readouterr().err
+    assert not (scene / "fault.csv").exists()
+
+
 FAULTS = [
     (["--camera", "{}/none.json"], "none.json: no such camera file"),
     (["--init", "{}/none.json"], "none.json: no such init file"),
@@ -127,6 +170,7 @@ FAULTS = [
     (["-o", "{}/none/out.csv"], "out.csv: folder .* does not exist"),
     (["--overlay", "{}/none/o.mp4"], "o.mp4: folder .* does not exist"),
     (["--overlay", "{}/o.gif"], "o.gif: unknown video suffix"),
+    (["--tracks", "{}/none.csv"], "none.csv: no such file of tracks"),
     (["--trc", "{}/none/o.trc"], "o.trc: folder .* does not exist"),
     (["--init", "{}/late.json"], "walk.mp4: no frame from 20 up to 20; it has 20"),
     (["--init", "auto", "--start", "500"], "walk.mp4: no frame from 500 up to 20; it has 20"),
@@ -163,6 +207,8 @@ RANGES = [
     *((f"--seed {n}", f"from 0 to {2**64 - 1}") for n in ("-1", str(2**64))),
     *((f"--height {m}", f"{m}: is not a stature; give metres from 0.5 to 2.5") for m in ("17", "nan", "x")),
     ("--start 50 --stop 20", "--stop 20: must be greater than --start 50"),
+    ("--tracks-sd 0", "0: give a number above 0"),
+    ("--tracks-sd 3", "--tracks-sd: needs --tracks"),
     ("--stop 0", "--stop 0: must be greater than --start 0"),
 ]
 

@@ -10,6 +10,9 @@ apart.  A JSON start is always better.
 Who is lost is looked for near the last place, then, with a background, anywhere in the picture: somebody
 who walks in full view for a second starts the track anew (not with --smooth).
 
+--tracks adds joints that a detector has found in the frames, as gait lift takes them, to what the pictures
+say: points of which the model knows nothing are left out, and so are frames that the file does not hold.
+
 Writes one row per frame to OUT.csv: see interfaces.md, section 3.
 """
 
@@ -21,18 +24,21 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gait import blob
-from gait._abi import Mode, TrackStatus
+from gait._abi import Mode, Term, TrackStatus
 from gait.autostart import Spotter, find_start
 from gait.camera import Camera
 from gait.cli import defaults, values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
+from gait.frame import Joints
 from gait.initial import Start
+from gait.lift import tracks_file
 from gait.model import Model, read_blob
 from gait.modelcurves import ModelCurves
 from gait.overlay import Overlay
@@ -42,6 +48,8 @@ from gait.tracker import Estimate, Tracker, TrackerConfig
 from gait.trackfile import TrackWriter
 from gait.trc import write_trc
 from gait.video import Frame, Image, Video, VideoWriter, background
+
+TRACKS_SD = 4.0  # pixels
 
 Sink = Callable[[Frame, Estimate], None]
 
@@ -88,6 +96,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mode", choices=[m.name.lower() for m in Mode], default="default", help="set of settings"
     )
+    parser.add_argument("--tracks", metavar="TRACKS.csv", help="2-D joints found in the frames, one more cue")
+    parser.add_argument(
+        "--tracks-sd",
+        type=values.positive,
+        metavar="PX",
+        help=f"noise of these at full confidence, and what joints are to the detector and not to the model "
+        f"({TRACKS_SD:g})",
+    )
     parser.add_argument("--overlay", metavar="O.mp4", help="also draw the estimate into the video")
     parser.add_argument(
         "--smooth", action="store_true", help="estimates that know the whole clip, frames after them included"
@@ -106,6 +122,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--stop {args.stop}: must be greater than --start {args.start or 0}")
     if args.draws and not args.smooth:
         raise UsageError("--draws: needs --smooth")
+    if args.tracks_sd and not args.tracks:
+        raise UsageError("--tracks-sd: needs --tracks")
     for path in filter(None, (args.output, args.overlay, args.trc, args.draws)):
         require_writable(path)
     video = Video(args.video)
@@ -114,11 +132,14 @@ def run(args: argparse.Namespace) -> int:
     with progress("background", video.count, args.quiet) as update:
         plate = background(args.background, video, update)
     start = _start(args, video, camera, plate, model)
-    _require_frames(video, start.frame, args.stop)
+    frames = _frames(args, video, start.frame)
+    joints = _joints(args, model, frames)
     config = TrackerConfig.default(Mode[args.mode.upper()], **_given(args))
+    if args.tracks:
+        config = replace(config, terms=config.terms | Term.TRACKS)
     tracker = Tracker(model, camera, config, background=plate, tasks=args.threads)
     spotter = None if plate is None or args.smooth else Spotter(camera, plate, model, args.height)
-    results = _track(args, video, tracker, start, spotter)
+    results = _track(args, video, tracker, start, frames, spotter, joints)
     if args.trc:
         write_trc(args.trc, model.joint_names, np.array(results.times), np.array(results.joints), video.fps)
     summary = results.summary(args.threads)
@@ -126,16 +147,29 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _require_frames(video: Video, start: int, stop: int | None) -> None:
-    """Raise UserError if no frame of the video is chosen."""
-    stop = video.count if stop is None else min(stop, video.count)
+def _frames(args: argparse.Namespace, video: Video, start: int) -> range:
+    """Frames from `start` that are chosen; UserError if there are none."""
+    stop = video.count if args.stop is None else min(args.stop, video.count)
     if start >= stop:
         raise UserError(f"{video.path}: no frame from {start} up to {stop}; it has {video.count}")
+    return range(start, stop)
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
     """Return the settings that the command line changes."""
     return {"seed": args.seed} | ({} if args.particles is None else {"particles": args.particles})
+
+
+def _joints(args: argparse.Namespace, model: Model, frames: range) -> dict[int, Joints]:
+    """Joints of --tracks, of which some must be in the frames to track, by frame."""
+    if not args.tracks:
+        return {}
+    tracks, ignored = tracks_file.read(args.tracks, model.joint_names, ignore_unknown=True)
+    if ignored and not args.quiet:
+        print(f"left out: {' '.join(ignored)}", file=sys.stderr)
+    if not any(frame in frames for frame in tracks.frame.tolist()):
+        raise UserError(f"{args.tracks}: has no frame that is tracked; number frames as in the video, from 0")
+    return tracks.joints(args.tracks_sd or TRACKS_SD)
 
 
 def _start(
@@ -144,7 +178,7 @@ def _start(
     """First state by --init, --start and --height."""
     if args.init != "auto":
         return Start.read(args.init, model, frame=args.start, height=args.height)
-    _require_frames(video, args.start or 0, args.stop)
+    _frames(args, video, args.start or 0)
     if plate is None:
         raise UserError("--init auto: needs a background to see the person against; give --init FILE.json")
     start = find_start(video, camera, plate, model, first=args.start or 0, stop=args.stop, height=args.height)
@@ -199,11 +233,16 @@ class _Results:
 
 
 def _track(
-    args: argparse.Namespace, video: Video, tracker: Tracker, start: Start, spotter: Spotter | None
+    args: argparse.Namespace,
+    video: Video,
+    tracker: Tracker,
+    start: Start,
+    frames: range,
+    spotter: Spotter | None,
+    joints: dict[int, Joints],
 ) -> _Results:
     """Run the tracker over the frames into all outputs, which appear together at the end."""
     model, results = tracker.model, _Results(tracker)
-    stop = video.count if args.stop is None else min(args.stop, video.count)
     with ExitStack() as stack:
         rows = TrackWriter(args.output, model.info.components, model.joint_names, model.angle_names)
         sinks: list[Sink] = [results.add, stack.enter_context(rows).write]
@@ -214,8 +253,9 @@ def _track(
             sinks.append(
                 lambda frame, estimate: film.write(overlay.draw(frame.image, estimate, frame.number))
             )
-        update = stack.enter_context(progress("tracking", stop - start.frame, args.quiet))
-        for done, (frame, estimate) in enumerate(tracker.follow(video, start, stop, spotter), 1):
+        update = stack.enter_context(progress("tracking", len(frames), args.quiet))
+        found = tracker.follow(video, start, frames.stop, spotter, joints)
+        for done, (frame, estimate) in enumerate(found, 1):
             results.step(frame, estimate)
             for sink in sinks if smoother is None else [smoother.add]:
                 sink(frame, estimate)

@@ -38,3 +38,14 @@ def stature(text: str) -> float:
     if not low <= metres <= high:
         raise ArgumentTypeError(f"{text}: is not a stature; give metres from {low} to {high}")
     return metres
+
+
+def positive(text: str) -> float:
+    """Finite numbers above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 < value < float("inf"):
+        raise ArgumentTypeError(f"{text}: give a number above 0")
+    return value

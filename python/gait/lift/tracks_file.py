@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gait.errors import UserError
 from gait.files import replacing
+from gait.frame import Joints
 
 Array = NDArray[np.float64]
 
@@ -51,6 +52,11 @@ class Tracks:
     def deviations(self, sd: float) -> Array:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
         return np.where(self.seen, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
+
+    def joints(self, sd: float) -> dict[int, Joints]:
+        """Joints by frame, as the tracker takes them; `sd` as in `deviations`."""
+        found = zip(self.frame.tolist(), self.uv, self.deviations(sd), strict=True)
+        return {frame: Joints(self.names, uv, deviation) for frame, uv, deviation in found}
 
 
 def read(
