@@ -7,8 +7,8 @@ from pathlib import Path
 
 PUBLIC = {"gait.h", "gait_pool.h"}
 SYSTEM = {
-    "assert.h", "cpuid.h", "float.h", "immintrin.h", "limits.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h",
-    "stdint.h", "stdio.h", "string.h", "sanitizer/asan_interface.h",
+    "assert.h", "cpuid.h", "float.h", "immintrin.h", "limits.h", "math.h", "stdarg.h", "stdbool.h",
+    "stddef.h", "stdint.h", "stdio.h", "string.h", "sanitizer/asan_interface.h",
 }  # fmt: skip
 THREADS = {"pool.c": {"pthread.h", "signal.h", "stdatomic.h"}, "task.c": {"stdatomic.h"}}
 
