@@ -48,7 +48,7 @@ def evaluate(
     -------
     dict
         ``frames``; ``abs``, ``root`` (mm) and ``px`` each as ``median``, ``mean``, ``p90``; ``lost`` (share);
-        ``phase`` (cycles; see `phase_errors`) and ``px`` are None where strikes or camera are unknown;
+        ``phase`` (cycles; see `phase_errors`) and ``px`` are None where they, strikes or camera are unknown;
         ``coverage`` (share) of the ``50`` and ``90`` % intervals; ``static`` and ``free``: the baselines;
         ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D
         pose networks have; ``proc``: after the best rotation, scale and shift of every frame, to compare
@@ -65,13 +65,13 @@ def evaluate(
     found, true = track.eval15()[ours], truth.eval15()[theirs]
     status = np.array(track.status)[ours]
     given_up = status == "lost"
-    true_phase = strikes.phase(common)
+    phase, true_phase = track.phase[ours], strikes.phase(common)
     still = static_pose(model, truth)[theirs]
     free = free_run(model, truth, strikes, first=int(theirs[0]))
     return {
         "frames": len(common),
         **pose_errors(found, true, given_up),
-        "phase": None if true_phase is None else phase_errors(track.phase[ours], true_phase),
+        "phase": None if true_phase is None or np.isnan(phase).all() else phase_errors(phase, true_phase),
         "px": None if camera is None else picture_errors(found, true, camera),
         "coverage": coverage(found, track.eval15_sd()[ours], true),
         "static": pose_errors(still, true),

@@ -153,6 +153,18 @@ def read_truth(path: str | os.PathLike[str]) -> Joints:
     return Joints(table.frames(), table.numbers("time"), {name: table.vectors(name, "xyz") for name in names})
 
 
+def read_estimates(path: str | os.PathLike[str]) -> Track:
+    """Read what ``gait track`` or ``gait lift`` wrote.
+
+    Lifted motion has joints alone: every status is then ``tracking`` and the phase NaN.
+    """
+    table = _Table(path, "track")
+    if not {"status", "phase"} & table.rows.keys():
+        count = len(table.frames())
+        return _track(table, ["tracking"] * count, np.full(count, np.nan))
+    return read_track(path)
+
+
 def read_track(path: str | os.PathLike[str]) -> Track:
     """Read what ``gait track`` wrote."""
     table = _Table(path, "track")
@@ -160,12 +172,16 @@ def read_track(path: str | os.PathLike[str]) -> Track:
     for line, word in enumerate(status, 2):
         if word not in STATUSES:
             raise UserError(f"{path}: line {line}: status {word!r} is not one of {' '.join(STATUSES)}")
+    return _track(table, status, table.numbers("phase"))
+
+
+def _track(table: _Table, status: list[str], phase: Array) -> Track:
     return Track(
         frame=table.frames(),
         time=table.numbers("time"),
         places={name: table.vectors(name, "xyz") for name in JOINTS},
         status=status,
-        phase=table.numbers("phase"),
+        phase=phase,
         sd={name: table.vectors(name, ("sx", "sy", "sz")) for name in JOINTS},
         numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
     )

@@ -23,9 +23,10 @@ from gait.evaluate import (
     trust,
 )
 from gait.events import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
+from gait.lift import lifted_file
 from gait.model import read_blob
 from gait.skeleton import EVAL15, JOINTS
-from gait.trackfile import Joints, Track, read_truth
+from gait.trackfile import Joints, Track, read_estimates, read_truth
 
 SECTIONS = blob.decode(read_blob(None))
 RATE, FIRST_PHASE, HEIGHT = 0.9, 0.3, 1.7
@@ -276,3 +277,13 @@ def test_zeni_on_a_dev_clip_agrees_with_its_meta_file(clip):
         inner = strikes[(strikes > 5) & (strikes < 95)]
         assert len(inner) >= 2
         assert max(np.abs(getattr(found, side) - at).min() for at in inner) < 2
+
+
+def test_lifted_motion_is_compared_without_status_and_phase(tmp_path):
+    names = [*EVAL15, *(name for name in JOINTS if name not in EVAL15)]
+    places = np.random.default_rng(3).normal(size=(4, len(names), 3))
+    path = tmp_path / "lifted.csv"
+    lifted_file.write(path, np.arange(4), np.arange(4) / 30, names, places, np.full_like(places, 0.1))
+    read = read_estimates(path)
+    assert read.status == ["tracking"] * 4 and np.isnan(read.phase).all()
+    np.testing.assert_allclose(read.eval15(), places[:, :15], atol=1e-5)

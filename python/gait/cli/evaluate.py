@@ -1,4 +1,4 @@
-"""Compare a track with the truth.
+"""Compare a track, or lifted motion, with the truth.
 
 Prints, over the frames that both have: the 3-D error of 15 joints in mm, as they are (abs) and with
 the hip midpoints laid on each other (root); the share of frames lost; the error of the phase,
@@ -22,7 +22,7 @@ from gait.camera import Camera
 from gait.evaluate import Measures, evaluate
 from gait.events import strikes_of
 from gait.model import read_blob
-from gait.trackfile import read_track, read_truth
+from gait.trackfile import read_estimates, read_truth
 
 NAME = "eval"
 HELP = "errors of a track against the truth"
@@ -39,7 +39,7 @@ MEANING = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("track", metavar="OUT.csv", help="what gait track wrote")
+    parser.add_argument("track", metavar="OUT.csv", help="what gait track or gait lift wrote")
     parser.add_argument("--truth", required=True, metavar="TRUTH.csv", help="frame, time and <joint>_x _y _z")
     parser.add_argument(
         "--camera", metavar="CAM", help="for the error in pixels (camera.json beside the truth)"
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     beside = Path(args.truth).parent
     camera = args.camera or (beside / "camera.json" if (beside / "camera.json").is_file() else None)
     measures = evaluate(
-        read_track(args.track),
+        read_estimates(args.track),
         truth,
         strikes=strikes_of(truth, beside / "meta.json"),
         model=blob.decode(read_blob(args.model), str(args.model)),
