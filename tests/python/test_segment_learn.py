@@ -245,10 +245,23 @@ def test_a_mixture_finds_its_components_and_how_many():
     assert np.allclose(one.covariances[0], np.cov(scores.T)) and one.weights.tolist() == [1.0]
     basis = segment_basis.Basis(np.zeros(6), np.eye(6)[:, :2], scores, np.zeros((600, 2)))
     model = segment_heldout.Fitted(np.zeros(2), scores.var(axis=0), np.eye(2), np.ones(2))
-    folds = [(model, np.arange(600) % 5 == k) for k in range(5)]
-    assert len(segment_mixture.choose(basis, model, folds, None).weights) == 3
+    folds, real = [np.arange(600) % 5 == k for k in range(5)], np.ones(600, bool)
+    assert len(segment_mixture.choose(basis, model, folds, real, None).weights) == 3
     single = replace(basis, scores=rng.normal(size=(600, 2)))
-    assert len(segment_mixture.choose(single, model, folds, None).weights) == 1
+    assert len(segment_mixture.choose(single, model, folds, real, None).weights) == 1
+
+
+def test_people_made_up_of_those_left_out_do_not_help_a_mixture():
+    """Everybody moves in a way of their own: a component for each is no use to the next one."""
+    rng = np.random.default_rng(8)
+    person, real = np.repeat(np.arange(6), 100), np.tile(np.arange(100) < 20, 6)
+    scores = rng.normal(size=(6, 2))[person] + 0.02 * rng.normal(size=(600, 2))
+    basis = segment_basis.Basis(np.zeros(6), np.eye(6)[:, :2], scores, np.zeros((600, 2)))
+    model = segment_heldout.Fitted(np.zeros(2), scores.var(axis=0), np.eye(2), np.ones(2))
+    folds = [person == k for k in range(6)]
+    assert len(segment_mixture.choose(basis, model, folds, real, None).weights) == 1
+    leaky = [one & real for one in folds]
+    assert len(segment_mixture.choose(basis, model, leaky, real, None).weights) > 1
 
 
 def test_a_prior_of_motions_has_their_mean_and_unit(motion):

@@ -40,12 +40,15 @@ def fit(recordings: Sequence[Recorded], wanted: Segments) -> SegmentPrior:
     modes = min(wanted.modes, max(1, real // EACH))
     found = basis(filled(table.rows, modes), len(table.names))
     everyone = segment_heldout.fitted(found, np.ones(len(table.rows), bool), modes)
-    held_out = [
-        (segment_heldout.fitted(found, ~gone, modes), gone & table.real)
-        for gone in segment_heldout.groups(table.subject, table.recording)
-    ]
-    gamma = segment_heldout.gamma([segment_heldout.fold(found, model, rows) for model, rows in held_out])
-    mixture = segment_mixture.choose(found, everyone, held_out, wanted.mixture)
+    folds = segment_heldout.groups(table.subject, table.recording)
+    others = (segment_heldout.fitted(found, ~gone, modes) for gone in folds)
+    gamma = segment_heldout.gamma(
+        [
+            segment_heldout.fold(found, model, gone & table.real)
+            for model, gone in zip(others, folds, strict=True)
+        ]
+    )
+    mixture = segment_mixture.choose(found, everyone, folds, table.real, wanted.mixture)
     return _prior(table, found, everyone, mixture, gamma, wanted, real)
 
 

@@ -13,6 +13,7 @@ from gait.learn.segment_basis import Basis
 from gait.learn.segment_heldout import Fitted
 
 Floats = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.bool_]
 
 MOST = 6  # components that are tried
 ROUNDS = 60
@@ -42,7 +43,8 @@ class Mixture:
 def choose(
     basis: Basis,
     model: Fitted,
-    held_out: Sequence[tuple[Fitted, npt.NDArray[np.bool_]]],
+    folds: Sequence[Rows],
+    real: Rows,
     components: int | None,
 ) -> Mixture:
     """Mixture of so many components, or (None) of as many as describe the people left out best.
@@ -51,29 +53,24 @@ def choose(
     ----------
     model : Fitted
         Of all rows: its modes are those of the mixture.
-    held_out : sequence of (model, rows)
-        Models of everybody else, and the rows (N,) left out.
+    folds : sequence of (N,)
+        Rows that are left out together.
+    real : (N,)
+        Whether a row was recorded: only these are described, those of people made up are left out as well.
     """
-    scores = _scores(basis, model)
+    scores = np.asarray((basis.scores - model.mean) @ model.vectors)
     if components is None:
-        gains = [_held_out(basis, model, held_out, count) for count in range(1, MOST + 1)]
-        components = 1 + int(np.argmax(gains)) if held_out else 1
+        gains = [_held_out(scores, folds, real, count) for count in range(1, MOST + 1)]
+        components = 1 + int(np.argmax(gains)) if folds else 1
     return fit(scores, components)
 
 
-def _scores(basis: Basis, model: Fitted) -> Floats:
-    return np.asarray((basis.scores - model.mean) @ model.vectors)
-
-
-def _held_out(
-    basis: Basis, model: Fitted, held_out: Sequence[tuple[Fitted, npt.NDArray[np.bool_]]], count: int
-) -> float:
-    """Mean log density of scores left out, every fold counting alike."""
-    scores = _scores(basis, model)
+def _held_out(scores: Floats, folds: Sequence[Rows], real: Rows, count: int) -> float:
+    """Mean log density of recorded scores left out, every fold counting alike."""
     found = []
-    for _, gone in held_out:
+    for gone in folds:
         learnt = fit(scores[~gone], count)
-        found.append(float(logsumexp(learnt.log_density(scores[gone]), axis=1).mean()))
+        found.append(float(logsumexp(learnt.log_density(scores[gone & real]), axis=1).mean()))
     return float(np.mean(found)) if found else 0.0
 
 
