@@ -2,7 +2,7 @@
 """calls.py [-v] LIMIT FILE.ci...: no function calls itself, and no path takes more than LIMIT bytes of stack.
 
 The files are gcc's call graphs (-fcallgraph-info=su).  A call through a pointer can reach every function that
-nothing calls by name and that is not exported, `NESTED` such calls deep (pool, piece, range, term, kernel).
+nothing calls by name and that is not exported: `NESTED` of them (pool, piece, range, term), then one kernel.
 -v: say the deepest.
 """
 
@@ -12,7 +12,8 @@ from pathlib import Path
 
 NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "[^"]*\\n(\d+) bytes \(', re.M)
 EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', re.M)
-POINTER, NESTED = "__indirect_call", 5
+ISA = re.compile(r"_(scalar|base|avx2|avx512)$")
+POINTER, NESTED = "__indirect_call", 4
 
 
 def read(paths: list[str]) -> tuple[dict[str, int], dict[str, set[str]]]:
@@ -51,23 +52,25 @@ def cycle(calls: dict[str, set[str]]) -> list[str] | None:
 
 
 def deepest(stack: dict[str, int], calls: dict[str, set[str]]) -> tuple[int, list[str]]:
-    """Bytes of the deepest path and the functions on it."""
+    """Bytes of the deepest path and the functions on it; no function is on it twice (`cycle`)."""
+    known: dict[str, tuple[int, list[str]]] = {POINTER: (0, [])}
+    nothing: tuple[int, list[str]] = (0, [])
+
+    def depth(name: str) -> tuple[int, list[str]]:
+        if name not in known:
+            below = max((depth(t) for t in calls.get(name, ())), default=nothing)
+            known[name] = (stack.get(name, 0) + below[0], [name, *below[1]])
+        return known[name]
+
     named = {target for targets in calls.values() for target in targets}
     pointed = [n for n in stack if n not in named and not n.startswith("gait_")]
-    nothing: tuple[int, list[str]] = (0, [])
-    through = nothing  # the deepest path from a pointer, with one more such call in every round
-    for _ in range(NESTED + 1):
-        known: dict[str, tuple[int, list[str]]] = {POINTER: through}
-
-        def depth(name: str, known: dict[str, tuple[int, list[str]]] = known) -> tuple[int, list[str]]:
-            if name not in known:
-                below = max((depth(t) for t in calls.get(name, ())), default=nothing)
-                known[name] = (stack.get(name, 0) + below[0], [name, *below[1]])
-            return known[name]
-
-        whole = max(map(depth, stack), default=nothing)
-        through = max(map(depth, pointed), default=nothing)
-    return whole
+    kernel = max((depth(n) for n in pointed if ISA.search(n)), default=nothing)  # they call no others
+    others = sorted(depth(n) for n in pointed if not ISA.search(n))
+    exported = (depth(n) for n in stack if n.startswith("gait_"))
+    path = [max(exported, default=nothing), *others[: -NESTED - 1 : -1], kernel]
+    if not any(POINTER in targets for targets in calls.values()):
+        path = [max(map(depth, stack), default=nothing)]
+    return sum(size for size, _ in path), [name for _, names in path for name in names]
 
 
 def main() -> int:

@@ -20,7 +20,7 @@ check headers     $here/headers.sh libgait/include/*.h
 check layers      python3 $here/layers.py libgait/LAYERS libgait/src
 check stack       python3 $here/stack.py 16384 "$B"/src/*.su
 if ls "$B"/src/*.ci >/dev/null 2>&1; then
-    check calls   python3 $here/calls.py 65536 "$B"/src/*.ci
+    check calls   python3 $here/calls.py 49152 "$B"/src/*.ci
 else
     echo 'check calls: needs the call graphs of gcc, skipped'
 fi
