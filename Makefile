@@ -105,6 +105,7 @@ $(READY): python/requirements.txt python/requirements-dev.txt python/pyproject.t
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "setup: needs Python >= 3.10: set PYTHON=")'
 	@$(PYTHON) -c 'import venv, ensurepip' || \
 	    { echo 'setup: $(PYTHON) cannot make environments: install python3-venv or set PYTHON=' >&2; exit 1; }
+	@test ! -h $(VENV) || { echo 'setup: $(VENV) is a link, an environment belongs to one folder: remove the link' >&2; exit 1; }
 	$(PYTHON) -m venv $$(test -f $@ || echo --clear) $(VENV)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check $(patsubst %,-r %,$(filter %.txt,$^))
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
@@ -114,7 +115,7 @@ $(READY): python/requirements.txt python/requirements-dev.txt python/pyproject.t
 	@pwd -P > $@
 
 # An environment does not survive being moved.
-MOVED := $(shell test ! -f $(READY) || test "$$(cat $(READY))" = "$$(pwd -P)" || rm $(READY))
+MOVED := $(shell test -h $(VENV) || test ! -f $(READY) || test "$$(cat $(READY))" = "$$(pwd -P)" || rm $(READY))
 
 # say CC file: one line a command, or with V=1 the command itself
 say = $(if $(V),,@echo '  $(1)' && )
