@@ -226,7 +226,7 @@ def test_help_names_the_defaults_of_the_library():
     assert f"pieces of a step for the threads, default {usual.tasks} " in printed
 
 
-TERMS = [f"{term}-weight" for term in ("texture", "silhouette", "edges", "template")]
+TERMS = [f"{term}-weight" for term in ("texture", "silhouette", "edges", "template", "tracks")]
 SETTINGS = [f.name.replace("_", "-") for f in fields(TrackerConfig) if f.type == "float"]
 
 
