@@ -22,7 +22,8 @@ static struct settings {
     char lift_model[OPTION_TEXT];
     float lift_stature, lift_sd;
     int32_t lift_lag;
-    bool particles_channel, quiet, version, lift;
+    float tracks_sd;
+    bool particles_channel, quiet, version, lift, tracks_term;
     tracker_values tracker;
 } settings = {.mode = "default",
               .init = "auto",
@@ -33,7 +34,8 @@ static struct settings {
               .seed = 1,
               .max_gap = 2,
               .lift_sd = 3,
-              .lift_lag = 5};
+              .lift_lag = 5,
+              .tracks_sd = 4};
 
 #define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
@@ -88,6 +90,14 @@ static const option own_options[] = {
     {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
      OPTION_FLOAT, &settings.max_gap, 0, 60},
     {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
+    {"tracks-term", 0, "",
+     "the tracker also heeds 2-D joints of a detector, GAIT_TRACKS_<i> with the capture time of the\n"
+     "        frame; a frame waits for its joints until the next one comes",
+     FLAG(tracks_term)},
+    {"tracks-sd", 0, "PX",
+     "standard deviation of a joint with confidence 1, what a detector's joints differ from the\n"
+     "        model's by included, default 4 pixels",
+     OPTION_FLOAT, &settings.tracks_sd, 0.01, 1000},
     {"lift", 0, "",
      "also lift 2-D tracks of joints, GAIT_TRACKS_<i>, to 3-D joints with standard deviations on\n"
      "        GAIT_LIFT, by the segment prior of the model",
@@ -209,6 +219,8 @@ static void make_config(workers *threads, gait_tracker_config *c)
     else if (c->tasks < PIECES * settings.threads)
         c->tasks = PIECES * settings.threads < 256 ? PIECES * settings.threads : 256;
     c->exec = gait_pool_tasks(threads->pool);
+    if (settings.tracks_term)
+        c->terms |= GAIT_TERM_TRACKS;
     tracker_options_apply(&settings.tracker, c);
 }
 
@@ -226,6 +238,11 @@ static bool read_background(service *s, message *why)
     free(bytes.data);
     return ok;
 }
+
+typedef struct parts { /* those that a service may lack */
+    lift_service lift;
+    tracks_cue cue;
+} parts;
 
 /* The second service, if it is asked for. */
 static bool load_lift(service *s, lift_service *lift, lcm_t *out, message *why)
@@ -245,7 +262,7 @@ static bool load_lift(service *s, lift_service *lift, lcm_t *out, message *why)
 }
 
 /* Model, start, camera and empty scene, as far as the command line gives them. */
-static bool load(service *s, lift_service *lift, workers *threads, lcm_t *out, message *why)
+static bool load(service *s, parts *p, workers *threads, lcm_t *out, message *why)
 {
     gait_tracker_config config;
     gait_camera camera;
@@ -255,8 +272,12 @@ static bool load(service *s, lift_service *lift, workers *threads, lcm_t *out, m
     if (!tracking_open(&s->track, settings.model, &config, why))
         return false;
     if ((has_init && !init_file_read(settings.init, s->track.model, &init, why)) ||
-        !load_lift(s, lift, out, why))
+        !load_lift(s, &p->lift, out, why))
         return false;
+    if (settings.tracks_term) {
+        tracks_cue_open(&p->cue, s->track.model, s->track.info.joints, settings.tracks_sd);
+        s->cue = &p->cue;
+    }
     s->max_gap = (double)settings.max_gap;
     s->budget = (budget){.limit_us = (int64_t)(1e3f * settings.budget_ms),
                          .low = settings.adapt_particles,
@@ -285,6 +306,9 @@ static void print_summary(const service *s, bool live)
     if (s->budget.limit_us)
         printf(" late %" PRId64 " over_budget %" PRId64 " particles %d", s->budget.late, s->budget.over,
                (int)(s->wanted ? s->wanted : s->track.config.particles));
+    if (s->cue)
+        printf(" tracks %" PRId64 " tracks_used %" PRId64 " tracks_late %" PRId64, s->cue->messages,
+               s->cue->used, s->cue->late);
     if (s->lift)
         printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
                " lift_ms median %.3f p99 %.3f",
@@ -294,14 +318,14 @@ static void print_summary(const service *s, bool live)
 }
 
 /* Everything between the settings and the exit code. */
-static bool serve(service *s, lift_service *lift, workers *threads, const sigset_t *unblocked, message *why)
+static bool serve(service *s, parts *p, workers *threads, const sigset_t *unblocked, message *why)
 {
     const char *const url = link_url(settings.url);
     bool const log = link_is_log(url);
     const char *const to = settings.out[0] ? settings.out : log ? NULL : url;
     receiver r = {0};
     lcm_t *const out = to ? link_open(to, why) : NULL;
-    bool const ok = (!to || out) && load(s, lift, threads, out, why) && receiver_open(&r, s, url, why) &&
+    bool const ok = (!to || out) && load(s, p, threads, out, why) && receiver_open(&r, s, url, why) &&
                     receiver_run(&r, &quit, unblocked, why);
     if (ok) {
         service_send_status(s);
@@ -317,7 +341,7 @@ static bool serve(service *s, lift_service *lift, workers *threads, const sigset
 int main(int argc, char **argv)
 {
     static service s;
-    static lift_service lift;
+    static parts extra;
     static workers threads;
     option table[OPTIONS];
     sigset_t unblocked;
@@ -340,10 +364,11 @@ int main(int argc, char **argv)
     set_signals(&unblocked);
     bool ok = workers_start(&threads, settings.threads, &why);
     if (ok) {
-        ok = serve(&s, &lift, &threads, &unblocked, &why);
+        ok = serve(&s, &extra, &threads, &unblocked, &why);
         workers_stop(&threads);
         service_close(&s);
-        lift_service_close(&lift);
+        lift_service_close(&extra.lift);
+        tracks_cue_close(&extra.cue);
     }
     if (!ok)
         fprintf(stderr, "gait-trackd: %s\n", why.text);

@@ -7,8 +7,6 @@
 #include <string.h>
 #include <time.h>
 
-#define LEAST_CONFIDENCE 0.1f /* the deviation of a point grows to ten times that of a sure one, no further */
-
 enum { MESSAGE_ROOM = 1 << 14 }; /* an estimate of all markers, with room to spare */
 
 static int64_t monotonic_us(void)
@@ -81,12 +79,11 @@ static int32_t take(lift_service *s, tracks_view *v)
     while (tracks_view_next(v, &track)) {
         int32_t const j = find(s, track.name);
         known += j >= 0;
-        if (j < 0 || !(track.confidence > 0.0f))
+        if (j < 0)
             continue;
-        float const confidence = track.confidence < 1.0f ? fmaxf(track.confidence, LEAST_CONFIDENCE) : 1.0f;
         s->uv[2 * j] = (double)track.u;
         s->uv[2 * j + 1] = (double)track.v;
-        s->sd[j] = s->config.sd / (double)confidence;
+        s->sd[j] = tracks_view_sd(&track, s->config.sd);
     }
     return known;
 }
@@ -140,8 +137,7 @@ bool lift_service_tracks(lift_service *s, tracks_view *v, int64_t receive_utime,
     int32_t const announced = v->count;
     if (take(s, v) == 0 && announced > 0) {
         s->rejected++;
-        return message_set(why,
-                           "tracks of no point that the model knows; name them pelvis, l_knee and so on");
+        return tracks_view_strangers(why);
     }
     int64_t const before = monotonic_us();
     if (gait_lift_push(s->lift, v->utime, s->uv, s->sd, &err) != GAIT_OK) {

@@ -25,13 +25,34 @@ static bool open_view(service *s, const lcm_recv_buf_t *buf, const char *channel
     return false;
 }
 
+static bool newest(const receiver *r)
+{
+    return r->log || lcm_subscription_get_queue_size(r->frames) == 0;
+}
+
+/* Track the frame that was held, if there is one. */
+static void flush(receiver *r)
+{
+    tracks_cue *const cue = r->service->cue;
+    image_view v;
+    message why;
+    if (cue && cue->held_bytes && image_view_open(&v, cue->held, cue->held_bytes, &why))
+        service_frame(r->service, &v, newest(r), cue->held_arrival);
+    if (cue)
+        cue->held_bytes = 0;
+}
+
 static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
     image_view v;
-    bool const newest = r->log || lcm_subscription_get_queue_size(r->frames) == 0;
-    if (open_view(r->service, buf, channel, &v))
-        service_frame(r->service, &v, newest, buf->recv_utime);
+    tracks_cue *const cue = r->service->cue;
+    flush(r);
+    if (!open_view(r->service, buf, channel, &v))
+        return;
+    bool const wait = cue && !tracks_cue_at(cue, v.utime);
+    if (!wait || !tracks_cue_hold(cue, v.utime, buf->data, buf->data_size, buf->recv_utime))
+        service_frame(r->service, &v, newest(r), buf->recv_utime);
 }
 
 static void on_background(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -49,16 +70,30 @@ static void damaged(receiver *r, const char *channel)
     service_complain(r->service, &why);
 }
 
+static void complain_of(receiver *r, const char *channel, const message *why)
+{
+    message line;
+    message_set(&line, "%.40s: %.180s", channel, why->text);
+    service_complain(r->service, &line);
+}
+
 static void on_tracks(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
+    tracks_cue *const cue = r->service->cue;
     tracks_view v;
-    message why, line;
-    if (tracks_view_open(&v, buf->data, buf->data_size, &why) &&
-        lift_service_tracks(r->service->lift, &v, buf->recv_utime, &why))
+    message why;
+    if (!tracks_view_open(&v, buf->data, buf->data_size, &why)) {
+        complain_of(r, channel, &why);
         return;
-    message_set(&line, "%.40s: %.180s", channel, why.text);
-    service_complain(r->service, &line);
+    }
+    tracks_view again = v; /* each goes through the tracks */
+    if (r->service->lift && !lift_service_tracks(r->service->lift, &v, buf->recv_utime, &why))
+        complain_of(r, channel, &why);
+    if (cue && !tracks_cue_take(cue, &again, &why))
+        complain_of(r, channel, &why);
+    if (cue && cue->held_bytes && tracks_cue_at(cue, cue->held_utime))
+        flush(r);
 }
 
 /* The same camera for the lifter. */
@@ -103,7 +138,8 @@ static bool subscribe(receiver *r, message *why)
     snprintf(name[3], sizeof name[3], "GAIT_TRACKS_%d", camera);
     r->frames = link_subscribe(r->images, name[0], on_frame, r, FRAMES_WAITING, why);
     return r->frames &&
-           (!r->service->lift || link_subscribe(r->others, name[3], on_tracks, r, OTHERS_WAITING, why)) &&
+           ((!r->service->lift && !r->service->cue) ||
+            link_subscribe(r->others, name[3], on_tracks, r, OTHERS_WAITING, why)) &&
            link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why);
@@ -159,8 +195,10 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
         int const ready = ppoll(fd, r->log ? 1 : 2, &wait, unblocked);
         if (ready < 0 && errno != EINTR)
             return message_set(why, "cannot wait for messages: %s", strerror(errno));
-        if (ready > 0 && !serve(r))
+        if (ready > 0 && !serve(r)) {
+            flush(r);
             return r->log || message_set(why, "the LCM connection has failed");
+        }
     }
     return true;
 }

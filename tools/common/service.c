@@ -114,8 +114,9 @@ void service_close(service *s)
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
-    if (!tracking_set_camera(&s->track, camera, why))
+    if (!tracking_set_camera(&s->track, camera, why) || (s->cue && !tracks_cue_room(s->cue, camera, why)))
         return false;
+    s->track.memory_bytes += s->cue ? s->cue->room : 0;
     const tracking *const t = &s->track;
     fprintf(stderr,
             "gait-trackd: model %016" PRIx64
@@ -324,6 +325,8 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
         reject(s, &why);
         return false;
     }
+    if (s->cue)
+        frame.tracks[0] = tracks_cue_use(s->cue, v->utime);
     gait_status status = bridge(s, v->utime, &estimate, &err);
     if (status == GAIT_OK)
         status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);

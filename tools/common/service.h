@@ -12,6 +12,7 @@
 #include "strides.h"
 #include "spotter.h"
 #include "tracking.h"
+#include "tracks_cue.h"
 
 #include <lcm/lcm.h>
 
@@ -32,6 +33,7 @@ typedef struct past_frame { /* what the source said of a frame that was tracked 
 typedef struct service {
     tracking track;
     lift_service *lift; /* the second service; NULL: not asked for */
+    tracks_cue *cue;    /* joints of a detector for the tracker; NULL: not asked for */
     lcm_t *out;         /* where messages go; NULL: nowhere */
     int threads;
     int stream; /* number of the camera, [0, 30] */

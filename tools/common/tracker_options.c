@@ -16,6 +16,7 @@ static const struct {
     {"silhouette-weight", FIELD(term_weight[1]), 0, 1e6, "nats per unit cost of the silhouette"},
     {"edges-weight", FIELD(term_weight[2]), 0, 1e6, "nats per unit cost of the edges"},
     {"template-weight", FIELD(term_weight[3]), 0, 1e6, "nats per unit cost of the running template"},
+    {"tracks-weight", FIELD(term_weight[4]), 0, 1e6, "nats per unit cost of joints found by a detector"},
     {"missed-weight", FIELD(missed_weight), 0, 1, "foreground outside the limbs against background inside"},
     {"girth", FIELD(girth), 0.5, 2, "limb radii against the model's (clothes)"},
     {"resample-ess", FIELD(resample_ess), 0, 1, "resample below this fraction of the particles"},

@@ -2,6 +2,8 @@
 
 #include "gaitmsg_tracks_t.h"
 
+#define LEAST_CONFIDENCE 0.1f /* points below it count as not seen, as in files of tracks */
+
 static bool take_track(byte_reader *r, track_view *out)
 {
     out->name = bytes_text(r);
@@ -29,4 +31,15 @@ bool tracks_view_open(tracks_view *v, const void *message_bytes, size_t size, me
 bool tracks_view_next(tracks_view *v, track_view *out)
 {
     return v->count-- > 0 && take_track(&v->tracks, out);
+}
+
+double tracks_view_sd(const track_view *track, double sd)
+{
+    float const confidence = track->confidence < 1.0f ? track->confidence : 1.0f;
+    return confidence >= LEAST_CONFIDENCE ? sd / (double)confidence : -1.0;
+}
+
+bool tracks_view_strangers(message *why)
+{
+    return message_set(why, "tracks of no point that the model knows; name them pelvis, l_knee and so on");
 }

@@ -19,4 +19,8 @@ typedef struct track_view {
 bool tracks_view_open(tracks_view *v, const void *message_bytes, size_t size, message *why);
 /* The next track; false: there are no more. */
 bool tracks_view_next(tracks_view *v, track_view *out);
+/* Deviation of a track, pixels, where one with full confidence has `sd`; -1: not seen. */
+double tracks_view_sd(const track_view *track, double sd);
+/* false, with the reason that no track of a message is of a joint that is known. */
+bool tracks_view_strangers(message *why);
 #endif

@@ -1,0 +1,152 @@
+"""gait-trackd --tracks-term: joints of a detector go to the frames that they were found in."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import lcm_rig as rig
+import numpy as np
+import pytest
+
+from gait.frame import Joints
+from gait.lcm.messages import image_message, tracks_message
+from gait.tracker import Term, Tracker, TrackerConfig
+
+FRAMES, SD = 16, 1.0
+SAID = re.compile(r"tracks (\d+) tracks_used (\d+) tracks_late (\d+)")
+
+
+@cache
+def found(frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """What a detector says of a frame: pixels (P, 2) with gaps, and confidences."""
+    rng = np.random.default_rng(frame)
+    uv = rig.CAMERA.project(rig.model().pose(rig.walker(frame))[0])
+    uv = (uv + 0.3 * rng.normal(size=uv.shape)).astype(np.float32)
+    uv[rng.random(len(uv)) < 0.15] = np.nan
+    return uv, rng.uniform(0.3, 1.0, len(uv)).astype(np.float32)
+
+
+def image(frame: int) -> rig.Event:
+    return "GAIT_IMAGE_0", rig.frame_message(frame)
+
+
+def tracks(frame: int, names: list[str] | None = None) -> rig.Event:
+    uv, confidence = found(frame)
+    order = slice(None, None, -1)  # a detector has an order of its own
+    names = names or list(rig.model().joint_names[order])
+    return "GAIT_TRACKS_0", tracks_message(names, uv[order], rig.utime(frame), frame, confidence[order])
+
+
+def play(tmp_path: Path, events: list[rig.Event], *options: object) -> tuple[rig.Outcome, tuple[int, ...]]:
+    """Track a log with the term; also how many tracks came, were used and were late."""
+    log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *events])
+    outcome = rig.play(log, "--tracks-term", "--tracks-sd", SD, *options)
+    said = SAID.search(outcome.printed)
+    assert said, outcome.printed
+    return outcome, tuple(int(n) for n in said.groups())
+
+
+def each(first: int = 0, stop: int = FRAMES) -> list[rig.Event]:
+    """Every frame, and then what is found in it."""
+    return [event for i in range(first, stop) for event in (image(i), tracks(i))]
+
+
+def as_in_messages(camera: rig.Camera) -> rig.Camera:
+    return replace(
+        camera, R=camera.R.astype(np.float32).astype(float), t=camera.t.astype(np.float32).astype(float)
+    )
+
+
+def by_python() -> str:
+    """Digest of the library that is given the same."""
+    usual = TrackerConfig.default(particles=rig.PARTICLES)
+    tracker = Tracker(
+        rig.model(),
+        as_in_messages(rig.CAMERA),
+        replace(usual, terms=usual.terms | Term.TRACKS),
+        background=rig.plate(),
+    )
+    tracker.start(rig.walker(0), rig.SD, rig.utime(0))
+    for i in range(FRAMES):
+        uv, confidence = found(i)
+        sd = SD / confidence.astype(float)
+        tracker.step(rig.picture(i), rig.utime(i), Joints(rig.model().joint_names, uv, sd))
+    return f"{tracker.digest():016x}"
+
+
+def test_joints_are_those_of_their_frame_whichever_comes_first(tmp_path: Path) -> None:
+    after, said = play(tmp_path, each())
+    assert said == (FRAMES, FRAMES, 0) and (after.frames, after.dropped) == (FRAMES, 0)
+    assert [e.frame for e in after.estimates] == list(range(FRAMES))
+    assert after.digest == by_python()
+    before, _ = play(tmp_path, [event for i in range(FRAMES) for event in (tracks(i), image(i))])
+    mixed, _ = play(tmp_path, [*each(0, 7), tracks(8), image(7), tracks(7), image(8), *each(9)])
+    assert before.digest == after.digest == mixed.digest
+
+
+def test_they_help_and_are_not_read_without_the_option(tmp_path: Path) -> None:
+    log = rig.write_log(tmp_path / "b.log", [*rig.opening(), *each()])
+    plain, bare = rig.play(log), rig.play(rig.write_log(tmp_path / "c.log", [*rig.opening(), *frames()]))
+    assert plain.digest == bare.digest and "tracks" not in plain.printed
+    fog = np.full((rig.CAMERA.height, rig.CAMERA.width), 120, np.uint8)
+    blank = [("GAIT_IMAGE_0", image_message(fog, rig.utime(i), i)) for i in range(FRAMES)]
+    dark = [event for i in range(FRAMES) for event in (blank[i], tracks(i))]
+    helped, _ = play(tmp_path, dark, "-n", 500)
+    unheard, _ = play(tmp_path, dark, "-n", 500, "--tracks-weight", 0)
+    assert error(helped) < 0.6 * error(unheard)
+
+
+def frames() -> list[rig.Event]:
+    return [image(i) for i in range(FRAMES)]
+
+
+def error(outcome: rig.Outcome) -> float:
+    """Mean distance of the joints in the second half, metres."""
+    off = [
+        np.array([j.position for j in e.joints]) - rig.model().pose(rig.walker(e.frame))[0]
+        for e in outcome.estimates[FRAMES // 2 :]
+    ]
+    return float(np.linalg.norm(off, axis=2).mean())
+
+
+def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None:
+    """Tracks that come after that are counted and named, and change nothing."""
+    without, said = play(tmp_path, frames())
+    assert said == (0, 0, 0) and without.frames == FRAMES  # also the last one, when the log ends
+    late = [event for i in range(FRAMES) for event in ([image(i), tracks(i - 1)] if i else [image(0)])]
+    outcome, said = play(tmp_path, late)
+    assert said == (FRAMES - 1, 0, FRAMES - 1) and outcome.digest == without.digest
+    assert outcome.words.count("tracks came after their frame was tracked") == 1
+
+
+def test_memory_holds_the_largest_frame_and_does_not_grow(tmp_path: Path) -> None:
+    size = []
+    for stop in (4, FRAMES):
+        outcome, _ = play(tmp_path, each(0, stop))
+        size.append(int(outcome.printed.split("memory_bytes ")[1].split()[0]))
+    plain = rig.play(rig.write_log(tmp_path / "b.log", [*rig.opening(), *frames()]))
+    without = int(plain.printed.split("memory_bytes ")[1].split()[0])
+    assert size[0] == size[1] and size[0] - without >= 3 * rig.CAMERA.width * rig.CAMERA.height
+    wide = image_message(rig.picture(2), rig.utime(2), 2)
+    wide.data += bytes(1 << 17)  # more than there is room for: tracked at once, its joints are late
+    wide.size = len(wide.data)
+    outcome, said = play(tmp_path, [*each(0, 2), ("GAIT_IMAGE_0", wide), tracks(2), *each(3)])
+    assert outcome.frames == FRAMES and said == (FRAMES, FRAMES - 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        (("GAIT_TRACKS_0", tracks(5)[1].encode()[:-3]), "GAIT_TRACKS_0: damaged message"),
+        (("GAIT_TRACKS_0", b"x"), "GAIT_TRACKS_0: not a gaitmsg.tracks_t"),
+        (tracks(5, [f"p{i}" for i in range(19)]), "no point that the model knows"),
+    ],
+    ids=["cut", "other", "strangers"],
+)
+def test_tracks_that_tell_nothing_are_named(tmp_path: Path, event: rig.Event, words: str) -> None:
+    outcome, said = play(tmp_path, [*each(0, 5), image(5), event, *each(6)])
+    assert words in outcome.words
+    assert outcome.frames == FRAMES and said[1] == FRAMES - 1
