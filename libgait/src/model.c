@@ -160,6 +160,9 @@ gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error
     sections r = {.what = "model", .err = err};
     gait_model t = {0};
     r.status = blob_open(data, bytes, &r.b, err);
+    if (r.status == GAIT_OK && !blob_has(&r.b, "CHNM") && blob_has(&r.b, "SGNM"))
+        sections_refuse(&r, GAIT_ERR_CORRUPT, "CHNM",
+                        "missing: only segments were learnt; learn without --segments only to track");
     read_channels(&r, &t);
     read_curves(&r, &t);
     read_statistics(&r, &t);

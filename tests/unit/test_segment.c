@@ -71,10 +71,25 @@ static void test_counts(void)
     CHECK(segment_open(buf, toy_finish(&f), &p, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "gait learn"));
 }
 
+/* A blob may hold segments alone; whoever wants to track with it is told what to do. */
+static void test_no_cyclic_model(void)
+{
+    gait_error err = {0};
+    size_t need = 0;
+    toy_segments_fill(&toy, 1, 0);
+    size_t const bytes = toy_segments_write(buf, &toy);
+    CHECK(gait_model_bytes(buf, bytes, &need, &err) == GAIT_ERR_CORRUPT);
+    CHECK(strstr(err.text, "CHNM") && strstr(err.text, "without --segments only"));
+    toy_file f = toy_begin(buf, 0);
+    CHECK(gait_model_bytes(buf, toy_finish(&f), &need, &err) == GAIT_ERR_CORRUPT);
+    CHECK(strstr(err.text, "CHNM") && !strstr(err.text, "--segments"));
+}
+
 int main(void)
 {
     test_views();
     test_refused();
     test_counts();
+    test_no_cyclic_model();
     return CHECK_DONE();
 }
