@@ -13,6 +13,7 @@ KERNEL_ROW void normals(uint64_t seed, uint32_t frame, uint32_t first, uint32_t 
     for (uint32_t lane = 0; lane < BLOCK; lane++) {
         float n[4];
         rng_normals(seed, STREAM_MOVE, frame, first + lane, draw, n);
+#pragma GCC unroll 4
         for (int32_t k = 0; k < 4; k++)
             out[k][lane] = n[k];
     }
