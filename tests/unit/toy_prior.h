@@ -38,7 +38,7 @@ static inline void move_block(const dynamics *d, walker w[BLOCK], float dt, floa
     for (int32_t f = 0; f < s.fields; f++)
         for (int32_t lane = 0; lane < BLOCK; lane++)
             from.f[f][lane] = w[lane].f[f];
-    kernels_choose(~0u)->dynamics_move(&s, first, &from, &to);
+    d->rule.run->dynamics_move(&s, first, &from, &to);
     for (int32_t f = 0; f < s.fields; f++)
         for (int32_t lane = 0; lane < BLOCK; lane++)
             w[lane].f[f] = to.f[f][lane];
