@@ -289,6 +289,7 @@ typedef struct gait_lift_config {
     uint32_t struct_size;     /* set by gait_lift_default() */
     int32_t  projection;      /* GAIT_LIFT_PERSPECTIVE (default): `camera`, u v in pixels; or ORTHOGRAPHIC: `axis`, metres */
     double   stature;         /* metres; default 0: the learners' mean */
+    double   stature_sd;      /* metres; default -1: 0.04, or 0.09 where stature is 0; 0: exactly that */
     double   sd;              /* of an observation where none is given, pixels or metres; default 3 */
     double   residual;        /* factor of what the modes leave over [0, 100]; default -1: the blob's; 0: the paper's form */
     double   place[3];        /* where the pelvis of the first frame is expected, metres; default 0 (z: of the floor) */
@@ -351,8 +352,8 @@ GAIT_API gait_status gait_lift_segment(gait_lift *l, const double *uv, const dou
 /* Of the last gait_lift_segment() (GAIT_ERR_STATE without one): posterior mean [F][J][3] and standard deviation (may
  * be NULL), metres, world; */
 GAIT_API gait_status gait_lift_positions(gait_lift *l, double *mean, double *sd);
-/* the unknowns [n], n = gait_lift_unknowns(), prior N(0, 1) each: modes, place x y z, heading if it is one; and their
- * covariance [n][n] (may be NULL); */
+/* the unknowns [n], n = gait_lift_unknowns(), prior N(0, 1) each: modes, place x y z, stature and heading if they are
+ * unknown; and their covariance [n][n] (may be NULL); */
 GAIT_API int32_t     gait_lift_unknowns(const gait_lift *l);
 GAIT_API gait_status gait_lift_posterior(gait_lift *l, double *mean, double *covariance);
 /* what the observations alone say, the least-squares fit of minimum norm [F][J][3] (fig. 5c); */

@@ -136,6 +136,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_lift_config, struct_size),
         FIELD(gait_lift_config, projection),
         FIELD(gait_lift_config, stature),
+        FIELD(gait_lift_config, stature_sd),
         FIELD(gait_lift_config, sd),
         FIELD(gait_lift_config, residual),
         FIELD(gait_lift_config, place),

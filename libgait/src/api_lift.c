@@ -13,6 +13,7 @@ void gait_lift_default(gait_lift_config *cfg)
     *cfg = (gait_lift_config){
         .struct_size = sizeof *cfg,
         .projection = GAIT_LIFT_PERSPECTIVE,
+        .stature_sd = -1.0,
         .sd = 3.0,
         .residual = -1.0,
         .place_sd = {10.0, 10.0, 0.05},

@@ -56,6 +56,8 @@ static void put_row(const lift_table *t, const lift_belief *b, const lift_axes *
     for (int32_t i = 0; i < 3; i++)
         w[k + i] = g[i] * t->cfg.place_sd[i];
     double rest = y - ((g[0] * base[0] + g[1] * base[1]) + g[2] * base[2]);
+    if (t->size >= 0)
+        w[t->size] = t->growth * ((q[0] * mean[0] + q[1] * mean[1]) + q[2] * mean[2]);
     if (t->turn >= 0) {
         double const turn = g[0] * spin[0] + g[1] * spin[1];
         w[t->turn] = b->turn_sd * turn;
@@ -94,6 +96,7 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
 {
     lift_moment const m = lift_find_moment(t, at);
     adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
+    double const grown = t->size < 0 ? 1.0 : 1.0 + t->growth * b->theta[t->size];
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
         double mean[3], x[3], own[3];
@@ -101,7 +104,7 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
             continue;
         marker_shape(t, b, &m, j, mean);
         for (int32_t i = 0; i < 3; i++)
-            x[i] = mean[i] + along_modes(t, t->shape + i * t->lanes, b->theta);
+            x[i] = grown * mean[i] + along_modes(t, t->shape + i * t->lanes, b->theta);
         lift_to_world(&a.now, x, own);
         if (said)
             memcpy(said + 3 * j, own, sizeof own);

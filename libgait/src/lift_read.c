@@ -2,32 +2,45 @@
 
 #include <string.h>
 
-/* Rows of t->Z that are modes, and the mean of the markers by them. */
-static void read_modes(const lift_table *t, const lift_belief *b, const lift_query *q, const lift_axes *axes,
-                       double *mean)
+/* Row i of the modes, -1: the mean, in the axes of the world. */
+static void read_row(const lift_table *t, const lift_belief *b, const lift_query *q, const lift_axes *axes,
+                     int32_t i, double *row)
 {
     const segment_prior *const p = &t->prior;
     lift_moment const m = lift_find_moment(t, q->at);
     double const w1 = m.part, w0 = 1.0 - w1;
-    for (int32_t i = -1; i < p->modes; i++) { /* -1: the mean */
-        const float *const x0 =
-            i < 0 ? segment_mean(p, b->component, m.f) : segment_mode(p, b->component, i, m.f);
-        const float *const x1 =
-            i < 0 ? segment_mean(p, b->component, m.next) : segment_mode(p, b->component, i, m.next);
-        double *const to = i < 0 ? mean : t->Z + (size_t)i * (size_t)t->width;
-        double const theta = i < 0 ? 0.0 : b->theta[i];
-        for (int32_t r = 0; r < q->count; r++) {
-            int32_t const j = 3 * q->marker[r];
-            double const x = w0 * (double)x0[j] + w1 * (double)x1[j];
-            double const y = w0 * (double)x0[j + 1] + w1 * (double)x1[j + 1];
-            double const z = w0 * (double)x0[j + 2] + w1 * (double)x1[j + 2];
-            double *const v = to + 3 * r;
-            v[0] = axes->c * x - axes->s * y + (i < 0 ? axes->place[0] : 0.0);
-            v[1] = axes->s * x + axes->c * y + (i < 0 ? axes->place[1] : 0.0);
-            v[2] = axes->z * z + (i < 0 ? axes->place[2] : 0.0);
-            for (int32_t a = 0; i >= 0 && a < 3; a++)
-                mean[3 * r + a] += theta * v[a];
-        }
+    const float *const x0 =
+        i < 0 ? segment_mean(p, b->component, m.f) : segment_mode(p, b->component, i, m.f);
+    const float *const x1 =
+        i < 0 ? segment_mean(p, b->component, m.next) : segment_mode(p, b->component, i, m.next);
+    for (int32_t r = 0; r < q->count; r++) {
+        int32_t const j = 3 * q->marker[r];
+        double const x = w0 * (double)x0[j] + w1 * (double)x1[j];
+        double const y = w0 * (double)x0[j + 1] + w1 * (double)x1[j + 1];
+        double const z = w0 * (double)x0[j + 2] + w1 * (double)x1[j + 2];
+        row[3 * r] = axes->c * x - axes->s * y;
+        row[3 * r + 1] = axes->s * x + axes->c * y;
+        row[3 * r + 2] = axes->z * z;
+    }
+}
+
+/* Rows of t->Z that are modes and stature, and the mean of the markers by them. */
+static void read_shape(const lift_table *t, const lift_belief *b, const lift_query *q, const lift_axes *axes,
+                       double *mean)
+{
+    double *const size = t->size < 0 ? NULL : t->Z + (size_t)t->size * (size_t)t->width;
+    double const growth = size ? t->growth * b->theta[t->size] : 0.0;
+    read_row(t, b, q, axes, -1, mean);
+    for (int32_t x = 0; x < 3 * q->count; x++) {
+        if (size)
+            size[x] = t->growth * mean[x];
+        mean[x] += growth * mean[x] + axes->place[x % 3];
+    }
+    for (int32_t i = 0; i < t->prior.modes; i++) {
+        double *const row = t->Z + (size_t)i * (size_t)t->width;
+        read_row(t, b, q, axes, i, row);
+        for (int32_t x = 0; x < 3 * q->count; x++)
+            mean[x] += b->theta[i] * row[x];
     }
 }
 
@@ -36,8 +49,8 @@ void lift_modes(const lift_table *t, const lift_belief *b, const lift_query *q, 
     lift_axes const axes = lift_axes_now(t, b);
     size_t const width = (size_t)t->width;
     int32_t const k = t->prior.modes;
-    read_modes(t, b, q, &axes, mean);
     memset(t->Z + (size_t)k * width, 0, (size_t)(t->n - k) * width * sizeof *t->Z);
+    read_shape(t, b, q, &axes, mean);
     for (int32_t r = 0; r < q->count; r++) {
         for (int32_t a = 0; a < 3; a++)
             t->Z[(size_t)(k + a) * width + (size_t)(3 * r + a)] = t->cfg.place_sd[a];

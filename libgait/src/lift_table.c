@@ -8,8 +8,9 @@ void lift_table_layout(arena *a, lift_table *t)
 {
     const segment_prior *const p = &t->prior;
     size_t const points = (size_t)p->components * (size_t)p->frames * (size_t)p->markers;
-    t->turn = t->cfg.heading_sd == 0.0 ? -1 : p->modes + 3;
-    t->n = p->modes + 3 + (t->turn >= 0);
+    t->n = p->modes + 3;
+    t->size = t->cfg.stature_sd > 0.0 ? t->n++ : -1;
+    t->turn = t->cfg.heading_sd == 0.0 ? -1 : t->n++;
     t->ld = dense_padded(t->n + 1);
     t->lanes = dense_padded(p->modes);
     t->width = dense_padded(3 * p->markers);
@@ -24,6 +25,7 @@ void lift_table_fill(lift_table *t)
     const segment_prior *const p = &t->prior;
     int32_t const J3 = 3 * p->markers;
     t->stature = t->cfg.stature > 0.0 ? t->cfg.stature : (double)p->stature;
+    t->growth = t->cfg.stature_sd / t->stature;
     t->gamma = t->cfg.residual < 0.0 ? (double)p->gamma : t->cfg.residual;
     memset(t->W, 0, 2 * (size_t)p->markers * (size_t)t->ld * sizeof *t->W);
     memset(t->Z, 0, (size_t)t->n * (size_t)t->width * sizeof *t->Z);

@@ -1,8 +1,8 @@
 /* lift_table.h - what all segments of a lifter share, a belief about one segment, and where that puts a
  * body.
  *
- * Unknowns theta ~ N(0, 1): k modes, place x y z in their deviations, and, unless it is known, the heading
- * in its own. */
+ * Unknowns theta ~ N(0, 1): k modes, place x y z in their deviations, and, unless they are known, stature and
+ * heading in theirs.  A stature off by a share s moves every marker of the mean by s. */
 #ifndef GAIT_LIFT_TABLE_H
 #define GAIT_LIFT_TABLE_H
 #include "arena.h"
@@ -34,10 +34,12 @@ typedef struct lift_table { /* sizes and places that every segment shares */
     eye eye;
     const kernels *run;
     int32_t n, ld; /* unknowns; padded n + 1 */
-    int32_t turn;  /* index of the heading, -1: known */
+    int32_t size;  /* index of the stature, -1: known */
+    int32_t turn;  /* index of the heading, the last; -1: known */
     int32_t lanes; /* modes padded */
     int32_t width; /* 3 J padded */
     double stature, gamma;
+    double growth; /* share of the stature that is one deviation */
     float *row;    /* K x F x J x 3 x lanes: modes, side by side */
     double *W;     /* 2 J x ld: white rows of a frame */
     double *shape; /* 3 x lanes: the modes of one marker at one moment */

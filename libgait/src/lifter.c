@@ -2,6 +2,10 @@
 
 #include "camera.h"
 
+#define KNOWN_STATURE_SD                                                                                     \
+    0.04 /* metres, of a stature that somebody gives: shoes, posture, where markers are */
+#define PEOPLE_STATURE_SD 0.09 /* metres, among people */
+
 /* x is in [low, high]; NaN is not. */
 static bool within(double x, double low, double high)
 {
@@ -30,7 +34,9 @@ static gait_status check_config(const gait_lift_config *c, gait_error *err)
     const char *const bad =
         c->projection != GAIT_LIFT_PERSPECTIVE && c->projection != GAIT_LIFT_ORTHOGRAPHIC
             ? "projection is none of GAIT_LIFT_*"
-        : !within(c->stature, 0.0, 10.0)                          ? "stature is not in [0, 10] metres"
+        : !within(c->stature, 0.0, 10.0) ? "stature is not in [0, 10] metres"
+        : c->stature_sd != -1.0 && !within(c->stature_sd, 0.0, 1.0)
+            ? "stature_sd is neither -1 nor in [0, 1] metres"
         : !within(c->sd, 1e-9, 1e9)                               ? "sd is not in [1e-9, 1e9]"
         : c->residual != -1.0 && !within(c->residual, 0.0, 100.0) ? "residual is neither -1 nor in [0, 100]"
         : !place                                                  ? "place or place_sd is out of range"
@@ -59,6 +65,8 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
     size_t const points = (size_t)prior->frames * (size_t)prior->markers;
     if (prior->headings != 0 && cfg->heading_sd < 0.0)
         t->cfg.heading_sd = 0.0; /* the turned copies are the prior's own headings */
+    if (cfg->stature_sd < 0.0)
+        t->cfg.stature_sd = cfg->stature > 0.0 ? KNOWN_STATURE_SD : PEOPLE_STATURE_SD;
     gait_lift *const self = TAKE(a, gait_lift, 1);
     lift_table_layout(a, t);
     lift_search_layout(a, t, &l.search);

@@ -43,6 +43,7 @@ class LiftConfigC(ctypes.Structure):
         ("struct_size", c_uint32),
         ("projection", c_int32),
         ("stature", c_double),
+        ("stature_sd", c_double),
         ("sd", c_double),
         ("residual", c_double),
         ("place", c_double * 3),

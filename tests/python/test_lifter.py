@@ -32,6 +32,11 @@ CAMERA = Camera(
 )
 
 
+def known(**changes: object) -> LiftConfig:
+    """Settings for a person of exactly the mean stature."""
+    return LiftConfig.default(**({"stature_sd": 0.0} | changes))
+
+
 @cache
 def model(size: int = 50, headings: int = 0, components: int = 1) -> tuple[bytes, SegmentPrior]:
     """A toy prior as a blob, and as the blob holds it."""
@@ -51,18 +56,18 @@ def noisy(uv: np.ndarray, sd: np.ndarray, rng: np.random.Generator) -> np.ndarra
     return uv + rng.normal(size=uv.shape) * np.where(np.isfinite(sd), sd, 0)[..., None]
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3, 2.5])
-def test_every_figure_equals_the_numpy_posterior(angle: float) -> None:
+@pytest.mark.parametrize(("angle", "stature_sd"), [(0.0, 0.0), (0.3, 0.09), (2.5, 0.2)])
+def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float) -> None:
     contents, prior = model()
     rng = np.random.default_rng(0)
-    gaussian = posterior.place(prior, heading=angle)
+    gaussian = posterior.place(prior, heading=angle, stature_sd=stature_sd)
     truth = gaussian.draw(rng)
     sd = deviations(rng, 0.01, 0.05)
     uv = noisy(truth @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
     want = posterior.infer(gaussian, rows)
     dual = posterior.infer(gaussian, rows, dual=True)
-    lifter = Lifter(contents, AXES, LiftConfig.default(heading=angle, heading_sd=0.0))
+    lifter = Lifter(contents, AXES, known(heading=angle, heading_sd=0.0, stature_sd=stature_sd))
     fit = lifter.segment(uv, sd)
     assert fit.log_evidence == pytest.approx(want.log_evidence, rel=1e-9)
     assert fit.log10_volume == pytest.approx(posterior.log10_volume(gaussian, rows), rel=1e-11)
@@ -86,7 +91,7 @@ def test_uncertain_displacements_equal_the_numpy_ones() -> None:
     want_sd, want = posterior.infer(
         gaussian, observe.orthographic(observe.Observations(uv, sd), AXES)
     ).uncertain_modes(4)
-    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0))
+    lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     lifter.segment(uv, sd)
     got_sd, got = lifter.uncertain(4)
     np.testing.assert_allclose(got_sd, want_sd, rtol=1e-8)
@@ -98,7 +103,7 @@ def test_uncertain_displacements_equal_the_numpy_ones() -> None:
 
 def test_drawn_from_the_prior_intervals_cover_what_they_say() -> None:
     contents, prior = model(size=20)
-    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0))
+    lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     rng = np.random.default_rng(7)
     gaussian = posterior.place(prior)
     inside, squares, count = [], 0.0, 0
@@ -129,7 +134,7 @@ def test_a_perspective_fit_is_the_maximum_of_the_posterior() -> None:
     sd = deviations(rng, 2.0, 4.0)
     uv = noisy(CAMERA.project(truth), sd, rng)
     # without residual the noise does not depend on the depth
-    lifter = Lifter(contents, CAMERA, LiftConfig.default(residual=0.0))
+    lifter = Lifter(contents, CAMERA, known(residual=0.0))
     fit = lifter.segment(uv, sd)
     assert fit.converged
     theta, _ = lifter.posterior()
@@ -156,7 +161,8 @@ def test_an_unknown_heading_is_found_as_in_numpy(angle: float) -> None:
     sd = np.full((FRAMES, MARKERS), 0.01)
     uv = noisy(truth @ AXES.T, sd, rng)
     seen = observe.Observations(uv, sd)
-    want = heading.explain(prior, lambda _: observe.orthographic(seen, AXES))[0]
+    person = heading.Person(stature_sd=0.09)  # the default of both, unless a stature is given
+    want = heading.explain(prior, lambda _: observe.orthographic(seen, AXES), person)[0]
     lifter = Lifter(contents, AXES)
     fit = lifter.segment(uv, sd)
     assert np.cos(fit.heading - angle) > 0.999
@@ -166,7 +172,7 @@ def test_an_unknown_heading_is_found_as_in_numpy(angle: float) -> None:
 
 def test_the_component_of_a_mixture_is_chosen_by_evidence() -> None:
     contents, prior = model(size=8, components=3)
-    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0))
+    lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     rng = np.random.default_rng(2)
     for component in range(3):
         gaussian = posterior.place(prior, component)
@@ -184,7 +190,7 @@ def test_the_component_of_a_mixture_is_chosen_by_evidence() -> None:
 def test_a_batch_is_each_segment_alone() -> None:
     contents, _ = model()
     rng = np.random.default_rng(4)
-    lifter = Lifter(contents, AXES, LiftConfig.default(heading=0.5, heading_sd=0.0))
+    lifter = Lifter(contents, AXES, known(heading=0.5, heading_sd=0.0))
     sd = deviations(rng, 0.01, 0.05)
     uv = rng.normal(size=(7, FRAMES, MARKERS, 2))
     with pytest.raises(GaitError):
@@ -201,13 +207,38 @@ def test_a_prior_in_the_axes_of_the_world_has_no_heading_to_find() -> None:
     contents, prior = model(size=6, headings=8)
     lifter = Lifter(contents, AXES)
     lifter.segment(np.zeros((FRAMES, MARKERS, 2)), np.inf)
-    assert lifter.info.headings == 8 and len(lifter.posterior()[0]) == prior.size + 3
+    assert lifter.info.headings == 8 and len(lifter.posterior()[0]) == prior.size + 4  # the stature
+
+
+def test_intervals_hold_people_of_any_stature() -> None:
+    """Taking the mean stature for theirs puts people at a wrong distance, and is sure of it."""
+    contents, prior = model(size=12)
+    rng = np.random.default_rng(6)
+    inside: dict[str, list[np.ndarray]] = {"default": [], "known": [], "given": []}
+    for _ in range(60):
+        stature = prior.stature + 0.09 * rng.normal()
+        gaussian = posterior.place(prior, stature=stature, heading=0.4, ground_sd=1.0)
+        truth = gaussian.draw(rng)
+        uv = CAMERA.project(truth) + 2.0 * rng.normal(size=(FRAMES, MARKERS, 2))
+        given = stature + 0.04 * rng.normal()
+        for name, config in (
+            ("default", LiftConfig.default()),
+            ("known", known()),
+            ("given", LiftConfig.default(stature=given)),
+        ):
+            lifter = Lifter(contents, CAMERA, config)
+            lifter.segment(uv, 2.0)
+            mean, sd = lifter.positions()
+            inside[name].append(np.abs(mean - truth) < 1.6449 * sd)
+    share = {name: float(np.mean(found)) for name, found in inside.items()}
+    assert 0.85 < share["default"] < 0.96 and 0.85 < share["given"] < 0.96
+    assert share["known"] < 0.75
 
 
 def test_missing_markers_cost_what_the_deviations_say() -> None:
     contents, prior = model(size=20)
     rng = np.random.default_rng(9)
-    lifter = Lifter(contents, AXES, LiftConfig.default(heading_sd=0.0, place_sd=(10.0, 0.0, 0.05)))
+    lifter = Lifter(contents, AXES, known(heading_sd=0.0, place_sd=(10.0, 0.0, 0.05)))
     gaussian = posterior.place(prior, ground_sd=0.0)
     found: dict[float, list[tuple[float, float]]] = {0.0: [], 0.3: [], 0.5: []}
     for _ in range(60):
@@ -233,6 +264,9 @@ def test_wrong_shapes_and_settings_are_refused() -> None:
         lifter.push(1, np.zeros((3, 2)))
     with pytest.raises(GaitError, match="stature"):
         Lifter(contents, CAMERA, LiftConfig.default(stature=-1.0))
+    for wrong in (-0.5, 1.5, np.nan):
+        with pytest.raises(GaitError, match="stature_sd is neither -1 nor in"):
+            Lifter(contents, CAMERA, LiftConfig.default(stature_sd=wrong))
     with pytest.raises(GaitError, match="axis"):
         Lifter(contents, [[1, 0, 0], [1, 0, 0]])
     with pytest.raises(TypeError):
@@ -258,7 +292,7 @@ def test_a_stream_follows_and_waits_as_told() -> None:
         modes=np.repeat(prior.modes[:, :, :1], FRAMES, axis=2),
         residual=np.full_like(prior.residual, 1e-6),
     )
-    lifter = Lifter(toy_blob(prior), CAMERA, LiftConfig.default(lag=3))
+    lifter = Lifter(toy_blob(prior), CAMERA, known(lag=3))
     rng = np.random.default_rng(1)
     times = np.arange(90) / 30.0
     truth = _walk(prior, times - 1.5, 0.03 * prior.stature * prior.fps)
