@@ -22,12 +22,11 @@ from gait.camera import Camera
 from gait.errors import UserError
 from gait.learn.stage import one_thread
 from gait.lift import motion
-from gait.lift.chain import rotation
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
 from gait.progress import progress
-from gait.skeleton import EVAL15
+from gait.skeleton import EVAL15, axis_rotation
 from gait.trackfile import Joints, read_truth
 from gait.trc import read_trc
 
@@ -86,7 +85,7 @@ def _facing(truth: Floats, hips: list[int]) -> Floats:
 def _static(prior: SegmentPrior, names: tuple[str, ...], truth: Floats, hips: list[int]) -> float:
     """Error of the mean pose at the true heading."""
     pose = prior.stature * prior.mean[0][:, prior.index(names)].mean(axis=0)
-    turned = np.stack([pose @ rotation(h).T for h in _facing(truth, hips)])
+    turned = np.stack([pose @ axis_rotation(2, h).T for h in _facing(truth, hips)])
     return root_error(turned, truth, hips)
 
 
@@ -111,7 +110,7 @@ def _lift(
 def _upright(places: Floats, camera: Camera) -> Floats:
     """Turn places of a level view along y about z so that y is the camera's line of sight."""
     ahead = camera.R[2]
-    return places @ rotation(float(np.arctan2(-ahead[0], ahead[1]))).T
+    return places @ axis_rotation(2, float(np.arctan2(-ahead[0], ahead[1]))).T
 
 
 def _clips() -> list[list[object]]:

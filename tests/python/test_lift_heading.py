@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from toy_segments import toy_prior
+from toy_segments import FRONT, toy_prior
 
 from gait.camera import Camera
 from gait.lift.heading import Person, explain
-from gait.lift.observe import Observations, image_axes, orthographic, perspective
+from gait.lift.observe import Observations, orthographic, perspective
 from gait.lift.posterior import infer, place
 
 CAMERA = Camera.looking((0.0, -7.0, 1.6), (0.0, 0.0, 0.9), (640, 480), 700.0)
@@ -54,7 +54,7 @@ def test_two_headings_that_look_alike_share_the_probability():
     prior.mean[...] *= flat
     prior.modes[...] *= flat
     truth = place(prior, heading=0.6, ground_sd=0, height_sd=0).draw(rng, residual=False)
-    axes = image_axes("y")
+    axes = FRONT
     obs = Observations(truth @ axes.T, np.full(truth.shape[:2], 0.01))
     found = explain(prior, lambda _: orthographic(obs, axes))
     shares = sorted((e.share for e in found), reverse=True)

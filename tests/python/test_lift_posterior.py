@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from toy_segments import FRONT as AXES
 from toy_segments import toy_prior
 
-from gait.lift.observe import Observations, Rows, image_axes, orthographic
+from gait.lift.observe import Observations, Rows, orthographic
 from gait.lift.posterior import (
     infer,
     likelihood_only,
@@ -16,7 +17,6 @@ from gait.lift.posterior import (
     share_rigid,
 )
 
-AXES = image_axes("y")
 DEPTH = np.array([0.0, 1, 0])
 
 

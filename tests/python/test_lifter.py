@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from toy_segments import FRONT as AXES
 from toy_segments import toy_blob, toy_prior
 
 from gait import blob
@@ -18,7 +19,6 @@ from gait.lifter import LiftConfig, Lifter, LiftFlag
 from gait.skeleton import axis_rotation
 
 FRAMES, MARKERS = 10, 19
-AXES = observe.image_axes("y")
 CAMERA = Camera(
     width=1280,
     height=720,

@@ -5,11 +5,14 @@ import json
 import mocap_files as files
 import numpy as np
 import pytest
+from marked_walker import FULL, walker
+from test_marker_files import write_trc
+from toy_segments import FRONT
 
 import gait.cli
 from gait import blob
 from gait.errors import UserError
-from gait.lift.observe import Observations, image_axes, orthographic
+from gait.lift.observe import Observations, orthographic
 from gait.lift.posterior import infer, place, share_along, share_rigid
 from gait.lift.prior import TAGS, SegmentPrior
 from gait.model import Model
@@ -66,6 +69,45 @@ def test_options_say_what_a_segment_is(walks, tmp_path):
     assert prior.headings == 2 and prior.components == 2
 
 
+def test_eight_headings_are_of_the_world(walks, tmp_path):
+    path = tmp_path / "m.gait"
+    assert learn(walks, path, "--segments", "only", "--segment-headings", 8) == 0
+    prior, free = SegmentPrior.load(path), tmp_path / "free.gait"
+    assert learn(walks, free, "--segments", "only") == 0
+    assert prior.headings == 8 and prior.segments == SegmentPrior.load(free).segments
+    ahead = [p.mean[0, -1, 0, :2] for p in (prior, SegmentPrior.load(free))]  # where the pelvis goes
+    assert np.linalg.norm(ahead[0]) < 1e-5 and ahead[1][0] > 0.1
+
+
+def test_the_number_of_components_is_found_and_told(walks, tmp_path, capsys):
+    """`segment_mixture` is tested for which number it is."""
+    path = tmp_path / "m.gait"
+    assert learn(walks, path, "--segments", "only", "--segment-mixture", "auto", "--json") == 0
+    told = json.loads(capsys.readouterr().out)["segments"]
+    prior = SegmentPrior.load(path)
+    assert 1 <= prior.components == told["components"] <= 6
+    assert prior.weights.sum() == pytest.approx(1, abs=1e-6)
+
+
+def test_recorded_markers_are_those_of_the_files(tmp_path, capsys):
+    """One of three recordings lacks the head's: they are learnt, being in most of the files."""
+    folder = tmp_path / "marked"
+    folder.mkdir()
+    for k in range(3):
+        names = FULL if k else [name for name in FULL if name[1:] not in ("FHD", "BHD")]
+        write_trc(folder / f"{k}_1.trc", names, walker(names, frames=420, seed=k)[0])
+    path = tmp_path / "m.gait"
+    assert (
+        run("learn", folder, "-o", path, "--segments", "only", "--segment-markers", "recorded", "--jobs", 1)
+        == 0
+    )
+    prior = SegmentPrior.load(path)
+    assert {name.upper() for name in prior.names} == set(FULL)
+    assert "37 markers" in capsys.readouterr().out
+    knees = [prior.names.index(next(n for n in prior.names if n.upper() == f"{s}KNE")) for s in "LR"]
+    assert np.all(np.abs(prior.mean[0, :, knees, 2] - 0.28) < 0.06)  # statures over the floor
+
+
 def test_whole_recordings_alone_give_a_blob_that_tracks_nothing(walks, tmp_path, capsys):
     path = tmp_path / "only.gait"
     assert learn(walks, path, "--segments", "only", "--json") == 0
@@ -105,6 +147,8 @@ def test_recorded_markers_need_files_that_have_them(walks, tmp_path, capsys):
         ["--segment-mixture", "many"],
         ["--segment-headings", "4"],
         ["--segments", "only", "--report", "r"],
+        ["--segment-hop", "11"],
+        ["--segment-hop", "5", "--segment-frames", "4"],
     ],
 )
 def test_bad_options_are_usage_errors(walks, tmp_path, words, monkeypatch):
@@ -130,7 +174,7 @@ def test_the_shipped_prior_is_of_its_walks():
 
 def test_of_a_walker_seen_flat_depth_is_least_certain():
     """F6: the five least certain modes are along depth, the first moves the whole body."""
-    prior, axes, depth = SegmentPrior.load(), image_axes("y"), np.array([0.0, 1, 0])
+    prior, axes, depth = SegmentPrior.load(), FRONT, np.array([0.0, 1, 0])
     gaussian = place(prior)
     seen = Observations(gaussian.mean @ axes.T, np.full(gaussian.mean.shape[:2], 0.02))
     sd, modes = infer(gaussian, orthographic(seen, axes)).uncertain_modes(5)

@@ -9,6 +9,9 @@ from gait.learn.segment_sections import sections
 from gait.lift.prior import SegmentPrior
 from gait.skeleton import JOINTS
 
+#: Axes of a picture taken along +y: to the right and up.
+FRONT = np.array([[1.0, 0, 0], [0, 0, 1]])
+
 
 def toy_prior(
     frames: int = 4, markers: int = 6, size: int = 5, seed: int = 0, components: int = 1, headings: int = 0

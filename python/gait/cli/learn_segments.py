@@ -8,7 +8,7 @@ import sys
 
 from gait import blob
 from gait.cli import segment_text, values
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
 from gait.learn import model, segment_fit, segment_options, segment_sections
 from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments
@@ -77,10 +77,12 @@ def _components(text: str) -> int | None:
 def options(args: argparse.Namespace) -> Segments:
     """Options as the learner takes them."""
     hop = args.segment_hop or max(1, args.segment_frames // 2)
+    if hop > args.segment_frames:
+        raise UsageError(f"--segment-hop {hop}: at most the {args.segment_frames} of --segment-frames")
     return Segments(
         source=args.segments,
         frames=args.segment_frames,
-        hop=min(hop, args.segment_frames),
+        hop=hop,
         fps=float(args.segment_fps),
         modes=args.segment_modes,
         headings=segment_options.TURNS[args.segment_headings],

@@ -55,15 +55,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--orthographic", metavar="AXIS", help="view along x, y, z, -x, -y, -z or X,Y,Z from far away"
     )
     group.add_argument(
-        "--metres-per-unit", type=_positive, metavar="M", help="scale of u and v with --orthographic"
+        "--metres-per-unit", type=values.positive, metavar="M", help="scale of u and v with --orthographic"
     )
     group.add_argument("--height", type=values.stature, metavar="M", help="stature (unknown: of most people)")
     group.add_argument(
-        "--pixel-sd", type=_positive, default=3.0, metavar="SD", help="noise of u and v, in their unit (3)"
+        "--pixel-sd",
+        type=values.positive,
+        default=3.0,
+        metavar="SD",
+        help="noise of u and v, in their unit (3)",
     )
     group.add_argument(
         "--floor-sd",
-        type=_positive,
+        type=values.positive,
         default=0.03,
         metavar="M",
         help="smooth with --camera: how well the person stands at z = 0, metres (0.03; more on steps)",
@@ -80,16 +84,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--ignore-unknown", action="store_true", help="leave out points the model has not")
     group.add_argument("--trc", metavar="O.trc", help="also write the places for OpenSim")
     lift_video.add_arguments(parser)
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text}: give a number above 0")
-    return value
 
 
 def run(args: argparse.Namespace) -> int:

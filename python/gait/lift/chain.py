@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy import linalg
 
 from gait.lift.prior import SegmentPrior
+from gait.skeleton import axis_rotation
 
 Floats = npt.NDArray[np.float64]
 
@@ -23,6 +24,7 @@ GROUND_SD = 10.0  # metres, where on the ground
 LASTING = 0.7  # share of the variance outside the modes that stays as it is within a segment
 OFFSET_SD = 0.006  # statures, of where somebody's joints are taken to be
 HEADING_SD = 2.0  # radians around the present estimate: as good as unknown
+LEADING = 8  # modes whose scores enter the shapes that views are linearised around
 
 
 @dataclass(frozen=True)
@@ -125,9 +127,11 @@ def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
 def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats) -> Around:
     """Linearise around new places (grid, J, 3): headings, stature and shapes that they say under the prior.
 
-    The shapes leave out what the prior takes for noise of single frames.  With it a larger body would have
-    more noise in metres, and the fit would shrink the body to get rid of it.  All segments and all views are
-    linearised around the same shapes, so that a change of size about the lens costs nothing by itself.
+    The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
+    to: derivatives taken there are correlated with the residuals, and draw the body to the lens, where the
+    same residuals in the picture are fewer metres (errors in variables; by the share of fitted numbers).  All
+    segments and all views are linearised around the same shapes, so that a change of size about the lens
+    costs nothing by itself.
     """
     headings, statures, shapes = [], [], []
     half = around.places.shape[1] // 2
@@ -158,18 +162,12 @@ def blended(segments: Floats, half: int) -> Floats:
     return total / norm
 
 
-def rotation(heading: float) -> Floats:
-    """Rotation (3, 3) about z."""
-    c, s = np.cos(heading), np.sin(heading)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
 class Segment:
     """Gaussian over one segment in the world: N(mean, diag(variance) + loads loads')."""
 
     def __init__(self, prior: SegmentPrior, around: Around, freedom: Freedom, s: int) -> None:
         component, place = around.component[s], around.places[s]
-        turn, stature = rotation(around.heading[s]), around.stature
+        turn, stature = axis_rotation(2, around.heading[s]), around.stature
         shape = place - _over_ground(place)
         self.own = stature * prior.mean[component] @ turn.T
         middle = _over_ground(place) - _over_ground(self.own)
@@ -222,12 +220,13 @@ class Segment:
         return -float(np.log(self.variance).sum() + 2 * np.log(np.diag(self._lower)).sum())
 
     def explained(self, places: Floats) -> tuple[float, float, Floats]:
-        """Turn in radians and stature in metres that places say, and the places without noise."""
+        """Turn in radians and stature in metres that places say, and their shape by the leading modes."""
         values = linalg.cho_solve(
             (self._lower, True), self._scaled @ (places - self.mean), check_finite=False
         )
         stature = self.freedom.stature + self.freedom.stature_sd * values[self.rigid + 4]
         turn = HEADING_SD * values[self.rigid + 3]
+        values[LEADING : self.rigid] = values[self.rigid + 5 :] = 0
         return float(turn), float(stature), self.mean + values @ self.loads
 
 

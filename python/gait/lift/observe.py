@@ -18,11 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.camera import Camera
-from gait.errors import UserError
 
 Floats = npt.NDArray[np.float64]
 
-AXES = {"x": 0, "y": 1, "z": 2}
 NEAREST = 0.1  # metres before the lens: noise is not taken nearer
 NEAR = 0.5  # metres beside the ray: a guess is good enough to take the projection's derivatives there
 
@@ -84,21 +82,6 @@ class Rows:
         return replace(self, value=self.value - np.einsum("nai,ni->na", self.direction, at))
 
 
-def image_axes(axis: str) -> Floats:
-    """Axes (2, 3), to the right and up, of a picture taken along +x, +y or +z; z is up, or +y if along z.
-
-    Raises
-    ------
-    UserError
-        If there is no such axis.
-    """
-    if axis not in AXES:
-        raise UserError(f"{axis!r} is no axis to look along; give x, y or z")
-    ahead = np.eye(3)[AXES[axis]]
-    up = np.eye(3)[1 if axis == "z" else 2]
-    return np.stack([np.cross(ahead, up), up])
-
-
 def orthographic(seen: Observations, axes: Floats) -> Rows:
     """Rows of a view that leaves depth out.
 
@@ -107,7 +90,7 @@ def orthographic(seen: Observations, axes: Floats) -> Rows:
     seen : Observations
         Metres along `axes`.
     axes : (2, 3)
-        Unit vectors of the picture; see `image_axes`.
+        Unit vectors of the picture.
     """
     frame, marker = np.nonzero(seen.seen)
     variance = seen.sd[frame, marker, None] ** 2 * np.ones(2)
