@@ -16,6 +16,7 @@ from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.observe import Observations
 from gait.lift.sequence import Grid, Seen, Start, smooth
 from gait.lift.tracks_file import Tracks
+from gait.skeleton import axis_rotation
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
 
@@ -169,7 +170,7 @@ def test_bones_cost_nothing_to_a_rigid_or_resized_body():
     prior = toy_prior(FRAMES, 19, 4)
     rng = np.random.default_rng(2)
     body = rng.normal(size=(19, 3))
-    turns = [chains.rotation(0.1 * t) for t in range(BLOCKS * FRAMES // 2)]
+    turns = [axis_rotation(2, 0.1 * t) for t in range(BLOCKS * FRAMES // 2)]
     places = np.stack([body @ turn.T for turn in turns])
     rows = rows_of(prior)
     soft.bones(rows, prior.names, places)
