@@ -323,7 +323,7 @@ int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weig
     if (!t->core->started)
         return GAIT_ERR_STATE;
     for (int32_t i = 0; i < i_min(cap, t->cfg.particles); i++) {
-        walker const w = walker_get(&t->gen[t->core->current].people, i);
+        walker const w = walker_get(&t->people, i);
         s[i] = walker_state(&t->rule, &w);
         weight[i] = (float)t->filter.weight[i];
     }

@@ -30,36 +30,51 @@ static float resultant_sd(double c, double s)
     return __builtin_sqrtf(f_max(-2.0f * m_log(f_max(resultant_length(c, s), 1e-6f)), 0.0f));
 }
 
-/* The particles of an estimate and what belongs to it. */
-typedef struct crowd {
+typedef struct sums { /* what an estimate sums over */
+    const gait_tracker *t;
     const kernels *run;
-    const population *people;
-    const double *weight;
-    const uint8_t *use; /* those of the mode, */
-    double mass;        /* which weigh this much */
+    const crowd *of;
+    double mass; /* of those of the mode, which t->mode tells */
     int32_t best;
-} crowd;
+} sums;
+
+/* One field of the crowd; up to three at a time, each in a room of its own, 0 .. 2. */
+static const float *column(const sums *s, int32_t f, int32_t room)
+{
+    float *const rooms[] = {s->t->ll, s->t->used, s->t->inner};
+    const float *const all = field(&s->of->people, f);
+    if (!s->of->who)
+        return all;
+    for (int32_t i = 0; i < s->of->n; i++)
+        rooms[room][i] = all[s->of->who[i]];
+    return rooms[room];
+}
 
 /* Mean and variance of one number per particle, and its mean in the mode. */
-static void moments(const crowd *c, const float *v, double *mean, double *var, double *mode)
+static void moments(const sums *s, const float *v, double *mean, double *var, double *mode)
 {
-    double const about = (double)v[c->best];
+    double const about = (double)v[s->best];
     double sum[3];
-    c->run->estimate_moments(v, c->weight, c->use, c->people->n, about, sum);
+    s->run->estimate_moments(v, s->of->weight, s->t->mode, s->of->n, about, sum);
     double const square = sum[1] - sum[0] * sum[0];
     *mean = about + sum[0];
     *var = square > 0.0 ? square : 0.0;
-    *mode = about + sum[2] / c->mass;
+    *mode = about + sum[2] / s->mass;
+}
+
+/* Cosine and sine of the mean direction over all, and over the mode. */
+static void resultant(const sums *s, int32_t f, float turn, double out[4])
+{
+    s->run->estimate_resultant(column(s, f, 0), turn, s->of->weight, s->t->mode, s->of->n, out);
 }
 
 /* Chordal mean of Rz(heading) Ry(pitch) Rx(roll) over the mode, back as the three angles. */
-static void mean_rotation(const crowd *c, walker *w)
+static void mean_rotation(const sums *s, walker *w)
 {
-    const population *const p = c->people;
     double qq[16];
     float q[4];
-    c->run->estimate_rotations(field(p, F_HEADING), field(p, F_PITCH), field(p, F_ROLL), c->weight, c->use,
-                               p->n, qq);
+    s->run->estimate_rotations(column(s, F_HEADING, 0), column(s, F_PITCH, 1), column(s, F_ROLL, 2),
+                               s->of->weight, s->t->mode, s->of->n, qq);
     la_rotation_mean(qq, q);
     w->f[F_HEADING] = m_atan2(2.0f * (q[0] * q[3] + q[1] * q[2]), 1.0f - 2.0f * (q[2] * q[2] + q[3] * q[3]));
     w->f[F_PITCH] = m_asin(f_clamp(2.0f * (q[0] * q[2] - q[3] * q[1]), -1.0f, 1.0f));
@@ -67,12 +82,13 @@ static void mean_rotation(const crowd *c, walker *w)
 }
 
 /* Posterior mean of every joint over all particles, and its deviation as it is reported. */
-static void joints(const gait_tracker *t, const crowd *c, float stature, gait_estimate *out)
+static void joints(const sums *s, float stature, gait_estimate *out)
 {
+    const gait_tracker *const t = s->t;
     double const factor = (double)t->cfg.joint_sd_factor, model = (double)(t->cfg.joint_sd_model * stature);
     for (int32_t p = 0; p < 3 * t->model->points; p++) {
         double mean, var, mode;
-        moments(c, t->joint + (size_t)p * (size_t)t->cfg.particles, &mean, &var, &mode);
+        moments(s, t->joint + (size_t)p * (size_t)s->of->n, &mean, &var, &mode);
         out->pose.joint[p / 3][p % 3] = (float)mean;
         out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(factor * factor * var + model * model);
     }
@@ -111,38 +127,44 @@ static void spread(const gait_tracker *t, const walker *sd, float phase_sd, floa
 }
 
 /* Means of the mode and deviations of all, field by field; phase and directions: along the line. */
-static void fields(const crowd *c, walker *mean, walker *sd)
+static void fields(const sums *s, walker *mean, walker *sd)
 {
-    for (int32_t f = 0; f < c->people->fields; f++) {
+    for (int32_t f = 0; f < s->of->people.fields; f++) {
         double all, var, mode;
-        moments(c, field(c->people, f), &all, &var, &mode);
+        moments(s, column(s, f, 0), &all, &var, &mode);
         mean->f[f] = (float)mode;
         sd->f[f] = (float)__builtin_sqrt(var);
     }
 }
 
-walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
+walker estimate_crowd(const gait_tracker *t, const crowd *c, int32_t best, gait_estimate *out)
 {
-    const population *const p = &t->gen[t->core->current].people;
-    crowd c = {.run = t->like->run, .people = p, .weight = t->filter.weight, .use = t->mode, .best = best};
+    sums s = {.t = t, .run = t->like->run, .of = c, .best = best};
     walker mean = {{0}}, sd;
-    double phase[4], heading[4]; /* cosine and sine of all, and of the mode */
+    double phase[4], heading[4];
     gait_pose pose;
-    c.mass = c.run->estimate_mode(field(p, F_PHASE), field(p, F_HEADING), c.weight, p->n, best, t->mode);
-    fields(&c, &mean, &sd);
-    c.run->estimate_resultant(field(p, F_PHASE), TWO_PI_F, c.weight, c.use, p->n, phase);
-    c.run->estimate_resultant(field(p, F_HEADING), 1.0f, c.weight, c.use, p->n, heading);
+    s.mass = s.run->estimate_mode(column(&s, F_PHASE, 0), column(&s, F_HEADING, 1), c->weight, c->n, best,
+                                  t->mode);
+    fields(&s, &mean, &sd);
+    resultant(&s, F_PHASE, TWO_PI_F, phase);
+    resultant(&s, F_HEADING, 1.0f, heading);
     mean.f[F_PHASE] = m_wrap1(m_atan2((float)phase[3], (float)phase[2]) / TWO_PI_F);
-    mean_rotation(&c, &mean);
-    joints(t, &c, mean.f[F_STATURE], out);
+    mean_rotation(&s, &mean);
+    joints(&s, mean.f[F_STATURE], out);
     spread(t, &sd, resultant_sd(phase[0], phase[1]) / TWO_PI_F, resultant_sd(heading[0], heading[1]), out);
-    walker const heaviest = walker_get(p, best);
+    walker const heaviest = walker_get(&c->people, c->who ? c->who[best] : best);
     out->mean = walker_state(&t->rule, &mean);
     out->best = walker_state(&t->rule, &heaviest);
     if (model_pose_state(t->model, &out->mean, &pose) == GAIT_OK)
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
     out->phase_r = resultant_length(phase[0], phase[1]);
-    out->mode_mass = (float)c.mass;
+    out->mode_mass = (float)s.mass;
     out->speed = estimate_speed(t, &mean);
     return mean;
+}
+
+walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out)
+{
+    crowd const all = {.people = t->people, .n = t->people.n, .weight = t->filter.weight};
+    return estimate_crowd(t, &all, best, out);
 }

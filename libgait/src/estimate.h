@@ -9,7 +9,17 @@ walker estimate_place(const population *p, const double *weight);
 /* Metres per second along the ground: stride length times stride rate. */
 float estimate_speed(const gait_tracker *t, const walker *w);
 
-/* Means, deviations, dominant mode and joints; best is the heaviest particle.  Returns the mean of the
- * dominant mode. */
+typedef struct crowd { /* weighted particles, whose joints are in t->joint */
+    population people;
+    const int32_t *who; /* n: which of the people; NULL: all */
+    int32_t n;
+    const double *weight; /* n */
+} crowd;
+
+/* Means, deviations, dominant mode and joints; best is the heaviest of the crowd.  Returns the mean of the dominant
+ * mode.  Writes t->mode and, unless the crowd is all people, t->ll, t->used and t->inner. */
+walker estimate_crowd(const gait_tracker *t, const crowd *c, int32_t best, gait_estimate *out);
+
+/* The same of the current particles. */
 walker estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out);
 #endif

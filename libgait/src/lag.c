@@ -5,46 +5,38 @@
 
 void lag_layout_state(lag *l, arena *a, int32_t frames, int32_t n, int32_t fields)
 {
-    l->depth = frames > 0 ? frames + 1 : 0;
-    if (l->depth == 0)
-        return;
+    l->depth = i_max(frames, 1) + 1;
+    l->room = n;
+    l->fields = fields;
     l->note = TAKE(a, lag_note, l->depth);
+    l->count = TAKE(a, int32_t, l->depth);
     l->value = TAKE(a, float, (size_t)l->depth *(size_t)fields *(size_t)n);
     l->parent = TAKE(a, int32_t, (size_t)l->depth *(size_t)n);
 }
 
-void lag_layout_work(lag *l, arena *a, int32_t n, int32_t fields)
+void lag_layout_work(lag *l, arena *a)
 {
-    if (l->depth == 0)
-        return;
-    l->people = population_layout(a, n, fields);
-    l->weight = TAKE(a, double, n);
+    l->who = TAKE(a, int32_t, l->room);
+    l->weight = TAKE(a, double, l->room);
 }
 
-/* Where step number `step` since start is kept. */
-static size_t slot_of(const lag *l, uint64_t step)
+population lag_people(const lag *l, int32_t slot)
 {
-    return (size_t)(step % (uint64_t)l->depth);
+    return (population){.n = l->count[slot],
+                        .fields = l->fields,
+                        .value = l->value + (size_t)slot * (size_t)l->fields * (size_t)l->room};
 }
 
-static population kept_people(const gait_tracker *t, size_t slot)
+static int32_t *parents(const lag *l, int32_t slot)
 {
-    population p = t->gen[0].people;
-    p.n = t->room; /* of which as many are in use as were then */
-    p.value = t->past.value + slot * (size_t)p.fields * (size_t)p.n;
-    return p;
+    return l->parent + (size_t)slot * (size_t)l->room;
 }
 
 void lag_keep(gait_tracker *t, const gait_estimate *e)
 {
     lag *const l = &t->past;
-    if (l->depth == 0)
-        return;
-    size_t const slot = slot_of(l, e->frame), n = (size_t)t->cfg.particles;
-    population const now = t->gen[t->core->current].people, kept = kept_people(t, slot);
-    for (int32_t f = 0; f < now.fields; f++)
-        memcpy(field(&kept, f), field(&now, f), n * sizeof *now.value);
-    memcpy(l->parent + slot * (size_t)t->room, t->filter.parent, n * sizeof *l->parent);
+    int32_t const slot = t->core->current;
+    memcpy(parents(l, slot), t->filter.parent, (size_t)t->cfg.particles * sizeof *l->parent);
     l->note[slot] = (lag_note){.age = e->utime - t->core->start_utime,
                                .frame = e->frame,
                                .log_evidence = e->log_evidence,
@@ -61,48 +53,43 @@ int32_t lag_reach(const gait_tracker *t)
 /* Sum the weights of today's particles on their ancestors `back` steps ago: weight[room]. */
 static void weigh_ancestors(gait_tracker *t, int32_t back, double *weight)
 {
-    uint64_t const last = t->core->frame - 1;
     for (int32_t i = 0; i < t->room; i++)
         weight[i] = 0.0;
     for (int32_t i = 0; i < t->cfg.particles; i++) {
         int32_t a = i;
-        for (uint64_t k = 0; k < (uint64_t)back; k++)
-            a = t->past.parent[slot_of(&t->past, last - k) * (size_t)t->room + (size_t)a];
+        for (int32_t k = 0; k < back; k++)
+            a = parents(&t->past, lag_slot(&t->past, t->core->current, k))[a];
         weight[a] += t->filter.weight[i];
     }
 }
 
-/* Bring the ancestors that weigh anything to the front; returns how many there are. */
-static int32_t gather(lag *l, const population *from)
+/* Bring the weights of those that weigh anything to the front; returns how many there are. */
+static int32_t gather(lag *l, int32_t n)
 {
     int32_t count = 0;
-    l->people.n = from->n;
-    for (int32_t i = 0; i < from->n; i++)
+    for (int32_t i = 0; i < n; i++)
         if (l->weight[i] > 0.0) {
-            for (int32_t f = 0; f < from->fields; f++)
-                l->people.value[(size_t)f * (size_t)from->n + (size_t)count] = field(from, f)[i];
+            l->who[count] = i;
             l->weight[count++] = l->weight[i];
         }
-    for (int32_t f = 1; f < from->fields; f++) /* close the gaps between the fields */
-        memmove(l->people.value + (size_t)f * (size_t)count, l->people.value + (size_t)f * (size_t)from->n,
-                (size_t)count * sizeof(float));
-    l->people.n = count;
     return count;
 }
 
 /* Joints of the gathered ancestors, with the first task's scratch. */
-static void place_joints(gait_tracker *t)
+static void place_joints(gait_tracker *t, const crowd *c)
 {
-    lag *const l = &t->past;
     weigh_scratch *const w = &t->work[0];
-    size_t const n = (size_t)l->people.n;
-    for (int32_t begin = 0; begin < l->people.n; begin += BLOCK) {
-        size_t const lanes = (size_t)i_min(BLOCK, l->people.n - begin);
-        population_bodies(&t->rule, &l->people, begin, &w->body);
+    size_t const n = (size_t)c->n;
+    for (int32_t begin = 0; begin < c->n; begin += BLOCK) {
+        int32_t const lanes = i_min(BLOCK, c->n - begin);
+        walker_block them;
+        walker_block_get(&c->people, c->who + begin, lanes, &them);
+        walker_block_bodies(&t->rule, &them, &w->body);
         kin_points(t->model, &w->body, w->points);
         for (size_t p = 0; p < (size_t)t->model->points; p++)
             for (size_t k = 0; k < 3; k++)
-                memcpy(t->joint + (3 * p + k) * n + (size_t)begin, w->points[p][k], lanes * sizeof(float));
+                memcpy(t->joint + (3 * p + k) * n + (size_t)begin, w->points[p][k],
+                       (size_t)lanes * sizeof(float));
     }
 }
 
@@ -119,19 +106,17 @@ static int32_t status_now(const gait_tracker *t, int32_t then, float mode_mass)
 void lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
 {
     lag *const l = &t->past;
-    size_t const slot = slot_of(l, t->core->frame - 1 - (uint64_t)back);
-    population const then = kept_people(t, slot);
+    int32_t const slot = lag_slot(l, t->core->current, back);
     lag_note const note = l->note[slot];
     gait_estimate e = {
         .utime = t->core->start_utime + note.age, .frame = note.frame, .log_evidence = note.log_evidence};
+    crowd c = {.people = lag_people(l, slot), .who = l->who, .weight = l->weight};
     weigh_ancestors(t, back, l->weight);
-    gait_tracker past = *t; /* the same tracker holding the ancestors */
-    past.filter.n = past.cfg.particles = gather(l, &then);
-    past.filter.weight = l->weight;
-    past.gen[t->core->current].people = l->people;
-    place_joints(t);
-    estimate_fill(&past, pf_heaviest(&past.filter), &e);
-    e.ess = (float)pf_ess(&past.filter);
+    c.n = gather(l, c.people.n);
+    pf const weights = {.n = c.n, .weight = l->weight};
+    place_joints(t, &c);
+    estimate_crowd(t, &c, pf_heaviest(&weights), &e);
+    e.ess = (float)pf_ess(&weights);
     e.flags = note.flags;
     e.status = status_now(t, note.status, e.mode_mass);
     *out = e;

@@ -57,7 +57,7 @@ void loss_search(gait_tracker *t, uint32_t frame)
         t->filter.log_weight[i] = m_log64(t->filter.weight[i]);
         if (anew) {
             walker const w = dynamics_draw(&d, &mean, &sd, i);
-            walker_put(&t->gen[t->core->current].people, i, &w);
+            walker_put(&t->people, i, &w);
         }
     }
     t->core->textured = 0; /* the ancestors were elsewhere */
@@ -65,7 +65,6 @@ void loss_search(gait_tracker *t, uint32_t frame)
 
 void loss_allow_hidden(gait_tracker *t)
 {
-    population const *const people = &t->gen[t->core->current].people;
     int32_t const n = t->cfg.particles;
     int32_t best = -1;
     for (int32_t i = 0; i < n; i++) {
@@ -75,7 +74,7 @@ void loss_allow_hidden(gait_tracker *t)
     }
     if (t->cfg.mode == GAIT_MODE_PAPER || best < 0)
         return;
-    walker const w = walker_get(people, best);
+    walker const w = walker_get(&t->people, best);
     float const support = weigh_walker(t, &w), least = t->ll[best] - support + HIDDEN;
     if (!(support != 0.0f)) /* no term has an opinion on whether anybody is there */
         return;

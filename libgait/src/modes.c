@@ -201,29 +201,42 @@ static void spread(const gait_tracker *t, int32_t i, walker *w)
     w->f[F_RATE] *= 1.0f + SPREAD_RATE * n[1];
 }
 
+/* Put the particles with even numbers first, the others behind them: the two sides. */
+static void deal(gait_tracker *t)
+{
+    pf *const f = &t->filter;
+    int32_t const n = f->n, second = first_of(f, 1);
+    float *const was = t->used; /* this frame has not filled it yet */
+    for (int32_t k = 0; k < t->people.fields; k++) {
+        float *const now = field(&t->people, k);
+        memcpy(was, now, (size_t)n * sizeof *was);
+        for (int32_t i = 0; i < n; i++)
+            now[i] = was[i < second ? 2 * i : 2 * (i - second) + 1];
+    }
+    for (int32_t i = 0; i < n; i++)
+        f->ticket[i] = (uint64_t)f->parent[i];
+    for (int32_t i = 0; i < n; i++)
+        f->parent[i] = (int32_t)f->ticket[i < second ? 2 * i : 2 * (i - second) + 1];
+}
+
 /* The particles are even, as resampled.  All are first brought to one side, those of the other by the
  * exchange, then dealt in turn to both: the odds begin even whatever the search made of left and right. */
 void modes_fork(gait_tracker *t)
 {
     pf *const f = &t->filter;
-    population *const now = &t->gen[t->core->current].people, *const was =
-                                                                  &t->gen[1 - t->core->current].people;
+    population *const now = &t->people;
     if (!search_is_over(t))
         return;
     float const middle = half_phase(now);
-    was->n = now->n;
-    memcpy(was->value, now->value, (size_t)now->fields * (size_t)now->n * sizeof *now->value);
-    for (int32_t i = 0; i < f->n; i++)
-        f->ticket[i] = (uint64_t)f->parent[i];
+    deal(t);
     for (int32_t i = 0; i < f->n; i++) {
-        int32_t const side = i >= first_of(f, 1), from = 2 * (i - first_of(f, side)) + side;
-        walker w = walker_get(was, from);
+        int32_t const side = i >= first_of(f, 1);
+        walker w = walker_get(now, i);
         bool const far = fabsf(m_wrap_pi(TWO_PI_F * (w.f[F_PHASE] - middle))) > 0.5f * PI_F;
         if (far != (side == 1))
             w = other_side(t, &w, i);
         spread(t, i, &w);
         walker_put(now, i, &w);
-        f->parent[i] = (int32_t)f->ticket[from];
     }
     t->core->textured = 0; /* what the ancestors looked like is not what their exchanged bodies would */
     enter(t, MODES_FORKED);
@@ -278,10 +291,9 @@ static void soften(const pf *f, float *ll)
 /* The looks of each side's heaviest particle. */
 static void remember(gait_tracker *t, int32_t side, int32_t best)
 {
-    const generation *const now = &t->gen[t->core->current];
     for (int32_t c = 0; c < t->cfg.cameras; c++)
-        if (t->camera[c].seen.seen && t->template[side][c] && now->texture)
-            template_update(t->template[side][c], t->model->limbs, texture_of(t, now, best, c));
+        if (t->camera[c].seen.seen && t->template[side][c] && t->texture)
+            template_update(t->template[side][c], t->model->limbs, texture_of(t, best, c));
 }
 
 /* Sum of the sides' evidence, each times its weight. */

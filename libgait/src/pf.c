@@ -1,6 +1,7 @@
 #include "pf.h"
 #include "fmath.h"
 #include "rng.h"
+#include <string.h>
 
 pf pf_layout(arena *a, int32_t n)
 {
@@ -132,4 +133,38 @@ void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t fra
         p->parent[i] = low;
     }
     pf_uniform(p);
+}
+
+static void swap(unsigned char *a, unsigned char *b, size_t bytes)
+{
+    for (size_t k = 0; k < bytes; k++) {
+        unsigned char const was = a[k];
+        a[k] = b[k];
+        b[k] = was;
+    }
+}
+
+void pf_inherit(pf *p, int32_t before, void *array, size_t bytes)
+{
+    unsigned char *const part = array;
+    uint64_t *const waiting = p->ticket, done = UINT64_MAX; /* how many others still have to copy a part */
+    for (int32_t i = 0; i < i_max(p->n, before); i++)
+        waiting[i] = 0;
+    for (int32_t i = 0; i < p->n; i++)
+        waiting[p->parent[i]] += p->parent[i] != i;
+    for (int32_t first = 0; first < p->n; first++)
+        for (int32_t i = first; i < p->n && p->parent[i] != i && waiting[i] == 0;) {
+            int32_t const from = p->parent[i];
+            memcpy(part + (size_t)i * bytes, part + (size_t)from * bytes, bytes);
+            waiting[i] = done;
+            waiting[from]--;
+            i = from;
+        }
+    /* Those left wait for one another in rings. */
+    for (int32_t first = 0; first < p->n; first++)
+        for (int32_t i = first; p->parent[i] != i && waiting[i] != done; i = p->parent[i]) {
+            waiting[i] = done;
+            if (p->parent[i] != first)
+                swap(part + (size_t)i * bytes, part + (size_t)p->parent[i] * bytes, bytes);
+        }
 }

@@ -39,6 +39,10 @@ void pf_resize(pf *p, int32_t count, uint32_t u);
 /* n independent draws (Ormoneit et al. 2000, 4.4). */
 void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t frame);
 
+/* Each particle's part of an array, `bytes` long, becomes its ancestor's, in place.  before: particles in the generation
+ * of the ancestors.  The tickets are lost. */
+void pf_inherit(pf *p, int32_t before, void *array, size_t bytes);
+
 /* Every particle is its own ancestor. */
 void pf_keep(pf *p);
 #endif

@@ -195,13 +195,22 @@ void population_bodies(const body_rule *r, const population *p, int32_t begin, k
     block_bodies(r, &b, out);
 }
 
-void walker_body(const body_rule *r, const walker *w, kin_body *out)
+void walker_block_bodies(const body_rule *r, const walker_block *w, kin_body *out)
 {
     block b;
     for (int32_t f = 0; f < body_rule_fields(r); f++) {
         float *const to = block_field(r, &b, f);
-        for (int32_t lane = 0; to && lane < BLOCK; lane++)
-            to[lane] = w->f[f];
+        if (to)
+            memcpy(to, w->f[f], sizeof w->f[f]);
     }
     block_bodies(r, &b, out);
+}
+
+void walker_body(const body_rule *r, const walker *w, kin_body *out)
+{
+    walker_block all;
+    for (int32_t f = 0; f < body_rule_fields(r); f++)
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            all.f[f][lane] = w->f[f];
+    walker_block_bodies(r, &all, out);
 }

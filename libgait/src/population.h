@@ -84,6 +84,7 @@ walker walker_from_state(const body_rule *r, const gait_state *s);
 
 /* Bodies of particles begin .. begin + BLOCK - 1; lanes beyond n repeat the last particle. */
 void population_bodies(const body_rule *r, const population *p, int32_t begin, kin_body *out);
+void walker_block_bodies(const body_rule *r, const walker_block *w, kin_body *out);
 void walker_body(const body_rule *r, const walker *w, kin_body *out); /* in every lane */
 
 /* Channel c (ROOT_*) at a phase: eq. 3 for one function. */

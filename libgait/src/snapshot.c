@@ -58,7 +58,7 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
 {
     tracker_core c;
     memcpy(&c, body, sizeof c);
-    bool ok = (c.current == 0 || c.current == 1) && (c.started == 0 || c.started == 1);
+    bool ok = c.current >= 0 && c.current < t->past.depth && (c.started == 0 || c.started == 1);
     ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->room && c.fewer >= 0 && c.fewer < t->room;
     ok &= c.modes.stage >= MODES_SINGLE && c.modes.stage <= MODES_FORKED && c.modes.since <= c.utime;
     ok &=
@@ -89,31 +89,24 @@ static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
     return sum > 0.999 && sum < 1.001;
 }
 
-static bool people_plausible(const gait_tracker *t, const unsigned char *body)
-{
-    size_t const count = (size_t)t->gen[0].people.fields * (size_t)t->room;
-    for (int32_t g = 0; g < 2; g++)
-        for (size_t i = 0; i < count; i++) {
-            float v;
-            memcpy(&v, in_body(t, body, &t->gen[g].people.value[i]), sizeof v);
-            if (!f_finite(&v, 1))
-                return false;
-        }
-    return true;
-}
-
 /* Indices and numbers of the generations kept; those of steps not yet done are zero. */
 static bool past_plausible(const gait_tracker *t, const unsigned char *body)
 {
     const lag *const l = &t->past;
-    size_t const n = (size_t)t->room, values = n * (size_t)t->gen[0].people.fields;
-    for (size_t i = 0; i < (size_t)l->depth * n; i++) {
-        int32_t parent;
-        memcpy(&parent, in_body(t, body, &l->parent[i]), sizeof parent);
-        if (parent < 0 || parent >= t->room)
+    size_t const generations = (size_t)l->depth, n = (size_t)l->room, values = n * (size_t)l->fields;
+    for (size_t i = 0; i < generations; i++) {
+        int32_t count;
+        memcpy(&count, in_body(t, body, &l->count[i]), sizeof count);
+        if (count < 0 || count > l->room)
             return false;
     }
-    for (size_t i = 0; i < (size_t)l->depth * values; i++) {
+    for (size_t i = 0; i < generations * n; i++) {
+        int32_t parent;
+        memcpy(&parent, in_body(t, body, &l->parent[i]), sizeof parent);
+        if (parent < 0 || parent >= l->room)
+            return false;
+    }
+    for (size_t i = 0; i < generations * values; i++) {
         float v;
         memcpy(&v, in_body(t, body, &l->value[i]), sizeof v);
         if (!f_finite(&v, 1))
@@ -154,8 +147,8 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
                          "snapshot of a tracker with another model or configuration");
     if (h.bytes != bytes || bytes != snapshot_bytes(t) || h.body != hash_state(body, state_bytes(t)))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot is damaged: length or checksum do not match");
-    if (!core_plausible(t, body) || !weights_plausible(t, body) || !people_plausible(t, body) ||
-        !past_plausible(t, body) || !template_plausible(t, body))
+    if (!core_plausible(t, body) || !weights_plausible(t, body) || !past_plausible(t, body) ||
+        !template_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot holds a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     t->wanted = t->room - t->core->fewer;
@@ -168,7 +161,7 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
 /* Times count from the start, so that the same walk at another time of day has the same digest. */
 uint64_t snapshot_digest(const gait_tracker *t)
 {
-    unsigned char *const arrays = (unsigned char *)t->gen[0].people.value; /* the core comes first */
+    unsigned char *const arrays = (unsigned char *)t->filter.log_weight; /* the core comes first */
     tracker_core core;
     memcpy(&core, t->core, sizeof core); /* with its padding, which is zero */
     core.utime -= core.start_utime;

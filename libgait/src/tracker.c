@@ -18,16 +18,25 @@ static void layout_state(arena *a, gait_tracker *t)
     int32_t const n = t->cfg.particles, cameras = t->cfg.cameras;
     size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
     t->core = TAKE(a, tracker_core, 1);
-    for (int32_t g = 0; g < 2; g++) {
-        t->gen[g].people = population_layout(a, n, body_rule_fields(&t->rule));
-        if (wants_texture(&t->cfg))
-            t->gen[g].texture = TAKE(a, like_patch, (size_t)n * (size_t)(cameras * t->model->limbs));
-    }
     t->filter = pf_layout(a, n);
+    if (wants_texture(&t->cfg))
+        t->texture = TAKE(a, like_patch, (size_t)n * (size_t)(cameras * t->model->limbs));
     for (int32_t c = 0; c < 2 * cameras && wants_texture(&t->cfg); c++)
         t->template[c / cameras][c % cameras] = TAKE(a, int16_t, samples);
     lag_layout_state(&t->past, a, t->cfg.lag, n, body_rule_fields(&t->rule));
     t->state_end = TAKE(a, unsigned char, 1);
+}
+
+/* The joints take the place of the planes that a frame's features were made from. */
+static void layout_shared(arena *a, gait_tracker *t)
+{
+    arena size = {.cap = SIZE_MAX, .solid = true};
+    features_scratch_layout(&size);
+    size_t const each = (size_t)(3 * t->model->points) * sizeof *t->joint, n = (size_t)t->cfg.particles;
+    size_t const bytes = each * n > size.used ? each * n : size.used;
+    t->joint = (float *)(void *)TAKE(a, unsigned char, bytes);
+    arena planes = {.base = (unsigned char *)t->joint, .cap = bytes, .solid = true};
+    t->scratch = features_scratch_layout(&planes);
 }
 
 static void layout_work(arena *a, gait_tracker *t)
@@ -43,16 +52,16 @@ static void layout_work(arena *a, gait_tracker *t)
     t->ll = TAKE(a, float, n);
     t->used = TAKE(a, float, n);
     t->inner = TAKE(a, float, n);
-    t->joint = TAKE(a, float, (size_t)(3 * t->model->points) * (size_t)n);
+    layout_shared(a, t);
     t->exchange = TAKE(a, exchange, 1);
     t->mode = TAKE(a, uint8_t, n);
     if (wants_texture(&t->cfg))
         t->seen = TAKE(a, like_patch, (size_t)t->cfg.cameras * limbs);
     for (int32_t c = 0; c < 2 * t->cfg.cameras && wants_texture(&t->cfg); c++)
         t->known[c / t->cfg.cameras][c % t->cfg.cameras] = TAKE(a, int8_t, LIKE_RING *limbs);
-    lag_layout_work(&t->past, a, n, body_rule_fields(&t->rule));
-    t->scratch = features_scratch_layout(a);
-    t->work = TAKE(a, weigh_scratch, t->cfg.tasks);
+    lag_layout_work(&t->past, a);
+    t->work = TAKE(a, weigh_scratch,
+                   t->cfg.exec.run ? t->cfg.tasks : 1); /* without threads only the first is used */
 }
 
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg)
@@ -77,7 +86,8 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
 void tracker_set_count(gait_tracker *t, int32_t particles)
 {
     t->cfg.particles = t->filter.n = particles;
-    t->gen[t->core->current].people.n = particles;
+    t->past.count[t->core->current] = particles;
+    t->people = lag_people(&t->past, t->core->current);
     t->core->fewer = t->room - particles;
 }
 
@@ -118,7 +128,7 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
     t->core->rate = mean->stride_hz;
     for (int32_t i = 0; i < t->cfg.particles; i++) {
         walker const w = dynamics_draw(&d, mean, sd, i);
-        walker_put(&t->gen[0].people, i, &w);
+        walker_put(&t->people, i, &w);
     }
 }
 
@@ -129,6 +139,7 @@ static float seconds_since(const gait_tracker *t, int64_t utime)
 
 typedef struct move_job {
     gait_tracker *t;
+    population from;
     dynamics_step step;
 } move_job;
 
@@ -136,26 +147,25 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     const move_job *const j = ctx;
     const gait_tracker *const t = j->t;
-    const population *const from = &t->gen[1 - t->core->current].people;
-    population to = t->gen[t->core->current].people;
+    population to = t->people;
     walker_block then, now;
     (void)task;
     for (int32_t i = begin; i < end; i += BLOCK) {
         int32_t const lanes = i_min(BLOCK, end - i);
-        walker_block_get(from, t->filter.parent + i, lanes, &then);
+        walker_block_get(&j->from, t->filter.parent + i, lanes, &then);
         if (j->step.dt > 0.0f)
             t->like->run->dynamics_move(&j->step, i, &then, &now);
         walker_block_put(&to, i, lanes, j->step.dt > 0.0f ? &now : &then);
     }
 }
 
-/* Move every particle from its ancestor into the other generation, which becomes the current one. */
+/* Move every particle from its ancestor into the next generation, which becomes the current one. */
 static void predict(gait_tracker *t, float dt, uint32_t frame)
 {
     dynamics const d = tracker_dynamics(t);
-    move_job j = {.t = t};
+    move_job j = {.t = t, .from = t->people};
     j.step = dynamics_step_init(&d, dt, seconds_since(t, t->core->start_utime), frame);
-    t->core->current = 1 - t->core->current;
+    t->core->current = (t->core->current + 1) % t->past.depth;
     tracker_set_count(t, t->filter.n);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
 }
@@ -236,7 +246,7 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
     predict(t, dt, counter);
     modes_fork(t);
     loss_search(t, counter);
-    walker const place = estimate_place(&t->gen[core->current].people, t->filter.weight);
+    walker const place = estimate_place(&t->people, t->filter.weight);
     if (weigh_look(t, frame, &place) > 0)
         observe(t, dt, &e);
     else

@@ -23,8 +23,8 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int64_t support_utime; /* when the images last supported the estimate */
     uint64_t frame;        /* steps since start */
     int32_t started;
-    int32_t current;   /* which of the two generations holds the particles */
-    uint32_t textured; /* bit c: that generation carries surface samples of camera c's previous frame */
+    int32_t current;   /* which of the generations kept holds the particles */
+    uint32_t textured; /* bit c: there are surface samples of camera c's previous frame */
     int32_t met;       /* the images have supported it since the start */
     double ess;
     modes_state modes;
@@ -33,11 +33,6 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     view_map map[GAIT_MAX_CAMERAS];
     int32_t fewer; /* particles than there is room for */
 } tracker_core;
-
-typedef struct generation {
-    population people;
-    like_patch *texture; /* n x cameras x limbs, or NULL */
-} generation;
 
 typedef struct camera_state {
     features seen;
@@ -64,23 +59,26 @@ struct gait_tracker {
     like_setup *like;
     /* Mutable state: one stretch of memory from core to state_end. */
     tracker_core *core;
-    generation gen[2];
+    like_patch
+        *texture; /* n x cameras x limbs: what particles saw, while weighing their ancestors; or NULL */
     pf filter;
     int16_t *template[2][GAIT_MAX_CAMERAS]; /* of each side while forked; otherwise the first */
-    lag past;
+    lag past;                               /* the particles of this step and those before */
     unsigned char *state_end;
+    population people; /* this step's */
     /* Recomputed in every step. */
     camera_state camera[GAIT_MAX_CAMERAS];
-    float *used;        /* n: as much of ll as counts (loss.h, modes.h) */
-    float *ll;          /* n */
-    float *inner;       /* n: ll without the silhouette */
-    float *joint;       /* P x 3 x n, metres: of the particles, or of those that lag_estimate() gathers */
-    exchange *exchange; /* constant */
-    uint8_t *mode;      /* n: particle belongs to the dominant mode */
-    like_patch *seen;   /* cameras x limbs: surface of the estimate */
+    float *used;  /* n: as much of ll as counts (loss.h, modes.h) */
+    float *ll;    /* n */
+    float *inner; /* n: ll without the silhouette */
+    float
+        *joint; /* P x 3 x n, metres: of the particles, or of those that lag_estimate() gathers; as scratch */
+    exchange *exchange;                 /* constant */
+    uint8_t *mode;                      /* n: particle belongs to the dominant mode */
+    like_patch *seen;                   /* cameras x limbs: surface of the estimate */
     int8_t *known[2][GAIT_MAX_CAMERAS]; /* template as compared in this frame: limbs x LIKE_RING */
-    features_scratch scratch;
-    weigh_scratch *work; /* tasks */
+    features_scratch scratch;           /* until the particles are weighed; as joint */
+    weigh_scratch *work;                /* tasks, or 1 without threads */
 };
 
 /* Which of the two sides a particle belongs to. */

@@ -1,5 +1,6 @@
 #include "weigh.h"
 #include "camera.h"
+#include <string.h>
 
 /* Aim one camera's region at the walker; false if the walker is behind it. */
 static bool aim(gait_tracker *t, int32_t c, const walker *w)
@@ -100,26 +101,30 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t
     return b;
 }
 
-like_patch *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c)
+like_patch *texture_of(const gait_tracker *t, int32_t i, int32_t c)
 {
     size_t const at = ((size_t)i * (size_t)t->cfg.cameras + (size_t)c) * (size_t)t->like->limbs;
-    return g->texture ? g->texture + at : NULL;
+    return t->texture ? t->texture + at : NULL;
 }
 
-/* An ancestor's samples lie anywhere in memory: they are asked for before the body is drawn. */
-static void fetch(const like_patch *samples, int32_t limbs)
+/* One particle of a block in one camera.  What it sees takes the place of what its ancestor saw. */
+static void weigh_one(gait_tracker *t, int32_t c, int32_t i, int32_t lane, weigh_scratch *w)
 {
-    enum { LINE = 64 };
-    const char *const end = (const char *)(samples + limbs);
-    for (const char *p = (const char *)samples; samples && p < end; p += LINE)
-        __builtin_prefetch(p);
+    like_patch seen[MODEL_MAX_LIMBS], *const texture = texture_of(t, i, c);
+    like_body b = look_at(t, c, modes_side(t, i), lane, w, texture ? seen : NULL);
+    b.ancestor = t->core->textured >> c & 1u ? texture : NULL;
+    float const ll = like_evaluate(&b);
+    t->ll[i] += ll;
+    if (t->core->modes.stage == MODES_FORKED)
+        t->inner[i] += ll - like_one(&b, &like_silhouette);
+    if (texture)
+        memcpy(texture, seen, (size_t)t->like->limbs * sizeof *seen);
 }
 
 static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scratch *w)
 {
-    const generation *const now = &t->gen[t->core->current], *const then = &t->gen[1 - t->core->current];
     int32_t const n = t->cfg.particles;
-    population_bodies(&t->rule, &now->people, begin, &w->body);
+    population_bodies(&t->rule, &t->people, begin, &w->body);
     kin_points(t->model, &w->body, w->points);
     for (int32_t p = 0; p < t->model->points; p++)
         for (int32_t k = 0; k < 3; k++)
@@ -131,18 +136,8 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
         if (!t->camera[c].seen.seen)
             continue;
         outline_limbs(t, c, w);
-        for (int32_t lane = 0; lane < lanes; lane++) {
-            int32_t const i = begin + lane;
-            const like_patch *const ancestor =
-                t->core->textured >> c & 1u ? texture_of(t, then, t->filter.parent[i], c) : NULL;
-            fetch(ancestor, t->like->limbs);
-            like_body b = look_at(t, c, modes_side(t, i), lane, w, texture_of(t, now, i, c));
-            b.ancestor = ancestor;
-            float const ll = like_evaluate(&b);
-            t->ll[i] += ll;
-            if (t->core->modes.stage == MODES_FORKED)
-                t->inner[i] += ll - like_one(&b, &like_silhouette);
-        }
+        for (int32_t lane = 0; lane < lanes; lane++)
+            weigh_one(t, c, begin + lane, lane, w);
     }
 }
 
@@ -158,6 +153,9 @@ void weigh_particles(gait_tracker *t)
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         for (int32_t side = 0; side < 2 && t->known[side][c]; side++)
             template_ring(t->template[side][c], t->like->limbs, t->known[side][c]);
+    if (t->core->textured)
+        pf_inherit(&t->filter, t->past.count[lag_slot(&t->past, t->core->current, 1)], t->texture,
+                   (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, weigh_range, t);
 }
 

@@ -12,7 +12,7 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
 void weigh_particles(gait_tracker *t);
 
 /* Surface samples of particle i in camera c by limb, NULL if none are kept. */
-like_patch *texture_of(const gait_tracker *t, const generation *g, int32_t i, int32_t c);
+like_patch *texture_of(const gait_tracker *t, int32_t i, int32_t c);
 
 /* Surface samples of one walker into t->seen; returns how much better it explains the frame than nobody,
  * nats. */

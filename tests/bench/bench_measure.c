@@ -89,14 +89,14 @@ bool bench_measure(const gait_model *model, const bench_scene *s, const bench_pl
     cfg.camera[0] = s->camera;
     cfg.cpu_mask = plan->cpu_mask;
     out->isa = gait_cpu_name(plan->cpu_mask);
-    if (gait_tracker_bytes(model, &cfg, &out->bytes, &err) != GAIT_OK)
-        return message_set(why, "%s", err.text);
     if (!workers_start(&crew, plan->threads, why))
         return false;
     cfg.exec = gait_pool_tasks(crew.pool);
+    gait_status status = gait_tracker_bytes(model, &cfg, &out->bytes, &err);
     void *const memory = aligned_alloc(GAIT_ALIGN, (out->bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
-    gait_status status =
-        memory ? gait_tracker_init(memory, out->bytes, model, &cfg, &tracker, &err) : GAIT_ERR_MEMORY;
+    if (status == GAIT_OK)
+        status =
+            memory ? gait_tracker_init(memory, out->bytes, model, &cfg, &tracker, &err) : GAIT_ERR_MEMORY;
     if (status == GAIT_OK)
         status = track(tracker, s, plan, out, &err);
     workers_stop(&crew);

@@ -9,7 +9,7 @@
 #include "check.h"
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x61e9de98e0fcd822)
+#define GOLDEN UINT64_C(0xa4bd96f62315d933)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 

@@ -15,7 +15,7 @@ static population *people;
 /* Every particle the same plausible walker of weight 1/N, its joints zero. */
 static void reset(void)
 {
-    people = &t->gen[t->core->current].people;
+    people = &t->people;
     pf_uniform(&t->filter);
     for (int32_t i = 0; i < N; i++) {
         walker const w = {.f = {[F_PHASE] = 0.5f, [F_RATE] = 0.9f, [F_STATURE] = 1.75f}};

@@ -83,6 +83,13 @@ static void test_canaries(void)
     CHECK(digest[0] == digest[1]);
 }
 
+static void run_in_turn(void *user, void (*task)(void *ctx, int32_t index), void *ctx, int32_t count)
+{
+    (void)user;
+    for (int32_t i = 0; i < count; i++)
+        task(ctx, i);
+}
+
 /* The need grows with what is asked for and not otherwise; a start begins anew in the same memory. */
 static void test_sizes(void)
 {
@@ -97,8 +104,11 @@ static void test_sizes(void)
     CHECK(bytes_of(&cfg) > base);
     cfg.cameras = 1;
     cfg.tasks = 5;
+    CHECK(bytes_of(&cfg) == base); /* nobody runs them at once */
+    cfg.exec.run = run_in_turn;
     CHECK(bytes_of(&cfg) > base);
     cfg.tasks = 4;
+    cfg.exec.run = NULL;
     cfg.terms = GAIT_TERM_EDGES;
     CHECK(bytes_of(&cfg) < base);
     cfg.terms = 0xf;

@@ -30,7 +30,7 @@ static double weight_of(const gait_tracker *t, int32_t from, int32_t to)
 /* Mean phase of a side, as a vector in double precision. */
 static double phase_of(const gait_tracker *t, int32_t from)
 {
-    const float *const phase = field(&t->gen[t->core->current].people, F_PHASE);
+    const float *const phase = field(&t->people, F_PHASE);
     double c = 0.0, s = 0.0;
     for (int32_t i = from; i < from + HALF; i++) {
         c += t->filter.weight[i] * cos(2 * TOY_PI * (double)phase[i]);

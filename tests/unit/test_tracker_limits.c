@@ -176,7 +176,7 @@ static void test_ambiguous(void)
         cfg.particles = 100;
         cfg.terms = GAIT_TERM_TEXTURE; /* nothing to compare with in the first frame: all weights equal */
         gait_tracker *const t = film_tracker(&cfg, 10, 0.1f);
-        float *const phase = field(&t->gen[t->core->current].people, F_PHASE);
+        float *const phase = field(&t->people, F_PHASE);
         for (int32_t i = 0; i < cases[k].apart; i++)
             phase[99 - i] = m_wrap1(phase[99 - i] + 0.5f);
         t->core->start_utime -= 1000000 * cases[k].seconds;

@@ -98,7 +98,7 @@ static const outline_block *outline_of(const gait_tracker *t, int32_t i)
 {
     static kin_body body;
     static outline_block out;
-    walker const w = walker_get(&t->gen[t->core->current].people, i);
+    walker const w = walker_get(&t->people, i);
     walker_body(&t->rule, &w, &body);
     toy_project(t->like->geometry, TOY_LIMBS, &body, &t->cfg.camera[0], &t->camera[0].seen.map, &out);
     return &out;
@@ -107,6 +107,7 @@ static const outline_block *outline_of(const gait_tracker *t, int32_t i)
 /* With texture, the ancestor's samples count: those of the particle each one came from. */
 static void test_ancestor(void)
 {
+    static like_patch then[N * TOY_LIMBS];
     gait_tracker *const t = tracker(1, 0, GAIT_TERM_TEXTURE);
     const uint8_t *see[] = {shot[0][0], NULL};
     gait_estimate e;
@@ -115,20 +116,20 @@ static void test_ancestor(void)
         CHECK(t->ll[i] == 0.0f); /* the first frame has nothing before it */
     CHECK(e.log_evidence == 0.0);
     see[0] = shot[0][1];
+    memcpy(then, t->texture, sizeof then);
     t->cfg.resample_ess = 1.0f;
     t->core->ess = 1.0;
     for (int32_t i = 0; i < N; i++)
         t->filter.weight[i] = i == 5 || i == 9 ? 0.5 : 0.0;
     toy_tracker_step(t, 21, see, &e);
     CHECK(e.flags & GAIT_EST_RESAMPLED);
-    const generation *const now = &t->gen[t->core->current], *const then = &t->gen[1 - t->core->current];
     for (int32_t i = 0; i < N; i++) {
         int32_t const parent = i < N / 2 ? 5 : 9;
         int32_t shared = 0;
         CHECK(t->filter.parent[i] == parent);
         for (int32_t l = 0; l < TOY_LIMBS; l++) {
-            const like_patch *const a = &now->texture[i * TOY_LIMBS + l];
-            const like_patch *const b = &then->texture[parent * TOY_LIMBS + l];
+            const like_patch *const a = &t->texture[i * TOY_LIMBS + l];
+            const like_patch *const b = &then[parent * TOY_LIMBS + l];
             for (int32_t k = 0; k < LIKE_FACING && a->turn == b->turn; k++)
                 shared += a->value[k] != TEXTURE_HIDDEN && b->value[k] != TEXTURE_HIDDEN;
         }
@@ -137,8 +138,8 @@ static void test_ancestor(void)
             like_body const b = {.setup = t->like,
                                  .features = &t->camera[0].seen,
                                  .outline = outline_of(t, i),
-                                 .seen = now->texture + i * TOY_LIMBS,
-                                 .ancestor = then->texture + parent * TOY_LIMBS};
+                                 .seen = t->texture + i * TOY_LIMBS,
+                                 .ancestor = then + parent * TOY_LIMBS};
             CHECK_NEAR(t->ll[i], like_evaluate(&b), 1e-5);
         }
     }
@@ -149,8 +150,7 @@ static void test_ancestor(void)
 static void spoil(gait_tracker *t, int value)
 {
     for (size_t i = 0; i < N; i++)
-        memset(t->gen[t->core->current].texture + (2 * i + 1) * TOY_LIMBS, value,
-               TOY_LIMBS * sizeof(like_patch));
+        memset(t->texture + (2 * i + 1) * TOY_LIMBS, value, TOY_LIMBS * sizeof(like_patch));
 }
 
 /* What a camera saw before it missed a frame does not count when it is back; what it sees then does. */
