@@ -2,13 +2,6 @@
 #include "fmath.h"
 #include <string.h>
 
-population population_layout(arena *a, int32_t n, int32_t fields)
-{
-    population p = {.n = n, .fields = fields};
-    p.value = TAKE(a, float, (size_t)fields *(size_t)n);
-    return p;
-}
-
 float root_channel(const gait_model *m, int32_t c, float phase, const float *coef, int32_t components)
 {
     return kin_channel(m, m->root_channel + c, phase, coef, components);

@@ -30,8 +30,6 @@ static inline float *field(const population *p, int32_t f)
     return p->value + (size_t)f * (size_t)p->n;
 }
 
-population population_layout(arena *a, int32_t n, int32_t fields);
-
 /* Constants that turn fields into bodies. */
 typedef struct body_rule {
     const gait_model *model;

@@ -128,13 +128,11 @@ static void test_root_channel(void)
 static void test_bodies(void)
 {
     enum { N = 21 };
-    static _Alignas(GAIT_ALIGN) unsigned char memory[16384];
+    static float value[F_MAX * N];
     static kin_body body, single;
     const gait_model *const m = toy_model();
     body_rule const r = make_rule(GAIT_MODE_DEFAULT, 2, 1u << 19 | 1u << 9);
-    arena a = {.base = memory, .cap = sizeof memory};
-    population p = population_layout(&a, N, body_rule_fields(&r));
-    CHECK(!a.overflow && p.n == N);
+    population p = {.n = N, .fields = body_rule_fields(&r), .value = value};
     for (uint32_t i = 0; i < N; i++) {
         gait_state const s = random_state(&r, i);
         walker const w = walker_from_state(&r, &s);
