@@ -106,6 +106,12 @@ def run(args: argparse.Namespace) -> int:
         found = motion.lift(prior, tracks, _view(args, tracks), options, names, update)
     if found.wider > 1 and not args.quiet:
         print(f"not a motion like those learnt: the prior was widened {found.wider:g} times", file=sys.stderr)
+    if found.resized != 1 and not args.quiet:
+        print(
+            f"the motion's size was told by the bones ({found.resized:.2f} times the fit's): it is unlike "
+            "those learnt, or the camera is wrong; deviations are wide",
+            file=sys.stderr,
+        )
     if not found.settled and not args.quiet:
         print(f"the estimate did not come to rest in {found.steps} iterations", file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
@@ -156,6 +162,7 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: motion.Motion) -> 
         "log10_volume_ratio": found.log_volume_ratio,
         "misfit": found.misfit if np.isfinite(found.misfit) else None,
         "prior_widened": found.wider,
+        "resized": found.resized,
     }
 
 

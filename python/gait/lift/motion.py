@@ -13,13 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.lift import sequence, start
+from gait.lift import sequence, size, start
 from gait.lift.chain import Freedom, blended, restricted
 from gait.lift.equations import Parallel, View
 from gait.lift.heading import Explanation, Person
 from gait.lift.observe import Observations
 from gait.lift.prior import SegmentPrior
-from gait.lift.sequence import Grid, Seen, Start
+from gait.lift.sequence import Grid, Lifted, Seen, Start
 from gait.lift.tracks_file import Tracks
 from gait.skeleton import JOINTS
 
@@ -85,6 +85,8 @@ class Motion:
         Squared deviations per number seen, about 1; NaN for segments alone.
     wider : float
         Factor of the prior's deviations that the tracks asked for; 1 for motions like those learnt.
+    resized : float
+        Factor by which the fit's size was changed to that of a person; 1 for motions like those learnt.
     """
 
     names: tuple[str, ...]
@@ -99,6 +101,7 @@ class Motion:
     evidence: float = float("nan")
     misfit: float = float("nan")
     wider: float = 1.0
+    resized: float = 1.0
 
 
 def output_names(prior: SegmentPrior, tracks: Tracks, everything: bool = False) -> tuple[str, ...]:
@@ -196,6 +199,7 @@ def _lift(
             "the tracks look like no motion that the model knows; check the camera, the points' names and "
             "that v points down"
         ) from None
+    found_motion, factor = _sized(prior, view, found_motion, stature, stature_sd / stature)
     places = found_motion.places
     _require_size(places, prior, stature)
     error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
@@ -211,7 +215,24 @@ def _lift(
         found_motion.log_volume_ratio,
         found_motion.evidence,
         found_motion.misfit,
+        resized=factor,
     )
+
+
+def _sized(
+    prior: SegmentPrior, view: View, found: Lifted, stature: float, size_sd: float
+) -> tuple[Lifted, float]:
+    """Give the estimate a person's size if it has none, and the factor; only a lens leaves it open."""
+    if isinstance(view, Parallel):
+        return found, 1.0
+    ratio = size.bones_ratio(prior, found.places, stature)
+    hips = list(prior.index(sequence.HIPS)) if set(sequence.HIPS) <= set(prior.names) else []
+    fresh = size.resized(
+        found.places, found.sd, found.rooted_sd, view.camera, ratio, size_sd, found.misfit, hips
+    )
+    if fresh is None:
+        return found, 1.0
+    return replace(found, places=fresh.places, sd=fresh.sd, rooted_sd=fresh.rooted_sd), 1 / ratio
 
 
 def _require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:

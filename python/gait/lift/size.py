@@ -1,0 +1,99 @@
+"""Size of a motion that its prior does not know: by the bones, not by the fit.
+
+A motion unlike those learnt fits best as a small body near the lens, where what does not fit is few metres.
+A change of size about the lens leaves the picture as it is; so the size may be taken from the bones, whose
+lengths per stature hardly depend on what somebody does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.camera import Camera
+from gait.lift.prior import SegmentPrior
+from gait.lift.soft import BONES
+
+Floats = npt.NDArray[np.float64]
+
+PROPORTION_SD = 0.04  # relative, of the bones of people of one stature
+UNLIKELY = 2.0  # deviations of the size from which the fit is not trusted with it
+
+
+@dataclass(frozen=True)
+class Resized:
+    """Motion whose size was set by the bones.
+
+    Attributes
+    ----------
+    places, sd, rooted_sd : (T, J, 3)
+        Metres, as in `motion.Motion`.
+    """
+
+    places: Floats
+    sd: Floats
+    rooted_sd: Floats
+
+
+def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
+    """Median over bones and frames of their length in places (T, J, 3) over that of most people; 1 without.
+
+    Parameters
+    ----------
+    stature : float
+        Metres.
+    """
+    known = [bone for bone in BONES if set(bone) <= set(prior.names)]
+    if not known:
+        return 1.0
+    first, last = (prior.index([bone[end] for bone in known]) for end in (0, 1))
+    mean, modes = prior.mean[0], prior.modes[0]
+    # the mean square of a length is that of the mean and of the modes together
+    squares = ((mean[:, last] - mean[:, first]) ** 2).sum(axis=2)
+    squares += ((modes[:, :, last] - modes[:, :, first]) ** 2).sum(axis=(0, 3))
+    usual = stature * np.sqrt(squares.mean(axis=0))
+    length = np.linalg.norm(places[:, last] - places[:, first], axis=2)
+    return float(np.median(np.median(length, axis=0) / usual))
+
+
+def resized(
+    places: Floats,
+    sd: Floats,
+    rooted_sd: Floats,
+    camera: Camera,
+    ratio: float,
+    size_sd: float,
+    misfit: float,
+    hips: list[int],
+) -> Resized | None:
+    """Divide a motion's size by `ratio` about the lens; None if the size is a likely one.
+
+    Deviations grow by the larger of how far off the size was and of the misfit, in deviations (Birge's
+    ratio), and by the size that the person's own bones may have.
+
+    Parameters
+    ----------
+    ratio : float
+        Of `bones_ratio`.
+    size_sd : float
+        Relative deviation of people's statures, as far as it is not known.
+    misfit : float
+        As in `motion.Motion`.
+    hips : list of int
+        Markers about whose middle `rooted_sd` are, none if they are those of places.
+    """
+    own = float(np.hypot(size_sd, PROPORTION_SD))
+    off = abs(float(np.log(ratio))) / own
+    if off < UNLIKELY:
+        return None
+    lens = -camera.R.T @ camera.t
+    larger = lens + (places - lens) / ratio
+    middle = larger[:, hips].mean(axis=1, keepdims=True) if hips else lens
+    grown = max(off, float(np.sqrt(misfit))) / ratio
+    return Resized(
+        larger,
+        np.hypot(grown * sd, own * np.abs(larger - lens)),
+        np.hypot(grown * rooted_sd, own * np.abs(larger - middle)),
+    )

@@ -1,0 +1,112 @@
+"""Size and depth: not drawn to the lens by what is fitted, and by the bones where the fit has no say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from toy_segments import toy_prior
+
+from gait.camera import Camera
+from gait.lift import chain as chains
+from gait.lift import size
+from gait.lift.chain import Around, Freedom, overlapping, restricted
+from gait.lift.equations import Perspective
+from gait.lift.observe import Observations
+from gait.lift.prior import SegmentPrior
+from gait.lift.sequence import Seen, Start, smooth
+from gait.skeleton import EVAL15, JOINTS
+
+STATURE, SECONDS, EXACT = 1.7, 2, 0.3  # metres, s, pixels
+VIEWS = {"from the side": (0.5, -6.0, 1.4), "towards": (12.0, 0.3, 1.5)}
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """The shipped prior of joints, and its mean motion walking on along x, on a grid."""
+    shipped = SegmentPrior.load()
+    prior = restricted(shipped, tuple(n for n in shipped.names if n in JOINTS))
+    half = prior.frames // 2
+    mean = STATURE * prior.mean[0]
+    step = (mean[half:] - mean[:half]).mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
+    blocks = [mean[:half] + k * step for k in range(SECONDS * int(prior.fps) // half)]
+    places = np.concatenate(blocks)
+    return prior, places - places.mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
+
+
+def drawn(prior, around, rng):
+    """Motion drawn from the chain of a person of known stature on a known floor, (grid, J, 3)."""
+    found = chains.chain(prior, around, Freedom(STATURE, 1e-4, 1e-4))
+    count, size_ = found.vector.shape
+    full = np.zeros((count, size_, count, size_))
+    for b in range(count):
+        full[b, :, b] = found.diagonal[b]
+    for b in range(count - 1):
+        full[b + 1, :, b], full[b, :, b + 1] = found.below[b], found.below[b].T
+    lower = np.linalg.cholesky(full.reshape(count * size_, -1))
+    mean = np.linalg.solve(lower.T, np.linalg.solve(lower, found.vector.ravel()))
+    x = mean + np.linalg.solve(lower.T, rng.normal(size=len(mean)))
+    return x.reshape(-1, len(prior.names), 3)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, view):
+    """Draws of the prior itself: linearised at what noise was fitted too, all came out 4 to 5 % nearer."""
+    prior, mean = walk
+    half = prior.frames // 2
+    segments = len(mean) // half - 1
+    headings, components = np.zeros(segments), np.zeros(segments, int)
+    with monkeypatch.context() as near:  # draws that stay in the picture
+        near.setattr(chains, "GROUND_SD", 0.5)
+        near.setattr(chains, "HEADING_SD", 0.02)
+        around = Around(headings, components, STATURE, overlapping(mean, half))
+        motions = [drawn(prior, around, np.random.default_rng(seed)) for seed in range(4)]
+    camera = Camera.looking(VIEWS[view], (0, 0, 0.9), (640, 480), 900)
+    markers, ahead = prior.index(EVAL15), camera.R[2]
+    off = []
+    for places in motions:
+        places = places - places.mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
+        uv = camera.project(places[:, markers])
+        points = Observations(uv, np.full(uv.shape[:2], EXACT))
+        seen = Seen(np.arange(len(places)) / prior.fps, points, markers)
+        start = Start(headings, components, STATURE, places, np.ones(len(places)))
+        freedom = Freedom(STATURE, 0.04, 0.03)
+        found = smooth(prior, seen, Perspective(camera), freedom, start, contact=False, bones=False)
+        spread = np.median(np.sqrt(found.sd**2 @ ahead**2))
+        off.append(float((found.places - places).mean(axis=(0, 1)) @ ahead) / spread)
+    assert abs(np.mean(off)) < 1.25
+
+
+BODY = Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600)
+
+
+def person(prior, factor):
+    """Mean body in a row of frames, zoomed about the lens, and deviations."""
+    places = np.repeat(STATURE * prior.mean[0][:1], 4, axis=0)
+    lens = -BODY.R.T @ BODY.t
+    return places, lens + factor * (places - lens), np.full(places.shape, 0.01)
+
+
+def test_bones_tell_the_size():
+    prior = toy_prior(6, 19, 4)
+    places, small, _ = person(prior, 0.6)
+    ratio = size.bones_ratio(prior, small, STATURE) / size.bones_ratio(prior, places, STATURE)
+    assert ratio == pytest.approx(0.6)
+    nameless = restricted(prior, prior.names[:2])
+    assert size.bones_ratio(nameless, places[:, :2], STATURE) == 1.0
+
+
+def test_an_unlikely_size_is_put_right_and_its_deviations_hold_the_truth():
+    prior = toy_prior(6, 19, 4)
+    places, small, sd = person(prior, 0.6)
+    hips = list(prior.index(("l_hip", "r_hip")))
+    found = size.resized(small, sd, sd, BODY, 0.6, 0.05, 1.0, hips)
+    np.testing.assert_allclose(found.places, places, atol=1e-9)
+    np.testing.assert_allclose(BODY.project(found.places), BODY.project(small))
+    assert found.sd.min() > 5 * sd.max()  # eight deviations off
+    assert (found.rooted_sd >= 5 * sd).all() and (found.sd >= found.rooted_sd.min()).all()
+
+
+def test_a_likely_size_is_left_alone():
+    prior = toy_prior(6, 19, 4)
+    _, small, sd = person(prior, 0.95)
+    assert size.resized(small, sd, sd, BODY, 0.95, 0.05, 2.0, []) is None
