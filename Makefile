@@ -183,7 +183,7 @@ $(B)/tools/%.c.o: tools/%.c Makefile build/lcm/.stamp | $(B)/tools/common/
 # ---- tests ---------------------------------------------------------------------------------------------------
 test: setup lib tools check unit python-test ## everything below that can fail
 
-check: lib ## symbols, heap, threads, globals, layers, stack, recursion, headers, hygiene
+check: lib ## symbols, heap, threads, globals, size, layers, stack, recursion, headers, hygiene
 	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
 
 unit: $(UNIT) ## C tests

@@ -13,6 +13,7 @@ cd "$(dirname "$0")/../.." || exit 1
 here=tests/check
 check no_heap     $here/no_heap.sh "$B"/src/*.o "$B/libgait.so"
 check deps        $here/deps.sh "$B/libgait.so"
+check size        $here/size.sh "$B/libgait.so" 400000
 check symbols     python3 $here/symbols.py libgait/include/*.h "$B/libgait.so" "$B/libgait.a"
 check threads     $here/threads.sh "$B"/src/*.o
 check static_init $here/static_init.sh "$B"/src/*.o

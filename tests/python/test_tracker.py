@@ -240,6 +240,10 @@ def test_memory_is_fixed_and_grows_with_particles():
     assert 0 < small.memory_bytes < large.memory_bytes
 
 
+def test_ten_thousand_particles_fit_into_twelve_megabytes():
+    assert Tracker(MODEL, VIEW, TrackerConfig.default(particles=10_000)).memory_bytes < 12e6
+
+
 def test_calls_out_of_order_are_refused():
     tracker = Tracker(MODEL, VIEW, SMALL)
     with pytest.raises(GaitError) as caught:
