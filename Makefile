@@ -57,7 +57,8 @@ ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug or sanitize)
 endif
 # At -O3 only what a step spends its time in: at -O2 the rest is a third smaller and hardly slower (2 % of a step).
-SMALL := $(if $(filter -O3,$(OPT)),-O2)
+GCC   := $(if $(findstring clang,$(shell $(CC) --version)),,gcc)
+SMALL := $(if $(filter -O3,$(OPT)),-O2 $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels)))
 FAST  := fmath.c pf.c $(patsubst %,%_kernel.c,outline like_edges like_silhouette like_surface like_texture)
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
@@ -69,7 +70,6 @@ NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inl
 
 # Kernels (libgait/src/kernels.h) are compiled once per instruction set; `scalar` defines their results.
 # gcc at -O3 would unroll every loop over 16 lanes besides making vector code of it: half as large again, no faster.
-GCC := $(if $(findstring clang,$(shell $(CC) --version)),,gcc)
 FAST_FLAGS := $(if $(GCC),--param=max-completely-peel-times=8)
 SMALL_FLAGS := $(if $(SMALL),$(SMALL) -ftree-vectorize $(if $(GCC),-fvect-cost-model=dynamic))
 KERNEL_FLAGS = $(if $(filter $(FAST),$(notdir $(1))),$(FAST_FLAGS),$(SMALL_FLAGS))
