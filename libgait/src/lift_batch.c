@@ -112,8 +112,9 @@ void lift_gain_apply(const lift_table *t, const lift_gain *g, const double *uv, 
         if (g->keep[i] >= 0.0)
             add_point(g->row + i * 2 * (size_t)t->ld, t->ld, uv[2 * i] - g->base[2 * i],
                       uv[2 * i + 1] - g->base[2 * i + 1], g->theta);
+    double const grown = t->size < 0 ? 1.0 : 1.0 + t->growth * g->theta[t->size];
     for (int32_t i = 0; i < width; i++)
-        mean[i] = (double)p->mean[i];
+        mean[i] = grown * (double)p->mean[i];
     t->run->lift_sum(mean, width, p->mode, (size_t)width, g->theta, p->modes);
     lift_axes axes = g->axes;
     for (int32_t i = 0; i < 3; i++)

@@ -187,10 +187,11 @@ def test_the_component_of_a_mixture_is_chosen_by_evidence() -> None:
         assert fit.share == pytest.approx(1 / np.exp(np.subtract(score, max(score))).sum(), rel=1e-6)
 
 
-def test_a_batch_is_each_segment_alone() -> None:
+@pytest.mark.parametrize("stature_sd", [0.0, 0.09])
+def test_a_batch_is_each_segment_alone(stature_sd: float) -> None:
     contents, _ = model()
     rng = np.random.default_rng(4)
-    lifter = Lifter(contents, AXES, known(heading=0.5, heading_sd=0.0))
+    lifter = Lifter(contents, AXES, known(heading=0.5, heading_sd=0.0, stature_sd=stature_sd))
     sd = deviations(rng, 0.01, 0.05)
     uv = rng.normal(size=(7, FRAMES, MARKERS, 2))
     with pytest.raises(GaitError):
