@@ -95,18 +95,37 @@ def test_bones_tell_the_size():
     assert size.bones_ratio(nameless, places[:, :2], STATURE) == 1.0
 
 
+def test_people_of_the_prior_have_its_bones(walk):
+    """Whatever they do: as long on average over the prior as in motions drawn from it."""
+    prior, _ = walk
+    rng = np.random.default_rng(0)
+    squares = 0.0
+    for _ in range(200):
+        scores = rng.normal(size=prior.size)
+        drawn = STATURE * (prior.mean[0] + np.tensordot(scores, prior.modes[0], 1))
+        squares += size.bones_ratio(prior, drawn, STATURE) ** 2 / 200
+    assert squares == pytest.approx(1, abs=0.06)
+
+
 def test_an_unlikely_size_is_put_right_and_its_deviations_hold_the_truth():
     prior = toy_prior(6, 19, 4)
     places, small, sd = person(prior, 0.6)
-    hips = list(prior.index(("l_hip", "r_hip")))
-    found = size.resized(small, sd, sd, BODY, 0.6, 0.05, 1.0, hips)
+    found = size.resized(size.Resized(small, sd, sd), BODY, 0.6, 0.05, 1.0)
     np.testing.assert_allclose(found.places, places, atol=1e-9)
     np.testing.assert_allclose(BODY.project(found.places), BODY.project(small))
+    assert found.factor == pytest.approx(1 / 0.6)
     assert found.sd.min() > 5 * sd.max()  # eight deviations off
-    assert (found.rooted_sd >= 5 * sd).all() and (found.sd >= found.rooted_sd.min()).all()
+    assert found.rooted_sd.min() > 5 * sd.max()
+    depth = BODY.R[2]
+    assert (found.sd @ abs(depth)).mean() > (found.rooted_sd @ abs(depth)).mean()
 
 
-def test_a_likely_size_is_left_alone():
+def test_a_likely_size_is_left_alone_and_its_deviations_follow_the_misfit():
     prior = toy_prior(6, 19, 4)
     _, small, sd = person(prior, 0.95)
-    assert size.resized(small, sd, sd, BODY, 0.95, 0.05, 2.0, []) is None
+    for misfit, grown in ((4.0, 2.0), (0.5, 1.0)):
+        found = size.resized(size.Resized(small, sd, sd), BODY, 0.95, 0.05, misfit)
+        np.testing.assert_array_equal(found.places, small)
+        np.testing.assert_allclose(found.sd, grown * sd)
+        np.testing.assert_allclose(found.rooted_sd, grown * sd)
+        assert found.factor == 1

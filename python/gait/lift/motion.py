@@ -199,15 +199,15 @@ def _lift(
             "the tracks look like no motion that the model knows; check the camera, the points' names and "
             "that v points down"
         ) from None
-    found_motion, factor = _sized(prior, view, found_motion, stature, stature_sd / stature)
-    places = found_motion.places
+    sized = _sized(prior, view, found_motion, options, stature, stature_sd / stature)
+    places = sized.places
     _require_size(places, prior, stature)
     error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
     return Motion(
         prior.names,
         places if view.grounded else _on_floor(places, prior),
-        found_motion.sd,
-        found_motion.rooted_sd,
+        sized.sd,
+        sized.rooted_sd,
         error,
         found_motion.stature,
         found_motion.steps,
@@ -215,24 +215,19 @@ def _lift(
         found_motion.log_volume_ratio,
         found_motion.evidence,
         found_motion.misfit,
-        resized=factor,
+        resized=sized.factor,
     )
 
 
 def _sized(
-    prior: SegmentPrior, view: View, found: Lifted, stature: float, size_sd: float
-) -> tuple[Lifted, float]:
-    """Give the estimate a person's size if it has none, and the factor; only a lens leaves it open."""
-    if isinstance(view, Parallel):
-        return found, 1.0
+    prior: SegmentPrior, view: View, found: Lifted, options: Options, stature: float, size_sd: float
+) -> size.Resized:
+    """Give the estimate a person's size if it has none; only a lens leaves it open."""
+    fitted = size.Resized(found.places, found.sd, found.rooted_sd)
+    if isinstance(view, Parallel) or not options.bones:
+        return size.widened(fitted, found.misfit)
     ratio = size.bones_ratio(prior, found.places, stature)
-    hips = list(prior.index(sequence.HIPS)) if set(sequence.HIPS) <= set(prior.names) else []
-    fresh = size.resized(
-        found.places, found.sd, found.rooted_sd, view.camera, ratio, size_sd, found.misfit, hips
-    )
-    if fresh is None:
-        return found, 1.0
-    return replace(found, places=fresh.places, sd=fresh.sd, rooted_sd=fresh.rooted_sd), 1 / ratio
+    return size.resized(fitted, view.camera, ratio, size_sd, found.misfit)
 
 
 def _require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:

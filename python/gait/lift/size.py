@@ -7,7 +7,7 @@ lengths per stature hardly depend on what somebody does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -24,17 +24,20 @@ UNLIKELY = 2.0  # deviations of the size from which the fit is not trusted with 
 
 @dataclass(frozen=True)
 class Resized:
-    """Motion whose size was set by the bones.
+    """Motion whose size and deviations were checked.
 
     Attributes
     ----------
     places, sd, rooted_sd : (T, J, 3)
         Metres, as in `motion.Motion`.
+    factor : float
+        By which the size was changed; 1 if it is a likely one.
     """
 
     places: Floats
     sd: Floats
     rooted_sd: Floats
+    factor: float = 1.0
 
 
 def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
@@ -50,7 +53,7 @@ def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
         return 1.0
     first, last = (prior.index([bone[end] for bone in known]) for end in (0, 1))
     mean, modes = prior.mean[0], prior.modes[0]
-    # the mean square of a length is that of the mean and of the modes together
+    # the prior has the second moments of what it was learnt from, and so the mean squares of lengths
     squares = ((mean[:, last] - mean[:, first]) ** 2).sum(axis=2)
     squares += ((modes[:, :, last] - modes[:, :, first]) ** 2).sum(axis=(0, 3))
     usual = stature * np.sqrt(squares.mean(axis=0))
@@ -58,42 +61,39 @@ def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
     return float(np.median(np.median(length, axis=0) / usual))
 
 
-def resized(
-    places: Floats,
-    sd: Floats,
-    rooted_sd: Floats,
-    camera: Camera,
-    ratio: float,
-    size_sd: float,
-    misfit: float,
-    hips: list[int],
-) -> Resized | None:
-    """Divide a motion's size by `ratio` about the lens; None if the size is a likely one.
+def resized(found: Resized, camera: Camera, ratio: float, size_sd: float, misfit: float) -> Resized:
+    """Divide a motion's size by `ratio` about the lens if it is an unlikely one.
 
     Deviations grow by the larger of how far off the size was and of the misfit, in deviations (Birge's
     ratio), and by the size that the person's own bones may have.
 
     Parameters
     ----------
+    found : Resized
+        With deviations as the fit has them.
     ratio : float
         Of `bones_ratio`.
     size_sd : float
         Relative deviation of people's statures, as far as it is not known.
     misfit : float
         As in `motion.Motion`.
-    hips : list of int
-        Markers about whose middle `rooted_sd` are, none if they are those of places.
     """
     own = float(np.hypot(size_sd, PROPORTION_SD))
     off = abs(float(np.log(ratio))) / own
     if off < UNLIKELY:
-        return None
+        return widened(found, misfit)
     lens = -camera.R.T @ camera.t
-    larger = lens + (places - lens) / ratio
-    middle = larger[:, hips].mean(axis=1, keepdims=True) if hips else lens
+    away = (found.places - lens) / ratio
     grown = max(off, float(np.sqrt(misfit))) / ratio
     return Resized(
-        larger,
-        np.hypot(grown * sd, own * np.abs(larger - lens)),
-        np.hypot(grown * rooted_sd, own * np.abs(larger - middle)),
+        lens + away,
+        np.hypot(grown * found.sd, own * np.abs(away)),
+        np.hypot(grown * found.rooted_sd, own * np.abs(away - away.mean(axis=1, keepdims=True))),
+        1 / ratio,
     )
+
+
+def widened(found: Resized, misfit: float) -> Resized:
+    """Deviations as wide as the misfit says, and never narrower."""
+    grown = float(np.sqrt(max(misfit, 1.0)))
+    return replace(found, sd=grown * found.sd, rooted_sd=grown * found.rooted_sd)
