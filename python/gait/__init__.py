@@ -15,7 +15,9 @@ from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryErr
 if TYPE_CHECKING:
     from gait._abi import Flag, Mode, Term, TrackStatus
     from gait.camera import Camera
+    from gait.frame import Joints
     from gait.initial import Start
+    from gait.lifter import LiftConfig, LiftedFrame, Lifter
     from gait.model import Model, ModelInfo
     from gait.state import State
     from gait.tracker import Estimate, Tracker, TrackerConfig
@@ -26,6 +28,10 @@ _HOME = {
     "Estimate": "tracker",
     "Flag": "_abi",
     "Frame": "video",
+    "Joints": "frame",
+    "LiftConfig": "lifter",
+    "LiftedFrame": "lifter",
+    "Lifter": "lifter",
     "Mode": "_abi",
     "Model": "model",
     "ModelInfo": "model",
@@ -48,7 +54,11 @@ __all__ = [
     "GaitArgumentError",
     "GaitError",
     "GaitLimitError",
+    "Joints",
     "LibraryError",
+    "LiftConfig",
+    "LiftedFrame",
+    "Lifter",
     "Mode",
     "Model",
     "ModelInfo",

@@ -7,6 +7,7 @@ import os
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from gait.errors import GaitError, UserError
 from gait.state import State
 
 Array = NDArray[np.float64]
+
+NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,9 @@ class ModelInfo:
     digest: int
 
 
+NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
+
+
 class Model:
     """Cyclic model read from a ``.gait`` blob.
 
@@ -89,7 +95,7 @@ class Model:
             self._load(contents)
         except GaitError as exc:
             if {"SGNM", "CURV"} & set(decode(contents)) == {"SGNM"}:
-                raise UserError(f"{source}: holds no cyclic model; learn it without --segments only") from exc
+                raise UserError(f"{source}: {NOT_CYCLIC}") from exc
             raise UserError(f"{source or 'walk.gait'}: {exc.text}; copy or learn it again") from exc
 
     def _load(self, blob: bytes) -> None:
@@ -176,3 +182,11 @@ def read_blob(path: str | os.PathLike[str] | None) -> bytes:
     contents = Path(path).read_bytes()
     decode(contents, str(path))
     return contents
+
+
+def read_cyclic(path: str | os.PathLike[str] | None) -> dict[str, Any]:
+    """Sections of a blob file, or of the package's own, that has a cyclic model."""
+    sections = decode(read_blob(path), str(path))
+    if "CURV" not in sections:
+        raise UserError(f"{path}: {NOT_CYCLIC}")
+    return sections

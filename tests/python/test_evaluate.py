@@ -8,6 +8,7 @@ import pytest
 from drawn_walker import DATA
 from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
+from toy_segments import toy_prior
 
 from gait import Camera, UserError, blob, skeleton
 from gait.baselines import free_run, root_path, static_pose, stature
@@ -23,8 +24,9 @@ from gait.evaluate import (
     trust,
 )
 from gait.events import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
+from gait.learn import segment_sections
 from gait.lift import lifted_file
-from gait.model import read_blob
+from gait.model import read_blob, read_cyclic
 from gait.skeleton import EVAL15, JOINTS
 from gait.trackfile import Joints, Track, read_estimates, read_truth
 
@@ -287,3 +289,10 @@ def test_lifted_motion_is_compared_without_status_and_phase(tmp_path):
     read = read_estimates(path)
     assert read.status == ["tracking"] * 4 and np.isnan(read.phase).all()
     np.testing.assert_allclose(read.eval15(), places[:, :15], atol=1e-5)
+
+
+def test_a_model_of_segments_alone_is_refused_by_name(tmp_path):
+    path = tmp_path / "segments.gait"
+    blob.write(path, segment_sections.sections(toy_prior(4, 3, 2, 1)))
+    with pytest.raises(UserError, match="segments.gait: holds no cyclic model; learn it without"):
+        read_cyclic(path)

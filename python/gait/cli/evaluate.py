@@ -17,11 +17,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gait import blob
 from gait.camera import Camera
 from gait.evaluate import Measures, evaluate
 from gait.events import strikes_of
-from gait.model import read_blob
+from gait.model import read_cyclic
 from gait.trackfile import read_estimates, read_truth
 
 NAME = "eval"
@@ -56,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         read_estimates(args.track),
         truth,
         strikes=strikes_of(truth, beside / "meta.json"),
-        model=blob.decode(read_blob(args.model), str(args.model)),
+        model=read_cyclic(args.model),
         camera=Camera.read(str(camera)) if camera else None,
     )
     print(json.dumps(measures) if args.json else text(measures))

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from gait import blob
 from gait.camera import Camera
 from gait.cli.evaluate import text as evaluation_text
 from gait.evaluate import Measures, evaluate
@@ -26,7 +25,7 @@ from gait.lcm.page import Page
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
 from gait.lcm.record import spread
 from gait.lcm.results import Run, read_run
-from gait.model import Model, read_blob
+from gait.model import Model, read_cyclic
 from gait.overlay import Overlay
 from gait.progress import progress
 from gait.trackfile import Joints, Track, read_track, read_truth
@@ -89,7 +88,7 @@ def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
 def _measures(
     args: argparse.Namespace, track: Track, truth: Joints, strikes: Strikes, camera: Camera
 ) -> Measures:
-    sections = blob.decode(read_blob(args.model), str(args.model))
+    sections = read_cyclic(args.model)
     return evaluate(track, truth, strikes=strikes, model=sections, camera=camera)
 
 

@@ -12,13 +12,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gait import blob, parameter_files
+from gait import parameter_files
 from gait.anglecycles import AngleCycle, angle_cycles
 from gait.errors import UserError
 from gait.files import replacing
 from gait.footfall_draws import Draws
 from gait.lcm.page import Page
-from gait.model import read_blob
+from gait.model import read_cyclic
 from gait.modelcurves import ModelCurves
 from gait.parameter_plots import angle_plot, deviation_plot, footfall_plot, path_plot, stride_plot
 from gait.parameters import QUANTITIES, Parameters, measure
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         parameters = measure(track, draws)
     except UserError as exc:
         raise UserError(f"{args.track}: {exc}") from None
-    norm = ModelCurves(blob.decode(read_blob(args.model), str(args.model)))
+    norm = ModelCurves(read_cyclic(args.model))
     cycles = angle_cycles(track, parameters, norm, draws)
     found = parameter_files.as_json(track, parameters, cycles)
     source = Path(args.track)

@@ -29,7 +29,6 @@ from typing import Any
 
 import numpy as np
 
-from gait import blob
 from gait._abi import Mode, Term, TrackStatus
 from gait.autostart import Spotter, find_start
 from gait.camera import Camera
@@ -39,7 +38,7 @@ from gait.files import require_writable
 from gait.frame import Joints
 from gait.initial import Start
 from gait.lift import tracks_file
-from gait.model import Model, read_blob
+from gait.model import Model, read_cyclic
 from gait.modelcurves import ModelCurves
 from gait.overlay import Overlay
 from gait.progress import progress
@@ -268,7 +267,7 @@ def _track(
 
 
 def _smoother(args: argparse.Namespace, tracker: Tracker) -> Smoother:
-    return Smoother(tracker, ModelCurves(blob.decode(read_blob(args.model), str(args.model))))
+    return Smoother(tracker, ModelCurves(read_cyclic(args.model)))
 
 
 def _smooth(args: argparse.Namespace, video: Video, smoother: Smoother, sinks: list[Sink]) -> None:
