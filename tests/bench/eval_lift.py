@@ -24,6 +24,7 @@ HERE = Path(__file__).resolve().parent
 PARTS = {
     "lift_mocap.py": ("lift_mocap", "lift_missing"),
     "lift_tracks.py": ("lift_dev", "lift_balancing"),
+    "lift_stream.py": ("lift_stream",),
     "lift_images.py": ("lift_sticks", "lift_clips", "lift_outdoor"),
 }
 
