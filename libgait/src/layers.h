@@ -27,14 +27,4 @@ typedef struct layers_block {
 /* Limb indices from near to far by depth[l * stride]; limbs behind the camera (depth 0) are left out.
  * Returns how many there are. */
 int32_t layers_order(const float *depth, int32_t stride, int32_t limbs, int32_t *order);
-
-/* Is the limb visible at this working pixel? */
-static inline bool layers_visible(const rast_mask *mask, float wx, float wy)
-{
-    /* Truncation is fine: cells left of or above the grid are refused first. */
-    if (!(wx >= 0.0f && wy >= 0.0f && wx < (float)VIEW_SIZE && wy < (float)VIEW_SIZE))
-        return false;
-    int32_t const x = (int32_t)wx >> 1, y = (int32_t)wy >> 1;
-    return y >= mask->first && y < mask->last && (mask->row[y][x >> 6] >> (x & 63) & 1);
-}
 #endif

@@ -4,6 +4,7 @@
 #include "population.h"
 #include "toy_draw.h"
 #include "toy_scene.h"
+#include "toy_visible.h"
 
 #include "check.h"
 
@@ -69,17 +70,17 @@ static void test_cells(void)
     CHECK(wrong == 0);
     CHECK(drawn.whole.first <= 20 && drawn.whole.last >= 50);
     const rast_mask *const m = &drawn.visible[0];
-    CHECK(layers_visible(m, 20.0f, 40.0f) && layers_visible(m, 59.9f, 99.9f));
-    CHECK(!layers_visible(m, 19.9f, 40.0f) && !layers_visible(m, 60.0f, 50.0f));
-    CHECK(!layers_visible(m, 30.0f, 39.9f) && !layers_visible(m, 30.0f, 100.0f));
-    CHECK(!layers_visible(m, NAN, 50.0f) && !layers_visible(m, 30.0f, NAN));
-    CHECK(!layers_visible(m, 1e30f, 50.0f) && !layers_visible(m, -1e30f, 50.0f));
+    CHECK(toy_visible(m, 20.0f, 40.0f) && toy_visible(m, 59.9f, 99.9f));
+    CHECK(!toy_visible(m, 19.9f, 40.0f) && !toy_visible(m, 60.0f, 50.0f));
+    CHECK(!toy_visible(m, 30.0f, 39.9f) && !toy_visible(m, 30.0f, 100.0f));
+    CHECK(!toy_visible(m, NAN, 50.0f) && !toy_visible(m, 30.0f, NAN));
+    CHECK(!toy_visible(m, 1e30f, 50.0f) && !toy_visible(m, -1e30f, 50.0f));
     rectangle(0, 3, -100, -100, 400, 400, 2.0f); /* the whole grid, and not a cell more */
     toy_draw(&outline, flat, 1, 3, &drawn);
     CHECK(count(m) == RAST_SIZE * RAST_SIZE);
-    CHECK(layers_visible(m, 0.0f, 0.0f) && layers_visible(m, 255.9f, 255.9f));
-    CHECK(!layers_visible(m, -0.1f, 5.0f) && !layers_visible(m, 5.0f, -0.1f));
-    CHECK(!layers_visible(m, 256.0f, 5.0f) && !layers_visible(m, 5.0f, 256.0f));
+    CHECK(toy_visible(m, 0.0f, 0.0f) && toy_visible(m, 255.9f, 255.9f));
+    CHECK(!toy_visible(m, -0.1f, 5.0f) && !toy_visible(m, 5.0f, -0.1f));
+    CHECK(!toy_visible(m, 256.0f, 5.0f) && !toy_visible(m, 5.0f, 256.0f));
 }
 
 /* The nearer one hides the farther one, whatever their indices. */

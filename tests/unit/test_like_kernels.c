@@ -3,6 +3,7 @@
 #include "kernel_check.h"
 #include "rng.h"
 #include "toy_look.h"
+#include "toy_visible.h"
 
 #include "check.h"
 
@@ -81,7 +82,7 @@ static int8_t look(int32_t l, int32_t i, int32_t lane)
     float const x = (v->cam.fx * (at[0] * inv) + v->cam.cx - v->f.map.u0) * v->f.map.scale;
     float const y = (v->cam.fy * (at[1] * inv) + v->cam.cy - v->f.map.v0) * v->f.map.scale;
     float const range = __builtin_sqrtf(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
-    if (!(-dot - 0.2f * range > 0.0f) || !layers_visible(&v->drawn.visible[l], x, y))
+    if (!(-dot - 0.2f * range > 0.0f) || !toy_visible(&v->drawn.visible[l], x, y))
         return TEXTURE_HIDDEN;
     int32_t const a = i_min((int32_t)(x * 256.0f), 255 * 256 - 1),
                   b = i_min((int32_t)(y * 256.0f), 255 * 256 - 1);
@@ -227,7 +228,7 @@ static void walk(const rast_mask *mask, const float from[2], const float to[2], 
     int32_t const sin2 = (int32_t)(64.0f * (-2.0f * dx * dy) / len2);
     for (int32_t i = 0; i < n; i++) {
         float const s = ((float)i + 0.5f) / (float)n, x = from[0] + s * dx, y = from[1] + s * dy;
-        if (!layers_visible(mask, x + 0.3f * (mid[0] - x), y + 0.3f * (mid[1] - y)))
+        if (!toy_visible(mask, x + 0.3f * (mid[0] - x), y + 0.3f * (mid[1] - y)))
             continue;
         if (!(x >= 0.0f && y >= 0.0f && x < (float)VIEW_SIZE && y < (float)VIEW_SIZE))
             continue;

@@ -1,0 +1,15 @@
+/* toy_visible.h - one point of a drawn body looked at by itself, as kernels must for many. */
+#ifndef TOY_VISIBLE_H
+#define TOY_VISIBLE_H
+#include "layers.h"
+
+/* Is the limb visible at this working pixel? */
+static inline bool toy_visible(const rast_mask *mask, float wx, float wy)
+{
+    /* Truncation is fine: cells left of or above the grid are refused first. */
+    if (!(wx >= 0.0f && wy >= 0.0f && wx < (float)VIEW_SIZE && wy < (float)VIEW_SIZE))
+        return false;
+    int32_t const x = (int32_t)wx >> 1, y = (int32_t)wy >> 1;
+    return y >= mask->first && y < mask->last && (mask->row[y][x >> 6] >> (x & 63) & 1);
+}
+#endif
