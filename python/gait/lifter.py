@@ -274,7 +274,7 @@ class Lifter:
         return mean, sd
 
     def posterior(self) -> tuple[Array, Array]:
-        """Mean (n,) and covariance (n, n) of the unknowns: modes, place, stature, heading; each N(0, 1) a priori."""
+        """Mean (n,) and covariance (n, n) of modes, place, stature and heading; each N(0, 1) a priori."""
         count = library().gait_lift_unknowns(self._handle)
         mean, covariance = np.empty(count), np.empty((count, count))
         check(library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data))
