@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from example_scene import drawn_walk
 
+from gait.cli import COMMANDS
+
 ROOT = Path(__file__).resolve().parents[2]
 BIN = ROOT / ".venv" / "bin"
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -48,7 +50,8 @@ def test_make_targets_exist(command):
 @pytest.mark.parametrize("command", [*commands("gait"), *commands("build/bin/gait-trackd")])
 def test_options_exist(command):
     words = command.split()
-    program = words[:2] if words[0] == "gait" else words[:1]
+    long = " ".join(words[1:3]) in COMMANDS  # such as gait report lift
+    program = words[: 3 if long else 2] if words[0] == "gait" else words[:1]
     text = run(*program, "--help", cwd=ROOT).stdout
     options = [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]
     assert [o for o in options if not re.search(rf"(^|[\s,\[]){re.escape(o)}\b", text, re.M)] == []
