@@ -2,6 +2,7 @@
 #include "layers.h"
 #include "toy_draw.h"
 #include "toy_scene.h"
+#include "toy_visible.h"
 
 #include "check.h"
 
@@ -48,7 +49,7 @@ static void test_against_layers(void)
             for (int32_t x = 0; x < RAST_SIZE; x++) {
                 int32_t id = 0;
                 for (int32_t l = 0; l < m->limbs; l++)
-                    if (layers_visible(&drawn.visible[l], 2.0f * (float)x + 0.5f, 2.0f * (float)y + 0.5f))
+                    if (toy_visible(&drawn.visible[l], 2.0f * (float)x + 0.5f, 2.0f * (float)y + 0.5f))
                         id = l + 1;
                 wrong += ids[y * SIDE + x] != id;
                 seen += id > 0;
