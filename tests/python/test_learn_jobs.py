@@ -17,6 +17,7 @@ import mocap_files as files
 import numpy as np
 import pytest
 
+from gait import cli
 from gait.errors import UserError
 from gait.learn import pool, sources
 from gait.learn.spool import Spool
@@ -158,6 +159,19 @@ def test_a_stopped_command_leaves_no_processes(walks, stuck, tmp_path, number):
         assert (run.returncode, words) == (1, "gait learn: interrupted\n")
     wait_for(lambda: not _group_lives(run.pid), 20)
     assert not list(tmp_path.glob("*gait*"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_waits_while_a_worker_starts(number):
+    ended = []
+    with pytest.raises(KeyboardInterrupt), cli._terminated_like_interrupted(), pool._held_back():
+        thread = threading.Thread(target=os.kill, args=(os.getpid(), number))
+        unblocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})  # as in a thread of a library
+        thread.start()
+        thread.join()
+        signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
+        ended.append(number)
+    assert ended == [number]
 
 
 def _group_lives(group):

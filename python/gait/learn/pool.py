@@ -100,8 +100,9 @@ def _pool(workers: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
         try:
             yield pool, folder
         except BaseException:
-            for child in set(multiprocessing.active_children()) - others:
-                child.kill()
+            with _held_back():
+                for child in set(multiprocessing.active_children()) - others:
+                    child.kill()
             raise
         finally:
             pool.shutdown(cancel_futures=True)
@@ -109,11 +110,30 @@ def _pool(workers: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
 
 def _submit(pool: ProcessPoolExecutor, path: Path, reading: Reading, folder: str) -> Future[str]:
     """Submit a file; workers started by this inherit that Ctrl-C is not for them but for their parent."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
+    with _held_back():
         return pool.submit(_stored, path, reading, folder)
+
+
+@contextmanager
+def _held_back() -> Iterator[None]:
+    """Let an interruption wait for the end of the block.
+
+    A worker half started is in no list of those to end; left over, it misses what its parent has taken away.
+    The mask alone does not do: another thread takes the signal, and Python still interrupts this one.
+    """
+    came: list[int] = []
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    here = numbers if threading.current_thread() is threading.main_thread() else ()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    handlers = {n: signal.signal(n, lambda number, _: came.append(number)) for n in here}
+    try:
+        yield
     finally:
+        for n, handler in handlers.items():
+            signal.signal(n, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number in came[:1]:
+            signal.raise_signal(number)
 
 
 def _stored(path: Path, reading: Reading, folder: str) -> str:
