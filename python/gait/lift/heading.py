@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.lift.chain import LEADING
 from gait.lift.observe import Rows
 from gait.lift.posterior import GROUND_SD, Gaussian, Posterior, infer, place
 from gait.lift.prior import SegmentPrior
@@ -91,6 +92,7 @@ def _refined(
     """Take Gauss-Newton passes from a start until heading and place settle; the share is not yet known."""
     heading, at, ground_sd, free = start, np.array(person.at), FAR_SD, prior.headings == 0
     places: Floats | None = None
+    shape: Floats | None = None
     for _ in range(PASSES):
         gaussian = place(
             prior,
@@ -104,8 +106,8 @@ def _refined(
         guess, first = gaussian.mean if places is None else places, len(gaussian.modes) - gaussian.rigid
         if free:
             gaussian = with_turn(gaussian, guess, at, start - heading)
-        posterior = infer(gaussian, measure(guess))
-        places, turn = posterior.points, 0.0
+        posterior = infer(gaussian, measure(gaussian.mean if shape is None else shape))
+        places, shape, turn = posterior.points, _shape(posterior), 0.0
         if free:
             turn = start - heading + TURN_SD * float(posterior.alpha[-1])
         heading, at = heading + turn, at + ground_sd * posterior.alpha[first : first + 2]
@@ -113,6 +115,13 @@ def _refined(
         if max(abs(turn), float(np.abs((places - guess).mean(axis=(0, 1))).max())) < SETTLED:
             break
     return Explanation(component, heading, posterior, 0.0)
+
+
+def _shape(posterior: Posterior) -> Floats:
+    """Places by the leading modes and the rigid ones: see `chain.moved` for what the others would do."""
+    alpha = posterior.alpha.copy()
+    alpha[LEADING : len(alpha) - posterior.gaussian.rigid] = 0
+    return np.asarray(posterior.gaussian.mean + np.tensordot(alpha, posterior.gaussian.modes, 1))
 
 
 def with_turn(gaussian: Gaussian, about: Floats, pivot: Floats, offset: float) -> Gaussian:
