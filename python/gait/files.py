@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -47,6 +48,37 @@ def require_writable(path: str | os.PathLike[str]) -> None:
         raise UserError(f"{path}: folder {target.parent} cannot be written; choose another place")
     if target.exists() and not os.access(target, os.W_OK):
         raise UserError(f"{path}: is read-only; choose another name, or change its permissions")
+
+
+@contextmanager
+def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield an empty folder; if the block succeeds its files go to the folder `path`, pages (.html) last.
+
+    Raises
+    ------
+    UserError
+        If there can be no such folder, as by `require_folder`.
+    """
+    require_folder(path)
+    folder = Path(path)
+    beside = folder if folder.is_dir() else folder.parent
+    beside.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=beside) as name:
+        yield Path(name)
+        folder.mkdir(exist_ok=True)
+        for file in sorted(Path(name).iterdir(), key=lambda p: (p.suffix == ".html", p.name)):
+            os.replace(file, folder / file.name)
+
+
+def require_folder(path: str | os.PathLike[str]) -> None:
+    """Raise UserError if `path` cannot be a folder of files; for long work, call it before the work."""
+    folder = Path(path).absolute()
+    there = next(p for p in (folder, *folder.parents) if p.exists())
+    if not there.is_dir():
+        what = "is" if there == folder else f"{there} is"
+        raise UserError(f"{path}: {what} a file; give the name of a folder")
+    if not os.access(there, os.W_OK):
+        raise UserError(f"{path}: folder {there} cannot be written; choose another place")
 
 
 def text_lines(path: Path) -> list[str]:

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from gait.errors import UserError
-from gait.files import replacing, require_writable
+from gait.files import filling, replacing, require_writable
 
 
 def test_a_link_stays_and_its_file_is_written(tmp_path):
@@ -49,3 +49,24 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
         require_writable(tmp_path / "no" / "b.csv")
     with pytest.raises(UserError, match="is a folder"):
         require_writable(tmp_path)
+
+
+def test_a_folder_is_filled_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "new" / "deep"
+    with pytest.raises(KeyboardInterrupt), filling(path) as folder:
+        (folder / "half.png").write_text("half")
+        raise KeyboardInterrupt
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()] and not path.exists()
+    for text in ("new", "again"):
+        with filling(path) as folder:
+            (folder / "report.html").write_text(text)
+            (folder / "a.png").write_text(text)
+        assert sorted(p.name for p in path.iterdir()) == ["a.png", "report.html"]
+        assert (path / "report.html").read_text() == text
+
+
+def test_a_file_is_no_folder(tmp_path):
+    (tmp_path / "a").write_text("")
+    for path in (tmp_path / "a", tmp_path / "a" / "b"):
+        with pytest.raises(UserError, match="is a file; give the name of a folder"), filling(path):
+            pass

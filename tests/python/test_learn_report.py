@@ -185,5 +185,5 @@ def test_a_place_that_is_no_folder_is_refused_before_the_work(walks, tmp_path, c
     words = ["learn", str(walks), "-o", str(tmp_path / "m.gait"), "--report", place.format(tmp=tmp_path)]
     assert gait.cli.main(words) == 1
     err = capsys.readouterr().err
-    assert "is not a folder to write in; choose another one" in err and err.count("\n") == 1
+    assert "is a file; give the name of a folder" in err and err.count("\n") == 1
     assert not (tmp_path / "m.gait").exists()

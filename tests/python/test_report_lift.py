@@ -10,6 +10,7 @@ import pytest
 from toy_segments import toy_blob, toy_prior
 
 from gait.cli import main
+from gait.lift import motion
 from gait.lift.tracks_file import Tracks, write
 
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
@@ -35,6 +36,30 @@ def test_figures_of_a_draw(folder, capsys):
     page = (folder / "r" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == len(FIGURES) + 1
     assert 'src="http' not in page
+
+
+def test_a_bad_clip_leaves_nothing(folder, capsys):
+    (folder / "bad.csv").write_text("frame,time,m0_u,m0_v\n0,0,1,x\n")
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "bad.csv"]) == 1
+    assert "bad.csv" in capsys.readouterr().err and not (folder / "r").exists()
+
+
+def test_an_interruption_leaves_nothing(folder, capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(motion, "lift", interrupted)  # after all other figures
+    before = sorted(folder.iterdir())
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 1
+    assert "interrupted" in capsys.readouterr().err and sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("command", [["lift", "-m", "m.gait"], ["track", "t.csv"]])
+def test_a_file_where_the_folder_shall_be(folder, capsys, command):
+    (folder / "r").write_text("mine")
+    assert main(["report", *command, "-o", "r"]) == 1
+    assert "is a file; give the name of a folder" in capsys.readouterr().err
+    assert (folder / "r").read_text() == "mine"
 
 
 def test_markers_must_be_known(folder, capsys):

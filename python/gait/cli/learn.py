@@ -30,8 +30,8 @@ import numpy as np
 
 from gait import blob
 from gait.cli import learn_segments, segment_text, values
-from gait.errors import UsageError, UserError
-from gait.files import require_writable
+from gait.errors import UsageError
+from gait.files import require_folder, require_writable
 from gait.learn import fit, ground, marker_map, model, segment_sections, sources, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
@@ -182,12 +182,7 @@ def _check(args: argparse.Namespace) -> None:
     _check_output(args)
     require_writable(args.output)
     if args.report:
-        folder = Path(args.report).absolute()
-        there = next(p for p in (folder, *folder.parents) if p.exists())
-        if not (there.is_dir() and os.access(there, os.W_OK)):
-            raise UserError(
-                f"--report {args.report}: {there} is not a folder to write in; choose another one"
-            )
+        require_folder(args.report)
 
 
 def _check_output(args: argparse.Namespace) -> None:

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from gait.camera import Camera
 from gait.cli import values
 from gait.errors import UserError
-from gait.files import replacing
+from gait.files import filling, require_folder
 from gait.lcm.page import Page
 from gait.learn import readers, segment_corpus, segment_motion
 from gait.learn.figures_base import Drawing
@@ -34,6 +34,7 @@ from gait.lift import figures_clip, motion, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.figures_segment import Case, case, drawings
 from gait.lift.prior import SegmentPrior
+from gait.lift.tracks_file import Tracks
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
@@ -58,37 +59,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
+    require_folder(args.output)
     prior = SegmentPrior.load(args.model)
+    seen = _clip(args, prior) if args.clip else None
     segment = _segment(args.mocap, prior) if args.mocap else None
     truth, stature = segment or (None, prior.stature)
     what = f"a segment of {Path(args.mocap).name}" if args.mocap else "a draw from the prior"
     shown = case(prior, truth, stature, what, args.seed)
-    folder = Path(args.output)
-    folder.mkdir(parents=True, exist_ok=True)
     page = Page(f"{Path(args.model).name if args.model else 'Shipped model'}: segments of motion")
     page.table("Prior", _facts(prior))
-    with progress("figures", FIGURES + bool(args.clip), args.quiet) as update:
-        for done, drawing in enumerate(_drawings(args, prior, shown), 1):
+    with filling(args.output) as folder, progress("figures", FIGURES + bool(seen), args.quiet) as update:
+        for done, drawing in enumerate(_drawings(args, prior, shown, seen), 1):
             page.figure(drawing.heading, _written(folder, drawing))
             update(done)
-    with replacing(folder / "report.html") as path:
-        path.write_text(page.text(), encoding="utf-8")
+        (folder / "report.html").write_text(page.text(), encoding="utf-8")
     figures = _figures(shown)
     print(json.dumps(figures) if args.json else "\n".join(f"{k}: {v:.4g}" for k, v in figures.items()))
     return 0
 
 
-def _drawings(args: argparse.Namespace, prior: SegmentPrior, shown: Case) -> Iterator[Drawing]:
+def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, View]:
+    """Tracks of the clip and how they are seen."""
+    tracks, _ = tracks_file.read(args.clip, prior.names, ignore_unknown=True)
+    if args.camera:
+        return tracks, Perspective(Camera.read(args.camera))
+    return tracks, Parallel(looking_along("y"), None, np.nanmean(tracks.uv, axis=(0, 1)), steady=False)
+
+
+def _drawings(
+    args: argparse.Namespace, prior: SegmentPrior, shown: Case, seen: tuple[Tracks, View] | None
+) -> Iterator[Drawing]:
     yield from drawings(shown, args.seed)
-    if args.clip:
-        tracks, _ = tracks_file.read(args.clip, prior.names, ignore_unknown=True)
-        middle = np.nanmean(tracks.uv, axis=(0, 1))
-        view: View = Parallel(looking_along("y"), None, middle, steady=False)
-        if args.camera:
-            view = Perspective(Camera.read(args.camera))
-        names = motion.output_names(prior, tracks)
-        found = motion.lift(prior, tracks, view, motion.Options(), names)
-        yield figures_clip.clip(tracks, found, view, Path(args.clip).name)
+    if seen:
+        found = motion.lift(prior, *seen, motion.Options(), motion.output_names(prior, seen[0]))
+        yield figures_clip.clip(seen[0], found, seen[1], Path(args.clip).name)
 
 
 def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
@@ -114,8 +118,7 @@ def _written(folder: Path, drawing: Drawing) -> str:
     """Write a figure's PNG; its part of the page."""
     buffer = io.BytesIO()
     drawing.figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-    with replacing(folder / f"{drawing.stem}.png") as path:
-        path.write_bytes(buffer.getvalue())
+    (folder / f"{drawing.stem}.png").write_bytes(buffer.getvalue())
     data = base64.b64encode(buffer.getvalue()).decode()
     caption = html.escape(drawing.caption)
     return f'<p>{caption}</p><img style="max-width: 100%" alt="{caption}" src="data:image/png;base64,{data}">'

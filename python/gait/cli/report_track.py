@@ -15,7 +15,7 @@ from typing import Any
 from gait import parameter_files
 from gait.anglecycles import AngleCycle, angle_cycles
 from gait.errors import UserError
-from gait.files import replacing
+from gait.files import filling, require_folder
 from gait.footfall_draws import Draws
 from gait.lcm.page import Page
 from gait.model import read_cyclic
@@ -43,6 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure, write, print."""
+    source = Path(args.track)
+    output = args.output or source.with_name(source.stem + "_gait")
+    require_folder(output)
     track = read_track(args.track)
     draws = Draws.read(args.draws, track) if args.draws else None
     try:
@@ -52,15 +55,13 @@ def run(args: argparse.Namespace) -> int:
     norm = ModelCurves(read_cyclic(args.model))
     cycles = angle_cycles(track, parameters, norm, draws)
     found = parameter_files.as_json(track, parameters, cycles)
-    source = Path(args.track)
-    folder = Path(args.output) if args.output else source.with_name(source.stem + "_gait")
-    folder.mkdir(parents=True, exist_ok=True)
-    parameter_files.write_json(folder / "parameters.json", found)
-    parameter_files.write_csv(folder / "events.csv", found["events"])
-    parameter_files.write_csv(folder / "strides.csv", list(parameter_files.strides(parameters)))
-    parameter_files.write_csv(folder / "curves.csv", list(parameter_files.curves(cycles)))
-    with replacing(folder / "report.html") as path:
-        Path(path).write_text(_page(source.name, track, parameters, cycles), encoding="utf-8")
+    with filling(output) as folder:
+        parameter_files.write_json(folder / "parameters.json", found)
+        parameter_files.write_csv(folder / "events.csv", found["events"])
+        parameter_files.write_csv(folder / "strides.csv", list(parameter_files.strides(parameters)))
+        parameter_files.write_csv(folder / "curves.csv", list(parameter_files.curves(cycles)))
+        page = _page(source.name, track, parameters, cycles)
+        (folder / "report.html").write_text(page, encoding="utf-8")
     print(json.dumps(found, allow_nan=False) if args.json else _text(parameters))
     return 0
 

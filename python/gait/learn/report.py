@@ -5,11 +5,10 @@ from __future__ import annotations
 import base64
 import html
 import io
-import os
-import tempfile
 from pathlib import Path
 
 from gait.errors import UserError
+from gait.files import filling
 from gait.learn import model
 from gait.learn.figures import drawings
 from gait.learn.figures_base import Drawing
@@ -39,16 +38,11 @@ def write(folder: Path, learned: Learned, activity: str, refused: list[str], qui
         If the folder cannot be made or written.
     """
     try:
-        beside = folder if folder.is_dir() else folder.parent
-        beside.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=beside) as name:
-            stems = _write_all(Path(name), learned, activity, refused, quiet)
-            folder.mkdir(exist_ok=True)
-            for old in folder.glob("strip-*.png"):  # of a run with more components
-                if old.stem not in stems:
-                    old.unlink()
-            for path in sorted(Path(name).iterdir(), key=lambda p: p.suffix == ".html"):  # the page last
-                os.replace(path, folder / path.name)
+        with filling(folder) as new:
+            stems = _write_all(new, learned, activity, refused, quiet)
+        for old in folder.glob("strip-*.png"):  # of a run with more components
+            if old.stem not in stems:
+                old.unlink()
     except OSError as error:
         raise UserError(f"--report {folder}: {error.strerror}; choose another folder") from error
 
