@@ -61,6 +61,22 @@ def test_lifts(folder, capsys, view, method):
     assert np.median(across) < 0.03  # what the picture shows
 
 
+@pytest.mark.parametrize(("axis", "vector"), [("-y", "0,-1,0"), ("-x", "-1,0,0"), ("-z", "-0.0,0,-2.5")])
+def test_views_the_other_way(folder, axis, vector):
+    command = ["lift", "t.csv", "-m", "m.gait", "--quiet"]
+    assert main([*command, "-o", "a.csv", "--orthographic", axis]) == 0
+    assert main([*command, "--orthographic", vector, "-o", "b.csv"]) == 0
+    assert main([*command, "-o", "c.csv", f"--orthographic={axis.replace('-', '')}"]) == 0
+    assert (folder / "a.csv").read_bytes() == (folder / "b.csv").read_bytes()
+    assert (folder / "a.csv").read_bytes() != (folder / "c.csv").read_bytes()
+
+
+def test_a_view_without_its_axis(folder, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["lift", "t.csv", "--orthographic", "-o", "a.csv"])
+    assert "--orthographic: expected one argument" in capsys.readouterr().err
+
+
 def test_trc_and_sd(folder, capsys):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--trc", "o.trc"]
     assert main([*command, "--quiet"]) == 0

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import re
 import signal
 import sys
 import threading
@@ -38,6 +39,9 @@ COMMANDS = {
 """Command to its module, in the order of ``gait --help``."""
 
 
+_DIRECTION = re.compile(r"-[xyz]|-[\d.][^,]*,[^,]+,[^,]+")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
@@ -46,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = f" {words[0]}" if words and words[0] in COMMANDS else ""
     try:
         with _terminated_like_interrupted():
-            args = _parser(words).parse_args(words)
+            args = _parser(words).parse_args(list(_joined(words)))
             return int(args.run(args))
     except UsageError as exc:
         _failed(command, str(exc))
@@ -107,6 +111,21 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         _offer(sub, "--quiet", "no words and no progress on stderr")
         sub.set_defaults(run=module.run)
     return parser
+
+
+def _joined(words: Sequence[str]) -> Iterator[str]:
+    """Words with ``--option -x`` and ``--option -1,0,0`` as one, as argparse takes ``-x`` for an option."""
+    held = ""
+    for word in words:
+        if held and _DIRECTION.fullmatch(word):
+            word, held = f"{held}={word}", ""
+        elif held:
+            yield held
+        held = word if len(word) > 2 and "--orthographic".startswith(word) else ""
+        if not held:
+            yield word
+    if held:
+        yield held
 
 
 def _offer(parser: argparse.ArgumentParser, option: str, text: str) -> None:
