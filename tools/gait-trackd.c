@@ -33,9 +33,7 @@ static struct settings {
               .cpu_mask = -1,
               .seed = 1,
               .max_gap = 2,
-              .lift_sd = 3,
-              .lift_lag = 5,
-              .tracks_sd = 4};
+              .lift_lag = -1};
 
 #define TEXT(field)           OPTION_TEXTUAL, settings.field, 0, 0
 #define INT(field, low, high) OPTION_INT, &settings.field, low, high
@@ -86,7 +84,7 @@ static const option own_options[] = {
     {"cpu-mask", 0, "N",
      "instruction sets that may be used, added up: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none;\n"
      "        default all that the CPU has; results do not depend on it",
-     INT(cpu_mask, 0, INT32_MAX)},
+     INT(cpu_mask, 0, GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512)},
     {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
      OPTION_FLOAT, &settings.max_gap, 0, 60},
     {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
@@ -177,6 +175,27 @@ static int32_t particles(void)
     return settings.particles ? settings.particles : usual.particles;
 }
 
+/* An option that only means something with another one is refused without it. */
+static bool check_company(message *why)
+{
+    struct {
+        const char *option, *needs;
+        bool given, there;
+    } const pair[] = {
+        {"adapt-particles", "budget-ms", settings.adapt_particles > 0, settings.budget_ms > 0},
+        {"background", "camera", settings.background[0], settings.camera[0]},
+        {"lift-model", "lift", settings.lift_model[0], settings.lift},
+        {"lift-height", "lift", settings.lift_stature > 0, settings.lift},
+        {"lift-sd", "lift", settings.lift_sd > 0, settings.lift},
+        {"lift-lag", "lift", settings.lift_lag >= 0, settings.lift},
+        {"tracks-sd", "tracks-term", settings.tracks_sd > 0, settings.tracks_term},
+    };
+    for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
+        if (pair[i].given && !pair[i].there)
+            return message_set(why, "--%s needs --%s", pair[i].option, pair[i].needs);
+    return true;
+}
+
 /* Command line over configuration file over defaults. */
 static option_result read_settings(int argc, char **argv, const option *table, message *why)
 {
@@ -196,13 +215,10 @@ static option_result read_settings(int argc, char **argv, const option *table, m
          message_set(why, "--url memq://: reaches nobody outside one process; give udpm:// or file://")) &&
         (settings.budget_ms == 0 || !link_is_log(link_url(settings.url)) ||
          message_set(why, "--budget-ms: a log is played without loss; leave it out")) &&
-        (!settings.adapt_particles || settings.budget_ms > 0 ||
-         message_set(why, "--adapt-particles needs --budget-ms to adapt to")) &&
+        check_company(why) &&
         (settings.adapt_particles <= particles() ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles",
-                     (int)settings.adapt_particles, (int)particles())) &&
-        (!settings.background[0] || settings.camera[0] ||
-         message_set(why, "--background needs --camera, or leave both to `gait capture`"));
+                     (int)settings.adapt_particles, (int)particles()));
     return ok ? OPTION_OK : OPTION_BAD;
 }
 
@@ -248,8 +264,8 @@ typedef struct parts { /* those that a service may lack */
 static bool load_lift(service *s, lift_service *lift, lcm_t *out, message *why)
 {
     lift_settings const set = {.stature = settings.lift_stature,
-                               .sd = settings.lift_sd,
-                               .lag = settings.lift_lag,
+                               .sd = settings.lift_sd > 0 ? settings.lift_sd : 3,
+                               .lag = settings.lift_lag >= 0 ? settings.lift_lag : 5,
                                .cpu_mask = (uint32_t)settings.cpu_mask};
     const char *const model = settings.lift_model[0] ? settings.lift_model : settings.model;
     if (!settings.lift)
@@ -275,7 +291,8 @@ static bool load(service *s, parts *p, workers *threads, lcm_t *out, message *wh
         !load_lift(s, &p->lift, out, why))
         return false;
     if (settings.tracks_term) {
-        tracks_cue_open(&p->cue, s->track.model, s->track.info.joints, settings.tracks_sd);
+        tracks_cue_open(&p->cue, s->track.model, s->track.info.joints,
+                        settings.tracks_sd > 0 ? settings.tracks_sd : 4);
         s->cue = &p->cue;
     }
     s->max_gap = (double)settings.max_gap;

@@ -1,5 +1,6 @@
 /* api_tracker.c - the public tracker and render functions: argument checks, then one call down. */
 #include "camera.h"
+#include "cpu.h"
 #include "image.h"
 #include "render.h"
 #include "snapshot.h"
@@ -146,6 +147,9 @@ static gait_status check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->terms == 0 || (cfg->terms & ~known) != 0)
         return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
                          (unsigned)cfg->terms);
+    if (!cpu_mask_valid(cfg->cpu_mask))
+        return base_fail(err, GAIT_ERR_ARG, -1, "config cpu_mask = 0x%x is not ~0u or a set of GAIT_CPU_*",
+                         (unsigned)cfg->cpu_mask);
     for (int32_t c = 0; c < cfg->cameras; c++) {
         if (!camera_valid(&cfg->camera[c]))
             return base_fail(

@@ -1,5 +1,10 @@
 #include "cpu.h"
 
+bool cpu_mask_valid(uint32_t mask)
+{
+    return mask == ~0u || (mask & ~(GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512)) == 0;
+}
+
 #if defined(__x86_64__)
 #include <cpuid.h>
 

@@ -1,6 +1,7 @@
 #include "lifter.h"
 
 #include "camera.h"
+#include "cpu.h"
 
 #define KNOWN_STATURE_SD                                                                                     \
     0.04 /* metres, of a stature that somebody gives: shoes, posture, where markers are */
@@ -50,6 +51,7 @@ static gait_status check_config(const gait_lift_config *c, gait_error *err)
         : !within(c->max_rate, 1.0, 1000.0)                ? "max_rate is not in [1, 1000] Hz"
         : !within(c->max_gap, 1e-3, 60.0)                  ? "max_gap is not in [0.001, 60] seconds"
         : !within(c->misfit, 0.0, 1e9)                     ? "misfit is not in [0, 1e9]"
+        : !cpu_mask_valid(c->cpu_mask)                     ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
         : c->projection == GAIT_LIFT_ORTHOGRAPHIC && !orthonormal(c->axis)
             ? "axis is not two unit vectors at right angles"
         : c->projection == GAIT_LIFT_PERSPECTIVE && !camera_valid(&c->camera)

@@ -205,6 +205,12 @@ def test_a_background_with_comments_is_read(tmp_path):
         (["-m", "x", "--quiet=maybe"], "--quiet maybe: give yes or no"),
         (["-m", "x", "--url", "memq://"], "--url memq://: reaches nobody"),
         (["-m", "x", "--background", "p.ppm"], "--background needs --camera"),
+        (["-m", "x", "--lift-model", "p.gait"], "--lift-model needs --lift"),
+        (["-m", "x", "--lift-height", "1.7"], "--lift-height needs --lift"),
+        (["-m", "x", "--lift-sd", "3"], "--lift-sd needs --lift"),
+        (["-m", "x", "--lift-lag", "0"], "--lift-lag needs --lift"),
+        (["-m", "x", "--tracks-sd", "4"], "--tracks-sd needs --tracks-term"),
+        (["-m", "x", "--cpu-mask", "8"], "--cpu-mask 8"),
         (["-m", "x", "--url", "u" * 2000], "--url: give a value of 1 to 1023 characters"),
     ],
 )
