@@ -249,9 +249,9 @@ bench-lift: $(B)/bench/lift ## time lifting a frame, a segment, by instruction s
 	@$< $(ARGS)
 
 CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null | head -n 1 | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9-')
-BENCH_CSV = tests/bench/results/$(or $(CPU_NAME),$(MACHINE)).csv
-bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage: tests/bench/results/<cpu>.csv (ARGS='-s 40')
-	@$< --csv $(BENCH_CSV) $(ARGS)
+BENCH_CSV = $(if $(filter --record,$(ARGS)),tests/bench/results,build/bench)/$(or $(CPU_NAME),$(MACHINE)).csv
+bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage (ARGS='-s 40'; --record keeps it)
+	@mkdir -p $(dir $(BENCH_CSV)) && $< --csv $(BENCH_CSV) $(filter-out --record,$(ARGS))
 	@$(PY) tests/bench/bench_plot.py $(BENCH_CSV) build/bench/speed.png
 
 eval: setup lib ## errors on the clips of ../shared/data

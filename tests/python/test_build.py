@@ -85,3 +85,14 @@ def test_a_library_without_threads_needs_none(tmp_path):
     subprocess.run(["cc", *options, source, "-o", tmp_path / "pool.o"], check=True)
     said = subprocess.run(["nm", tmp_path / "pool.o"], capture_output=True, text=True, check=True).stdout
     assert "pthread" not in said and "gait_pool" not in said
+
+
+@pytest.mark.parametrize(
+    ("words", "folder"), [((), "build/bench/"), (("ARGS=-s 9 --record",), "tests/bench/results/")]
+)
+def test_figures_of_a_machine_are_kept_only_if_asked(words, folder):
+    done = subprocess.run(
+        ["make", "-n", "bench", *words], cwd=ROOT, capture_output=True, text=True, timeout=120, check=True
+    )
+    command = next(line for line in done.stdout.splitlines() if "bench/step --csv" in line)
+    assert f"--csv {folder}" in command and "--record" not in command
