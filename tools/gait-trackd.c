@@ -65,8 +65,8 @@ static const option own_options[] = {
     {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
     {"particles", 'n', "N", particles_help, INT(particles, 16, 1 << 20)},
     {"budget-ms", 0, "MS",
-     "live: an estimate comes within so many milliseconds of its frame's capture; frames that\n"
-     "        are older already, less what a step takes, are dropped and counted; default: none",
+     "live: frames that cannot be answered within so many milliseconds of their capture are\n"
+     "        dropped and counted; default: none",
      OPTION_FLOAT, &settings.budget_ms, 1, 10000},
     {"adapt-particles", 0, "LOW",
      "with --budget-ms: halve the particles, down to LOW, when steps are too slow or frames are\n"
@@ -321,8 +321,9 @@ static void print_summary(const service *s, bool live)
         printf(" latency_ms median %.2f p99 %.2f", histogram_quantile(&c->latency, 0.5) / 1e3,
                histogram_quantile(&c->latency, 0.99) / 1e3);
     if (s->budget.limit_us)
-        printf(" late %" PRId64 " over_budget %" PRId64 " particles %d", s->budget.late, s->budget.over,
-               (int)(s->wanted ? s->wanted : s->track.config.particles));
+        printf(" late %" PRId64 " over_budget %" PRId64 " particles %d slow_steps %" PRId64, s->budget.late,
+               s->budget.over, (int)(s->wanted ? s->wanted : s->track.config.particles),
+               s->budget.slow_steps);
     if (s->cue)
         printf(" tracks %" PRId64 " tracks_used %" PRId64 " tracks_late %" PRId64, s->cue->messages,
                s->cue->used, s->cue->late);

@@ -75,6 +75,25 @@ static void test_without_adapting_it_stays(void)
     CHECK(settle(&b, 500, 0.1, 500) == 500);
 }
 
+static void test_steps_longer_than_the_limit_are_said_once(void)
+{
+    budget b = {.limit_us = 10 * MS, .high = 4000},
+           adapting = {.limit_us = 10 * MS, .low = 100, .high = 4000};
+    int said = 0;
+    settle(&b, 500, 20.1, 7);
+    CHECK(!budget_hopeless(&b, 500));
+    for (int i = 0; i < 30; i++) {
+        settle(&b, 500, 20.1, 1);
+        said += budget_hopeless(&b, 500);
+    }
+    CHECK(said == 1 && b.slow_steps == 37);
+    settle(&b, 500, 19.9, 10);
+    CHECK(b.slow_steps == 37 && b.slow == 0);
+    int32_t const particles = settle(&adapting, 400, 20000, 8);
+    CHECK(particles == 200 && !budget_hopeless(&adapting, particles));
+    CHECK(settle(&adapting, particles, 20000, 20) == 100 && budget_hopeless(&adapting, 100));
+}
+
 int main(void)
 {
     test_birth();
@@ -83,5 +102,6 @@ int main(void)
     test_the_number_follows_the_time();
     test_dropped_frames_halve_it();
     test_without_adapting_it_stays();
+    test_steps_longer_than_the_limit_are_said_once();
     return CHECK_DONE();
 }

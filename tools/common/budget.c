@@ -47,6 +47,8 @@ int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, i
     b->over += now - birth > b->limit_us;
     b->step_us += b->step_us ? (step_us - b->step_us) / 4 : step_us;
     b->calm = step_us < b->limit_us / 4 ? b->calm + 1 : 0;
+    b->slow = step_us > b->limit_us ? b->slow + 1 : 0;
+    b->slow_steps += b->slow > 0;
     b->steps++;
     int32_t const wanted = b->low ? choose(b, particles) : particles;
     if (wanted != particles || b->steps >= LOOK)
@@ -54,4 +56,11 @@ int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, i
     if (wanted != particles)
         b->calm = 0;
     return wanted;
+}
+
+bool budget_hopeless(budget *b, int32_t particles)
+{
+    if (b->hopeless || b->slow < SETTLE || (b->low && particles > b->low))
+        return false;
+    return b->hopeless = true;
 }

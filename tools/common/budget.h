@@ -11,6 +11,9 @@ typedef struct budget {
     int32_t steps;      /* since the last choice or look at `dropped` */
     int32_t dropped;    /* frames since then */
     int32_t calm;       /* steps in a row that took less than a quarter of the limit */
+    int32_t slow;       /* steps in a row that alone took longer than the limit */
+    bool hopeless;      /* so many that it was said */
+    int64_t slow_steps; /* all of them */
     int64_t late, over; /* frames dropped for their age; estimates that came later than the limit */
 } budget;
 
@@ -27,4 +30,7 @@ void budget_missed(budget *b);
 /* A frame was tracked.  Returns the number of particles to go on with: half as many when steps are too slow or frames
  * are dropped, twice as many after a while with time to spare. */
 int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, int32_t particles);
+
+/* Do steps with so many particles take longer than the limit, and may their number not fall?  true only once. */
+bool budget_hopeless(budget *b, int32_t particles);
 #endif

@@ -63,7 +63,7 @@ static void set_idle(service *s)
 static void rearm(service *s)
 {
     memset(&s->counts, 0, sizeof s->counts);
-    s->budget.late = s->budget.over = 0;
+    s->budget.late = s->budget.over = s->budget.slow_steps = 0;
     s->dropped_before = 0;
     s->last_frame = s->last_utime = -1;
     s->start = (arming){0};
@@ -306,6 +306,11 @@ static void adapt(service *s, int64_t birth, int64_t step_us)
 {
     int32_t const had = s->wanted;
     s->wanted = budget_stepped(&s->budget, birth, service_now(), step_us, had);
+    if (budget_hopeless(&s->budget, s->wanted))
+        fprintf(stderr,
+                "gait-trackd: a step takes %.1f ms, more than the budget of %.1f: fewer --particles, more "
+                "--threads or --adapt-particles\n",
+                (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
     if (s->wanted == had || gait_tracker_set_particles(s->track.tracker, s->wanted, NULL) != GAIT_OK)
         return;
     fprintf(stderr, "gait-trackd: %d particles instead of %d: a step took %.1f ms of %.1f\n", (int)s->wanted,
