@@ -325,12 +325,12 @@ static void print_summary(const service *s, bool live)
                s->budget.over, (int)(s->wanted ? s->wanted : s->track.config.particles),
                s->budget.slow_steps);
     if (s->cue)
-        printf(" tracks %" PRId64 " tracks_used %" PRId64 " tracks_late %" PRId64, s->cue->messages,
-               s->cue->used, s->cue->late);
+        printf(" tracks %" PRId64 " tracks_used %" PRId64 " tracks_late %" PRId64 " points_left_out %" PRId64,
+               s->cue->messages, s->cue->used, s->cue->late, s->cue->sieve.left_out);
     if (s->lift)
         printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
-               " lift_ms median %.3f p99 %.3f",
-               s->lift->frames, s->lift->lifted, s->lift->rejected,
+               " lift_points_left_out %" PRId64 " lift_ms median %.3f p99 %.3f",
+               s->lift->frames, s->lift->lifted, s->lift->rejected, s->lift->sieve.left_out,
                histogram_quantile(&s->lift->step, 0.5) / 1e3, histogram_quantile(&s->lift->step, 0.99) / 1e3);
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }

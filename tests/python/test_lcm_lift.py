@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import lcm_rig as rig
 import numpy as np
@@ -73,7 +75,7 @@ def test_joints_are_those_of_the_library(tmp_path: Path) -> None:
     lifter = Lifter(model()[0], camera(), LiftConfig.default(lag=LAG, sd=SD))
     assert len(lifted) == FRAMES - LAG
     assert f"lift_frames {FRAMES} lifted {FRAMES - LAG} lift_rejected 0" in outcome.printed
-    tracking = 0
+    tracking = waiting = 0
     messages = iter(lifted)
     for i, (utime, uv, confidence) in enumerate(observations()):
         pixels, sd = np.full((19, 2), np.nan), np.full(19, np.inf)
@@ -86,11 +88,15 @@ def test_joints_are_those_of_the_library(tmp_path: Path) -> None:
             continue
         got = next(messages)
         assert (got.utime, got.frame, got.status) == (rig.utime(i - LAG), 100 + i - LAG, want.status)
+        if want.status == got.INIT:
+            waiting += 1
+            assert got.njoints == 0 and not got.joints
+            continue
         assert tuple(j.name for j in got.joints) == lifter.names
         np.testing.assert_array_equal([j.position for j in got.joints], want.markers.astype(np.float32))
         np.testing.assert_array_equal([j.sd for j in got.joints], want.sd.astype(np.float32))
         tracking += got.status == got.TRACKING
-    assert tracking > FRAMES - 20
+    assert tracking > FRAMES - 20 and waiting > 0
 
 
 def test_the_lifter_alone_costs_the_tracker_nothing(tmp_path: Path) -> None:
@@ -142,6 +148,33 @@ def test_tracks_out_of_order_or_of_strangers_are_named(tmp_path: Path) -> None:
     happenings.insert(20, ("GAIT_TRACKS_0", tracks_message(["tail"], [[1.0, 2.0]], rig.utime(3))))
     outcome, _ = lift(tmp_path, happenings)
     assert "no point that the model knows" in outcome.words
+
+
+def spoilt(message: Any) -> Any:
+    """Points that are of no use: a stranger, one twice, three confidences that are none."""
+    names = model()[1]
+    message.tracks += [point("nose", 0.9), point(message.tracks[0].name, 0.9)]
+    message.tracks += [point(names[NAMES_SEEN + k], c) for k, c in enumerate((1.5, -0.5, math.nan))]
+    message.ntracks = len(message.tracks)
+    return message
+
+
+def point(name: str, confidence: float) -> Any:
+    track = gaitmsg.track_t()
+    track.name, track.u, track.v, track.confidence = name, 5.0, 5.0, confidence
+    return track
+
+
+def test_points_of_no_use_are_left_out_counted_and_said_once(tmp_path: Path) -> None:
+    _, clean = lift(tmp_path, events())
+    first, *tracks = events()
+    outcome, lifted = lift(tmp_path, [first, *((channel, spoilt(m)) for channel, m in tracks)])
+    assert f" lift_points_left_out {5 * FRAMES} " in outcome.printed
+    assert "lift_rejected 0 lift_points" in outcome.printed
+    assert [outcome.words.count(w) for w in ("not know it", "names it twice", "not from 0 to 1")] == [1, 1, 1]
+    assert "'nose'" in outcome.words
+    for a, b in zip(clean, lifted, strict=True):
+        assert [j.position for j in a.joints] == [j.position for j in b.joints]
 
 
 def test_a_model_without_the_prior_is_refused_with_the_remedy(tmp_path: Path) -> None:

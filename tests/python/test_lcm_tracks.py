@@ -13,6 +13,7 @@ import pytest
 
 from gait.frame import Joints
 from gait.lcm.messages import image_message, tracks_message
+from gait.lcm.types import gaitmsg
 from gait.tracker import Term, Tracker, TrackerConfig
 
 FRAMES, SD = 16, 1.0
@@ -110,6 +111,22 @@ def error(outcome: rig.Outcome) -> float:
         for e in outcome.estimates[FRAMES // 2 :]
     ]
     return float(np.linalg.norm(off, axis=2).mean())
+
+
+def test_points_of_no_use_are_left_out_and_counted(tmp_path: Path) -> None:
+    clean, _ = play(tmp_path, each())
+    events = each()
+    for _, message in events[1::2]:
+        for name in ("nose", message.tracks[0].name):
+            track = gaitmsg.track_t()
+            track.name, track.u, track.v, track.confidence = name, 5.0, 5.0, 0.9
+            message.tracks.append(track)
+        message.ntracks = len(message.tracks)
+    outcome, said = play(tmp_path, events)
+    assert outcome.digest == clean.digest and said == (FRAMES, FRAMES, 0)
+    assert f" points_left_out {2 * FRAMES} " in outcome.printed
+    assert outcome.words.count("'nose' is left out, the model does not know it") == 1
+    assert outcome.words.count("names it twice") == 1
 
 
 def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None:

@@ -76,10 +76,11 @@ static int32_t take(lift_service *s, tracks_view *v)
     int32_t known = 0;
     for (int32_t j = 0; j < s->info.markers; j++)
         s->sd[j] = -1.0;
+    tracks_sieve_begin(&s->sieve);
     while (tracks_view_next(v, &track)) {
         int32_t const j = find(s, track.name);
         known += j >= 0;
-        if (j < 0)
+        if (!tracks_sieve_pass(&s->sieve, &track, j))
             continue;
         s->uv[2 * j] = (double)track.u;
         s->uv[2 * j + 1] = (double)track.v;
@@ -102,6 +103,7 @@ static void send(lift_service *s, int64_t step_us)
     static uint8_t room[MESSAGE_ROOM];
     const gait_lift_frame *const e = &s->estimate;
     const lift_past *const past = past_of(s, e->utime);
+    bool const known = e->status != GAIT_STATUS_INIT; /* before that nobody knows where the joints are */
     gaitmsg_estimate_t m = {.utime = e->utime,
                             .frame = past->frame,
                             .step = (int64_t)e->frame,
@@ -109,12 +111,12 @@ static void send(lift_service *s, int64_t step_us)
                             .step_us = (int32_t)step_us,
                             .status = (int8_t)e->status,
                             .model_digest = (int64_t)s->info.digest,
-                            .njoints = s->info.markers,
+                            .njoints = known ? s->info.markers : 0,
                             .joints = s->joint};
     m.flags = e->flags & GAIT_LIFT_UNSEEN ? GAITMSG_ESTIMATE_T_FLAG_NO_IMAGE : 0;
     m.mean.heading = (float)e->heading;
     m.mean.stature = (float)(s->config.stature > 0.0 ? s->config.stature : (double)s->info.stature);
-    for (int32_t j = 0; j < s->info.markers; j++) {
+    for (int32_t j = 0; j < m.njoints; j++) {
         s->joint[j].name =
             (char *)gait_lift_marker_name(s->lift, j); /* LCM's strings lack const; read only */
         for (int32_t i = 0; i < 3; i++) {

@@ -32,6 +32,7 @@ typedef struct lift_service {
     size_t memory_bytes;
     int64_t frames, lifted, rejected;
     histogram step; /* microseconds */
+    tracks_sieve sieve;
     double uv[2 * GAIT_MAX_MARKERS], sd[GAIT_MAX_MARKERS];
     gait_lift_frame estimate;
     gaitmsg_joint_t joint[GAIT_MAX_MARKERS];

@@ -49,10 +49,11 @@ bool tracks_cue_take(tracks_cue *cue, tracks_view *v, message *why)
     }
     for (int32_t j = 0; j < cue->joints; j++)
         to->track[j].sd = -1.0f;
+    tracks_sieve_begin(&cue->sieve);
     while (tracks_view_next(v, &track)) {
         int32_t const j = find(cue, track.name);
         known += j >= 0;
-        if (j >= 0)
+        if (tracks_sieve_pass(&cue->sieve, &track, j))
             to->track[j] = (gait_track){track.u, track.v, (float)tracks_view_sd(&track, (double)cue->sd)};
     }
     if (announced && known == 0)

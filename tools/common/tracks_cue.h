@@ -19,6 +19,7 @@ typedef struct tracks_cue {
     int32_t joints;
     float sd; /* pixels, of a joint with full confidence */
     cue_joints past[TRACKS_CUE_PAST];
+    tracks_sieve sieve;
     int64_t messages, used, late; /* tracks that came, that a frame had, that came after it */
     int64_t frame_utime;          /* of the last frame tracked; -1: none */
     uint8_t *held;                /* an encoded image_t; taken once */

@@ -2,6 +2,9 @@
 
 #include "gaitmsg_tracks_t.h"
 
+#include <stdio.h>
+#include <string.h>
+
 #define LEAST_CONFIDENCE 0.1f /* points below it count as not seen, as in files of tracks */
 
 static bool take_track(byte_reader *r, track_view *out)
@@ -35,8 +38,30 @@ bool tracks_view_next(tracks_view *v, track_view *out)
 
 double tracks_view_sd(const track_view *track, double sd)
 {
-    float const confidence = track->confidence < 1.0f ? track->confidence : 1.0f;
-    return confidence >= LEAST_CONFIDENCE ? sd / (double)confidence : -1.0;
+    return track->confidence >= LEAST_CONFIDENCE ? sd / (double)track->confidence : -1.0;
+}
+
+void tracks_sieve_begin(tracks_sieve *s)
+{
+    memset(s->named, 0, sizeof s->named);
+}
+
+bool tracks_sieve_pass(tracks_sieve *s, const track_view *track, int32_t joint)
+{
+    static const char *const reason[] = {"the model does not know it", "its message names it twice",
+                                         "its confidence is not from 0 to 1"};
+    bool const sure = track->confidence >= 0.0f && track->confidence <= 1.0f; /* NaN is not */
+    int const why = joint < 0 ? 0 : s->named[joint] ? 1 : !sure ? 2 : -1;
+    if (joint >= 0)
+        s->named[joint] = true;
+    if (why < 0)
+        return true;
+    s->left_out++;
+    if (!s->told[why])
+        fprintf(stderr, "gait-trackd: tracks: point '%.40s' is left out, %s; all such points are counted\n",
+                track->name, reason[why]);
+    s->told[why] = true;
+    return false;
 }
 
 bool tracks_view_strangers(message *why)

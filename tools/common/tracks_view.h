@@ -2,6 +2,7 @@
 #ifndef TOOLS_TRACKS_VIEW_H
 #define TOOLS_TRACKS_VIEW_H
 #include "byte_reader.h"
+#include "gait.h"
 #include "message.h"
 
 typedef struct tracks_view {
@@ -14,6 +15,18 @@ typedef struct track_view {
     const char *name; /* in the message */
     float u, v, confidence;
 } track_view;
+
+/* Which points of messages a model takes: those that it knows, each once, with a confidence from 0 to 1. */
+typedef struct tracks_sieve {
+    int64_t left_out;             /* points */
+    bool told[3];                 /* by reason, once on stderr */
+    bool named[GAIT_MAX_MARKERS]; /* by the message so far */
+} tracks_sieve;
+
+/* A new message begins. */
+void tracks_sieve_begin(tracks_sieve *s);
+/* Is the point of use?  `joint` is its index in the model, -1: unknown. */
+bool tracks_sieve_pass(tracks_sieve *s, const track_view *track, int32_t joint);
 
 /* false, with the reason: another type, or shorter than its lengths say. */
 bool tracks_view_open(tracks_view *v, const void *message_bytes, size_t size, message *why);
