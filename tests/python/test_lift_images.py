@@ -223,6 +223,22 @@ def test_a_wrong_correction_is_named(tmp_path, entry, words):
         read_corrections(written(tmp_path, {"corrections": [entry]}), PRIOR, 10)
 
 
+def test_two_corrections_of_one_joint_and_frame_are_refused(tmp_path):
+    knee = {"frame": 2, "joint": "l_knee", "uv": [1, 2]}
+    clicks = [knee, knee | {"frame": 3}, knee | {"joint": "r_knee"}, knee | {"uv": [9, 9]}]
+    with pytest.raises(
+        UserError, match="correction 4 points at l_knee in frame 2, as correction 1 does; remove"
+    ):
+        read_corrections(written(tmp_path, {"corrections": clicks}), PRIOR, 10)
+    assert len(read_corrections(written(tmp_path, {"corrections": clicks[:3]}), PRIOR, 10)) == 3
+
+
+def test_a_correction_outside_the_clip_is_named(tmp_path):
+    clicks = {"corrections": [{"frame": f, "joint": "l_knee", "uv": [1, 2]} for f in (5, 4)]}
+    with pytest.raises(UserError, match=r"file\.json: correction 2: frame is 4.* 5 to 9, or other --start"):
+        read_corrections(written(tmp_path, clicks), PRIOR, 10, 5)
+
+
 def test_a_prior_of_other_markers_is_refused():
     with pytest.raises(UserError, match="no marker"):
         Sticks.of(toy_prior(markers=6).names)

@@ -219,6 +219,8 @@ def test_faults_are_named(files, tmp_path, refused):
     assert "pelvis_px is missing" in refused(*placed)
     camera = ["--camera", files / "camera.json"]
     assert "frame 0 is not among the frames 5 to 23" in refused(*camera, *placed, "--start", 5)
+    gone = refused(*camera, *placed, "--start", 5000)
+    assert "no frame from 5000" in gone and "its frames are 0 to 23" in gone and "--start" in gone
     behind = json.loads((files / "placement.json").read_text()) | {"pelvis": [50, 500]}
     (tmp_path / "behind.json").write_text(json.dumps(behind))
     assert "behind the camera" in refused(*camera, "--placement", tmp_path / "behind.json")

@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     camera = Camera.read(args.camera, video.size) if args.camera else None
     placement = read_placement(args.placement, prior, camera is not None)
     first, stop = _frames(args, video, placement)
-    corrections = read_corrections(args.corrections, prior, video.count) if args.corrections else []
+    corrections = read_corrections(args.corrections, prior, stop, first) if args.corrections else []
     view = CameraView(camera) if camera else _flat(placement, prior)
     film = _film(args, video, view, placement, prior, (first, stop))
     used = [c for c in corrections if first <= c.frame < first + len(film.times)]
@@ -101,6 +101,11 @@ def _frames(args: argparse.Namespace, video: Video, placement: Placement) -> tup
     """First frame, and the first not used."""
     first = placement.frame if args.start is None else args.start
     stop = video.count if args.stop is None else min(args.stop, video.count)
+    if first >= stop:
+        raise UserError(
+            f"{args.input}: has no frame from {first} to before {stop}; its frames are 0 to "
+            f"{video.count - 1}, give other --start and --stop, or another frame in the placement"
+        )
     if not first <= placement.frame < stop:
         raise UserError(
             f"{args.placement}: frame {placement.frame} is not among the frames {first} to {stop - 1}; "

@@ -145,8 +145,10 @@ def _deviation(spread: Fields, key: str, usual: float) -> float:
     return value
 
 
-def read_corrections(path: str | os.PathLike[str], prior: SegmentPrior, stop: int) -> list[Correction]:
-    """Read a corrections file; frames must lie before `stop`.
+def read_corrections(
+    path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0
+) -> list[Correction]:
+    """Read a corrections file: of frames from `first` to before `stop`, each joint of one at most once.
 
     Raises
     ------
@@ -159,17 +161,27 @@ def read_corrections(path: str | os.PathLike[str], prior: SegmentPrior, stop: in
     listed = fields.get("corrections", remedy)
     if not isinstance(listed, list):
         raise fields.fail("corrections", "is not a list", remedy)
-    found = []
+    found: list[Correction] = []
     for number, entry in enumerate(listed, 1):
         if not isinstance(entry, dict):
             raise UserError(f"{path}: correction {number} is no object of keys; {remedy}")
-        found.append(_correction(Fields(f"{path}: correction {number}", entry), prior, stop))
+        fields = Fields(f"{path}: correction {number}", entry)
+        correction = _correction(fields, prior, range(first, stop))
+        twin = next(
+            (i for i, c in enumerate(found, 1) if (c.frame, c.joint) == (correction.frame, correction.joint)),
+            None,
+        )
+        if twin is not None:
+            what = f"points at {correction.joint} in frame {correction.frame}, as correction {twin} does"
+            raise UserError(f"{path}: correction {number} {what}; remove one of them")
+        found.append(correction)
     return found
 
 
-def _correction(fields: Fields, prior: SegmentPrior, stop: int) -> Correction:
+def _correction(fields: Fields, prior: SegmentPrior, frames: range) -> Correction:
     fields.only(("frame", "joint", "uv", "sd_px"))
-    frame = fields.integer("frame", 0, stop - 1, "give a frame of the video, from 0")
+    remedy = f"give a frame that is used, {frames[0]} to {frames[-1]}, or other --start and --stop"
+    frame = fields.integer("frame", frames[0], frames[-1], remedy)
     joint = fields.get("joint", "name a joint")
     if joint not in prior.names:
         raise fields.fail("joint", f"is {joint!r}", f"use one of {' '.join(prior.names)}")
