@@ -126,7 +126,10 @@ def test_all_also_learns_from_what_is_no_walk(walks, tmp_path, capsys):
     assert learn(walks, path, "--segments", "all", "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert len(told["sequences"]) == 4 and told["segments"]["recordings"] == 5
-    assert any("04_01" in line for line in told["left_out"])
+    (line,) = (line for line in told["left_out"] if "04_01" in line)
+    assert line.endswith("(its segments are used all the same)")
+    assert learn(walks, path, "--segments", "learnt", "--json") == 0
+    assert not any("used" in line for line in json.loads(capsys.readouterr().out)["left_out"])
 
 
 def test_recorded_markers_need_files_that_have_them(walks, tmp_path, capsys):

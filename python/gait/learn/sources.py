@@ -142,7 +142,8 @@ def load_all(
                 spool.put(found.channels)
                 sequences.append(replace(found, name=names[i], subject=persons[i], channels=NOT_YET))
             elif told is not None and (files[i][1] or outcome.motion is not None):
-                refused.append(str(told))
+                whole = outcome.motion is None or corpus is None
+                refused.append(f"{told}" if whole else f"{told} (its segments are used all the same)")
             elif told is not None:
                 raise told
             progress(i + 1)
