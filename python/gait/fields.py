@@ -106,3 +106,21 @@ def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     if not isinstance(data, dict):
         raise UserError(f"{path}: holds no JSON object; the {what} is an object of keys in braces")
     return Fields(str(path), data)
+
+
+def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Column `frame` of a table, whose rows start in line 2, as numbers of frames.
+
+    Raises
+    ------
+    UserError
+        If they are not whole numbers that increase, with the first such line.
+    """
+    wrong = column != column.round()
+    wrong[1:] |= np.diff(column) <= 0
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        raise UserError(
+            f"{path}: line {i + 2}: frame is {column[i]:g}; it must be whole numbers that increase"
+        )
+    return column.astype(np.int64)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
+from gait.fields import frame_numbers
 from gait.files import replacing
 from gait.skeleton import EVAL15, JOINTS
 from gait.tracker import Estimate
@@ -182,7 +183,7 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
         places={name: table.vectors(name, "xyz") for name in JOINTS},
         status=status,
         phase=phase,
-        sd={name: table.vectors(name, ("sx", "sy", "sz")) for name in JOINTS},
+        sd={name: table.deviations(name) for name in JOINTS},
         numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
     )
 
@@ -230,11 +231,18 @@ class _Table:
                 raise UserError(f"{self.path}: line {i + 2}: {name} is {cell!r}; give a finite number")
         return values
 
+    def deviations(self, joint: str) -> Array:
+        sd = self.vectors(joint, ("sx", "sy", "sz"))
+        if (sd < 0).any():
+            i, axis = np.argwhere(sd < 0)[0]
+            cell = f"{joint}_s{'xyz'[axis]} is {sd[i, axis]:g}"
+            raise UserError(
+                f"{self.path}: line {i + 2}: {cell}; a standard deviation is 0 or more, write the file anew"
+            )
+        return sd
+
     def vectors(self, joint: str, axes: str | tuple[str, ...]) -> Array:
         return np.stack([self.numbers(f"{joint}_{axis}") for axis in axes], axis=1)
 
     def frames(self) -> NDArray[np.int64]:
-        frames = self.numbers("frame")
-        if (frames != frames.round()).any() or (np.diff(frames) <= 0).any():
-            raise UserError(f"{self.path}: frame must be whole numbers that increase")
-        return frames.astype(np.int64)
+        return frame_numbers(self.path, self.numbers("frame"))

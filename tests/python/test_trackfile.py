@@ -120,7 +120,10 @@ def spoil(path, change):
             "line 4: phase is 'nan'; give a finite",
         ),
         (lambda s: s.__setitem__(0, s[0].replace("l_knee_sx", "x")), "column l_knee_sx is missing"),
-        (lambda s: s.__setitem__(2, "9" + s[2][2:]), "frame must be whole numbers that increase"),
+        (
+            lambda s: s.__setitem__(2, "9" + s[2][2:]),
+            r"line \d+: frame is \d+; it must be whole numbers that increase",
+        ),
         (lambda s: s.__delitem__(slice(1, None)), "has no rows"),
     ],
 )
@@ -128,6 +131,21 @@ def test_damaged_tracks_are_told(change, words, tmp_path):
     write(tmp_path / "t.csv")
     spoil(tmp_path / "t.csv", change)
     with pytest.raises(UserError, match=f"t.csv: {words}"):
+        read_track(tmp_path / "t.csv")
+
+
+def test_a_negative_deviation_is_named(tmp_path):
+    write(tmp_path / "t.csv")
+
+    def negate(lines):
+        cells = lines[2].split(",")
+        cells[lines[0].split(",").index("l_knee_sy")] = "-0.25"
+        lines[2] = ",".join(cells)
+
+    spoil(tmp_path / "t.csv", negate)
+    with pytest.raises(
+        UserError, match=r"t.csv: line 3: l_knee_sy is -0.25; a standard deviation is 0 or more"
+    ):
         read_track(tmp_path / "t.csv")
 
 

@@ -12,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
+from gait.fields import frame_numbers
 from gait.files import replacing
 from gait.frame import Joints
 
 Array = NDArray[np.float64]
 
 LEAST_CONFIDENCE = 0.1  # points below it count as not seen
+
+LONGEST_STEP = 1.0  # seconds between frames; so long a step is a cycle of walking
 
 
 @dataclass(frozen=True)
@@ -97,12 +100,13 @@ def read(
     if not names:
         raise UserError(f"{path}: no point of the model; rename them to {' '.join(known)}")
     numbers = _Numbers(path, columns, rows)
-    frame, time = numbers.required("frame"), numbers.required("time")
-    if (frame != frame.round()).any() or (np.diff(frame) <= 0).any():
-        raise UserError(f"{path}: frame must be whole numbers that increase")
+    frame, time = frame_numbers(path, numbers.required("frame")), numbers.required("time")
     if (np.diff(time) <= 0).any():
         line = int(np.argmax(np.diff(time) <= 0)) + 3
         raise UserError(f"{path}: line {line}: time does not increase; give seconds")
+    if len(time) > 1 and np.median(np.diff(time)) >= LONGEST_STEP:
+        step = f"time goes on by {np.median(np.diff(time)):g} from frame to frame"
+        raise UserError(f"{path}: {step}; give seconds, not milliseconds or frames")
     uv = np.stack([np.stack([numbers.column(f"{n}_{a}") for a in "uv"], axis=1) for n in names], axis=1)
     half = np.isfinite(uv[..., 0]) != np.isfinite(uv[..., 1])
     if half.any():
@@ -112,7 +116,7 @@ def read(
     uv[confidence < LEAST_CONFIDENCE] = np.nan
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
-    return Tracks(frame.astype(np.int64), time, tuple(names), uv, confidence), ignored
+    return Tracks(frame, time, tuple(names), uv, confidence), ignored
 
 
 def write(path: str | os.PathLike[str], tracks: Tracks) -> None:
