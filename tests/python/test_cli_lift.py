@@ -153,3 +153,21 @@ def test_blending_needs_every_segment(folder, capsys):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--method", "blend"]
     assert main(command) == 1
     assert "use --method smooth" in capsys.readouterr().err
+
+
+def test_one_wild_point_changes_little(folder, capsys):
+    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
+    row = int(np.flatnonzero(tracks.seen[1:-1, 3])[4]) + 1
+    uv = tracks.uv.copy()
+    uv[row, 3] += 20
+    write("wild.csv", replace(tracks, uv=uv))
+    command = ["-m", "m.gait", "--camera", "cam.json", "--pixel-sd", "1", "--json"]
+    assert main(["lift", "wild.csv", *command, "-o", "wild.out.csv"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["jumps"] == 1
+    assert f"{tracks.names[3]} in frame {tracks.frame[row]} (--keep-jumps)" in said.err
+    assert main(["lift", "t.csv", *command, "-o", "out.csv"]) == 0
+    far = np.linalg.norm(lifted("wild.out.csv", tracks.names) - lifted("out.csv", tracks.names), axis=2)
+    assert far.max() < 0.1
+    assert main(["lift", "wild.csv", *command, "-o", "kept.csv", "--keep-jumps"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["jumps"] == 0

@@ -30,7 +30,7 @@ from gait.cli import lift_video, values
 from gait.errors import UsageError
 from gait.files import require_writable
 from gait.learn.stage import one_thread
-from gait.lift import lifted_file, motion, tracks_file
+from gait.lift import lifted_file, motion, outliers, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
@@ -40,7 +40,8 @@ from gait.trc import write_trc
 NAME = "lift"
 HELP = "2-D joint tracks, or a video, to 3-D"
 
-_ONLY_TRACKS = ("orthographic", "metres_per_unit", "trc", "ignore_unknown", "height")
+_ONLY_TRACKS = ("orthographic", "metres_per_unit", "trc", "ignore_unknown", "keep_jumps", "height")
+MOST_JUMPS = 5  # named
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,6 +83,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--no-contact", action="store_true", help="smooth: feet on the ground may slide")
     group.add_argument("--no-bones", action="store_true", help="smooth: bones may change their length")
     group.add_argument("--ignore-unknown", action="store_true", help="leave out points the model has not")
+    group.add_argument(
+        "--keep-jumps",
+        action="store_true",
+        help="keep points that are far from where they were a frame before and after",
+    )
     group.add_argument("--trc", metavar="O.trc", help="also write the places for OpenSim")
     lift_video.add_arguments(parser)
 
@@ -98,6 +104,11 @@ def run(args: argparse.Namespace) -> int:
     tracks, ignored = tracks_file.read(args.input, prior.names, args.ignore_unknown)
     if ignored and not args.quiet:
         print(f"left out: {' '.join(ignored)}", file=sys.stderr)
+    jumps: list[tuple[int, str]] = []
+    if not args.keep_jumps:
+        tracks, jumps = outliers.without_jumps(tracks, args.pixel_sd)
+    if jumps and not args.quiet:
+        print(_jumped(jumps), file=sys.stderr)
     names = motion.output_names(prior, tracks, args.all_markers)
     options = motion.Options(
         args.method, args.height, args.pixel_sd, args.floor_sd, not args.no_contact, not args.no_bones
@@ -117,9 +128,16 @@ def run(args: argparse.Namespace) -> int:
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
-    summary = _summary(args, tracks, found)
+    summary = _summary(args, tracks, found) | {"jumps": len(jumps)}
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
+
+
+def _jumped(jumps: list[tuple[int, str]]) -> str:
+    """Name the points that were taken out."""
+    named = ", ".join(f"{name} in frame {frame}" for frame, name in jumps[:MOST_JUMPS])
+    more = f" and {len(jumps) - MOST_JUMPS} more" if len(jumps) > MOST_JUMPS else ""
+    return f"left out, far from where they were a frame before and after: {named}{more} (--keep-jumps)"
 
 
 def _check(args: argparse.Namespace) -> None:

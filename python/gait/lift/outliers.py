@@ -1,0 +1,57 @@
+"""Single points of 2-D tracks that a detector put elsewhere for a frame or two."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.lift.tracks_file import Tracks
+
+Array = NDArray[np.float64]
+
+LIMIT = 8.0  # deviations from the line between neighbours beyond which a point is no noise
+SPREAD = 1.4826  # median absolute deviation to standard deviation, normal noise
+PAIR = np.sqrt(1.5)  # sd of a point against the middle of its neighbours, over that of one point
+
+
+def without_jumps(tracks: Tracks, sd: float) -> tuple[Tracks, list[tuple[int, str]]]:
+    """Take out points that lie far off the line between the same point's neighbours in time.
+
+    The measure of a point is the larger of the noise `sd` (pixels) and the median of its own distances from
+    that line, which holds its acceleration.  The furthest goes first, because it bends its neighbours' lines.
+
+    Returns
+    -------
+    tracks : Tracks
+        With these points not seen.
+    jumps : list of (frame, name)
+        In the order of time.
+    """
+    uv = tracks.uv.copy()
+    gone: list[tuple[int, str]] = []
+    for j, name in enumerate(tracks.names):
+        gone += [(int(tracks.frame[t]), name) for t in _clear(tracks.time, uv[:, j], sd)]
+    return replace(tracks, uv=uv), sorted(gone)
+
+
+def _clear(time: Array, uv: Array, sd: float) -> list[int]:
+    """Set the jumps of one point (T, 2) to NaN; returns their rows."""
+    gone: list[int] = []
+    while (seen := np.flatnonzero(np.isfinite(uv).all(axis=1))).size >= 5:
+        distance = _off_line(time[seen], uv[seen])
+        scale = max(PAIR * sd, SPREAD * float(np.median(distance)))
+        worst = int(distance.argmax())
+        if distance[worst] <= LIMIT * scale:
+            break
+        gone.append(int(seen[worst]))
+        uv[seen[worst]] = np.nan
+    return gone
+
+
+def _off_line(time: Array, uv: Array) -> Array:
+    """Distance of each place (n, 2) from the line between its neighbours at its time; the ends: 0."""
+    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
+    inner = uv[1:-1] - (1 - share) * uv[:-2] - share * uv[2:]
+    return np.pad(np.hypot(*inner.T), 1)

@@ -1,0 +1,48 @@
+"""Points that jump are taken out of 2-D tracks, quick motion is not."""
+
+import numpy as np
+import pytest
+
+from gait.lift.outliers import without_jumps
+from gait.lift.tracks_file import Tracks
+
+
+def swinging(rate: float, frames: int = 60, seed: int = 4) -> Tracks:
+    """A foot and a wrist that swing by 60 and 40 pixels once a second, 3 px of noise."""
+    time = np.arange(frames) / rate
+    turn = 2 * np.pi * time[:, None]
+    u = 300 + 30 * time[:, None] + np.array([60, 40]) * np.sin(turn)
+    v = 200 + np.array([20, 10]) * np.cos(turn) + np.zeros((1, 2))
+    uv = np.stack([u, v], axis=2) + np.random.default_rng(seed).normal(0, 3, (frames, 2, 2))
+    return Tracks(np.arange(frames), time, ("l_ankle", "r_wrist"), uv, np.ones((frames, 2)))
+
+
+@pytest.mark.parametrize("rate", [10, 30, 60])
+def test_quick_motion_stays(rate):
+    tracks = swinging(rate)
+    kept, jumps = without_jumps(tracks, 3.0)
+    assert jumps == []
+    np.testing.assert_array_equal(kept.uv, tracks.uv)
+
+
+@pytest.mark.parametrize("off", [(80, 0), (0, -150), (-1000, 1000)])
+def test_a_jump_is_taken_out_and_named(off):
+    tracks = swinging(30)
+    tracks.uv[20, 1] += off
+    kept, jumps = without_jumps(tracks, 3.0)
+    assert jumps == [(20, "r_wrist")]
+    assert np.isnan(kept.uv[20, 1]).all() and kept.seen.sum() == tracks.seen.sum() - 1
+
+
+def test_many_jumps_beside_gaps():
+    tracks = swinging(30)
+    tracks.uv[[5, 17, 18, 40], 0] = 0.0
+    tracks.uv[30:36, 1] = np.nan
+    _, jumps = without_jumps(tracks, 3.0)
+    assert jumps == [(5, "l_ankle"), (17, "l_ankle"), (18, "l_ankle"), (40, "l_ankle")]
+
+
+def test_few_points_are_left_alone():
+    tracks = swinging(30, frames=4)
+    tracks.uv[1] += 500
+    assert without_jumps(tracks, 3.0)[1] == []
