@@ -71,6 +71,16 @@ def test_views_the_other_way(folder, axis, vector):
     assert (folder / "a.csv").read_bytes() != (folder / "c.csv").read_bytes()
 
 
+@pytest.mark.parametrize(("share", "milli"), [(1 / 640, 1), (1, 1000)])
+def test_other_units_are_told(folder, capsys, share, milli):
+    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4).names)
+    write("u.csv", replace(tracks, uv=tracks.uv * share, time=tracks.time * milli))
+    assert main(["lift", "u.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json"]) == 1
+    words = capsys.readouterr().err
+    assert "u.csv: " in words and ("give pixels" if share < 1 else "give seconds") in words
+    assert not (folder / "out.csv").exists()
+
+
 def test_a_view_without_its_axis(folder, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["lift", "t.csv", "--orthographic", "-o", "a.csv"])
@@ -171,3 +181,11 @@ def test_one_wild_point_changes_little(folder, capsys):
     assert far.max() < 0.1
     assert main(["lift", "wild.csv", *command, "-o", "kept.csv", "--keep-jumps"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["jumps"] == 0
+
+
+def test_a_camera_that_cannot_be_is_said(folder, capsys):
+    camera = json.loads((folder / "cam.json").read_text())
+    (folder / "long.json").write_text(json.dumps(camera | {"fx": 6e7, "fy": 6e7}))
+    code = main(["lift", "t.csv", "-m", "m.gait", "--camera", "long.json", "-o", "long.csv"])
+    said = capsys.readouterr().err
+    assert code == 1 or "do not rely on it" in said

@@ -77,6 +77,18 @@ def test_unknown_points_can_be_left_out(tmp_path):
         read(path, ("l_wrist",), ignore_unknown=True)
 
 
+def test_points_within_their_noise_tell_nothing():
+    uv = np.random.default_rng(1).uniform(0, 1, (4, 2, 2))
+    tracks = Tracks(np.arange(4), np.arange(4) / 20, KNOWN[:2], uv, np.ones((4, 2)))
+    with pytest.raises(
+        UserError, match=r"t.csv: all u and v lie within 0\.\d+, less than .* of 3; give pixels"
+    ):
+        tracks.require_spread("t.csv", 3.0)
+    tracks.require_spread("t.csv", 0.01)
+    uv[:, 1] = np.nan  # one alone may stand still
+    tracks.require_spread("t.csv", 3.0)
+
+
 def test_missing_file():
     with pytest.raises(UserError, match="no such file"):
         read("nowhere.csv", KNOWN)

@@ -27,7 +27,7 @@ import numpy as np
 
 from gait.camera import Camera
 from gait.cli import lift_video, values
-from gait.errors import UsageError
+from gait.errors import UsageError, UserError
 from gait.files import require_writable
 from gait.learn.stage import one_thread
 from gait.lift import lifted_file, motion, outliers, tracks_file
@@ -42,6 +42,7 @@ HELP = "2-D joint tracks, or a video, to 3-D"
 
 _ONLY_TRACKS = ("orthographic", "metres_per_unit", "trc", "ignore_unknown", "keep_jumps", "height")
 MOST_JUMPS = 5  # named
+FAR = 4.0  # noise alone gives a median of 1.2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     prior = SegmentPrior.load(args.model)
     tracks, ignored = tracks_file.read(args.input, prior.names, args.ignore_unknown)
+    tracks.require_spread(args.input, args.pixel_sd)
     if ignored and not args.quiet:
         print(f"left out: {' '.join(ignored)}", file=sys.stderr)
     jumps: list[tuple[int, str]] = []
@@ -124,7 +126,18 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     if not found.settled and not args.quiet:
-        print(f"the estimate did not come to rest in {found.steps} iterations", file=sys.stderr)
+        print(
+            f"the estimate did not come to rest in {found.steps} iterations: do not rely on it",
+            file=sys.stderr,
+        )
+    if not np.isfinite(found.error).any():
+        raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
+    if (far := float(np.nanmedian(found.error)) / args.pixel_sd) > FAR and not args.quiet:
+        print(
+            f"the estimate is {far:.0f} times --pixel-sd from what was seen: do not rely on it; check the "
+            "camera, the names of the points and --pixel-sd",
+            file=sys.stderr,
+        )
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
@@ -189,7 +202,7 @@ def _text(s: dict[str, Any]) -> str:
     lines = [
         f"{s['frames']} frames, {len(markers['seen'])} points seen in {s['seen_share']:.0%} of them, "
         f"{len(markers['estimated'])} estimated",
-        f"{s['reprojection_px']:.2f} from what was seen, median sd {s['sd_mm']:.0f} mm, "
+        f"{s['reprojection_px']:.2f} px from what was seen, median sd {s['sd_mm']:.0f} mm, "
         f"stature {s['stature_m']:.2f} m",
     ]
     if s["method"] == "smooth":

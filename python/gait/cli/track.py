@@ -168,7 +168,9 @@ def _joints(args: argparse.Namespace, model: Model, frames: range) -> dict[int, 
         print(f"left out: {' '.join(ignored)}", file=sys.stderr)
     if not any(frame in frames for frame in tracks.frame.tolist()):
         raise UserError(f"{args.tracks}: has no frame that is tracked; number frames as in the video, from 0")
-    return tracks.joints(args.tracks_sd or TRACKS_SD)
+    sd = args.tracks_sd or TRACKS_SD
+    tracks.require_spread(args.tracks, sd)
+    return tracks.joints(sd)
 
 
 def _start(

@@ -52,6 +52,16 @@ class Tracks:
         """Which points are seen, shape (T, J)."""
         return np.asarray(np.isfinite(self.uv).all(axis=2))
 
+    def require_spread(self, path: str | os.PathLike[str], sd: float) -> None:
+        """Raise UserError if several points all lie within `sd`: they are not in its unit, and tell nothing."""
+        seen = self.uv[self.seen]
+        spread = float(np.ptp(seen, axis=0).max())
+        if self.seen.any(axis=0).sum() > 1 and spread <= sd:
+            raise UserError(
+                f"{path}: all u and v lie within {spread:.3g}, less than their noise of {sd:g}; give pixels, "
+                "not shares of the picture, or the noise in their unit"
+            )
+
     def deviations(self, sd: float) -> Array:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
         return np.where(self.seen, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
