@@ -53,7 +53,7 @@ class Tracks:
         return np.asarray(np.isfinite(self.uv).all(axis=2))
 
     def require_spread(self, path: str | os.PathLike[str], sd: float) -> None:
-        """Raise UserError if several points all lie within `sd`: they are not in its unit, and tell nothing."""
+        """Raise UserError if several points all lie within `sd`: not in its unit, they tell nothing."""
         seen = self.uv[self.seen]
         spread = float(np.ptp(seen, axis=0).max())
         if self.seen.any(axis=0).sum() > 1 and spread <= sd:
