@@ -122,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
     if found.resized != 1 and not args.quiet:
         print(
             f"the motion's size was told by the bones ({found.resized:.2f} times the fit's): it is unlike "
-            "those learnt, or the camera is wrong; deviations are wide",
+            "those learnt, or the camera is wrong; deviations are wide, do not rely on the places",
             file=sys.stderr,
         )
     if not found.settled and not args.quiet:
