@@ -70,8 +70,8 @@ NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inl
 
 # Kernels (libgait/src/kernels.h) are compiled once per instruction set; `scalar` defines their results.
 # gcc at -O3 would unroll every loop over 16 lanes besides making vector code of it: half as large again, no faster.
-FAST_FLAGS := $(if $(GCC),--param=max-completely-peel-times=8)
-SMALL_FLAGS := $(if $(SMALL),$(SMALL) -ftree-vectorize $(if $(GCC),-fvect-cost-model=dynamic))
+FAST_FLAGS := $(if $(GCC),--param=max-completely-peel-times=8,-Wno-pass-failed)
+SMALL_FLAGS := $(if $(SMALL),$(SMALL) -ftree-vectorize $(if $(GCC),-fvect-cost-model=dynamic)) $(if $(GCC),,-Wno-pass-failed)
 KERNEL_FLAGS = $(if $(filter $(FAST),$(notdir $(1))),$(FAST_FLAGS),$(SMALL_FLAGS))
 FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
 FLAGS_base   :=
