@@ -6,6 +6,7 @@ enum {
     SETTLE = 8,              /* steps until step_us shows what another number of particles takes */
     TOO_MANY = 3,            /* frames dropped between two looks */
     CALM = 90,               /* steps that are fast before the number doubles */
+    RETRY = 4,               /* frames refused for the last step's time alone before one is tried again */
 };
 
 int64_t budget_birth(int64_t capture_utime, int64_t arrival_utime)
@@ -16,9 +17,13 @@ int64_t budget_birth(int64_t capture_utime, int64_t arrival_utime)
 
 bool budget_allows(budget *b, int64_t birth, int64_t now)
 {
-    int64_t const left = b->limit_us - b->step_us, least = b->limit_us / 4;
-    if (b->limit_us == 0 || now - birth <= (left > least ? left : least))
+    int64_t const left = b->limit_us - b->step_us, least = b->limit_us / 4, age = now - birth;
+    bool const try = age <= b->limit_us && b->refused >= RETRY;
+    if (b->limit_us == 0 || age <= (left > least ? left : least) || try) {
+        b->refused = 0;
         return true;
+    }
+    b->refused++;
     b->late++;
     budget_missed(b);
     return false;

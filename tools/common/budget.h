@@ -10,6 +10,7 @@ typedef struct budget {
     int64_t step_us;    /* what a step has taken lately */
     int32_t steps;      /* since the last choice or look at `dropped` */
     int32_t dropped;    /* frames since then */
+    int32_t refused;    /* frames in a row */
     int32_t calm;       /* steps in a row that took less than a quarter of the limit */
     int32_t slow;       /* steps in a row that alone took longer than the limit */
     bool hopeless;      /* so many that it was said */
@@ -21,7 +22,8 @@ typedef struct budget {
 int64_t budget_birth(int64_t capture_utime, int64_t arrival_utime);
 
 /* Can a frame that was born at `birth` still be tracked in time?  At least a quarter of the limit is left for the
- * way to here, so that something is tracked even where a step takes longer than the limit. */
+ * way to here, and after a few frames refused in a row one is tried that is not older than the limit itself, so that
+ * something is tracked even where a step takes longer. */
 bool budget_allows(budget *b, int64_t birth, int64_t now);
 
 /* A frame was dropped because another waits behind it. */
