@@ -117,33 +117,31 @@ def run(args: argparse.Namespace) -> int:
     )
     with one_thread(), progress("segments", motion.segments_of(prior, tracks), args.quiet) as update:
         found = motion.lift(prior, tracks, _view(args, tracks), options, names, update)
-    if found.wider > 1 and not args.quiet:
-        print(f"not a motion like those learnt: the prior was widened {found.wider:g} times", file=sys.stderr)
-    if found.resized != 1 and not args.quiet:
-        print(
-            f"the motion's size was told by the bones ({found.resized:.2f} times the fit's): it is unlike "
-            "those learnt, or the camera is wrong; deviations are wide, do not rely on the places",
-            file=sys.stderr,
-        )
-    if not found.settled and not args.quiet:
-        print(
-            f"the estimate did not come to rest in {found.steps} iterations: do not rely on it",
-            file=sys.stderr,
-        )
     if not np.isfinite(found.error).any():
         raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
-    if (far := float(np.nanmedian(found.error)) / args.pixel_sd) > FAR and not args.quiet:
-        print(
-            f"the estimate is {far:.0f} times --pixel-sd from what was seen: do not rely on it; check the "
-            "camera, the names of the points and --pixel-sd",
-            file=sys.stderr,
-        )
+    if not args.quiet:
+        for words in _doubts(found, args.pixel_sd):
+            print(words, file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
     summary = _summary(args, tracks, found) | {"jumps": len(jumps)}
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
+
+
+def _doubts(found: motion.Motion, pixel_sd: float) -> list[str]:
+    """Why the result may be wrong, a line each."""
+    far = float(np.nanmedian(found.error)) / pixel_sd
+    doubts = {
+        f"not a motion like those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
+        f"the motion's size was told by the bones ({found.resized:.2f} times the fit's): it is unlike those "
+        "learnt, or the camera is wrong; deviations are wide, do not rely on the places": found.resized != 1,
+        f"the estimate did not rest in {found.steps} iterations: do not rely on it": not found.settled,
+        f"the estimate is {far:.0f} times --pixel-sd from what was seen: do not rely on it; check camera, "
+        "the names of the points and --pixel-sd": far > FAR,
+    }
+    return [words for words, holds in doubts.items() if holds]
 
 
 def _jumped(jumps: list[tuple[int, str]]) -> str:
