@@ -6,8 +6,8 @@
 enum { LAYERS_ROWS = 4 }; /* the grid is drawn in bands of so many rows */
 
 typedef struct layers {
-    rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; [first, last) are whole bands, others are not written */
-    rast_mask whole;                    /* the body; the same */
+    rast_mask whole;                    /* the body; [first, last) are whole bands, others are not written */
+    rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; the same */
 } layers;
 
 typedef struct layers_limb { /* a limb's polygon in the grid, in the bodies of a block */
@@ -17,11 +17,11 @@ typedef struct layers_limb { /* a limb's polygon in the grid, in the bodies of a
 } layers_limb;
 
 typedef struct layers_block {
-    layers_limb limb[MODEL_MAX_LIMBS];
     int32_t vertices[MODEL_MAX_LIMBS];
     int32_t count;                         /* limbs */
     int32_t drawn[BLOCK];                  /* of them in front of the camera */
     uint8_t order[BLOCK][MODEL_MAX_LIMBS]; /* from near to far; equal depths by index */
+    _Alignas(GAIT_ALIGN) layers_limb limb[MODEL_MAX_LIMBS];
 } layers_block;
 
 /* Limb indices from near to far by depth[l * stride]; limbs behind the camera (depth 0) are left out.

@@ -43,14 +43,14 @@ static void limb_edges(const float x[][BLOCK], const float y[][BLOCK], int32_t n
 }
 
 /* Each limb's place from near to far, by counting those before it. */
-static void depth_order(const float depth[][BLOCK], int32_t count, layers_block *restrict out)
+static void depth_order(const outline_lanes *limb, int32_t count, layers_block *restrict out)
 {
     float key[MODEL_MAX_LIMBS][BLOCK];
     memset(out->drawn, 0, sizeof out->drawn);
     for (int32_t l = 0; l < count; l++)
         for (int32_t i = 0; i < BLOCK; i++) {
-            int32_t const front = depth[l][i] > 0.0f;
-            key[l][i] = front ? f_min(depth[l][i], FLT_MAX) : INFINITY;
+            int32_t const front = limb[l].depth[i] > 0.0f;
+            key[l][i] = front ? f_min(limb[l].depth[i], FLT_MAX) : INFINITY;
             out->drawn[i] += front;
         }
     for (int32_t l = 0; l < count; l++) {
@@ -72,9 +72,9 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
     out->count = count;
     for (int32_t l = 0; l < count; l++) {
         out->vertices[l] = outline_vertices(&limbs[l]);
-        limb_edges(outline->x[l], outline->y[l], out->vertices[l], &out->limb[l]);
+        limb_edges(outline->limb[l].x, outline->limb[l].y, out->vertices[l], &out->limb[l]);
     }
-    depth_order(outline->depth, count, out);
+    depth_order(outline->limb, count, out);
 }
 
 /* ---- masks, lanes are rows, or their words where that fills a vector better ---- */

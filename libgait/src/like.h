@@ -35,12 +35,15 @@ typedef struct like_surface {
     float side[3][LIKE_AZIMUTHS]; /* the first half of the directions */
 } like_surface;
 
-/* Limbs of BLOCK bodies before one camera. */
+typedef struct like_pose_limb { /* one limb of BLOCK bodies before a camera */
+    float R[9][BLOCK];          /* its frame to camera */
+    float t[3][BLOCK];          /* its origin in the camera, metres */
+    float scale[BLOCK];
+    int32_t turn[BLOCK]; /* first of the LIKE_AZIMUTHS directions that can face the camera */
+} like_pose_limb;
+
 typedef struct like_pose {
-    float R[MODEL_MAX_LIMBS][9][BLOCK]; /* limb's frame to camera */
-    float t[MODEL_MAX_LIMBS][3][BLOCK]; /* its origin in the camera, metres */
-    float scale[MODEL_MAX_LIMBS][BLOCK];
-    int32_t turn[MODEL_MAX_LIMBS][BLOCK]; /* first of the LIKE_AZIMUTHS directions that can face the camera */
+    like_pose_limb limb[MODEL_MAX_LIMBS];
 } like_pose;
 
 /* What the half of a limb that is turned to the camera looks like. */

@@ -9,12 +9,12 @@ typedef struct sides { /* of each point's side, from 0 to 1, and how far along i
     float middle_x, middle_y; /* inside the limb */
 } sides;
 
-static inline void cone(const outline_block *o, int32_t l, int32_t lane, sides *restrict out)
+static inline void cone(const outline_lanes *o, int32_t lane, sides *restrict out)
 {
     float x[4], y[4], mx = 0.0f, my = 0.0f;
     for (int32_t k = 0; k < 4; k++) {
-        x[k] = o->x[l][k][lane];
-        y[k] = o->y[l][k][lane];
+        x[k] = o->x[k][lane];
+        y[k] = o->y[k][lane];
         mx += 0.25f * x[k];
         my += 0.25f * y[k];
     }
@@ -30,13 +30,13 @@ static inline void cone(const outline_block *o, int32_t l, int32_t lane, sides *
     out->middle_y = my;
 }
 
-static inline void ellipsoid(const outline_block *o, int32_t l, int32_t lane, sides *restrict out)
+static inline void ellipsoid(const outline_lanes *o, int32_t lane, sides *restrict out)
 {
     for (int32_t i = 0; i < LANES; i++) {
-        out->x0[i] = o->x[l][i & 7][lane];
-        out->y0[i] = o->y[l][i & 7][lane];
-        out->x1[i] = o->x[l][(i + 1) & 7][lane];
-        out->y1[i] = o->y[l][(i + 1) & 7][lane];
+        out->x0[i] = o->x[i & 7][lane];
+        out->y0[i] = o->y[i & 7][lane];
+        out->x1[i] = o->x[(i + 1) & 7][lane];
+        out->y1[i] = o->y[(i + 1) & 7][lane];
         out->share[i] = i < 8 ? 0.25f : 0.75f;
     }
     out->middle_x = 0.5f * (out->x0[0] + out->x0[4]);
@@ -110,19 +110,19 @@ static inline void respond(const edge_cell *edge, const spots *p, sums *restrict
 
 void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
 {
-    const outline_block *const o = b->outline;
     const rast_mask *mask[MODEL_MAX_LIMBS];
     spots p[MODEL_MAX_LIMBS];
     sums sum = {{0}, {0}, {0}};
     int32_t n = 0;
     for (int32_t l = 0; l < b->setup->limbs; l++) {
+        const outline_lanes *const o = &b->outline->limb[l];
         sides s;
-        if (!(o->depth[l][b->lane] > 0.0f))
+        if (!(o->depth[b->lane] > 0.0f))
             continue;
         if (b->setup->geometry[l].shape == LIMB_ELLIPSOID)
-            ellipsoid(o, l, b->lane, &s);
+            ellipsoid(o, b->lane, &s);
         else
-            cone(o, l, b->lane, &s);
+            cone(o, b->lane, &s);
         mask[n] = &b->layers->visible[l];
         place(&s, mask[n], &p[n]);
         n++;

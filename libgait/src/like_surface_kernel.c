@@ -36,18 +36,19 @@ void KERNEL(surface_pose)(const like_setup *s, const gait_camera *cam, const kin
 {
     for (int32_t l = 0; l < s->limbs; l++) {
         int32_t const f = s->geometry[l].frame;
+        like_pose_limb *const to = &out->limb[l];
         for (int32_t r = 0; r < 3; r++) {
             const float *const c = cam->R + 3 * r;
             for (int32_t k = 0; k < 3; k++)
                 for (int32_t i = 0; i < BLOCK; i++)
-                    out->R[l][3 * r + k][i] =
+                    to->R[3 * r + k][i] =
                         c[0] * body->R[f][k][i] + c[1] * body->R[f][3 + k][i] + c[2] * body->R[f][6 + k][i];
             for (int32_t i = 0; i < BLOCK; i++)
-                out->t[l][r][i] =
+                to->t[r][i] =
                     c[0] * body->o[f][0][i] + c[1] * body->o[f][1][i] + c[2] * body->o[f][2][i] + cam->t[r];
         }
-        memcpy(out->scale[l], body->scale[f], sizeof out->scale[l]);
-        choose_half(&s->surface[l], out->R[l], out->t[l], out->scale[l], out->turn[l]);
+        memcpy(to->scale, body->scale[f], sizeof to->scale);
+        choose_half(&s->surface[l], to->R, to->t, to->scale, to->turn);
     }
 }
 
@@ -56,17 +57,17 @@ typedef struct spots {                      /* where the points of half a limb a
     int32_t shown[LIKE_FACING];             /* -1: faces the camera well enough, in the image; otherwise 0 */
 } spots;
 
-static inline void place(const like_surface *s, const like_pose *pose, int32_t l, int32_t lane,
+static inline void place(const like_surface *s, const like_pose_limb *pose, int32_t lane,
                          const gait_camera *cam, const view_map *map, spots *restrict out)
 {
     float const min_facing = 0.2f; /* |n.v| below which a point grazes the outline */
-    float const scale = pose->scale[l][lane];
-    int32_t const first = 2 * pose->turn[l][lane];
+    float const scale = pose->scale[lane];
+    int32_t const first = 2 * pose->turn[lane];
     float R[9], t[3];
     for (int32_t k = 0; k < 9; k++)
-        R[k] = pose->R[l][k][lane];
+        R[k] = pose->R[k][lane];
     for (int32_t k = 0; k < 3; k++)
-        t[k] = pose->t[l][k][lane];
+        t[k] = pose->t[k][lane];
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++) {
         int32_t const j = first + i;
@@ -136,11 +137,11 @@ void KERNEL(surface_sample)(const like_setup *s, const features *f, const gait_c
 {
     spots p[MODEL_MAX_LIMBS];
     for (int32_t l = 0; l < s->limbs; l++)
-        place(&s->surface[l], pose, l, lane, cam, &f->map, &p[l]);
+        place(&s->surface[l], &pose->limb[l], lane, cam, &f->map, &p[l]);
     for (int32_t l = 0; l < s->limbs; l++)
         hide(&drawn->visible[l], &p[l]);
     for (int32_t l = 0; l < s->limbs; l++) {
-        seen[l].turn = (uint8_t)pose->turn[l][lane];
+        seen[l].turn = (uint8_t)pose->limb[l].turn[lane];
         look_up(f, &p[l], seen[l].value);
     }
 }

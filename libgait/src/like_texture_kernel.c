@@ -83,7 +83,7 @@ void KERNEL(texture_logs)(const like_body *b, float *restrict log)
     float facing[MODEL_MAX_LIMBS] = {0};
     compare_limbs(b->seen, b->ancestor, limbs, b->setup->paper ? b->setup->square : b->setup->robust, sum);
     for (int32_t l = 0; l < limbs; l++)
-        facing[l] = b->outline->facing[l][b->lane];
+        facing[l] = b->outline->limb[l].facing[b->lane];
     if (b->setup->paper)
         for (int32_t l = 0; l < whole; l++)
             log[l] = literal(sum[l] / LIKE_COUNT_ONE, sum[l] % LIKE_COUNT_ONE, facing[l]);

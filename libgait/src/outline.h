@@ -24,11 +24,14 @@ typedef struct limb_polygon {
     float facing; /* cosine of the angle between limb and image plane (R16) */
 } limb_polygon;
 
-typedef struct outline_block { /* the same for BLOCK bodies */
-    float x[MODEL_MAX_LIMBS][RAST_MAX_VERTICES][BLOCK];
-    float y[MODEL_MAX_LIMBS][RAST_MAX_VERTICES][BLOCK];
-    float depth[MODEL_MAX_LIMBS][BLOCK];
-    float facing[MODEL_MAX_LIMBS][BLOCK];
+typedef struct outline_lanes { /* the same in BLOCK bodies */
+    float x[RAST_MAX_VERTICES][BLOCK], y[RAST_MAX_VERTICES][BLOCK];
+    float depth[BLOCK], facing[BLOCK];
+} outline_lanes;
+
+/* Here and in what is made of it the limbs come last: a tracker has memory for those of its model only. */
+typedef struct outline_block {
+    outline_lanes limb[MODEL_MAX_LIMBS];
 } outline_block;
 
 static inline int32_t outline_vertices(const limb_geometry *g)

@@ -15,15 +15,14 @@ static part part_of(const limb_geometry *g, const kin_body *body, int32_t lane, 
                   .map = map};
 }
 
-static void store(const limb_polygon *q, int32_t limb, int32_t vertices, int32_t lane,
-                  outline_block *restrict out)
+static void store(const limb_polygon *q, int32_t vertices, int32_t lane, outline_lanes *restrict out)
 {
     for (int32_t k = 0; k < vertices; k++) {
-        out->x[limb][k][lane] = q->x[k];
-        out->y[limb][k][lane] = q->y[k];
+        out->x[k][lane] = q->x[k];
+        out->y[k][lane] = q->y[k];
     }
-    out->depth[limb][lane] = q->depth;
-    out->facing[limb][lane] = q->facing;
+    out->depth[lane] = q->depth;
+    out->facing[lane] = q->facing;
 }
 
 void KERNEL(outline_project)(const limb_geometry *limbs, int32_t count, const kin_body *restrict body,
@@ -39,14 +38,14 @@ void KERNEL(outline_project)(const limb_geometry *limbs, int32_t count, const ki
             part const p = part_of(&g, body, i, &eye, &window);
             limb_polygon q;
             part_ellipsoid(&p, &q);
-            store(&q, l, 8, i, out);
+            store(&q, 8, i, &out->limb[l]);
         }
         else KERNEL_LANES for (int32_t i = 0; i < BLOCK; i++)
         {
             part const p = part_of(&g, body, i, &eye, &window);
             limb_polygon q;
             part_cone(&p, &q);
-            store(&q, l, 4, i, out);
+            store(&q, 4, i, &out->limb[l]);
         }
     }
 }

@@ -20,8 +20,8 @@ typedef struct rast_spans { /* rows first <= y < last; each covers begin[y - top
 } rast_spans;
 
 typedef struct rast_mask { /* bit x of row y; rows outside [first, last) are not written */
+    _Alignas(GAIT_ALIGN) uint64_t row[RAST_SIZE][RAST_WORDS]; /* four rows are one cache line */
     int32_t first, last;
-    uint64_t row[RAST_SIZE][RAST_WORDS];
 } rast_mask;
 
 typedef struct rast_edge { /* crosses rows first <= y < last at columns rast_column(at, slope, y) */

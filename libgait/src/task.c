@@ -2,7 +2,7 @@
 
 #include <stdatomic.h>
 
-enum { SHARES = 8 }; /* of a task, on average: so that none waits long for another */
+enum { SHARES = 32 }; /* of a task, on average: so that none waits long for another */
 
 typedef struct work {
     task_range_fn *fn;

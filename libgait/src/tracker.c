@@ -39,6 +39,24 @@ static void layout_shared(arena *a, gait_tracker *t)
     t->scratch = features_scratch_layout(&planes);
 }
 
+/* Without threads there is but one task.  The lagged estimate uses the first one's scratch; what it needs besides takes
+ * the place of the others'. */
+static void layout_tasks(arena *a, gait_tracker *t)
+{
+    int32_t const tasks = t->cfg.exec.run ? t->cfg.tasks : 1;
+    arena past = {.cap = SIZE_MAX, .solid = true}, others = past;
+    lag_layout_work(&t->past, &past);
+    for (int32_t k = 1; k < tasks; k++)
+        weigh_scratch_layout(&others, t->model, NULL);
+    t->work = TAKE(a, weigh_scratch, tasks);
+    weigh_scratch_layout(a, t->model, t->work);
+    size_t const bytes = past.used > others.used ? past.used : others.used;
+    past = others = (arena){.base = TAKE(a, unsigned char, bytes), .cap = bytes, .solid = true};
+    lag_layout_work(&t->past, &past);
+    for (int32_t k = 1; k < tasks; k++)
+        weigh_scratch_layout(&others, t->model, t->work ? t->work + k : NULL);
+}
+
 static void layout_work(arena *a, gait_tracker *t)
 {
     int32_t const n = t->cfg.particles;
@@ -59,9 +77,7 @@ static void layout_work(arena *a, gait_tracker *t)
         t->seen = TAKE(a, like_patch, (size_t)t->cfg.cameras * limbs);
     for (int32_t c = 0; c < 2 * t->cfg.cameras && wants_texture(&t->cfg); c++)
         t->known[c / t->cfg.cameras][c % t->cfg.cameras] = TAKE(a, int8_t, LIKE_RING *limbs);
-    lag_layout_work(&t->past, a);
-    t->work = TAKE(a, weigh_scratch,
-                   t->cfg.exec.run ? t->cfg.tasks : 1); /* without threads only the first is used */
+    layout_tasks(a, t);
 }
 
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg)

@@ -41,13 +41,13 @@ typedef struct camera_state {
     bool plate_stale;
 } camera_state;
 
-typedef struct weigh_scratch { /* one per task */
+typedef struct weigh_scratch { /* one per task; its arrays hold the model's limbs and points */
     kin_body body;
-    outline_block outline;
-    layers_block edges;
-    like_pose pose;
-    layers layers;
-    float points[GAIT_MAX_JOINTS][3][BLOCK];
+    outline_block *outline;
+    layers_block *edges;
+    like_pose *pose;
+    layers *layers;
+    float (*points)[3][BLOCK];
 } weigh_scratch;
 
 struct gait_tracker {
@@ -78,7 +78,7 @@ struct gait_tracker {
     like_patch *seen;                   /* cameras x limbs: surface of the estimate */
     int8_t *known[2][GAIT_MAX_CAMERAS]; /* template as compared in this frame: limbs x LIKE_RING */
     features_scratch scratch;           /* until the particles are weighed; as joint */
-    weigh_scratch *work;                /* tasks, or 1 without threads */
+    weigh_scratch *work;                /* tasks, or 1 without threads; all but the first as past */
 };
 
 /* Which of the two sides a particle belongs to. */

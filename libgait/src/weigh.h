@@ -4,6 +4,9 @@
 #define GAIT_WEIGH_H
 #include "tracker.h"
 
+/* Place a task's arrays; w NULL: only count. */
+void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w);
+
 /* Move each camera's region to the predicted walker and compute its features.  Returns how many cameras
  * saw. */
 int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted);

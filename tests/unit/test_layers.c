@@ -16,10 +16,10 @@ static void rectangle(int32_t limb, int32_t lane, float x0, float y0, float x1, 
 {
     const float x[4] = {x0, x1, x1, x0}, y[4] = {y0, y0, y1, y1};
     for (int k = 0; k < 4; k++) {
-        outline.x[limb][k][lane] = x[k];
-        outline.y[limb][k][lane] = y[k];
+        outline.limb[limb].x[k][lane] = x[k];
+        outline.limb[limb].y[k][lane] = y[k];
     }
-    outline.depth[limb][lane] = depth;
+    outline.limb[limb].depth[lane] = depth;
 }
 
 static bool bit(const rast_mask *m, int32_t x, int32_t y)
@@ -42,16 +42,17 @@ static int32_t count(const rast_mask *m)
 
 static void test_order(void)
 {
+    enum { NEXT = sizeof(outline_lanes) / sizeof(float) };
     static const float depth[] = {4.0f, 2.0f, 0.0f, 3.0f, 2.0f, -1.0f, 1.0f, NAN};
     static const int32_t want[] = {6, 1, 4, 3, 0};
     int32_t order[MODEL_MAX_LIMBS];
     for (int32_t l = 0; l < 8; l++) {
-        outline.depth[l][5] = depth[l];
-        outline.depth[l][4] = 1.0f;
+        outline.limb[l].depth[5] = depth[l];
+        outline.limb[l].depth[4] = 1.0f;
     }
-    CHECK(layers_order(&outline.depth[0][5], BLOCK, 8, order) == 5);
+    CHECK(layers_order(&outline.limb[0].depth[5], NEXT, 8, order) == 5);
     CHECK(memcmp(order, want, sizeof want) == 0); /* near to far; equal ones by index; none behind */
-    CHECK(layers_order(&outline.depth[0][5], BLOCK, 0, order) == 0);
+    CHECK(layers_order(&outline.limb[0].depth[5], NEXT, 0, order) == 0);
 }
 
 /* Working pixels [20, 60) x [40, 100) are cells [10, 30) x [20, 50). */
@@ -139,8 +140,8 @@ static void test_walker(void)
         for (int32_t l = 0; l < m->limbs; l++) {
             float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES];
             for (int32_t k = 0; k < outline_vertices(&limbs[l]); k++) {
-                x[k] = (outline.x[l][k][lane] - 0.5f) / 2.0f;
-                y[k] = (outline.y[l][k][lane] - 0.5f) / 2.0f;
+                x[k] = (outline.limb[l].x[k][lane] - 0.5f) / 2.0f;
+                y[k] = (outline.limb[l].y[k][lane] - 0.5f) / 2.0f;
             }
             rast_convex(x, y, outline_vertices(&limbs[l]), 0, RAST_SIZE, &alone[l]);
         }
@@ -150,7 +151,8 @@ static void test_walker(void)
                 for (int32_t l = 0; l < m->limbs; l++)
                     if (covers(&alone[l], x, y)) {
                         covering++;
-                        top = top < 0 || outline.depth[l][lane] < outline.depth[top][lane] ? l : top;
+                        top =
+                            top < 0 || outline.limb[l].depth[lane] < outline.limb[top].depth[lane] ? l : top;
                     }
                 for (int32_t l = 0; l < m->limbs; l++)
                     wrong += bit(&drawn.visible[l], x, y) != (l == top);

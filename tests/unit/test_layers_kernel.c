@@ -90,26 +90,36 @@ static float odd(uint32_t index, uint32_t draw)
                            : (float)(r[2] % 300000) / 1000.0f - 20.0f;
 }
 
+static void odd_limb(uint32_t l, uint32_t round, outline_lanes *out)
+{
+    for (uint32_t k = 0; k < RAST_MAX_VERTICES; k++)
+        for (uint32_t lane = 0; lane < BLOCK; lane++) {
+            uint32_t const i = (l * RAST_MAX_VERTICES + k) * BLOCK + lane;
+            out->x[k][lane] = odd(i, 4 * round);
+            out->y[k][lane] = odd(i, 4 * round + 1);
+        }
+    for (uint32_t lane = 0; lane < BLOCK; lane++) {
+        uint32_t const i = l * BLOCK + lane;
+        out->depth[lane] =
+            round % 2 ? f_min(odd(i, 4 * round + 2), 1e30f) : (float)(i * 7 % 5); /* many are equal */
+    }
+}
+
 static void test_garbage(void)
 {
+    enum { NEXT = sizeof(outline_lanes) / sizeof(float) };
     static limb_geometry limbs[MODEL_MAX_LIMBS];
-    float *const x = &outline.x[0][0][0], *const y = &outline.y[0][0][0], *const depth = &outline.depth[0][0];
     for (uint32_t round = 0; round < 40; round++) {
         int32_t const count = (int32_t)(round * 7 % (MODEL_MAX_LIMBS + 1));
-        for (uint32_t i = 0; i < MODEL_MAX_LIMBS * RAST_MAX_VERTICES * BLOCK; i++) {
-            x[i] = odd(i, 4 * round);
-            y[i] = odd(i, 4 * round + 1);
-        }
-        for (uint32_t i = 0; i < MODEL_MAX_LIMBS * BLOCK; i++)
-            depth[i] =
-                round % 2 ? f_min(odd(i, 4 * round + 2), 1e30f) : (float)(i * 7 % 5); /* many are equal */
-        for (uint32_t l = 0; l < MODEL_MAX_LIMBS; l++)
+        for (uint32_t l = 0; l < MODEL_MAX_LIMBS; l++) {
+            odd_limb(l, round, &outline.limb[l]);
             limbs[l].shape = (l + round) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
+        }
         compare_layers(limbs, count);
         int32_t wrong = 0;
         for (int32_t lane = 0; lane < BLOCK; lane++) {
             int32_t order[MODEL_MAX_LIMBS];
-            wrong += layers_order(&depth[lane], BLOCK, count, order) != edges.drawn[lane];
+            wrong += layers_order(&outline.limb[0].depth[lane], NEXT, count, order) != edges.drawn[lane];
             for (int32_t k = 0; k < edges.drawn[lane]; k++)
                 wrong += edges.order[lane][k] != order[k];
         }

@@ -13,10 +13,10 @@ static like_body one_limb(int32_t shape, const float *x, const float *y)
     v->setup.limbs = 1;
     v->setup.geometry[0].shape = shape;
     for (int32_t k = 0; k < outline_vertices(&v->setup.geometry[0]); k++) {
-        v->outline.x[0][k][LANE] = x[k];
-        v->outline.y[0][k][LANE] = y[k];
+        v->outline.limb[0].x[k][LANE] = x[k];
+        v->outline.limb[0].y[k][LANE] = y[k];
     }
-    v->outline.depth[0][LANE] = 3.0f;
+    v->outline.limb[0].depth[LANE] = 3.0f;
     toy_draw(&v->outline, v->setup.geometry, 1, LANE, &drawn);
     return (like_body){
         .setup = &v->setup, .features = &v->f, .outline = &v->outline, .lane = LANE, .layers = &drawn};
@@ -118,10 +118,10 @@ static void test_hidden(void)
     for (int32_t l = 0; l < 3; l++) {
         v->setup.geometry[l].shape = LIMB_CONE;
         for (int32_t k = 0; k < 4; k++) {
-            v->outline.x[l][k][LANE] = l < 2 ? x[l][k] : cover[k];
-            v->outline.y[l][k][LANE] = y[k];
+            v->outline.limb[l].x[k][LANE] = l < 2 ? x[l][k] : cover[k];
+            v->outline.limb[l].y[k][LANE] = y[k];
         }
-        v->outline.depth[l][LANE] = l < 2 ? 4.0f : 2.0f; /* the third hides the second */
+        v->outline.limb[l].depth[LANE] = l < 2 ? 4.0f : 2.0f; /* the third hides the second */
     }
     toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
     like_body const b = {
@@ -132,10 +132,10 @@ static void test_hidden(void)
         for (int k = 0; k < 4; k++)
             v->f.edge[i * VIEW_SIZE + column[k]] = (edge_cell){.trace = EDGE_ONE, .xx_yy = EDGE_ONE};
     CHECK_NEAR(like_edges.log_likelihood(&b), 0.0, 0.03); /* all that is visible has an edge */
-    v->outline.depth[2][LANE] = 5.0f; /* now it lies behind: the second is seen, without edges */
+    v->outline.limb[2].depth[LANE] = 5.0f; /* now it lies behind: the second is seen, without edges */
     toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
     CHECK_NEAR(like_edges.log_likelihood(&b), -1.0 / 3.0, 0.03);
-    v->outline.depth[1][LANE] = 0.0f; /* behind the camera: no part of the average */
+    v->outline.limb[1].depth[LANE] = 0.0f; /* behind the camera: no part of the average */
     toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
     CHECK_NEAR(like_edges.log_likelihood(&b), 0.0, 0.03);
 }
@@ -172,10 +172,10 @@ static void test_beyond(void)
         v->setup.limbs = 2; /* the same twice: points enough to judge */
         v->setup.geometry[1] = v->setup.geometry[0];
         for (int i = 0; i < 4; i++) {
-            v->outline.x[1][i][b.lane] = x[k][i] - 60.0f;
-            v->outline.y[1][i][b.lane] = y[k][i] - 20.0f;
+            v->outline.limb[1].x[i][b.lane] = x[k][i] - 60.0f;
+            v->outline.limb[1].y[i][b.lane] = y[k][i] - 20.0f;
         }
-        v->outline.depth[1][b.lane] = 3.0f;
+        v->outline.limb[1].depth[b.lane] = 3.0f;
         toy_draw(&v->outline, v->setup.geometry, 2, b.lane, &drawn);
         CHECK_NEAR(like_edges.support(&b), -0.005, 1e-6); /* enough points, no edges */
         CHECK(like_edges.log_likelihood(&b) == -1.0f);

@@ -129,10 +129,7 @@ static void test_sample(void)
         for (int k = 0; k < isa_count(); k++) {
             memset(&pose, 0, sizeof pose);
             isa_at(k)->surface_pose(&v->setup, &v->cam, &v->body, &pose);
-            differ += memcmp(pose.R, v->pose.R, sizeof(float[TOY_LIMBS][9][BLOCK])) != 0;
-            differ += memcmp(pose.t, v->pose.t, sizeof(float[TOY_LIMBS][3][BLOCK])) != 0;
-            differ += memcmp(pose.scale, v->pose.scale, sizeof(float[TOY_LIMBS][BLOCK])) != 0;
-            differ += memcmp(pose.turn, v->pose.turn, sizeof(int32_t[TOY_LIMBS][BLOCK])) != 0;
+            differ += memcmp(&pose, &v->pose, TOY_LIMBS * sizeof *pose.limb) != 0;
         }
         for (int32_t lane = 0; lane < BLOCK; lane++) {
             toy_draw(&v->outline, v->setup.geometry, TOY_LIMBS, lane, &v->drawn);
@@ -200,7 +197,7 @@ static void test_compare(void)
         for (uint32_t i = 0; i < sizeof known; i++)
             known[i] = (int8_t)draw(i, round);
         for (int32_t l = 0; l < LIMBS; l++)
-            v->outline.facing[l][b.lane] = fabsf(uniform((uint32_t)l, round));
+            v->outline.limb[l].facing[b.lane] = fabsf(uniform((uint32_t)l, round));
         isa_scalar()->texture_logs(&b, want);
         int64_t const cost = isa_scalar()->template_cost(&b);
         for (int k = 0; k < isa_count(); k++) {
@@ -246,15 +243,15 @@ static like_edge_tally walk_limbs(int32_t lane)
         bool const round = v->setup.geometry[l].shape == LIMB_ELLIPSOID;
         float at[8][2], mid[2] = {0};
         for (int32_t k = 0; k < 8; k++) {
-            at[k][0] = v->outline.x[l][k][lane];
-            at[k][1] = v->outline.y[l][k][lane];
+            at[k][0] = v->outline.limb[l].x[k][lane];
+            at[k][1] = v->outline.limb[l].y[k][lane];
             for (int32_t a = 0; a < 2 && !round && k < 4; a++)
                 mid[a] += 0.25f * at[k][a];
         }
         for (int32_t a = 0; a < 2 && round; a++)
             mid[a] = 0.5f * (at[0][a] + at[4][a]);
         const rast_mask *const mask = &v->drawn.visible[l];
-        if (!(v->outline.depth[l][lane] > 0.0f))
+        if (!(v->outline.limb[l].depth[lane] > 0.0f))
             continue;
         for (int32_t k = 0; k < 8 && round; k++)
             walk(mask, at[k], at[(k + 1) & 7], mid, 2, &t);
@@ -297,7 +294,7 @@ static void test_edges(void)
         for (uint32_t l = 0; l < LIMBS; l++) {
             rast_mask *const mask = &v->drawn.visible[l];
             v->setup.geometry[l].shape = draw(l, round + 100) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
-            v->outline.depth[l][lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
+            v->outline.limb[l].depth[lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
             mask->first = (int32_t)(draw(l, round + 300) % 5 * 16);
             mask->last = mask->first + (int32_t)(draw(l, round + 400) % 5 * 16);
             for (uint32_t y = 0; y < RAST_SIZE; y++)
@@ -305,8 +302,8 @@ static void test_edges(void)
                     mask->row[y][w] = round % 3 ? ~UINT64_C(0)
                                                 : (uint64_t)draw(4 * y + w, l) << 32 | draw(4 * y + w + 2, l);
             for (uint32_t k = 0; k < 8; k++) {
-                v->outline.x[l][k][lane] = corner(round, 16 * l + k);
-                v->outline.y[l][k][lane] = corner(round, 16 * l + 8 + k);
+                v->outline.limb[l].x[k][lane] = corner(round, 16 * l + k);
+                v->outline.limb[l].y[k][lane] = corner(round, 16 * l + 8 + k);
             }
         }
         like_edge_tally const reference = walk_limbs(lane);

@@ -13,7 +13,7 @@ static float limb(int32_t mode, double facing, int n, int d)
 {
     v = toy_look_new(0, mode);
     v->setup.limbs = 1;
-    v->outline.facing[0][LANE] = (float)facing;
+    v->outline.limb[0].facing[LANE] = (float)facing;
     now[0].turn = then[0].turn = 0;
     for (int i = 0; i < LIKE_FACING; i++) {
         now[0].value[i] = (int8_t)(i < n ? 20 : i % 2 ? TEXTURE_HIDDEN : 3);
@@ -111,7 +111,7 @@ static void test_limbs(void)
     float const one = limb(GAIT_MODE_DEFAULT, 0.9, 16, 7);
     v->setup.limbs = 3;
     for (int l = 1; l < 3; l++) {
-        v->outline.facing[l][LANE] = 0.9f;
+        v->outline.limb[l].facing[LANE] = 0.9f;
         memset(now[l].value, l == 1 ? 20 : TEXTURE_HIDDEN, LIKE_FACING);
         memset(then[l].value, 13, LIKE_FACING);
     }

@@ -348,9 +348,10 @@ static void test_lanes(void)
             limb_polygon p;
             outline_limb(&limbs[l], at[lane].R + 9 * f, at[lane].o + 3 * f, at[lane].scale[f], &cam, &map,
                          &p);
+            const outline_lanes *const q = &block.limb[l];
             for (int32_t k = 0; k < outline_vertices(&limbs[l]); k++)
-                wrong += block.x[l][k][lane] != p.x[k] || block.y[l][k][lane] != p.y[k];
-            wrong += block.depth[l][lane] != p.depth || block.facing[l][lane] != p.facing;
+                wrong += q->x[k][lane] != p.x[k] || q->y[k][lane] != p.y[k];
+            wrong += q->depth[lane] != p.depth || q->facing[lane] != p.facing;
         }
     CHECK(wrong == 0);
 }
