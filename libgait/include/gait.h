@@ -166,7 +166,7 @@ typedef struct gait_tracker_config {
     uint64_t seed;             /* default 1 */
     int32_t  particles;        /* [16, 1 << 20]; default 1500 (paper mode 10000) */
     int32_t  components;       /* [0, the model's]; default -1: all */
-    int32_t  tasks;            /* pieces per step [1, 256], sizes the scratch if exec is set; default 8 */
+    int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
     int32_t  proportions;      /* [0, the model's]; -1: all; default 0 (doc/design.md says why) */

@@ -21,7 +21,7 @@ GAIT_API gait_status gait_pool_bytes(int32_t threads, size_t *bytes, gait_error 
  * GAIT_ALIGN and must stay until gait_pool_stop().  GAIT_ERR_LIMIT: the system refuses that many, none is left. */
 GAIT_API gait_status gait_pool_init(void *mem, size_t mem_bytes, int32_t threads, gait_pool **out, gait_error *err);
 /* For any number of trackers, one call at a time: steps of two trackers must not overlap.  Config tasks should be
- * a few times the threads. */
+ * the number of threads. */
 GAIT_API gait_tasks  gait_pool_tasks(gait_pool *p);
 /* End and join the threads; the memory is the caller's again. */
 GAIT_API void        gait_pool_stop(gait_pool *p);

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -212,6 +212,8 @@ class Tracker:
         self.cameras = [cameras] if isinstance(cameras, Camera) else list(cameras)
         self.config = config or TrackerConfig.default()
         self._tasks = _task_source(tasks)
+        if isinstance(tasks, int) and tasks > 1:
+            self.config = replace(self.config, tasks=tasks)
         self._error = _abi.Error()
         c = self._c_config()
         size, handle = ctypes.c_size_t(), ctypes.c_void_p()

@@ -88,6 +88,7 @@ bool bench_measure(const gait_model *model, const bench_scene *s, const bench_pl
     cfg.particles = plan->particles;
     cfg.camera[0] = s->camera;
     cfg.cpu_mask = plan->cpu_mask;
+    cfg.tasks = plan->threads;
     out->isa = gait_cpu_name(plan->cpu_mask);
     if (!workers_start(&crew, plan->threads, why))
         return false;

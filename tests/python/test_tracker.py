@@ -240,8 +240,10 @@ def test_memory_is_fixed_and_grows_with_particles():
     assert 0 < small.memory_bytes < large.memory_bytes
 
 
-def test_ten_thousand_particles_fit_into_twelve_megabytes():
-    assert Tracker(MODEL, VIEW, TrackerConfig.default(particles=10_000)).memory_bytes < 12e6
+@pytest.mark.parametrize(("threads", "megabytes"), [(1, 11.8), (2, 11.8), (4, 12), (8, 12.5)])
+def test_ten_thousand_particles_fit_into_twelve_megabytes(threads, megabytes):
+    config = TrackerConfig.default(particles=10_000)
+    assert Tracker(MODEL, VIEW, config, tasks=threads).memory_bytes < 1e6 * megabytes
 
 
 def test_calls_out_of_order_are_refused():
