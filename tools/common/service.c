@@ -22,7 +22,12 @@ int64_t service_now(void)
     return clock_us(CLOCK_REALTIME);
 }
 
-static void set_state(service *s, int8_t state, const char *text)
+int64_t service_ticks(void)
+{
+    return clock_us(CLOCK_MONOTONIC);
+}
+
+void service_set_state(service *s, int8_t state, const char *text)
 {
     s->state = state;
     s->news = true;
@@ -38,7 +43,7 @@ void service_complain(service *s, const message *why)
     s->text = s->complaint = *why;
 }
 
-static void reject(service *s, const message *why)
+void service_reject(service *s, const message *why)
 {
     s->counts.rejected++;
     service_complain(s, why);
@@ -48,15 +53,15 @@ static void reject(service *s, const message *why)
 static void set_idle(service *s)
 {
     if (!s->track.tracker)
-        set_state(s, GAITMSG_STATUS_T_WAITING, "waiting for a camera");
+        service_set_state(s, GAITMSG_STATUS_T_WAITING, "waiting for a camera");
     else if (s->start.armed)
-        set_state(s, GAITMSG_STATUS_T_ARMED, "waiting for the frame of the start");
+        service_set_state(s, GAITMSG_STATUS_T_ARMED, "waiting for the frame of the start");
     else
-        set_state(s, GAITMSG_STATUS_T_READY,
-                  !s->seek ? "waiting for START"
-                  : s->track.background.data
-                      ? "looking for somebody who walks in, or waiting for START"
-                      : "waiting for the empty scene to look for somebody, or for START");
+        service_set_state(s, GAITMSG_STATUS_T_READY,
+                          !s->seek ? "waiting for START"
+                          : s->track.background.data
+                              ? "looking for somebody who walks in, or waiting for START"
+                              : "waiting for the empty scene to look for somebody, or for START");
 }
 
 /* As after the program's start. */
@@ -145,8 +150,7 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
     }
 }
 
-/* Pixels of a frame or plate as the tracker takes them. */
-static bool pixels_of(service *s, const image_view *v, gait_image *out, message *why)
+bool service_pixels(service *s, const image_view *v, gait_image *out, message *why)
 {
     const gait_camera *const c = &s->track.config.camera[0];
     if (v->pixelformat == GAITMSG_IMAGE_T_PIXEL_FORMAT_MJPEG)
@@ -161,8 +165,8 @@ void service_background(service *s, const image_view *v)
     bool const first = !s->track.background.data;
     if (!s->track.tracker)
         return; /* it is sent again every few seconds */
-    if (!pixels_of(s, v, &plate, &why) || !tracking_set_background(&s->track, &plate, &why))
-        reject(s, &why);
+    if (!service_pixels(s, v, &plate, &why) || !tracking_set_background(&s->track, &plate, &why))
+        service_reject(s, &why);
     else if (first && s->state == GAITMSG_STATUS_T_READY)
         set_idle(s);
     else
@@ -201,189 +205,6 @@ void service_command(service *s, const gaitmsg_command_t *msg)
         message_set(&why, "unknown command %d; send START, STOP or RESET", msg->command);
         service_complain(s, &why);
     }
-}
-
-/* Frames that never arrived, by the gap in their numbers. */
-static void count_gap(service *s, const image_view *v)
-{
-    if (s->state == GAITMSG_STATUS_T_RUNNING && s->last_frame >= 0 && v->frame > s->last_frame + 1)
-        s->counts.dropped += v->frame - s->last_frame - 1;
-    s->last_frame = v->frame > s->last_frame ? v->frame : s->last_frame;
-}
-
-/* Begin to track if the armed start has come; true when the tracker runs. */
-static bool begin(service *s, const image_view *v)
-{
-    message why;
-    gait_error err = {.text = ""};
-    int64_t utime;
-    arming_answer const answer = arming_reached(&s->start, v, s->max_gap, &utime, &why);
-    if (answer == ARMING_WAIT)
-        return false;
-    gait_status const status = answer == ARMING_MISSED ? GAIT_ERR_STATE
-                                                       : gait_tracker_start(s->track.tracker, &s->start.mean,
-                                                                            &s->start.sd, utime, &err);
-    if (answer != ARMING_MISSED && status != GAIT_OK)
-        message_set(&why, "cannot start: %s (%s)", err.text, gait_status_name(status));
-    if (status != GAIT_OK) {
-        set_state(s, GAITMSG_STATUS_T_READY, NULL);
-        service_complain(s, &why);
-        return false;
-    }
-    s->last_utime = utime;
-    s->dropped_before = s->counts.dropped;
-    s->last_frame = v->frame;
-    s->steps = 0;
-    memset(s->past, 0xff, sizeof s->past); /* no step has such a number */
-    s->meter.running = false;
-    set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
-    return true;
-}
-
-static void stop(service *s, const message *why)
-{
-    set_state(s, GAITMSG_STATUS_T_READY, NULL);
-    service_complain(s, why);
-}
-
-/* Can this frame follow the last one?  A pause that is too long stops the tracker, or it would wait for
- * ever. */
-static bool in_time(service *s, const image_view *v)
-{
-    message why;
-    int64_t const gap = v->utime - s->last_utime;
-    double const pause = (double)gap * 1e-6;
-    if (pause > s->max_gap) {
-        message_set(&why, "no frame for %.3f s (at most %.3f): stopped; send START", pause, s->max_gap);
-        stop(s, &why);
-        return false;
-    }
-    if (gap < 0 || (gap == 0 && s->steps > 0)) {
-        message_set(&why, "capture time did not advance (%.6f s); stamp frames in order", pause);
-        reject(s, &why);
-        return false;
-    }
-    return true;
-}
-
-/* Look for somebody to start with; true when the tracker has begun with this frame. */
-static bool spot(service *s, const image_view *v, const gait_image *frame)
-{
-    gait_state mean = s->track.prior_mean, sd = s->track.prior_sd;
-    if (!s->seek || !s->track.background.data ||
-        !spotter_see(&s->spotter, frame, &s->track.background, &s->track.config.camera[0], s->track.model,
-                     v->utime, &mean, &sd))
-        return false;
-    spotter_forget(&s->spotter);
-    arming_by_time(&s->start, &mean, &sd, v->utime);
-    return begin(s, v);
-}
-
-/* Nobody is tracked: start with whoever walks in. */
-static bool spot_first(service *s, const image_view *v)
-{
-    gait_image frame;
-    message why;
-    return s->seek && pixels_of(s, v, &frame, &why) && spot(s, v, &frame);
-}
-
-/* Predict through a pause longer than one step may be, in equal steps without an image. */
-static gait_status bridge(service *s, int64_t utime, gait_estimate *out, gait_error *err)
-{
-    int64_t const longest = (int64_t)((double)s->track.config.max_dt * 1e6), from = s->last_utime;
-    int64_t const pieces = (utime - from + longest - 1) / longest;
-    for (int64_t i = 1; i < pieces; i++) {
-        gait_frame const nothing = {.utime = from + (utime - from) * i / pieces};
-        gait_status const status = gait_tracker_step(s->track.tracker, &nothing, out, err);
-        if (status != GAIT_OK)
-            return status;
-    }
-    return GAIT_OK;
-}
-
-/* Go on with another number of particles if the budget says so. */
-static void adapt(service *s, int64_t birth, int64_t step_us)
-{
-    int32_t const had = s->wanted;
-    s->wanted = budget_stepped(&s->budget, birth, service_now(), step_us, had);
-    if (budget_hopeless(&s->budget, s->wanted))
-        fprintf(stderr,
-                "gait-trackd: a step takes %.1f ms, more than the budget of %.1f: fewer --particles, more "
-                "--threads or --adapt-particles\n",
-                (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
-    if (s->wanted == had || gait_tracker_set_particles(s->track.tracker, s->wanted, NULL) != GAIT_OK)
-        return;
-    fprintf(stderr, "gait-trackd: %d particles instead of %d: a step took %.1f ms of %.1f\n", (int)s->wanted,
-            (int)had, (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
-    s->news = true;
-}
-
-/* Track the frame; false: it could not be used. */
-static bool step(service *s, const image_view *v, int64_t received, int64_t birth)
-{
-    gait_frame frame = {.utime = v->utime};
-    gait_estimate estimate;
-    gait_error err = {.text = ""};
-    message why;
-    int64_t const begun = clock_us(CLOCK_MONOTONIC);
-    if (!pixels_of(s, v, &frame.image[0], &why)) {
-        reject(s, &why);
-        return false;
-    }
-    if (s->cue)
-        frame.tracks[0] = tracks_cue_use(s->cue, v->utime);
-    gait_status status = bridge(s, v->utime, &estimate, &err);
-    if (status == GAIT_OK)
-        status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);
-    if (status != GAIT_OK) {
-        message_set(&why, "stopped: %s (%s); send START", err.text, gait_status_name(status));
-        stop(s, &why);
-        return false;
-    }
-    int64_t const step_us = clock_us(CLOCK_MONOTONIC) - begun;
-    s->last_utime = v->utime;
-    s->counts.frames++;
-    message_set(&s->text, "tracking");
-    histogram_add(&s->counts.step, step_us);
-    service_send_estimate(s, v, &estimate, received, step_us);
-    s->steps++;
-    histogram_add(&s->counts.latency, service_now() - v->utime);
-    adapt(s, birth, step_us);
-    if (estimate.status == GAIT_STATUS_LOST)
-        spot(s, v, &frame.image[0]);
-    else if (estimate.status != GAIT_STATUS_INIT)
-        spotter_forget(&s->spotter);
-    return true;
-}
-
-/* May this frame be tracked, or is there a newer one, or is it too old? */
-static bool fresh(service *s, bool newest, int64_t birth, int64_t now)
-{
-    message why;
-    if (!newest)
-        budget_missed(&s->budget);
-    else if (budget_allows(&s->budget, birth, now))
-        return true;
-    else {
-        message_set(&why, "frames too old for a budget of %.1f ms are dropped",
-                    (double)s->budget.limit_us / 1e3);
-        service_complain(s, &why);
-    }
-    return false;
-}
-
-void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
-{
-    int64_t const now = service_now(), birth = budget_birth(v->utime, arrival_utime);
-    count_gap(s, v);
-    if (s->state == GAITMSG_STATUS_T_ARMED && !begin(s, v))
-        return;
-    if (s->state == GAITMSG_STATUS_T_READY && newest && !spot_first(s, v))
-        return;
-    if (s->state != GAITMSG_STATUS_T_RUNNING)
-        return;
-    if (!fresh(s, newest, birth, now) || !in_time(s, v) || !step(s, v, now, birth))
-        s->counts.dropped++;
 }
 
 uint64_t service_digest(const service *s)

@@ -75,10 +75,17 @@ void service_background(service *s, const image_view *v);
 void service_command(service *s, const gaitmsg_command_t *msg);
 /* One frame that arrived at `arrival_utime`; not the `newest`: another waits behind it, this one is dropped. */
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime);
-/* Say in the status, and once on stderr, what is wrong with the input. */
+/* Say in the status, and once on stderr, what is wrong with the input; reject: and count it. */
 void service_complain(service *s, const message *why);
+void service_reject(service *s, const message *why);
+/* Go to a state, GAITMSG_STATUS_T_*; text NULL: the status goes on saying what it says. */
+void service_set_state(service *s, int8_t state, const char *text);
+/* Pixels of a frame or plate as the tracker takes them. */
+bool service_pixels(service *s, const image_view *v, gait_image *out, message *why);
 void service_send_status(service *s);
 uint64_t service_digest(const service *s); /* 0 before the camera is known */
 /* Wall clock, microseconds since the Unix epoch. */
 int64_t service_now(void);
+/* The same of a clock that nobody sets, from any beginning. */
+int64_t service_ticks(void);
 #endif
