@@ -26,6 +26,41 @@ static void test_age(void)
     CHECK(b.late == 3 && b.dropped == 3);
 }
 
+/* Nobody waits for ever: where a step takes longer than the budget, a frame is tried after a few were refused. */
+static void test_a_slow_step_does_not_starve(void)
+{
+    enum { FRAMES = 100, AGE = 12 * MS };
+    budget b = {.limit_us = 40 * MS, .step_us = 90 * MS}, old = b;
+    int tried = 0, row = 0, longest = 0;
+    for (int i = 0; i < FRAMES; i++) { /* all of them a little too old for what is left */
+        bool const go = budget_allows(&b, 0, AGE);
+        row = go ? 0 : row + 1;
+        longest = row > longest ? row : longest;
+        tried += go;
+    }
+    CHECK(longest == RETRY && tried == FRAMES / (RETRY + 1));
+    CHECK(b.late == FRAMES - tried && b.dropped == b.late);
+    for (int i = 0; i < FRAMES; i++) /* one older than the limit is not tried, */
+        CHECK(!budget_allows(&old, 0, 40 * MS + 1));
+    CHECK(budget_allows(&old, 0, 40 * MS)); /* the next that is not is */
+    CHECK(!budget_allows(&old, 0, AGE) && old.refused == 1);
+}
+
+/* The tried step shows how long steps take now: where they are fast again, frames come through. */
+static void test_a_fast_step_ends_the_refusals(void)
+{
+    budget b = {.limit_us = 40 * MS, .step_us = 90 * MS};
+    int refused = 0;
+    for (int i = 0; i < 200; i++) {
+        if (budget_allows(&b, 0, 12 * MS))
+            budget_stepped(&b, 0, 17 * MS, 5 * MS, 500);
+        else
+            refused++;
+    }
+    CHECK(b.step_us < 28 * MS && refused > RETRY && refused < 10 * RETRY);
+    CHECK(budget_allows(&b, 0, 12 * MS) && b.over == 0);
+}
+
 static void test_late_estimates_are_counted(void)
 {
     budget b = {.limit_us = 40 * MS};
@@ -98,6 +133,8 @@ int main(void)
 {
     test_birth();
     test_age();
+    test_a_slow_step_does_not_starve();
+    test_a_fast_step_ends_the_refusals();
     test_late_estimates_are_counted();
     test_the_number_follows_the_time();
     test_dropped_frames_halve_it();
