@@ -7,14 +7,14 @@
 walker estimate_place(const population *p, const double *weight)
 {
     static const int32_t FIELDS[] = {F_X, F_Y, F_Z, F_STATURE};
+    enum { COUNT = sizeof FIELDS / sizeof *FIELDS };
     walker w = {{0}};
-    for (size_t k = 0; k < sizeof FIELDS / sizeof *FIELDS; k++) {
-        const float *const v = field(p, FIELDS[k]);
-        double sum = 0.0;
-        for (int32_t i = 0; i < p->n; i++)
-            sum += weight[i] * (double)v[i];
-        w.f[FIELDS[k]] = (float)sum;
-    }
+    double sum[COUNT] = {0.0};
+    for (int32_t i = 0; i < p->n; i++)
+        for (int32_t k = 0; k < COUNT; k++) /* none waits for another */
+            sum[k] += weight[i] * (double)field(p, FIELDS[k])[i];
+    for (int32_t k = 0; k < COUNT; k++)
+        w.f[FIELDS[k]] = (float)sum[k];
     return w;
 }
 
@@ -30,12 +30,19 @@ static float resultant_sd(double c, double s)
     return __builtin_sqrtf(f_max(-2.0f * m_log(f_max(resultant_length(c, s), 1e-6f)), 0.0f));
 }
 
-typedef struct sums { /* what an estimate sums over */
+typedef struct moments { /* of one number per particle */
+    double mean, var;
+    double mode; /* its mean in the mode */
+} moments;
+
+typedef struct sums { /* what an estimate sums over, */
     const gait_tracker *t;
     const kernels *run;
     const crowd *of;
     double mass; /* of those of the mode, which t->mode tells */
     int32_t best;
+    moments field[F_MAX], joint[3 * GAIT_MAX_JOINTS]; /* and what comes of it */
+    double phase[4], heading[4], rotation[16];
 } sums;
 
 /* One field of the crowd; up to three at a time, each in a room of its own, 0 .. 2. */
@@ -50,16 +57,13 @@ static const float *column(const sums *s, int32_t f, int32_t room)
     return rooms[room];
 }
 
-/* Mean and variance of one number per particle, and its mean in the mode. */
-static void moments(const sums *s, const float *v, double *mean, double *var, double *mode)
+static moments moments_of(const sums *s, const float *v)
 {
     double const about = (double)v[s->best];
     double sum[3];
     s->run->estimate_moments(v, s->of->weight, s->t->mode, s->of->n, about, sum);
     double const square = sum[1] - sum[0] * sum[0];
-    *mean = about + sum[0];
-    *var = square > 0.0 ? square : 0.0;
-    *mode = about + sum[2] / s->mass;
+    return (moments){about + sum[0], square > 0.0 ? square : 0.0, about + sum[2] / s->mass};
 }
 
 /* Cosine and sine of the mean direction over all, and over the mode. */
@@ -68,14 +72,41 @@ static void resultant(const sums *s, int32_t f, float turn, double out[4])
     s->run->estimate_resultant(column(s, f, 0), turn, s->of->weight, s->t->mode, s->of->n, out);
 }
 
+enum { SUM_PHASE, SUM_HEADING, SUM_ROTATION, SUM_FIELDS }; /* then the fields, then the joints */
+
+static void sums_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    sums *const s = ctx;
+    int32_t const joints = SUM_FIELDS + s->of->people.fields;
+    (void)task;
+    for (int32_t k = begin; k < end; k++)
+        if (k == SUM_PHASE)
+            resultant(s, F_PHASE, TWO_PI_F, s->phase);
+        else if (k == SUM_HEADING)
+            resultant(s, F_HEADING, 1.0f, s->heading);
+        else if (k == SUM_ROTATION)
+            s->run->estimate_rotations(column(s, F_HEADING, 0), column(s, F_PITCH, 1), column(s, F_ROLL, 2),
+                                       s->of->weight, s->t->mode, s->of->n, s->rotation);
+        else if (k < joints)
+            s->field[k - SUM_FIELDS] = moments_of(s, column(s, k - SUM_FIELDS, 0));
+        else
+            s->joint[k - joints] = moments_of(s, s->t->joint + (size_t)(k - joints) * (size_t)s->of->n);
+}
+
+/* A crowd that has to be gathered is, in one place, so that its sums come one after the other. */
+static void sum_up(sums *s)
+{
+    static const gait_tasks here = {NULL, NULL};
+    const gait_tasks *const exec = s->of->who ? &here : &s->t->cfg.exec;
+    task_run(exec, s->t->cfg.tasks, SUM_FIELDS + s->of->people.fields + 3 * s->t->model->points, 1,
+             sums_range, s);
+}
+
 /* Chordal mean of Rz(heading) Ry(pitch) Rx(roll) over the mode, back as the three angles. */
 static void mean_rotation(const sums *s, walker *w)
 {
-    double qq[16];
     float q[4];
-    s->run->estimate_rotations(column(s, F_HEADING, 0), column(s, F_PITCH, 1), column(s, F_ROLL, 2),
-                               s->of->weight, s->t->mode, s->of->n, qq);
-    la_rotation_mean(qq, q);
+    la_rotation_mean(s->rotation, q);
     w->f[F_HEADING] = m_atan2(2.0f * (q[0] * q[3] + q[1] * q[2]), 1.0f - 2.0f * (q[2] * q[2] + q[3] * q[3]));
     w->f[F_PITCH] = m_asin(f_clamp(2.0f * (q[0] * q[2] - q[3] * q[1]), -1.0f, 1.0f));
     w->f[F_ROLL] = m_atan2(2.0f * (q[0] * q[1] + q[2] * q[3]), 1.0f - 2.0f * (q[1] * q[1] + q[2] * q[2]));
@@ -87,10 +118,9 @@ static void joints(const sums *s, float stature, gait_estimate *out)
     const gait_tracker *const t = s->t;
     double const factor = (double)t->cfg.joint_sd_factor, model = (double)(t->cfg.joint_sd_model * stature);
     for (int32_t p = 0; p < 3 * t->model->points; p++) {
-        double mean, var, mode;
-        moments(s, t->joint + (size_t)p * (size_t)s->of->n, &mean, &var, &mode);
-        out->pose.joint[p / 3][p % 3] = (float)mean;
-        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(factor * factor * var + model * model);
+        out->pose.joint[p / 3][p % 3] = (float)s->joint[p].mean;
+        out->joint_sd[p / 3][p % 3] =
+            (float)__builtin_sqrt(factor * factor * s->joint[p].var + model * model);
     }
 }
 
@@ -130,10 +160,8 @@ static void spread(const gait_tracker *t, const walker *sd, float phase_sd, floa
 static void fields(const sums *s, walker *mean, walker *sd)
 {
     for (int32_t f = 0; f < s->of->people.fields; f++) {
-        double all, var, mode;
-        moments(s, column(s, f, 0), &all, &var, &mode);
-        mean->f[f] = (float)mode;
-        sd->f[f] = (float)__builtin_sqrt(var);
+        mean->f[f] = (float)s->field[f].mode;
+        sd->f[f] = (float)__builtin_sqrt(s->field[f].var);
     }
 }
 
@@ -141,23 +169,22 @@ walker estimate_crowd(const gait_tracker *t, const crowd *c, int32_t best, gait_
 {
     sums s = {.t = t, .run = t->like->run, .of = c, .best = best};
     walker mean = {{0}}, sd;
-    double phase[4], heading[4];
     gait_pose pose;
     s.mass = s.run->estimate_mode(column(&s, F_PHASE, 0), column(&s, F_HEADING, 1), c->weight, c->n, best,
                                   t->mode);
+    sum_up(&s);
     fields(&s, &mean, &sd);
-    resultant(&s, F_PHASE, TWO_PI_F, phase);
-    resultant(&s, F_HEADING, 1.0f, heading);
-    mean.f[F_PHASE] = m_wrap1(m_atan2((float)phase[3], (float)phase[2]) / TWO_PI_F);
+    mean.f[F_PHASE] = m_wrap1(m_atan2((float)s.phase[3], (float)s.phase[2]) / TWO_PI_F);
     mean_rotation(&s, &mean);
     joints(&s, mean.f[F_STATURE], out);
-    spread(t, &sd, resultant_sd(phase[0], phase[1]) / TWO_PI_F, resultant_sd(heading[0], heading[1]), out);
+    spread(t, &sd, resultant_sd(s.phase[0], s.phase[1]) / TWO_PI_F, resultant_sd(s.heading[0], s.heading[1]),
+           out);
     walker const heaviest = walker_get(&c->people, c->who ? c->who[best] : best);
     out->mean = walker_state(&t->rule, &mean);
     out->best = walker_state(&t->rule, &heaviest);
     if (model_pose_state(t->model, &out->mean, &pose) == GAIT_OK)
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
-    out->phase_r = resultant_length(phase[0], phase[1]);
+    out->phase_r = resultant_length(s.phase[0], s.phase[1]);
     out->mode_mass = (float)s.mass;
     out->speed = estimate_speed(t, &mean);
     return mean;

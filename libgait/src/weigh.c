@@ -90,6 +90,14 @@ int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predi
     return count;
 }
 
+void weigh_inherit(gait_tracker *t)
+{
+    int32_t const before = t->past.count[lag_slot(&t->past, t->core->current, 1)];
+    if (t->core->textured)
+        pf_inherit(&t->filter, before, t->texture,
+                   (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
+}
+
 /* The block's limbs in one camera, and in its working image and grid. */
 static void outline_limbs(const gait_tracker *t, int32_t c, weigh_scratch *w)
 {
@@ -171,9 +179,6 @@ void weigh_particles(gait_tracker *t)
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         for (int32_t side = 0; side < 2 && t->known[side][c]; side++)
             template_ring(t->template[side][c], t->like->limbs, t->known[side][c]);
-    if (t->core->textured)
-        pf_inherit(&t->filter, t->past.count[lag_slot(&t->past, t->core->current, 1)], t->texture,
-                   (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, weigh_range, t);
 }
 

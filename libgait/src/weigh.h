@@ -11,6 +11,9 @@ void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w);
  * saw. */
 int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted);
 
+/* Every particle's surface samples become its ancestor's, if there are any of the previous frame. */
+void weigh_inherit(gait_tracker *t);
+
 /* Log-likelihoods t->ll, joints and surface samples of all particles. */
 void weigh_particles(gait_tracker *t);
 

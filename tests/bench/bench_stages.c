@@ -15,6 +15,8 @@ const char *const bench_stage_name[BENCH_STAGES] = {
 
 static struct {
     bool on, weighing;          /* weighing: on, and inside the particles' likelihood */
+    int within;                 /* whole stages that have begun, */
+    double inner_ns;            /* and the time of those that began within the last */
     const kernels *plain;       /* of the tracker */
     kernels timed;              /* the same with the functions below */
     double ms_per_tick, cost;   /* a tick; ticks that timing takes */
@@ -156,11 +158,18 @@ double bench_stages_cells(void)
 }
 
 /* ---- functions of the library (-Wl,--wrap) ---- */
+/* `call`, timed as a stage without the stages within it. */
 #define WHOLE(stage, call)                                                                                   \
     do {                                                                                                     \
         int64_t const since_ = b.on ? bench_cpu_ns() : 0;                                                    \
+        double const outer_ = b.inner_ns;                                                                    \
+        b.inner_ns = 0.0;                                                                                    \
+        b.within++;                                                                                          \
         call;                                                                                                \
-        b.ns[stage] += b.on ? (double)(bench_cpu_ns() - since_) : 0.0;                                       \
+        b.within--;                                                                                          \
+        double const all_ = b.on ? (double)(bench_cpu_ns() - since_) : 0.0;                                  \
+        b.ns[stage] += all_ - b.inner_ns;                                                                    \
+        b.inner_ns = outer_ + all_;                                                                          \
     } while (0)
 #define WRAP(result, name, parameters)                                                                       \
     result __real_##name parameters;                                                                         \
@@ -172,6 +181,11 @@ WRAP(int32_t, weigh_look, (gait_tracker * t, const gait_frame *frame, const walk
     int32_t cameras;
     WHOLE(STAGE_FEATURES, cameras = __real_weigh_look(t, frame, predicted));
     return cameras;
+}
+
+WRAP(void, pf_inherit, (pf * p, int32_t before, void *array, size_t bytes))
+{
+    WHOLE(STAGE_RESAMPLE, __real_pf_inherit(p, before, array, bytes));
 }
 
 WRAP(bool, modes_resample, (gait_tracker * t, uint32_t frame))
@@ -188,11 +202,11 @@ WRAP(void, weigh_particles, (gait_tracker * t))
     b.weighing = false;
 }
 
-/* Outside the likelihood there is one such loop over the particles: their motion. */
+/* Tasks that belong to no stage move the particles, or begin stages of their own. */
 WRAP(void, task_run,
      (const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn, void *ctx))
 {
-    if (b.weighing)
+    if (b.weighing || b.within)
         __real_task_run(exec, tasks, items, block, fn, ctx);
     else
         WHOLE(STAGE_PROPAGATE, __real_task_run(exec, tasks, items, block, fn, ctx));
