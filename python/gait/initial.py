@@ -18,7 +18,7 @@ KEYS = ("frame", *DEFAULT_SD, "sd")
 FAR = 1e4  # metres from the origin; single precision places nothing to the millimetre further out
 STATURE = (0.5, 2.5)  # metres, accepted range
 
-_SCALARS = {  # key in the file: attribute of State, accepted range, remedy
+SCALARS = {  # key in the file: attribute of State, accepted range, remedy
     "heading_rad": ("heading", (-7.0, 7.0), "give the walking direction about z in radians, 0 = along +x"),
     "phase": ("phase", (0.0, 1.0), "give the phase of the stride from 0 (right heel strike) to 1"),
     "stride_hz": ("stride_hz", (0.1, 4.0), "give strides (two steps) per second, about 0.9"),
@@ -73,7 +73,7 @@ class Start:
                 raise fields.fail("frame", f"is {own}, --start says {frame}", "leave one of them out")
             frame = own
         mean, sd = model.prior()
-        for key, (name, (low, high), remedy) in _SCALARS.items():
+        for key, (name, (low, high), remedy) in SCALARS.items():
             if key in fields:
                 setattr(mean, name, fields.number(key, low, high, remedy))
                 setattr(sd, name, DEFAULT_SD[key])

@@ -16,29 +16,33 @@ from gait.skeleton import EVAL15
 
 Array = NDArray[np.float64]
 
+WIDTH90 = 1.645  # deviations of half a 90 % interval
 POINTING = 3.0  # pixels, standard deviation of a click
 
 
 @dataclass(frozen=True)
 class Score:
-    """Errors of an estimate: corrections so far, root (mm), abs (mm) and distance in the picture (px)."""
+    """Errors of an estimate: root and absolute (mm), in the picture (px); coverage of 90 % intervals."""
 
     corrections: int
     root: float
     absolute: float
     pixels: float
+    coverage: float
 
 
 def score(clip: ClipSegments, fit: ClipFit, truth: Array, joints: list[str]) -> Score:
     """Medians over frames; truth: (T, P, 3) of `joints`, which hold EVAL15."""
     body = [joints.index(name) for name in EVAL15]
-    found, true = fit.places[:, clip.prior.index(EVAL15)], truth[:, body]
+    markers = clip.prior.index(EVAL15)
+    found, true = fit.places[:, markers], truth[:, body]
     off = np.linalg.norm(clip.view.project(found)[0] - clip.view.project(true)[0], axis=2)
     return Score(
         len(clip.corrections),
         float(np.median(root_errors(found, true))),
         float(np.median(1000 * np.linalg.norm(found - true, axis=2).mean(axis=1))),
         float(np.median(off.mean(axis=1))),
+        float(np.mean(np.abs(found - true) < WIDTH90 * fit.sd[:, markers])),
     )
 
 

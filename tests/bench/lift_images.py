@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import eval_clips
@@ -27,15 +25,16 @@ from lift_clicks import POINTING, corrected, score
 from lift_sticks import Walk, stick_clip
 
 from gait.camera import Camera
-from gait.errors import UserError
 from gait.learn import readers, segment_motion
 from gait.learn.segment_options import Segments
+from gait.lift.beginning import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.fit_clip import ClipFit, fit_clip
 from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_placement
 from gait.lift.views import CameraView
+from gait.model import read_cyclic
 from gait.progress import progress
 from gait.skeleton import EVAL15, JOINTS
 from gait.trackfile import read_truth
@@ -61,45 +60,33 @@ def main(argv: Sequence[str] | None = None) -> int:
     parts = args.only or PARTS
     clips = [c for c in eval_clips.shared_clips(None) if c.name != eval_clips.OUTDOOR]
     subjects = {str(clip.subject) for clip in clips} if "clips" in parts else set()
-    priors = _priors(args.mocap, sorted(subjects | set(WALKS if "sticks" in parts else ())))
+    models = _models(sorted(subjects | set(WALKS if "sticks" in parts else ())), clips)
     met = []
     if "sticks" in parts:
-        met.append(_sticks(args.mocap, priors))
+        met.append(_sticks(args.mocap, models))
     if "clips" in parts:
-        met.append(_clips(clips, priors))
+        met.append(_clips(clips, models))
     if "outdoor" in parts:
         _outdoor(SegmentPrior.load())
     return 0 if all(met) else 1
 
 
-def _priors(mocap: Path, subjects: Sequence[str]) -> dict[str, SegmentPrior]:
-    """Priors learnt from everybody but one of the subjects."""
-    priors = {}
-    with TemporaryDirectory() as folder, progress("learning", len(subjects)) as update:
-        for done, subject in enumerate(subjects, 1):
-            priors[subject] = _prior_without(subject, mocap, Path(folder) / f"{subject}.gait")
-            update(done)
-    return priors
+def _models(subjects: Sequence[str], clips: Sequence[Clip]) -> dict[str, Path]:
+    """Models learnt from everybody but one of the subjects, who walk in the clips."""
+    wanted = [clip for clip in clips if clip.subject in subjects]
+    folder = eval_clips.ROOT / "build" / "eval" / "models"
+    with progress("learning", None) as update:
+        return eval_clips.models(wanted, folder, 1, update)
 
 
-def _prior_without(subject: str, mocap: Path, path: Path) -> SegmentPrior:
-    """Prior learnt from everybody else."""
-    words = ["learn", mocap, "-o", path, "--exclude", f"*/{subject}/*", "--segments", "only", "--quiet"]
-    done = subprocess.run(
-        [sys.executable, "-m", "gait", *map(str, words)], capture_output=True, text=True, check=False
-    )
-    if done.returncode:
-        raise UserError(f"gait learn without {subject}: {done.stderr.strip()}")
-    return SegmentPrior.load(path)
-
-
-def _sticks(mocap: Path, priors: dict[str, SegmentPrior]) -> bool:
+def _sticks(mocap: Path, models: dict[str, Path]) -> bool:
     """F9 and F10 on rendered stick figures of people left out of learning."""
     rows, ratios, jumps = [], [], []
     for subject, name in WALKS.items():
+        prior = SegmentPrior.load(models[subject])
         walk = _walk(mocap / subject / f"{name}.amc")
         for angle in ANGLES:
-            clip = stick_clip(priors[subject], walk, np.radians(angle), seed=1)
+            clip = stick_clip(prior, walk, np.radians(angle), seed=1)
             truth = walk.joints[:, [JOINTS.index(joint) for joint in EVAL15]]
             known = score(clip, fit_clip(_all_known(clip, truth)), truth, EVAL15)
             found = _scores(clip, truth, (0.0, 0.5, 1.0))
@@ -160,12 +147,12 @@ def _jump(fit: ClipFit, clip: ClipSegments) -> float:
     return max(0.0, float(bend[near].max() - bend[~near].max())) / clip.placement.stature
 
 
-def _clips(clips: Sequence[Clip], priors: dict[str, SegmentPrior]) -> bool:
+def _clips(clips: Sequence[Clip], models: dict[str, Path]) -> bool:
     """Corrections that the development clips need."""
     rows, ok = [], True
     for clip in clips:
         for plated in (True, False):
-            first, truth = _segments(clip, priors[str(clip.subject)], plated)
+            first, truth = _segments(clip, models[str(clip.subject)], plated)
             found = []
             for some, fit in corrected(first, truth, EVAL15, round(MOST * len(truth))):
                 found.append(score(some, fit, truth, EVAL15))
@@ -174,22 +161,27 @@ def _clips(clips: Sequence[Clip], priors: dict[str, SegmentPrior]) -> bool:
             start, end = found[0], found[-1]
             reached = end.root < ENOUGH
             ok &= reached
-            cells = [start.root, start.absolute, start.pixels, end.corrections, end.corrections / len(truth)]
-            rows.append([clip.name, "plate" if plated else "none", *cells, end.root, _met(reached)])
+            cells = [start.root, start.absolute, start.pixels, start.coverage]
+            cells += [end.corrections, end.corrections / len(truth), end.root, end.coverage]
+            rows.append([clip.name, "plate" if plated else "none", *cells, _met(reached)])
     table.publish(
         "lift_clips",
         "From images: corrections on the development clips",
-        ["clip", "background", "root mm", "abs mm", "px", "corrections", "per frame", "root then mm", "met"],
+        [
+            *("clip", "background", "root mm", "abs mm", "px", "coverage", "corrections", "per frame"),
+            *("root then mm", "coverage then", "met"),
+        ],
         rows,
-        "root, abs, px: without corrections, medians over frames. corrections: by a simulated user (worst "
+        "root, abs, px: without corrections, medians over frames. coverage: of the 90 % intervals of "
+        "places, without corrections and with. corrections: by a simulated user (worst "
         f"joints first, {POINTING:g} px, a tenth of the frames at a time) until the root error is below "
         f"{ENOUGH:g} mm, at most {MOST:g} per frame. Placed from the truth with "
-        "noise (3 cm, 0.05 rad, 1 % of stature). none: the paper's way, sensors see the whole scene.",
+        "noise (3 cm, 0.05 rad, 1 % of stature, phase 0.03). none: sensors see the scene, as in the paper.",
     )
     return ok
 
 
-def _segments(clip: Clip, prior: SegmentPrior, plated: bool) -> tuple[ClipSegments, np.ndarray[Any, Any]]:
+def _segments(clip: Clip, model: Path, plated: bool) -> tuple[ClipSegments, np.ndarray[Any, Any]]:
     """Clip with its truth (T, 15, 3)."""
     start, view = eval_clips.noisy_start(clip, 1, 0.0), CameraView(Camera.read(str(clip.camera)))
     truth, video = read_truth(str(clip.truth)), Video(clip.video)
@@ -202,11 +194,16 @@ def _segments(clip: Clip, prior: SegmentPrior, plated: bool) -> tuple[ClipSegmen
         ground_sd=spread["pelvis"],
         heading_sd=spread["heading_rad"],
         stature_sd=spread["stature_m"],
+        phase=start.get("phase"),
+        stride_hz=start.get("stride_hz"),
     )
+    prior = SegmentPrior.load(model)
+    beginning = Beginning.of(prior, read_cyclic(model), placed)
     size = placed.stature * view.scale(np.array(start["pelvis"]))
     plate = read_plate(str(clip.plate), video.size) if plated else None
     film = Film.make(video.frames(start["frame"]), size, plate)
-    return ClipSegments(prior, view, film, placed, (), Settings()), truth.eval15()[: len(film.times)]
+    segments = ClipSegments(prior, view, film, placed, (), Settings(), beginning)
+    return segments, truth.eval15()[: len(film.times)]
 
 
 def _outdoor(prior: SegmentPrior) -> None:
@@ -223,7 +220,8 @@ def _outdoor(prior: SegmentPrior) -> None:
         placed.stature * view.scale(np.array([*placed.ground, 0.9])),
         read_plate(str(clip.plate), video.size),
     )
-    some, rows = ClipSegments(prior, view, film, placed, (), Settings()), []
+    beginning = Beginning.of(prior, read_cyclic(None), placed)
+    some, rows = ClipSegments(prior, view, film, placed, (), Settings(), beginning), []
     known = None
     for _ in range(4):
         fit = fit_clip(some, known)

@@ -10,11 +10,14 @@ from toy_segments import toy_prior
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.lift import sensors
+from gait.lift.beginning import Beginning
 from gait.lift.descent import Link, normal
 from gait.lift.energy import GAIN, HEADING, PLACE, Anchor, Energy, Reading, Shape, Springs
+from gait.lift.prior import SegmentPrior
 from gait.lift.springs import CLICK_SD, as_json, read_corrections, read_placement
 from gait.lift.stick import Sticks, stick_responses
 from gait.lift.views import CameraView, FlatView
+from gait.model import read_cyclic
 from gait.skeleton import JOINTS
 from gait.video import Frame
 
@@ -194,6 +197,8 @@ def test_corrections_survive_writing(tmp_path):
         ({"height": 3}, "height is not a known key"),
         ({"pelvis": [1]}, "pelvis"),
         ({"sd": {"pelvis": -1}}, "pelvis is -1"),
+        ({"phase": 1.5}, "phase is 1.5"),
+        ({"stride_hz": 0}, "stride_hz is 0"),
     ],
 )
 def test_a_wrong_placement_is_named(tmp_path, change, words):
@@ -246,3 +251,37 @@ def test_a_prior_of_other_markers_is_refused():
 
 def test_place_is_a_slice_of_the_state():
     assert np.arange(10)[PLACE].tolist() == [4, 5, 6]
+
+
+def test_a_phase_tells_which_leg_is_ahead(tmp_path):
+    """Half a stride later left and right are exchanged; hardly known, it tells nothing."""
+    prior, cycle = SegmentPrior.load(), read_cyclic(None)
+    path = tmp_path / "p.json"
+
+    def ahead(phase):
+        """How far the left ankle is before the right one in the first frame, metres."""
+        path.write_text(json.dumps(ROUGH | {"phase": phase, "stride_hz": 0.9}))
+        beginning = Beginning.of(prior, cycle, read_placement(path, prior, True))
+        state = np.concatenate([beginning.mean[0], np.zeros(6)])
+        assert (beginning.sd[0] <= 1).all() and beginning.sd[0].min() < 0.6
+        ankles, _ = Shape.of(prior, 0, 1.7).positions(
+            state, np.eye(prior.frames), prior.index(["l_ankle", "r_ankle"])
+        )
+        return ankles[0, 0, 0] - ankles[0, 1, 0]
+
+    assert ahead(0.0) < -0.3  # the right heel strikes
+    assert ahead(0.5) == pytest.approx(-ahead(0.0), rel=0.2)
+    for vague in ({"phase": 0.5, "sd": {"phase": 0.3}}, {}):
+        path.write_text(json.dumps(ROUGH | vague))
+        assert Beginning.of(prior, cycle, read_placement(path, prior, True)) is None
+
+
+def test_without_a_plate_noise_has_no_edges():
+    rng = np.random.default_rng(0)
+    grey = (150 + 3 * rng.standard_normal((200, 200))).astype(np.float32)
+    grey[80:120, 98:103] = 40
+    edges = sensors.normalised_gradient(grey, 8.0)
+    left = sensors.above_usual(edges)
+    away = np.s_[:60]
+    assert left[away].mean() < 0.05 * edges[away].mean()
+    assert left[90:110, 94:107].max() > 0.8 * edges[90:110, 94:107].max()

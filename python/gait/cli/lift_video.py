@@ -5,18 +5,21 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from gait.blob import decode
 from gait.camera import Camera
 from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.files import require_writable
 from gait.learn.stage import one_thread
 from gait.lift import lifted_file, suggest
+from gait.lift.beginning import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.cylinder import Figure
 from gait.lift.cylinder_picture import draw_figure
@@ -25,6 +28,7 @@ from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_corrections, read_placement
 from gait.lift.views import CameraView, FlatView, View
+from gait.model import read_blob, read_cyclic
 from gait.progress import progress
 from gait.skeleton import JOINTS
 from gait.video import Video, VideoWriter, background
@@ -37,6 +41,8 @@ P.json says where the person roughly is in one frame, with --camera as --init of
   {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65}
 and without a camera in the picture; places are then in its axes (x to the right, y away, z up):
   {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
+"phase" (of walking, 0 as the right heel strikes, 0.5 as the left one does) tells which leg is ahead;
+without it, and seen from the side, left and right may come out exchanged.
 C.json says where joints (or other markers of the model) are, and if wanted how exactly (4 pixels):
   {"corrections": [{"frame": 70, "joint": "l_knee", "uv": [1285.5, 812], "sd_px": 5}]}
 """
@@ -84,7 +90,8 @@ def run(args: argparse.Namespace) -> int:
     used = [c for c in corrections if first <= c.frame < first + len(film.times)]
     if len(used) < len(corrections) and not args.quiet:
         print(f"{len(corrections) - len(used)} corrections of frames that are not used", file=sys.stderr)
-    clip = ClipSegments(prior, view, film, placement, used, Settings(joined=not args.alone))
+    beginning = Beginning.of(prior, _cycle(args.model), placement)
+    clip = ClipSegments(prior, view, film, placement, used, Settings(joined=not args.alone), beginning)
     free, fit = _fits(clip, args.quiet)
     figure = Figure.fit(fit.places, prior.names)
     shown = [i for i, name in enumerate(prior.names) if name in JOINTS or args.all_markers]
@@ -120,6 +127,12 @@ def _flat(placement: Placement, prior: SegmentPrior) -> FlatView:
     pixels = placement.height_px / placement.stature
     pelvis = placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
     return FlatView(pixels, (placement.pelvis_px[0], placement.pelvis_px[1] + pixels * pelvis))
+
+
+def _cycle(model: str | None) -> Mapping[str, Any]:
+    """Sections with a cyclic model: the model's own, or those of the shipped one."""
+    sections = decode(read_blob(model))
+    return sections if "CURV" in sections else read_cyclic(None)
 
 
 def _film(

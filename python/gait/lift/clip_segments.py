@@ -11,7 +11,8 @@ import numpy.typing as npt
 from scipy.interpolate import make_interp_spline
 
 from gait.lift import sensors
-from gait.lift.energy import GAIN, HEADING, LEVEL, PLACE, Anchor, Energy, Reading, Shape, Springs
+from gait.lift.beginning import Beginning
+from gait.lift.energy import EXTRA, GAIN, HEADING, LEVEL, PLACE, Anchor, Energy, Reading, Shape, Springs
 from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import HEIGHT_SD, Correction, Placement
@@ -63,6 +64,8 @@ class ClipSegments:
     placement : Placement
     corrections : sequence of Correction
     settings : Settings
+    beginning : Beginning, optional
+        What a phase of walking says about the first segment.
     """
 
     prior: SegmentPrior
@@ -71,6 +74,7 @@ class ClipSegments:
     placement: Placement
     corrections: Sequence[Correction]
     settings: Settings
+    beginning: Beginning | None = None
 
     @cached_property
     def shapes(self) -> list[Shape]:
@@ -131,12 +135,18 @@ class ClipSegments:
         return np.asarray(spline(np.clip(times, 0, count - 1)))
 
     def mean_state(self) -> Floats:
-        """State that the placement and the prior's mean say."""
+        """State (k + 6,) that the placement and the prior's mean say."""
         state = np.zeros(self.shapes[0].size)
         state[PLACE] = [*self.placement.ground, 0.0]
         state[HEADING] = self.placement.heading if self.shapes[0].turning else 0.0
         state[[GAIN, LEVEL]] = self.settings.gain[0], self.settings.level[0]
         return state
+
+    def first_modes(self, component: int) -> tuple[Floats, Floats]:
+        """Mean and deviations (k,) of the modes of the first segment."""
+        if self.beginning is None:
+            return np.zeros(self.prior.size), np.ones(self.prior.size)
+        return self.beginning.mean[component], self.beginning.sd[component]
 
     def energy(
         self,
@@ -161,6 +171,8 @@ class ClipSegments:
         mean = self.mean_state()
         sd = np.ones(len(mean))
         placement, first = self.placement, segment == self.origin
+        if first:
+            mean[:-EXTRA], sd[:-EXTRA] = self.first_modes(component)
         sd[PLACE] = [*[placement.ground_sd if first else FAR] * 2, HEIGHT_SD]
         sd[HEADING] = placement.heading_sd if first else TURN
         sd[[GAIN, LEVEL]] = self.settings.gain[1], self.settings.level[1]

@@ -113,7 +113,7 @@ def _first_segments(clip: ClipSegments) -> list[Settled]:
     tried = [
         _settled(clip, clip.origin, component, start, None)
         for component in range(len(clip.shapes))
-        for start in _first_starts(clip)
+        for start in _first_starts(clip, component)
     ]
     kept: list[Settled] = []
     places: list[Floats] = []
@@ -146,13 +146,16 @@ def _one_after_the_other(clip: ClipSegments, first: Settled, update: Update | No
     return Sequence(components, states, energy)
 
 
-def _first_starts(clip: ClipSegments) -> list[Floats]:
+def _first_starts(clip: ClipSegments, component: int) -> list[Floats]:
     """Where the first segment's descent starts: the mean, and along the first modes to both sides."""
-    starts = [clip.mean_state()]
+    mean, sd = clip.first_modes(component)
+    start = clip.mean_state()
+    start[: len(mean)] = mean
+    starts = [start]
     for mode in range(min(START_MODES, clip.prior.size)):
         for side in (-START_SD, START_SD):
-            starts.append(clip.mean_state())
-            starts[-1][mode] = side
+            starts.append(start.copy())
+            starts[-1][mode] += side * sd[mode]
     return starts
 
 

@@ -24,6 +24,7 @@ CONTRAST = 0.035  # deviation of the window of local contrast, statures: 8 pixel
 BLUR = 0.6  # deviation of the sensors' blur, steps of the grid
 TALL = 240.0  # pixels of a person; larger pictures are made smaller first
 GRAIN = 4.0  # grey levels added to the contrast: noise of the camera
+FLOOR = 2.0  # medians of the picture's gradients that every place has
 SAMPLES = 3.0  # stored per deviation of the blur
 CHANGE = 6.0  # deviations of the difference to the empty scene at which a gradient counts half
 
@@ -103,7 +104,9 @@ class Film:
         for done, frame in enumerate(frames, 1):
             grey = _grey(frame.image, shrink)
             edges = normalised_gradient(grey, window)
-            if scene is not None:
+            if scene is None:
+                edges = above_usual(edges)
+            else:
                 edges *= changed(grey, scene, 0.5 * window)
             fields.append(_blurred(edges, blur_of(stature * shrink)))
             numbers.append(frame.number)
@@ -132,6 +135,14 @@ def normalised_gradient(grey: Field, window: float) -> Field:
     mean, square = (cv2.GaussianBlur(x, (0, 0), window) for x in (grey, grey * grey))
     contrast = np.sqrt(np.maximum(square - mean * mean, 0)) + GRAIN
     return np.asarray(window * slope / contrast, np.float32)
+
+
+def above_usual(edges: Field) -> Field:
+    """Take from gradients (h, w) what noise and texture give everywhere.
+
+    Else the figure looks smaller than it is: next to it contrast is high and normalised noise low.
+    """
+    return np.asarray(np.maximum(edges - FLOOR * np.median(edges), 0), np.float32)
 
 
 def changed(grey: Field, plate: Field, window: float) -> Field:

@@ -1,13 +1,15 @@
 """What the user says about a clip: where the person is at first, and corrections (springs) in any frame.
 
-Placement (JSON), with a camera, in the form of ``gait track --init`` (phase and rate are left out)::
+Placement (JSON), with a camera, in the form of ``gait track --init``::
 
-    {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65,
-     "sd": {"pelvis": 0.1, "heading_rad": 0.1}}
+    {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65, "phase": 0.3,
+     "sd": {"pelvis": 0.1, "heading_rad": 0.1, "phase": 0.1}}
 
 and without one, where heading 0 is to the right of the picture and +90 degrees away from the viewer::
 
     {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
+
+The phase of walking, from 0 (right heel strike) to 1, says which leg is ahead.
 
 Corrections (JSON): any marker of the prior in any frame; ``sd_px`` is how exactly it was pointed at::
 
@@ -26,7 +28,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.fields import Fields, read_json
-from gait.initial import STATURE
+from gait.initial import SCALARS, STATURE
 from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
@@ -35,6 +37,8 @@ CLICK_SD = 4.0  # pixels, where a correction does not say
 PLACE_SD = 0.3  # metres on the ground, and radians of heading, where a placement does not say
 HEADING_SD = 0.3
 STATURE_SD = 0.03  # metres
+PHASE_SD = 0.1  # strides: a phase by eye
+RATE_SD = 0.05  # strides per second
 HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 0
 FURTHEST = 1e6  # pixels or metres
 _KNOWN = ("frame", "pelvis", "pelvis_px", "height_px", "heading_rad", "stature_m", "phase", "stride_hz", "sd")
@@ -79,6 +83,11 @@ class Placement:
         Without a camera: the pelvis in the picture.
     height_px : float, optional
         Without a camera: how many pixels the standing person is high.
+    phase : float, optional
+        Of walking, from 0 (right heel strike) to 1.
+    stride_hz : float, optional
+        Strides per second.
+    phase_sd, stride_hz_sd : float
     """
 
     frame: int
@@ -90,6 +99,10 @@ class Placement:
     stature_sd: float = STATURE_SD
     pelvis_px: tuple[float, float] | None = None
     height_px: float | None = None
+    phase: float | None = None
+    stride_hz: float | None = None
+    phase_sd: float = PHASE_SD
+    stride_hz_sd: float = RATE_SD
 
 
 def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated: bool) -> Placement:
@@ -114,6 +127,10 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
         ground_sd=_deviation(spread, "pelvis", PLACE_SD),
         heading_sd=_deviation(spread, "heading_rad", HEADING_SD),
         stature_sd=_deviation(spread, "stature_m", STATURE_SD),
+        phase=_optional(fields, "phase"),
+        stride_hz=_optional(fields, "stride_hz"),
+        phase_sd=_deviation(spread, "phase", PHASE_SD),
+        stride_hz_sd=_deviation(spread, "stride_hz", RATE_SD),
     )
     return placed if calibrated else replace(placed, **_in_picture(fields))
 
@@ -125,6 +142,12 @@ def _in_picture(fields: Fields) -> dict[str, Any]:
     u, v = fields.array("pelvis_px", (2,), "give column and row of the pelvis, pixels")
     height = fields.number("height_px", 10.0, FURTHEST, "give how many pixels the person is high")
     return {"pelvis_px": (float(u), float(v)), "height_px": height}
+
+
+def _optional(fields: Fields, key: str) -> float | None:
+    """Read a number as a start of the tracker has it; None if absent."""
+    _, (low, high), remedy = SCALARS[key]
+    return fields.number(key, low, high, remedy) if key in fields else None
 
 
 def _ground(fields: Fields) -> Floats:
