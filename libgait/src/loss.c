@@ -78,10 +78,7 @@ void loss_allow_hidden(gait_tracker *t)
     float const support = weigh_walker(t, &w), least = t->ll[best] - support + HIDDEN;
     if (!(support != 0.0f)) /* no term has an opinion on whether anybody is there */
         return;
-    for (int32_t i = 0; i < n; i++) {
-        float const more = f_max(t->ll[i], least), less = f_min(t->ll[i], least);
-        t->used[i] = more + m_log(1.0f + m_exp(less - more));
-    }
+    t->like->run->loss_join(t->ll, least, n, t->used);
 }
 
 /* Did the walker go on walking while nobody saw it?  Then left and right are as they were. */
