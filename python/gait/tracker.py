@@ -210,10 +210,8 @@ class Tracker:
         self._lib = library()
         self.model = model
         self.cameras = [cameras] if isinstance(cameras, Camera) else list(cameras)
-        self.config = config or TrackerConfig.default()
-        self._tasks = _task_source(tasks)
-        if isinstance(tasks, int) and tasks > 1:
-            self.config = replace(self.config, tasks=tasks)
+        self._tasks, config = _task_source(tasks), config or TrackerConfig.default()
+        self.config = replace(config, tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
         self._error = _abi.Error()
         c = self._c_config()
         size, handle = ctypes.c_size_t(), ctypes.c_void_p()

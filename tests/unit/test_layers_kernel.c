@@ -11,7 +11,8 @@
 static outline_block outline;
 static layers_block edges;
 static layers drawn[BLOCK];
-static unsigned char memory[sizeof(layers_block) + sizeof(outline_block) + sizeof(layers) + 2 * GUARD];
+static _Alignas(GAIT_ALIGN) unsigned char memory[sizeof(layers_block) + sizeof(outline_block) +
+                                                 sizeof(layers) + 2 * GUARD];
 
 /* Each other set draws the block as `outline`, `edges` and `drawn` say. */
 static void compare_layers(const limb_geometry *limbs, int32_t count)
