@@ -137,8 +137,9 @@ static gait_status check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->proportions < -1 || cfg->proportions > m->proportions)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config proportions = %d, the model has %d",
                          (int)cfg->proportions, (int)m->proportions);
-    if (cfg->tasks < 1 || cfg->tasks > 256)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config tasks = %d is outside [1, 256]", (int)cfg->tasks);
+    if (cfg->tasks < 1 || cfg->tasks > TASK_MOST)
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config tasks = %d is outside [1, %d]", (int)cfg->tasks,
+                         TASK_MOST);
     if (cfg->cameras < 1 || cfg->cameras > GAIT_MAX_CAMERAS)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config cameras = %d is outside [1, %d]", (int)cfg->cameras,
                          GAIT_MAX_CAMERAS);

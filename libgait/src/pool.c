@@ -1,4 +1,5 @@
-/* pool.c - tasks on POSIX threads: whoever is free takes the next one. */
+/* pool.c - tasks on POSIX threads: whoever is free takes the next one.  Who has to wait looks on for a while before it
+ * sleeps: the jobs of a step follow one another closely, and waking a thread takes as long as some of them. */
 #ifndef GAIT_NO_THREADS
 #define _POSIX_C_SOURCE 200809L
 #endif
@@ -18,16 +19,31 @@ typedef struct job {
 } job;
 
 struct gait_pool {
-    pthread_mutex_t lock; /* of everything but `next` */
+    pthread_mutex_t lock; /* of everything but `next`; `number` and `busy` are looked at without it */
     pthread_cond_t work, done;
     pthread_t *thread; /* helpers; the caller of a job works as well */
     int32_t helpers;
     bool quit;
     job now;
-    uint64_t number; /* of the job */
-    int32_t busy;    /* helpers that work on it */
-    atomic_int next; /* task to hand out */
+    atomic_uint number; /* of the job */
+    atomic_uint busy;   /* helpers that work on it */
+    atomic_int next;    /* task to hand out */
 };
+
+enum { LOOKS = 4000 }; /* about 50 microseconds */
+
+/* While *value is `known`, or while it is not, but not for long. */
+static void look_on(const atomic_uint *value, unsigned known, bool same)
+{
+    for (int i = 0; i < LOOKS && (atomic_load_explicit(value, memory_order_relaxed) == known) == same; i++)
+#if defined(__x86_64__)
+        __builtin_ia32_pause();
+#elif defined(__aarch64__)
+        __asm__ volatile("isb" ::: "memory"); /* waits about as long as the other's pause */
+#else
+        continue;
+#endif
+}
 
 static void work_off(gait_pool *p, const job *j)
 {
@@ -38,9 +54,17 @@ static void work_off(gait_pool *p, const job *j)
 static void *helper(void *arg)
 {
     gait_pool *const p = arg;
-    uint64_t seen = 0;
+    unsigned seen = 0;
+    bool fresh = false; /* from a job: the next one may be near */
     pthread_mutex_lock(&p->lock);
     while (!p->quit) {
+        if (fresh) {
+            fresh = false;
+            pthread_mutex_unlock(&p->lock);
+            look_on(&p->number, seen, true);
+            pthread_mutex_lock(&p->lock);
+            continue;
+        }
         if (!p->now.fn || p->number == seen) {
             pthread_cond_wait(&p->work, &p->lock);
             continue;
@@ -51,6 +75,7 @@ static void *helper(void *arg)
         pthread_mutex_unlock(&p->lock);
         work_off(p, &mine);
         pthread_mutex_lock(&p->lock);
+        fresh = true;
         if (--p->busy == 0)
             pthread_cond_signal(&p->done);
     }
@@ -70,6 +95,7 @@ static void run(void *user, gait_task_fn *fn, void *ctx, int32_t count)
     pthread_cond_broadcast(&p->work);
     pthread_mutex_unlock(&p->lock);
     work_off(p, &mine);
+    look_on(&p->busy, 0, false);
     pthread_mutex_lock(&p->lock);
     while (p->busy)
         pthread_cond_wait(&p->done, &p->lock);

@@ -11,6 +11,7 @@ typedef struct record {
     int32_t block, tasks;
     int32_t hits[4096];
     int32_t faults[MOST]; /* of each task: ranges that are empty, or begin within a block */
+    int32_t first[MOST];  /* of each task: where it began, if it was -1 */
 } record;
 
 static void note(void *ctx, int32_t begin, int32_t end, int32_t task)
@@ -19,6 +20,8 @@ static void note(void *ctx, int32_t begin, int32_t end, int32_t task)
     if (task < 0 || task >= r->tasks)
         abort();
     r->faults[task] += begin >= end || begin % r->block != 0;
+    if (r->first[task] == -1)
+        r->first[task] = begin;
     for (int32_t i = begin; i < end; i++)
         r->hits[i]++;
 }
@@ -69,6 +72,20 @@ static void check_cover(const record *r, int32_t items)
     CHECK(ok);
 }
 
+/* A task begins with its own part and, where nobody else has, goes on with the others'. */
+static void test_own_part(void)
+{
+    enum { TASKS = 4, ITEMS = 1000 };
+    static record r;
+    int runs = 0;
+    gait_tasks const reverse = {backwards, &runs};
+    r = (record){.block = 1, .tasks = TASKS, .first = {-1, -1, -1, -1}};
+    task_run(&reverse, TASKS, ITEMS, 1, note, &r);
+    check_cover(&r, ITEMS);
+    CHECK(r.first[TASKS - 1] == (TASKS - 1) * ITEMS / TASKS);
+    CHECK(r.first[0] == -1 && r.first[1] == -1 && r.first[2] == -1);
+}
+
 int main(void)
 {
     static const int32_t tasks[] = {1, 2, 3, 16, 64, 256}, items[] = {0, 1, 15, 16, 17, 1000, 4096};
@@ -92,5 +109,6 @@ int main(void)
         task_run(&parallel, 7, 4000, 16, note, &big);
         check_cover(&big, 4000);
     }
+    test_own_part();
     return CHECK_DONE();
 }
