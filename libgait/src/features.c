@@ -40,26 +40,44 @@ static void pack_quads(const int8_t *surface, uint32_t *quads)
                    (uint32_t)p[i + VIEW_SIZE + 1] << 24;
 }
 
-void features_compute(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
-                      const view_planes *plate, bool raw, features_scratch *s)
+void features_sample(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
+                     features_scratch *s)
 {
     f->seen = im->data != NULL;
     f->has_fg = false;
     if (!f->seen)
         return;
     run->view_sample(&f->map, cam, im, &s->planes);
-    refresh_inside(run, f, cam);
     run->view_grey(&s->planes, s->grey);
+}
+
+static void foreground(const kernels *run, features *f, const gait_camera *cam, const view_planes *plate,
+                       const features_scratch *s)
+{
+    view_planes const luma = {.channel = {s->grey}, .channels = 1};
+    refresh_inside(run, f, cam);
     f->has_fg = plate != NULL;
-    if (f->has_fg) {
-        view_planes const luma = {.channel = {s->grey}, .channels = 1};
+    if (f->has_fg)
         run->features_foreground(f, plate->channels == 1 ? &luma : &s->planes, plate);
-    }
-    run->features_edges(s->grey, f->edge, s->rows);
+}
+
+static void surface(const kernels *run, features *f, bool raw, const features_scratch *s)
+{
     if (raw)
         for (int32_t i = 0; i < VIEW_PIXELS; i++)
             f->surface[i] = (int8_t)i_max(s->grey[i] - 128, -127);
     else
         run->features_contrast(s->grey, f->surface);
     pack_quads(f->surface, f->quads);
+}
+
+void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,
+                  const view_planes *plate, bool raw, features_scratch *s)
+{
+    if (map == FEATURES_EDGES)
+        run->features_edges(s->grey, f->edge, s->rows);
+    else if (map == FEATURES_SURFACE)
+        surface(run, f, raw, s);
+    else
+        foreground(run, f, cam, plate, s);
 }

@@ -54,11 +54,18 @@ typedef struct features_scratch { /* shared by the cameras */
 features features_layout(arena *a);
 features_scratch features_scratch_layout(arena *a);
 
-/* All maps of one frame.  plate: resampled empty scene, with colour only if the frame has, or NULL; raw:
- * surface keeps grey levels (paper mode).  Kernels (kernels.h), each one map:
+/* A frame's planes in the region f->map, and their grey levels, into s; f->seen tells whether there is a frame. */
+void features_sample(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
+                     features_scratch *s);
+
+/* The maps of what was sampled, each apart from the others, in the order of the time that they take. */
+enum { FEATURES_EDGES, FEATURES_SURFACE, FEATURES_FOREGROUND, FEATURES_MAPS };
+
+/* One of them.  plate: resampled empty scene, with colour only if the frame has, or NULL; raw: surface keeps grey
+ * levels (paper mode).  Kernels (kernels.h):
  *   features_foreground  fg and fg_total where inside
  *   features_edges       edge tensors of a grey plane
  *   features_contrast    local contrast of a grey plane */
-void features_compute(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
-                      const view_planes *plate, bool raw, features_scratch *s);
+void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,
+                  const view_planes *plate, bool raw, features_scratch *s);
 #endif

@@ -1,6 +1,7 @@
 #include "tracker.h"
 #include "estimate.h"
 #include "fmath.h"
+#include "look.h"
 #include "loss.h"
 #include "modes.h"
 #include "weigh.h"
@@ -221,34 +222,6 @@ static void remember_appearance(gait_tracker *t)
             template_update(t->template[0][c], t->model->limbs, t->seen + c * t->model->limbs);
 }
 
-typedef struct look_job {
-    gait_tracker *t;
-    const gait_frame *frame;
-    const walker *place;
-    int32_t seeing; /* of the cameras */
-} look_job;
-
-enum { LOOK, INHERIT, LOOK_ITEMS };
-
-static void look_range(void *ctx, int32_t begin, int32_t end, int32_t task)
-{
-    look_job *const j = ctx;
-    (void)task;
-    for (int32_t i = begin; i < end; i++)
-        if (i == LOOK)
-            j->seeing = weigh_look(j->t, j->frame, j->place);
-        else
-            weigh_inherit(j->t);
-}
-
-/* Look at the frame where the walker should be; meanwhile particles take over what their ancestors saw. */
-static int32_t look(gait_tracker *t, const gait_frame *frame, const walker *place)
-{
-    look_job j = {.t = t, .frame = frame, .place = place};
-    task_run(&t->cfg.exec, t->cfg.tasks, LOOK_ITEMS, 1, look_range, &j);
-    return j.seeing;
-}
-
 /* Weigh the particles by the frame and fill in the estimate. */
 static void observe(gait_tracker *t, float dt, gait_estimate *out)
 {
@@ -291,7 +264,7 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
     modes_fork(t);
     loss_search(t, counter);
     walker const place = estimate_place(&t->people, t->filter.weight);
-    if (look(t, frame, &place) > 0)
+    if (look_frame(t, frame, &place) > 0)
         observe(t, dt, &e);
     else
         coast(t, dt, &e);

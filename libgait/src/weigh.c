@@ -1,5 +1,4 @@
 #include "weigh.h"
-#include "camera.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -18,84 +17,6 @@ void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w)
     w->pose = pose;
     w->layers = drawn;
     w->points = points;
-}
-
-/* Aim one camera's region at the walker; false if the walker is behind it. */
-static bool aim(gait_tracker *t, int32_t c, const walker *w)
-{
-    const gait_camera *const cam = &t->cfg.camera[c];
-    float const H = w->f[F_STATURE], middle[3] = {w->f[F_X], w->f[F_Y], w->f[F_Z] + 0.52f * H};
-    float uv[2];
-    float const depth = camera_project(cam, middle, uv);
-    if (!(depth > 0.1f))
-        return false;
-    float const tall = H * f_max(cam->fx, cam->fy) / depth;
-    if (view_follow(&t->core->map[c], uv, tall))
-        t->camera[c].plate_stale = true;
-    return true;
-}
-
-/* Resample the background where the region moved or the frames changed between grey and colour: a grey
- * frame is compared with a grey plate. */
-static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
-{
-    camera_state *const s = &t->camera[c];
-    bool const colour = s->background.format != GAIT_GREY8;
-    if (!s->plate_stale && s->plate.channels == (colour && !grey ? 3 : 1))
-        return;
-    t->like->run->view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
-    if (colour && grey) {
-        t->like->run->view_grey(&s->plate, s->plate.channel[0]);
-        s->plate.channels = 1;
-    }
-    s->plate_stale = false;
-}
-
-/* Tracks of one camera without the lens's distortion. */
-static void take_tracks(const gait_tracker *t, int32_t c, const gait_track *track, features_tracks *out)
-{
-    *out = (features_tracks){0};
-    for (int32_t p = 0; track && (t->cfg.terms & GAIT_TERM_TRACKS) && p < t->model->points; p++) {
-        const gait_track *const one = &track[p];
-        bool const seen =
-            one->sd > 0.0f && one->sd <= FLT_MAX && f_finite(&one->u, 1) && f_finite(&one->v, 1);
-        if (!seen)
-            continue;
-        double ideal[2];
-        camera_ideal(&t->cfg.camera[c], (const double[2]){(double)one->u, (double)one->v}, ideal);
-        out->u[p] = (float)ideal[0];
-        out->v[p] = (float)ideal[1];
-        out->inverse_sd[p] = 1.0f / one->sd;
-        out->seen++;
-    }
-}
-
-int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted)
-{
-    int32_t count = 0;
-    for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        camera_state *const s = &t->camera[c];
-        gait_image im = frame->image[c];
-        if (!aim(t, c, predicted))
-            im.data = NULL;
-        s->seen.map = t->core->map[c];
-        bool const plate = s->plate.channel[0] && s->background.data && im.data;
-        if (plate)
-            refresh_plate(t, c, im.format == GAIT_GREY8);
-        features_compute(t->like->run, &s->seen, &t->cfg.camera[c], &im, plate ? &s->plate : NULL,
-                         t->like->paper, &t->scratch);
-        take_tracks(t, c, frame->tracks[c], &s->seen.tracks);
-        count += s->seen.seen;
-    }
-    return count;
-}
-
-void weigh_inherit(gait_tracker *t)
-{
-    int32_t const before = t->past.count[lag_slot(&t->past, t->core->current, 1)];
-    if (t->core->textured)
-        pf_inherit(&t->filter, before, t->texture,
-                   (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
 }
 
 /* The block's limbs in one camera, and in its working image and grid. */

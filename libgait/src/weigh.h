@@ -1,18 +1,10 @@
-/* weigh.h - image evidence of bodies: regions and features of a frame, then every particle's
- * log-likelihood. */
+/* weigh.h - image evidence of bodies: every particle's log-likelihood. */
 #ifndef GAIT_WEIGH_H
 #define GAIT_WEIGH_H
 #include "tracker.h"
 
 /* Place a task's arrays; w NULL: only count. */
 void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w);
-
-/* Move each camera's region to the predicted walker and compute its features.  Returns how many cameras
- * saw. */
-int32_t weigh_look(gait_tracker *t, const gait_frame *frame, const walker *predicted);
-
-/* Every particle's surface samples become its ancestor's, if there are any of the previous frame. */
-void weigh_inherit(gait_tracker *t);
 
 /* Log-likelihoods t->ll, joints and surface samples of all particles. */
 void weigh_particles(gait_tracker *t);

@@ -1,6 +1,7 @@
 #include "bench_stages.h"
 #include "bench_clock.h"
 #include "estimate.h"
+#include "look.h"
 #include "loss.h"
 #include "modes.h"
 #include "weigh.h"
@@ -158,28 +159,42 @@ double bench_stages_cells(void)
 }
 
 /* ---- functions of the library (-Wl,--wrap) ---- */
-/* `call`, timed as a stage without the stages within it. */
+static void stage_begin(double *outer_ns, int64_t *since)
+{
+    *outer_ns = b.inner_ns;
+    b.inner_ns = 0.0;
+    b.within++;
+    *since = bench_cpu_ns();
+}
+
+static void stage_end(int stage, double outer_ns, int64_t since)
+{
+    double const all = (double)(bench_cpu_ns() - since);
+    b.within--;
+    b.ns[stage] += all - b.inner_ns;
+    b.inner_ns = outer_ns + all;
+}
+
+/* `call`, timed as a stage without the stages within it; untimed it may be made by several threads. */
 #define WHOLE(stage, call)                                                                                   \
     do {                                                                                                     \
-        int64_t const since_ = b.on ? bench_cpu_ns() : 0;                                                    \
-        double const outer_ = b.inner_ns;                                                                    \
-        b.inner_ns = 0.0;                                                                                    \
-        b.within++;                                                                                          \
+        double outer_ = 0.0;                                                                                 \
+        int64_t since_ = 0;                                                                                  \
+        if (b.on)                                                                                            \
+            stage_begin(&outer_, &since_);                                                                   \
         call;                                                                                                \
-        b.within--;                                                                                          \
-        double const all_ = b.on ? (double)(bench_cpu_ns() - since_) : 0.0;                                  \
-        b.ns[stage] += all_ - b.inner_ns;                                                                    \
-        b.inner_ns = outer_ + all_;                                                                          \
+        if (b.on)                                                                                            \
+            stage_end(stage, outer_, since_);                                                                \
     } while (0)
 #define WRAP(result, name, parameters)                                                                       \
     result __real_##name parameters;                                                                         \
     result __wrap_##name parameters;                                                                         \
     result __wrap_##name parameters
 
-WRAP(int32_t, weigh_look, (gait_tracker * t, const gait_frame *frame, const walker *predicted))
+WRAP(int32_t, look_frame, (gait_tracker * t, const gait_frame *frame, const walker *predicted))
 {
     int32_t cameras;
-    WHOLE(STAGE_FEATURES, cameras = __real_weigh_look(t, frame, predicted));
+    WHOLE(STAGE_FEATURES, cameras = __real_look_frame(t, frame, predicted));
     return cameras;
 }
 

@@ -4,6 +4,7 @@
 #include "arena.h"
 #include "base.h"
 #include "rng.h"
+#include "toy_features.h"
 
 #include "check.h"
 
@@ -336,14 +337,14 @@ static void test_compute(void)
         pixels[i] = (uint8_t)(noise((uint32_t)(i / 3)) % 251);
     f.map = (view_map){.scale = 1.0f, .u0 = -100.0f, .v0 = -50.0f};
     run->view_sample(&f.map, &cam, &im, &plate);
-    features_compute(run, &f, &cam, &im, &plate, false, &scratch);
+    toy_features(run, &f, &cam, &im, &plate, false, &scratch);
     CHECK(f.seen && f.has_fg && f.fg_total == 0);
     int32_t cells = 0;
     for (int32_t y = 0; y < RAST_SIZE; y++)
         cells += rast_popcount(f.inside[y][0]) + rast_popcount(f.inside[y][1]);
     CHECK(cells == W / 2 * (H / 2));
     CHECK(f.edge[20 * VIEW_SIZE + 20].trace == 0 && f.edge[120 * VIEW_SIZE + 180].trace > 5);
-    features_compute(run, &f, &cam, &im, NULL, true, &scratch); /* no plate; grey levels in paper mode */
+    toy_features(run, &f, &cam, &im, NULL, true, &scratch); /* no plate; grey levels in paper mode */
     CHECK(f.seen && !f.has_fg);
     int32_t wrong = 0;
     for (int32_t y = 0; y < H; y++)
@@ -352,11 +353,11 @@ static void test_compute(void)
     CHECK(wrong == 0);
     im.format = GAIT_RGB8;
     im.stride = 3 * W;
-    features_compute(run, &f, &cam, &im, &plate, false, &scratch); /* a grey plate: its luma is compared */
+    toy_features(run, &f, &cam, &im, &plate, false, &scratch); /* a grey plate: its luma is compared */
     CHECK(f.seen && f.has_fg && f.fg_total > 0);
     im.data = NULL;
     f.has_fg = true;
-    features_compute(run, &f, &cam, &im, &plate, false, &scratch);
+    toy_features(run, &f, &cam, &im, &plate, false, &scratch);
     CHECK(!f.seen && !f.has_fg);
 }
 

@@ -8,6 +8,7 @@
 #define TOY_LOOK_H
 #include "like.h"
 #include "toy_draw.h"
+#include "toy_features.h"
 #include "toy_scene.h"
 
 typedef struct toy_look {
@@ -64,7 +65,7 @@ static inline void toy_look_at(toy_look *v, const uint8_t *grey, const uint8_t *
         gait_image const empty = toy_image(wall);
         v->setup.run->view_sample(&v->f.map, &v->cam, &empty, &v->plate);
     }
-    features_compute(v->setup.run, &v->f, &v->cam, &im, wall ? &v->plate : NULL, v->setup.paper, &v->scratch);
+    toy_features(v->setup.run, &v->f, &v->cam, &im, wall ? &v->plate : NULL, v->setup.paper, &v->scratch);
 }
 
 static inline like_body toy_look_body(toy_look *v, const gait_state *s)
