@@ -100,6 +100,7 @@ void verdict_print(const verdict *v, const gait_model *model)
     line("cost of a particle, 1920x1080 against 640x480", 1.1,
          particle_ns(v->picture[2]) / particle_ns(v->picture[0]), false, "times");
     line("memory of the tracker, 10,000 particles", 12, (double)v->many[0][0]->bytes / 1e6, false, "MB");
+    line("    with two threads", 12, (double)v->many[0][1]->bytes / 1e6, false, "MB");
     if (getloadavg(&load, 1) == 1 && load > 2.5)
         printf("the machine was busy (load %.1f): only CPU times and their ratios mean something\n", load);
 }
