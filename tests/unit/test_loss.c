@@ -128,7 +128,8 @@ static void test_join(void)
             far += a[i] > -1e3f && a[i] < 1e3f &&
                    fabs((double)want[i] - log(exp((double)a[i]) + exp((double)b))) > 1e-5;
         for (int k = 0; k < isa_count(); k++) {
-            guarded const g = guard_fill(memory + n / 4 % 4 * sizeof(float), (size_t)n * sizeof(float));
+            guarded const g =
+                guard_fill(memory + (size_t)(n / 4 % 4) * sizeof(float), (size_t)n * sizeof(float));
             isa_at(k)->loss_join(a, b, n, (float *)(void *)g.begin);
             wrong += !guard_whole(&g) || memcmp(g.begin, want, g.bytes) != 0;
         }
