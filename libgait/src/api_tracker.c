@@ -26,7 +26,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
                        : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
         .term_weight = {0.2f, 25.0f, 40.0f, 4.0f, 8.0f},
         .missed_weight = 0.4f,
-        .girth = 1.05f,
+        .girth = 1.0f,
         .resample_ess = paper ? 1.0f : 0.5f,
         .max_dt = 0.5f,
         .phase_noise = 0.0164f,
@@ -34,8 +34,8 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .rate_noise_start = 0.055f,
         .settle_time = 1.0f,
         .rate_time = 5.0f,
-        .forward_noise = 0.022f,
-        .lateral_noise = 0.0164f,
+        .forward_noise = 0.05f,
+        .lateral_noise = 0.05f,
         .vertical_noise = 0.0096f,
         .heading_noise = 0.044f,
         .tilt_noise = 0.033f,
@@ -47,7 +47,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .joint_sd_factor = 2.7f,
         .joint_sd_model = 0.018f,
         .offset_noise = 0.02f,
-        .offset_sd = 0.07f,
+        .offset_sd = 0.035f,
         .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
         .cpu_mask = ~0u,
     };
@@ -61,7 +61,6 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
         cfg->stature_noise = 0.0f;
         cfg->offset_angles = 0;
-        cfg->girth = 1.0f;
         cfg->joint_sd_factor = 1.0f;
         cfg->joint_sd_model = 0.0f;
         cfg->term_weight[0] = 1.0f;

@@ -177,41 +177,51 @@ def _points(p: Proportions) -> dict[str, tuple[str, tuple[float, float, float]]]
     return points
 
 
-CLOTHED = 1.05  # clothes over the anatomical radius
 CONE, ELLIPSOID = 0, 1
+#: Solids of a dressed body of 1.75 m, millimetres: shape, how far axes start and end from joints (left side),
+#: half axes at both ends.  Fitted to silhouettes of walkers whose pose is known (design.md, "What the
+#: defaults were chosen on"): flesh lies ahead of hips and spine; the trunk reaches into the neck.
+_SOLIDS = {
+    "torso": (CONE, (52, 0, 108), (61, 0, 86), (172, 133, 184, 72)),
+    "pelvis": (CONE, (13, 0, -67), (40, 0, 128), (174, 117, 176, 120)),
+    "head": (ELLIPSOID, (25, 0, -35), (25, 0, 6), (75, 98, 75, 98)),
+    "upper_arm": (CONE, (0, -18, 18), (18, -5, 0), (60, 60, 38, 38)),
+    "forearm": (CONE, (9, 0, 0), (-7, 0, -131), (35, 35, 25, 31)),
+    "thigh": (CONE, (30, -22, 5), (14, -4, 0), (96, 102, 69, 69)),
+    "shank": (CONE, (-15, 0, 0), (0, 0, 0), (67, 67, 54, 57)),
+    "foot": (CONE, (14, 0, 30), (38, 0, 6), (28, 59, 37, 35)),
+}
 
 
 def _limbs(p: Proportions) -> dict[str, tuple[str, int, list[float]]]:
-    """Limb name to frame, shape and LIMF row; anatomical radii at a stature of 1.75 m, clothed."""
-
-    def limb(
-        frame: str, shape: int, start: tuple[float, ...], end: tuple[float, ...], radii_mm: tuple[float, ...]
-    ) -> tuple[str, int, list[float]]:
-        return frame, shape, [*start, *end, *(CLOTHED * r / 1750 for r in radii_mm)]
-
-    top = p.shoulder[2] + 0.015
-    limbs = {
-        "torso": limb("torso", CONE, (0, 0, 0.06), (0, 0, top), (140, 105, 155, 105)),
-        "pelvis": limb("pelvis", CONE, (0, 0, -0.045), (0, 0, 0.075), (155, 115, 140, 105)),
-        "head": limb(
-            "head",
-            ELLIPSOID,
-            (p.head[0] + 0.012, 0, p.head[2] - 0.135),
-            (p.head[0] + 0.012, 0, p.head[2]),
-            (78, 95, 78, 95),
-        ),
+    """Limb name to frame, shape and LIMF row."""
+    joint = (0.0, 0.0, 0.0)
+    spans: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {  # where solids start and end
+        "torso": (joint, (0, 0, p.shoulder[2])),
+        "pelvis": (joint, joint),
+        "head": (joint, (0, 0, p.head[2])),
+        "upper_arm": (joint, (0, 0, -p.upper_arm)),
+        "forearm": (joint, (0, 0, -p.forearm)),
+        "thigh": (joint, (0, 0, -p.thigh)),
+        "shank": (joint, (0, 0, -p.shank)),
+        "foot": ((p.heel[0], 0, -p.sole), (p.toe[0], 0, -p.sole)),
     }
-    heel, ball = (p.heel[0] + 0.012, 0.0, 0.024 - p.sole), (p.toe[0] + 0.02, 0.0, 0.02 - p.sole)
+    limbs = {}
+    for name in ("torso", "pelvis", "head"):
+        limbs[name] = name, _SOLIDS[name][0], _solid(name, spans[name], "l")
     for s in SIDES:
-        hand = -p.forearm - 0.075
-        limbs |= {
-            f"{s}_upper_arm": limb(f"{s}_upper_arm", CONE, (0, 0, 0), (0, 0, -p.upper_arm), (50, 50, 40, 40)),
-            f"{s}_forearm": limb(f"{s}_forearm", CONE, (0, 0, 0), (0, 0, hand), (40, 40, 27, 33)),
-            f"{s}_thigh": limb(f"{s}_thigh", CONE, (0, 0, 0), (0, 0, -p.thigh), (85, 85, 62, 62)),
-            f"{s}_shank": limb(f"{s}_shank", CONE, (0, 0, 0), (0, 0, -p.shank), (60, 60, 40, 42)),
-            f"{s}_foot": limb(f"{s}_foot", CONE, heel, ball, (37, 40, 44, 33)),
-        }
+        for name in ("upper_arm", "forearm", "thigh", "shank", "foot"):
+            limbs[f"{s}_{name}"] = f"{s}_{name}", _SOLIDS[name][0], _solid(name, spans[name], s)
     return limbs
+
+
+def _solid(name: str, span: tuple[tuple[float, ...], tuple[float, ...]], side: str) -> list[float]:
+    """LIMF row, statures: start, end, half axes."""
+    _, start, end, radii = _SOLIDS[name]
+    ends = [
+        np.array(at) + np.array(_mirror(by, side)) / 1750 for at, by in zip(span, (start, end), strict=True)
+    ]
+    return [*ends[0].tolist(), *ends[1].tolist(), *(r / 1750 for r in radii)]
 
 
 def pose(

@@ -22,7 +22,6 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "stature search": {"stature_noise": 0.0},
     "tilt": {"tilt_noise": 0.0},
     "rate return": {"rate_time": 0.0},
-    "clothes (girth)": {"girth": 1.0},
     "missed foreground": {"missed_weight": 0.0},
 }
 _SAME_AS = {"two-stage rate": ("rate_noise_start", "rate_noise")}  # off: the first is set to the second

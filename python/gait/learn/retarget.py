@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +20,15 @@ from gait.skeleton import ANGLES, SIDES, Proportions
 Floats = npt.NDArray[np.float64]
 
 HEAD = 0.141  # neck to head top, statures: files end the head's bone at different heights
-HEAD_TOP = (0.015, 0.0, 0.140)  # top of the head from the base of the neck, of the length HEAD
-SHOULDER_HEIGHT = 0.262  # centre of the shoulder's joint over the hips, statures
-AHEAD = 0.02  # neck and shoulders before the line from the hips to CMU's neck, statures
-UPPER_ARM = 0.156  # from there to the elbow
+#: Trunk and upper arms of a body by anatomy, statures: recordings end the clavicle near the acromion and the
+#: spine near its back; here the shoulder's centre is lower, the neck further ahead, the elbow nearer.
+ANATOMICAL: dict[str, Any] = {
+    "shoulder": (0.043, 0.1085, 0.2595),
+    "neck": 0.3205,
+    "neck_ahead": 0.048,
+    "head": (0.027, 0.0, 0.130),
+    "upper_arm": 0.161,
+}
 BALL = 0.0235  # centre of the ball of the foot over the ground in stance, statures
 #: What the parts of a standing body that may be unknown take of its height, statures.
 SHARES = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
@@ -166,24 +172,13 @@ def _centred(table: Floats) -> Floats:
 
 
 def generic_proportions(bodies: Sequence[Measures | None]) -> Proportions:
-    """Mean proportions for people who were not measured.
+    """Mean proportions for people who were not measured: legs and forearms recorded, the rest `ANATOMICAL`.
 
-    Recordings end the clavicle near the acromion and the spine near its back; anatomical bodies (MakeHuman)
-    have neck and shoulders further forward, the shoulder's centre lower, the elbow nearer, and the top of the
-    head ahead of the base of the neck.  These are set by hand towards the rendered bodies of the development
-    clips of ../shared/data: where hips and neck lie in a body is a matter of definition, and no image tells
-    which is meant.  Errors measured on these clips are therefore no independent proof of it; what it costs on
-    CMU's walkers tests/bench/learn_floor.py tells.
+    Where hips and neck lie in a body is a matter of definition, and no image tells which is meant.  These are
+    set by the tracker's errors on the rendered bodies (MakeHuman) of the development clips of ../shared/data,
+    which are therefore no independent proof; what it costs on CMU's walkers tests/bench/learn_floor.py tells.
     """
-    mean = mean_proportions(bodies)
-    x, y, _ = mean.shoulder
-    return replace(
-        mean,
-        shoulder=(x + AHEAD, y, SHOULDER_HEIGHT),
-        neck_ahead=AHEAD,
-        upper_arm=(mean.upper_arm + UPPER_ARM) / 2,
-        head=HEAD_TOP,
-    )
+    return replace(mean_proportions(bodies), **ANATOMICAL)
 
 
 def own_proportions(m: Measures) -> Proportions:
