@@ -31,15 +31,6 @@ static void refresh_inside(const kernels *run, features *f, const gait_camera *c
     f->inside_map = *now;
 }
 
-/* Neighbours for bilinear look-up in one word.  Those of the last row are missing; nobody looks there. */
-static void pack_quads(const int8_t *surface, uint32_t *quads)
-{
-    const uint8_t *const p = (const uint8_t *)surface;
-    for (int32_t i = 0; i < VIEW_PIXELS - VIEW_SIZE - 1; i++)
-        quads[i] = p[i] | (uint32_t)p[i + 1] << 8 | (uint32_t)p[i + VIEW_SIZE] << 16 |
-                   (uint32_t)p[i + VIEW_SIZE + 1] << 24;
-}
-
 void features_sample(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
                      features_scratch *s)
 {
@@ -68,7 +59,7 @@ static void surface(const kernels *run, features *f, bool raw, const features_sc
             f->surface[i] = (int8_t)i_max(s->grey[i] - 128, -127);
     else
         run->features_contrast(s->grey, f->surface);
-    pack_quads(f->surface, f->quads);
+    run->features_quads(f->surface, f->quads);
 }
 
 void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,

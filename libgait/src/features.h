@@ -65,7 +65,8 @@ enum { FEATURES_EDGES, FEATURES_SURFACE, FEATURES_FOREGROUND, FEATURES_MAPS };
  * levels (paper mode).  Kernels (kernels.h):
  *   features_foreground  fg and fg_total where inside
  *   features_edges       edge tensors of a grey plane
- *   features_contrast    local contrast of a grey plane */
+ *   features_contrast    local contrast of a grey plane
+ *   features_quads       each value of the surface with its neighbours */
 void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,
                   const view_planes *plate, bool raw, features_scratch *s);
 #endif
