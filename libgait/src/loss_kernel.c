@@ -1,11 +1,25 @@
 /* Particles as likely as somebody who is hidden at the least. */
 #include "fmath.h"
 #include "kernels.h"
+#include <string.h>
 
-void KERNEL(loss_join)(const float *restrict a, float b, int32_t n, float *restrict out)
+enum { LANES = 64 }; /* as many at once, so that the loop needs no remainder */
+
+KERNEL_ROW void join(const float *restrict a, float b, float *restrict out)
 {
-    for (int32_t i = 0; i < n; i++) {
+    for (int32_t i = 0; i < LANES; i++) {
         float const more = f_max(a[i], b), less = f_min(a[i], b);
         out[i] = more + m_log(1.0f + m_exp(less - more));
     }
+}
+
+void KERNEL(loss_join)(const float *a, float b, int32_t n, float *out)
+{
+    int32_t const whole = n - n % LANES;
+    float end[2][LANES] = {{0.0f}};
+    for (int32_t i = 0; i < whole; i += LANES)
+        join(a + i, b, out + i);
+    memcpy(end[0], a + whole, (size_t)(n - whole) * sizeof *a);
+    join(end[0], b, end[1]);
+    memcpy(out + whole, end[1], (size_t)(n - whole) * sizeof *out);
 }

@@ -110,7 +110,7 @@ static void test_the_bound(void)
  * instruction set. */
 static void test_join(void)
 {
-    enum { MOST = 67 };
+    enum { MOST = 150 };
     static const float odd[] = {NAN, INFINITY, -INFINITY, 0.0f, -1e30f, -3.0f, 88.0f, FLT_MAX};
     static _Alignas(GAIT_ALIGN) unsigned char memory[MOST * sizeof(float) + 2 * GUARD + 16];
     float room[MOST + 3], want[MOST];
