@@ -30,12 +30,13 @@ struct gait_pool {
     atomic_int next;    /* task to hand out */
 };
 
-enum { LOOKS = 4000 }; /* about 50 microseconds */
+enum { LOOKS = 4000 }; /* about 50 microseconds, of all helpers together: there may be more than cores */
 
 /* While *value is `known`, or while it is not, but not for long. */
-static void look_on(const atomic_uint *value, unsigned known, bool same)
+static void look_on(const gait_pool *p, const atomic_uint *value, unsigned known, bool same)
 {
-    for (int i = 0; i < LOOKS && (atomic_load_explicit(value, memory_order_relaxed) == known) == same; i++)
+    int32_t left = LOOKS / i_max(p->helpers, 1);
+    while (left-- > 0 && (atomic_load_explicit(value, memory_order_relaxed) == known) == same)
 #if defined(__x86_64__)
         __builtin_ia32_pause();
 #elif defined(__aarch64__)
@@ -61,7 +62,7 @@ static void *helper(void *arg)
         if (fresh) {
             fresh = false;
             pthread_mutex_unlock(&p->lock);
-            look_on(&p->number, seen, true);
+            look_on(p, &p->number, seen, true);
             pthread_mutex_lock(&p->lock);
             continue;
         }
@@ -95,7 +96,7 @@ static void run(void *user, gait_task_fn *fn, void *ctx, int32_t count)
     pthread_cond_broadcast(&p->work);
     pthread_mutex_unlock(&p->lock);
     work_off(p, &mine);
-    look_on(&p->busy, 0, false);
+    look_on(p, &p->busy, 0, false);
     pthread_mutex_lock(&p->lock);
     while (p->busy)
         pthread_cond_wait(&p->done, &p->lock);
