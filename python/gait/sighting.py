@@ -31,15 +31,23 @@ class Sighting:
         Where the ray of `foot` meets the ground, metres.
     stature : float
         Height of the head ray over `place`, metres.
-    area : int
-        Pixels.
+    strength : float
+        How much there is of it: pixels of a blob, votes of a detector.
+    spread : float
+        Standard deviation of `foot` and `head` beyond a pixel or two, as a share of the person's height.
     """
 
     foot: Array
     head: Array
     place: Array
     stature: float
-    area: int
+    strength: float
+    spread: float = 0.0
+
+    @property
+    def tall(self) -> float:
+        """Height in the picture, pixels."""
+        return float(self.foot[1] - self.head[1])
 
 
 def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
@@ -69,7 +77,7 @@ def sightings(image: Image, plate: Image, camera: Camera) -> list[Sighting]:
             one = _measure(blob, x, y, area, camera)
             if one is not None:
                 found.append(one)
-    return sorted(found, key=lambda one: -one.area)
+    return sorted(found, key=lambda one: -one.strength)
 
 
 def _measure(blob: NDArray[np.bool_], x: int, y: int, area: int, camera: Camera) -> Sighting | None:
@@ -80,11 +88,19 @@ def _measure(blob: NDArray[np.bool_], x: int, y: int, area: int, camera: Camera)
     crown = np.nonzero(blob[: max(1, height // 10)])[1]
     foot = np.array([middle, y + height - 0.5])
     head = np.array([x + float(np.median(crown)), y - 0.5])
+    return standing(foot, head, camera, area)
+
+
+def standing(
+    foot: Array, head: Array, camera: Camera, strength: float, spread: float = 0.0
+) -> Sighting | None:
+    """Sighting of somebody between two pixels; None if a person on the ground is not there and that tall."""
     place = camera.on_plane(foot)
     if not np.isfinite(place).all():
         return None
     stature = height_over(camera, head, float(np.hypot(*(place - camera.centre)[:2])))
-    return Sighting(foot, head, place, stature, area) if STATURE[0] <= stature <= STATURE[1] else None
+    fits = STATURE[0] <= stature <= STATURE[1]
+    return Sighting(foot, head, place, stature, strength, spread) if fits else None
 
 
 def height_over(camera: Camera, pixel: Array, distance: float) -> float:

@@ -164,7 +164,7 @@ FAULTS = [
     (["--init", "{}/init.json", "--start", "3"], "init.json: frame is 0, --start says 3"),
     (["--background", "{}/none.png"], "none.png: no such background image"),
     (["--background", "{}/small.png"], "small.png: is 32x24, the video 320x240"),
-    (["--background", "none", "--init", "auto"], "--init auto: needs a background"),
+    (["--background", "none", "--init", "auto"], "walk.mp4: --init auto found nobody in full view"),
     (["-m", "{}/camera.json"], "camera.json: .*"),
     (["-m", "{}/none.gait"], "none.gait: no such model file"),
     (["-o", "{}/none/out.csv"], "out.csv: folder .* does not exist"),

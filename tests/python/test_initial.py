@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from drawn_walker import camera, clip, wall, write
+from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
 
-from gait import Model, Start, UserError, Video, blob
+from gait import Camera, Model, Start, UserError, Video, blob
 from gait.autostart import Spotter, find_start
 from gait.initial import DEFAULT_SD
 from gait.model import read_blob
+from gait.trackfile import read_truth
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -185,8 +186,50 @@ def test_nobody_in_the_picture_is_told(tmp_path):
     write(tmp_path / "empty.mp4", [wall()] * 12)
     with pytest.raises(UserError, match="empty.mp4: --init auto found nobody .*give --init FILE.json"):
         find_start(Video(tmp_path / "empty.mp4"), camera(), wall(), MODEL)
-    with pytest.raises(UserError, match="--init auto: needs a background"):
+    with pytest.raises(UserError, match="empty.mp4: --init auto found nobody .*give --init FILE.json"):
         find_start(Video(tmp_path / "empty.mp4"), camera(), None, MODEL)
+
+
+CLIPS = DATA / "eval" / "dev"
+
+
+@pytest.mark.skipif(not CLIPS.is_dir(), reason="../shared/data is absent")
+@pytest.mark.parametrize("name", ["side_rl_16", "oblique45_pole_05", "toward300_08"])
+def test_a_walker_is_found_without_a_background(name):
+    video, truth = Video(CLIPS / name / "video.mp4"), read_truth(CLIPS / name / "truth.csv")
+    found = find_start(video, Camera.read(str(CLIPS / name / "camera.json"), video.size), None, MODEL)
+    path = truth.places["pelvis"][found.frame : found.frame + 31]
+    off = found.mean.pelvis - path[0]
+    assert (np.abs(off) < 2.5 * found.sd.pelvis).all() and found.sd.pelvis.max() < 1.5
+    turn = found.mean.heading - np.arctan2(*(path[-1] - path[0])[1::-1])
+    assert abs((turn + np.pi) % (2 * np.pi) - np.pi) < 2 * found.sd.heading < 1.5
+
+
+def test_who_walks_goes_before_who_stands_nearer(tmp_path):
+    view = camera(place=(0.0, -6.0, 2.2))
+    standing, _ = clip(MODEL, SECTIONS, 1, view=view, start=(1.2, -1.5))
+    pictures, states = [], []
+    for i in range(34):
+        states.append(state_at(MODEL, SECTIONS, i / 30, start=(-1.4, 0.0)))
+        pictures.append(draw(MODEL, view, states[-1], standing[0], i))
+    write(tmp_path / "two.mp4", pictures)
+    found = find_start(Video(tmp_path / "two.mp4"), view, wall(), MODEL)
+    off = found.mean.pelvis - states[found.frame].pelvis
+    assert (np.abs(off) < 2.5 * found.sd.pelvis).all() and abs(found.mean.heading) < 2 * found.sd.heading
+
+
+def test_two_who_pass_are_told_apart(tmp_path):
+    view = camera(place=(0.0, -6.0, 2.2))
+    both = []
+    for i in range(34):
+        mine = state_at(MODEL, SECTIONS, i / 30, start=(-1.3, 0.0))
+        other = state_at(MODEL, SECTIONS, i / 30, start=(1.6, 1.5), heading=np.pi)
+        both.append(draw(MODEL, view, mine, draw(MODEL, view, other, wall(), i), i))
+    write(tmp_path / "two.mp4", both)
+    found = find_start(Video(tmp_path / "two.mp4"), view, wall(), MODEL)
+    at, turned = (0.0, 0.0) if abs(found.mean.heading) < 1 else (1.5, np.pi)
+    assert abs(found.mean.pelvis[1] - at) < 2.5 * found.sd.pelvis[1]
+    assert abs((found.mean.heading - turned + np.pi) % (2 * np.pi) - np.pi) < 2 * found.sd.heading
 
 
 def test_a_spotter_starts_with_who_walks_in(tmp_path):

@@ -3,12 +3,14 @@
 The start comes from --init: a JSON file that says where the person is and in which phase, or auto.
 auto compares a second of frames with the background, takes the person-sized blob and puts its foot
 point on the ground: this gives place, stature and heading, but not the phase, nor which leg is which.
-It needs a background and one person in full view, feet included; a long shadow misplaces the start.
+Without a background, or where nobody is seen against it, a detector of upright people looks for somebody,
+which is vaguer.  People must be in full view, feet included; of several the one who walks is taken; a long
+shadow misplaces the start.
 Seen from the side, left and right look alike at first: the status is ambiguous until the picture tells them
 apart.  A JSON start is always better.
 
-Who is lost is looked for near the last place, then, with a background, anywhere in the picture: somebody
-who walks in full view for a second starts the track anew (not with --smooth).
+Who is lost is looked for near the last place, then anywhere in the picture: somebody who walks in full view
+for a second starts the track anew (not with --smooth).
 
 --tracks adds joints that a detector has found in the frames, as gait lift takes them, to what the pictures
 say: points of which the model knows nothing are left out, and so are frames that the file does not hold.
@@ -137,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
     if args.tracks:
         config = replace(config, terms=config.terms | Term.TRACKS)
     tracker = Tracker(model, camera, config, background=plate, tasks=args.threads)
-    spotter = None if plate is None or args.smooth else Spotter(camera, plate, model, args.height)
+    spotter = None if args.smooth else Spotter(camera, plate, model, args.height)
     results = _track(args, video, tracker, start, frames, spotter, joints)
     if args.trc:
         write_trc(args.trc, model.joint_names, np.array(results.times), np.array(results.joints), video.fps)
@@ -180,8 +182,6 @@ def _start(
     if args.init != "auto":
         return Start.read(args.init, model, frame=args.start, height=args.height)
     _frames(args, video, args.start or 0)
-    if plate is None:
-        raise UserError("--init auto: needs a background to see the person against; give --init FILE.json")
     start = find_start(video, camera, plate, model, first=args.start or 0, stop=args.stop, height=args.height)
     if not args.quiet:
         at, turn, unsure = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
