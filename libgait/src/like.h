@@ -76,6 +76,8 @@ typedef struct like_body { /* one body in one camera, as the terms see it */
     const gait_camera *camera;
     const float (*points)[3][BLOCK]; /* joints in the world, metres; read if the features have tracks */
     const int8_t *known;             /* limbs x LIKE_RING: running appearance (like_template.h), or NULL */
+    int32_t area,
+        covered; /* cells of the body that the camera sees, and the foreground in them; FG_ONE = 1 */
 } like_body;
 
 typedef struct like_edge_tally {
@@ -111,5 +113,16 @@ float like_one(const like_body *b, const like_term *term);
 /* Sum of the weighted terms over the hypothesis that nobody is there: positive if the frame shows this
  * body. */
 float like_support(const like_body *b);
+
+/* Count area and covered, which the silhouette's term reads. */
+void like_silhouette_look(like_body *b);
+
+/* The foreground that the body explains and that it leaves over, in nats of missed foreground; nothing without
+ * a plate. */
+typedef struct like_parts {
+    float explained, missed;
+} like_parts;
+
+like_parts like_silhouette_parts(const like_body *b);
 
 #endif

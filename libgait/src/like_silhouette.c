@@ -1,33 +1,37 @@
 /* Silhouette both ways: background inside the body and foreground that the body leaves unexplained. */
 #include "like.h"
 
-/* Area of the body (in FG_ONE per cell) and the foreground under it, over cells that the camera sees. */
-static void count(const like_body *b, int32_t *area, int32_t *covered)
-{
-    b->setup->run->silhouette_count(b->features, &b->layers->whole, area, covered);
-}
-
 /* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */
 static const float TYPICAL = 0.16f * 0.25f * (float)VIEW_PERSON * (float)VIEW_PERSON * (float)FG_ONE;
 
+void like_silhouette_look(like_body *b)
+{
+    if (b->features->has_fg && (b->setup->terms & GAIT_TERM_SILHOUETTE))
+        b->setup->run->silhouette_count(b->features, &b->layers->whole, &b->area, &b->covered);
+}
+
 static float log_likelihood(const like_body *b)
 {
-    int32_t area, covered;
     if (!b->features->has_fg)
         return 0.0f;
-    count(b, &area, &covered);
-    float const missed = (float)(b->features->fg_total - covered);
-    return -((float)(area - covered) + b->setup->missed_weight * missed) / TYPICAL;
+    float const missed = (float)(b->features->fg_total - b->covered);
+    return -((float)(b->area - b->covered) + b->setup->missed_weight * missed) / TYPICAL;
 }
 
 /* With nobody there all foreground is missed and no background is inside. */
 static float support(const like_body *b)
 {
-    int32_t area, covered;
     if (!b->features->has_fg)
         return 0.0f;
-    count(b, &area, &covered);
-    return (b->setup->missed_weight * (float)covered - (float)(area - covered)) / TYPICAL;
+    return (b->setup->missed_weight * (float)b->covered - (float)(b->area - b->covered)) / TYPICAL;
+}
+
+like_parts like_silhouette_parts(const like_body *b)
+{
+    if (!b->features->has_fg || !(b->setup->terms & GAIT_TERM_SILHOUETTE))
+        return (like_parts){0};
+    float const nats = b->setup->weight[1] * b->setup->missed_weight / TYPICAL;
+    return (like_parts){nats * (float)b->covered, nats * (float)(b->features->fg_total - b->covered)};
 }
 
 const like_term like_silhouette = {"silhouette", GAIT_TERM_SILHOUETTE, log_likelihood, support};

@@ -3,11 +3,15 @@
 #include "fmath.h"
 #include "modes.h"
 #include "weigh.h"
+#include <string.h>
 
 static const float PATIENCE = 0.33f;   /* seconds without support until the walker is lost */
 static const float PHASE_KEEPS = 1.5f; /* seconds for which a lost walker's phase can be predicted */
 static const float SAME_PHASE = 0.15f; /* strides within which the prediction counts as met */
-static const float HIDDEN = -4.0f;     /* log probability of being hidden in a frame */
+static const float HIDDEN = -4.0f;     /* log probability of being hidden in a frame, */
+static const float SEEN = 3.0f;        /* and nats by which parts that are seen can raise it */
+static const float PART = 1.0f;        /* nats for a walker who is seen in part */
+static const float USUAL = 10.0f;      /* frames over which unexplained foreground becomes the usual */
 static const double ELSEWHERE = 0.01; /* probability, in a frame, that a lost walker is not where predicted */
 enum { SEARCHERS = 8 };               /* one particle of so many looks there */
 
@@ -63,22 +67,28 @@ void loss_search(gait_tracker *t, uint32_t frame)
     t->core->textured = 0; /* the ancestors were elsewhere */
 }
 
-void loss_allow_hidden(gait_tracker *t)
+/* The particle that explains the frame best; -1: none can be compared. */
+static int32_t likeliest(const gait_tracker *t)
 {
-    int32_t const n = t->cfg.particles;
     int32_t best = -1;
-    for (int32_t i = 0; i < n; i++) {
-        t->used[i] = t->ll[i];
+    for (int32_t i = 0; i < t->cfg.particles; i++)
         if (f_finite(&t->ll[i], 1) && (best < 0 || t->ll[i] > t->ll[best]))
             best = i;
+    return best;
+}
+
+void loss_allow_hidden(gait_tracker *t)
+{
+    int32_t const n = t->cfg.particles, best = likeliest(t);
+    float support = 0.0f; /* also if no term has an opinion on whether anybody is there */
+    if (t->cfg.mode != GAIT_MODE_PAPER && best >= 0) {
+        walker const w = walker_get(&t->people, best);
+        support = weigh_walker(t, &w).support;
     }
-    if (t->cfg.mode == GAIT_MODE_PAPER || best < 0)
-        return;
-    walker const w = walker_get(&t->people, best);
-    float const support = weigh_walker(t, &w), least = t->ll[best] - support + HIDDEN;
-    if (!(support != 0.0f)) /* no term has an opinion on whether anybody is there */
-        return;
-    t->like->run->loss_join(t->ll, least, n, t->used);
+    if (support != 0.0f)
+        t->like->run->loss_join(t->ll, t->ll[best] - support + HIDDEN, SEEN, n, t->used);
+    else
+        memcpy(t->used, t->ll, (size_t)n * sizeof *t->used);
 }
 
 /* Did the walker go on walking while nobody saw it?  Then left and right are as they were. */
@@ -89,11 +99,24 @@ static bool as_predicted(const gait_tracker *t, const walker *mean)
     return gap < PHASE_KEEPS && fabsf(off) < SAME_PHASE;
 }
 
+/* Is the walker seen as a whole, or, unless lost, in part? */
+static bool seen(gait_tracker *t, bool lost, const weigh_sight *s)
+{
+    float *const usual = &t->core->missed;
+    /* Terms without an opinion on whether anybody is there give exactly zero. */
+    bool const whole = s->support >= 0.0f;
+    float const strange = f_max(0.0f, s->parts.missed - *usual);
+    if (whole)
+        *usual = t->core->met ? *usual + (s->parts.missed - *usual) / USUAL : s->parts.missed;
+    t->core->part = !whole && !lost && t->core->met && s->parts.explained - strange > PART;
+    return whole || t->core->part;
+}
+
 void loss_watch(gait_tracker *t, const walker *mean)
 {
     bool const lost = loss_is_lost(t);
-    /* Terms without an opinion on whether anybody is there give exactly zero. */
-    if (!(weigh_walker(t, mean) >= 0.0f)) {
+    weigh_sight const sight = weigh_walker(t, mean);
+    if (!seen(t, lost, &sight)) {
         if (lost && (t->core->modes.stage != MODES_FORKED || seconds_unseen(t) > PHASE_KEEPS))
             modes_give_up(t);
         return;

@@ -235,7 +235,7 @@ static void observe(gait_tracker *t, float dt, gait_estimate *out)
     walker const mean = estimate_fill(t, s.best, out);
     loss_watch(t, &mean);
     out->status = judge(t, dt, s.degenerate, out);
-    if (out->status == GAIT_STATUS_TRACKING && t->core->modes.stage == MODES_SINGLE)
+    if (out->status == GAIT_STATUS_TRACKING && t->core->modes.stage == MODES_SINGLE && !t->core->part)
         remember_appearance(t);
 }
 

@@ -26,6 +26,8 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int32_t current;   /* which of the generations kept holds the particles */
     uint32_t textured; /* bit c: there are surface samples of camera c's previous frame */
     int32_t met;       /* the images have supported it since the start */
+    int32_t part;      /* this frame supports but a part of it */
+    float missed;      /* foreground that is usually left unexplained, nats */
     double ess;
     modes_state modes;
     walker last;       /* when the images last supported it */

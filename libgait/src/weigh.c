@@ -45,6 +45,7 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t
     t->like->run->layers_draw(w->edges, lane, w->layers);
     if (seen)
         like_sample(t->like, b.features, &t->cfg.camera[c], w->pose, lane, w->layers, seen);
+    like_silhouette_look(&b);
     return b;
 }
 
@@ -62,6 +63,7 @@ static void weigh_one(gait_tracker *t, int32_t c, int32_t i, int32_t lane, weigh
     b.ancestor = t->core->textured >> c & 1u ? texture : NULL;
     float const ll = like_evaluate(&b);
     t->ll[i] += ll;
+    t->used[i] += like_silhouette_parts(&b).explained;
     if (t->core->modes.stage == MODES_FORKED)
         t->inner[i] += ll - like_one(&b, &like_silhouette);
     if (texture)
@@ -78,7 +80,7 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
             for (int32_t lane = 0; lane < lanes; lane++)
                 t->joint[(size_t)(3 * p + k) * (size_t)n + (size_t)(begin + lane)] = w->points[p][k][lane];
     for (int32_t lane = 0; lane < lanes; lane++)
-        t->ll[begin + lane] = t->inner[begin + lane] = 0.0f;
+        t->ll[begin + lane] = t->inner[begin + lane] = t->used[begin + lane] = 0.0f;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;
@@ -103,10 +105,10 @@ void weigh_particles(gait_tracker *t)
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, weigh_range, t);
 }
 
-float weigh_walker(gait_tracker *t, const walker *person)
+weigh_sight weigh_walker(gait_tracker *t, const walker *person)
 {
     weigh_scratch *const w = &t->work[0];
-    float support = 0.0f;
+    weigh_sight sight = {.support = 0.0f};
     walker_body(&t->rule, person, &w->body);
     if (t->cfg.terms & GAIT_TERM_TRACKS)
         kin_points(t->model, &w->body, w->points);
@@ -116,7 +118,10 @@ float weigh_walker(gait_tracker *t, const walker *person)
         outline_limbs(t, c, w);
         like_patch *const seen = t->seen ? t->seen + c * t->like->limbs : NULL;
         like_body const b = look_at(t, c, 0, 0, w, seen);
-        support += like_support(&b);
+        like_parts const parts = like_silhouette_parts(&b);
+        sight.support += like_support(&b);
+        sight.parts.explained += parts.explained;
+        sight.parts.missed += parts.missed;
     }
-    return support;
+    return sight;
 }

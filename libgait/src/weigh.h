@@ -6,13 +6,19 @@
 /* Place a task's arrays; w NULL: only count. */
 void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w);
 
-/* Log-likelihoods t->ll, joints and surface samples of all particles. */
+/* Log-likelihoods t->ll, joints and surface samples of all particles; t->used: the nats of foreground that
+ * each explains. */
 void weigh_particles(gait_tracker *t);
 
 /* Surface samples of particle i in camera c by limb, NULL if none are kept. */
 like_patch *texture_of(const gait_tracker *t, int32_t i, int32_t c);
 
-/* Surface samples of one walker into t->seen; returns how much better it explains the frame than nobody,
- * nats. */
-float weigh_walker(gait_tracker *t, const walker *w);
+/* What the cameras say of one walker. */
+typedef struct weigh_sight {
+    float support;    /* how much better it explains the frame than nobody, nats */
+    like_parts parts; /* if it may be hidden in part */
+} weigh_sight;
+
+/* Also takes the walker's surface samples into t->seen. */
+weigh_sight weigh_walker(gait_tracker *t, const walker *w);
 #endif

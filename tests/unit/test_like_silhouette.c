@@ -55,8 +55,13 @@ static void test_counts(void)
                 outside += see && !in ? p / 15.0 : 0.0;
             }
         v->setup.missed_weight = 0.05f * (float)round;
-        like_body const b = {.setup = &v->setup, .features = &v->f, .layers = &body};
-        double const missed = (double)v->setup.missed_weight;
+        like_body b = {.setup = &v->setup, .features = &v->f, .layers = &body};
+        double const missed = (double)v->setup.missed_weight,
+                     nats = (double)v->setup.weight[1] * missed / typical;
+        like_silhouette_look(&b);
+        like_parts const parts = like_silhouette_parts(&b);
+        CHECK_NEAR(parts.explained, nats * under, 1e-3);
+        CHECK_NEAR(parts.missed, nats * outside, 1e-3);
         CHECK_NEAR(like_silhouette.log_likelihood(&b), -(inside + missed * outside) / typical, 1e-4);
         CHECK_NEAR(like_silhouette.support(&b), (missed * under - inside) / typical, 1e-4);
     }
@@ -66,8 +71,10 @@ static void test_counts(void)
 static void test_silent(void)
 {
     toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
-    like_body const b = {.setup = &v->setup, .features = &v->f, .layers = &body};
+    like_body b = {.setup = &v->setup, .features = &v->f, .layers = &body};
     v->f.has_fg = false;
+    like_silhouette_look(&b);
+    CHECK(like_silhouette_parts(&b).explained == 0.0f && like_silhouette_parts(&b).missed == 0.0f);
     CHECK(like_silhouette.log_likelihood(&b) == 0.0f && like_silhouette.support(&b) == 0.0f);
     CHECK(like_silhouette.flag == GAIT_TERM_SILHOUETTE);
 }

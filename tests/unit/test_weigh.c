@@ -187,9 +187,9 @@ static void test_support(void)
     gait_estimate e;
     toy_tracker_step(t, 20, see, &e);
     walker w = walker_from_state(&t->rule, &s);
-    float const there = weigh_walker(t, &w);
+    float const there = weigh_walker(t, &w).support;
     w.f[F_X] += 0.5f;
-    CHECK(there > 1.0f && weigh_walker(t, &w) < -1.0f);
+    CHECK(there > 1.0f && weigh_walker(t, &w).support < -1.0f);
     toy_tracker_free(t);
 }
 

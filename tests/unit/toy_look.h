@@ -77,11 +77,13 @@ static inline like_body toy_look_body(toy_look *v, const gait_state *s)
     toy_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
     v->setup.run->surface_pose(&v->setup, &v->cam, &v->body, &v->pose);
     like_sample(&v->setup, &v->f, &v->cam, &v->pose, LANE, &v->drawn, v->seen);
-    return (like_body){.setup = &v->setup,
-                       .features = &v->f,
-                       .outline = &v->outline,
-                       .lane = LANE,
-                       .layers = &v->drawn,
-                       .seen = v->seen};
+    like_body b = {.setup = &v->setup,
+                   .features = &v->f,
+                   .outline = &v->outline,
+                   .lane = LANE,
+                   .layers = &v->drawn,
+                   .seen = v->seen};
+    like_silhouette_look(&b);
+    return b;
 }
 #endif
