@@ -20,7 +20,10 @@ typedef struct bodies {
     const float *channel;                /* M x n */
     const float *heading, *pitch, *roll; /* n */
     const float *pelvis;                 /* 3 x n */
-    float *R, *o, *scale;                /* F x 9 x n, F x 3 x n, F x n */
+    const float *stature;                /* n */
+    const float *score;                  /* p x n: of the proportions, the first `proportions` in use */
+    int32_t proportions;
+    float *R, *o, *scale; /* F x 9 x n, F x 3 x n, F x n */
 } bodies;
 
 /* Channels first .. first + count - 1 of one body; component k's score is coef[k * stride]. */
@@ -90,18 +93,17 @@ LANES void place_root(const gait_model *m, const bodies *b, int n)
 }
 
 /* Metres per model length in every frame: stature, changed by the limbs' proportions. */
-LANES void scale_frames(const gait_model *m, const float *stature, const float *score, int32_t proportions,
-                        float *restrict scale, int n)
+LANES void scale_frames(const gait_model *m, const bodies *b, int n)
 {
     for (int32_t f = 0; f < m->frames; f++) {
         float change[BLOCK];
         for (int lane = 0; lane < n; lane++)
             change[lane] = 1.0f;
-        for (int32_t k = 0; k < proportions; k++)
+        for (int32_t k = 0; k < b->proportions; k++)
             for (int lane = 0; lane < n; lane++)
-                change[lane] += score[k * n + lane] * m->proportion[k * (m->frames + 1) + f];
+                change[lane] += b->score[k * n + lane] * m->proportion[k * (m->frames + 1) + f];
         for (int lane = 0; lane < n; lane++)
-            scale[f * n + lane] = stature[lane] * change[lane];
+            b->scale[f * n + lane] = b->stature[lane] * change[lane];
     }
 }
 
@@ -116,8 +118,26 @@ LANES void place_point(const float *R, const float *o, const float *scale, const
         }
 }
 
+/* Move the origin o (3 x n) of frame f by what the proportions shift it in its parent's axes R. */
+LANES void shift_origin(const gait_model *m, const bodies *b, int32_t f, const float *R, float *restrict o,
+                        int n)
+{
+    for (int32_t k = 0; k < b->proportions; k++) {
+        const float *const by = m->shift + 3 * (k * m->frames + f);
+        if (by[0] == 0.0f && by[1] == 0.0f && by[2] == 0.0f)
+            continue;
+        for (int i = 0; i < 3; i++)
+            for (int lane = 0; lane < n; lane++) {
+                const float *const r = R + 3 * i * n + lane;
+                o[i * n + lane] += b->stature[lane] * b->score[k * n + lane] *
+                                   (r[0] * by[0] + r[n] * by[1] + r[2 * n] * by[2]);
+            }
+    }
+}
+
 LANES void place_frames(const gait_model *m, const bodies *b, int n)
 {
+    scale_frames(m, b, n);
     place_root(m, b, n);
     for (int32_t f = 1; f < m->frames; f++) {
         const int32_t *const info = m->frame_info + FRAME_INFO * f;
@@ -125,6 +145,8 @@ LANES void place_frames(const gait_model *m, const bodies *b, int n)
         const float *const parent = b->R + 9 * n * info[0];
         place_point(parent, b->o + 3 * n * info[0], b->scale + n * info[0], m->frame_origin + 3 * f,
                     b->o + 3 * n * f, n);
+        if (m->shift)
+            shift_origin(m, b, f, parent, b->o + 3 * n * f, n);
         memcpy(R, parent, 9 * (size_t)n * sizeof(float));
         for (int32_t k = 0; k < info[1]; k++) {
             int32_t const axis = info[2 + 2 * k];

@@ -49,13 +49,15 @@ static void place_state(const gait_model *m, const gait_state *s, float *channel
                       .pitch = &s->pitch,
                       .roll = &s->roll,
                       .pelvis = s->pelvis,
+                      .stature = &s->stature,
+                      .score = s->proportion,
+                      .proportions = m->proportions,
                       .R = out->R,
                       .o = out->o,
                       .scale = out->scale};
     curves_at(m, s, channel);
     for (int32_t a = 0; a < m->angles; a++)
         channel[a] += s->offset[a];
-    scale_frames(m, &s->stature, s->proportion, m->proportions, b.scale, 1);
     place_frames(m, &b, 1);
 }
 

@@ -21,9 +21,11 @@ void KERNEL(kin_pose)(const gait_model *m, const kin_channels *ch, const kin_inp
                       .pitch = in->pitch,
                       .roll = in->roll,
                       .pelvis = in->pelvis[0],
+                      .stature = in->stature,
+                      .score = in->proportion[0],
+                      .proportions = proportions,
                       .R = out->R[0][0],
                       .o = out->o[0][0],
                       .scale = out->scale[0]};
-    scale_frames(m, in->stature, in->proportion[0], proportions, b.scale, BLOCK);
     place_frames(m, &b, BLOCK);
 }

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#define LARGEST_PROPORTION 0.1f /* per standard deviation */
+#define LARGEST_PROPORTION 0.1f /* per standard deviation; a shift: statures */
 
 static const float *take_table(sections *r, const char *tag, int32_t rows, uint32_t columns)
 {
@@ -120,6 +120,22 @@ static void read_proportions(sections *r, gait_model *m)
     m->proportions = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
 }
 
+/* Optional: models without it change lengths in proportion alone. */
+static void read_shifts(sections *r, gait_model *m)
+{
+    uint32_t dims[4] = {(uint32_t)m->proportions, (uint32_t)m->frames, 3};
+    if (r->status != GAIT_OK || !blob_has(&r->b, "SHFT"))
+        return;
+    sections_require(r, m->proportions > 0, "SHFT", "needs PROP");
+    m->shift = sections_floats(r, "SHFT", 3, dims);
+    for (uint32_t k = 0; r->status == GAIT_OK && k < dims[0]; k++)
+        for (uint32_t i = 0; i < 3 * dims[1]; i++) {
+            float const by = fabsf(m->shift[3 * dims[1] * k + i]);
+            sections_require(r, by <= LARGEST_PROPORTION, "SHFT", "moves an origin by more than a tenth");
+            sections_require(r, i >= 3 || by == 0.0f, "SHFT", "frame 0 must lie at 0");
+        }
+}
+
 static void read_points(sections *r, gait_model *m)
 {
     m->point_name = sections_names(r, "PTNM", GAIT_MAX_JOINTS, &m->points);
@@ -168,6 +184,7 @@ gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error
     read_statistics(&r, &t);
     read_frames(&r, &t);
     read_proportions(&r, &t);
+    read_shifts(&r, &t);
     read_points(&r, &t);
     read_limbs(&r, &t);
     if (r.status != GAIT_OK)

@@ -307,12 +307,15 @@ def frames(
     n = len(channels)
     rotations, origins = np.empty((n, len(links), 3, 3)), np.empty((n, len(links), 3))
     scale = np.broadcast_to(length_change(sections, proportion)[:, :-1], (n, len(links)))
+    shift = origin_shift(sections, proportion)
     for i, link in enumerate(links):
         parent = int(link[0])
         rotation = np.broadcast_to(np.eye(3), (n, 3, 3)) if parent < 0 else rotations[:, parent]
-        origins[:, i] = (
-            0 if parent < 0 else origins[:, parent] + scale[:, parent, None] * (rotation @ offsets[i])
-        )
+        if parent < 0:
+            origins[:, i] = 0
+        else:
+            local = scale[:, parent, None] * offsets[i] + shift[:, i]
+            origins[:, i] = origins[:, parent] + np.einsum("nij,nj->ni", rotation, local)
         for axis, channel in link[2 : 2 + 2 * link[1]].reshape(-1, 2):
             rotation = rotation @ axis_rotation(abs(axis) - 1, np.sign(axis) * channels[:, channel])
         rotations[:, i] = rotation
@@ -324,6 +327,14 @@ def length_change(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Flo
     score = np.atleast_2d(np.asarray(proportion, float))
     table = np.asarray(sections.get("PROP", np.zeros((0, len(sections["FRMI"]) + 1))), float)
     return np.asarray(1 + score @ table[: score.shape[1]])
+
+
+def origin_shift(sections: Mapping[str, Any], proportion: npt.ArrayLike) -> Floats:
+    """How far (N, F, 3) the frames' origins move in their parents, statures, for scores (N, l), (l,)."""
+    score = np.atleast_2d(np.asarray(proportion, float))
+    table = np.asarray(sections.get("SHFT", np.zeros((0, len(sections["FRMI"]), 3))), float)
+    used = table[: score.shape[1]]
+    return np.asarray(np.einsum("nk,kfi->nfi", score[:, : len(used)], used), float)
 
 
 def axis_rotation(axis: int, angle: npt.ArrayLike) -> Floats:

@@ -58,6 +58,15 @@ static void twin_point(const twin *t, int frame, const float p[3], double scale,
     }
 }
 
+static void twin_shift(const gait_model *m, const gait_state *s, int parent, int f, twin *t)
+{
+    for (int n = 0; m->shift && n < m->proportions; n++)
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++)
+                t->o[f][i] += (double)s->stature * (double)s->proportion[n] * t->R[parent][i][k] *
+                              (double)m->shift[3 * (n * m->frames + f) + k];
+}
+
 static void twin_pose(const gait_model *m, const gait_state *s, twin *t)
 {
     double const given[3] = {(double)s->heading, (double)s->pitch, (double)s->roll};
@@ -70,9 +79,10 @@ static void twin_pose(const gait_model *m, const gait_state *s, twin *t)
             double const own = twin_channel(m, info[3 + 2 * k], s);
             twin_turn(t->R[f], abs(info[2 + 2 * k]), info[2 + 2 * k] < 0 ? -own : f ? own : own + given[k]);
         }
-        if (f)
+        if (f) {
             twin_point(t, info[0], m->frame_origin + 3 * f, twin_scale(m, s, info[0]), t->o[f]);
-        else
+            twin_shift(m, s, info[0], f, t);
+        } else
             for (int i = 0; i < 3; i++)
                 t->o[0][i] = (double)s->pelvis[i];
     }
@@ -132,9 +142,8 @@ static void run_block(const gait_model *m, uint32_t first, block *b)
 }
 
 /* ---- tests ---- */
-static void test_against_twin(void)
+static void test_against_twin(const gait_model *m)
 {
-    const gait_model *const m = toy_model();
     static block b;
     double worst = 0.0, angle = 0.0, turn = 0.0;
     for (uint32_t first = 0; first < 160; first += BLOCK) {
@@ -165,9 +174,8 @@ static void test_against_twin(void)
 }
 
 /* A single body has the bits of a lane, whatever the other lanes hold. */
-static void test_lanes(void)
+static void test_lanes(const gait_model *m)
 {
-    const gait_model *const m = toy_model();
     static block b;
     for (uint32_t first = 0; first < 7; first++) {
         run_block(m, first, &b);
@@ -379,8 +387,10 @@ static void test_ground(void)
 
 int main(void)
 {
-    test_against_twin();
-    test_lanes();
+    test_against_twin(toy_model());
+    test_against_twin(toy_shifted());
+    test_lanes(toy_model());
+    test_lanes(toy_shifted());
     test_curves();
     test_mirror();
     test_signs();

@@ -28,8 +28,8 @@ static void test_bits(void)
     static kin_channels ch;
     static kin_body body;
     static unsigned char memory[sizeof body + 2 * GUARD];
-    const gait_model *const m = toy_model();
     for (uint32_t round = 0; round < 60; round++) {
+        const gait_model *const m = round % 3 ? toy_model() : toy_shifted();
         kin_input const in = random_input(round);
         int32_t const components = (int32_t)round % (m->components + 1);
         int32_t const proportions = (int32_t)round % (m->proportions + 1);

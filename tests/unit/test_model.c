@@ -196,8 +196,9 @@ static void test_limits(void)
     CHECK(model_open(buf, toy_finish(&f), &m, &err) == GAIT_ERR_LIMIT && strstr(err.text, "LBNM"));
 }
 
-/* PROP of `rows` by `columns` numbers in an otherwise sound model. */
-static gait_status open_proportions(uint32_t rows, uint32_t columns, gait_model *m, gait_error *err)
+/* PROP of `rows` by `columns` zeros, and SHFT of `shifts` rows if it is given, in an otherwise sound model. */
+static gait_status open_shifted(uint32_t rows, uint32_t columns, uint32_t shifts,
+                                float (*shift)[TOY_FRAMES][3], gait_model *m, gait_error *err)
 {
     static unsigned char name[TOY_FRAMES][32], info[TOY_FRAMES][32], origin[TOY_FRAMES][12];
     static const float zero[(GAIT_MAX_PROPORTIONS + 1) * (TOY_FRAMES + 2)];
@@ -205,15 +206,49 @@ static gait_status open_proportions(uint32_t rows, uint32_t columns, gait_model 
     memcpy(name, section("FRNM"), sizeof name);
     memcpy(info, section("FRMI"), sizeof info);
     memcpy(origin, section("FRMF"), sizeof origin);
-    toy_file f = toy_begin(buf, TOY_SECTIONS - 1);
+    toy_file f = toy_begin(buf, (uint32_t)TOY_SECTIONS - (rows ? 1u : 2u) + (shift ? 1u : 0u));
     toy_put_curves(&f, 8, 1);
-    toy_section(&f, "PROP", 3, 2, rows, columns, 1, zero);
+    if (rows)
+        toy_section(&f, "PROP", 3, 2, rows, columns, 1, zero);
+    if (shift)
+        toy_section(&f, "SHFT", 3, 3, shifts, TOY_FRAMES, 3, shift);
     toy_section(&f, "FRNM", 1, 2, TOY_FRAMES, 32, 1, name);
     toy_section(&f, "FRMI", 2, 2, TOY_FRAMES, 8, 1, info);
     toy_section(&f, "FRMF", 3, 2, TOY_FRAMES, 3, 1, origin);
     toy_put_points(&f);
     toy_put_limbs(&f);
     return model_open(buf, toy_finish(&f), m, err);
+}
+
+static gait_status open_proportions(uint32_t rows, uint32_t columns, gait_model *m, gait_error *err)
+{
+    return open_shifted(rows, columns, 0, NULL, m, err);
+}
+
+/* One row to each of PROP; frame 0 stays where it is; a tenth of the stature at most. */
+static void test_shifts(void)
+{
+    enum { ROWS = 2, COLUMNS = TOY_FRAMES + 1 };
+    float shift[ROWS + 1][TOY_FRAMES][3] = {{{0.0f}}};
+    gait_model m;
+    gait_error err = {0};
+    shift[1][4][2] = -0.1f;
+    CHECK(open_shifted(ROWS, COLUMNS, ROWS, shift, &m, &err) == GAIT_OK);
+    CHECK(m.proportions == ROWS && m.shift[3 * (TOY_FRAMES + 4) + 2] == -0.1f);
+    for (uint32_t rows = 0; rows <= ROWS + 1; rows++)
+        CHECK(rows == ROWS || (open_shifted(rows, COLUMNS, ROWS, shift, &m, &err) == GAIT_ERR_CORRUPT &&
+                               strstr(err.text, "SHFT")));
+    static const struct {
+        int row, frame, axis;
+        float by;
+    } bad[] = {{0, 4, 0, 0.101f}, {1, 12, 2, -0.101f}, {1, 3, 1, NAN}, {0, 0, 0, 0.01f}, {1, 0, 2, -0.01f}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        float *const at = &shift[bad[i].row][bad[i].frame][bad[i].axis], was = *at;
+        *at = bad[i].by;
+        CHECK(open_shifted(ROWS, COLUMNS, ROWS, shift, &m, &err) == GAIT_ERR_CORRUPT &&
+              strstr(err.text, "SHFT"));
+        *at = was;
+    }
 }
 
 static void test_proportions(void)
@@ -255,6 +290,7 @@ int main(void)
     test_names();
     test_limits();
     test_proportions();
+    test_shifts();
     test_missing();
     return CHECK_DONE();
 }
