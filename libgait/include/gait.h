@@ -165,7 +165,7 @@ typedef struct gait_tracker_config {
     int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
     uint64_t seed;             /* default 1 */
     int32_t  particles;        /* [16, 1 << 20]; default 1500 (paper mode 10000) */
-    int32_t  components;       /* [0, the model's]; default -1: all */
+    int32_t  components;       /* [0, the model's]; default -1: the first 4, in paper mode all */
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */

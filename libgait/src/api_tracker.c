@@ -44,7 +44,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .coef_time = 4.5f,
         .stature_noise = 0.005f,
         .proportion_noise = 0.15f,
-        .joint_sd_factor = 2.7f,
+        .joint_sd_factor = 1.8f,
         .joint_sd_model = 0.018f,
         .offset_noise = 0.02f,
         .offset_sd = 0.035f,

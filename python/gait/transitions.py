@@ -21,6 +21,9 @@ PHASE, HEADING = 0, 3
 RATES = (1 / 2.1, 1 / 0.4)
 """Strides per second that a walker may have."""
 
+TELLING = 4
+"""Scores that the default mode uses unless told (population.c)."""
+
 SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
 """Columns of a table of states; then x, y, z of the track, scores, proportions and posture offsets in use."""
 
@@ -53,9 +56,10 @@ class Transitions:
 
     def __init__(self, curves: ModelCurves, config: TrackerConfig) -> None:
         self.curves, self.config = curves, config
-        most = len(curves.samples) - 1
         self._plain = config.mode == Mode.PAPER  # no root motion within the stride
-        self._scores = most if config.components < 0 else config.components
+        every = len(curves.samples) - 1
+        usual = every if self._plain else min(every, TELLING)
+        self._scores = usual if config.components < 0 else config.components
         every = len(curves.height_change)
         self._proportions = every if config.proportions < 0 else config.proportions
         angles = len(curves.names) - 6

@@ -51,6 +51,20 @@ static void test_rule(void)
     CHECK(make_rule(GAIT_MODE_PAPER, 0, 0).plain_root);
 }
 
+static void test_the_default_mode_uses_the_first_four_components_paper_mode_all(void)
+{
+    gait_model m = *toy_model();
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
+        gait_tracker_config cfg;
+        gait_tracker_default(&cfg, mode);
+        for (m.components = 0; m.components <= 8; m.components++)
+            CHECK(body_rule_init(&m, &cfg).components ==
+                  (mode == GAIT_MODE_PAPER || m.components < 4 ? m.components : 4));
+        cfg.components = m.components = 8;
+        CHECK(body_rule_init(&m, &cfg).components == 8);
+    }
+}
+
 static void test_round_trip(void)
 {
     for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
@@ -190,6 +204,7 @@ static void test_plain_body(void)
 int main(void)
 {
     test_rule();
+    test_the_default_mode_uses_the_first_four_components_paper_mode_all();
     test_round_trip();
     test_track();
     test_root_channel();
