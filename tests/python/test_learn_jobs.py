@@ -91,6 +91,21 @@ def test_processes_give_the_same_bits_in_the_order_of_the_files(walks, at_once):
     assert counts == [1, 2, 3, 4, 5, 6]
 
 
+def test_bodies_of_people_of_whom_no_file_can_be_used(tmp_path, at_once):
+    """Two strangers of one cycle, the one twice; a walker's own short file counts for nothing."""
+    for name in ("02_01", "02_02", "03_01", "01_99"):
+        files.write_toy(tmp_path, name, frames=110)
+    files.write_toy(tmp_path, "01_00", frames=300)
+    found = sources.find([str(tmp_path)])
+    for jobs in (1, 2):
+        others = []
+        learnt, refused = sources.load_all(found, jobs=jobs, others=others)
+        assert [s.subject for s in learnt] == ["01"] and len(refused) == 4
+        assert len(others) == 2
+        for body in others:  # all toys have the same bones
+            assert body.thigh == pytest.approx(learnt[0].measures.thigh) and body.stature > 1
+
+
 def test_a_bad_file_named_by_itself_stops_the_run_from_a_process_too(walks, at_once):
     found = [(path, path.stem != "01_02x") for path, _ in sources.find([str(walks)])]
     with pytest.raises(UserError, match="01_02x.amc:3: 2 numbers where 6"):

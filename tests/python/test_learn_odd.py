@@ -13,7 +13,7 @@ import gait.cli
 from gait import Model, blob
 from gait.errors import UserError
 from gait.learn import fit, fpca, model, sources
-from gait.skeleton import ANGLES, CHANNELS
+from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for name in ANGLES])
 
@@ -87,7 +87,21 @@ def test_three_subjects_have_proportions(sequences):
     """Toy walkers are of one skeleton: lengths change by what swing does to the stature, next to nothing."""
     made = sections(fit.fit(sequences, 2))
     assert made["PROP"].shape == (1, len(made["FRMI"]) + 1)
+    assert made["SHFT"].shape == (1, len(made["FRMI"]), 3) and np.abs(made["SHFT"]).max() < 2e-3
     assert np.abs(made["PROP"]).max() < 2e-3 and made["CHST"][:, 3].max() > 0
+
+
+def test_bodies_of_others_tell_how_people_differ(sequences):
+    """Of two people there are no proportions; a third, with long forearms, gives one."""
+    two = [s for s in sequences if s.subject in ("01", "02")]
+    long = replace(two[0].measures, forearm=1.2 * two[0].measures.forearm)
+    assert not len(fit.fit(two, 2).lengths)
+    learned = fit.fit(two, 2, others=[long])
+    frames = default_skeleton().frames
+    assert learned.lengths.shape == (1, len(frames) + 1)
+    assert int(np.argmax(learned.lengths[0])) == frames.index("l_forearm") and learned.lengths.max() > 0.05
+    plain = fit.fit(two, 2, kind="paper", others=[long])
+    assert not len(plain.lengths) and not len(plain.shifts)
 
 
 def test_the_body_of_a_person_is_of_the_recording_that_shows_most(sequences):

@@ -60,7 +60,8 @@ def test_metric_is_the_displacement_of_the_joints():
     for _ in range(20):
         step = 1e-4 * rng.normal(size=len(CHANNELS))
         whole = sum((w * step[CHANNELS.index(name)]) ** 2 for name, w in prior.DISPLACING.items())
-        moved = points(SECTIONS, mean + step) - points(SECTIONS, mean)
+        counted = step * [prior.TURNING.get(name, 1.0) for name in CHANNELS]
+        moved = points(SECTIONS, mean + counted) - points(SECTIONS, mean)
         expected = np.mean(np.sum(moved**2, axis=2)) + whole + prior.RIDGE * np.sum(step**2)
         assert np.sum((step @ metric) ** 2) == pytest.approx(expected, rel=0.02)
 

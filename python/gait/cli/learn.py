@@ -35,6 +35,7 @@ from gait.files import require_folder, require_writable
 from gait.learn import fit, ground, marker_map, model, segment_sections, sources, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
+from gait.learn.retarget import Measures
 from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
 from gait.learn.stage import one_thread
@@ -141,10 +142,10 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     wanted = learn_segments.options(args)
     with one_thread(), Corpus() as corpus:
-        sequences, refused = _read(args, corpus)
+        sequences, refused, others = _read(args, corpus)
         if wanted.source == "only":
             return learn_segments.write_alone(args, corpus, wanted, refused)
-        learned = fit.fit(sequences, args.components, args.seed, args.prior)
+        learned = fit.fit(sequences, args.components, args.seed, args.prior, others)
         if args.components is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS and not args.quiet:
             print(_few(learned), file=sys.stderr)
         if (parts := model.unobserved(learned)) and not args.quiet:
@@ -202,8 +203,9 @@ def _check_output(args: argparse.Namespace) -> None:
             )
 
 
-def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], list[str]]:
-    """Find and prepare the files; say which were left out."""
+def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], list[str], list[Measures]]:
+    """Find and prepare the files; say which were left out; bodies are of people who are in these alone."""
+    others: list[Measures] = []
     idle: list[str] = []
     files = sources.find(args.sources, args.exclude, idle.append)
     for glob in idle if not args.quiet else ():
@@ -221,13 +223,20 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
     with progress("reading motion", len(files), args.quiet) as update:
         try:
             sequences, refused = sources.load_all(
-                files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects, corpus=corpus
+                files,
+                reading,
+                update,
+                jobs=jobs,
+                dask=args.dask,
+                people=args.subjects,
+                corpus=corpus,
+                others=others,
             )
         except sources.NothingLeft as error:
             _tell(error.refused[1:], args.quiet, "")
             raise
     _tell(refused, args.quiet, " (see --json or --report)")
-    return sequences, refused
+    return sequences, refused, others
 
 
 def _tell(refused: list[str], quiet: bool, more: str) -> None:

@@ -67,6 +67,8 @@ class Learned:
         In the channels' own units; gaps are filled in units scaled by `scale` (M,), and `rmse` is in those.
     lengths : (p, F + 1)
         PROP: how limbs differ in length among people of one stature; no rows in the paper's model.
+    shifts : (p, F, 3)
+        SHFT: how origins of frames (the shoulders') differ besides.
     static : (M,)
         Standard deviation over subjects of a person's constant offsets from the model.
     held_out : (n,)
@@ -83,6 +85,7 @@ class Learned:
     scale: Floats
     held_out: Floats
     lengths: Floats
+    shifts: Floats
     static: Floats
 
     @property
@@ -117,6 +120,7 @@ def fit(
     components: int | str | None = None,
     seed: int = 1,
     kind: str = "people",
+    others: list[retarget.Measures] | None = None,
 ) -> Learned:
     """Learn the cyclic model of prepared sequences.
 
@@ -127,6 +131,8 @@ def fit(
     kind : "people" or "paper"
         The prior that reaches people who were not recorded (`gait.learn.prior`), or the paper's components
         of the recorded cycles and one body for everybody.
+    others : list of Measures, optional
+        Bodies of people whose motion is not learnt: they tell how proportions differ.
 
     Raises
     ------
@@ -153,14 +159,24 @@ def fit(
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = prior.joint_metric(model.mean, proportions)
     static = prior.static_spread(model.filled, row_subject, wanted, metric)
-    table = np.zeros((0, len(default_skeleton().frames) + 1))
     if kind == "people":
         model = prior.refine(model, row_subject, wanted, metric)
     model = ground.grounded(model, rows.seen, proportions)
-    if kind == "people":
-        table = lengths.learn(_bodies(sequences, index, len(subjects)), proportions, model.mean)
+    bodies = [*_bodies(sequences, index, len(subjects)), *(others or [])] if kind == "people" else []
+    table, shifts = lengths.learn(bodies, proportions, model.mean)
     return Learned(
-        sequences, subjects, index, proportions, alignment, rows, model, scale, held_out, table, static
+        sequences,
+        subjects,
+        index,
+        proportions,
+        alignment,
+        rows,
+        model,
+        scale,
+        held_out,
+        table,
+        shifts,
+        static,
     )
 
 

@@ -1,28 +1,30 @@
-"""How people of one stature differ in their proportions: limbs longer or shorter, hips and trunk.
+"""How people of one stature differ in their proportions: limbs longer or shorter, hips, trunk and shoulders.
 
 The lengths of every frame of the skeleton (its points, its limbs, the origins of its children) are multiplied
-by one factor; principal components of the subjects' factors, weighed by how far they move the joints, are the
-section PROP of a blob.
+by one factor; shoulders also move by themselves, because they do not follow the neck.  Principal components
+of these changes, weighed by how far they move the joints, are the sections PROP and SHFT of a blob.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from gait.learn.retarget import Measures, own_proportions
-from gait.skeleton import Proportions, default_skeleton, points
+from gait.skeleton import SIDES, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 
 COUNT = 4  # components kept, fewer with few subjects
-LARGEST = 0.09  # relative change per standard deviation; the library takes no more than a tenth
+LARGEST = 0.09  # relative change, or shift in statures, per deviation; the library takes no more than 0.1
 STEP = 1e-3
-#: Frames that change together (names end so).
+#: Frames that change together (names end so); three coordinates of the shoulders follow them in a change.
 GROUPS = ("pelvis", "torso", "upper_arm", "forearm", "thigh", "shank", "foot")
+TORSO = GROUPS.index("torso")
+CHANGES = len(GROUPS) + 3
 
 
 def spans(p: Proportions) -> Floats:
@@ -32,8 +34,10 @@ def spans(p: Proportions) -> Floats:
     )
 
 
-def learn(bodies: Sequence[Measures | None], mean: Proportions, pose: Floats, count: int = COUNT) -> Floats:
-    """PROP (p, F + 1): relative changes of the frames' lengths and of the pelvis's height, per deviation.
+def learn(
+    bodies: Sequence[Measures | None], mean: Proportions, pose: Floats, count: int = COUNT
+) -> tuple[Floats, Floats]:
+    """Relative changes of lengths and shifts of origins per standard deviation of each component.
 
     Parameters
     ----------
@@ -45,35 +49,56 @@ def learn(bodies: Sequence[Measures | None], mean: Proportions, pose: Floats, co
     Returns
     -------
     table : (p, F + 1)
-        Empty with fewer than three subjects.
+        PROP: of the lengths in each frame, and of the pelvis's height.  Empty with fewer than three subjects.
+    shift : (p, F, 3)
+        SHFT: of the frames' origins, statures.
     """
-    skeleton = default_skeleton(mean)
-    member = np.array([[name.endswith(group) for name in skeleton.frames] for group in GROUPS], float)
     whole = [m for m in bodies if m is not None and np.isfinite(_lengths(m)).all()]
     if len(whole) < 3:
-        return np.zeros((0, member.shape[1] + 1))
-    each = np.array([spans(own_proportions(m)) for m in whole])
-    factors = each / each.mean(axis=0) - 1
-    effect = _effect(skeleton.sections(), pose, member)
-    metric = np.asarray(np.linalg.cholesky(effect + 1e-9 * np.eye(len(GROUPS))), float)
-    _, singular, right = np.linalg.svd((factors - factors.mean(axis=0)) @ metric, full_matrices=False)
+        return tables(np.zeros((0, CHANGES)), mean)
+    changes = _changes(whole)
+    metric = np.asarray(np.linalg.cholesky(_effect(mean, pose) + 1e-9 * np.eye(CHANGES)), float)
+    _, singular, right = np.linalg.svd(changes @ metric, full_matrices=False)
     kept = min(count, len(whole) - 2)
     rows = right[:kept] @ np.linalg.inv(metric) * (singular[:kept, None] / np.sqrt(len(whole) - 1))
+    rows *= np.sign(rows[np.arange(kept), np.abs(rows).argmax(axis=1)])[:, None]
+    table, shift = tables(rows, mean)
+    return np.clip(table, -LARGEST, LARGEST), np.clip(shift, -LARGEST, LARGEST)
+
+
+def tables(changes: Floats, mean: Proportions) -> tuple[Floats, Floats]:
+    """PROP (k, F + 1) and SHFT (k, F, 3) of changes (k, 10): groups relatively, then the left shoulder."""
+    frames = default_skeleton(mean).frames
+    member = np.array([[name.endswith(group) for name in frames] for group in GROUPS], float)
     leg = np.array([0, 0, 0, 0, mean.thigh, mean.shank, mean.sole]) / (mean.thigh + mean.shank + mean.sole)
-    table = np.concatenate([rows @ member, (rows @ leg)[:, None]], axis=1)
-    sign = np.sign(table[np.arange(kept), np.abs(table).argmax(axis=1)])
-    return np.asarray(np.clip(table * sign[:, None], -LARGEST, LARGEST))
+    groups, shoulder = changes[:, : len(GROUPS)], changes[:, len(GROUPS) :]
+    shift = np.zeros((len(changes), len(frames), 3))
+    for s in SIDES:
+        shift[:, frames.index(f"{s}_upper_arm")] = shoulder * (1, 1 if s == "l" else -1, 1)
+    return np.concatenate([groups @ member, (groups @ leg)[:, None]], axis=1), shift
+
+
+def _changes(bodies: Sequence[Measures]) -> Floats:
+    """Differences (n, 10) from the mean: lengths relatively, shoulders beyond what the torso does."""
+    own = [own_proportions(m) for m in bodies]
+    each, shoulder = np.array([spans(p) for p in own]), np.array([p.shoulder for p in own])
+    factor = each / each.mean(axis=0)
+    centre = shoulder.mean(axis=0)
+    return np.concatenate([factor - 1, shoulder - factor[:, TORSO : TORSO + 1] * centre], axis=1)
 
 
 def _lengths(m: Measures) -> Floats:
-    return np.concatenate([m.hip.ravel(), m.upper_arm, m.forearm, m.thigh, m.shank, m.foot, [m.neck]])
+    ends = [m.hip.ravel(), m.shoulder.ravel()]
+    return np.concatenate([*ends, m.upper_arm, m.forearm, m.thigh, m.shank, m.foot, [m.neck]])
 
 
-def _effect(sections: Mapping[str, Any], pose: Floats, member: Floats) -> Floats:
-    """Mean squared displacement (7, 7) of the points by unit changes of the groups, squared statures."""
+def _effect(mean: Proportions, pose: Floats) -> Floats:
+    """Mean squared displacement (10, 10) of the points by unit changes, squared statures."""
+    sections: dict[str, Any] = default_skeleton(mean).sections()
     base = points(sections, pose)
     moves = []
-    for row in member:
-        changed = {**sections, "PROP": np.append(row, 0.0)[None] * STEP}
-        moves.append(((points(changed, pose, [1.0]) - base) / STEP).ravel())
+    for row in np.eye(CHANGES) * STEP:
+        table, shift = tables(row[None], mean)
+        moved = points({**sections, "PROP": table, "SHFT": shift}, pose, [1.0])
+        moves.append(((moved - base) / STEP).ravel())
     return np.asarray(np.array(moves) @ np.array(moves).T / (base.size / 3))

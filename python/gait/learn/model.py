@@ -40,8 +40,15 @@ def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array
         "SCST": _stored(score_statistics(learned)),
         "GAIT": _stored(gait_statistics(learned)),
         **default_skeleton(learned.proportions).sections(),
-        **({"PROP": _stored(learned.lengths)} if len(learned.lengths) else {}),
+        **_proportions(learned),
     }
+
+
+def _proportions(learned: Learned) -> dict[str, blob.Array]:
+    """PROP and SHFT, if proportions were learnt."""
+    if not len(learned.lengths):
+        return {}
+    return {"PROP": _stored(learned.lengths), "SHFT": _stored(learned.shifts)}
 
 
 def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:

@@ -24,6 +24,8 @@ Groups = npt.NDArray[np.intp]
 
 STEP = 1e-4  # of the numerical derivatives, radians and statures
 RIDGE = 1e-5  # squared statures per squared unit: channels that move no joint still count a little
+#: What turns of the whole body count for: a particle has a heading, pitch and roll of its own besides.
+TURNING = {"root_roll": 0.3, "root_pitch": 0.3, "root_yaw": 0.3}
 #: What root channels that displace the whole body count for, statures; forward speed is per stride.
 DISPLACING = {"root_forward": 0.3, "root_sway": 1.0, "root_height": 1.0}
 AGAINST = ("torso_x", "torso_z", "neck_x", "neck_z", "root_sway", "root_roll", "root_yaw")
@@ -51,7 +53,7 @@ def joint_metric(mean: Floats, proportions: Proportions) -> Floats:
     -------
     metric : (M, M)
         |x @ metric|^2 is the mean squared displacement of a point about the pelvis plus that of the pelvis,
-        squared statures, for a small x.
+        squared statures, for a small x whose root channels are counted by TURNING and DISPLACING.
     """
     sections = default_skeleton(proportions).sections()
     base = points(sections, mean)
@@ -59,7 +61,7 @@ def joint_metric(mean: Floats, proportions: Proportions) -> Floats:
     for k in range(len(CHANNELS)):
         moved = mean.copy()
         moved[:, k] += STEP
-        moves[k] = ((points(sections, moved) - base) / STEP).ravel()
+        moves[k] = TURNING.get(CHANNELS[k], 1.0) * ((points(sections, moved) - base) / STEP).ravel()
     whole = np.array([DISPLACING.get(name, 0.0) ** 2 for name in CHANNELS])
     gram = moves @ moves.T / (base.size / 3) + np.diag(whole + RIDGE)
     return np.asarray(np.linalg.cholesky(gram), float)

@@ -96,6 +96,11 @@ def level_body(path: Path, reading: Reading = DEFAULT, kept: tuple[int, int] | N
     return _levelled(read if kept is None else _part_of_body(read, *kept))
 
 
+def measured(read: Body | AngleTable) -> retarget.Measures | None:
+    """Measure the body of a recording, whatever it does; None where the file has angles alone."""
+    return None if isinstance(read, AngleTable) else retarget.measure(_levelled(read))
+
+
 def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
     """Read and prepare one file; it is named as if it were alone.
 

@@ -13,6 +13,7 @@ from gait.errors import UserError
 from gait.learn import cluster, pool, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import DEFAULT, Reading
+from gait.learn.retarget import Measures, known_parts
 from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
 from gait.learn.spool import Spool
@@ -104,6 +105,7 @@ def load_all(
     dask: str | None = None,
     people: str = "auto",
     corpus: Corpus | None = None,
+    others: list[Measures] | None = None,
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
 
@@ -122,6 +124,8 @@ def load_all(
         Which files are of one person.
     corpus : Corpus, optional
         Gets the motions for the prior over segments; a file that gave one is no error.
+    others : list, optional
+        Gets the bodies of people none of whose files can be used: the one of which most was seen.
 
     Raises
     ------
@@ -132,9 +136,11 @@ def load_all(
     outcomes = cluster.prepared(paths, reading, dask) if dask else pool.prepared(paths, reading, jobs)
     names, persons = subjects.names(paths), subjects.subjects(paths, people)
     sequences, refused, used = [], [], False
+    bodies: list[Measures | None] = []
     with closing(outcomes), Spool() as spool:
         for i, outcome in enumerate(outcomes):
             found, told = outcome.sequence, outcome.refused
+            bodies.append(outcome.body)
             if corpus is not None and outcome.motion is not None:
                 corpus.put(names[i], persons[i], paths[i], outcome.motion)
                 used = True
@@ -152,7 +158,18 @@ def load_all(
         raise NothingLeft(refused)
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels
+    if others is not None:
+        others += _strangers(persons, bodies, {s.subject for s in sequences})
     return sequences, refused
+
+
+def _strangers(persons: list[str], bodies: list[Measures | None], known: set[str]) -> list[Measures]:
+    """One body of each person who is not known, in the order of their names."""
+    best: dict[str, Measures] = {}
+    for person, body in zip(persons, bodies, strict=True):
+        if body is not None and person not in known and known_parts(body) > known_parts(best.get(person)):
+            best[person] = body
+    return [best[person] for person in sorted(best)]
 
 
 def _kinds() -> str:

@@ -15,6 +15,7 @@ from gait.learn import readers, segment_motion, sequence
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body
 from gait.learn.reading import DEFAULT, Reading
+from gait.learn.retarget import Measures
 from gait.learn.segment_motion import Motion
 from gait.learn.segment_options import Segments
 from gait.learn.sequence import Sequence
@@ -22,11 +23,12 @@ from gait.learn.sequence import Sequence
 
 @dataclass(frozen=True)
 class Prepared:
-    """What a file gave: a sequence, or why none; and markers for the prior over segments."""
+    """What a file gave: a sequence, or why none and whose body; and markers for the prior over segments."""
 
     sequence: Sequence | None = None
     refused: UserError | None = None
     motion: Motion | None = None
+    body: Measures | None = None  #: of a file whose motion is refused
 
 
 def prepare(path: Path, reading: Reading = DEFAULT) -> Prepared:
@@ -36,17 +38,17 @@ def prepare(path: Path, reading: Reading = DEFAULT) -> Prepared:
             read = readers.read(path, reading)
         except UserError as error:
             return Prepared(refused=error)
-        found, refused = None, None
+        found, refused, body = None, None, None
         try:
             if reading.segments.source != "only":
                 found = sequence.prepare(path, read, reading)
         except UserError as error:
-            refused = error
+            refused, body = error, sequence.measured(read)
         try:
             motion = _motion(path, read, reading.segments, found)
         except UserError as error:
-            return Prepared(found, None if found else refused or error)
-        return Prepared(found, refused, motion)
+            return Prepared(found, None if found else refused or error, body=body)
+        return Prepared(found, refused, motion, body)
 
 
 def _motion(path: Path, read: Body | AngleTable, wanted: Segments, found: Sequence | None) -> Motion | None:
