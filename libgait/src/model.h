@@ -31,7 +31,8 @@ struct gait_model {
     /* p x (F + 1): relative change of the lengths in each frame, then of the pelvis's height, per standard
      * deviation; NULL if p is 0 */
     const float *proportion;
-    const float *shift; /* p x F x 3: how far each frame's origin is moved in its parent besides; may be NULL */
+    const float
+        *shift; /* p x F x 3: how far each frame's origin is moved in its parent besides; may be NULL */
 
     float stride_hz, stride_hz_sd;         /* strides per second: mean, sd between subjects */
     float stride_cv;                       /* variation of the stride time within a subject */

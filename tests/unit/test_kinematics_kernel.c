@@ -3,7 +3,7 @@
 #include "kinematics.h"
 
 #include "rng.h"
-#include "toy_model.h"
+#include "toy_shifted.h"
 
 #include "check.h"
 

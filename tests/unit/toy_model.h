@@ -366,21 +366,6 @@ static inline const gait_model *toy_model(void)
     return model;
 }
 
-/* The same whose proportions also move the shoulders: section SHFT. */
-static inline const gait_model *toy_shifted(void)
-{
-    static float shift[TOY_PROPORTIONS][TOY_FRAMES][3];
-    static gait_model model;
-    model = *toy_model();
-    for (int side = 0; side < 2; side++) {
-        float const to[3] = {0.03f, side ? 0.01f : -0.01f, 0.02f};
-        memcpy(shift[0][3 + 5 * side], to, sizeof to);
-    }
-    model.shift = shift[0][0];
-    return &model;
-}
-
-/* Standing at the origin at the model's own pelvis height, 1.75 m, mean shape, heading +x. */
 /* Index of a point by its public name; -1 if there is none. */
 static inline int32_t toy_find_point(const gait_model *m, const char *name)
 {
@@ -391,6 +376,7 @@ static inline int32_t toy_find_point(const gait_model *m, const char *name)
     return -1;
 }
 
+/* Standing at the origin at the model's own pelvis height, 1.75 m, mean shape, heading +x. */
 static inline gait_state toy_state(float phase)
 {
     gait_state s = {.phase = phase, .stride_hz = 0.92f, .stature = 1.75f};
