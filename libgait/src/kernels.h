@@ -74,8 +74,8 @@ struct walker_block;
     K(void, estimate_rotations,                                                                              \
       (const float *heading, const float *pitch, const float *roll, const double *weight,                    \
        const uint8_t *use, int32_t n, double out[16]))                                                       \
-    /* log(exp(a[i]) + exp(b + min(part[i], most))) into part */                                             \
-    K(void, loss_join, (const float *a, float b, float most, int32_t n, float *part))                        \
+    /* log(exp(a[i]) + exp(b + part[i])) into part */                                                        \
+    K(void, loss_join, (const float *a, float b, int32_t n, float *part))                                    \
     /* The limbs of a block of bodies in one camera's working image. */                                      \
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \

@@ -9,9 +9,11 @@ static const float PATIENCE = 0.33f;   /* seconds without support until the walk
 static const float PHASE_KEEPS = 1.5f; /* seconds for which a lost walker's phase can be predicted */
 static const float SAME_PHASE = 0.15f; /* strides within which the prediction counts as met */
 static const float HIDDEN = -4.0f;     /* log probability of being hidden in a frame, */
-static const float SEEN = 3.0f;        /* and nats by which parts that are seen can raise it */
-static const float PART = 1.0f;        /* nats for a walker who is seen in part */
-static const float USUAL = 10.0f;      /* frames over which unexplained foreground becomes the usual */
+static const float SEEN = 3.0f;        /* nats by which parts that are seen can raise it, */
+static const float STRANGE = 3.0f; /* and how many times foreground beyond the usual speaks against them */
+static const float PART = 1.0f;    /* nats for a walker who is seen in part */
+static const float USUAL = 60.0f,
+                   BETTER = 10.0f;    /* frames in which more, or less, unexplained foreground is usual */
 static const double ELSEWHERE = 0.01; /* probability, in a frame, that a lost walker is not where predicted */
 enum { SEARCHERS = 8 };               /* one particle of so many looks there */
 
@@ -67,6 +69,13 @@ void loss_search(gait_tracker *t, uint32_t frame)
     t->core->textured = 0; /* the ancestors were elsewhere */
 }
 
+/* What foreground says for a walker who may be hidden in part, nats: what is explained, and what is left over
+ * beyond the usual. */
+static float parts_speak(float explained, float more)
+{
+    return explained - STRANGE * f_max(0.0f, more);
+}
+
 /* The particle that explains the frame best; -1: none can be compared. */
 static int32_t likeliest(const gait_tracker *t)
 {
@@ -77,18 +86,28 @@ static int32_t likeliest(const gait_tracker *t)
     return best;
 }
 
+/* t->used, what each particle explains of all the foreground, becomes what that says for a hidden walker. */
+static void credit_parts(gait_tracker *t, float foreground)
+{
+    float const usual = t->core->missed;
+    for (int32_t i = 0; i < t->cfg.particles; i++)
+        t->used[i] = f_clamp(parts_speak(t->used[i], foreground - t->used[i] - usual), 0.0f, SEEN);
+}
+
 void loss_allow_hidden(gait_tracker *t)
 {
     int32_t const n = t->cfg.particles, best = likeliest(t);
-    float support = 0.0f; /* also if no term has an opinion on whether anybody is there */
+    weigh_sight s = {.support = 0.0f}; /* also if no term has an opinion on whether anybody is there */
     if (t->cfg.mode != GAIT_MODE_PAPER && best >= 0) {
         walker const w = walker_get(&t->people, best);
-        support = weigh_walker(t, &w).support;
+        s = weigh_walker(t, &w);
     }
-    if (support != 0.0f)
-        t->like->run->loss_join(t->ll, t->ll[best] - support + HIDDEN, SEEN, n, t->used);
-    else
+    if (s.support != 0.0f) {
+        credit_parts(t, s.parts.explained + s.parts.missed);
+        t->like->run->loss_join(t->ll, t->ll[best] - s.support + HIDDEN, n, t->used);
+    } else {
         memcpy(t->used, t->ll, (size_t)n * sizeof *t->used);
+    }
 }
 
 /* Did the walker go on walking while nobody saw it?  Then left and right are as they were. */
@@ -103,12 +122,12 @@ static bool as_predicted(const gait_tracker *t, const walker *mean)
 static bool seen(gait_tracker *t, bool lost, const weigh_sight *s)
 {
     float *const usual = &t->core->missed;
+    float const more = s->parts.missed - *usual;
     /* Terms without an opinion on whether anybody is there give exactly zero. */
     bool const whole = s->support >= 0.0f;
-    float const strange = f_max(0.0f, s->parts.missed - *usual);
+    t->core->part = !whole && !lost && t->core->met && parts_speak(s->parts.explained, more) > PART;
     if (whole)
-        *usual = t->core->met ? *usual + (s->parts.missed - *usual) / USUAL : s->parts.missed;
-    t->core->part = !whole && !lost && t->core->met && s->parts.explained - strange > PART;
+        *usual += t->core->met ? more / (more > 0.0f ? USUAL : BETTER) : more;
     return whole || t->core->part;
 }
 

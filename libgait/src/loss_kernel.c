@@ -5,23 +5,23 @@
 
 enum { LANES = 64 }; /* as many at once, so that the loop needs no remainder */
 
-KERNEL_ROW void join(const float *restrict a, float b, float most, float *restrict part)
+KERNEL_ROW void join(const float *restrict a, float b, float *restrict part)
 {
     for (int32_t i = 0; i < LANES; i++) {
-        float const hidden = b + f_min(part[i], most);
+        float const hidden = b + part[i];
         float const more = f_max(a[i], hidden), less = f_min(a[i], hidden);
         part[i] = more + m_log(1.0f + m_exp(less - more));
     }
 }
 
-void KERNEL(loss_join)(const float *a, float b, float most, int32_t n, float *part)
+void KERNEL(loss_join)(const float *a, float b, int32_t n, float *part)
 {
     int32_t const whole = n - n % LANES;
     float end[2][LANES] = {{0.0f}};
     for (int32_t i = 0; i < whole; i += LANES)
-        join(a + i, b, most, part + i);
+        join(a + i, b, part + i);
     memcpy(end[0], a + whole, (size_t)(n - whole) * sizeof *a);
     memcpy(end[1], part + whole, (size_t)(n - whole) * sizeof *part);
-    join(end[0], b, most, end[1]);
+    join(end[0], b, end[1]);
     memcpy(part + whole, end[1], (size_t)(n - whole) * sizeof *part);
 }

@@ -19,7 +19,7 @@ from eval_plan import Clip, Job
 from gait import Camera, Model, Start, Tracker, TrackerConfig, UserError, Video, blob
 from gait._abi import Mode
 from gait._lib import library
-from gait.autostart import find_start
+from gait.autostart import Spotter, find_start
 from gait.errors import GaitError
 from gait.evaluate import evaluate
 from gait.events import Strikes, strikes_of
@@ -94,7 +94,7 @@ def _run(job: Job) -> Result:
     tracker = Tracker(model, camera, config, background=plate)
     begun = time.perf_counter()
     start = _start(job, video, camera, plate, model)
-    kept = _follow(job, video, tracker, start)
+    kept = _follow(job, video, tracker, start, Spotter(camera, plate, model, clip.height))
     seconds = time.perf_counter() - begun
     track = read_track(job.folder / f"{job.stem}.csv")
     result = _judge(job, track, camera)
@@ -130,15 +130,15 @@ def _start(job: Job, video: Video, camera: Camera, plate: Image | None, model: M
     return Start.read(path, model)
 
 
-def _follow(job: Job, video: Video, tracker: Tracker, start: Start) -> _Kept:
-    """Track into the run's CSV file."""
+def _follow(job: Job, video: Video, tracker: Tracker, start: Start, spotter: Spotter) -> _Kept:
+    """Track into the run's CSV file; whoever is lost is looked for, as in `gait track`."""
     model, kept = tracker.model, _Kept()
     spread = eval_measures.Spread(job.clip.truth, model) if job.arm.mode == "default" else None
     rows = TrackWriter(
         job.folder / f"{job.stem}.csv", model.info.components, model.joint_names, model.angle_names
     )
     with rows:
-        for frame, estimate in tracker.follow(video, start, job.clip.stop):
+        for frame, estimate in tracker.follow(video, start, job.clip.stop, spotter):
             rows.write(frame, estimate)
             kept.estimates[frame.number] = estimate
             kept.steps.append(1000 * tracker.step_seconds)
