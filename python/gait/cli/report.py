@@ -21,12 +21,12 @@ from gait.cli.evaluate import text as evaluation_text
 from gait.evaluate import Measures, evaluate
 from gait.events import Strikes, strikes_of
 from gait.files import replacing
-from gait.lcm.page import Page
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
 from gait.lcm.record import spread
 from gait.lcm.results import Run, read_run
 from gait.model import Model, read_cyclic
 from gait.overlay import Overlay
+from gait.page import Page
 from gait.progress import progress
 from gait.trackfile import Joints, Track, read_track, read_truth
 from gait.video import Image, Video, VideoWriter

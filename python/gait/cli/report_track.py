@@ -17,9 +17,9 @@ from gait.anglecycles import AngleCycle, angle_cycles
 from gait.errors import UserError
 from gait.files import filling, require_folder
 from gait.footfall_draws import Draws
-from gait.lcm.page import Page
 from gait.model import read_cyclic
 from gait.modelcurves import ModelCurves
+from gait.page import Page
 from gait.parameter_plots import angle_plot, deviation_plot, footfall_plot, path_plot, stride_plot
 from gait.parameters import QUANTITIES, Parameters, measure
 from gait.trackfile import Track, read_track
