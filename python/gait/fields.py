@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from gait.errors import UserError
 
+_LAST_FRAME = 2**53  # larger whole numbers are not exact as floating point
+
 
 class Fields:
     """A mapping read from a file that knows what to say about itself.
@@ -68,7 +70,7 @@ class Fields:
         if len(shape) == 1 and array.ndim == 2 and 1 in array.shape:
             array = array.ravel()
         if array.shape != tuple(shape):
-            wanted, found = "x".join(map(str, shape)), "x".join(map(str, array.shape)) or "one number"
+            wanted, found = ("x".join(map(str, s)) or "one number" for s in (shape, array.shape))
             raise self.fail(key, f"has shape {found}, not {wanted}", remedy)
         if not np.isfinite(array).all():
             raise self.fail(key, "is not finite", remedy)
@@ -104,7 +106,7 @@ def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     except (json.JSONDecodeError, UnicodeDecodeError) as exc:
         raise UserError(f"{path}: not valid JSON ({exc}); mend it or write the {what} anew") from None
     if not isinstance(data, dict):
-        raise UserError(f"{path}: holds no JSON object; the {what} is an object of keys in braces")
+        raise UserError(f"{path}: holds no JSON object; {what} files are objects of keys in braces")
     return Fields(str(path), data)
 
 
@@ -116,11 +118,12 @@ def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> 
     UserError
         If they are not whole numbers that increase, with the first such line.
     """
-    wrong = column != column.round()
+    wrong = (column != column.round()) | (np.abs(column) > _LAST_FRAME)
     wrong[1:] |= np.diff(column) <= 0
     if wrong.any():
         i = int(np.argmax(wrong))
         raise UserError(
-            f"{path}: line {i + 2}: frame is {column[i]:g}; it must be whole numbers that increase"
+            f"{path}: line {i + 2}: frame is {column[i]:g}; it must be whole numbers that increase, at most "
+            f"{_LAST_FRAME}"
         )
     return column.astype(np.int64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -37,6 +37,7 @@ def require_writable(path: str | os.PathLike[str]) -> None:
 
     The folder must exist and be writable, and `path` be new or a regular file that may be written.
     """
+    _require_name(path)
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise UserError(f"{path}: is a folder; give the name of a file in it")
@@ -48,6 +49,28 @@ def require_writable(path: str | os.PathLike[str]) -> None:
         raise UserError(f"{path}: folder {target.parent} cannot be written; choose another place")
     if target.exists() and not os.access(target, os.W_OK):
         raise UserError(f"{path}: is read-only; choose another name, or change its permissions")
+
+
+def require_outputs(outputs: Sequence[str | None], inputs: Sequence[str | None]) -> None:
+    """Raise UserError unless each output can be written, is named once, and is none of the inputs.
+
+    Parameters
+    ----------
+    outputs, inputs : sequence of str or None
+        Files, None where the user names none.
+    """
+    read = {os.path.realpath(path) for path in inputs if path}
+    written: set[str] = set()
+    for path in outputs:
+        if path is None:
+            continue
+        require_writable(path)
+        real = os.path.realpath(path)
+        if real in read:
+            raise UserError(f"{path}: is read by this command; give the output another name")
+        if real in written:
+            raise UserError(f"{path}: two outputs have this name; give each its own")
+        written.add(real)
 
 
 @contextmanager
@@ -72,6 +95,7 @@ def filling(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 def require_folder(path: str | os.PathLike[str]) -> None:
     """Raise UserError if `path` cannot be a folder of files; for long work, call it before the work."""
+    _require_name(path)
     folder = Path(path).absolute()
     there = next(p for p in (folder, *folder.parents) if p.exists())
     if not there.is_dir():
@@ -79,6 +103,11 @@ def require_folder(path: str | os.PathLike[str]) -> None:
         raise UserError(f"{path}: {what} a file; give the name of a folder")
     if not os.access(there, os.W_OK):
         raise UserError(f"{path}: folder {there} cannot be written; choose another place")
+
+
+def _require_name(path: str | os.PathLike[str]) -> None:
+    if not os.fspath(path):
+        raise UserError("the output's name is empty; give one")
 
 
 def text_lines(path: Path) -> list[str]:

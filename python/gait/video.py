@@ -123,6 +123,12 @@ def _upright(frame: av.VideoFrame, pixels: str) -> Image:
     return np.ascontiguousarray(np.rot90(image, frame.rotation // 90)) if frame.rotation % 360 else image
 
 
+def require_video_name(path: str | os.PathLike[str]) -> None:
+    """Raise UserError if the suffix of `path` is of no container that `VideoWriter` writes."""
+    if Path(path).suffix.lower() not in _CONTAINERS:
+        raise UserError(f"{path}: unknown video suffix; use one of {' '.join(_CONTAINERS)}")
+
+
 class VideoWriter:
     """H.264 file that every player and browser shows; appears under its name when closed without error.
 
@@ -140,8 +146,7 @@ class VideoWriter:
 
     def __init__(self, path: str | os.PathLike[str], fps: float, *, crf: int = 18) -> None:
         self.path = Path(path)
-        if self.path.suffix.lower() not in _CONTAINERS:
-            raise UserError(f"{self.path}: unknown video suffix; use one of {' '.join(_CONTAINERS)}")
+        require_video_name(path)
         self._rate = Fraction(fps).limit_denominator(1001)
         self._crf = crf
         self._stack = ExitStack()

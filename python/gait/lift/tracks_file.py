@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,9 @@ Array = NDArray[np.float64]
 LEAST_CONFIDENCE = 0.1  # points below it count as not seen
 
 LONGEST_STEP = 1.0  # seconds between frames; so long a step is a cycle of walking
+SHORTEST_STEP = 1e-5  # no camera is as fast
+LONGEST_GAP = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
+FURTHEST = 1e6  # pixels, or units of an orthographic view
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,18 @@ class Tracks:
             raise UserError(
                 f"{path}: all u and v lie within {spread:.3g}, less than their noise of {sd:g}; give pixels, "
                 "not shares of the picture, or the noise in their unit"
+            )
+
+    def require_motion(self, path: str | os.PathLike[str]) -> None:
+        """Raise UserError unless this is one stretch of two frames or more."""
+        if len(self.time) < 2:
+            raise UserError(f"{path}: has one frame; lifting is of motion, give two or more")
+        gap = np.diff(self.time)
+        if gap.max() > LONGEST_GAP:
+            line = int(gap.argmax()) + 3
+            raise UserError(
+                f"{path}: line {line}: {gap.max():.3g} s after the frame before; lift what is before and "
+                f"after a gap of more than {LONGEST_GAP:g} s by itself"
             )
 
     def deviations(self, sd: float) -> Array:
@@ -114,10 +130,12 @@ def read(
     if (np.diff(time) <= 0).any():
         line = int(np.argmax(np.diff(time) <= 0)) + 3
         raise UserError(f"{path}: line {line}: time does not increase; give seconds")
-    if len(time) > 1 and np.median(np.diff(time)) >= LONGEST_STEP:
-        step = f"time goes on by {np.median(np.diff(time)):g} from frame to frame"
-        raise UserError(f"{path}: {step}; give seconds, not milliseconds or frames")
-    uv = np.stack([np.stack([numbers.column(f"{n}_{a}") for a in "uv"], axis=1) for n in names], axis=1)
+    step = float(np.median(np.diff(time))) if len(time) > 1 else SHORTEST_STEP
+    if not SHORTEST_STEP <= step < LONGEST_STEP:
+        what = f"time goes on by {step:g} from frame to frame"
+        raise UserError(f"{path}: {what}; give seconds, not milliseconds or frames")
+    both = [[numbers.column(f"{name}_{axis}", FURTHEST) for axis in "uv"] for name in names]
+    uv = np.moveaxis(np.array(both), 2, 0).copy()
     half = np.isfinite(uv[..., 0]) != np.isfinite(uv[..., 1])
     if half.any():
         t, j = np.argwhere(half)[0]
@@ -149,9 +167,10 @@ class _Numbers:
     def __init__(self, path: str | os.PathLike[str], columns: dict[str, int], rows: list[list[str]]) -> None:
         self._path, self._columns, self._rows = path, columns, rows
 
-    def column(self, name: str) -> Array:
-        """Values of a column, NaN where it is empty."""
+    def column(self, name: str, most: float = sys.float_info.max) -> Array:
+        """Values of a column between -most and most, NaN where it is empty."""
         values = np.full(len(self._rows), np.nan)
+        limit = f" of at most {most:g}" if most < sys.float_info.max else ""
         for i, row in enumerate(self._rows):
             cell = row[self._columns[name]].strip()
             if not cell or cell.lower() == "nan":
@@ -160,9 +179,9 @@ class _Numbers:
                 values[i] = float(cell)
             except ValueError:
                 values[i] = np.inf
-            if not np.isfinite(values[i]):
+            if not abs(values[i]) <= most:
                 raise UserError(
-                    f"{self._path}: line {i + 2}: {name} is {cell!r}; give a number or leave it empty"
+                    f"{self._path}: line {i + 2}: {name} is {cell!r}; give a number{limit} or leave it empty"
                 )
         return values
 
