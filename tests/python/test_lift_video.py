@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gait import blob
 from gait.cli import lift_video, main
 from gait.evaluate import root_errors
 from gait.lift.clip_segments import Settings
 from gait.lift.cylinder import LIMBS, Figure
 from gait.lift.cylinder_picture import draw_figure
 from gait.lift.fit_clip import fit_clip
-from gait.lift.prior import SegmentPrior
+from gait.lift.prior import TAGS, SegmentPrior
 from gait.lift.springs import Correction, as_json
 from gait.lift.suggest import suggest
 from gait.model import read_blob
@@ -37,8 +38,6 @@ def prior():
 
 def walk(frames=24, coef=(0.7, -0.5)):
     """Walk of the shipped cyclic model with proportions and a way of its own."""
-    from gait import blob
-
     time = np.arange(frames) / FPS
     place = np.column_stack([SPEED * time, np.zeros(frames), np.full(frames, 0.9)])
     joints, _ = pose(
@@ -224,5 +223,28 @@ def test_faults_are_named(files, tmp_path, refused):
     behind = json.loads((files / "placement.json").read_text()) | {"pelvis": [50, 500]}
     (tmp_path / "behind.json").write_text(json.dumps(behind))
     assert "behind the camera" in refused(*camera, "--placement", tmp_path / "behind.json")
+    for place, words in (
+        ([-246, -426], "px tall in a picture of 640x480; give the place and stature"),
+        ([3.74, 5.28], "px tall in a picture of 640x480; give the place and stature"),
+        ([-4.5, 3.0], "of a picture of 640x480; place the person where the picture shows some of it"),
+    ):
+        (tmp_path / "far.json").write_text(json.dumps(behind | {"pelvis": place}))
+        assert words in refused(*camera, "--placement", tmp_path / "far.json")
+    wild = {"frame": 3, "joint": "l_knee", "uv": [100000, 20]}
+    (tmp_path / "c.json").write_text(json.dumps({"corrections": [wild]}))
+    said = refused(*camera, *placed, "--corrections", tmp_path / "c.json")
+    assert "correction 1: uv is (100000, 20), far outside a picture of 640x480" in said
     (tmp_path / "c.json").write_text('{"corrections": [{"frame": 99, "joint": "l_knee", "uv": [1, 2]}]}')
     assert "frame is 99" in refused(*camera, *placed, "--corrections", tmp_path / "c.json")
+    assert "unknown video suffix" in refused(*camera, *placed, "--overlay", tmp_path / "o.gif")
+    size = (files / "video.mp4").stat().st_size
+    assert "is read by this command" in refused(*camera, *placed, "--overlay", files / "video.mp4")
+    assert (files / "video.mp4").stat().st_size == size
+
+
+def test_a_model_without_a_cycle_takes_the_phase_of_the_shipped_one(prior, tmp_path):
+    shipped = blob.decode(read_blob(None))
+    path = tmp_path / "only.gait"
+    blob.write(path, {tag: shipped[tag] for tag in ("META", *TAGS)})
+    assert set(lift_video._cycle(str(path))) == set(lift_video._cycle(None))
+    assert lift_video._cycle(str(path))["CURV"].tobytes() == shipped["CURV"].tobytes()

@@ -16,7 +16,6 @@ from gait.blob import decode
 from gait.camera import Camera
 from gait.cli import values
 from gait.errors import UsageError, UserError
-from gait.files import require_writable
 from gait.learn.stage import one_thread
 from gait.lift import lifted_file, suggest
 from gait.lift.beginning import Beginning
@@ -31,9 +30,13 @@ from gait.lift.views import CameraView, FlatView, View
 from gait.model import read_blob, read_cyclic
 from gait.progress import progress
 from gait.skeleton import JOINTS
-from gait.video import Video, VideoWriter, background
+from gait.video import Video, VideoWriter, background, require_video_name
 
 Floats = npt.NDArray[np.float64]
+
+
+SMALLEST = 20.0  # pixels of a person whose limbs can be told
+LARGEST = 4.0  # heights of the picture
 
 
 FILES = """\
@@ -51,26 +54,33 @@ C.json says where joints (or other markers of the model) are, and if wanted how 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that only a video has."""
     group = parser.add_argument_group("from a video", FILES)
-    group.add_argument("--placement", metavar="P.json", help="where the person roughly is in one frame")
+    group.add_argument(
+        "--placement", metavar="P.json", help="where the person roughly is in one frame; a video needs it"
+    )
     group.add_argument("--corrections", metavar="C.json", help="joints pointed at in any frames")
     group.add_argument(
         "--background",
-        default="auto",
         metavar="PNG|auto|none",
-        help="empty scene that the sensors leave out: an image, the median of the clip, or none (auto)",
+        help="empty scene, whose edges the sensors leave out: an image; auto (default), the median of the "
+        "clip; or none",
     )
-    group.add_argument("--start", type=values.whole(0), metavar="F", help="first frame (the placement's)")
-    group.add_argument("--stop", type=values.whole(0), metavar="F", help="first frame not to use")
     group.add_argument(
-        "--alone", action="store_true", help="segments one after the other, as in the paper, not together"
+        "--start", type=values.whole(0), metavar="F", help="first frame to use (default: the placement's)"
+    )
+    group.add_argument(
+        "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
+    )
+    group.add_argument(
+        "--alone",
+        action="store_true",
+        help="estimate segments one after the other, as in the paper (default: together)",
     )
     group.add_argument("--overlay", metavar="O.mp4", help="draw the cylinder figure into the video")
     group.add_argument(
         "--suggest",
         type=values.whole(0),
-        default=0,
         metavar="N",
-        help="name the N corrections that would tell most",
+        help="name the N corrections that would tell most (default: 0)",
     )
 
 
@@ -78,13 +88,15 @@ def run(args: argparse.Namespace) -> int:
     """Estimate the motion in a video and report."""
     if not args.placement:
         raise UsageError("--placement: a video needs it; say where the person roughly is in one frame")
-    for path in filter(None, (args.output, args.overlay)):
-        require_writable(path)
+    if args.overlay:
+        require_video_name(args.overlay)
     video, prior = Video(args.input), SegmentPrior.load(args.model)
     camera = Camera.read(args.camera, video.size) if args.camera else None
     placement = read_placement(args.placement, prior, camera is not None)
     first, stop = _frames(args, video, placement)
-    corrections = read_corrections(args.corrections, prior, stop, first) if args.corrections else []
+    corrections = []
+    if args.corrections:
+        corrections = read_corrections(args.corrections, prior, stop, first, video.size)
     view = CameraView(camera) if camera else _flat(placement, prior)
     film = _film(args, video, view, placement, prior, (first, stop))
     used = [c for c in corrections if first <= c.frame < first + len(film.times)]
@@ -99,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
     lifted_file.write(args.output, fit.frame, fit.time, names, fit.places[:, shown], fit.sd[:, shown])
     if args.overlay:
         _draw(args, video, clip, fit, figure)
-    summary = _summary(clip, free, fit, figure, args.suggest)
+    summary = _summary(clip, free, fit, figure, args.suggest or 0)
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
 
@@ -144,15 +156,32 @@ def _film(
     frames: tuple[int, int],
 ) -> Film:
     """Sensors of the frames used."""
-    with progress("background", video.count, args.quiet) as update:
-        plate = background(args.background, video, update)
     pelvis = np.append(placement.ground, placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2])
     if not view.visible(pelvis):
         raise UserError(
             f"{args.placement}: pelvis is behind the camera; give its place in the camera's world"
         )
+    height = placement.stature * view.scale(pelvis)
+    _require_in_picture(args.placement, video, view.project(pelvis)[0], height)
+    with progress("background", video.count, args.quiet) as update:
+        plate = background(args.background or "auto", video, update)
     with progress("sensors", frames[1] - frames[0], args.quiet) as update:
-        return Film.make(video.frames(*frames), placement.stature * view.scale(pelvis), plate, update)
+        return Film.make(video.frames(*frames), height, plate, update)
+
+
+def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) -> None:
+    """Refuse a placement of nobody in the picture: `pelvis` (2,) and `height` in pixels."""
+    wide, high = video.size
+    if not SMALLEST <= height <= LARGEST * high:
+        raise UserError(
+            f"{path}: the person would be {height:.3g} px tall in a picture of {wide}x{high}; give the place "
+            f"and stature, or height_px, of a person of {SMALLEST:g} to {LARGEST * high:g} px"
+        )
+    if (np.maximum(-pelvis, pelvis - (wide - 1, high - 1)) > height / 2).any():
+        raise UserError(
+            f"{path}: the pelvis falls at pixel ({pelvis[0]:.0f}, {pelvis[1]:.0f}) of a picture of "
+            f"{wide}x{high}; place the person where the picture shows some of it"
+        )
 
 
 def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:

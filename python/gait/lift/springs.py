@@ -28,10 +28,11 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.fields import Fields, read_json
-from gait.initial import SCALARS, STATURE
+from gait.initial import DEFAULT_SD, SCALARS, STATURE
 from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
+Size = tuple[int, int]
 
 CLICK_SD = 4.0  # pixels, where a correction does not say
 PLACE_SD = 0.3  # metres on the ground, and radians of heading, where a placement does not say
@@ -42,6 +43,7 @@ RATE_SD = 0.05  # strides per second
 HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 0
 FURTHEST = 1e6  # pixels or metres
 _KNOWN = ("frame", "pelvis", "pelvis_px", "height_px", "heading_rad", "stature_m", "phase", "stride_hz", "sd")
+_SPREAD = tuple(DEFAULT_SD)  # as in a start of the tracker
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,7 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
     fields = read_json(path, "placement")
     fields.only(_KNOWN)
     spread = fields.table("sd", "give standard deviations by key")
+    spread.only(_SPREAD)
     stature = prior.stature
     if "stature_m" in fields:
         stature = fields.number("stature_m", *STATURE, "give the person's height in metres")
@@ -162,16 +165,19 @@ def _deviation(spread: Fields, key: str, usual: float) -> float:
         return usual
     remedy = "give a positive standard deviation"
     three = np.size(spread.get(key, remedy)) == 3
-    value = float(spread.array(key, (3,) if three else (), remedy).max())
-    if not 0 < value < FURTHEST:
-        raise spread.fail(key, f"is {value:g}", remedy)
-    return value
+    values = np.atleast_1d(spread.array(key, (3,) if three else (), remedy))
+    wrong = values[(values <= 0) | (values >= FURTHEST)]
+    if len(wrong):
+        raise spread.fail(key, f"is {wrong[0]:g}", remedy)
+    return float(values.max())
 
 
 def read_corrections(
-    path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0
+    path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0, size: Size = (16384, 16384)
 ) -> list[Correction]:
     """Read a corrections file: of frames from `first` to before `stop`, each joint of one at most once.
+
+    Joints may lie outside the picture of `size` (width, height), but not further than it is large.
 
     Raises
     ------
@@ -189,7 +195,7 @@ def read_corrections(
         if not isinstance(entry, dict):
             raise UserError(f"{path}: correction {number} is no object of keys; {remedy}")
         fields = Fields(f"{path}: correction {number}", entry)
-        correction = _correction(fields, prior, range(first, stop))
+        correction = _correction(fields, prior, range(first, stop), size)
         twin = next(
             (i for i, c in enumerate(found, 1) if (c.frame, c.joint) == (correction.frame, correction.joint)),
             None,
@@ -201,7 +207,7 @@ def read_corrections(
     return found
 
 
-def _correction(fields: Fields, prior: SegmentPrior, frames: range) -> Correction:
+def _correction(fields: Fields, prior: SegmentPrior, frames: range, size: Size) -> Correction:
     fields.only(("frame", "joint", "uv", "sd_px"))
     remedy = f"give a frame that is used, {frames[0]} to {frames[-1]}, or other --start and --stop"
     frame = fields.integer("frame", frames[0], frames[-1], remedy)
@@ -209,6 +215,9 @@ def _correction(fields: Fields, prior: SegmentPrior, frames: range) -> Correctio
     if joint not in prior.names:
         raise fields.fail("joint", f"is {joint!r}", f"use one of {' '.join(prior.names)}")
     u, v = fields.array("uv", (2,), "give column and row, pixels")
+    if any(not -n <= x <= 2 * n for x, n in zip((u, v), size, strict=True)):
+        what = f"is ({u:g}, {v:g}), far outside a picture of {size[0]}x{size[1]}"
+        raise fields.fail("uv", what, "give column and row, pixels")
     sd = CLICK_SD
     if "sd_px" in fields:
         sd = fields.number("sd_px", 1e-3, FURTHEST, "give a standard deviation in pixels")
