@@ -12,6 +12,7 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.camera import Camera
 from gait.cli import main
+from gait.lift import motion
 from gait.lift.tracks_file import Tracks, read, write
 from gait.trc import read_trc
 
@@ -108,10 +109,57 @@ def test_trc_and_sd(folder, capsys):
         (["--method", "blend", "--no-bones"], 2, "go with --method smooth"),
         (["-o", "nowhere/out.csv"], 1, "does not exist"),
         (["--camera", "no.json"], 1, "no.json"),
+        (["--floor-sd", "0.1"], 2, "goes with --camera and --method smooth"),
+        (["--camera", "cam.json", "--floor-sd", "0.1", "--method", "blend"], 2, "--method smooth"),
+        (["--start", "0"], 2, "--start is for a video, and t.csv holds tracks"),
+        (["--overlay", "o.mp4"], 2, "--overlay is for a video, and t.csv holds tracks"),
+        (["--placement", "cam.json"], 2, "--placement is for a video, and t.csv holds tracks"),
+        (["-o", "t.csv"], 1, "t.csv: is read by this command; give the output another name"),
+        (["--trc", "./out.csv"], 1, "./out.csv: two outputs have this name"),
+        (["-o", ""], 1, "name is empty"),
     ],
 )
 def test_faults(folder, capsys, options, code, words):
+    before = {path: path.read_bytes() for path in folder.iterdir()}
     assert main(["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", *options]) == code
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (["--floor-sd", "1e300"], "give metres from 0.0001 to 100"),
+        (["--pixel-sd", "0"], "give a standard deviation from 1e-06 to 1e+06"),
+        (["--metres-per-unit", "nan"], "give metres from 1e-06 to 1000"),
+    ],
+)
+def test_options_out_of_range(folder, capsys, option, words):
+    with pytest.raises(SystemExit, match="2"):
+        main(["lift", "t.csv", "-o", "out.csv", *option])
+    assert f"argument {option[0]}: {option[1]}: {words}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: replace(t, time=t.time + 1e6 * (t.frame > 8)), "line 11: 1e+06 s after the frame before"),
+        (lambda t: replace(t, time=t.time * 1e-9), "u.csv: time goes on by 5e-11 from frame to frame"),
+        (lambda t: replace(t, uv=t.uv * 1e9), "give a number of at most 1e+06"),
+        (lambda t: Tracks(t.frame[:1], t.time[:1], t.names, t.uv[:1], t.confidence[:1]), "has one frame"),
+    ],
+)
+def test_tracks_that_cannot_be(folder, capsys, change, words):
+    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4).names)
+    changed = change(tracks)
+    head = ["frame", "time", *(f"{name}_{axis}" for name in tracks.names for axis in "uv")]
+    with open("u.csv", "w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(head)
+        for row in zip(changed.frame, changed.time, changed.uv.reshape(len(changed.frame), -1), strict=True):
+            table.writerow([row[0], row[1], *("" if np.isnan(u) else u for u in row[2])])
+    assert main(["lift", "u.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json"]) == 1
     assert words in capsys.readouterr().err
     assert not (folder / "out.csv").exists()
 
@@ -120,7 +168,9 @@ def test_video_needs_placement(folder, capsys):
     assert main(["lift", "clip.mp4", "-m", "m.gait", "-o", "out.csv"]) == 2
     assert "--placement" in capsys.readouterr().err
     assert main(["lift", "clip.mp4", "-o", "out.csv", "--height", "1.7"]) == 2
-    assert "--height is for tracks" in capsys.readouterr().err
+    assert "--height is for tracks, and clip.mp4 is a video" in capsys.readouterr().err
+    assert main(["lift", "clip.mp4", "-o", "out.csv", "--method", "smooth"]) == 2
+    assert "--method is for tracks" in capsys.readouterr().err
 
 
 def damaged(change):
@@ -152,7 +202,7 @@ def test_too_little_is_said(folder, capsys, method):
     damaged(hide)
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--method", method]
     assert main(command) == 1
-    assert "fewer than 4 points" in capsys.readouterr().err
+    assert "t.csv: fewer than 4 points" in capsys.readouterr().err
 
 
 def test_blending_needs_every_segment(folder, capsys):
@@ -189,3 +239,13 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
     code = main(["lift", "t.csv", "-m", "m.gait", "--camera", "long.json", "-o", "long.csv"])
     said = capsys.readouterr().err
     assert code == 1 or "do not rely on" in said
+
+
+@pytest.mark.parametrize("stature", [24.0, -7.0, np.nan])
+def test_nobody_is_so_tall(folder, capsys, monkeypatch, stature):
+    """As with a camera in millimetres."""
+    lift = motion.lift
+    monkeypatch.setattr(motion, "lift", lambda *args: replace(lift(*args), stature=stature))
+    assert main(["lift", "t.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv"]) == 1
+    assert f"t.csv: the person came out {stature:.3g} m tall; check the camera" in capsys.readouterr().err
+    assert not (folder / "out.csv").exists()

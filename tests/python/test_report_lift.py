@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import threadpoolctl
 from toy_segments import toy_blob, toy_prior
 
 from gait.cli import main
-from gait.lift import motion
-from gait.lift.tracks_file import Tracks, write
+from gait.lift import figures_clip, motion
+from gait.lift.tracks_file import Tracks, read, write
 
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
 FIGURES = {"spectrum", "synthesis", "draws", "estimates", "uncertain"}
@@ -44,11 +46,35 @@ def test_a_bad_clip_leaves_nothing(folder, capsys):
     assert "bad.csv" in capsys.readouterr().err and not (folder / "r").exists()
 
 
+def test_a_camera_is_of_a_clip(folder, capsys):
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--camera", "cam.json"]) == 2
+    assert "give its tracks with --clip" in capsys.readouterr().err and not (folder / "r").exists()
+
+
+def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch, capsys):
+    """Threads of the linear algebra get in each other's way at matrices this small."""
+    lift, seen = motion.lift, []
+
+    def watched(prior, tracks, *args):
+        seen.append(({pool["num_threads"] for pool in threadpoolctl.threadpool_info()}, tracks))
+        return lift(prior, tracks, *args)
+
+    tracks, _ = read("t.csv", toy_prior(6, 19, 4, seed=5).names)
+    uv = tracks.uv.copy()
+    uv[6, 3] += 500
+    write("t.csv", replace(tracks, uv=uv))
+    monkeypatch.setattr(motion, "lift", watched)
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 0
+    threads, used = seen[0]
+    assert threads == {1} and not used.seen[6, 3] and used.seen.sum() == used.seen.size - 1
+    assert "left out, far from" in capsys.readouterr().err
+
+
 def test_an_interruption_leaves_nothing(folder, capsys, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(motion, "lift", interrupted)  # after all other figures
+    monkeypatch.setattr(figures_clip, "clip", interrupted)  # after all other figures
     before = sorted(folder.iterdir())
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 1
     assert "interrupted" in capsys.readouterr().err and sorted(folder.iterdir()) == before

@@ -25,109 +25,153 @@ from typing import Any
 
 import numpy as np
 
-from gait.camera import Camera
-from gait.cli import lift_video, values
+from gait.cli import lift_tracks, lift_video, values
 from gait.errors import UsageError, UserError
-from gait.files import require_writable
-from gait.learn.stage import one_thread
-from gait.lift import lifted_file, motion, outliers, tracks_file
-from gait.lift.equations import Parallel, Perspective, View, looking_along
+from gait.files import require_outputs
+from gait.initial import STATURE
+from gait.lift import lifted_file, motion
 from gait.lift.prior import SegmentPrior
-from gait.lift.tracks_file import Tracks
-from gait.progress import progress
+from gait.lift.tracks_file import FURTHEST, Tracks
 from gait.trc import write_trc
 
 NAME = "lift"
 HELP = "2-D joint tracks, or a video, to 3-D"
 
-_ONLY_TRACKS = ("orthographic", "metres_per_unit", "trc", "ignore_unknown", "keep_jumps", "height")
-MOST_JUMPS = 5  # named
+_ONLY_TRACKS = (
+    *("orthographic", "metres_per_unit", "height", "pixel_sd", "floor_sd", "method", "no_contact"),
+    *("no_bones", "ignore_unknown", "keep_jumps", "trc"),
+)
+_ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
+PIXEL_SD, FLOOR_SD = 3.0, 0.03  # pixels, metres
 FAR = 4.0  # noise alone gives a median of 1.2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("input", metavar="TRACKS.csv|VIDEO", help="2-D tracks, or a video with --placement")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT.csv", help="places and deviations")
-    parser.add_argument("-m", "--model", metavar="M.gait", help="with a segment prior (the shipped model)")
-    parser.add_argument("--camera", metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name")
-    parser.add_argument("--all-markers", action="store_true", help="write all markers of the prior")
-    group = parser.add_argument_group("from tracks")
-    group.add_argument(
-        "--orthographic", metavar="AXIS", help="view along x, y, z, -x, -y, -z or X,Y,Z from far away"
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="OUT.csv", help="places and standard deviations, metres"
     )
-    group.add_argument(
-        "--metres-per-unit", type=values.positive, metavar="M", help="scale of u and v with --orthographic"
+    parser.add_argument(
+        "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
     )
-    group.add_argument("--height", type=values.stature, metavar="M", help="stature (unknown: of most people)")
-    group.add_argument(
-        "--pixel-sd",
-        type=values.positive,
-        default=3.0,
-        metavar="SD",
-        help="noise of u and v, in their unit (3)",
+    parser.add_argument(
+        "--camera", metavar="CAM", help="calibration: JSON, OpenCV YAML or XML, or FILE.toml:name"
     )
-    group.add_argument(
-        "--floor-sd",
-        type=values.positive,
-        default=0.03,
+    parser.add_argument(
+        "--all-markers", action="store_true", help="write all markers of the prior, not its joints alone"
+    )
+    add = parser.add_argument_group("from tracks").add_argument
+    add(
+        "--orthographic",
+        metavar="AXIS",
+        help="without a camera: look from far away along x, y, z, -x, -y, -z or X,Y,Z",
+    )
+    add(
+        "--metres-per-unit",
+        type=values.between(1e-6, 1e3, "metres"),
         metavar="M",
-        help="smooth with --camera: how well the person stands at z = 0, metres (0.03; more on steps)",
+        help="length of a unit of u and v, with --orthographic (default: told from the person's stature)",
     )
-    group.add_argument(
+    add(
+        "--height",
+        type=values.stature,
+        metavar="M",
+        help="the person's stature in metres (default: unknown, about that of the people learnt from)",
+    )
+    add(
+        "--pixel-sd",
+        type=values.between(1e-6, FURTHEST, "a standard deviation"),
+        metavar="SD",
+        help=f"standard deviation of u and v at full confidence, in their unit (default: {PIXEL_SD:g})",
+    )
+    add(
+        "--floor-sd",
+        type=values.between(1e-4, 100, "metres"),
+        metavar="M",
+        help="how well the person stands at z = 0: a standard deviation in metres, with --camera and "
+        f"--method smooth (default: {FLOOR_SD:g}; more on steps)",
+    )
+    add(
         "--method",
         choices=motion.METHODS,
-        default=motion.METHODS[0],
-        help="smooth (the default): one Gaussian over the whole sequence; blend: overlapping segments alone, "
-        "mixed as in the paper; segment: one after another",
+        help="smooth (default): one Gaussian over the whole sequence; blend: overlapping segments, each "
+        "estimated alone, mixed as in the paper; segment: one after another",
     )
-    group.add_argument("--no-contact", action="store_true", help="smooth: feet on the ground may slide")
-    group.add_argument("--no-bones", action="store_true", help="smooth: bones may change their length")
-    group.add_argument("--ignore-unknown", action="store_true", help="leave out points the model has not")
-    group.add_argument(
+    add("--no-contact", action="store_true", help="smooth: let feet on the ground slide")
+    add("--no-bones", action="store_true", help="smooth: let bones change their length")
+    add("--ignore-unknown", action="store_true", help="leave out points that the model does not know")
+    add(
         "--keep-jumps",
         action="store_true",
         help="keep points that are far from where they were a frame before and after",
     )
-    group.add_argument("--trc", metavar="O.trc", help="also write the places for OpenSim")
+    add("--trc", metavar="O.trc", help="also write the places for OpenSim")
     lift_video.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Lift tracks, or pass a video on."""
-    if args.placement or Path(args.input).suffix.lower() not in (".csv", ".txt", ""):
-        for option in _ONLY_TRACKS:
-            if getattr(args, option):
-                raise UsageError(f"--{option.replace('_', '-')} is for tracks, and {args.input} is a video")
+    suffix = Path(args.input).suffix.lower()
+    video = suffix not in (".csv", ".txt") and bool(suffix or args.placement)
+    _require_own(args, video)
+    require_outputs(
+        (args.output, args.trc, args.overlay),
+        (args.input, args.model, args.camera, args.placement, args.corrections, args.background),
+    )
+    if video:
         return lift_video.run(args)
     _check(args)
-    prior = SegmentPrior.load(args.model)
-    tracks, ignored = tracks_file.read(args.input, prior.names, args.ignore_unknown)
-    tracks.require_spread(args.input, args.pixel_sd)
-    if ignored and not args.quiet:
-        print(f"left out: {' '.join(ignored)}", file=sys.stderr)
-    jumps: list[tuple[int, str]] = []
+    prior, pixel_sd = SegmentPrior.load(args.model), args.pixel_sd or PIXEL_SD
+    tracks = lift_tracks.read(args.input, prior, pixel_sd, args.ignore_unknown, args.quiet)
+    jumps = 0
     if not args.keep_jumps:
-        tracks, jumps = outliers.without_jumps(tracks, args.pixel_sd)
-    if jumps and not args.quiet:
-        print(_jumped(jumps), file=sys.stderr)
+        tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
     names = motion.output_names(prior, tracks, args.all_markers)
-    options = motion.Options(
-        args.method, args.height, args.pixel_sd, args.floor_sd, not args.no_contact, not args.no_bones
-    )
-    with one_thread(), progress("segments", motion.segments_of(prior, tracks), args.quiet) as update:
-        found = motion.lift(prior, tracks, _view(args, tracks), options, names, update)
-    if not np.isfinite(found.error).any():
-        raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
+    view = lift_tracks.view(tracks, args.camera, args.orthographic, args.metres_per_unit)
+    found = lift_tracks.lift(args.input, prior, tracks, view, _options(args, pixel_sd), names, args.quiet)
+    _require_person(args, found)
     if not args.quiet:
-        for words in _doubts(found, args.pixel_sd):
+        for words in _doubts(found, pixel_sd):
             print(words, file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
-    summary = _summary(args, tracks, found) | {"jumps": len(jumps)}
+    summary = _summary(args, tracks, found) | {"jumps": jumps}
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
+
+
+def _options(args: argparse.Namespace, pixel_sd: float) -> motion.Options:
+    return motion.Options(
+        args.method or motion.METHODS[0],
+        args.height,
+        pixel_sd,
+        args.floor_sd or FLOOR_SD,
+        not args.no_contact,
+        not args.no_bones,
+    )
+
+
+def _require_own(args: argparse.Namespace, video: bool) -> None:
+    """Refuse options of a video for tracks and of tracks for a video, which would do nothing."""
+    kind, other = ("is a video", "tracks") if video else ("holds tracks", "a video")
+    for option in _ONLY_TRACKS if video else _ONLY_VIDEO:
+        value = getattr(args, option)
+        if value is not None and value is not False:
+            raise UsageError(f"--{option.replace('_', '-')} is for {other}, and {args.input} {kind}")
+
+
+def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
+    """Refuse an estimate that no person can be."""
+    if not np.isfinite(found.error).any():
+        raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
+    low, high = STATURE
+    if not low <= found.stature <= high:
+        view = "the camera (metres; R, t: world to camera)" if args.camera else "the direction of view"
+        raise UserError(
+            f"{args.input}: the person came out {found.stature:.3g} m tall; check {view} and the names"
+        )
 
 
 def _doubts(found: motion.Motion, pixel_sd: float) -> list[str]:
@@ -144,31 +188,17 @@ def _doubts(found: motion.Motion, pixel_sd: float) -> list[str]:
     return [words for words, holds in doubts.items() if holds]
 
 
-def _jumped(jumps: list[tuple[int, str]]) -> str:
-    """Name the points that were taken out."""
-    named = ", ".join(f"{name} in frame {frame}" for frame, name in jumps[:MOST_JUMPS])
-    more = f" and {len(jumps) - MOST_JUMPS} more" if len(jumps) > MOST_JUMPS else ""
-    return f"left out, far from where they were a frame before and after: {named}{more} (--keep-jumps)"
-
-
 def _check(args: argparse.Namespace) -> None:
-    """Refuse before the work what would fail after it."""
+    """Refuse options that do not go together."""
+    smooth = args.method in (None, "smooth")
     if args.camera and args.orthographic:
         raise UsageError("--camera and --orthographic are two views; give one of them")
     if args.metres_per_unit and not args.orthographic:
         raise UsageError("--metres-per-unit goes with --orthographic")
-    if args.method != "smooth" and (args.no_contact or args.no_bones):
+    if not smooth and (args.no_contact or args.no_bones):
         raise UsageError("--no-contact and --no-bones go with --method smooth")
-    for path in filter(None, (args.output, args.trc)):
-        require_writable(path)
-
-
-def _view(args: argparse.Namespace, tracks: Tracks) -> View:
-    if args.camera:
-        return Perspective(Camera.read(args.camera))
-    middle = np.nanmean(tracks.uv, axis=(0, 1))
-    axes = looking_along(args.orthographic or "y")
-    return Parallel(axes, args.metres_per_unit, middle, steady=bool(args.orthographic))
+    if args.floor_sd and not (smooth and args.camera):
+        raise UsageError("--floor-sd goes with --camera and --method smooth")
 
 
 def _rate(tracks: Tracks) -> float:
@@ -180,7 +210,7 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: motion.Motion) -> 
     """Figures of ``--json``."""
     return {
         "frames": len(tracks.frame),
-        "method": args.method,
+        "method": args.method or motion.METHODS[0],
         "markers": {"seen": list(tracks.names), "estimated": list(found.names)},
         "seen_share": float(tracks.seen.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),

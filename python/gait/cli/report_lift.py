@@ -21,20 +21,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.camera import Camera
-from gait.cli import values
-from gait.errors import UserError
+from gait.cli import lift_tracks, values
+from gait.errors import UsageError, UserError
 from gait.files import filling, require_folder
-from gait.lcm.page import Page
 from gait.learn import readers, segment_corpus, segment_motion
 from gait.learn.figures_base import Drawing
 from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments
-from gait.lift import figures_clip, motion, tracks_file
-from gait.lift.equations import Parallel, Perspective, View, looking_along
+from gait.lift import figures_clip
+from gait.lift.equations import View
 from gait.lift.figures_segment import Case, case, drawings
+from gait.lift.motion import Motion, Options, output_names
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
+from gait.page import Page
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
@@ -47,29 +47,43 @@ FIGURES = 5  # besides that of a clip
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("-m", "--model", metavar="M.gait", help="with a segment prior (the shipped model)")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for page and figures")
-    parser.add_argument("--mocap", metavar="FILE", help="recording (.amc .bvh .c3d .trc .csv) to look at")
-    parser.add_argument("--clip", metavar="TRACKS.csv", help="2-D tracks of a clip, as for gait lift")
-    parser.add_argument("--camera", metavar="CAM", help="of the clip (level and far away)")
     parser.add_argument(
-        "--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of noise and draws (1)"
+        "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for page and figures")
+    parser.add_argument(
+        "--mocap",
+        metavar="FILE",
+        help="recording (.amc .bvh .c3d .trc .csv) to look at (default: a draw from the prior)",
+    )
+    parser.add_argument("--clip", metavar="TRACKS.csv", help="2-D tracks of a clip, as for gait lift")
+    parser.add_argument(
+        "--camera", metavar="CAM", help="the clip's calibration (default: seen level and from far away)"
+    )
+    parser.add_argument(
+        "--seed",
+        type=values.whole(*values.SEED),
+        default=1,
+        metavar="S",
+        help="of noise and draws (default: 1)",
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
+    if args.camera and not args.clip:
+        raise UsageError("--camera is of a clip; give its tracks with --clip")
     require_folder(args.output)
     prior = SegmentPrior.load(args.model)
-    seen = _clip(args, prior) if args.clip else None
+    lifted = _clip(args, prior) if args.clip else None
     segment = _segment(args.mocap, prior) if args.mocap else None
     truth, stature = segment or (None, prior.stature)
     what = f"a segment of {Path(args.mocap).name}" if args.mocap else "a draw from the prior"
     shown = case(prior, truth, stature, what, args.seed)
     page = Page(f"{Path(args.model).name if args.model else 'Shipped model'}: segments of motion")
     page.table("Prior", _facts(prior))
-    with filling(args.output) as folder, progress("figures", FIGURES + bool(seen), args.quiet) as update:
-        for done, drawing in enumerate(_drawings(args, prior, shown, seen), 1):
+    with filling(args.output) as folder, progress("figures", FIGURES + bool(lifted), args.quiet) as update:
+        for done, drawing in enumerate(_drawings(args, shown, lifted), 1):
             page.figure(drawing.heading, _written(folder, drawing))
             update(done)
         (folder / "report.html").write_text(page.text(), encoding="utf-8")
@@ -78,21 +92,22 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, View]:
-    """Tracks of the clip and how they are seen."""
-    tracks, _ = tracks_file.read(args.clip, prior.names, ignore_unknown=True)
-    if args.camera:
-        return tracks, Perspective(Camera.read(args.camera))
-    return tracks, Parallel(looking_along("y"), None, np.nanmean(tracks.uv, axis=(0, 1)), steady=False)
+def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, Motion, View]:
+    """Lift the tracks of the clip as `gait lift` does by default."""
+    options = Options()
+    tracks = lift_tracks.read(args.clip, prior, options.pixel_sd, ignore_unknown=True, quiet=args.quiet)
+    tracks, _ = lift_tracks.without_jumps(tracks, options.pixel_sd, args.quiet)
+    view = lift_tracks.view(tracks, args.camera)
+    found = lift_tracks.lift(args.clip, prior, tracks, view, options, output_names(prior, tracks), args.quiet)
+    return tracks, found, view
 
 
 def _drawings(
-    args: argparse.Namespace, prior: SegmentPrior, shown: Case, seen: tuple[Tracks, View] | None
+    args: argparse.Namespace, shown: Case, lifted: tuple[Tracks, Motion, View] | None
 ) -> Iterator[Drawing]:
     yield from drawings(shown, args.seed)
-    if seen:
-        found = motion.lift(prior, *seen, motion.Options(), motion.output_names(prior, seen[0]))
-        yield figures_clip.clip(seen[0], found, seen[1], Path(args.clip).name)
+    if lifted:
+        yield figures_clip.clip(*lifted, Path(args.clip).name)
 
 
 def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:

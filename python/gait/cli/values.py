@@ -28,13 +28,22 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
     return value
 
 
+def between(low: float, high: float, unit: str) -> Callable[[str], float]:
+    """Numbers in [low, high], in `unit`."""
+
+    def value(text: str) -> float:
+        number = _number(text)
+        if not low <= number <= high:
+            raise ArgumentTypeError(f"{text}: give {unit} from {low:g} to {high:g}")
+        return number
+
+    return value
+
+
 def stature(text: str) -> float:
     """Height of a person in metres."""
     low, high = STATURE
-    try:
-        metres = float(text)
-    except ValueError:
-        metres = float("nan")
+    metres = _number(text)
     if not low <= metres <= high:
         raise ArgumentTypeError(f"{text}: is not a stature; give metres from {low} to {high}")
     return metres
@@ -42,10 +51,15 @@ def stature(text: str) -> float:
 
 def positive(text: str) -> float:
     """Finite numbers above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
+    value = _number(text)
     if not 0 < value < float("inf"):
         raise ArgumentTypeError(f"{text}: give a number above 0")
     return value
+
+
+def _number(text: str) -> float:
+    """Read a number, NaN if the text is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")

@@ -1,0 +1,85 @@
+"""2-D tracks of a clip as `gait lift` and `gait report lift` take them: read, seen in a view, lifted."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from gait.camera import Camera
+from gait.errors import UserError
+from gait.learn.stage import one_thread
+from gait.lift import motion, outliers, tracks_file
+from gait.lift.equations import Parallel, Perspective, View, looking_along
+from gait.lift.motion import Motion, Options
+from gait.lift.prior import SegmentPrior
+from gait.lift.tracks_file import Tracks
+from gait.progress import progress
+
+MOST_JUMPS = 5  # named
+
+
+def read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, quiet: bool) -> Tracks:
+    """Read tracks of points of a prior whose noise is `sd`, and tell what is left out."""
+    tracks, ignored = tracks_file.read(path, prior.names, ignore_unknown)
+    tracks.require_motion(path)
+    tracks.require_spread(path, sd)
+    if ignored and not quiet:
+        print(f"left out, unknown to the model: {' '.join(ignored)}", file=sys.stderr)
+    return tracks
+
+
+def without_jumps(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, int]:
+    """Leave out single points that jump, tell which (`hint`: and what to do about it), and count them."""
+    tracks, jumps = outliers.without_jumps(tracks, sd)
+    if jumps and not quiet:
+        print(_jumped(jumps) + hint, file=sys.stderr)
+    return tracks, len(jumps)
+
+
+def _jumped(jumps: list[tuple[int, str]]) -> str:
+    """Name the points that were taken out."""
+    named = ", ".join(f"{name} in frame {frame}" for frame, name in jumps[:MOST_JUMPS])
+    more = f" and {len(jumps) - MOST_JUMPS} more" if len(jumps) > MOST_JUMPS else ""
+    return f"left out, far from where they were a frame before and after: {named}{more}"
+
+
+def view(tracks: Tracks, camera: str | None, axis: str | None = None, metres: float | None = None) -> View:
+    """See tracks through a calibrated camera, or else from far away.
+
+    Parameters
+    ----------
+    camera : str, optional
+        File of the calibration.
+    axis : str, optional
+        Direction of view from far away; level and with a slowly changing scale if left out.
+    metres : float, optional
+        Of a unit of u and v along `axis`; unknown if left out.
+    """
+    if camera:
+        return Perspective(Camera.read(camera))
+    middle = np.nanmean(tracks.uv, axis=(0, 1))
+    return Parallel(looking_along(axis or "y"), metres, middle, steady=bool(axis))
+
+
+def lift(
+    path: str,
+    prior: SegmentPrior,
+    tracks: Tracks,
+    seen_in: View,
+    options: Options,
+    names: tuple[str, ...],
+    quiet: bool,
+) -> Motion:
+    """Lift tracks with a bar of progress; matrices are too small for several threads to gain.
+
+    Raises
+    ------
+    UserError
+        One line that names the file `path` of the tracks.
+    """
+    with one_thread(), progress("segments", motion.segments_of(prior, tracks), quiet) as update:
+        try:
+            return motion.lift(prior, tracks, seen_in, options, names, update)
+        except UserError as error:
+            raise type(error)(f"{path}: {error}") from None
