@@ -146,7 +146,8 @@ def test_recorded_markers_need_files_that_have_them(walks, tmp_path, capsys):
 @pytest.mark.parametrize(
     "words",
     [
-        ["--segment-frames", "1"],
+        ["--segment-frames", "3"],
+        ["--segments", "none", "--segment-modes", "5"],
         ["--segment-mixture", "many"],
         ["--segment-headings", "4"],
         ["--segments", "only", "--report", "r"],

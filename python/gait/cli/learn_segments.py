@@ -14,82 +14,87 @@ from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments
 from gait.lift.prior import SegmentPrior
 
-FRAMES, FPS, MODES, MIXTURE = (2, 60), (5, 240), (1, 120), (1, 16)  # what can be asked for
+FRAMES, FPS, MODES, MIXTURE = (4, 60), (5, 240), (1, 120), (1, 16)  # what can be asked for
+AUTO = "auto"
+_WHAT = ("frames", "hop", "fps", "modes", "headings", "mixture", "markers")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     usual = Segments()
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "--segments",
         choices=segment_options.SOURCES,
         default=usual.source,
-        help="of what the prior over short segments is learnt, which gait lift uses. learnt (the default): "
+        help="of what the prior over short segments is learnt, which gait lift uses. learnt (default): "
         "the recordings of the cyclic model; all: whole recordings, also those that it refuses; none: no "
         "prior; only: as all, but without a cyclic model, so that gait track cannot use the file",
     )
-    add = parser.add_argument
     add(
-        "--segment-frames", type=values.whole(*FRAMES), default=usual.frames, metavar="F", help="of each (10)"
+        "--segment-frames",
+        type=values.whole(*FRAMES),
+        metavar="F",
+        help=f"frames of a segment (default: {usual.frames})",
     )
-    add("--segment-hop", type=values.whole(1, FRAMES[1]), metavar="H", help="frames between them (half of F)")
+    add(
+        "--segment-hop",
+        type=values.whole(1, FRAMES[1]),
+        metavar="H",
+        help="frames from one segment to the next (default: half of F)",
+    )
     add(
         "--segment-fps",
         type=values.whole(*FPS),
-        default=round(usual.fps),
         metavar="R",
-        help="per second (20)",
+        help=f"frames of a segment per second (default: {usual.fps:g})",
     )
     add(
         "--segment-modes",
         type=values.whole(*MODES),
-        default=usual.modes,
         metavar="K",
-        help="at most (50, a quarter of the segments)",
+        help=f"modes kept, at most a quarter of the segments (default: {usual.modes})",
     )
     add(
         "--segment-headings",
         choices=list(segment_options.TURNS),
-        default=segment_options.FREE,
-        help="free (the default): gait lift finds the heading. 2: every segment also turned by 90 degrees, "
+        help="free (default): gait lift finds the heading. 2: every segment also turned by 90 degrees, "
         "as in the paper; 8: by each of 45; people's headings in the world are then part of the prior",
     )
     add(
         "--segment-mixture",
         type=_components,
-        default=usual.mixture,
         metavar="auto|K",
-        help="Gaussians in the prior (1); auto: as many as describe people left out best",
+        help=f"Gaussians in the prior (default: {usual.mixture}); auto: as many as describe people left out "
+        "best",
     )
     add(
         "--segment-markers",
         choices=segment_options.MARKERS,
-        default=usual.markers,
-        help="virtual (the default): 37 of the default skeleton; recorded: those that most of the files hold "
+        help="virtual (default): 37 of the default skeleton; recorded: those that most of the files hold "
         "(.c3d, .trc)",
     )
 
 
-def _components(text: str) -> int | None:
-    return None if text == "auto" else values.whole(*MIXTURE)(text)
+def _components(text: str) -> int | str:
+    return AUTO if text == AUTO else values.whole(*MIXTURE)(text)
 
 
 def options(args: argparse.Namespace) -> Segments:
     """Options as the learner takes them."""
-    hop = args.segment_hop or max(1, args.segment_frames // 2)
-    if hop > args.segment_frames:
-        raise UsageError(f"--segment-hop {hop}: at most the {args.segment_frames} of --segment-frames")
-    return Segments(
-        source=args.segments,
-        frames=args.segment_frames,
-        hop=hop,
-        fps=float(args.segment_fps),
-        modes=args.segment_modes,
-        headings=segment_options.TURNS[args.segment_headings],
-        mixture=args.segment_mixture,
-        markers=args.segment_markers,
-        people=args.prior == "people",
-    )
+    given = {name: getattr(args, f"segment_{name}") for name in _WHAT}
+    given = {name: value for name, value in given.items() if value is not None}
+    if args.segments == "none" and given:
+        raise UsageError(f"--segment-{next(iter(given))} says what a segment is; not with --segments none")
+    frames = given.get("frames", Segments.frames)
+    hop = given.setdefault("hop", max(1, frames // 2))
+    if hop > frames:
+        raise UsageError(f"--segment-hop {hop}: at most the {frames} of --segment-frames")
+    if "headings" in given:
+        given["headings"] = segment_options.TURNS[given["headings"]]
+    if given.get("mixture") == AUTO:
+        given["mixture"] = None
+    return Segments(source=args.segments, people=args.prior == "people", **given)
 
 
 def learn(corpus: Corpus, wanted: Segments, quiet: bool) -> SegmentPrior | None:

@@ -35,7 +35,8 @@ def fit(recordings: Sequence[Recorded], wanted: Segments) -> SegmentPrior:
     if real < FEWEST:
         seconds = wanted.frames / wanted.fps
         raise UserError(
-            f"the recordings hold {real} segments of {seconds:g} s; add recordings, or --segments none"
+            f"the recordings hold {real} segments of {seconds:g} s, fewer than {FEWEST}; add recordings, "
+            "or leave the prior out (--segments none)"
         )
     modes = min(wanted.modes, max(1, real // EACH))
     found = basis(filled(table.rows, modes), len(table.names))
