@@ -9,8 +9,8 @@ import pytest
 from toy_segments import toy_prior
 
 from gait.camera import Camera
+from gait.lift import bordered, motion, sequence, soft, tridiagonal
 from gait.lift import chain as chains
-from gait.lift import motion, sequence, soft, tridiagonal
 from gait.lift.chain import Around, Freedom, Segment, overlapping, restricted
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.observe import Observations
@@ -48,6 +48,14 @@ def dense(diagonal, below):
     return full.reshape(count * size, -1)
 
 
+def whole(information):
+    """Whole matrix and vector of blocks and of what lasts."""
+    inner = dense(information.diagonal, information.below)
+    side = information.border.reshape(len(inner), -1)
+    matrix = np.block([[inner, side], [side.T, information.corner]])
+    return matrix, np.append(information.vector, information.edge)
+
+
 def test_tridiagonal_is_dense_algebra():
     rng = np.random.default_rng(1)
     base = rng.normal(size=(3, 8, 20))
@@ -61,7 +69,8 @@ def test_tridiagonal_is_dense_algebra():
     vector = rng.normal(size=(4, 4))
     full = dense(diagonal, below)
     factor = tridiagonal.factor(diagonal, below)
-    np.testing.assert_allclose(factor.solve(vector).ravel(), np.linalg.solve(full, vector.ravel()), rtol=1e-9)
+    solved = np.linalg.solve(full, vector.ravel())
+    np.testing.assert_allclose(factor.solve(vector[..., None]).ravel(), solved, rtol=1e-9)
     assert factor.log_det == pytest.approx(np.linalg.slogdet(full)[1])
     inverse = np.linalg.inv(full).reshape(4, 4, 4, 4)
     same, across = factor.covariance()
@@ -74,28 +83,65 @@ def test_tridiagonal_refuses_indefinite():
         tridiagonal.factor(np.stack([np.eye(2), -np.eye(2)]), np.zeros((1, 2, 2)))
 
 
+def test_border_is_dense_algebra(prior):
+    found = chains.chain(prior, around(prior), FREEDOM)
+    full, vector = whole(found.information)
+    solution = bordered.solve(found.information)
+    blocks, size = found.information.vector.shape
+    mean = np.linalg.solve(full, vector)
+    np.testing.assert_allclose(solution.blocks.ravel(), mean[: blocks * size], atol=1e-8)
+    np.testing.assert_allclose(solution.lasting, mean[blocks * size :], atol=1e-8)
+    assert solution.log_det == pytest.approx(np.linalg.slogdet(full)[1])
+    inverse = np.linalg.inv(full)[: blocks * size, : blocks * size].reshape(blocks, size, blocks, size)
+    same, across = solution.covariance()
+    np.testing.assert_allclose(same, [inverse[s, :, s] for s in range(blocks)], rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(
+        across, [inverse[s + 1, :, s] for s in range(blocks - 1)], rtol=1e-5, atol=1e-6
+    )
+
+
 def test_chain_holds_each_overlap_once(prior):
     """Its first segment has the segment's own covariance, its determinant is that of the factors."""
     there = around(prior)
     found = chains.chain(prior, there, FREEDOM)
-    full = dense(found.diagonal, found.below)
+    full, vector = whole(found.information)
     assert found.log_det == pytest.approx(np.linalg.slogdet(full)[1])
     segment = Segment(prior, there, FREEDOM, 0)
-    wanted = np.diag(segment.variance) + segment.loads.T @ segment.loads
+    wanted = np.diag(segment.variance) + segment.loads.T @ segment.loads + segment.lasting.T @ segment.lasting
     size = len(wanted)
     np.testing.assert_allclose(np.linalg.inv(full)[:size, :size], wanted, rtol=1e-5, atol=1e-6)
-    mean = np.linalg.solve(full, found.vector.ravel())
+    mean = np.linalg.solve(full, vector)
     np.testing.assert_allclose(mean[:size], segment.mean, atol=1e-6)
     assert found.constant == pytest.approx(mean @ full @ mean, rel=1e-6)
+
+
+def test_what_lasts_is_no_surer_for_a_longer_sequence(prior):
+    """Before anything is seen the size of the body is as open in the long run as in one segment."""
+    freedom, blocks = Freedom(stature=1.7, stature_sd=0.1, height_sd=0.05), 12
+    found = chains.chain(prior, around(prior, blocks), freedom)
+    covariance = np.linalg.inv(whole(found.information)[0])
+    half = np.zeros((blocks, FRAMES // 2, MARKERS, 3))
+    half[..., 3, 2], half[..., 0, 2] = 1, -1  # height of one marker over another
+    spread = []
+    for used in (2, blocks):
+        along = np.concatenate([np.where(np.arange(blocks)[:, None, None, None] < used, half, 0).ravel()])
+        along = np.pad(along / (used * FRAMES // 2), (0, len(covariance) - along.size))
+        spread.append(np.sqrt(along @ covariance @ along))
+    body = 1.7 * (prior.mean[0, :, 3, 2] - prior.mean[0, :, 0, 2]).mean()
+    offsets = 2 * (chains.THROUGHOUT * chains.LASTING * prior.gamma * prior.residual[0, [0, 3]].mean())
+    least = np.sqrt((0.1 / 1.7 * body) ** 2 + 1.7**2 * (offsets + 2 * chains.OFFSET_SD**2))
+    assert spread[1] > 0.99 * least
+    assert spread[1] < spread[0]
 
 
 def drawn(prior, rng):
     """Motion drawn from the chain, (grid, J, 3)."""
     found = chains.chain(prior, around(prior), FREEDOM)
-    covariance = np.linalg.inv(dense(found.diagonal, found.below))
-    mean = covariance @ found.vector.ravel()
+    matrix, vector = whole(found.information)
+    covariance = np.linalg.inv(matrix)
+    mean = covariance @ vector
     x = mean + np.linalg.cholesky((covariance + covariance.T) / 2) @ rng.normal(size=len(mean))
-    return x.reshape(-1, MARKERS, 3)
+    return x[: found.information.vector.size].reshape(-1, MARKERS, 3)
 
 
 def observed(prior, places, view, sd, rng, missing=0.1):
@@ -116,7 +162,11 @@ def test_smoother_covers_what_is_drawn_from_its_prior(prior):
     inside, ratios = [], []
     there = around(prior)
     start = Start(
-        there.heading, there.component, 1.7, chains.blended(there.places, FRAMES // 2), np.ones(BLOCKS * 3)
+        there.heading,
+        there.component,
+        1.7,
+        chains.blended(there.places, FRAMES // 2),
+        np.ones(BLOCKS * 3),
     )
     for _ in range(40):
         truth, seen = observed(prior, drawn(prior, rng), view, 0.01, rng)
@@ -147,7 +197,11 @@ def test_scale_does_not_drift_with_noise():
     uv = camera.project(places) + 3 * rng.normal(size=(*places.shape[:2], 2))
     tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
     found = motion.lift(
-        prior, tracks, Perspective(camera), motion.Options(contact=False, bones=False), prior.names
+        prior,
+        tracks,
+        Perspective(camera),
+        motion.Options(contact=False, bones=False),
+        prior.names,
     )
     size = np.linalg.norm(found.places - found.places.mean(axis=1, keepdims=True))
     true = np.linalg.norm(places - places.mean(axis=1, keepdims=True))
@@ -204,7 +258,13 @@ def test_blending_keeps_what_segments_agree_on():
 
 def test_lifting_needs_four_frames():
     prior = toy_prior(3, 4, 3)
-    tracks = Tracks(np.arange(9), np.arange(9) / 20, prior.names, np.ones((9, 4, 2)), np.ones((9, 4)))
+    tracks = Tracks(
+        np.arange(9),
+        np.arange(9) / 20,
+        prior.names,
+        np.ones((9, 4, 2)),
+        np.ones((9, 4)),
+    )
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     with pytest.raises(motion.UserError, match="4 or more"):
         motion.lift(prior, tracks, view, motion.Options(), prior.names)

@@ -36,14 +36,20 @@ def walk():
 def drawn(prior, around, rng):
     """Motion drawn from the chain of a person of known stature on a known floor, (grid, J, 3)."""
     found = chains.chain(prior, around, Freedom(STATURE, 1e-4, 1e-4))
-    count, size_ = found.vector.shape
+    information = found.information
+    count, size_ = information.vector.shape
     full = np.zeros((count, size_, count, size_))
     for b in range(count):
-        full[b, :, b] = found.diagonal[b]
+        full[b, :, b] = information.diagonal[b]
     for b in range(count - 1):
-        full[b + 1, :, b], full[b, :, b + 1] = found.below[b], found.below[b].T
+        full[b + 1, :, b], full[b, :, b + 1] = (
+            information.below[b],
+            information.below[b].T,
+        )
+    lasting = rng.normal(size=len(information.edge))
+    vector = information.vector - information.border @ lasting
     lower = np.linalg.cholesky(full.reshape(count * size_, -1))
-    mean = np.linalg.solve(lower.T, np.linalg.solve(lower, found.vector.ravel()))
+    mean = np.linalg.solve(lower.T, np.linalg.solve(lower, vector.ravel()))
     x = mean + np.linalg.solve(lower.T, rng.normal(size=len(mean)))
     return x.reshape(-1, len(prior.names), 3)
 

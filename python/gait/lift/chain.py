@@ -1,10 +1,14 @@
-"""The segment prior over a whole sequence: a Markov chain of half segments.
+"""The segment prior over a whole sequence: a Markov chain of half segments, given what lasts.
 
 Frames of the prior's rate are cut into blocks of half a segment.  Two neighbouring blocks are a segment, so
 that the prior gives p(first, second) and, by division, p(second | first): the sequence has the density
 p(X_0, X_1) prod_s p(X_s+1 | X_s), in which every overlap counts once.  Its information matrix is
-block-tridiagonal.  In the world a segment is X = stature Rz(heading) x + shift; shift, heading and stature
-are unknown too and enter by their linear effects around the present estimate (`Around`).
+block-tridiagonal.  In the world a segment is X = stature Rz(heading) x + shift; shift and heading are unknown
+too and enter by their linear effects around the present estimate (`Around`).
+
+A chain forgets: left to it, every half segment would bring news of the person's size and of the floor, and
+the more frames, the surer it would be of the mean person.  So what stays the same throughout - stature, floor
+and where somebody's joints are taken to be - are numbers g of their own, and the chain is that given g.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
+from gait.lift.bordered import Information
 from gait.lift.prior import SegmentPrior
 from gait.skeleton import axis_rotation
 
@@ -22,9 +27,11 @@ Floats = npt.NDArray[np.float64]
 
 GROUND_SD = 10.0  # metres, where on the ground
 LASTING = 0.7  # share of the variance outside the modes that stays as it is within a segment
-OFFSET_SD = 0.006  # statures, of where somebody's joints are taken to be
+THROUGHOUT = 0.5  # share of that which stays as it is in the whole sequence
+OFFSET_SD = 0.009  # statures, of where somebody's joints are taken to be
 HEADING_SD = 2.0  # radians around the present estimate: as good as unknown
-LEADING = 8  # modes whose scores enter the shapes that views are linearised around
+WHOLE = 2  # numbers that last and move the whole body, stature and floor; each marker's offset follows
+LEADING = 3  # modes whose scores enter the shapes that views are linearised around
 
 
 @dataclass(frozen=True)
@@ -68,23 +75,18 @@ class Around:
 
 @dataclass(frozen=True)
 class Chain:
-    """Information form of the chain, B blocks of n = 3 b J numbers.
+    """Information form of the chain, B blocks of n = 3 b J numbers, and of what lasts (`bordered`).
 
     Attributes
     ----------
-    diagonal : (B, n, n)
-    below : (B - 1, n, n)
-    vector : (B, n)
-        Information times mean.
+    information : Information
     constant : float
         Mean' information mean, summed over the factors.
     log_det : float
         Of the information matrix.
     """
 
-    diagonal: Floats
-    below: Floats
-    vector: Floats
+    information: Information
     constant: float
     log_det: float
 
@@ -104,27 +106,32 @@ def restricted(prior: SegmentPrior, names: tuple[str, ...]) -> SegmentPrior:
 def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
     """Make the chain of a prior (`restricted`) with 2 b frames a segment."""
     segments, frames, markers = around.places.shape[:3]
-    size = 3 * markers * frames // 2
+    size, lasting = 3 * markers * frames // 2, WHOLE + 3 * markers
     diagonal, below = np.zeros((segments + 1, size, size)), np.zeros((segments, size, size))
-    vector, constant, log_det = np.zeros((segments + 1, size)), 0.0, 0.0
+    border, corner = np.zeros((segments + 1, size, lasting)), np.eye(lasting)
+    vector, edge, constant, log_det = np.zeros((segments + 1, size)), np.zeros(lasting), 0.0, 0.0
     for s in range(segments):
         whole = Segment(prior, around, freedom, s)
         factors = [(1.0, whole)] if s == 0 else [(1.0, whole), (-1.0, whole.first_half())]
         for sign, part in factors:
             information = sign * part.information()
-            product = information @ part.mean
+            product, reach = information @ part.mean, information @ part.lasting.T
             constant += float(part.mean @ product)
             log_det += sign * part.log_det()
             diagonal[s] += information[:size, :size]
             vector[s] += product[:size]
+            border[s] -= reach[:size]
+            corner += part.lasting @ reach
+            edge -= part.lasting @ product
             if sign > 0:
                 below[s] += information[size:, :size]
                 diagonal[s + 1] += information[size:, size:]
                 vector[s + 1] += product[size:]
-    return Chain(diagonal, below, vector, constant, log_det)
+                border[s + 1] -= reach[size:]
+    return Chain(Information(diagonal, below, border, corner, vector, edge), constant, log_det)
 
 
-def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats) -> Around:
+def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
     """Linearise around new places (grid, J, 3): headings, stature and shapes that they say under the prior.
 
     The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
@@ -133,15 +140,15 @@ def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats)
     segments and all views are linearised around the same shapes, so that a change of size about the lens
     costs nothing by itself.
     """
-    headings, statures, shapes = [], [], []
+    headings, shapes = [], []
     half = around.places.shape[1] // 2
     for s, place in enumerate(overlapping(places, half)):
-        turn, stature, shape = Segment(prior, around, freedom, s).explained(place.ravel())
+        turn, shape = Segment(prior, around, freedom, s).explained(place.ravel(), lasting)
         headings.append(around.heading[s] + turn)
-        statures.append(stature)
         shapes.append(shape.reshape(place.shape))
     common = overlapping(blended(np.stack(shapes), half), half)
-    return Around(np.array(headings), around.component, float(np.mean(statures)), common)
+    stature = freedom.stature + freedom.stature_sd * float(lasting[0])
+    return Around(np.array(headings), around.component, stature, common)
 
 
 def overlapping(values: Floats, half: int) -> Floats:
@@ -163,35 +170,33 @@ def blended(segments: Floats, half: int) -> Floats:
 
 
 class Segment:
-    """Gaussian over one segment in the world: N(mean, diag(variance) + loads loads')."""
+    """One segment in the world: N(mean + lasting' g, diag(variance) + loads' loads), g ~ N(0, I)."""
 
     def __init__(self, prior: SegmentPrior, around: Around, freedom: Freedom, s: int) -> None:
         component, place = around.component[s], around.places[s]
         turn, stature = axis_rotation(2, around.heading[s]), around.stature
         shape = place - _over_ground(place)
-        self.own = stature * prior.mean[component] @ turn.T
-        middle = _over_ground(place) - _over_ground(self.own)
+        own = stature * prior.mean[component] @ turn.T
+        middle = _over_ground(place) - _over_ground(own)
         growth = shape / stature
-        self.mean = (self.own + middle + (freedom.stature - stature) * growth).ravel()
+        self.mean = (own + middle + (freedom.stature - stature) * growth).ravel()
         outside = stature**2 * prior.gamma * prior.residual[component]
         self.variance = np.broadcast_to(((1 - LASTING) * outside)[None, :, None], place.shape).ravel()
         modes = stature * prior.modes[component] @ turn.T
         size, markers = len(modes), place.shape[1]
-        loads = np.zeros((size + 5 + 3 * markers, *place.shape))
+        loads = np.zeros((size + 3 + 3 * markers, *place.shape))
         loads[:size] = modes
         loads[size, ..., 0] = loads[size + 1, ..., 1] = GROUND_SD
-        loads[size + 2, ..., 2] = freedom.height_sd
         if prior.headings == 0:
-            loads[size + 3, ..., 0], loads[size + 3, ..., 1] = -shape[..., 1], shape[..., 0]
-        loads[size + 3] *= HEADING_SD
-        loads[size + 4] = freedom.stature_sd * growth
-        column = np.arange(3 * markers)
-        lasting = np.sqrt(LASTING * outside + (stature * OFFSET_SD) ** 2)
-        by_frame = loads.reshape(len(loads), len(place), -1)
-        by_frame[size + 5 + column, :, column] = np.repeat(lasting, 3)[:, None]
+            loads[size + 2, ..., 0], loads[size + 2, ..., 1] = -shape[..., 1], shape[..., 0]
+        loads[size + 2] *= HEADING_SD
+        loads[size + 3 :] = _each_marker(np.sqrt((1 - THROUGHOUT) * LASTING * outside), place.shape)
+        lasting = np.zeros((WHOLE + 3 * markers, *place.shape))
+        lasting[0], lasting[1, ..., 2] = freedom.stature_sd * growth, freedom.height_sd
+        own_sd = np.sqrt(THROUGHOUT * LASTING * outside + (stature * OFFSET_SD) ** 2)
+        lasting[WHOLE:] = _each_marker(own_sd, place.shape) @ turn.T
         self.rigid = size
-        self.loads = loads.reshape(len(loads), -1)
-        self.freedom = freedom
+        self.loads, self.lasting = loads.reshape(len(loads), -1), lasting.reshape(len(lasting), -1)
         self._prepare()
 
     def _prepare(self) -> None:
@@ -204,30 +209,36 @@ class Segment:
         half = object.__new__(Segment)
         keep = len(self.mean) // 2
         half.mean, half.variance = self.mean[:keep], self.variance[:keep]
-        half.loads, half.freedom, half.rigid = self.loads[:, :keep], self.freedom, self.rigid
+        half.loads, half.lasting, half.rigid = self.loads[:, :keep], self.lasting[:, :keep], self.rigid
         half._prepare()
         return half
 
     def information(self) -> Floats:
-        """Inverse of the covariance."""
+        """Inverse of the covariance, given what lasts."""
         thin = linalg.solve_triangular(self._lower, self._scaled, lower=True, check_finite=False)
         result = -(thin.T @ thin)
         result[np.diag_indices_from(result)] += 1 / self.variance
         return result
 
     def log_det(self) -> float:
-        """Logarithm of the determinant of the information."""
+        """Logarithm of the determinant of the information, given what lasts."""
         return -float(np.log(self.variance).sum() + 2 * np.log(np.diag(self._lower)).sum())
 
-    def explained(self, places: Floats) -> tuple[float, float, Floats]:
-        """Turn in radians and stature in metres that places say, and their shape by the leading modes."""
-        values = linalg.cho_solve(
-            (self._lower, True), self._scaled @ (places - self.mean), check_finite=False
-        )
-        stature = self.freedom.stature + self.freedom.stature_sd * values[self.rigid + 4]
-        turn = HEADING_SD * values[self.rigid + 3]
-        values[LEADING : self.rigid] = values[self.rigid + 5 :] = 0
-        return float(turn), float(stature), self.mean + values @ self.loads
+    def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats]:
+        """Turn in radians that places say, and their shape by the leading modes, given what lasts."""
+        rest = places - self.mean - lasting @ self.lasting
+        values = linalg.cho_solve((self._lower, True), self._scaled @ rest, check_finite=False)
+        turn = HEADING_SD * values[self.rigid + 2]
+        values[LEADING : self.rigid] = values[self.rigid + 3 :] = 0
+        shape = self.mean + lasting[:WHOLE] @ self.lasting[:WHOLE] + values @ self.loads
+        return float(turn), shape
+
+
+def _each_marker(sd: Floats, shape: tuple[int, ...]) -> Floats:
+    """Move (3 J, F, J, 3) of each marker along each axis by its deviation (J,), alike in all frames."""
+    frames, markers = shape[:2]
+    own = (np.eye(3 * markers) * np.repeat(sd, 3)).reshape(3 * markers, 1, markers, 3)
+    return np.broadcast_to(own, (3 * markers, frames, markers, 3))
 
 
 def _over_ground(places: Floats) -> Floats:

@@ -34,9 +34,9 @@ class Perspective:
         """Right, down and ahead in the world, rows of (3, 3)."""
         return np.asarray(self.camera.R)
 
-    def rows(self, seen: Observations, places: Floats, lengths: Floats) -> Rows:
-        """Rows of what is seen, linearised at places (T, J, 3)."""
-        return perspective(seen, self.camera, places)
+    def rows(self, seen: Observations, places: Floats, lengths: Floats, guess: Floats | None = None) -> Rows:
+        """Rows of what is seen: derivatives at places (T, J, 3), exact at a guess (T, J, 3)."""
+        return perspective(seen, self.camera, places, guess)
 
     def project(self, places: Floats, lengths: Floats) -> Floats:
         """Pixels (T, J, 2) of places (T, J, 3)."""
@@ -70,7 +70,7 @@ class Parallel:
         """Whether the scale is unknown."""
         return self.metres is None
 
-    def rows(self, seen: Observations, places: Floats, lengths: Floats) -> Rows:
+    def rows(self, seen: Observations, places: Floats, lengths: Floats, guess: Floats | None = None) -> Rows:
         """Rows of what is seen if a unit of the picture has `lengths` (T,) metres."""
         metric = Observations((seen.uv - self.origin) * lengths[:, None, None], seen.sd * lengths[:, None])
         return orthographic(metric, self.axes[:2])

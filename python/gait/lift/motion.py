@@ -147,7 +147,34 @@ def lift(
         if not found.misfit > MISFIT:
             break
     assert best is not None
+    if options.method == "smooth" and (best.wider > 1 or not best.settled):
+        return _unlike(prior, tracks, view, options, grid, best)
     return best
+
+
+def _unlike(
+    prior: SegmentPrior, tracks: Tracks, view: View, options: Options, grid: Grid, found: Motion
+) -> Motion:
+    """Estimate a motion that the prior does not know by its segments alone: a chain of them goes astray.
+
+    Size and deviations are by the bones and by the misfit of the whole, which the segments do not know.
+    """
+    try:
+        alone = _lift(prior, tracks, view, replace(options, method="blend"), grid, lambda done: None)
+    except UserError:  # segments in which next to nothing is seen
+        return found
+    misfit = max(found.misfit, 1.0) * found.wider**2
+    stature, size_sd = options.stature or prior.stature, KNOWN_SD if options.stature else PEOPLE_SD
+    sized = _sized(prior, view, alone, misfit, options, stature, size_sd / stature)
+    return replace(
+        found,
+        places=sized.places,
+        sd=sized.sd,
+        rooted_sd=sized.rooted_sd,
+        error=alone.error,
+        stature=alone.stature,
+        resized=sized.factor,
+    )
 
 
 def widened(prior: SegmentPrior, factor: float) -> SegmentPrior:
@@ -199,7 +226,7 @@ def _lift(
             "the tracks look like no motion that the model knows; check the camera, the points' names and "
             "that v points down"
         ) from None
-    sized = _sized(prior, view, found_motion, options, stature, stature_sd / stature)
+    sized = _sized(prior, view, found_motion, found_motion.misfit, options, stature, stature_sd / stature)
     places = sized.places
     _require_size(places, prior, stature)
     error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
@@ -220,14 +247,20 @@ def _lift(
 
 
 def _sized(
-    prior: SegmentPrior, view: View, found: Lifted, options: Options, stature: float, size_sd: float
+    prior: SegmentPrior,
+    view: View,
+    found: Lifted | Motion,
+    misfit: float,
+    options: Options,
+    stature: float,
+    size_sd: float,
 ) -> size.Resized:
     """Give the estimate a person's size if it has none; only a lens leaves it open."""
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
     if isinstance(view, Parallel) or not options.bones:
-        return size.widened(fitted, found.misfit)
+        return size.widened(fitted, misfit)
     ratio = size.bones_ratio(prior, found.places, stature)
-    return size.resized(fitted, view.camera, ratio, size_sd, found.misfit)
+    return size.resized(fitted, view.camera, ratio, size_sd, misfit)
 
 
 def _require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:

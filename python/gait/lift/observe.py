@@ -98,7 +98,7 @@ def orthographic(seen: Observations, axes: Floats) -> Rows:
     return Rows(frame, marker, direction, seen.uv[frame, marker], variance)
 
 
-def perspective(seen: Observations, camera: Camera, about: Floats) -> Rows:
+def perspective(seen: Observations, camera: Camera, about: Floats, guess: Floats | None = None) -> Rows:
     """Rows of a calibrated view, the noise being that at the places `about`.
 
     Parameters
@@ -106,7 +106,9 @@ def perspective(seen: Observations, camera: Camera, about: Floats) -> Rows:
     seen : Observations
         Pixels; the lens distortion is taken out of them here.
     about : (T, J, 3) or (3,)
-        Guess of the places, metres, world.
+        Where derivatives are taken, metres, world.
+    guess : (T, J, 3), optional
+        Where the rows hold exactly; by default `about`.
     """
     frame, marker = np.nonzero(seen.seen)
     rays = camera.rays(seen.uv[frame, marker]) @ camera.R.T
@@ -114,9 +116,16 @@ def perspective(seen: Observations, camera: Camera, about: Floats) -> Rows:
     places = np.broadcast_to(about, (*seen.sd.shape, 3))[frame, marker]
     depth = np.maximum(camera.depth(places), NEAREST)
     sd = seen.sd[frame, marker, None] * depth[:, None] / (camera.fx, camera.fy)
-    guessed = (places @ camera.R[:2].T + camera.t[:2]) / depth[:, None]
-    miss = (ideal - guessed) * depth[:, None]
+    there = places if guess is None else guess[frame, marker]
+    guessed, said = _ideal(camera, places), _ideal(camera, there)
+    miss = (ideal - said) * depth[:, None]
     near = np.linalg.norm(miss, axis=1, keepdims=True) < NEAR
     direction = camera.R[:2] - np.where(near, guessed, ideal)[:, :, None] * camera.R[2]
-    tangent = miss + np.einsum("nai,ni->na", direction, places)
+    tangent = miss + np.einsum("nai,ni->na", direction, there)
     return Rows(frame, marker, direction, np.where(near, tangent, ideal * camera.t[2] - camera.t[:2]), sd**2)
+
+
+def _ideal(camera: Camera, places: Floats) -> Floats:
+    """Ideal image coordinates (n, 2) of places (n, 3)."""
+    depth = np.maximum(camera.depth(places), NEAREST)[:, None]
+    return np.asarray((places @ camera.R[:2].T + camera.t[:2]) / depth)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gait.lift import soft, tridiagonal
+from gait.lift import bordered, doubt, soft
+from gait.lift.bordered import Information
 from gait.lift.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
 from gait.lift.equations import Parallel, View, scale_free
 from gait.lift.observe import Observations
@@ -163,43 +164,50 @@ def smooth(
     unit = float(np.mean(start.lengths)) if view.scaled else None
     problem = _Problem(prior, seen, view, freedom, unit, contact, bones)
     around = problem.around(start.heading, start.component, start.stature, start.places)
-    places, lengths, settled, steps = start.places, start.lengths, False, 0
-    while not settled and steps < MOST_STEPS:
-        constrained = steps >= FREE_STEPS
-        system = problem.system(around, lengths, constrained)
-        values = system.factor.solve(system.vector)
-        fresh = problem.layout.places(values)
-        settled = constrained and _change(fresh - places) < SETTLED
-        places, steps = fresh, steps + 1
-        lengths = problem.layout.lengths(values) if view.scaled else lengths
-        around = moved(prior, around, freedom, places)
-    return problem.result(around, places, lengths, steps, settled)
+    state = _State(around, start.places, start.lengths, 0)
+    settled = False
+    while not settled and state.steps < MOST_STEPS:
+        problem.doubt(state)
+        before, state = state, problem.step(state, constrained=state.steps >= FREE_STEPS)
+        settled = state.steps > FREE_STEPS and _change(state.places - before.places) < SETTLED
+    return problem.result(state, settled)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Estimate on the grid, and the steps that it took."""
+
+    around: Around
+    places: Floats
+    lengths: Floats
+    steps: int
 
 
 @dataclass(frozen=True)
 class _System:
     """One linear problem."""
 
-    factor: tridiagonal.Factor
-    vector: Floats
+    found: bordered.Solution
+    information: Information
     chain: Chain
     fit: float  #: y' W y of what is seen
 
     @property
     def log_volume_ratio(self) -> float:
         """Logarithm to base 10 of the posterior's volume over the prior's."""
-        return (self.chain.log_det - self.factor.log_det) / 2 / float(np.log(10))
+        return (self.chain.log_det - self.found.log_det) / 2 / float(np.log(10))
 
     @property
     def square(self) -> float:
         """Squared deviations of what is seen and of the motion from the prior, at the mean."""
-        mean = self.factor.solve(self.vector)
-        return self.fit + self.chain.constant - float((self.vector * mean).sum())
+        explained = (self.information.vector * self.found.blocks).sum()
+        explained += self.information.edge @ self.found.lasting
+        return self.fit + self.chain.constant - float(explained)
 
     @property
     def evidence(self) -> float:
         """Logarithm of the density of what is seen but for a constant, by Laplace's method."""
-        return 0.5 * (self.chain.log_det - self.factor.log_det - self.square)
+        return 0.5 * (self.chain.log_det - self.found.log_det - self.square)
 
 
 class _Problem:
@@ -217,6 +225,7 @@ class _Problem:
     ) -> None:
         self.prior, self.seen, self.view, self.freedom = prior, seen, view, freedom
         self.contact, self.bones = contact, bones
+        self.points = seen.points
         self.grid = Grid.over(seen.time, prior)
         self.at = self.grid.between(seen.time)
         self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit)
@@ -225,30 +234,39 @@ class _Problem:
         """Say what the chain is linearised around."""
         return Around(heading, component, stature, overlapping(places, self.grid.frames))
 
-    def system(self, around: Around, lengths: Floats, constrained: bool) -> _System:
-        """Linear problem around an estimate."""
-        prior = chain(self.prior, around, self.freedom)
-        places = blended(around.places, self.grid.frames)
-        rows = Rows(self.layout)
-        self._observe(rows, places, lengths)
-        if constrained and self.contact:
-            soft.contacts(rows, self.prior.names, places, self.grid.rate)
-        if constrained and self.bones:
-            soft.bones(rows, self.prior.names, places)
-        diagonal, below, vector, fit = rows.normal()
-        used = prior.diagonal.shape[1]
-        diagonal[:, :used, :used] += prior.diagonal
-        below[:, :used, :used] += prior.below
-        vector[:, :used] += prior.vector
-        return _System(tridiagonal.factor(diagonal, below), vector, prior, fit)
+    def doubt(self, state: _State) -> None:
+        """Leave points that are far from an estimate less to say (`gait.lift.doubt`)."""
+        places = self._at_video(state.places)[:, self.seen.markers]
+        said = self.view.project(places, self._at_video(state.lengths))
+        self.points = doubt.doubted(self.seen.points, said)
 
-    def _observe(self, rows: Rows, places: Floats, lengths: Floats) -> None:
-        near, scale = self._at_video(places), self._at_video(lengths)
-        seen = self.view.rows(self.seen.points, near[:, self.seen.markers], scale)
+    def system(self, state: _State, constrained: bool) -> _System:
+        """Linear problem around an estimate."""
+        prior = chain(self.prior, state.around, self.freedom)
+        shape = blended(state.around.places, self.grid.frames)
+        rows = Rows(self.layout)
+        self._observe(rows, shape, state)
+        if constrained and self.contact:
+            soft.contacts(rows, self.prior.names, shape, self.grid.rate)
+        if constrained and self.bones:
+            soft.bones(rows, self.prior.names, shape)
+        diagonal, below, vector, fit = rows.normal()
+        own, used = prior.information, prior.information.diagonal.shape[1]
+        diagonal[:, :used, :used] += own.diagonal
+        below[:, :used, :used] += own.below
+        vector[:, :used] += own.vector
+        border = np.pad(own.border, ((0, 0), (0, diagonal.shape[1] - used), (0, 0)))
+        information = Information(diagonal, below, border, own.corner, vector, own.edge)
+        return _System(bordered.solve(information), information, prior, fit)
+
+    def _observe(self, rows: Rows, shape: Floats, state: _State) -> None:
+        near, scale = self._at_video(shape), self._at_video(state.lengths)
+        guess = self._at_video(state.places)[:, self.seen.markers]
+        seen = self.view.rows(self.points, near[:, self.seen.markers], scale, guess)
         factors = None
         if isinstance(self.view, Parallel) and self.view.scaled:
             seen, factors = scale_free(seen, near[:, self.seen.markers], scale)
-            soft.steady_lengths(rows, lengths, None if self.view.steady else DRIFT)
+            soft.steady_lengths(rows, state.lengths, None if self.view.steady else DRIFT)
         soft.observe(rows, seen, self.seen.markers, self.at, factors)
 
     def _at_video(self, values: Floats) -> Floats:
@@ -256,11 +274,20 @@ class _Problem:
         frames, weights = self.at
         return np.asarray(np.einsum("tw,tw...->t...", weights, values[frames]))
 
-    def result(self, around: Around, places: Floats, lengths: Floats, steps: int, settled: bool) -> Lifted:
+    def step(self, state: _State, constrained: bool) -> _State:
+        """Estimate by the linear problem around another."""
+        found = self.system(state, constrained).found
+        places = self.layout.places(found.blocks)
+        lengths = self.layout.lengths(found.blocks) if self.view.scaled else state.lengths
+        around = moved(self.prior, state.around, self.freedom, places, found.lasting)
+        return _State(around, places, lengths, state.steps + 1)
+
+    def result(self, state: _State, settled: bool) -> Lifted:
         """Covariances and figures of the last estimate."""
-        system = self.system(around, lengths, constrained=True)
-        bare = self.system(around, lengths, constrained=False)
-        diagonal, across = system.factor.covariance()
+        system = self.system(state, constrained=True)
+        bare = self.system(state, constrained=False)
+        around, places = state.around, state.places
+        diagonal, across = system.found.covariance()
         every = np.arange(self.layout.markers)
         sure = soft.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
         return Lifted(
@@ -270,9 +297,9 @@ class _Problem:
             grid=places,
             heading=around.heading,
             stature=around.stature,
-            lengths=self._at_video(lengths),
+            lengths=self._at_video(state.lengths),
             contact=sure if self.contact else np.zeros_like(sure),
-            steps=steps,
+            steps=state.steps,
             settled=settled,
             log_volume_ratio=bare.log_volume_ratio,
             evidence=bare.evidence,

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.lift import doubt
 from gait.lift.equations import View
 from gait.lift.heading import Explanation, Person, explain
 from gait.lift.observe import Observations, Rows
@@ -19,6 +20,7 @@ from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 
+DOUBTS = 4  # times at most that a segment is explained anew without the points that are far off
 FEWEST = 4  # points that must be seen of a segment for an estimate of its own
 TURN_SD = 0.7  # radians by which the heading changes in half a segment
 
@@ -49,12 +51,29 @@ def explanations(
             found.append([])
             continue
 
-        def measure(places: Floats, part: Observations = part, begin: int = begin, end: int = end) -> Rows:
-            rows = view.rows(part, places, lengths[begin:end])
+        found.append(_trusted(prior, part, view, lengths[begin:end], person))
+        update(s + 1)
+    return found
+
+
+def _trusted(
+    prior: SegmentPrior, seen: Observations, view: View, lengths: Floats, person: Person
+) -> list[Explanation]:
+    """Explain a segment by all points, then without those far from where the rest has them (`doubt`)."""
+    points = seen
+    for _ in range(DOUBTS):
+
+        def measure(places: Floats, points: Observations = points) -> Rows:
+            rows = view.rows(points, places, lengths)
             return rows if view.grounded else _centred(rows, places)
 
-        found.append(explain(prior, measure, person))
-        update(s + 1)
+        found = explain(prior, measure, person)
+        said = view.project(found[0].posterior.points, lengths)
+        if not view.grounded:
+            said = said + np.nanmedian(seen.uv - said, axis=(0, 1))
+        before, points = points, doubt.doubted(seen, said)
+        if points is seen and before is seen:
+            break
     return found
 
 

@@ -35,7 +35,7 @@ class Factor:
         return 2 * float(np.log(np.diagonal(self.lower, axis1=1, axis2=2)).sum())
 
     def solve(self, vector: Floats) -> Floats:
-        """Mean (B, n) of the Gaussian with the information vector (B, n)."""
+        """Mean (B, n, c) of Gaussians with information vectors (B, n, c)."""
         result = np.empty_like(vector)
         for s, lower in enumerate(self.lower):
             rest = vector[s] if s == 0 else vector[s] - self.below[s - 1] @ result[s - 1]

@@ -1,0 +1,83 @@
+"""Points that a detector put elsewhere for longer lose their say; right ones and other motions keep it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gait.camera import Camera
+from gait.lift import motion
+from gait.lift.doubt import FAR, doubted
+from gait.lift.equations import Perspective
+from gait.lift.observe import Observations
+from gait.lift.prior import SegmentPrior
+from gait.lift.tracks_file import Tracks
+from gait.skeleton import EVAL15
+
+SD = 3.0
+CAMERA = Camera.looking((1.5, -6.0, 1.4), (1.0, 0, 0.9), (960, 720), 900)
+
+
+def points(frames: int = 8, markers: int = 15):
+    """Points as they are said to be, with noise."""
+    rng = np.random.default_rng(3)
+    said = rng.uniform(0, 500, (frames, markers, 2))
+    return said, Observations(said + SD * rng.normal(size=said.shape), np.full(said.shape[:2], SD))
+
+
+def test_right_points_are_left_as_they_are():
+    said, seen = points()
+    assert doubted(seen, said) is seen
+
+
+def test_a_wrong_point_loses_its_pull_the_further_the_more():
+    said, seen = points()
+    pulls = []
+    for off in (5 * FAR * SD, 20 * FAR * SD):
+        seen.uv[2, 4] = said[2, 4] + (off, 0)
+        sd = doubted(seen, said).sd
+        assert (np.delete(sd, 2 * 15 + 4) == SD).all()
+        pulls.append(off / sd[2, 4] ** 2)
+    assert pulls[1] < pulls[0] / 50 < FAR / SD
+
+
+def test_of_a_motion_that_is_another_no_point_is_doubted():
+    said, seen = points()
+    assert doubted(seen, said + (30.0, 40.0)) is seen
+
+
+def test_what_is_not_seen_is_not_judged():
+    said, seen = points()
+    seen.uv[0], seen.sd[0] = np.nan, np.inf
+    assert doubted(seen, said) is seen
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """Shipped prior, its mean motion going on along x for two seconds, and its tracks with noise."""
+    prior = SegmentPrior.load()
+    half = prior.frames // 2
+    body = 1.7 * prior.mean[0][:, prior.index(EVAL15)]
+    step = (body[half:] - body[:half]).mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
+    places = np.concatenate([body[:half] + k * step for k in range(8)])
+    uv = CAMERA.project(places) + SD * np.random.default_rng(1).normal(size=(*places.shape[:2], 2))
+    frames = np.arange(len(places))
+    return prior, places, Tracks(frames, frames / prior.fps, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
+
+
+def test_a_point_wrong_for_a_second_hardly_matters(walk):
+    prior, places, tracks = walk
+    uv = tracks.uv.copy()
+    wrong = slice(10, 30), tracks.names.index("r_wrist")
+    uv[wrong] += (70.0, -50.0)
+    names = motion.output_names(prior, tracks)
+    order = [names.index(name) for name in tracks.names]
+    errors = []
+    for given in (tracks, replace(tracks, uv=uv)):
+        found = motion.lift(prior, given, Perspective(CAMERA), motion.Options(pixel_sd=SD), names)
+        assert found.settled
+        apart = found.places[:, order] - places
+        errors.append(np.linalg.norm(apart - apart.mean(axis=1, keepdims=True), axis=2).mean())
+    assert errors[1] < 1.5 * errors[0]
