@@ -11,8 +11,10 @@ import pytest
 import threadpoolctl
 from toy_segments import toy_blob, toy_prior
 
+from gait.camera import Camera
 from gait.cli import main
 from gait.lift import figures_clip, motion
+from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.tracks_file import Tracks, read, write
 
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
@@ -44,6 +46,21 @@ def test_a_bad_clip_leaves_nothing(folder, capsys):
     (folder / "bad.csv").write_text("frame,time,m0_u,m0_v\n0,0,1,x\n")
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "bad.csv"]) == 1
     assert "bad.csv" in capsys.readouterr().err and not (folder / "r").exists()
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_dots_are_where_a_right_estimate_is(far):
+    camera = Camera.looking((0, -6, 1.0), (0, 0, 1.0), (640, 480), 600)
+    places = np.random.default_rng(0).normal(size=(2, 3, 3)) * 0.3
+    view = Parallel(looking_along("y"), None, np.zeros(2)) if far else Perspective(camera)
+    uv = 150 * places @ view.axes[:2].T + (40, 30) if far else camera.project(places)
+    uv[1, 2] = np.nan
+    tracks = Tracks(np.arange(2), np.arange(2) / 20, ("a", "b", "c"), uv, np.ones((2, 3)))
+    found = motion.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0)
+    for frame, seen in ((0, 3), (1, 2)):
+        drawn, points = figures_clip._in_picture(view, found, frame, tracks)
+        assert drawn.shape == (3, 2) and points.shape == (seen, 2)
+        np.testing.assert_allclose(drawn[:seen], points, atol=1e-6)
 
 
 def test_a_camera_is_of_a_clip(folder, capsys):

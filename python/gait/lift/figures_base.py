@@ -16,6 +16,8 @@ Floats = npt.NDArray[np.float64]
 
 SHOWN = 5  # frames of a segment
 STEP = 0.75  # statures from one figure of a strip to the next
+FAINT = "#c8c8c4"
+HALO = 2.5  # points by which what is drawn under something else is wider, so that it shows where both agree
 SIDE = np.array([1.0, 0.0, 0.0])  # to the right on the paper: seen from the person's right
 AHEAD = np.array([0.0, 1.0, 0.0])  # seen from ahead
 
@@ -51,7 +53,7 @@ def strip(
     across : (3,)
         What is to the right on the paper; up is z.
     ghost : bool
-        Faint, under something else.
+        Faint and wide, under something else.
     size : float
         Stature, which the distance between figures follows.
     path : (F, J, 3), optional
@@ -66,9 +68,12 @@ def strip(
         for side, chains in STICKS.items():
             for chain in chains:
                 known = [index[name] for name in chain if name in index]
+                width = 0.9 if side == "l" else 1.8
                 axes.plot(
-                    *flat[known].T, color=colour, lw=0.9 if side == "l" else 1.8, alpha=0.35 if ghost else 1,
+                    *flat[known].T,
+                    color=FAINT if ghost else colour,
+                    lw=width + HALO * ghost,
                     solid_capstyle="round",
-                )  # fmt: skip
+                )
     axes.axhline(0, color=GREY, lw=0.5, zorder=0)
     axes.set_xlim(-0.6 * STEP * size, (SHOWN - 0.4) * STEP * size)

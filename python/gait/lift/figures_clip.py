@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from gait.learn.figures_base import BLUE, GREY, ORANGE, Drawing, plain
+from gait.learn.figures_base import BLUE, DARK, GREY, ORANGE, Drawing, plain
 from gait.learn.figures_model import STICKS
-from gait.lift.equations import View
+from gait.lift.equations import Perspective, View
 from gait.lift.figures_base import SHOWN
 from gait.lift.motion import Motion
 from gait.lift.tracks_file import Tracks
+
+Floats = npt.NDArray[np.float64]
 
 
 def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
@@ -18,11 +21,12 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
     frames = np.linspace(0, len(tracks.frame) - 1, min(SHOWN, len(tracks.frame))).round().astype(int)
     figure = Figure(figsize=(9, 4.8), layout="constrained")
     panels = figure.subplots(2, len(frames), squeeze=False)
-    right, down, ahead = view.axes
+    _, down, ahead = view.axes
     index = {marker: k for k, marker in enumerate(motion.names)}
     for column, frame in enumerate(frames):
         body = motion.places[frame] - motion.places[frame].mean(axis=0)
-        sides = [np.column_stack([body @ axis, body @ -down]) for axis in (right, ahead)]
+        seen, points = _in_picture(view, motion, frame, tracks)
+        sides = [seen, np.column_stack([body @ ahead, body @ -down])]
         for axes, flat in zip(panels[:, column], sides, strict=True):
             plain(axes)
             axes.grid(visible=False)
@@ -33,6 +37,7 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
                 for chain in chains:
                     known = [index[joint] for joint in chain if joint in index]
                     axes.plot(*flat[known].T, color=BLUE if side == "l" else ORANGE, lw=1.6)
+        panels[0, column].plot(*points.T, ".", color=DARK, ms=3, zorder=3)
         depth = body @ ahead
         sd = motion.rooted_sd[frame] @ np.abs(ahead)
         panels[1, column].errorbar(
@@ -44,6 +49,26 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
     error = float(np.nanmedian(motion.error))
     caption = (
         f"{name}: the estimate as the view sees it, {error:.1f} px from the tracks (median), and from the "
-        "side, with one deviation of the depth about the hips. Left limbs blue, right ones orange."
+        "side, with one deviation of the depth about the hips. Dots: the tracks. Left limbs blue, right ones "
+        "orange."
     )
     return Drawing("clip", "A clip", caption, figure)
+
+
+def _in_picture(view: View, motion: Motion, frame: int, tracks: Tracks) -> tuple[Floats, Floats]:
+    """Estimate (J, 2) and points seen (n, 2) of a frame of the tracks, pixels, up is positive.
+
+    Of a view from far away only the shape is known: it is shifted and scaled to the points.
+    """
+    uv, seen = tracks.uv[frame], tracks.seen[frame]
+    body = motion.places[frame]
+    if isinstance(view, Perspective):
+        flat = view.camera.project(body)
+    else:
+        flat = body @ view.axes[:2].T
+        own = flat[[motion.names.index(name) for name in tracks.names]][seen]
+        if len(own) > 1:
+            middle, target = own.mean(axis=0), uv[seen].mean(axis=0)
+            scale = ((own - middle) * (uv[seen] - target)).sum() / max(((own - middle) ** 2).sum(), 1e-12)
+            flat = target + scale * (flat - middle)
+    return flat * (1, -1), uv[seen] * (1, -1)
