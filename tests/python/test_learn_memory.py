@@ -3,13 +3,14 @@
 import json
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import mocap_files as files
 import numpy as np
 import pytest
 
-from gait.learn import spool
+from gait.learn import rank, spool
 
 STATUS = Path("/proc/self/status")
 MOST = 0.05  # MB per cycle; a cycle's values alone are 0.03 MB, and they are used in a dozen ways
@@ -52,6 +53,21 @@ def test_memory_grows_little_with_the_cycles(tmp_path):
     (few, small), (many, large) = (peak(tmp_path, copies) for copies in COPIES)
     assert many >= 2 * few > 700
     assert large - small <= MOST * (many - few), f"{few} cycles: {small:.0f} MB, {many}: {large:.0f} MB"
+
+
+@pytest.mark.parametrize("people", [True, False], ids=["people", "blocks"])
+def test_choosing_the_number_of_components_keeps_cycles_on_disk(people):
+    """Memory grows by less than one copy of the cycles that are added."""
+    shape, peaks = (64, 10), []
+    for blocks in (4, 12):
+        rng = np.random.default_rng(0)
+        values = spool.stored((rng.normal(size=(spool.ROWS, *shape)) for _ in range(blocks)), shape)
+        groups = np.arange(len(values)) % 8 if people else None
+        tracemalloc.start()
+        rank.choose(values, np.ones(values.shape, bool), rng, groups, 5, 1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] - peaks[0] < 8 * spool.ROWS * 8 * np.prod(shape)
 
 
 def test_rows_on_disk_are_those_put_there_also_after_their_release():

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from gait.learn.bayes import Problem, climb
+from gait.learn.bayes import Problem, Rows, climb
 from gait.learn.belief import Belief, without
 from gait.learn.fourier import HARMONICS, fourier_basis
 from gait.learn.impute import column_mean
+from gait.learn.spool import by_rows, release, stored
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -74,15 +75,14 @@ def _of_people(
     result = []
     fewest = min(int(np.sum(fold != f)) for f in np.unique(fold))
     for f in np.unique(fold):
-        out = fold == f
         # Every draw is a copy of the person's cycles of which other parts are hidden.
-        truth, seen = np.tile(values[out], (DRAWS, 1, 1)), np.tile(mask[out], (DRAWS, 1, 1))
+        out, rest = np.tile(np.flatnonzero(fold == f), DRAWS), np.flatnonzero(fold != f)
+        truth, seen = _picked(values, out), mask[out]
         hidden = _half(truth.shape, rng)
-        there, errors = Problem(truth, seen & ~hidden, basis), []
-        for belief in _descending(values[~out], mask[~out], basis, min(largest, fewest - 1)):
-            model = there.expect(belief).model.reshape(truth.shape)
-            errors.append(_mean_square(model - truth, seen & hidden))
-        result.append(errors[::-1])
+        there, held, errors = Problem(truth, seen & ~hidden, basis), seen & hidden, []
+        for belief in _descending(_picked(values, rest), mask[rest], basis, min(largest, fewest - 1)):
+            errors.append(sum(float(np.sum(d)) for _, d in _squares(there.expect(belief), truth, held)))
+        result.append(np.array(errors[::-1]) / max(int(held.sum()), 1))
     return np.array(result)
 
 
@@ -91,19 +91,39 @@ def _of_blocks(values: Floats, mask: Mask, rng: np.random.Generator, basis: Floa
     blocks = hold_out(mask, HELD_OUT, rng)
     seen = mask & (blocks < 0)
     problem, result = Problem(values, seen, basis), []
-    index, held = blocks[mask & (blocks >= 0)], mask & (blocks >= 0)
+    held = mask & (blocks >= 0)
+    count = np.bincount(blocks[held])
     for belief in _descending(values, seen, basis, min(largest, len(values) - 1)):
-        model = problem.expect(belief).model.reshape(values.shape)
-        total = np.bincount(index, (model - values)[held] ** 2)
-        result.append((total / np.maximum(np.bincount(index), 1))[np.bincount(index) > 0])
+        total = np.zeros(len(count))
+        for part, squares in _squares(problem.expect(belief), values, held):
+            total += np.bincount(blocks[part][held[part]], squares, len(count))
+        result.append(total[count > 0] / count[count > 0])
     return np.array(result[::-1]).T
 
 
-def hold_out(mask: Mask, share: float, rng: np.random.Generator) -> Groups:
+def _picked(values: Floats, rows: Groups) -> Floats:
+    """Put some rows on disk."""
+
+    def parts() -> Iterator[Floats]:
+        for part in by_rows(rows):
+            yield values[rows[part]]
+            release(values)
+
+    return stored(parts(), values.shape[1:])
+
+
+def _squares(rows: Rows, values: Floats, held: Mask) -> Iterator[tuple[slice, Floats]]:
+    """Blocks of rows, and the squares (n,) of what the model misses where entries are held out."""
+    for part in by_rows(values):
+        model = rows.some(part).reshape(-1, *values.shape[1:])
+        yield part, (model - values[part])[held[part]] ** 2
+
+
+def hold_out(mask: Mask, share: float, rng: np.random.Generator) -> npt.NDArray[np.int32]:
     """Draw blocks, a BLOCK-th of a cycle of a channel and row each: their numbers, -1 outside, (R, T, M)."""
     rows, samples, channels = mask.shape
     length = samples // BLOCK
-    chosen = np.full(mask.shape, -1)
+    chosen: npt.NDArray[np.int32] = np.full(mask.shape, -1, np.int32)
     for k in range(max(int(share * mask.sum() / length), 1)):
         r, m, t = int(rng.integers(rows)), int(rng.integers(channels)), int(rng.integers(samples))
         chosen[r, (t + np.arange(length)) % samples, m] = k
@@ -129,7 +149,3 @@ def _descending(values: Floats, mask: Mask, basis: Floats, largest: int) -> Iter
             belief = without(belief, int(np.argmin(np.sum(belief.loadings[1:] ** 2, axis=1))))
         belief = climb(problem, belief, TOLERANCE, PASSES).belief
         yield belief
-
-
-def _mean_square(difference: Floats, where: Mask) -> float:
-    return float(np.mean(difference[where] ** 2)) if where.any() else 0.0
