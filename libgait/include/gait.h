@@ -180,7 +180,7 @@ typedef struct gait_tracker_config {
     float    phase_noise;      /* strides */
     float    rate_noise;       /* fraction of the model's mean stride_hz */
     float    rate_noise_start; /* the same while settling */
-    float    settle_time;      /* seconds after start with rate_noise_start */
+    float    settle_time;      /* seconds with rate_noise_start, from when phase, left and right are known */
     float    rate_time;        /* time constant of the rate's return to the population's, seconds; 0: never */
     float    forward_noise, lateral_noise, vertical_noise; /* metres */
     float    heading_noise, tilt_noise;                    /* radians */

@@ -17,6 +17,11 @@ static float seconds_in_stage(const gait_tracker *t)
     return 1e-6f * (float)(t->core->utime - t->core->modes.since);
 }
 
+float modes_settled(const gait_tracker *t)
+{
+    return t->core->modes.stage == MODES_SINGLE ? seconds_in_stage(t) : 0.0f;
+}
+
 static void enter(gait_tracker *t, int32_t stage)
 {
     t->core->modes = (modes_state){.stage = stage, .since = t->core->utime, .known = stage == MODES_SINGLE};

@@ -181,7 +181,7 @@ static void predict(gait_tracker *t, float dt, uint32_t frame)
 {
     dynamics const d = tracker_dynamics(t);
     move_job j = {.t = t, .from = t->people};
-    j.step = dynamics_step_init(&d, dt, seconds_since(t, t->core->start_utime), frame);
+    j.step = dynamics_step_init(&d, dt, modes_settled(t), frame);
     t->core->current = (t->core->current + 1) % t->past.depth;
     tracker_set_count(t, t->filter.n);
     task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);

@@ -46,6 +46,7 @@ static void test_a_known_phase_is_never_split(void)
         gait_estimate e;
         film_step(t, 1, n, 0, &e);
         CHECK(t->core->modes.stage == MODES_SINGLE && e.status == GAIT_STATUS_TRACKING);
+        CHECK_NEAR(modes_settled(t), n / 30.0, 1e-3);
     }
     toy_tracker_free(t);
 }
@@ -96,6 +97,38 @@ static void test_the_loser_is_given_up(void)
     }
 }
 
+static double rate_spread(const gait_tracker *t)
+{
+    const float *const rate = field(&t->people, F_RATE);
+    double sum = 0.0, square = 0.0;
+    for (int32_t i = 0; i < N; i++) {
+        sum += (double)rate[i] / N;
+        square += (double)rate[i] * (double)rate[i] / N;
+    }
+    return sqrt(square - sum * sum);
+}
+
+/* The rate stays loose as long as left and right are open, and settles when they are known. */
+static void test_rates_settle_when_all_is_known(void)
+{
+    double spread[2];
+    for (int known = 0; known < 2; known++) {
+        gait_tracker *const t = begin(0.5f);
+        gait_estimate e;
+        t->cfg.rate_noise = 0.0f;
+        t->cfg.rate_noise_start = 0.3f;
+        t->cfg.settle_time = 0.1f;
+        for (int n = 0; n < 45; n++) {
+            if (t->core->modes.stage == MODES_FORKED)
+                t->core->modes.odds = known ? 30.0 : 0.0;
+            film_step(t, 1, n, 0, &e);
+        }
+        spread[known] = rate_spread(t);
+        toy_tracker_free(t);
+    }
+    CHECK(spread[0] > 1.5 * spread[1]);
+}
+
 /* Status: ambiguous while the odds are open, never tracking. */
 static void test_open_odds_are_ambiguous(void)
 {
@@ -105,6 +138,7 @@ static void test_open_odds_are_ambiguous(void)
         t->core->modes.odds = 0.0;
         film_step(t, 1, n, 0, &e);
         CHECK(e.status != GAIT_STATUS_TRACKING && (e.status == GAIT_STATUS_INIT || n > 24));
+        CHECK(modes_settled(t) == 0.0f);
     }
     toy_tracker_free(t);
 }
@@ -116,5 +150,6 @@ int main(void)
     test_sides_live_on();
     test_the_loser_is_given_up();
     test_open_odds_are_ambiguous();
+    test_rates_settle_when_all_is_known();
     return CHECK_DONE();
 }
