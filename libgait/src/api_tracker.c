@@ -40,7 +40,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .heading_noise = 0.044f,
         .tilt_noise = 0.033f,
         .tilt_time = 1.1f,
-        .coef_noise = 0.66f,
+        .coef_noise = 0.5f,
         .coef_time = 4.5f,
         .stature_noise = 0.005f,
         .proportion_noise = 0.15f,
