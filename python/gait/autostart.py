@@ -90,8 +90,9 @@ def find_start(
             if spotter.full_second(frame):
                 break
             spotter.see(frame)
-        if spotter.enough():
-            return spotter.start()
+        start = spotter.start() if spotter.enough() else None
+        if start and (spotter.sees_change or start.sd.heading < np.pi):
+            return start
     raise UserError(
         f"{video.path}: --init auto found nobody in full view for {ENOUGH} frames; give --init FILE.json"
     )
@@ -121,6 +122,11 @@ class Spotter:
     ) -> None:
         self._camera, self._plate, self._model, self._height = camera, plate, model, height
         self._everybody: list[_Seen] = []
+
+    @property
+    def sees_change(self) -> bool:
+        """Whether people are told by the background, and not by looks, which things that stand have, too."""
+        return self._plate is not None
 
     def forget(self) -> None:
         """Begin anew."""

@@ -256,3 +256,15 @@ def test_a_spotter_does_not_start_with_who_stands(tmp_path):
         spotter.see(frame)
         assert not spotter.walks_in(frame)
     assert spotter.full_second(frame)
+
+
+@pytest.mark.skipif(not CLIPS.is_dir(), reason="../shared/data is absent")
+def test_who_stands_is_not_started_with_by_looks_alone(tmp_path):
+    folder = CLIPS / "oblique45_07"
+    first = next(Video(folder / "video.mp4").frames(0)).image
+    noise = np.random.default_rng(5)
+    held = [np.clip(first + noise.normal(0, 2, first.shape), 0, 255).astype(np.uint8) for _ in range(34)]
+    write(tmp_path / "held.mp4", held)
+    video = Video(tmp_path / "held.mp4")
+    with pytest.raises(UserError, match="held.mp4: --init auto found nobody .*give --init FILE.json"):
+        find_start(video, Camera.read(str(folder / "camera.json"), video.size), None, MODEL)
