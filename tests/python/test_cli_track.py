@@ -170,6 +170,9 @@ FAULTS = [
     (["-o", "{}/none/out.csv"], "out.csv: folder .* does not exist"),
     (["--overlay", "{}/none/o.mp4"], "o.mp4: folder .* does not exist"),
     (["--overlay", "{}/o.gif"], "o.gif: unknown video suffix"),
+    (["-o", "{}/walk.mp4"], "walk.mp4: is read by this command; give the output another name"),
+    (["--trc", "{}/init.json"], "init.json: is read by this command"),
+    (["--trc", "{}/fault.csv"], "fault.csv: two outputs have this name"),
     (["--tracks", "{}/none.csv"], "none.csv: no such file of tracks"),
     (["--trc", "{}/none/o.trc"], "o.trc: folder .* does not exist"),
     (["--init", "{}/late.json"], "walk.mp4: no frame from 20 up to 20; it has 20"),
@@ -181,13 +184,13 @@ FAULTS = [
 def test_every_fault_is_one_line_and_leaves_no_output(options, words, scene, capsys):
     cv2.imwrite(str(scene / "small.png"), np.zeros((24, 32), np.uint8))
     (scene / "late.json").write_text('{"frame": 20}')
-    before = set(scene.iterdir())
+    before = {path: path.read_bytes() for path in scene.iterdir()}
     assert track(scene, *(str(o).format(scene) for o in options), out="fault.csv") == 1
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
     assert err.startswith("gait track: ")
     assert re.search(words, err)
-    assert set(scene.iterdir()) == before
+    assert {path: path.read_bytes() for path in scene.iterdir()} == before
 
 
 @pytest.mark.parametrize(
@@ -294,6 +297,23 @@ def test_render_faults(words, message, tmp_path, capsys):
     assert main(["render", *words, "-o", str(tmp_path / "o.png")]) == 1
     assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_render_does_not_draw_over_what_it_reads(tmp_path, capsys):
+    state = tmp_path / "state.json"
+    state.write_text("{}")
+    assert main(["render", "--state", str(state), "-o", str(state)]) == 1
+    assert "state.json: is read by this command" in capsys.readouterr().err and state.read_text() == "{}"
+
+
+@pytest.mark.parametrize("words", [["-o", "walk.mp4"], ["-o", "r.html", "--overlay", "./walk.mp4"]])
+def test_report_does_not_write_over_the_clip(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walk.mp4").write_bytes(b"clip")
+    files = ["e.log", "--track", "t.csv", "--video", "walk.mp4", "--camera", "c.json"]
+    assert main(["report", *files, *words]) == 1
+    assert "walk.mp4: is read by this command" in capsys.readouterr().err
+    assert (tmp_path / "walk.mp4").read_bytes() == b"clip" and len(list(tmp_path.iterdir())) == 1
 
 
 def test_render_wants_an_image_suffix(tmp_path, capsys):

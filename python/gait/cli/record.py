@@ -16,7 +16,7 @@ import signal
 import sys
 from typing import Any
 
-from gait.files import require_writable
+from gait.files import require_outputs
 from gait.lcm.link import lcm_url
 from gait.lcm.record import ESTIMATE, LAGGED, Recorder
 
@@ -45,8 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record and report."""
-    for path in filter(None, (args.output, args.log)):
-        require_writable(path)
+    require_outputs((args.output, args.log), ())
     url = lcm_url(args.url)
     recorder = Recorder(url, args.output, args.log, LAGGED if args.lagged else ESTIMATE)
 

@@ -18,7 +18,7 @@ import numpy as np
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.fields import Fields, read_json
-from gait.files import replacing, require_writable
+from gait.files import replacing, require_outputs
 from gait.model import Model
 from gait.state import SCALARS, State
 from gait.strip import draw_room, draw_strip, room_camera
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and write."""
-    require_writable(args.output)
+    require_outputs((args.output,), (args.model, args.camera, args.state))
     model = Model(args.model)
     if args.strip:
         if args.camera:

@@ -20,7 +20,7 @@ from gait.camera import Camera
 from gait.cli.evaluate import text as evaluation_text
 from gait.evaluate import Measures, evaluate
 from gait.events import Strikes, strikes_of
-from gait.files import replacing
+from gait.files import replacing, require_outputs
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
 from gait.lcm.record import spread
 from gait.lcm.results import Run, read_run
@@ -53,6 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
+    require_outputs(
+        (args.output, args.overlay), (args.log, args.track, args.video, args.camera, args.truth, args.model)
+    )
     measures = make_report(args, quiet=args.quiet)
     if measures is not None:
         print(json.dumps(measures) if args.json else evaluation_text(measures))

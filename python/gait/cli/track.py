@@ -15,7 +15,10 @@ for a second starts the track anew (not with --smooth).
 --tracks adds joints that a detector has found in the frames, as gait lift takes them, to what the pictures
 say: points of which the model knows nothing are left out, and so are frames that the file does not hold.
 
-Writes one row per frame to OUT.csv: see interfaces.md, section 3.
+Writes one row per frame to OUT.csv: frame, time (s), status (init tracking ambiguous lost), phase (of the
+stride, 0 as the right heel strikes), stride rate, heading, stature, speed; effective number of particles, log
+evidence; coefficients of the components; each joint's place in the world (_x _y _z, metres) and standard
+deviation (_sx _sy _sz); angles (_deg); standard deviations of phase, rate, heading, stature, coefficients.
 """
 
 from __future__ import annotations
@@ -36,7 +39,7 @@ from gait.autostart import Spotter, find_start
 from gait.camera import Camera
 from gait.cli import defaults, values
 from gait.errors import UsageError, UserError
-from gait.files import require_writable
+from gait.files import require_outputs
 from gait.frame import Joints
 from gait.initial import Start
 from gait.lift import tracks_file
@@ -125,8 +128,10 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--draws: needs --smooth")
     if args.tracks_sd and not args.tracks:
         raise UsageError("--tracks-sd: needs --tracks")
-    for path in filter(None, (args.output, args.overlay, args.trc, args.draws)):
-        require_writable(path)
+    require_outputs(
+        (args.output, args.overlay, args.trc, args.draws),
+        (args.video, args.camera, args.model, args.init, args.background, args.tracks),
+    )
     video = Video(args.video)
     camera = Camera.read(args.camera, video.size)
     model = Model(args.model)
