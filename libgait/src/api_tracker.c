@@ -42,7 +42,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .tilt_time = 1.1f,
         .coef_noise = 0.5f,
         .coef_time = 4.5f,
-        .stature_noise = 0.005f,
+        .stature_noise = 0.015f,
         .proportion_noise = 0.15f,
         .joint_sd_factor = 1.8f,
         .joint_sd_model = 0.018f,
