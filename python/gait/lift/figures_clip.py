@@ -45,11 +45,11 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
         )
         panels[0, column].set_title(f"frame {tracks.frame[frame]}", fontsize=9)
     panels[0, 0].set_ylabel("as seen", fontsize=9)
-    panels[1, 0].set_ylabel("from the side", fontsize=9)
+    panels[1, 0].set_ylabel("turned by 90°", fontsize=9)
     error = float(np.nanmedian(motion.error))
     caption = (
-        f"{name}: the estimate as the view sees it, {error:.1f} px from the tracks (median), and from the "
-        "side, with one deviation of the depth about the hips. Dots: the tracks. Left limbs blue, right ones "
+        f"{name}: the estimate as the view sees it, {error:.1f} px from the tracks (median), and turned by "
+        "90°, with one deviation of the depth about the hips. Dots: the tracks. Left limbs blue, right ones "
         "orange."
     )
     return Drawing("clip", "A clip", caption, figure)
