@@ -2,7 +2,9 @@
 
 Writes into DIR: report.html (needs nothing else), parameters.json, strides.csv, events.csv and curves.csv.
 Heel strikes are where the heel is furthest ahead of the pelvis, toe-offs where the toe is furthest behind.
-Best from `gait track --smooth --draws D.npz`: then the standard deviations come from whole motions.
+From `gait track --smooth --draws D.npz` the standard deviations come from whole motions.  They say how sure
+the tracker is given model and camera; what these get wrong, such as a stature off by a few per cent, comes
+on top.
 """
 
 from __future__ import annotations
