@@ -292,10 +292,11 @@ def _smooth(args: argparse.Namespace, video: Video, smoother: Smoother, sinks: l
 
 
 def _text(summary: dict[str, Any]) -> str:
-    step = summary["step_ms"]
+    step, threads = summary["step_ms"], summary["threads"]
     return (
         f"{summary['frames']} frames, {summary['lost']} lost, {summary['ambiguous']} ambiguous\n"
-        f"{summary['particles']} particles, {summary['threads']} threads, {summary['memory_bytes']} bytes\n"
+        f"{summary['particles']} particles, {threads} thread{'s' if threads > 1 else ''}, "
+        f"{summary['memory_bytes']} bytes\n"
         f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "
         f"{summary['wall_fps']:.1f} frames/s in all\ndigest {summary['digest']}"
     )
