@@ -105,9 +105,10 @@ def test_a_second_demo_in_the_same_folder_keeps_out(folder, tmp_path):
         (["--video", "{}/video.mp4", "--init", "{}/camera.json"], "camera.json: ", 1),
         (["--video", "{}/video.mp4", "--background", "{}/none.png"], "none.png: no such background", 1),
         (["--model", "{}/camera.json"], "camera.json: not a .gait model", 1),
+        (["-o", "{}/camera.json"], "camera.json: is a file; give the name of a folder", 1),
     ],
 )
 def test_the_demo_checks_its_inputs_first(folder, tmp_path, words, said, code):
     out = tmp_path / "out"
-    done = rig.gait("demo", *(word.format(folder) for word in words), "-o", out)
+    done = rig.gait("demo", "-o", out, *(word.format(folder) for word in words))
     assert done.returncode == code and said in done.stderr.splitlines()[-1] and not out.exists()

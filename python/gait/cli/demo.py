@@ -30,6 +30,7 @@ from gait.cli.record import text as recording_text
 from gait.cli.report import make_report
 from gait.errors import UsageError, UserError
 from gait.fields import read_json
+from gait.files import require_folder
 from gait.initial import Start
 from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_buffer
 from gait.lcm.session import Session
@@ -102,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
     if not Path(args.trackd).is_file():
         raise UserError(f"{args.trackd}: no such program; run make tools, or give --trackd")
     _check_inputs(args)
+    require_folder(args.output)
     out = Path(args.output)
     out.mkdir(parents=True, exist_ok=True)
     live = multicast_works()
