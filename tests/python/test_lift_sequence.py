@@ -13,8 +13,9 @@ from gait.lift import bordered, motion, sequence, soft, tridiagonal
 from gait.lift import chain as chains
 from gait.lift.chain import Around, Freedom, Segment, overlapping, restricted
 from gait.lift.equations import Parallel, Perspective, looking_along
+from gait.lift.grid import Grid
 from gait.lift.observe import Observations
-from gait.lift.sequence import Grid, Seen, Start, smooth
+from gait.lift.sequence import Seen, Start, smooth
 from gait.lift.tracks_file import Tracks
 from gait.skeleton import axis_rotation
 
@@ -124,7 +125,7 @@ def test_what_lasts_is_no_surer_for_a_longer_sequence(prior):
     half[..., 3, 2], half[..., 0, 2] = 1, -1  # height of one marker over another
     spread = []
     for used in (2, blocks):
-        along = np.concatenate([np.where(np.arange(blocks)[:, None, None, None] < used, half, 0).ravel()])
+        along = np.where(np.arange(blocks)[:, None, None, None] < used, half, 0).ravel()
         along = np.pad(along / (used * FRAMES // 2), (0, len(covariance) - along.size))
         spread.append(np.sqrt(along @ covariance @ along))
     body = 1.7 * (prior.mean[0, :, 3, 2] - prior.mean[0, :, 0, 2]).mean()
@@ -276,7 +277,23 @@ def test_restricted_prior_is_its_marginal(prior):
     np.testing.assert_array_equal(part.modes, prior.modes[:, :, :, 1:3])
     odd = replace(toy_prior(7, 4, 3))
     assert restricted(odd, odd.names).frames == 6
-    assert sequence.Grid.over(np.array([0.0, 1.0]), restricted(odd, odd.names)).blocks == 7
+    assert Grid.over(np.array([0.0, 1.0]), restricted(odd, odd.names)).blocks == 7
+
+
+@pytest.mark.parametrize("method", motion.METHODS)
+def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
+    prior = toy_prior(FRAMES, 19, 4, seed=5)
+    time = np.arange(FRAMES * 2) / 20
+    places = np.tile(1.7 * prior.mean[0], (2, 1, 1))
+    view = Parallel(looking_along("y"), 1.0, np.array([0.0, 3.0]))  # v begins anywhere
+    uv = view.project(places, np.ones(len(time)))
+    tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
+    options = motion.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    view = replace(view, origin=np.nanmean(uv, axis=(0, 1)))
+    found = motion.lift(prior, tracks, view, options, prior.names)
+    feet = [n for n, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
+    floor = prior.stature * prior.mean[:, :, feet, 2].min()
+    assert feet and np.quantile(found.places[:, feet, 2].min(axis=1), 0.1) == pytest.approx(floor)
 
 
 def test_deviations_about_the_hips_are_those_of_differences():

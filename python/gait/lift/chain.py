@@ -169,6 +169,15 @@ def blended(segments: Floats, half: int) -> Floats:
     return total / norm
 
 
+def in_turn(segments: Floats, half: int) -> Floats:
+    """Every second of overlapping segments (S, F, ...) after the other; the last block from the last one."""
+    last = len(segments) - 1
+    owner = [min(block - block % 2, last) for block in range(last + 2)]
+    return np.concatenate(
+        [segments[s][(block - s) * half : (block - s + 1) * half] for block, s in enumerate(owner)]
+    )
+
+
 class Segment:
     """One segment in the world: N(mean + lasting' g, diag(variance) + loads' loads), g ~ N(0, I)."""
 

@@ -14,12 +14,14 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.lift import sequence, size, start
-from gait.lift.chain import Freedom, blended, restricted
+from gait.lift.chain import Freedom, blended, in_turn, restricted
 from gait.lift.equations import Parallel, View
+from gait.lift.grid import Grid, interpolated
 from gait.lift.heading import Explanation, Person
-from gait.lift.observe import Observations
+from gait.lift.observe import Observations, resampled
 from gait.lift.prior import SegmentPrior
-from gait.lift.sequence import Grid, Lifted, Seen, Start
+from gait.lift.refuse import require_seen, require_size
+from gait.lift.sequence import Lifted, Seen, Start
 from gait.lift.tracks_file import Tracks
 from gait.skeleton import JOINTS
 
@@ -30,8 +32,6 @@ KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and amon
 ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
 WIDER = (1.0, 2.0, 4.0, 8.0)  # factors of the prior's deviations, tried in turn while the tracks ask for it
 MISFIT = 1.3  # squared deviations per number seen from which a wider prior is tried
-SIZES = (0.6, 1.6)  # of the usual extent: no person is smaller or larger
-LONGEST_GAP = 0.15  # seconds over which a track is interpolated for a segment's own estimate
 
 
 @dataclass(frozen=True)
@@ -195,16 +195,16 @@ def _lift(
     """Estimate all markers of a prior."""
     markers = prior.index(tracks.names)
     points = Observations(tracks.uv, tracks.deviations(options.pixel_sd))
-    resampled = _resampled(points, tracks.time, grid).among(markers, len(prior.names))
+    sampled = resampled(points, tracks.time, grid.time).among(markers, len(prior.names))
     stature = options.stature or prior.stature
     stature_sd = KNOWN_SD if options.stature else PEOPLE_SD
     lengths = np.ones(len(grid.time))
     if isinstance(view, Parallel):
-        lengths = view.lengths(resampled, prior.mean[0].mean(axis=0), stature)
+        lengths = view.lengths(sampled, prior.mean[0].mean(axis=0), stature)
     # a start must not shrink a motion that does not fit: its noise in the picture would grow
     person = Person(stature=stature, stature_sd=0.0 if options.method == "smooth" else stature_sd)
-    found = start.explanations(prior, resampled, view, lengths, person, update)
-    _require_seen(found, options, grid)
+    found = start.explanations(prior, sampled, view, lengths, person, update)
+    require_seen(found, grid, alone=options.method != "smooth")
     chosen = start.course(found)
     if options.method != "smooth":
         return _alone(prior, chosen, tracks, view, grid, lengths, stature, options.method == "blend")
@@ -228,7 +228,7 @@ def _lift(
         ) from None
     sized = _sized(prior, view, found_motion, found_motion.misfit, options, stature, stature_sd / stature)
     places = sized.places
-    _require_size(places, prior, stature)
+    require_size(places, prior, stature)
     error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
     return Motion(
         prior.names,
@@ -263,52 +263,6 @@ def _sized(
     return size.resized(fitted, view.camera, ratio, size_sd, misfit)
 
 
-def _require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
-    """Refuse an estimate that shrank or grew to fit a motion unlike the prior's."""
-    ratio = _extent(places) / (stature * _extent(prior.mean[0]))
-    if not SIZES[0] < ratio < SIZES[1]:
-        raise UserError(
-            f"the estimate came out {ratio:.2f} times a person's size: the motion is unlike the model's, or "
-            "the camera wrong; learn a model with such motions, or use --method blend"
-        )
-
-
-def _extent(places: Floats) -> float:
-    """Mean distance of markers (T, J, 3) from their middle."""
-    apart = places - places.mean(axis=1, keepdims=True)
-    return float(np.linalg.norm(apart, axis=2).mean())
-
-
-def _require_seen(found: list[list[Explanation]], options: Options, grid: Grid) -> None:
-    """Refuse tracks that show next to nothing, or nothing in a segment that is estimated alone."""
-    if not any(found):
-        raise UserError(
-            f"fewer than {start.FEWEST} points are seen in every segment; give more of the tracks"
-        )
-    empty = next((s for s, choices in enumerate(found) if not choices), None)
-    if options.method != "smooth" and empty is not None:
-        at = grid.time[empty * grid.frames]
-        raise UserError(f"next to nothing is seen from {at:.2f} s on; use --method smooth across the gap")
-
-
-def _resampled(points: Observations, time: Floats, grid: Grid) -> Observations:
-    """Interpolate what is seen to the frames of the grid; across longer gaps nothing is seen."""
-    count = points.uv.shape[1]
-    uv, sd = np.full((len(grid.time), count, 2), np.nan), np.full((len(grid.time), count), np.inf)
-    for j, seen in enumerate(points.seen.T):
-        known = np.flatnonzero(seen)
-        if len(known) < 2:
-            continue
-        after = np.clip(np.searchsorted(time[known], grid.time), 1, len(known) - 1)
-        a, b = known[after - 1], known[after]
-        gap = time[b] - time[a]
-        share = (grid.time - time[a]) / gap
-        near = (share > -1e-6) & (share < 1 + 1e-6) & (gap < LONGEST_GAP)
-        uv[near, j] = (points.uv[a, j] + share[:, None] * (points.uv[b, j] - points.uv[a, j]))[near]
-        sd[near, j] = np.hypot((1 - share) * points.sd[a, j], share * points.sd[b, j])[near]
-    return Observations(uv, sd)
-
-
 def _alone(
     prior: SegmentPrior,
     chosen: list[Explanation],
@@ -322,34 +276,22 @@ def _alone(
     """Segments estimated alone, mixed or one after another."""
     places = np.stack([e.posterior.points for e in chosen])
     spread = np.stack([e.posterior.sd for e in chosen])
-    join = blended if blend else _in_turn
-    frames, weights = grid.between(tracks.time)
-    at_video = [
-        np.einsum("tw,tw...->t...", weights, values[frames])
-        for values in (join(places, grid.frames), lengths)
-    ]
+    join = blended if blend else in_turn
+    at = grid.between(tracks.time)
+    placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
     markers = prior.index(tracks.names)
     # neighbours see the same points, so that mixing them does not make the estimate surer
-    sd = np.einsum("tw,tw...->t...", np.abs(weights), join(spread, grid.frames)[frames])
+    sd = interpolated(join(spread, grid.frames), at[0], np.abs(at[1]))
     return Motion(
         names=prior.names,
-        places=at_video[0],
+        places=placed if view.grounded else _on_floor(placed, prior),
         sd=sd,
         rooted_sd=sd,
-        error=_error(view, at_video[0][:, markers], at_video[1], tracks.uv),
+        error=_error(view, placed[:, markers], scale, tracks.uv),
         stature=stature,
         steps=0,
         settled=True,
         log_volume_ratio=float(np.mean([e.posterior.log10_volume for e in chosen])),
-    )
-
-
-def _in_turn(segments: Floats, half: int) -> Floats:
-    """Every second of overlapping segments (S, F, ...) after the other; the last block from the last one."""
-    last = len(segments) - 1
-    owner = [min(block - block % 2, last) for block in range(last + 2)]
-    return np.concatenate(
-        [segments[s][(block - s) * half : (block - s + 1) * half] for block, s in enumerate(owner)]
     )
 
 

@@ -22,6 +22,7 @@ from gait.camera import Camera
 Floats = npt.NDArray[np.float64]
 
 NEAREST = 0.1  # metres before the lens: noise is not taken nearer
+LONGEST_GAP = 0.15  # seconds over which tracks are interpolated
 NEAR = 0.5  # metres beside the ray: a guess is good enough to take the projection's derivatives there
 
 
@@ -55,6 +56,24 @@ class Observations:
         uv, sd = np.full((frames, count, 2), np.nan), np.full((frames, count), np.inf)
         uv[:, index], sd[:, index] = self.uv, self.sd
         return Observations(uv, sd)
+
+
+def resampled(points: Observations, time: Floats, at: Floats) -> Observations:
+    """Interpolate what is seen at times (T,) to other times (n,), seconds; across longer gaps nothing is."""
+    count = points.uv.shape[1]
+    uv, sd = np.full((len(at), count, 2), np.nan), np.full((len(at), count), np.inf)
+    for j, seen in enumerate(points.seen.T):
+        known = np.flatnonzero(seen)
+        if len(known) < 2:
+            continue
+        after = np.clip(np.searchsorted(time[known], at), 1, len(known) - 1)
+        a, b = known[after - 1], known[after]
+        gap = time[b] - time[a]
+        share = (at - time[a]) / gap
+        near = (share > -1e-6) & (share < 1 + 1e-6) & (gap < LONGEST_GAP)
+        uv[near, j] = (points.uv[a, j] + share[:, None] * (points.uv[b, j] - points.uv[a, j]))[near]
+        sd[near, j] = np.hypot((1 - share) * points.sd[a, j], share * points.sd[b, j])[near]
+    return Observations(uv, sd)
 
 
 @dataclass(frozen=True)

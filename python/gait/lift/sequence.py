@@ -17,6 +17,7 @@ from gait.lift import bordered, doubt, soft
 from gait.lift.bordered import Information
 from gait.lift.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
 from gait.lift.equations import Parallel, View, scale_free
+from gait.lift.grid import Grid, interpolated
 from gait.lift.observe import Observations
 from gait.lift.prior import SegmentPrior
 from gait.lift.soft import Layout, Rows
@@ -105,49 +106,6 @@ class Lifted:
     log_volume_ratio: float
     evidence: float
     misfit: float
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Frames of the prior's rate that cover a sequence, in whole blocks.
-
-    Attributes
-    ----------
-    begin, rate : float
-        Seconds, frames per second.
-    blocks, frames : int
-        Blocks B of b frames.
-    """
-
-    begin: float
-    rate: float
-    blocks: int
-    frames: int
-
-    @classmethod
-    def over(cls, time: Floats, prior: SegmentPrior) -> Grid:
-        """Cover times (T,) with at least one segment."""
-        half = prior.frames // 2
-        needed = int(np.ceil((time[-1] - time[0]) * prior.fps - 1e-6)) + 1
-        return cls(float(time[0]), prior.fps, max(2, -(-needed // half)), half)
-
-    @property
-    def time(self) -> Floats:
-        """Seconds of the frames."""
-        return self.begin + np.arange(self.blocks * self.frames) / self.rate
-
-    def between(self, time: Floats) -> tuple[Ints, Floats]:
-        """Frames (T, w) and weights (T, w) that interpolate at times: cubic, linear if blocks are short."""
-        width = 4 if self.frames >= 3 else 2
-        at = (time - self.begin) * self.rate
-        first = np.clip(np.floor(at).astype(int) - (width // 2 - 1), 0, self.blocks * self.frames - width)
-        frames = first[:, None] + np.arange(width)
-        weights = np.ones(frames.shape)
-        for i in range(width):
-            for k in range(width):
-                if k != i:
-                    weights[:, i] *= (at - frames[:, k]) / (i - k)
-        return frames, weights
 
 
 def smooth(
@@ -271,8 +229,7 @@ class _Problem:
 
     def _at_video(self, values: Floats) -> Floats:
         """Interpolate values (grid, ...) at the frames of the video."""
-        frames, weights = self.at
-        return np.asarray(np.einsum("tw,tw...->t...", weights, values[frames]))
+        return interpolated(values, *self.at)
 
     def step(self, state: _State, constrained: bool) -> _State:
         """Estimate by the linear problem around another."""

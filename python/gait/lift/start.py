@@ -49,9 +49,8 @@ def explanations(
         part = seen.part(begin, end)
         if part.seen.sum() < FEWEST:
             found.append([])
-            continue
-
-        found.append(_trusted(prior, part, view, lengths[begin:end], person))
+        else:
+            found.append(_trusted(prior, part, view, lengths[begin:end], person))
         update(s + 1)
     return found
 
