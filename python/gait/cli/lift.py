@@ -42,7 +42,7 @@ _ONLY_TRACKS = (
     *("no_bones", "ignore_unknown", "keep_jumps", "trc"),
 )
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
-PIXEL_SD, FLOOR_SD = 3.0, 0.03  # pixels, metres
+PIXEL_SD, FLOOR_SD = motion.Options.pixel_sd, motion.Options.floor_sd  # pixels, metres
 FAR = 4.0  # noise alone gives a median of 1.2
 
 
