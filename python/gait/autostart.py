@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 WINDOW = 1.0  # seconds of sightings used
 KEEP = 1.5  # seconds after which a sighting is forgotten
 ENOUGH = 8  # sightings, at least
-SELDOM = 3  # without a background only every third frame is looked at: the detector is slow
+SELDOM = 0.09  # seconds, at least, between frames looked at without a background: the detector is slow
 _BLUR = 0.25  # heights that the feet seem to jump between sightings
 _FASTEST = 2.0  # heights per second
 _LEAD = 0.1  # statures by which the lowest foot is nearer to the camera than the pelvis, on average
@@ -112,7 +112,7 @@ class Spotter:
     ----------
     camera, plate, model
         `plate` is the empty scene, BGR; without one people are told by their looks (`people`), every
-        `SELDOM`-th frame.
+        `SELDOM` seconds.
     height : float, optional
         Known stature, metres.
     """
@@ -122,6 +122,7 @@ class Spotter:
     ) -> None:
         self._camera, self._plate, self._model, self._height = camera, plate, model, height
         self._everybody: list[_Seen] = []
+        self._looked = -np.inf  # when, without a plate
 
     @property
     def sees_change(self) -> bool:
@@ -134,8 +135,10 @@ class Spotter:
 
     def see(self, frame: Frame) -> None:
         """Look for people in a frame, and for whom of those seen before they are."""
-        if self._plate is None and frame.number % SELDOM:
-            return
+        if self._plate is None:
+            if 0 <= frame.time - self._looked < SELDOM:
+                return
+            self._looked = frame.time
         kept = ([item for item in seen if frame.time - item[0].time < KEEP] for seen in self._everybody)
         self._everybody = [seen for seen in kept if seen]
         bare = Frame(frame.number, frame.time, frame.image[:0])

@@ -10,7 +10,9 @@ from gait import Camera, Model, Start, UserError, Video, blob
 from gait.autostart import Spotter, find_start
 from gait.initial import DEFAULT_SD
 from gait.model import read_blob
+from gait.sighting import standing
 from gait.trackfile import read_truth
+from gait.video import Frame
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -256,6 +258,26 @@ def test_a_spotter_does_not_start_with_who_stands(tmp_path):
         spotter.see(frame)
         assert not spotter.walks_in(frame)
     assert spotter.full_second(frame)
+
+
+@pytest.mark.parametrize("rate", [6, 10, 15, 25, 30, 60])
+def test_looks_alone_do_at_any_frame_rate(monkeypatch, rate):
+    """Enough sightings in time, and no more than a slow detector can give."""
+    view = camera(place=(0.0, -6.0, 2.2))
+    seen = []
+
+    def one(image, given):
+        foot, head = view.project(np.array([[0.0, 0, 0], [0, 0, 1.7]]))
+        seen.append(standing(foot, head, view, 1.0, 0.04))
+        return seen[-1:]
+
+    monkeypatch.setattr("gait.autostart.people", one)
+    spotter = Spotter(view, None, MODEL)
+    for n in range(2 * rate):
+        frame = Frame(n, n / rate, wall())
+        spotter.see(frame)
+    assert spotter.full_second(frame)
+    assert len(seen) <= 22
 
 
 @pytest.mark.skipif(not CLIPS.is_dir(), reason="../shared/data is absent")
