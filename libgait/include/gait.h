@@ -187,7 +187,7 @@ typedef struct gait_tracker_config {
     float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds */
     float    coef_noise;       /* score standard deviations */
     float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
-    float    stature_noise;    /* fraction of stature, while settling */
+    float    stature_noise;    /* fraction of stature, while settling; later a tenth */
     float    offset_noise;     /* posture of the angles in offset_angles, radians */
     float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
     float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */

@@ -23,7 +23,7 @@ typedef struct dynamics_step { /* constants of one interval; noise: standard dev
     const gait_model *model;
     uint64_t seed;
     uint32_t frame; /* counter of the random numbers */
-    bool plain_root, settling;
+    bool plain_root;
     int32_t fields, components, proportion, offset; /* how many, and the first of the last two kinds */
     float dt, mean_rate;                            /* seconds, strides per second */
     float phase_noise, forward_noise, lateral_noise, heading_noise, stature_noise;

@@ -9,7 +9,7 @@
 #include "check.h"
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x13243f3e980a510f)
+#define GOLDEN UINT64_C(0x7ed06fb22c049f66)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 
