@@ -9,6 +9,7 @@ and the votes of those about one place are averaged.
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -75,7 +76,7 @@ def _sighting(box: Array, vote: float, camera: Camera) -> Sighting | None:
         return None
     off = (seen.stature - _STATURE) / _STATURE_SD
     strength = float(np.exp(min(vote, 3.0) - 0.5 * off * off))
-    return standing(foot, head, camera, strength, _SPREAD)
+    return replace(seen, strength=strength)
 
 
 def _mean(near: list[Sighting], camera: Camera) -> Sighting | None:

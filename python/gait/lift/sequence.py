@@ -88,7 +88,8 @@ class Lifted:
     log_volume_ratio : float
         Logarithm to base 10 of the posterior's volume over the prior's.
     evidence : float
-        Logarithm of the density of what is seen, without the soft constraints, but for a constant.
+        Logarithm of the density of what is seen, without the soft constraints, but for a constant.  Points
+        that lost their say (`gait.lift.doubt`) do not pay for it.
     misfit : float
         Squared deviations per number seen; about 1 if the motion is of the prior's kind, more if it is not.
     """
