@@ -19,6 +19,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
+from gait._abi import Mode, TrackStatus
 from gait.tracker import Estimate, Tracker
 from gait.transitions import HEADING, PHASE, Step, Transitions, wrap
 
@@ -49,6 +50,7 @@ class Spool:
         self._rows: list[tuple[int, int]] = []  # offset and count of each frame
         self.utime: list[int] = []
         self.step: list[int] = []
+        self._known: list[int] = []
 
     def __enter__(self) -> Spool:
         self._file = tempfile.TemporaryFile(prefix="gait-")
@@ -66,7 +68,19 @@ class Spool:
         self._rows.append((self._file.tell(), len(table)))
         self._file.write(table.tobytes())
         self.utime.append(estimate.utime)
+        self._known.append(self._known_since(estimate))
         self.step.append(estimate.frame)
+
+    def _known_since(self, estimate: Estimate) -> int:
+        """Index of the frame from which on phase, left and right are known; -1 if they are not."""
+        now = len(self._known)
+        goes_on = now > 0 and estimate.frame == self.step[now - 1] + 1
+        before = self._known[-1] if goes_on else -1
+        if estimate.status == TrackStatus.LOST:
+            return before
+        if estimate.status != TrackStatus.TRACKING and self._transitions.config.mode != Mode.PAPER:
+            return -1
+        return before if before >= 0 else now
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -84,9 +98,9 @@ class Spool:
         since = self.step[index]
         if index == 0 or since != self.step[index - 1] + 1:
             return None
-        started = self.utime[max(index - since, 0)]
-        age = 1e-6 * (self.utime[index] - started)
-        settling = age < self._transitions.config.settle_time
+        known = self._known[index - 1]
+        settle_time = 1e6 * self._transitions.config.settle_time
+        settling = known < 0 or self.utime[index] - self.utime[known] < settle_time
         return Step(1e-6 * (self.utime[index] - self.utime[index - 1]), settling)
 
 

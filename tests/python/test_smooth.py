@@ -1,6 +1,7 @@
 """Smoothing: the dynamics' twin, the exact linear case, two modes, new starts, the command."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from drawn_walker import camera, clip, state_at, wall, write
 
 from gait import Model, State, Tracker, TrackerConfig, UserError, blob
-from gait._abi import Mode
+from gait._abi import Mode, TrackStatus
 from gait.cli import main
 from gait.footfall_draws import Draws
 from gait.model import read_blob
@@ -162,7 +163,8 @@ def test_the_spool_gives_back_what_it_took_and_knows_the_starts():
         for begin in (0, 40):
             tracker.start(state_at(MODEL, SECTIONS, 0.0), State(), 33333 * begin)
             for i in range(begin, begin + 35):
-                spool.add(tracker, tracker.step(None, 33333 * i))
+                known = TrackStatus.INIT if i < begin + 2 else TrackStatus.TRACKING
+                spool.add(tracker, replace(tracker.step(None, 33333 * i), status=known))
                 kept.append(tracker.particles())
         assert len(spool) == 70
         for i in (0, 34, 35, 69):
@@ -171,7 +173,8 @@ def test_the_spool_gives_back_what_it_took_and_knows_the_starts():
             np.testing.assert_array_equal(weights.astype(np.float32), kept[i][1])
         assert spool.step_to(0) is None and spool.step_to(35) is None
         assert spool.step_to(1) == Step(pytest.approx(0.033333), True)
-        assert not spool.step_to(34).settling and spool.step_to(36).settling
+        assert spool.step_to(31).settling and not spool.step_to(34).settling  # a second after frame 2
+        assert spool.step_to(36).settling and not spool.step_to(69).settling
 
 
 @pytest.fixture(scope="module")
