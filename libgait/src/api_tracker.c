@@ -33,7 +33,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .rate_noise = 0.02f,
         .rate_noise_start = 0.055f,
         .settle_time = 1.0f,
-        .rate_time = 10.0f,
+        .rate_time = 5.0f,
         .forward_noise = 0.05f,
         .lateral_noise = 0.05f,
         .vertical_noise = 0.0096f,
