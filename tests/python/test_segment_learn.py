@@ -294,5 +294,5 @@ def test_too_few_segments_are_an_error(motion):
     with Corpus() as corpus:
         corpus.put("a_1", "a", None, short)
         recordings = corpus.recordings()
-    with pytest.raises(UserError, match="hold 1 segments of 0.5 s; add recordings"):
+    with pytest.raises(UserError, match="hold 1 segments of 0.5 s, fewer than 8; add recordings"):
         segment_fit.fit(recordings, Segments())
