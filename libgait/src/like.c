@@ -44,7 +44,7 @@ static void surface_init(const limb_geometry *g, like_surface *out)
     }
 }
 
-/* Student-t with 4 degrees of freedom and scale half a local standard deviation (prototype.md 2.1). */
+/* Student-t with 4 degrees of freedom, scale half a local standard deviation: a square loses real clips. */
 static void costs_init(like_setup *s)
 {
     float const scale = 0.5f * (float)CONTRAST_UNIT;

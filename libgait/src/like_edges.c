@@ -1,4 +1,4 @@
-/* Image gradient along the visible outlines of the limbs, normal to them (prototype.md 5.3). */
+/* Image gradient along the visible outlines of the limbs, normal to them. */
 #include "like.h"
 
 enum { ENOUGH = 16 }; /* points below which the outline counts as unseen */

@@ -1,4 +1,4 @@
-/* Points along the visible outlines of the limbs, and the image gradient there (prototype.md 5.3). */
+/* Points along the visible outlines of the limbs, and the image gradient there. */
 #include "kernels.h"
 #include "lanes.h"
 #include "like.h"

@@ -8,7 +8,7 @@ void template_clear(int16_t *template, int32_t limbs)
 
 static int16_t approach(int16_t known, int32_t seen)
 {
-    int32_t const slow = 10, now = seen * TEMPLATE_ONE; /* frames (prototype.md: rate 0.1) */
+    int32_t const slow = 10, now = seen * TEMPLATE_ONE; /* frames: a tenth of what is new */
     return (int16_t)(known == TEMPLATE_EMPTY ? now : known + (now - known) / slow);
 }
 

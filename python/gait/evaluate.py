@@ -1,4 +1,4 @@
-"""Errors of a track against the truth: the measures of interfaces.md, section 4."""
+"""Errors of a track against the truth."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from gait.fields import Fields, read_json
 from gait.model import Model
 from gait.state import State
 
-# Standard deviations of values that an init file gives without saying how sure they are (interfaces.md, 3).
+# Standard deviations of values that an init file gives without saying how sure they are.
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
 FAR = 1e4  # metres from the origin; single precision places nothing to the millimetre further out
@@ -51,7 +51,7 @@ class Start:
         Parameters
         ----------
         path : path
-            JSON as in interfaces.md, section 3.  A pelvis of two numbers gets the model's height over ground.
+            JSON with `KEYS`, each optional.  A pelvis of two numbers gets the model's height over ground.
         model : Model
         frame : int, optional
             First frame, where the file does not say.

@@ -48,7 +48,7 @@ def simulate(
     ----------
     scenario : Scenario
     folder : path
-        Gets the files of `FILES`, in the formats of interfaces.md, section 3.
+        Gets the files of `FILES`, in the formats that `gait capture` and `gait eval` read.
     progress : callable, optional
         Called with the number of frames done.
 
