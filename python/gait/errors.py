@@ -8,7 +8,7 @@ class UserError(Exception):
 
 
 class UsageError(UserError):
-    """Options that do not go together.  Commands print it and exit 2."""
+    """Options out of their range, or that do not go together.  Commands print it and exit 2."""
 
 
 class LibraryError(UserError):

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 
 from gait.camera import Camera
+from gait.cli.values import between
 from gait.errors import UserError
 from gait.fields import Fields, read_json
 from gait.files import replacing, require_outputs
@@ -38,7 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera", metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name (built-in view)"
     )
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--phase", type=float, metavar="P", help="of the stride, 0 = right heel strike (0)")
+    what.add_argument(
+        "--phase",
+        type=between(0, 1, "a share of the stride"),
+        metavar="P",
+        help="of the stride, 0 = right heel strike (0)",
+    )
     what.add_argument("--state", metavar="JSON", help="file with the whole state")
     what.add_argument("--strip", action="store_true", help="sheet of all components")
 
@@ -67,8 +73,6 @@ def _state(args: argparse.Namespace, model: Model) -> State:
     """Walker of --phase or --state; on the ground at the origin unless placed."""
     state = State(stride_hz=model.info.stride_hz)
     if args.phase is not None:
-        if not 0 <= args.phase <= 1:
-            raise UserError(f"--phase {args.phase:g}: give a share of the stride from 0 to 1")
         state.phase = args.phase % 1.0
     fields = read_json(args.state, "state") if args.state else Fields("state", {})
     fields.only((*SCALARS, "pelvis", "coef"))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gait.errors import UserError
+from gait.errors import UsageError
 from gait.simulate.views import DIRECTIONS, VIEWS
 
 GENERATOR = "generator"
@@ -72,19 +72,19 @@ class Scenario:
     def __post_init__(self) -> None:
         """Check every option; the message names it as on the command line."""
         if self.view not in VIEWS:
-            raise UserError(f"--view {self.view}: unknown; use one of {' '.join(VIEWS)}")
+            raise UsageError(f"--view {self.view}: unknown; use one of {' '.join(VIEWS)}")
         if self.direction not in DIRECTIONS:
-            raise UserError(f"--direction {self.direction}: unknown; use lr or rl")
+            raise UsageError(f"--direction {self.direction}: unknown; use lr or rl")
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise UserError(
+                raise UsageError(
                     f"--{name.replace('_', '-')} {value:g}: give a value from {low:g} to {high:g}"
                 )
         for pixels in self.size:
             if not _SIZE[0] <= pixels <= _SIZE[1] or pixels % 2:
                 width, height = self.size
-                raise UserError(f"--size {width}x{height}: give even numbers from {_SIZE[0]} to {_SIZE[1]}")
+                raise UsageError(f"--size {width}x{height}: give even numbers from {_SIZE[0]} to {_SIZE[1]}")
 
     def stream(self, name: str, *more: int) -> np.random.Generator:
         """Return random numbers for one purpose, so that one option does not change the others."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gait.camera import Camera
-from gait.errors import UserError
+from gait.errors import UsageError
 from gait.simulate.arrays import Array
 from gait.simulate.path import Path
 
@@ -47,14 +47,14 @@ def make_camera(
 
     Raises
     ------
-    UserError
+    UsageError
         If the walker would come too close to the lens.
     """
     near = -float(points[:, 1].min())
     if distance is None:
         distance = max(_AWAY[view], near + (4.0 if view in ("toward", "oblique", "away") else 3.0))
     if distance - near < _CLOSEST:
-        raise UserError(
+        raise UsageError(
             f"--distance {distance:g}: the walker comes within {distance - near:.1f} m of the camera; "
             f"give at least {near + _CLOSEST:.1f}"
         )

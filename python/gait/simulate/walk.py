@@ -14,7 +14,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import brentq
 
-from gait.errors import UserError
+from gait.errors import UsageError
 from gait.simulate import feet
 from gait.simulate.anatomy import BONE_INDEX, BONES, JOINT_OF, POINT_BONE, POINTS, SIDES, Anatomy
 from gait.simulate.arrays import Array, Ints
@@ -81,7 +81,7 @@ def make_walk(
 
     Raises
     ------
-    UserError
+    UsageError
         If no step length of this person and cadence gives that speed.
     """
     angles = curves.angles(timing.phase, timing.scores)
@@ -194,7 +194,7 @@ def _stride_gain(angles: dict[str, Array], timing: Timing, body: Anatomy, speed:
     if excess(low) > 0 or excess(high) < 0:
         cadence = float(np.gradient(timing.phase, timing.step).mean())
         slow, fast = excess(low) + speed, excess(high) + speed
-        raise UserError(
+        raise UsageError(
             f"--speed {speed:g}: at {cadence:.2f} strides/s and this stature a walk goes {slow:.2f} to "
             f"{fast:.2f} m/s; change --speed or --stride-hz"
         )
