@@ -56,10 +56,16 @@ OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug or sanitize)
 endif
-# At -O3 only what a step spends its time in: at -O2 the rest is a third smaller and hardly slower (2 % of a step).
+# At -O3 only what a step spends its time in, at -O2 what else runs for every particle or row of numbers (a third
+# smaller, 2 % of a step), at -Os the rest (a fifth smaller again, no slower).
 GCC   := $(if $(findstring clang,$(shell $(CC) --version)),,gcc)
-SMALL := $(if $(filter -O3,$(OPT)),-O2 $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels)))
+TIGHT := $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels))
+SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
+LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
 FAST  := fmath.c pf.c $(patsubst %,%_kernel.c,outline like_edges like_silhouette like_surface like_texture)
+MANY  := $(patsubst %,%.c,dense kinematics like like_edges like_joints like_silhouette like_template like_texture lift \
+         lift_batch lift_fit lift_read lift_spread loss population weigh)
+C_FLAGS = $(if $(filter $(FAST),$(1)),,$(if $(filter $(MANY),$(1)),$(SMALL),$(LEAST)))
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 COMMON := $(OPT) -g -MMD -MP -ffp-contract=off
@@ -138,7 +144,7 @@ $(B)/libgait.a: $(OBJ)
 	@$(AR) rcs $@ $(B)/libgait.o
 
 $(B)/src/%.c.o: libgait/src/%.c Makefile | $(B)/src/
-	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(if $(filter $(FAST),$(notdir $<)),,$(SMALL)) $(CFLAGS) -c $< -o $@
+	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(call C_FLAGS,$(notdir $<)) $(CFLAGS) -c $< -o $@
 
 $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
 	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) $(NO_RUNTIME) $(EIGEN_FLAGS) $(WARN) $(SMALL) $(CXXFLAGS) -c $< -o $@
