@@ -21,7 +21,7 @@ import table
 from gait.camera import Camera
 from gait.errors import UserError
 from gait.learn.stage import one_thread
-from gait.lift import motion
+from gait.lift import motion, result
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
@@ -102,8 +102,8 @@ def _lift(
     noise: float,
     method: str = "smooth",
     floor_sd: float = 0.03,
-) -> motion.Motion:
-    options = motion.Options(method=method, pixel_sd=noise, floor_sd=floor_sd)
+) -> result.Motion:
+    options = result.Options(method=method, pixel_sd=noise, floor_sd=floor_sd)
     return motion.lift(prior, tracks, _view(camera, tracks), options, motion.output_names(prior, tracks))
 
 
@@ -173,7 +173,7 @@ def _blind(prior: SegmentPrior, tracks: Tracks, camera: Camera, truth: Floats) -
     return root_error(_upright(found.places[:, order], camera), truth, HIPS)
 
 
-def _coverage(found: motion.Motion, truth: Floats, order: list[int]) -> tuple[float, float]:
+def _coverage(found: result.Motion, truth: Floats, order: list[int]) -> tuple[float, float]:
     """Shares of coordinates in their 90 % intervals: in the world, and about the hips."""
     places, sd = found.places[:, order], found.sd[:, order]
     hips = [order.index(found.names.index(name)) for name in ("l_hip", "r_hip")]

@@ -241,6 +241,26 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
     assert code == 1 or "do not rely on" in said
 
 
+def test_doubts_are_told(folder, capsys, monkeypatch):
+    lift = motion.lift
+
+    def doubting(prior, tracks, *args):
+        doubted = np.zeros(tracks.uv.shape[:2], bool)
+        doubted[2:6, 3] = doubted[4, 1] = True
+        return replace(lift(prior, tracks, *args), doubted=doubted, alone=True, steps=0, wider=2.0)
+
+    monkeypatch.setattr(motion, "lift", doubting)
+    command = ["lift", "t.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv"]
+    assert main([*command, "--json"]) == 0
+    said = capsys.readouterr()
+    names = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].names
+    assert f"far from where the rest has them: {names[3]} in 4 frames\n" in said.err
+    assert "segments are estimated alone" in said.err and "widened 2 times" in said.err
+    figures = json.loads(said.out)
+    assert figures["doubted"] == 5 and figures["segments_alone"]
+    assert main(command) == 0 and "iterations" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("stature", [24.0, -7.0, np.nan])
 def test_nobody_is_so_tall(folder, capsys, monkeypatch, stature):
     """As with a camera in millimetres."""

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gait.camera import Camera
-from gait.lift import motion
-from gait.lift.doubt import FAR, doubted
+from gait.lift import motion, result
+from gait.lift.doubt import FAR, doubted, price
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
 from gait.lift.prior import SegmentPrior
@@ -43,6 +43,16 @@ def test_a_wrong_point_loses_its_pull_the_further_the_more():
     assert pulls[1] < pulls[0] / 50 < FAR / SD
 
 
+def test_doubted_points_pay_for_their_deviations():
+    """The density of a Gaussian point falls with each coordinate's deviation."""
+    said, seen = points()
+    seen.uv[2, 4] = said[2, 4] + (20 * FAR * SD, 0)
+    seen.sd[0, 1] = np.inf
+    found = doubted(seen, said)
+    assert price(seen, seen) == 0
+    assert price(seen, found) == pytest.approx(2 * np.log(found.sd[2, 4] / SD))
+
+
 def test_of_a_motion_that_is_another_no_point_is_doubted():
     said, seen = points()
     assert doubted(seen, said + (30.0, 40.0)) is seen
@@ -74,10 +84,13 @@ def test_a_point_wrong_for_a_second_hardly_matters(walk):
     uv[wrong] += (70.0, -50.0)
     names = motion.output_names(prior, tracks)
     order = [names.index(name) for name in tracks.names]
-    errors = []
+    errors, evidence = [], []
     for given in (tracks, replace(tracks, uv=uv)):
-        found = motion.lift(prior, given, Perspective(CAMERA), motion.Options(pixel_sd=SD), names)
-        assert found.settled
+        found = motion.lift(prior, given, Perspective(CAMERA), result.Options(pixel_sd=SD), names)
+        assert found.settled and not found.alone and found.doubted is not None
+        assert found.doubted[wrong].all() == (given is not tracks)
+        evidence.append(found.evidence)
         apart = found.places[:, order] - places
         errors.append(np.linalg.norm(apart - apart.mean(axis=1, keepdims=True), axis=2).mean())
     assert errors[1] < 1.5 * errors[0]
+    assert evidence[1] < evidence[0] - 20  # each of the 20 frames pays at least one

@@ -215,7 +215,10 @@ def test_without_a_camera_the_person_is_placed_in_the_picture(tmp_path):
     with pytest.raises(UserError, match="pelvis_px is missing"):
         read_placement(written(tmp_path, ROUGH), PRIOR, False)
     flat = ROUGH | {"pelvis_px": [100, 200], "height_px": 300}
-    assert read_placement(written(tmp_path, flat), PRIOR, False).height_px == 300
+    placed = read_placement(written(tmp_path, flat), PRIOR, False)
+    assert placed.height_px == 300 and placed.unused == ("pelvis",)
+    assert read_placement(written(tmp_path, flat), PRIOR, True).unused == ("pelvis_px", "height_px")
+    assert read_placement(written(tmp_path, ROUGH), PRIOR, True).unused == ()
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,14 @@ import pytest
 from toy_segments import toy_prior
 
 from gait.camera import Camera
-from gait.lift import bordered, motion, sequence, soft, tridiagonal
+from gait.errors import UserError
+from gait.lift import bordered, motion, result, sequence, soft, tridiagonal
 from gait.lift import chain as chains
 from gait.lift.chain import Around, Freedom, Segment, overlapping, restricted
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.grid import Grid
 from gait.lift.observe import Observations
+from gait.lift.refuse import Unlike
 from gait.lift.sequence import Seen, Start, smooth
 from gait.lift.tracks_file import Tracks
 from gait.skeleton import axis_rotation
@@ -201,7 +203,7 @@ def test_scale_does_not_drift_with_noise():
         prior,
         tracks,
         Perspective(camera),
-        motion.Options(contact=False, bones=False),
+        result.Options(contact=False, bones=False),
         prior.names,
     )
     size = np.linalg.norm(found.places - found.places.mean(axis=1, keepdims=True))
@@ -268,7 +270,48 @@ def test_lifting_needs_four_frames():
     )
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     with pytest.raises(motion.UserError, match="4 or more"):
-        motion.lift(prior, tracks, view, motion.Options(), prior.names)
+        motion.lift(prior, tracks, view, result.Options(), prior.names)
+
+
+def lifted_by(monkeypatch, outcomes):
+    """Lift with a smoother whose attempts end as told, one by one: an error, or a misfit."""
+    prior, pending = toy_prior(6, 4, 3), list(outcomes)
+
+    def attempt(prior, tracks, view, options, grid, update):
+        nothing = np.zeros((9, 4, 3))
+        if options.method == "blend":
+            return result.Motion(prior.names, nothing, nothing, nothing, nothing[..., 0], 1.8, 0, True, 0.0)
+        ends = pending.pop(0)
+        if isinstance(ends, Exception):
+            raise ends
+        whole = result.Motion(prior.names, nothing + 1, nothing, nothing, nothing[..., 0], 1.7, 9, False, 0.0)
+        return replace(whole, evidence=-ends, misfit=ends)
+
+    monkeypatch.setattr(motion, "_lift", attempt)
+    tracks = Tracks(np.arange(9), np.arange(9) / 20, prior.names, np.ones((9, 4, 2)), np.ones((9, 4)))
+    view = Parallel(looking_along("y"), 1.0, np.zeros(2))
+    return motion.lift(prior, tracks, view, result.Options(), prior.names), pending
+
+
+def test_a_wider_prior_is_tried_where_a_narrow_one_fails(monkeypatch):
+    found, _ = lifted_by(monkeypatch, [Unlike("1"), Unlike("2"), 1.2])
+    assert found.wider == 4 and found.misfit == 1.2
+    found, pending = lifted_by(monkeypatch, [9.0, 3.0, Unlike("4"), 1.0])
+    assert found.wider == 2 and pending == [1.0]
+
+
+def test_what_no_width_mends_is_refused_as_the_learnt_one_is(monkeypatch):
+    with pytest.raises(Unlike, match="1"):
+        lifted_by(monkeypatch, [Unlike("1"), Unlike("2"), Unlike("4"), Unlike("8")])
+    with pytest.raises(UserError, match="too little"):
+        lifted_by(monkeypatch, [UserError("too little"), 1.0])
+
+
+def test_a_motion_estimated_by_its_segments_says_so(monkeypatch):
+    """Iterations, rest and stature are then those of the segments, not of the smoother that went astray."""
+    found, _ = lifted_by(monkeypatch, [1.0])  # came to no rest
+    assert found.alone and found.settled and found.steps == 0 and found.stature == 1.8
+    assert (found.places == 0).all() and found.misfit == 1.0
 
 
 def test_restricted_prior_is_its_marginal(prior):
@@ -280,7 +323,7 @@ def test_restricted_prior_is_its_marginal(prior):
     assert Grid.over(np.array([0.0, 1.0]), restricted(odd, odd.names)).blocks == 7
 
 
-@pytest.mark.parametrize("method", motion.METHODS)
+@pytest.mark.parametrize("method", result.METHODS)
 def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
     prior = toy_prior(FRAMES, 19, 4, seed=5)
     time = np.arange(FRAMES * 2) / 20
@@ -288,7 +331,7 @@ def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
     view = Parallel(looking_along("y"), 1.0, np.array([0.0, 3.0]))  # v begins anywhere
     uv = view.project(places, np.ones(len(time)))
     tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
-    options = motion.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    options = result.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
     view = replace(view, origin=np.nanmean(uv, axis=(0, 1)))
     found = motion.lift(prior, tracks, view, options, prior.names)
     feet = [n for n, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
@@ -305,7 +348,7 @@ def test_deviations_about_the_hips_are_those_of_differences():
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     uv = view.project(places, np.ones(len(time)))
     tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
-    options = motion.Options(stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    options = result.Options(stature=1.7, pixel_sd=0.01, contact=False, bones=False)
     found = motion.lift(prior, tracks, view, options, prior.names)
     assert found.sd[..., 1].min() > 5  # metres of depth
     assert found.rooted_sd[..., 1].max() < 1

@@ -13,7 +13,7 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.camera import Camera
 from gait.cli import main
-from gait.lift import figures_clip, motion
+from gait.lift import figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.tracks_file import Tracks, read, write
 
@@ -56,7 +56,7 @@ def test_dots_are_where_a_right_estimate_is(far):
     uv = 150 * places @ view.axes[:2].T + (40, 30) if far else camera.project(places)
     uv[1, 2] = np.nan
     tracks = Tracks(np.arange(2), np.arange(2) / 20, ("a", "b", "c"), uv, np.ones((2, 3)))
-    found = motion.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0)
+    found = result.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0)
     for frame, seen in ((0, 3), (1, 2)):
         drawn, points = figures_clip._in_picture(view, found, frame, tracks)
         assert drawn.shape == (3, 2) and points.shape == (seen, 2)
@@ -66,6 +66,20 @@ def test_dots_are_where_a_right_estimate_is(far):
 def test_a_camera_is_of_a_clip(folder, capsys):
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--camera", "cam.json"]) == 2
     assert "give its tracks with --clip" in capsys.readouterr().err and not (folder / "r").exists()
+
+
+def test_the_method_is_of_a_clip(folder, monkeypatch, capsys):
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--method", "blend"]) == 2
+    assert "give its tracks with --clip" in capsys.readouterr().err and not (folder / "r").exists()
+    lift, methods = motion.lift, []
+
+    def watched(prior, tracks, view, options, *args):
+        methods.append(options.method)
+        return lift(prior, tracks, view, options, *args)
+
+    monkeypatch.setattr(motion, "lift", watched)
+    command = ["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]
+    assert main([*command, "--method", "blend"]) == 0 and methods == ["blend"]
 
 
 def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch, capsys):

@@ -29,7 +29,7 @@ from gait.cli import lift_tracks, lift_video, values
 from gait.errors import UsageError, UserError
 from gait.files import require_outputs
 from gait.initial import STATURE
-from gait.lift import lifted_file, motion
+from gait.lift import lifted_file, motion, result
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import FURTHEST, Tracks
 from gait.trc import write_trc
@@ -42,8 +42,9 @@ _ONLY_TRACKS = (
     *("no_bones", "ignore_unknown", "keep_jumps", "trc"),
 )
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
-PIXEL_SD, FLOOR_SD = motion.Options.pixel_sd, motion.Options.floor_sd  # pixels, metres
+PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
 FAR = 4.0  # noise alone gives a median of 1.2
+DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -94,7 +95,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--method",
-        choices=motion.METHODS,
+        choices=result.METHODS,
         help="smooth (default): one Gaussian over the whole sequence; blend: overlapping segments, each "
         "estimated alone, mixed as in the paper; segment: one after another",
     )
@@ -132,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
     found = lift_tracks.lift(args.input, prior, tracks, view, _options(args, pixel_sd), names, args.quiet)
     _require_person(args, found)
     if not args.quiet:
-        for words in _doubts(found, pixel_sd):
+        for words in _doubts(found, tracks.names, pixel_sd):
             print(words, file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
@@ -142,9 +143,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _options(args: argparse.Namespace, pixel_sd: float) -> motion.Options:
-    return motion.Options(
-        args.method or motion.METHODS[0],
+def _options(args: argparse.Namespace, pixel_sd: float) -> result.Options:
+    return result.Options(
+        args.method or result.METHODS[0],
         args.height,
         pixel_sd,
         args.floor_sd or FLOOR_SD,
@@ -162,7 +163,7 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
             raise UsageError(f"--{option.replace('_', '-')} is for {other}, and {args.input} {kind}")
 
 
-def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
+def _require_person(args: argparse.Namespace, found: result.Motion) -> None:
     """Refuse an estimate that no person can be."""
     if not np.isfinite(found.error).any():
         raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
@@ -174,11 +175,16 @@ def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
         )
 
 
-def _doubts(found: motion.Motion, pixel_sd: float) -> list[str]:
+def _doubts(found: result.Motion, names: tuple[str, ...], pixel_sd: float) -> list[str]:
     """Why the result may be wrong, a line each."""
     far = float(np.nanmedian(found.error)) / pixel_sd
+    doubted = _doubted(found, names)
     doubts = {
+        f"left with little say, far from where the rest has them: {doubted}": bool(doubted),
         f"not a motion like those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
+        "the smoother goes astray in such a motion: its segments are estimated alone, as by --method blend": (
+            found.alone
+        ),
         f"the motion's size was told by the bones ({found.resized:.2f} times the fit's): it is unlike those "
         "learnt, or the camera is wrong; deviations are wide, do not rely on the places": found.resized != 1,
         f"the estimate did not rest in {found.steps} iterations: do not rely on it": not found.settled,
@@ -186,6 +192,14 @@ def _doubts(found: motion.Motion, pixel_sd: float) -> list[str]:
         "the names of the points and --pixel-sd": far > FAR,
     }
     return [words for words, holds in doubts.items() if holds]
+
+
+def _doubted(found: result.Motion, names: tuple[str, ...]) -> str:
+    """Points of the tracks that were doubted, and in how many frames."""
+    if found.doubted is None:
+        return ""
+    counts = zip(names, found.doubted.sum(axis=0).tolist(), strict=True)
+    return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= DOUBTED)
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -206,11 +220,11 @@ def _rate(tracks: Tracks) -> float:
     return float((len(tracks.time) - 1) / (tracks.time[-1] - tracks.time[0])) if len(tracks.time) > 1 else 1.0
 
 
-def _summary(args: argparse.Namespace, tracks: Tracks, found: motion.Motion) -> dict[str, Any]:
+def _summary(args: argparse.Namespace, tracks: Tracks, found: result.Motion) -> dict[str, Any]:
     """Figures of ``--json``."""
     return {
         "frames": len(tracks.frame),
-        "method": args.method or motion.METHODS[0],
+        "method": args.method or result.METHODS[0],
         "markers": {"seen": list(tracks.names), "estimated": list(found.names)},
         "seen_share": float(tracks.seen.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
@@ -221,6 +235,8 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: motion.Motion) -> 
         "log10_volume_ratio": found.log_volume_ratio,
         "misfit": found.misfit if np.isfinite(found.misfit) else None,
         "prior_widened": found.wider,
+        "segments_alone": found.alone,
+        "doubted": 0 if found.doubted is None else int(found.doubted.sum()),
         "resized": found.resized,
     }
 
@@ -233,7 +249,7 @@ def _text(s: dict[str, Any]) -> str:
         f"{s['reprojection_px']:.2f} px from what was seen, median sd {s['sd_mm']:.0f} mm, "
         f"stature {s['stature_m']:.2f} m",
     ]
-    if s["method"] == "smooth":
+    if s["iterations"]:
         lines.append(
             f"{s['iterations']} iterations; posterior volume 1e{s['log10_volume_ratio']:.0f} of the prior's"
         )

@@ -11,8 +11,8 @@ from gait.errors import UserError
 from gait.learn.stage import one_thread
 from gait.lift import motion, outliers, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
-from gait.lift.motion import Motion, Options
 from gait.lift.prior import SegmentPrior
+from gait.lift.result import Motion, Options
 from gait.lift.tracks_file import Tracks
 from gait.progress import progress
 

@@ -93,6 +93,9 @@ def run(args: argparse.Namespace) -> int:
     video, prior = Video(args.input), SegmentPrior.load(args.model)
     camera = Camera.read(args.camera, video.size) if args.camera else None
     placement = read_placement(args.placement, prior, camera is not None)
+    if placement.unused and not args.quiet:
+        keys = " and ".join(placement.unused)
+        print(f"{args.placement}: not used {'with' if camera else 'without'} --camera: {keys}", file=sys.stderr)
     first, stop = _frames(args, video, placement)
     corrections = []
     if args.corrections:

@@ -31,8 +31,9 @@ from gait.learn.segment_options import Segments
 from gait.lift import figures_clip
 from gait.lift.equations import View
 from gait.lift.figures_segment import Case, case, drawings
-from gait.lift.motion import Motion, Options, output_names
+from gait.lift.motion import output_names
 from gait.lift.prior import SegmentPrior
+from gait.lift.result import METHODS, Motion, Options
 from gait.lift.tracks_file import Tracks
 from gait.page import Page
 from gait.progress import progress
@@ -61,6 +62,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera", metavar="CAM", help="the clip's calibration (default: seen level and from far away)"
     )
     parser.add_argument(
+        "--method",
+        choices=METHODS,
+        help=f"how the clip is lifted, as in gait lift (default: {METHODS[0]})",
+    )
+    parser.add_argument(
         "--seed",
         type=values.whole(*values.SEED),
         default=1,
@@ -73,6 +79,8 @@ def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
     if args.camera and not args.clip:
         raise UsageError("--camera is of a clip; give its tracks with --clip")
+    if args.method and not args.clip:
+        raise UsageError("--method is of a clip; give its tracks with --clip")
     require_folder(args.output)
     prior = SegmentPrior.load(args.model)
     lifted = _clip(args, prior) if args.clip else None
@@ -93,8 +101,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, Motion, View]:
-    """Lift the tracks of the clip as `gait lift` does by default."""
-    options = Options()
+    """Lift the tracks of the clip as `gait lift` does."""
+    options = Options(args.method or METHODS[0])
     tracks = lift_tracks.read(args.clip, prior, options.pixel_sd, ignore_unknown=True, quiet=args.quiet)
     tracks, _ = lift_tracks.without_jumps(tracks, options.pixel_sd, args.quiet)
     view = lift_tracks.view(tracks, args.camera)

@@ -34,3 +34,9 @@ def doubted(points: Observations, said: Floats) -> Observations:
             limit[t] = max(FAR, BEYOND * float(np.median(apart[t, seen])))
     far = np.maximum(apart / limit[:, None], 1.0)
     return points if (far == 1.0).all() else Observations(points.uv, points.sd * far**2)
+
+
+def price(points: Observations, trusted: Observations) -> float:
+    """Give what larger deviations cost the logarithm of the points' density: two coordinates each."""
+    seen = points.seen
+    return 2 * float(np.log(trusted.sd[seen] / points.sd[seen]).sum())

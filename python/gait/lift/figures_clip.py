@@ -10,7 +10,7 @@ from gait.learn.figures_base import BLUE, DARK, GREY, ORANGE, Drawing, plain
 from gait.learn.figures_model import STICKS
 from gait.lift.equations import Perspective, View
 from gait.lift.figures_base import SHOWN
-from gait.lift.motion import Motion
+from gait.lift.result import Motion
 from gait.lift.tracks_file import Tracks
 
 Floats = npt.NDArray[np.float64]

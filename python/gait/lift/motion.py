@@ -7,7 +7,7 @@ alone and mixed by triangular weights (Leventon and Freeman 1998).  segment: seg
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,88 +20,18 @@ from gait.lift.grid import Grid, interpolated
 from gait.lift.heading import Explanation, Person
 from gait.lift.observe import Observations, resampled
 from gait.lift.prior import SegmentPrior
-from gait.lift.refuse import require_seen, require_size
+from gait.lift.refuse import Unlike, require_seen, require_size
+from gait.lift.result import Motion, Options
 from gait.lift.sequence import Lifted, Seen, Start
 from gait.lift.tracks_file import Tracks
 from gait.skeleton import JOINTS
 
 Floats = npt.NDArray[np.float64]
 
-METHODS = ("smooth", "blend", "segment")
 KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
 ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
 WIDER = (1.0, 2.0, 4.0, 8.0)  # factors of the prior's deviations, tried in turn while the tracks ask for it
 MISFIT = 1.3  # squared deviations per number seen from which a wider prior is tried
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to lift.
-
-    Attributes
-    ----------
-    method : one of METHODS
-    stature : float or None
-        Metres; None: unknown.
-    pixel_sd : float
-        Noise of points seen with full confidence.
-    floor_sd : float
-        How well the ground of the camera's world is where the person stands, metres.
-    contact, bones : bool
-        Feet stay put; bones keep their length.
-    """
-
-    method: str = "smooth"
-    stature: float | None = None
-    pixel_sd: float = 3.0
-    floor_sd: float = 0.03
-    contact: bool = True
-    bones: bool = True
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Lifted tracks.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The J markers.
-    places, sd : (T, J, 3)
-        Metres, and posterior standard deviations.
-    rooted_sd : (T, J, 3)
-        Deviations of the places about the middle of the hips; of segments alone, as `sd`.
-    error : (T, P)
-        Distance in the picture from what was seen, pixels; NaN where nothing was.
-    stature : float
-    steps : int
-        Iterations over the whole sequence; 0 for segments alone.
-    settled : bool
-    log_volume_ratio : float
-        Logarithm to base 10 of the posterior's volume over the prior's; of segments alone, their mean.
-    evidence : float
-        Logarithm of the density of what is seen, but for a constant; NaN for segments alone.
-    misfit : float
-        Squared deviations per number seen, about 1; NaN for segments alone.
-    wider : float
-        Factor of the prior's deviations that the tracks asked for; 1 for motions like those learnt.
-    resized : float
-        Factor by which the fit's size was changed to that of a person; 1 for motions like those learnt.
-    """
-
-    names: tuple[str, ...]
-    places: Floats
-    sd: Floats
-    rooted_sd: Floats
-    error: Floats
-    stature: float
-    steps: int
-    settled: bool
-    log_volume_ratio: float
-    evidence: float = float("nan")
-    misfit: float = float("nan")
-    wider: float = 1.0
-    resized: float = 1.0
 
 
 def output_names(prior: SegmentPrior, tracks: Tracks, everything: bool = False) -> tuple[str, ...]:
@@ -133,22 +63,41 @@ def lift(
         raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
     prior = restricted(prior, names)
     grid = Grid.over(tracks.time, prior)
+    if options.method != "smooth":
+        return _lift(prior, tracks, view, options, grid, update)
+    best = _widest_needed(prior, tracks, view, options, grid, update)
+    if best.wider > 1 or not best.settled:
+        return _unlike(prior, tracks, view, options, grid, best)
+    return best
+
+
+def _widest_needed(
+    prior: SegmentPrior,
+    tracks: Tracks,
+    view: View,
+    options: Options,
+    grid: Grid,
+    update: Callable[[int], None],
+) -> Motion:
+    """Estimate by the prior, or by a wider one if the tracks ask for it."""
     best: Motion | None = None
-    for wider in WIDER if options.method == "smooth" else WIDER[:1]:
+    refused: Unlike | None = None
+    for wider in WIDER:
         try:
             found = _lift(widened(prior, wider), tracks, view, options, grid, update)
-        except UserError:
+        except Unlike as error:
+            refused = refused or error
             if best is None:
-                raise
+                continue
             break
         if best is not None and found.evidence <= best.evidence:
             break
         best = replace(found, wider=wider)
         if not found.misfit > MISFIT:
             break
-    assert best is not None
-    if options.method == "smooth" and (best.wider > 1 or not best.settled):
-        return _unlike(prior, tracks, view, options, grid, best)
+    if best is None:
+        assert refused is not None
+        raise refused
     return best
 
 
@@ -167,13 +116,15 @@ def _unlike(
     stature, size_sd = options.stature or prior.stature, KNOWN_SD if options.stature else PEOPLE_SD
     sized = _sized(prior, view, alone, misfit, options, stature, size_sd / stature)
     return replace(
-        found,
+        alone,
         places=sized.places,
         sd=sized.sd,
         rooted_sd=sized.rooted_sd,
-        error=alone.error,
-        stature=alone.stature,
+        evidence=found.evidence,
+        misfit=found.misfit,
+        wider=found.wider,
         resized=sized.factor,
+        alone=True,
     )
 
 
@@ -222,7 +173,7 @@ def _lift(
             prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
         )
     except np.linalg.LinAlgError:
-        raise UserError(
+        raise Unlike(
             "the tracks look like no motion that the model knows; check the camera, the points' names and "
             "that v points down"
         ) from None
@@ -243,6 +194,7 @@ def _lift(
         found_motion.evidence,
         found_motion.misfit,
         resized=sized.factor,
+        doubted=found_motion.doubted,
     )
 
 

@@ -13,6 +13,11 @@ from gait.lift.start import FEWEST
 
 Floats = npt.NDArray[np.float64]
 
+
+class Unlike(UserError):
+    """The tracks show a motion unlike the prior's: a wider prior may do."""
+
+
 SIZES = (0.6, 1.6)  # of the usual extent: no person is smaller or larger
 
 
@@ -30,7 +35,7 @@ def require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
     """Refuse an estimate that shrank or grew to fit a motion unlike the prior's."""
     ratio = _extent(places) / (stature * _extent(prior.mean[0]))
     if not SIZES[0] < ratio < SIZES[1]:
-        raise UserError(
+        raise Unlike(
             f"the estimate came out {ratio:.2f} times a person's size: the motion is unlike the model's, or "
             "the camera wrong; learn a model with such motions, or use --method blend"
         )

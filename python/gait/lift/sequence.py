@@ -88,8 +88,9 @@ class Lifted:
     log_volume_ratio : float
         Logarithm to base 10 of the posterior's volume over the prior's.
     evidence : float
-        Logarithm of the density of what is seen, without the soft constraints, but for a constant.  Points
-        that lost their say (`gait.lift.doubt`) do not pay for it.
+        Logarithm of the density of what is seen, without the soft constraints, but for a constant.
+    doubted : (T, P)
+        Points that lost their say (`gait.lift.doubt`).
     misfit : float
         Squared deviations per number seen; about 1 if the motion is of the prior's kind, more if it is not.
     """
@@ -106,6 +107,7 @@ class Lifted:
     settled: bool
     log_volume_ratio: float
     evidence: float
+    doubted: npt.NDArray[np.bool_]
     misfit: float
 
 
@@ -260,7 +262,8 @@ class _Problem:
             steps=state.steps,
             settled=settled,
             log_volume_ratio=bare.log_volume_ratio,
-            evidence=bare.evidence,
+            evidence=bare.evidence - doubt.price(self.seen.points, self.points),
+            doubted=self.points.sd > self.seen.points.sd,
             misfit=bare.square / max(2 * int(self.seen.points.seen.sum()), 1),
         )
 

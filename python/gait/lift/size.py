@@ -29,7 +29,7 @@ class Resized:
     Attributes
     ----------
     places, sd, rooted_sd : (T, J, 3)
-        Metres, as in `motion.Motion`.
+        Metres, as in `result.Motion`.
     factor : float
         By which the size was changed; 1 if it is a likely one.
     """
@@ -76,7 +76,7 @@ def resized(found: Resized, camera: Camera, ratio: float, size_sd: float, misfit
     size_sd : float
         Relative deviation of people's statures, as far as it is not known.
     misfit : float
-        As in `motion.Motion`.
+        As in `result.Motion`.
     """
     own = float(np.hypot(size_sd, PROPORTION_SD))
     off = abs(float(np.log(ratio))) / own

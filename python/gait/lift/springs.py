@@ -42,7 +42,8 @@ PHASE_SD = 0.1  # strides: a phase by eye
 RATE_SD = 0.05  # strides per second
 HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 0
 FURTHEST = 1e6  # pixels or metres
-_KNOWN = ("frame", "pelvis", "pelvis_px", "height_px", "heading_rad", "stature_m", "phase", "stride_hz", "sd")
+_SPACE, _PICTURE = ("pelvis",), ("pelvis_px", "height_px")  # where the person is, with and without a camera
+_KNOWN = ("frame", *_SPACE, *_PICTURE, "heading_rad", "stature_m", "phase", "stride_hz", "sd")
 _SPREAD = tuple(DEFAULT_SD)  # as in a start of the tracker
 
 
@@ -90,6 +91,8 @@ class Placement:
     stride_hz : float, optional
         Strides per second.
     phase_sd, stride_hz_sd : float
+    unused : tuple of str
+        Keys of the file that say nothing in this view.
     """
 
     frame: int
@@ -105,6 +108,7 @@ class Placement:
     stride_hz: float | None = None
     phase_sd: float = PHASE_SD
     stride_hz_sd: float = RATE_SD
+    unused: tuple[str, ...] = ()
 
 
 def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated: bool) -> Placement:
@@ -134,6 +138,7 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
         stride_hz=_optional(fields, "stride_hz"),
         phase_sd=_deviation(spread, "phase", PHASE_SD),
         stride_hz_sd=_deviation(spread, "stride_hz", RATE_SD),
+        unused=tuple(key for key in (_PICTURE if calibrated else _SPACE) if key in fields),
     )
     return placed if calibrated else replace(placed, **_in_picture(fields))
 
