@@ -5,6 +5,7 @@ import json
 import mocap_files as files
 import numpy as np
 import pytest
+from lift_reference import share_along, share_rigid, uncertain_modes
 from marked_walker import FULL, walker
 from test_marker_files import write_trc
 from toy_segments import FRONT
@@ -13,7 +14,7 @@ import gait.cli
 from gait import blob
 from gait.errors import UserError
 from gait.lift.observe import Observations, orthographic
-from gait.lift.posterior import infer, place, share_along, share_rigid
+from gait.lift.posterior import infer, place
 from gait.lift.prior import TAGS, SegmentPrior
 from gait.model import Model
 from gait.skeleton import EVAL15, JOINTS
@@ -181,7 +182,7 @@ def test_of_a_walker_seen_flat_depth_is_least_certain():
     prior, axes, depth = SegmentPrior.load(), FRONT, np.array([0.0, 1, 0])
     gaussian = place(prior)
     seen = Observations(gaussian.mean @ axes.T, np.full(gaussian.mean.shape[:2], 0.02))
-    sd, modes = infer(gaussian, orthographic(seen, axes)).uncertain_modes(5)
+    sd, modes = uncertain_modes(infer(gaussian, orthographic(seen, axes)), 5)
     assert share_along(modes[0], depth) >= 0.99 and share_rigid(modes[0]) >= 0.98
     assert all(share_along(mode, depth) >= 0.95 for mode in modes)
     assert sd[0] > 5 > 0.5 > sd[1]

@@ -95,7 +95,9 @@ def run(args: argparse.Namespace) -> int:
     placement = read_placement(args.placement, prior, camera is not None)
     if placement.unused and not args.quiet:
         keys = " and ".join(placement.unused)
-        print(f"{args.placement}: not used {'with' if camera else 'without'} --camera: {keys}", file=sys.stderr)
+        print(
+            f"{args.placement}: not used {'with' if camera else 'without'} --camera: {keys}", file=sys.stderr
+        )
     first, stop = _frames(args, video, placement)
     corrections = []
     if args.corrections:

@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     segment = _segment(args.mocap, prior) if args.mocap else None
     truth, stature = segment or (None, prior.stature)
     what = f"a segment of {Path(args.mocap).name}" if args.mocap else "a draw from the prior"
-    shown = case(prior, truth, stature, what, args.seed)
+    shown = case(args.model, truth, stature, what, args.seed)
     page = Page(f"{Path(args.model).name if args.model else 'Shipped model'}: segments of motion")
     page.table("Prior", _facts(prior))
     with filling(args.output) as folder, progress("figures", FIGURES + bool(lifted), args.quiet) as update:
@@ -167,6 +167,6 @@ def _figures(c: Case) -> dict[str, Any]:
     return {
         "mean_mm": apart(c.gaussian.mean),
         "likelihood_mm": apart(c.likelihood),
-        "bayes_mm": apart(c.posterior.points),
-        "log10_volume_ratio": c.posterior.log10_volume,
+        "bayes_mm": apart(c.bayes),
+        "log10_volume_ratio": c.log10_volume,
     }

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from gait.learn.figures_base import BLUE, DARK, GREY, ORANGE, Drawing, grid, line_legend
 from gait.lift.figures_base import AHEAD, SIDE, rows, strip
-from gait.lift.observe import Observations, orthographic
-from gait.lift.posterior import Gaussian, Posterior, infer, likelihood_only, place
+from gait.lift.posterior import Gaussian, place
 from gait.lift.prior import SegmentPrior
+from gait.lifter import LiftConfig, Lifter
 
 Floats = npt.NDArray[np.float64]
 
@@ -33,29 +33,57 @@ class Case:
         Metres, placed as in the prior.
     what : str
         Where it is from.
-    gaussian, posterior
-        The prior at its stature, and given what is seen.
-    likelihood : (F, J, 3)
-        Least squares in the modes.
+    gaussian : Gaussian
+        The prior at its stature.
+    bayes, likelihood : (F, J, 3)
+        Posterior mean, and least squares in the modes.
+    variance : (k,)
+        Posterior variances of the modes' scores.
+    log10_volume : float
+        Of the posterior over the prior.
+    uncertain : (MODES, F, J, 3)
+        Least certain displacements, one deviation long, the longest first.
     """
 
     prior: SegmentPrior
     truth: Floats
     what: str
     gaussian: Gaussian
-    posterior: Posterior
+    bayes: Floats
     likelihood: Floats
+    variance: Floats
+    log10_volume: float
+    uncertain: Floats
 
 
-def case(prior: SegmentPrior, truth: Floats | None, stature: float, what: str, seed: int) -> Case:
-    """See a segment, or one drawn from the prior if `truth` is None, from behind with noise."""
-    rng = np.random.default_rng(seed)
+def case(model: str | None, truth: Floats | None, stature: float, what: str, seed: int) -> Case:
+    """See a segment, or one drawn from a model's prior if `truth` is None, from behind with noise."""
+    prior, rng = SegmentPrior.load(model), np.random.default_rng(seed)
     gaussian = place(prior, stature=stature, ground_sd=0.0, height_sd=0.0)
     x = gaussian.draw(rng) if truth is None else truth
     axes = np.stack([AHEAD, [0.0, 0.0, 1.0]])
     uv = x @ axes.T + NOISE * rng.normal(size=(*x.shape[:2], 2))
-    seen = orthographic(Observations(uv, np.full(uv.shape[:2], NOISE)), axes)
-    return Case(prior, x, what, gaussian, infer(gaussian, seen), likelihood_only(gaussian, seen))
+    lifter = Lifter(model, axes, placed_as_learnt(stature))
+    fit = lifter.segment(uv, NOISE)
+    if fit.component:
+        gaussian = place(prior, fit.component, stature=stature, ground_sd=0.0, height_sd=0.0)
+    return Case(
+        prior,
+        x,
+        what,
+        gaussian,
+        bayes=lifter.positions()[0],
+        likelihood=lifter.least_squares(),
+        variance=np.diag(lifter.posterior()[1])[: len(gaussian.modes)],
+        log10_volume=fit.log10_volume,
+        uncertain=lifter.uncertain(MODES)[1],
+    )
+
+
+def placed_as_learnt(stature: float, heading: float = 0.0, **changes: float) -> LiftConfig:
+    """Make the settings of a lifter for somebody whose size, place and heading are known, as in the paper."""
+    known = {"stature": stature, "stature_sd": 0.0, "heading": heading, "heading_sd": 0.0}
+    return LiftConfig.default(**known, place_sd=(0.0, 0.0, 0.0), **changes)
 
 
 def drawings(c: Case, seed: int) -> Iterator[Drawing]:
@@ -71,7 +99,7 @@ def spectrum(c: Case) -> Drawing:
     """Variances of the modes before and after the segment was seen (fig. 3)."""
     figure, panels = grid(1, 2, 9, 3.4)
     lengths = np.linalg.norm(c.gaussian.modes.reshape(len(c.gaussian.modes), -1), axis=1) ** 2
-    after = lengths * np.diag(c.posterior.covariance)
+    after = lengths * c.variance
     number = np.arange(1, len(lengths) + 1)
     panels[0].semilogy(number, lengths, "o-", ms=3, color=BLUE)
     panels[0].semilogy(number, after, "o-", ms=3, color=ORANGE)
@@ -80,12 +108,11 @@ def spectrum(c: Case) -> Drawing:
     panels[1].plot(number, share, color=DARK)
     panels[1].set(xlabel="modes", ylabel="variance explained, %", ylim=(0, 102))
     line_legend(figure, {"prior": BLUE, "posterior": ORANGE})
-    ratio = c.posterior.log10_volume
     return Drawing(
         "spectrum",
         "Spectrum",
         f"Variances of the modes, and what is left of them when {c.what} was seen from behind with "
-        f"{1000 * NOISE:.0f} mm of noise: the volume shrinks to 10^{ratio:.1f} of the prior's.",
+        f"{1000 * NOISE:.0f} mm of noise: the volume shrinks to 10^{c.log10_volume:.1f} of the prior's.",
         figure,
     )
 
@@ -134,7 +161,7 @@ def estimates(c: Case) -> Drawing:
         "original": (c.truth, DARK),
         f"projection\n{floor:.0f} mm": (projected, DARK),
         f"likelihood only\n{_apart(c.likelihood, c.truth):.0f} mm": (c.likelihood, BLUE),
-        f"Bayes\n{_apart(c.posterior.points, c.truth):.0f} mm": (c.posterior.points, ORANGE),
+        f"Bayes\n{_apart(c.bayes, c.truth):.0f} mm": (c.bayes, ORANGE),
     }
     figure, panels = rows(len(found), list(found))
     for axes, (x, colour) in zip(panels, found.values(), strict=True):
@@ -152,15 +179,15 @@ def estimates(c: Case) -> Drawing:
 
 def uncertain(c: Case) -> Drawing:
     """Least certain displacements, from where they show most (fig. 6)."""
-    sd, modes = c.posterior.uncertain_modes(MODES)
-    titles = [f"mode {k + 1}\n{1000 * s / np.sqrt(c.truth[..., 0].size):.0f} mm" for k, s in enumerate(sd)]
+    length = np.linalg.norm(c.uncertain.reshape(MODES, -1), axis=1) / np.sqrt(c.truth[..., 0].size)
+    titles = [f"mode {k + 1}\n{1000 * each:.0f} mm" for k, each in enumerate(length)]
     figure, panels = rows(MODES, titles)
-    for axes, deviation, mode in zip(panels, sd, modes, strict=True):
-        strip(axes, c.posterior.points, c.prior.names, SIDE, DARK, ghost=True, size=c.prior.stature)
+    for axes, mode in zip(panels, c.uncertain, strict=True):
+        strip(axes, c.bayes, c.prior.names, SIDE, DARK, ghost=True, size=c.prior.stature)
         for sign, colour in ((1, ORANGE), (-1, BLUE)):
-            moved = c.posterior.points + sign * SWING * deviation * mode
-            strip(axes, moved, c.prior.names, SIDE, colour, size=c.prior.stature, path=c.posterior.points)
-    depth = [float(np.sum(mode[..., 0] ** 2)) for mode in modes]
+            moved = c.bayes + sign * SWING * mode
+            strip(axes, moved, c.prior.names, SIDE, colour, size=c.prior.stature, path=c.bayes)
+    depth = [float(np.sum(mode[..., 0] ** 2) / np.sum(mode**2)) for mode in c.uncertain]
     line_legend(figure, {f"+{SWING:g} sd": ORANGE, f"-{SWING:g} sd": BLUE})
     return Drawing(
         "uncertain",

@@ -5,8 +5,8 @@ about the mean and noise of covariance R:
 
     alpha = G' (G G' + R)^-1 y = (I + G' R^-1 G)^-1 G' R^-1 y,    Q = (I + G' R^-1 G)^-1.
 
-The first is the paper's form (dual), the second the information form; they are equal.  R holds the noise of
-the observations and the markers' variance outside the modes.
+The first is the paper's form (dual), the second the information form, which is used here; they are equal
+(tests).  R holds the noise of the observations and the markers' variance outside the modes.
 """
 
 from __future__ import annotations
@@ -47,12 +47,6 @@ class Gaussian:
     modes: Floats
     residual: Floats
     rigid: int = 0
-
-    @cached_property
-    def _factors(self) -> tuple[Floats, Floats]:
-        """Orthonormal directions (D, r) and R (r, m) with modes = directions R."""
-        q, r = np.linalg.qr(self.modes.reshape(len(self.modes), -1).T)
-        return q, r
 
     def draw(self, rng: np.random.Generator, residual: bool = True) -> Floats:
         """Segment (F, J, 3) from the prior."""
@@ -194,57 +188,19 @@ class Posterior:
         return np.sqrt(np.maximum(np.diagonal(self.covariances, axis1=2, axis2=3), 0))
 
     @property
-    def subspace_sd(self) -> Floats:
-        """Square root of diag(U Q U') + gamma psi, (F, J, 3): deviations of `subspace`."""
-        modes = self.gaussian.modes
-        variance = np.einsum("mfji,mn,nfji->fji", modes, self.covariance, modes, optimize=True)
-        return np.sqrt(np.maximum(variance, 0) + self.gaussian.residual[:, None])
-
-    @property
     def log10_volume(self) -> float:
         """log10 of sqrt(det Q / det Lambda): how much smaller the posterior is than the prior."""
         return float(np.linalg.slogdet(self.covariance)[1] / (2 * LN10))
 
-    def uncertain_modes(self, count: int = 3) -> tuple[Floats, Floats]:
-        """Directions of largest posterior deviation, within the modes.
 
-        Returns
-        -------
-        sd : (count,)
-            Metres, along the unit vectors below, largest first.
-        modes : (count, F, J, 3)
-            Unit vectors over all coordinates.
-        """
-        q, r = self.gaussian._factors
-        values, vectors = np.linalg.eigh(r @ self.covariance @ r.T)
-        order = np.argsort(values)[::-1][:count]
-        modes = (q @ vectors[:, order]).T.reshape(-1, *self.gaussian.mean.shape)
-        return np.sqrt(np.maximum(values[order], 0)), modes
-
-
-def infer(gaussian: Gaussian, rows: Rows, dual: bool = False) -> Posterior:
-    """Posterior of a Gaussian given measurements.
-
-    Parameters
-    ----------
-    dual : bool
-        Use eqs. 5 and 6 as the paper prints them, with a matrix of the measurements' size, instead of the
-        information form.
-    """
+def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
+    """Posterior of a Gaussian given measurements, by the information form."""
     s = system(gaussian, rows)
-    scores, measured = np.eye(len(gaussian.modes)), np.eye(len(s.y))
-    if dual:
-        wide = s.design @ s.design.T + measured
-        gain = np.linalg.solve(wide, s.design).T
-        alpha, covariance = gain @ s.y, scores - gain @ s.design
-        spread = np.linalg.slogdet(wide)[1]
-    else:
-        precision = scores + s.design.T @ s.design
-        covariance = _inverse(precision)
-        alpha = covariance @ (s.design.T @ s.y)
-        spread = np.linalg.slogdet(precision)[1]
+    precision = np.eye(len(gaussian.modes)) + s.design.T @ s.design
+    covariance = _inverse(precision)
+    alpha = covariance @ (s.design.T @ s.y)
     fit = s.y @ (s.y - s.design @ alpha)
-    spread -= 2 * np.log(np.linalg.det(s.whiten)).sum()
+    spread = np.linalg.slogdet(precision)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
     evidence = -0.5 * float(fit + spread + len(s.y) * np.log(2 * np.pi))
     return Posterior(gaussian, rows, s, alpha, (covariance + covariance.T) / 2, evidence)
 
@@ -254,36 +210,3 @@ def _inverse(precision: Floats) -> Floats:
     scale = 1 / np.sqrt(np.diagonal(precision))
     root = np.linalg.inv(np.linalg.cholesky(precision * np.outer(scale, scale))) * scale
     return np.asarray(root.T @ root)
-
-
-def log10_volume(gaussian: Gaussian, rows: Rows) -> float:
-    """log10 sqrt(det Q / det Lambda) in closed form: -1/2 sum log10(1 + s_i^2), s of the whitened design."""
-    s = np.linalg.svd(system(gaussian, rows).design, compute_uv=False)
-    return float(-0.5 * np.log10(1 + s**2).sum())
-
-
-def likelihood_only(gaussian: Gaussian, rows: Rows) -> Floats:
-    """Segment (F, J, 3) in the span of the modes that fits the measurements best, whatever the prior says.
-
-    Of all that do, the one nearest to the mean (least squares of minimum norm); the deviations of the
-    observations weigh them, the prior has no part.
-    """
-    norm = np.linalg.norm(gaussian.modes.reshape(len(gaussian.modes), -1), axis=1)
-    unit = gaussian.modes / norm[:, None, None, None]
-    weight = 1 / np.sqrt(rows.variance)
-    design = np.einsum("nai,mni->nam", rows.direction, unit[:, rows.frame, rows.marker])
-    y = weight * rows.shifted(gaussian.mean).value
-    flat = (design * weight[..., None]).reshape(y.size, -1)
-    scores = np.linalg.lstsq(flat, y.ravel(), rcond=1e-10)[0]
-    return np.asarray(gaussian.mean + np.tensordot(scores, unit, 1))
-
-
-def share_along(mode: Floats, axis: Floats) -> float:
-    """Share of a mode's energy (F, J, 3) that is along a unit vector (3,)."""
-    return float(np.sum((mode @ axis) ** 2) / np.sum(mode**2))
-
-
-def share_rigid(mode: Floats) -> float:
-    """Share of a mode's energy (F, J, 3) that is one displacement of all markers in all frames."""
-    points = mode.reshape(-1, 3)
-    return float(len(points) * np.sum(points.mean(axis=0) ** 2) / np.sum(points**2))
