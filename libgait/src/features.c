@@ -9,6 +9,7 @@ features features_layout(arena *a)
     f.quads = TAKE(a, uint32_t, VIEW_PIXELS);
     f.fg = (uint64_t (*)[RAST_SIZE][RAST_WORDS])arena_take(a, sizeof *f.fg, FG_PLANES);
     f.inside = (uint64_t (*)[RAST_WORDS])arena_take(a, sizeof *f.inside, RAST_SIZE);
+    f.words = (uint64_t (*)[FG_PLANES + 1][RAST_SIZE]) arena_take(a, sizeof *f.words, RAST_STARTS);
     return f;
 }
 
@@ -42,14 +43,32 @@ void features_sample(const kernels *run, features *f, const gait_camera *cam, co
     run->view_grey(&s->planes, s->grey);
 }
 
+/* One word of each row, from a column on. */
+static void words_of(const uint64_t (*row)[RAST_WORDS], int32_t column, uint64_t *restrict out)
+{
+    for (int32_t y = 0; y < RAST_SIZE; y++)
+        out[y] = column < 64 ? row[y][0] >> column | row[y][1] << 1 << (63 - column) : row[y][1];
+}
+
+void features_words(features *f)
+{
+    for (int32_t s = 0; s < RAST_STARTS; s++) {
+        for (int32_t k = 0; k < FG_PLANES; k++)
+            words_of((const uint64_t (*)[RAST_WORDS])f->fg[k], s * RAST_STEP, f->words[s][k]);
+        words_of((const uint64_t (*)[RAST_WORDS])f->inside, s * RAST_STEP, f->words[s][FG_PLANES]);
+    }
+}
+
 static void foreground(const kernels *run, features *f, const gait_camera *cam, const view_planes *plate,
                        const features_scratch *s)
 {
     view_planes const luma = {.channel = {s->grey}, .channels = 1};
     refresh_inside(run, f, cam);
     f->has_fg = plate != NULL;
-    if (f->has_fg)
-        run->features_foreground(f, plate->channels == 1 ? &luma : &s->planes, plate);
+    if (!f->has_fg)
+        return;
+    run->features_foreground(f, plate->channels == 1 ? &luma : &s->planes, plate);
+    features_words(f);
 }
 
 static void surface(const kernels *run, features *f, bool raw, const features_scratch *s)

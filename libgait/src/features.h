@@ -35,6 +35,8 @@ typedef struct features {
     uint64_t (*fg)[RAST_SIZE][RAST_WORDS]; /* FG_PLANES bit planes of the foreground probability */
     uint64_t (*inside)[RAST_WORDS];        /* cells that the camera sees, */
     view_map inside_map;                   /* found for this place of the region */
+    /* The planes of fg, then inside, in words that begin at each multiple of RAST_STEP columns: rast_mask's. */
+    uint64_t (*words)[FG_PLANES + 1][RAST_SIZE]; /* RAST_STARTS */
     features_tracks tracks;
 } features;
 
@@ -57,6 +59,9 @@ features_scratch features_scratch_layout(arena *a);
 /* A frame's planes in the region f->map, and their grey levels, into s; f->seen tells whether there is a frame. */
 void features_sample(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
                      features_scratch *s);
+
+/* Make `words` of fg and inside. */
+void features_words(features *f);
 
 /* The maps of what was sampled, each apart from the others, in the order of the time that they take. */
 enum { FEATURES_EDGES, FEATURES_SURFACE, FEATURES_FOREGROUND, FEATURES_MAPS };

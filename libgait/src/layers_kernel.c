@@ -13,19 +13,48 @@ static int32_t to_cell(float v)
     return rast_sub(0.5f * v - 0.25f);
 }
 
-static void limb_edges(const float x[][BLOCK], const float y[][BLOCK], int32_t n, layers_limb *restrict out)
+typedef struct box { /* cells that the limbs in front of the camera can meet */
+    int32_t left[BLOCK], right[BLOCK], top[BLOCK], end[BLOCK];
+} box;
+
+static box box_empty(void)
 {
-    int32_t px[RAST_MAX_VERTICES][BLOCK], py[RAST_MAX_VERTICES][BLOCK], low[BLOCK], high[BLOCK];
+    box b;
     for (int32_t i = 0; i < BLOCK; i++) {
-        low[i] = RAST_SIZE;
-        high[i] = 0;
+        b.left[i] = b.top[i] = RAST_SIZE;
+        b.right[i] = b.end[i] = 0;
     }
+    return b;
+}
+
+/* What a limb meets, whole bands of rows, grows what the body does. */
+static void box_join(box *restrict body, const box *limb, const float *depth, layers_limb *restrict out)
+{
+    for (int32_t i = 0; i < BLOCK; i++) {
+        int32_t const top = i_max(limb->top[i], 0), end = i_min(limb->end[i], RAST_SIZE);
+        bool const front = depth[i] > 0.0f, met = front & (top < end);
+        out->top[i] = met ? top / LAYERS_ROWS * LAYERS_ROWS : 0;
+        out->end[i] = met ? (end + LAYERS_ROWS - 1) / LAYERS_ROWS * LAYERS_ROWS : 0;
+        body->top[i] = i_min(body->top[i], met ? out->top[i] : RAST_SIZE);
+        body->end[i] = i_max(body->end[i], out->end[i]);
+        body->left[i] = i_min(body->left[i], met ? limb->left[i] : RAST_SIZE);
+        body->right[i] = i_max(body->right[i], met ? limb->right[i] : 0);
+    }
+}
+
+static void limb_edges(const outline_lanes *limb, int32_t n, box *restrict body, layers_limb *restrict out)
+{
+    int32_t px[RAST_MAX_VERTICES][BLOCK], py[RAST_MAX_VERTICES][BLOCK];
+    box own = box_empty();
     for (int32_t k = 0; k < n; k++)
         for (int32_t i = 0; i < BLOCK; i++) {
-            px[k][i] = to_cell(x[k][i]);
-            py[k][i] = to_cell(y[k][i]);
-            low[i] = i_min(low[i], rast_row(py[k][i]));
-            high[i] = i_max(high[i], rast_row(py[k][i]));
+            px[k][i] = to_cell(limb->x[k][i]);
+            py[k][i] = to_cell(limb->y[k][i]);
+            /* a column more on either side, because edges are rounded */
+            own.left[i] = i_min(own.left[i], (px[k][i] >> 8) - 1);
+            own.right[i] = i_max(own.right[i], (px[k][i] >> 8) + 2);
+            own.top[i] = i_min(own.top[i], rast_row(py[k][i]));
+            own.end[i] = i_max(own.end[i], rast_row(py[k][i]));
         }
     for (int32_t k = 0, j = n - 1; k < n; j = k++)
         for (int32_t i = 0; i < BLOCK; i++) {
@@ -35,10 +64,19 @@ static void limb_edges(const float x[][BLOCK], const float y[][BLOCK], int32_t n
             out->first[k][i] = e.first;
             out->rows[k][i] = e.last - e.first;
         }
+    box_join(body, &own, limb->depth, out);
+}
+
+/* Most bodies are no wider than a word; its first column is a multiple of RAST_STEP. */
+static void choose_columns(const box *body, layers_block *restrict out)
+{
     for (int32_t i = 0; i < BLOCK; i++) {
-        int32_t const top = i_max(low[i], 0), end = i_min(high[i], RAST_SIZE);
-        out->top[i] = top < end ? top / LAYERS_ROWS * LAYERS_ROWS : 0;
-        out->end[i] = top < end ? (end + LAYERS_ROWS - 1) / LAYERS_ROWS * LAYERS_ROWS : 0;
+        int32_t const column = i_clamp(body->left[i], 0, 63) / RAST_STEP * RAST_STEP;
+        bool const fits = i_min(body->right[i], RAST_SIZE) - column <= 64;
+        out->first[i] = i_min(body->top[i], body->end[i]);
+        out->last[i] = body->end[i];
+        out->column[i] = fits ? column : 0;
+        out->width[i] = fits ? 64 : RAST_SIZE;
     }
 }
 
@@ -69,23 +107,17 @@ static void depth_order(const outline_lanes *limb, int32_t count, layers_block *
 void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *limbs, int32_t count,
                             layers_block *restrict out)
 {
+    box body = box_empty();
     out->count = count;
     for (int32_t l = 0; l < count; l++) {
         out->vertices[l] = outline_vertices(&limbs[l]);
-        limb_edges(outline->limb[l].x, outline->limb[l].y, out->vertices[l], &out->limb[l]);
+        limb_edges(&outline->limb[l], out->vertices[l], &body, &out->limb[l]);
     }
+    choose_columns(&body, out);
     depth_order(outline->limb, count, out);
 }
 
-/* ---- masks, lanes are rows, or their words where that fills a vector better ---- */
-_Static_assert(RAST_WORDS == 2, "a lane has one word of a row or both");
-#if defined(__AVX2__)
-enum { LANE_WORDS = 1 };
-#else
-enum { LANE_WORDS = 2 };
-#endif
-enum { BAND = LAYERS_ROWS * RAST_WORDS / LANE_WORDS }; /* lanes of a band */
-
+/* ---- masks, lanes are rows ---- */
 typedef struct edge { /* of one body */
     uint32_t at, slope, first, rows;
 } edge;
@@ -103,102 +135,90 @@ static inline void stretch(edge e, int32_t y, int32_t *begin, int32_t *end)
 {
     int32_t const column = rast_column(e.at, e.slope, y);
     bool const crosses = (uint32_t)y - e.first < e.rows;
-    *begin = i_min(*begin, crosses ? column : RAST_SIZE);
-    *end = i_max(*end, crosses ? column : 0);
+    *begin = crosses ? i_min(*begin, column) : *begin;
+    *end = crosses ? i_max(*end, column) : *end;
 }
 
-/* The limb's bits in one word go behind those of `whole`. */
-static inline void cover_word(int32_t word, int32_t begin, int32_t end, uint64_t *restrict whole,
-                              uint64_t *restrict seen)
-{
-    int32_t const base = (word & 1) * 64;
-    uint64_t const mine = rast_bits(i_max(begin - base, 0), i_min(end - base, 64));
-    uint64_t const nearer = whole[word];
-    whole[word] = nearer | mine;
-    seen[word] = mine & ~nearer;
-}
-
-/* The same in the words of lane i. */
-static inline void cover(int32_t i, int32_t begin, int32_t end, uint64_t *restrict whole,
+/* The limb's bits in a word that begins at column `base` go behind those of the body. */
+static inline void cover(int32_t begin, int32_t end, int32_t base, uint64_t *restrict whole,
                          uint64_t *restrict seen)
 {
-    cover_word(i * LANE_WORDS, begin, end, whole, seen);
-    if (LANE_WORDS == 2)
-        cover_word(i * LANE_WORDS + 1, begin, end, whole, seen);
+    uint64_t const mine = rast_bits(i_max(begin - base, 0), i_min(end - base, 64)), nearer = *whole;
+    *whole = nearer | mine;
+    *seen = mine & ~nearer;
 }
 
-/* Rows from `top` on in whole bands, of which the compiler sees that they need no remainder. */
-static void draw_cone(const layers_limb *limb, int32_t lane, int32_t top, int32_t bands,
-                      uint64_t *restrict whole, uint64_t *restrict seen)
+/* Rows [first, last), whole bands, of which the compiler sees that they need no remainder. */
+KERNEL_ROW void draw_cone(const layers_limb *limb, int32_t lane, int32_t base, uint64_t *restrict whole,
+                          uint64_t *restrict seen)
 {
+    int32_t const first = limb->top[lane], last = limb->end[lane];
     edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
     edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
-    KERNEL_LANES
-    for (int32_t i = 0; i < bands * BAND; i++) {
-        int32_t const y = top + (i * LANE_WORDS >> 1);
+    for (int32_t band = first; band < last; band += LAYERS_ROWS)
+        KERNEL_LANES
+    for (int32_t i = 0; i < LAYERS_ROWS; i++) {
         int32_t begin = RAST_SIZE, end = 0;
-        stretch(a, y, &begin, &end);
-        stretch(b, y, &begin, &end);
-        stretch(c, y, &begin, &end);
-        stretch(d, y, &begin, &end);
-        cover(i, begin, end, whole, seen);
+        stretch(a, band + i, &begin, &end);
+        stretch(b, band + i, &begin, &end);
+        stretch(c, band + i, &begin, &end);
+        stretch(d, band + i, &begin, &end);
+        cover(begin, end, base, whole + band + i, seen + band + i);
     }
 }
 
-static void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t top, int32_t bands,
-                           uint64_t *restrict whole, uint64_t *restrict seen)
+KERNEL_ROW void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t base, uint64_t *restrict whole,
+                               uint64_t *restrict seen)
 {
+    int32_t const first = limb->top[lane], last = limb->end[lane];
     edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
     edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
     edge const e = edge_of(limb, 4, lane), f = edge_of(limb, 5, lane);
     edge const g = edge_of(limb, 6, lane), h = edge_of(limb, 7, lane);
-    KERNEL_LANES
-    for (int32_t i = 0; i < bands * BAND; i++) {
-        int32_t const y = top + (i * LANE_WORDS >> 1);
+    for (int32_t band = first; band < last; band += LAYERS_ROWS)
+        KERNEL_LANES
+    for (int32_t i = 0; i < LAYERS_ROWS; i++) {
         int32_t begin = RAST_SIZE, end = 0;
-        stretch(a, y, &begin, &end);
-        stretch(b, y, &begin, &end);
-        stretch(c, y, &begin, &end);
-        stretch(d, y, &begin, &end);
-        stretch(e, y, &begin, &end);
-        stretch(f, y, &begin, &end);
-        stretch(g, y, &begin, &end);
-        stretch(h, y, &begin, &end);
-        cover(i, begin, end, whole, seen);
+        stretch(a, band + i, &begin, &end);
+        stretch(b, band + i, &begin, &end);
+        stretch(c, band + i, &begin, &end);
+        stretch(d, band + i, &begin, &end);
+        stretch(e, band + i, &begin, &end);
+        stretch(f, band + i, &begin, &end);
+        stretch(g, band + i, &begin, &end);
+        stretch(h, band + i, &begin, &end);
+        cover(begin, end, base, whole + band + i, seen + band + i);
     }
 }
 
-static void draw_limb(const layers_limb *limb, int32_t vertices, int32_t lane, rast_mask *whole,
-                      rast_mask *out)
+/* One word of every row. */
+static void draw_word(const layers_block *block, int32_t lane, int32_t word, layers *restrict out)
 {
-    int32_t const top = limb->top[lane], bands = (limb->end[lane] - top) / LAYERS_ROWS;
-    uint64_t *const body = (uint64_t *)whole->row + top * RAST_WORDS;
-    uint64_t *const seen = (uint64_t *)out->row + top * RAST_WORDS;
-    out->first = top;
-    out->last = limb->end[lane];
-    if (vertices == 4)
-        draw_cone(limb, lane, top, bands, body, seen);
-    else
-        draw_ellipsoid(limb, lane, top, bands, body, seen);
+    int32_t const base = out->whole.column + 64 * word;
+    uint64_t *const whole = out->whole.word[word];
+    memset(whole + out->whole.first, 0, (size_t)(out->whole.last - out->whole.first) * sizeof *whole);
+    for (int32_t k = 0; k < block->drawn[lane]; k++) {
+        int32_t const l = block->order[lane][k];
+        if (block->vertices[l] == 4)
+            draw_cone(&block->limb[l], lane, base, whole, out->visible[l].word[word]);
+        else
+            draw_ellipsoid(&block->limb[l], lane, base, whole, out->visible[l].word[word]);
+    }
 }
 
 void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restrict out)
 {
-    rast_mask *const whole = &out->whole;
-    int32_t first = RAST_SIZE, last = 0;
-    for (int32_t l = 0; l < block->count; l++)
-        out->visible[l].first = out->visible[l].last = 0;
-    for (int32_t k = 0; k < block->drawn[lane]; k++) {
-        const layers_limb *const limb = &block->limb[block->order[lane][k]];
-        bool const met = limb->top[lane] < limb->end[lane];
-        first = met ? i_min(first, limb->top[lane]) : first;
-        last = met ? i_max(last, limb->end[lane]) : last;
+    int32_t const column = block->column[lane], width = block->width[lane];
+    out->whole.first = block->first[lane];
+    out->whole.last = block->last[lane];
+    out->whole.column = column;
+    out->whole.width = width;
+    for (int32_t l = 0; l < block->count; l++) {
+        out->visible[l].first = block->limb[l].top[lane];
+        out->visible[l].last = block->limb[l].end[lane];
+        out->visible[l].column = column;
+        out->visible[l].width = width;
     }
-    whole->first = i_min(first, last);
-    whole->last = last;
-    memset(whole->row[whole->first], 0, (size_t)(last - whole->first) * sizeof whole->row[0]);
-    for (int32_t k = 0; k < block->drawn[lane]; k++) {
-        int32_t const l = block->order[lane][k];
-        draw_limb(&block->limb[l], block->vertices[l], lane, whole, &out->visible[l]);
-    }
+    for (int32_t word = 0; 64 * word < width; word++)
+        draw_word(block, lane, word, out);
 }

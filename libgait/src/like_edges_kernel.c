@@ -58,7 +58,7 @@ static inline int32_t inside(float x, float y)
 
 static inline void place(const sides *s, const rast_mask *mask, spots *restrict out)
 {
-    int32_t const first = mask->first, last = mask->last;
+    int32_t const first = mask->first, last = mask->last, column = mask->column, width = mask->width;
     float const mx = s->middle_x, my = s->middle_y;
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++) {
@@ -69,20 +69,20 @@ static inline void place(const sides *s, const rast_mask *mask, spots *restrict 
         /* Neither a point nor beyond all pictures. */
         int32_t const real = (len2 > 1.0f) & (len2 < 1e12f) & inside(x, y) & inside(ix, iy);
         int32_t const u = real ? (int32_t)x : 0, v = real ? (int32_t)y : 0;
-        int32_t const c = real ? (int32_t)ix >> 1 : 0, r = real ? (int32_t)iy >> 1 : 0;
+        int32_t const c = (real ? (int32_t)ix >> 1 : 0) - column, r = real ? (int32_t)iy >> 1 : 0;
         out->cos2[i] = real ? (int32_t)(64.0f * (dy * dy - dx * dx) / len2) : 0;
         out->sin2[i] = real ? (int32_t)(64.0f * (-2.0f * dx * dy) / len2) : 0;
         out->cell[i] = v * VIEW_SIZE + u;
-        out->word[i] = r << 2 | c >> 5;
+        out->word[i] = rast_half(c, r);
         out->bit[i] = c & 31;
-        out->shown[i] = -(real & (r >= first) & (r < last));
+        out->shown[i] = -(real & (c >= 0) & (c < width) & (r >= first) & (r < last));
     }
 }
 
 static inline void hide(const rast_mask *mask, spots *restrict p)
 {
     int32_t bits[LANES];
-    lookup(mask->row, p->word, p->shown, bits);
+    lookup(mask->word, p->word, p->shown, bits);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++)
         p->shown[i] = -((int32_t)((uint32_t)bits[i] >> p->bit[i]) & 1);

@@ -94,17 +94,17 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
 static inline void hide(const rast_mask *mask, spots *restrict p)
 {
     int32_t at[LIKE_FACING], bits[LIKE_FACING];
-    /* A row of the grid has four words of 32 cells of two pixels. */
+    /* A cell of the grid has two pixels. */
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++) {
-        int32_t const y = p->v[i] >> 9;
-        at[i] = y << 2 | p->u[i] >> 14;
-        p->shown[i] &= -((y >= mask->first) & (y < mask->last));
+        int32_t const x = (p->u[i] >> 9) - mask->column, y = p->v[i] >> 9;
+        at[i] = rast_half(x, y);
+        p->shown[i] &= -((x >= 0) & (x < mask->width) & (y >= mask->first) & (y < mask->last));
     }
-    lookup(mask->row, at, p->shown, bits);
+    lookup(mask->word, at, p->shown, bits);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++)
-        p->shown[i] = -((int32_t)((uint32_t)bits[i] >> (p->u[i] >> 9 & 31)) & 1);
+        p->shown[i] = -((int32_t)((uint32_t)bits[i] >> (((p->u[i] >> 9) - mask->column) & 31)) & 1);
 }
 
 /* Bilinear look-up in the surface map, rounded towards 0. */

@@ -9,6 +9,8 @@
 enum {
     RAST_SIZE = 128, /* the grid is RAST_SIZE x RAST_SIZE cells */
     RAST_WORDS = 2,  /* 64-bit words per row of the grid */
+    RAST_STEP = 8,   /* a word can begin at any multiple of this many columns */
+    RAST_STARTS = 64 / RAST_STEP + 1,
     RAST_MAX_VERTICES = 8,
     RAST_LIMIT = 16000, /* coordinates are clamped to +-this many pixels */
     RAST_SUB = 256      /* sub-pixel steps */
@@ -19,9 +21,10 @@ typedef struct rast_spans { /* rows first <= y < last; each covers begin[y - top
     int16_t begin[RAST_SIZE], end[RAST_SIZE];
 } rast_spans;
 
-typedef struct rast_mask { /* bit x of row y; rows outside [first, last) are not written */
-    _Alignas(GAIT_ALIGN) uint64_t row[RAST_SIZE][RAST_WORDS]; /* four rows are one cache line */
-    int32_t first, last;
+typedef struct
+    rast_mask { /* of rows [first, last) and columns from `column` on, a multiple of RAST_STEP; all beyond is empty, and not written */
+    _Alignas(GAIT_ALIGN) uint64_t word[RAST_WORDS][RAST_SIZE]; /* bit 0: column, or column + 64 */
+    int32_t first, last, column, width;                        /* width: 64, or 128 from column 0 on */
 } rast_mask;
 
 typedef struct rast_edge { /* crosses rows first <= y < last at columns rast_column(at, slope, y) */
@@ -77,8 +80,14 @@ void rast_convex(const float *x, const float *y, int32_t n, int32_t top, int32_t
 /* Bits [begin, end) of a word, begin >= 0, end <= 64; begin >= end: none.  No branch: a loop becomes vector code. */
 static inline uint64_t rast_bits(int32_t begin, int32_t end)
 {
-    uint64_t const ones = 0 - (uint64_t)(begin < end);
+    uint64_t const ones = (uint64_t)(int64_t)-(int32_t)(begin < end);
     return (ones >> ((uint32_t)(begin - end) & 63u)) << ((uint32_t)begin & 63u);
+}
+
+/* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y. */
+static inline int32_t rast_half(int32_t x, int32_t y)
+{
+    return (x >> 6 << 8) | (y << 1) | (x >> 5 & 1);
 }
 
 /* Number of set bits, without a table or an ISA extension. */

@@ -3,6 +3,7 @@
 
 #include "features.h"
 #include "rng.h"
+#include "toy_visible.h"
 
 #include "check.h"
 
@@ -46,8 +47,9 @@ static uint64_t word(uint32_t index, uint32_t draw, uint32_t kind)
 static void test_silhouette_count(void)
 {
     static uint64_t fg[FG_PLANES][RAST_SIZE][RAST_WORDS], inside[RAST_SIZE][RAST_WORDS];
+    static uint64_t words[RAST_STARTS][FG_PLANES + 1][RAST_SIZE];
     static rast_mask body;
-    features const f = {.fg = fg, .inside = inside};
+    features f = {.fg = fg, .inside = inside, .words = words};
     for (uint32_t round = 0; round < 400; round++) {
         int32_t const first = (int32_t)(round * 37 % 128),
                       last = first + (int32_t)(round * 11 % 129) % (129 - first);
@@ -55,17 +57,20 @@ static void test_silhouette_count(void)
         for (uint32_t y = 0; y < RAST_SIZE; y++)
             for (uint32_t w = 0; w < RAST_WORDS; w++) {
                 uint32_t const at = y * RAST_WORDS + w;
-                body.row[y][w] = word(at, 10 * round, round % 3);
+                body.word[w][y] = word(at, 10 * round, round % 3);
                 inside[y][w] = word(at, 10 * round + 1, round / 3 % 4);
                 for (uint32_t k = 0; k < FG_PLANES; k++)
                     fg[k][y][w] = word(at, 10 * round + 2 + k, round / 12 % 4);
             }
         body.first = round % 5 ? first : 0;
         body.last = round % 5 ? last : RAST_SIZE;
-        for (int32_t y = body.first; y < body.last; y++)
+        body.width = round % 2 ? 64 : RAST_SIZE;
+        body.column = round % 2 ? (int32_t)(round / 2 % 8 * RAST_STEP) : 0;
+        features_words(&f);
+        for (int32_t y = 0; y < RAST_SIZE; y++)
             for (int32_t x = 0; x < RAST_SIZE; x++) {
                 uint64_t const bit = UINT64_C(1) << (x & 63);
-                if (!(body.row[y][x >> 6] & inside[y][x >> 6] & bit))
+                if (!toy_cell(&body, x, y) || !(inside[y][x >> 6] & bit))
                     continue;
                 cells++;
                 for (int32_t k = 0; k < FG_PLANES; k++)

@@ -22,11 +22,6 @@ static void rectangle(int32_t limb, int32_t lane, float x0, float y0, float x1, 
     outline.limb[limb].depth[lane] = depth;
 }
 
-static bool bit(const rast_mask *m, int32_t x, int32_t y)
-{
-    return y >= m->first && y < m->last && (m->row[y][x >> 6] >> (x & 63) & 1);
-}
-
 static bool covers(const rast_spans *s, int32_t x, int32_t y)
 {
     return y >= s->first && y < s->last && x >= s->begin[y] && x < s->end[y];
@@ -35,8 +30,9 @@ static bool covers(const rast_spans *s, int32_t x, int32_t y)
 static int32_t count(const rast_mask *m)
 {
     int32_t n = 0;
-    for (int32_t y = m->first; y < m->last; y++)
-        n += rast_popcount(m->row[y][0]) + rast_popcount(m->row[y][1]);
+    for (int32_t w = 0; 64 * w < m->width; w++)
+        for (int32_t y = m->first; y < m->last; y++)
+            n += rast_popcount(m->word[w][y]);
     return n;
 }
 
@@ -65,8 +61,8 @@ static void test_cells(void)
     for (int32_t y = 0; y < RAST_SIZE; y++)
         for (int32_t x = 0; x < RAST_SIZE; x++) {
             bool const in = x >= 10 && x < 30 && y >= 20 && y < 50;
-            wrong += bit(&drawn.visible[0], x, y) != in;
-            wrong += bit(&drawn.whole, x, y) != in;
+            wrong += toy_cell(&drawn.visible[0], x, y) != in;
+            wrong += toy_cell(&drawn.whole, x, y) != in;
         }
     CHECK(wrong == 0);
     CHECK(drawn.whole.first <= 20 && drawn.whole.last >= 50);
@@ -82,6 +78,29 @@ static void test_cells(void)
     CHECK(toy_visible(m, 0.0f, 0.0f) && toy_visible(m, 255.9f, 255.9f));
     CHECK(!toy_visible(m, -0.1f, 5.0f) && !toy_visible(m, 5.0f, -0.1f));
     CHECK(!toy_visible(m, 256.0f, 5.0f) && !toy_visible(m, 5.0f, 256.0f));
+}
+
+/* Bodies of any width anywhere across the grid and beyond it, two limbs each. */
+static void test_columns(void)
+{
+    int32_t wrong = 0, narrow = 0, wide = 0;
+    for (int32_t apart = 0; apart < 130; apart += 9)
+        for (int32_t x = -40; x < 140; x++) { /* cells */
+            float const a = 2.0f * (float)x, b = a + 2.0f * (float)apart;
+            rectangle(0, 1, a, 20, a + 20, 60, 2.0f);
+            rectangle(1, 1, b, 100, b + 20, 120, 3.0f);
+            toy_draw(&outline, flat, 2, 1, &drawn);
+            for (int32_t c = 0; c < RAST_SIZE; c++) {
+                wrong += toy_cell(&drawn.visible[0], c, 20) != (c >= x && c < x + 10);
+                wrong += toy_cell(&drawn.visible[1], c, 55) != (c >= x + apart && c < x + apart + 10);
+                wrong += toy_cell(&drawn.whole, c, 55) != (c >= x + apart && c < x + apart + 10);
+            }
+            wrong += drawn.whole.column % RAST_STEP;
+            narrow += drawn.whole.width == 64;
+            wide += drawn.whole.width == RAST_SIZE;
+        }
+    CHECK(wrong == 0);
+    CHECK(narrow > 500 && wide > 500);
 }
 
 /* The nearer one hides the farther one, whatever their indices. */
@@ -103,8 +122,8 @@ static void test_hiding(void)
         toy_draw(&outline, flat, 6, 0, &drawn);
         CHECK(count(&drawn.visible[near]) == 20 * 20);
         CHECK(count(&drawn.visible[far]) == 20 * 40 - 10 * 20);
-        CHECK(bit(&drawn.visible[near], 35, 30) && !bit(&drawn.visible[far], 35, 30));
-        CHECK(bit(&drawn.visible[far], 45, 30) && bit(&drawn.visible[far], 35, 15));
+        CHECK(toy_cell(&drawn.visible[near], 35, 30) && !toy_cell(&drawn.visible[far], 35, 30));
+        CHECK(toy_cell(&drawn.visible[far], 45, 30) && toy_cell(&drawn.visible[far], 35, 15));
         CHECK(count(&drawn.visible[2]) == 0 && count(&drawn.visible[3]) == 0 &&
               count(&drawn.visible[4]) == 0);
         CHECK(count(&drawn.visible[5]) == 10 * 5);
@@ -155,8 +174,8 @@ static void test_walker(void)
                             top < 0 || outline.limb[l].depth[lane] < outline.limb[top].depth[lane] ? l : top;
                     }
                 for (int32_t l = 0; l < m->limbs; l++)
-                    wrong += bit(&drawn.visible[l], x, y) != (l == top);
-                wrong += bit(&drawn.whole, x, y) != (top >= 0);
+                    wrong += toy_cell(&drawn.visible[l], x, y) != (l == top);
+                wrong += toy_cell(&drawn.whole, x, y) != (top >= 0);
                 cells += top >= 0;
                 hidden += covering > 1;
             }
@@ -169,6 +188,7 @@ int main(void)
 {
     test_order();
     test_cells();
+    test_columns();
     test_hiding();
     test_walker();
     return CHECK_DONE();

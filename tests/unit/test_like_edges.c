@@ -103,7 +103,7 @@ static void test_where(void)
     CHECK_NEAR(like_edges.log_likelihood(&b), -0.5, 0.03); /* one of two sides */
     /* Hide a part of the limb: too few of its points are left to judge. */
     for (int32_t row = 0; row < 54; row++)
-        drawn.visible[0].row[row][0] = drawn.visible[0].row[row][1] = 0;
+        drawn.visible[0].word[0][row] = drawn.visible[0].word[1][row] = 0;
     CHECK(like_edges.log_likelihood(&b) == -1.0f);
     CHECK(like_edges.support(&b) == -1.0f);
 }

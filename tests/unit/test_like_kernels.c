@@ -297,10 +297,13 @@ static void test_edges(void)
             v->outline.limb[l].depth[lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
             mask->first = (int32_t)(draw(l, round + 300) % 5 * 16);
             mask->last = mask->first + (int32_t)(draw(l, round + 400) % 5 * 16);
+            mask->width = round % 4 ? 64 : RAST_SIZE;
+            mask->column = round % 4 ? (int32_t)(draw(l, round + 500) % 8 * RAST_STEP) : 0;
             for (uint32_t y = 0; y < RAST_SIZE; y++)
                 for (uint32_t w = 0; w < RAST_WORDS; w++)
-                    mask->row[y][w] = round % 3 ? ~UINT64_C(0)
-                                                : (uint64_t)draw(4 * y + w, l) << 32 | draw(4 * y + w + 2, l);
+                    mask->word[w][y] = round % 3
+                                           ? ~UINT64_C(0)
+                                           : (uint64_t)draw(4 * y + w, l) << 32 | draw(4 * y + w + 2, l);
             for (uint32_t k = 0; k < 8; k++) {
                 v->outline.limb[l].x[k][lane] = corner(round, 16 * l + k);
                 v->outline.limb[l].y[k][lane] = corner(round, 16 * l + 8 + k);

@@ -28,11 +28,16 @@ static void test_counts(void)
 {
     toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
     double const typical = 0.16 * 96.0 * 96.0;
+    uint64_t drawn[RAST_SIZE][RAST_WORDS];
     for (uint32_t round = 0; round < 20; round++) {
         double inside = 0.0, outside = 0.0, under = 0.0;
         int32_t const first = (int32_t)(6 * round), last = i_min(first + 40, RAST_SIZE);
         random_words(8 * round, v->f.inside);
-        random_words(8 * round + 1, body.whole.row); /* rows outside [first, last) hold leftovers */
+        random_words(8 * round + 1, drawn);
+        for (uint32_t y = 0; y < RAST_SIZE; y++) /* rows outside [first, last) hold leftovers */
+            for (int32_t w = 0; w < RAST_WORDS; w++)
+                body.whole.word[w][y] = drawn[y][w];
+        body.whole.width = RAST_SIZE;
         for (uint32_t k = 0; k < FG_PLANES; k++)
             random_words(8 * round + 2 + k, v->f.fg[k]);
         body.whole.first = first;
@@ -47,8 +52,7 @@ static void test_counts(void)
                     p |= bit((const uint64_t (*)[RAST_WORDS])v->f.fg[k], x, y) << k;
                 }
                 bool const see = bit((const uint64_t (*)[RAST_WORDS])v->f.inside, x, y);
-                bool const in =
-                    y >= first && y < last && bit((const uint64_t (*)[RAST_WORDS])body.whole.row, x, y);
+                bool const in = y >= first && y < last && bit((const uint64_t (*)[RAST_WORDS])drawn, x, y);
                 v->f.fg_total += p;
                 inside += see && in ? 1.0 - p / 15.0 : 0.0;
                 under += see && in ? p / 15.0 : 0.0;
@@ -58,6 +62,7 @@ static void test_counts(void)
         like_body b = {.setup = &v->setup, .features = &v->f, .layers = &body};
         double const missed = (double)v->setup.missed_weight,
                      nats = (double)v->setup.weight[1] * missed / typical;
+        features_words(&v->f);
         like_silhouette_look(&b);
         like_parts const parts = like_silhouette_parts(&b);
         CHECK_NEAR(parts.explained, nats * under, 1e-3);

@@ -3,6 +3,13 @@
 #define TOY_VISIBLE_H
 #include "layers.h"
 
+/* Has the mask this cell? */
+static inline bool toy_cell(const rast_mask *m, int32_t x, int32_t y)
+{
+    int32_t const c = x - m->column;
+    return y >= m->first && y < m->last && c >= 0 && c < m->width && (m->word[c >> 6][y] >> (c & 63) & 1);
+}
+
 /* Is the limb visible at this working pixel? */
 static inline bool toy_visible(const rast_mask *mask, float wx, float wy)
 {
@@ -10,6 +17,6 @@ static inline bool toy_visible(const rast_mask *mask, float wx, float wy)
     if (!(wx >= 0.0f && wy >= 0.0f && wx < (float)VIEW_SIZE && wy < (float)VIEW_SIZE))
         return false;
     int32_t const x = (int32_t)wx >> 1, y = (int32_t)wy >> 1;
-    return y >= mask->first && y < mask->last && (mask->row[y][x >> 6] >> (x & 63) & 1);
+    return toy_cell(mask, x, y);
 }
 #endif
