@@ -15,6 +15,14 @@ class LibraryError(UserError):
     """libgait could not be loaded, or the file found is of another version or layout than this package."""
 
 
+LONGEST_QUOTE = 40  # characters of a file that a message quotes
+
+
+def quoted(text: str) -> str:
+    """Quote what a file says in a message: short and printable, whatever the file holds."""
+    return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
+
+
 def unreadable(path: object, error: OSError) -> UserError:
     """Error about a file that the system does not let us read."""
     what = "its permissions" if isinstance(error, PermissionError) else "the name"

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.errors import UserError
+from gait.errors import UserError, quoted
 from gait.files import replacing, text_lines
 
 Array = NDArray[np.float64]
 
 METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: one unit of a file
+NAMED = {"DataRate", "NumMarkers", "Units"}  #: fields that a header must name
 HEAD = 5  # lines of the header; an empty one may follow
 
 
@@ -36,20 +37,30 @@ def read_trc(path: Path) -> tuple[list[str], Array, float]:
         Naming file, line and remedy.
     """
     lines = text_lines(path)
-    try:
-        head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
-        rate, scale, count = float(head["DataRate"]), METRES[head["Units"].lower()], int(head["NumMarkers"])
-        labels = [cell.strip() for cell in lines[3].split("\t")[2:] if cell.strip()]
-        if len(labels) != count or not 0 < rate < np.inf:
-            raise ValueError
-    except (IndexError, KeyError, ValueError):
-        raise UserError(f"{path}: not a .trc header of five lines; export the file again") from None
+    if len(lines) < HEAD or not set(lines[1].split()) >= NAMED:
+        raise UserError(f"{path}: not a .trc header of five lines; export the file again")
+    head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
+    labels = [cell.strip() for cell in lines[3].split("\t")[2:] if cell.strip()]
+    rate, scale, count = *_rate_and_scale(path, head), len(labels)
+    if head.get("NumMarkers") != str(count):
+        promised = quoted(head.get("NumMarkers", ""))
+        raise UserError(f"{path}:4: {count} labels where NumMarkers is {promised}; correct it")
     numbered = [(i, line) for i, line in enumerate(lines[HEAD:], HEAD + 1) if line.strip()]
     rows = [_row(line, 2 + 3 * count, f"{path}:{i}") for i, line in numbered]
     if len(rows) < 3:
-        raise UserError(f"{path}: {len(rows)} frames; a recording of a few seconds is needed")
+        raise UserError(f"{path}: too few frames ({len(rows)}); a recording of a few seconds is needed")
     _require_consistent(path, head, labels, [(i, row[1]) for (i, _), row in zip(numbered, rows, strict=True)])
     return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, rate
+
+
+def _rate_and_scale(path: Path, head: dict[str, str]) -> tuple[float, float]:
+    """Frames per second and metres per unit as the header has them."""
+    rate, units = head.get("DataRate", ""), head.get("Units", "")
+    if not _NUMBER.fullmatch(rate) or not 0 < float(rate) < np.inf:
+        raise UserError(f"{path}:3: DataRate is {quoted(rate)}; write the frames per second")
+    if units.lower() not in METRES:
+        raise UserError(f"{path}:3: Units is {quoted(units)}; write one of {' '.join(METRES)}")
+    return float(rate), METRES[units.lower()]
 
 
 def _require_consistent(
@@ -58,7 +69,7 @@ def _require_consistent(
     """Refuse labels that are not unique, frames that are not all there, and times that fall."""
     twice = next((label for label in labels if labels.count(label) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}:4: label {twice!r} is there twice; rename or remove one")
+        raise UserError(f"{path}:4: label {quoted(twice)} is there twice; rename or remove one")
     promised = head.get("NumFrames", str(len(times)))
     if promised != str(len(times)):
         raise UserError(
@@ -79,7 +90,7 @@ def _row(line: str, width: int, where: str) -> list[float]:
         values = [float(cell) if cell.strip() else float("nan") for cell in cells[:width]]
     except ValueError:
         bad = next(cell for cell in cells if cell.strip() and not _NUMBER.fullmatch(cell.strip()))
-        raise UserError(f"{where}: {bad.strip()!r} is not a number; restore the file") from None
+        raise UserError(f"{where}: {quoted(bad.strip())} is not a number; restore the file") from None
     return values + [float("nan")] * (width - len(values))
 
 

@@ -58,6 +58,10 @@ def test_root_channels_and_stature(tmp_path):
     assert table.root[:, ROOTS.index("root_forward")] == pytest.approx(0.8)
     assert table.root[:, ROOTS.index("root_pitch")] == pytest.approx(np.radians(3))
     assert np.isnan(table.root[:, ROOTS.index("root_sway")]).all()
+    for stature in (0.0, 170.0):
+        extra["stature_m"] = [stature] * 240
+        with pytest.raises(UserError, match="a.csv: stature_m is not from 0.5 to 2.5; write metres"):
+            readers.read(write(tmp_path / "a.csv", extra=extra))
 
 
 def test_empty_cells_and_dropped_rows_are_missing(tmp_path):
@@ -135,7 +139,7 @@ def test_what_a_track_writes_has_its_joints_and_its_angles_but_not_what_was_lost
         (lambda s: s.replace("\n40,", "\n\n\n40,").replace("\n50,", "\n50,,"), "a.csv:54: 27 cells where"),
         (lambda s: s.replace("\n239,2.3900", "\n239,99.0"), r"a.csv:241: 96.6 s after the row before; cut"),
         (lambda s: s.replace("\n50,0.5000", "\n50,"), "a.csv:52: the times do not increase"),
-        (lambda s: "\n".join(s.split("\n")[:3]), "a.csv: 2 frames"),
+        (lambda s: "\n".join(s.split("\n")[:3]), r"a.csv: too few frames \(2\)"),
         (lambda s: s[:-30], r"a.csv:241: \d+ cells where 26 belong"),
         (lambda s: s.replace("\n7,0.0700,", "\n7,0.0700,1e"), "a.csv:9: neck_x_deg: '1e.*' is not a number"),
         (lambda s: "", "a.csv: the file is empty"),

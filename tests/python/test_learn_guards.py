@@ -1,5 +1,7 @@
 """gait learn: what it refuses to write over, what --exclude leaves out, and models of little data."""
 
+import os
+import re
 from pathlib import Path
 
 import gait_generator as g
@@ -85,6 +87,33 @@ def test_hidden_files_skeletons_and_empty_names(walks, tmp_path, capsys):
     for source, words in ((tmp_path, "no motion files"), (walks / "01/01.asf", ".amc"), ("", "no name")):
         assert run("learn", source, "-o", tmp_path / "m.gait") == 1
         assert words in capsys.readouterr().err
+
+
+def test_links_are_followed_once_and_closed_folders_are_named(walks, tmp_path, capsys, monkeypatch):
+    for name in ("a", "closed"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "a/up").symlink_to(tmp_path)
+    for name in ("walks", "again"):
+        (tmp_path / name).symlink_to(walks)
+    (tmp_path / "a/gone.bvh").symlink_to("nowhere")
+    real = os.scandir
+
+    def scandir(path):
+        if str(path).endswith("closed"):
+            raise PermissionError(13, "Permission denied", str(path))
+        return real(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    closed = []
+    found = sources.find([str(tmp_path)], closed=closed.append)
+    assert [path.name for path, _ in found] == ["gone.bvh", "01_01.amc", "02_01.amc"]
+    assert closed == [f"{tmp_path / 'closed'}: Permission denied; check its permissions"]
+    assert run("learn", tmp_path, "-o", tmp_path / "m.gait") == 0
+    assert {"closed: Permission denied; check", "gone.bvh: No such file"} <= set(
+        re.findall(r"/(closed: .* check|gone.bvh: No such file)", capsys.readouterr().err)
+    )
+    assert run("learn", tmp_path / "closed", "-o", tmp_path / "n.gait") == 1
+    assert "closed: Permission denied; check its permissions" in capsys.readouterr().err
 
 
 def test_few_people_leave_a_doubt_about_others():

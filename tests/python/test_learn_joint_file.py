@@ -94,7 +94,7 @@ def test_empty_cells_are_missing(walker, tmp_path):
         (lambda s: s.replace("time", "zeit", 1), "a.csv:1: no column 'time'"),
         (lambda s: s[:-20] + "\n", r"a.csv:401: \d+ cells where"),
         (lambda s: s.rsplit(",", 1)[0] + ",1.2.3\n", r"a.csv:401: r_toe_z: '1.2.3' is not a number"),
-        (lambda s: s.split("\n")[0] + "\n", "a.csv: 0 frames"),
+        (lambda s: s.split("\n")[0] + "\n", r"a.csv: too few frames \(0\)"),
         (lambda s: "", "a.csv: the file is empty"),
     ],
 )
@@ -106,14 +106,31 @@ def test_malformed_csv_is_named(walker, tmp_path, change, words):
 
 
 @pytest.mark.parametrize(
-    "change",
-    [lambda s: s.replace("Units", "Unit"), lambda s: s.replace("\tmm", "\tfurlong"), lambda s: s[:40]],
+    ("change", "words"),
+    [
+        (lambda s: s.replace("Units", "Unit"), "not a .trc header"),
+        (lambda s: s[:40], "not a .trc header"),
+        (lambda s: s.replace("\tmm", "\tfurlong"), "a.trc:3: Units is 'furlong'; write one of m mm cm"),
+    ],
 )
-def test_malformed_trc_is_named(walker, tmp_path, change):
+def test_malformed_trc_is_named(walker, tmp_path, change, words):
     path = write_trc(tmp_path / "a.trc", walker)
     path.write_text(change(path.read_text()))
-    with pytest.raises(UserError, match="not a .trc header"):
+    with pytest.raises(UserError, match=words):
         readers.read(path)
+
+
+@pytest.mark.parametrize("scale", [100, 39.37, 3.28, 0.01])
+def test_positions_in_other_units_are_named(walker, tmp_path, scale):
+    path = write_csv(tmp_path / "a.csv", turned(walker, scale * np.eye(3)))
+    with pytest.raises(UserError, match=r"a.csv: legs of .* m, 0.25 to 1.5 are plausible"):
+        readers.read(path)
+
+
+def test_left_and_right_swapped_are_refused(walker, tmp_path):
+    path = write_csv(tmp_path / "a.csv", turned(walker, np.diag([1.0, -1, 1])))
+    with pytest.raises(UserError, match=r"goes backwards, or left and right are swapped \(ahead -1, "):
+        load(path)
 
 
 def turned(walker, turn):

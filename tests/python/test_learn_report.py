@@ -141,6 +141,20 @@ def test_a_strip_shows_the_walker_plus_and_minus_two_deviations(learned):
     assert (more + less) / 2 == pytest.approx(mean, abs=0.05)
 
 
+def test_names_in_the_map_do_not_lie_over_each_other(learned):
+    rows = np.repeat([0, 1, 2], [100, 1, 100])
+    values = np.ones((len(rows), *learned.cycles.values.shape[1:]))
+    crowded = replace(
+        learned, row_subject=rows, cycles=replace(learned.cycles, values=values, mask=values > 0)
+    )
+    labels = figures_cycle.missing(crowded).axes[0].get_yticklabels()
+    assert [label.get_text() for label in labels] == learned.subjects
+    rows = np.repeat([0, 1, 2], [100, 1, 3])
+    crowded = replace(crowded, row_subject=rows, cycles=replace(crowded.cycles, mask=values[:104] > 0))
+    labels = figures_cycle.missing(crowded).axes[0].get_yticklabels()
+    assert [label.get_text() for label in labels] == [*learned.subjects[:2], ""]
+
+
 def test_a_subject_left_out_is_followed_less_well(learned):
     within, without = figures_subject.errors(learned).axes[0].lines
     assert np.all(np.asarray(without.get_xdata()) > np.asarray(within.get_xdata()))

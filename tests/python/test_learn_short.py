@@ -15,7 +15,7 @@ from gait.learn.body import body
 from gait.learn.reading import Reading
 from gait.learn.sequence import load
 
-FEW = "frames; a recording of a few seconds is needed"
+FEW = "too few frames ({}); a recording of a few seconds is needed"
 LEGS = [f"{s}_{joint}_flexion" for s in "lr" for joint in ("hip", "knee")]
 
 
@@ -65,7 +65,7 @@ def test_a_file_of_few_frames_is_refused_in_one_line(tmp_path, kind, frames, tri
         load(path, Reading(trim=trim))
     line = str(refused.value)
     assert line.startswith(str(path)) and "\n" not in line
-    assert (f"{frames} {FEW}" in line) == (frames < 3)
+    assert (FEW.format(frames) in line) == (frames < 3)
     assert frames < 3 or "it holds no cycle" in line
 
 
@@ -76,7 +76,7 @@ def test_among_good_walks_it_is_left_out(tmp_path, capsys):
     words = ["learn", str(tmp_path), "-o", str(tmp_path / "m.gait"), "--components", "1"]
     assert gait.cli.main(words) == 0
     out, err = capsys.readouterr()
-    assert "2 sequences" in out and f"77_01.amc: 2 {FEW}" in err and err.count("\n") == 1
+    assert "2 sequences" in out and f"77_01.amc: {FEW.format(2)}" in err and err.count("\n") == 1
 
 
 @pytest.mark.parametrize("fps", [10, 12, 15, 25])

@@ -50,6 +50,18 @@ def test_who_always_has_a_foot_on_the_ground_walks(duty):
     assert not refused.accepted and "not running" in refused.reason
 
 
+def test_a_walk_goes_where_the_pelvis_faces():
+    angles = gait()
+    found = period.find(angles, FPS)
+    for degrees, accepted in ((0, True), (30, True), (90, False), (180, False)):
+        yaw = np.radians(degrees) + 0.1 * np.sin(np.arange(len(angles)) / 20)
+        yaw[:50] = np.nan
+        assert verdict.judge(angles, found, None, "walk", yaw).accepted == accepted
+        assert verdict.judge(angles, found, None, "sidestep", yaw).accepted
+    assert "goes backwards" in verdict.judge(angles, found, None, "walk", yaw).reason
+    assert verdict.judge(angles, found, None, "walk", np.full(len(angles), np.nan)).accepted
+
+
 @pytest.mark.parametrize("duty", [0.25, 0.32, 0.37])
 def test_who_flies_runs(duty):
     footing = activity.footing(feet(duty, 0.02), PERIOD)

@@ -210,9 +210,11 @@ def test_a_reader_that_hangs_is_ended(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda s: s.replace("mm", "inch"), "not a .trc header"),
-        (lambda s: s.replace("\tRANK", "\tRANK\t\t\tMORE"), "not a .trc header"),
-        (lambda s: "\n".join(s.split("\n")[:7]), "a.trc: 1 frames"),
+        (lambda s: s.replace("mm", "inch"), "a.trc:3: Units is 'inch'; write one of m mm cm"),
+        (lambda s: s.replace("\tRANK", "\tRANK\t\t\tMORE"), "a.trc:4: 18 labels where NumMarkers is '17'"),
+        (lambda s: s.replace("DataRate\t", "Rate\t", 1), "a.trc: not a .trc header of five lines"),
+        (lambda s: s.replace("\n 120.0", "\n 0", 1), "a.trc:3: DataRate is '0'; write the frames per second"),
+        (lambda s: "\n".join(s.split("\n")[:7]), r"a.trc: too few frames \(1\)"),
         (lambda s: s.replace("\tRANK", "\tLANK"), "a.trc:4: label 'LANK' is there twice"),
         (lambda s: s.replace(" 240\t", " 999\t"), "a.trc:3: NumFrames is 999 but 240 frames are there"),
         (lambda s: s.replace("\n100\t", "\n100\t-"), "a.trc:106: the times do not increase"),

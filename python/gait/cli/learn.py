@@ -207,7 +207,8 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
     """Find and prepare the files; say which were left out; bodies are of people who are in these alone."""
     others: list[Measures] = []
     idle: list[str] = []
-    files = sources.find(args.sources, args.exclude, idle.append)
+    closed: list[str] = []
+    files = sources.find(args.sources, args.exclude, idle.append, closed.append)
     for glob in idle if not args.quiet else ():
         print(f"--exclude {glob}: no file's path ends like this", file=sys.stderr)
     reading = Reading(
@@ -233,8 +234,9 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
                 others=others,
             )
         except sources.NothingLeft as error:
-            _tell(error.refused[1:], args.quiet, "")
+            _tell(closed + error.refused[1:], args.quiet, "")
             raise
+    refused = closed + refused
     _tell(refused, args.quiet, " (see --json or --report)")
     return sequences, refused, others
 

@@ -51,9 +51,10 @@ def text(s: dict[str, Any]) -> str:
     """Lay the figures out in one line."""
     turned = "" if not s["headings"] else f", {s['headings']} headings"
     mixed = "" if s["components"] == 1 else f", {s['components']} Gaussians"
+    several = "s" if s["recordings"] != 1 else ""
     return (
         f"segment prior: {s['segments']} segments of {s['frames']} frames at {s['fps']:g}/s from "
-        f"{s['recordings']} recordings, {len(s['markers'])} markers{turned}{mixed}; "
+        f"{s['recordings']} recording{several}, {len(s['markers'])} markers{turned}{mixed}; "
         f"{s['modes']} modes hold {100 * s['variance_explained']:.1f} % of the variance, "
         f"gamma {s['gamma']:.2f}"
     )

@@ -30,6 +30,7 @@ RADIANS = 4.0  # in a walk some joint turns by more degrees than that, and none 
 LEGS = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]
 LEAST_RANGE = 4.0  # degrees: a range of a radian or so under the name of degrees is less
 LONGEST = 100.0  # statures that the root may be away or move in a cycle
+STATURE = 0.5, 2.5  # metres that people are tall
 LENGTHS = ("root_forward", "root_sway", "root_height")
 
 
@@ -104,6 +105,8 @@ def read(path: Path, fps: float | None = None) -> AngleTable:
     missing = np.full(len(table.values), np.nan)
     angles, root = (np.stack([values.get(n, missing) for n in names], axis=1) for names in (ANGLES, ROOTS))
     stature = table["stature_m"] if "stature_m" in table.names else missing
+    if ((stature < STATURE[0]) | (stature > STATURE[1])).any():
+        raise UserError(f"{path}: stature_m is not from {STATURE[0]:g} to {STATURE[1]:g}; write metres")
     return AngleTable(
         path.stem,
         table.fps,

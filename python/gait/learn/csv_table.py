@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError, unreadable
+from gait.errors import UserError, quoted, unreadable
 from gait.learn.recording import DEGREES, FARTHEST, require_frames
 from gait.skeleton import ANGLES, ROOTS
 
@@ -74,7 +74,7 @@ def read(path: Path, fps: float | None = None) -> Table:
         raise UserError(f"{path}:1: no column 'time'; the header must be frame,time,... (or give --fps)")
     twice = next((name for name in names if name and names.count(name) > 1), None)
     if twice is not None:
-        raise UserError(f"{path}:1: column {twice!r} is there twice; remove one")
+        raise UserError(f"{path}:1: column {quoted(twice)} is there twice; remove one")
     values = np.array([_numbers(row, names, path, line) for line, row in rows])
     require_frames(path, len(values))
     _require_ranges(path, names, values, [line for line, _ in rows])
@@ -158,5 +158,7 @@ def _number(cell: str, name: str, path: Path, line: int) -> float:
     if not np.isinf(value):
         return value
     if name in QUANTITIES or name.endswith(tuple(LIMITS)):
-        raise UserError(f"{path}:{line}: {name}: {cell.strip()!r} is not a number; correct it or empty it")
+        raise UserError(
+            f"{path}:{line}: {name}: {quoted(cell.strip())} is not a number; correct it or empty it"
+        )
     return float("nan")

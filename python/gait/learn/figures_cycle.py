@@ -31,6 +31,7 @@ BINS, FEWEST_BINS = 64, 20  # of the mean curve of what is folded
 IN_BIN = 5  # samples that a bin should have
 SCATTERED = 0.9  # observed share below which samples are dotted
 MOST_TICKS = 20  # subjects named in the map
+LINE = 0.03  # share of the map that a name takes
 
 
 def alignment(learned: Learned) -> Figure:
@@ -157,7 +158,12 @@ def _name_subjects(axes: Axes, learned: Learned) -> None:
     if len(counts) > MOST_TICKS:
         axes.set_ylabel("cycle, by subject")
         return
-    axes.set_yticks(ends - counts / 2, learned.subjects)
+    middles, names = ends - counts / 2, []
+    free = -np.inf
+    for middle, subject in zip(middles / ends[-1], learned.subjects, strict=True):
+        names.append(subject if middle >= free else "")  # names must not lie over each other
+        free = middle + LINE if names[-1] else free
+    axes.set_yticks(middles, names)
     axes.set_ylabel("cycles of the subject")
     for each in axes.figure.axes:
         for end in ends[:-1]:

@@ -181,5 +181,6 @@ def convergence(learned: Learned) -> Figure:
         axes.plot(np.arange(1, len(values) + 1), values, "o-", ms=3, color=BLUE)
         axes.set(xlabel="pass", ylabel=unit)
         axes.set_title(title, fontsize=10)
+        axes.ticklabel_format(axis="y", useOffset=False)
         whole_numbers(axes)
     return figure

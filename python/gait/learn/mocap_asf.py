@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError
+from gait.errors import UserError, quoted
 from gait.files import text_lines
 from gait.learn.recording import (
     DEGREES,
@@ -114,7 +114,9 @@ def _numbers(words: list[str], path: Path, line: int, count: int | None = None) 
     try:
         values = np.array([float(w) for w in words])
     except ValueError:
-        raise UserError(f"{path}:{line}: {' '.join(words)[:40]!r} is not numbers; restore the file") from None
+        raise UserError(
+            f"{path}:{line}: {quoted(' '.join(words))} is not numbers; restore the file"
+        ) from None
     if (count is not None and len(values) != count) or not np.isfinite(values).all():
         raise UserError(
             f"{path}:{line}: {len(values)} numbers where {count} finite ones belong; restore the file"
@@ -147,7 +149,7 @@ def _degrees(path: Path, line: int, words: list[str]) -> bool:
     """Whether the unit of angles is degrees and not radians."""
     unit = words[0].lower() if words else ""
     if not unit.startswith(("deg", "rad")):
-        raise UserError(f"{path}:{line}: angles in {unit!r}; write 'angle deg' or 'angle rad'")
+        raise UserError(f"{path}:{line}: angles in {quoted(unit)}; write 'angle deg' or 'angle rad'")
     return unit.startswith("deg")
 
 
@@ -184,7 +186,9 @@ def _root(lines: list[tuple[int, list[str]]], path: Path, degrees: bool) -> Bone
         elif key == "orientation":
             bone.axis = _turn(words[1:], path, line, degrees)
     if sorted(bone.dof) != ["rx", "ry", "rz", "tx", "ty", "tz"]:
-        raise UserError(f"{path}: the root's order is {' '.join(bone.dof)!r}; it must name TX TY TZ RX RY RZ")
+        raise UserError(
+            f"{path}: the root's order is {quoted(' '.join(bone.dof))}; it must name TX TY TZ RX RY RZ"
+        )
     return bone
 
 
@@ -195,7 +199,7 @@ def _bones(lines: list[tuple[int, list[str]]], path: Path, degrees: bool) -> lis
         if key == "begin":
             bones.append(Bone(""))
         elif not bones:
-            raise UserError(f"{path}:{line}: {key!r} outside begin ... end; restore the file")
+            raise UserError(f"{path}:{line}: {quoted(key)} outside begin ... end; restore the file")
         elif key == "name" and len(words) > 1:
             bones[-1].name = words[1]
         elif key == "direction":
@@ -218,10 +222,10 @@ def _linked(bones: list[Bone], lines: list[tuple[int, list[str]]], path: Path) -
             continue
         for word in words:
             if word not in known:
-                raise UserError(f"{path}:{line}: bone {word!r} is not in :bonedata; restore the file")
+                raise UserError(f"{path}:{line}: bone {quoted(word)} is not in :bonedata; restore the file")
         if words[0] not in order:
             raise UserError(
-                f"{path}:{line}: {words[0]!r} has children before it has a parent; sort :hierarchy"
+                f"{path}:{line}: {quoted(words[0])} has children before it has a parent; sort :hierarchy"
             )
         for word in words[1:]:
             known[word].parent = order.index(words[0])
@@ -247,7 +251,8 @@ def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
             frame += 1
         elif words[0] not in moving:
             raise UserError(
-                f"{path}:{line}: bone {words[0]!r} does not move in the .asf; use the subject's own .asf"
+                f"{path}:{line}: bone {quoted(words[0])} does not move in the .asf; "
+                "use the subject's own .asf"
             )
         elif len(rows[words[0]]) != frame - 1:
             raise UserError(

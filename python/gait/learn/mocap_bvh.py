@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError
+from gait.errors import UserError, quoted
 from gait.files import text_lines
 from gait.learn.recording import (
     DEGREES,
@@ -56,7 +56,9 @@ class _Words:
         if not word:
             raise UserError(f"{self.path}:{self.line}: the file ends too early; fetch it again")
         if expected and word.upper() != expected:
-            raise UserError(f"{self.path}:{self.line}: {word!r} where {expected} belongs; restore the file")
+            raise UserError(
+                f"{self.path}:{self.line}: {quoted(word)} where {expected} belongs; restore the file"
+            )
         return word
 
     def after(self, label: str) -> float:
@@ -65,7 +67,8 @@ class _Words:
         while not text.startswith(f"{label}:"):
             if not f"{label}:".startswith(text):
                 raise UserError(
-                    f"{self.path}:{self.line}: {text!r} where {label.title()!r} belongs; restore the file"
+                    f"{self.path}:{self.line}: {quoted(text)} where {label.title()!r} belongs; "
+                    "restore the file"
                 )
             text += self.next().upper()
         return self.number(text.removeprefix(f"{label}:"))
@@ -77,7 +80,9 @@ class _Words:
         except ValueError:
             value = float("nan")
         if not np.isfinite(value):
-            raise UserError(f"{self.path}:{self.line}: {word!r} where a number belongs; restore the file")
+            raise UserError(
+                f"{self.path}:{self.line}: {quoted(word)} where a number belongs; restore the file"
+            )
         return value
 
 
@@ -134,7 +139,7 @@ def _hierarchy(words: _Words) -> list[Joint]:
             site = False
         else:
             raise UserError(
-                f"{words.path}:{words.line}: {word!r} is not known in a hierarchy; restore the file"
+                f"{words.path}:{words.line}: {quoted(word)} is not known in a hierarchy; restore the file"
             )
     return joints
 
@@ -144,7 +149,9 @@ def _channels(words: _Words) -> list[str]:
     names = [words.next() for _ in range(int(words.number()))]
     for name in names:
         if name[0].upper() not in AXES or name[1:].lower() not in ("position", "rotation"):
-            raise UserError(f"{words.path}:{words.line}: channel {name!r} is not known; restore the file")
+            raise UserError(
+                f"{words.path}:{words.line}: channel {quoted(name)} is not known; restore the file"
+            )
     return [name[0].upper() + name[1:].lower() for name in names]
 
 

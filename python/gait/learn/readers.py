@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from gait.errors import UserError
 from gait.learn import angle_file, c3d_file, joint_file, marker_body, mocap_asf, mocap_bvh, root
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body, body
 from gait.learn.reading import DEFAULT, Reading
 from gait.learn.recording import FARTHEST, Y_UP, require_frames, require_range
+from gait.skeleton import SIDES
 from gait.trc import read_trc
 
 RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
+LEG = 0.25, 1.5  #: metres from hip over knee to ankle, from small children to more than the tallest man
 #: Suffixes that are learnt from.
 KINDS = (*RECORDINGS, ".c3d", ".trc", ".csv")
 
@@ -33,7 +38,28 @@ def read(path: Path, reading: Reading = DEFAULT) -> Body | AngleTable:
         walker = joint_file.read_csv(path, reading.fps)
     else:
         walker = _points(path, reading)
+    _require_size(path, walker)
     return root.overground(walker)
+
+
+def _require_size(path: Path, walker: Body) -> None:
+    """Refuse a body that is no human's, which positions in other units than metres make.
+
+    Raises
+    ------
+    UserError
+    """
+    hip, knee, ankle = (
+        np.stack([walker.joints[f"{s}_{joint}"] for s in SIDES]) for joint in ("hip", "knee", "ankle")
+    )
+    legs = np.linalg.norm(hip - knee, axis=2) + np.linalg.norm(knee - ankle, axis=2)
+    if not np.isfinite(legs).any():  # what is not seen is judged by what comes after
+        return
+    leg, (least, most) = float(np.nanmedian(legs)), LEG
+    if not least <= leg <= most:
+        raise UserError(
+            f"{path}: legs of {leg:.3g} m, {least:g} to {most:g} are plausible; correct the file's units"
+        )
 
 
 def _points(path: Path, reading: Reading) -> Body:

@@ -30,7 +30,7 @@ def require_frames(path: Path, frames: int) -> None:
     UserError
     """
     if frames < FEWEST:
-        raise UserError(f"{path}: {frames} frames; a recording of a few seconds is needed")
+        raise UserError(f"{path}: too few frames ({frames}); a recording of a few seconds is needed")
 
 
 def require_range(path: Path, what: str, values: Floats, limit: float, unit: str) -> None:

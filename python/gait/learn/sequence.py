@@ -18,6 +18,7 @@ from gait.skeleton import ANGLES, ROOTS, SIDES
 
 Floats = npt.NDArray[np.float64]
 
+YAW = ROOTS.index("root_yaw")
 PHASES = 64  # at which it is counted how much of a cycle is seen
 
 
@@ -208,7 +209,7 @@ def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.
         moving = motion.root
         feet = activity.of_channels(np.concatenate([motion.angles, moving], axis=1))
     footing = activity.footing(feet, found.frames) if feet is not None else None
-    judged = verdict.judge(motion.angles, found, footing, wanted)
+    judged = verdict.judge(motion.angles, found, footing, wanted, moving[:, YAW])
     return judged, np.concatenate([motion.angles, moving], axis=1), heading
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 from gait.learn import cluster, pool, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import DEFAULT, Reading
@@ -34,6 +35,7 @@ def find(
     sources: Iterable[str],
     exclude: Iterable[str] = (),
     idle: Callable[[str], None] = lambda glob: None,
+    closed: Callable[[str], None] = lambda words: None,
 ) -> list[tuple[Path, bool]]:
     """Motion files of files and folders, sorted; whether each was found in a folder.
 
@@ -44,6 +46,8 @@ def find(
         without wildcards, such as 'cmu_walk/02', for all that is inside.
     idle : callable
         Gets each glob that no file matches.
+    closed : callable
+        Gets a line about each folder in a source that cannot be read.
 
     Raises
     ------
@@ -56,7 +60,7 @@ def find(
         if not name:
             raise UserError("'': is no name of a file or folder; use . for this folder")
         if source.is_dir():
-            inside = sorted(_inside(source))
+            inside = sorted(_inside(source, closed))
             if not inside:
                 raise UserError(f"{source}: no motion files ({_kinds()}) in this folder; name another one")
             found.update((path, True) for path in inside if path not in found)
@@ -80,12 +84,23 @@ def find(
     return kept
 
 
-def _inside(folder: Path) -> Iterator[Path]:
-    """Motion files of a folder and those in it, but for hidden ones."""
-    for path in folder.rglob("*"):
-        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
-        if not hidden and path.suffix.lower() in KINDS and path.is_file():
-            yield path
+def _inside(folder: Path, closed: Callable[[str], None]) -> Iterator[Path]:
+    """Motion files of a folder and those in it, but for hidden ones; links are followed, each folder once."""
+    entered = {os.path.realpath(folder)}
+
+    def tell(error: OSError) -> None:
+        if Path(error.filename) == folder:
+            raise unreadable(folder, error)
+        closed(str(unreadable(error.filename, error)))
+
+    for at, folders, files in os.walk(folder, onerror=tell, followlinks=True):
+        shown = sorted((name for name in folders if name[0] != "."), reverse=True)
+        new = {os.path.realpath(Path(at, name)): name for name in shown}  # of several names the first
+        folders[:] = [name for real, name in new.items() if real not in entered]
+        entered |= set(new)
+        for path in (Path(at, name) for name in files if name[0] != "."):
+            if path.suffix.lower() in KINDS and (path.is_file() or path.is_symlink()):
+                yield path
 
 
 def _matches(path: Path, glob: str) -> bool:

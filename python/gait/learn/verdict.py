@@ -18,6 +18,7 @@ REPEATS = 0.75  # the walks of CMU reach 0.88 to 0.99; punching 0.69, dances and
 LEGS = 0.7  # legs within an eighth of a cycle of taking turns; the walks of CMU: 0.96 and more
 LIFT = 0.02  # statures
 STEPS = 0.03  # statures
+AHEAD = 0.5  # the walks of CMU: 0.98 and more, with left and right swapped -0.98 and less
 SWING = ("hip_flexion", "knee_flexion")
 
 
@@ -77,7 +78,9 @@ class Verdict:
         return "; ".join(str(e) for e in self.evidence if not e.accepted)
 
 
-def judge(angles: Floats, found: Period, feet: Footing | None, wanted: str) -> Verdict:
+def judge(
+    angles: Floats, found: Period, feet: Footing | None, wanted: str, yaw: Floats | None = None
+) -> Verdict:
     """Judge the steady part of a recording.
 
     Parameters
@@ -89,6 +92,8 @@ def judge(angles: Floats, found: Period, feet: Footing | None, wanted: str) -> V
         None if the feet were not seen.
     wanted : str
         The activity that is learnt; other names than those of walking and running only ask for cycles.
+    yaw : (T,), optional
+        Of the pelvis from the direction in which it goes, radians; NaN where missing.
     """
     kind = NAMES.get(wanted.lower(), "")
     evidence = list(_cyclic(angles, found))
@@ -102,6 +107,9 @@ def judge(angles: Floats, found: Period, feet: Footing | None, wanted: str) -> V
         known = ("run" if feet.running else "walk") if legged else ""
         if kind:
             evidence += _footing(feet, kind)
+    if kind and yaw is not None and np.isfinite(yaw).any():
+        words = "it goes backwards, or left and right are swapped"
+        evidence.append(Evidence("ahead", float(np.nanmean(np.cos(yaw))), AHEAD, words=words))
     return Verdict(known, tuple(evidence))
 
 
