@@ -43,21 +43,44 @@ static double along_modes(const lift_table *t, const double *row, const double *
     return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
 }
 
+typedef struct marker { /* linear about theta, statures */
+    double base[3];     /* with no modes and no growth */
+    double shape[3];    /* what grows with the stature */
+    double grown;       /* factor of the modes */
+} marker;
+
+/* Marker j, and in x where theta has it.  In a parallel view the mean alone grows: all is linear. */
+static void find_marker(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j, marker *r,
+                        double x[3])
+{
+    bool const whole = t->eye.perspective;
+    double const growth = t->size < 0 ? 0.0 : t->growth * b->theta[t->size];
+    marker_shape(t, b, m, j, r->base);
+    r->grown = whole ? 1.0 + growth : 1.0;
+    for (int32_t i = 0; i < 3; i++) {
+        double const moved = along_modes(t, t->shape + i * t->lanes, b->theta);
+        r->shape[i] = whole ? r->base[i] + moved : r->base[i];
+        x[i] = r->base[i] + moved + growth * r->shape[i];
+        r->base[i] -= (r->grown - 1.0) * moved;
+    }
+}
+
 /* The white row g . X = y of a marker as a row of the unknowns, with y last. */
-static void put_row(const lift_table *t, const lift_belief *b, const lift_axes *f, const double mean[3],
+static void put_row(const lift_table *t, const lift_belief *b, const lift_axes *f, const marker *m,
                     const double spin[2], const double g[3], double y, double *w)
 {
     int32_t const k = t->prior.modes, lanes = t->lanes;
     const double q[3] = {f->c * g[0] + f->s * g[1], f->c * g[1] - f->s * g[0], f->z * g[2]};
     double base[3];
-    lift_to_world(f, mean, base);
+    lift_to_world(f, m->base, base);
     for (int32_t i = 0; i < lanes; i++) /* the lanes past k are written again below */
-        w[i] = (q[0] * t->shape[i] + q[1] * t->shape[lanes + i]) + q[2] * t->shape[2 * lanes + i];
+        w[i] =
+            m->grown * ((q[0] * t->shape[i] + q[1] * t->shape[lanes + i]) + q[2] * t->shape[2 * lanes + i]);
     for (int32_t i = 0; i < 3; i++)
         w[k + i] = g[i] * t->cfg.place_sd[i];
     double rest = y - ((g[0] * base[0] + g[1] * base[1]) + g[2] * base[2]);
     if (t->size >= 0)
-        w[t->size] = t->growth * ((q[0] * mean[0] + q[1] * mean[1]) + q[2] * mean[2]);
+        w[t->size] = t->growth * ((q[0] * m->shape[0] + q[1] * m->shape[1]) + q[2] * m->shape[2]);
     if (t->turn >= 0) {
         double const turn = g[0] * spin[0] + g[1] * spin[1];
         w[t->turn] = b->turn_sd * turn;
@@ -73,7 +96,7 @@ typedef struct adding { /* what is the same for all markers of a frame */
 
 /* Two white rows of marker j. */
 static void add_marker(const lift_table *t, lift_belief *b, const adding *a, const double *ideal, double sd,
-                       int32_t j, const double mean[3], const double *about, double *w)
+                       int32_t j, const marker *m, const double *about, double *w)
 {
     eye_rows r;
     double spin[2] = {-(about[1] - a->now.place[1]), about[0] - a->now.place[0]};
@@ -87,7 +110,7 @@ static void add_marker(const lift_table *t, lift_belief *b, const adding *a, con
     for (int32_t i = 0; i < 2; i++) {
         double const miss = r.y[i] - ((r.g[i][0] * about[0] + r.g[i][1] * about[1]) + r.g[i][2] * about[2]);
         b->miss += miss * miss;
-        put_row(t, b, &a->prior, mean, spin, r.g[i], r.y[i], w + (size_t)i * (size_t)t->ld);
+        put_row(t, b, &a->prior, m, spin, r.g[i], r.y[i], w + (size_t)i * (size_t)t->ld);
     }
 }
 
@@ -96,19 +119,17 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
 {
     lift_moment const m = lift_find_moment(t, at);
     adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
-    double const grown = t->size < 0 ? 1.0 : 1.0 + t->growth * b->theta[t->size];
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
-        double mean[3], x[3], own[3];
+        marker r;
+        double x[3], own[3];
         if (!lift_seen_at(seen, j))
             continue;
-        marker_shape(t, b, &m, j, mean);
-        for (int32_t i = 0; i < 3; i++)
-            x[i] = grown * mean[i] + along_modes(t, t->shape + i * t->lanes, b->theta);
+        find_marker(t, b, &m, j, &r, x);
         lift_to_world(&a.now, x, own);
         if (said)
             memcpy(said + 3 * j, own, sizeof own);
-        add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, mean, guess ? guess + 3 * j : own,
+        add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, &r, guess ? guess + 3 * j : own,
                    t->W + (size_t)rows * (size_t)t->ld);
         rows += 2;
     }

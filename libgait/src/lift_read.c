@@ -24,23 +24,30 @@ static void read_row(const lift_table *t, const lift_belief *b, const lift_query
     }
 }
 
-/* Rows of t->Z that are modes and stature, and the mean of the markers by them. */
+/* Mean of the markers by modes and stature, and the rows of t->Z that are these. */
 static void read_shape(const lift_table *t, const lift_belief *b, const lift_query *q, const lift_axes *axes,
                        double *mean)
 {
     double *const size = t->size < 0 ? NULL : t->Z + (size_t)t->size * (size_t)t->width;
     double const growth = size ? t->growth * b->theta[t->size] : 0.0;
+    double const scale = t->eye.perspective ? 1.0 + growth : 1.0;
+    int32_t const count = 3 * q->count;
     read_row(t, b, q, axes, -1, mean);
-    for (int32_t x = 0; x < 3 * q->count; x++) {
-        if (size)
+    if (size)
+        for (int32_t x = 0; x < count; x++)
             size[x] = t->growth * mean[x];
-        mean[x] += growth * mean[x] + axes->place[x % 3];
-    }
     for (int32_t i = 0; i < t->prior.modes; i++) {
         double *const row = t->Z + (size_t)i * (size_t)t->width;
         read_row(t, b, q, axes, i, row);
-        for (int32_t x = 0; x < 3 * q->count; x++)
+        for (int32_t x = 0; x < count; x++) {
             mean[x] += b->theta[i] * row[x];
+            row[x] *= scale;
+        }
+    }
+    for (int32_t x = 0; x < count; x++) {
+        if (size && t->eye.perspective)
+            size[x] = t->growth * mean[x];
+        mean[x] += axes->place[x % 3] + (size ? b->theta[t->size] * size[x] : 0.0);
     }
 }
 

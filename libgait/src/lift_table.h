@@ -2,7 +2,9 @@
  * body.
  *
  * Unknowns theta ~ N(0, 1): k modes, place x y z in their deviations, and, unless they are known, stature and
- * heading in theirs.  A stature off by a share s moves every marker of the mean by s. */
+ * heading in theirs.  A stature off by a share s moves every marker by s of its place in the body: where it is
+ * by the modes too, so that a small body near the lens pays as much for them as a large one far away; by the mean
+ * in a parallel view, which has no such choice and stays linear. */
 #ifndef GAIT_LIFT_TABLE_H
 #define GAIT_LIFT_TABLE_H
 #include "arena.h"
