@@ -41,6 +41,7 @@ CAMERAS = ("cam_03", "cam_04")  # those that match their calibration
 BALANCING_NOISE = 5.0
 BEAM = 0.3  # metres, of the height at which he stands
 Y_UP = [2, 0, 1]  # axes of the .trc to x, y, z of the calibration
+WITHIN = 1.645  # deviations that hold 90 %
 HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 
 
@@ -95,7 +96,7 @@ def _view(camera: Camera | None, tracks: Tracks) -> View:
     return Parallel(looking_along("y"), None, np.nanmean(tracks.uv, axis=(0, 1)), steady=False)
 
 
-def _lift(
+def lifted(
     prior: SegmentPrior,
     tracks: Tracks,
     camera: Camera | None,
@@ -103,6 +104,7 @@ def _lift(
     method: str = "smooth",
     floor_sd: float = 0.03,
 ) -> result.Motion:
+    """Lift tracks by a camera, or without one."""
     options = result.Options(method=method, pixel_sd=noise, floor_sd=floor_sd)
     return motion.lift(prior, tracks, _view(camera, tracks), options, motion.output_names(prior, tracks))
 
@@ -125,8 +127,8 @@ def _clips() -> list[list[object]]:
             prior = SegmentPrior.load(paths[str(clip.subject)])
             joints, camera = read_truth(str(clip.truth)), Camera.read(str(clip.camera))
             tracks, truth = tracked(joints, camera, NOISE, GAPS), joints.eval15()
-            found = _lift(prior, tracks, camera, NOISE)
-            blend = _lift(prior, tracks, camera, NOISE, "blend")
+            found = lifted(prior, tracks, camera, NOISE)
+            blend = lifted(prior, tracks, camera, NOISE, "blend")
             order = [found.names.index(name) for name in EVAL15]
             error = root_error(found.places[:, order], truth, HIPS)
             share, rooted_share = _coverage(found, truth, order)
@@ -145,7 +147,7 @@ def _clips() -> list[list[object]]:
         "root-aligned median mm over 15 joints. blend: overlapping segments mixed as in the paper. "
         "no camera: only the tracks; the view is taken to be level and far away (above is not). "
         "mean pose: at the true heading. "
-        "Coverage of the 90 % intervals: of places in the world, and about the hips. "
+        "Coverage of the 90 % intervals: of places in the world (lift_people judges it), and about the hips. "
         f"Wanted: below {TARGET:g} mm with the camera."
     )
     head = [
@@ -166,7 +168,7 @@ def _clips() -> list[list[object]]:
 def _blind(prior: SegmentPrior, tracks: Tracks, camera: Camera, truth: Floats) -> float:
     """Error of the tracks alone; NaN if there is no estimate."""
     try:
-        found = _lift(prior, tracks, None, NOISE)
+        found = lifted(prior, tracks, None, NOISE)
     except UserError:
         return float("nan")
     order = [found.names.index(name) for name in EVAL15]
@@ -177,8 +179,8 @@ def _coverage(found: result.Motion, truth: Floats, order: list[int]) -> tuple[fl
     """Shares of coordinates in their 90 % intervals: in the world, and about the hips."""
     places, sd = found.places[:, order], found.sd[:, order]
     hips = [order.index(found.names.index(name)) for name in ("l_hip", "r_hip")]
-    inside = np.abs(places - truth) < 1.645 * sd
-    about = np.abs(rooted(places, hips) - rooted(truth, hips)) < 1.645 * found.rooted_sd[:, order]
+    inside = np.abs(places - truth) < WITHIN * sd
+    about = np.abs(rooted(places, hips) - rooted(truth, hips)) < WITHIN * found.rooted_sd[:, order]
     return float(inside.mean()), float(about.mean())
 
 
@@ -213,8 +215,8 @@ def _balancing() -> None:
                 tracks = tracked(joints, camera, BALANCING_NOISE, 0.0)
                 truth = np.stack([joints.places[n] for n in tracks.names], axis=1)
                 hips = [tracks.names.index(n) for n in ("l_hip", "r_hip")]
-                smooth = _lift(prior, tracks, camera, BALANCING_NOISE, floor_sd=BEAM)
-                blend = _lift(prior, tracks, camera, BALANCING_NOISE, "blend")
+                smooth = lifted(prior, tracks, camera, BALANCING_NOISE, floor_sd=BEAM)
+                blend = lifted(prior, tracks, camera, BALANCING_NOISE, "blend")
                 order = [blend.names.index(n) for n in tracks.names]
                 apart = np.linalg.norm(smooth.places[:, order] - truth, axis=2).mean(axis=1)
                 rows.append(

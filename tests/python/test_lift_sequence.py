@@ -37,7 +37,8 @@ def around(prior, blocks=BLOCKS):
     """The mean motion, standing at the origin."""
     half = FRAMES // 2
     places = np.concatenate([1.7 * prior.mean[0], *[1.7 * prior.mean[0, half:]] * (blocks - 2)])
-    return Around(np.zeros(blocks - 1), np.zeros(blocks - 1, int), 1.7, overlapping(places, half))
+    segments = overlapping(places, half)
+    return Around(np.zeros(blocks - 1), np.zeros(blocks - 1, int), 1.7, segments, segments)
 
 
 def dense(diagonal, below):

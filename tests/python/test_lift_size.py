@@ -64,7 +64,8 @@ def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, 
     with monkeypatch.context() as near:  # draws that stay in the picture
         near.setattr(chains, "GROUND_SD", 0.5)
         near.setattr(chains, "HEADING_SD", 0.02)
-        around = Around(headings, components, STATURE, overlapping(mean, half))
+        shapes = overlapping(mean, half)
+        around = Around(headings, components, STATURE, shapes, shapes)
         motions = [drawn(prior, around, np.random.default_rng(seed)) for seed in range(4)]
     camera = Camera.looking(VIEWS[view], (0, 0, 0.9), (640, 480), 900)
     markers, ahead = prior.index(EVAL15), camera.R[2]

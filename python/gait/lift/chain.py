@@ -65,12 +65,16 @@ class Around:
         Metres.
     places : (S, 2 b, J, 3)
         Markers in the world, metres.
+    grown : (S, 2 b, J, 3)
+        What grows with the stature: the same by all modes.  If some did not grow, a small body near the lens
+        would pay less for them, and everybody was drawn to it.
     """
 
     heading: Floats
     component: npt.NDArray[np.intp]
     stature: float
     places: Floats
+    grown: Floats
 
 
 @dataclass(frozen=True)
@@ -134,21 +138,22 @@ def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
 def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
     """Linearise around new places (grid, J, 3): headings, stature and shapes that they say under the prior.
 
-    The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
+    The shapes hold the leading modes only (what grows with the stature holds all).  What else an estimate fits goes with the noise that it is fitted
     to: derivatives taken there are correlated with the residuals, and draw the body to the lens, where the
     same residuals in the picture are fewer metres (errors in variables; by the share of fitted numbers).  All
     segments and all views are linearised around the same shapes, so that a change of size about the lens
     costs nothing by itself.
     """
-    headings, shapes = [], []
+    headings, shapes, grown = [], [], []
     half = around.places.shape[1] // 2
     for s, place in enumerate(overlapping(places, half)):
-        turn, shape = Segment(prior, around, freedom, s).explained(place.ravel(), lasting)
+        turn, shape, full = Segment(prior, around, freedom, s).explained(place.ravel(), lasting)
+        grown.append(full.reshape(place.shape))
         headings.append(around.heading[s] + turn)
         shapes.append(shape.reshape(place.shape))
     common = overlapping(blended(np.stack(shapes), half), half)
     stature = freedom.stature + freedom.stature_sd * float(lasting[0])
-    return Around(np.array(headings), around.component, stature, common)
+    return Around(np.array(headings), around.component, stature, common, np.stack(grown))
 
 
 def overlapping(values: Floats, half: int) -> Floats:
@@ -187,7 +192,7 @@ class Segment:
         shape = place - _over_ground(place)
         own = stature * prior.mean[component] @ turn.T
         middle = _over_ground(place) - _over_ground(own)
-        growth = shape / stature
+        growth = (around.grown[s] - _over_ground(around.grown[s])) / stature
         self.mean = (own + middle + (freedom.stature - stature) * growth).ravel()
         outside = stature**2 * prior.gamma * prior.residual[component]
         self.variance = np.broadcast_to(((1 - LASTING) * outside)[None, :, None], place.shape).ravel()
@@ -233,14 +238,16 @@ class Segment:
         """Logarithm of the determinant of the information, given what lasts."""
         return -float(np.log(self.variance).sum() + 2 * np.log(np.diag(self._lower)).sum())
 
-    def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats]:
-        """Turn in radians that places say, and their shape by the leading modes, given what lasts."""
+    def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats, Floats]:
+        """Turn in radians that places say, their shape by the leading modes and by all, given what lasts."""
         rest = places - self.mean - lasting @ self.lasting
         values = linalg.cho_solve((self._lower, True), self._scaled @ rest, check_finite=False)
         turn = HEADING_SD * values[self.rigid + 2]
-        values[LEADING : self.rigid] = values[self.rigid + 3 :] = 0
-        shape = self.mean + lasting[:WHOLE] @ self.lasting[:WHOLE] + values @ self.loads
-        return float(turn), shape
+        values[self.rigid + 3 :] = 0
+        middle = self.mean + lasting[:WHOLE] @ self.lasting[:WHOLE]
+        whole = middle + values @ self.loads
+        values[LEADING : self.rigid] = 0
+        return float(turn), middle + values @ self.loads, whole
 
 
 def _each_marker(sd: Floats, shape: tuple[int, ...]) -> Floats:

@@ -193,7 +193,8 @@ class _Problem:
 
     def around(self, heading: Floats, component: Ints, stature: float, places: Floats) -> Around:
         """Say what the chain is linearised around."""
-        return Around(heading, component, stature, overlapping(places, self.grid.frames))
+        around = overlapping(places, self.grid.frames)
+        return Around(heading, component, stature, around, around)
 
     def doubt(self, state: _State) -> None:
         """Leave points that are far from an estimate less to say (`gait.lift.doubt`)."""
