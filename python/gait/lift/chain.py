@@ -138,11 +138,11 @@ def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
 def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
     """Linearise around new places (grid, J, 3): headings, stature and shapes that they say under the prior.
 
-    The shapes hold the leading modes only (what grows with the stature holds all).  What else an estimate fits goes with the noise that it is fitted
+    The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
     to: derivatives taken there are correlated with the residuals, and draw the body to the lens, where the
     same residuals in the picture are fewer metres (errors in variables; by the share of fitted numbers).  All
     segments and all views are linearised around the same shapes, so that a change of size about the lens
-    costs nothing by itself.
+    costs nothing by itself.  What grows with the stature holds all modes (`Around`).
     """
     headings, shapes, grown = [], [], []
     half = around.places.shape[1] // 2
