@@ -219,6 +219,16 @@ def test_malformed_amc_is_named_with_its_line(amc, change, line, words):
         (lambda s: s.replace("lfemur ltibia", "lfemur ltibbia"), r":\d+: bone 'ltibbia' is not in"),
         (lambda s: s.replace("TX TY TZ", "TX TY"), "order"),
         (lambda s: s.replace("direction 1 0 0", "direction 1 0", 1), r":\d+: .* numbers where 3"),
+        (lambda s: s.replace("20 XYZ", "20 XYW", 1), r":\d+: 'xyw' is no order of X, Y and Z"),
+        (lambda s: s.replace("20 XYZ", "20 XYY", 1), r":\d+: 'xyy' is no order of X, Y and Z"),
+        (lambda s: s.replace("length 0.45", "length 0"), r":3: a unit of length of 0"),
+        (lambda s: s.replace("dof rx ry", "dof rx rw", 1), r":\d+: 'rx rw rz' are no degrees of freedom"),
+        (lambda s: s.replace("dof rx ry", "dof rx rx", 1), r":\d+: 'rx rx rz' are no degrees of freedom"),
+        (lambda s: s.replace("    length 7.4\n", "", 1), ": bone 'lfemur' has no length"),
+        (
+            lambda s: s.replace("lfemur ltibia", "lfemur ltibia lhipjoint"),
+            r":\d+: 'lhipjoint' has two parents",
+        ),
     ],
 )
 def test_malformed_asf_is_named(amc, change, words):

@@ -156,5 +156,6 @@ def _left_sign(joint: str, s: str, joints: dict[str, Floats], axis: Floats) -> f
     """Sign that makes the axis point left: the knee bends back and the elbow forward on average."""
     ends = ("hip", "knee", "ankle") if joint == "knee" else ("shoulder", "elbow", "wrist")
     a, b, c = (joints[f"{s}_{end}"] for end in ends)
-    bend = np.nanmean(np.einsum("ti,ti->t", np.cross(unit(b - a), unit(c - b)), axis))
+    bends = np.einsum("ti,ti->t", np.cross(unit(b - a), unit(c - b)), axis)
+    bend = bends[np.isfinite(bends)].sum()
     return float(np.copysign(1.0, bend if joint == "knee" else -bend))

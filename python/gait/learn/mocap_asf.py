@@ -28,6 +28,7 @@ Floats = npt.NDArray[np.float64]
 INCH = 0.0254
 FPS = 120.0  # of the CMU database, whose files do not say
 AXES = "xyz"
+DOF = {"rx", "ry", "rz", "tx", "ty", "tz", "l"}
 
 
 @dataclass
@@ -36,7 +37,7 @@ class Bone:
 
     name: str
     direction: Floats = field(default_factory=lambda: np.zeros(3))
-    length: float = 0.0
+    length: float = np.nan  # of the root 0
     axis: Floats = field(default_factory=lambda: np.eye(3))
     dof: list[str] = field(default_factory=list)
     parent: int = -1
@@ -141,6 +142,8 @@ def read_skeleton(path: Path) -> Skeleton:
     degrees = _degrees(path, *units.get("angle", (0, ["deg"])))
     length = units.get("length", (0, ["1"]))
     scale = float(_numbers(length[1][:1], path, length[0], 1)[0])
+    if scale <= 0:
+        raise UserError(f"{path}:{length[0]}: a unit of length of {scale:g}; correct it")
     bones = [_root(sections[":root"], path, degrees)] + _bones(sections[":bonedata"], path, degrees)
     return Skeleton(_linked(bones, sections[":hierarchy"], path), INCH / scale, degrees)
 
@@ -172,13 +175,16 @@ def _declared(path: Path) -> tuple[bool | None, float | None]:
 def _turn(words: list[str], path: Path, line: int, degrees: bool) -> Floats:
     """Constant rotation of an `axis` line: three angles and their order."""
     angles = _numbers(words[:3], path, line, 3)
-    order = [AXES.index(c) for c in (words[3] if len(words) > 3 else "XYZ").lower()]
+    named = (words[3] if len(words) > 3 else "XYZ").lower()
+    if sorted(named) != list(AXES):
+        raise UserError(f"{path}:{line}: {quoted(named)} is no order of X, Y and Z; restore the file")
+    order = [AXES.index(c) for c in named]
     angles = np.radians(angles) if degrees else angles
     return from_angles(angles[::-1], order[::-1])
 
 
 def _root(lines: list[tuple[int, list[str]]], path: Path, degrees: bool) -> Bone:
-    bone = Bone("root")
+    bone = Bone("root", length=0.0)
     for line, words in lines:
         key = words[0].lower()
         if key == "order":
@@ -210,6 +216,12 @@ def _bones(lines: list[tuple[int, list[str]]], path: Path, degrees: bool) -> lis
             bones[-1].axis = _turn(words[1:], path, line, degrees)
         elif key == "dof":
             bones[-1].dof = [w.lower() for w in words[1:]]
+            if len(set(bones[-1].dof) & DOF) != len(words) - 1:
+                what = quoted(" ".join(words[1:]))
+                raise UserError(f"{path}:{line}: {what} are no degrees of freedom; restore the file")
+    for bone in bones:
+        if not np.isfinite(bone.length):
+            raise UserError(f"{path}: bone {quoted(bone.name)} has no length; restore the file")
     return bones
 
 
@@ -228,6 +240,8 @@ def _linked(bones: list[Bone], lines: list[tuple[int, list[str]]], path: Path) -
                 f"{path}:{line}: {quoted(words[0])} has children before it has a parent; sort :hierarchy"
             )
         for word in words[1:]:
+            if word in order:
+                raise UserError(f"{path}:{line}: {quoted(word)} has two parents; restore the file")
             known[word].parent = order.index(words[0])
             order.append(word)
     return [known[name] for name in order]
