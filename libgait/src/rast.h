@@ -84,10 +84,11 @@ static inline uint64_t rast_bits(int32_t begin, int32_t end)
     return (ones >> ((uint32_t)(begin - end) & 63u)) << ((uint32_t)begin & 63u);
 }
 
-/* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y. */
+/* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y; x may be
+ * negative, then it is none. */
 static inline int32_t rast_half(int32_t x, int32_t y)
 {
-    return (x >> 6 << 8) | (y << 1) | (x >> 5 & 1);
+    return (x >> 6) * 256 + (y << 1) + (x >> 5 & 1);
 }
 
 /* Number of set bits, without a table or an ISA extension. */
