@@ -6,17 +6,31 @@
 
 enum { NORMALS = 4 * ((F_MAX + 3) / 4) };
 
-/* Four standard normals of each of BLOCK particles from `first` on. */
-KERNEL_ROW void normals(uint64_t seed, uint32_t frame, uint32_t first, uint32_t draw,
-                        float (*restrict out)[BLOCK])
+KERNEL_ROW void words(uint64_t seed, uint32_t frame, uint32_t first, uint32_t draw,
+                      uint32_t (*restrict out)[BLOCK])
 {
     for (uint32_t lane = 0; lane < BLOCK; lane++) {
-        float n[4];
-        rng_normals(seed, STREAM_MOVE, frame, first + lane, draw, n);
+        uint32_t w[4];
+        rng_words(seed, STREAM_MOVE, frame, first + lane, draw, w);
 #pragma GCC unroll 4
         for (int32_t k = 0; k < 4; k++)
-            out[k][lane] = n[k];
+            out[k][lane] = w[k];
     }
+}
+
+KERNEL_ROW void normal_pair(const uint32_t (*restrict bits)[BLOCK], float (*restrict out)[BLOCK])
+{
+    for (int32_t lane = 0; lane < BLOCK; lane++)
+        rng_normal_pair(bits[0][lane], bits[1][lane], &out[0][lane], &out[1][lane]);
+}
+
+/* Four standard normals of each of BLOCK particles from `first` on. */
+static void normals(uint64_t seed, uint32_t frame, uint32_t first, uint32_t draw, float (*out)[BLOCK])
+{
+    uint32_t bits[4][BLOCK];
+    words(seed, frame, first, draw, bits);
+    normal_pair((const uint32_t (*)[BLOCK])bits, out);
+    normal_pair((const uint32_t (*)[BLOCK])bits + 2, out + 2);
 }
 
 KERNEL_ROW void relax(relaxing r, const float *restrict x, const float *restrict n, float *restrict out)

@@ -62,19 +62,38 @@ void KERNEL(estimate_moments)(const float *v, const double *weight, const uint8_
 }
 
 /* ---- directions ---- */
-KERNEL_ROW void resultant_add(const float *restrict angle, float turn, const double *restrict weight,
-                              const uint8_t *restrict use, int32_t n, double (*restrict sum)[LANES])
+KERNEL_ROW void terms_add(const float (*restrict term)[LANES], int32_t count, const double *restrict weight,
+                          double (*restrict sum)[LANES])
 {
-    for (int32_t i = 0; i < n; i += LANES)
-        for (int32_t lane = 0; lane < LANES; lane++) {
-            float sn, cs;
-            m_sincos(turn * angle[i + lane], &sn, &cs);
-            double const c = weight[i + lane] * (double)cs, s = weight[i + lane] * (double)sn;
-            sum[0][lane] += c;
-            sum[1][lane] += s;
-            sum[2][lane] += (double)use[i + lane] * c;
-            sum[3][lane] += (double)use[i + lane] * s;
-        }
+    for (int32_t k = 0; k < count; k++)
+        for (int32_t lane = 0; lane < LANES; lane++)
+            sum[k][lane] += weight[lane] * (double)term[k][lane];
+}
+
+/* The weights of those in use. */
+KERNEL_ROW void weights_used(const double *restrict weight, const uint8_t *restrict use, double *restrict out)
+{
+    for (int32_t lane = 0; lane < LANES; lane++)
+        out[lane] = (double)use[lane] * weight[lane];
+}
+
+KERNEL_ROW void directions(const float *restrict angle, float turn, float (*restrict out)[LANES])
+{
+    for (int32_t lane = 0; lane < LANES; lane++)
+        m_sincos(turn * angle[lane], &out[1][lane], &out[0][lane]);
+}
+
+static void resultant_add(const float *angle, float turn, const double *weight, const uint8_t *use, int32_t n,
+                          double (*sum)[LANES])
+{
+    float cs[2][LANES];
+    double used[LANES];
+    for (int32_t i = 0; i < n; i += LANES) {
+        directions(angle + i, turn, cs);
+        weights_used(weight + i, use + i, used);
+        terms_add((const float (*)[LANES])cs, 2, weight + i, sum);
+        terms_add((const float (*)[LANES])cs, 2, used, sum + 2);
+    }
 }
 
 void KERNEL(estimate_resultant)(const float *angle, float turn, const double *weight, const uint8_t *use,
@@ -145,12 +164,16 @@ KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pi
     }
 }
 
-KERNEL_ROW void pairs_add(const float (*restrict pair)[LANES], const double *restrict weight,
-                          const uint8_t *restrict use, double (*restrict sum)[LANES])
+static void rotations_add(const float *heading, const float *pitch, const float *roll, const double *weight,
+                          const uint8_t *use, int32_t n, double (*sum)[LANES])
 {
-    for (int32_t k = 0; k < PAIRS; k++)
-        for (int32_t lane = 0; lane < LANES; lane++)
-            sum[k][lane] += (double)use[lane] * weight[lane] * (double)pair[k][lane];
+    float pair[PAIRS][LANES];
+    double used[LANES];
+    for (int32_t i = 0; i < n; i += LANES) {
+        pairs_of(heading + i, pitch + i, roll + i, pair);
+        weights_used(weight + i, use + i, used);
+        terms_add((const float (*)[LANES])pair, PAIRS, used, sum);
+    }
 }
 
 void KERNEL(estimate_rotations)(const float *heading, const float *pitch, const float *roll,
@@ -159,13 +182,8 @@ void KERNEL(estimate_rotations)(const float *heading, const float *pitch, const 
     static const uint8_t place[16] = {0, 1, 2, 3, 1, 4, 5, 6, 2, 5, 7, 8, 3, 6, 8, 9};
     ends const e = ends_of(n, 3, (const float *const[]){heading, pitch, roll}, weight, use);
     double sum[PAIRS][LANES] = {{0.0}};
-    float pair[PAIRS][LANES];
-    for (int32_t i = 0; i < n - n % LANES; i += LANES) {
-        pairs_of(heading + i, pitch + i, roll + i, pair);
-        pairs_add((const float (*)[LANES])pair, weight + i, use + i, sum);
-    }
-    pairs_of(e.v[0], e.v[1], e.v[2], pair);
-    pairs_add((const float (*)[LANES])pair, e.weight, e.use, sum);
+    rotations_add(heading, pitch, roll, weight, use, n - n % LANES, sum);
+    rotations_add(e.v[0], e.v[1], e.v[2], e.weight, e.use, LANES, sum);
     for (int32_t k = 0; k < 16; k++)
         out[k] = total(sum[place[k]]);
 }

@@ -43,20 +43,24 @@ static inline float rng_unit(uint32_t bits)
     return (float)(int32_t)(bits >> 8) * 0x1p-24f;
 }
 
+/* Two standard normals of two words. */
+static inline void rng_normal_pair(uint32_t first, uint32_t second, float *a, float *b)
+{
+    /* All 32 bits in (0, 1]: with 24 the tail would end at 5.8. */
+    float const u = ((float)first + 1.0f) * 0x1p-32f;
+    float const radius = __builtin_sqrtf(-2.0f * m_log(u));
+    float s, c;
+    m_sincos(TWO_PI_F * rng_unit(second), &s, &c);
+    *a = radius * c;
+    *b = radius * s;
+}
+
 static inline void rng_normals(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw,
                                float out[4])
 {
     uint32_t bits[4];
     rng_words(seed, stream, frame, index, draw, bits);
-#pragma GCC unroll 2
-    for (int i = 0; i < 4; i += 2) {
-        /* All 32 bits in (0, 1]: with 24 the tail would end at 5.8. */
-        float const u = ((float)bits[i] + 1.0f) * 0x1p-32f;
-        float const radius = __builtin_sqrtf(-2.0f * m_log(u));
-        float s, c;
-        m_sincos(TWO_PI_F * rng_unit(bits[i + 1]), &s, &c);
-        out[i] = radius * c;
-        out[i + 1] = radius * s;
-    }
+    rng_normal_pair(bits[0], bits[1], out, out + 1);
+    rng_normal_pair(bits[2], bits[3], out + 2, out + 3);
 }
 #endif
