@@ -101,8 +101,15 @@ def periods(learned: Learned) -> Figure:
 
 
 def _resampled(s: Sequence) -> Floats:
-    """Scores over their largest on GRID; NaN beyond the candidates that the recording allows."""
+    """Scores over their largest on GRID; NaN beyond the candidates that the recording allows.
+
+    Peaks may be narrower than a cell: it shows the largest score in it.
+    """
     valid = np.isfinite(s.period.scores)
     seconds = s.period.candidates[valid] / s.fps
     share = s.period.scores[valid] / s.period.scores[valid].max()
-    return np.interp(GRID, seconds, share, left=np.nan, right=np.nan)
+    row = np.interp(GRID, seconds, share, left=np.nan, right=np.nan)
+    cell = np.round((seconds - GRID[0]) / (GRID[1] - GRID[0])).astype(int)
+    shown = (cell >= 0) & (cell < len(GRID))
+    np.fmax.at(row, cell[shown], share[shown])
+    return row
