@@ -9,7 +9,7 @@
 #include "check.h"
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x7ed06fb22c049f66)
+#define GOLDEN UINT64_C(0x6ee2d83f4da21880)
 
 enum { STEPS = 50, SAVE_AT = 25 };
 
