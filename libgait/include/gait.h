@@ -91,7 +91,7 @@ typedef struct gait_camera { /* u = fx X/Z + cx, v = fy Y/Z + cy with (X,Y,Z) = 
 
 typedef struct gait_state {          /* one hypothesis: everything that places and poses a walker */
     float phase;                     /* [0, 1) of the stride; 0 = right heel strike */
-    float stride_hz;                 /* strides per second */
+    float stride_hz;                 /* strides per second; in poses 0 stands for the model's mean */
     float stature;                   /* metres */
     float heading;                   /* walking direction about world z, radians; 0 = along +x */
     float pitch, roll;               /* tilt of the pelvis beyond the model's own, radians */
@@ -165,7 +165,7 @@ typedef struct gait_tracker_config {
     int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
     uint64_t seed;             /* default 1 */
     int32_t  particles;        /* [16, 1 << 20]; default 1500 (paper mode 10000) */
-    int32_t  components;       /* [0, the model's]; default -1: the first 4, in paper mode all */
+    int32_t  components;       /* [0, the model's]; default -1: the first 5, in paper mode all */
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
@@ -175,8 +175,6 @@ typedef struct gait_tracker_config {
     float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
     float    girth;            /* limb radii against the model's (clothes) [0.5, 2] */
     float    resample_ess;     /* resample below this fraction of particles [0, 1] */
-    float    evidence_time;    /* seconds for which errors of the image terms last; a frame's log-likelihood counts at
-                                * dt / this, at most whole; default 0.1; 0: frames are independent (paper mode) */
     float    max_dt;           /* longest accepted interval, seconds; default 0.5 */
     /* Dynamics (eqs. 5-9): standard deviations per sqrt(second) unless said otherwise. */
     float    phase_noise;      /* strides */
@@ -189,15 +187,17 @@ typedef struct gait_tracker_config {
     float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds */
     float    coef_noise;       /* score standard deviations */
     float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
-    float    stature_noise;    /* deviations of stature at the start */
-    float    stature_noise_start; /* the same while settling */
+    float    stature_noise;    /* fraction of stature, while settling; later a tenth */
     float    offset_noise;     /* posture of the angles in offset_angles, radians */
     float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
     float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
-    float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of stature */
+    /* Reported joint_sd: the particles' deviation times this, because frames err alike, */
+    float    joint_sd_factor;
+    float    joint_sd_model;   /* and, in quadrature, what the model cannot express, fraction of stature */
     gait_camera camera[GAIT_MAX_CAMERAS];
+    uint32_t reserved;
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;
 

@@ -59,7 +59,7 @@ KERNEL_ROW void speeds(const dynamics_step *s, const walker_block *restrict from
     const gait_model *const m = s->model;
     int32_t const T = m->phases, M = m->channels;
     int32_t here[BLOCK], next[BLOCK];
-    float w[BLOCK];
+    float w[BLOCK], pace[BLOCK];
     for (int32_t lane = 0; lane < BLOCK; lane++) {
         float const at = m_wrap1(from->f[F_PHASE][lane] + 0.5f * turn[lane]) * (float)T;
         int32_t const j = i_min((int32_t)at, T - 1);
@@ -68,11 +68,13 @@ KERNEL_ROW void speeds(const dynamics_step *s, const walker_block *restrict from
         w[lane] = at - (float)j;
         out[lane] = 0.0f;
     }
-    for (int32_t k = 0; k <= s->components; k++) {
-        const float *const curve =
-            m->curves + (size_t)k * (size_t)T * (size_t)M + m->root_channel + ROOT_FORWARD;
+    for (int32_t lane = 0; lane < BLOCK; lane++)
+        pace[lane] = kin_pace(m, from->f[F_RATE][lane]);
+    for (int32_t k = m->pace_curve ? -1 : 0; k <= s->components; k++) {
+        const float *const curve = (k < 0 ? m->pace_curve : m->curves + (size_t)k * (size_t)T * (size_t)M) +
+                                   m->root_channel + ROOT_FORWARD;
         for (int32_t lane = 0; lane < BLOCK; lane++) {
-            float const c = k ? from->f[F_COEF + k - 1][lane] : 1.0f;
+            float const c = k < 0 ? pace[lane] : k ? from->f[F_COEF + k - 1][lane] : 1.0f;
             out[lane] += c * (1.0f - w[lane]) * curve[here[lane]] + c * w[lane] * curve[next[lane]];
         }
     }

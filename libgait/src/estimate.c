@@ -116,10 +116,11 @@ static void mean_rotation(const sums *s, walker *w)
 static void joints(const sums *s, float stature, gait_estimate *out)
 {
     const gait_tracker *const t = s->t;
-    double const model = (double)(t->cfg.joint_sd_model * stature);
+    double const factor = (double)t->cfg.joint_sd_factor, model = (double)(t->cfg.joint_sd_model * stature);
     for (int32_t p = 0; p < 3 * t->model->points; p++) {
         out->pose.joint[p / 3][p % 3] = (float)s->joint[p].mean;
-        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(s->joint[p].var + model * model);
+        out->joint_sd[p / 3][p % 3] =
+            (float)__builtin_sqrt(factor * factor * s->joint[p].var + model * model);
     }
 }
 
@@ -131,7 +132,8 @@ float estimate_speed(const gait_tracker *t, const walker *w)
     if (t->rule.plain_root)
         return w->f[F_STATURE] * w->f[F_RATE] * m->stride_length;
     for (int32_t j = 0; j < m->phases; j++)
-        sum += root_channel(m, ROOT_FORWARD, (float)j / (float)m->phases, w->f + F_COEF, t->rule.components);
+        sum += root_channel(m, ROOT_FORWARD, (float)j / (float)m->phases,
+                            body_rule_pace(&t->rule, w->f[F_RATE]), w->f + F_COEF, t->rule.components);
     return w->f[F_STATURE] * w->f[F_RATE] * sum / (float)m->phases;
 }
 

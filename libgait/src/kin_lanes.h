@@ -27,7 +27,7 @@ typedef struct bodies {
 } bodies;
 
 /* Channels first .. first + count - 1 of one body; component k's score is coef[k * stride]. */
-LANES void curves_part(const gait_model *m, float phase, const float *coef, int32_t stride,
+LANES void curves_part(const gait_model *m, float phase, float pace, const float *coef, int32_t stride,
                        int32_t components, int32_t first, int32_t count, float *acc)
 {
     int32_t const T = m->phases, M = m->channels;
@@ -35,10 +35,11 @@ LANES void curves_part(const gait_model *m, float phase, const float *coef, int3
     int32_t const j = i_min((int32_t)at, T - 1), next = j + 1 < T ? j + 1 : 0;
     float const w = at - (float)j;
     memset(acc, 0, (size_t)count * sizeof *acc);
-    for (int32_t k = 0; k <= components; k++) {
-        const float *const curve = m->curves + (size_t)k * (size_t)T * (size_t)M + first;
-        const float *const a = curve + (size_t)j * (size_t)M, *const b = curve + (size_t)next * (size_t)M;
-        float const c = k ? coef[(k - 1) * stride] : 1.0f, ca = c * (1.0f - w), cb = c * w;
+    for (int32_t k = m->pace_curve ? -1 : 0; k <= components; k++) {
+        const float *const curve = k < 0 ? m->pace_curve : m->curves + (size_t)k * (size_t)T * (size_t)M;
+        const float *const a = curve + (size_t)j * (size_t)M + first;
+        const float *const b = curve + (size_t)next * (size_t)M + first;
+        float const c = k < 0 ? pace : k ? coef[(k - 1) * stride] : 1.0f, ca = c * (1.0f - w), cb = c * w;
         for (int32_t i = 0; i < count; i++)
             acc[i] += ca * a[i] + cb * b[i];
     }

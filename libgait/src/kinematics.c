@@ -6,13 +6,14 @@
 /* Every channel of one body. */
 static void curves_at(const gait_model *m, const gait_state *s, float channel[MODEL_MAX_CHANNELS])
 {
-    curves_part(m, s->phase, s->coef, 1, m->components, 0, m->channels, channel);
+    curves_part(m, s->phase, kin_pace(m, s->stride_hz), s->coef, 1, m->components, 0, m->channels, channel);
 }
 
-float kin_channel(const gait_model *m, int32_t channel, float phase, const float *coef, int32_t components)
+float kin_channel(const gait_model *m, int32_t channel, float phase, float pace, const float *coef,
+                  int32_t components)
 {
     float value;
-    curves_part(m, phase, coef, 1, components, channel, 1, &value);
+    curves_part(m, phase, pace, coef, 1, components, channel, 1, &value);
     return value;
 }
 

@@ -2,12 +2,14 @@
  * Frames and signs: doc/model-format.md.  Lane results do not depend on the other lanes. */
 #ifndef GAIT_KINEMATICS_H
 #define GAIT_KINEMATICS_H
+#include "fmath.h"
 #include "model.h"
 
 enum { BLOCK = 16, KIN_MAX_FRAMES = MODEL_MAX_FRAMES };
 
 typedef struct kin_input {
     float phase[BLOCK];                            /* cycles; wrapped to [0, 1) */
+    float pace[BLOCK];                             /* of kin_pace */
     float stature[BLOCK];                          /* metres */
     float heading[BLOCK];                          /* radians */
     float pitch[BLOCK], roll[BLOCK];               /* radians, added to the model's own */
@@ -26,8 +28,19 @@ typedef struct kin_body {
     float scale[KIN_MAX_FRAMES][BLOCK]; /* metres per model length in the frame */
 } kin_body;
 
+/* How much faster than the mean somebody walks: standard deviations between people of the stride rate, at most
+ * as far from it as was learnt.  0 for a rate of 0, which is not known. */
+static inline float kin_pace(const gait_model *m, float stride_hz)
+{
+    float const most = 2.0f;
+    if (!m->pace_curve || !(stride_hz > 0.0f))
+        return 0.0f;
+    return f_clamp((stride_hz - m->stride_hz) / m->stride_hz_sd, -most, most);
+}
+
 /* One channel of one body: the same bits as the kernel kin_curves gives. */
-float kin_channel(const gait_model *m, int32_t channel, float phase, const float *coef, int32_t components);
+float kin_channel(const gait_model *m, int32_t channel, float phase, float pace, const float *coef,
+                  int32_t components);
 
 /* By how much the first `proportions` scores change the pelvis's height, relatively. */
 float kin_height_change(const gait_model *m, const float *score, int32_t proportions);

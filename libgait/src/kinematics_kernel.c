@@ -7,7 +7,8 @@ void KERNEL(kin_curves)(const gait_model *m, const kin_input *in, int32_t compon
     GAIT_ASSERT(components >= 0 && components <= m->components);
     float acc[BLOCK][MODEL_MAX_CHANNELS];
     for (int32_t lane = 0; lane < BLOCK; lane++)
-        curves_part(m, in->phase[lane], &in->coef[0][lane], BLOCK, components, 0, m->channels, acc[lane]);
+        curves_part(m, in->phase[lane], in->pace[lane], &in->coef[0][lane], BLOCK, components, 0, m->channels,
+                    acc[lane]);
     for (int32_t i = 0; i < m->channels; i++)
         for (int32_t lane = 0; lane < BLOCK; lane++)
             out->v[i][lane] = acc[lane][i];

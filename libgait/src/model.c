@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#define LARGEST_PACE       1.0f /* radians and statures per standard deviation of the rate */
 #define LARGEST_PROPORTION 0.1f /* per standard deviation; a shift: statures */
 
 static const float *take_table(sections *r, const char *tag, int32_t rows, uint32_t columns)
@@ -68,6 +69,18 @@ static void read_statistics(sections *r, gait_model *m)
                      "stride rate or stature not positive");
     sections_require(r, g[1] >= 0.0f && g[2] >= 0.0f && g[4] >= 0.0f && g[7] >= 0.0f, "GAIT",
                      "has a negative sd");
+}
+
+/* Optional: models without it walk alike at every stride rate. */
+static void read_pace(sections *r, gait_model *m)
+{
+    if (r->status != GAIT_OK || !blob_has(&r->b, "PACE"))
+        return;
+    m->pace_curve = take_table(r, "PACE", m->phases, (uint32_t)m->channels);
+    sections_require(r, m->stride_hz_sd > 0.0f, "PACE", "needs an sd of the stride rate in GAIT");
+    for (int32_t i = 0; r->status == GAIT_OK && i < m->phases * m->channels; i++)
+        sections_require(r, fabsf(m->pace_curve[i]) <= LARGEST_PACE, "PACE",
+                         "changes a channel by more than 1");
 }
 
 /* The pairs (axis, channel) of a frame: n of them valid, the others 0. */
@@ -182,6 +195,7 @@ gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error
     read_channels(&r, &t);
     read_curves(&r, &t);
     read_statistics(&r, &t);
+    read_pace(&r, &t);
     read_frames(&r, &t);
     read_proportions(&r, &t);
     read_shifts(&r, &t);

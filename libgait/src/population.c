@@ -2,13 +2,19 @@
 #include "fmath.h"
 #include <string.h>
 
-float root_channel(const gait_model *m, int32_t c, float phase, const float *coef, int32_t components)
+float body_rule_pace(const body_rule *r, float stride_hz)
 {
-    return kin_channel(m, m->root_channel + c, phase, coef, components);
+    return r->plain_root ? 0.0f : kin_pace(r->model, stride_hz);
+}
+
+float root_channel(const gait_model *m, int32_t c, float phase, float pace, const float *coef,
+                   int32_t components)
+{
+    return kin_channel(m, m->root_channel + c, phase, pace, coef, components);
 }
 
 /* The first components tell people apart in pictures; more only add noise that 1,500 particles must search. */
-enum { TELLING = 4 };
+enum { TELLING = 5 };
 
 static int32_t components_used(const gait_model *m, const gait_tracker_config *cfg)
 {
@@ -64,14 +70,13 @@ void walker_block_put(population *p, int32_t first, int32_t lanes, const walker_
 /* Sway to the left and height of the pelvis over the track, metres. */
 static void pelvis_offset(const body_rule *r, const walker *w, float *sway, float *height)
 {
-    float const H = w->f[F_STATURE];
-    *sway = r->plain_root
-                ? 0.0f
-                : H * root_channel(r->model, ROOT_SWAY, w->f[F_PHASE], w->f + F_COEF, r->components);
+    float const H = w->f[F_STATURE], phase = w->f[F_PHASE], pace = body_rule_pace(r, w->f[F_RATE]);
+    *sway = r->plain_root ? 0.0f
+                          : H * root_channel(r->model, ROOT_SWAY, phase, pace, w->f + F_COEF, r->components);
     *height =
         H * (1.0f + kin_height_change(r->model, w->f + body_rule_proportion(r), r->proportions)) *
         (r->plain_root ? r->mean_height
-                       : root_channel(r->model, ROOT_HEIGHT, w->f[F_PHASE], w->f + F_COEF, r->components));
+                       : root_channel(r->model, ROOT_HEIGHT, phase, pace, w->f + F_COEF, r->components));
 }
 
 gait_state walker_state(const body_rule *r, const walker *w)
@@ -126,11 +131,14 @@ typedef struct block { /* fields of BLOCK walker_block */
     float offset[GAIT_MAX_ANGLES][BLOCK];
 } block;
 
-/* The track and level in in.pelvis become the pelvis; then curves, posture and kinematics. */
+/* Rates in in.pace become what kin_pace says of them, the track and level in in.pelvis the pelvis; then curves,
+ * posture and kinematics. */
 static void block_bodies(const body_rule *r, block *b, kin_body *out)
 {
     kin_channels ch;
     kin_input *const in = &b->in;
+    for (int32_t i = 0; i < BLOCK; i++)
+        in->pace[i] = body_rule_pace(r, in->pace[i]);
     r->run->kin_curves(r->model, in, r->components, &ch);
     float (*const root)[BLOCK] = ch.v + r->model->root_channel;
     for (int32_t k = 0; k < r->offsets; k++)
@@ -155,7 +163,7 @@ static void block_bodies(const body_rule *r, block *b, kin_body *out)
     r->run->kin_pose(r->model, &ch, in, r->proportions, out);
 }
 
-/* Where field f of a block's walkers goes; NULL: the body does not depend on it. */
+/* Where field f of a block's walkers goes. */
 static float *block_field(const body_rule *r, block *b, int32_t f)
 {
     kin_input *const in = &b->in;
@@ -163,7 +171,7 @@ static float *block_field(const body_rule *r, block *b, int32_t f)
     case F_PHASE:
         return in->phase;
     case F_RATE:
-        return NULL;
+        return in->pace;
     case F_X:
     case F_Y:
     case F_Z:
@@ -189,8 +197,6 @@ void population_bodies(const body_rule *r, const population *p, int32_t begin, k
     int32_t const whole = i_min(BLOCK, p->n - begin);
     for (int32_t f = 0; f < body_rule_fields(r); f++) {
         float *const to = block_field(r, &b, f);
-        if (!to)
-            continue;
         memcpy(to, field(p, f) + begin, (size_t)whole * sizeof *to);
         for (int32_t lane = whole; lane < BLOCK; lane++)
             to[lane] = to[whole - 1];
@@ -201,11 +207,8 @@ void population_bodies(const body_rule *r, const population *p, int32_t begin, k
 void walker_block_bodies(const body_rule *r, const walker_block *w, kin_body *out)
 {
     block b;
-    for (int32_t f = 0; f < body_rule_fields(r); f++) {
-        float *const to = block_field(r, &b, f);
-        if (to)
-            memcpy(to, w->f[f], sizeof w->f[f]);
-    }
+    for (int32_t f = 0; f < body_rule_fields(r); f++)
+        memcpy(block_field(r, &b, f), w->f[f], sizeof w->f[f]);
     block_bodies(r, &b, out);
 }
 

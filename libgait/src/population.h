@@ -85,6 +85,10 @@ void population_bodies(const body_rule *r, const population *p, int32_t begin, k
 void walker_block_bodies(const body_rule *r, const walker_block *w, kin_body *out);
 void walker_body(const body_rule *r, const walker *w, kin_body *out); /* in every lane */
 
+/* What kin_pace says of a walker; 0 in paper mode. */
+float body_rule_pace(const body_rule *r, float stride_hz);
+
 /* Channel c (ROOT_*) at a phase: eq. 3 for one function. */
-float root_channel(const gait_model *m, int32_t c, float phase, const float *coef, int32_t components);
+float root_channel(const gait_model *m, int32_t c, float phase, float pace, const float *coef,
+                   int32_t components);
 #endif

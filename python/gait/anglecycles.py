@@ -32,7 +32,7 @@ class AngleCycle:
     mean, sd : ndarray
         Mean of the strides, and its posterior standard deviation (NaN if the track does not tell).
     norm_mean, norm_sd : ndarray
-        Of the people the model was learned from.
+        Of the people the model was learned from, at the stride rate of these strides.
     """
 
     strides: Array
@@ -82,7 +82,8 @@ def angle_cycles(
         if not len(when):
             continue
         strides = np.interp(when, track.time, angles[name])
-        norm_mean, norm_sd = curves.norm(name, PERCENT / 100 + (0.5 if left else 0.0))
+        rate = 1 / float(np.median(when[:, -1] - when[:, 0]))
+        norm_mean, norm_sd = curves.norm(name, PERCENT / 100 + (0.5 if left else 0.0), rate)
         sd = (
             _drawn_sd(draws, name, when)
             if draws
@@ -115,13 +116,14 @@ def _linear_sd(
     scores = sorted((n for n in numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)
     scores = scores[: len(curves.samples) - 1]
     phase, coef = numbers["phase"], np.stack([numbers[n] for n in scores], axis=1)
-    here = curves.channel(name, phase, coef)
-    late, early = (curves.channel(name, phase + move, coef) for move in (_SMALL, -_SMALL))
+    rate = numbers["stride_hz"]
+    here = curves.channel(name, phase, coef, rate)
+    late, early = (curves.channel(name, phase + move, coef, rate) for move in (_SMALL, -_SMALL))
     slope = (late - early) / (2 * _SMALL)
     variance = (slope * numbers["phase_sd"]) ** 2
     for k, score in enumerate(scores):
         one = np.eye(len(scores))[k]
-        variance += ((curves.channel(name, phase, coef + one) - here) * numbers[f"{score}_sd"]) ** 2
+        variance += ((curves.channel(name, phase, coef + one, rate) - here) * numbers[f"{score}_sd"]) ** 2
     return np.asarray(np.interp(when, time, np.degrees(np.sqrt(variance))).mean(axis=0))
 
 

@@ -48,9 +48,9 @@ def free_run(model: dict[str, Any], truth: Joints, strikes: Strikes, first: int)
         return None
     advance = (truth.frame - truth.frame[first]) * (cycles[1] - cycles[0])
     size = stature(model, truth)
-    joints = _poses(model, cycles[0] + advance, size)
-    joints += size * root_path(model, cycles[0] + advance)[:, None]
     stride = (truth.time[-1] - truth.time[0]) / (advance[-1] - advance[0])
+    joints = _poses(model, cycles[0] + advance, size, 1 / stride)
+    joints += size * root_path(model, cycles[0] + advance, 1 / stride)[:, None]
     joints = np.einsum("ij,npj->npi", _turns(truth, stride)[first], joints)
     return np.asarray(joints - joints[first, _HIPS].mean(axis=0) + _hip_midpoint(truth)[first])
 
@@ -65,19 +65,22 @@ def stature(model: dict[str, Any], truth: Joints) -> float:
     return lengths[0] / lengths[1]
 
 
-def _poses(model: dict[str, Any], phase: Array, size: float) -> Array:
+def _poses(model: dict[str, Any], phase: Array, size: float, rate: float = 0.0) -> Array:
     """EVAL15 (n, 15, 3) of the mean cycle heading along x with the pelvis at the origin."""
-    joints, _ = skeleton.pose(model, phase, np.zeros(0), size, 0.0, 0.0, 0.0, np.zeros(3))
+    joints, _ = skeleton.pose(model, phase, np.zeros(0), size, 0.0, 0.0, 0.0, np.zeros(3), stride_hz=rate)
     names = unpack_names(model["PTNM"])
     return joints[:, [names.index(name) for name in EVAL15]]
 
 
-def root_path(model: dict[str, Any], cycles: Array) -> Array:
-    """Pelvis (n, 3) of the mean cycle in statures against phase in strides, wherever it began."""
+def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:
+    """Pelvis (n, 3) of the mean cycle in statures against phase in strides, wherever it began.
+
+    rate : strides per second, which the mean cycle follows; 0: the mean rate.
+    """
     names = unpack_names(model["CHNM"])
     columns = [names.index(f"root_{name}") for name in ("forward", "sway", "height")]
     fine = np.linspace(cycles.min(), cycles.max(), 64 * int(np.ptp(cycles) + 2))
-    speed, sway, height = skeleton.curves(model, fine, np.zeros((len(fine), 0)))[:, columns].T
+    speed, sway, height = skeleton.curves(model, fine, np.zeros((len(fine), 0)), rate)[:, columns].T
     steps = np.diff(fine) * 0.5 * (speed[1:] + speed[:-1])
     forward = np.concatenate([[0.0], np.cumsum(steps)])
     return np.stack([np.interp(cycles, fine, path) for path in (forward, sway, height)], axis=1)

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gait import blob
 from gait.errors import UserError
+from gait.pace import pace
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ class ModelCurves:
         Standard deviations of what the components leave, and of a person's constant offset.
     height_change : ndarray of shape (p,)
         Of the pelvis, relatively, by one standard deviation of each of the limbs' proportions.
+    faster : ndarray of shape (T, M)
+        Change of the mean per unit of `gait.pace.pace`; 0 in models whose mean does not follow the rate.
     stride_hz, stride_length : float
         Means of the training set; per second, statures.
     """
@@ -42,13 +45,15 @@ class ModelCurves:
             raise UserError(f"model: section {missing[0]} is missing, not a cyclic model; use gait learn")
         self.names = blob.unpack_names(sections["CHNM"])
         self.samples = np.asarray(sections["CURV"], float)
+        self.faster = np.asarray(sections.get("PACE", np.zeros(self.samples.shape[1:])), float)
+        self._gait = np.asarray(sections["GAIT"], float)
         statistics = np.asarray(sections["CHST"], float)
         self.residual, self.static = statistics[:, 0], statistics[:, 3]
         table = np.asarray(sections.get("PROP", np.zeros((0, 1))), float)
         self.height_change = table[:, -1]
-        self.stride_hz, self.stride_length = float(sections["GAIT"][0]), float(sections["GAIT"][3])
+        self.stride_hz, self.stride_length = float(self._gait[0]), float(self._gait[3])
 
-    def channel(self, name: str, phase: Array, coef: Array) -> Array:
+    def channel(self, name: str, phase: Array, coef: Array, stride_hz: ArrayLike = 0.0) -> Array:
         """Values of one channel.
 
         Parameters
@@ -58,20 +63,27 @@ class ModelCurves:
             Strides, of any cycle.
         coef : ndarray of shape (..., k)
             Scores of the first k components; broadcast against `phase`.
+        stride_hz : array_like
+            Stride rates, broadcast against `phase`; 0: the mean rate.
         """
-        curve = self.samples[: 1 + coef.shape[-1], :, self.names.index(name)]
+        at = self.names.index(name)
+        curve = np.vstack([self.samples[: 1 + coef.shape[-1], :, at], self.faster[:, at]])
         size = curve.shape[1]
         place = (np.asarray(phase, float) % 1.0) * size
         left = np.floor(place).astype(int) % size
         share = place - np.floor(place)
         rows = curve[:, left] + share * (curve[:, (left + 1) % size] - curve[:, left])
-        return np.asarray(rows[0] + np.sum(np.moveaxis(coef, -1, 0) * rows[1:], axis=0))
+        moved = np.sum(np.moveaxis(coef, -1, 0) * rows[1:-1], axis=0)
+        return np.asarray(rows[0] + moved + pace(self._gait, stride_hz) * rows[-1])
 
-    def norm(self, name: str, phase: Array) -> tuple[Array, Array]:
-        """Mean and standard deviation of one channel among people, each of the shape of `phase`."""
+    def norm(self, name: str, phase: Array, stride_hz: float = 0.0) -> tuple[Array, Array]:
+        """Mean and standard deviation of one channel among people, each of the shape of `phase`.
+
+        stride_hz : the rate at which they walk; 0: the mean rate.
+        """
         at = self.names.index(name)
         q = len(self.samples) - 1
-        mean = self.channel(name, phase, np.zeros((1, q)))
-        parts = [self.channel(name, phase, row) - mean for row in np.eye(q)[:, None]]
+        mean = self.channel(name, phase, np.zeros((1, q)), stride_hz)
+        parts = [self.channel(name, phase, row, stride_hz) - mean for row in np.eye(q)[:, None]]
         variance = sum(part**2 for part in parts) + self.residual[at] ** 2 + self.static[at] ** 2
         return mean, np.sqrt(variance)

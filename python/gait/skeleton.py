@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait import blob as blobs
+from gait.pace import pace
 
 Floats = npt.NDArray[np.float64]
 
@@ -234,6 +235,7 @@ def pose(
     roll: npt.ArrayLike,
     pelvis: npt.ArrayLike,
     proportion: npt.ArrayLike = (),
+    stride_hz: npt.ArrayLike = 0.0,
 ) -> tuple[Floats, Floats]:
     """Joints of N hypotheses: curves (Ormoneit 2000, eq. 3), then forward kinematics.
 
@@ -249,6 +251,8 @@ def pose(
         Pelvis joint in the world, metres.
     proportion : (N, l) or (l,)
         Scores of the limbs' proportions, l <= p; the rest are 0.
+    stride_hz : (N,) or scalar
+        Stride rate, which the mean cycle follows; 0: the mean rate.
 
     Returns
     -------
@@ -262,7 +266,7 @@ def pose(
     scalars = [np.atleast_1d(np.asarray(v, float)) for v in (phase, stature, heading, pitch, roll)]
     n = np.broadcast_shapes(*(v.shape for v in scalars), coef.shape[:1], np.atleast_2d(pelvis).shape[:1])[0]
     phase, stature, heading, pitch, roll = (np.broadcast_to(v, n) for v in scalars)
-    channels = curves(sections, phase, np.broadcast_to(coef, (n, coef.shape[1])))
+    channels = curves(sections, phase, np.broadcast_to(coef, (n, coef.shape[1])), stride_hz)
     angles = channels.copy()
     angles[:, _root_columns(sections)] += np.stack([heading, pitch, roll], axis=1)
     positions = points(sections, angles, proportion) * stature[:, None, None] + np.asarray(
@@ -271,8 +275,13 @@ def pose(
     return positions, channels[:, : channels.shape[1] - len(ROOTS)]
 
 
-def curves(sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLike) -> Floats:
-    """Channels (N, M) at phases (N,), scores (N, k): mean + sum of c_k comp_k, linear between samples."""
+def curves(
+    sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLike, stride_hz: npt.ArrayLike = 0.0
+) -> Floats:
+    """Channels (N, M) at phases (N,), scores (N, k): mean + sum of c_k comp_k, linear between samples.
+
+    stride_hz : stride rates (N,) or scalar, which the mean follows; 0: the mean rate.
+    """
     table = np.asarray(sections["CURV"], float)
     phase, coef = np.asarray(phase, float), np.asarray(coef, float)
     samples = table.shape[1]
@@ -281,6 +290,10 @@ def curves(sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLik
     weight = (at - np.floor(at))[:, None]
     weights = np.concatenate([np.ones((len(phase), 1)), coef], axis=1)
     used = table[: weights.shape[1]]
+    if "PACE" in sections:
+        faster = np.broadcast_to(pace(sections["GAIT"], stride_hz), len(phase))
+        weights = np.column_stack([weights, faster])
+        used = np.concatenate([used, np.asarray(sections["PACE"], float)[None]])
     ends = [np.einsum("nk,knm->nm", weights, used[:, i]) for i in (low, (low + 1) % samples)]
     return ends[0] * (1 - weight) + ends[1] * weight
 

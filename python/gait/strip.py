@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -48,20 +50,23 @@ def draw_room(model: Model, state: State, camera: Camera) -> Image:
 
 
 def draw_strip(model: Model) -> Image:
-    """Draw the sheet: rows are the mean and each component at -2, 0 and +2 deviations, columns phases."""
-    names = ["mean", *(f"component {k + 1}" for k in range(model.info.components))]
+    """Draw the sheet, columns phases.
+
+    Rows are the mean, then at -2, 0 and +2 deviations the stride rate (where the mean follows it) and scores.
+    """
+    rows = _rows(model)
     left, top = _MARGIN
     width, height = _CELL
-    sheet = np.full((top + height * len(names), left + width * _PHASES, 3), _PAPER, np.uint8)
+    sheet = np.full((top + height * len(rows), left + width * _PHASES, 3), _PAPER, np.uint8)
     camera = Camera.looking((0.0, -20.0, 0.9), (0.0, 0.0, 0.9), _CELL, 20 * 0.84 * height / 2.0)
     overlay = Overlay(model, camera)
-    for row, name in enumerate(names):
+    for row, (name, states) in enumerate(rows.items()):
         y = top + row * height
         cv2.putText(sheet, name, (10, y + height // 2), _FONT, 0.45, _TEXT, 1, cv2.LINE_AA)
         for column in range(_PHASES):
-            state = _standing(model, column / _PHASES, np.zeros(model.info.components))
+            there = [_standing(model, state, column / _PHASES) for state in states]
             x = left + column * width
-            sheet[y : y + height, x : x + width] = _cell(overlay, state, row - 1)
+            sheet[y : y + height, x : x + width] = _cell(overlay, there)
     for column in range(_PHASES):
         place = (left + column * width + width // 2 - 34, 24)
         cv2.putText(sheet, f"phase {column / _PHASES:.3g}", place, _FONT, 0.42, _TEXT, 1, cv2.LINE_AA)
@@ -69,26 +74,36 @@ def draw_strip(model: Model) -> Image:
     return sheet
 
 
-def _standing(model: Model, phase: float, coef: Array) -> State:
-    """Walker over the origin, heading along x, of average size."""
-    state = State(phase=phase, coef=coef)
+def _rows(model: Model) -> dict[str, list[State]]:
+    """Name of each row: walkers at 0, -2 and +2 deviations, for the mean at 0 alone."""
+    info, turns = model.info, (0.0, -2.0, 2.0)
+    mean = State(stride_hz=info.stride_hz, coef=np.zeros(info.components))
+    rows = {"mean": [mean]}
+    rates = [replace(mean, stride_hz=info.stride_hz + turn * info.stride_hz_sd) for turn in turns]
+    if not np.array_equal(model.pose(rates[1])[1], model.pose(mean)[1]):
+        rows["stride rate"] = rates
+    for k, component in enumerate(np.eye(info.components)):
+        rows[f"component {k + 1}"] = [replace(mean, coef=turn * component) for turn in turns]
+    return rows
+
+
+def _standing(model: Model, state: State, phase: float) -> State:
+    """Walker of average size at a phase over the origin, heading along x."""
+    state = replace(state, phase=phase, pelvis=np.zeros(3))
     state.pelvis[2] = model.pelvis_height(state)
     return state
 
 
-def _cell(overlay: Overlay, state: State, component: int) -> Image:
-    """Body of the mean for component -1, else sticks at -2, 0 and +2 deviations of that component."""
+def _cell(overlay: Overlay, states: list[State]) -> Image:
+    """Body of a single walker, else sticks of three."""
     camera, model = overlay.camera, overlay.model
     cell = np.full((camera.height, camera.width, 3), _PAPER, np.uint8)
     ground = round(float(camera.project([0.0, 0.0, 0.0])[1]))
     cv2.line(cell, (0, ground), (camera.width, ground), _RULE, 1, cv2.LINE_AA)
-    if component < 0:
-        return overlay.figure(cell, state)
-    for score, colour in ((0.0, _MEAN), (-2.0, _LESS), (2.0, _MORE)):
-        coef = state.coef.copy()
-        coef[component] = score
-        moved = _standing(model, state.phase, coef)
-        overlay.sticks(cell, model.pose(moved)[0], 3 if score else 6, colour)
+    if len(states) == 1:
+        return overlay.figure(cell, states[0])
+    for state, colour, width in zip(states, (_MEAN, _LESS, _MORE), (6, 3, 3), strict=True):
+        overlay.sticks(cell, model.pose(state)[0], width, colour)
     return cell
 
 

@@ -21,7 +21,10 @@ PHASE, HEADING = 0, 3
 RATES = (1 / 2.1, 1 / 0.4)
 """Strides per second that a walker may have."""
 
-TELLING = 4
+SLOWLY = 0.1
+"""Share of its noise at which the stature goes on once settled (dynamics.c)."""
+
+TELLING = 5
 """Scores that the default mode uses unless told (population.c)."""
 
 SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
@@ -38,13 +41,10 @@ class Step:
         Seconds.
     settling : bool
         The rate is loose and the stature moves fast, as until a while after phase, left and right are known.
-    stature_doubt : float
-        Deviation of stature at the start, fraction of it.
     """
 
     dt: float
     settling: bool
-    stature_doubt: float
 
 
 class Transitions:
@@ -109,11 +109,11 @@ class Transitions:
 
     def _about(self, scalars: Array, coef: Array, build: Array) -> Array:
         """Pelvis relative to its track, (N, 3): sway to the left and height, by phase."""
-        phase, stature, heading = scalars[:, 0], scalars[:, 2], scalars[:, 3]
+        phase, rate, stature, heading = scalars[:, :4].T
         sway, height = np.zeros(len(phase)), np.full(len(phase), self._height)
         if not self._plain:
-            sway = self.curves.channel("root_sway", phase, coef)
-            height = self.curves.channel("root_height", phase, coef)
+            sway = self.curves.channel("root_sway", phase, coef, rate)
+            height = self.curves.channel("root_height", phase, coef, rate)
         height = height * (1 + build @ self.curves.height_change[: self._proportions])
         return (stature * np.stack([-sway * np.sin(heading), sway * np.cos(heading), height])).T
 
@@ -134,8 +134,8 @@ class Transitions:
         rate = (c.rate_noise_start if step.settling else c.rate_noise) * self.curves.stride_hz
         away = _relax(b[:, 1] - self.curves.stride_hz, dt, c.rate_time, rate, noise[:, 1])
         after[:, 1] = _reflect(self.curves.stride_hz + away)
-        grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.stature_doubt
-        after[:, 2] = np.maximum(b[:, 2] * (1 + grown * root * noise[:, 2]), 0.3)
+        grown = (1.0 if step.settling else SLOWLY) * c.stature_noise * root * noise[:, 2]
+        after[:, 2] = np.maximum(b[:, 2] * (1 + grown), 0.3)
         after[:, 3] = wrap(b[:, 3] + c.heading_noise * root * noise[:, 3], 2 * np.pi)
         after[:, 4:6] = _relax(b[:, 4:6], dt, c.tilt_time, c.tilt_noise, noise[:, 4:6])
         ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, 6]
@@ -156,7 +156,8 @@ class Transitions:
         """Metres along the heading while the phase advances by `turn` (eq. 8)."""
         if self._plain:
             return np.asarray(before[:, 2] * self.curves.stride_length * before[:, 1] * dt)
-        speed = self.curves.channel("root_forward", before[:, 0] + 0.5 * turn, self._coef(before))
+        middle = before[:, 0] + 0.5 * turn
+        speed = self.curves.channel("root_forward", middle, self._coef(before), before[:, 1])
         return np.asarray(before[:, 2] * speed * turn)
 
     def difference(self, a: Array, b: Array) -> Array:

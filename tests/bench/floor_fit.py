@@ -40,6 +40,8 @@ class Walk:
         COMPARED from the pelvis, along the pelvis's axes, metres.
     channels : (n, 30)
     measures : retarget.Measures
+    stride_hz : float
+        Strides per second, which the mean cycle of a model may follow.
     """
 
     subject: str
@@ -47,6 +49,7 @@ class Walk:
     joints: Floats
     channels: Floats
     measures: retarget.Measures
+    stride_hz: float
 
 
 @dataclass
@@ -79,7 +82,8 @@ def walk(s: Sequence) -> Walk:
     frames = np.arange(0, len(local), EVERY)
     seen = np.isfinite(local[frames]).all(axis=(1, 2)) & np.isfinite(s.channels[frames]).all(axis=1)
     frames = frames[seen]
-    return Walk(s.subject, frames / s.period.frames, local[frames], s.channels[frames], measures)
+    at, rate = frames / s.period.frames, s.fps / s.period.frames
+    return Walk(s.subject, at, local[frames], s.channels[frames], measures, rate)
 
 
 def sizes(sections: Sections) -> tuple[int, int]:
@@ -91,7 +95,8 @@ def model_channels(w: Walk, sections: Sections, x: Floats) -> Floats:
     """Channels (k, n, 30) for k vectors of scores, proportions and a phase offset, x (k, q + p + 1)."""
     q, _ = sizes(sections)
     scores = np.repeat(x[:, :q], len(w.at), axis=0)
-    return curves(sections, (w.at + x[:, -1:]).ravel(), scores).reshape(len(x), len(w.at), -1)
+    found = curves(sections, (w.at + x[:, -1:]).ravel(), scores, w.stride_hz)
+    return found.reshape(len(x), len(w.at), -1)
 
 
 def model_joints(w: Walk, sections: Sections, x: Floats, channels: Floats) -> Floats:

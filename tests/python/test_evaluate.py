@@ -38,11 +38,11 @@ def mean_walk(frames=100, fps=30, heading=0.7, start=(1.0, -2.0)):
     """Truth that is the model's mean cycle, walking on."""
     frame = np.arange(frames)
     cycles = FIRST_PHASE + RATE * frame / fps
-    path = HEIGHT * root_path(SECTIONS, cycles)
+    path = HEIGHT * root_path(SECTIONS, cycles, RATE)
     turn = np.array(
         [[np.cos(heading), -np.sin(heading), 0], [np.sin(heading), np.cos(heading), 0], [0, 0, 1]]
     )
-    joints, _ = skeleton.pose(SECTIONS, cycles, np.zeros(0), HEIGHT, 0.0, 0.0, 0.0, path)
+    joints, _ = skeleton.pose(SECTIONS, cycles, np.zeros(0), HEIGHT, 0.0, 0.0, 0.0, path, stride_hz=RATE)
     joints = joints @ turn.T + [*start, 0.0]
     names = blob.unpack_names(SECTIONS["PTNM"])
     places = {name: joints[:, names.index(name)] for name in JOINTS}

@@ -11,7 +11,7 @@ import pytest
 
 import gait.cli
 from gait import Model, blob, skeleton
-from gait.learn import ground, model, report, sources
+from gait.learn import between, ground, report, sources
 from gait.skeleton import CHANNELS, Proportions
 
 SHIPPED = Path(skeleton.__file__).parent / "data/walk.gait"
@@ -118,11 +118,11 @@ def test_links_are_followed_once_and_closed_folders_are_named(walks, tmp_path, c
 
 def test_few_people_leave_a_doubt_about_others():
     one, rates = np.zeros(1, int), np.array([0.9, 0.9, 1.0])
-    assert model._by_subject(np.array([0.9]), one, 0.07) == pytest.approx((0.9, 0.063))
-    two = model._by_subject(rates[1:], np.arange(2), 0.07)
+    assert between.by_subject(np.array([0.9]), one, 0.07) == pytest.approx((0.9, 0.063))
+    two = between.by_subject(rates[1:], np.arange(2), 0.07)
     assert two[1] > rates[1:].std(ddof=1) * 0.99
-    assert model._by_subject(rates, np.arange(3), 0.5)[1] == pytest.approx(rates.std(ddof=1))
-    assert model._by_subject(np.full(4, 0.9), np.arange(4), 0.07)[1] == pytest.approx(0.009)
+    assert between.by_subject(rates, np.arange(3), 0.5)[1] == pytest.approx(rates.std(ddof=1))
+    assert between.by_subject(np.full(4, 0.9), np.arange(4), 0.07)[1] == pytest.approx(0.009)
 
 
 def test_the_pelvis_of_the_shipped_model_follows_from_its_legs():

@@ -195,9 +195,11 @@ def test_c_and_numpy_agree_on_poses_with_proportions(made):
             0.0,
             np.zeros(3),
             state.proportion,
+            state.stride_hz,
         )
         assert joints == pytest.approx(expected[0], abs=1e-5)
         assert angles == pytest.approx(expected_angles[0], abs=1e-5)
-        height = skeleton.curves(SHIPPED, [state.phase], [state.coef])[0, CHANNELS.index("root_height")]
+        height = skeleton.curves(SHIPPED, [state.phase], [state.coef], state.stride_hz)[0]
+        height = height[CHANNELS.index("root_height")]
         height *= skeleton.length_change(SHIPPED, state.proportion)[0, -1] * state.stature
         assert model.pelvis_height(state) == pytest.approx(height, abs=1e-5)

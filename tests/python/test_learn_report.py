@@ -83,7 +83,7 @@ def test_the_page_holds_everything_and_needs_nothing(walks, tmp_path, capsys):
     summary = json.loads(capsys.readouterr().out)
     page = Page((folder / "index.html").read_text())
     stems = {p.stem for p in folder.glob("*.png")}
-    strips = {f"strip-{k + 1}" for k in range(summary["components"])}
+    strips = {"strip-rate", *(f"strip-{k + 1}" for k in range(summary["components"]))}
     assert stems == strips | {
         "strip-mean", "alignment", "convergence", "components", "cycles", "missing", "periods", "residuals",
         "snr", "spectrum", "subjects",
@@ -139,12 +139,15 @@ def test_alignment_brings_the_curves_together(learned):
 
 
 def test_a_strip_shows_the_walker_plus_and_minus_two_deviations(learned):
-    figure = figures_model.strip(learned, 0)
+    turned = learned.curves[1]
+    figure = figures_model.strip(learned, turned)
     side = figure.axes[0]
     assert len(side.lines) == 3 * 8 * 9 + 1  # turns, phases, chains; the ground
     heights = np.concatenate([np.asarray(line.get_ydata()) for line in side.lines])
     assert heights.min() == pytest.approx(0, abs=1e-9) and 0.9 < heights.max() < side.get_ylim()[1] < 1.2
-    mean, less, more = (figures_model._bodies(learned, 0, turn) for turn in (0.0, -2.0, 2.0))
+    mean, less, more = (
+        figures_model._bodies(learned, learned.curves[0] + turn * turned) for turn in (0.0, -2.0, 2.0)
+    )
     assert np.abs(more - less).max() > 0.02
     assert (more + less) / 2 == pytest.approx(mean, abs=0.05)
 

@@ -37,7 +37,15 @@ STATES = st.builds(
 
 def twin(state):
     joints, angles = skeleton.pose(
-        SECTIONS, state.phase, state.coef, state.stature, state.heading, state.pitch, state.roll, state.pelvis
+        SECTIONS,
+        state.phase,
+        state.coef,
+        state.stature,
+        state.heading,
+        state.pitch,
+        state.roll,
+        state.pelvis,
+        stride_hz=state.stride_hz,
     )
     return joints[0], angles[0]
 
@@ -62,7 +70,7 @@ def test_pose_equals_the_numpy_twin(state):
 @given(STATES)
 def test_pelvis_height_is_the_height_channel(state):
     names = blob.unpack_names(SECTIONS["CHNM"])
-    channels = skeleton.curves(SECTIONS, [state.phase], [state.coef])[0]
+    channels = skeleton.curves(SECTIONS, [state.phase], [state.coef], state.stride_hz)[0]
     expected = state.stature * channels[names.index("root_height")]
     assert MODEL.pelvis_height(state) == pytest.approx(expected, abs=2e-5)
 

@@ -16,7 +16,7 @@ static gait_state random_state(uint32_t i)
     rng_normal4(9, 1, 0, i, 0, x);
     rng_normal4(9, 2, 0, i, 0, y);
     return (gait_state){.phase = u[0],
-                        .stride_hz = 1.0f,
+                        .stride_hz = 0.6f + 0.6f * u[3], /* four deviations either way */
                         .stature = 1.5f + 0.5f * u[1],
                         .heading = 6.28f * (u[2] - 0.5f),
                         .pitch = 0.1f * x[0],
@@ -26,9 +26,10 @@ static gait_state random_state(uint32_t i)
                         .proportion = {y[3]}};
 }
 
-static void put_lane(kin_input *in, int lane, const gait_state *s)
+static void put_lane(const gait_model *m, kin_input *in, int lane, const gait_state *s)
 {
     in->phase[lane] = s->phase;
+    in->pace[lane] = kin_pace(m, s->stride_hz);
     in->stature[lane] = s->stature;
     in->heading[lane] = s->heading;
     in->pitch[lane] = s->pitch;
@@ -53,7 +54,7 @@ static void run_block(const gait_model *m, uint32_t first, block *b)
     kin_input filled = {0};
     for (int lane = 0; lane < BLOCK; lane++) {
         gait_state const s = random_state(first + (uint32_t)lane);
-        put_lane(&filled, lane, &s);
+        put_lane(m, &filled, lane, &s);
     }
     const kernels *const run = kernels_choose(~0u);
     run->kin_curves(m, &filled, m->components, &b->ch);
@@ -305,6 +306,24 @@ static void test_ground(void)
     }
 }
 
+/* A state without a rate, and one at the mean rate, have the mean cycle; beyond two deviations nothing changes. */
+static void test_pace(void)
+{
+    const gait_model *const plain = toy_model(), *const m = toy_shifted();
+    CHECK(kin_pace(plain, 2.0f) == 0.0f && kin_pace(m, 0.0f) == 0.0f && kin_pace(m, m->stride_hz) == 0.0f);
+    CHECK(kin_pace(m, 2.4f) == 2.0f && kin_pace(m, 0.5f) == -2.0f);
+    CHECK_NEAR(kin_pace(m, m->stride_hz + 0.5f * m->stride_hz_sd), 0.5, 1e-5);
+    gait_state s = random_state(3);
+    gait_pose without, mean, fast;
+    s.stride_hz = 0.0f;
+    CHECK(model_pose_state(m, &s, &without) == GAIT_OK);
+    s.stride_hz = m->stride_hz;
+    CHECK(model_pose_state(m, &s, &mean) == GAIT_OK);
+    s.stride_hz = 2.4f;
+    CHECK(model_pose_state(m, &s, &fast) == GAIT_OK);
+    CHECK(memcmp(&without, &mean, sizeof mean) == 0 && memcmp(&fast, &mean, sizeof mean) != 0);
+}
+
 int main(void)
 {
     test_against_twin(toy_model());
@@ -312,6 +331,7 @@ int main(void)
     test_lanes(toy_model());
     test_lanes(toy_shifted());
     test_curves();
+    test_pace();
     test_mirror();
     test_signs();
     test_shoulder_rotation();

@@ -220,6 +220,46 @@ static gait_status open_shifted(uint32_t rows, uint32_t columns, uint32_t shifts
     return model_open(buf, toy_finish(&f), m, err);
 }
 
+/* PACE of `phases` by `channels` numbers and so much deviation of the stride rate in an otherwise sound model. */
+static gait_status open_paced(uint32_t phases, uint32_t channels, const float *curve, float rate_sd,
+                              gait_model *m, gait_error *err)
+{
+    toy_file f = toy_begin(buf, TOY_SECTIONS); /* PACE in place of META */
+    toy_put_curves(&f, 8, 1);
+    toy_section(&f, "PACE", 3, 2, phases, channels, 1, curve);
+    toy_put_skeleton(&f);
+    toy_put_points(&f);
+    toy_put_limbs(&f);
+    size_t const bytes = toy_finish(&f);
+    memcpy(section("GAIT") + 4, &rate_sd, sizeof rate_sd);
+    toy_seal(buf, bytes);
+    return model_open(buf, bytes, m, err);
+}
+
+/* As large as the mean curves, of moderate numbers, and only with a deviation of the rate to count in. */
+static void test_pace(void)
+{
+    static float curve[9 * (TOY_CHANNELS + 1)];
+    gait_model m;
+    gait_error err = {0};
+    curve[8 * TOY_CHANNELS - 1] = -1.0f;
+    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_OK);
+    CHECK(m.pace_curve[8 * TOY_CHANNELS - 1] == -1.0f);
+    CHECK(model_open(buf, toy_write(buf, 8, 1), &m, &err) == GAIT_OK && !m.pace_curve);
+    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.0f, &m, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "PACE"));
+    CHECK(open_paced(7, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
+          strstr(err.text, "PACE"));
+    CHECK(open_paced(9, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
+          strstr(err.text, "PACE"));
+    CHECK(open_paced(8, TOY_CHANNELS + 1, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT);
+    curve[3] = 1.01f;
+    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
+          strstr(err.text, "PACE"));
+    curve[3] = NAN;
+    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
+          strstr(err.text, "PACE"));
+}
+
 static gait_status open_proportions(uint32_t rows, uint32_t columns, gait_model *m, gait_error *err)
 {
     return open_shifted(rows, columns, 0, NULL, m, err);
@@ -291,6 +331,7 @@ int main(void)
     test_limits();
     test_proportions();
     test_shifts();
+    test_pace();
     test_missing();
     return CHECK_DONE();
 }

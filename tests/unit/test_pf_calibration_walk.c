@@ -26,7 +26,7 @@ static dynamics lively(uint64_t seed)
     cfg.tilt_noise = 0.08f;
     cfg.coef_noise = 0.8f;
     cfg.coef_time = 2.0f;
-    cfg.stature_noise_start = 0.6f; /* 0.03 of stature */
+    cfg.stature_noise = 0.03f;
     cfg.proportion_noise = 0.8f;
     cfg.offset_noise = 0.06f;
     return d;
@@ -82,7 +82,8 @@ static void truth_move(const gait_model *m, const double n[NORMALS], double *x)
     float const score[] = {(float)x[F_COEF], (float)x[F_COEF + 1]};
     double const turn = x[F_RATE] * DT + 0.05 * root * n[0];
     double const middle = x[F_PHASE] + 0.5 * turn;
-    double const speed = (double)root_channel(m, ROOT_FORWARD, (float)(middle - floor(middle)), score, 2);
+    double const speed =
+        (double)root_channel(m, ROOT_FORWARD, (float)(middle - floor(middle)), 0.0f, score, 2);
     double const ahead = x[F_STATURE] * speed * turn + 0.1 * root * n[1], aside = 0.06 * root * n[2];
     x[F_PHASE] += turn - floor(x[F_PHASE] + turn);
     x[F_RATE] = own + relaxed(x[F_RATE] - own, 5.0, 0.05 * own, n[3]);

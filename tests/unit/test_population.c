@@ -130,12 +130,12 @@ static void test_root_channel(void)
             r.run->kin_curves(m, &filled, q, &ch);
             for (int32_t c = ROOT_FORWARD; c <= ROOT_YAW; c++) {
                 float const want = ch.v[m->root_channel + c][0];
-                CHECK_NEAR(root_channel(m, c, filled.phase[0], s.coef, q), want, 1e-6);
-                CHECK_NEAR(root_channel(m, c, filled.phase[0] - 7.0f, s.coef, q), want, 1e-5);
+                CHECK_NEAR(root_channel(m, c, filled.phase[0], 0.0f, s.coef, q), want, 1e-6);
+                CHECK_NEAR(root_channel(m, c, filled.phase[0] - 7.0f, 0.0f, s.coef, q), want, 1e-5);
             }
         }
     }
-    CHECK(isfinite(root_channel(m, ROOT_HEIGHT, NAN, NULL, 0)));
+    CHECK(isfinite(root_channel(m, ROOT_HEIGHT, NAN, 0.0f, NULL, 0)));
 }
 
 /* Bodies of a population are those of the particles' states, and the tail repeats the last. */

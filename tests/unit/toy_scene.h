@@ -66,7 +66,7 @@ static inline gait_state toy_walk(float seconds)
 {
     gait_state s = toy_state(m_wrap1(0.1f + 0.92f * seconds));
     s.pelvis[0] = -1.3f + s.stature * 0.80f * s.stride_hz * seconds;
-    s.pelvis[1] = s.stature * root_channel(toy_model(), ROOT_SWAY, s.phase, s.coef, 0);
+    s.pelvis[1] = s.stature * root_channel(toy_model(), ROOT_SWAY, s.phase, 0.0f, s.coef, 0);
     return s;
 }
 

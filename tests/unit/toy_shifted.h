@@ -4,7 +4,8 @@
 #include "model.h"
 #include "toy_model.h"
 
-/* The toy model whose proportions also move the shoulders: section SHFT. */
+/* The toy model whose proportions also move the shoulders, section SHFT, and whose strides are the longer the
+ * faster they follow each other, section PACE. */
 static inline const gait_model *toy_shifted(void)
 {
     static float shift[TOY_PROPORTIONS][TOY_FRAMES][3];
@@ -15,6 +16,7 @@ static inline const gait_model *toy_shifted(void)
         memcpy(shift[0][3 + 5 * side], to, sizeof to);
     }
     model.shift = shift[0][0];
+    model.pace_curve = model.curves + model.phases * model.channels; /* the first component is stride size */
     return &model;
 }
 

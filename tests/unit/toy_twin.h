@@ -18,11 +18,14 @@ static inline double twin_channel(const gait_model *m, int channel, const gait_s
 {
     double const at = ((double)s->phase - floor((double)s->phase)) * m->phases;
     int const j = (int)at % m->phases, next = (j + 1) % m->phases;
+    double const faster = ((double)s->stride_hz - (double)m->stride_hz) / (double)m->stride_hz_sd;
     double sum = 0.0;
-    for (int k = 0; k <= m->components; k++) {
-        const float *const curve = m->curves + k * m->phases * m->channels + channel;
+    for (int k = m->pace_curve ? -1 : 0; k <= m->components; k++) {
+        const float *const curve =
+            (k < 0 ? m->pace_curve : m->curves + k * m->phases * m->channels) + channel;
         double const a = (double)curve[j * m->channels], b = (double)curve[next * m->channels];
-        sum += (k ? (double)s->coef[k - 1] : 1.0) * (a + (at - floor(at)) * (b - a));
+        double const weight = k < 0 ? fmax(-2.0, fmin(faster, 2.0)) : k ? (double)s->coef[k - 1] : 1.0;
+        sum += weight * (a + (at - floor(at)) * (b - a));
     }
     return sum;
 }

@@ -48,7 +48,7 @@ static void make_table(settings *s, option *table)
          "        dropped, and double them, up to --particles, when there is time to spare; results\n"
          "        then depend on time; default: their number never changes",
          INT(adapt_particles, 16, 1 << 20)},
-        {"components", 0, "Q", "principal components in use; default the first 4, in paper mode all",
+        {"components", 0, "Q", "principal components in use; default the first 5, in paper mode all",
          INT(components, 0, GAIT_MAX_COMPONENTS)},
         {"lag", 0, "N",
          "frames that GAIT_ESTIMATE_LAG and GAIT_STRIDE wait for, default 5; 0: no GAIT_ESTIMATE_LAG",

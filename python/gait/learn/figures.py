@@ -59,13 +59,20 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
 def _model(learned: Learned) -> Iterator[Drawing]:
     """Mean, components and their number."""
     yield Drawing("strip-mean", "Mean cycle", "The right side is bold.", figures_model.strip(learned, None))
+    if learned.pace_curve.any():
+        yield Drawing(
+            "strip-rate",
+            "Stride rate",
+            "The mean cycle at the mean rate, and at those two standard deviations (between people) off it.",
+            figures_model.strip(learned, learned.pace_curve),
+        )
     for k in range(len(learned.curves) - 1):
         share = 100 * learned.components.spectrum[k] if k < len(learned.components.spectrum) else 0.0
         yield Drawing(
             f"strip-{k + 1}",
             f"Component {k + 1}: {share:.0f} % of the variance",
             "Mean and two standard deviations to either side, feet on the ground.",
-            figures_model.strip(learned, k),
+            figures_model.strip(learned, learned.curves[k + 1]),
         )
     if len(learned.curves) > 1:
         yield Drawing(

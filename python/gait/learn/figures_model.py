@@ -44,11 +44,13 @@ STICKS = {
 
 
 def curves(learned: Learned) -> Figure:
-    """Mean and two standard deviations along each component, angle by angle."""
-    table = np.degrees(learned.curves)
-    count, seen = min(len(table) - 1, MOST_COMPONENTS), observed(learned)
-    figure = Figure(figsize=(11, 1.6 * max(count, 1) + 0.7), layout="constrained")
-    panels = figure.subplots(count, len(SHOWN), sharex=True, sharey="col", squeeze=False)
+    """Mean and two standard deviations of the stride rate and along each component, angle by angle."""
+    mean_curve, *turns = np.degrees(learned.curves[: 1 + MOST_COMPONENTS])
+    names, seen = [f"component {k + 1}" for k in range(len(turns))], observed(learned)
+    if learned.pace_curve.any():
+        names, turns = ["stride rate", *names], [np.degrees(learned.pace_curve), *turns]
+    figure = Figure(figsize=(11, 1.6 * len(names) + 0.7), layout="constrained")
+    panels = figure.subplots(len(names), len(SHOWN), sharex=True, sharey="col", squeeze=False)
     for k, row in enumerate(panels):
         for axes, name in zip(row, SHOWN, strict=True):
             plain(axes)
@@ -56,7 +58,7 @@ def curves(learned: Learned) -> Figure:
             if not seen[c]:
                 say_unobserved(axes)
             else:
-                mean, turn = table[0, :, c], 2 * table[k + 1, :, c]
+                mean, turn = mean_curve[:, c], 2 * turns[k][:, c]
                 axes.fill_between(PHASE, mean - turn, mean + turn, color=GREY, alpha=0.2, lw=0)
                 axes.plot(PHASE, mean + turn, color=ORANGE, lw=1)
                 axes.plot(PHASE, mean, color=DARK, lw=1)
@@ -64,27 +66,27 @@ def curves(learned: Learned) -> Figure:
             axes.set(xlim=(0, 1))
             if k == 0:
                 axes.set_title(words(name), fontsize=9)
-        row[0].set_ylabel(f"component {k + 1}\ndegrees", fontsize=8)
+        row[0].set_ylabel(f"{names[k]}\ndegrees", fontsize=8)
     line_legend(figure, {**TURNS, "mean": DARK})
     figure.supxlabel(PHASE_LABEL, fontsize=9)
     return figure
 
 
-def strip(learned: Learned, component: int | None) -> Figure:
+def strip(learned: Learned, moved: Floats | None) -> Figure:
     """Walker over one cycle from the side and from the front.
 
     Parameters
     ----------
-    component : int, optional
-        Draw the mean plus and minus two standard deviations of this one over the mean; None: the mean alone.
+    moved : (T, M), optional
+        Draw the mean plus and minus two of these changes over the mean; None: the mean alone.
     """
     figure, panels = grid(2, 1, 10, 4.6)
-    turns = [0.0] if component is None else [0.0, -2.0, 2.0]
+    turns = [0.0] if moved is None else [0.0, -2.0, 2.0]
     top = 1.05
     for turn in turns:
-        bodies = _bodies(learned, component, turn)
+        bodies = _bodies(learned, learned.curves[0] if moved is None else learned.curves[0] + turn * moved)
         top = max(top, float(bodies[..., 2].max()))
-        colour = {0.0: DARK if component is None else GREY, -2.0: BLUE, 2.0: ORANGE}[turn]
+        colour = {0.0: DARK if moved is None else GREY, -2.0: BLUE, 2.0: ORANGE}[turn]
         for axes, across in zip(panels, (0, 1), strict=True):
             _draw(axes, bodies, across, colour)
     for axes, name in zip(panels, ("seen from the right", "seen from ahead"), strict=True):
@@ -95,18 +97,15 @@ def strip(learned: Learned, component: int | None) -> Figure:
         axes.spines[["left", "bottom"]].set_visible(False)
         axes.set_xticks(STEP * np.arange(PHASES), [f"{i / PHASES:g}" for i in range(PHASES)])
     panels[1].set_xlabel(PHASE_LABEL)
-    if component is not None:
+    if moved is not None:
         line_legend(figure, TURNS)
     return figure
 
 
-def _bodies(learned: Learned, component: int | None, turn: float) -> Floats:
-    """Joints (PHASES, P, 3) in statures, the lowest point on the ground."""
+def _bodies(learned: Learned, cycle: Floats) -> Floats:
+    """Joints (PHASES, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
     at = np.arange(PHASES) * len(PHASE) // PHASES
-    channels = learned.curves[0, at]
-    if component is not None:
-        channels = channels + turn * learned.curves[component + 1, at]
-    joints = points(default_skeleton(learned.proportions).sections(), channels)
+    joints = points(default_skeleton(learned.proportions).sections(), cycle[at])
     joints[:, :, 2] -= joints[:, :, 2].min(axis=1, keepdims=True)
     return joints
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import align, cycles, fpca, ground, lengths, prior, rank, retarget
+from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
@@ -65,6 +65,11 @@ class Learned:
         Rows of the analysis, channels in their own units.
     components : fpca.Components
         In the channels' own units; gaps are filled in units scaled by `scale` (M,), and `rmse` is in those.
+        Mean, components and scores are of the cycles as they would be at the mean stride rate.
+    pace_curve : (T, M)
+        PACE: how the mean curves follow the stride rate; 0 in the paper's model.
+    paces : (n,)
+        Pace of each sequence.
     lengths : (p, F + 1)
         PROP: how limbs differ in length among people of one stature; no rows in the paper's model.
     shifts : (p, F, 3)
@@ -82,6 +87,8 @@ class Learned:
     alignment: align.Alignment
     cycles: cycles.Cycles
     components: fpca.Components
+    pace_curve: Floats
+    paces: Floats
     scale: Floats
     held_out: Floats
     lengths: Floats
@@ -100,7 +107,9 @@ class Learned:
         values, mask = self.cycles.values, self.cycles.mask
         squares = np.empty((len(values), values.shape[2]))
         for part in by_rows(values):
-            rest = np.where(mask[part], values[part] - self.components.reconstruct(part), 0.0)
+            told = self.components.reconstruct(part)
+            told += self.paces[self.cycles.sequence[part], None, None] * self.pace_curve
+            rest = np.where(mask[part], values[part] - told, 0.0)
             squares[part] = np.sum(rest**2, axis=1)
         return Residuals(squares, mask.sum(axis=1))
 
@@ -158,9 +167,12 @@ def fit(
     model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = prior.joint_metric(model.mean, proportions)
-    static = prior.static_spread(model.filled, row_subject, wanted, metric)
+    paces, slope, even = pace.of(sequences, index), np.zeros(model.mean.shape), model.filled
     if kind == "people":
-        model = prior.refine(model, row_subject, wanted, metric)
+        slope = pace.slope(model.filled, row_subject, paces[rows.sequence])
+        even = pace.without(model.filled, paces[rows.sequence], slope)
+        model = prior.refine(model, even, row_subject, wanted, metric)
+    static = prior.static_spread(even, row_subject, wanted, metric)
     model = ground.grounded(model, rows.seen, proportions)
     bodies = [*_bodies(sequences, index, len(subjects)), *(others or [])] if kind == "people" else []
     table, shifts = lengths.learn(bodies, proportions, model.mean)
@@ -172,6 +184,8 @@ def fit(
         alignment,
         rows,
         model,
+        slope,
+        paces,
         scale,
         held_out,
         table,

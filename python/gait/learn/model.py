@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from gait import blob
 from gait._version import __version__
+from gait.learn.between import LENGTH_SD, RATE_SD, by_subject
 from gait.learn.fit import Learned
 from gait.learn.spool import by_rows, release
 from gait.skeleton import ANGLES, CHANNELS, default_skeleton
@@ -21,9 +22,6 @@ Floats = npt.NDArray[np.float64]
 MOST_ROWS = 12  # of the table of sequences in META: five components stay under 100 kB
 GENERATOR = f"gait {__version__}"
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not this training set
-RATE_SD, LENGTH_SD = 0.07, 0.06  # of stride rate and length among people who walk as they like: share of mean
-ENOUGH = 3  # subjects that tell for themselves how people differ
-LEAST_SD = 0.01  # share of the mean: even recordings that are all alike leave a doubt
 CMU = (
     "The data used in this project was obtained from mocap.cs.cmu.edu. "
     "The database was created with funding from NSF EIA-0196217."
@@ -39,6 +37,7 @@ def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array
         "CHST": _stored(channel_statistics(learned)),
         "SCST": _stored(score_statistics(learned)),
         "GAIT": _stored(gait_statistics(learned)),
+        **({"PACE": _stored(learned.pace_curve)} if learned.pace_curve.any() else {}),
         **default_skeleton(learned.proportions).sections(),
         **_proportions(learned),
     }
@@ -122,8 +121,8 @@ def gait_statistics(learned: Learned) -> Floats:
     speeds = [_observed(s.channels, column) for s in learned.sequences]
     lengths = np.array([speed.mean() if len(speed) else np.nan for speed in speeds])
     fps = float(np.median([s.fps for s in learned.sequences]))
-    rate = _by_subject(rates, learned.subject_index, RATE_SD)
-    length = _by_subject(lengths, learned.subject_index, LENGTH_SD)
+    rate = by_subject(rates, learned.subject_index, RATE_SD)
+    length = by_subject(lengths, learned.subject_index, LENGTH_SD)
     if not np.isfinite(lengths).any():
         made_up = float(learned.components.mean[:, column].mean())
         length = made_up, 2 * LENGTH_SD * made_up
@@ -135,23 +134,6 @@ def _observed(channels: Floats, column: int) -> Floats:
     values = channels[np.isfinite(channels[:, column]), column]
     release(channels)
     return values
-
-
-def _by_subject(values: Floats, group: npt.NDArray[np.intp], usual: float) -> tuple[float, float]:
-    """Mean and sd of the subjects' means; sequences of NaN do not count.
-
-    Fewer than `ENOUGH` subjects cannot tell how people differ: the variance is then drawn towards that of
-    people in general, whose sd is `usual` of the mean, and never below what the sequences show.
-    """
-    group, values = group[np.isfinite(values)], values[np.isfinite(values)]
-    if not len(values):
-        return 0.0, 0.0
-    means = np.array([values[group == g].mean() for g in np.unique(group)])
-    middle, spread = float(means.mean()), means if len(means) > 1 else values
-    seen = float(spread.std(ddof=1)) if len(spread) > 1 else 0.0
-    told = min((len(means) - 1) / (ENOUGH - 1), 1.0)
-    variance = told * seen**2 + (1 - told) * max(seen, usual * middle) ** 2
-    return middle, max(float(np.sqrt(variance)), LEAST_SD * middle)
 
 
 def stride_variation(learned: Learned) -> float:

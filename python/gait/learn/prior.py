@@ -122,9 +122,9 @@ def _sign(curves: Floats) -> Floats:
     return np.asarray(np.where(half[np.arange(len(half)), np.abs(half).argmax(axis=1)] < 0, -1.0, 1.0))
 
 
-def refine(plain: Components, subject: Groups, count: int, metric: Floats) -> Components:
-    """Replace the components of an analysis (own units) by those that reach further."""
-    mean, curves, scores, sd, spectrum = components(plain.filled, subject, count, metric)
+def refine(plain: Components, cycles: Floats, subject: Groups, count: int, metric: Floats) -> Components:
+    """Replace the components of an analysis (own units) by those of completed cycles that reach further."""
+    mean, curves, scores, sd, spectrum = components(cycles, subject, count, metric)
     return replace(plain, mean=mean, curves=curves, scores=scores, sd=sd, spectrum=spectrum)
 
 

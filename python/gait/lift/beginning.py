@@ -68,7 +68,9 @@ def _columns(
     assert placement.phase is not None
 
     def body(phase: float, rate: float, coef: Floats) -> Floats:
-        joints, _ = pose(cycle, phase + rate * time, coef, 1.0, heading, 0.0, 0.0, np.zeros(3))
+        joints, _ = pose(
+            cycle, phase + rate * time, coef, 1.0, heading, 0.0, 0.0, np.zeros(3), stride_hz=rate
+        )
         names = blob.unpack_names(cycle["PTNM"])
         places = joints[:, [names.index(name) for name in markers]]
         return np.asarray(places - joints[:, names.index("pelvis"), None])

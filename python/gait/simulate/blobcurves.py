@@ -6,6 +6,7 @@ import numpy as np
 
 from gait import blob
 from gait.errors import UserError
+from gait.pace import pace
 from gait.simulate.arrays import Array
 from gait.simulate.curves import NAMES, Curves, fit_series, stride_modes
 
@@ -13,8 +14,10 @@ _ROOT = {"pelvis_yaw": "root_yaw", "pelvis_pitch": "root_pitch", "pelvis_roll": 
 _NEEDED = tuple(f"{side}_{name}" for side in "lr" for name in ("hip_flexion", "knee_flexion"))
 
 
-def curves_of_model(path: str, rng: np.random.Generator) -> Curves:
+def curves_of_model(path: str, rng: np.random.Generator, cadence: float) -> Curves:
     """Return the curves of a person drawn from the model at `path`; strides differ as the model says.
+
+    cadence : strides per second, which the mean cycle follows.
 
     Raises
     ------
@@ -35,6 +38,8 @@ def curves_of_model(path: str, rng: np.random.Generator) -> Curves:
     spread = np.asarray(sections["SCST"], np.float64)
     scores = spread[:, 1] * np.clip(rng.standard_normal(len(spread)), -1.5, 1.5)
     mean = curves[0] + np.einsum("q,qtm->tm", scores, curves[1:])
+    if "PACE" in sections:
+        mean += pace(sections["GAIT"], cadence) * np.asarray(sections["PACE"], np.float64)
     modes = stride_modes(rng)
     for k in range(min(len(modes), len(spread))):
         modes[k] = spread[k, 2] * _rows(names, curves[1 + k])

@@ -66,7 +66,8 @@ def set_stage(scenario: Scenario) -> Stage:
     body = draw_anatomy(stature, rng)
     speed, cadence = pace(scenario, stature)
     rng = scenario.stream("gait")
-    curves = normative(rng) if scenario.gait == GENERATOR else curves_of_model(scenario.gait, rng)
+    generated = scenario.gait == GENERATOR
+    curves = normative(rng) if generated else curves_of_model(scenario.gait, rng, cadence)
     timing = draw_timing(cadence, scenario.fps, scenario.frames, len(curves.modes), rng)
     path = make_path(scenario.view, scenario.direction, float(scenario.stream("path").uniform(-1, 1)))
     walk = make_walk(body, curves, timing, path, speed, rng)

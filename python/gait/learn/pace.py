@@ -1,0 +1,74 @@
+"""How the mean cycle follows the stride rate: arms and legs swing further the faster somebody walks.
+
+People differ at one rate, and a person differs between rates; only the latter is regressed here.  A tracker
+knows the rate anyway (it is a state of the paper's, eq. 7), so what follows it costs no score.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.learn.between import RATE_SD, by_subject
+from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
+from gait.learn.prior import mirrored
+from gait.learn.sequence import Sequence
+from gait.learn.spool import by_rows, release, stored
+from gait.pace import pace
+from gait.skeleton import CHANNELS
+
+Floats = npt.NDArray[np.float64]
+Groups = npt.NDArray[np.intp]
+
+#: Variance of the pace of an imaginary person who walks alike at any rate: with recordings of few people, or
+#: of hardly any other rates, the slope is drawn towards 0.
+UNMOVED = 1.0
+#: Does not follow the rate: how far people step at one rate differs much, and a tracker that hardly sees the
+#: distance, as from in front, adds up what its speed is off.  The components have it.
+LEFT_OUT = CHANNELS.index("root_forward")
+
+
+def of(sequences: list[Sequence], subject: Groups) -> Floats:
+    """Pace of sequences (n,): stride rates as `gait.pace` tells them; `subject` (n,) owns them."""
+    rates = np.array([s.fps / s.period.frames for s in sequences])
+    return pace(by_subject(rates, subject, RATE_SD), rates)
+
+
+def slope(filled: Floats, subject: Groups, paces: Floats) -> Floats:
+    """Change (T, M) of the cycle per unit of pace, as steep in every person, who all count alike.
+
+    Parameters
+    ----------
+    filled : (R, T, M)
+        Completed cycles, own units.
+    subject : (R,)
+        Person of each cycle.
+    paces : (R,)
+
+    Returns
+    -------
+    (T, M)
+        Least squares of the differences between a person's cycles and their mean on those of the pace, with
+        the images in the mirror; band-limited.  0 where there is one person, or one pace, and for LEFT_OUT.
+    """
+    together, variance = np.zeros(filled.shape[1:]), UNMOVED
+    people = np.unique(subject)
+    for person in people if len(people) > 1 else ():
+        rows = np.flatnonzero(subject == person)
+        away = (paces[rows] - paces[rows].mean()) / len(rows)
+        variance += float(np.sum(away**2)) * len(rows)
+        for part in by_rows(rows):
+            # Differences of the pace sum to 0, so that the mean cycle need not be taken off.
+            together += np.tensordot(away[part], filled[rows[part]], 1)
+            release(filled)
+    found = together[None] / variance
+    found[..., LEFT_OUT] = 0.0
+    basis = fourier_basis(filled.shape[1], HARMONICS)
+    both = 0.5 * (found + mirrored(found))
+    return np.asarray(decode(encode(both, basis), basis, filled.shape[2])[0])
+
+
+def without(filled: Floats, paces: Floats, slope: Floats) -> Floats:
+    """Put cycles (R, T, M) as they would be at the mean rate on disk."""
+    parts = (filled[part] - paces[part, None, None] * slope for part in by_rows(filled))
+    return stored(parts, filled.shape[1:])
