@@ -204,7 +204,7 @@ python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
 	@$(PY) -m pytest -q -c python/pyproject.toml --rootdir . tests/python $(ARGS)
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
-	@$(MAKE) --no-print-directory config=sanitize unit
+	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit
 
 # The plain program needs no libFuzzer; with clang: -fsanitize=fuzzer instead of standalone.c's main.
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))

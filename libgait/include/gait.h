@@ -175,6 +175,8 @@ typedef struct gait_tracker_config {
     float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
     float    girth;            /* limb radii against the model's (clothes) [0.5, 2] */
     float    resample_ess;     /* resample below this fraction of particles [0, 1] */
+    float    evidence_time;    /* seconds for which errors of the image terms last; a frame's log-likelihood counts at
+                                * dt / this, at most whole; default 0.1; 0: frames are independent (paper mode) */
     float    max_dt;           /* longest accepted interval, seconds; default 0.5 */
     /* Dynamics (eqs. 5-9): standard deviations per sqrt(second) unless said otherwise. */
     float    phase_noise;      /* strides */
@@ -187,17 +189,15 @@ typedef struct gait_tracker_config {
     float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds */
     float    coef_noise;       /* score standard deviations */
     float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
-    float    stature_noise;    /* fraction of stature, while settling; later a tenth */
+    float    stature_noise;    /* deviations of stature at the start */
+    float    stature_noise_start; /* the same while settling */
     float    offset_noise;     /* posture of the angles in offset_angles, radians */
     float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
     float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
-    /* Reported joint_sd: the particles' deviation times this, because frames err alike, */
-    float    joint_sd_factor;
-    float    joint_sd_model;   /* and, in quadrature, what the model cannot express, fraction of stature */
+    float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of stature */
     gait_camera camera[GAIT_MAX_CAMERAS];
-    uint32_t reserved;
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;
 

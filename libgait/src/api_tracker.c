@@ -28,12 +28,13 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .missed_weight = 0.4f,
         .girth = 1.0f,
         .resample_ess = paper ? 1.0f : 0.5f,
+        .evidence_time = paper ? 0.0f : 0.1f,
         .max_dt = 0.5f,
         .phase_noise = 0.0164f,
-        .rate_noise = 0.02f,
+        .rate_noise = 0.014f,
         .rate_noise_start = 0.055f,
         .settle_time = 1.0f,
-        .rate_time = 5.0f,
+        .rate_time = 20.0f,
         .forward_noise = 0.05f,
         .lateral_noise = 0.05f,
         .vertical_noise = 0.0096f,
@@ -42,9 +43,9 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .tilt_time = 1.1f,
         .coef_noise = 0.5f,
         .coef_time = 4.5f,
-        .stature_noise = 0.015f,
+        .stature_noise = 0.2f,
+        .stature_noise_start = 2.0f,
         .proportion_noise = 0.15f,
-        .joint_sd_factor = 1.8f,
         .joint_sd_model = 0.018f,
         .offset_noise = 0.02f,
         .offset_sd = 0.035f,
@@ -59,9 +60,8 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->heading_noise = 0.11f;
         cfg->tilt_noise = 0.055f;
         cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
-        cfg->stature_noise = 0.0f;
+        cfg->stature_noise = cfg->stature_noise_start = 0.0f;
         cfg->offset_angles = 0;
-        cfg->joint_sd_factor = 1.0f;
         cfg->joint_sd_model = 0.0f;
         cfg->term_weight[0] = 1.0f;
     }
@@ -86,6 +86,7 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(missed_weight, 0.0f, 1.0f),
         RANGE(girth, 0.5f, 2.0f),
         RANGE(resample_ess, 0.0f, 1.0f),
+        RANGE(evidence_time, 0.0f, 1e6f),
         RANGE(max_dt, 1e-3f, 10.0f),
         RANGE(phase_noise, 0.0f, 10.0f),
         RANGE(rate_noise, 0.0f, 10.0f),
@@ -100,11 +101,11 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(tilt_time, 0.0f, 1e6f),
         RANGE(coef_noise, 0.0f, 100.0f),
         RANGE(coef_time, 0.0f, 1e6f),
-        RANGE(stature_noise, 0.0f, 1.0f),
+        RANGE(stature_noise, 0.0f, 100.0f),
+        RANGE(stature_noise_start, 0.0f, 100.0f),
         RANGE(offset_noise, 0.0f, 10.0f),
         RANGE(offset_sd, 0.0f, 10.0f),
         RANGE(proportion_noise, 0.0f, 100.0f),
-        RANGE(joint_sd_factor, 0.0f, 100.0f),
         RANGE(joint_sd_model, 0.0f, 1.0f),
     };
     for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {

@@ -60,9 +60,6 @@ static float time_for(float sd, float noise)
     return noise > 0.0f ? 2.0f * sd * sd / (noise * noise) : 0.0f;
 }
 
-/* Share of its noise at which stature goes on once settled: else resampling leaves a single value. */
-static float const SLOWLY = 0.1f;
-
 dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_t frame)
 {
     const gait_tracker_config *const c = d->cfg;
@@ -83,7 +80,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .forward_noise = c->forward_noise * root_dt,
         .lateral_noise = c->lateral_noise * root_dt,
         .heading_noise = c->heading_noise * root_dt,
-        .stature_noise = (settling ? 1.0f : SLOWLY) * c->stature_noise * root_dt,
+        .stature_noise = (settling ? c->stature_noise_start : c->stature_noise) * d->stature_doubt * root_dt,
         .rate = relax(dt, c->rate_time, (settling ? c->rate_noise_start : c->rate_noise) * mean_rate),
         .level = relax(dt, c->tilt_time, c->vertical_noise),
         .tilt = relax(dt, c->tilt_time, c->tilt_noise),

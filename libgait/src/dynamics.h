@@ -10,6 +10,7 @@ typedef struct dynamics {
     const gait_tracker_config *cfg;
     body_rule rule;
     uint64_t seed;
+    float stature_doubt; /* deviation of stature at the start, fraction of it */
 } dynamics;
 
 /* Particle i of the prior: independent normals about mean (gait_tracker_start). */

@@ -116,11 +116,10 @@ static void mean_rotation(const sums *s, walker *w)
 static void joints(const sums *s, float stature, gait_estimate *out)
 {
     const gait_tracker *const t = s->t;
-    double const factor = (double)t->cfg.joint_sd_factor, model = (double)(t->cfg.joint_sd_model * stature);
+    double const model = (double)(t->cfg.joint_sd_model * stature);
     for (int32_t p = 0; p < 3 * t->model->points; p++) {
         out->pose.joint[p / 3][p % 3] = (float)s->joint[p].mean;
-        out->joint_sd[p / 3][p % 3] =
-            (float)__builtin_sqrt(factor * factor * s->joint[p].var + model * model);
+        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(s->joint[p].var + model * model);
     }
 }
 

@@ -6,7 +6,6 @@
 
 static const float SEARCH = 0.5f; /* seconds until the phase is known modulo half a stride */
 static const float REFIT = 0.4f;  /* seconds in which both sides find their own best before evidence counts */
-static const float CORRELATION = 0.13f; /* seconds over which errors of the image terms last */
 static const float SPREAD_SCORE = 0.5f, SPREAD_HEADING = 0.1f, SPREAD_RATE = 0.02f;
 static const double ENOUGH = 0.2;  /* of the particles must keep weight while searching */
 static const double SURE = 4.5;    /* log odds from which one side is reported as the truth (0.99) */
@@ -15,6 +14,12 @@ static const double DECIDED = 9.0; /* and from which the other is given up */
 static float seconds_in_stage(const gait_tracker *t)
 {
     return 1e-6f * (float)(t->core->utime - t->core->modes.since);
+}
+
+/* Since the images last supported the walker. */
+static float seconds_unseen(const gait_tracker *t)
+{
+    return 1e-6f * (float)(t->core->utime - t->core->support_utime);
 }
 
 float modes_settled(const gait_tracker *t)
@@ -282,6 +287,19 @@ static double ess_after(const pf *f, const float *ll, float power)
     return square > 0.0 ? sum * sum / square : 0.0;
 }
 
+static void temper(float *ll, int32_t n, float power)
+{
+    for (int32_t i = 0; i < n; i++)
+        ll[i] *= power;
+}
+
+/* Share at which evidence counts so many seconds after the last: errors of the image terms outlast that. */
+static float share_of_news(const gait_tracker *t, float since)
+{
+    float const lasting = t->cfg.evidence_time;
+    return since > 0.0f && since < lasting ? since / lasting : 1.0f;
+}
+
 /* Raise the likelihood to the largest power 1, 1/2, 1/4 ... that leaves enough particles: a start from a
  * broad prior must not follow the first frame's luckiest few (annealing; Deutscher and Reid 2005). */
 static void soften(const pf *f, float *ll)
@@ -289,8 +307,7 @@ static void soften(const pf *f, float *ll)
     float power = 1.0f;
     while (power > 0.05f && ess_after(f, ll, power) < ENOUGH * (double)f->n)
         power *= 0.5f;
-    for (int32_t i = 0; i < f->n; i++)
-        ll[i] *= power;
+    temper(ll, f->n, power);
 }
 
 /* The looks of each side's heaviest particle. */
@@ -313,8 +330,8 @@ static double joined(double a, double b)
 static void decide(gait_tracker *t, float dt, double inner, double all)
 {
     modes_state *const m = &t->core->modes;
-    double const share = (double)f_min(1.0f, dt / CORRELATION);
-    bool const seen = 1e-6f * (float)(t->core->utime - t->core->support_utime) < 1.5f * dt;
+    double const share = (double)share_of_news(t, dt);
+    bool const seen = seconds_unseen(t) < 1.5f * dt;
     m->lead += share * (all - m->lead);
     if (seen && seconds_in_stage(t) >= REFIT)
         m->odds += share * inner;
@@ -358,6 +375,8 @@ static pf_summary reweigh_sides(gait_tracker *t, float dt)
 
 pf_summary modes_reweigh(gait_tracker *t, float dt)
 {
+    if (!modes_searching(t)) /* else soften() sees to it */
+        temper(t->used, t->cfg.particles, share_of_news(t, seconds_unseen(t)));
     if (t->core->modes.stage == MODES_FORKED)
         return reweigh_sides(t, dt);
     if (t->core->modes.stage == MODES_SEARCH)

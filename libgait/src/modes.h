@@ -7,7 +7,7 @@
  *
  * The odds leave the silhouette out: the two outlines differ by errors of the body's shape more than by
  * the side that is in front, and such an error does not average out.  Frames nearer together than
- * CORRELATION count less, because their errors are the same. */
+ * config evidence_time count less, here as in the particles' weights, because their errors are the same. */
 #ifndef GAIT_MODES_H
 #define GAIT_MODES_H
 #include "tracker.h"
@@ -27,7 +27,7 @@ bool modes_resample(gait_tracker *t, uint32_t frame);
 /* After the prediction: lay the particles out as two sides if the search is over. */
 void modes_fork(gait_tracker *t);
 
-/* Multiply the weights by the likelihood t->used, the sides' by their evidence over dt seconds. */
+/* Multiply the weights by the likelihood t->used, tempered, the sides' by their evidence over dt seconds. */
 pf_summary modes_reweigh(gait_tracker *t, float dt);
 
 /* Whether left and right are still open. */

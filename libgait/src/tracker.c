@@ -124,7 +124,8 @@ void tracker_clear(gait_tracker *t)
 
 dynamics tracker_dynamics(const gait_tracker *t)
 {
-    return (dynamics){.cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed};
+    return (dynamics){
+        .cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed, .stature_doubt = t->core->stature_doubt};
 }
 
 /* Standard deviation of the phase below which a start says which leg is which, strides. */
@@ -132,9 +133,9 @@ static const float PHASE_KNOWN = 0.2f;
 
 void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime)
 {
-    dynamics const d = tracker_dynamics(t);
     tracker_clear(t);
     t->core->started = 1;
+    t->core->stature_doubt = sd->stature / f_max(mean->stature, 0.3f);
     t->core->utime = t->core->start_utime = t->core->support_utime = utime;
     if (sd->phase < PHASE_KNOWN)
         modes_single(t);
@@ -143,6 +144,7 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
     t->core->last = walker_from_state(&t->rule, mean);
     t->core->phase = mean->phase;
     t->core->rate = mean->stride_hz;
+    dynamics const d = tracker_dynamics(t);
     for (int32_t i = 0; i < t->cfg.particles; i++) {
         walker const w = dynamics_draw(&d, mean, sd, i);
         walker_put(&t->people, i, &w);

@@ -23,11 +23,12 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int64_t support_utime; /* when the images last supported the estimate */
     uint64_t frame;        /* steps since start */
     int32_t started;
-    int32_t current;   /* which of the generations kept holds the particles */
-    uint32_t textured; /* bit c: there are surface samples of camera c's previous frame */
-    int32_t met;       /* the images have supported it since the start */
-    int32_t part;      /* this frame supports but a part of it */
-    float missed;      /* foreground that is usually left unexplained, nats */
+    int32_t current;     /* which of the generations kept holds the particles */
+    uint32_t textured;   /* bit c: there are surface samples of camera c's previous frame */
+    int32_t met;         /* the images have supported it since the start */
+    int32_t part;        /* this frame supports but a part of it */
+    float stature_doubt; /* as in dynamics */
+    float missed;        /* foreground that is usually left unexplained, nats */
     double ess;
     modes_state modes;
     walker last;       /* when the images last supported it */

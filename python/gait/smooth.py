@@ -51,6 +51,7 @@ class Spool:
         self.utime: list[int] = []
         self.step: list[int] = []
         self._known: list[int] = []
+        self._doubt: list[float] = []
 
     def __enter__(self) -> Spool:
         self._file = tempfile.TemporaryFile(prefix="gait-")
@@ -69,6 +70,7 @@ class Spool:
         self._file.write(table.tobytes())
         self.utime.append(estimate.utime)
         self._known.append(self._known_since(estimate))
+        self._doubt.append(tracker.stature_doubt)
         self.step.append(estimate.frame)
 
     def _known_since(self, estimate: Estimate) -> int:
@@ -101,7 +103,7 @@ class Spool:
         known = self._known[index - 1]
         settle_time = 1e6 * self._transitions.config.settle_time
         settling = known < 0 or self.utime[index] - self.utime[known] < settle_time
-        return Step(1e-6 * (self.utime[index] - self.utime[index - 1]), settling)
+        return Step(1e-6 * (self.utime[index] - self.utime[index - 1]), settling, self._doubt[index])
 
 
 def draw_motions(

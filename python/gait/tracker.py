@@ -41,6 +41,7 @@ class TrackerConfig:
     missed_weight: float
     girth: float
     resample_ess: float
+    evidence_time: float
     max_dt: float
     phase_noise: float
     rate_noise: float
@@ -56,12 +57,12 @@ class TrackerConfig:
     coef_noise: float
     coef_time: float
     stature_noise: float
+    stature_noise_start: float
     offset_noise: float
     offset_sd: float
     proportion_noise: float
     offset_angles: int
     cpu_mask: int
-    joint_sd_factor: float
     joint_sd_model: float
 
     @staticmethod
@@ -192,6 +193,8 @@ class Tracker:
         All the memory the filter uses; the instruction set in use: scalar, base, avx2 or avx512.
     step_seconds : float
         Time that the last `step` spent in the C library.
+    stature_doubt : float
+        Deviation of stature at the last start, fraction of it.
 
     Notes
     -----
@@ -224,6 +227,7 @@ class Tracker:
         self._check(self._lib.gait_tracker_init(*where, model.handle, settings, ctypes.byref(handle), err))
         self._handle = handle
         self._plates: dict[int, Image] = {}
+        self.stature_doubt = 0.0
         self.step_seconds = 0.0
         for i, plate in enumerate(per_camera(background)):
             self.set_background(plate, i)
@@ -253,6 +257,7 @@ class Tracker:
         means, sds = ctypes.byref(mean.to_c()), ctypes.byref(sd.to_c())
         err = ctypes.byref(self._error)
         self._check(self._lib.gait_tracker_start(self._handle, means, sds, utime, err))
+        self.stature_doubt = sd.stature / max(mean.stature, 0.3)
 
     def step(
         self,

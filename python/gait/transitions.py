@@ -21,9 +21,6 @@ PHASE, HEADING = 0, 3
 RATES = (1 / 2.1, 1 / 0.4)
 """Strides per second that a walker may have."""
 
-SLOWLY = 0.1
-"""Share of its noise at which the stature goes on once settled (dynamics.c)."""
-
 TELLING = 5
 """Scores that the default mode uses unless told (population.c)."""
 
@@ -41,10 +38,13 @@ class Step:
         Seconds.
     settling : bool
         The rate is loose and the stature moves fast, as until a while after phase, left and right are known.
+    stature_doubt : float
+        Deviation of stature at the start, fraction of it.
     """
 
     dt: float
     settling: bool
+    stature_doubt: float
 
 
 class Transitions:
@@ -134,8 +134,8 @@ class Transitions:
         rate = (c.rate_noise_start if step.settling else c.rate_noise) * self.curves.stride_hz
         away = _relax(b[:, 1] - self.curves.stride_hz, dt, c.rate_time, rate, noise[:, 1])
         after[:, 1] = _reflect(self.curves.stride_hz + away)
-        grown = (1.0 if step.settling else SLOWLY) * c.stature_noise * root * noise[:, 2]
-        after[:, 2] = np.maximum(b[:, 2] * (1 + grown), 0.3)
+        grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.stature_doubt
+        after[:, 2] = np.maximum(b[:, 2] * (1 + grown * root * noise[:, 2]), 0.3)
         after[:, 3] = wrap(b[:, 3] + c.heading_noise * root * noise[:, 3], 2 * np.pi)
         after[:, 4:6] = _relax(b[:, 4:6], dt, c.tilt_time, c.tilt_noise, noise[:, 4:6])
         ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, 6]

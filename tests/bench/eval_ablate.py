@@ -19,8 +19,9 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "score return": {"coef_time": 0.0},
     "posture": {"offset_angles": 0},
     "limb proportions": {"proportions": 0},
-    "stature search": {"stature_noise": 0.0},
+    "stature search": {"stature_noise": 0.0, "stature_noise_start": 0.0},
     "tilt": {"tilt_noise": 0.0},
+    "frames alike": {"evidence_time": 0.0},
     "rate return": {"rate_time": 0.0},
     "missed foreground": {"missed_weight": 0.0},
 }

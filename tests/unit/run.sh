@@ -1,8 +1,8 @@
 #!/bin/sh
-# Run C tests (arguments) and add up what they print; a crash, a hang or a silent exit is a failed test.
+# Run C tests (arguments) and add up what they print; a crash, a hang (LIMIT seconds) or a silent exit is a failed test.
 passed=0 failed=0
 for test; do
-    out=$(timeout 300 "$test")
+    out=$(timeout "${LIMIT:-300}" "$test")
     status=$?
     [ -n "$out" ] && printf '%s\n' "$out"
     counts=$(printf '%s\n' "$out" | sed -n 's/^.* \([0-9]*\) passed, \([0-9]*\) failed$/\1 \2/p' | tail -n 1)

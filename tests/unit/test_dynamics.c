@@ -19,7 +19,8 @@ static void noisy(void)
     cfg.heading_noise = 0.044f;
     cfg.tilt_noise = 0.033f;
     cfg.coef_noise = 0.66f;
-    cfg.stature_noise = 0.005f;
+    cfg.stature_noise = 0.02f;
+    cfg.stature_noise_start = 0.1f;
     cfg.proportion_noise = 0.3f;
     cfg.offset_noise = 0.02f;
 }
@@ -172,7 +173,7 @@ static void test_spread(void)
     check_moments(moments_of(sampled[0][F_COEF + 2], DRAWS), 0.0, sqrt(1.0 - exp(-0.09 * T)), DRAWS);
     check_moments(moments_of(sampled[0][F_COEF + 3], DRAWS), 0.0, 0.07 * sqrt(1.0 - exp(-2.0 * T / tau)),
                   DRAWS);
-    check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.0005 * sqrt(T),
+    check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.05 * 0.02 * sqrt(T),
                   DRAWS);                                    /* settled */
     moments const side = moments_of(sampled[0][F_Y], DRAWS); /* lateral noise, and drifting headings */
     double const path = 1.75 * 0.8 * own, veer = path * 0.044;
@@ -276,10 +277,10 @@ static void test_settling(void)
     cfg.rate_time = 0.0f;
     spread_after(&d, &from, 0.1f, 0.1f, 0.95f, sampled[0]);
     check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.05 * own * sqrt(0.1), DRAWS);
-    check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.005 * sqrt(0.1), DRAWS);
+    check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.05 * 0.1 * sqrt(0.1), DRAWS);
     spread_after(&d, &from, 0.1f, 0.1f, 1.0f, sampled[0]);
     check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.02 * own * sqrt(0.1), DRAWS);
-    check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.0005 * sqrt(0.1), DRAWS);
+    check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.05 * 0.02 * sqrt(0.1), DRAWS);
 }
 
 /* Noise of different fields, frames and particles is independent; the same arguments give the same. */

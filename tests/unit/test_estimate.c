@@ -223,7 +223,7 @@ static void test_joints(void)
             square += t->filter.weight[i] * pow((double)t->joint[p * N + i] - sum, 2.0);
         CHECK_NEAR(e.pose.joint[p / 3][p % 3], sum, 1e-6);
         double const model = 0.01 * (double)e.mean.stature;
-        CHECK_NEAR(e.joint_sd[p / 3][p % 3], sqrt(2.25 * square + model * model), 1e-6);
+        CHECK_NEAR(e.joint_sd[p / 3][p % 3], sqrt(square + model * model), 1e-6);
     }
     for (int k = 0; k < 3; k++)
         CHECK(e.sd.pelvis[k] == e.joint_sd[0][k]);
@@ -337,7 +337,6 @@ int main(void)
     cfg.particles = N;
     cfg.offset_angles = 1u << TOY_TORSO;
     cfg.proportions = -1;
-    cfg.joint_sd_factor = 1.5f;
     cfg.joint_sd_model = 0.01f;
     t = toy_tracker_new(&cfg);
     test_phase();

@@ -143,9 +143,33 @@ static void test_open_odds_are_ambiguous(void)
     toy_tracker_free(t);
 }
 
+/* A frame's log-likelihood counts by the time since the images last supported the walker; in full at the start,
+ * and while a search is annealed anyway. */
+static void test_evidence_counts_by_time(void)
+{
+    static const struct {
+        int64_t since; /* microseconds */
+        float phase_sd;
+        double share;
+    } CASES[] = {{0, 0.05f, 1.0},      {20000, 0.05f, 0.2},  {50000, 0.05f, 0.5},
+                 {100000, 0.05f, 1.0}, {400000, 0.05f, 1.0}, {20000, 0.5f, 1.0}};
+    for (size_t k = 0; k < sizeof CASES / sizeof *CASES; k++) {
+        gait_tracker *const t = begin(CASES[k].phase_sd);
+        const double *const log_weight = t->filter.log_weight;
+        t->cfg.evidence_time = 0.1f;
+        t->core->utime = t->core->support_utime + CASES[k].since;
+        for (int i = 0; i < N; i++)
+            t->used[i] = 0.5f * (float)i / (float)N;
+        modes_reweigh(t, 1e-6f * (float)CASES[k].since);
+        CHECK_NEAR(log_weight[HALF] - log_weight[0], 0.25 * CASES[k].share, 1e-6);
+        toy_tracker_free(t);
+    }
+}
+
 int main(void)
 {
     film_make(1, 46);
+    test_evidence_counts_by_time();
     test_a_known_phase_is_never_split();
     test_sides_live_on();
     test_the_loser_is_given_up();

@@ -26,7 +26,7 @@ static dynamics lively(uint64_t seed)
     cfg.tilt_noise = 0.08f;
     cfg.coef_noise = 0.8f;
     cfg.coef_time = 2.0f;
-    cfg.stature_noise = 0.03f;
+    cfg.stature_noise_start = 0.6f; /* 0.03 of stature */
     cfg.proportion_noise = 0.8f;
     cfg.offset_noise = 0.06f;
     return d;

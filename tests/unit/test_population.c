@@ -59,7 +59,7 @@ static void test_the_default_mode_uses_the_first_four_components_paper_mode_all(
         gait_tracker_default(&cfg, mode);
         for (m.components = 0; m.components <= 8; m.components++)
             CHECK(body_rule_init(&m, &cfg).components ==
-                  (mode == GAIT_MODE_PAPER || m.components < 4 ? m.components : 4));
+                  (mode == GAIT_MODE_PAPER || m.components < 5 ? m.components : 5));
         cfg.components = m.components = 8;
         CHECK(body_rule_init(&m, &cfg).components == 8);
     }

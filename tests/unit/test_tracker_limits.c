@@ -224,6 +224,7 @@ static void test_resampling(void)
     gait_tracker_config cfg = toy_config(1);
     int told[3] = {0};
     cfg.term_weight[1] = cfg.term_weight[2] = cfg.term_weight[3] = 2.0f;
+    cfg.evidence_time = 0.0f;
     for (int k = 0; k < 3; k++) {
         cfg.resample_ess = 0.5f * (float)k;
         gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);

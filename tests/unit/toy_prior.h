@@ -18,7 +18,8 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.components = 2;
     cfg.offset_angles = 1u << OFFSET_ANGLE;
     cfg.proportions = mode == GAIT_MODE_PAPER ? 0 : -1;
-    cfg.phase_noise = cfg.rate_noise = cfg.rate_noise_start = cfg.stature_noise = 0.0f;
+    cfg.phase_noise = cfg.rate_noise = cfg.rate_noise_start = 0.0f;
+    cfg.stature_noise = cfg.stature_noise_start = 0.0f;
     cfg.forward_noise = cfg.lateral_noise = cfg.vertical_noise = 0.0f;
     cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = cfg.proportion_noise = 0.0f;
     cfg.offset_sd = 0.07f;
@@ -26,7 +27,8 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.rate_time = 5.0f;
     cfg.tilt_time = 1.1f;
     cfg.coef_time = 4.5f;
-    return (dynamics){.cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed};
+    return (dynamics){
+        .cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed, .stature_doubt = 0.05f};
 }
 
 /* Particles first .. first + BLOCK - 1 over one interval of dt seconds at an age. */

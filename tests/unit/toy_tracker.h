@@ -27,6 +27,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.missed_weight = 0.4f;
     c.girth = 1.0f;
     c.resample_ess = 0.5f;
+    c.evidence_time = 0.13f;
     c.max_dt = 0.5f;
     c.phase_noise = 0.0164f;
     c.rate_noise = 0.02f;
@@ -41,12 +42,12 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.tilt_time = 1.1f;
     c.coef_noise = 0.66f;
     c.coef_time = 4.5f;
-    c.stature_noise = 0.005f;
+    c.stature_noise = 0.02f;
+    c.stature_noise_start = 0.2f;
     c.offset_noise = 0.02f;
     c.offset_sd = 0.07f;
     c.offset_angles = 0;
     c.proportions = -1; /* so that they are tested */
-    c.joint_sd_factor = 1.0f;
     c.joint_sd_model = 0.0f;
     for (int k = 0; k < GAIT_MAX_CAMERAS; k++)
         c.camera[k] = toy_camera(k);
