@@ -80,7 +80,8 @@ def main() -> int:
         for done, walk in enumerate(walks, 1):
             found.append((walk.clip, *_lifted(walk)))
             update(done)
-    rows = [_row(clip.name, [one for one in found if one[0] == clip.name]) for clip in clips]
+    of = {clip.name: [one for one in found if one[0] == clip.name] for clip in clips}
+    rows = [_row(name, its) for name, its in of.items() if its]
     rows.append(_row("all", found))
     _publish(rows)
     return "NO" in rows[-1]
