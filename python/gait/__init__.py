@@ -15,17 +15,19 @@ from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryErr
 if TYPE_CHECKING:
     from gait._abi import Flag, Mode, Term, TrackStatus
     from gait.camera import Camera
+    from gait.estimate import Estimate
     from gait.frame import Joints
     from gait.initial import Start
     from gait.lifter import LiftConfig, LiftedFrame, Lifter
     from gait.model import Model, ModelInfo
     from gait.state import State
-    from gait.tracker import Estimate, Tracker, TrackerConfig
+    from gait.tracker import Tracker
+    from gait.trackerconfig import TrackerConfig
     from gait.video import Frame, Video, VideoWriter, background
 
 _HOME = {
     "Camera": "camera",
-    "Estimate": "tracker",
+    "Estimate": "estimate",
     "Flag": "_abi",
     "Frame": "video",
     "Joints": "frame",
@@ -40,7 +42,7 @@ _HOME = {
     "Term": "_abi",
     "TrackStatus": "_abi",
     "Tracker": "tracker",
-    "TrackerConfig": "tracker",
+    "TrackerConfig": "trackerconfig",
     "Video": "video",
     "VideoWriter": "video",
     "background": "video",

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.camera import Camera
+from gait.estimate import Estimate
 from gait.model import Model
 from gait.panel import draw_panel
 from gait.state import State
-from gait.tracker import Estimate
 from gait.video import Image
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from gait._abi import TrackStatus
-from gait.tracker import Estimate
+from gait.estimate import Estimate
 from gait.video import Image
 
 _SIZE = (236, 92)  # of the panel, pixels at scale 1

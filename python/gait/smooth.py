@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait._abi import Mode, TrackStatus
-from gait.tracker import Estimate, Tracker
+from gait.estimate import Estimate
+from gait.tracker import Tracker
 from gait.transitions import HEADING, PHASE, Step, Transitions, wrap
 
 Array = NDArray[np.float64]

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from gait import _abi
 from gait._abi import TrackStatus
 from gait._lib import check, library
+from gait.estimate import Estimate
 from gait.footfall_draws import Draws
 from gait.model import Model
 from gait.modelcurves import ModelCurves
 from gait.smooth import Spool, draw_motions
 from gait.state import Array, State
-from gait.tracker import Estimate, Tracker
+from gait.tracker import Tracker
 from gait.transitions import Transitions, wrap
 from gait.video import Frame
 

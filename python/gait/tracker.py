@@ -5,172 +5,25 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait import _abi
-from gait._abi import Flag, Mode, Term, TrackStatus
+from gait._abi import TrackStatus
 from gait._lib import aligned, check, library
 from gait.autostart import Spotter
 from gait.camera import Camera
 from gait.errors import UserError
+from gait.estimate import Estimate
 from gait.frame import Joints, image_view, per_camera, track_array
 from gait.initial import Start
-from gait.model import Model, camera_c, pose_arrays
-from gait.state import Array, State
+from gait.model import Model, camera_c
+from gait.state import State
 from gait.tasks import PythonTasks, Runner, TaskSource, threads
+from gait.trackerconfig import TrackerConfig
 from gait.video import Frame, Image, Video
-
-
-@dataclass(frozen=True)
-class TrackerConfig:
-    """Settings of a tracker, each documented in ``gait.h``; `default` fills them from the C library."""
-
-    mode: Mode
-    seed: int
-    particles: int
-    components: int
-    tasks: int
-    lag: int
-    proportions: int
-    terms: Term
-    term_weight: tuple[float, ...]
-    missed_weight: float
-    girth: float
-    resample_ess: float
-    evidence_time: float
-    max_dt: float
-    phase_noise: float
-    rate_noise: float
-    rate_noise_start: float
-    settle_time: float
-    rate_time: float
-    forward_noise: float
-    lateral_noise: float
-    vertical_noise: float
-    heading_noise: float
-    tilt_noise: float
-    tilt_time: float
-    coef_noise: float
-    coef_time: float
-    stature_noise: float
-    stature_noise_start: float
-    offset_noise: float
-    offset_sd: float
-    proportion_noise: float
-    offset_angles: int
-    cpu_mask: int
-    joint_sd_model: float
-
-    @staticmethod
-    def default(mode: Mode | int = Mode.DEFAULT, **changes: Any) -> TrackerConfig:
-        """Defaults of the library for `mode`, with `changes`.
-
-        Raises
-        ------
-        TypeError
-            If a change names no setting.
-        """
-        c = _abi.TrackerConfigC()
-        library().gait_tracker_default(ctypes.byref(c), int(mode))
-        values = {item.name: getattr(c, item.name) for item in fields(TrackerConfig)}
-        values["term_weight"] = tuple(c.term_weight)
-        return TrackerConfig(**(values | {"mode": Mode(c.mode), "terms": Term(c.terms)} | changes))
-
-    def to_c(self) -> _abi.TrackerConfigC:
-        """Make a ``gait_tracker_config`` without cameras and tasks."""
-        c = _abi.TrackerConfigC()
-        library().gait_tracker_default(ctypes.byref(c), int(self.mode))
-        for item in fields(self):
-            if item.name != "term_weight":
-                setattr(c, item.name, getattr(self, item.name))
-        if len(self.term_weight) != len(c.term_weight):
-            raise ValueError(f"term_weight: give {len(c.term_weight)} numbers")
-        c.term_weight[:] = self.term_weight
-        return c
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """What the tracker believes after a frame.
-
-    Attributes
-    ----------
-    utime : int
-        Capture time, microseconds.
-    frame : int
-        Steps since start.
-    status : TrackStatus
-    flags : Flag
-    log_evidence : float
-        log p(frame | past), up to a constant.
-    ess : float
-        Effective number of particles.
-    phase_r : float
-        How sure the phase is, [0, 1].
-    mode_mass : float
-        Weight of the dominant mode, [0, 1].
-    speed : float
-        Metres per second along the ground.
-    mean, sd, best : State
-        Of the dominant mode; standard deviation over all particles; heaviest particle.
-    joints : ndarray of shape (P, 3)
-        Posterior mean of the joints in the world, metres.
-    joint_sd : ndarray of shape (P, 3)
-        Posterior standard deviation, metres.
-    angles : ndarray of shape (A,)
-        Radians, of the dominant mode.
-    joint_names : tuple of str
-        Names of the P joints.
-    """
-
-    utime: int
-    frame: int
-    status: TrackStatus
-    flags: Flag
-    log_evidence: float
-    ess: float
-    phase_r: float
-    mode_mass: float
-    speed: float
-    mean: State
-    sd: State
-    best: State
-    joints: Array
-    joint_sd: Array
-    angles: Array
-    joint_names: tuple[str, ...]
-
-    def joint(self, name: str) -> Array:
-        """Place of one joint in the world, shape (3,), metres."""
-        return np.asarray(self.joints[self.joint_names.index(name)])
-
-    @staticmethod
-    def from_c(c: _abi.EstimateC, model: Model) -> Estimate:
-        """Copy a ``gait_estimate``."""
-        info = model.info
-        joints, angles = pose_arrays(c.pose, info.joints, info.angles)
-        return Estimate(
-            utime=c.utime,
-            frame=c.frame,
-            status=TrackStatus(c.status),
-            flags=Flag(c.flags),
-            log_evidence=c.log_evidence,
-            ess=c.ess,
-            phase_r=c.phase_r,
-            mode_mass=c.mode_mass,
-            speed=c.speed,
-            mean=State.from_c(c.mean, info.components, info.angles),
-            sd=State.from_c(c.sd, info.components, info.angles),
-            best=State.from_c(c.best, info.components, info.angles),
-            joints=joints,
-            joint_sd=np.array(c.joint_sd, float)[: info.joints],
-            angles=angles,
-            joint_names=model.joint_names,
-        )
 
 
 class Tracker:

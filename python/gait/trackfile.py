@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
+from gait.estimate import Estimate
 from gait.fields import frame_numbers
 from gait.files import replacing
 from gait.skeleton import EVAL15, JOINTS
-from gait.tracker import Estimate
 from gait.video import Frame
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gait import _abi
 from gait._abi import Mode
 from gait.modelcurves import ModelCurves
-from gait.tracker import TrackerConfig
+from gait.trackerconfig import TrackerConfig
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from gait import Camera, Model, State
 from gait.calibration import APART
+from gait.estimate import Estimate
 from gait.evaluate import LOST_MM, root_errors
 from gait.events import Strikes, strikes_by_zeni
 from gait.skeleton import EVAL15
-from gait.tracker import Estimate
 from gait.trackfile import STATUSES, Joints, Track, read_truth
 
 LOCK_AFTER = (1.0, 1.5)  # seconds from the start: the phase must be right in this window

@@ -10,8 +10,8 @@ import numpy as np
 from eval_marks import Marks
 
 from gait import Camera, Model, Video
+from gait.estimate import Estimate
 from gait.overlay import BONES, Overlay
-from gait.tracker import Estimate
 from gait.trackfile import read_truth
 from gait.video import Image
 

@@ -21,10 +21,10 @@ from gait._abi import Mode
 from gait._lib import library
 from gait.autostart import Spotter, find_start
 from gait.errors import GaitError
+from gait.estimate import Estimate
 from gait.evaluate import evaluate
 from gait.events import Strikes, strikes_of
 from gait.model import read_blob
-from gait.tracker import Estimate
 from gait.trackfile import Track, TrackWriter, read_track, read_truth
 from gait.video import Frame, Image, median_plate, read_plate
 

@@ -16,7 +16,7 @@ from gait import Model, Video, blob
 from gait.cli import COMMANDS, main
 from gait.lift import tracks_file
 from gait.model import read_blob
-from gait.tracker import TrackerConfig
+from gait.trackerconfig import TrackerConfig
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))

@@ -12,7 +12,8 @@ import gait
 from gait._abi import Mode
 from gait.errors import GaitError
 from gait.model import Model
-from gait.tracker import Tracker, TrackerConfig
+from gait.tracker import Tracker
+from gait.trackerconfig import TrackerConfig
 
 CAMERA = rig.CAMERA.to_dict()
 INIT = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": 0.1}}

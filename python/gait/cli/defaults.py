@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gait._abi import Mode
 from gait.errors import LibraryError
-from gait.tracker import TrackerConfig
+from gait.trackerconfig import TrackerConfig
 
 
 def particles(mode: Mode = Mode.DEFAULT) -> str:

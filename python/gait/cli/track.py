@@ -39,6 +39,7 @@ from gait.autostart import Spotter, find_start
 from gait.camera import Camera
 from gait.cli import defaults, values
 from gait.errors import UsageError, UserError
+from gait.estimate import Estimate
 from gait.files import require_outputs
 from gait.frame import Joints
 from gait.initial import Start
@@ -48,7 +49,8 @@ from gait.modelcurves import ModelCurves
 from gait.overlay import Overlay
 from gait.progress import progress
 from gait.smoothed import Smoother
-from gait.tracker import Estimate, Tracker, TrackerConfig
+from gait.tracker import Tracker
+from gait.trackerconfig import TrackerConfig
 from gait.trackfile import TrackWriter
 from gait.trc import write_trc
 from gait.video import Frame, Image, Video, VideoWriter, background

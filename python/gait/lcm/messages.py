@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from gait._abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
 from gait.camera import Camera
 from gait.errors import UserError
+from gait.estimate import Estimate
 from gait.lcm.types import gaitmsg
 from gait.state import SCALARS, State
-from gait.tracker import Estimate
 from gait.video import Image
 
 _FRAME_KEY = "frame"

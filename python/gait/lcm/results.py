@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
+from gait.estimate import Estimate
 from gait.lcm.messages import decode, estimate_of
 from gait.lcm.types import gaitmsg
-from gait.tracker import Estimate
 
 Array = NDArray[np.float64]
 
