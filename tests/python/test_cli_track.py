@@ -287,7 +287,6 @@ def test_render_a_sheet(tmp_path):
 @pytest.mark.parametrize(
     "words, message",
     [
-        (["--phase", "1.5"], "--phase 1.5: give a share"),
         (["--strip", "--camera", "c.json"], "--camera: --strip has its own view"),
         (["--state", "{}"], "no such state file"),
     ],
@@ -297,6 +296,12 @@ def test_render_faults(words, message, tmp_path, capsys):
     assert main(["render", *words, "-o", str(tmp_path / "o.png")]) == 1
     assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_render_refuses_a_phase_beyond_the_stride(tmp_path, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["render", "--phase", "1.5", "-o", str(tmp_path / "o.png")])
+    assert "--phase: 1.5: give a share of the stride from 0 to 1" in capsys.readouterr().err
 
 
 def test_render_does_not_draw_over_what_it_reads(tmp_path, capsys):
