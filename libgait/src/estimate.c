@@ -169,6 +169,7 @@ walker estimate_crowd(const gait_tracker *t, const crowd *c, int32_t best, gait_
 {
     sums s = {.t = t, .run = t->like->run, .of = c, .best = best};
     walker mean = {{0}}, sd;
+    gait_state shown;
     gait_pose pose;
     s.mass = s.run->estimate_mode(column(&s, F_PHASE, 0), column(&s, F_HEADING, 1), c->weight, c->n, best,
                                   t->mode);
@@ -182,7 +183,10 @@ walker estimate_crowd(const gait_tracker *t, const crowd *c, int32_t best, gait_
     walker const heaviest = walker_get(&c->people, c->who ? c->who[best] : best);
     out->mean = walker_state(&t->rule, &mean);
     out->best = walker_state(&t->rule, &heaviest);
-    if (model_pose_state(t->model, &out->mean, &pose) == GAIT_OK)
+    shown = out->mean;
+    if (t->rule.plain_root)
+        shown.stride_hz = 0.0f; /* particles of the paper walk alike at any rate */
+    if (model_pose_state(t->model, &shown, &pose) == GAIT_OK)
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
     out->phase_r = resultant_length(s.phase[0], s.phase[1]);
     out->mode_mass = (float)s.mass;

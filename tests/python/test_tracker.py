@@ -123,6 +123,16 @@ def test_a_missed_frame_is_predicted_and_widens(missing):
     assert after.joint_sd.mean() > before.joint_sd.mean()
 
 
+def test_angles_of_paper_mode_are_those_of_its_particles_which_walk_alike_at_any_rate():
+    config = TrackerConfig.default(Mode.PAPER, particles=16)
+    tracker = Tracker(MODEL, VIEW, config)
+    fast = replace(TRUE[0], stride_hz=1.2)
+    tracker.start(fast, State(), 0)
+    now = tracker.step(None, 0)
+    np.testing.assert_allclose(now.angles, MODEL.pose(replace(now.mean, stride_hz=0.0))[1], atol=1e-6)
+    assert np.abs(now.angles - MODEL.pose(now.mean)[1]).max() > 0.01
+
+
 def test_threads_and_any_task_order_give_the_same_bits():
     def backwards(task, count):
         for i in reversed(range(count)):

@@ -1,4 +1,6 @@
 /* Saving and restoring: the same continuation, and nothing but an exact snapshot is taken. */
+#include "tracker.h"
+
 #include "toy_film.h"
 
 #include "check.h"
@@ -145,6 +147,25 @@ static void test_damage(void)
     free(kept);
 }
 
+/* Numbers that no tracker gets to, with a checksum that is right. */
+static void test_implausible(void)
+{
+    const float doubt[] = {NAN, INFINITY, -0.1f};
+    gait_tracker_config cfg = small(1);
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    size_t bytes = 0;
+    target = film_tracker(&cfg, 7, 0.3f);
+    target_digest = gait_tracker_digest(target);
+    for (int k = 0; k < 3; k++) {
+        t->core->stature_doubt = doubt[k];
+        unsigned char *const kept = save(t, &bytes);
+        refuse(kept, bytes, GAIT_ERR_CORRUPT);
+        free(kept);
+    }
+    toy_tracker_free(target);
+    toy_tracker_free(t);
+}
+
 /* A snapshot of another configuration or model is refused. */
 static void test_other(void)
 {
@@ -207,6 +228,7 @@ int main(void)
     test_continue();
     test_digest();
     test_damage();
+    test_implausible();
     test_other();
     return CHECK_DONE();
 }
