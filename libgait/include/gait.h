@@ -221,12 +221,12 @@ enum { GAIT_STATUS_INIT = 0, GAIT_STATUS_TRACKING = 1, GAIT_STATUS_AMBIGUOUS = 2
 typedef struct gait_estimate {
     int64_t    utime;
     uint64_t   frame;       /* steps since start */
-    double     log_evidence; /* log p(frame | past), up to the terms' common constant */
+    double     log_evidence; /* log p(frame | past), as the frame counts (config evidence_time), up to a constant */
     gait_state mean;        /* of the dominant mode: circular in phase and heading */
     gait_state sd;          /* over all particles, field by field; circular for phase and heading */
     gait_state best;        /* heaviest particle */
     gait_pose  pose;        /* joints: posterior mean (paper mode: no root motion); angles: of the mode */
-    float      joint_sd[GAIT_MAX_JOINTS][3]; /* standard deviation, metres: config joint_sd_* */
+    float      joint_sd[GAIT_MAX_JOINTS][3]; /* standard deviation, metres: config joint_sd_model */
     float      ess;         /* effective sample size after weighting */
     float      phase_r;     /* resultant length of the phase, [0, 1]: 1 = certain */
     float      mode_mass;   /* weight of the dominant mode, [0, 1] */

@@ -24,9 +24,8 @@ struct gait_model {
     int32_t proportions;  /* p */
     int32_t root_channel; /* index of root_forward; the other ROOT_* follow */
 
-    const float *curves; /* (1 + q) x T x M: mean, then component k times its standard deviation */
-    const float
-        *pace_curve; /* T x M: change of the mean per unit of kin_pace; NULL: the rate changes nothing */
+    const float *curves;       /* (1 + q) x T x M: mean, then component k times its standard deviation */
+    const float *pace_curve;   /* T x M: change of the mean per unit of kin_pace; NULL: none */
     const float *channel_stat; /* M x 4: residual sd, smallest, largest, sd of the static offset */
     const float *score_stat;   /* q x 3: singular-value sd, between-subject sd, within-subject sd */
 

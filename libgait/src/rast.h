@@ -21,8 +21,8 @@ typedef struct rast_spans { /* rows first <= y < last; each covers begin[y - top
     int16_t begin[RAST_SIZE], end[RAST_SIZE];
 } rast_spans;
 
-typedef struct
-    rast_mask { /* of rows [first, last) and columns from `column` on, a multiple of RAST_STEP; all beyond is empty, and not written */
+/* Rows [first, last) and columns from `column` on, a multiple of RAST_STEP; the rest is empty and not written. */
+typedef struct rast_mask {
     _Alignas(GAIT_ALIGN) uint64_t word[RAST_WORDS][RAST_SIZE]; /* bit 0: column, or column + 64 */
     int32_t first, last, column, width;                        /* width: 64, or 128 from column 0 on */
 } rast_mask;
@@ -88,7 +88,7 @@ static inline uint64_t rast_bits(int32_t begin, int32_t end)
  * negative, then it is none. */
 static inline int32_t rast_half(int32_t x, int32_t y)
 {
-    return (x >> 6) * 256 + (y << 1) + (x >> 5 & 1);
+    return (x >> 6) * 2 * RAST_SIZE + (y << 1) + (x >> 5 & 1);
 }
 
 /* Number of set bits, without a table or an ISA extension. */

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gait import Model, State, blob, skeleton
+from gait import GaitError, Model, State, blob, skeleton
 from gait.learn import pace as learnt
 from gait.learn.prior import mirrored
 from gait.model import read_blob
@@ -147,5 +147,5 @@ def test_a_model_whose_rates_do_not_vary_has_no_use_for_a_slope():
     made = paced()
     made["GAIT"] = np.array(made["GAIT"])
     made["GAIT"][1] = 0.0
-    with pytest.raises(Exception, match="PACE"):
+    with pytest.raises(GaitError, match="PACE"):
         Model(blob.encode(made))

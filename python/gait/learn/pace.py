@@ -69,6 +69,6 @@ def slope(filled: Floats, subject: Groups, paces: Floats) -> Floats:
 
 
 def without(filled: Floats, paces: Floats, slope: Floats) -> Floats:
-    """Put cycles (R, T, M) as they would be at the mean rate on disk."""
+    """Cycles (R, T, M) as they would be at the mean rate; they lie on disk."""
     parts = (filled[part] - paces[part, None, None] * slope for part in by_rows(filled))
     return stored(parts, filled.shape[1:])
