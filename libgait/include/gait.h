@@ -164,7 +164,7 @@ typedef struct gait_tracker_config {
     uint32_t struct_size;      /* set by gait_tracker_default() */
     int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
     uint64_t seed;             /* default 1 */
-    int32_t  particles;        /* [16, 1 << 20]; default 1500 (paper mode 10000) */
+    int32_t  particles;        /* [16, 1 << 20]; default 1800 (paper mode 10000) */
     int32_t  components;       /* [0, the model's]; default -1: the first 5, in paper mode all */
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
