@@ -167,7 +167,8 @@ def fit(
     model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = prior.joint_metric(model.mean, proportions)
-    paces, slope, even = pace.of(sequences, index), np.zeros(model.mean.shape), model.filled
+    paces = pace.of(sequences, index)
+    slope, even = np.zeros(model.mean.shape), model.filled
     if kind == "people":
         slope = pace.slope(model.filled, row_subject, paces[rows.sequence])
         even = pace.without(model.filled, paces[rows.sequence], slope)
@@ -177,20 +178,20 @@ def fit(
     bodies = [*_bodies(sequences, index, len(subjects)), *(others or [])] if kind == "people" else []
     table, shifts = lengths.learn(bodies, proportions, model.mean)
     return Learned(
-        sequences,
-        subjects,
-        index,
-        proportions,
-        alignment,
-        rows,
-        model,
-        slope,
-        paces,
-        scale,
-        held_out,
-        table,
-        shifts,
-        static,
+        sequences=sequences,
+        subjects=subjects,
+        subject_index=index,
+        proportions=proportions,
+        alignment=alignment,
+        cycles=rows,
+        components=model,
+        pace_curve=slope,
+        paces=paces,
+        scale=scale,
+        held_out=held_out,
+        lengths=table,
+        shifts=shifts,
+        static=static,
     )
 
 
