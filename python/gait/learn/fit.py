@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget
+from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget, unseen
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
@@ -170,8 +170,9 @@ def fit(
     paces = pace.of(sequences, index)
     slope, even = np.zeros(model.mean.shape), model.filled
     if kind == "people":
-        slope = pace.slope(model.filled, row_subject, paces[rows.sequence])
-        even = pace.without(model.filled, paces[rows.sequence], slope)
+        whole = unseen.bounded(model.filled, rows.mask, row_subject)
+        slope = pace.slope(whole, row_subject, paces[rows.sequence])
+        even = pace.without(whole, paces[rows.sequence], slope)
         model = prior.refine(model, even, row_subject, wanted, metric)
     static = prior.static_spread(even, row_subject, wanted, metric)
     model = ground.grounded(model, rows.seen, proportions)
