@@ -21,7 +21,7 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
     s.phase = sd->phase >= 0.5f ? u[0] : m_wrap1(mean->phase + sd->phase * n[0]);
     s.heading = sd->heading >= PI_F ? TWO_PI_F * u[1] : mean->heading + sd->heading * n[1];
     s.stride_hz = dynamics_reflect_rate(mean->stride_hz + sd->stride_hz * n[2]);
-    s.stature = f_max(mean->stature + sd->stature * n[3], 0.3f);
+    s.stature = f_max(mean->stature + sd->stature * n[3], LEAST_STATURE);
     s.pitch += sd->pitch * n[4];
     s.roll += sd->roll * n[5];
     s.pelvis[0] += sd->pelvis[0] * n[6];

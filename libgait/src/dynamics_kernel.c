@@ -101,7 +101,7 @@ KERNEL_ROW void grow(const dynamics_step *s, const float *restrict x, const floa
                      float *restrict out)
 {
     for (int32_t lane = 0; lane < BLOCK; lane++)
-        out[lane] = f_max(x[lane] * (1.0f + s->stature_noise * n[lane]), 0.3f);
+        out[lane] = f_max(x[lane] * (1.0f + s->stature_noise * n[lane]), LEAST_STATURE);
 }
 
 void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const walker_block *from, walker_block *to)

@@ -6,6 +6,8 @@
 
 /* One float array per field.  (X, Y) is the smooth track over the ground and Z the ground's height under
  * the walker; the pelvis follows by the model's sway and height (ROOT_*). */
+#define LEAST_STATURE 0.3f /* metres: no particle gets smaller */
+
 enum {
     F_PHASE,
     F_RATE,

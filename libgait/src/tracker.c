@@ -135,7 +135,7 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
 {
     tracker_clear(t);
     t->core->started = 1;
-    t->core->stature_doubt = sd->stature / f_max(mean->stature, 0.3f);
+    t->core->stature_doubt = sd->stature / f_max(mean->stature, LEAST_STATURE);
     t->core->utime = t->core->start_utime = t->core->support_utime = utime;
     if (sd->phase < PHASE_KNOWN)
         modes_single(t);

@@ -13,6 +13,7 @@ from gait import _abi
 
 Array = NDArray[np.float64]
 LIMITS = {"coef": _abi.MAX_COMPONENTS, "offset": _abi.MAX_ANGLES, "proportion": _abi.MAX_PROPORTIONS}
+LEAST_STATURE = 0.3  # metres, of a particle (population.h)
 SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
 
 

@@ -20,7 +20,7 @@ from gait.estimate import Estimate
 from gait.frame import Joints, image_view, per_camera, track_array
 from gait.initial import Start
 from gait.model import Model, camera_c
-from gait.state import State
+from gait.state import LEAST_STATURE, State
 from gait.tasks import PythonTasks, Runner, TaskSource, threads
 from gait.trackerconfig import TrackerConfig
 from gait.video import Frame, Image, Video
@@ -110,7 +110,7 @@ class Tracker:
         means, sds = ctypes.byref(mean.to_c()), ctypes.byref(sd.to_c())
         err = ctypes.byref(self._error)
         self._check(self._lib.gait_tracker_start(self._handle, means, sds, utime, err))
-        self.stature_doubt = sd.stature / max(mean.stature, 0.3)
+        self.stature_doubt = sd.stature / max(mean.stature, LEAST_STATURE)
 
     def step(
         self,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gait import _abi
 from gait._abi import Mode
 from gait.modelcurves import ModelCurves
+from gait.state import LEAST_STATURE
 from gait.trackerconfig import TrackerConfig
 
 Array = NDArray[np.float64]
@@ -135,7 +136,7 @@ class Transitions:
         away = _relax(b[:, 1] - self.curves.stride_hz, dt, c.rate_time, rate, noise[:, 1])
         after[:, 1] = _reflect(self.curves.stride_hz + away)
         grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.stature_doubt
-        after[:, 2] = np.maximum(b[:, 2] * (1 + grown * root * noise[:, 2]), 0.3)
+        after[:, 2] = np.maximum(b[:, 2] * (1 + grown * root * noise[:, 2]), LEAST_STATURE)
         after[:, 3] = wrap(b[:, 3] + c.heading_noise * root * noise[:, 3], 2 * np.pi)
         after[:, 4:6] = _relax(b[:, 4:6], dt, c.tilt_time, c.tilt_noise, noise[:, 4:6])
         ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, 6]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gait import GaitError, Model, State, blob, skeleton
+from gait.errors import UserError
 from gait.learn import pace as learnt
 from gait.learn.prior import mirrored
 from gait.model import read_blob
@@ -21,7 +22,7 @@ SHIPPED = blob.decode(read_blob(None))
 def wave(rng):
     """A cycle (SAMPLES, 30) of three harmonics; the forward speed stays."""
     turn = 2 * np.pi * np.arange(SAMPLES)[:, None] / SAMPLES
-    cycle = sum(rng.normal(size=30) / h * np.cos(h * turn + rng.uniform(0, 6, 30)) for h in (1, 2, 3))
+    cycle = sum(0.1 * rng.normal(size=30) / h * np.cos(h * turn + rng.uniform(0, 6, 30)) for h in (1, 2, 3))
     cycle[:, CHANNELS.index("root_forward")] = 0.0
     return cycle
 
@@ -47,6 +48,15 @@ def test_the_slope_is_that_within_people_drawn_towards_none():
     found = learnt.slope(*walkers(rng, slope, paces))
     seen = 1 + 0.5 / 3  # variances of the people's paces; a single cycle tells nothing
     np.testing.assert_allclose(found, slope * seen / (seen + learnt.UNMOVED), atol=1e-12)
+
+
+def test_turns_within_a_person_are_no_slope():
+    rows, subject, at = walkers(
+        np.random.default_rng(3), np.zeros((SAMPLES, 30)), [np.array([-1.0, 1.0])] * 2
+    )
+    rows[1, :, CHANNELS.index("l_knee_flexion")] += 8 * np.pi
+    with pytest.raises(UserError, match=r"^[lr]_knee_flexion: .*turns of 360"):
+        learnt.slope(rows, subject, at)
 
 
 def test_more_cycles_of_one_person_weigh_no_more():

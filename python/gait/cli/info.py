@@ -72,7 +72,8 @@ def text(name: str, s: Mapping[str, Any]) -> str:
         lines.append(f"{s['components']} components, {s['phases']} phases, {counts}")
     if gait:
         lines += [
-            "{stride_hz:.3f} +- {stride_hz_sd:.3f} strides/s, varying by {stride_time_cv:.1%}".format(**gait),
+            "{stride_hz:.3f} +- {stride_hz_sd:.3f} strides/s, varying by {stride_time_cv:.1%}".format(**gait)
+            + (", which the mean cycle follows" if "PACE" in s["sections"] else ""),
             "stride of {stride_length:.3f} +- {stride_length_sd:.3f} statures".format(**gait),
         ]
     if "sequences" in meta:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget
+from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget, unseen
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
@@ -167,30 +167,32 @@ def fit(
     model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
     metric = prior.joint_metric(model.mean, proportions)
-    paces, slope, even = pace.of(sequences, index), np.zeros(model.mean.shape), model.filled
+    paces = pace.of(sequences, index)
+    slope, even = np.zeros(model.mean.shape), model.filled
     if kind == "people":
-        slope = pace.slope(model.filled, row_subject, paces[rows.sequence])
-        even = pace.without(model.filled, paces[rows.sequence], slope)
+        whole = unseen.bounded(model.filled, rows.mask, row_subject)
+        slope = pace.slope(whole, row_subject, paces[rows.sequence])
+        even = pace.without(whole, paces[rows.sequence], slope)
         model = prior.refine(model, even, row_subject, wanted, metric)
     static = prior.static_spread(even, row_subject, wanted, metric)
     model = ground.grounded(model, rows.seen, proportions)
     bodies = [*_bodies(sequences, index, len(subjects)), *(others or [])] if kind == "people" else []
     table, shifts = lengths.learn(bodies, proportions, model.mean)
     return Learned(
-        sequences,
-        subjects,
-        index,
-        proportions,
-        alignment,
-        rows,
-        model,
-        slope,
-        paces,
-        scale,
-        held_out,
-        table,
-        shifts,
-        static,
+        sequences=sequences,
+        subjects=subjects,
+        subject_index=index,
+        proportions=proportions,
+        alignment=alignment,
+        cycles=rows,
+        components=model,
+        pace_curve=slope,
+        paces=paces,
+        scale=scale,
+        held_out=held_out,
+        lengths=table,
+        shifts=shifts,
+        static=static,
     )
 
 

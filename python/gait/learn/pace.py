@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from gait.errors import UserError
 from gait.learn.between import RATE_SD, by_subject
 from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
 from gait.learn.prior import mirrored
@@ -26,6 +27,8 @@ UNMOVED = 1.0
 #: Does not follow the rate: how far people step at one rate differs much, and a tracker that hardly sees the
 #: distance, as from in front, adds up what its speed is off.  The components have it.
 LEFT_OUT = CHANNELS.index("root_forward")
+#: Radians or statures per unit of pace: more is no walk, and libgait refuses it.
+STEEPEST = 1.0
 
 
 def of(sequences: list[Sequence], subject: Groups) -> Floats:
@@ -50,6 +53,11 @@ def slope(filled: Floats, subject: Groups, paces: Floats) -> Floats:
     (T, M)
         Least squares of the differences between a person's cycles and their mean on those of the pace, with
         the images in the mirror; band-limited.  0 where there is one person, or one pace, and for LEFT_OUT.
+
+    Raises
+    ------
+    UserError
+        If an angle changes more than any walk's: turns of 360 degrees within one person's recordings.
     """
     together, variance = np.zeros(filled.shape[1:]), UNMOVED
     people = np.unique(subject)
@@ -65,10 +73,17 @@ def slope(filled: Floats, subject: Groups, paces: Floats) -> Floats:
     found[..., LEFT_OUT] = 0.0
     basis = fourier_basis(filled.shape[1], HARMONICS)
     both = 0.5 * (found + mirrored(found))
-    return np.asarray(decode(encode(both, basis), basis, filled.shape[2])[0])
+    steep = np.asarray(decode(encode(both, basis), basis, filled.shape[2])[0])
+    channel = int(np.abs(steep).max(axis=0).argmax())
+    if np.abs(steep[:, channel]).max() > STEEPEST:
+        raise UserError(
+            f"{CHANNELS[channel]}: recordings of one person differ more than walks at two rates do; "
+            "take turns of 360 degrees out of the angles, or leave recordings out with --exclude"
+        )
+    return steep
 
 
-def without(filled: Floats, paces: Floats, slope: Floats) -> Floats:
-    """Cycles (R, T, M) as they would be at the mean rate; they lie on disk."""
-    parts = (filled[part] - paces[part, None, None] * slope for part in by_rows(filled))
+def without(filled: Floats, paces: Floats, steep: Floats) -> Floats:
+    """Cycles (R, T, M) as they would be at the mean rate, with the slope `steep`; they lie on disk."""
+    parts = (filled[part] - paces[part, None, None] * steep for part in by_rows(filled))
     return stored(parts, filled.shape[1:])
