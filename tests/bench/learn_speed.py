@@ -45,13 +45,14 @@ def learn(mocap: Path, jobs: int, model: Path) -> tuple[float, float]:
 
 
 def difference(path: Path) -> float:
-    """Largest difference of an angle between C and Python, radians, over phases, mean and components."""
+    """Largest difference of an angle between C and Python, radians, over phases, rates, mean and components."""
     sections, rng = blob.read(path), np.random.default_rng(14)
     model, components, worst = Model(path), len(sections["CURV"]) - 1, 0.0
     for k in range(POSES):
         phase, scores = float(rng.uniform()), np.eye(1 + components)[k % (1 + components), 1:]
-        _, found = model.pose(State(phase=phase, stride_hz=0.9, stature=1.7, coef=scores))
-        known = skeleton.curves(sections, [phase], scores[None])[0, : len(found)]
+        rate = float(rng.uniform(0.5, 1.5))
+        _, found = model.pose(State(phase=phase, stride_hz=rate, stature=1.7, coef=scores))
+        known = skeleton.curves(sections, [phase], scores[None], rate)[0, : len(found)]
         worst = max(worst, float(np.max(np.abs(found - known))))
     return worst
 
