@@ -45,7 +45,7 @@ def learn(mocap: Path, jobs: int, model: Path) -> tuple[float, float]:
 
 
 def difference(path: Path) -> float:
-    """Largest difference of an angle between C and Python, radians, over phases, rates, mean and components."""
+    """Largest difference of an angle between C and Python, radians, over phases, rates and components."""
     sections, rng = blob.read(path), np.random.default_rng(14)
     model, components, worst = Model(path), len(sections["CURV"]) - 1, 0.0
     for k in range(POSES):
