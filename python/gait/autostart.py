@@ -301,7 +301,8 @@ def _course(path: _Path, usual: float) -> tuple[float, float, float, float]:
     resultant = complex((share * np.exp(1j * heading)).sum())
     fast = float((share * speed).sum())
     spread = float(np.sqrt((share * (speed - fast) ** 2).sum()))
-    return float(np.angle(resultant)), float(np.sqrt(-2 * np.log(abs(resultant)))), fast, spread
+    length = max(abs(resultant), 1e-12)  # 0 where nothing moves: no heading at all
+    return float(np.angle(resultant)), float(np.sqrt(-2 * np.log(length))), fast, spread
 
 
 def _depth_sd(camera: Camera, distance: float, spread: float) -> float:
