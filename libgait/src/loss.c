@@ -17,11 +17,6 @@ static const float USUAL = 60.0f,
 static const double ELSEWHERE = 0.01; /* probability, in a frame, that a lost walker is not where predicted */
 enum { SEARCHERS = 8 };               /* one particle of so many looks there */
 
-static float seconds_unseen(const gait_tracker *t)
-{
-    return 1e-6f * (float)(t->core->utime - t->core->support_utime);
-}
-
 bool loss_is_lost(const gait_tracker *t)
 {
     return seconds_unseen(t) > PATIENCE;

@@ -16,12 +16,6 @@ static float seconds_in_stage(const gait_tracker *t)
     return 1e-6f * (float)(t->core->utime - t->core->modes.since);
 }
 
-/* Since the images last supported the walker. */
-static float seconds_unseen(const gait_tracker *t)
-{
-    return 1e-6f * (float)(t->core->utime - t->core->support_utime);
-}
-
 float modes_settled(const gait_tracker *t)
 {
     return t->core->modes.stage == MODES_SINGLE ? seconds_in_stage(t) : 0.0f;

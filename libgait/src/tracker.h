@@ -89,6 +89,12 @@ int32_t modes_side(const gait_tracker *t, int32_t particle);
 
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg);
 void tracker_clear(gait_tracker *t);
+/* Since the images last supported the walker. */
+static inline float seconds_unseen(const gait_tracker *t)
+{
+    return 1e-6f * (float)(t->core->utime - t->core->support_utime);
+}
+
 /* From now on so many particles are in use. */
 void tracker_set_count(gait_tracker *t, int32_t particles);
 dynamics tracker_dynamics(const gait_tracker *t);
