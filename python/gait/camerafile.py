@@ -20,6 +20,7 @@ else:
     import tomli as tomllib
 
 MAX_PIXELS = 1 << 14
+LONGEST_LENS = 1000  #: focal length over the width of the picture; the longest made have a few hundred
 
 # Names in use for the same thing in OpenCV's own samples and in ROS; the first is the documented one.
 _ALIASES = {
@@ -58,6 +59,9 @@ def read_camera(path: str, size: tuple[int, int] | None = None) -> Camera:
         camera = _from_toml(file, name)
     else:
         raise UserError(f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml or .toml")
+    if max(camera.fx, camera.fy) > LONGEST_LENS * camera.width:
+        far = f"is over {LONGEST_LENS} times the picture's width"
+        raise UserError(f"{path}: focal length of {max(camera.fx, camera.fy):.6g} pixels {far}; give it in pixels")
     if size is not None:
         camera.check_size(str(path), size)
     return camera

@@ -235,8 +235,13 @@ def test_one_wild_point_changes_little(folder, capsys):
 
 def test_a_camera_that_cannot_be_is_said(folder, capsys):
     camera = json.loads((folder / "cam.json").read_text())
+    command = ["lift", "t.csv", "-m", "m.gait", "--camera", "long.json", "-o", "long.csv"]
     (folder / "long.json").write_text(json.dumps(camera | {"fx": 6e7, "fy": 6e7}))
-    code = main(["lift", "t.csv", "-m", "m.gait", "--camera", "long.json", "-o", "long.csv"])
+    assert main(command) == 1
+    assert "long.json: focal length of 6e+07 pixels is over 1000 times" in capsys.readouterr().err
+    # a lens that could be, not one that took these tracks
+    (folder / "long.json").write_text(json.dumps(camera | {"fx": 6e5, "fy": 6e5}))
+    code = main(command)
     said = capsys.readouterr().err
     assert code == 1 or "do not rely on" in said
 

@@ -160,10 +160,19 @@ class _System:
 
     @property
     def square(self) -> float:
-        """Squared deviations of what is seen and of the motion from the prior, at the mean."""
+        """Squared deviations of what is seen and of the motion from the prior, at the mean.
+
+        Raises
+        ------
+        LinAlgError
+            What is seen is so far from the prior that their difference has lost its digits.
+        """
         explained = (self.information.vector * self.found.blocks).sum()
         explained += self.information.edge @ self.found.lasting
-        return self.fit + self.chain.constant - float(explained)
+        square = self.fit + self.chain.constant - float(explained)
+        if not square > -1:  # none is below zero but for rounding
+            raise np.linalg.LinAlgError("squared deviations are negative")
+        return max(square, 0.0)
 
     @property
     def evidence(self) -> float:
