@@ -59,9 +59,12 @@ def read_camera(path: str, size: tuple[int, int] | None = None) -> Camera:
         camera = _from_toml(file, name)
     else:
         raise UserError(f"{file}: unknown camera suffix; use .json, .yaml, .yml, .xml or .toml")
-    if max(camera.fx, camera.fy) > LONGEST_LENS * camera.width:
-        far = f"is over {LONGEST_LENS} times the picture's width"
-        raise UserError(f"{path}: focal length of {max(camera.fx, camera.fy):.6g} pixels {far}; give it in pixels")
+    focal = max(camera.fx, camera.fy)
+    if focal > LONGEST_LENS * camera.width:
+        raise UserError(
+            f"{path}: focal length of {focal:.6g} pixels is over {LONGEST_LENS} times the picture's width; "
+            "give it in pixels"
+        )
     if size is not None:
         camera.check_size(str(path), size)
     return camera
