@@ -40,6 +40,17 @@ struct walker_block;
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
     K(void, lift_sum,                                                                                        \
       (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
+    /* A marker's modes between two frames, out = w0 s0 + w1 s1 (3 x lanes); where theta moves it */         \
+    K(void, lift_shape,                                                                                      \
+      (double *out, const float *s0, const float *s1, double w0, double w1, int32_t lanes,                   \
+       const double *theta, int32_t modes, double moved[3]))                                                 \
+    /* w[i] = g . shape[.][i], i < lanes */                                                                  \
+    K(void, lift_row, (double *w, const double *shape, int32_t lanes, const double g[3]))                    \
+    /* z[i * stride + a] = M[a] . shape[.][i], a < 3, i < modes */                                           \
+    K(void, lift_columns,                                                                                    \
+      (double *z, size_t stride, const double *shape, int32_t lanes, int32_t modes, double M[3][3]))         \
+    /* x[j] += sum_i Z[i * stride + j]^2, j < width */                                                       \
+    K(void, lift_squares, (double *x, int32_t width, const double *Z, size_t stride, int32_t rows))          \
     /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. */    \
     K(void, kin_curves,                                                                                      \
       (const struct gait_model *m, const struct kin_input *in, int32_t components,                           \
