@@ -20,6 +20,7 @@ struct layers;
 struct layers_block;
 struct like_body;
 struct like_edge_tally;
+struct like_outline;
 struct like_patch;
 struct like_pose;
 struct like_setup;
@@ -100,13 +101,17 @@ struct walker_block;
       (const struct features *f, const struct rast_mask *whole, int32_t *area, int32_t *covered))            \
     /* The limbs of a block before a camera, what one body's surface shows, and how that compares. */        \
     K(void, surface_pose,                                                                                    \
-      (const struct like_setup *s, const gait_camera *cam, const struct kin_body *body,                      \
-       struct like_pose *out))                                                                               \
+      (const struct like_setup *s, const gait_camera *cam, const struct view_map *map,                       \
+       const struct kin_body *body, struct like_pose *out))                                                  \
     K(void, surface_sample,                                                                                  \
-      (const struct like_setup *s, const struct features *f, const gait_camera *cam,                         \
-       const struct like_pose *pose, int32_t lane, const struct layers *drawn, struct like_patch *seen))     \
+      (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,     \
+       const struct layers *drawn, struct like_patch *seen))                                                 \
     K(void, texture_logs, (const struct like_body *b, float *log))                                           \
     K(int64_t, template_cost, (const struct like_body *b))                                                   \
+    /* The sides of a block's limbs, and the edges along one body's. */                                      \
+    K(void, edges_prepare,                                                                                   \
+      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
+       struct like_outline *out))                                                                            \
     K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
 
 /* Those of this build, best last, with the bit that a CPU mask must have. */
