@@ -26,8 +26,8 @@ UNMOVED = 1.0
 #: Does not follow the rate: how far people step at one rate differs much, and a tracker that hardly sees the
 #: distance, as from in front, adds up what its speed is off.  The components have it.
 LEFT_OUT = CHANNELS.index("root_forward")
-#: Coefficients of a channel's Fourier series, ten harmonics: those above move joints by less than 0.1 mm in
-#: somebody whose rate is a standard deviation off (root mean square), and a model stays small.
+#: Coefficients of a channel's Fourier series, ten harmonics: those above move joints by 0.12 mm in somebody
+#: whose rate is a standard deviation off (root mean square, `make eval-learn`), and a model stays small.
 TERMS = 21
 #: Sum of a channel's coefficients, radians or statures per unit of pace: more is no walk; libgait refuses it.
 STEEPEST = 1.0
