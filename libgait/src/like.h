@@ -38,7 +38,18 @@ typedef struct like_surface {
     float side[3][LIKE_AZIMUTHS]; /* the first half of the directions */
 } like_surface;
 
-enum { LIKE_WORDS = 16 }; /* of one body about one limb: a line of the cache */
+/* Numbers of one body about one limb, a line of the cache: of its view and, in one part, of a cone's sides. */
+enum { LIKE_WORDS = 16, LIKE_SUBPIXELS = 256 /* of a working pixel, in one direction */ };
+enum { LIKE_VIEW_IMAGE = 0, LIKE_VIEW_SHIFT = 9, LIKE_VIEW_EYE = 12, LIKE_VIEW_GRAZE = 15 };
+enum {
+    LIKE_SIDE_X = 0,
+    LIKE_SIDE_Y = 2,
+    LIKE_SIDE_DX = 4,
+    LIKE_SIDE_DY = 6,
+    LIKE_SIDE_COS2 = 8,
+    LIKE_SIDE_SIN2 = 10,
+    LIKE_SIDE_INNER = 12
+};
 
 /* A limb of BLOCK bodies: image (3 x 3), shift (3), eye (3), graze.  A surface point p shows at
  * (x, y) = (image[0] p + shift[0], image[1] p + shift[1]) / (image[2] p + shift[2]), 1/256 working pixels; its normal n
