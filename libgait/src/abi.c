@@ -74,6 +74,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_tracker_config, girth),
         FIELD(gait_tracker_config, resample_ess),
         FIELD(gait_tracker_config, evidence_time),
+        FIELD(gait_tracker_config, mingle_time),
         FIELD(gait_tracker_config, max_dt),
         FIELD(gait_tracker_config, phase_noise),
         FIELD(gait_tracker_config, rate_noise),

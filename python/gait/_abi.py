@@ -91,6 +91,7 @@ class TrackerConfigC(ctypes.Structure):
         ("girth", c_float),
         ("resample_ess", c_float),
         ("evidence_time", c_float),
+        ("mingle_time", c_float),
         ("max_dt", c_float),
         ("phase_noise", c_float),
         ("rate_noise", c_float),
