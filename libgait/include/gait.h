@@ -296,7 +296,7 @@ typedef struct gait_lift_config {
     double   sd;              /* of an observation where none is given, pixels or metres; default 3 */
     double   residual;        /* factor of what the modes leave over [0, 100]; default -1: the blob's; 0: the paper's form */
     double   place[3];        /* where the pelvis of the first frame is expected, metres; default 0 (z: of the floor) */
-    double   place_sd[3];     /* default 10 10 0.05; 0: exactly there */
+    double   place_sd[3];     /* default 10 10 0.03; 0: exactly there */
     double   heading;         /* of the body in the first frame about z, radians; 0 = along +x */
     double   heading_sd;      /* default -1: unknown, all are tried (blobs with turned copies: 0); 0: exactly `heading` */
     double   turn_sd;         /* by how much a heading may depart from the segment before, radians; default 0.3 */

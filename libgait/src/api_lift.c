@@ -16,7 +16,7 @@ void gait_lift_default(gait_lift_config *cfg)
         .stature_sd = -1.0,
         .sd = 3.0,
         .residual = -1.0,
-        .place_sd = {10.0, 10.0, 0.05},
+        .place_sd = {10.0, 10.0, 0.03},
         .heading_sd = -1.0,
         .turn_sd = 0.3,
         .tolerance = 1e-9,

@@ -24,10 +24,17 @@ bool dense_factor(const kernels *k, double *A, int32_t n, int32_t ld)
 /* Sum of u[j] v[j], j in [first, last), in four chains. */
 static double dot(const double *u, const double *v, int32_t first, int32_t last)
 {
-    double s[4] = {0.0};
-    for (int32_t j = first; j < last; j++)
-        s[j & 3] += u[j] * v[j];
-    return (s[0] + s[1]) + (s[2] + s[3]);
+    double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0;
+    int32_t j = first;
+    for (; j + 4 <= last; j += 4) {
+        s0 += u[j] * v[j];
+        s1 += u[j + 1] * v[j + 1];
+        s2 += u[j + 2] * v[j + 2];
+        s3 += u[j + 3] * v[j + 3];
+    }
+    for (; j < last; j++)
+        s0 += u[j] * v[j];
+    return (s0 + s1) + (s2 + s3);
 }
 
 void dense_ahead(const double *A, int32_t n, int32_t ld, double *v)

@@ -109,7 +109,7 @@ KERNEL_ROW void pack_row(const int16_t *restrict xx, const int16_t *restrict yy,
 {
     for (int32_t i = 0; i < VIEW_SIZE; i++) {
         uint32_t const trace = (uint8_t)((xx[i] + yy[i]) / 8), xx_yy = (uint8_t)((xx[i] - yy[i]) / 8);
-        uint32_t const xy2 = (uint8_t)(xy[i] / 4), cell = trace | xx_yy << 8 | xy2 << 16;
+        uint32_t const xy2 = (uint8_t)(xy[i] / 4), cell = trace | xx_yy << 8 | xy2 << 24;
         memcpy(&out[i], &cell, sizeof cell); /* in the order of edge_cell */
     }
 }

@@ -14,7 +14,7 @@ enum {
 };
 
 typedef struct edge_cell { /* smoothed, contrast-normalised edge tensor: n'Tn is the response to a normal n */
-    int8_t trace, xx_yy, xy2, zero;
+    int8_t trace, xx_yy, zero, xy2;
 } edge_cell;
 
 typedef struct features_tracks {                  /* joints located in the frame by somebody else */

@@ -20,6 +20,7 @@ struct layers;
 struct layers_block;
 struct like_body;
 struct like_edge_tally;
+struct like_outline;
 struct like_patch;
 struct like_pose;
 struct like_setup;
@@ -40,6 +41,17 @@ struct walker_block;
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
     K(void, lift_sum,                                                                                        \
       (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
+    /* A marker's modes between two frames, out = w0 s0 + w1 s1 (3 x lanes); where theta moves it */         \
+    K(void, lift_shape,                                                                                      \
+      (double *out, const float *s0, const float *s1, double w0, double w1, int32_t lanes,                   \
+       const double *theta, int32_t modes, double moved[3]))                                                 \
+    /* w[i] = g . shape[.][i], i < lanes */                                                                  \
+    K(void, lift_row, (double *w, const double *shape, int32_t lanes, const double g[3]))                    \
+    /* z[i * stride + a] = M[a] . shape[.][i], a < 3, i < modes */                                           \
+    K(void, lift_columns,                                                                                    \
+      (double *z, size_t stride, const double *shape, int32_t lanes, int32_t modes, double M[3][3]))         \
+    /* x[j] += sum_i Z[i * stride + j]^2, j < width */                                                       \
+    K(void, lift_squares, (double *x, int32_t width, const double *Z, size_t stride, int32_t rows))          \
     /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. */    \
     K(void, kin_curves,                                                                                      \
       (const struct gait_model *m, const struct kin_input *in, int32_t components,                           \
@@ -89,13 +101,17 @@ struct walker_block;
       (const struct features *f, const struct rast_mask *whole, int32_t *area, int32_t *covered))            \
     /* The limbs of a block before a camera, what one body's surface shows, and how that compares. */        \
     K(void, surface_pose,                                                                                    \
-      (const struct like_setup *s, const gait_camera *cam, const struct kin_body *body,                      \
-       struct like_pose *out))                                                                               \
+      (const struct like_setup *s, const gait_camera *cam, const struct view_map *map,                       \
+       const struct kin_body *body, struct like_pose *out))                                                  \
     K(void, surface_sample,                                                                                  \
-      (const struct like_setup *s, const struct features *f, const gait_camera *cam,                         \
-       const struct like_pose *pose, int32_t lane, const struct layers *drawn, struct like_patch *seen))     \
+      (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,     \
+       const struct layers *drawn, struct like_patch *seen))                                                 \
     K(void, texture_logs, (const struct like_body *b, float *log))                                           \
     K(int64_t, template_cost, (const struct like_body *b))                                                   \
+    /* The sides of a block's limbs, and the edges along one body's. */                                      \
+    K(void, edges_prepare,                                                                                   \
+      (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
+       struct like_outline *out))                                                                            \
     K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
 
 /* Those of this build, best last, with the bit that a CPU mask must have. */

@@ -7,6 +7,8 @@
 
 enum { BLOCK = 16, KIN_MAX_FRAMES = MODEL_MAX_FRAMES };
 
+typedef float body_lanes[BLOCK];
+
 typedef struct kin_input {
     float phase[BLOCK];                            /* cycles; wrapped to [0, 1) */
     float pace[BLOCK];                             /* of kin_pace */

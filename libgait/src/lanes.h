@@ -65,4 +65,39 @@ static inline void narrow(const int32_t *in, int8_t *out)
         out[i] = (int8_t)in[i];
 #endif
 }
+
+/* Sixteen numbers of sixteen bodies: from in[number][body] to out[body][number], a cache line each. */
+static inline void deal(const float (*restrict in)[LANES], float (*restrict out)[LANES])
+{
+#if defined(__AVX2__)
+    for (int32_t a = 0; a < LANES; a += 8)
+        for (int32_t b = 0; b < LANES; b += 8) {
+            __m256 r[8], s[8];
+#pragma GCC unroll 8
+            for (int32_t i = 0; i < 8; i++) /* four numbers of two halves of the bodies in each */
+                r[i] =
+                    _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(in[a + (i & 3)] + b + (i & 4))),
+                                         _mm_loadu_ps(in[a + 4 + (i & 3)] + b + (i & 4)), 1);
+#pragma GCC unroll 4
+            for (int32_t i = 0; i < 8; i += 2) {
+                s[i] = _mm256_unpacklo_ps(r[i], r[i + 1]);
+                s[i + 1] = _mm256_unpackhi_ps(r[i], r[i + 1]);
+            }
+#pragma GCC unroll 2
+            for (int32_t i = 0; i < 8; i += 4)
+#pragma GCC unroll 2
+                for (int32_t k = 0; k < 2; k++) {
+                    __m256d const low = _mm256_castps_pd(s[i + k]), high = _mm256_castps_pd(s[i + 2 + k]);
+                    _mm256_storeu_pd((double *)(void *)(out[b + i + 2 * k] + a),
+                                     _mm256_unpacklo_pd(low, high));
+                    _mm256_storeu_pd((double *)(void *)(out[b + i + 2 * k + 1] + a),
+                                     _mm256_unpackhi_pd(low, high));
+                }
+        }
+#else
+    for (int32_t b = 0; b < LANES; b++)
+        for (int32_t a = 0; a < LANES; a++)
+            out[b][a] = in[a][b];
+#endif
+}
 #endif

@@ -3,23 +3,29 @@
 #define GAIT_LAYERS_H
 #include "outline.h"
 
-enum { LAYERS_ROWS = 8 }; /* the grid is drawn in bands of so many rows */
+enum {
+    LAYERS_BAND = 8,          /* bodies, and where limbs begin, are at multiples of so many rows; */
+    LAYERS_ROWS = RAST_SPARE, /* a limb is drawn by so many at once */
+    LAYERS_LINES = 4          /* most lines that bound a polygon on one side: an octagon's */
+};
 
 typedef struct layers {
     rast_mask whole;                    /* the body; [first, last) are whole bands */
     rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; the same, with the columns of the whole body */
 } layers;
 
-typedef struct layers_limb { /* a limb's polygon in the grid, in the bodies of a block */
-    uint32_t at[RAST_MAX_VERTICES][BLOCK], slope[RAST_MAX_VERTICES][BLOCK]; /* its edges as in rast_edge; */
-    int32_t first[RAST_MAX_VERTICES][BLOCK], rows[RAST_MAX_VERTICES][BLOCK];
-    int32_t top[BLOCK], end[BLOCK]; /* the bands that it meets; none behind the camera */
+/* A convex polygon in the grid, in the bodies of a block: in rows top <= y < end what lies right of all of its left
+ * lines and left of all of its right ones, the lines going on beyond the corners.  Columns are at + slope y. */
+typedef struct layers_limb {
+    float left_at[LAYERS_LINES][BLOCK], left_slope[LAYERS_LINES][BLOCK];
+    float right_at[LAYERS_LINES][BLOCK], right_slope[LAYERS_LINES][BLOCK];
+    int32_t top[BLOCK], end[BLOCK]; /* none behind the camera */
 } layers_limb;
 
 typedef struct layers_block {
-    int32_t vertices[MODEL_MAX_LIMBS];
-    int32_t count;                                                  /* limbs */
-    int32_t drawn[BLOCK];                                           /* of them in front of the camera */
+    int32_t lines[MODEL_MAX_LIMBS]; /* on either side: 3 of a cone, LAYERS_LINES of an ellipsoid */
+    int32_t count;                  /* limbs */
+    int32_t drawn[BLOCK];           /* of them in front of the camera */
     int32_t first[BLOCK], last[BLOCK], column[BLOCK], width[BLOCK]; /* of the masks of the whole body */
     uint8_t order[BLOCK][MODEL_MAX_LIMBS]; /* from near to far; equal depths by index */
     _Alignas(GAIT_ALIGN) layers_limb limb[MODEL_MAX_LIMBS];

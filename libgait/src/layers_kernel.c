@@ -1,16 +1,29 @@
-/* The limbs of a block of bodies as edges in the grid, one lane a body; then one body's edges as masks, one lane a
+/* The limbs of a block of bodies as lines in the grid, one lane a body; then one body's lines as masks, one lane a
  * row, each limb without what stands before it. */
 #include "kernels.h"
 #include "layers.h"
 
 #include <string.h>
 
-/* ---- edges, lanes are bodies ---- */
+/* ---- lines, lanes are bodies ---- */
+
+/* Corners are clamped to so many cells beyond the grid's first, and no line is less steep: one that crosses two rows
+ * cannot be, and one that crosses a single row is right there. */
+#define FAR     512.0f
+#define SHALLOW (2.0f * FAR) /* cells in a row */
+#define NOWHERE 1e6f         /* column of a line that bounds nothing */
 
 /* Working pixels to grid cells: the centre of cell c is working pixel 2 c + 1/2. */
-static int32_t to_cell(float v)
+static float to_cell(float v)
 {
-    return rast_sub(0.5f * v - 0.25f);
+    return f_clamp(0.5f * v - 0.25f, -FAR, FAR);
+}
+
+/* First row whose centre is at or below y. */
+static int32_t row_from(float y)
+{
+    enum { BELOW = 1024 }; /* makes the number positive, which is rounded down */
+    return BELOW - (int32_t)((float)BELOW - y);
 }
 
 typedef struct box { /* cells that the limbs in front of the camera can meet */
@@ -27,43 +40,83 @@ static box box_empty(void)
     return b;
 }
 
-/* What a limb meets, whole bands of rows, grows what the body does. */
+/* What a limb meets grows what the body does, by whole bands of rows. */
 static void box_join(box *restrict body, const box *limb, const float *depth, layers_limb *restrict out)
 {
     for (int32_t i = 0; i < BLOCK; i++) {
         int32_t const top = i_max(limb->top[i], 0), end = i_min(limb->end[i], RAST_SIZE);
         bool const front = depth[i] > 0.0f, met = front & (top < end);
-        out->top[i] = met ? top / LAYERS_ROWS * LAYERS_ROWS : 0;
-        out->end[i] = met ? (end + LAYERS_ROWS - 1) / LAYERS_ROWS * LAYERS_ROWS : 0;
-        body->top[i] = i_min(body->top[i], met ? out->top[i] : RAST_SIZE);
-        body->end[i] = i_max(body->end[i], out->end[i]);
+        out->top[i] = met ? top : 0;
+        out->end[i] = met ? end : 0;
+        body->top[i] = i_min(body->top[i], met ? top / LAYERS_BAND * LAYERS_BAND : RAST_SIZE);
+        body->end[i] = i_max(body->end[i], met ? (end + LAYERS_BAND - 1) / LAYERS_BAND * LAYERS_BAND : 0);
         body->left[i] = i_min(body->left[i], met ? limb->left[i] : RAST_SIZE);
         body->right[i] = i_max(body->right[i], met ? limb->right[i] : 0);
     }
 }
 
-static void limb_edges(const outline_lanes *limb, int32_t n, box *restrict body, layers_limb *restrict out)
+typedef struct corners { /* cells */
+    float x[RAST_MAX_VERTICES][BLOCK], y[RAST_MAX_VERTICES][BLOCK];
+} corners;
+
+static void corners_of(const outline_lanes *limb, int32_t n, corners *restrict c, box *restrict own)
 {
-    int32_t px[RAST_MAX_VERTICES][BLOCK], py[RAST_MAX_VERTICES][BLOCK];
-    box own = box_empty();
     for (int32_t k = 0; k < n; k++)
         for (int32_t i = 0; i < BLOCK; i++) {
-            px[k][i] = to_cell(limb->x[k][i]);
-            py[k][i] = to_cell(limb->y[k][i]);
-            /* a column more on either side, because edges are rounded */
-            own.left[i] = i_min(own.left[i], (px[k][i] >> 8) - 1);
-            own.right[i] = i_max(own.right[i], (px[k][i] >> 8) + 2);
-            own.top[i] = i_min(own.top[i], rast_row(py[k][i]));
-            own.end[i] = i_max(own.end[i], rast_row(py[k][i]));
+            float const x = to_cell(limb->x[k][i]), y = to_cell(limb->y[k][i]);
+            c->x[k][i] = x;
+            c->y[k][i] = y;
+            /* a column more on either side, because lines are rounded */
+            own->left[i] = i_min(own->left[i], row_from(x) - 2);
+            own->right[i] = i_max(own->right[i], row_from(x) + 2);
+            own->top[i] = i_min(own->top[i], row_from(y));
+            own->end[i] = i_max(own->end[i], row_from(y));
         }
-    for (int32_t k = 0, j = n - 1; k < n; j = k++)
+}
+
+/* The side from corner j to corner k, which goes down on the right if the corners go round clockwise. */
+static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwise, int32_t slot,
+                 layers_limb *restrict out)
+{
+    KERNEL_LANES
+    for (int32_t i = 0; i < BLOCK; i++) {
+        bool const down = c->y[j][i] < c->y[k][i];
+        float const x0 = down ? c->x[j][i] : c->x[k][i], y0 = down ? c->y[j][i] : c->y[k][i];
+        float const x1 = down ? c->x[k][i] : c->x[j][i], y1 = down ? c->y[k][i] : c->y[j][i];
+        int32_t const first = row_from(y0), last = row_from(y1);
+        bool const crosses = first < last, right = down == clockwise[i];
+        float const slope = f_clamp((x1 - x0) / (crosses ? y1 - y0 : 1.0f), -NOWHERE, NOWHERE);
+        float const steep = f_clamp(slope, -SHALLOW, SHALLOW);
+        float const at = x0 + slope * ((float)first - y0) - steep * (float)first;
+        bool const to_left = crosses & !right, to_right = crosses & right;
+        out->left_at[slot][i] = to_left ? at : out->left_at[slot][i];
+        out->left_slope[slot][i] = to_left ? steep : out->left_slope[slot][i];
+        out->right_at[slot][i] = to_right ? at : out->right_at[slot][i];
+        out->right_slope[slot][i] = to_right ? steep : out->right_slope[slot][i];
+    }
+}
+
+/* Opposite sides of an octagon, and the ends of a cone, are parallel: one is on the left, the other on the right. */
+static void limb_lines(const outline_lanes *limb, int32_t n, int32_t lines, box *restrict body,
+                       layers_limb *restrict out)
+{
+    corners c;
+    int32_t clockwise[BLOCK];
+    box own = box_empty();
+    corners_of(limb, n, &c, &own);
+    for (int32_t i = 0; i < BLOCK; i++) {
+        int32_t const a = n / 4, b = n / 2, d = n / 4 + n / 2;
+        clockwise[i] = (c.x[b][i] - c.x[0][i]) * (c.y[d][i] - c.y[a][i]) >
+                       (c.y[b][i] - c.y[0][i]) * (c.x[d][i] - c.x[a][i]);
+    }
+    for (int32_t slot = 0; slot < lines; slot++)
         for (int32_t i = 0; i < BLOCK; i++) {
-            rast_edge const e = rast_edge_of(px[j][i], py[j][i], px[k][i], py[k][i]);
-            out->at[k][i] = e.at;
-            out->slope[k][i] = e.slope;
-            out->first[k][i] = e.first;
-            out->rows[k][i] = e.last - e.first;
+            out->left_at[slot][i] = -NOWHERE;
+            out->right_at[slot][i] = NOWHERE;
+            out->left_slope[slot][i] = out->right_slope[slot][i] = 0.0f;
         }
+    for (int32_t k = 0; k < n; k++)
+        side(&c, k, (k + 1) % n, clockwise, n == 4 && k == 3 ? 1 : k % LAYERS_LINES, out);
     box_join(body, &own, limb->depth, out);
 }
 
@@ -110,84 +163,87 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
     box body = box_empty();
     out->count = count;
     for (int32_t l = 0; l < count; l++) {
-        out->vertices[l] = outline_vertices(&limbs[l]);
-        limb_edges(&outline->limb[l], out->vertices[l], &body, &out->limb[l]);
+        int32_t const n = outline_vertices(&limbs[l]);
+        out->lines[l] = n == 4 ? 3 : LAYERS_LINES;
+        limb_lines(&outline->limb[l], n, out->lines[l], &body, &out->limb[l]);
     }
     choose_columns(&body, out);
     depth_order(outline->limb, count, out);
 }
 
 /* ---- masks, lanes are rows ---- */
-typedef struct edge { /* of one body */
-    uint32_t at, slope, first, rows;
-} edge;
 
-static inline edge edge_of(const layers_limb *limb, int32_t k, int32_t lane)
+typedef struct pair { /* a left line and a right one of one body */
+    float left_at, left_slope, right_at, right_slope;
+} pair;
+
+static inline pair pair_of(const layers_limb *limb, int32_t k, int32_t lane, int32_t base)
 {
-    return (edge){.at = limb->at[k][lane],
-                  .slope = limb->slope[k][lane],
-                  .first = (uint32_t)limb->first[k][lane],
-                  .rows = (uint32_t)limb->rows[k][lane]};
+    return (pair){.left_at = limb->left_at[k][lane] - (float)base,
+                  .left_slope = limb->left_slope[k][lane],
+                  .right_at = limb->right_at[k][lane] - (float)base,
+                  .right_slope = limb->right_slope[k][lane]};
 }
 
-/* Stretch the span of row y to an edge that crosses it. */
-static inline void stretch(edge e, int32_t y, int32_t *begin, int32_t *end)
+/* Narrow a row's span to what lies between the lines. */
+static inline void bound(pair p, float y, float *left, float *right)
 {
-    int32_t const column = rast_column(e.at, e.slope, y);
-    bool const crosses = (uint32_t)y - e.first < e.rows;
-    *begin = crosses ? i_min(*begin, column) : *begin;
-    *end = crosses ? i_max(*end, column) : *end;
+    *left = f_max(p.left_at + p.left_slope * y, *left);
+    *right = f_min(p.right_at + p.right_slope * y, *right);
 }
 
-/* The limb's bits in a word that begins at column `base` go behind those of the body. */
-static inline void cover(int32_t begin, int32_t end, int32_t base, uint64_t *restrict whole,
+/* The first cell whose centre is at or right of a line. */
+static inline int32_t cell_from(float x)
+{
+    return (int32_t)(x + (1.0f - 1.0f / 1024.0f));
+}
+
+/* The limb's bits in a word go behind those of the body; none in rows that are not the limb's. */
+static inline void cover(float left, float right, int32_t row, int32_t rows, uint64_t *restrict whole,
                          uint64_t *restrict seen)
 {
-    uint64_t const mine = rast_bits(i_max(begin - base, 0), i_min(end - base, 64)), nearer = *whole;
+    int32_t const begin = cell_from(left), end = cell_from(right);
+    uint64_t const mine = rast_bits(begin, (uint32_t)row < (uint32_t)rows ? end : 0), nearer = *whole;
     *whole = nearer | mine;
     *seen = mine & ~nearer;
 }
 
-/* Rows [first, last), whole bands, of which the compiler sees that they need no remainder. */
+/* The bits in the word that begins at column `base`, by LAYERS_ROWS at once, so that there is no remainder; what was
+ * stored eight rows at a time is loaded so. */
 KERNEL_ROW void draw_cone(const layers_limb *limb, int32_t lane, int32_t base, uint64_t *restrict whole,
                           uint64_t *restrict seen)
 {
-    int32_t const first = limb->top[lane], last = limb->end[lane];
-    edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
-    edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
-    for (int32_t band = first; band < last; band += LAYERS_ROWS)
+    int32_t const top = limb->top[lane], end = limb->end[lane];
+    pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
+    pair const c = pair_of(limb, 2, lane, base);
+    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS)
         KERNEL_LANES
     for (int32_t i = 0; i < LAYERS_ROWS; i++) {
-        int32_t begin = RAST_SIZE, end = 0;
-        stretch(a, band + i, &begin, &end);
-        stretch(b, band + i, &begin, &end);
-        stretch(c, band + i, &begin, &end);
-        stretch(d, band + i, &begin, &end);
-        cover(begin, end, base, whole + band + i, seen + band + i);
+        float const y = (float)(strip + i);
+        float left = 0.0f, right = 64.0f;
+        bound(a, y, &left, &right);
+        bound(b, y, &left, &right);
+        bound(c, y, &left, &right);
+        cover(left, right, strip + i - top, end - top, whole + strip + i, seen + strip + i);
     }
 }
 
 KERNEL_ROW void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t base, uint64_t *restrict whole,
                                uint64_t *restrict seen)
 {
-    int32_t const first = limb->top[lane], last = limb->end[lane];
-    edge const a = edge_of(limb, 0, lane), b = edge_of(limb, 1, lane);
-    edge const c = edge_of(limb, 2, lane), d = edge_of(limb, 3, lane);
-    edge const e = edge_of(limb, 4, lane), f = edge_of(limb, 5, lane);
-    edge const g = edge_of(limb, 6, lane), h = edge_of(limb, 7, lane);
-    for (int32_t band = first; band < last; band += LAYERS_ROWS)
+    int32_t const top = limb->top[lane], end = limb->end[lane];
+    pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
+    pair const c = pair_of(limb, 2, lane, base), d = pair_of(limb, 3, lane, base);
+    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS)
         KERNEL_LANES
     for (int32_t i = 0; i < LAYERS_ROWS; i++) {
-        int32_t begin = RAST_SIZE, end = 0;
-        stretch(a, band + i, &begin, &end);
-        stretch(b, band + i, &begin, &end);
-        stretch(c, band + i, &begin, &end);
-        stretch(d, band + i, &begin, &end);
-        stretch(e, band + i, &begin, &end);
-        stretch(f, band + i, &begin, &end);
-        stretch(g, band + i, &begin, &end);
-        stretch(h, band + i, &begin, &end);
-        cover(begin, end, base, whole + band + i, seen + band + i);
+        float const y = (float)(strip + i);
+        float left = 0.0f, right = 64.0f;
+        bound(a, y, &left, &right);
+        bound(b, y, &left, &right);
+        bound(c, y, &left, &right);
+        bound(d, y, &left, &right);
+        cover(left, right, strip + i - top, end - top, whole + strip + i, seen + strip + i);
     }
 }
 
@@ -199,7 +255,7 @@ static void draw_word(const layers_block *block, int32_t lane, int32_t word, lay
     memset(whole + out->whole.first, 0, (size_t)(out->whole.last - out->whole.first) * sizeof *whole);
     for (int32_t k = 0; k < block->drawn[lane]; k++) {
         int32_t const l = block->order[lane][k];
-        if (block->vertices[l] == 4)
+        if (block->lines[l] == 3)
             draw_cone(&block->limb[l], lane, base, whole, out->visible[l].word[word]);
         else
             draw_ellipsoid(&block->limb[l], lane, base, whole, out->visible[l].word[word]);

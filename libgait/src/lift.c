@@ -13,69 +13,38 @@ void lift_clear(const lift_table *t, lift_belief *b)
     b->log_noise = b->miss = 0.0;
 }
 
-/* Mean of marker j, statures, and in t->shape its modes. */
-static void marker_shape(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
-                         double mean[3])
+void lift_marker_at(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
+                    lift_marker *r, double x[3])
 {
     const segment_prior *const p = &t->prior;
+    bool const whole = t->eye.perspective;
+    double const growth = t->size < 0 ? 0.0 : t->growth * b->theta[t->size], w1 = m->part, w0 = 1.0 - w1;
     const float *const m0 = segment_mean(p, b->component, m->f) + 3 * j;
     const float *const m1 = segment_mean(p, b->component, m->next) + 3 * j;
     size_t const J = (size_t)p->markers, first = (size_t)b->component * (size_t)p->frames;
     const float *const s0 = t->row + ((first + (size_t)m->f) * J + (size_t)j) * 3 * (size_t)t->lanes;
     const float *const s1 = t->row + ((first + (size_t)m->next) * J + (size_t)j) * 3 * (size_t)t->lanes;
-    double const w1 = m->part, w0 = 1.0 - w1;
-    for (int32_t i = 0; i < 3; i++)
-        mean[i] = w0 * (double)m0[i] + w1 * (double)m1[i];
-    for (int32_t i = 0; i < 3 * t->lanes; i++)
-        t->shape[i] = w0 * (double)s0[i] + w1 * (double)s1[i];
-}
-
-/* Sum over modes of a row and theta, in eight chains. */
-static double along_modes(const lift_table *t, const double *row, const double *theta)
-{
-    double s[DENSE_LANES] = {0.0};
-    int32_t const whole = t->prior.modes / DENSE_LANES * DENSE_LANES;
-    for (int32_t i = 0; i < whole; i += DENSE_LANES)
-        for (int32_t k = 0; k < DENSE_LANES; k++)
-            s[k] += row[i + k] * theta[i + k];
-    for (int32_t i = whole; i < t->prior.modes; i++)
-        s[i - whole] += row[i] * theta[i];
-    return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
-}
-
-typedef struct marker { /* linear about theta, statures */
-    double base[3];     /* with no modes and no growth */
-    double shape[3];    /* what grows with the stature */
-    double grown;       /* factor of the modes */
-} marker;
-
-/* Marker j, and in x where theta has it.  In a parallel view the mean alone grows: all is linear. */
-static void find_marker(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j, marker *r,
-                        double x[3])
-{
-    bool const whole = t->eye.perspective;
-    double const growth = t->size < 0 ? 0.0 : t->growth * b->theta[t->size];
-    marker_shape(t, b, m, j, r->base);
+    double moved[3];
+    t->run->lift_shape(t->shape, s0, s1, w0, w1, t->lanes, b->theta, p->modes, moved);
     r->grown = whole ? 1.0 + growth : 1.0;
     for (int32_t i = 0; i < 3; i++) {
-        double const moved = along_modes(t, t->shape + i * t->lanes, b->theta);
-        r->shape[i] = whole ? r->base[i] + moved : r->base[i];
-        x[i] = r->base[i] + moved + growth * r->shape[i];
-        r->base[i] -= (r->grown - 1.0) * moved;
+        double const mean = w0 * (double)m0[i] + w1 * (double)m1[i];
+        r->shape[i] = whole ? mean + moved[i] : mean;
+        x[i] = mean + moved[i] + growth * r->shape[i];
+        r->base[i] = mean - (r->grown - 1.0) * moved[i];
     }
 }
 
 /* The white row g . X = y of a marker as a row of the unknowns, with y last. */
-static void put_row(const lift_table *t, const lift_belief *b, const lift_axes *f, const marker *m,
+static void put_row(const lift_table *t, const lift_belief *b, const lift_axes *f, const lift_marker *m,
                     const double spin[2], const double g[3], double y, double *w)
 {
-    int32_t const k = t->prior.modes, lanes = t->lanes;
+    int32_t const k = t->prior.modes;
     const double q[3] = {f->c * g[0] + f->s * g[1], f->c * g[1] - f->s * g[0], f->z * g[2]};
+    const double grown[3] = {m->grown * q[0], m->grown * q[1], m->grown * q[2]};
     double base[3];
     lift_to_world(f, m->base, base);
-    for (int32_t i = 0; i < lanes; i++) /* the lanes past k are written again below */
-        w[i] =
-            m->grown * ((q[0] * t->shape[i] + q[1] * t->shape[lanes + i]) + q[2] * t->shape[2 * lanes + i]);
+    t->run->lift_row(w, t->shape, t->lanes, grown); /* the lanes past k are written again below */
     for (int32_t i = 0; i < 3; i++)
         w[k + i] = g[i] * t->cfg.place_sd[i];
     double rest = y - ((g[0] * base[0] + g[1] * base[1]) + g[2] * base[2]);
@@ -96,7 +65,7 @@ typedef struct adding { /* what is the same for all markers of a frame */
 
 /* Two white rows of marker j. */
 static void add_marker(const lift_table *t, lift_belief *b, const adding *a, const double *ideal, double sd,
-                       int32_t j, const marker *m, const double *about, double *w)
+                       int32_t j, const lift_marker *m, const double *about, double *w)
 {
     eye_rows r;
     double spin[2] = {-(about[1] - a->now.place[1]), about[0] - a->now.place[0]};
@@ -121,11 +90,11 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
     adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
-        marker r;
+        lift_marker r;
         double x[3], own[3];
         if (!lift_seen_at(seen, j))
             continue;
-        find_marker(t, b, &m, j, &r, x);
+        lift_marker_at(t, b, &m, j, &r, x);
         lift_to_world(&a.now, x, own);
         if (said)
             memcpy(said + 3 * j, own, sizeof own);

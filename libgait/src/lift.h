@@ -5,6 +5,16 @@
 #define GAIT_LIFT_H
 #include "lift_table.h"
 
+typedef struct lift_marker { /* linear about theta, statures */
+    double base[3];          /* with no modes and no growth */
+    double shape[3];         /* what grows with the stature */
+    double grown;            /* factor of the modes */
+} lift_marker;
+
+/* Marker j, its modes in t->shape, and in x where theta has it.  In a parallel view the mean alone grows: all
+ * is linear. */
+void lift_marker_at(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
+                    lift_marker *r, double x[3]);
 /* Normal equations of the prior alone. */
 void lift_clear(const lift_table *t, lift_belief *b);
 /* White rows t->W of a frame at moment `at`, in frames [0, F - 1]; returns how many. They are linearised

@@ -36,6 +36,7 @@ static void surface_init(const limb_geometry *g, like_surface *out)
             out->point[k][i] = p[k];
             out->normal[k][i] = n[k];
         }
+        out->outward[i] = p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
     }
     for (int32_t k = 0; k < 3; k++) {
         out->middle[k] = 0.5f * (g->start[k] + g->end[k]);

@@ -24,6 +24,8 @@ enum {
     LIKE_COUNT_ONE = 1 << 24 /* in every entry: a sum of costs counts the points as well */
 };
 
+/* Visibility of an outline's point is looked up so far on its way to the limb's middle. */
+#define LIKE_INWARD         0.3f
 #define LIKE_PAPER_OCCLUDED (-6.3200f) /* log 0.0018 per grey level (R18) */
 
 /* Fixed points on one limb (spec 1.6.2), statures; same for every particle.  Points 2 d and 2 d + 1 face
@@ -31,20 +33,47 @@ enum {
 typedef struct like_surface {
     float point[3][LIKE_RING];
     float normal[3][LIKE_RING];
+    float outward[LIKE_RING];     /* normal times point */
     float middle[3];              /* of the limb's axis */
     float side[3][LIKE_AZIMUTHS]; /* the first half of the directions */
 } like_surface;
 
-typedef struct like_pose_limb { /* one limb of BLOCK bodies before a camera */
-    float R[9][BLOCK];          /* its frame to camera */
-    float t[3][BLOCK];          /* its origin in the camera, metres */
-    float scale[BLOCK];
+/* Numbers of one body about one limb, a line of the cache: of its view and, in one part, of a cone's sides. */
+enum { LIKE_WORDS = 16, LIKE_SUBPIXELS = 256 /* of a working pixel, in one direction */ };
+enum { LIKE_VIEW_IMAGE = 0, LIKE_VIEW_SHIFT = 9, LIKE_VIEW_EYE = 12, LIKE_VIEW_GRAZE = 15 };
+enum {
+    LIKE_SIDE_X = 0,
+    LIKE_SIDE_Y = 2,
+    LIKE_SIDE_DX = 4,
+    LIKE_SIDE_DY = 6,
+    LIKE_SIDE_COS2 = 8,
+    LIKE_SIDE_SIN2 = 10,
+    LIKE_SIDE_INNER = 12
+};
+
+/* A limb of BLOCK bodies: image (3 x 3), shift (3), eye (3), graze.  A surface point p shows at
+ * (x, y) = (image[0] p + shift[0], image[1] p + shift[1]) / (image[2] p + shift[2]), 1/256 working pixels; its normal n
+ * is turned away unless n eye + n p < graze, where eye leads from the camera to the frame's origin, in the frame,
+ * statures. */
+typedef struct like_pose_limb {
+    float view[BLOCK][LIKE_WORDS];
     int32_t turn[BLOCK]; /* first of the LIKE_AZIMUTHS directions that can face the camera */
 } like_pose_limb;
 
 typedef struct like_pose {
     like_pose_limb limb[MODEL_MAX_LIMBS];
 } like_pose;
+
+/* Sides of a limb's outline in BLOCK bodies, body by body, so that each reads few lines of the cache: where they begin
+ * and their vectors (x, y, dx, dy), working pixels; the double-angle form of their normals (cos2, sin2), 64 = 1, which
+ * counts in whole numbers; LIKE_INWARD times the limb's middle (inner_x, inner_y), cells. */
+typedef struct like_sides {
+    float part[4][BLOCK][LIKE_WORDS];
+} like_sides;
+
+typedef struct like_outline {
+    like_sides limb[MODEL_MAX_LIMBS];
+} like_outline;
 
 /* What the half of a limb that is turned to the camera looks like. */
 typedef struct like_patch {
@@ -69,6 +98,7 @@ typedef struct like_body { /* one body in one camera, as the terms see it */
     const like_setup *setup;
     const features *features;
     const outline_block *outline;
+    const like_outline *sides; /* of the outline */
     int32_t lane;
     const layers *layers;
     const like_patch *seen;     /* by limb: its surface in this frame */
@@ -98,10 +128,10 @@ extern const like_term like_texture, like_silhouette, like_edges, like_template,
 void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg);
 
 /* Look up the surface of every limb of one lane in the frame. */
-static inline void like_sample(const like_setup *s, const features *f, const gait_camera *cam,
-                               const like_pose *pose, int32_t lane, const layers *drawn, like_patch *seen)
+static inline void like_sample(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,
+                               const layers *drawn, like_patch *seen)
 {
-    s->run->surface_sample(s, f, cam, pose, lane, drawn, seen);
+    s->run->surface_sample(s, f, pose, lane, drawn, seen);
 }
 
 /* Sum of the weighted terms in use. */

@@ -6,92 +6,79 @@
 #include <string.h>
 
 /* A limb has LANES points: eight along each side of a cone, two along each side of an ellipsoid's octagon. */
-typedef struct sides { /* of each point's side, from 0 to 1, and how far along it lies */
-    float x0[LANES], y0[LANES], x1[LANES], y1[LANES], share[LANES];
-    float middle_x, middle_y; /* inside the limb */
+
+typedef struct sides { /* of each point */
+    float x[LANES], y[LANES], dx[LANES], dy[LANES], cos2[LANES], sin2[LANES], share[LANES];
 } sides;
 
-static inline void cone(const outline_lanes *o, int32_t lane, sides *restrict out)
+static inline void cone(const float *w, sides *restrict out)
 {
-    float x[4], y[4], mx = 0.0f, my = 0.0f;
-    for (int32_t k = 0; k < 4; k++) {
-        x[k] = o->x[k][lane];
-        y[k] = o->y[k][lane];
-        mx += 0.25f * x[k];
-        my += 0.25f * y[k];
-    }
+    float const x0 = w[LIKE_SIDE_X], x1 = w[LIKE_SIDE_X + 1], y0 = w[LIKE_SIDE_Y], y1 = w[LIKE_SIDE_Y + 1];
+    float const dx0 = w[LIKE_SIDE_DX], dx1 = w[LIKE_SIDE_DX + 1], dy0 = w[LIKE_SIDE_DY],
+                dy1 = w[LIKE_SIDE_DY + 1];
+    float const cos0 = w[LIKE_SIDE_COS2], cos1 = w[LIKE_SIDE_COS2 + 1], sin0 = w[LIKE_SIDE_SIN2],
+                sin1 = w[LIKE_SIDE_SIN2 + 1];
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++) {
-        out->x0[i] = i < 8 ? x[0] : x[3];
-        out->y0[i] = i < 8 ? y[0] : y[3];
-        out->x1[i] = i < 8 ? x[1] : x[2];
-        out->y1[i] = i < 8 ? y[1] : y[2];
+        out->x[i] = i < 8 ? x0 : x1;
+        out->y[i] = i < 8 ? y0 : y1;
+        out->dx[i] = i < 8 ? dx0 : dx1;
+        out->dy[i] = i < 8 ? dy0 : dy1;
+        out->cos2[i] = i < 8 ? cos0 : cos1;
+        out->sin2[i] = i < 8 ? sin0 : sin1;
         out->share[i] = ((float)(i & 7) + 0.5f) / 8.0f;
     }
-    out->middle_x = mx;
-    out->middle_y = my;
 }
 
-/* The octagon's corners from the one `ahead`, twice round: fetched, because lanes written one by one are waited for. */
-static inline void corners(const float (*v)[BLOCK], int32_t lane, int32_t ahead, float *restrict out)
+/* The octagon's sides, twice round. */
+static inline void twice(const float *eight, float *restrict out)
 {
-    int32_t at[LANES], all[LANES], bits[LANES];
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LANES; i++) {
-        at[i] = ((i + ahead) & 7) * BLOCK + lane;
-        all[i] = -1;
-    }
-    lookup(v, at, all, bits);
-    memcpy(out, bits, sizeof bits);
+    memcpy(out, eight, 8 * sizeof *out);
+    memcpy(out + 8, eight, 8 * sizeof *out);
 }
 
-static inline void ellipsoid(const outline_lanes *o, int32_t lane, sides *restrict out)
+static inline void ellipsoid(const like_sides *s, int32_t lane, sides *restrict out)
 {
-    corners(o->x, lane, 0, out->x0);
-    corners(o->y, lane, 0, out->y0);
-    corners(o->x, lane, 1, out->x1);
-    corners(o->y, lane, 1, out->y1);
+    twice(s->part[0][lane], out->x);
+    twice(s->part[0][lane] + 8, out->y);
+    twice(s->part[1][lane], out->dx);
+    twice(s->part[1][lane] + 8, out->dy);
+    twice(s->part[2][lane], out->cos2);
+    twice(s->part[2][lane] + 8, out->sin2);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++)
         out->share[i] = i < 8 ? 0.25f : 0.75f;
-    out->middle_x = 0.5f * (o->x[0][lane] + o->x[4][lane]);
-    out->middle_y = 0.5f * (o->y[0][lane] + o->y[4][lane]);
 }
 
 typedef struct spots {                     /* points of the limbs' outlines */
     int32_t cell[MODEL_MAX_LIMBS][LANES];  /* of the edge map; then n'Tn there, */
     int32_t word[MODEL_MAX_LIMBS][LANES];  /* of the limb's mask; then half the trace of T, */
-    int32_t shown[MODEL_MAX_LIMBS][LANES]; /* -1: on a side of some length, in the image; otherwise 0 */
+    int32_t shown[MODEL_MAX_LIMBS][LANES]; /* -1: in the image; otherwise 0 */
     int32_t bit[MODEL_MAX_LIMBS][LANES];   /* in the word */
     int32_t cos2[MODEL_MAX_LIMBS][LANES],
         sin2[MODEL_MAX_LIMBS][LANES]; /* double-angle form of the side's normal (dy, -dx), 64 = 1 */
 } spots;
 
-static inline int32_t inside(float x, float y)
+static inline void place(const sides *s, const float inner[2], const rast_mask *mask, int32_t k,
+                         spots *restrict out)
 {
-    return (x >= 0.0f) & (y >= 0.0f) & (x < (float)VIEW_SIZE) & (y < (float)VIEW_SIZE);
-}
-
-static inline void place(const sides *s, const rast_mask *mask, int32_t k, spots *restrict out)
-{
-    int32_t const first = mask->first, last = mask->last, column = mask->column, width = mask->width;
-    float const mx = s->middle_x, my = s->middle_y;
+    float const outer = 0.5f * (1.0f - LIKE_INWARD); /* cells */
+    int32_t const first = mask->first, column = mask->column;
+    float const inner_x = inner[0], inner_y = inner[1];
+    uint32_t const rows = (uint32_t)(mask->last - first), width = (uint32_t)mask->width;
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++) {
-        float const dx = s->x1[i] - s->x0[i], dy = s->y1[i] - s->y0[i], len2 = dx * dx + dy * dy;
-        float const x = s->x0[i] + s->share[i] * dx, y = s->y0[i] + s->share[i] * dy;
+        float const x = s->x[i] + s->share[i] * s->dx[i], y = s->y[i] + s->share[i] * s->dy[i];
+        int32_t const u = (int32_t)x, v = (int32_t)y;
         /* A little inside the limb its own mask tells whether something nearer hides this point. */
-        float const ix = x + 0.3f * (mx - x), iy = y + 0.3f * (my - y);
-        /* Neither a point nor beyond all pictures. */
-        int32_t const real = (len2 > 1.0f) & (len2 < 1e12f) & inside(x, y) & inside(ix, iy);
-        int32_t const u = real ? (int32_t)x : 0, v = real ? (int32_t)y : 0;
-        int32_t const c = (real ? (int32_t)ix >> 1 : 0) - column, r = real ? (int32_t)iy >> 1 : 0;
-        out->cos2[k][i] = real ? (int32_t)(64.0f * (dy * dy - dx * dx) / len2) : 0;
-        out->sin2[k][i] = real ? (int32_t)(64.0f * (-2.0f * dx * dy) / len2) : 0;
+        int32_t const c = (int32_t)(outer * x + inner_x) - column, r = (int32_t)(outer * y + inner_y);
+        out->cos2[k][i] = (int32_t)s->cos2[i];
+        out->sin2[k][i] = (int32_t)s->sin2[i];
         out->cell[k][i] = v * VIEW_SIZE + u;
         out->word[k][i] = rast_half(c, r);
         out->bit[k][i] = c & 31;
-        out->shown[k][i] = -(real & (c >= 0) & (c < width) & (r >= first) & (r < last));
+        out->shown[k][i] =
+            -(((uint32_t)(u | v) < VIEW_SIZE) & ((uint32_t)c < width) & ((uint32_t)(r - first) < rows));
     }
 }
 
@@ -113,7 +100,7 @@ static inline void respond(const edge_cell *edge, int32_t k, spots *restrict p)
     for (int32_t i = 0; i < LANES; i++) {
         uint32_t const e = (uint32_t)cell[i];
         int32_t const trace = (int32_t)(e << 24) >> 24, xx_yy = (int32_t)(e << 16) >> 24;
-        int32_t const xy2 = (int32_t)(e << 8) >> 24;
+        int32_t const xy2 = (int32_t)e >> 24;
         p->cell[k][i] = trace * 64 + xx_yy * p->cos2[k][i] + xy2 * p->sin2[k][i];
         p->word[k][i] = trace * 64;
     }
@@ -130,27 +117,23 @@ static inline int32_t sum(const int32_t *v, int32_t limbs)
 
 void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
 {
-    const rast_mask *mask[MODEL_MAX_LIMBS];
+    int32_t const limbs = b->setup->limbs, lane = b->lane;
+    const rast_mask *const visible = b->layers->visible;
     spots p;
-    int32_t n = 0;
-    for (int32_t l = 0; l < b->setup->limbs; l++) {
-        const outline_lanes *const o = &b->outline->limb[l];
+    for (int32_t l = 0; l < limbs; l++) {
+        const like_sides *const o = &b->sides->limb[l];
         sides s;
-        if (!(o->depth[b->lane] > 0.0f))
-            continue;
-        mask[n] = &b->layers->visible[l];
         if (b->setup->geometry[l].shape == LIMB_ELLIPSOID) {
-            ellipsoid(o, b->lane, &s);
-            place(&s, mask[n], n, &p);
+            ellipsoid(o, lane, &s);
+            place(&s, o->part[3][lane], &visible[l], l, &p);
         } else { /* twice, so that the sides need not be written down */
-            cone(o, b->lane, &s);
-            place(&s, mask[n], n, &p);
+            cone(o->part[0][lane], &s);
+            place(&s, o->part[0][lane] + LIKE_SIDE_INNER, &visible[l], l, &p);
         }
-        n++;
     }
-    for (int32_t k = 0; k < n; k++)
-        hide(mask[k], k, &p);
-    for (int32_t k = 0; k < n; k++)
-        respond(b->features->edge, k, &p);
-    *out = (like_edge_tally){sum(p.cell[0], n), sum(p.word[0], n), -sum(p.shown[0], n)};
+    for (int32_t l = 0; l < limbs; l++)
+        hide(&visible[l], l, &p);
+    for (int32_t l = 0; l < limbs; l++)
+        respond(b->features->edge, l, &p);
+    *out = (like_edge_tally){sum(p.cell[0], limbs), sum(p.word[0], limbs), -sum(p.shown[0], limbs)};
 }

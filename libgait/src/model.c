@@ -1,11 +1,12 @@
 #include "model.h"
 
+#include "fmath.h"
 #include "hash.h"
 #include "sections.h"
 
 #include <string.h>
 
-#define LARGEST_PACE       1.0f /* radians and statures per standard deviation of the rate */
+#define LARGEST_PACE       1.0f /* a channel's coefficients: radians or statures per unit of kin_pace */
 #define LARGEST_PROPORTION 0.1f /* per standard deviation; a shift: statures */
 
 static const float *take_table(sections *r, const char *tag, int32_t rows, uint32_t columns)
@@ -76,11 +77,18 @@ static void read_pace(sections *r, gait_model *m)
 {
     if (r->status != GAIT_OK || !blob_has(&r->b, "PACE"))
         return;
-    m->pace_curve = take_table(r, "PACE", m->phases, (uint32_t)m->channels);
+    uint32_t dims[4] = {SECTION_ANY, (uint32_t)m->channels};
+    m->pace_series = sections_floats(r, "PACE", 2, dims);
     sections_require(r, m->stride_hz_sd > 0.0f, "PACE", "needs an sd of the stride rate in GAIT");
-    for (int32_t i = 0; r->status == GAIT_OK && i < m->phases * m->channels; i++)
-        sections_require(r, fabsf(m->pace_curve[i]) <= LARGEST_PACE, "PACE",
-                         "changes a channel by more than 1");
+    sections_require(r, dims[0] % 2 == 1 && dims[0] < (uint32_t)m->phases, "PACE",
+                     "its rows are no Fourier series; learn the model again");
+    for (int32_t c = 0; r->status == GAIT_OK && c < m->channels; c++) {
+        float sum = 0.0f;
+        for (uint32_t i = 0; i < dims[0]; i++)
+            sum += fabsf(m->pace_series[i * dims[1] + (uint32_t)c]);
+        sections_require(r, sum <= LARGEST_PACE, "PACE", "changes a channel by more than 1");
+    }
+    m->pace_terms = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
 }
 
 /* The pairs (axis, channel) of a frame: n of them valid, the others 0. */
@@ -208,10 +216,32 @@ gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error
     return GAIT_OK;
 }
 
+/* The series at the phases of the mean curves, T x M, summed from the constant up. */
+static void unfold_pace(const gait_model *m, float *curve)
+{
+    int32_t const T = m->phases, M = m->channels;
+    for (int32_t j = 0; j < T; j++) {
+        float *const at = curve + j * M;
+        memcpy(at, m->pace_series, (size_t)M * sizeof(float));
+        for (int32_t h = 1; 2 * h < m->pace_terms; h++) {
+            const float *const a = m->pace_series + (2 * h - 1) * M;
+            float s, c;
+            m_sincos(TWO_PI_F * (float)(h * j % T) / (float)T, &s, &c);
+            for (int32_t i = 0; i < M; i++)
+                at[i] += c * a[i] + s * a[M + i];
+        }
+    }
+}
+
 gait_model *model_layout(arena *a, const gait_model *m)
 {
     gait_model *const self = TAKE(a, gait_model, 1);
-    if (self)
-        *self = *m;
+    float *const curve = m->pace_terms ? TAKE(a, float, m->phases * m->channels) : NULL;
+    if (!self || a->overflow)
+        return NULL;
+    *self = *m;
+    self->pace_curve = curve;
+    if (curve)
+        unfold_pace(m, curve);
     return self;
 }

@@ -25,6 +25,8 @@ struct gait_model {
     int32_t root_channel; /* index of root_forward; the other ROOT_* follow */
 
     const float *curves;       /* (1 + q) x T x M: mean, then component k times its standard deviation */
+    const float *pace_series;  /* pace_terms x M: constant, then cosine and sine of each harmonic */
+    int32_t pace_terms;        /* odd; 0: the mean is the same at every rate */
     const float *pace_curve;   /* T x M: change of the mean per unit of kin_pace; NULL: none */
     const float *channel_stat; /* M x 4: residual sd, smallest, largest, sd of the static offset */
     const float *score_stat;   /* q x 3: singular-value sd, between-subject sd, within-subject sd */
@@ -55,9 +57,9 @@ struct gait_model {
     uint64_t digest; /* FNV-1a of the blob */
 };
 
-/* Check a blob and fill m with views into it; err names the section at fault. */
+/* Check a blob and fill m with views into it (pace_curve is none); err names the section at fault. */
 gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error *err);
 
-/* Place a copy of m in the arena (NULL in the counting pass). */
+/* Place a copy of m in the arena, and pace_curve, made of its series.  NULL when counting or on overflow. */
 gait_model *model_layout(arena *a, const gait_model *m);
 #endif

@@ -9,6 +9,7 @@
 enum {
     RAST_SIZE = 128, /* the grid is RAST_SIZE x RAST_SIZE cells */
     RAST_WORDS = 2,  /* 64-bit words per row of the grid */
+    RAST_SPARE = 16, /* rows of a mask beyond the grid: written in passing, never read */
     RAST_STEP = 8,   /* a word can begin at any multiple of this many columns */
     RAST_STARTS = 64 / RAST_STEP + 1,
     RAST_MAX_VERTICES = 8,
@@ -23,8 +24,9 @@ typedef struct rast_spans { /* rows first <= y < last; each covers begin[y - top
 
 /* Rows [first, last) and columns from `column` on, a multiple of RAST_STEP; the rest is empty and not written. */
 typedef struct rast_mask {
-    _Alignas(GAIT_ALIGN) uint64_t word[RAST_WORDS][RAST_SIZE]; /* bit 0: column, or column + 64 */
-    int32_t first, last, column, width;                        /* width: 64, or 128 from column 0 on */
+    _Alignas(
+        GAIT_ALIGN) uint64_t word[RAST_WORDS][RAST_SIZE + RAST_SPARE]; /* from column, and from column + 64 */
+    int32_t first, last, column, width; /* width: 64, or 128 from column 0 on */
 } rast_mask;
 
 typedef struct rast_edge { /* crosses rows first <= y < last at columns rast_column(at, slope, y) */
@@ -88,7 +90,7 @@ static inline uint64_t rast_bits(int32_t begin, int32_t end)
  * negative, then it is none. */
 static inline int32_t rast_half(int32_t x, int32_t y)
 {
-    return (x >> 6) * 2 * RAST_SIZE + (y << 1) + (x >> 5 & 1);
+    return (x >> 6) * 2 * (RAST_SIZE + RAST_SPARE) + (y << 1) + (x >> 5 & 1);
 }
 
 /* Number of set bits, without a table or an ISA extension. */

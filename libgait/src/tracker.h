@@ -48,7 +48,8 @@ typedef struct camera_state {
 typedef struct weigh_scratch { /* one per task; its arrays hold the model's limbs and points */
     kin_body body;
     outline_block *outline;
-    layers_block *edges;
+    layers_block *lines;
+    like_outline *sides;
     like_pose *pose;
     layers *layers;
     float (*points)[3][BLOCK];

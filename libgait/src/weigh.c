@@ -6,14 +6,16 @@ void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w)
 {
     size_t const limbs = (size_t)m->limbs;
     void *const outline = arena_take(a, sizeof(outline_lanes), limbs);
-    void *const edges = arena_take(a, offsetof(layers_block, limb) + limbs * sizeof(layers_limb), 1);
+    void *const lines = arena_take(a, offsetof(layers_block, limb) + limbs * sizeof(layers_limb), 1);
+    void *const sides = arena_take(a, sizeof(like_sides), limbs);
     void *const pose = arena_take(a, sizeof(like_pose_limb), limbs);
     void *const drawn = arena_take(a, offsetof(layers, visible) + limbs * sizeof(rast_mask), 1);
     void *const points = arena_take(a, sizeof *w->points, (size_t)m->points);
     if (!w)
         return;
     w->outline = outline;
-    w->edges = edges;
+    w->lines = lines;
+    w->sides = sides;
     w->pose = pose;
     w->layers = drawn;
     w->points = points;
@@ -23,10 +25,12 @@ void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w)
 static void outline_limbs(const gait_tracker *t, int32_t c, weigh_scratch *w)
 {
     const like_setup *const s = t->like;
-    s->run->outline_project(s->geometry, s->limbs, &w->body, &t->cfg.camera[c], &t->camera[c].seen.map,
-                            w->outline);
-    s->run->layers_prepare(w->outline, s->geometry, s->limbs, w->edges);
-    s->run->surface_pose(s, &t->cfg.camera[c], &w->body, w->pose);
+    const gait_camera *const cam = &t->cfg.camera[c];
+    const view_map *const map = &t->camera[c].seen.map;
+    s->run->outline_project(s->geometry, s->limbs, &w->body, cam, map, w->outline);
+    s->run->layers_prepare(w->outline, s->geometry, s->limbs, w->lines);
+    s->run->edges_prepare(w->outline, s->geometry, s->limbs, w->sides);
+    s->run->surface_pose(s, cam, map, &w->body, w->pose);
 }
 
 /* One body of a block in one camera, ready for the terms. */
@@ -36,15 +40,16 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t
     like_body b = {.setup = t->like,
                    .features = &t->camera[c].seen,
                    .outline = w->outline,
+                   .sides = w->sides,
                    .lane = lane,
                    .layers = w->layers,
                    .seen = seen,
                    .camera = &t->cfg.camera[c],
                    .points = (const float (*)[3][BLOCK])w->points,
                    .known = t->known[side][c]};
-    t->like->run->layers_draw(w->edges, lane, w->layers);
+    t->like->run->layers_draw(w->lines, lane, w->layers);
     if (seen)
-        like_sample(t->like, b.features, &t->cfg.camera[c], w->pose, lane, w->layers, seen);
+        like_sample(t->like, b.features, w->pose, lane, w->layers, seen);
     like_silhouette_look(&b);
     return b;
 }

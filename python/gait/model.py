@@ -61,9 +61,6 @@ class ModelInfo:
     digest: int
 
 
-NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
-
-
 class Model:
     """Cyclic model read from a ``.gait`` blob.
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gait import blob
 from gait.errors import UserError
-from gait.pace import pace
+from gait.pace import pace, slope_of
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,8 @@ class ModelCurves:
             raise UserError(f"model: section {missing[0]} is missing, not a cyclic model; use gait learn")
         self.names = blob.unpack_names(sections["CHNM"])
         self.samples = np.asarray(sections["CURV"], float)
-        self.faster = np.asarray(sections.get("PACE", np.zeros(self.samples.shape[1:])), float)
+        slope = slope_of(sections)
+        self.faster = np.zeros(self.samples.shape[1:]) if slope is None else slope
         self._gait = np.asarray(sections["GAIT"], float)
         statistics = np.asarray(sections["CHST"], float)
         self.residual, self.static = statistics[:, 0], statistics[:, 3]

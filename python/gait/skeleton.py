@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait import blob as blobs
-from gait.pace import pace
+from gait.pace import pace, slope_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -290,10 +290,10 @@ def curves(
     weight = (at - np.floor(at))[:, None]
     weights = np.concatenate([np.ones((len(phase), 1)), coef], axis=1)
     used = table[: weights.shape[1]]
-    if "PACE" in sections:
+    if (slope := slope_of(sections)) is not None:
         faster = np.broadcast_to(pace(sections["GAIT"], stride_hz), len(phase))
         weights = np.column_stack([weights, faster])
-        used = np.concatenate([used, np.asarray(sections["PACE"], float)[None]])
+        used = np.concatenate([used, slope[None]])
     ends = [np.einsum("nk,knm->nm", weights, used[:, i]) for i in (low, (low + 1) % samples)]
     return ends[0] * (1 - weight) + ends[1] * weight
 

@@ -99,17 +99,22 @@ static void silhouette_count(const struct features *f, const struct rast_mask *w
     b.bodies++;
 }
 
-static void surface_pose(const struct like_setup *s, const gait_camera *cam, const struct kin_body *body,
-                         struct like_pose *out)
+static void edges_prepare(const struct outline_block *outline, const struct limb_geometry *limbs,
+                          int32_t count, struct like_outline *out)
 {
-    PART(STAGE_SAMPLES, b.plain->surface_pose(s, cam, body, out));
+    PART(STAGE_EDGES, b.plain->edges_prepare(outline, limbs, count, out));
 }
 
-static void surface_sample(const struct like_setup *s, const struct features *f, const gait_camera *cam,
-                           const struct like_pose *pose, int32_t lane, const struct layers *drawn,
-                           struct like_patch *seen)
+static void surface_pose(const struct like_setup *s, const gait_camera *cam, const struct view_map *map,
+                         const struct kin_body *body, struct like_pose *out)
 {
-    PART(STAGE_SAMPLES, b.plain->surface_sample(s, f, cam, pose, lane, drawn, seen));
+    PART(STAGE_SAMPLES, b.plain->surface_pose(s, cam, map, body, out));
+}
+
+static void surface_sample(const struct like_setup *s, const struct features *f, const struct like_pose *pose,
+                           int32_t lane, const struct layers *drawn, struct like_patch *seen)
+{
+    PART(STAGE_SAMPLES, b.plain->surface_sample(s, f, pose, lane, drawn, seen));
 }
 
 static void texture_logs(const struct like_body *body, float *log)
@@ -138,6 +143,7 @@ void bench_stages_enable(gait_tracker *t, bool on)
         b.timed.layers_prepare = layers_prepare;
         b.timed.layers_draw = layers_draw;
         b.timed.silhouette_count = silhouette_count;
+        b.timed.edges_prepare = edges_prepare;
         b.timed.surface_pose = surface_pose;
         b.timed.surface_sample = surface_sample;
         b.timed.texture_logs = texture_logs;

@@ -109,9 +109,9 @@ def models(clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], N
 def _learning_key() -> str:
     """Digest of the sources that learning uses and of the names and sizes of the data."""
     package = ROOT / "python" / "gait"
-    code = [*package.glob("learn/**/*.py"), package / "skeleton.py", package / "blob.py"]
+    others = ("skeleton.py", "blob.py", "pace.py", "kernels.py", "cli/learn.py")
     digest = hashlib.sha256()
-    for path in sorted([*code, package / "cli" / "learn.py"]):
+    for path in sorted([*package.glob("learn/**/*.py"), *(package / name for name in others)]):
         digest.update(path.read_bytes())
     for path in sorted(p for p in MOCAP.rglob("*") if p.is_file()):
         digest.update(f"{path.relative_to(MOCAP)} {path.stat().st_size}".encode())

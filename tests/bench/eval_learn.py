@@ -23,7 +23,7 @@ from facts import facts
 from gait.files import replacing
 
 HERE = Path(__file__).resolve().parent
-PARTS = ("learn_period.py", "learn_impute.py", "learn_floor.py", "learn_speed.py")
+PARTS = ("learn_period.py", "learn_impute.py", "learn_floor.py", "learn_size.py", "learn_speed.py")
 WITH_MOCAP = PARTS[1:]  # parts that want the folder of walks as argument
 JOINED = "learn.md"
 

@@ -28,6 +28,7 @@ from gait.errors import UserError
 from gait.learn import cycles, fit, fpca, model, pace, prior, retarget, subjects
 from gait.learn.sequence import Sequence, level_body, load
 from gait.learn.stage import one_thread_for_good
+from gait.pace import series
 from gait.progress import progress
 from gait.skeleton import Proportions, default_skeleton
 
@@ -112,7 +113,7 @@ def models(learners: list[Sequence], others: Bodies) -> tuple[dict[str, Sections
     filled, subject, scale = ours.components.filled, ours.row_subject, fit.channel_scale()
     both = np.concatenate([filled, prior.mirrored(filled)])
     metric = prior.joint_metric(ours.components.mean, ours.proportions)
-    follows = {"PACE": ours.pace_curve, "GAIT": model.gait_statistics(ours)}
+    follows = {"PACE": series(ours.pace_curve, pace.TERMS), "GAIT": model.gait_statistics(ours)}
     even = pace.without(filled, ours.paces[ours.cycles.sequence], ours.pace_curve)
     steps: tuple[Sections, ...] = (
         {"CURV": _plain(filled, scale)},

@@ -10,7 +10,7 @@ import pytest
 
 import gait.cli
 from gait import blob, skeleton
-from gait.learn import model, sources
+from gait.learn import fit, model, sources
 from gait.lift.prior import TAGS
 from gait.skeleton import ANGLES, CHANNELS, JOINTS
 
@@ -75,7 +75,9 @@ def test_the_same_input_gives_the_same_bytes(walks, learned, tmp_path):
 def test_sections_are_those_of_the_format(learned):
     s = blob.read(learned)
     assert blob.unpack_names(s["CHNM"]) == CHANNELS and blob.unpack_names(s["PTNM"]) == JOINTS
-    assert s["CURV"].shape == (4, 128, 30) and s["CHST"].shape == (30, 4) and s["SCST"].shape == (3, 3)
+    assert (
+        s["CURV"].shape == (4, fit.SAMPLES, 30) and s["CHST"].shape == (30, 4) and s["SCST"].shape == (3, 3)
+    )
     assert np.isfinite(s["CURV"]).all()
     assert np.all(s["CHST"][:, 0] >= 0) and np.all(s["CHST"][:, 1] <= s["CHST"][:, 2])
     assert s["GAIT"].shape == (8,) and s["GAIT"][5] == 120
@@ -86,10 +88,10 @@ def test_sections_are_those_of_the_format(learned):
 
 def test_the_mean_cycle_is_a_walk_and_phase_0_its_right_heel_strike(learned):
     s = blob.read(learned)
-    phase = np.arange(128) / 128
+    phase = np.arange(fit.SAMPLES) / fit.SAMPLES
     joints, angles = skeleton.pose(s, phase, np.zeros(3), 1.7, 0.0, 0.0, 0.0, np.zeros(3))
     right, left = (joints[:, JOINTS.index(f"{side}_heel"), 0] for side in "rl")
-    assert min(np.argmax(right), 128 - np.argmax(right)) <= 1
+    assert min(np.argmax(right), fit.SAMPLES - np.argmax(right)) <= 1
     assert abs(np.argmax(left) - 64) <= 6
     knee = np.degrees(angles[:, ANGLES.index("r_knee_flexion")])
     assert 50 < knee.max() < 80 and 0.6 < phase[np.argmax(knee)] < 0.85
@@ -192,12 +194,28 @@ def test_people_get_a_few_lines_however_many_files(walks, tmp_path, capsys):
 def test_info_tells_what_was_learnt(learned, capsys):
     assert run("info", learned, "--json") == 0
     info = json.loads(capsys.readouterr().out)
-    assert info["components"] == 3 and info["phases"] == 128 and len(info["joints"]) == 19
+    assert info["components"] == 3 and info["phases"] == fit.SAMPLES and len(info["joints"]) == 19
     assert info["bytes"] == learned.stat().st_size
     assert info["meta"]["subjects"] == ["01", "02", "03", "04"] and info["meta"]["activity"] == "walk"
     assert run("info", learned) == 0
     text = capsys.readouterr().out
     assert info["crc32"] in text and model.CMU in text and "01_03" in text
+
+
+def test_an_activity_that_is_not_known_is_said(walks, tmp_path, capsys):
+    assert run("learn", walks, "-o", tmp_path / "m.gait", "--activity", "wlak", "--components", 1) == 0
+    assert "--activity wlak: none of walk, walking, " in capsys.readouterr().err
+
+
+def test_people_without_arms_are_said(walks, tmp_path, capsys):
+    rows = np.degrees(skeleton.curves(blob.read(SHIPPED), np.arange(400) / 100, np.zeros((400, 1))))
+    for k, some in enumerate((ANGLES, [a for a in ANGLES if "shoulder" not in a])):
+        lines = [",".join(["time", *(f"{a}_deg" for a in some)])]
+        for t, row in enumerate(rows):
+            lines.append(",".join([f"{t / 100:.2f}", *(f"{row[ANGLES.index(a)]:.3f}" for a in some)]))
+        (tmp_path / f"{'ab'[k]}_1.csv").write_text("\n".join(lines) + "\n")
+    assert run("learn", tmp_path, "-o", tmp_path / "m.gait", "--components", 1) == 0
+    assert "1 person never shows l_shoulder or r_shoulder: filled in from" in capsys.readouterr().err
 
 
 def test_info_of_something_else_fails(tmp_path, capsys):
@@ -208,14 +226,11 @@ def test_info_of_something_else_fails(tmp_path, capsys):
 
 def test_the_shipped_model_is_small_and_acknowledges_its_source():
     s = {tag: array for tag, array in blob.read(SHIPPED).items() if tag not in TAGS}
-    assert len(blob.encode(s)) < 165_000  # ten curves over 128 phases of 30 channels are 154 kB
-    assert SHIPPED.stat().st_size < 400_000  # with fifty modes of 37 markers over ten frames
-    five = {**s, "CURV": s["CURV"][:6], "SCST": s["SCST"][:5]}
-    slope = five.pop("PACE")  # counts as a component
-    assert len(blob.encode(five)) < 100_000 and slope.shape == (128, 30)
+    assert len(blob.encode(s)) < 145_000  # nine curves over 120 phases of 30 channels are 130 kB
+    assert SHIPPED.stat().st_size < 375_000  # with fifty modes of 37 markers over ten frames
     meta = json.loads(s["META"].tobytes())
     assert meta["acknowledgement"] == model.CMU and meta["sequences"]["count"] == 51
-    assert s["CURV"].shape == (9, 128, 30) and s["PROP"].shape == (4, len(s["FRMI"]) + 1)
+    assert s["CURV"].shape == (9, fit.SAMPLES, 30) and s["PROP"].shape == (4, len(s["FRMI"]) + 1)
     step = np.abs(np.diff(s["CURV"][0], axis=0, append=s["CURV"][0][:1]))
     assert np.all(step[-1] <= 2 * np.maximum(step.max(axis=0), 1e-6))
 

@@ -3,6 +3,7 @@
 import importlib.metadata
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -93,3 +94,25 @@ def test_a_file_that_kills_its_workers_is_named(walks, scheduler, tmp_path, monk
     )
     _, refused = sources.load_all([(walks / "01_01.amc", True), (bad, True)], dask=scheduler)
     assert len(refused) == 1 and refused[0].startswith(f"{bad}: the workers that read it were killed")
+
+
+def test_a_worker_with_other_kernels_is_refused_with_the_remedy(walks, scheduler, monkeypatch):
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Nehalem")
+    with pytest.raises(UserError, match=r"CPU of worker tcp://.*--preload-nanny gait\.kernels tcp://"):
+        sources.load_all([(walks / "01_00.amc", True)], dask=scheduler)
+
+
+def test_the_remedy_gives_the_model_of_the_command_line(walks, tmp_path):
+    dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--preload-nanny", "gait.kernels"]
+    learn = [sys.executable, "-m", "gait", "learn", walks, "--components", "2", "--quiet", "-o"]
+    with distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as local:
+        worker = subprocess.Popen([*dask, local.scheduler_address], stderr=subprocess.DEVNULL)
+        try:
+            with distributed.Client(local, set_as_default=False) as client:
+                client.wait_for_workers(1, timeout=60)
+            subprocess.run([*learn, tmp_path / "dask.gait", "--dask", local.scheduler_address], check=True)
+        finally:
+            worker.terminate()
+            worker.wait(30)
+    subprocess.run([*learn, tmp_path / "alone.gait"], check=True)
+    assert (tmp_path / "dask.gait").read_bytes() == (tmp_path / "alone.gait").read_bytes()

@@ -11,7 +11,7 @@ from gait.learn import pace as learnt
 from gait.learn.prior import mirrored
 from gait.model import read_blob
 from gait.modelcurves import ModelCurves
-from gait.pace import MOST, pace
+from gait.pace import MOST, pace, series, slope_of
 from gait.skeleton import CHANNELS
 
 SAMPLES = 64
@@ -111,9 +111,8 @@ def test_paces_of_sequences_are_those_the_tracker_takes():
 
 def paced():
     """The shipped model with a slope of its own in every channel."""
-    slope = 0.02 * wave(np.random.default_rng(6))
-    slope = np.repeat(slope, 2, axis=0).astype(np.float32)
-    return {**SHIPPED, "PACE": slope}
+    slope = series(0.02 * wave(np.random.default_rng(6)), learnt.TERMS)
+    return {**SHIPPED, "PACE": slope.astype(np.float32)}
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.3, 0.8, 0.9, 1.0, 1.3, 2.4])
@@ -139,18 +138,36 @@ def test_the_norm_is_that_of_the_rate():
     usual, sd = curves.norm("l_hip_flexion", phase)
     fast, sd_fast = curves.norm("l_hip_flexion", phase, curves.stride_hz + 1.0)
     at = curves.names.index("l_hip_flexion")
-    step = curves.faster[(phase * 128).astype(int), at]
+    step = curves.faster[(phase * len(curves.faster)).astype(int), at]
     np.testing.assert_allclose(fast - usual, MOST * step, atol=1e-9)
     np.testing.assert_allclose(sd_fast, sd, atol=1e-12)
 
 
 def test_whoever_walks_faster_swings_further_in_the_shipped_model():
-    slope = np.asarray(SHIPPED["PACE"], float)
+    slope = slope_of(SHIPPED)
     np.testing.assert_allclose(mirrored(slope[None])[0], slope, atol=2e-6)
     assert not slope[:, CHANNELS.index("root_forward")].any()
     hip = CHANNELS.index("r_hip_flexion")
     mean = np.asarray(SHIPPED["CURV"][0], float)
     assert np.ptp((mean + slope)[:, hip]) > np.ptp(mean[:, hip]) + np.radians(1)
+
+
+def test_a_curve_and_its_series_are_the_same():
+    sections = {
+        "CURV": np.zeros((1, SAMPLES, 30)),
+        "PACE": series(curve := wave(np.random.default_rng(8)), 7),
+    }
+    np.testing.assert_allclose(slope_of(sections), curve, atol=1e-12)
+    assert slope_of({"CURV": sections["CURV"]}) is None
+
+
+@pytest.mark.parametrize("rows", [20, 120, 121])
+def test_what_is_no_series_is_refused_by_both(rows):
+    made = {**SHIPPED, "PACE": np.zeros((rows, 30), np.float32)}
+    with pytest.raises(GaitError, match=r"PACE: .*learn the model again"):
+        Model(blob.encode(made))
+    with pytest.raises(UserError, match=r"PACE has \d+ rows.*learn the model again"):
+        ModelCurves(made)
 
 
 def test_a_model_whose_rates_do_not_vary_has_no_use_for_a_slope():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gait.learn.unseen import bounded
+from gait.learn.unseen import bounded, never_shown
 
 
 def people(rng, odd):
@@ -38,3 +38,11 @@ def test_what_is_never_shown_deviates_as_people_do_at_most():
 def test_a_modest_filling_stays():
     cycles, mask, subject = people(np.random.default_rng(3), 0.1)
     assert np.array_equal(bounded(cycles, mask, subject), cycles)
+
+
+def test_who_never_shows_what_others_show_is_counted():
+    _, mask, subject = people(np.random.default_rng(4), 0.1)
+    people_lacking, channels = never_shown(mask, subject)
+    assert people_lacking == 1 and channels.tolist() == [False, False, True]
+    mask[..., 2] = False  # a channel that nobody shows is nobody's lack
+    assert never_shown(mask, subject)[0] == 0

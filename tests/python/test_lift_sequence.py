@@ -356,3 +356,23 @@ def test_deviations_about_the_hips_are_those_of_differences():
     hips = [prior.names.index(name) for name in sequence.HIPS]
     both = found.rooted_sd[:, hips]
     np.testing.assert_allclose(both[:, 0], both[:, 1], rtol=1e-4)  # opposite ends of one difference
+
+
+def test_numbers_out_of_range_are_refused_in_one_line(monkeypatch):
+    """Whatever step they are found in: a segment's equations may fail before those of the sequence."""
+
+    def failing(*_args, **_kwargs):
+        raise np.linalg.LinAlgError("not positive definite")
+
+    monkeypatch.setattr(motion.start, "explanations", failing)
+    prior = toy_prior(6, 19, 4)
+    uv = np.full((12, 3, 2), 100.0)
+    tracks = Tracks(np.arange(12), np.arange(12) / 20.0, prior.names[:3], uv, np.ones((12, 3)))
+    view = Perspective(Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600))
+    for method in ("smooth", "blend"):
+        with pytest.raises(UserError, match="no motion that the model knows"):
+            motion.lift(prior, tracks, view, result.Options(method=method), prior.names)
+
+
+def test_variances_below_zero_by_rounding_are_zero():
+    np.testing.assert_array_equal(sequence._deviations(np.array([-1e-18, 0.0, 4.0])), [0.0, 0.0, 2.0])

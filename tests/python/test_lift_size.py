@@ -8,12 +8,14 @@ from toy_segments import toy_prior
 
 from gait.camera import Camera
 from gait.lift import chain as chains
-from gait.lift import size
+from gait.lift import motion, size
 from gait.lift.chain import Around, Freedom, overlapping, restricted
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
 from gait.lift.prior import SegmentPrior
+from gait.lift.result import Options
 from gait.lift.sequence import Seen, Start, smooth
+from gait.lift.tracks_file import Tracks
 from gait.skeleton import EVAL15, JOINTS
 
 STATURE, SECONDS, EXACT = 1.7, 2, 0.3  # metres, s, pixels
@@ -100,6 +102,21 @@ def test_bones_tell_the_size():
     assert ratio == pytest.approx(0.6)
     nameless = restricted(prior, prior.names[:2])
     assert size.bones_ratio(nameless, places[:, :2], STATURE) == 1.0
+
+
+def test_a_short_person_who_walks_as_learnt_is_left_short(walk):
+    """Somebody of 1.38 m was made 18 % larger, and put as much too far away, though floor and motion told."""
+    prior, mean = walk
+    places = 1.38 / STATURE * mean
+    camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 600)
+    uv = camera.project(places[:, prior.index(EVAL15)])
+    time = np.arange(len(places)) / prior.fps
+    tracks = Tracks(np.arange(len(places)), time, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
+    found = motion.lift(prior, tracks, Perspective(camera), Options(pixel_sd=1.0, floor_sd=0.01), prior.names)
+    assert found.misfit < motion.MISFIT and found.wider == 1
+    assert size.bones_ratio(prior, found.places, prior.stature) < 0.85  # an unlikely size
+    assert found.resized == 1
+    assert np.linalg.norm(found.places - places, axis=2).mean() < 0.1
 
 
 def test_people_of_the_prior_have_its_bones(walk):

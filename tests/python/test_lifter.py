@@ -247,7 +247,7 @@ def test_intervals_hold_people_of_any_stature() -> None:
 def test_missing_markers_cost_what_the_deviations_say() -> None:
     contents, prior = model(size=20)
     rng = np.random.default_rng(9)
-    lifter = Lifter(contents, AXES, known(heading_sd=0.0, place_sd=(10.0, 0.0, 0.05)))
+    lifter = Lifter(contents, AXES, known(heading_sd=0.0, place_sd=(10.0, 0.0, 0.03)))
     gaussian = posterior.place(prior, ground_sd=0.0)
     found: dict[float, list[tuple[float, float]]] = {0.0: [], 0.3: [], 0.5: []}
     for _ in range(60):

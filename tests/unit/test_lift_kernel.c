@@ -4,6 +4,8 @@
 #include "check.h"
 #include "kernel_check.h"
 
+#include <math.h>
+
 enum { WIDEST = 75, MODES = 9, MISALIGNED = 4, NUMBERS = WIDEST + MISALIGNED };
 
 static float number(uint32_t index)
@@ -56,8 +58,62 @@ static void compare(int32_t width, int32_t modes, int32_t off)
     }
 }
 
+enum { MOST_MODES = 19, LANES = 24, MARKERS = 5, WIDTH = 3 * MARKERS + 1 };
+
+typedef struct shapes { /* what the kernels about one marker make */
+    double shape[3 * LANES], moved[3], row[LANES], columns[MOST_MODES * WIDTH], squares[WIDTH];
+} shapes;
+
+static void run(const kernels *k, int32_t modes, shapes *s)
+{
+    float mode[2][3 * LANES];
+    double theta[MOST_MODES], M[3][3];
+    for (uint32_t i = 0; i < 3 * LANES; i++) {
+        bool const used = (int32_t)(i % LANES) < modes;
+        mode[0][i] = used ? number(i) : 0.0f;
+        mode[1][i] = used ? number(200 + i) : 0.0f;
+    }
+    for (uint32_t i = 0; i < MOST_MODES; i++)
+        theta[i] = (double)number(400 + i);
+    for (uint32_t i = 0; i < 9; i++)
+        M[i / 3][i % 3] = (double)number(600 + i);
+    memset(s, 0, sizeof *s);
+    k->lift_shape(s->shape, mode[0], mode[1], 0.75, 0.25, LANES, theta, modes, s->moved);
+    k->lift_row(s->row, s->shape, LANES, M[0]);
+    for (int32_t r = 0; r < MARKERS; r++)
+        k->lift_columns(s->columns + 3 * r, WIDTH, s->shape, LANES, modes, M);
+    k->lift_squares(s->squares, WIDTH, s->columns, WIDTH, modes);
+}
+
+/* One marker's modes: against sums in plain order, and every instruction set against the scalar one. */
+static void compare_shapes(int32_t modes)
+{
+    static shapes want, have;
+    run(isa_scalar(), modes, &want);
+    for (int32_t a = 0; a < 3; a++) {
+        double moved = 0.0, squares = 0.0;
+        for (int32_t i = 0; i < modes; i++) {
+            double const column = want.columns[i * WIDTH + a];
+            moved += want.shape[a * LANES + i] * (double)number(400 + (uint32_t)i);
+            squares += column * column;
+            CHECK(column == want.columns[i * WIDTH + 3 * (MARKERS - 1) + a]);
+            CHECK(a > 0 || column == want.row[i]);
+        }
+        CHECK(fabs(moved - want.moved[a]) < 1e-12 && fabs(squares - want.squares[a]) < 1e-12);
+    }
+    for (int32_t i = 0; i < modes; i++)
+        CHECK(want.columns[i * WIDTH + WIDTH - 1] == 0.0); /* past the last marker */
+    for (int k = 0; k < isa_count(); k++) {
+        run(isa_at(k), modes, &have);
+        CHECK(memcmp(&have, &want, sizeof have) == 0);
+    }
+}
+
 int main(void)
 {
+    for (int32_t modes = 1; modes <= MOST_MODES; modes++)
+        compare_shapes(modes);
+
     for (int32_t width = 1; width <= WIDEST; width++)
         for (int32_t modes = 0; modes <= MODES; modes++)
             compare(width, modes, width % MISALIGNED);

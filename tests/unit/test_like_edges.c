@@ -6,6 +6,24 @@
 static toy_look *v;
 static layers drawn;
 
+/* The limbs' outlines as masks and sides. */
+static void draw(int32_t lane)
+{
+    toy_draw(&v->outline, v->setup.geometry, v->setup.limbs, lane, &drawn);
+    v->setup.run->edges_prepare(&v->outline, v->setup.geometry, v->setup.limbs, &v->sides);
+}
+
+/* One body of them as the term sees it. */
+static like_body body(int32_t lane)
+{
+    return (like_body){.setup = &v->setup,
+                       .features = &v->f,
+                       .outline = &v->outline,
+                       .sides = &v->sides,
+                       .lane = lane,
+                       .layers = &drawn};
+}
+
 /* One limb, the polygon with these corners, nothing before it. */
 static like_body one_limb(int32_t shape, const float *x, const float *y)
 {
@@ -17,9 +35,8 @@ static like_body one_limb(int32_t shape, const float *x, const float *y)
         v->outline.limb[0].y[k][LANE] = y[k];
     }
     v->outline.limb[0].depth[LANE] = 3.0f;
-    toy_draw(&v->outline, v->setup.geometry, 1, LANE, &drawn);
-    return (like_body){
-        .setup = &v->setup, .features = &v->f, .outline = &v->outline, .lane = LANE, .layers = &drawn};
+    draw(LANE);
+    return body(LANE);
 }
 
 /* Every pixel of the map holds the tensor of an edge whose normal stands at this angle; share of a full response. */
@@ -123,9 +140,8 @@ static void test_hidden(void)
         }
         v->outline.limb[l].depth[LANE] = l < 2 ? 4.0f : 2.0f; /* the third hides the second */
     }
-    toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
-    like_body const b = {
-        .setup = &v->setup, .features = &v->f, .outline = &v->outline, .lane = LANE, .layers = &drawn};
+    draw(LANE);
+    like_body const b = body(LANE);
     edge_field(0.0, 0.0, false);
     static const int32_t column[] = {40, 64, 110, 210};
     for (int32_t i = 0; i < VIEW_SIZE; i++)
@@ -133,10 +149,10 @@ static void test_hidden(void)
             v->f.edge[i * VIEW_SIZE + column[k]] = (edge_cell){.trace = EDGE_ONE, .xx_yy = EDGE_ONE};
     CHECK_NEAR(like_edges.log_likelihood(&b), 0.0, 0.03); /* all that is visible has an edge */
     v->outline.limb[2].depth[LANE] = 5.0f; /* now it lies behind: the second is seen, without edges */
-    toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
+    draw(LANE);
     CHECK_NEAR(like_edges.log_likelihood(&b), -1.0 / 3.0, 0.03);
     v->outline.limb[1].depth[LANE] = 0.0f; /* behind the camera: no part of the average */
-    toy_draw(&v->outline, v->setup.geometry, 3, LANE, &drawn);
+    draw(LANE);
     CHECK_NEAR(like_edges.log_likelihood(&b), 0.0, 0.03);
 }
 
@@ -176,7 +192,7 @@ static void test_beyond(void)
             v->outline.limb[1].y[i][b.lane] = y[k][i] - 20.0f;
         }
         v->outline.limb[1].depth[b.lane] = 3.0f;
-        toy_draw(&v->outline, v->setup.geometry, 2, b.lane, &drawn);
+        draw(b.lane);
         CHECK_NEAR(like_edges.support(&b), -0.005, 1e-6); /* enough points, no edges */
         CHECK(like_edges.log_likelihood(&b) == -1.0f);
     }

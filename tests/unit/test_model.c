@@ -220,13 +220,13 @@ static gait_status open_shifted(uint32_t rows, uint32_t columns, uint32_t shifts
     return model_open(buf, toy_finish(&f), m, err);
 }
 
-/* PACE of `phases` by `channels` numbers and so much deviation of the stride rate in an otherwise sound model. */
-static gait_status open_paced(uint32_t phases, uint32_t channels, const float *curve, float rate_sd,
+/* PACE of `terms` by `channels` numbers and so much deviation of the stride rate in an otherwise sound model. */
+static gait_status open_paced(uint32_t terms, uint32_t channels, const float *series, float rate_sd,
                               gait_model *m, gait_error *err)
 {
     toy_file f = toy_begin(buf, TOY_SECTIONS); /* PACE in place of META */
     toy_put_curves(&f, 8, 1);
-    toy_section(&f, "PACE", 3, 2, phases, channels, 1, curve);
+    toy_section(&f, "PACE", 3, 2, terms, channels, 1, series);
     toy_put_skeleton(&f);
     toy_put_points(&f);
     toy_put_limbs(&f);
@@ -236,28 +236,58 @@ static gait_status open_paced(uint32_t phases, uint32_t channels, const float *c
     return model_open(buf, bytes, m, err);
 }
 
-/* As large as the mean curves, of moderate numbers, and only with a deviation of the rate to count in. */
-static void test_pace(void)
+static bool pace_refused(uint32_t terms, uint32_t channels, const float *series, float rate_sd)
 {
-    static float curve[9 * (TOY_CHANNELS + 1)];
     gait_model m;
     gait_error err = {0};
-    curve[8 * TOY_CHANNELS - 1] = -1.0f;
-    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_OK);
-    CHECK(m.pace_curve[8 * TOY_CHANNELS - 1] == -1.0f);
-    CHECK(model_open(buf, toy_write(buf, 8, 1), &m, &err) == GAIT_OK && !m.pace_curve);
-    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.0f, &m, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "PACE"));
-    CHECK(open_paced(7, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
-          strstr(err.text, "PACE"));
-    CHECK(open_paced(9, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
-          strstr(err.text, "PACE"));
-    CHECK(open_paced(8, TOY_CHANNELS + 1, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT);
-    curve[3] = 1.01f;
-    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
-          strstr(err.text, "PACE"));
-    curve[3] = NAN;
-    CHECK(open_paced(8, TOY_CHANNELS, curve, 0.07f, &m, &err) == GAIT_ERR_CORRUPT &&
-          strstr(err.text, "PACE"));
+    return open_paced(terms, channels, series, rate_sd, &m, &err) == GAIT_ERR_CORRUPT &&
+           strstr(err.text, "PACE");
+}
+
+/* A Fourier series that the phases can show, of moderate numbers, and a deviation of the rate to count in. */
+static void test_pace(void)
+{
+    static float series[9 * (TOY_CHANNELS + 1)];
+    gait_model m;
+    series[7 * TOY_CHANNELS - 1] = -1.0f;
+    CHECK(open_paced(7, TOY_CHANNELS, series, 0.07f, &m, NULL) == GAIT_OK);
+    CHECK(m.pace_terms == 7 && m.pace_series[7 * TOY_CHANNELS - 1] == -1.0f && !m.pace_curve);
+    CHECK(open_paced(1, TOY_CHANNELS, series, 0.07f, &m, NULL) == GAIT_OK && m.pace_terms == 1);
+    CHECK(model_open(buf, toy_write(buf, 8, 1), &m, NULL) == GAIT_OK && !m.pace_terms);
+    CHECK(pace_refused(7, TOY_CHANNELS, series, 0.0f));
+    CHECK(pace_refused(6, TOY_CHANNELS, series, 0.07f));
+    CHECK(pace_refused(8, TOY_CHANNELS, series, 0.07f)); /* the curve itself, as models once had it */
+    CHECK(pace_refused(9, TOY_CHANNELS, series, 0.07f));
+    CHECK(pace_refused(7, TOY_CHANNELS + 1, series, 0.07f));
+    series[TOY_CHANNELS - 1] = 0.01f; /* of the same channel: the sum counts */
+    CHECK(pace_refused(7, TOY_CHANNELS, series, 0.07f));
+    series[TOY_CHANNELS - 1] = NAN;
+    CHECK(pace_refused(7, TOY_CHANNELS, series, 0.07f));
+}
+
+/* The model's own memory holds the series at the phases of the mean; too little of it is refused. */
+static void test_pace_unfolds(void)
+{
+    static _Alignas(GAIT_ALIGN) unsigned char place[8192];
+    static float series[5 * TOY_CHANNELS];
+    int const channel = TOY_KNEE;
+    float const a[5] = {0.1f, -0.2f, 0.3f, 0.05f, -0.15f};
+    gait_model m;
+    for (int i = 0; i < 5; i++)
+        series[i * TOY_CHANNELS + channel] = a[i];
+    CHECK(open_paced(5, TOY_CHANNELS, series, 0.07f, &m, NULL) == GAIT_OK);
+    arena count = {.base = NULL}, small = {.base = place, .cap = sizeof m},
+          room = {.base = place, .cap = sizeof place};
+    CHECK(!model_layout(&count, &m) && !model_layout(&small, &m) && small.overflow);
+    const gait_model *const own = model_layout(&room, &m);
+    CHECK(own && own->pace_curve && room.used == count.used);
+    for (int j = 0; own && j < m.phases; j++) {
+        double const turn = 2.0 * TOY_PI * j / m.phases;
+        double const want =
+            a[0] + a[1] * cos(turn) + a[2] * sin(turn) + a[3] * cos(2 * turn) + a[4] * sin(2 * turn);
+        CHECK_NEAR(own->pace_curve[j * TOY_CHANNELS + channel], want, 1e-6);
+        CHECK(own->pace_curve[j * TOY_CHANNELS + channel + 1] == 0.0f);
+    }
 }
 
 static gait_status open_proportions(uint32_t rows, uint32_t columns, gait_model *m, gait_error *err)
@@ -332,6 +362,7 @@ int main(void)
     test_proportions();
     test_shifts();
     test_pace();
+    test_pace_unfolds();
     test_missing();
     return CHECK_DONE();
 }

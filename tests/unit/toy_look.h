@@ -21,6 +21,7 @@ typedef struct toy_look {
     view_planes plate;
     kin_body body;
     outline_block outline;
+    like_outline sides;
     like_pose pose;
     layers drawn;
     like_patch seen[TOY_LIMBS];
@@ -75,11 +76,13 @@ static inline like_body toy_look_body(toy_look *v, const gait_state *s)
     walker_body(&v->rule, &w, &v->body);
     toy_project(v->setup.geometry, v->setup.limbs, &v->body, &v->cam, &v->f.map, &v->outline);
     toy_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
-    v->setup.run->surface_pose(&v->setup, &v->cam, &v->body, &v->pose);
-    like_sample(&v->setup, &v->f, &v->cam, &v->pose, LANE, &v->drawn, v->seen);
+    v->setup.run->edges_prepare(&v->outline, v->setup.geometry, v->setup.limbs, &v->sides);
+    v->setup.run->surface_pose(&v->setup, &v->cam, &v->f.map, &v->body, &v->pose);
+    like_sample(&v->setup, &v->f, &v->pose, LANE, &v->drawn, v->seen);
     like_body b = {.setup = &v->setup,
                    .features = &v->f,
                    .outline = &v->outline,
+                   .sides = &v->sides,
                    .lane = LANE,
                    .layers = &v->drawn,
                    .seen = v->seen};

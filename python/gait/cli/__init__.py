@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 from types import FrameType
 
+from gait import kernels
 from gait.errors import GaitError, UsageError, UserError
 
 COMMANDS = {
@@ -45,6 +46,8 @@ _DIRECTION = re.compile(r"-[xyz]|-[\d.][^,]*,[^,]+,[^,]+")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
+    if argv is None and words[:1] == ["learn"]:  # the process is ours, and numpy not yet loaded
+        kernels.settle()
     if " ".join(words[:2]) in COMMANDS:  # a command of two words
         words[:2] = [" ".join(words[:2])]
     command = f" {words[0]}" if words and words[0] in COMMANDS else ""

@@ -7,9 +7,9 @@ period; functional principal components of all cycles give the mean curves and t
 learnt.  gait info lists the sequences of a model, --report shows everything.
 
 Recordings are read a few at a time and their signals wait on disk, in the folder that TMPDIR names; in memory
-are their cycles alone.  The model does not depend on --jobs or --dask.  The workers of a Dask cluster
-(.venv/bin/pip install -e 'python[dask]' in the repository) need this version of the package and the files
-under the same paths.
+are their cycles alone.  The model does not depend on --jobs or --dask, nor on the CPU if it is x86-64.
+The workers of a Dask cluster (.venv/bin/pip install -e 'python[dask]' in the repository) need this version of
+the package and the files under the same paths; start them with dask worker --preload-nanny gait.kernels.
 
 What the columns of .csv and the marker names of .c3d and .trc must be: libgait/doc/mocap-formats.md.
 
@@ -32,7 +32,7 @@ from gait import blob
 from gait.cli import learn_segments, segment_text, values
 from gait.errors import UsageError
 from gait.files import require_folder, require_writable
-from gait.learn import fit, ground, marker_map, model, segment_sections, sources, subjects
+from gait.learn import activity, fit, ground, marker_map, model, segment_sections, sources, subjects, unseen
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
 from gait.learn.retarget import Measures
@@ -153,6 +153,8 @@ def run(args: argparse.Namespace) -> int:
         if not args.quiet:
             for words in _unsettled(learned):
                 print(words, file=sys.stderr)
+        if (some := _never_shown(learned)) and not args.quiet:
+            print(some, file=sys.stderr)
         made_up = ground.unseen(learned.cycles.seen)
         if made_up and not args.quiet:
             print(_made_up(made_up), file=sys.stderr)
@@ -180,6 +182,9 @@ def _check(args: argparse.Namespace) -> None:
         marker_map.read(args.markers)
     if args.report and args.segments == "only":
         raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
+    if args.activity.lower() not in activity.NAMES and not args.quiet:
+        names = ", ".join(activity.NAMES)
+        print(f"--activity {args.activity}: none of {names}: any cyclic motion is learnt", file=sys.stderr)
     _check_output(args)
     require_writable(args.output)
     if args.report:
@@ -282,9 +287,22 @@ def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str,
 
 def _unsettled(learned: fit.Learned) -> Iterator[str]:
     """Say what stopped before nothing was left to gain."""
-    for name, part in (("alignment", learned.alignment), ("filling of gaps", learned.components)):
+    stages = (
+        ("alignment", learned.alignment, "leave out recordings unlike the others"),
+        ("filling of gaps", learned.components, "add recordings or ask for fewer --components"),
+    )
+    for name, part, remedy in stages:
         if not part.converged:
-            yield f"the {name} did not converge in {len(part.objective)} passes; look at the report's curves"
+            yield f"the {name} did not converge in {len(part.objective)} passes; {remedy}"
+
+
+def _never_shown(learned: fit.Learned) -> str:
+    """Say how many people lack parts that others show; nothing if nobody does."""
+    people, channels = unseen.never_shown(learned.cycles.mask, learned.row_subject)
+    if not (names := model.parts(channels)):
+        return ""
+    shows = "person never shows" if people == 1 else "people never show"
+    return f"{people} {shows} {_words(names)}: filled in from the others"
 
 
 def _made_up(channels: list[str]) -> str:

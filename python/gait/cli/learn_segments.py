@@ -113,7 +113,7 @@ def write_alone(args: argparse.Namespace, corpus: Corpus, wanted: Segments, refu
     """Learn and write a blob that holds the prior alone, and say what it is."""
     recordings = corpus.recordings()
     prior = segment_fit.fit(recordings, wanted)
-    names = [r.name for r in recordings]
+    names = [model.shortened(r.name) for r in recordings[: model.MOST_ROWS]]
     sources = [r.source for r in recordings]
     meta = model.meta_section(model.origin(args.activity, args.seed, sources) | {"recordings": names})
     data = blob.write(args.output, {"META": meta, **segment_sections.sections(prior)})

@@ -27,6 +27,7 @@ Mask = npt.NDArray[np.bool_]
 
 ITERATIONS = 500
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
+LEAST_CHANGE = 1e-7  # rms change that is none, in the data's units: a tenth of the last digit stored
 LEAST_NOISE = 1e-10  # variance relative to the data's
 
 
@@ -219,7 +220,8 @@ def climb(problem: Problem, belief: Belief, tolerance: float, passes: int = ITER
     mixer = Mixer()
     while not at.converged and len(at.rmse) < passes:
         after, found = _pass(problem, mixer, at.belief, at.rows)
-        at.converged = problem.change(at.rows, found) <= tolerance * np.sqrt(after.noise)
+        enough = max(tolerance * np.sqrt(after.noise), LEAST_CHANGE)
+        at.converged = problem.change(at.rows, found) <= enough
         at.objective.append(-found.bound / problem.observed)
         falls = not found.bound >= at.rows.bound
         if falls:  # by rounding nothing is left to gain; more than that is a mistake

@@ -1,7 +1,8 @@
 """The per-file stage on a Dask cluster, in the order of the files.
 
 The workers read the files themselves, so they need the same paths as this machine: a shared file system.
-They also need this package, and the same versions of it, numpy, scipy and ezc3d, or the results would differ.
+They also need this package, the same versions of it, numpy, scipy and ezc3d, and the same kernels
+(`gait.kernels`), or the results would differ.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gait import kernels
 from gait.errors import UsageError, UserError
 from gait.learn.reading import Reading
 from gait.learn.stage import Prepared, one_thread_for_good, prepare
@@ -42,6 +44,7 @@ def prepared(paths: Sequence[Path], reading: Reading, address: str) -> Generator
         reading = replace(reading, markers=reading.markers.absolute())
     with _connected(address) as client:
         _require_same_versions(client, address)
+        _require_same_kernels(client, address)
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
         waiting, flying = deque(paths), deque[tuple[Path, "Future"]]()
         while waiting or flying:
@@ -80,7 +83,8 @@ def _connected(address: str) -> Iterator[Client]:
             except (TimeoutError, OSError) as error:
                 raise UserError(
                     f"--dask {address}: no scheduler with a worker answered within {CONNECT:.0f} s; "
-                    f"start them with 'dask scheduler' and 'dask worker {address}'"
+                    "start them with 'dask scheduler' and "
+                    f"'dask worker --preload-nanny {kernels.__name__} {address}'"
                 ) from error
             yield client
     finally:
@@ -97,6 +101,15 @@ def _require_same_versions(client: Client, address: str) -> None:
                     f"--dask {address}: worker {worker} has {found} of {package}, this machine {here}; "
                     "install the same versions on both"
                 )
+
+
+def _require_same_kernels(client: Client, address: str) -> None:
+    for worker, there in client.run(kernels.chosen).items():
+        if there != kernels.chosen():
+            raise UserError(
+                f"--dask {address}: last digits would depend on the CPU of worker {worker}; "
+                f"start it with 'dask worker --preload-nanny {kernels.__name__} {address}'"
+            )
 
 
 def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | None:

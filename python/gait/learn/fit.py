@@ -17,7 +17,7 @@ from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, point
 
 Floats = npt.NDArray[np.float64]
 
-SAMPLES = 128
+SAMPLES = 120  # phases of a cycle: five components take less than 100 kB
 MOST_NAMES = 4  # of files in a message
 DEFAULT_COMPONENTS = 8
 KINDS = ("people", "paper")  # of priors
@@ -67,7 +67,7 @@ class Learned:
         In the channels' own units; gaps are filled in units scaled by `scale` (M,), and `rmse` is in those.
         Mean, components and scores are of the cycles as they would be at the mean stride rate.
     pace_curve : (T, M)
-        PACE: how the mean curves follow the stride rate; 0 in the paper's model.
+        How the mean curves follow the stride rate (PACE is its series); 0 in the paper's model.
     paces : (n,)
         Pace of each sequence.
     lengths : (p, F + 1)

@@ -14,12 +14,16 @@ from gait import blob
 from gait._version import __version__
 from gait.learn.between import LENGTH_SD, RATE_SD, by_subject
 from gait.learn.fit import Learned
+from gait.learn.pace import TERMS
+from gait.learn.rounded import rounded
 from gait.learn.spool import by_rows, release
+from gait.pace import series
 from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 
-MOST_ROWS = 12  # of the table of sequences in META: five components stay under 100 kB
+#: What META tells of a large corpus: so many rows of a table, and so many characters of a name, as JSON.
+MOST_ROWS, MOST_NAME = 12, 32
 GENERATOR = f"gait {__version__}"
 ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not this training set
 CMU = (
@@ -33,11 +37,11 @@ def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array
     return {
         "META": meta_section(meta(learned, activity, seed)),
         "CHNM": blob.pack_names(CHANNELS),
-        "CURV": _stored(learned.curves),
-        "CHST": _stored(channel_statistics(learned)),
-        "SCST": _stored(score_statistics(learned)),
-        "GAIT": _stored(gait_statistics(learned)),
-        **({"PACE": _stored(learned.pace_curve)} if learned.pace_curve.any() else {}),
+        "CURV": rounded(learned.curves),
+        "CHST": rounded(channel_statistics(learned)),
+        "SCST": rounded(score_statistics(learned)),
+        "GAIT": rounded(gait_statistics(learned)),
+        **({"PACE": rounded(series(learned.pace_curve, TERMS))} if learned.pace_curve.any() else {}),
         **default_skeleton(learned.proportions).sections(),
         **_proportions(learned),
     }
@@ -47,7 +51,7 @@ def _proportions(learned: Learned) -> dict[str, blob.Array]:
     """PROP and SHFT, if proportions were learnt."""
     if not len(learned.lengths):
         return {}
-    return {"PROP": _stored(learned.lengths), "SHFT": _stored(learned.shifts)}
+    return {"PROP": rounded(learned.lengths), "SHFT": rounded(learned.shifts)}
 
 
 def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
@@ -57,18 +61,23 @@ def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
 
 def origin(activity: str, seed: int, sources: Iterable[Path]) -> dict[str, Any]:
     """Entries of META that say what a blob is and where it comes from."""
-    made = {"activity": activity, "generator": GENERATOR, "seed": seed}
+    made = {"activity": shortened(activity), "generator": GENERATOR, "seed": seed}
     return made | ({"acknowledgement": CMU} if from_cmu(sources) else {})
+
+
+def shortened(name: str) -> str:
+    """Keep the name, or as much of its beginning as MOST_NAME characters of JSON hold."""
+    if len(json.dumps(name)) <= MOST_NAME:
+        return name
+    end = len(name)
+    while len(json.dumps(f"{name[:end]}...")) > MOST_NAME:
+        end -= 1
+    return f"{name[:end]}..."
 
 
 def from_cmu(sources: Iterable[Path]) -> bool:
     """Whether any recording is in the CMU database's form, whose terms ask for an acknowledgement."""
     return any(source.suffix.lower() == ".amc" for source in sources)
-
-
-def _stored(values: Floats) -> npt.NDArray[np.float32]:
-    """Round to a millionth, so that the last bits of another machine's algebra do not show."""
-    return np.round(values, 6).astype(np.float32)
 
 
 def channel_statistics(learned: Learned) -> Floats:
@@ -146,31 +155,36 @@ def stride_variation(learned: Learned) -> float:
 def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
     """META: what people and tools may want to know; degrees, metres, seconds."""
     c = learned.components
-    statures = [_stature(learned, name) for name in learned.subjects]
+    statures = [_stature(learned, name) for name in learned.subjects[:MOST_ROWS]]
     return {
         **origin(activity, seed, [s.source for s in learned.sequences]),
-        "subjects": learned.subjects,
+        "subject_count": len(learned.subjects),
+        "subjects": [shortened(name) for name in learned.subjects[:MOST_ROWS]],
         "statures_m": [None if h is None else round(h, 3) for h in statures],
         "sequences": {
             "count": len(learned.sequences),
             "columns": list(SEQUENCE_COLUMNS),
-            "rows": sequence_table(learned)[:MOST_ROWS],
+            "rows": [[shortened(name), *row] for name, *row in sequence_table(learned)[:MOST_ROWS]],
         },
         **({"unobserved": missing} if (missing := unobserved(learned)) else {}),
         "cycles": len(c.scores),
         "missing": round(float(1 - learned.cycles.mask.mean()), 3),
-        "variance_explained": _rounded(np.cumsum(c.spectrum)[: len(c.sd)], 3),
-        "residual_deg": _rounded(np.degrees(channel_statistics(learned)[: len(ANGLES), 0]), 1),
+        "variance_explained": [round(float(v), 3) for v in np.cumsum(c.spectrum)[: len(c.sd)]],
         "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
     }
 
 
 def unobserved(learned: Learned) -> list[str]:
     """Parts of the body, such as 'l_shoulder', of which no recording has any angle."""
-    seen = dict.fromkeys((name.rsplit("_", 1)[0] for name in ANGLES), False)
-    for name, observed in zip(ANGLES, np.atleast_1d(learned.cycles.mask.any(axis=(0, 1))), strict=False):
-        seen[name.rsplit("_", 1)[0]] |= bool(observed)
-    return [part for part, observed in seen.items() if not observed]
+    seen = parts(np.asarray(learned.cycles.mask.any(axis=(0, 1))))
+    return [part for part in parts(np.ones(len(ANGLES), bool)) if part not in seen]
+
+
+def parts(which: npt.NDArray[np.bool_]) -> list[str]:
+    """Parts of the body that have any of some channels (>= A,), the angles first."""
+    return list(
+        dict.fromkeys(name.rsplit("_", 1)[0] for name, one in zip(ANGLES, which, strict=False) if one)
+    )
 
 
 def _stature(learned: Learned, subject: str) -> float | None:
@@ -190,7 +204,3 @@ def sequence_table(learned: Learned) -> list[list[Any]]:
         row = [round(1000 * s.period.frames / s.fps), round(s.cycles, 1), round(s.period.sharpness)]
         table.append([s.name, *row, round(float(np.degrees(rms)), 1) if np.isfinite(rms) else None])
     return table
-
-
-def _rounded(values: Any, digits: int) -> list[float]:
-    return [round(float(v), digits) for v in values]

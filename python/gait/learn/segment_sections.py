@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from gait import blob
+from gait.learn.rounded import rounded
 from gait.lift.prior import SegmentPrior
 
 
@@ -18,13 +18,8 @@ def sections(prior: SegmentPrior) -> dict[str, blob.Array]:
         "SGIN": np.array(counts, np.int32),
         "SGRT": np.array([prior.fps, prior.gamma, prior.stature, 0, 0, 0, 0, 0], np.float32),
         "SGWT": prior.weights.astype(np.float32),
-        "SGMN": _stored(prior.mean),
-        "SGMD": _stored(prior.modes.reshape(components, size, frames, 3 * markers)),
+        "SGMN": rounded(prior.mean),
+        "SGMD": rounded(prior.modes.reshape(components, size, frames, 3 * markers)),
         "SGSD": prior.sd.astype(np.float32),
         "SGPS": prior.residual.astype(np.float32),
     }
-
-
-def _stored(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-    """Round to a millionth, so that the last bits of another machine's algebra do not show."""
-    return np.round(values, 6).astype(np.float32)

@@ -16,6 +16,19 @@ Groups = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 
+def never_shown(mask: Mask, subject: Groups) -> tuple[int, Mask]:
+    """How many people never show channels (M,) that others show, and which these are.
+
+    mask : (R, T, M)
+        What was recorded.
+    subject : (R,)
+        Person of each cycle.
+    """
+    shown = np.array([mask[subject == who].any(axis=(0, 1)) for who in np.unique(subject)])
+    lacking = ~shown & shown.any(axis=0)
+    return int(lacking.any(axis=1).sum()), np.asarray(lacking.any(axis=0))
+
+
 def bounded(filled: Floats, mask: Mask, subject: Groups) -> Floats:
     """Completed cycles whose unseen channels are no further from the mean than people usually are.
 

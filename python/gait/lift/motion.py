@@ -143,7 +143,24 @@ def _lift(
     grid: Grid,
     update: Callable[[int], None],
 ) -> Motion:
-    """Estimate all markers of a prior."""
+    """Estimate all markers of a prior; Unlike if numbers leave their range on the way."""
+    try:
+        return _estimated(prior, tracks, view, options, grid, update)
+    except np.linalg.LinAlgError:
+        raise Unlike(
+            "the tracks look like no motion that the model knows; check the camera, the points' names and "
+            "that v points down"
+        ) from None
+
+
+def _estimated(
+    prior: SegmentPrior,
+    tracks: Tracks,
+    view: View,
+    options: Options,
+    grid: Grid,
+    update: Callable[[int], None],
+) -> Motion:
     markers = prior.index(tracks.names)
     points = Observations(tracks.uv, tracks.deviations(options.pixel_sd))
     sampled = resampled(points, tracks.time, grid.time).among(markers, len(prior.names))
@@ -168,15 +185,9 @@ def _lift(
     )
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
     seen = Seen(tracks.time, points, markers)
-    try:
-        found_motion = sequence.smooth(
-            prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
-        )
-    except np.linalg.LinAlgError:
-        raise Unlike(
-            "the tracks look like no motion that the model knows; check the camera, the points' names and "
-            "that v points down"
-        ) from None
+    found_motion = sequence.smooth(
+        prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
+    )
     sized = _sized(prior, view, found_motion, found_motion.misfit, options, stature, stature_sd / stature)
     places = sized.places
     require_size(places, prior, stature)
@@ -207,9 +218,12 @@ def _sized(
     stature: float,
     size_sd: float,
 ) -> size.Resized:
-    """Give the estimate a person's size if it has none; only a lens leaves it open."""
+    """Give an estimate that does not fit a person's size, if it has none; only a lens leaves that open.
+
+    One that fits is of its prior's kind, and prior and floor know more of its size than the bones do.
+    """
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
-    if isinstance(view, Parallel) or not options.bones:
+    if isinstance(view, Parallel) or not options.bones or not misfit > MISFIT:
         return size.widened(fitted, misfit)
     ratio = size.bones_ratio(prior, found.places, stature)
     return size.resized(fitted, view.camera, ratio, size_sd, misfit)

@@ -24,7 +24,7 @@ from gait.skeleton import axis_rotation
 Floats = npt.NDArray[np.float64]
 
 GROUND_SD = 10.0  # metres, of where somebody stands
-HEIGHT_SD = 0.05  # metres, of the floor's height
+HEIGHT_SD = 0.03  # metres, of the floor's height
 LN10 = float(np.log(10))
 
 

@@ -262,8 +262,8 @@ class _Problem:
         sure = soft.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
         return Lifted(
             places=self._at_video(places),
-            sd=np.sqrt(self._covariances(diagonal, across, every, every)),
-            rooted_sd=np.sqrt(self._rooted(diagonal, across)),
+            sd=_deviations(self._covariances(diagonal, across, every, every)),
+            rooted_sd=_deviations(self._rooted(diagonal, across)),
             grid=places,
             heading=around.heading,
             stature=around.stature,
@@ -289,7 +289,7 @@ class _Problem:
         )
         with_both = with_left + with_right
         middle = with_both[:, [left, right]].sum(axis=1, keepdims=True) / 4
-        return np.maximum(own + middle - with_both, 0)
+        return np.asarray(own + middle - with_both)
 
     def _covariances(self, diagonal: Floats, across: Floats, first: Ints, second: Ints) -> Floats:
         """Covariances (T, n, 3) by coordinate of interpolated places of markers (n,) with others (n,)."""
@@ -311,6 +311,11 @@ class _Problem:
                 )
                 total += (weights[:, i] * weights[:, k])[:, None, None] * value
         return total
+
+
+def _deviations(variances: Floats) -> Floats:
+    """Square roots of variances, none of which is below zero but for rounding."""
+    return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
 def _change(difference: Floats) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from gait import blob
 from gait.errors import UserError
-from gait.pace import pace
+from gait.pace import pace, slope_of
 from gait.simulate.arrays import Array
 from gait.simulate.curves import NAMES, Curves, fit_series, stride_modes
 
@@ -38,8 +38,8 @@ def curves_of_model(path: str, rng: np.random.Generator, cadence: float) -> Curv
     spread = np.asarray(sections["SCST"], np.float64)
     scores = spread[:, 1] * np.clip(rng.standard_normal(len(spread)), -1.5, 1.5)
     mean = curves[0] + np.einsum("q,qtm->tm", scores, curves[1:])
-    if "PACE" in sections:
-        mean += pace(sections["GAIT"], cadence) * np.asarray(sections["PACE"], np.float64)
+    if (slope := slope_of(sections)) is not None:
+        mean += pace(sections["GAIT"], cadence) * slope
     modes = stride_modes(rng)
     for k in range(min(len(modes), len(spread))):
         modes[k] = spread[k, 2] * _rows(names, curves[1 + k])

@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""How large a model of five components is, and what its phases and the series of section PACE leave out.
+
+.venv/bin/python tests/bench/learn_size.py ../shared/data/mocap/cmu_walk
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import table
+
+from gait import blob
+from gait.errors import UserError
+from gait.learn import fit, model, pace
+from gait.learn.fourier import HARMONICS
+from gait.learn.sequence import load
+from gait.learn.stage import one_thread
+from gait.pace import series, waves
+from gait.skeleton import default_skeleton, points
+
+Floats = npt.NDArray[np.float64]
+
+COMPONENTS, LIMIT = 5, 100_000  # bytes wanted
+TERMS = 2 * HARMONICS + 1  # of the curves as they are learnt: none is cut off
+PHASES = (fit.SAMPLES, 128)  # the second is the reference's
+FINE = 32  # points between two phases
+COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
+
+
+def interpolated(curve: Floats, phases: int) -> tuple[Floats, Floats]:
+    """Give a band-limited curve between so many phases, linear and true, (FINE phases, M) each."""
+    rows = series(curve, TERMS)
+    known, true = (waves(TERMS, n).T @ rows for n in (phases, FINE * phases))
+    share = (np.arange(FINE) / FINE)[:, None]
+    ends = known[:, None], np.roll(known, -1, axis=0)[:, None]
+    return (ends[0] * (1 - share) + ends[1] * share).reshape(true.shape), true
+
+
+def distance(learned: fit.Learned, one: Floats, other: Floats) -> float:
+    """Root mean square distance of the points about the pelvis, mm, of two stretches of channels (n, M)."""
+    sections = default_skeleton(learned.proportions).sections()
+    off = points(sections, one) - points(sections, other)
+    return 1000 * model.ADULT_STATURE[0] * float(np.sqrt(np.mean(np.sum(off**2, axis=-1))))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("source", type=Path, help="folder of .amc walks")
+    args = parser.parse_args()
+    paths = sorted(args.source.rglob("*.amc"))
+    if not paths:
+        print(f"learn_size: {args.source}: no .amc files; name the folder of walks", file=sys.stderr)
+        return 1
+    with one_thread():
+        learned = fit.fit([load(path) for path in paths], COMPONENTS)
+        size = len(blob.encode(model.sections(learned, "walk", 1)))
+        paces = learned.paces[learned.cycles.sequence]
+        whole = pace.slope(learned.components.filled, learned.row_subject, paces, TERMS)
+    mean = learned.components.mean
+    cut = distance(learned, mean + learned.pace_curve, mean + whole)
+    rows = [
+        ("size", f"{COMPONENTS} components", "bytes", size, f"< {LIMIT}", "yes" if size < LIMIT else "NO"),
+        ("size", "series of PACE cut off, one sd from the mean rate", "joints, mm", cut, "", ""),
+    ]
+    for phases in PHASES:
+        off = distance(learned, *interpolated(mean, phases))
+        rows.append(("size", f"linear between {phases} phases", "joints, mm", off, "", ""))
+    table.publish(
+        "learn_size",
+        "Size of a model",
+        COLUMNS,
+        rows,
+        f"The cyclic model of {len(paths)} walks, without the prior over segments, and what it loses by "
+        "being no larger: root mean square over joints and phases, about the pelvis.",
+    )
+    return 0 if size < LIMIT else 1
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except UserError as error:
+        sys.exit(f"learn_size: {error}")
