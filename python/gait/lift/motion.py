@@ -218,15 +218,16 @@ def _sized(
     stature: float,
     size_sd: float,
 ) -> size.Resized:
-    """Give an estimate that does not fit a person's size, if it has none; only a lens leaves that open.
+    """Give the estimate a person's size if it has none; only a lens leaves it open.
 
     One that fits is of its prior's kind, and prior and floor know more of its size than the bones do.
     """
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
-    if isinstance(view, Parallel) or not options.bones or not misfit > MISFIT:
+    if isinstance(view, Parallel) or not options.bones:
         return size.widened(fitted, misfit)
     ratio = size.bones_ratio(prior, found.places, stature)
-    return size.resized(fitted, view.camera, ratio, size_sd, misfit)
+    limit = size.UNLIKELY if misfit > MISFIT else size.IMPOSSIBLE
+    return size.resized(fitted, view.camera, ratio, size_sd, misfit, limit)
 
 
 def _alone(

@@ -19,7 +19,8 @@ from gait.lift.soft import BONES
 Floats = npt.NDArray[np.float64]
 
 PROPORTION_SD = 0.04  # relative, of the bones of people of one stature
-UNLIKELY = 2.0  # deviations of the size from which the fit is not trusted with it
+UNLIKELY = 2.0  # deviations of the size from which a motion that does not fit is not trusted with it
+IMPOSSIBLE = 4.0  # and one that fits
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,10 @@ def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
     return float(np.median(np.median(length, axis=0) / usual))
 
 
-def resized(found: Resized, camera: Camera, ratio: float, size_sd: float, misfit: float) -> Resized:
-    """Divide a motion's size by `ratio` about the lens if it is an unlikely one.
+def resized(
+    found: Resized, camera: Camera, ratio: float, size_sd: float, misfit: float, limit: float = UNLIKELY
+) -> Resized:
+    """Divide a motion's size by `ratio` about the lens if it is off by `limit` deviations or more.
 
     Deviations grow by the larger of how far off the size was and of the misfit, in deviations (Birge's
     ratio), and by the size that the person's own bones may have.
@@ -80,7 +83,7 @@ def resized(found: Resized, camera: Camera, ratio: float, size_sd: float, misfit
     """
     own = float(np.hypot(size_sd, PROPORTION_SD))
     off = abs(float(np.log(ratio))) / own
-    if off < UNLIKELY:
+    if off < limit:
         return widened(found, misfit)
     lens = -camera.R.T @ camera.t
     away = (found.places - lens) / ratio
