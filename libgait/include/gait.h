@@ -200,6 +200,7 @@ typedef struct gait_tracker_config {
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
     float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of stature */
+    uint32_t reserved;
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;

@@ -97,6 +97,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_tracker_config, offset_angles),
         FIELD(gait_tracker_config, cpu_mask),
         FIELD(gait_tracker_config, joint_sd_model),
+        FIELD(gait_tracker_config, reserved),
         FIELD(gait_tracker_config, camera),
         FIELD(gait_tracker_config, exec),
         STRUCT(gait_track),

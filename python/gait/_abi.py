@@ -114,6 +114,7 @@ class TrackerConfigC(ctypes.Structure):
         ("offset_angles", c_uint32),
         ("cpu_mask", c_uint32),
         ("joint_sd_model", c_float),
+        ("reserved", c_uint32),
         ("camera", CameraC * MAX_CAMERAS),
         ("exec", Tasks),
     ]
