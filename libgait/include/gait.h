@@ -176,8 +176,10 @@ typedef struct gait_tracker_config {
     float    girth;            /* limb radii against the model's (clothes) [0.5, 2] */
     float    resample_ess;     /* resample below this fraction of particles [0, 1] */
     float    evidence_time;    /* seconds for which errors of the image terms last; a frame's log-likelihood counts at
-                                * the time since images last supported the walker / this, at most whole; default 0.1;
+                                * the time since images last supported the walker / this, at most whole; default 0.067;
                                 * 0: frames are independent (paper mode) */
+    float    mingle_time;      /* seconds in which particles forget whom they descend from; default 0.7; 0: never (paper
+                                * mode) */
     float    max_dt;           /* longest accepted interval, seconds; default 0.5 */
     /* Dynamics (eqs. 5-9): standard deviations per sqrt(second) unless said otherwise. */
     float    phase_noise;      /* strides */
@@ -198,6 +200,7 @@ typedef struct gait_tracker_config {
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
     float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of stature */
+    uint32_t reserved;
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;

@@ -4,7 +4,7 @@
 #include "population.h"
 
 /* Streams of random numbers: one per purpose, so that none depends on how many another took. */
-enum { STREAM_START = 1, STREAM_MOVE = 2, STREAM_RESAMPLE = 3, STREAM_FORK = 4 };
+enum { STREAM_START = 1, STREAM_MOVE = 2, STREAM_RESAMPLE = 3, STREAM_FORK = 4, STREAM_MINGLE = 5 };
 
 typedef struct dynamics {
     const gait_tracker_config *cfg;

@@ -64,6 +64,7 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     ok &=
         c.modes.odds > -1e6 && c.modes.odds < 1e6 && c.modes.lead > -1e12 && c.modes.lead < 1e12; /* no NaN */
     ok &= c.start_utime <= c.utime && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
+    ok &= c.mingle_utime <= c.utime && c.mingle_utime >= c.start_utime;
     ok &= c.missed >= 0.0f && c.missed < 1e9f && c.stature_doubt >= 0.0f && c.stature_doubt < 1e9f;
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};

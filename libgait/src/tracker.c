@@ -3,6 +3,7 @@
 #include "fmath.h"
 #include "look.h"
 #include "loss.h"
+#include "mingle.h"
 #include "modes.h"
 #include "weigh.h"
 #include <string.h>
@@ -136,7 +137,7 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
     tracker_clear(t);
     t->core->started = 1;
     t->core->stature_doubt = sd->stature / f_max(mean->stature, LEAST_STATURE);
-    t->core->utime = t->core->start_utime = t->core->support_utime = utime;
+    t->core->utime = t->core->start_utime = t->core->support_utime = t->core->mingle_utime = utime;
     if (sd->phase < PHASE_KNOWN)
         modes_single(t);
     else
@@ -159,6 +160,7 @@ static float seconds_since(const gait_tracker *t, int64_t utime)
 typedef struct move_job {
     gait_tracker *t;
     population from;
+    mingling mingling;
     dynamics_step step;
 } move_job;
 
@@ -172,17 +174,35 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
     for (int32_t i = begin; i < end; i += BLOCK) {
         int32_t const lanes = i_min(BLOCK, end - i);
         walker_block_get(&j->from, t->filter.parent + i, lanes, &then);
+        mingle_block(&j->mingling, i, lanes, &then);
         if (j->step.dt > 0.0f)
             t->like->run->dynamics_move(&j->step, i, &then, &now);
         walker_block_put(&to, i, lanes, j->step.dt > 0.0f ? &now : &then);
     }
 }
 
+/* Particles mingle where they were drawn by weight and are of one mode; between two modes there is nobody. */
+static mingling mingle_after(gait_tracker *t, const population *from, bool resampled, uint32_t frame)
+{
+    bool const one_mode = t->core->modes.stage == MODES_SINGLE && !loss_is_lost(t);
+    mingling m = {.from = from,
+                  .parent = t->filter.parent,
+                  .n = t->filter.n,
+                  .seed = t->cfg.seed,
+                  .frame = frame};
+    if (one_mode && resampled)
+        mingling_set(&m, seconds_since(t, t->core->mingle_utime), t->cfg.mingle_time);
+    if (!one_mode || resampled)
+        t->core->mingle_utime = t->core->utime;
+    return m;
+}
+
 /* Move every particle from its ancestor into the next generation, which becomes the current one. */
-static void predict(gait_tracker *t, float dt, uint32_t frame)
+static void predict(gait_tracker *t, float dt, bool resampled, uint32_t frame)
 {
     dynamics const d = tracker_dynamics(t);
     move_job j = {.t = t, .from = t->people};
+    j.mingling = mingle_after(t, &j.from, resampled, frame);
     j.step = dynamics_step_init(&d, dt, modes_settled(t), frame);
     t->core->current = (t->core->current + 1) % t->past.depth;
     tracker_set_count(t, t->filter.n);
@@ -262,7 +282,7 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
     if (loss_is_lost(t))
         core->ess = 0.0; /* particles drawn anew weigh what others do */
     bool const resampled = core->frame > 0 && modes_resample(t, counter);
-    predict(t, dt, counter);
+    predict(t, dt, resampled, counter);
     modes_fork(t);
     loss_search(t, counter);
     walker const place = estimate_place(&t->people, t->filter.weight);

@@ -21,6 +21,7 @@ typedef struct modes_state {
 typedef struct tracker_core { /* small mutable state; saved and hashed with the arrays that follow it */
     int64_t utime, start_utime;
     int64_t support_utime; /* when the images last supported the estimate */
+    int64_t mingle_utime;  /* when the particles last mingled, or were of no one mode */
     uint64_t frame;        /* steps since start */
     int32_t started;
     int32_t current;     /* which of the generations kept holds the particles */

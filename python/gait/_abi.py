@@ -91,6 +91,7 @@ class TrackerConfigC(ctypes.Structure):
         ("girth", c_float),
         ("resample_ess", c_float),
         ("evidence_time", c_float),
+        ("mingle_time", c_float),
         ("max_dt", c_float),
         ("phase_noise", c_float),
         ("rate_noise", c_float),
@@ -113,6 +114,7 @@ class TrackerConfigC(ctypes.Structure):
         ("offset_angles", c_uint32),
         ("cpu_mask", c_uint32),
         ("joint_sd_model", c_float),
+        ("reserved", c_uint32),
         ("camera", CameraC * MAX_CAMERAS),
         ("exec", Tasks),
     ]

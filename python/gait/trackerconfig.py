@@ -28,6 +28,7 @@ class TrackerConfig:
     girth: float
     resample_ess: float
     evidence_time: float
+    mingle_time: float
     max_dt: float
     phase_noise: float
     rate_noise: float

@@ -93,6 +93,7 @@ static void test_floats(void)
         FLOAT(offset_sd, -1e-3f, 1e9f),
         FLOAT(proportion_noise, -1e-3f, 1e9f),
         FLOAT(evidence_time, -1e-3f, 1e9f),
+        FLOAT(mingle_time, -1e-3f, 1e9f),
         FLOAT(joint_sd_model, -1e-3f, 1.1f),
     };
 #undef FLOAT

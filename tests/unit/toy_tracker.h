@@ -28,6 +28,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.girth = 1.0f;
     c.resample_ess = 0.5f;
     c.evidence_time = 0.13f;
+    c.mingle_time = 0.7f;
     c.max_dt = 0.5f;
     c.phase_noise = 0.0164f;
     c.rate_noise = 0.02f;

@@ -22,6 +22,8 @@ static const struct {
     {"resample-ess", FIELD(resample_ess), 0, 1, "resample below this fraction of the particles"},
     {"evidence-time", FIELD(evidence_time), 0, 1e6,
      "seconds for which errors of the image terms last; 0: every frame counts in full"},
+    {"mingle-time", FIELD(mingle_time), 0, 1e6,
+     "seconds in which particles forget whom they descend from; 0: never"},
     {"max-dt", FIELD(max_dt), 1e-3, 10, "longest pause between frames, seconds"},
     {"phase-noise", FIELD(phase_noise), 0, 10, "strides per sqrt(second)"},
     {"rate-noise", FIELD(rate_noise), 0, 10, "fraction of the mean stride rate per sqrt(second)"},
