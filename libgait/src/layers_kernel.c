@@ -192,10 +192,11 @@ static inline void bound(pair p, float y, float *left, float *right)
     *right = f_min(p.right_at + p.right_slope * y, *right);
 }
 
-/* The first cell whose centre is at or right of a line. */
+/* The first cell whose centre is at or right of a line; so little left of it is rounding. */
 static inline int32_t cell_from(float x)
 {
-    return (int32_t)(x + (1.0f - 1.0f / 1024.0f));
+    float const slack = 1.0f / 1024.0f; /* cells */
+    return (int32_t)(x + (1.0f - slack));
 }
 
 /* The limb's bits in a word go behind those of the body; none in rows that are not the limb's. */

@@ -22,10 +22,12 @@ static void draw_others(const mingling *m, int32_t first, int32_t lanes, int32_t
 }
 
 /* Move one field of every lane. */
-static void mingle_field(const mingling *m, int32_t lanes, const float *x, int32_t other[OTHERS][BLOCK], float *v)
+static void mingle_field(const mingling *m, int32_t lanes, const float *x, int32_t other[OTHERS][BLOCK],
+                         float *v)
 {
     for (int32_t lane = 0; lane < lanes; lane++)
-        v[lane] += m->pull * (x[other[0][lane]] - v[lane]) + m->spread * (x[other[1][lane]] - x[other[2][lane]]);
+        v[lane] +=
+            m->pull * (x[other[0][lane]] - v[lane]) + m->spread * (x[other[1][lane]] - x[other[2][lane]]);
 }
 
 /* The same where differences go round: of a turn, in units of it. */

@@ -1,6 +1,6 @@
-/* rast.h - scan conversion of convex polygons to exact row spans and to bit masks of a small grid.
+/* rast.h - scan conversion of convex polygons to exact row spans, and bit masks of a small grid (drawn by layers.h).
  *
- * Coverage is decided in integers (vertices at 1/256 of a pixel): a pixel belongs to a polygon if its centre
+ * A span's coverage is decided in integers (vertices at 1/256 of a pixel): a pixel belongs to a polygon if its centre
  * does, left and top edges included, so two polygons that share an edge never cover a pixel twice. */
 #ifndef GAIT_RAST_H
 #define GAIT_RAST_H

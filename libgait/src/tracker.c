@@ -185,11 +185,8 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 static mingling mingle_after(gait_tracker *t, const population *from, bool resampled, uint32_t frame)
 {
     bool const one_mode = t->core->modes.stage == MODES_SINGLE && !loss_is_lost(t);
-    mingling m = {.from = from,
-                  .parent = t->filter.parent,
-                  .n = t->filter.n,
-                  .seed = t->cfg.seed,
-                  .frame = frame};
+    mingling m = {
+        .from = from, .parent = t->filter.parent, .n = t->filter.n, .seed = t->cfg.seed, .frame = frame};
     if (one_mode && resampled)
         mingling_set(&m, seconds_since(t, t->core->mingle_utime), t->cfg.mingle_time);
     if (!one_mode || resampled)

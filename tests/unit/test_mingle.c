@@ -41,16 +41,16 @@ static mingling after(const population *from, const crowd *c, float seconds, uin
 
 static void mingle_all(const mingling *m, crowd *out)
 {
-    population const to = {.n = N, .fields = FIELDS, .value = out->value};
+    population to = {.n = N, .fields = FIELDS, .value = out->value};
     for (int32_t i = 0; i < N; i += BLOCK) {
         walker_block w;
         walker_block_get(m->from, m->parent + i, i_min(BLOCK, N - i), &w);
         mingle_block(m, i, i_min(BLOCK, N - i), &w);
-        walker_block_put((population *)&to, i, i_min(BLOCK, N - i), &w);
+        walker_block_put(&to, i, i_min(BLOCK, N - i), &w);
     }
 }
 
-/* Mean of a over b about the means given. */
+/* Mean product of two fields about the means given. */
 static double moment(const crowd *c, int32_t f, double mean_f, int32_t g, double mean_g)
 {
     double sum = 0.0;
@@ -93,7 +93,8 @@ static void test_mean_and_covariance_remain(void)
     CHECK_NEAR(covariance(&first, F_COEF, F_COEF) / score, 1.0, 0.15);
     double shared = 0.0; /* exp(-2.5) of who they were is left */
     for (int32_t i = 0; i < N; i++)
-        shared += ((double)first.value[F_STATURE * N + i] - stature) * ((double)start.value[F_STATURE * N + i] - stature);
+        shared += ((double)first.value[F_STATURE * N + i] - stature) *
+                  ((double)start.value[F_STATURE * N + i] - stature);
     CHECK_NEAR(shared / N / spread, 0.082, 0.06);
 }
 
@@ -103,7 +104,8 @@ static void test_angles_go_the_short_way(void)
     mingling const m = after(&from, &first, 0.5f, 0);
     mingle_all(&m, &second);
     for (int32_t i = 0; i < N; i++) {
-        float const phase = TWO_PI_F * second.value[F_PHASE * N + i], heading = second.value[F_HEADING * N + i];
+        float const phase = TWO_PI_F * second.value[F_PHASE * N + i],
+                    heading = second.value[F_HEADING * N + i];
         CHECK(fabsf(m_wrap_pi(phase)) < TWO_PI_F * 0.1f);
         CHECK(fabsf(m_wrap_pi(heading - PI_F)) < 0.5f);
     }
