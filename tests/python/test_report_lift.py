@@ -26,7 +26,8 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     prior = toy_prior(6, 19, 4, seed=5)
     (tmp_path / "m.gait").write_bytes(toy_blob(prior))
-    uv = 200 * np.repeat(prior.mean[0, :1, :, [0, 2]].transpose(1, 2, 0), 12, axis=0) * (1, -1)
+    walk = prior.mean[0, :1] + np.arange(12)[:, None, None] * (0.02, 0, 0)  # on and on as the prior's segments
+    uv = 200 * walk[..., [0, 2]] * (1, -1)
     write("t.csv", Tracks(np.arange(12), np.arange(12) / 20, prior.names, uv, np.ones(uv.shape[:2])))
     return tmp_path
 
