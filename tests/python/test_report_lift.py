@@ -26,7 +26,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     prior = toy_prior(6, 19, 4, seed=5)
     (tmp_path / "m.gait").write_bytes(toy_blob(prior))
-    walk = prior.mean[0, :1] + np.arange(12)[:, None, None] * (0.02, 0, 0)  # on and on as the prior's segments
+    walk = prior.mean[0, :1] + np.arange(12)[:, None, None] * (0.02, 0, 0)  # as the prior's mean
     uv = 200 * walk[..., [0, 2]] * (1, -1)
     write("t.csv", Tracks(np.arange(12), np.arange(12) / 20, prior.names, uv, np.ones(uv.shape[:2])))
     return tmp_path
