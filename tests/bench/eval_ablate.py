@@ -22,7 +22,7 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "stature search": {"stature_noise": 0.0, "stature_noise_start": 0.0},
     "tilt": {"tilt_noise": 0.0},
     "frames alike": {"evidence_time": 0.0},
-    "no mingling": {"mingle_time": 0.0},
+    "mingling": {"mingle_time": 0.0},
     "rate return": {"rate_time": 0.0},
     "missed foreground": {"missed_weight": 0.0},
 }
