@@ -10,6 +10,7 @@ little longer.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
@@ -20,6 +21,8 @@ COMMON = {
 }
 """Environment of a process that uses the common kernels."""
 
+_RESTARTED = "GAIT_RESTARTED"  # which process was: never twice, whatever sets COMMON back at its start
+
 
 def chosen() -> dict[str, str]:
     """Tell which of COMMON's names this process was given, and how."""
@@ -27,12 +30,23 @@ def chosen() -> dict[str, str]:
 
 
 def settle() -> None:
-    """Start this program anew, its command line the same, unless it uses the common kernels already."""
-    if os.name == "posix" and os.uname().machine == "x86_64" and sys.executable and chosen() != COMMON:
-        os.environ.update(COMMON)
-        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+    """Start this program anew, its command line the same, unless it uses the common kernels already.
+
+    A program that cannot be had again, typed or read from stdin, goes on with the kernels of its CPU.
+    """
+    again = sys.executable and sys.argv[0] not in ("", "-") and os.environ.get(_RESTARTED) != str(os.getpid())
+    if again and _to_choose() and chosen() != COMMON:
+        os.environ.update({**COMMON, _RESTARTED: str(os.getpid())})
+        with contextlib.suppress(OSError):
+            os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
 
 
 def dask_setup(_: object) -> None:
     """Let the workers that a nanny starts use the common kernels."""
-    os.environ.update(COMMON)
+    if _to_choose():
+        os.environ.update(COMMON)
+
+
+def _to_choose() -> bool:
+    """Tell whether COMMON is for this machine."""
+    return os.name == "posix" and os.uname().machine == "x86_64"
