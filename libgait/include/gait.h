@@ -164,7 +164,7 @@ typedef struct gait_tracker_config {
     uint32_t struct_size;      /* set by gait_tracker_default() */
     int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
     uint64_t seed;             /* default 1 */
-    int32_t  particles;        /* [16, 1 << 20]; default 1800 (paper mode 10000) */
+    int32_t  particles;        /* [16, 1 << 20]; default 1500 (paper mode 10000) */
     int32_t  components;       /* [0, the model's]; default -1: the first 5, in paper mode all */
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
@@ -176,9 +176,9 @@ typedef struct gait_tracker_config {
     float    girth;            /* limb radii against the model's (clothes) [0.5, 2] */
     float    resample_ess;     /* resample below this fraction of particles [0, 1] */
     float    evidence_time;    /* seconds for which errors of the image terms last; a frame's log-likelihood counts at
-                                * the time since images last supported the walker / this, at most whole; default 0.067;
+                                * the time since images last supported the walker / this, at most whole; default 0.1;
                                 * 0: frames are independent (paper mode) */
-    float    mingle_time;      /* seconds in which particles forget whom they descend from; default 0.7; 0: never (paper
+    float    mingle_time;      /* seconds in which particles forget whom they descend from; default 1.5; 0: never (paper
                                 * mode) */
     float    max_dt;           /* longest accepted interval, seconds; default 0.5 */
     /* Dynamics (eqs. 5-9): standard deviations per sqrt(second) unless said otherwise. */
