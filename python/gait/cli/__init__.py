@@ -54,7 +54,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with _terminated_like_interrupted():
             args = _parser(words).parse_args(list(_joined(words)))
-            return int(args.run(args))
+            code = int(args.run(args))
+            sys.stdout.flush()  # here a reader that has left is noticed, at exit it would be Python's own words
+            return code
     except UsageError as exc:
         _failed(command, str(exc))
         return 2
