@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _terminated_like_interrupted():
             args = _parser(words).parse_args(list(_joined(words)))
             code = int(args.run(args))
-            sys.stdout.flush()  # here a reader that has left is noticed, at exit it would be Python's own words
+            sys.stdout.flush()  # at exit a reader that has left would be told in words of Python
             return code
     except UsageError as exc:
         _failed(command, str(exc))
