@@ -108,6 +108,8 @@ class Camera:
         """Look along pixels (..., 2): unit directions (..., 3) in the world from `centre`."""
         uv = np.asarray(pixels, np.float64)
         flat = np.ascontiguousarray(uv.reshape(-1, 1, 2))
+        if not flat.size:  # OpenCV answers None
+            return np.empty((*uv.shape[:-1], 3))
         stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-9)
         same = np.eye(3)
         plane = cv2.undistortPointsIter(flat, self.matrix, self.distortion, same, same, stop)[:, 0]

@@ -17,6 +17,7 @@ from gait._lib import aligned, check, library
 from gait.blob import decode
 from gait.camera import Camera
 from gait.errors import GaitError, UserError
+from gait.pace import slope_of
 from gait.state import State
 
 Array = NDArray[np.float64]
@@ -186,4 +187,5 @@ def read_cyclic(path: str | os.PathLike[str] | None) -> dict[str, Any]:
     sections = decode(read_blob(path), str(path))
     if "CURV" not in sections:
         raise UserError(f"{path}: {NOT_CYCLIC}")
+    slope_of(sections, str(path))
     return sections

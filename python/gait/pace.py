@@ -48,8 +48,10 @@ def series(curve: Floats, terms: int) -> Floats:
     return np.asarray(rows @ curve / np.sum(rows**2, axis=1)[:, None])
 
 
-def slope_of(sections: Mapping[str, Any]) -> Floats | None:
+def slope_of(sections: Mapping[str, Any], name: str = "model") -> Floats | None:
     """Change (T, M) of the mean cycle per unit of pace, at the phases of CURV; None without section PACE.
+
+    Errors call the model `name`.
 
     Raises
     ------
@@ -60,5 +62,5 @@ def slope_of(sections: Mapping[str, Any]) -> Floats | None:
         return None
     terms, phases = len(sections["PACE"]), sections["CURV"].shape[1]
     if terms % 2 == 0 or terms >= phases:
-        raise UserError(f"model: section PACE has {terms} rows, no Fourier series; learn the model again")
+        raise UserError(f"{name}: section PACE has {terms} rows, no Fourier series; learn the model again")
     return np.asarray(waves(terms, phases).T @ np.asarray(sections["PACE"], float))

@@ -74,6 +74,12 @@ def test_points_behind_are_not_a_number_and_shapes_are_kept():
     assert np.isnan(uv[0, 1]).all()
 
 
+def test_no_pixels_have_no_rays():
+    camera = Camera.looking((0.0, -5.0, 1.5), (0.0, 0.0, 1.0), (640, 480), 800.0)
+    assert camera.rays(np.empty((0, 2))).shape == (0, 3)
+    assert camera.on_plane(np.empty((2, 0, 2))).shape == (2, 0, 3)
+
+
 def test_pixels_meet_the_ground_below_the_horizon_only():
     view = Camera.looking((0, -5, 1.5), (0, 0, 1.5), (640, 480), 700.0)
     ground = view.on_plane([[319.5, 400.0], [319.5, 100.0]])

@@ -1,16 +1,19 @@
 """Commands that are ended from outside leave nothing behind."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
+from importlib import resources
 
 import numpy as np
 import pytest
 from drawn_walker import camera, write
 
 PATIENCE = 30.0
+MODEL = resources.files("gait") / "data" / "walk.gait"
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +48,16 @@ def test_track_leaves_no_temporary_files(clip, tmp_path, number):
         process.communicate()
     assert (process.returncode, said) == (1, "gait track: interrupted\n")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_leaves_is_no_error_of_ours():
+    quiet = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gait", "info", MODEL],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=quiet,
+    )
+    process.stdout.close()  # before anything is written
+    assert process.stderr.read() == b""
+    process.wait(timeout=PATIENCE)

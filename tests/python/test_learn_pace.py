@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from gait import GaitError, Model, State, blob, skeleton
+from gait.cli import main
 from gait.errors import UserError
 from gait.learn import pace as learnt
 from gait.learn.prior import mirrored
-from gait.model import read_blob
+from gait.model import read_blob, read_cyclic
 from gait.modelcurves import ModelCurves
 from gait.pace import MOST, pace, series, slope_of
 from gait.skeleton import CHANNELS
@@ -168,6 +169,15 @@ def test_what_is_no_series_is_refused_by_both(rows):
         Model(blob.encode(made))
     with pytest.raises(UserError, match=r"PACE has \d+ rows.*learn the model again"):
         ModelCurves(made)
+
+
+def test_commands_name_the_file_of_another_layout(tmp_path, capsys):
+    old = tmp_path / "old.gait"
+    old.write_bytes(blob.encode({**SHIPPED, "PACE": np.zeros((128, 30), np.float32)}))
+    with pytest.raises(UserError, match=r"old\.gait: section PACE has 128 rows.*learn the model again"):
+        read_cyclic(old)
+    assert main(["info", str(old)]) == 1
+    assert "old.gait: section PACE has 128 rows" in capsys.readouterr().err
 
 
 def test_a_model_whose_rates_do_not_vary_has_no_use_for_a_slope():

@@ -54,7 +54,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with _terminated_like_interrupted():
             args = _parser(words).parse_args(list(_joined(words)))
-            return int(args.run(args))
+            code = int(args.run(args))
+            sys.stdout.flush()  # at exit a reader that has left would be told in words of Python
+            return code
     except UsageError as exc:
         _failed(command, str(exc))
         return 2

@@ -13,6 +13,7 @@ import numpy as np
 from gait import blob
 from gait.cli import segment_text
 from gait.lift.prior import TAGS, SegmentPrior
+from gait.pace import slope_of
 
 NAME = "info"
 HELP = "what a model holds"
@@ -47,6 +48,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
         if tag in sections:
             result[key] = blob.unpack_names(sections[tag])
     if "CURV" in sections:
+        slope_of(sections, name)  # refuses what no tracker can use
         result |= {"components": len(sections["CURV"]) - 1, "phases": sections["CURV"].shape[1]}
     if "GAIT" in sections:
         result["gait"] = dict(zip(GAIT, np.round(sections["GAIT"].astype(float), 4).tolist(), strict=False))
