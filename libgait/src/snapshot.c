@@ -168,6 +168,7 @@ uint64_t snapshot_digest(const gait_tracker *t)
     memcpy(&core, t->core, sizeof core); /* with its padding, which is zero */
     core.utime -= core.start_utime;
     core.support_utime -= core.start_utime;
+    core.mingle_utime -= core.start_utime;
     core.modes.since -= core.start_utime;
     core.start_utime = 0;
     uint64_t const small = hash_fnv1a(HASH_INIT, &core, sizeof core);

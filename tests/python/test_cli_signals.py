@@ -52,12 +52,7 @@ def test_track_leaves_no_temporary_files(clip, tmp_path, number):
 
 def test_a_reader_that_leaves_is_no_error_of_ours():
     quiet = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "gait", "info", MODEL],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env=quiet,
-    )
-    process.stdout.close()  # before anything is written
-    assert process.stderr.read() == b""
-    process.wait(timeout=PATIENCE)
+    words = [sys.executable, "-m", "gait", "info", MODEL]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=quiet) as process:
+        process.stdout.close()  # before anything is written
+        assert process.stderr.read() == b""
