@@ -1,7 +1,7 @@
 /* mingle.h - particles drawn anew around themselves, so that what they are does not hang on descent alone.
  *
- * Most particles of a second ago have no descendants: of 1,800 one or two were the ancestors of all, and with them
- * came one depth, one stature, one posture.  So after resampling every state becomes
+ * Most particles of a second ago have no descendants: a few are the ancestors of all, and from them comes one depth, one
+ * stature, one posture.  So after resampling every state becomes
  *
  *   x' = x + a (m - x) + sqrt(a (1 - a)) (j - k)
  *

@@ -23,7 +23,7 @@ from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import gait_generator as g
-from learn_measures import cramer_rao, gauge_free, walkers
+from learn_measures import cramer_rao, falls, gauge_free, walkers
 
 from gait.learn import align, period
 from gait.learn.sequence import load
@@ -71,9 +71,8 @@ def _aligned(job: tuple[int, float, str]) -> tuple[Floats, float, int, bool]:
     signals, periods, true = walkers(np.random.default_rng([5, seed, int(style)]), style)
     found = align.align(signals, periods, start=start)
     errors = np.abs(gauge_free(found.offsets, true, periods))
-    values = np.array(found.objective)
-    falls = found.converged and np.all(np.diff(values) <= align.ROUNDING * values[:-1])
-    return errors, float(np.max(errors / periods)), len(values), bool(falls)
+    fell = found.converged and falls(found.objective)
+    return errors, float(np.max(errors / periods)), len(found.objective), fell
 
 
 def _gauge(seed: int) -> float:

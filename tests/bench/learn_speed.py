@@ -35,7 +35,7 @@ Row = tuple[str, str, str, float | int, str, str]
 
 
 def learn(mocap: Path, jobs: int, model: Path) -> tuple[float, float, float]:
-    """Seconds of a run, its processor time, and the memory of its largest process, MB."""
+    """Seconds of a run, processor time and memory, MB, of its process without its workers'."""
     command = ["-m", "gait", "learn", str(mocap), "-o", str(model), "--jobs", str(jobs), "--quiet"]
     begun = time.perf_counter()
     run = subprocess.Popen([sys.executable, *command], stdout=subprocess.DEVNULL)
@@ -83,10 +83,12 @@ def main() -> int:
                 digests.add(hashlib.sha256(model.read_bytes()).hexdigest())
                 update(k * RUNS + run + 1)
             seconds, work, memory = np.median(found, axis=0)
-            case, met = f"{walks} walks, --jobs {jobs}", "yes" if seconds < SECONDS else "NO"
-            rows.append(("speed", case, "wall clock, s", float(seconds), f"< {SECONDS}", met))
-            rows.append(("speed", case, "processor time, s", float(work), "", ""))
-            rows.append(("speed", case, "memory of the largest process, MB", float(memory), "", ""))
+            case, wanted = f"{walks} walks, --jobs {jobs}", f"< {SECONDS}" if jobs > 1 else ""
+            met = ("yes" if seconds < SECONDS else "NO") if wanted else ""
+            rows.append(("speed", case, "wall clock, s", float(seconds), wanted, met))
+            if jobs == 1:  # of workers the system tells their parent alone
+                rows.append(("speed", case, "processor time, s", float(work), "", ""))
+            rows.append(("speed", case, "memory of the process, MB", float(memory), "", ""))
         played = machines.environments()
         others = {machines.learn(environment, model, args.source) for environment in played.values()}
         worst = difference(model)
@@ -103,7 +105,7 @@ def main() -> int:
         COLUMNS,
         rows,
         f"`gait learn` from start to end of the process, median of {RUNS} runs, nothing set aside for it on "
-        "the machine. Other CPUs are played by the kernels of OpenBLAS, numpy and libm that they choose; "
+        "the machine; wanted on two cores. Other CPUs are played by the kernels of OpenBLAS, numpy and libm that they choose; "
         "the command makes all x86-64 take the same. Others, and other versions of these libraries, may "
         "differ in the sixth decimal.",
     )

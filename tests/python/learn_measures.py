@@ -3,6 +3,8 @@
 import gait_generator as g
 import numpy as np
 
+ROUNDING = 1e-9  # relative; no objective may rise by more
+
 
 def cramer_rao(true, frames, noise, missing):
     """Least standard deviation of a period estimate, frames, with the shape unknown up to 8 harmonics."""
@@ -33,3 +35,9 @@ def gauge_free(found, true, periods):
     phase = np.exp(2j * np.pi * (found - true) / periods)
     phase /= phase.mean() / abs(phase.mean())
     return np.angle(phase) / (2 * np.pi) * periods
+
+
+def falls(objective):
+    """Whether an objective never rises by more than rounding."""
+    values = np.array(objective)
+    return bool(np.all(np.diff(values) <= ROUNDING * values[:-1]))

@@ -3,15 +3,9 @@
 import gait_generator as g
 import numpy as np
 import pytest
-from learn_measures import gauge_free, walkers
+from learn_measures import falls, gauge_free, walkers
 
 from gait.learn import align, periodic, shift
-
-
-def falls(objective):
-    """Whether it never rises by more than rounding."""
-    values = np.array(objective)
-    return bool(np.all(np.diff(values) <= align.ROUNDING * values[:-1]))
 
 
 @pytest.mark.parametrize("start", ["xcorr", "zeros"])
@@ -31,21 +25,36 @@ def test_offsets_are_found_below_a_frame(start):
     assert np.median(errors[0]) < 0.05
 
 
-def test_a_step_that_makes_it_worse_is_shown_and_taken_back(monkeypatch):
-    signals, periods, true = walkers(np.random.default_rng(6), 2.0)
-    good, calls = align.align(signals, periods, start="zeros"), []
-    best_offset = shift.Shift.best_offset
+def spoil(monkeypatch, passes, wrong):
+    """After so many passes over 8 walkers put all offsets wrong by so many frames, in turn up and down."""
+    calls, best_offset = [], shift.Shift.best_offset
 
     def spoiled(sequence, table, weights, now):
         calls.append(now)
-        wrong = 10.0 * (-1) ** len(calls) if len(calls) > 2 * len(signals) else 0.0
-        return best_offset(sequence, table, weights, now) + wrong
+        off = wrong * (-1) ** len(calls) if len(calls) > passes * 8 else 0.0
+        return best_offset(sequence, table, weights, now) + off
 
     monkeypatch.setattr(shift.Shift, "best_offset", spoiled)
+
+
+def test_a_step_that_makes_it_worse_is_shown_and_taken_back(monkeypatch):
+    signals, periods, true = walkers(np.random.default_rng(6), 2.0)
+    good = align.align(signals, periods, start="zeros")
+    spoil(monkeypatch, 2, 10.0)
     bad = align.align(signals, periods, start="zeros")
     assert not falls(bad.objective) and not bad.converged
     assert bad.objective[:3] == good.objective[:3] and len(bad.objective) == 4
     assert np.max(np.abs(gauge_free(bad.offsets, true, periods))) < 3
+
+
+def test_a_rise_too_small_to_look_for_is_the_end_and_taken_back(monkeypatch):
+    signals, periods, true = walkers(np.random.default_rng(6), 2.0)
+    good = align.align(signals, periods, start="zeros")
+    spoil(monkeypatch, len(good.objective) - 1, 0.01)
+    end = align.align(signals, periods, start=good.offsets)
+    rise = end.objective[-1] / end.objective[-2] - 1
+    assert 0 < rise < align.TOLERANCE and end.converged
+    assert np.array_equal(end.offsets, good.offsets)
 
 
 def test_missing_blocks_do_not_bias_the_offsets():

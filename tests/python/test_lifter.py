@@ -163,7 +163,7 @@ def test_an_unknown_heading_is_found_as_in_numpy(angle: float) -> None:
     seen = observe.Observations(uv, sd)
     person = heading.Person(stature_sd=0.09)  # the default of both, unless a stature is given
     want = heading.explain(prior, lambda _: observe.orthographic(seen, AXES), person)[0]
-    floor = LiftConfig.default(place_sd=(posterior.GROUND_SD, posterior.GROUND_SD, heading.HEIGHT_SD))
+    floor = LiftConfig.default(place_sd=(posterior.GROUND_SD, posterior.GROUND_SD, heading.ALONE_FLOOR_SD))
     lifter = Lifter(contents, AXES, floor)
     fit = lifter.segment(uv, sd)
     assert np.cos(fit.heading - angle) > 0.999

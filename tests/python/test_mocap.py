@@ -238,6 +238,37 @@ def test_malformed_asf_is_named(amc, change, words):
         mocap_asf.read(amc)
 
 
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda text: text.replace("\nroot", "  # of the frame\nroot"),
+        lambda text: text.replace("\nroot", "\n\nroot", 1),
+        lambda text: text.replace("\n2\n", "\n2 # second\n"),
+    ],
+)
+def test_a_layout_of_its_own_is_read_as_the_usual_one(amc, spoil):
+    skeleton = mocap_asf.read_skeleton(amc.with_name("77.asf"))
+    known = mocap_asf.read_motion(amc, skeleton)
+    other = amc.with_name("77_02.amc")
+    other.write_text(spoil(amc.read_text()))
+    assert other.read_text() != amc.read_text()
+    found = mocap_asf.read_motion(other, skeleton)
+    assert list(found) == list(known)
+    assert all(np.array_equal(found[name], known[name]) for name in known)
+
+
+def test_bones_may_come_in_another_order_in_each_frame(amc):
+    skeleton = mocap_asf.read_skeleton(amc.with_name("77.asf"))
+    known = mocap_asf.read_motion(amc, skeleton)
+    head, second, rest = amc.read_text().partition("\n2\n")
+    lines, number, rest = rest.partition("\n3\n")
+    turned = "\n".join(reversed(lines.split("\n")))
+    amc.write_text(head + second + turned + number + rest)
+    found = mocap_asf.read_motion(amc, skeleton)
+    assert list(found) == list(known)
+    assert all(np.array_equal(found[name], known[name]) for name in known)
+
+
 def test_skeleton_beside_the_motion_is_found(amc, tmp_path):
     amc.with_name("77.asf").unlink()
     with pytest.raises(UserError, match=r"no skeleton 77\.asf beside it"):

@@ -9,12 +9,7 @@ static gait_tracker *begin(float phase_sd, float mingle_time)
 {
     gait_tracker_config cfg = toy_config(1);
     cfg.mingle_time = mingle_time;
-    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
-    gait_state const mean = toy_walk(0.0f);
-    gait_state sd = toy_doubt(1.0f);
-    sd.phase = phase_sd;
-    CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
-    return t;
+    return film_doubtful(&cfg, phase_sd);
 }
 
 static bool alike(const gait_tracker *a, const gait_tracker *b)

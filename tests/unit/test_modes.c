@@ -11,12 +11,7 @@ static gait_tracker *begin(float phase_sd)
 {
     gait_tracker_config cfg = toy_config(1);
     cfg.particles = N;
-    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
-    gait_state const mean = toy_walk(0.0f);
-    gait_state sd = toy_doubt(1.0f);
-    sd.phase = phase_sd;
-    CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
-    return t;
+    return film_doubtful(&cfg, phase_sd);
 }
 
 static double weight_of(const gait_tracker *t, int32_t from, int32_t to)

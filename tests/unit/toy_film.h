@@ -29,6 +29,18 @@ static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, 
     return t;
 }
 
+/* A tracker of cfg, started at frame 0 with so wide a phase. */
+static inline gait_tracker *film_doubtful(const gait_tracker_config *cfg, float phase_sd)
+{
+    gait_tracker *const t = film_tracker(cfg, 0, 1.0f);
+    gait_state const mean = toy_walk(0.0f);
+    gait_state sd = toy_doubt(1.0f);
+    sd.phase = phase_sd;
+    if (gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) != GAIT_OK)
+        abort();
+    return t;
+}
+
 /* Frame n of every camera in use, but of those in `missing` (bits). */
 static inline void film_step(gait_tracker *t, int cameras, int n, uint32_t missing, gait_estimate *e)
 {

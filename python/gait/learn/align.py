@@ -20,8 +20,7 @@ from gait.skeleton import ANGLES
 Floats = npt.NDArray[np.float64]
 
 ITERATIONS = 100
-TOLERANCE = 1e-6  # relative decrease of the objective at which to stop
-ROUNDING = 1e-9  # relative; the objective may rise by no more
+TOLERANCE = 1e-6  # relative change of the objective at which to stop
 XCORR_ROUNDS = 3
 AMBIGUOUS = 0.75  # depth of a sequence's second best phase, of its best, at which other starts are tried
 APART = 0.1  # cycles between those phases, at least
@@ -141,7 +140,7 @@ def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
         cost = sum(s.cost(table, weights, o) for s, o in zip(problem.sequences(), now, strict=True))
         result.objective.append(cost)
         if len(result.objective) > 1 and cost > result.objective[-2] * (1 - TOLERANCE):
-            result.converged = cost <= result.objective[-2] * (1 + ROUNDING)
+            result.converged = cost <= result.objective[-2] * (1 + TOLERANCE)
             now = before if cost > result.objective[-2] else now
             break
         steps = zip(problem.sequences(), now, strict=True)

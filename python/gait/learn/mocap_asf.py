@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -250,7 +249,39 @@ def _linked(bones: list[Bone], lines: list[tuple[int, list[str]]], path: Path) -
 def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
     """Read an .amc file: bone name to (T, dof) in the file's units; bones without motion have no entry."""
     moving = {bone.name: bone for bone in skeleton.bones if bone.dof}
-    rows: dict[str, list[list[float]]] = {name: [] for name in moving}
+    values = _regular(path, moving) or _by_lines(path, moving)
+    require_frames(path, len(values.get("root", ())))
+    return values
+
+
+def _regular(path: Path, moving: dict[str, Bone]) -> dict[str, Floats] | None:
+    """Read a motion whose frames are all laid out as its first, all lines at once; None of any other."""
+    lines = text_lines(path)
+    begins = (i for i, line in enumerate(lines) if line.strip().isdigit())
+    first = next(begins, len(lines))
+    frame = [line.split() for line in lines[first : next(begins, len(lines))]]
+    words, width = " ".join(lines[first:]).split(), sum(map(len, frame))
+    numbers, columns = words[::width] if width else [], dict[str, list[list[str]]]()
+    place = 1
+    for name, *values in filter(None, frame[1:]):
+        expected = len(moving[name].dof) if name in moving and name not in columns else -1
+        if len(values) != expected or words[place::width] != [name] * len(numbers):
+            return None
+        columns[name] = [words[k::width] for k in range(place + 1, place + 1 + len(values))]
+        place += 1 + len(values)
+    if "root" not in columns or len(words) % width or not all(map(str.isdigit, numbers)):
+        return None
+    try:
+        result = {b: np.array(columns[b], dtype=float).T.copy() for b in moving if b in columns}
+    except ValueError:
+        return None
+    counted = np.array_equal(np.diff(np.array(numbers, dtype=float)), np.ones(len(numbers) - 1))
+    return result if counted and all(np.isfinite(v).all() for v in result.values()) else None
+
+
+def _by_lines(path: Path, moving: dict[str, Bone]) -> dict[str, Floats]:
+    """Read a motion line by line, whatever its layout, or name the line that is wrong."""
+    rows: dict[str, list[Floats]] = {name: [] for name in moving}
     frame, first, line = 0, 0, 0
     for line, words in _lines(path):
         if words[0].startswith(":"):
@@ -273,24 +304,12 @@ def read_motion(path: Path, skeleton: Skeleton) -> dict[str, Floats]:
                 f"{path}:{line}: bone {words[0]!r} out of place in frame {frame}; restore the file"
             )
         else:
-            rows[words[0]].append(_row(words[1:], path, line, len(moving[words[0]].dof)))
+            rows[words[0]].append(_numbers(words[1:], path, line, len(moving[words[0]].dof)))
     _check_frame(rows, frame, path, line)
-    require_frames(path, frame)
     return {name: np.array(values) for name, values in rows.items() if values}
 
 
-def _row(words: list[str], path: Path, line: int, count: int) -> list[float]:
-    """Read a line's finite numbers; like `_numbers`, but quick for the many lines of a motion."""
-    try:
-        values = list(map(float, words))
-    except ValueError:
-        values = []
-    if len(values) != count or not isfinite(sum(values)):
-        return list(_numbers(words, path, line, count))
-    return values
-
-
-def _check_frame(rows: dict[str, list[list[float]]], frame: int, path: Path, line: int) -> None:
+def _check_frame(rows: dict[str, list[Floats]], frame: int, path: Path, line: int) -> None:
     """Every bone that moved in frame 1, and the root, must move in every frame."""
     lacking = [name for name, values in rows.items() if len(values) != frame and (values or name == "root")]
     if lacking:

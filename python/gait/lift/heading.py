@@ -25,7 +25,7 @@ TURN_SD = 0.4  # radians from a start: half of what lies between two
 PASSES = 12
 SETTLED = 1e-4  # radians, and metres of the mean place, between passes
 FAR_SD = 100.0  # metres, of the place on the ground in the first pass
-HEIGHT_SD = 0.05  # metres, of the floor: a segment alone hangs less on it than a sequence
+ALONE_FLOOR_SD = 0.05  # metres: a segment alone hangs less on it than a sequence
 SAME = 0.2  # radians: explanations that are nearer are one
 
 #: Rows given a guess of the places (F, J, 3): `observe.perspective`, or `observe.orthographic` of any guess.
@@ -103,7 +103,7 @@ def _refined(
             heading=heading,
             at=at,
             ground_sd=ground_sd,
-            height_sd=HEIGHT_SD,
+            height_sd=ALONE_FLOOR_SD,
         )
         guess, first = gaussian.mean if places is None else places, len(gaussian.modes) - gaussian.rigid
         if free:

@@ -6,7 +6,8 @@ alone and mixed by triangular weights (Leventon and Freeman 1998).  segment: seg
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -135,6 +136,19 @@ def widened(prior: SegmentPrior, factor: float) -> SegmentPrior:
     )
 
 
+@contextmanager
+def _numbers_in_range() -> Iterator[None]:
+    """Unlike if numbers leave their range on the way."""
+    try:
+        yield
+    except np.linalg.LinAlgError:
+        raise Unlike(
+            "the tracks look like no motion that the model knows; check the camera, the points' names and "
+            "that v points down"
+        ) from None
+
+
+@_numbers_in_range()
 def _lift(
     prior: SegmentPrior,
     tracks: Tracks,
@@ -143,24 +157,7 @@ def _lift(
     grid: Grid,
     update: Callable[[int], None],
 ) -> Motion:
-    """Estimate all markers of a prior; Unlike if numbers leave their range on the way."""
-    try:
-        return _estimated(prior, tracks, view, options, grid, update)
-    except np.linalg.LinAlgError:
-        raise Unlike(
-            "the tracks look like no motion that the model knows; check the camera, the points' names and "
-            "that v points down"
-        ) from None
-
-
-def _estimated(
-    prior: SegmentPrior,
-    tracks: Tracks,
-    view: View,
-    options: Options,
-    grid: Grid,
-    update: Callable[[int], None],
-) -> Motion:
+    """Estimate all markers of a prior."""
     markers = prior.index(tracks.names)
     points = Observations(tracks.uv, tracks.deviations(options.pixel_sd))
     sampled = resampled(points, tracks.time, grid.time).among(markers, len(prior.names))

@@ -24,7 +24,7 @@ from gait.skeleton import axis_rotation
 Floats = npt.NDArray[np.float64]
 
 GROUND_SD = 10.0  # metres, of where somebody stands
-HEIGHT_SD = 0.03  # metres, of the floor's height
+FLOOR_SD = 0.03  # metres, of the floor's height
 LN10 = float(np.log(10))
 
 
@@ -63,7 +63,7 @@ def place(
     heading: float = 0.0,
     at: npt.ArrayLike = (0.0, 0.0),
     ground_sd: float = GROUND_SD,
-    height_sd: float = HEIGHT_SD,
+    height_sd: float = FLOOR_SD,
 ) -> Gaussian:
     """Put a component of the prior into the world; where it stands becomes three rigid modes.
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.lift.posterior import FLOOR_SD
+
 Floats = npt.NDArray[np.float64]
 
 METHODS = ("smooth", "blend", "segment")
@@ -32,7 +34,7 @@ class Options:
     method: str = "smooth"
     stature: float | None = None
     pixel_sd: float = 3.0
-    floor_sd: float = 0.03
+    floor_sd: float = FLOOR_SD
     contact: bool = True
     bones: bool = True
 
