@@ -105,9 +105,9 @@ def main() -> int:
         COLUMNS,
         rows,
         f"`gait learn` from start to end of the process, median of {RUNS} runs, nothing set aside for it on "
-        "the machine; wanted on two cores. Other CPUs are played by the kernels of OpenBLAS, numpy and libm that they choose; "
-        "the command makes all x86-64 take the same. Others, and other versions of these libraries, may "
-        "differ in the sixth decimal.",
+        "the machine; wanted on two cores. Other CPUs are played by the kernels of OpenBLAS, numpy and libm "
+        "that they choose; the command makes all x86-64 take the same. Others, and other versions of these "
+        "libraries, may differ in the sixth decimal.",
     )
     return 0 if all(row[5] != "NO" for row in rows) else 1
 
