@@ -81,7 +81,7 @@ static void read_pace(sections *r, gait_model *m)
     m->pace_series = sections_floats(r, "PACE", 2, dims);
     sections_require(r, m->stride_hz_sd > 0.0f, "PACE", "needs an sd of the stride rate in GAIT");
     sections_require(r, dims[0] % 2 == 1 && dims[0] < (uint32_t)m->phases, "PACE",
-                     "its rows are no Fourier series; learn the model again");
+                     "its rows are no Fourier series");
     for (int32_t c = 0; r->status == GAIT_OK && c < m->channels; c++) {
         float sum = 0.0f;
         for (uint32_t i = 0; i < dims[0]; i++)

@@ -10,6 +10,7 @@ import pytest
 
 import gait.cli
 from gait import blob, skeleton
+from gait.cli import info
 from gait.learn import fit, model, sources
 from gait.lift.prior import TAGS
 from gait.skeleton import ANGLES, CHANNELS, JOINTS
@@ -193,13 +194,13 @@ def test_people_get_a_few_lines_however_many_files(walks, tmp_path, capsys):
 
 def test_info_tells_what_was_learnt(learned, capsys):
     assert run("info", learned, "--json") == 0
-    info = json.loads(capsys.readouterr().out)
-    assert info["components"] == 3 and info["phases"] == fit.SAMPLES and len(info["joints"]) == 19
-    assert info["bytes"] == learned.stat().st_size
-    assert info["meta"]["subjects"] == ["01", "02", "03", "04"] and info["meta"]["activity"] == "walk"
+    told = json.loads(capsys.readouterr().out)
+    assert told["components"] == 3 and told["phases"] == fit.SAMPLES and len(told["joints"]) == 19
+    assert told["bytes"] == learned.stat().st_size
+    assert told["meta"]["subjects"] == ["01", "02", "03", "04"] and told["meta"]["activity"] == "walk"
     assert run("info", learned) == 0
     text = capsys.readouterr().out
-    assert info["crc32"] in text and model.CMU in text and "01_03" in text
+    assert told["crc32"] in text and model.CMU in text and "01_03" in text
 
 
 def test_an_activity_that_is_not_known_is_said(walks, tmp_path, capsys):
@@ -216,6 +217,12 @@ def test_people_without_arms_are_said(walks, tmp_path, capsys):
         (tmp_path / f"{'ab'[k]}_1.csv").write_text("\n".join(lines) + "\n")
     assert run("learn", tmp_path, "-o", tmp_path / "m.gait", "--components", 1) == 0
     assert "1 person never shows l_shoulder or r_shoulder: filled in from" in capsys.readouterr().err
+
+
+def test_columns_of_info_make_room_for_long_names():
+    rows = [["a_recording_of_a_long_name", 1100, 2.5, 40.0, 3.2], ["b", 990, 12.5, 9.0, None]]
+    lines = info.sequence_lines(rows)
+    assert len({len(line) for line in lines}) == 1 and lines[1].startswith("a_recording_of_a_long_name  ")
 
 
 def test_info_of_something_else_fails(tmp_path, capsys):

@@ -347,6 +347,13 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
         simulate(TINY, tmp_path / "taken")
 
 
+def test_a_model_that_cannot_be_walked_leaves_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "old.gait").write_bytes(b"no model")
+    with pytest.raises(UserError, match="old.gait"):
+        simulate(replace(TINY, gait=str(tmp_path / "old.gait")), tmp_path / "clip")
+    assert not (tmp_path / "clip").exists()
+
+
 def test_every_bone_and_point_hangs_together() -> None:
     seen: set[str] = set()
     for bone, parent in PARENTS.items():

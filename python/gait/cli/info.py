@@ -96,8 +96,9 @@ def text(name: str, s: Mapping[str, Any]) -> str:
 
 def sequence_lines(rows: list[list[Any]]) -> list[str]:
     """Table of sequences: rows of gait.learn.model.SEQUENCE_COLUMNS."""
-    lines = [f"{'sequence':12}{'period':>9}{'cycles':>8}{'sharpness':>11}{'residual':>10}"]
+    wide = max([11, *(len(row[0]) for row in rows)]) + 1
+    lines = [f"{'sequence':{wide}}{'period':>9}{'cycles':>8}{'sharpness':>11}{'residual':>10}"]
     for name, period, cycles, sharpness, residual in rows:
         rest = "-" if residual is None else f"{residual:.1f} deg"
-        lines.append(f"{name:12}{period:>6} ms{cycles:>8.1f}{sharpness:>11.0f}{rest:>10}")
+        lines.append(f"{name:{wide}}{period:>6} ms{cycles:>8.1f}{sharpness:>11.0f}{rest:>10}")
     return lines

@@ -62,8 +62,8 @@ def simulate(
     UserError
         If the folder cannot be written or the options contradict each other.
     """
-    target = _folder(folder)
     stage = set_stage(scenario)
+    target = _folder(folder)
     made = build_set(stage)
     events = find_events(stage)
     meta = describe(stage, made, events)
