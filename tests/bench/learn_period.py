@@ -90,7 +90,7 @@ def _noise(missing: float) -> list[Row]:
     rng = np.random.default_rng([3, int(100 * missing)])
     noise = g.remove_blocks(rng, rng.normal(size=(SERIES_FRAMES, SERIES)), missing)
     candidates, folder = np.arange(50, 251, 5), period.Folder(noise)
-    ratios = np.array([folder.literal(int(p)) for p in candidates])
+    ratios = folder.literal(candidates)
     mean = ratios.mean(axis=1)
     slope = 200 * float(np.polyfit(candidates, mean, 1)[0])
     degrees = np.isfinite(noise).sum(axis=0) - candidates[:, None]
@@ -110,7 +110,7 @@ def _sinusoid(job: tuple[int, float]) -> Row:
     p, amplitude = job
     frames, rng = 20 * p, np.random.default_rng([4, p])
     wave = amplitude * np.sin(2 * np.pi * np.arange(frames) / p)
-    found = period.Folder(wave[:, None] + rng.normal(size=(frames, 400))).literal(p).mean()
+    found = period.Folder(wave[:, None] + rng.normal(size=(frames, 400))).literal([p]).mean()
     error = found / (1 + frames * amplitude**2 / (2 * (p - 1))) - 1
     return _row("L4", f"p = {p}, amplitude {amplitude:g} sd", "error", error, "0 +- 0.03", abs(error) <= 0.03)
 

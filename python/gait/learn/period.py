@@ -8,6 +8,7 @@ regression. Signals are (T, A) with NaN for missing entries; periods are in fram
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,28 +64,38 @@ class Folder:
         mean = np.where(seen, signals, 0).sum(axis=0) / np.maximum(self.total, 1)
         values = np.where(seen, signals - mean, 0)
         self.squares = (values**2).sum(axis=0)
-        self.stacked = np.concatenate([values, seen.astype(float)], axis=1)
+        masks, self.mask = np.unique(seen, axis=1, return_inverse=True)  # mostly one for all angles
+        self.stacked = np.concatenate([values, masks.astype(float)], axis=1)
 
-    def literal(self, period: int) -> Floats:
-        """Ratio (A,) of folding at a whole number of frames (R1-R3); NaN if observations are too few."""
-        return self._anova(np.arange(len(self.stacked)) % period)
+    def literal(self, periods: npt.ArrayLike) -> Floats:
+        """Ratios (n, A) of folding at whole numbers of frames (R1-R3); NaN if observations are too few."""
+        frames = np.arange(len(self.stacked))
+        return self._anova(frames % period for period in np.asarray(periods, int))
 
-    def binned(self, period: float, bins: int) -> Floats:
-        """Signal-to-noise ratio (A,) with a fixed number of phase bins (R4)."""
-        phase = np.arange(len(self.stacked)) / period % 1.0
-        return self._anova(np.minimum((bins * phase).astype(int), bins - 1))
+    def binned(self, periods: npt.ArrayLike, bins: int) -> Floats:
+        """Signal-to-noise ratios (n, A) with a fixed number of phase bins (R4)."""
+        frames = np.arange(len(self.stacked))
+        phases = (frames / period % 1.0 for period in np.asarray(periods, float))
+        return self._anova(np.minimum((bins * phase).astype(int), bins - 1) for phase in phases)
 
-    def _anova(self, group: npt.NDArray[np.intp]) -> Floats:
+    def _anova(self, groupings: Iterable[npt.NDArray[np.intp]]) -> Floats:
         """Unbalanced one-way F per column: mean square between groups over mean square within."""
-        order = np.argsort(group, kind="stable")
-        starts = np.flatnonzero(np.diff(group[order], prepend=-1))
-        sums, counts = np.split(np.add.reduceat(self.stacked[order], starts), 2, axis=1)
-        groups = (counts > 0).sum(axis=0)
-        between = (sums**2 / np.maximum(counts, 1)).sum(axis=0)
+        folded = [self._folded(group) for group in groupings]
+        between = np.array([squares for squares, _ in folded]).reshape(len(folded), len(self.total))
+        groups = np.array([count for _, count in folded], int).reshape(between.shape)
         within = self.squares - between
         valid = (self.total - groups >= groups) & (groups > 1) & (within > 0)
         score = between / np.maximum(groups - 1, 1) * (self.total - groups) / np.where(within > 0, within, 1)
         return np.where(valid, score, np.nan)
+
+    def _folded(self, group: npt.NDArray[np.intp]) -> tuple[Floats, npt.NDArray[np.intp]]:
+        """Sum of squares between groups, and how many groups are seen, per column."""
+        size = np.bincount(group)
+        starts = (np.cumsum(size) - size)[size > 0]
+        rows = self.stacked[np.argsort(group, kind="stable")]
+        sums, counts = np.split(np.add.reduceat(rows, starts), [len(self.total)], axis=1)
+        between = (sums**2 / np.maximum(counts, 1)[:, self.mask]).sum(axis=0)
+        return between, np.count_nonzero(counts, axis=0)[self.mask]
 
 
 def patterns(signals: Floats) -> list[tuple[npt.NDArray[np.bool_], Floats]]:
@@ -150,11 +161,11 @@ def curves(
     candidates = np.arange(np.ceil(low - 1e-9), high + 0.1, 1.0 if literal else 0.5)
     folder, longest, bins = Folder(signals[:, moving]), len(signals) / CYCLES, _bins(low)
     ratios = np.full((len(candidates), signals.shape[1]), np.nan)
-    for row, p in zip(ratios, candidates, strict=True):
-        if literal:
-            row[moving] = folder.literal(int(p))
-        elif p <= longest:
-            row[moving] = folder.binned(p, bins)
+    if literal:
+        ratios[:, moving] = folder.literal(candidates)
+    else:
+        allowed = candidates <= longest
+        ratios[np.ix_(allowed, moving)] = folder.binned(candidates[allowed], bins)
     return candidates, ratios
 
 
@@ -208,9 +219,8 @@ def _divisor(folder: Folder, bins: int, signals: Floats, best: float, low: float
     Angles vote singly: in a sum of scores the trunk, which repeats every step, could outvote the legs, and a
     multiple fitted to a recording hardly longer than itself scores a quarter above the period (CMU 38_02).
     """
-    whole = folder.binned(best, bins)
-    for divisor in DIVISORS:
-        part = folder.binned(best / divisor, bins)
+    whole, *parts = folder.binned([best, *(best / divisor for divisor in DIVISORS)], bins)
+    for divisor, part in zip(DIVISORS, parts, strict=True):
         voting = np.isfinite(whole) & np.isfinite(part)
         allowing = (part >= DIVISOR_SCORE * whole)[voting]
         enough = 2 * len(allowing) > len(part) and allowing.mean() >= DIVISOR_ANGLES
