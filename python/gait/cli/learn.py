@@ -22,17 +22,13 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from gait import blob
-from gait.cli import learn_segments, segment_text, values
+from gait.cli import learn_segments, learn_text, values
 from gait.errors import UsageError
 from gait.files import require_folder, require_writable
-from gait.learn import activity, fit, ground, marker_map, model, segment_sections, sources, subjects, unseen
+from gait.learn import activity, fit, marker_map, model, segment_sections, sources, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
 from gait.learn.retarget import Measures
@@ -40,12 +36,10 @@ from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
 from gait.learn.stage import one_thread
 from gait.progress import progress
-from gait.skeleton import ANGLES
 
 NAME = "learn"
 HELP = "learn a cyclic model from motion capture"
 MOST_LINES = 20  # about files left out
-MOST_NAMES = 8  # of subjects
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -146,18 +140,9 @@ def run(args: argparse.Namespace) -> int:
         if wanted.source == "only":
             return learn_segments.write_alone(args, corpus, wanted, refused)
         learned = fit.fit(sequences, args.components, args.seed, args.prior, others)
-        if args.components is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS and not args.quiet:
-            print(_few(learned), file=sys.stderr)
-        if (parts := model.unobserved(learned)) and not args.quiet:
-            print(f"no recording shows {_words(parts)}: these stay in the rest pose", file=sys.stderr)
         if not args.quiet:
-            for words in _unsettled(learned):
-                print(words, file=sys.stderr)
-        if (some := _never_shown(learned)) and not args.quiet:
-            print(some, file=sys.stderr)
-        made_up = ground.unseen(learned.cycles.seen)
-        if made_up and not args.quiet:
-            print(_made_up(made_up), file=sys.stderr)
+            for note in learn_text.notes(learned, args.components):
+                print(note, file=sys.stderr)
         prior = learn_segments.learn(corpus, wanted, args.quiet)
         sections = model.sections(learned, args.activity, args.seed)
         data = blob.write(args.output, sections | (segment_sections.sections(prior) if prior else {}))
@@ -169,8 +154,8 @@ def run(args: argparse.Namespace) -> int:
             except BaseException:
                 print(f"{args.output}: the model is written; the report is not", file=sys.stderr)
                 raise
-    summary = _summary(learned, data, refused) | {"segments": segment_text.summary(prior) if prior else None}
-    print(json.dumps(summary) if args.json else _text(args.output, summary))
+    figures = learn_text.summary(learned, data, refused, prior)
+    print(json.dumps(figures) if args.json else learn_text.text(args.output, figures))
     return 0
 
 
@@ -254,106 +239,3 @@ def _tell(refused: list[str], quiet: bool, more: str) -> None:
         print(f"left out: {line}", file=sys.stderr)
     if len(refused) > MOST_LINES:
         print(f"left out: {len(refused) - MOST_LINES} more{more}", file=sys.stderr)
-
-
-def _summary(learned: fit.Learned, data: bytes, refused: list[str]) -> dict[str, Any]:
-    """Figures of what was learnt."""
-    rate, rate_sd, variation, length, length_sd, fps = model.gait_statistics(learned)[:6].tolist()
-    residual = learned.residuals.rms(columns=slice(len(ANGLES)))
-    table = model.sequence_table(learned)
-    return {
-        "bytes": len(data),
-        "crc32": f"{blob.checksum(data):08x}",
-        "subjects": learned.subjects,
-        "sequences": [
-            dict(zip(model.SEQUENCE_COLUMNS, row, strict=True)) | _found(sequence)
-            for row, sequence in zip(table, learned.sequences, strict=True)
-        ],
-        "left_out": refused,
-        "cycles": len(learned.components.scores),
-        "components": len(learned.components.sd),
-        "variance_explained": np.cumsum(learned.components.spectrum)[: len(learned.components.sd)].tolist(),
-        "residual_deg": float(np.degrees(residual)),
-        "held_out": learned.held_out.tolist(),
-        "stride_hz": [rate, rate_sd],
-        "stride_time_cv": variation,
-        "stride_length_statures": [length, length_sd],
-        "fps": fps,
-        "alignment": learned.alignment.objective,
-        "imputation": learned.components.rmse,
-        "imputation_objective": learned.components.objective,
-    }
-
-
-def _unsettled(learned: fit.Learned) -> Iterator[str]:
-    """Say what stopped before nothing was left to gain."""
-    stages = (
-        ("alignment", learned.alignment, "leave out recordings unlike the others"),
-        ("filling of gaps", learned.components, "add recordings or ask for fewer --components"),
-    )
-    for name, part, remedy in stages:
-        if not part.converged:
-            yield f"the {name} did not converge in {len(part.objective)} passes; {remedy}"
-
-
-def _never_shown(learned: fit.Learned) -> str:
-    """Say how many people lack parts that others show; nothing if nobody does."""
-    people, channels = unseen.never_shown(learned.cycles.mask, learned.row_subject)
-    if not (names := model.parts(channels)):
-        return ""
-    shows = "person never shows" if people == 1 else "people never show"
-    return f"{people} {shows} {_words(names)}: filled in from the others"
-
-
-def _made_up(channels: list[str]) -> str:
-    return f"no recording shows {' or '.join(channels)}: taken from the motion of the legs"
-
-
-def _few(learned: fit.Learned) -> str:
-    """Say why there are fewer components than usual."""
-    cycles, kept = len(learned.components.scores), len(learned.components.sd)
-    return f"{cycles} cycles allow {_count(kept, 'component')} instead of {fit.DEFAULT_COMPONENTS}"
-
-
-def _found(s: Sequence) -> dict[str, Any]:
-    """Where a sequence comes from and why it was taken."""
-    return {
-        "subject": s.subject,
-        "source": str(s.source),
-        "fps": s.fps,
-        "kept": list(s.kept),
-        "cut": list(s.cut),
-        "activity": s.verdict.activity,
-        "evidence": {e.name: round(e.value, 4) if np.isfinite(e.value) else None for e in s.verdict.evidence},
-    }
-
-
-def _text(path: str, s: dict[str, Any]) -> str:
-    """Lay the figures out for people."""
-    explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
-    left = f"; {_count(len(s['left_out']), 'file')} left out" if s["left_out"] else ""
-    lines = [
-        f"{_count(len(s['sequences']), 'sequence')} of {_count(len(s['subjects']), 'subject')} "
-        f"({_listed(s['subjects'])}), "
-        f"{_count(s['cycles'], 'cycle')}{left}",
-        f"{s['stride_hz'][0]:.2f} strides/s, stride length {s['stride_length_statures'][0]:.2f} statures",
-        f"{_count(s['components'], 'component')}: {explained} % of the variance; "
-        f"residual {s['residual_deg']:.1f} deg",
-        *([segment_text.text(s["segments"])] if s["segments"] else []),
-        f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
-    ]
-    return "\n".join(lines)
-
-
-def _words(names: list[str]) -> str:
-    """Join names as in a sentence."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
-
-
-def _listed(names: list[str]) -> str:
-    """Name the first few."""
-    return " ".join(names[:MOST_NAMES]) + (" ..." if len(names) > MOST_NAMES else "")
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
