@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import subspace_angles
 
-from gait.learn import prior
+from gait.learn import prior, singular
 from gait.learn.fourier import decode, encode, fourier_basis
 from gait.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
 
@@ -130,6 +130,24 @@ def test_static_spread_is_what_others_do_not_explain():
     assert np.delete(spread, knees).max() < 0.01
     everybody = rows + 0.3 * (rng.normal(size=people)[subject] > 0)[:, None, None] * (np.arange(30) == 0)
     assert prior.static_spread(everybody, subject, 4, PLAIN)[0] < 1e-6
+
+
+@pytest.mark.parametrize("rows", [10, 40, 200], ids=["few", "more", "many"])
+def test_leading_directions_are_those_of_the_whole_decomposition(rows):
+    rng = np.random.default_rng(8)
+    data, factor = rng.normal(size=(rows, 60)) * 0.8 ** np.arange(60), rng.uniform(0.5, 2.0, rows)
+    factor[0] = 0
+    mean = data.mean(axis=0)
+    right = np.linalg.svd((data - mean) * factor[:, None], full_matrices=False)[2]
+    found = singular.leading(data, mean, factor, 5)
+    assert found.shape == (5, 60)
+    assert np.abs(np.sum(found * right[:5], axis=1)) == pytest.approx(1, abs=1e-12)
+
+
+def test_leading_directions_of_rows_that_hardly_vary_are_fewer():
+    data = np.outer(np.arange(6.0), np.ones(40)) + np.outer([0, 0, 0, 0, 0, 1.0], np.arange(40))
+    assert singular.leading(data, data[0], np.ones(6), 4).shape == (2, 40)
+    assert singular.leading(data[:1], data[0], np.ones(1), 4).shape == (0, 40)
 
 
 def test_static_spread_of_too_few_people_is_zero():

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
 from gait.learn.fpca import Components
-from gait.learn.singular import right_singular
+from gait.learn.singular import leading, right_singular
 from gait.learn.spool import by_rows
 from gait.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 
@@ -142,7 +142,7 @@ def static_spread(filled: Floats, subject: Groups, count: int, metric: Floats) -
         weight = np.where(image == held, 0.0, 1 / np.bincount(subject)[image])
         weight /= weight.sum()
         mean = weight @ coded
-        right = right_singular(coded, mean, np.sqrt(weight))[1][:count].copy()
+        right = leading(coded, mean, np.sqrt(weight), count)
         # The mean over a cycle is its first coefficient, and the residual of the mean that of the cycles.
         rest = coded[: len(subject)][subject == held].mean(axis=0) - mean
         rest -= (right @ rest) @ right

@@ -10,6 +10,8 @@ from gait.learn.spool import by_rows
 
 Floats = npt.NDArray[np.float64]
 
+LEAST = 1e-14  # of the largest squared singular value: what is smaller is rounding
+
 
 def right_singular(rows: Floats, mean: Floats, factor: Floats | None = None) -> tuple[Floats, Floats]:
     """Decompose rows (R, P) minus their mean, each times its factor (R,), without the left vectors.
@@ -35,3 +37,17 @@ def right_singular(rows: Floats, mean: Floats, factor: Floats | None = None) -> 
         gram += some.T @ some
     squares, vectors = scipy.linalg.eigh(gram.T, overwrite_a=True, check_finite=False)
     return np.sqrt(np.maximum(squares[::-1][:fewer], 0)), vectors[:, ::-1].T
+
+
+def leading(rows: Floats, mean: Floats, factor: Floats, count: int) -> Floats:
+    """Give the first right singular vectors (<= count, P) alone; of few rows by the products of those.
+
+    Directions in which the rows do not vary are left out.
+    """
+    if 2 * len(rows) > rows.shape[1]:
+        return right_singular(rows, mean, factor)[1][:count]
+    some = (rows - mean) * factor[:, None]
+    first = max(len(rows) - count, 0)
+    squares, left = scipy.linalg.eigh(some @ some.T, subset_by_index=(first, len(rows) - 1))
+    kept = squares > LEAST * squares[-1]
+    return np.asarray(((left[:, kept] / np.sqrt(squares[kept])).T @ some)[::-1])
