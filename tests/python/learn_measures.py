@@ -40,4 +40,4 @@ def gauge_free(found, true, periods):
 def falls(objective):
     """Whether an objective never rises by more than rounding."""
     values = np.array(objective)
-    return bool(np.all(np.diff(values) <= ROUNDING * values[:-1]))
+    return bool(np.all(np.diff(values) <= ROUNDING * np.abs(values[:-1])))

@@ -4,6 +4,7 @@ import gait_generator as g
 import learn_cases as cases
 import numpy as np
 import pytest
+from learn_measures import falls
 
 from gait.learn import bayes, cycles, fpca, impute
 from gait.learn.fourier import HARMONICS
@@ -11,12 +12,6 @@ from gait.learn.model import anova
 from gait.learn.rank import LARGEST, choose
 
 METHODS = sorted(fpca.METHODS)
-
-
-def falls(objective):
-    """Whether it never rises by more than rounding."""
-    values = np.array(objective)
-    return bool(np.all(np.diff(values) <= impute.ROUNDING * np.abs(values[:-1])))
 
 
 @pytest.fixture(

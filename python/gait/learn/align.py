@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from gait.learn.fourier import first_harmonic
 from gait.learn.periodic import Curve
 from gait.learn.shift import BINS, Shift
 from gait.skeleton import ANGLES
@@ -76,8 +77,8 @@ class _Problem:
             return offsets
         right, left = self.hips
         total = sum(
-            s.first_harmonic(z[:, right] - z[:, left], offset)
-            for s, z, offset in zip(self.sequences(), self.signals, offsets, strict=True)
+            first_harmonic(z[:, right] - z[:, left], float(period), float(offset))
+            for z, period, offset in zip(self.signals, self.periods, offsets, strict=True)
         )
         return np.asarray((offsets - np.angle(total) / (2 * np.pi) * self.periods) % self.periods)
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline
 
+from gait.learn.patterns import same_columns
 from gait.learn.spool import release, stored
 
 Floats = npt.NDArray[np.float64]
@@ -92,7 +93,7 @@ def fewest(z: Floats, period: float, samples: int) -> int:
     channels, reach = int(seen.any(axis=0).sum()), max(BRACKET / INTERVALS, NEXT / period)
     grid = np.arange(-samples, (int(np.ceil(u[-1])) + 1) * samples) / samples
     entries = np.zeros(len(grid))
-    for columns in _same_columns(seen):
+    for columns in same_columns(seen):
         if seen[:, columns[0]].any():
             entries += len(columns) * _bracketed(grid, u[seen[:, columns[0]]], reach)
     total = np.concatenate([[0.0], np.cumsum(entries)])
@@ -128,7 +129,7 @@ def resample(u: Floats, z: Floats, samples: int, interval: float = 0.0) -> tuple
         return values, mask
     basis, at_grid = _basis(u, margin), _basis(grid, margin)
     seen = np.isfinite(z)
-    for columns in _same_columns(seen):
+    for columns in same_columns(seen):
         rows = seen[:, columns[0]]
         if rows.sum() < 4:
             continue
@@ -149,14 +150,6 @@ def _penalty(x: Floats) -> Floats:
     difference = np.diff(np.eye(x.shape[1]), 2, axis=0)
     gram = difference.T @ difference
     return gram * (PENALTY * float(np.sum(x**2)) / np.trace(gram)) + 1e-10 * np.eye(x.shape[1])
-
-
-def _same_columns(seen: Mask) -> list[list[int]]:
-    """Columns grouped by their pattern of observed rows."""
-    groups: dict[bytes, list[int]] = {}
-    for k, column in enumerate(seen.T):
-        groups.setdefault(column.tobytes(), []).append(k)
-    return list(groups.values())
 
 
 def _bracketed(grid: Floats, u: Floats, reach: float) -> Mask:

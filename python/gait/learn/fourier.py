@@ -10,6 +10,7 @@ from gait.learn.spool import by_rows
 Floats = npt.NDArray[np.float64]
 
 HARMONICS = 19
+FEWEST = 4  # samples: one more than a constant, a cosine and a sine
 
 
 def fourier_basis(samples: int, harmonics: int = HARMONICS) -> Floats:
@@ -36,3 +37,27 @@ def encode_all(curves: Floats, basis: Floats) -> Floats:
 def decode(coded: Floats, basis: Floats, channels: int) -> Floats:
     """Fourier coefficients (n, B M) to curves (n, T, M)."""
     return np.matmul(basis.T, coded.reshape(len(coded), len(basis), channels))
+
+
+def first_harmonic(signal: Floats, period: float, offset: float = 0.0) -> complex:
+    """Complex amplitude of a signal (T,) at one cycle per period, by least squares with a constant.
+
+    Parameters
+    ----------
+    signal : (T,)
+        NaN where missing.
+    period, offset : float
+        Frames; the cycle begins at `offset`.
+
+    Returns
+    -------
+    complex
+        0 if hardly anything is seen.
+    """
+    seen = np.flatnonzero(np.isfinite(signal))
+    if len(seen) < FEWEST:
+        return 0j
+    angle = 2 * np.pi * (seen - offset) / period
+    design = np.stack([np.ones(len(seen)), np.cos(angle), np.sin(angle)], axis=1)
+    _, cosine, sine = np.linalg.lstsq(design, signal[seen], rcond=None)[0]
+    return complex(cosine, -sine)

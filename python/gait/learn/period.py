@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.learn.patterns import same_columns
+
 Floats = npt.NDArray[np.float64]
 
 BINS = 50
@@ -101,11 +103,8 @@ class Folder:
 def patterns(signals: Floats) -> list[tuple[npt.NDArray[np.bool_], Floats]]:
     """Columns grouped by which rows are observed: (rows (T,), centred values of the group)."""
     seen = np.isfinite(signals)
-    groups: dict[bytes, list[int]] = {}
-    for k, column in enumerate(seen.T):
-        groups.setdefault(column.tobytes(), []).append(k)
     result = []
-    for columns in groups.values():
+    for columns in same_columns(seen):
         rows = seen[:, columns[0]]
         values = signals[rows][:, columns]
         result.append((rows, values - values.mean(axis=0)))

@@ -80,13 +80,3 @@ class Shift:
             cost, best = min(options)
             step /= 4 if abs(shift) < step else 1.5
         return best % self.period
-
-    def first_harmonic(self, signal: Floats, offset: float) -> complex:
-        """Complex amplitude of the first harmonic of a signal (T,), by least squares with a constant."""
-        seen = np.isfinite(signal)
-        if seen.sum() < 4:
-            return 0j
-        angle = 2 * np.pi * (self.time[seen] - offset) / self.period
-        design = np.stack([np.ones(len(angle)), np.cos(angle), np.sin(angle)], axis=1)
-        weights = np.linalg.lstsq(design, signal[seen], rcond=None)[0]
-        return complex(weights[1], -weights[2])

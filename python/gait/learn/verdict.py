@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.learn.activity import NAMES, Footing
+from gait.learn.fourier import first_harmonic
 from gait.learn.period import CYCLES, Period
 from gait.skeleton import ANGLES, SIDES
 
@@ -163,23 +164,12 @@ def legs(angles: Floats, period: float) -> float:
     limp.  NaN if nothing moves or is seen.
     """
     left, right = (
-        np.array([_first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in SWING])
+        np.array([first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in SWING])
         for s in SIDES
     )
     products = left * right.conj()
     scale = float(np.abs(products).sum())
     return -float(products.real.sum()) / scale if scale > 0 else float("nan")
-
-
-def _first_harmonic(signal: Floats, period: float) -> complex:
-    """Complex amplitude of a signal (T,) at one cycle per period, by least squares; 0 if little is seen."""
-    seen = np.flatnonzero(np.isfinite(signal))
-    if len(seen) < 3:
-        return 0j
-    angle = 2 * np.pi * seen / period
-    design = np.stack([np.ones(len(seen)), np.cos(angle), np.sin(angle)], axis=1)
-    _, cosine, sine = np.linalg.lstsq(design, signal[seen], rcond=None)[0]
-    return complex(cosine, -sine)
 
 
 def _about_mean(values: Floats) -> Floats:
