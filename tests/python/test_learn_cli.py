@@ -164,6 +164,7 @@ def test_json_says_of_each_sequence_where_it_is_from_and_why_it_was_taken(walks,
         )
         assert 0 <= s["kept"][0] < s["kept"][1] <= 420 and len(s["cut"]) == 2
         assert s["evidence"]["repeats"] > 0.75 and s["activity"] in ("walk", "")
+        assert s["snr"] > s["sharpness"] > 3
 
 
 def test_a_stand_before_the_walk_is_cut_off_unless_no_trim_keeps_it(tmp_path, capsys):

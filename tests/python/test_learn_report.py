@@ -93,7 +93,7 @@ def test_the_page_holds_everything_and_needs_nothing(walks, tmp_path, capsys):
     assert (
         {link.removeprefix("#") for link in page.links} == set(page.ids) == stems | {"sequences", "left-out"}
     )
-    assert page.cells == 9 * 6 and sum("02_99.amc:3" in t for t in page.texts) == 1
+    assert page.cells == 10 * 6 and sum("02_99.amc:3" in t for t in page.texts) == 1
     assert any("mocap.cs.cmu.edu" in t for t in page.texts)
 
 
@@ -103,6 +103,7 @@ def test_the_table_says_what_was_cut_and_why_a_sequence_was_taken(learned):
     page = Page(report._sequences(odd))
     assert "120 to 399 (before: it stands <still>)" in page.texts
     assert any("repeats 0.9" in t or "repeats 1" in t for t in page.texts)
+    assert "SNR" in page.texts and f"{np.nanmax(first.period.scores):.0f}" in page.texts
 
 
 def test_the_ratio_peaks_at_the_period_and_noise_is_flat(learned):
@@ -192,7 +193,7 @@ def test_odd_input_gives_a_report_too(sequences, tmp_path, make):
     report.write(tmp_path, odd, "walk & run", [])
     page = Page((tmp_path / "index.html").read_text())
     assert "Cyclic model of walk & run" in page.texts and "left-out" not in page.ids
-    assert len(page.pictures) >= 10 and page.cells == 9 * len(odd.sequences)
+    assert len(page.pictures) >= 10 and page.cells == 10 * len(odd.sequences)
     assert ("subjects" in page.ids) == (make is lower_body)
     texts = [t.get_text() for axes in figures_cycle.cycles(odd).axes for t in axes.texts]
     unseen = [name for name in SHOWN if not odd.cycles.mask[:, :, column(name)].any()]

@@ -57,6 +57,7 @@ def _found(s: Sequence) -> dict[str, Any]:
         "fps": s.fps,
         "kept": list(s.kept),
         "cut": list(s.cut),
+        "snr": round(s.period.peak, 1),
         "activity": s.verdict.activity,
         "evidence": {e.name: round(e.value, 4) if np.isfinite(e.value) else None for e in s.verdict.evidence},
     }

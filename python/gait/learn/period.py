@@ -50,6 +50,11 @@ class Period:
     scores: Floats
     sharpness: float
 
+    @property
+    def peak(self) -> float:
+        """Best score."""
+        return float(np.nanmax(self.scores))
+
 
 class Folder:
     """Signals prepared for folding at many periods.

@@ -26,7 +26,7 @@ td { vertical-align: top; font-variant-numeric: tabular-nums; } .n { text-align:
 td.w { font-size: 85%; color: #555; } .wide { overflow-x: auto; }
 """
 DPI = 110
-RIGHT = ("period, ms", "cycles", "sharpness", "residual, °")  # columns of numbers
+RIGHT = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")  # columns of numbers
 
 
 def write(folder: Path, learned: Learned, activity: str, refused: list[str], quiet: bool = True) -> None:
@@ -113,8 +113,10 @@ def _sequences(learned: Learned) -> str:
         for row in rows
     )
     return (
-        '<h2 id="sequences">Sequences</h2><p>Sharpness: largest over median ratio of the period. Residual: '
-        "what the components leave of the sequence, rms of all its angles. Evidence: repeats: correlation "
+        '<h2 id="sequences">Sequences</h2><p>SNR: best signal-to-noise ratio of all periods tried, summed over '
+        "the angles that move; it grows with the cycles and angles seen, so compare it with other periods of the "
+        "same row, not with other rows. Sharpness: SNR over the median of all periods tried. Residual: what the "
+        "components leave of the sequence, rms of all its angles. Evidence: repeats: correlation "
         "with the next cycle; legs: of each leg with the other half a cycle later; flight: share "
         "of the time with both feet off the ground; lift and steps: rise of the feet and of the ground, "
         "statures; ahead: cosine of the angle between where the pelvis faces and where it goes.</p>"
@@ -138,6 +140,7 @@ def _row(s: Sequence, found: list[object]) -> list[str]:
         s.subject,
         str(period),
         str(cycles),
+        f"{s.period.peak:.0f}",
         str(sharpness),
         "-" if residual is None else str(residual),
         f"{s.kept[0]} to {s.kept[1] - 1}" + (f" ({cut})" if cut else ""),
