@@ -16,7 +16,7 @@ import table
 
 from gait import blob
 from gait.errors import UserError
-from gait.learn import fit, model, pace
+from gait.learn import between, fit, model, pace
 from gait.learn.fourier import HARMONICS
 from gait.learn.sequence import load
 from gait.learn.stage import one_thread
@@ -45,7 +45,7 @@ def distance(learned: fit.Learned, one: Floats, other: Floats) -> float:
     """Root mean square distance of the points about the pelvis, mm, of two stretches of channels (n, M)."""
     sections = default_skeleton(learned.proportions).sections()
     off = points(sections, one) - points(sections, other)
-    return 1000 * model.ADULT_STATURE[0] * float(np.sqrt(np.mean(np.sum(off**2, axis=-1))))
+    return 1000 * between.ADULT_STATURE[0] * float(np.sqrt(np.mean(np.sum(off**2, axis=-1))))
 
 
 def main() -> int:

@@ -13,6 +13,7 @@ import gait.cli
 from gait.learn import figures_cycle, figures_model, figures_period, figures_subject, fit, report, sources
 from gait.learn.figures_base import SHOWN, column
 from gait.learn.stage import one_thread
+from gait.learn.subject_residuals import subject_residuals
 from gait.skeleton import ANGLES, CHANNELS
 
 
@@ -95,6 +96,8 @@ def test_the_page_holds_everything_and_needs_nothing(walks, tmp_path, capsys):
     )
     assert page.cells == 10 * 6 and sum("02_99.amc:3" in t for t in page.texts) == 1
     assert any("mocap.cs.cmu.edu" in t for t in page.texts)
+    assert [row["subject"] for row in summary["by_subject"]] == summary["subjects"]
+    assert all(row["left_out_mm"] > row["learnt_from_mm"] > 0 for row in summary["by_subject"])
 
 
 def test_the_table_says_what_was_cut_and_why_a_sequence_was_taken(learned):
@@ -163,8 +166,29 @@ def test_names_in_the_map_do_not_lie_over_each_other(cycles, named):
 
 
 def test_a_subject_left_out_is_followed_less_well(learned):
-    within, without = figures_subject.errors(learned).axes[0].lines
-    assert np.all(np.asarray(without.get_xdata()) > np.asarray(within.get_xdata()))
+    for axes in figures_subject.errors(learned).axes:
+        within, without = (np.asarray(line.get_xdata()) for line in axes.lines)
+        assert np.all(without > within) and np.all(within > 0)
+
+
+def test_residuals_in_millimetres_are_those_of_the_joints(learned):
+    """A knee bent too little by a known angle moves the ankle by the shank times that angle."""
+    values = np.repeat(learned.curves[:1], 6, axis=0)
+    subject = np.repeat([0, 1, 2], 2)
+    knee = CHANNELS.index("r_knee_flexion")
+    values[subject == 2, :, knee] += 0.01
+    mask = np.ones(values.shape, bool)
+    body = learned.proportions
+    found = subject_residuals(values, mask, learned.scale, subject, 0, body)
+    off = np.array([0.01 / 3, 0.01 / 3, 0.02 / 3])  # from the mean of all
+    assert found.degrees[0] == pytest.approx(np.degrees(off / np.sqrt(len(ANGLES))))
+    assert found.millimetres[0] == pytest.approx(1700 * body.shank * off / 14, rel=1e-4)
+    assert found.degrees[1] == pytest.approx(
+        np.degrees(np.array([0.005, 0.005, 0.01]) / np.sqrt(len(ANGLES)))
+    )
+    mask[subject == 2, :, knee] = False
+    blind = subject_residuals(values, mask, learned.scale, subject, 0, body)
+    assert np.isnan(blind.millimetres[:, 2]).all() and np.isfinite(blind.degrees).all()
 
 
 def one_file(sequences):

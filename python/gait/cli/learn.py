@@ -154,7 +154,7 @@ def run(args: argparse.Namespace) -> int:
             except BaseException:
                 print(f"{args.output}: the model is written; the report is not", file=sys.stderr)
                 raise
-    figures = learn_text.summary(learned, data, refused, prior)
+    figures = learn_text.summary(learned, data, refused, prior, bool(args.report))
     print(json.dumps(figures) if args.json else learn_text.text(args.output, figures))
     return 0
 

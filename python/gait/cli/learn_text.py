@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gait import blob
 from gait.cli import segment_text
@@ -14,13 +15,15 @@ from gait.learn.sequence import Sequence
 from gait.lift.prior import SegmentPrior
 from gait.skeleton import ANGLES
 
+Floats = npt.NDArray[np.float64]
+
 MOST_NAMES = 8  # of subjects
 
 
 def summary(
-    learned: fit.Learned, data: bytes, refused: list[str], prior: SegmentPrior | None
+    learned: fit.Learned, data: bytes, refused: list[str], prior: SegmentPrior | None, report: bool
 ) -> dict[str, Any]:
-    """Figures of what was learnt and written; of the prior over segments too if there is one."""
+    """Figures of what was learnt and written; beside a report those of the subjects too."""
     rate, rate_sd, variation, length, length_sd, fps = model.gait_statistics(learned)[:6].tolist()
     residual = learned.residuals.rms(columns=slice(len(ANGLES)))
     table = model.sequence_table(learned)
@@ -46,6 +49,7 @@ def summary(
         "imputation": learned.components.rmse,
         "imputation_objective": learned.components.objective,
         "segments": segment_text.summary(prior) if prior else None,
+        **({"by_subject": _by_subject(learned)} if report else {}),
     }
 
 
@@ -63,6 +67,24 @@ def _found(s: Sequence) -> dict[str, Any]:
     }
 
 
+def _by_subject(learned: fit.Learned) -> list[dict[str, Any]]:
+    """Residuals with each subject among those learnt from and left out; nobody if they were not computed."""
+    if (found := learned.by_subject) is None:
+        return []
+    columns = {
+        "subject": learned.subjects,
+        "learnt_from_deg": _rounded(found.degrees[0]),
+        "left_out_deg": _rounded(found.degrees[1]),
+        "learnt_from_mm": _rounded(found.millimetres[0]),
+        "left_out_mm": _rounded(found.millimetres[1]),
+    }
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _rounded(values: Floats) -> list[float | None]:
+    return [round(v, 2) if np.isfinite(v) else None for v in values.tolist()]
+
+
 def text(path: str, s: dict[str, Any]) -> str:
     """Lay the figures out for people."""
     explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
@@ -74,10 +96,20 @@ def text(path: str, s: dict[str, Any]) -> str:
         f"{s['stride_hz'][0]:.2f} strides/s, stride length {s['stride_length_statures'][0]:.2f} statures",
         f"{_count(s['components'], 'component')}: {explained} % of the variance; "
         f"residual {s['residual_deg']:.1f} deg",
+        *_left_out(s.get("by_subject", [])),
         *([segment_text.text(s["segments"])] if s["segments"] else []),
         f"{path}: {s['bytes']} bytes, checksum {s['crc32']}",
     ]
     return "\n".join(lines)
+
+
+def _left_out(rows: list[dict[str, Any]]) -> list[str]:
+    """Medians of the residuals of subjects left out; nothing if some have none."""
+    units = {"left_out_deg": "{:.1f} deg", "left_out_mm": "{:.0f} mm of joint position"}
+    if not rows or any(row[name] is None for row in rows for name in units):
+        return []
+    found = [words.format(np.median([row[name] for row in rows])) for name, words in units.items()]
+    return [f"residual of a subject left out: {', '.join(found)} (median)"]
 
 
 def notes(learned: fit.Learned, wanted: int | str | None) -> Iterator[str]:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 RATE_SD, LENGTH_SD = 0.07, 0.06  # of stride rate and length among people who walk as they like: share of mean
+ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not a training set's
 ENOUGH = 3  # subjects that tell for themselves how people differ
 LEAST_SD = 0.01  # share of the mean: even recordings that are all alike leave a doubt
 

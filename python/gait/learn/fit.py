@@ -13,6 +13,7 @@ from gait.errors import UserError
 from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget, unseen
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
+from gait.learn.subject_residuals import SubjectResiduals, subject_residuals
 from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
@@ -112,6 +113,12 @@ class Learned:
             rest = np.where(mask[part], values[part] - told, 0.0)
             squares[part] = np.sum(rest**2, axis=1)
         return Residuals(squares, mask.sum(axis=1))
+
+    @cached_property
+    def by_subject(self) -> SubjectResiduals | None:
+        """What is left of each subject; None if they are too few or too many.  It costs a fit for each."""
+        values, mask, components = self.cycles.values, self.cycles.mask, len(self.components.sd)
+        return subject_residuals(values, mask, self.scale, self.row_subject, components, self.proportions)
 
     @property
     def row_subject(self) -> npt.NDArray[np.intp]:

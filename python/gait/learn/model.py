@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from gait import blob
 from gait._version import __version__
-from gait.learn.between import LENGTH_SD, RATE_SD, by_subject
+from gait.learn.between import ADULT_STATURE, LENGTH_SD, RATE_SD, by_subject
 from gait.learn.fit import Learned
 from gait.learn.pace import TERMS
 from gait.learn.rounded import rounded
@@ -25,7 +25,6 @@ Floats = npt.NDArray[np.float64]
 #: What META tells of a large corpus: so many rows of a table, and so many characters of a name, as JSON.
 MOST_ROWS, MOST_NAME = 12, 32
 GENERATOR = f"gait {__version__}"
-ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not this training set
 CMU = (
     "The data used in this project was obtained from mocap.cs.cmu.edu. "
     "The database was created with funding from NSF EIA-0196217."
