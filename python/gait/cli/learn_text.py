@@ -10,6 +10,7 @@ import numpy as np
 from gait import blob
 from gait.cli import segment_text
 from gait.learn import fit, ground, model, unseen
+from gait.learn.model_options import DEFAULT_COMPONENTS
 from gait.learn.sequence import Sequence
 from gait.lift.prior import SegmentPrior
 from gait.skeleton import ANGLES
@@ -82,7 +83,7 @@ def text(path: str, s: dict[str, Any]) -> str:
 
 def notes(learned: fit.Learned, wanted: int | str | None) -> Iterator[str]:
     """Say what a user should know of what was learnt and might not expect; `wanted` are the components."""
-    if wanted is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS:
+    if wanted is None and len(learned.components.sd) < DEFAULT_COMPONENTS:
         yield _few(learned)
     if parts := model.unobserved(learned):
         yield f"no recording shows {_words(parts)}: these stay in the rest pose"
@@ -95,7 +96,7 @@ def notes(learned: fit.Learned, wanted: int | str | None) -> Iterator[str]:
 def _few(learned: fit.Learned) -> str:
     """Say why there are fewer components than usual."""
     cycles, kept = len(learned.components.scores), len(learned.components.sd)
-    return f"{cycles} cycles allow {_count(kept, 'component')} instead of {fit.DEFAULT_COMPONENTS}"
+    return f"{cycles} cycles allow {_count(kept, 'component')} instead of {DEFAULT_COMPONENTS}"
 
 
 def _unsettled(learned: fit.Learned) -> Iterator[str]:
