@@ -109,7 +109,7 @@ def models(clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], N
 def _learning_key() -> str:
     """Digest of the sources that learning uses and of the names and sizes of the data."""
     package = ROOT / "python" / "gait"
-    others = ("skeleton.py", "blob.py", "pace.py", "kernels.py", "cli/learn.py")
+    others = ("skeleton.py", "blob.py", "pace.py", "kernels.py", "cli/learn.py", "cli/learn_run.py")
     digest = hashlib.sha256()
     for path in sorted([*package.glob("learn/**/*.py"), *(package / name for name in others)]):
         digest.update(path.read_bytes())

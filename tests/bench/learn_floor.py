@@ -26,6 +26,7 @@ import table
 
 from gait.errors import UserError
 from gait.learn import cycles, fit, fpca, model, pace, prior, retarget, subjects
+from gait.learn.model_options import DEFAULT_COMPONENTS
 from gait.learn.sequence import Sequence, level_body, load
 from gait.learn.stage import one_thread_for_good
 from gait.pace import series
@@ -37,7 +38,7 @@ Sections = dict[str, Any]
 Bodies = list[retarget.Measures]
 Project = Callable[[floor_fit.Walk, Sections], floor_fit.Found]
 
-PAPER, OURS, MOST = 5, fit.DEFAULT_COMPONENTS, 12  # components; MOST: dimensions of a particle for its shape
+PAPER, OURS, MOST = 5, DEFAULT_COMPONENTS, 12  # components; MOST: dimensions of a particle for its shape
 MEAN, SHIPPED, OWN = "mean of the learners", "as shipped", "own"  # bodies
 JOINTS, ANGLES = "joints", "angles"  # what the projection makes small
 PROJECT: dict[str, Project] = {JOINTS: floor_fit.in_joints, ANGLES: floor_fit.in_angles}

@@ -37,6 +37,7 @@ FPS = 120.0
 MOCAP = Path(__file__).resolve().parents[2] / "../shared/data/mocap"
 TRUE = (61.7, 80.3, 126.4, 240.2)
 LENGTHS = {600: 20, 1500: 16, 5000: 8}  # frames to runs for each period
+JITTER, JITTERED = 0.02, (126.4, 1500, 100)  # share of the stride's time; period, frames, runs
 MULTIPLES = 1000
 SERIES, SERIES_FRAMES = 1000, 1500
 STYLES = (0.0, 2.0, 4.0)  # degrees
@@ -44,6 +45,7 @@ ALIGNMENTS = 334  # for each of the styles
 GAUGES = 10
 ADDED = (0.123456, 0.25, 0.5)  # cycles, to all phases
 HIPS = (7, 15)  # right and left hip flexion of the generator
+BY_STYLE = "L5 by style"  # told, not judged
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 
 
@@ -53,6 +55,15 @@ def _period(job: tuple[float, int, int, str]) -> float:
     rng = np.random.default_rng([seed, frames])
     signals = g.walk(rng, true, frames, offset=rng.uniform(0, true), noise=5.0, missing=0.1)
     return period.find(signals, FPS, mode).frames
+
+
+def _jittered(seed: int) -> float:
+    """Error of the period, frames, where each stride has a time of its own."""
+    true, frames, _ = JITTERED
+    rng = np.random.default_rng([7, seed])
+    offset = rng.uniform(0, true)
+    signals = g.walk(rng, true, frames, offset=offset, noise=5.0, missing=0.1, jitter=JITTER)
+    return period.find(signals, FPS).frames - true
 
 
 def _styled(seed: int) -> float:
@@ -142,9 +153,19 @@ def _periods(run: Callable[..., Iterable[Any]]) -> list[Row]:
         case = f"p = {true}, T = {frames}, literal mode, fold drifts {drift:.1f} frames"
         if drift < 2:
             rows.append(_row("L1", case, "error, frames", found - true, "0 +- 1", abs(found - true) <= 1))
-        elif abs(found - true) > 1:
-            rows.append(("L1", case, "period found, frames", found, "(wrong, as the paper's method is)", "-"))
+        else:
+            words = "(right)" if abs(found - true) <= 1 else "(wrong, as the paper's method is)"
+            rows.append(("L1", case, "period found, frames", found, words, "-"))
     return rows
+
+
+def _jitter(run: Callable[..., Iterable[Any]]) -> Row:
+    """L1 with strides of unlike times: told beside the floor, no bound."""
+    true, frames, runs = JITTERED
+    rms = float(np.sqrt(np.mean(np.square(list(run(_jittered, range(runs)))))))
+    floor = JITTER * true / np.sqrt(frames / true)
+    case = f"p = {true}, T = {frames}, {runs} runs, stride times vary by {100 * JITTER:g} %"
+    return "L1", case, f"rms error / floor of {floor:.4f} frames", rms / floor, "", ""
 
 
 def _multiples(run: Callable[..., Iterable[Any]]) -> Row:
@@ -177,8 +198,10 @@ def _alignment(run: Callable[..., Iterable[Any]]) -> list[Row]:
         for style, part in found.items():
             median, high = np.quantile(np.concatenate([f[0] for f in part]), [0.5, 0.95])
             case = f"start {start}, style {style:g} deg, {len(part)} runs"
-            rows.append(("L5", case, "median error, frames", median, "", ""))
-            rows.append(("L5", case, "95 % error, frames", high, "", ""))
+            rows += [
+                _row(BY_STYLE, case, "median error, frames", median, "<= 0.25", median <= 0.25),
+                _row(BY_STYLE, case, "95 % error, frames", high, "<= 1.2", high <= 1.2),
+            ]
     return rows
 
 
@@ -214,7 +237,8 @@ def _walks(run: Callable[..., Iterable[Any]], folder: Path) -> bool:
         rows,
         f"Wanted: every error below 2 %, none a multiple. Largest {errors.max():.2f} %, median "
         f"{np.median(errors):.2f} %; the reference has steps of 0.01 s and takes the whole file of the knee. "
-        "Repeats: correlation with the next cycle; legs: of one leg with the other half a cycle later.",
+        "Repeats: correlation with the next cycle; legs: cosine of the lag beyond half a cycle between "
+        "left and right leg, whatever their swing.",
     )
     return good
 
@@ -224,7 +248,7 @@ def main() -> int:
     parser.add_argument("mocap", type=Path, nargs="?", default=MOCAP, help="folder of cmu_walk")
     args = parser.parse_args()
     total = sum(4 * (runs + 1) for runs in LENGTHS.values()) + MULTIPLES + 3 * ALIGNMENTS
-    total += 3 * (ALIGNMENTS // 10) + GAUGES + 6 + 51
+    total += 3 * (ALIGNMENTS // 10) + JITTERED[-1] + GAUGES + 6 + 51
     with (
         ProcessPoolExecutor(os.cpu_count(), initializer=one_thread_for_good) as pool,
         progress("periods and alignment", total, False) as update,
@@ -238,7 +262,7 @@ def main() -> int:
                 update(done)
                 yield result
 
-        rows = [*_periods(run), _multiples(run)]
+        rows = [*_periods(run), _jitter(run), _multiples(run)]
         rows += [row for part in run(_noise, (0.0, 0.2, 0.4)) for row in part]
         rows += list(run(_sinusoid, [(60, 1.0), (100, 3.0), (240, 0.5)]))
         rows += _alignment(run)
@@ -257,11 +281,15 @@ def main() -> int:
         "Generator G1 (tests/python/gait_generator.py). L1: 5 degrees of noise, 10 % missing in blocks; the "
         "bound is Cramer and Rao's. The largest error wanted is below 0.5 frames; but where the bound is "
         "above 0.125 frames (p = 240.2, T = 600: 2.5 cycles) no method can keep that, so four times it. "
-        "L2: random style, 3 degrees, 10 % missing. L5: eight walkers each, 3 degrees, styles of 0, "
-        "2 and 4; an objective rises if any pass ends above the one before by more than rounding (1e-9). L6: "
-        "the constant is added to the phases at which the alignment begins.",
+        "The floor where stride times vary is jitter x p / sqrt(T / p), the spread of the mean of so many "
+        "strides; nothing is wanted there. The literal mode is judged where its fold drifts less than two "
+        "frames; all else that it finds is told. L2: random style, 3 degrees, 10 % missing. L5: eight "
+        "walkers each, 3 degrees of noise. Judged are the errors of styles of 0, 2 and 4 degrees together, a "
+        "third of the runs each; the rows by style hold each style alone to the same bounds, and what they "
+        "miss does not fail this command. An objective rises if any pass ends above the one before by more "
+        "than rounding (1e-9). L6: the constant is added to the phases at which the alignment begins.",
     )
-    return 0 if good and all(row[5] != "NO" for row in rows) else 1
+    return 0 if good and all(row[5] != "NO" for row in rows if row[0] != BY_STYLE) else 1
 
 
 if __name__ == "__main__":

@@ -69,14 +69,28 @@ def random_modes(rng, count=5):
     return Modes(coefficients[:, 0], coefficients[:, 1])
 
 
-def walk(rng, period, frames, *, offset=0.0, noise=5.0, scores=None, modes=None, missing=0.0):
-    """Angles (frames, 19) of one walker: phase (t - offset) / period, NaN in blocks."""
+def walk(rng, period, frames, *, offset=0.0, noise=5.0, scores=None, modes=None, missing=0.0, jitter=0.0):
+    """Angles (frames, 19) of one walker: phase (t - offset) / period, NaN in blocks.
+
+    jitter : standard deviation of a stride's time, a share of the period.
+    """
     phase = (np.arange(frames) - offset) / period
+    if jitter:
+        phase = jittered(rng, phase, jitter)
     clean = mean_curves(phase)
     if modes is not None:
         clean = clean + np.einsum("q,qnc->nc", scores, modes.curves(phase))
     angles = clean + rng.normal(scale=noise, size=clean.shape)
     return remove_blocks(rng, angles, missing)
+
+
+def jittered(rng, phase, jitter):
+    """Phases (n,) of strides whose times vary: `phase` counts usual stride times, each stride is even."""
+    first = np.floor(phase[0])
+    count = 2 * int(np.ceil(phase[-1] - first) + 1)  # twice as many as usual: enough if they are short
+    times = 1 + jitter * rng.normal(size=count)
+    strikes = first + np.concatenate([[0], np.cumsum(times)])
+    return np.interp(phase, strikes, first + np.arange(count + 1))
 
 
 @dataclass

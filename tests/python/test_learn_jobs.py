@@ -21,7 +21,7 @@ import pytest
 
 from gait import cli
 from gait.errors import UserError
-from gait.learn import pool, sources
+from gait.learn import fork_server, pool, sources
 from gait.learn.spool import Spool
 
 
@@ -115,6 +115,44 @@ def test_a_bad_file_named_by_itself_stops_the_run_from_a_process_too(walks, at_o
     assert not multiprocessing.active_children()
 
 
+def test_workers_are_expected_where_much_is_to_be_read_beside_the_first_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(fork_server, "WORTH", 100)
+    first, second = tmp_path / "a" / "1.amc", tmp_path / "a" / "b" / "2.amc"
+    second.parent.mkdir(parents=True)
+    first.write_bytes(bytes(200))
+    assert not fork_server.worth([str(tmp_path)]) and not fork_server.worth([str(first), "missing"])
+    second.write_bytes(bytes(101))
+    assert fork_server.worth([str(tmp_path)]) and fork_server.worth([str(first), str(second)])
+
+
+@pytest.mark.parametrize(("jobs", "large", "starts"), [("2", True, 1), ("1", True, 0), ("2", False, 0)])
+def test_the_fork_server_starts_before_what_is_slow_to_import(jobs, large, starts, tmp_path):
+    """A run that ends at once: the skeleton beside a recording is none."""
+    script = (
+        "import sys, gait.cli; from gait.learn import fork_server\n"
+        f"fork_server.worth = lambda sources: {large}\n"
+        "fork_server.start = lambda: print('scipy' in sys.modules)\n"
+        f"gait.cli.main(['learn', 'x.asf', '-o', {str(tmp_path / 'm.gait')!r}, '--jobs', {jobs!r}])"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert run.stdout == starts * "False\n" and run.stderr.startswith("gait learn: x.asf: no such file")
+
+
+def test_workers_have_the_stage_from_the_server_that_was_started():
+    script = """
+import sys
+from gait.learn import fork_server
+
+if __name__ == "__main__":
+    fork_server.start()
+    with fork_server.context().Pool(1) as pool:
+        print(pool.apply(eval, ("'gait.learn.stage' in __import__('sys').modules",)))
+    print("gait.learn.stage" in sys.modules)
+"""
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == ["True", "False"]
+
+
 def test_few_small_files_do_not_start_processes_and_many_do(walks, monkeypatch):
     started, clock = [], itertools.count()
     monkeypatch.setattr(pool, "_pooled", lambda paths, *_: started.append(len(paths)) or iter(()))
@@ -182,7 +220,7 @@ def test_a_stopped_command_leaves_no_processes(walks, stuck, tmp_path, number):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_waits_while_a_worker_starts(number):
     ended = []
-    with pytest.raises(KeyboardInterrupt), cli._terminated_like_interrupted(), pool._held_back():
+    with pytest.raises(KeyboardInterrupt), cli._terminated_like_interrupted(), fork_server.held_back():
         thread = threading.Thread(target=os.kill, args=(os.getpid(), number))
         unblocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})  # as in a thread of a library
         thread.start()

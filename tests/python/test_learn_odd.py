@@ -12,7 +12,7 @@ import pytest
 import gait.cli
 from gait import Model, blob
 from gait.errors import UserError
-from gait.learn import fit, fpca, model, sources
+from gait.learn import fit, fpca, model, model_options, sources
 from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for name in ANGLES])
@@ -124,7 +124,7 @@ def test_paper_prior_has_the_plain_components_and_one_body(sequences):
     np.testing.assert_allclose(c.sd, plain.sd)
 
 
-@pytest.mark.parametrize("kind", fit.KINDS)
+@pytest.mark.parametrize("kind", model_options.PRIORS)
 def test_legs_alone_leave_the_rest_at_rest(sequences, kind):
     cut = [replace(s, channels=s.channels.copy()) for s in sequences]
     for s in cut:
@@ -136,7 +136,7 @@ def test_legs_alone_leave_the_rest_at_rest(sequences, kind):
     assert np.all(made["CHST"][seen, 1] < made["CHST"][seen, 2]) and np.ptp(made["CURV"][0][:, seen]) > 0.5
 
 
-@pytest.mark.parametrize("kind", fit.KINDS)
+@pytest.mark.parametrize("kind", model_options.PRIORS)
 def test_angles_of_the_legs_alone_are_learnt(tmp_path, kind):
     """The least that a .csv of angles may hold: no joints, no root, hips and knees."""
     names = [f"{s}_{a}_flexion" for s in "rl" for a in ("hip", "knee")]

@@ -33,6 +33,17 @@ def test_period_reaches_the_cramer_rao_bound(true, frames, runs):
     assert np.sqrt(np.mean(np.square(errors))) <= bound * max(2, few_runs)
 
 
+def test_strides_of_unlike_times_have_their_mean_as_period():
+    rng, (true, frames, jitter) = np.random.default_rng(12), (80.3, 1500, 0.02)
+    time = np.arange(40100) / 100
+    strikes = np.interp(np.arange(1, 390), g.jittered(rng, time, jitter), time)
+    assert np.std(np.diff(strikes)) == pytest.approx(jitter, rel=0.2)
+    signals = [g.walk(rng, true, frames, noise=3.0, jitter=jitter) for _ in range(4)]
+    errors = [period.find(z, FPS).frames - true for z in signals]
+    floor = jitter * true / np.sqrt(frames / true)  # of the mean stride time
+    assert 0.2 * floor < np.sqrt(np.mean(np.square(errors))) < 2.2 * floor
+
+
 def test_no_multiple_or_part_of_the_period():
     rng = np.random.default_rng(2)
     for _ in range(12):

@@ -19,27 +19,14 @@ The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o 
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import sys
 from pathlib import Path
 
-from gait import blob
-from gait.cli import learn_segments, learn_text, values
-from gait.errors import UsageError
-from gait.files import require_folder, require_writable
-from gait.learn import activity, fit, marker_map, model, segment_sections, sources, subjects
-from gait.learn.readers import KINDS
-from gait.learn.reading import Reading
-from gait.learn.retarget import Measures
-from gait.learn.segment_corpus import Corpus
-from gait.learn.sequence import Sequence
-from gait.learn.stage import one_thread
-from gait.progress import progress
+from gait.cli import learn_segments, values
+from gait.learn import fork_server, subjects
+from gait.learn.model_options import DEFAULT_COMPONENTS, MOST_COMPONENTS, PRIORS
 
 NAME = "learn"
 HELP = "learn a cyclic model from motion capture"
-MOST_LINES = 20  # about files left out
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,13 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_components,
         metavar="auto|N",
         help="in how many ways the model can differ from the mean walk. N: so many, from 1 to "
-        f"{fit.MOST_COMPONENTS}. auto: as many as describe data that were held out best. Without the option "
-        f"{fit.DEFAULT_COMPONENTS}, or two less than there are cycles if that is fewer",
+        f"{MOST_COMPONENTS}. auto: as many as describe data that were held out best. Without the option "
+        f"{DEFAULT_COMPONENTS}, or two less than there are cycles if that is fewer",
     )
     parser.add_argument(
         "--prior",
-        choices=fit.KINDS,
-        default=fit.KINDS[0],
+        choices=PRIORS,
+        default=PRIORS[0],
         help="people (the default): also allow for people who were not recorded, with lengths of limbs and "
         "postures of their own. paper: only what the recorded cycles show, and one body for everybody",
     )
@@ -115,9 +102,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _components(text: str) -> int | str:
     if text == "auto":
         return text
-    if text.isdigit() and 1 <= int(text) <= fit.MOST_COMPONENTS:
+    if text.isdigit() and 1 <= int(text) <= MOST_COMPONENTS:
         return int(text)
-    raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor 1 to {fit.MOST_COMPONENTS}")
+    raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor 1 to {MOST_COMPONENTS}")
 
 
 def _rate(text: str) -> float:
@@ -132,110 +119,10 @@ def _rate(text: str) -> float:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read, learn, write, report."""
-    _check(args)
-    wanted = learn_segments.options(args)
-    with one_thread(), Corpus() as corpus:
-        sequences, refused, others = _read(args, corpus)
-        if wanted.source == "only":
-            return learn_segments.write_alone(args, corpus, wanted, refused)
-        learned = fit.fit(sequences, args.components, args.seed, args.prior, others)
-        if not args.quiet:
-            for note in learn_text.notes(learned, args.components):
-                print(note, file=sys.stderr)
-        prior = learn_segments.learn(corpus, wanted, args.quiet)
-        sections = model.sections(learned, args.activity, args.seed)
-        data = blob.write(args.output, sections | (segment_sections.sections(prior) if prior else {}))
-        if args.report:
-            from gait.learn import report  # matplotlib is slow to import
+    """Let the workers of a large run import what they need while this process does."""
+    jobs = args.jobs or fork_server.cores()
+    if jobs > 1 and not args.dask and fork_server.worth(args.sources):
+        fork_server.start()
+    from gait.cli import learn_run  # scipy takes most of a second
 
-            try:
-                report.write(Path(args.report), learned, args.activity, refused, args.quiet)
-            except BaseException:
-                print(f"{args.output}: the model is written; the report is not", file=sys.stderr)
-                raise
-    figures = learn_text.summary(learned, data, refused, prior, bool(args.report))
-    print(json.dumps(figures) if args.json else learn_text.text(args.output, figures))
-    return 0
-
-
-def _check(args: argparse.Namespace) -> None:
-    """Refuse before the work what would fail after it."""
-    if args.dask and args.jobs:
-        raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
-    if args.markers:
-        marker_map.read(args.markers)
-    if args.report and args.segments == "only":
-        raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
-    if args.activity.lower() not in activity.NAMES and not args.quiet:
-        names = ", ".join(activity.NAMES)
-        print(f"--activity {args.activity}: none of {names}: any cyclic motion is learnt", file=sys.stderr)
-    _check_output(args)
-    require_writable(args.output)
-    if args.report:
-        require_folder(args.report)
-
-
-def _check_output(args: argparse.Namespace) -> None:
-    """Refuse to write the model over what is read, or where the report shall be."""
-    output = Path(os.path.realpath(args.output))
-    if output.suffix.lower() in (*KINDS, ".asf"):
-        raise UsageError(
-            f"-o {args.output}: is named like a recording; name the model M.gait, and sources before -o"
-        )
-    if any(os.path.realpath(p) == str(output) for p in (*args.sources, args.markers) if p):
-        raise UsageError(f"-o {args.output}: is also read; name the model otherwise")
-    if args.report:
-        folder = Path(os.path.realpath(args.report))
-        if output in (folder, *folder.parents):
-            raise UsageError(
-                f"--report {args.report}: the model is to be at {args.output}; name another folder"
-            )
-
-
-def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], list[str], list[Measures]]:
-    """Find and prepare the files; say which were left out; bodies are of people who are in these alone."""
-    others: list[Measures] = []
-    idle: list[str] = []
-    closed: list[str] = []
-    files = sources.find(args.sources, args.exclude, idle.append, closed.append)
-    for glob in idle if not args.quiet else ():
-        print(f"--exclude {glob}: no file's path ends like this", file=sys.stderr)
-    reading = Reading(
-        args.period_mode,
-        args.fps,
-        args.zeros_missing,
-        args.activity,
-        args.markers,
-        not args.no_trim,
-        learn_segments.options(args),
-    )
-    jobs = args.jobs or len(os.sched_getaffinity(0))
-    with progress("reading motion", len(files), args.quiet) as update:
-        try:
-            sequences, refused = sources.load_all(
-                files,
-                reading,
-                update,
-                jobs=jobs,
-                dask=args.dask,
-                people=args.subjects,
-                corpus=corpus,
-                others=others,
-            )
-        except sources.NothingLeft as error:
-            _tell(closed + error.refused[1:], args.quiet, "")
-            raise
-    refused = closed + refused
-    _tell(refused, args.quiet, " (see --json or --report)")
-    return sequences, refused, others
-
-
-def _tell(refused: list[str], quiet: bool, more: str) -> None:
-    """Say which files were left out."""
-    if quiet:
-        return
-    for line in refused[:MOST_LINES]:
-        print(f"left out: {line}", file=sys.stderr)
-    if len(refused) > MOST_LINES:
-        print(f"left out: {len(refused) - MOST_LINES} more{more}", file=sys.stderr)
+    return learn_run.run(args)

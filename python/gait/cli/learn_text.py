@@ -11,6 +11,7 @@ import numpy.typing as npt
 from gait import blob
 from gait.cli import segment_text
 from gait.learn import fit, ground, model, unseen
+from gait.learn.model_options import DEFAULT_COMPONENTS
 from gait.learn.sequence import Sequence
 from gait.lift.prior import SegmentPrior
 from gait.skeleton import ANGLES
@@ -114,7 +115,7 @@ def _left_out(rows: list[dict[str, Any]]) -> list[str]:
 
 def notes(learned: fit.Learned, wanted: int | str | None) -> Iterator[str]:
     """Say what a user should know of what was learnt and might not expect; `wanted` are the components."""
-    if wanted is None and len(learned.components.sd) < fit.DEFAULT_COMPONENTS:
+    if wanted is None and len(learned.components.sd) < DEFAULT_COMPONENTS:
         yield _few(learned)
     if parts := model.unobserved(learned):
         yield f"no recording shows {_words(parts)}: these stay in the rest pose"
@@ -127,7 +128,7 @@ def notes(learned: fit.Learned, wanted: int | str | None) -> Iterator[str]:
 def _few(learned: fit.Learned) -> str:
     """Say why there are fewer components than usual."""
     cycles, kept = len(learned.components.scores), len(learned.components.sd)
-    return f"{cycles} cycles allow {_count(kept, 'component')} instead of {fit.DEFAULT_COMPONENTS}"
+    return f"{cycles} cycles allow {_count(kept, 'component')} instead of {DEFAULT_COMPONENTS}"
 
 
 def _unsettled(learned: fit.Learned) -> Iterator[str]:

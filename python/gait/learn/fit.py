@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget, unseen
+from gait.learn.model_options import DEFAULT_COMPONENTS
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
 from gait.learn.subject_residuals import SubjectResiduals, subject_residuals
@@ -20,9 +21,6 @@ Floats = npt.NDArray[np.float64]
 
 SAMPLES = 120  # phases of a cycle: five components take less than 100 kB
 MOST_NAMES = 4  # of files in a message
-DEFAULT_COMPONENTS = 8
-KINDS = ("people", "paper")  # of priors
-MOST_COMPONENTS = 16  # the library reads no more
 #: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as
 #: much as the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per
 #: radian).

@@ -10,7 +10,6 @@ import multiprocessing
 import os
 import pickle
 import shutil
-import signal
 import tempfile
 import threading
 import time
@@ -22,6 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gait.errors import UserError
+from gait.learn import fork_server
 from gait.learn.reading import Reading
 from gait.learn.spool import no_room
 from gait.learn.stage import Prepared, prepare
@@ -90,17 +90,16 @@ def _alone(path: Path, reading: Reading) -> Prepared:
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
+def _pool(count: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
     """Worker processes and their folder, gone at the end, at once if the end is an exception."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([prepare.__module__])
     others = set(multiprocessing.active_children())
     with tempfile.TemporaryDirectory(prefix="gait-") as folder:
-        pool = ProcessPoolExecutor(workers, context, initializer=_follow_parent, initargs=(folder,))
+        context = fork_server.context()
+        pool = ProcessPoolExecutor(count, context, initializer=_follow_parent, initargs=(folder,))
         try:
             yield pool, folder
         except BaseException:
-            with _held_back():
+            with fork_server.held_back():
                 for child in set(multiprocessing.active_children()) - others:
                     child.kill()
             raise
@@ -110,30 +109,8 @@ def _pool(workers: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
 
 def _submit(pool: ProcessPoolExecutor, path: Path, reading: Reading, folder: str) -> Future[str]:
     """Submit a file; workers started by this inherit that Ctrl-C is not for them but for their parent."""
-    with _held_back():
+    with fork_server.held_back():
         return pool.submit(_stored, path, reading, folder)
-
-
-@contextmanager
-def _held_back() -> Iterator[None]:
-    """Let an interruption wait for the end of the block.
-
-    A worker half started is in no list of those to end; left over, it misses what its parent has taken away.
-    The mask alone does not do: another thread takes the signal, and Python still interrupts this one.
-    """
-    came: list[int] = []
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    here = numbers if threading.current_thread() is threading.main_thread() else ()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    handlers = {n: signal.signal(n, lambda number, _: came.append(number)) for n in here}
-    try:
-        yield
-    finally:
-        for n, handler in handlers.items():
-            signal.signal(n, handler)
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        for number in came[:1]:
-            signal.raise_signal(number)
 
 
 def _stored(path: Path, reading: Reading, folder: str) -> str:
