@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from gait.learn import retarget
+from gait.learn import readers, retarget
 from gait.learn.fit import channel_scale
-from gait.learn.sequence import Sequence, level_body
+from gait.learn.sequence import Sequence, levelled
 from gait.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, curves, points
 
 Floats = npt.NDArray[np.float64]
@@ -70,7 +70,7 @@ class Found:
 
 def walk(s: Sequence) -> Walk:
     """Take every EVERYth frame of a prepared recording with all of its joints and channels."""
-    body, measures = level_body(s.source, kept=s.kept), s.measures
+    body, measures = levelled(readers.read(s.source), s.kept), s.measures
     if measures is None:
         raise ValueError(f"{s.source}: no joints")
     joints = dict(body.joints)

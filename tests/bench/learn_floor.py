@@ -25,9 +25,9 @@ import numpy.typing as npt
 import table
 
 from gait.errors import UserError
-from gait.learn import cycles, fit, fpca, model, pace, prior, retarget, subjects
+from gait.learn import cycles, fit, fpca, model, pace, prior, readers, retarget, subjects
 from gait.learn.model_options import DEFAULT_COMPONENTS
-from gait.learn.sequence import Sequence, level_body, load
+from gait.learn.sequence import Sequence, load, measured
 from gait.learn.stage import one_thread_for_good
 from gait.pace import series
 from gait.progress import progress
@@ -45,7 +45,7 @@ PROJECT: dict[str, Project] = {JOINTS: floor_fit.in_joints, ANGLES: floor_fit.in
 BASELINE = "paper"
 OTHERS = "cmu_misc"  # folder beside the walks: other people and motions
 WALKS_TOO = ("md",)  # a dancer there with the bones of a walker, 05
-OURS_NAME = "libgait"
+OURS_NAME, TRACKED = "libgait", "libgait, as tracked"
 GOAL = 25.0  # per cent below the paper's model
 
 
@@ -60,8 +60,8 @@ class Case:
 
 STEPS = ("plain", "+ mirror images", "+ subjects alike", "+ joint metric", "+ stride rate")
 CASES = [
-    *(Case(name, MEAN, JOINTS) for name in (BASELINE, *STEPS, OURS_NAME)),
-    *(Case(name, SHIPPED, JOINTS) for name in (BASELINE, OURS_NAME)),
+    *(Case(name, MEAN, JOINTS) for name in (BASELINE, *STEPS, OURS_NAME, TRACKED)),
+    *(Case(name, SHIPPED, JOINTS) for name in (BASELINE, OURS_NAME, TRACKED)),
     *(Case(name, body, ANGLES) for body in (MEAN, SHIPPED) for name in (BASELINE, OURS_NAME)),
 ]
 #: The comparison that the goal is judged by: like for like, and nothing but the models differs.
@@ -79,6 +79,8 @@ Mean distance of 14 joints after alignment of the pelvis, mm, averaged over a su
   dimensions on the lengths of limbs and places of shoulders, learnt besides from {others} people whose motion
   is no walk (`cmu_misc`).  With *+ stride rate* and in *libgait* the mean cycle follows the stride rate, the
   walk's own here: the rate is a state of the paper's tracker (eq. 7) too, so it is none of the dimensions.
+  *libgait, as tracked* has no proportions, as the tracker by default (config `proportions` 0).  Constant
+  offsets of single angles, whose variance among people is learnt too (section `CHST`), are in no row.
 - body: *mean of the learners*, or *as shipped*: joints moved by hand to where anatomical bodies have them
   (`generic_proportions`), which these recordings do not know, so that both models are far off.
 - projection: *joints*, nonlinear least squares of the joints, the best the model can do; *angles*, least
@@ -86,9 +88,11 @@ Mean distance of 14 joints after alignment of the pelvis, mm, averaged over a su
 - less: median below that of the paper's model with the same body and projection; wanted: {goal:g} %.
 
 **The goal of {goal:g} % is {verdict}** where it is judged, with the mean body of the learners and joints
-projected for both models: {fair:.1f} % less.  With the body as shipped it is {shipped:.1f} %.  The best
-description by libgait (joints) against the paper's model projected the paper's way (angles), same body:
-{ours:.1f} against {papers:.1f} mm, {way:.1f} %.
+projected for both models: {fair:.1f} % less.  No other row decides.  With the body as shipped it is
+{shipped:.1f} %; with angles projected for both models {angles:.1f} %, and with the body as shipped too
+{both:.1f} %.  Without proportions, as the tracker runs by default, it is {tracked:.1f} % with the mean body and
+{tracked_shipped:.1f} % with the one shipped.  The best description by libgait (joints) against the paper's
+model projected the paper's way (angles), same body: {ours:.1f} against {papers:.1f} mm, {way:.1f} %.
 """
 
 Result = dict[Case, list[floor_fit.Found]]
@@ -127,6 +131,7 @@ def models(learners: list[Sequence], others: Bodies) -> tuple[dict[str, Sections
         BASELINE: {"CURV": paper.curves},
         **dict(zip(STEPS, steps, strict=True)),
         OURS_NAME: {"CURV": ours.curves, "PROP": ours.lengths, "SHFT": ours.shifts, **follows},
+        TRACKED: {"CURV": ours.curves, **follows},
     }
     measures = [next(s.measures for s in learners if s.subject == n) for n in ours.subjects]
     return made, {MEAN: retarget.mean_proportions(measures), SHIPPED: ours.proportions}
@@ -164,12 +169,13 @@ def rows_of(found: dict[str, Result], medians: dict[Case, float]) -> Iterable[li
     shape = {
         BASELINE: f"{PAPER}",
         OURS_NAME: f"{OURS} + {MOST - OURS}",
+        TRACKED: f"{OURS} + 0",
         **dict.fromkeys(STEPS, f"{MOST}"),
     }
     for case, median in medians.items():
         angles = [np.mean([f.angles_deg for f in result[case]]) for result in found.values()]
         compared = case.model not in (BASELINE, MEAN_CYCLE.model, EXACT.model)
-        judged = case.model == OURS_NAME
+        judged = case == FAIR
         yield [
             case.model,
             shape.get(case.model),
@@ -196,6 +202,10 @@ def publish(found: dict[str, Result], walks: int, others: int) -> bool:
         verdict="reached" if fair >= GOAL else "missed",
         fair=fair,
         shipped=less(medians, Case(OURS_NAME, SHIPPED, JOINTS)),
+        angles=less(medians, Case(OURS_NAME, MEAN, ANGLES)),
+        both=less(medians, Case(OURS_NAME, SHIPPED, ANGLES)),
+        tracked=less(medians, Case(TRACKED, MEAN, JOINTS)),
+        tracked_shipped=less(medians, Case(TRACKED, SHIPPED, JOINTS)),
         ours=medians[FAIR],
         papers=medians[PAPERS_WAY],
         way=less(medians, FAIR, PAPERS_WAY),
@@ -236,7 +246,7 @@ def main() -> int:
 def strangers(paths: list[Path], walkers: list[str]) -> Bodies:
     """Bodies of people in other files who are none of the walkers, one each."""
     files = dict(zip(subjects.subjects(paths), paths, strict=True))
-    return [retarget.measure(level_body(path)) for who, path in files.items() if who not in walkers]
+    return [measured(readers.read(path)) for who, path in files.items() if who not in walkers]
 
 
 def _load(path: Path) -> Sequence:

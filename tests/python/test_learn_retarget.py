@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait import skeleton
-from gait.learn import retarget, root, rotations
+from gait.learn import readers, retarget, root, rotations
 from gait.learn.body import Body
 from gait.skeleton import ANGLES, CHANNELS, SIDES
 
@@ -172,12 +172,12 @@ def test_real_walks_are_reproduced_to_8_mm():
     """The 24 angles with own lengths and a rigid shoulder girdle reach 8 mm on average (root-aligned)."""
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
-    from gait.learn.sequence import level_body, load
+    from gait.learn.sequence import levelled, load
 
     errors = []
     for name in ("02/02_01", "07/07_01", "16/16_16", "35/35_01", "38/38_01"):
         s = load(WALKS / f"{name}.amc")
-        walker = level_body(s.source, kept=s.kept)
+        walker = levelled(readers.read(s.source), s.kept)
         own = skeleton.default_skeleton(retarget.own_proportions(s.measures)).sections()
         local = s.channels.copy()
         local[:, [column(f"root_{n}") for n in ("roll", "pitch", "yaw")]] = 0

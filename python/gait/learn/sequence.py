@@ -78,28 +78,20 @@ class _Motion:
     root: Floats | None = None
 
 
-def level_body(path: Path, reading: Reading = DEFAULT, kept: tuple[int, int] | None = None) -> Body:
-    """Read a recording's joints, on a level floor, with the pelvis axes in their standard place.
+def levelled(body: Body, kept: tuple[int, int] | None = None) -> Body:
+    """Put a body on a level floor, with the pelvis axes in their standard place.
 
     Parameters
     ----------
     kept : (start, stop), optional
         Frames to use, all by default; the floor and the pelvis are those of these frames.
-
-    Raises
-    ------
-    UserError
-        If the file is malformed or holds angles alone.
     """
-    read = readers.read(path, reading)
-    if isinstance(read, AngleTable):
-        raise UserError(f"{path}: angles without joints; name a file of joints")
-    return _levelled(read if kept is None else _part_of_body(read, *kept))
+    return root.align_pelvis(root.level(body if kept is None else _part_of_body(body, *kept))[0])
 
 
 def measured(read: Body | AngleTable) -> retarget.Measures | None:
     """Measure the body of a recording, whatever it does; None where the file has angles alone."""
-    return None if isinstance(read, AngleTable) else retarget.measure(_levelled(read))
+    return None if isinstance(read, AngleTable) else retarget.measure(levelled(read))
 
 
 def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
@@ -183,15 +175,11 @@ def _part_of_body(read: Body, start: int, stop: int) -> Body:
     return replace(read, joints=joints, pelvis=read.pelvis[start:stop], lateral=lateral)
 
 
-def _levelled(body: Body) -> Body:
-    return root.align_pelvis(root.level(body)[0])
-
-
 def _motion(read: Body | AngleTable) -> _Motion:
     """Angles and what else is known of what was read."""
     if isinstance(read, AngleTable):
         return _Motion(read.angles, trim.Track(), root=read.root)
-    body = _levelled(read)
+    body = levelled(read)
     measures = retarget.measure(body)
     yaw = np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0])
     track = trim.Track(body.joints["pelvis"][:, :2], unwrap(yaw[:, None])[:, 0])
