@@ -13,6 +13,7 @@ from gait.learn import angle_file, readers, retarget
 from gait.learn.angle_file import AngleTable
 from gait.learn.articulated import posed
 from gait.learn.body import Body
+from gait.learn.reading import Reading
 from gait.skeleton import ANGLES, JOINTS, ROOTS, default_skeleton
 from gait.trackfile import header
 
@@ -76,6 +77,19 @@ def test_empty_cells_and_dropped_rows_are_missing(tmp_path):
     assert table.frames == 240 and gone[50:60].all() and gone[10, ANGLES.index("l_knee_flexion")]
     assert gone.sum() == 10 * len(ANGLES) + 1
     assert table.angles[60:] == pytest.approx(TABLE[60:], abs=1e-5)
+
+
+def test_zeros_in_a_row_are_missing_if_asked_for(tmp_path):
+    path, knee, fixed = tmp_path / "a.csv", ANGLES.index("l_knee_flexion"), ANGLES.index("neck_x")
+    rows = [line.split(",") for line in write(path).read_text().splitlines()]
+    for t, row in enumerate(rows[1:]):
+        row[2 + fixed] = "0"  # in all rows: a joint that the file does not move
+        if 100 <= t < 140 or t in (20, 21):
+            row[2 + knee] = "0.0"
+    path.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    assert np.isfinite(readers.read(path).angles).all()
+    gone = np.isnan(readers.read(path, Reading(zero_runs=True)).angles)
+    assert gone[100:140, knee].all() and gone.sum() == 40
 
 
 def test_semicolons_with_decimal_commas_and_a_byte_order_mark(tmp_path):

@@ -5,9 +5,11 @@ from dataclasses import replace
 import mocap_files as files
 import numpy as np
 import pytest
+from test_marker_files import write_c3d
 
 from gait.errors import UserError
 from gait.learn import body, joint_file, mocap_asf, readers, retarget
+from gait.learn.reading import Reading
 from gait.learn.recording import Y_UP
 from gait.learn.sequence import load
 from gait.skeleton import ANGLES
@@ -69,6 +71,33 @@ def test_a_csv_is_learnt_from(walker, tmp_path):
     sequence = load(write_csv(tmp_path / "p1_a.csv", walker))
     assert sequence.period.frames == pytest.approx(120, abs=0.5)
     assert sequence.subject == "p1" and np.isfinite(sequence.channels).all()
+
+
+def without_wrist(walker):
+    """The same walker with zeros where the left wrist was hidden for 20 frames."""
+    wrist = walker.joints["l_wrist"].copy()
+    wrist[50:70] = 0
+    return replace(walker, joints={**walker.joints, "l_wrist": wrist})
+
+
+def test_zeros_in_a_row_are_missing_if_asked_for(walker, tmp_path):
+    path = write_csv(tmp_path / "a.csv", without_wrist(walker))
+    assert not readers.read(path).joints["l_wrist"][50:70, 2].any()
+    found = readers.read(path, Reading(zero_runs=True)).joints
+    assert np.flatnonzero(np.isnan(found["l_wrist"]).any(axis=1)).tolist() == list(range(50, 70))
+    assert all(np.isfinite(place).all() for name, place in found.items() if name != "l_wrist")
+
+
+@pytest.mark.parametrize("kind", ["trc", "c3d"])
+def test_joint_centres_at_the_origin_are_missing(walker, tmp_path, kind):
+    hidden, path = without_wrist(walker), tmp_path / f"a.{kind}"
+    if kind == "trc":
+        write_trc(path, hidden)
+    else:
+        joints = np.stack([hidden.joints[n] for n in joint_file.NEEDED], axis=1)
+        write_c3d(path, joint_file.NEEDED, joints @ Y_UP)
+    sequence = load(path)
+    assert np.flatnonzero(np.isnan(sequence.channels).any(axis=1)).tolist() == list(range(50, 70))
 
 
 def test_empty_cells_are_missing(walker, tmp_path):

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn import csv_table, joint_file
-from gait.learn.recording import DEGREES, require_range
+from gait.learn.recording import DEGREES, mask_zero_runs, require_range
 from gait.learn.rotations import unwrap
 from gait.skeleton import ANGLES, ROOTS, SIDES
 
@@ -71,13 +71,15 @@ def holds_angles(path: Path) -> bool:
     return set(joint_file.NEEDED) > set(joints) and bool(_columns(names, ANGLES))
 
 
-def read(path: Path, fps: float | None = None) -> AngleTable:
+def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> AngleTable:
     """Read a .csv of angles.
 
     Parameters
     ----------
     fps : float, optional
         Frames per second, by default those of the column `time`.
+    zero_runs : bool
+        Take runs of three or more exact zeros of a column for missing data.
 
     Raises
     ------
@@ -93,6 +95,8 @@ def read(path: Path, fps: float | None = None) -> AngleTable:
     if twice is not None:
         raise UserError(f"{path}:1: {twice} is there as {' and '.join(columns[twice])}; remove one")
     values = _in_radians(table, {name: found[0] for name, found in columns.items()})
+    if zero_runs:
+        values = {name: mask_zero_runs(column[:, None])[:, 0] for name, column in values.items()}
     for name, column in values.items():
         if name in LENGTHS:
             require_range(path, name, column, LONGEST, "statures")

@@ -18,7 +18,7 @@ from gait.learn import csv_table, skeleton_fit
 from gait.learn.articulated import HINGES, ORIGINS, SEGMENTS, Pose, posed
 from gait.learn.body import Body
 from gait.learn.gaps import bridged
-from gait.learn.recording import Y_UP
+from gait.learn.recording import Y_UP, mask_zero_runs
 from gait.learn.rotations import frame_from, unit
 from gait.skeleton import ANGLES, JOINTS, SIDES, default_skeleton
 
@@ -33,8 +33,10 @@ STRAIGHT = (
 )
 
 
-def read_csv(path: Path, fps: float | None = None) -> Body:
+def read_csv(path: Path, fps: float | None = None, zero_runs: bool = False) -> Body:
     """Read `frame,time,<joint>_x,<joint>_y,<joint>_z,...`: metres, z (or y) up; empty cells are missing.
+
+    With `zero_runs`, three or more exact zeros in a row of an angle, or of a joint's three columns, are too.
 
     Raises
     ------
@@ -49,11 +51,14 @@ def read_csv(path: Path, fps: float | None = None) -> Body:
         raise UserError(
             f"{path}:1: column {error.args[0].split()[0]} is missing; each joint needs x, y, z"
         ) from None
+    if zero_runs:
+        places = {name: mask_zero_runs(place) for name, place in places.items()}
     walker = body(path, _upright(path, places), table.fps)
     columns = [f"{name}_deg" for name in ANGLES]
     if not set(columns) <= set(table.names):
         return walker
-    return oriented(walker, np.radians(np.stack([table[column] for column in columns], axis=1)))
+    angles = [mask_zero_runs(table[c][:, None])[:, 0] if zero_runs else table[c] for c in columns]
+    return oriented(walker, np.radians(np.stack(angles, axis=1)))
 
 
 def _upright(path: Path, places: dict[str, Floats]) -> dict[str, Floats]:

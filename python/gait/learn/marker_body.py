@@ -37,7 +37,7 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
     path : Path
         The file they come from.
     points : (T, M, 3)
-        Metres, any axis up; NaN, or exact zeros, where missing.
+        Metres, any axis up; NaN where missing.
     fps : float
         Frames per second.
     markers : Path, optional
@@ -48,8 +48,7 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
     UserError
         If too few labels are known, or the markers do not fit a walker.
     """
-    missing = (points == 0).all(axis=2) | ~np.isfinite(points).all(axis=2)
-    points = np.where(missing[..., None], np.nan, points)
+    points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
     places = assign(path, labels, points, markers)
     columns = list(places)
     found = skeleton_fit.Points(

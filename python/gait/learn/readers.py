@@ -31,11 +31,11 @@ def read(path: Path, reading: Reading = DEFAULT) -> Body | AngleTable:
     """
     suffix = path.suffix.lower()
     if suffix == ".csv" and angle_file.holds_angles(path):
-        return angle_file.read(path, reading.fps)
+        return angle_file.read(path, reading.fps, reading.zero_runs)
     if suffix in RECORDINGS:
         walker = body(RECORDINGS[suffix](path, reading.fps, reading.zero_runs))
     elif suffix == ".csv":
-        walker = joint_file.read_csv(path, reading.fps)
+        walker = joint_file.read_csv(path, reading.fps, reading.zero_runs)
     else:
         walker = _points(path, reading)
     _require_size(path, walker)
@@ -63,11 +63,15 @@ def _require_size(path: Path, walker: Body) -> None:
 
 
 def _points(path: Path, reading: Reading) -> Body:
-    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
+    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers.
+
+    A point at exactly (0, 0, 0) is missing: so these formats write gaps.
+    """
     labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else c3d_file.read)(path)
     require_frames(path, len(points))
     for k, label in enumerate(labels):
         require_range(path, f"point {label!r} at", points[:, k], FARTHEST, "metres")
+    points[(points == 0).all(axis=2)] = np.nan
     fps = reading.fps or rate
     if reading.markers is None and set(joint_file.NEEDED) <= set(joint_file.find(labels)):
         upright = points @ Y_UP.T
