@@ -88,11 +88,14 @@ Mean distance of 14 joints after alignment of the pelvis, mm, averaged over a su
 - less: median below that of the paper's model with the same body and projection; wanted: {goal:g} %.
 
 **The goal of {goal:g} % is {verdict}** where it is judged, with the mean body of the learners and joints
-projected for both models: {fair:.1f} % less.  No other row decides.  With the body as shipped it is
-{shipped:.1f} %; with angles projected for both models {angles:.1f} %, and with the body as shipped too
-{both:.1f} %.  Without proportions, as the tracker runs by default, it is {tracked:.1f} % with the mean body
-and {tracked_shipped:.1f} % with the one shipped.  The best description by libgait (joints) against the paper's
-model projected the paper's way (angles), same body: {ours:.1f} against {papers:.1f} mm, {way:.1f} %.
+projected for both models: {fair:.1f} % less.  No other row decides:
+
+- with the body as shipped it is {shipped:.1f} %;
+- with angles projected for both models it is {angles:.1f} %, and with the body as shipped too {both:.1f} %;
+- without proportions, as the tracker runs by default, it is {tracked:.1f} %, and with the body as shipped
+  {tracked_shipped:.1f} %;
+- the best description by libgait (joints) against the paper's model projected the paper's way (angles), same
+  body: {ours:.1f} against {papers:.1f} mm, {way:.1f} %.
 """
 
 Result = dict[Case, list[floor_fit.Found]]
