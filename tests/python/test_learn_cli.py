@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import learn_cases as cases
 import mocap_files as files
 import numpy as np
 import pytest
@@ -239,8 +240,13 @@ def test_the_shipped_model_is_small_and_acknowledges_its_source():
     meta = json.loads(s["META"].tobytes())
     assert meta["acknowledgement"] == model.CMU and meta["sequences"]["count"] == 51
     assert s["CURV"].shape == (9, fit.SAMPLES, 30) and s["PROP"].shape == (4, len(s["FRMI"]) + 1)
-    step = np.abs(np.diff(s["CURV"][0], axis=0, append=s["CURV"][0][:1]))
-    assert np.all(step[-1] <= 2 * np.maximum(step.max(axis=0), 1e-6))
+
+
+def test_the_curves_of_the_shipped_model_have_no_seam():
+    curves = blob.read(SHIPPED)["CURV"].astype(float)
+    assert max(cases.seam(curve) for curve in curves) <= 2
+    ramp = 0.01 * np.ptp(curves[0], axis=0) * np.arange(fit.SAMPLES)[:, None] / fit.SAMPLES
+    assert cases.seam(curves[0] + ramp) > 2  # a jump of a hundredth of each channel's range shows
 
 
 def test_the_shipped_model_comes_from_the_documented_command(tmp_path):
