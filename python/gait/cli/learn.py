@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--period-mode",
         choices=("refined", "literal"),
         default="refined",
-        help="literal: whole frames from 50 to 250, as in the paper (refined)",
+        help="literal: whole frames, at 120 per second from 50 to 250, as in the paper (refined)",
     )
     parser.add_argument(
         "--fps", type=_rate, metavar="F", help="frames per second (what the file says; .amc: 120)"
@@ -83,7 +83,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--markers", type=Path, metavar="MAP.json", help="which joints the markers of .c3d and .trc belong to"
     )
     parser.add_argument(
-        "--zeros-missing", action="store_true", help="three or more exact zeros in a row are missing data"
+        "--zeros-missing",
+        action="store_true",
+        help="three or more exact zeros in a row are missing data (points of .c3d and .trc at the origin "
+        "always are)",
     )
     parser.add_argument(
         "--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings"

@@ -57,13 +57,13 @@ def _row(axes: Axes, candidates: Floats, ratio: Floats, name: str) -> None:
 
 
 def _sum(axes: Axes, candidates: Floats, table: Floats, s: Sequence) -> None:
-    """Sum over the angles with the period of its maximum and the refined one."""
+    """Sum over the angles with the period of its maximum and the one found."""
     valid = np.isfinite(table).any(axis=1)
     total = np.where(valid, np.nansum(table, axis=1), np.nan)
     best = int(np.nanargmax(total))
     plain(axes)
     axes.plot(candidates, total, color=DARK, lw=1.4)
-    axes.axvline(s.period.frames, color=ORANGE, lw=1, ls="--", label=f"refined: {s.period.frames:.2f} frames")
+    axes.axvline(s.period.frames, color=ORANGE, lw=1, ls="--", label=f"found: {s.period.frames:.2f} frames")
     axes.plot(
         candidates[best], total[best], "o", ms=5, color=DARK,
         label=f"largest sum: {total[best]:.0f} at {candidates[best]:.0f} frames",
