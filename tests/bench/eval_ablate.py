@@ -26,7 +26,6 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "rate return": {"rate_time": 0.0},
     "missed foreground": {"missed_weight": 0.0},
 }
-_SAME_AS = {"two-stage rate": ("rate_noise_start", "rate_noise")}  # off: the first is set to the second
 MEASURES = {
     "root_mm": "root mm",
     "abs_mm": "abs mm",
@@ -46,9 +45,6 @@ def switches(config: TrackerConfig) -> dict[str, dict[str, Any]]:
     for name, off in _FEATURES.items():
         if all(hasattr(config, key) for key in off) and any(getattr(config, k) != v for k, v in off.items()):
             out[name] = off
-    for name, (key, usual) in _SAME_AS.items():
-        if hasattr(config, key) and getattr(config, key) != getattr(config, usual):
-            out[name] = {key: getattr(config, usual)}
     return out
 
 

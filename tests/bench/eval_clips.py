@@ -27,7 +27,7 @@ OUTDOOR = "outdoor"
 OUTDOOR_FRAMES = (64, 187)  # she is in full view
 OUTDOOR_HEIGHT = 1.65  # metres
 SPREAD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "stature_m": 0.01}
-"""Standard deviations of the noise on a start from the truth."""
+"""Standard deviations of a start, and of its noise about the truth; the stature is known and has no noise."""
 
 
 def shared_clips(names: list[str] | None) -> list[Clip]:
@@ -145,7 +145,7 @@ def _noisy_truth(clip: Clip, seed: int) -> dict[str, Any]:
         heading = float(next(csv.DictReader(file))["heading_rad"])
     noise = np.random.default_rng(seed).standard_normal(7)
     true = _cadence(clip, truth) | {"stature_m": meta_of(clip.folder)["stature_m"], "heading_rad": heading}
-    drawn = dict(zip(("phase", "stride_hz", "stature_m", "heading_rad"), noise, strict=False))
+    drawn = {"phase": noise[0], "stride_hz": noise[1], "stature_m": 0.0, "heading_rad": noise[3]}
     start = {key: float(value + SPREAD[key] * drawn[key]) for key, value in true.items()}
     if "phase" in start:
         start["phase"] %= 1.0

@@ -196,8 +196,9 @@ def test_noise_on_a_start_is_the_seeds_and_a_wrong_stature_is_believed(tmp_path)
     assert phase.mean() == pytest.approx(FIRST_PHASE, abs=0.01)
     assert phase.std() == pytest.approx(eval_clips.SPREAD["phase"], rel=0.15)
     assert starts[3] == eval_clips.noisy_start(clip, 3, 0.0)
+    assert {s["stature_m"] for s in starts} == {1.7}
     wrong = eval_clips.noisy_start(clip, 3, -0.05)
-    assert wrong["stature_m"] == pytest.approx(0.95 * starts[3]["stature_m"])
+    assert wrong["stature_m"] == pytest.approx(0.95 * 1.7)
     assert wrong["sd"]["stature_m"] < 0.05 * 1.7 < 0.1  # nobody told the tracker
     still = eval_clips.noisy_start(replace(clip, steady=False), 3, 0.0)
     assert "phase" not in still and "stride_hz" not in still and "phase" not in still["sd"]
