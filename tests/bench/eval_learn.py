@@ -66,10 +66,16 @@ def _summary(tables: list[Path]) -> str:
                 name = row.get("measure") or path.stem.removeprefix("learn_")
                 if row.get("met") in ("yes", "NO"):
                     counts.setdefault(name, Counter())[row["met"]] += 1
-    order = sorted(counts, key=lambda name: (name[0] != "L", int(name[1:]) if name[0] == "L" else 0))
+    order = sorted(counts, key=_place)
     cells = [[name, str(counts[name]["yes"]), str(counts[name]["NO"])] for name in order]
     head = ["measure", "bounds kept", "missed"]
     return "## Bounds by measure\n\n" + table.markdown(head, cells, [False, True, True])
+
+
+def _place(measure: str) -> tuple[bool, int, str]:
+    """L measures by their number first, those by style after their own, then all others."""
+    code = measure.split()[0]
+    return (False, int(code[1:]), measure) if code[0] == "L" else (True, 0, "")
 
 
 def _stamps() -> dict[Path, int]:

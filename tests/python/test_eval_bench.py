@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import eval_ablate
 import eval_clips
 import eval_edits
+import eval_learn
 import eval_measures
 import eval_plan
 import eval_wanted
@@ -223,3 +224,10 @@ def test_an_edited_clip_has_the_truth_of_its_frames(tmp_path):
     shift = views[0].project(was.places["neck"]) - views[1].project(was.places["neck"])
     np.testing.assert_allclose(shift, [[40, 0]] * 12, atol=1e-9)
     assert eval_edits._frames(cut)[0].shape == (120, 80, 3)
+
+
+def test_bounds_of_learning_are_counted_by_measure(tmp_path):
+    rows = ["measure,met", "auto,yes", "L10,yes", "L5,yes", "L5,NO", "L5 by style,NO", "L6,"]
+    (tmp_path / "learn_a.csv").write_text("\n".join(rows) + "\n")
+    lines = eval_learn._summary([tmp_path / "learn_a.md"]).splitlines()[4:]
+    assert lines == ["| L5 | 1 | 1 |", "| L5 by style | 0 | 1 |", "| L10 | 1 | 0 |", "| auto | 1 | 0 |"]

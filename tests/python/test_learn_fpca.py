@@ -53,6 +53,17 @@ def test_passes_descend_and_stop(imputed, method):
     assert found.rmse[-1] < found.rmse[0]
 
 
+def test_passes_stop_when_the_bound_hardly_gains():
+    """A channel that half of the people never show moves on when there is nothing left to gain."""
+    case = cases.people(np.random.default_rng(26), missing=0.1)
+    cases.without_channel(case, [10], np.flatnonzero(case.subject % 2 == 0))
+    found = fpca.fit(case.values, case.mask, 8, tolerance=0.0)  # the model may not move at all
+    gains = -np.diff(found.objective)
+    assert found.converged and len(gains) < 200
+    assert np.all(gains[-bayes.PATIENCE :] < bayes.LEAST_GAIN)
+    assert gains[-bayes.PATIENCE - 1] >= bayes.LEAST_GAIN
+
+
 def test_a_pass_that_makes_it_worse_is_shown_and_not_called_convergence(monkeypatch):
     case, passes = cases.walks(np.random.default_rng(24), rows=30), []
     maximise = bayes.Problem.maximise

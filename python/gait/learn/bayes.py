@@ -28,6 +28,8 @@ Mask = npt.NDArray[np.bool_]
 ITERATIONS = 500
 TOLERANCE = 1e-5  # rms change of the model between passes over the noise
 LEAST_CHANGE = 1e-7  # rms change that is none, in the data's units: a tenth of the last digit stored
+LEAST_GAIN = 2e-7  # of the bound in a pass, nats per observed entry
+PATIENCE = 20  # passes in a row that gain less, after which what still moves is what the data leave open
 LEAST_NOISE = 1e-10  # variance relative to the data's
 
 
@@ -207,7 +209,7 @@ class Climb:
 
 
 def climb(problem: Problem, belief: Belief, tolerance: float, passes: int = ITERATIONS) -> Climb:
-    """Raise the bound by turns: scores of the rows, then components.
+    """Raise the bound by turns: scores of the rows, then components; until it, or the model, hardly moves.
 
     Parameters
     ----------
@@ -217,11 +219,12 @@ def climb(problem: Problem, belief: Belief, tolerance: float, passes: int = ITER
         At most.
     """
     at = Climb(belief, problem.expect(belief), [], [], False)
-    mixer = Mixer()
+    mixer, slow = Mixer(), 0
     while not at.converged and len(at.rmse) < passes:
         after, found = _pass(problem, mixer, at.belief, at.rows)
         enough = max(tolerance * np.sqrt(after.noise), LEAST_CHANGE)
-        at.converged = problem.change(at.rows, found) <= enough
+        slow = slow + 1 if found.bound - at.rows.bound < LEAST_GAIN * problem.observed else 0
+        at.converged = problem.change(at.rows, found) <= enough or slow >= PATIENCE
         at.objective.append(-found.bound / problem.observed)
         falls = not found.bound >= at.rows.bound
         if falls:  # by rounding nothing is left to gain; more than that is a mistake
