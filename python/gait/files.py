@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -9,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gait.errors import UserError, unreadable
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room on the disk, or for one user, or in one file
 
 
 @contextmanager
@@ -20,7 +23,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     UserError
-        If a file cannot be put there, as by `require_writable`.
+        If a file cannot be put there, as by `require_writable`, or has no room.
     """
     require_writable(path)
     target = Path(os.path.realpath(path))
@@ -28,6 +31,10 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         os.replace(temporary, target)
+    except OSError as error:
+        if error.errno not in FULL and error.filename != str(temporary):
+            raise
+        raise UserError(f"{path}: {error.strerror}; choose another place") from error
     finally:
         temporary.unlink(missing_ok=True)
 

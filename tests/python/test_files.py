@@ -1,5 +1,6 @@
 """Outputs that appear whole or not at all, and places where none may be put."""
 
+import errno
 import os
 
 import pytest
@@ -26,6 +27,21 @@ def test_a_failure_leaves_what_was_there(tmp_path):
         temporary.write_text("half")
         raise KeyboardInterrupt
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EFBIG])
+def test_a_full_disk_is_named_with_its_file(tmp_path, number):
+    with (
+        pytest.raises(UserError, match=r"out\.gait: .*; choose another place"),
+        replacing(tmp_path / "out.gait"),
+    ):
+        raise OSError(number, os.strerror(number))
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_else_fails_beside_a_file_keeps_its_name(tmp_path):
+    with pytest.raises(FileNotFoundError, match="other"), replacing(tmp_path / "out.gait"):
+        (tmp_path / "other").read_text()
 
 
 def test_pipes_and_devices_are_refused(tmp_path):

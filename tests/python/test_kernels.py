@@ -35,6 +35,11 @@ def test_a_program_starts_anew_with_its_command_line():
     assert python("-c", TELL, **kernels.COMMON).stdout == "True\n"
 
 
+def test_numpy_may_lack_features_where_warnings_are_errors():
+    done = python("-c", f"{TELL}; import numpy", PYTHONWARNINGS="error")
+    assert done.returncode == 0 and not done.stderr
+
+
 @pytest.mark.parametrize("words", [["-m", "gait"], ["-c", PROGRAM]])
 def test_the_command_is_the_same_afterwards(words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

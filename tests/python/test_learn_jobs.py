@@ -138,6 +138,20 @@ def test_the_fork_server_starts_before_what_is_slow_to_import(jobs, large, start
     assert run.stdout == starts * "False\n" and run.stderr.startswith("gait learn: x.asf: no such file")
 
 
+@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="signals held back are told elsewhere")
+def test_the_server_that_imports_does_not_hear_an_interruption():
+    """From a terminal it reaches the whole group; the command ends its server itself."""
+    tell = "print(open(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read())"
+    program = (
+        f"from multiprocessing import forkserver; from gait.learn import fork_server as f; f.start(); {tell}"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True
+    )
+    held = next(line.split()[1] for line in told.stdout.splitlines() if line.startswith("SigBlk"))
+    assert int(held, 16) >> (signal.SIGINT - 1) & 1
+
+
 def test_workers_have_the_stage_from_the_server_that_was_started():
     script = """
 import sys

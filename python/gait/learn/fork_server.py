@@ -9,7 +9,7 @@ import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import islice
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext
 
 STAGE = "gait.learn.stage"  # what workers run; by name, as this process may not have it yet
@@ -51,6 +51,7 @@ def context() -> ForkServerContext:
 def start() -> None:
     """Begin the imports; whoever asks for a worker before their end waits for it."""
     context()
+    resource_tracker.ensure_running()  # begun by the server, it would let interruptions through again
     with held_back():
         forkserver.ensure_running()
 

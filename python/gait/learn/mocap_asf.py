@@ -297,7 +297,7 @@ def _by_lines(path: Path, moving: dict[str, Bone]) -> dict[str, Floats]:
         elif words[0] not in moving:
             raise UserError(
                 f"{path}:{line}: bone {quoted(words[0])} does not move in the .asf; "
-                "use the subject's own .asf"
+                "use the subject's own .asf, or restore the file"
             )
         elif len(rows[words[0]]) != frame - 1:
             raise UserError(
