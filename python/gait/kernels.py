@@ -21,7 +21,7 @@ COMMON = {
 }
 """Environment of a process that uses the common kernels."""
 
-_KNOWN = "ignore:During parsing environment variable:ImportWarning"  # numpy names features it lacks
+_NO_WARNING = "ignore:During parsing environment variable:ImportWarning"  # numpy names features it lacks
 _RESTARTED = "GAIT_RESTARTED"  # which process was: never twice, whatever sets COMMON back at its start
 
 
@@ -38,7 +38,7 @@ def settle() -> None:
     again = sys.executable and sys.argv[0] not in ("", "-") and os.environ.get(_RESTARTED) != str(os.getpid())
     if again and _to_choose() and chosen() != COMMON:
         os.environ.update({**COMMON, _RESTARTED: str(os.getpid())})
-        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), _KNOWN)))
+        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), _NO_WARNING)))
         with contextlib.suppress(OSError):
             os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
 

@@ -118,11 +118,10 @@ def _sequences(learned: Learned) -> str:
         "with the cycles and angles seen, so compare it with other periods of the same row, not with "
         "other rows, nor with the figure, whose bins are single frames. Sharpness: SNR over the median of "
         "all periods tried. Residual: what the components leave of the sequence, rms of all its angles. "
-        "Evidence: repeats: correlation with the next "
-        "cycle; legs: cosine of the lag beyond half a cycle between left and right leg, whatever their "
-        "swing; flight: share of the time with both feet off the ground; lift and steps: rise of the feet "
-        "and of the ground, statures; ahead: cosine of the angle between where the pelvis faces and where "
-        "it goes.</p>"
+        "Evidence: repeats: correlation with the next cycle; legs: cosine of the lag beyond half a cycle "
+        "between left and right leg, whatever their swing; flight: share of the time with both feet off the "
+        "ground; lift and steps: rise of the feet and of the ground, statures; ahead: cosine of the angle "
+        "between where the pelvis faces and where it goes.</p>"
         f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
     )
 
