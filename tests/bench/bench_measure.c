@@ -5,29 +5,75 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_STEPS = 2000 };
+enum { MAX_STEPS = 2000, TURN = 3 }; /* steps in turn: of the first alone the data are in no cache */
 
 typedef struct times { /* of each step, milliseconds */
-    int32_t count;
     double wall[MAX_STEPS], cpu[MAX_STEPS], stage[BENCH_STAGES][MAX_STEPS];
 } times;
 
-static int ascending(const void *a, const void *b)
+typedef struct runner { /* what takes turns: a tracker, or two at the same time */
+    bench_result *result;
+    workers crew;
+    unsigned char *memory;
+    size_t each; /* bytes of it for a tracker */
+    gait_tracker *tracker[2];
+    int32_t frame, count; /* next in the scene; steps measured */
+    times *spent;
+} runner;
+
+static int32_t trackers(const runner *r)
 {
-    double const x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+    return r->result->plan.twins ? 2 : 1;
 }
 
-/* Sorts the values. */
-static double quantile(double *values, int32_t count, double share)
+/* ---- one step ---- */
+typedef struct job {
+    const runner *r;
+    gait_frame frame;
+    gait_status status[2];
+    gait_error err[2];
+} job;
+
+static void step_one(void *ctx, int32_t k)
 {
-    qsort(values, (size_t)count, sizeof *values, ascending);
-    int32_t const at = (int32_t)(share * (double)count);
-    return count ? values[at < count ? at : count - 1] : 0.0;
+    job *const j = ctx;
+    gait_estimate estimate;
+    j->status[k] = gait_tracker_step(j->r->tracker[k], &j->frame, &estimate, &j->err[k]);
 }
 
-/* From the start to the scene's end, or until enough steps are there. */
-static gait_status once(gait_tracker *t, const bench_scene *s, int32_t steps, times *out, gait_error *err)
+static void step_all(const runner *r, job *j)
+{
+    gait_tasks const both = gait_pool_tasks(r->crew.pool);
+    if (r->result->plan.twins)
+        both.run(both.user, step_one, j, 2);
+    else
+        step_one(j, 0);
+}
+
+static void note_times(runner *r, double wall, double cpu)
+{
+    r->spent->wall[r->count] = wall * 1e-6;
+    r->spent->cpu[r->count] = cpu * 1e-6;
+    for (int k = 0; k < BENCH_STAGES; k++)
+        r->spent->stage[k][r->count] = bench_stages_take(k);
+}
+
+static bool step(runner *r, const bench_scene *s, message *why)
+{
+    job j = {.r = r,
+             .frame = {.utime = (int64_t)r->frame * 1000000 / 30, .image = {bench_scene_frame(s, r->frame)}}};
+    int64_t const wall = bench_wall_ns(), cpu = bench_cpu_ns();
+    step_all(r, &j);
+    note_times(r, (double)(bench_wall_ns() - wall), (double)(bench_cpu_ns() - cpu));
+    r->count += r->frame > 0; /* the first frame has no ancestors */
+    for (int k = 0; k < trackers(r); k++)
+        if (j.status[k] != GAIT_OK)
+            return message_set(why, "%s: %s", gait_status_name(j.status[k]), j.err[k].text);
+    return true;
+}
+
+/* ---- a turn ---- */
+static bool start(const runner *r, const bench_scene *s, message *why)
 {
     gait_state const sd = {.phase = 0.05f,
                            .stride_hz = 0.05f,
@@ -36,71 +82,134 @@ static gait_status once(gait_tracker *t, const bench_scene *s, int32_t steps, ti
                            .pelvis = {0.05f, 0.05f, 0.02f},
                            .pitch = 0.02f,
                            .roll = 0.02f};
-    gait_estimate estimate;
-    gait_status status = gait_tracker_start(t, &s->start, &sd, 0, err);
-    for (int32_t f = 0; f < s->frames && out->count < steps && status == GAIT_OK; f++) {
-        gait_frame const frame = {.utime = (int64_t)f * 1000000 / 30, .image = {bench_scene_frame(s, f)}};
-        int64_t const wall = bench_wall_ns(), cpu = bench_cpu_ns();
-        status = gait_tracker_step(t, &frame, &estimate, err);
-        out->cpu[out->count] = (double)(bench_cpu_ns() - cpu) * 1e-6;
-        out->wall[out->count] = (double)(bench_wall_ns() - wall) * 1e-6;
-        for (int k = 0; k < BENCH_STAGES; k++)
-            out->stage[k][out->count] = bench_stages_take(k);
-        out->count += f > 0; /* the first frame has no ancestors */
-    }
-    return status;
+    gait_error err = {.text = ""};
+    for (int k = 0; k < trackers(r); k++)
+        if (gait_tracker_start(r->tracker[k], &s->start, &sd, 0, &err) != GAIT_OK)
+            return message_set(why, "%s", err.text);
+    return true;
 }
 
-static gait_status track(gait_tracker *t, const bench_scene *s, const bench_plan *plan, bench_result *out,
-                         gait_error *err)
+/* From the start to the scene's end, again and again, until enough steps are there. */
+static bool take_turn(runner *r, const bench_scene *s, int32_t steps, message *why)
 {
-    static times all;
-    gait_image const plate = bench_scene_plate(s);
-    int32_t const steps = plan->steps < MAX_STEPS ? plan->steps : MAX_STEPS;
-    gait_status status = gait_tracker_set_background(t, 0, &plate);
-    all.count = 0;
-    bench_stages_enable(t, plan->stages);
-    while (status == GAIT_OK && all.count < steps) {
-        bool const first = all.count == 0;
-        status = once(t, s, steps, &all, err);
-        if (first)
-            out->digest = gait_tracker_digest(t);
+    bool ok = true;
+    bench_stages_enable(r->tracker[0], r->result->plan.stages);
+    for (int i = 0; ok && i < TURN && r->count < steps; i++) {
+        ok = (r->frame > 0 || start(r, s, why)) && step(r, s, why);
+        r->frame = (r->frame + 1) % s->frames;
+        bool const first_round = r->count < s->frames;
+        if (first_round && (r->frame == 0 || r->count == steps))
+            r->result->digest = gait_tracker_digest(r->tracker[0]);
     }
-    bench_stages_enable(t, false);
-    out->median_ms = quantile(all.wall, all.count, 0.5);
-    out->p99_ms = quantile(all.wall, all.count, 0.99);
-    out->cpu_ms = quantile(all.cpu, all.count, 0.5);
-    out->cpu_p99_ms = quantile(all.cpu, all.count, 0.99);
+    bench_stages_enable(r->tracker[0], false);
+    return ok;
+}
+
+/* Every other time in the opposite order. */
+static bool take_turns(runner *r, int32_t count, const bench_scene *s, message *why)
+{
+    int32_t const steps = r->result->plan.steps < MAX_STEPS ? r->result->plan.steps : MAX_STEPS;
+    bool ok = true;
+    for (int32_t turn = 0; ok && r[0].count < steps; turn++)
+        for (int32_t k = 0; ok && k < count; k++)
+            ok = take_turn(&r[turn % 2 ? count - 1 - k : k], s, steps, why);
+    return ok;
+}
+
+/* ---- figures ---- */
+static int ascending(const void *a, const void *b)
+{
+    double const x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double quantile(const double *values, int32_t count, double share)
+{
+    static double sorted[MAX_STEPS];
+    memcpy(sorted, values, (size_t)count * sizeof *sorted);
+    qsort(sorted, (size_t)count, sizeof *sorted, ascending);
+    int32_t const at = (int32_t)(share * (double)count);
+    return count ? sorted[at < count ? at : count - 1] : 0.0;
+}
+
+static double particle_ms(const runner *r, int32_t step)
+{
+    return (r->spent->cpu[step] - r->spent->stage[STAGE_FEATURES][step]) / r->result->plan.particles;
+}
+
+static void sum_up(const runner *r, const runner *first)
+{
+    static double ratio[MAX_STEPS], particle[MAX_STEPS];
+    bench_result *const out = r->result;
+    for (int32_t i = 0; i < r->count; i++) {
+        ratio[i] = r->spent->wall[i] / first->spent->wall[i];
+        particle[i] = particle_ms(r, i) / particle_ms(first, i);
+    }
+    out->median_ms = quantile(r->spent->wall, r->count, 0.5);
+    out->p99_ms = quantile(r->spent->wall, r->count, 0.99);
+    out->cpu_ms = quantile(r->spent->cpu, r->count, 0.5);
+    out->cpu_p99_ms = quantile(r->spent->cpu, r->count, 0.99);
+    out->ratio = quantile(ratio, r->count, 0.5);
+    out->particle_ratio = quantile(particle, r->count, 0.5);
     for (int k = 0; k < BENCH_STAGES; k++)
-        out->stage_ms[k] = plan->stages ? quantile(all.stage[k], all.count, 0.5) : 0.0;
-    return status;
+        out->stage_ms[k] = out->plan.stages ? quantile(r->spent->stage[k], r->count, 0.5) : 0.0;
 }
 
-bool bench_measure(const gait_model *model, const bench_scene *s, const bench_plan *plan, bench_result *out,
-                   message *why)
+/* ---- what is measured ---- */
+static bool make_tracker(runner *r, int k, const gait_model *model, const gait_tracker_config *cfg,
+                         const gait_image *plate, message *why)
 {
-    workers crew;
+    gait_error err = {.text = ""};
+    return (gait_tracker_init(r->memory + (size_t)k * r->each, r->each, model, cfg, &r->tracker[k], &err) ==
+                GAIT_OK &&
+            gait_tracker_set_background(r->tracker[k], 0, plate) == GAIT_OK) ||
+           message_set(why, "%s", err.text);
+}
+
+static bool make(runner *r, const gait_model *model, const bench_scene *s, message *why)
+{
+    const bench_plan *const plan = &r->result->plan;
     gait_tracker_config cfg;
     gait_error err = {.text = ""};
-    gait_tracker *tracker = NULL;
-    *out = (bench_result){.plan = *plan, .width = s->camera.width, .height = s->camera.height};
+    gait_image const plate = bench_scene_plate(s);
+    if (!workers_start(&r->crew, plan->threads, why))
+        return false;
     gait_tracker_default(&cfg, plan->mode);
     cfg.particles = plan->particles;
     cfg.camera[0] = s->camera;
     cfg.cpu_mask = plan->cpu_mask;
-    cfg.tasks = plan->threads;
-    out->isa = gait_cpu_name(plan->cpu_mask);
-    if (!workers_start(&crew, plan->threads, why))
-        return false;
-    cfg.exec = gait_pool_tasks(crew.pool);
-    gait_status status = gait_tracker_bytes(model, &cfg, &out->bytes, &err);
-    void *const memory = aligned_alloc(GAIT_ALIGN, (out->bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
-    if (status == GAIT_OK)
-        status =
-            memory ? gait_tracker_init(memory, out->bytes, model, &cfg, &tracker, &err) : GAIT_ERR_MEMORY;
-    if (status == GAIT_OK)
-        status = track(tracker, s, plan, out, &err);
-    workers_stop(&crew);
-    free(memory);
-    return status == GAIT_OK || message_set(why, "%s: %s", gait_status_name(status), err.text);
+    cfg.tasks = plan->twins ? 1 : plan->threads;
+    if (!plan->twins)
+        cfg.exec = gait_pool_tasks(r->crew.pool);
+    if (gait_tracker_bytes(model, &cfg, &r->result->bytes, &err) != GAIT_OK)
+        return message_set(why, "%s", err.text);
+    r->each = (r->result->bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
+    r->memory = aligned_alloc(GAIT_ALIGN, r->each * (size_t)trackers(r));
+    bool ok = r->memory || message_set(why, "not enough memory for %d particles", (int)plan->particles);
+    for (int k = 0; ok && k < trackers(r); k++)
+        ok = make_tracker(r, k, model, &cfg, &plate, why);
+    return ok;
+}
+
+bool bench_measure(const gait_model *model, const bench_scene *s, bench_result *results, int32_t count,
+                   message *why)
+{
+    static times spent[BENCH_TURNS];
+    runner r[BENCH_TURNS] = {0};
+    bool ok = count <= BENCH_TURNS || message_set(why, "more than %d trackers in turns", BENCH_TURNS);
+    for (int32_t k = 0; ok && k < count; k++) {
+        results[k].width = s->camera.width;
+        results[k].height = s->camera.height;
+        results[k].isa = gait_cpu_name(results[k].plan.cpu_mask);
+        r[k] = (runner){.result = &results[k], .spent = &spent[k]};
+        ok = make(&r[k], model, s, why);
+    }
+    ok = ok && take_turns(r, count, s, why);
+    for (int32_t k = 0; ok && k < count; k++)
+        sum_up(&r[k], &r[0]);
+    for (int32_t k = 0; k < BENCH_TURNS; k++) {
+        workers_stop(&r[k].crew);
+        free(r[k].memory);
+    }
+    return ok;
 }

@@ -1,14 +1,20 @@
-/* bench_measure.h - one tracker over a scene: time of a step, of its stages, memory, digest. */
+/* bench_measure.h - trackers over a scene: time of a step, of its stages, memory, digest.
+ *
+ * What is compared takes turns, a few steps each, and a ratio is the median over the steps: other programs, the clock
+ * and the host of a virtual machine change a processor's speed by more than what is to be told apart. */
 #ifndef BENCH_MEASURE_H
 #define BENCH_MEASURE_H
 #include "bench_scene.h"
 #include "bench_stages.h"
 
+enum { BENCH_TURNS = 8 }; /* trackers that can take turns */
+
 typedef struct bench_plan {
     int32_t mode, particles, threads;
     uint32_t cpu_mask;
-    int32_t steps; /* over all rounds through the scene */
+    int32_t steps; /* over all rounds through the scene; of the first for all that take turns */
     bool stages;   /* time the stages as well, which takes a little time itself */
+    bool twins;    /* two trackers at the same time, each on one of the two threads */
 } bench_plan;
 
 typedef struct bench_result {
@@ -19,9 +25,13 @@ typedef struct bench_result {
     double median_ms, p99_ms;      /* of a step, time of day */
     double cpu_ms, cpu_p99_ms;     /* of the calling thread, which other programs do not lengthen */
     double stage_ms[BENCH_STAGES]; /* median, CPU; 0 without stages */
-    uint64_t digest;               /* after the first round */
+    double ratio; /* step by step to the first that took turns with it, median: time of day, */
+    double
+        particle_ratio; /* and CPU time per particle without the features, which are the same for any number */
+    uint64_t digest;    /* after the first round */
 } bench_result;
 
-bool bench_measure(const gait_model *model, const bench_scene *s, const bench_plan *plan, bench_result *out,
+/* Measure by the plans that results[0 .. count) hold. */
+bool bench_measure(const gait_model *model, const bench_scene *s, bench_result *results, int32_t count,
                    message *why);
 #endif

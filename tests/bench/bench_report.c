@@ -16,11 +16,17 @@ static struct {
 static int other_count;
 
 const bench_result *bench_report_measure(const gait_model *model, const bench_scene *s,
-                                         const bench_plan *plan, message *why)
+                                         const bench_plan *plans, int32_t n, message *why)
 {
-    if (count == MAX_RESULTS)
+    bench_result *const first = results + count;
+    if (count + n > MAX_RESULTS)
         return message_set(why, "more than %d measurements", MAX_RESULTS) ? NULL : NULL;
-    return bench_measure(model, s, plan, &results[count], why) ? &results[count++] : NULL;
+    for (int32_t k = 0; k < n; k++)
+        first[k] = (bench_result){.plan = plans[k]};
+    if (!bench_measure(model, s, first, n, why))
+        return NULL;
+    count += n;
+    return first;
 }
 
 void bench_report_add(const char *what, const char *isa, double ms)
@@ -34,7 +40,7 @@ void bench_report_add(const char *what, const char *isa, double ms)
 
 static const char *mode_of(const bench_result *r)
 {
-    return r->plan.mode == GAIT_MODE_PAPER ? "paper" : "default";
+    return r->plan.twins ? "twins" : r->plan.mode == GAIT_MODE_PAPER ? "paper" : "default";
 }
 
 void bench_report_head(const char *title)
@@ -44,11 +50,17 @@ void bench_report_head(const char *title)
         title);
 }
 
-void bench_report_row(const bench_result *r)
+static void row(const bench_result *r)
 {
     printf("%-7s %-7s %4dx%-4d %9d %7d %9.1f %9.2f %8.2f %8.2f %8.1f\n", mode_of(r), r->isa, (int)r->width,
            (int)r->height, (int)r->plan.particles, (int)r->plan.threads, (double)r->bytes / 1e6, r->median_ms,
            r->p99_ms, r->cpu_ms, 1e3 / r->median_ms);
+}
+
+void bench_report_rows(const bench_result *r, int32_t n)
+{
+    for (int32_t k = 0; k < n; k++)
+        row(&r[k]);
     fflush(stdout);
 }
 
@@ -57,6 +69,9 @@ void bench_report_stages(const bench_result *const *runs, int n)
     printf("\nstages, CPU ns per particle (the step's fixed parts in ms)\n%-12s", "");
     for (int k = 0; k < n; k++)
         printf("%12s", runs[k]->isa);
+    printf("\n%-12s", "particles");
+    for (int k = 0; k < n; k++)
+        printf("%12d", (int)runs[k]->plan.particles);
     printf("\n");
     for (int stage = 0; stage < BENCH_STAGES; stage++) {
         printf("%s%-*s", bench_stage_is_part(stage) ? "  " : "", bench_stage_is_part(stage) ? 10 : 12,
@@ -75,20 +90,21 @@ bool bench_report_csv(const char *path, message *why)
     FILE *const f = fopen(path, "w");
     if (!f)
         return message_set(why, "%.120s: cannot be written: %s", path, strerror(errno));
-    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms");
+    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms,ratio,particle_ratio");
     for (int k = 0; k < BENCH_STAGES; k++)
         fprintf(f, ",%s_ms", bench_stage_name[k]);
     fprintf(f, "\n");
     for (int i = 0; i < count; i++) {
         const bench_result *const r = &results[i];
-        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f", mode_of(r), r->isa, (int)r->width, (int)r->height,
-                (int)r->plan.particles, (int)r->plan.threads, r->bytes, r->median_ms, r->p99_ms, r->cpu_ms);
+        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f", mode_of(r), r->isa, (int)r->width,
+                (int)r->height, (int)r->plan.particles, (int)r->plan.threads, r->bytes, r->median_ms,
+                r->p99_ms, r->cpu_ms, r->ratio, r->particle_ratio);
         for (int k = 0; k < BENCH_STAGES; k++)
             r->plan.stages ? fprintf(f, ",%.4f", r->stage_ms[k]) : fprintf(f, ",");
         fprintf(f, "\n");
     }
     for (int i = 0; i < other_count; i++) {
-        fprintf(f, "%s,%s,,,,1,,,,%.4f", others[i].what, others[i].isa, others[i].ms);
+        fprintf(f, "%s,%s,,,,1,,,,%.4f,,", others[i].what, others[i].isa, others[i].ms);
         for (int k = 0; k < BENCH_STAGES; k++)
             fprintf(f, ",");
         fprintf(f, "\n");

@@ -3,14 +3,14 @@
 #define BENCH_REPORT_H
 #include "bench_measure.h"
 
-/* Results are kept until the program ends; NULL (why says so) when it fails. */
+/* Results of trackers that take turns, kept until the program ends; NULL (why says so) when it fails. */
 const bench_result *bench_report_measure(const gait_model *model, const bench_scene *s,
-                                         const bench_plan *plan, message *why);
+                                         const bench_plan *plans, int32_t count, message *why);
 /* A time of something else than a tracker: CPU milliseconds. */
 void bench_report_add(const char *what, const char *isa, double ms);
 
 void bench_report_head(const char *title);
-void bench_report_row(const bench_result *r);
+void bench_report_rows(const bench_result *r, int32_t count);
 /* Stages of several runs side by side, nanoseconds a particle; for features and resampling milliseconds a step. */
 void bench_report_stages(const bench_result *const *runs, int count);
 bool bench_report_csv(const char *path, message *why);

@@ -4,16 +4,16 @@
 #include "bench_measure.h"
 
 typedef struct verdict {
-    const bench_result *usual;      /* default number of particles */
-    const bench_result *many[2][2]; /* 10,000: [mode][threads - 1] */
-    const bench_result *isa[4];     /* the same with the stages, scalar first, best last */
+    const bench_result *usual;   /* default number of particles */
+    const bench_result *many[2]; /* 10,000, by mode: one thread, two; in the first two trackers as well */
+    const bench_result *isa[4];  /* the same with the stages, scalar first, best last */
     int isas;
     const bench_result *picture[3]; /* 640x480, 1280x720, 1920x1080 */
-    double least_ns, most_ns;       /* a particle without the features, from 1,000 to 100,000 of them */
+    double least, most;             /* particle_ratio from 1,000 to 100,000 of them */
     double limit_ms, kept_ms;       /* best instruction set */
 } verdict;
 
-/* Take a number of particles into least_ns and most_ns: one thread, with stages. */
+/* Take a number of particles into least and most: one thread, with stages. */
 void verdict_size(verdict *v, const bench_result *r);
 void verdict_print(const verdict *v, const gait_model *model);
 #endif

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_SWEEP = 8, FRAMES = 90, LARGE_FRAMES = 30, MANY = 10000 };
+enum { FRAMES = 90, LARGE_FRAMES = 30, MANY = 10000 };
 
 typedef struct settings {
     char model[OPTION_TEXT], particles[OPTION_TEXT], threads[OPTION_TEXT], csv[OPTION_TEXT];
@@ -19,10 +19,10 @@ typedef struct settings {
 } settings;
 
 /* "100,1000" to numbers in [1, high]; returns how many, 0 if it is not such a list. */
-static int numbers(const char *text, long high, int32_t out[MAX_SWEEP])
+static int numbers(const char *text, long high, int32_t out[BENCH_TURNS])
 {
     int count = 0;
-    for (char *end; count < MAX_SWEEP; text = end + 1) {
+    for (char *end; count < BENCH_TURNS; text = end + 1) {
         long const v = strtol(text, &end, 10);
         if (end == text || v < 1 || v > high || (*end != ',' && *end != '\0'))
             return 0;
@@ -44,17 +44,19 @@ typedef struct bench {
 /* Steps enough for a stable figure, fewer where they are long. */
 static int32_t steps_for(const bench *b, int32_t particles)
 {
+    enum { LEAST = 24 };
     int32_t const fewer = (int32_t)((int64_t)b->set->steps * MANY / particles);
-    return particles <= MANY ? b->set->steps : fewer > 10 ? fewer : 10;
+    return particles <= MANY ? b->set->steps : fewer > LEAST ? fewer : LEAST;
 }
 
-static const bench_result *run(bench *b, bench_plan plan)
+/* Trackers that take turns, as many steps each as the first one's number of particles allows. */
+static const bench_result *run(bench *b, bench_plan *plans, int32_t count)
 {
-    if (plan.steps == 0)
-        plan.steps = steps_for(b, plan.particles);
-    const bench_result *const r = bench_report_measure(b->model, &b->scene, &plan, b->why);
+    if (plans->steps == 0)
+        plans->steps = steps_for(b, plans->particles);
+    const bench_result *const r = bench_report_measure(b->model, &b->scene, plans, count, b->why);
     if (r)
-        bench_report_row(r);
+        bench_report_rows(r, count);
     return r;
 }
 
@@ -65,21 +67,24 @@ static bool same_bits(bench *b, const bench_result *x, const bench_result *y)
                        (int)x->plan.particles);
 }
 
-/* The settings in use: default and paper, on one core and two. */
+/* The settings in use: default and paper, on one core and two, and what two trackers do at the same time. */
 static bool modes(bench *b)
 {
     gait_tracker_config usual;
     gait_tracker_default(&usual, GAIT_MODE_DEFAULT);
     bench_report_head("modes, colour frames");
-    b->found.usual = run(b, (bench_plan){.particles = usual.particles, .threads = 1, .cpu_mask = ~0u});
-    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++)
-        for (int32_t threads = 1; threads <= 2; threads++) {
-            bench_plan const plan = {.mode = mode, .particles = MANY, .threads = threads, .cpu_mask = ~0u};
-            if (!(b->found.many[mode][threads - 1] = run(b, plan)))
-                return false;
-        }
-    return b->found.usual && same_bits(b, b->found.many[0][0], b->found.many[0][1]) &&
-           same_bits(b, b->found.many[1][0], b->found.many[1][1]);
+    b->found.usual = run(b, &(bench_plan){.particles = usual.particles, .threads = 1, .cpu_mask = ~0u}, 1);
+    for (int32_t mode = GAIT_MODE_DEFAULT; b->found.usual && mode <= GAIT_MODE_PAPER; mode++) {
+        bench_plan const one = {.mode = mode, .particles = MANY, .threads = 1, .cpu_mask = ~0u};
+        bench_plan plans[] = {one, one, one};
+        plans[1].threads = plans[2].threads = 2;
+        plans[2].twins = true;
+        const bench_result *const r = run(b, plans, mode == GAIT_MODE_DEFAULT ? 3 : 2);
+        if (!r || !same_bits(b, &r[0], &r[1]))
+            return false;
+        b->found.many[mode] = r;
+    }
+    return b->found.usual;
 }
 
 /* The same with each instruction set, with the stages' times. */
@@ -87,48 +92,72 @@ static bool instruction_sets(bench *b)
 {
     static const uint32_t masks[] = {0, GAIT_CPU_BASE, GAIT_CPU_BASE | GAIT_CPU_AVX2,
                                      GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512};
-    int32_t const steps = b->set->steps < 40 ? b->set->steps : 40;
+    enum { SETS = sizeof masks / sizeof *masks };
+    bench_plan plans[SETS];
     int count = 0;
+    for (int k = 0; k < SETS; k++)
+        if (!(masks[k] & ~gait_cpu_features()))
+            plans[count++] =
+                (bench_plan){.particles = MANY, .threads = 1, .cpu_mask = masks[k], .stages = true};
+    plans[0].steps = b->set->steps < 40 ? b->set->steps : 40;
     bench_report_head("instruction sets, with the stages timed");
-    for (size_t k = 0; k < sizeof masks / sizeof *masks; k++) {
-        bench_plan const plan = {
-            .particles = MANY, .threads = 1, .cpu_mask = masks[k], .steps = steps, .stages = true};
-        if (masks[k] & ~gait_cpu_features())
-            continue;
-        if (!(b->found.isa[count] = run(b, plan)) || !same_bits(b, b->found.isa[0], b->found.isa[count]))
+    const bench_result *const r = run(b, plans, count);
+    for (int k = 0; k < count; k++) {
+        if (!r || !same_bits(b, &r[0], &r[k]))
             return false;
-        count++;
+        b->found.isa[k] = &r[k];
     }
     b->found.isas = count;
     bench_report_stages(b->found.isa, count);
     return true;
 }
 
+/* Numbers of particles on one core, with the stages' times; as many steps of each as of the most. */
+static bool sizes(bench *b, const int32_t *particles, int count)
+{
+    const bench_result *of[BENCH_TURNS];
+    bench_plan plans[BENCH_TURNS];
+    for (int k = 0; k < count; k++) {
+        plans[k] = (bench_plan){.particles = particles[k], .threads = 1, .cpu_mask = ~0u, .stages = true};
+        int32_t const steps = steps_for(b, particles[k]);
+        plans[0].steps = k == 0 || steps < plans[0].steps ? steps : plans[0].steps;
+    }
+    bench_report_head("particles, with the stages timed");
+    const bench_result *const r = run(b, plans, count);
+    for (int k = 0; r && k < count; k++) {
+        of[k] = &r[k];
+        verdict_size(&b->found, &r[k]);
+    }
+    if (r)
+        bench_report_stages(of, count);
+    return r;
+}
+
+static bool threads_of(bench *b, int32_t particles, const int32_t *threads, int count)
+{
+    bench_plan plans[BENCH_TURNS];
+    for (int k = 0; k < count; k++)
+        plans[k] = (bench_plan){.particles = particles, .threads = threads[k], .cpu_mask = ~0u};
+    const bench_result *const r = run(b, plans, count);
+    for (int k = 1; r && k < count; k++)
+        if (!same_bits(b, &r[0], &r[k]))
+            return false;
+    return r;
+}
+
 static bool sweep(bench *b)
 {
-    int32_t particles[MAX_SWEEP], threads[MAX_SWEEP];
-    int const sizes = numbers(b->set->particles, 1 << 20, particles),
+    int32_t particles[BENCH_TURNS], threads[BENCH_TURNS];
+    int const count = numbers(b->set->particles, 1 << 20, particles),
               counts = numbers(b->set->threads, GAIT_POOL_MAX, threads);
-    if (!sizes || !counts)
+    if (!count || !counts)
         return message_set(b->why, "--particles and --threads want up to %d numbers like 100,1000",
-                           MAX_SWEEP);
+                           BENCH_TURNS);
+    bool ok = sizes(b, particles, count);
     bench_report_head("particles and threads");
-    for (int i = 0; i < sizes; i++) {
-        const bench_result *first = NULL;
-        for (int k = 0; k < counts; k++) {
-            const bench_result *const r = run(b, (bench_plan){.particles = particles[i],
-                                                              .threads = threads[k],
-                                                              .cpu_mask = ~0u,
-                                                              .stages = threads[k] == 1});
-            if (!r || (first && !same_bits(b, first, r)))
-                return false;
-            if (!first)
-                first = r;
-            if (threads[k] == 1)
-                verdict_size(&b->found, r);
-        }
-    }
-    return true;
+    for (int i = 0; ok && i < count; i++)
+        ok = threads_of(b, particles[i], threads, counts);
+    return ok;
 }
 
 /* A person of the same size in larger pictures. */
@@ -137,10 +166,10 @@ static bool pictures(bench *b)
     static const int32_t size[][2] = {{640, 480}, {1280, 720}, {1920, 1080}};
     bench_report_head("picture size, the person as large in all");
     for (int k = 0; k < 3; k++) {
-        bench_plan const plan = {.particles = 1500, .threads = 1, .cpu_mask = ~0u, .stages = true};
+        bench_plan plan = {.particles = 1500, .threads = 1, .cpu_mask = ~0u, .stages = true};
         bench_scene_free(&b->scene);
         if (!bench_scene_make(&b->scene, b->model, size[k][0], size[k][1], LARGE_FRAMES, b->why) ||
-            !(b->found.picture[k] = run(b, plan)))
+            !(b->found.picture[k] = run(b, &plan, 1)))
             return false;
     }
     bench_report_stages(b->found.picture, 3);
