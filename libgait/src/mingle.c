@@ -2,57 +2,79 @@
 #include "fmath.h"
 #include "rng.h"
 
-enum { OTHERS = 3 };
-
 void mingling_set(mingling *m, float seconds, float time)
 {
     m->pull = time > 0.0f ? 1.0f - m_exp(-seconds / time) : 0.0f;
     m->spread = __builtin_sqrtf(m->pull * (1.0f - m->pull));
 }
 
-/* Three particles for each lane, drawn by weight. */
-static void draw_others(const mingling *m, int32_t first, int32_t lanes, int32_t other[OTHERS][BLOCK])
+void mingle_rows(const population *from, int32_t begin, int32_t end, float *row)
 {
-    for (int32_t lane = 0; lane < lanes; lane++) {
-        uint32_t r[4];
-        rng_bits(m->seed, STREAM_MINGLE, m->frame, (uint32_t)(first + lane), 0, r);
-        for (int32_t k = 0; k < OTHERS; k++)
-            other[k][lane] = m->parent[(uint64_t)r[k] * (uint32_t)m->n >> 32];
-    }
+    int32_t const stride = mingle_stride(from->fields);
+    for (int32_t f = 0; f < stride; f++)
+        for (int32_t i = begin; i < end; i++)
+            row[(size_t)i * (size_t)stride + (size_t)f] = f < from->fields ? field(from, f)[i] : 0.0f;
 }
 
-/* Move one field of every lane. */
-static void mingle_field(const mingling *m, int32_t lanes, const float *x, int32_t other[OTHERS][BLOCK],
-                         float *v)
+typedef struct drawn { /* rows of a particle and of three that are drawn by weight */
+    const float *own, *towards, *apart[2];
+} drawn;
+
+static drawn draw(const mingling *m, int32_t i)
 {
-    for (int32_t lane = 0; lane < lanes; lane++)
-        v[lane] +=
-            m->pull * (x[other[0][lane]] - v[lane]) + m->spread * (x[other[1][lane]] - x[other[2][lane]]);
+    size_t const stride = (size_t)mingle_stride(m->fields);
+    uint32_t r[4];
+    size_t at[3];
+    rng_bits(m->seed, STREAM_MINGLE, m->frame, (uint32_t)i, 0, r);
+    for (int32_t k = 0; k < 3; k++)
+        at[k] = (size_t)m->parent[(uint64_t)r[k] * (uint32_t)m->n >> 32];
+    return (drawn){m->row + (size_t)m->parent[i] * stride,
+                   m->row + at[0] * stride,
+                   {m->row + at[1] * stride, m->row + at[2] * stride}};
 }
 
-/* The same where differences go round: of a turn, in units of it. */
-static void mingle_angle(const mingling *m, int32_t lanes, const float *x, int32_t other[OTHERS][BLOCK],
-                         float turn, float *v)
+static void mingle_row(const mingling *m, const drawn *d, float *restrict out)
+{
+    float const pull = m->pull, spread = m->spread;
+    for (int32_t f = 0; f < m->fields; f += 4)
+        for (int32_t k = f; k < f + 4; k++) /* four at once */
+            out[k] =
+                d->own[k] + (pull * (d->towards[k] - d->own[k]) + spread * (d->apart[0][k] - d->apart[1][k]));
+}
+
+typedef struct angles { /* of a lane each: own, and how far it is from others */
+    float own[BLOCK], towards[BLOCK], apart[BLOCK];
+} angles;
+
+static void take_angle(const drawn *d, int32_t f, int32_t lane, angles *out)
+{
+    out->own[lane] = d->own[f];
+    out->towards[lane] = d->towards[f] - d->own[f];
+    out->apart[lane] = d->apart[0][f] - d->apart[1][f];
+}
+
+/* Differences go round: of a turn, in units of it. */
+static void mingle_angles(const mingling *m, const angles *a, float turn, float *restrict out)
 {
     float const unit = TWO_PI_F / turn;
-    for (int32_t lane = 0; lane < lanes; lane++) {
-        float const towards = m_wrap_pi(unit * (x[other[0][lane]] - v[lane]));
-        float const apart = m_wrap_pi(unit * (x[other[1][lane]] - x[other[2][lane]]));
-        v[lane] += (m->pull * towards + m->spread * apart) / unit;
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        float const towards = m_wrap_pi(unit * a->towards[lane]), apart = m_wrap_pi(unit * a->apart[lane]);
+        out[lane] = a->own[lane] + (m->pull * towards + m->spread * apart) / unit;
     }
 }
 
-void mingle_block(const mingling *m, int32_t first, int32_t lanes, walker_block *w)
+void mingle_block(const mingling *m, int32_t first, int32_t lanes, walker_block *out)
 {
-    int32_t other[OTHERS][BLOCK];
-    if (!(m->pull > 0.0f))
-        return;
-    draw_others(m, first, lanes, other);
-    for (int32_t f = 0; f < m->from->fields; f++) {
-        const float *const x = field(m->from, f);
-        if (f == F_PHASE || f == F_HEADING)
-            mingle_angle(m, lanes, x, other, f == F_PHASE ? 1.0f : TWO_PI_F, w->f[f]);
-        else
-            mingle_field(m, lanes, x, other, w->f[f]);
+    angles phase, heading;
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        float row[(F_MAX + 3) / 4 * 4];
+        drawn const d = draw(m, first + i_min(lane, lanes - 1));
+        mingle_row(m, &d, row);
+        for (int32_t f = 0; f < m->fields; f++)
+            out->f[f][lane] = row[f];
+        take_angle(&d, F_PHASE, lane, &phase);
+        take_angle(&d, F_HEADING, lane, &heading);
     }
+    mingle_angles(m, &phase, 1.0f, out->f[F_PHASE]);
+    mingle_angles(m, &heading, TWO_PI_F, out->f[F_HEADING]);
 }

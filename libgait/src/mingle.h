@@ -12,7 +12,8 @@
 #include "dynamics.h"
 
 typedef struct mingling { /* of one frame, after resampling */
-    const population *from;
+    int32_t fields;
+    const float *row;      /* of every particle that can be a parent: mingle_rows() */
     const int32_t *parent; /* n: drawn by weight */
     int32_t n;
     uint64_t seed;
@@ -23,6 +24,15 @@ typedef struct mingling { /* of one frame, after resampling */
 /* Set pull and spread for so many seconds since the last; time: seconds in which particles forget, 0: never. */
 void mingling_set(mingling *m, float seconds, float time);
 
-/* Change the lanes of w, which hold particles parent[first], parent[first + 1] ... */
-void mingle_block(const mingling *m, int32_t first, int32_t lanes, walker_block *w);
+/* Floats of a particle's row: its fields and zeros. */
+static inline int32_t mingle_stride(int32_t fields)
+{
+    return (fields + 3) & ~3;
+}
+
+/* Rows of particles begin .. end - 1: one drawn at random is in two lines of the cache, and not in one for each field. */
+void mingle_rows(const population *from, int32_t begin, int32_t end, float *row);
+
+/* Particles parent[first], parent[first + 1] ... after mingling; lanes beyond repeat the last. */
+void mingle_block(const mingling *m, int32_t first, int32_t lanes, walker_block *out);
 #endif

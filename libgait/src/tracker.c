@@ -29,13 +29,15 @@ static void layout_state(arena *a, gait_tracker *t)
     t->state_end = TAKE(a, unsigned char, 1);
 }
 
-/* The joints take the place of the planes that a frame's features were made from. */
+/* The joints take the place of the planes that a frame's features were made from, and these that of the rows in which
+ * particles mingle. */
 static void layout_shared(arena *a, gait_tracker *t)
 {
     arena size = {.cap = SIZE_MAX, .solid = true};
     features_scratch_layout(&size);
-    size_t const each = (size_t)(3 * t->model->points) * sizeof *t->joint, n = (size_t)t->cfg.particles;
-    size_t const bytes = each * n > size.used ? each * n : size.used;
+    int32_t const floats = i_max(3 * t->model->points, mingle_stride(body_rule_fields(&t->rule)));
+    size_t const all = (size_t)floats * (size_t)t->cfg.particles * sizeof *t->joint;
+    size_t const bytes = all > size.used ? all : size.used;
     t->joint = (float *)(void *)TAKE(a, unsigned char, bytes);
     arena planes = {.base = (unsigned char *)t->joint, .cap = bytes, .solid = true};
     t->scratch = features_scratch_layout(&planes);
@@ -164,6 +166,14 @@ typedef struct move_job {
     dynamics_step step;
 } move_job;
 
+static void rows_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    const move_job *const j = ctx;
+    (void)task;
+    for (int32_t i = begin; i < end; i += BLOCK)
+        mingle_rows(&j->from, i, i_min(i + BLOCK, end), j->t->joint);
+}
+
 static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     const move_job *const j = ctx;
@@ -173,8 +183,10 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
     (void)task;
     for (int32_t i = begin; i < end; i += BLOCK) {
         int32_t const lanes = i_min(BLOCK, end - i);
-        walker_block_get(&j->from, t->filter.parent + i, lanes, &then);
-        mingle_block(&j->mingling, i, lanes, &then);
+        if (j->mingling.pull > 0.0f)
+            mingle_block(&j->mingling, i, lanes, &then);
+        else
+            walker_block_get(&j->from, t->filter.parent + i, lanes, &then);
         if (j->step.dt > 0.0f)
             t->like->run->dynamics_move(&j->step, i, &then, &now);
         walker_block_put(&to, i, lanes, j->step.dt > 0.0f ? &now : &then);
@@ -182,11 +194,15 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 }
 
 /* Particles mingle where they were drawn by weight and are of one mode; between two modes there is nobody. */
-static mingling mingle_after(gait_tracker *t, const population *from, bool resampled, uint32_t frame)
+static mingling mingle_after(gait_tracker *t, bool resampled, uint32_t frame)
 {
     bool const one_mode = t->core->modes.stage == MODES_SINGLE && !loss_is_lost(t);
-    mingling m = {
-        .from = from, .parent = t->filter.parent, .n = t->filter.n, .seed = t->cfg.seed, .frame = frame};
+    mingling m = {.fields = t->people.fields,
+                  .row = t->joint,
+                  .parent = t->filter.parent,
+                  .n = t->filter.n,
+                  .seed = t->cfg.seed,
+                  .frame = frame};
     if (one_mode && resampled)
         mingling_set(&m, seconds_since(t, t->core->mingle_utime), t->cfg.mingle_time);
     if (!one_mode || resampled)
@@ -199,7 +215,9 @@ static void predict(gait_tracker *t, float dt, bool resampled, uint32_t frame)
 {
     dynamics const d = tracker_dynamics(t);
     move_job j = {.t = t, .from = t->people};
-    j.mingling = mingle_after(t, &j.from, resampled, frame);
+    j.mingling = mingle_after(t, resampled, frame);
+    if (j.mingling.pull > 0.0f)
+        task_run(&t->cfg.exec, t->cfg.tasks, j.from.n, BLOCK, rows_range, &j);
     j.step = dynamics_step_init(&d, dt, modes_settled(t), frame);
     t->core->current = (t->core->current + 1) % t->past.depth;
     tracker_set_count(t, t->filter.n);

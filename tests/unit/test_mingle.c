@@ -13,6 +13,8 @@ typedef struct crowd {
     int32_t parent[N];
 } crowd;
 
+static float rows[N * (FIELDS + 3)];
+
 /* Normal particles; stature and place along x hang together.  Phases and headings lie across their ends. */
 static population normal_crowd(crowd *c)
 {
@@ -34,7 +36,8 @@ static population normal_crowd(crowd *c)
 
 static mingling after(const population *from, const crowd *c, float seconds, uint32_t frame)
 {
-    mingling m = {.from = from, .parent = c->parent, .n = N, .seed = 11, .frame = frame};
+    mingling m = {.fields = FIELDS, .row = rows, .parent = c->parent, .n = N, .seed = 11, .frame = frame};
+    mingle_rows(from, 0, N, rows);
     mingling_set(&m, seconds, 1.0f);
     return m;
 }
@@ -44,7 +47,6 @@ static void mingle_all(const mingling *m, crowd *out)
     population to = {.n = N, .fields = FIELDS, .value = out->value};
     for (int32_t i = 0; i < N; i += BLOCK) {
         walker_block w;
-        walker_block_get(m->from, m->parent + i, i_min(BLOCK, N - i), &w);
         mingle_block(m, i, i_min(BLOCK, N - i), &w);
         walker_block_put(&to, i, i_min(BLOCK, N - i), &w);
     }
@@ -138,8 +140,22 @@ static void test_nothing_changes_without_time(void)
     CHECK(memcmp(first.value, second.value, sizeof first.value) == 0);
 }
 
+/* Wherever the block begins, and however many of its lanes are in use. */
+static void test_lanes_beyond_repeat_the_last(void)
+{
+    population const from = normal_crowd(&first);
+    mingling const m = after(&from, &first, 0.5f, 0);
+    walker_block whole, part;
+    mingle_block(&m, 5, BLOCK, &whole);
+    mingle_block(&m, 7, 3, &part);
+    for (int32_t f = 0; f < FIELDS; f++)
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            CHECK(part.f[f][lane] == whole.f[f][2 + i_min(lane, 2)]);
+}
+
 int main(void)
 {
+    test_lanes_beyond_repeat_the_last();
     test_mean_and_covariance_remain();
     test_angles_go_the_short_way();
     test_others_are_drawn_by_weight();
