@@ -16,6 +16,7 @@ from gait.learn.sequence import Sequence, levelled
 from gait.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, curves, points
 
 Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
 Sections = Mapping[str, Any]
 
 COMPARED = [name for name in EVAL15 if name != "pelvis"]
@@ -25,6 +26,7 @@ STARTS = 16  # phase offsets tried first, over a stride
 EVERY = 12  # frames; a tenth of a second in CMU's recordings
 STEP = 1e-4  # of the numerical derivatives: standard deviations and strides
 PASSES = 12  # of the nonlinear least squares
+OFFSETS = "offsets"  # beside the sections of a model: channels (m, 30) moved by one deviation of each offset
 
 
 @dataclass
@@ -86,22 +88,22 @@ def walk(s: Sequence) -> Walk:
     return Walk(s.subject, at, local[frames], s.channels[frames], measures, rate)
 
 
-def sizes(sections: Sections) -> tuple[int, int]:
-    """Numbers of components and of proportions."""
-    return len(sections["CURV"]) - 1, len(sections.get("PROP", ()))
+def sizes(sections: Sections) -> tuple[int, int, int]:
+    """Numbers of components, of proportions and of static offsets."""
+    return len(sections["CURV"]) - 1, len(sections.get("PROP", ())), len(sections.get(OFFSETS, ()))
 
 
 def model_channels(w: Walk, sections: Sections, x: Floats) -> Floats:
-    """Channels (k, n, 30) for k vectors of scores, proportions and a phase offset, x (k, q + p + 1)."""
-    q, _ = sizes(sections)
+    """Channels (k, n, 30) for k vectors of scores, proportions, offsets and a phase, x (k, q + p + m + 1)."""
+    q, p, m = sizes(sections)
     scores = np.repeat(x[:, :q], len(w.at), axis=0)
-    found = curves(sections, (w.at + x[:, -1:]).ravel(), scores, w.stride_hz)
-    return found.reshape(len(x), len(w.at), -1)
+    found = curves(sections, (w.at + x[:, -1:]).ravel(), scores, w.stride_hz).reshape(len(x), len(w.at), -1)
+    return found + (x[:, q + p : -1] @ sections[OFFSETS])[:, None] if m else found
 
 
 def model_joints(w: Walk, sections: Sections, x: Floats, channels: Floats) -> Floats:
     """Joints (k, n, 14, 3) as `Walk.joints`, for channels (k, n, 30)."""
-    q, p = sizes(sections)
+    q, p, _ = sizes(sections)
     aligned = channels.reshape(-1, channels.shape[2]).copy()
     aligned[:, TURNS] = 0
     proportion = np.repeat(x[:, q : q + p], len(w.at), axis=0)
@@ -109,12 +111,22 @@ def model_joints(w: Walk, sections: Sections, x: Floats, channels: Floats) -> Fl
     return found.reshape(*channels.shape[:2], len(COMPARED), 3) * w.measures.stature
 
 
-def in_joints(w: Walk, sections: Sections) -> Found:
-    """Scores, proportions and offset by nonlinear least squares of the joints: no others do better."""
-    start = np.zeros((STARTS, sum(sizes(sections)) + 1))
+def in_joints(w: Walk, sections: Sections, frames_alike: bool = False) -> Found:
+    """Scores, proportions and phase by nonlinear least squares of the joints: no others do better.
+
+    Then static offsets besides, the most probable ones: each has its standard deviation, and a coordinate of
+    a joint that of what the model leaves of this walk without offsets; anew in every frame, or once for all.
+    """
+    *others, m = sizes(sections)
+    start = np.zeros((STARTS, sum(others) + m + 1))
     start[:, -1] = np.arange(STARTS) / STARTS
     squares = np.sum(_misses(w, sections, start) ** 2, axis=1)
-    return _found(w, sections, _least(w, sections, start[int(np.argmin(squares))], slice(None)))
+    free = np.delete(np.arange(start.shape[1]), sum(others) + np.arange(m))
+    x = _least(w, sections, start[int(np.argmin(squares))], free)
+    if m:
+        noise = float(np.sqrt(np.mean(_misses(w, sections, x[None]) ** 2)))
+        x = _least(w, sections, x, np.arange(len(x)), noise * np.sqrt(len(w.at) if frames_alike else 1))
+    return _found(w, sections, x)
 
 
 def in_angles(w: Walk, sections: Sections) -> Found:
@@ -122,7 +134,7 @@ def in_angles(w: Walk, sections: Sections) -> Found:
 
     The sway does not count, and the other channels by `channel_scale`.
     """
-    q, p = sizes(sections)
+    q, p, _ = sizes(sections)
     tries = [_linear(w, sections, k / STARTS) for k in range(STARTS)]
     best, step = min(tries, key=lambda found: found[0]), 1 / STARTS
     while step > 0.003:
@@ -130,7 +142,7 @@ def in_angles(w: Walk, sections: Sections) -> Found:
         tries = [_linear(w, sections, best[1][-1] + d) for d in (-step, step)]
         best = min([best, *tries], key=lambda found: found[0])
     x = best[1]
-    return _found(w, sections, _least(w, sections, x, slice(q, q + p)) if p else x)
+    return _found(w, sections, _least(w, sections, x, np.arange(q, q + p)) if p else x)
 
 
 def exact_angles(w: Walk, sections: Sections) -> Found:
@@ -141,7 +153,7 @@ def exact_angles(w: Walk, sections: Sections) -> Found:
 
 def _linear(w: Walk, sections: Sections, offset: float) -> tuple[float, Floats]:
     """Sum of squares, and scores with zero proportions and the offset (q + p + 1,)."""
-    q, p = sizes(sections)
+    q, p, _ = sizes(sections)
     x = np.zeros((q + 1, q + p + 1))
     x[1:, :q], x[:, -1] = np.eye(q), offset
     use = channel_scale() * (np.arange(len(CHANNELS)) != CHANNELS.index("root_sway"))
@@ -152,8 +164,8 @@ def _linear(w: Walk, sections: Sections, offset: float) -> tuple[float, Floats]:
     return float(np.sum((goal - x[0, :q] @ design) ** 2)), x[0]
 
 
-def _least(w: Walk, sections: Sections, start: Floats, free: slice) -> Floats:
-    """Least squares of the joints over the `free` entries of x (q + p + 1,)."""
+def _least(w: Walk, sections: Sections, start: Floats, free: Indices, noise: float = 0.0) -> Floats:
+    """Least squares of the joints, and of the offsets times `noise`, over the `free` entries of x."""
 
     def full(part: Floats) -> Floats:
         x = start.copy()
@@ -162,11 +174,11 @@ def _least(w: Walk, sections: Sections, start: Floats, free: slice) -> Floats:
 
     def slopes(part: Floats) -> Floats:
         x = np.array([full(part), *(full(part + STEP * e) for e in np.eye(len(part)))])
-        misses = _misses(w, sections, x)
+        misses = _misses(w, sections, x, noise)
         return np.asarray((misses[1:] - misses[0]).T / STEP)
 
     result = least_squares(
-        lambda part: _misses(w, sections, full(part)[None])[0],
+        lambda part: _misses(w, sections, full(part)[None], noise)[0],
         start[free],
         jac=slopes,
         method="lm",
@@ -177,10 +189,11 @@ def _least(w: Walk, sections: Sections, start: Floats, free: slice) -> Floats:
     return full(result.x)
 
 
-def _misses(w: Walk, sections: Sections, x: Floats) -> Floats:
-    """Model minus recording (k, n * 14 * 3), metres."""
+def _misses(w: Walk, sections: Sections, x: Floats, noise: float = 0.0) -> Floats:
+    """Model minus recording (k, n * 14 * 3), metres, and the m offsets times `noise`."""
+    q, p, _ = sizes(sections)
     joints = model_joints(w, sections, x, model_channels(w, sections, x))
-    return np.asarray((joints - w.joints).reshape(len(x), -1))
+    return np.hstack([(joints - w.joints).reshape(len(x), -1), noise * x[:, q + p : -1]])
 
 
 def _found(w: Walk, sections: Sections, x: Floats) -> Found:
