@@ -52,7 +52,7 @@ def require_writable(path: str | os.PathLike[str]) -> None:
         raise UserError(f"{path}: is a device or a pipe, not a file; give the name of a file")
     if not target.parent.is_dir():
         raise UserError(f"{path}: folder {target.parent} does not exist; create it first")
-    if not os.access(target.parent, os.W_OK):
+    if not _takes_files(target.parent):
         raise UserError(f"{path}: folder {target.parent} cannot be written; choose another place")
     if target.exists() and not os.access(target, os.W_OK):
         raise UserError(f"{path}: is read-only; choose another name, or change its permissions")
@@ -108,8 +108,17 @@ def require_folder(path: str | os.PathLike[str]) -> None:
     if not there.is_dir():
         what = "is" if there == folder else f"{there} is"
         raise UserError(f"{path}: {what} a file; give the name of a folder")
-    if not os.access(there, os.W_OK):
+    if not _takes_files(there):
         raise UserError(f"{path}: folder {there} cannot be written; choose another place")
+
+
+def _takes_files(folder: Path) -> bool:
+    """Whether a file can be made in a folder; in /proc not even root can, whom all permissions allow it."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return os.access(folder, os.W_OK)
+    except OSError:
+        return False
 
 
 def _require_name(path: str | os.PathLike[str]) -> None:

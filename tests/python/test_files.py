@@ -6,7 +6,7 @@ import os
 import pytest
 
 from gait.errors import UserError
-from gait.files import filling, replacing, require_writable
+from gait.files import filling, replacing, require_folder, require_writable
 
 
 def test_a_link_stays_and_its_file_is_written(tmp_path):
@@ -65,6 +65,15 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
         require_writable(tmp_path / "no" / "b.csv")
     with pytest.raises(UserError, match="is a folder"):
         require_writable(tmp_path)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="no /proc")
+def test_a_folder_that_takes_no_files_is_refused_before_the_work():
+    for check in (require_writable, require_folder):
+        with pytest.raises(
+            UserError, match=r"^/proc/x: folder /proc cannot be written; choose another place"
+        ):
+            check("/proc/x")
 
 
 def test_a_folder_is_filled_whole_or_not_at_all(tmp_path):

@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 
 import gait.cli
-from gait.learn import figures_cycle, figures_model, figures_period, figures_subject, fit, report, sources
+from gait.learn import (
+    figures_cycle,
+    figures_model,
+    figures_period,
+    figures_subject,
+    fit,
+    report,
+    report_place,
+    sources,
+)
 from gait.learn.figures_base import SHOWN, column
 from gait.learn.stage import one_thread
 from gait.learn.subject_residuals import subject_residuals
@@ -222,6 +231,20 @@ def test_odd_input_gives_a_report_too(sequences, tmp_path, make):
     texts = [t.get_text() for axes in figures_cycle.cycles(odd).axes for t in axes.texts]
     unseen = [name for name in SHOWN if not odd.cycles.mask[:, :, column(name)].any()]
     assert texts == ["not observed"] * len(unseen) and bool(unseen) == (make is lower_body)
+
+
+def test_a_page_of_somebody_else_is_kept_and_one_of_ours_replaced(walks, learned, tmp_path, capsys):
+    page = tmp_path / "site/index.html"
+    page.parent.mkdir()
+    page.write_text("<title>Home</title>" + "gait learn" * 1000)
+    words = ["learn", str(walks), "-o", str(tmp_path / "m.gait"), "--report", str(page.parent), "--quiet"]
+    assert gait.cli.main(words) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "index.html there was not made by gait learn; choose another" in err
+    assert "Home" in page.read_text() and not (tmp_path / "m.gait").exists()
+    page.unlink()
+    report.write(page.parent, learned, "walk & run", [])
+    report_place.require_own(page.parent)
 
 
 @pytest.mark.parametrize("place", ["{tmp}/file", "{tmp}/file/below"])

@@ -8,6 +8,7 @@ import mocap_files as files
 import pytest
 
 import gait.cli
+from gait.learn import sources
 from gait.learn.subjects import names, subjects
 
 
@@ -56,6 +57,16 @@ def test_relative_paths_name_their_folders(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert subjects([Path("walk.bvh")]) == [tmp_path.name]
     assert names([Path("walk.bvh")]) == [f"{tmp_path.name}/walk"]
+
+
+def test_names_do_not_hang_on_how_a_path_is_spelt(tmp_path, monkeypatch):
+    (tmp_path / "Anna").mkdir()
+    (tmp_path / "Anna/walk.bvh").write_text("")
+    monkeypatch.chdir(tmp_path / "Anna")
+    spelt = [Path(words) for words in ("walk.bvh", "../Anna/walk.bvh", "../Anna/../Anna/walk.bvh")]
+    for path in (*spelt, tmp_path / "Anna/walk.bvh"):
+        assert (subjects([path]), names([path])) == (["Anna"], ["Anna/walk"])
+    assert sources.find(map(str, [*spelt, ".", tmp_path])) == [(spelt[2], False)]
 
 
 def test_a_folder_for_each_person_is_learnt_as_such(tmp_path, capsys):

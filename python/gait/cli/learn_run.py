@@ -12,7 +12,7 @@ from gait import blob
 from gait.cli import learn_prior, learn_segments, learn_text
 from gait.errors import UsageError
 from gait.files import require_folder, require_writable
-from gait.learn import activity, fit, fork_server, marker_map, model, segment_sections, sources
+from gait.learn import activity, fit, fork_server, marker_map, model, report_place, segment_sections, sources
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
 from gait.learn.retarget import Measures
@@ -67,6 +67,7 @@ def _check(args: argparse.Namespace) -> None:
     require_writable(args.output)
     if args.report:
         require_folder(args.report)
+        report_place.require_own(Path(args.report))
 
 
 def _check_output(args: argparse.Namespace) -> None:

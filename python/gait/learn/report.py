@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gait.errors import UserError
 from gait.files import filling
-from gait.learn import model
+from gait.learn import model, report_place
 from gait.learn.figures import drawings
 from gait.learn.figures_base import Drawing
 from gait.learn.fit import Learned
@@ -66,9 +66,9 @@ def _write_all(folder: Path, learned: Learned, activity: str, refused: list[str]
         _left_out(refused),
         f"<p>{model.CMU}</p>" if model.from_cmu(s.source for s in learned.sequences) else "",
     ]
-    head = f"<meta charset=utf-8><title>{html.escape(activity)}: gait learn</title><style>{STYLE}</style>"
+    head = f"<meta charset=utf-8>{report_place.title(activity)}<style>{STYLE}</style>"
     page = f"<!doctype html><html lang=en><head>{head}</head><body>{''.join(body)}</body></html>\n"
-    (folder / "index.html").write_text(page, encoding="utf-8")
+    (folder / report_place.PAGE).write_text(page, encoding="utf-8")
     return stems
 
 

@@ -54,7 +54,7 @@ def find(
     UserError
         If a source is missing, of an unknown kind, or nothing is left.
     """
-    found: dict[Path, bool] = {}
+    found: dict[str, tuple[Path, bool]] = {}  # by the whole path, however it is spelt
     for name in sources:
         source = Path(name)
         if not name:
@@ -63,7 +63,8 @@ def find(
             inside = sorted(_inside(source, closed))
             if not inside:
                 raise UserError(f"{source}: no motion files ({_kinds()}) in this folder; name another one")
-            found.update((path, True) for path in inside if path not in found)
+            for path in inside:
+                found.setdefault(os.path.abspath(path), (path, True))
         elif not source.is_file():
             raise UserError(f"{source}: no such file or folder; check the name")
         elif source.suffix.lower() == ".asf":
@@ -73,12 +74,12 @@ def find(
                 f"{source}: {source.suffix or 'no suffix'} is not learnt from; convert it to {_kinds()}"
             )
         else:
-            found[source] = False
+            found[os.path.abspath(source)] = source, False
     globs = list(exclude)
     for glob in globs:
-        if not any(_matches(path, glob) for path in found):
+        if not any(_matches(path, glob) for path, _ in found.values()):
             idle(glob)
-    kept = [(p, inside) for p, inside in found.items() if not any(_matches(p, glob) for glob in globs)]
+    kept = [(p, inside) for p, inside in found.values() if not any(_matches(p, glob) for glob in globs)]
     if not kept:
         raise UserError(f"--exclude {' '.join(globs)}: leaves none of {len(found)} files; exclude less")
     return kept

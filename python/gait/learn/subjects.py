@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ RULES = ("auto", "prefix", "folder", "file")
 
 def names(paths: Sequence[Path]) -> list[str]:
     """Name recordings, each differently: the stem if it has a '_' and is there once, else with its folder."""
-    places = _without_suffix([path.absolute() for path in paths])
+    places = _without_suffix([_place(path) for path in paths])
     stems = Counter(place.name for place in places)
     ends = _ends(places, 2)
     return [
@@ -33,7 +34,7 @@ def subjects(paths: Sequence[Path], rule: str = "auto") -> list[str]:
     """
     if rule == "file":
         return names(paths)
-    folders = _ends([path.absolute().parent for path in paths], 1)
+    folders = _ends([_place(path).parent for path in paths], 1)
     prefixes = [path.stem.split("_")[0] for path in paths]
     if rule == "folder" or (rule == "auto" and _repeated(paths)):
         return folders
@@ -50,10 +51,15 @@ def _repeated(paths: Sequence[Path]) -> bool:
     folders: dict[str, set[Path]] = {}
     for path in paths:
         if "_" in path.stem:
-            folders.setdefault(path.stem.split("_")[0], set()).add(path.absolute().parent)
+            folders.setdefault(path.stem.split("_")[0], set()).add(_place(path).parent)
     return any(
         len(found) > 1 and any(folder.name != prefix for folder in found) for prefix, found in folders.items()
     )
+
+
+def _place(path: Path) -> Path:
+    """Whole path, however it is spelt; links keep their names."""
+    return Path(os.path.abspath(path))
 
 
 def _without_suffix(paths: list[Path]) -> list[Path]:
