@@ -66,6 +66,45 @@ static inline void narrow(const int32_t *in, int8_t *out)
 #endif
 }
 
+#if defined(__AVX512VBMI__)
+#define LANES_BYTES 4 /* rows of LANES bytes in a register */
+
+static inline __m512i bytes_load(const int8_t *const *row)
+{
+    __m512i v = _mm512_castsi128_si512(_mm_loadu_si128((const __m128i_u *)row[0]));
+    v = _mm512_inserti32x4(v, _mm_loadu_si128((const __m128i_u *)row[1]), 1);
+    v = _mm512_inserti32x4(v, _mm_loadu_si128((const __m128i_u *)row[2]), 2);
+    return _mm512_inserti32x4(v, _mm_loadu_si128((const __m128i_u *)row[3]), 3);
+}
+
+/* table[index], 0 .. 255 */
+static inline __m512i bytes_lookup(const uint8_t *table, __m512i index)
+{
+    __m512i const low =
+        _mm512_permutex2var_epi8(_mm512_loadu_si512(table), index, _mm512_loadu_si512(table + 64));
+    __m512i const high =
+        _mm512_permutex2var_epi8(_mm512_loadu_si512(table + 128), index, _mm512_loadu_si512(table + 192));
+    return _mm512_mask_blend_epi8(_mm512_movepi8_mask(index), low, high);
+}
+
+/* For each pair of rows the sum over differences d, where neither byte is `none`, of low[d] + 2^8 high[d] + 2^24. */
+static inline void bytes_costs(const int8_t *const *a, const int8_t *const *b, int8_t none,
+                               const uint8_t *low, const uint8_t *high, int32_t *sum)
+{
+    __m512i const x = bytes_load(a), y = bytes_load(b), no = _mm512_set1_epi8(none),
+                  zero = _mm512_setzero_si512();
+    __m512i const d = _mm512_sub_epi8(_mm512_max_epi8(x, y), _mm512_min_epi8(x, y));
+    __mmask64 const both = _mm512_mask_cmpneq_epi8_mask(_mm512_cmpneq_epi8_mask(x, no), y, no);
+    __m512i const l = _mm512_sad_epu8(_mm512_maskz_mov_epi8(both, bytes_lookup(low, d)), zero);
+    __m512i const h = _mm512_sad_epu8(_mm512_maskz_mov_epi8(both, bytes_lookup(high, d)), zero);
+    __m512i const n = _mm512_sad_epu8(_mm512_maskz_set1_epi8(both, 1), zero);
+    __m512i const half = l + (h << 8) + (n << 24); /* of a row, twice in each */
+    __m512i const all = half + _mm512_shuffle_epi32(half, _MM_PERM_BADC);
+    __m512i const first = _mm512_permutexvar_epi64(_mm512_setr_epi64(0, 2, 4, 6, 0, 0, 0, 0), all);
+    _mm_storeu_si128((__m128i_u *)sum, _mm256_cvtepi64_epi32(_mm512_castsi512_si256(first)));
+}
+#endif
+
 /* Sixteen numbers of sixteen bodies: from in[number][body] to out[body][number], a cache line each. */
 static inline void deal(const float (*restrict in)[LANES], float (*restrict out)[LANES])
 {

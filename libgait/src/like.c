@@ -45,15 +45,21 @@ static void surface_init(const limb_geometry *g, like_surface *out)
     }
 }
 
+static void cost_set(like_costs *c, int32_t difference, int32_t cost)
+{
+    c->one[difference] = LIKE_COUNT_ONE + cost;
+    c->low[difference] = (uint8_t)(cost & 255);
+    c->high[difference] = (uint8_t)(cost >> 8);
+}
+
 /* Student-t with 4 degrees of freedom, scale half a local standard deviation: a square loses real clips. */
 static void costs_init(like_setup *s)
 {
     float const scale = 0.5f * (float)CONTRAST_UNIT;
     for (int32_t d = 0; d < LIKE_COSTS; d++) {
         float const r = (float)d / scale;
-        s->robust[d] =
-            LIKE_COUNT_ONE + (int32_t)(2.5f * m_log(1.0f + r * r / 4.0f) * (float)LIKE_COST_ONE + 0.5f);
-        s->square[d] = LIKE_COUNT_ONE + d * d;
+        cost_set(&s->robust, d, (int32_t)(2.5f * m_log(1.0f + r * r / 4.0f) * (float)LIKE_COST_ONE + 0.5f));
+        cost_set(&s->square, d, d * d);
     }
 }
 

@@ -81,6 +81,13 @@ typedef struct like_patch {
     int8_t value[LIKE_FACING]; /* or TEXTURE_HIDDEN; as the surface points from 2 turn on */
 } like_patch;
 
+/* Costs of differences between surface samples, with LIKE_COUNT_ONE in each; and without it their bytes, of which a
+ * register holds many. */
+typedef struct like_costs {
+    int32_t one[LIKE_COSTS];
+    uint8_t low[LIKE_COSTS], high[LIKE_COSTS];
+} like_costs;
+
 typedef struct like_setup { /* constant while a tracker lives */
     const kernels *run;
     int32_t limbs;
@@ -90,8 +97,8 @@ typedef struct like_setup { /* constant while a tracker lives */
     float missed_weight;
     limb_geometry geometry[MODEL_MAX_LIMBS];
     like_surface surface[MODEL_MAX_LIMBS];
-    int32_t robust[LIKE_COSTS]; /* Student-t cost of a surface difference, LIKE_COST_ONE = 1 nat */
-    int32_t square[LIKE_COSTS]; /* the difference squared */
+    like_costs robust; /* Student-t cost, LIKE_COST_ONE = 1 nat */
+    like_costs square; /* the difference squared */
 } like_setup;
 
 typedef struct like_body { /* one body in one camera, as the terms see it */

@@ -5,7 +5,24 @@
 #include "lanes.h"
 #include <string.h>
 
-/* Sum of costs over one half of a limb; LIKE_COUNT_ONE for each point seen in both. */
+enum { PLACES = (MODEL_MAX_LIMBS + 3) / 4 * 4 }; /* for limbs, four at a time */
+
+typedef struct rows { /* points of each limb */
+    const int8_t *now[PLACES], *then[PLACES];
+} rows;
+
+/* Sums of costs over the points of each limb, with LIKE_COUNT_ONE for each point that is seen in both. */
+#ifdef LANES_BYTES
+static void compare_all(rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
+{
+    for (int32_t l = limbs; l % LANES_BYTES != 0; l++) { /* nobody reads their sums */
+        r->now[l] = r->now[0];
+        r->then[l] = r->then[0];
+    }
+    for (int32_t l = 0; l < limbs; l += LANES_BYTES)
+        bytes_costs(r->now + l, r->then + l, TEXTURE_HIDDEN, cost->low, cost->high, sum + l);
+}
+#else
 static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b, const int32_t *cost)
 {
     int32_t x[LIKE_FACING], y[LIKE_FACING], difference[LIKE_FACING], both[LIKE_FACING], one[LIKE_FACING],
@@ -24,20 +41,30 @@ static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b
     return sum;
 }
 
+static void compare_all(const rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
+{
+    for (int32_t l = 0; l < limbs; l++)
+        sum[l] = compare(r->now[l], r->then[l], cost->one);
+}
+#endif
+
 /* The ancestor's half may begin elsewhere: its values are laid among hidden ones and read from where `now`
  * begins. */
-static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs, const int32_t *cost,
-                          int32_t *sum)
+static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs,
+                          const like_costs *cost, int32_t *sum)
 {
     int8_t wide[MODEL_MAX_LIMBS][3 * LIKE_FACING];
+    rows r;
     for (int32_t l = 0; l < limbs; l++) {
         memset(wide[l], TEXTURE_HIDDEN, sizeof wide[l]);
         memcpy(wide[l] + LIKE_FACING, then[l].value, LIKE_FACING);
     }
     for (int32_t l = 0; l < limbs; l++) {
         int32_t const ahead = (now[l].turn - then[l].turn + LIKE_AZIMUTHS) & (LIKE_DIRECTIONS - 1);
-        sum[l] = compare(now[l].value, wide[l] + 2 * ahead, cost);
+        r.now[l] = now[l].value;
+        r.then[l] = wide[l] + 2 * ahead;
     }
+    compare_all(&r, limbs, cost, sum);
 }
 
 /* Share of the about LIKE_SAMPLES / 2 points facing the camera that both frames show. */
@@ -79,9 +106,9 @@ void KERNEL(texture_logs)(const like_body *b, float *restrict log)
 {
     int32_t const limbs = b->setup->limbs,
                   whole = (limbs + 15) & ~15; /* in full vectors; the rest says nothing */
-    int32_t sum[MODEL_MAX_LIMBS] = {0};
+    int32_t sum[PLACES] = {0};
     float facing[MODEL_MAX_LIMBS] = {0};
-    compare_limbs(b->seen, b->ancestor, limbs, b->setup->paper ? b->setup->square : b->setup->robust, sum);
+    compare_limbs(b->seen, b->ancestor, limbs, b->setup->paper ? &b->setup->square : &b->setup->robust, sum);
     for (int32_t l = 0; l < limbs; l++)
         facing[l] = b->outline->limb[l].facing[b->lane];
     if (b->setup->paper)
@@ -94,10 +121,16 @@ void KERNEL(texture_logs)(const like_body *b, float *restrict log)
 
 int64_t KERNEL(template_cost)(const like_body *b)
 {
-    int64_t sum = 0;
-    for (int32_t l = 0; l < b->setup->limbs; l++)
-        sum += compare(b->seen[l].value,
-                       b->known + l * LIKE_RING + 2 * (b->seen[l].turn & (LIKE_DIRECTIONS - 1)),
-                       b->setup->robust);
-    return sum;
+    int32_t const limbs = b->setup->limbs;
+    int32_t sum[PLACES];
+    int64_t all = 0;
+    rows r;
+    for (int32_t l = 0; l < limbs; l++) {
+        r.now[l] = b->seen[l].value;
+        r.then[l] = b->known + l * LIKE_RING + 2 * (b->seen[l].turn & (LIKE_DIRECTIONS - 1));
+    }
+    compare_all(&r, limbs, &b->setup->robust, sum);
+    for (int32_t l = 0; l < limbs; l++)
+        all += sum[l];
+    return all;
 }
