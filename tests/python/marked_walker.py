@@ -33,13 +33,24 @@ def walk_angles(frames, period, seed=0):
     return angles
 
 
-def walker(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003, seed=0):
-    """Points (T, M, 3), metres, z up, and the true pose, of a walker of odd lengths and marker places."""
-    rng = np.random.default_rng(seed)
-    angles = walk_angles(frames, period, seed)
+def odd_lengths(rng, spread=0.08):
+    """Stretches of somebody whose proportions are all off by `spread`."""
     stretch = spread * rng.choice([-1.0, 1.0], articulated.STRETCH.shape[2])
     stretch[0] = np.log(1.82)
     stretch[-len(articulated.LIMBS) :] = 0  # both sides alike
+    return stretch
+
+
+def walker(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003, seed=0, again=None):
+    """Points (T, M, 3), metres, z up, and the true pose, of a walker of odd lengths and marker places.
+
+    With `again` it is another recording of the walker `seed`, with markers put on anew.
+    """
+    rng = np.random.default_rng(seed)
+    angles = walk_angles(frames, period, seed)
+    stretch = odd_lengths(rng, spread)
+    if again is not None:
+        rng = np.random.default_rng([seed, again])
     time, phase = np.arange(frames) / fps, 2 * np.pi * np.arange(frames) / period
     place = np.stack([1.3 * time, 0.02 * np.sin(phase), 0.97 + 0.02 * np.cos(2 * phase)], axis=1)
     turn = articulated.turn_by(

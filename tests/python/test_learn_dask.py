@@ -7,8 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import marked_walker as mw
 import mocap_files as files
 import pytest
+from test_marker_files import write_c3d
 
 import gait.cli
 from gait.errors import UserError
@@ -43,6 +45,16 @@ def test_a_cluster_gives_the_same_model(walks, scheduler, tmp_path, monkeypatch,
     assert gait.cli.main([*words, str(tmp_path / "dask.gait"), "--dask", scheduler]) == 0
     assert capsys.readouterr().err == alone.err and "01_02x.amc:3" in alone.err
     assert (tmp_path / "dask.gait").read_bytes() == (tmp_path / "alone.gait").read_bytes()
+
+
+def test_a_cluster_measures_people_alike(scheduler, tmp_path, monkeypatch):
+    for k in (1, 2):
+        points = mw.walker(mw.LOWER, frames=60, again=k)[0]
+        write_c3d(tmp_path / f"anna_{k}.c3d", mw.LOWER, points)
+    monkeypatch.chdir(tmp_path)
+    found = sources.find(["."])
+    here, there = sources.measured(found), sources.measured(found, dask=scheduler)
+    assert [body.stretch.tobytes() for body in there] == [body.stretch.tobytes() for body in here]
 
 
 def test_a_bad_file_named_by_itself_stops_the_run(walks, scheduler):
@@ -86,11 +98,11 @@ def test_without_dask_the_remedy_is_named(walks, monkeypatch):
 def test_a_file_that_kills_its_workers_is_named(walks, scheduler, tmp_path, monkeypatch):
     """Workers that die on a task are KilledWorker to the client; here a task that ends its process."""
     bad = Path(shutil.copy(walks / "01_00.amc", tmp_path / "05_01.amc"))
-    true = cluster._task
+    true = cluster._done
     monkeypatch.setattr(
         cluster,
-        "_task",
-        lambda path, reading: os._exit(9) if path.name == "05_01.amc" else true(path, reading),
+        "_done",
+        lambda task: os._exit(9) if task.path.name == "05_01.amc" else true(task),
     )
     _, refused = sources.load_all([(walks / "01_01.amc", True), (bad, True)], dask=scheduler)
     assert len(refused) == 1 and refused[0].startswith(f"{bad}: the workers that read it were killed")

@@ -23,6 +23,7 @@ from gait import cli
 from gait.errors import UserError
 from gait.learn import fork_server, pool, sources
 from gait.learn.spool import Spool
+from gait.learn.stage import Task
 
 
 @pytest.fixture(scope="module")
@@ -169,11 +170,11 @@ if __name__ == "__main__":
 
 def test_few_small_files_do_not_start_processes_and_many_do(walks, monkeypatch):
     started, clock = [], itertools.count()
-    monkeypatch.setattr(pool, "_pooled", lambda paths, *_: started.append(len(paths)) or iter(()))
+    monkeypatch.setattr(pool, "_pooled", lambda tasks, *_: started.append(len(tasks)) or iter(()))
     monkeypatch.setattr(pool, "time", SimpleNamespace(perf_counter=lambda: 0.1 * next(clock)))
-    path = walks / "01_00.amc"
-    assert len(list(pool.prepared([path] * 3, sources.DEFAULT, 2))) == 3 and not started
-    done = len(list(pool.prepared([path] * 3000, sources.DEFAULT, 2)))
+    task = Task(walks / "01_00.amc")
+    assert len(list(pool.prepared([task] * 3, 2))) == 3 and not started
+    done = len(list(pool.prepared([task] * 3000, 2)))
     assert started == [3000 - done] and done == 1
 
 

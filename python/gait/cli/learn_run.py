@@ -18,6 +18,7 @@ from gait.learn.reading import Reading
 from gait.learn.retarget import Measures
 from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
+from gait.learn.shared_stretches import Shared
 from gait.learn.stage import one_thread
 from gait.progress import progress
 
@@ -105,6 +106,7 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
         learn_segments.options(args),
     )
     jobs = args.jobs or fork_server.cores()
+    bodies = _measured(args, files, reading, jobs)
     with progress("reading motion", len(files), args.quiet) as update:
         try:
             sequences, refused = sources.load_all(
@@ -116,6 +118,7 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
                 people=args.subjects,
                 corpus=corpus,
                 others=others,
+                bodies=bodies,
             )
         except sources.NothingLeft as error:
             _tell(closed + error.refused[1:], args.quiet, "")
@@ -123,6 +126,20 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
     refused = closed + refused
     _tell(refused, args.quiet, " (see --json or --report)")
     return sequences, refused, others
+
+
+def _measured(
+    args: argparse.Namespace, files: list[tuple[Path, bool]], reading: Reading, jobs: int
+) -> list[Shared | None]:
+    """Measure people with several recordings of markers; say which cannot be of one body."""
+    apart: list[str] = []
+    with progress("measuring people", None, args.quiet) as update:
+        bodies = sources.measured(
+            files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects, tell=apart.append
+        )
+    for line in apart if not args.quiet else ():
+        print(line, file=sys.stderr)
+    return bodies
 
 
 def _tell(refused: list[str], quiet: bool, more: str) -> None:

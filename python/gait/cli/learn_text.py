@@ -60,6 +60,7 @@ def _found(s: Sequence) -> dict[str, Any]:
         "subject": s.subject,
         "source": str(s.source),
         "fps": s.fps,
+        "lengths_by": s.recordings,
         "kept": list(s.kept),
         "cut": list(s.cut),
         "snr": round(s.period.peak, 1),

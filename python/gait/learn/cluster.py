@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 
 from gait import kernels
 from gait.errors import UsageError, UserError
-from gait.learn.reading import Reading
-from gait.learn.stage import Prepared, one_thread_for_good, prepare
+from gait.learn.stage import Prepared, Task, one_thread_for_good
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -32,33 +31,39 @@ AHEAD = 4  # files in flight per thread of the workers
 SAME = ("gait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
 
 
-def prepared(paths: Sequence[Path], reading: Reading, address: str) -> Generator[Prepared, None, None]:
-    """Outcomes of the files in their order, from the workers of the scheduler at `address`.
+def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, None]:
+    """Outcomes of files in their order, from the workers of the scheduler at `address`.
 
     Raises
     ------
     UserError
         If dask is not installed, nothing answers, the workers have other versions or do not see the files.
     """
-    if reading.markers:
-        reading = replace(reading, markers=reading.markers.absolute())
     with _connected(address) as client:
         _require_same_versions(client, address)
         _require_same_kernels(client, address)
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
-        waiting, flying = deque(paths), deque[tuple[Path, "Future"]]()
+        waiting, flying = deque(tasks), deque[tuple[Path, "Future"]]()
         while waiting or flying:
             while waiting and len(flying) < ahead:
-                path = waiting.popleft()
-                flying.append((path, client.submit(_task, path.absolute(), reading, pure=False)))
+                task = waiting.popleft()
+                flying.append((task.path, client.submit(_done, _absolute(task), pure=False)))
             path, future = flying.popleft()
             yield _as_named(_result(client, address, path, future), path)
 
 
-def _task(path: Path, reading: Reading) -> Prepared | None:
-    """Prepare a file on a worker; None if the worker does not see it."""
+def _absolute(task: Task) -> Task:
+    """Task for whoever works in another folder."""
+    reading = task.reading
+    if reading.markers:
+        reading = replace(reading, markers=reading.markers.absolute())
+    return replace(task, path=task.path.absolute(), reading=reading)
+
+
+def _done(task: Task) -> Prepared | None:
+    """Do a task on a worker; None if the worker does not see the file."""
     one_thread_for_good()
-    return prepare(path, reading) if path.is_file() else None
+    return task.done() if task.path.is_file() else None
 
 
 @contextmanager

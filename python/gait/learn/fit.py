@@ -241,9 +241,13 @@ def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects:
 def _bodies(
     sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int
 ) -> list[retarget.Measures | None]:
-    """One body of each subject: of the recordings, the first that shows most of it."""
+    """One body of each subject: of the recordings, the first that shows most of it and that most agree on."""
+
+    def known(s: Sequence) -> tuple[int, int]:
+        return retarget.known_parts(s.measures), s.recordings
+
     return [
-        max((s.measures for s, k in zip(sequences, index, strict=True) if k == i), key=retarget.known_parts)
+        max((s for s, k in zip(sequences, index, strict=True) if k == i), key=known).measures
         for i in range(subjects)
     ]
 

@@ -17,6 +17,7 @@ from gait.learn import articulated, marker_map, marker_sets, skeleton_fit
 from gait.learn.articulated import HINGES, SEGMENTS
 from gait.learn.body import RECORDED, Body
 from gait.learn.marker_sets import LANDMARKS, Landmark, plain
+from gait.learn.stretch_information import Information
 from gait.skeleton import JOINTS, SIDES, default_skeleton
 
 Floats = npt.NDArray[np.float64]
@@ -29,7 +30,14 @@ CHUNK = 512  # frames worked on at once
 LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
 
 
-def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Path | None = None) -> Body:
+def body(
+    path: Path,
+    labels: list[str],
+    points: Floats,
+    fps: float,
+    markers: Path | None = None,
+    stretch: Floats | None = None,
+) -> Body:
     """Fit the skeleton to markers.
 
     Parameters
@@ -42,6 +50,8 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
         Frames per second.
     markers : Path, optional
         Mapping file; by default the labels of known sets.
+    stretch : (S,), optional
+        The person's stretches, if other recordings tell them too; by default those of this one.
 
     Raises
     ------
@@ -49,17 +59,8 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
         If too few labels are known, or the markers do not fit a walker.
     """
     points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
-    places = assign(path, labels, points, markers)
-    columns = list(places)
-    found = skeleton_fit.Points(
-        segment=np.array([SEGMENTS.index(places[k].segment) for k in columns], np.intp),
-        at=np.array([places[k].at for k in columns]),
-        sd=np.array([places[k].sd for k in columns]),
-    )
-    try:
-        fit = skeleton_fit.fit(points[:, columns], found)
-    except ValueError:
-        raise UserError(f"{path}: fewer than three known markers in every frame; see --markers") from None
+    columns, places = _placed(path, labels, points, markers)
+    fit = skeleton_fit.fit(points[:, columns], places, stretch)
     own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
     walker = from_fit(path.stem, fps, fit, own)
     if not walker.residual or not walker.residual < WORST_RMS:
@@ -75,6 +76,34 @@ def body(path: Path, labels: list[str], points: Floats, fps: float, markers: Pat
             f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers file"
         )
     return walker
+
+
+def information(
+    path: Path, labels: list[str], points: Floats, markers: Path | None = None
+) -> Information | None:
+    """Find what markers tell of the person's stretches; None if they do not fit a body.
+
+    Parameters and errors are those of `body`.
+    """
+    points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
+    columns, places = _placed(path, labels, points, markers)
+    found, rms = skeleton_fit.information(points[:, columns], places)
+    return found if rms < WORST_RMS else None
+
+
+def _placed(
+    path: Path, labels: list[str], points: Floats, markers: Path | None
+) -> tuple[list[int], skeleton_fit.Points]:
+    """Columns of the known markers and their places on the skeleton; there are frames that can be fitted."""
+    places = assign(path, labels, points, markers)
+    columns = list(places)
+    if not skeleton_fit.enough(points[:, columns]):
+        raise UserError(f"{path}: fewer than three known markers in every frame; see --markers")
+    return columns, skeleton_fit.Points(
+        segment=np.array([SEGMENTS.index(places[k].segment) for k in columns], np.intp),
+        at=np.array([places[k].at for k in columns]),
+        sd=np.array([places[k].sd for k in columns]),
+    )
 
 
 def assign(path: Path, labels: list[str], points: Floats, markers: Path | None) -> dict[int, Landmark]:

@@ -22,31 +22,30 @@ from pathlib import Path
 
 from gait.errors import UserError
 from gait.learn import fork_server
-from gait.learn.reading import Reading
 from gait.learn.spool import no_room
-from gait.learn.stage import Prepared, prepare
+from gait.learn.stage import Prepared, Task
 
 #: Seconds that starting the workers costs: they import the package anew (measured: 0.4 to 0.6).
 START = 0.6
 AHEAD = 4  # files in flight per worker: what waits its turn stays little
 
 
-def prepared(paths: Sequence[Path], reading: Reading, jobs: int) -> Generator[Prepared, None, None]:
-    """Outcomes of the files in their order.
+def prepared(tasks: Sequence[Task], jobs: int) -> Generator[Prepared, None, None]:
+    """Outcomes of files in their order.
 
     Files are prepared here until their time says that the rest would gain from a pool of up to `jobs`
     workers; the outcomes are the same.
     """
-    sizes = [_size(path) for path in paths]
+    sizes = [_size(task.path) for task in tasks]
     spent, done = 0.0, 0
-    for i, path in enumerate(paths):
-        workers = min(jobs, len(paths) - i)
+    for i, task in enumerate(tasks):
+        workers = min(jobs, len(tasks) - i)
         rest = spent / max(done, 1) * sum(sizes[i:])
         if workers > 1 and rest * (1 - 1 / workers) > START:
-            yield from _pooled(paths[i:], reading, workers)
+            yield from _pooled(tasks[i:], workers)
             return
         begun = time.perf_counter()
-        outcome = prepare(path, reading)
+        outcome = task.done()
         spent, done = spent + time.perf_counter() - begun, done + sizes[i]
         yield outcome
 
@@ -58,32 +57,32 @@ def _size(path: Path) -> int:
         return 1
 
 
-def _pooled(paths: Sequence[Path], reading: Reading, workers: int) -> Generator[Prepared, None, None]:
+def _pooled(tasks: Sequence[Task], workers: int) -> Generator[Prepared, None, None]:
     """Outcomes from a pool; if a worker dies, the files then in flight are done one by one."""
-    waiting, flying = deque(paths), deque[tuple[Path, Future[str]]]()
+    waiting, flying = deque(tasks), deque[tuple[Task, Future[str]]]()
     while waiting:
         try:
             with _pool(workers) as (pool, folder):
                 while waiting or flying:
                     while waiting and len(flying) < AHEAD * workers:
-                        flying.append((waiting[0], _submit(pool, waiting[0], reading, folder)))
+                        flying.append((waiting[0], _submit(pool, waiting[0], folder)))
                         waiting.popleft()
                     outcome = _fetched(flying[0][1].result())
                     flying.popleft()
                     yield outcome
         except BrokenProcessPool:
-            yield from (_alone(path, reading) for path, _ in flying)
+            yield from (_alone(task) for task, _ in flying)
             flying.clear()
 
 
-def _alone(path: Path, reading: Reading) -> Prepared:
+def _alone(task: Task) -> Prepared:
     """Outcome of one file in a process of its own, so that its death has a name."""
     try:
         with _pool(1) as (pool, folder):
-            return _fetched(_submit(pool, path, reading, folder).result())
+            return _fetched(_submit(pool, task, folder).result())
     except BrokenProcessPool:
         killed = UserError(
-            f"{path}: the process that read it was killed (out of memory?); "
+            f"{task.path}: the process that read it was killed (out of memory?); "
             "leave it out with --exclude or cut the recording"
         )
         return Prepared(refused=killed)
@@ -107,15 +106,15 @@ def _pool(count: int) -> Iterator[tuple[ProcessPoolExecutor, str]]:
             pool.shutdown(cancel_futures=True)
 
 
-def _submit(pool: ProcessPoolExecutor, path: Path, reading: Reading, folder: str) -> Future[str]:
+def _submit(pool: ProcessPoolExecutor, task: Task, folder: str) -> Future[str]:
     """Submit a file; workers started by this inherit that Ctrl-C is not for them but for their parent."""
     with fork_server.held_back():
-        return pool.submit(_stored, path, reading, folder)
+        return pool.submit(_stored, task, folder)
 
 
-def _stored(path: Path, reading: Reading, folder: str) -> str:
+def _stored(task: Task, folder: str) -> str:
     """Prepare a file in a worker: name of the file in `folder` that holds the outcome."""
-    outcome = prepare(path, reading)
+    outcome = task.done()
     try:
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
             pickle.dump(outcome, file)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn import angle_file, c3d_file, joint_file, marker_body, mocap_asf, mocap_bvh, root
@@ -12,17 +13,26 @@ from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body, body
 from gait.learn.reading import DEFAULT, Reading
 from gait.learn.recording import FARTHEST, Y_UP, require_frames, require_range
+from gait.learn.stretch_information import Information
 from gait.skeleton import SIDES
 from gait.trc import read_trc
 
+Floats = npt.NDArray[np.float64]
+
 RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
 LEG = 0.25, 1.5  #: metres from hip over knee to ankle, from small children to more than the tallest man
+MARKED = (".c3d", ".trc")  #: suffixes of files that may hold markers
 #: Suffixes that are learnt from.
-KINDS = (*RECORDINGS, ".c3d", ".trc", ".csv")
+KINDS = (*RECORDINGS, *MARKED, ".csv")
 
 
-def read(path: Path, reading: Reading = DEFAULT) -> Body | AngleTable:
+def read(path: Path, reading: Reading = DEFAULT, stretch: Floats | None = None) -> Body | AngleTable:
     """Read a motion file by its suffix; a .csv may hold angles alone.
+
+    Parameters
+    ----------
+    stretch : (S,), optional
+        Of the person, for files of markers (`gait.learn.marker_body.body`).
 
     Raises
     ------
@@ -37,7 +47,7 @@ def read(path: Path, reading: Reading = DEFAULT) -> Body | AngleTable:
     elif suffix == ".csv":
         walker = joint_file.read_csv(path, reading.fps, reading.zero_runs)
     else:
-        walker = _points(path, reading)
+        walker = _points(path, reading, stretch)
     _require_size(path, walker)
     return root.overground(walker)
 
@@ -62,8 +72,37 @@ def _require_size(path: Path, walker: Body) -> None:
         )
 
 
-def _points(path: Path, reading: Reading) -> Body:
-    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers.
+def information(path: Path, reading: Reading = DEFAULT) -> Information | None:
+    """Find what a file of a kind of `MARKED` tells of the person's stretches; None if no markers do.
+
+    Raises
+    ------
+    UserError
+        If the file is malformed, or its markers are not known.
+    """
+    labels, points, _ = _labelled(path)
+    if _of_joints(labels, reading):
+        return None
+    return marker_body.information(path, labels, points, reading.markers)
+
+
+def _points(path: Path, reading: Reading, stretch: Floats | None) -> Body:
+    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
+    labels, points, rate = _labelled(path)
+    fps = reading.fps or rate
+    if _of_joints(labels, reading):
+        upright = points @ Y_UP.T
+        return joint_file.body(path, {name: upright[:, k] for k, name in enumerate(labels)}, fps)
+    return marker_body.body(path, labels, points, fps, reading.markers, stretch)
+
+
+def _of_joints(labels: list[str], reading: Reading) -> bool:
+    """Whether points are centres of joints."""
+    return reading.markers is None and set(joint_file.NEEDED) <= set(joint_file.find(labels))
+
+
+def _labelled(path: Path) -> tuple[list[str], Floats, float]:
+    """Labels, points (T, M, 3) and frames per second.
 
     A point at exactly (0, 0, 0) is missing: so these formats write gaps.
     """
@@ -72,8 +111,4 @@ def _points(path: Path, reading: Reading) -> Body:
     for k, label in enumerate(labels):
         require_range(path, f"point {label!r} at", points[:, k], FARTHEST, "metres")
     points[(points == 0).all(axis=2)] = np.nan
-    fps = reading.fps or rate
-    if reading.markers is None and set(joint_file.NEEDED) <= set(joint_file.find(labels)):
-        upright = points @ Y_UP.T
-        return joint_file.body(path, {name: upright[:, k] for k, name in enumerate(labels)}, fps)
-    return marker_body.body(path, labels, points, fps, reading.markers)
+    return labels, points, rate

@@ -139,7 +139,7 @@ def _row(s: Sequence, found: list[object]) -> list[str]:
     ]
     return [
         s.name,
-        s.subject,
+        s.subject + (f" (limbs by {s.recordings} recordings)" if s.recordings > 1 else ""),
         str(period),
         str(cycles),
         f"{s.period.peak:.0f}",

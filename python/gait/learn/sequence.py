@@ -46,6 +46,8 @@ class Sequence:
     cut : (before, after)
         Why frames before and after them were left out, in words; '' if none were.
     verdict : verdict.Verdict
+    recordings : int
+        How many recordings of the person tell the lengths of the limbs.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Sequence:
     kept: tuple[int, int]
     cut: tuple[str, str]
     verdict: verdict.Verdict
+    recordings: int = 1
 
     @property
     def cycles(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,9 @@ from gait.learn.reading import DEFAULT, Reading
 from gait.learn.retarget import Measures, known_parts
 from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
+from gait.learn.shared_stretches import Shared, shared
 from gait.learn.spool import Spool
+from gait.learn.stage import Prepared, Task
 
 NOT_YET = np.zeros((0, 0))  # channels of a sequence while they go to disk
 
@@ -122,6 +124,7 @@ def load_all(
     people: str = "auto",
     corpus: Corpus | None = None,
     others: list[Measures] | None = None,
+    bodies: list[Shared | None] | None = None,
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
 
@@ -142,6 +145,8 @@ def load_all(
         Gets the motions for the prior over segments; a file that gave one is no error.
     others : list, optional
         Gets the bodies of people none of whose files can be used: the one of which most was seen.
+    bodies : list, optional
+        What `measured` gave for these files; without it each is fitted by itself.
 
     Raises
     ------
@@ -149,20 +154,29 @@ def load_all(
         If a file named by itself cannot be used, or none can.
     """
     paths = [path for path, _ in files]
-    outcomes = cluster.prepared(paths, reading, dask) if dask else pool.prepared(paths, reading, jobs)
+    known = bodies or [None] * len(paths)
+    outcomes = _done(
+        [
+            Task(path, reading, body.stretch if body else None)
+            for path, body in zip(paths, known, strict=True)
+        ],
+        jobs,
+        dask,
+    )
     names, persons = subjects.names(paths), subjects.subjects(paths, people)
     sequences, refused, used = [], [], False
-    bodies: list[Measures | None] = []
+    measures: list[Measures | None] = []
     with closing(outcomes), Spool() as spool:
         for i, outcome in enumerate(outcomes):
             found, told = outcome.sequence, outcome.refused
-            bodies.append(outcome.body)
+            measures.append(outcome.body)
             if corpus is not None and outcome.motion is not None:
                 corpus.put(names[i], persons[i], paths[i], outcome.motion)
                 used = True
             if found is not None:
                 spool.put(found.channels)
-                sequences.append(replace(found, name=names[i], subject=persons[i], channels=NOT_YET))
+                found = replace(found, name=names[i], subject=persons[i], channels=NOT_YET)
+                sequences.append(replace(found, recordings=body.recordings) if (body := known[i]) else found)
             elif told is not None and (files[i][1] or outcome.motion is not None):
                 whole = outcome.motion is None or corpus is None
                 refused.append(f"{told}" if whole else f"{told} (its segments are used all the same)")
@@ -175,8 +189,38 @@ def load_all(
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels
     if others is not None:
-        others += _strangers(persons, bodies, {s.subject for s in sequences})
+        others += _strangers(persons, measures, {s.subject for s in sequences})
     return sequences, refused
+
+
+def measured(
+    files: list[tuple[Path, bool]],
+    reading: Reading = DEFAULT,
+    progress: Callable[[int], None] = lambda done: None,
+    *,
+    jobs: int = 1,
+    dask: str | None = None,
+    people: str = "auto",
+    tell: Callable[[str], None] = lambda words: None,
+) -> list[Shared | None]:
+    """Bodies of people with several recordings of markers, for each file; None where it is fitted by itself.
+
+    Parameters are those of `load_all`; `tell` gets a line about recordings that cannot be of one body.
+    """
+    paths = [path for path, _ in files]
+    return shared(
+        paths,
+        subjects.subjects(paths, people),
+        reading,
+        lambda tasks: _done(tasks, jobs, dask),
+        tell,
+        progress,
+    )
+
+
+def _done(tasks: list[Task], jobs: int, dask: str | None) -> Generator[Prepared, None, None]:
+    """Outcomes of tasks in their order, wherever they are done."""
+    return cluster.prepared(tasks, dask) if dask else pool.prepared(tasks, jobs)
 
 
 def _strangers(persons: list[str], bodies: list[Measures | None], known: set[str]) -> list[Measures]:

@@ -1,4 +1,7 @@
-"""The per-file stage of learning: a file to a sequence and its markers, or to the reason why not."""
+"""The per-file stage of learning: a file to a sequence and its markers, or to the reason why not.
+
+Before it, files of markers are measured whose person has several (`gait.learn.shared_stretches`).
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
 from threadpoolctl import ThreadpoolController
 
 from gait.errors import UserError
@@ -19,6 +24,24 @@ from gait.learn.retarget import Measures
 from gait.learn.segment_motion import Motion
 from gait.learn.segment_options import Segments
 from gait.learn.sequence import Sequence
+from gait.learn.stretch_information import Information
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A file to prepare, or only to measure; with the stretches of its person if others tell them too."""
+
+    path: Path
+    reading: Reading = DEFAULT
+    stretch: Floats | None = None
+    measuring: bool = False
+
+    def done(self) -> Prepared:
+        """Do it; what its user can mend comes back as a value, so that it can travel."""
+        with one_thread():
+            return _measured(self) if self.measuring else _prepared(self)
 
 
 @dataclass(frozen=True)
@@ -29,26 +52,35 @@ class Prepared:
     refused: UserError | None = None
     motion: Motion | None = None
     body: Measures | None = None  #: of a file whose motion is refused
+    stretches: Information | None = None  #: of a file that was only to be measured
 
 
-def prepare(path: Path, reading: Reading = DEFAULT) -> Prepared:
-    """Read and prepare one file; what its user can mend comes back as a value, so that it can travel."""
-    with one_thread():
-        try:
-            read = readers.read(path, reading)
-        except UserError as error:
-            return Prepared(refused=error)
-        found, refused, body = None, None, None
-        try:
-            if reading.segments.source != "only":
-                found = sequence.prepare(path, read, reading)
-        except UserError as error:
-            refused, body = error, sequence.measured(read)
-        try:
-            motion = _motion(path, read, reading.segments, found)
-        except UserError as error:
-            return Prepared(found, None if found else refused or error, body=body)
-        return Prepared(found, refused, motion, body)
+def _measured(task: Task) -> Prepared:
+    """Find what markers tell of the person; why they tell nothing is said when the file is prepared."""
+    try:
+        return Prepared(stretches=readers.information(task.path, task.reading))
+    except UserError:
+        return Prepared()
+
+
+def _prepared(task: Task) -> Prepared:
+    """Read and prepare one file."""
+    path, reading = task.path, task.reading
+    try:
+        read = readers.read(path, reading, task.stretch)
+    except UserError as error:
+        return Prepared(refused=error)
+    found, refused, body = None, None, None
+    try:
+        if reading.segments.source != "only":
+            found = sequence.prepare(path, read, reading)
+    except UserError as error:
+        refused, body = error, sequence.measured(read)
+    try:
+        motion = _motion(path, read, reading.segments, found)
+    except UserError as error:
+        return Prepared(found, None if found else refused or error, body=body)
+    return Prepared(found, refused, motion, body)
 
 
 def _motion(path: Path, read: Body | AngleTable, wanted: Segments, found: Sequence | None) -> Motion | None:
