@@ -16,10 +16,16 @@ typedef struct places { /* of one row of the working image in the captured frame
     int32_t u[VIEW_SIZE], v[VIEW_SIZE];
 } places;
 
-typedef struct taps { /* four source pixels about each working pixel, two in a word, and their weights */
-    uint32_t word[2][2][VIEW_SIZE]; /* upper and lower row; colour: bytes r g b r and b r g b */
+typedef struct
+    taps { /* the first of four source pixels about each working pixel, and the weights of the others */
+    int32_t offset[VIEW_SIZE];
     uint32_t x[VIEW_SIZE], y[VIEW_SIZE];
 } taps;
+
+typedef struct blend { /* of source pixels side by side, FRACTION times */
+    int32_t of;        /* offset of the first; -1: none yet */
+    uint16_t channel[3][VIEW_SIZE];
+} blend;
 
 KERNEL_ROW void place_row(const view_map *map, const gait_camera *cam, bool bent, int32_t j, places *out)
 {
@@ -66,54 +72,85 @@ static void bilinear_odd(const gait_image *im, int32_t step, const places *at, u
 }
 
 /* The last row and column are reached with weight FRACTION from those before. */
-static void fetch(const gait_image *im, int32_t step, const places *at, taps *t)
+static void locate(const gait_image *im, int32_t step, const places *at, taps *restrict t)
 {
     int32_t const right = im->width - 1, low = im->height - 1;
-    int32_t offset[VIEW_SIZE];
     for (int32_t i = 0; i < VIEW_SIZE; i++) {
         int32_t const u = i_clamp(at->u[i], 0, right * FRACTION), v = i_clamp(at->v[i], 0, low * FRACTION);
         int32_t const x = i_min(u / FRACTION, right - 1), y = i_min(v / FRACTION, low - 1);
-        offset[i] = y * im->stride + x * step;
+        t->offset[i] = y * im->stride + x * step;
         t->x[i] = (uint32_t)(u - x * FRACTION);
         t->y[i] = (uint32_t)(v - y * FRACTION);
     }
-    for (int32_t i = 0; i < VIEW_SIZE; i++)
-        for (int32_t k = 0; k < 2; k++) {
-            const uint8_t *const p = im->data + (offset[i] + k * im->stride);
-            if (step == 1) {
-                t->word[k][0][i] = p[0] | (uint32_t)p[1] << 8;
-            } else {
-                memcpy(&t->word[k][0][i], p, 4);
-                memcpy(&t->word[k][1][i], p + 2, 4);
-            }
-        }
 }
 
 /* The byte that begins at bit `a` of word `wa` (left pixel) and at bit `b` of word `wb` (right pixel). */
-static void blend(const taps *t, int32_t wa, int32_t a, int32_t wb, int32_t b, uint8_t *restrict out)
+static void blend_bytes(const uint32_t *restrict wa, int32_t a, const uint32_t *restrict wb, int32_t b,
+                        const uint32_t *restrict x, uint16_t *restrict out)
 {
+    for (int32_t i = 0; i < VIEW_SIZE; i++)
+        out[i] = (uint16_t)((wa[i] >> a & 255u) * (FRACTION - x[i]) + (wb[i] >> b & 255u) * x[i]);
+}
+
+/* Two pixels are in a word, or with colour in two: bytes r g b r and b r g b. */
+static void blend_row(const uint8_t *from, int32_t step, const taps *t, blend *restrict out)
+{
+    uint32_t word[2][VIEW_SIZE];
     for (int32_t i = 0; i < VIEW_SIZE; i++) {
-        uint32_t const x = t->x[i], y = t->y[i], back = FRACTION - x;
-        uint32_t const top = (t->word[0][wa][i] >> a & 255u) * back + (t->word[0][wb][i] >> b & 255u) * x;
-        uint32_t const low = (t->word[1][wa][i] >> a & 255u) * back + (t->word[1][wb][i] >> b & 255u) * x;
-        out[i] = (uint8_t)((top * (FRACTION - y) + low * y + (1u << 15)) >> 16);
+        const uint8_t *const p = from + t->offset[i];
+        if (step == 1) {
+            word[0][i] = p[0] | (uint32_t)p[1] << 8;
+        } else {
+            memcpy(&word[0][i], p, 4);
+            memcpy(&word[1][i], p + 2, 4);
+        }
+    }
+    if (step == 1) {
+        blend_bytes(word[0], 0, word[0], 8, t->x, out->channel[0]);
+    } else {
+        blend_bytes(word[0], 0, word[0], 24, t->x, out->channel[0]);
+        blend_bytes(word[0], 8, word[1], 16, t->x, out->channel[1]);
+        blend_bytes(word[1], 0, word[1], 24, t->x, out->channel[2]);
     }
 }
 
-KERNEL_ROW void bilinear_row(const gait_image *im, int32_t step, const places *at, uint8_t *const row[3])
+static void blend_rows(const uint16_t *restrict top, const uint16_t *restrict low, const uint32_t *restrict y,
+                       uint8_t *restrict out)
+{
+    for (int32_t i = 0; i < VIEW_SIZE; i++)
+        out[i] = (uint8_t)((top[i] * (FRACTION - y[i]) + low[i] * y[i] + (1u << 15)) >> 16);
+}
+
+/* Two source rows that follow one another.  Without a lens all working rows have the same columns, so that what one
+ * blended serves the next. */
+typedef struct blends {
+    blend row[2];
+} blends;
+
+static const blend *kept_row(blends *kept, const gait_image *im, int32_t step, int32_t below, bool bent,
+                             const taps *t)
+{
+    int32_t const of = t->offset[0] + below * im->stride;
+    blend *const to = &kept->row[of / im->stride & 1];
+    if (bent || to->of != of)
+        blend_row(im->data + below * im->stride, step, t, to);
+    to->of = of;
+    return to;
+}
+
+KERNEL_ROW void bilinear_row(const gait_image *im, int32_t step, bool bent, const places *at, blends *kept,
+                             uint8_t *const row[3])
 {
     taps t;
     if (is_odd(im)) {
         bilinear_odd(im, step, at, row);
-    } else if (step == 1) {
-        fetch(im, 1, at, &t);
-        blend(&t, 0, 0, 0, 8, row[0]);
-    } else {
-        fetch(im, 3, at, &t);
-        blend(&t, 0, 0, 0, 24, row[0]);
-        blend(&t, 0, 8, 1, 16, row[1]);
-        blend(&t, 1, 0, 1, 24, row[2]);
+        return;
     }
+    locate(im, step, at, &t);
+    const blend *const top = kept_row(kept, im, step, 0, bent, &t);
+    const blend *const low = kept_row(kept, im, step, 1, bent, &t);
+    for (int32_t c = 0; c < step; c++)
+        blend_rows(top->channel[c], low->channel[c], t.y, row[c]);
 }
 
 /* ---- mean of a box of pixels ---- */
@@ -205,6 +242,8 @@ void KERNEL(view_sample)(const view_map *map, const gait_camera *cam, const gait
     int32_t const step = im->format == GAIT_GREY8 ? 1 : 3;
     int32_t const side = i_clamp((int32_t)(1.0f / map->scale), 1, MAX_SIDE);
     bool const bent = camera_distorted(cam), swap = im->format == GAIT_BGR8;
+    blends kept;
+    kept.row[0].of = kept.row[1].of = -1;
     out->channels = step;
     for (int32_t j = 0; j < VIEW_SIZE; j++) {
         places at;
@@ -213,7 +252,7 @@ void KERNEL(view_sample)(const view_map *map, const gait_camera *cam, const gait
             row[c] = out->channel[swap ? 2 - c : c] + j * VIEW_SIZE;
         place_row(map, cam, bent, j, &at);
         if (side == 1)
-            bilinear_row(im, step, &at, row);
+            bilinear_row(im, step, bent, &at, &kept, row);
         else
             box_row(im, step, side, &at, row);
     }
