@@ -130,10 +130,10 @@ def test_what_tells_nothing_tells_nobody_apart():
     assert odds(NOTHING, body(1.1)) == pytest.approx(0)
 
 
-def body(stature, error=0.0):
+def body(stature, error=0.0, precision=1e4):
     """Findings of somebody's stature with an error of log stature."""
     matrix = np.zeros(PEOPLE.matrix.shape)
-    matrix[0, 0] = 1e4
+    matrix[0, 0] = precision
     return Information(matrix, matrix[0] * (np.log(stature) + error))
 
 
@@ -158,6 +158,11 @@ def test_only_people_with_several_recordings_of_markers_are_measured():
     assert [f.recordings if f else None for f in found] == [2, None, None, 2, None] and not lines
     assert np.exp(found[0].stretch[0]) == pytest.approx(1.7 * np.exp(0.002), rel=1e-4)
     assert found[0] is found[3]
+
+
+def test_what_is_known_of_people_counts_once():
+    found, _ = share({"a.c3d": body(2.0, precision=8.0), "b.c3d": body(2.0, precision=8.0)})
+    assert found[0].stretch[0] == pytest.approx(np.log(1.7 * 2.0) / 2)  # people's precision of it is 16
 
 
 def test_a_recording_that_tells_nothing_does_not_count():
