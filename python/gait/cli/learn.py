@@ -1,10 +1,11 @@
 """Learn a cyclic model of motion from motion capture.
 
 Sources are files or folders of them: .amc with its .asf beside it, .bvh, .c3d, .trc, and .csv of joint
-positions or angles.  Each recording is retargeted to the default skeleton and cut into cycles by its own
-period; functional principal components of all cycles give the mean curves and the ways in which people differ
-(Ormoneit and others, 2000).  In a folder, a file that cannot be used is named in one line and the rest is
-learnt.  gait info lists the sequences of a model, --report shows everything.
+positions or angles, separated by ',', ';' (with decimal commas) or tabs.  Each recording is retargeted to the
+default skeleton and cut into cycles by its own period; functional principal components of all cycles give the
+mean curves and the ways in which people differ (Ormoneit and others, 2000).  In a folder, a file that cannot
+be used is named in one line and the rest is learnt.  gait info lists the sequences of a model, --report shows
+everything.
 
 Recordings are read a few at a time and their signals wait on disk, in the folder that TMPDIR names; in memory
 are their cycles alone.  The model does not depend on --jobs or --dask, nor on the CPU if it is x86-64.
@@ -85,8 +86,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--zeros-missing",
         action="store_true",
-        help="three or more exact zeros in a row are missing data (points of .c3d and .trc at the origin "
-        "always are)",
+        help="three or more exact zeros in a row are missing data, for systems that write 0 for what they "
+        "did not see (empty cells of .csv, and points of .c3d and .trc at the origin, always are missing)",
     )
     parser.add_argument(
         "--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings"

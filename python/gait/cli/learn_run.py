@@ -6,15 +6,17 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from gait import blob
-from gait.cli import learn_prior, learn_segments, learn_text
+from gait.cli import learn_hints, learn_prior, learn_segments, learn_text
 from gait.errors import UsageError
 from gait.files import require_folder, require_writable
 from gait.learn import activity, fit, fork_server, marker_map, model, report_place, segment_sections, sources
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading
+from gait.learn.remarks import Noticed
 from gait.learn.retarget import Measures
 from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
@@ -34,9 +36,7 @@ def run(args: argparse.Namespace) -> int:
         if wanted.source == "only":
             return learn_prior.write_alone(args, corpus, wanted, refused)
         learned = fit.fit(sequences, args.components, args.seed, args.prior, others)
-        if not args.quiet:
-            for note in learn_text.notes(learned, args.components):
-                print(note, file=sys.stderr)
+        _say(learn_text.notes(learned, args.components), args.quiet)
         prior = learn_prior.learn(corpus, wanted, args.quiet)
         sections = model.sections(learned, args.activity, args.seed)
         data = blob.write(args.output, sections | (segment_sections.sections(prior) if prior else {}))
@@ -94,8 +94,9 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
     idle: list[str] = []
     closed: list[str] = []
     files = sources.find(args.sources, args.exclude, idle.append, closed.append)
-    for glob in idle if not args.quiet else ():
-        print(f"--exclude {glob}: no file's path ends like this", file=sys.stderr)
+    noticed = Noticed()
+    _say((f"--exclude {glob}: no file's path ends like this" for glob in idle), args.quiet)
+    _say(learn_hints.idle_map(args.markers, [path for path, _ in files]), args.quiet)
     reading = Reading(
         args.period_mode,
         args.fps,
@@ -119,12 +120,14 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
                 corpus=corpus,
                 others=others,
                 bodies=bodies,
+                noticed=noticed,
             )
         except sources.NothingLeft as error:
             _tell(closed + error.refused[1:], args.quiet, "")
             raise
     refused = closed + refused
     _tell(refused, args.quiet, " (see --json or --report)")
+    _say(learn_hints.hints(args.markers, noticed), args.quiet)
     return sequences, refused, others
 
 
@@ -137,9 +140,14 @@ def _measured(
         bodies = sources.measured(
             files, reading, update, jobs=jobs, dask=args.dask, people=args.subjects, tell=apart.append
         )
-    for line in apart if not args.quiet else ():
-        print(line, file=sys.stderr)
+    _say(apart, args.quiet)
     return bodies
+
+
+def _say(lines: Iterable[str], quiet: bool) -> None:
+    """Say what a user should know, one line each."""
+    for line in lines if not quiet else ():
+        print(line, file=sys.stderr)
 
 
 def _tell(refused: list[str], quiet: bool, more: str) -> None:

@@ -18,8 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import csv_table, joint_file
+from gait.learn import csv_table, joint_file, remarks
 from gait.learn.recording import DEGREES, mask_zero_runs, require_range
+from gait.learn.remarks import NOTHING, Remarks
 from gait.learn.rotations import unwrap
 from gait.skeleton import ANGLES, ROOTS, SIDES
 
@@ -50,6 +51,8 @@ class AngleTable:
         In the order of `gait.skeleton.ROOTS`, radians and statures; None if the file has no such column.
     stature : float or None
         Metres, if the file says.
+    remarks : Remarks
+        What else was noticed in the file.
     """
 
     name: str
@@ -57,6 +60,7 @@ class AngleTable:
     angles: Floats
     root: Floats | None = None
     stature: float | None = None
+    remarks: Remarks = NOTHING
 
     @property
     def frames(self) -> int:
@@ -95,8 +99,11 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Angle
     if twice is not None:
         raise UserError(f"{path}:1: {twice} is there as {' and '.join(columns[twice])}; remove one")
     values = _in_radians(table, {name: found[0] for name, found in columns.items()})
+    columned, zeros = {name: column[:, None] for name, column in values.items()}, ""
     if zero_runs:
-        values = {name: mask_zero_runs(column[:, None])[:, 0] for name, column in values.items()}
+        values = {name: mask_zero_runs(column)[:, 0] for name, column in columned.items()}
+    else:
+        zeros = remarks.zero_run(columned, remarks.ANGLES)
     for name, column in values.items():
         if name in LENGTHS:
             require_range(path, name, column, LONGEST, "statures")
@@ -117,6 +124,7 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Angle
         unwrap(angles),
         root if any(name in values for name in ROOTS) else None,
         float(np.nanmedian(stature)) if np.isfinite(stature).any() else None,
+        Remarks(zeros=zeros),
     )
 
 

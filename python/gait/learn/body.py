@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError
 from gait.learn.recording import Recording
+from gait.learn.remarks import NOTHING, Remarks
 from gait.learn.rotations import rotation_vectors, unit
 from gait.skeleton import SIDES
 
@@ -60,6 +61,8 @@ class Body:
         The head's direction to the left and the hinge axes {l,r}_{knee,elbow}, to the left in the rest pose.
     residual : float or None
         Rms distance of markers from the body fitted to them, metres; None if it is not fitted to markers.
+    remarks : Remarks
+        What else the reader noticed in the file.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Body:
     pelvis: Floats
     lateral: dict[str, Floats] = field(default_factory=dict)
     residual: float | None = None
+    remarks: Remarks = NOTHING
 
     @property
     def frames(self) -> int:
@@ -93,7 +97,8 @@ def body(recording: Recording) -> Body:
             hinge = _hinge(recording, bones[f"{s}_{upper}"], bones[f"{s}_{lower}"])
             lateral[f"{s}_{joint}"] = recording.rotation[:, bones[f"{s}_{upper}"]] @ hinge
             lateral[f"{s}_{joint}"] *= _left_sign(joint, s, joints, lateral[f"{s}_{joint}"])
-    return Body(recording.name, recording.fps, joints, recording.rotation[:, bones["pelvis"]] @ axes, lateral)
+    pelvis = recording.rotation[:, bones["pelvis"]] @ axes
+    return Body(recording.name, recording.fps, joints, pelvis, lateral, remarks=recording.remarks)
 
 
 def _plain(name: str) -> str:

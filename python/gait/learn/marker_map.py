@@ -64,6 +64,11 @@ def read(path: Path) -> dict[str, Landmark]:
     return table
 
 
+def named(path: Path) -> list[str]:
+    """Labels that a mapping (of which `read` is sure) names, as they are written."""
+    return list(_content(path).get("markers", {}))
+
+
 def _content(path: Path) -> dict[str, Any]:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         keys = [key for key, _ in pairs]

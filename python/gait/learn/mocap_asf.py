@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError, quoted
 from gait.files import text_lines
+from gait.learn import remarks
 from gait.learn.recording import (
     DEGREES,
     FARTHEST,
@@ -69,13 +70,17 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
         Naming file, line and remedy.
     """
     skeleton = read_skeleton(find_skeleton(path))
-    values = read_motion(path, skeleton)
+    values, zeros = read_motion(path, skeleton), ""
     if zero_runs:
         values = {name: mask_zero_runs(columns) for name, columns in values.items()}
+    else:
+        zeros = remarks.zero_run(values, remarks.BONES)
     degrees, stated = _declared(path)
     skeleton.degrees = skeleton.degrees if degrees is None else degrees
     _require_ranges(path, skeleton, values)
-    return assemble(path, skeleton, values, fps or stated or FPS)
+    return replace(
+        assemble(path, skeleton, values, fps or stated or FPS), remarks=remarks.Remarks(zeros=zeros)
+    )
 
 
 def _require_ranges(path: Path, skeleton: Skeleton, values: dict[str, Floats]) -> None:

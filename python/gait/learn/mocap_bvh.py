@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from gait.errors import UserError, quoted
 from gait.files import text_lines
+from gait.learn import remarks
 from gait.learn.recording import (
     DEGREES,
     FARTHEST,
@@ -187,10 +188,11 @@ def assemble(
     _require_ranges(path, joints, values, metres)
     start, end = np.empty((2, len(values), len(joints), 3))
     rotation = np.empty((len(values), len(joints), 3, 3))
-    column, heirs = 0, _ends(joints)
+    column, heirs, parts = 0, _ends(joints), {}
     for i, joint in enumerate(joints):
         own = values[:, column : column + len(joint.channels)]
         column += len(joint.channels)
+        parts[joint.name] = own
         place, turn = _split(joint, mask_zero_runs(own) if zero_runs else own)
         parent = joint.parent
         rotation[:, i] = turn if parent < 0 else rotation[:, parent] @ turn
@@ -208,6 +210,7 @@ def assemble(
         rotation=turn_up @ rotation @ turn_up.T,
         rest_start=rest[0] @ turn_up.T * metres,
         rest_end=rest[1] @ turn_up.T * metres,
+        remarks=remarks.Remarks(zeros="" if zero_runs else remarks.zero_run(parts, remarks.BONES)),
     )
 
 

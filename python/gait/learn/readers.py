@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import angle_file, c3d_file, joint_file, marker_body, mocap_asf, mocap_bvh, root
+from gait.learn import (
+    angle_file,
+    c3d_file,
+    joint_file,
+    marker_body,
+    marker_sets,
+    mocap_asf,
+    mocap_bvh,
+    remarks,
+    root,
+)
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body, body
 from gait.learn.reading import DEFAULT, Reading
@@ -93,7 +104,9 @@ def _points(path: Path, reading: Reading, stretch: Floats | None) -> Body:
     if _of_joints(labels, reading):
         upright = points @ Y_UP.T
         return joint_file.body(path, {name: upright[:, k] for k, name in enumerate(labels)}, fps)
-    return marker_body.body(path, labels, points, fps, reading.markers, stretch)
+    walker = marker_body.body(path, labels, points, fps, reading.markers, stretch)
+    known = map(marker_sets.plain, labels) if reading.markers else ()
+    return replace(walker, remarks=remarks.Remarks(frozenset(known)))
 
 
 def _of_joints(labels: list[str], reading: Reading) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
+from gait.learn.remarks import NOTHING, Remarks
 
 Floats = npt.NDArray[np.float64]
 
@@ -72,6 +73,7 @@ class Recording:
         The rest pose, metres, axes as above.
     hinges : dict of str to (3,)
         Axis of bones with a single rotation, in the rest pose; flexion positive as the file has it.
+    remarks : Remarks
     """
 
     name: str
@@ -84,6 +86,7 @@ class Recording:
     rest_start: Floats
     rest_end: Floats
     hinges: dict[str, Floats] = field(default_factory=dict)
+    remarks: Remarks = NOTHING
 
     @property
     def frames(self) -> int:

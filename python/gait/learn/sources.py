@@ -14,6 +14,7 @@ from gait.errors import UserError, unreadable
 from gait.learn import cluster, pool, subjects
 from gait.learn.readers import KINDS
 from gait.learn.reading import DEFAULT, Reading
+from gait.learn.remarks import Noticed
 from gait.learn.retarget import Measures, known_parts
 from gait.learn.segment_corpus import Corpus
 from gait.learn.sequence import Sequence
@@ -125,6 +126,7 @@ def load_all(
     corpus: Corpus | None = None,
     others: list[Measures] | None = None,
     bodies: list[Shared | None] | None = None,
+    noticed: Noticed | None = None,
 ) -> tuple[list[Sequence], list[str]]:
     """Read and prepare files; those in folders that cannot be used give one line each and are left out.
 
@@ -147,6 +149,8 @@ def load_all(
         Gets the bodies of people none of whose files can be used: the one of which most was seen.
     bodies : list, optional
         What `measured` gave for these files; without it each is fitted by itself.
+    noticed : Noticed, optional
+        Gets what the readers noticed besides.
 
     Raises
     ------
@@ -170,6 +174,8 @@ def load_all(
         for i, outcome in enumerate(outcomes):
             found, told = outcome.sequence, outcome.refused
             measures.append(outcome.body)
+            if noticed is not None:
+                noticed.add(paths[i], outcome.remarks)
             if corpus is not None and outcome.motion is not None:
                 corpus.put(names[i], persons[i], paths[i], outcome.motion)
                 used = True

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from gait.learn import readers, segment_motion, sequence
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body
 from gait.learn.reading import DEFAULT, Reading
+from gait.learn.remarks import NOTHING, Remarks
 from gait.learn.retarget import Measures
 from gait.learn.segment_motion import Motion
 from gait.learn.segment_options import Segments
@@ -53,6 +54,7 @@ class Prepared:
     motion: Motion | None = None
     body: Measures | None = None  #: of a file whose motion is refused
     stretches: Information | None = None  #: of a file that was only to be measured
+    remarks: Remarks = NOTHING
 
 
 def _measured(task: Task) -> Prepared:
@@ -70,6 +72,11 @@ def _prepared(task: Task) -> Prepared:
         read = readers.read(path, reading, task.stretch)
     except UserError as error:
         return Prepared(refused=error)
+    return replace(_used(path, read, reading), remarks=read.remarks)
+
+
+def _used(path: Path, read: Body | AngleTable, reading: Reading) -> Prepared:
+    """Prepare what was read of a file."""
     found, refused, body = None, None, None
     try:
         if reading.segments.source != "only":
