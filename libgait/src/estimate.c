@@ -6,15 +6,20 @@
 
 walker estimate_place(const population *p, const double *weight)
 {
-    static const int32_t FIELDS[] = {F_X, F_Y, F_Z, F_STATURE};
-    enum { COUNT = sizeof FIELDS / sizeof *FIELDS };
+    const float *const x = field(p, F_X), *const y = field(p, F_Y), *const z = field(p, F_Z),
+                       *const stature = field(p, F_STATURE);
+    double sum_x = 0.0, sum_y = 0.0, sum_z = 0.0, sum_stature = 0.0; /* none waits for another */
+    for (int32_t i = 0; i < p->n; i++) {
+        sum_x += weight[i] * (double)x[i];
+        sum_y += weight[i] * (double)y[i];
+        sum_z += weight[i] * (double)z[i];
+        sum_stature += weight[i] * (double)stature[i];
+    }
     walker w = {{0}};
-    double sum[COUNT] = {0.0};
-    for (int32_t i = 0; i < p->n; i++)
-        for (int32_t k = 0; k < COUNT; k++) /* none waits for another */
-            sum[k] += weight[i] * (double)field(p, FIELDS[k])[i];
-    for (int32_t k = 0; k < COUNT; k++)
-        w.f[FIELDS[k]] = (float)sum[k];
+    w.f[F_X] = (float)sum_x;
+    w.f[F_Y] = (float)sum_y;
+    w.f[F_Z] = (float)sum_z;
+    w.f[F_STATURE] = (float)sum_stature;
     return w;
 }
 

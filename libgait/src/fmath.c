@@ -10,19 +10,44 @@ static double from_bits64(uint64_t u)
     return x;
 }
 
+enum { LANES = 4 };
+
+static void exp_lanes(const double *restrict x, double *restrict out)
+{
+    double const magic = 6755399441055744.0; /* 1.5 * 2^52 */
+    double r[LANES], scale[LANES], p[LANES];
+    for (int32_t i = 0; i < LANES; i++) {
+        double const y = x[i] > -708.0 ? x[i] < 709.0 ? x[i] : 709.0 : -708.0;
+        double const k = (y * 1.44269504088896340736 + magic) - magic; /* in [-1021, 1023] */
+        r[i] = (y - k * LN2_HI) - k * LN2_LO;
+        scale[i] = x[i] > -708.0 ? from_bits64((uint64_t)((int32_t)k + 1023) << 52) : 0.0;
+        p[i] = 1.0;
+    }
+    /* Taylor series: |r| <= ln(2)/2, so the first term left out is below 5e-18. */
+#pragma GCC unroll 1
+    for (int n = 13; n > 0; n--)
+        for (int32_t i = 0; i < LANES; i++)
+            p[i] = p[i] * r[i] / n + 1.0;
+    for (int32_t i = 0; i < LANES; i++)
+        out[i] = p[i] * scale[i];
+}
+
+void m_exp64_all(const double *x, int32_t n, double *out)
+{
+    int32_t const whole = n - n % LANES;
+    double end[2][LANES] = {{0.0}};
+    for (int32_t i = 0; i < whole; i += LANES)
+        exp_lanes(x + i, out + i);
+    memcpy(end[0], x + whole, (size_t)(n - whole) * sizeof *x);
+    exp_lanes(end[0], end[1]);
+    memcpy(out + whole, end[1], (size_t)(n - whole) * sizeof *out);
+}
+
 double m_exp64(double x)
 {
-    if (!(x > -708.0))
-        return 0.0;
-    double const y = x < 709.0 ? x : 709.0;
-    double const magic = 6755399441055744.0; /* 1.5 * 2^52 */
-    double const k = (y * 1.44269504088896340736 + magic) - magic;
-    double const r = (y - k * LN2_HI) - k * LN2_LO;
-    /* Taylor series: |r| <= ln(2)/2, so the first term left out is below 5e-18. */
-    double p = 1.0;
-    for (int n = 13; n > 0; n--)
-        p = p * r / n + 1.0;
-    return p * from_bits64((uint64_t)((int32_t)k + 1023) << 52); /* k in [-1021, 1023] */
+    double out;
+    m_exp64_all(&x, 1, &out);
+    return out;
 }
 
 double m_log64(double x)

@@ -153,6 +153,7 @@ static inline float m_asin(float x)
 
 /* Relative error < 4e-16.  Below -708 and for NaN: 0; above 709: exp(709). */
 double m_exp64(double x);
+void m_exp64_all(const double *x, int32_t n, double *out);
 
 /* Relative error < 4e-16.  Below DBL_MIN and for NaN: log(DBL_MIN); above DBL_MAX: its log. */
 double m_log64(double x);

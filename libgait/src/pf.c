@@ -66,10 +66,12 @@ pf_summary pf_reweigh(pf *p, const float *ll)
         return s;
     }
     for (int32_t i = 0; i < p->n; i++) {
-        p->log_weight[i] = p->ticket[i] ? p->log_weight[i] + (double)ll[i] - top : none;
-        p->weight[i] = p->ticket[i] ? m_exp64(p->log_weight[i]) : 0.0;
-        sum += p->weight[i];
+        double const l = p->log_weight[i] + (double)ll[i] - top;
+        p->log_weight[i] = p->ticket[i] ? l : none;
     }
+    m_exp64_all(p->log_weight, p->n, p->weight); /* 0 of none */
+    for (int32_t i = 0; i < p->n; i++)
+        sum += p->weight[i];
     double const log_sum = m_log64(sum);
     for (int32_t i = 0; i < p->n; i++) {
         p->weight[i] /= sum;
@@ -97,13 +99,15 @@ static uint64_t make_tickets(pf *p)
 void pf_resize(pf *p, int32_t count, uint32_t u)
 {
     uint64_t const n = (uint64_t)count, total = make_tickets(p), step = total / n, rest = total % n;
-    uint64_t const start = (uint64_t)u * step >> 32;
+    uint64_t at = (uint64_t)u * step >> 32, over = 0; /* start + floor(i total / n), without 128 bits */
     int32_t from = 0;
     for (uint64_t i = 0; i < n; i++) {
-        uint64_t const at = start + i * step + i * rest / n; /* floor(i total / n) without 128 bits */
         while (from < p->n - 1 && p->ticket[from] <= at)
             from++;
         p->parent[i] = from;
+        over += rest;
+        at += step + (over >= n);
+        over -= over >= n ? n : 0;
     }
     p->n = count;
     pf_uniform(p);

@@ -16,8 +16,7 @@ typedef struct places { /* of one row of the working image in the captured frame
     int32_t u[VIEW_SIZE], v[VIEW_SIZE];
 } places;
 
-typedef struct
-    taps { /* the first of four source pixels about each working pixel, and the weights of the others */
+typedef struct taps { /* the first of four source pixels about each working pixel; weights of the others */
     int32_t offset[VIEW_SIZE];
     uint32_t x[VIEW_SIZE], y[VIEW_SIZE];
 } taps;
