@@ -88,8 +88,7 @@ static void place_joints(gait_tracker *t, const crowd *c)
         kin_points(t->model, &w->body, w->points);
         for (size_t p = 0; p < (size_t)t->model->points; p++)
             for (size_t k = 0; k < 3; k++)
-                memcpy(t->joint + (3 * p + k) * n + (size_t)begin, w->points[p][k],
-                       (size_t)lanes * sizeof(float));
+                block_copy(t->joint + (3 * p + k) * n + (size_t)begin, w->points[p][k], lanes);
     }
 }
 

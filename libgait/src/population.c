@@ -64,7 +64,7 @@ void walker_block_get(const population *p, const int32_t *index, int32_t lanes, 
 void walker_block_put(population *p, int32_t first, int32_t lanes, const walker_block *w)
 {
     for (int32_t f = 0; f < p->fields; f++)
-        memcpy(field(p, f) + first, w->f[f], (size_t)lanes * sizeof(float));
+        block_copy(field(p, f) + first, w->f[f], lanes);
 }
 
 /* Sway to the left and height of the pelvis over the track, metres. */
@@ -197,7 +197,7 @@ void population_bodies(const body_rule *r, const population *p, int32_t begin, k
     int32_t const whole = i_min(BLOCK, p->n - begin);
     for (int32_t f = 0; f < body_rule_fields(r); f++) {
         float *const to = block_field(r, &b, f);
-        memcpy(to, field(p, f) + begin, (size_t)whole * sizeof *to);
+        block_copy(to, field(p, f) + begin, whole);
         for (int32_t lane = whole; lane < BLOCK; lane++)
             to[lane] = to[whole - 1];
     }

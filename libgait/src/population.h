@@ -3,6 +3,7 @@
 #define GAIT_POPULATION_H
 #include "kernels.h"
 #include "kinematics.h"
+#include <string.h>
 
 /* One float array per field.  (X, Y) is the smooth track over the ground and Z the ground's height under
  * the walker; the pelvis follows by the model's sway and height (ROOT_*). */
@@ -70,6 +71,15 @@ typedef struct walker {
 typedef struct walker_block { /* BLOCK of them, a lane each */
     float f[F_MAX][BLOCK];
 } walker_block;
+
+/* The first lanes of a block; nearly all blocks are whole, and of those the compiler knows the size. */
+static inline void block_copy(float *restrict to, const float *restrict from, int32_t lanes)
+{
+    if (lanes == BLOCK)
+        memcpy(to, from, BLOCK * sizeof *to);
+    else
+        memcpy(to, from, (size_t)lanes * sizeof *to);
+}
 
 /* Particles index[0 .. lanes); lanes beyond repeat the last. */
 void walker_block_get(const population *p, const int32_t *index, int32_t lanes, walker_block *out);

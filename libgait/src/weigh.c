@@ -82,8 +82,7 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
     kin_points(t->model, &w->body, w->points);
     for (int32_t p = 0; p < t->model->points; p++)
         for (int32_t k = 0; k < 3; k++)
-            for (int32_t lane = 0; lane < lanes; lane++)
-                t->joint[(size_t)(3 * p + k) * (size_t)n + (size_t)(begin + lane)] = w->points[p][k][lane];
+            block_copy(t->joint + (size_t)(3 * p + k) * (size_t)n + (size_t)begin, w->points[p][k], lanes);
     for (int32_t lane = 0; lane < lanes; lane++)
         t->ll[begin + lane] = t->inner[begin + lane] = t->used[begin + lane] = 0.0f;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
