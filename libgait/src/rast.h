@@ -13,8 +13,7 @@ enum {
     RAST_STEP = 8,   /* a word can begin at any multiple of this many columns */
     RAST_STARTS = 64 / RAST_STEP + 1,
     RAST_MAX_VERTICES = 8,
-    RAST_LIMIT = 16000, /* coordinates are clamped to +-this many pixels */
-    RAST_SUB = 256      /* sub-pixel steps */
+    RAST_LIMIT = 16000 /* coordinates are clamped to +-this many pixels */
 };
 
 typedef struct rast_spans { /* rows first <= y < last; each covers begin[y - top] <= x < end[y - top] */
@@ -28,52 +27,6 @@ typedef struct rast_mask {
         GAIT_ALIGN) uint64_t word[RAST_WORDS][RAST_SIZE + RAST_SPARE]; /* from column, and from column + 64 */
     int32_t first, last, column, width; /* width: 64, or 128 from column 0 on */
 } rast_mask;
-
-typedef struct rast_edge { /* crosses rows first <= y < last at columns rast_column(at, slope, y) */
-    int32_t first, last;
-    uint32_t at, slope; /* 1/65536 pixel, modulo 2^32; at is raised for the shift to round up */
-} rast_edge;
-
-/* Nearest integer, ties away from 0; clamped to +-limit, NaN to -limit. */
-static inline int32_t rast_round(float v, float limit)
-{
-    float const c = f_clamp(v, -limit, limit);
-    return (int32_t)(c < 0.0f ? c - 0.5f : c + 0.5f);
-}
-
-/* A coordinate in sub-pixels. */
-static inline int32_t rast_sub(float v)
-{
-    return rast_round(v * (float)RAST_SUB, (float)(RAST_LIMIT * RAST_SUB));
-}
-
-/* First row whose centre is at or below y sub-pixels. */
-static inline int32_t rast_row(int32_t y)
-{
-    return (y + RAST_SUB - 1) >> 8;
-}
-
-/* The edge between two vertices in sub-pixels, the same whichever comes first.  Its column is off by less than 1/256
- * pixel plus 1/65536 for each row from its top: the slope is rounded. */
-static inline rast_edge rast_edge_of(int32_t xa, int32_t ya, int32_t xb, int32_t yb)
-{
-    bool const down = ya < yb;
-    int32_t const x0 = down ? xa : xb, y0 = down ? ya : yb, x1 = down ? xb : xa, y1 = down ? yb : ya;
-    int32_t const first = rast_row(y0);
-    float const most =
-        2147483520.0f; /* the largest float below 2^31; reached by edges between two rows only */
-    float const slope = (float)(x1 - x0) / (float)i_max(y1 - y0, 1);
-    int32_t const step = rast_round(slope * 65536.0f, most);
-    int32_t const start = rast_round(slope * (float)(first * RAST_SUB - y0) * 256.0f, most);
-    uint32_t const at = (uint32_t)x0 * 256u + (uint32_t)start - (uint32_t)step * (uint32_t)first;
-    return (rast_edge){first, rast_row(y1), at + 65535u, (uint32_t)step};
-}
-
-/* Column of the first pixel centre at or right of the edge in a row that it crosses. */
-static inline int32_t rast_column(uint32_t at, uint32_t slope, int32_t y)
-{
-    return (int32_t)(at + slope * (uint32_t)y) >> 16;
-}
 
 /* Spans of a convex polygon of n vertices in the window of RAST_SIZE rows from top and width columns from
  * 0. */
