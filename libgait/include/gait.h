@@ -194,13 +194,12 @@ typedef struct gait_tracker_config {
     float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
     float    stature_noise;    /* deviations of stature at the start */
     float    stature_noise_start; /* the same while settling */
-    float    offset_noise;     /* posture of the angles in offset_angles, radians */
-    float    offset_sd;        /* their standard deviation among people, to which they relax, radians */
+    float    offset_noise;     /* posture of the angles in offset_angles, in the deviation among people learnt of each
+                                * angle, which it relaxes to */
     float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
     float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of stature */
-    uint32_t reserved;
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;

@@ -48,8 +48,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .stature_noise_start = 1.0f,
         .proportion_noise = 0.15f,
         .joint_sd_model = 0.018f,
-        .offset_noise = 0.02f,
-        .offset_sd = 0.035f,
+        .offset_noise = 0.58f,
         .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
         .cpu_mask = ~0u,
     };
@@ -105,8 +104,7 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(coef_time, 0.0f, 1e6f),
         RANGE(stature_noise, 0.0f, 100.0f),
         RANGE(stature_noise_start, 0.0f, 100.0f),
-        RANGE(offset_noise, 0.0f, 10.0f),
-        RANGE(offset_sd, 0.0f, 10.0f),
+        RANGE(offset_noise, 0.0f, 100.0f),
         RANGE(proportion_noise, 0.0f, 100.0f),
         RANGE(joint_sd_model, 0.0f, 1.0f),
     };
@@ -231,7 +229,7 @@ gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
     for (int32_t k = 0; k < m->proportions; k++)
         sd->proportion[k] = 1.0f;
     for (int32_t a = 0; a < m->angles; a++)
-        sd->offset[a] = 0.07f; /* 4 degrees */
+        sd->offset[a] = model_posture_sd(m, a);
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2]);
 }
 

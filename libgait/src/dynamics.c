@@ -54,10 +54,10 @@ static relaxing relax(float dt, float tau, float noise)
     return (relaxing){keep, noise * __builtin_sqrtf(share * dt)};
 }
 
-/* The time constant that keeps a deviation sd with so much noise. */
-static float time_for(float sd, float noise)
+/* The return that keeps a deviation of 1 with so much noise. */
+static relaxing relax_to_one(float dt, float noise)
 {
-    return noise > 0.0f ? 2.0f * sd * sd / (noise * noise) : 0.0f;
+    return relax(dt, noise > 0.0f ? 2.0f / (noise * noise) : 0.0f, noise);
 }
 
 dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_t frame)
@@ -65,7 +65,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
     const gait_tracker_config *const c = d->cfg;
     float const root_dt = __builtin_sqrtf(dt), mean_rate = d->rule.model->stride_hz;
     bool const settling = age < c->settle_time;
-    return (dynamics_step){
+    dynamics_step s = {
         .model = d->rule.model,
         .seed = d->seed,
         .frame = frame,
@@ -85,7 +85,11 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .level = relax(dt, c->tilt_time, c->vertical_noise),
         .tilt = relax(dt, c->tilt_time, c->tilt_noise),
         .score = relax(dt, c->coef_time, c->coef_noise),
-        .shape = relax(dt, time_for(1.0f, c->proportion_noise), c->proportion_noise),
-        .posture = relax(dt, time_for(c->offset_sd, c->offset_noise), c->offset_noise),
+        .shape = relax_to_one(dt, c->proportion_noise),
     };
+    relaxing const posture = relax_to_one(dt, c->offset_noise);
+    for (int32_t k = 0; k < d->rule.offsets; k++)
+        s.posture[k] =
+            (relaxing){posture.keep, posture.noise * model_posture_sd(d->rule.model, d->rule.angle[k])};
+    return s;
 }

@@ -28,7 +28,8 @@ typedef struct dynamics_step { /* constants of one interval; noise: standard dev
     int32_t fields, components, proportion, offset; /* how many, and the first of the last two kinds */
     float dt, mean_rate;                            /* seconds, strides per second */
     float phase_noise, forward_noise, lateral_noise, heading_noise, stature_noise;
-    relaxing rate, level, tilt, score, shape, posture;
+    relaxing rate, level, tilt, score, shape;
+    relaxing posture[GAIT_MAX_ANGLES]; /* in the order of the fields */
 } dynamics_step;
 
 /* An interval of dt seconds; age: seconds since start. */

@@ -125,6 +125,6 @@ void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const walker_b
     for (int32_t k = F_COEF; k < s->fields; k++)
         relax(k < s->proportion ? s->score
               : k < s->offset   ? s->shape
-                                : s->posture,
+                                : s->posture[k - s->offset],
               from->f[k], n[k], to->f[k]);
 }

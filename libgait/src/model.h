@@ -57,6 +57,13 @@ struct gait_model {
     uint64_t digest; /* FNV-1a of the blob */
 };
 
+/* Deviation among people of the posture of angle a, radians. */
+static inline float model_posture_sd(const gait_model *m, int32_t a)
+{
+    float const learnt = m->channel_stat[4 * a + 3];
+    return learnt > 0.0f ? learnt : 0.035f; /* 2 degrees, where too few people were seen to tell */
+}
+
 /* Check a blob and fill m with views into it (pace_curve is none); err names the section at fault. */
 gait_status model_open(const void *data, size_t bytes, gait_model *m, gait_error *err);
 

@@ -109,12 +109,10 @@ class TrackerConfigC(ctypes.Structure):
         ("stature_noise", c_float),
         ("stature_noise_start", c_float),
         ("offset_noise", c_float),
-        ("offset_sd", c_float),
         ("proportion_noise", c_float),
         ("offset_angles", c_uint32),
         ("cpu_mask", c_uint32),
         ("joint_sd_model", c_float),
-        ("reserved", c_uint32),
         ("camera", CameraC * MAX_CAMERAS),
         ("exec", Tasks),
     ]

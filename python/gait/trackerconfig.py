@@ -46,7 +46,6 @@ class TrackerConfig:
     stature_noise: float
     stature_noise_start: float
     offset_noise: float
-    offset_sd: float
     proportion_noise: float
     offset_angles: int
     cpu_mask: int

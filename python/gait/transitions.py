@@ -25,6 +25,9 @@ RATES = (1 / 2.1, 1 / 0.4)
 TELLING = 5
 """Scores that the default mode uses unless told (population.c)."""
 
+POSTURE_SD = 0.035
+"""Of an angle's posture where too few people were learnt from to tell, radians (model.h)."""
+
 SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
 """Columns of a table of states; then x, y, z of the track, scores, proportions and posture offsets in use."""
 
@@ -68,6 +71,8 @@ class Transitions:
         self._proportions = every if config.proportions < 0 else config.proportions
         angles = len(curves.names) - 6
         self._offsets = [a for a in range(angles) if config.offset_angles >> a & 1]
+        learnt = curves.static[self._offsets]
+        self._posture_sd = np.where(learnt > 0, learnt, POSTURE_SD)
         self._height = float(curves.samples[0, :, curves.names.index("root_height")].mean())
 
     @property
@@ -147,8 +152,8 @@ class Transitions:
         after[:, 8] = _relax(b[:, 8], dt, c.tilt_time, c.vertical_noise, noise[:, 8])
         for first, last, tau, sd in (
             (9, self._build, c.coef_time, c.coef_noise),
-            (self._build, self._posture, _time(1.0, c.proportion_noise), c.proportion_noise),
-            (self._posture, self.columns, _time(c.offset_sd, c.offset_noise), c.offset_noise),
+            (self._build, self._posture, _time(c.proportion_noise), c.proportion_noise),
+            (self._posture, self.columns, _time(c.offset_noise), c.offset_noise * self._posture_sd),
         ):
             after[:, first:last] = _relax(b[:, first:last], dt, tau, sd, noise[:, first:last])
         return after
@@ -174,9 +179,9 @@ def wrap(x: Array, turn: float) -> Array:
     return np.asarray((x + turn / 2) % turn - turn / 2)
 
 
-def _time(sd: float, noise: float) -> float:
-    """Return the time constant that keeps a deviation with so much noise."""
-    return 2 * (sd / noise) ** 2 if noise > 0 else 0.0
+def _time(noise: float) -> float:
+    """Return the time constant that keeps a deviation of 1 with so much noise."""
+    return 2 / noise**2 if noise > 0 else 0.0
 
 
 def _reflect(rate: Array) -> Array:
@@ -186,7 +191,7 @@ def _reflect(rate: Array) -> Array:
     return np.clip(folded, low, high)
 
 
-def _relax(x: Array, dt: float, tau: float, noise: float, normal: Array) -> Array:
+def _relax(x: Array, dt: float, tau: float, noise: float | Array, normal: Array) -> Array:
     """Return to zero with time constant `tau` (never if 0) plus noise per square root of a second."""
     if tau <= 0:
         return x + noise * np.sqrt(dt) * normal

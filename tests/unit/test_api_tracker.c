@@ -90,7 +90,6 @@ static void test_floats(void)
         FLOAT(stature_noise, -1e-3f, 1e9f),
         FLOAT(stature_noise_start, -1e-3f, 1e9f),
         FLOAT(offset_noise, -1e-3f, 1e9f),
-        FLOAT(offset_sd, -1e-3f, 1e9f),
         FLOAT(proportion_noise, -1e-3f, 1e9f),
         FLOAT(evidence_time, -1e-3f, 1e9f),
         FLOAT(mingle_time, -1e-3f, 1e9f),
@@ -103,7 +102,7 @@ static void test_floats(void)
     for (uint32_t i = 0; i < count; i++)
         if (f[i].field && strcmp(f[i].type, "gait_tracker_config") == 0 &&
             f[i].offset >= offsetof(gait_tracker_config, term_weight) &&
-            f[i].offset < offsetof(gait_tracker_config, reserved) &&
+            f[i].offset < offsetof(gait_tracker_config, camera) &&
             strcmp(f[i].field, "offset_angles") != 0 && strcmp(f[i].field, "cpu_mask") != 0)
             floats += f[i].size / sizeof(float);
     CHECK(floats == sizeof number / sizeof *number);

@@ -28,7 +28,7 @@ static dynamics lively(uint64_t seed)
     cfg.coef_time = 2.0f;
     cfg.stature_noise_start = 0.6f; /* 0.03 of stature */
     cfg.proportion_noise = 0.8f;
-    cfg.offset_noise = 0.06f;
+    cfg.offset_noise = 1.2f;
     return d;
 }
 
@@ -97,7 +97,7 @@ static void truth_move(const gait_model *m, const double n[NORMALS], double *x)
     for (int k = 0; k < 2; k++)
         x[F_COEF + k] = relaxed(x[F_COEF + k], 2.0, 0.8, n[9 + k]);
     x[F_COEF + 2] = relaxed(x[F_COEF + 2], 2.0 / (0.8 * 0.8), 0.8, n[11]); /* stationary deviation 1 */
-    x[F_COEF + 3] = relaxed(x[F_COEF + 3], 2.0 * 0.07 * 0.07 / (0.06 * 0.06), 0.06, n[12]); /* 0.07 */
+    x[F_COEF + 3] = relaxed(x[F_COEF + 3], 2.0 / (1.2 * 1.2), 0.06, n[12]); /* 1.2 of 0.05 */
 }
 
 /* ---- what is seen: every field in every frame, `noise` times as uncertain as at the start ---- */

@@ -45,8 +45,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.coef_time = 4.5f;
     c.stature_noise = 0.02f;
     c.stature_noise_start = 0.2f;
-    c.offset_noise = 0.02f;
-    c.offset_sd = 0.07f;
+    c.offset_noise = 0.4f;
     c.offset_angles = 0;
     c.proportions = -1; /* so that they are tested */
     c.joint_sd_model = 0.0f;

@@ -13,6 +13,7 @@ static const double HEAD_SD = 0.03, SIDE_SD = 0.06; /* metres */
 static const double SLOW = 0.4;                     /* metres per second: stands */
 static const double HEADING_SD = 0.2;               /* radians, at least */
 static const double SHORTEST = 1.2, TALLEST = 2.4;  /* metres by foot and head ray */
+static const float BUILD_SHARE = 0.25f;             /* of the deviations of scores and posture */
 enum { ENOUGH = 8 };
 
 void spotter_forget(spotter *s)
@@ -201,6 +202,10 @@ static bool first_state(const spotter *s, const gait_camera *camera, const gait_
     sd->pelvis[0] = (float)(hypot(depth * x, SIDE_SD * y) / distance);
     sd->pelvis[1] = (float)(hypot(depth * y, SIDE_SD * x) / distance);
     sd->pelvis[2] = 0.03f;
+    for (int k = 0; k < GAIT_MAX_COMPONENTS; k++)
+        sd->coef[k] *= BUILD_SHARE;
+    for (int a = 0; a < GAIT_MAX_ANGLES; a++)
+        sd->offset[a] *= BUILD_SHARE;
     return true;
 }
 

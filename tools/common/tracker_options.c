@@ -44,8 +44,7 @@ static const struct {
     {"proportion-noise", FIELD(proportion_noise), 0, 100,
      "standard deviations of the limbs' proportions per sqrt(second)"},
     {"joint-sd-model", FIELD(joint_sd_model), 0, 1, "what the model cannot express, fraction of stature"},
-    {"offset-noise", FIELD(offset_noise), 0, 10, "radians of posture per sqrt(second)"},
-    {"offset-sd", FIELD(offset_sd), 0, 10, "radians by which people differ in posture"},
+    {"offset-noise", FIELD(offset_noise), 0, 100, "deviations of posture among people per sqrt(second)"},
 };
 
 _Static_assert(sizeof fields / sizeof *fields == TRACKER_OPTIONS, "every field has a value");
