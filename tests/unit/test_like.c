@@ -137,13 +137,14 @@ static void test_costs(void)
     int32_t wrong = 0;
     for (int d = 0; d < LIKE_COSTS; d++) { /* Student-t, 4 degrees of freedom, scale half a local deviation */
         double const r = d / 16.0;
-        wrong += fabs(s->robust[d] - LIKE_COUNT_ONE - 2.5 * log(1.0 + r * r / 4.0) * LIKE_COST_ONE) > 0.6;
-        wrong += s->square[d] != LIKE_COUNT_ONE + d * d;
+        wrong += fabs(s->robust.one[d] - LIKE_COUNT_ONE - 2.5 * log(1.0 + r * r / 4.0) * LIKE_COST_ONE) > 0.6;
+        wrong += s->square.one[d] != LIKE_COUNT_ONE + d * d;
+        wrong += s->square.low[d] != (d * d & 255) || s->square.high[d] != d * d >> 8;
     }
     CHECK(wrong == 0);
     /* The sum over a limb, and over all limbs of robust ones, leaves the count alone. */
-    CHECK(LIKE_FACING * (s->square[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
-    CHECK(MODEL_MAX_LIMBS * LIKE_FACING * (s->robust[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
+    CHECK(LIKE_FACING * (s->square.one[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
+    CHECK(MODEL_MAX_LIMBS * LIKE_FACING * (s->robust.one[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
 }
 
 /* ---- all terms together ---- */
