@@ -1,5 +1,6 @@
 #include "features.h"
 #include "base.h"
+#include "image.h"
 
 features features_layout(arena *a)
 {
@@ -32,15 +33,21 @@ static void refresh_inside(const kernels *run, features *f, const gait_camera *c
     f->inside_map = *now;
 }
 
-void features_sample(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
-                     features_scratch *s)
+void features_begin(features *f, const gait_image *im, features_scratch *s)
 {
     f->seen = im->data != NULL;
     f->has_fg = false;
+    s->planes.channels = image_channels(im->format);
+}
+
+void features_sample(const kernels *run, const features *f, int32_t band, const gait_camera *cam,
+                     const gait_image *im, features_scratch *s)
+{
+    enum { ROWS = VIEW_SIZE / FEATURES_BANDS };
     if (!f->seen)
         return;
-    run->view_sample(&f->map, cam, im, &s->planes);
-    run->view_grey(&s->planes, s->grey);
+    run->view_rows(&f->map, cam, im, band * ROWS, (band + 1) * ROWS, &s->planes);
+    run->view_grey(&s->planes, band * ROWS, (band + 1) * ROWS, s->grey);
 }
 
 /* One word of each row, from a column on. */

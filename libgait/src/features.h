@@ -56,9 +56,13 @@ typedef struct features_scratch { /* shared by the cameras */
 features features_layout(arena *a);
 features_scratch features_scratch_layout(arena *a);
 
-/* A frame's planes in the region f->map, and their grey levels, into s; f->seen tells whether there is a frame. */
-void features_sample(const kernels *run, features *f, const gait_camera *cam, const gait_image *im,
-                     features_scratch *s);
+/* A new frame, or none (im->data NULL), in the region f->map: f->seen tells which. */
+void features_begin(features *f, const gait_image *im, features_scratch *s);
+
+/* One of FEATURES_BANDS parts of the frame's planes and of their grey levels, each apart from the others. */
+enum { FEATURES_BANDS = 4 };
+void features_sample(const kernels *run, const features *f, int32_t band, const gait_camera *cam,
+                     const gait_image *im, features_scratch *s);
 
 /* Make `words` of fg and inside. */
 void features_words(features *f);

@@ -61,10 +61,11 @@ struct walker_block;
       (const struct gait_model *m, const struct kin_channels *ch, const struct kin_input *in,                \
        int32_t proportions, struct kin_body *out))                                                           \
     /* A captured frame in the region's working image, and its maps. */                                      \
-    K(void, view_sample,                                                                                     \
-      (const struct view_map *map, const gait_camera *cam, const gait_image *im, struct view_planes *out))   \
+    K(void, view_rows,                                                                                       \
+      (const struct view_map *map, const gait_camera *cam, const gait_image *im, int32_t begin, int32_t end, \
+       const struct view_planes *out))                                                                       \
     K(void, view_inside, (const struct view_map *map, const gait_camera *cam, uint64_t (*inside)[2]))        \
-    K(void, view_grey, (const struct view_planes *in, uint8_t *grey))                                        \
+    K(void, view_grey, (const struct view_planes *in, int32_t begin, int32_t end, uint8_t *grey))            \
     K(void, features_foreground,                                                                             \
       (struct features * f, const struct view_planes *im, const struct view_planes *plate))                  \
     K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))               \

@@ -24,9 +24,9 @@ static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
     bool const colour = s->background.format != GAIT_GREY8;
     if (!s->plate_stale && s->plate.channels == (colour && !grey ? 3 : 1))
         return;
-    t->like->run->view_sample(&s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
+    view_sample(t->like->run, &s->seen.map, &t->cfg.camera[c], &s->background, &s->plate);
     if (colour && grey) {
-        t->like->run->view_grey(&s->plate, s->plate.channel[0]);
+        t->like->run->view_grey(&s->plate, 0, VIEW_SIZE, s->plate.channel[0]);
         s->plate.channels = 1;
     }
     s->plate_stale = false;
@@ -67,18 +67,24 @@ typedef struct job { /* one camera's frame */
     const view_planes *plate;
 } job;
 
-enum { SAMPLE, INHERIT };
+/* With the first camera the samples of the ancestors, which take longest, come before the bands. */
+static int32_t inheriting(const job *j)
+{
+    return j->c == 0;
+}
 
 static void sample_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     const job *const j = ctx;
     gait_tracker *const t = j->t;
+    int32_t const first = inheriting(j);
     (void)task;
     for (int32_t i = begin; i < end; i++)
-        if (i == SAMPLE)
-            features_sample(t->like->run, &t->camera[j->c].seen, &t->cfg.camera[j->c], &j->im, &t->scratch);
-        else
+        if (i < first)
             inherit(t);
+        else
+            features_sample(t->like->run, &t->camera[j->c].seen, i - first, &t->cfg.camera[j->c], &j->im,
+                            &t->scratch);
 }
 
 static void map_range(void *ctx, int32_t begin, int32_t end, int32_t task)
@@ -103,7 +109,8 @@ static void look(gait_tracker *t, int32_t c, const gait_frame *frame, const walk
         refresh_plate(t, c, j.im.format == GAIT_GREY8);
         j.plate = &s->plate;
     }
-    task_run(&t->cfg.exec, t->cfg.tasks, c == 0 ? INHERIT + 1 : SAMPLE + 1, 1, sample_range, &j);
+    features_begin(&s->seen, &j.im, &t->scratch);
+    task_run(&t->cfg.exec, t->cfg.tasks, inheriting(&j) + FEATURES_BANDS, 1, sample_range, &j);
     if (s->seen.seen)
         task_run(&t->cfg.exec, t->cfg.tasks, FEATURES_MAPS, 1, map_range, &j);
     take_tracks(t, c, frame->tracks[c], &s->seen.tracks);

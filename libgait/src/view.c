@@ -1,4 +1,5 @@
 #include "view.h"
+#include "image.h"
 #include "base.h"
 
 view_planes view_planes_layout(arena *a, int32_t channels)
@@ -24,4 +25,11 @@ bool view_follow(view_map *map, const float uv[2], float tall)
     map->u0 = uv[0] - half / want;
     map->v0 = uv[1] - half / want;
     return true;
+}
+
+void view_sample(const kernels *run, const view_map *map, const gait_camera *cam, const gait_image *im,
+                 view_planes *out)
+{
+    out->channels = image_channels(im->format);
+    run->view_rows(map, cam, im, 0, VIEW_SIZE, out);
 }

@@ -7,6 +7,7 @@
 #define GAIT_VIEW_H
 #include "arena.h"
 #include "gait.h"
+#include "kernels.h"
 #include <stdbool.h>
 
 enum { VIEW_SIZE = 256, VIEW_PIXELS = VIEW_SIZE * VIEW_SIZE, VIEW_PERSON = 192 };
@@ -25,10 +26,14 @@ typedef struct view_planes { /* resampled planes: R, G, B, or grey in the first 
  * resampled differently from frame to frame. */
 bool view_follow(view_map *map, const float uv[2], float tall);
 
-/* Kernels (kernels.h):
- *   view_sample  one captured frame (bilinear, or a box of pixels where the working image is coarser), undoing
- *                the lens distortion
+/* Kernels (kernels.h), the first and the last for working rows begin .. end - 1:
+ *   view_rows    one captured frame (bilinear, or a box of pixels where the working image is coarser), undoing
+ *                the lens distortion; out has as many planes as the frame has channels
  *   view_inside  working pixels whose source lies inside the frame, as bits of the RAST grid
  *   view_grey    luma of the planes: (77 R + 150 G + 29 B) / 256; grey may be one of them */
 view_planes view_planes_layout(arena *a, int32_t channels);
+
+/* All rows of a frame, and how many planes it has. */
+void view_sample(const kernels *run, const view_map *map, const gait_camera *cam, const gait_image *im,
+                 view_planes *out);
 #endif

@@ -236,15 +236,15 @@ KERNEL_ROW void box_row(const gait_image *im, int32_t step, int32_t side, const 
 
 /* ---- all rows ---- */
 
-void KERNEL(view_sample)(const view_map *map, const gait_camera *cam, const gait_image *im, view_planes *out)
+void KERNEL(view_rows)(const view_map *map, const gait_camera *cam, const gait_image *im, int32_t begin,
+                       int32_t end, const view_planes *out)
 {
     int32_t const step = im->format == GAIT_GREY8 ? 1 : 3;
     int32_t const side = i_clamp((int32_t)(1.0f / map->scale), 1, MAX_SIDE);
     bool const bent = camera_distorted(cam), swap = im->format == GAIT_BGR8;
     blends kept;
     kept.row[0].of = kept.row[1].of = -1;
-    out->channels = step;
-    for (int32_t j = 0; j < VIEW_SIZE; j++) {
+    for (int32_t j = begin; j < end; j++) {
         places at;
         uint8_t *row[3]; /* planes are R, G, B whatever the order in the frame */
         for (int32_t c = 0; c < step; c++)
@@ -273,12 +273,13 @@ void KERNEL(view_inside)(const view_map *map, const gait_camera *cam, uint64_t (
     }
 }
 
-void KERNEL(view_grey)(const view_planes *in, uint8_t *grey)
+void KERNEL(view_grey)(const view_planes *in, int32_t begin, int32_t end, uint8_t *grey)
 {
     const uint8_t *const r = in->channel[0], *const g = in->channel[1], *const b = in->channel[2];
+    int32_t const first = begin * VIEW_SIZE, last = end * VIEW_SIZE;
     if (in->channels == 1)
-        memmove(grey, r, VIEW_PIXELS);
+        memmove(grey + first, r + first, (size_t)(last - first));
     else
-        for (int32_t i = 0; i < VIEW_PIXELS; i++)
+        for (int32_t i = first; i < last; i++)
             grey[i] = (uint8_t)((77 * r[i] + 150 * g[i] + 29 * b[i] + 128) >> 8);
 }

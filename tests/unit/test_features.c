@@ -336,9 +336,11 @@ static void test_compute(void)
     for (int32_t i = 0; i < W * H * 3; i++)
         pixels[i] = (uint8_t)(noise((uint32_t)(i / 3)) % 251);
     f.map = (view_map){.scale = 1.0f, .u0 = -100.0f, .v0 = -50.0f};
-    run->view_sample(&f.map, &cam, &im, &plate);
+    view_sample(run, &f.map, &cam, &im, &plate);
     toy_features(run, &f, &cam, &im, &plate, false, &scratch);
     CHECK(f.seen && f.has_fg && f.fg_total == 0);
+    CHECK(memcmp(scratch.planes.channel[0], plate.channel[0], VIEW_PIXELS) ==
+          0); /* in bands as in one piece */
     int32_t cells = 0;
     for (int32_t y = 0; y < RAST_SIZE; y++)
         cells += rast_popcount(f.inside[y][0]) + rast_popcount(f.inside[y][1]);

@@ -73,7 +73,7 @@ static void sample_case(uint32_t n)
         guarded const g = guard_fill(memory[to], PLANES * VIEW_PIXELS);
         for (int32_t c = 0; c < PLANES; c++)
             out[to].channel[c] = g.begin + c * VIEW_PIXELS;
-        run->view_sample(&map, &cam, &im, &out[to]);
+        view_sample(run, &map, &cam, &im, &out[to]);
         run->view_inside(&map, &cam, inside[to]);
         CHECK(guard_whole(&g) && out[to].channels == channels);
         CHECK(!to || memcmp(memory[0], memory[1], sizeof memory[0]) == 0);
@@ -99,7 +99,7 @@ static void compute(const kernels *run, const view_planes *im, const view_planes
         guard_fill(out->surface, VIEW_PIXELS), guard_fill(out->fg, FG_PLANES * RAST_SIZE * RAST_WORDS * 8),
         guard_fill(out->quads, QUADS * sizeof(uint32_t))};
     features f = {.inside = inside, .fg = (uint64_t (*)[RAST_SIZE][RAST_WORDS])(void *)g[3].begin};
-    run->view_grey(im, g[0].begin);
+    run->view_grey(im, 0, VIEW_SIZE, g[0].begin);
     run->features_edges(g[0].begin, (edge_cell *)(void *)g[1].begin, &rows);
     run->features_contrast(g[0].begin, (int8_t *)g[2].begin);
     run->features_quads((int8_t *)g[2].begin, (uint32_t *)(void *)g[4].begin);

@@ -95,7 +95,7 @@ static void test_copy(void)
     for (size_t k = 0; k < sizeof origin / sizeof *origin; k++) {
         view_map const map = {.scale = 1.0f, .u0 = origin[k][0], .v0 = origin[k][1]};
         int32_t wrong = 0;
-        run->view_sample(&map, &cam, &im, &planes);
+        view_sample(run, &map, &cam, &im, &planes);
         for (int32_t j = 0; j < VIEW_SIZE; j++)
             for (int32_t i = 0; i < VIEW_SIZE; i++) {
                 int32_t const x = i_clamp((int32_t)map.u0 + i, 0, W - 1);
@@ -120,7 +120,7 @@ static void test_colour(void)
         im.format = bgr ? GAIT_BGR8 : GAIT_RGB8;
         view_map const map = {.scale = scale[k % 3], .u0 = 0.3f, .v0 = 0.7f};
         int32_t wrong = 0;
-        run->view_sample(&map, &cam, &im, &planes);
+        view_sample(run, &map, &cam, &im, &planes);
         for (int32_t c = 0; c < 3; c++)
             for (int32_t i = 0; i < VIEW_PIXELS; i++)
                 wrong += plane[c][i] != 50 + 70 * (bgr ? 2 - c : c);
@@ -141,7 +141,7 @@ static void test_ramp(void)
         view_map const map = {.scale = scales[k], .u0 = 20.4f, .v0 = 31.3f};
         double sum = 0.0, worst = 0.0;
         int32_t n = 0;
-        run->view_sample(&map, &cam, &im, &planes);
+        view_sample(run, &map, &cam, &im, &planes);
         for (int32_t j = 0; j < VIEW_SIZE; j++)
             for (int32_t i = 0; i < VIEW_SIZE; i++) {
                 double const u = (double)map.u0 + i / (double)map.scale;
@@ -168,10 +168,10 @@ static void test_average(void)
         pixels[i] = (i % MOST + i / MOST) % 2 ? 255 : 0;
     view_map const half = {.scale = 0.5f, .u0 = 3.0f, .v0 = 3.0f}, quarter = {.scale = 0.25f};
     int32_t wrong = 0;
-    run->view_sample(&half, &cam, &im, &planes);
+    view_sample(run, &half, &cam, &im, &planes);
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
         wrong += plane[0][i] != 128;
-    run->view_sample(&quarter, &cam, &im, &planes);
+    view_sample(run, &quarter, &cam, &im, &planes);
     for (int32_t j = 0; j < 150; j++)
         for (int32_t i = 0; i < 150; i++)
             wrong += plane[0][j * VIEW_SIZE + i] != 128;
@@ -197,7 +197,7 @@ static void test_small(void)
                 .scale = scales[s % 4], .u0 = s % 3 ? -3.5f : 1e9f, .v0 = s % 2 ? 2.5f : -1e9f};
             int32_t wrong = 0;
             cam.distortion[0] = s < 4 ? 0.0f : 1e6f;
-            run->view_sample(&map, &cam, &im, &planes);
+            view_sample(run, &map, &cam, &im, &planes);
             for (int32_t i = 0; i < VIEW_PIXELS; i++)
                 wrong += plane[0][i] != 99;
             CHECK(wrong == 0);
@@ -259,7 +259,7 @@ static void test_line(void)
                 pixels[y * W + x] = (uint8_t)(200.0 - fmax(0.0, 40.0 * (3.0 - off)));
             }
         view_map const map = {.scale = 0.9f, .u0 = 90.0f, .v0 = 10.0f};
-        run->view_sample(&map, &cam, &im, &planes);
+        view_sample(run, &map, &cam, &im, &planes);
         for (int32_t i = 0; i < VIEW_SIZE; i++) {
             double const u = (double)map.u0 + i / (double)map.scale;
             double const want = (60.0 + 0.12 * u - (double)map.v0) * (double)map.scale, have = line_row(i);
@@ -312,13 +312,13 @@ static void test_grey(void)
         memcpy(plane[c], pixels + c * VIEW_PIXELS, VIEW_PIXELS);
     planes.channels = 3;
     double worst = 0.0;
-    run->view_grey(&planes, grey);
+    run->view_grey(&planes, 0, VIEW_SIZE, grey);
     for (int32_t i = 0; i < VIEW_PIXELS; i++)
         worst =
             fmax(worst, fabs(grey[i] - (0.299 * plane[0][i] + 0.587 * plane[1][i] + 0.114 * plane[2][i])));
     CHECK(worst < 1.5);
     planes.channels = 1;
-    run->view_grey(&planes, grey);
+    run->view_grey(&planes, 0, VIEW_SIZE, grey);
     CHECK(memcmp(grey, plane[0], sizeof grey) == 0);
 }
 

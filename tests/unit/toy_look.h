@@ -64,7 +64,7 @@ static inline void toy_look_at(toy_look *v, const uint8_t *grey, const uint8_t *
     gait_image const im = toy_image(grey);
     if (wall) {
         gait_image const empty = toy_image(wall);
-        v->setup.run->view_sample(&v->f.map, &v->cam, &empty, &v->plate);
+        view_sample(v->setup.run, &v->f.map, &v->cam, &empty, &v->plate);
     }
     toy_features(v->setup.run, &v->f, &v->cam, &im, wall ? &v->plate : NULL, v->setup.paper, &v->scratch);
 }
