@@ -46,7 +46,7 @@ def test_units_by_suffix_or_range(tmp_path, suffix, scale):
 
 
 def test_legs_that_turn_round_are_refused(tmp_path):
-    with pytest.raises(UserError, match=r"l_hip_flexion_rad .* \d{4} degrees; if it is in degrees, name it l_hip_"):
+    with pytest.raises(UserError, match=r"l_hip_flexion_rad .* \d{4} degrees; if it is in degrees, name "):
         readers.read(write(tmp_path / "a.csv", "_rad", scale=DEGREES))
     with pytest.raises(UserError, match=r"l_hip_flexion_deg has a range of \d{4} degrees; repair it"):
         readers.read(write(tmp_path / "a.csv", scale=20 * DEGREES))
