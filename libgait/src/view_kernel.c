@@ -211,26 +211,25 @@ static int32_t run_end(const places *corner, int32_t begin, int32_t *low, int32_
     return end;
 }
 
-KERNEL_ROW void box_row(const gait_image *im, int32_t step, int32_t side, const places *at,
-                        uint8_t *const row[3])
+/* at: where the pixels look; afterwards the corners of their boxes. */
+KERNEL_ROW void box_row(const gait_image *im, int32_t step, int32_t side, places *at, uint8_t *const row[3])
 {
     box const b = box_of(im, side);
     int32_t const offset = FRACTION / 2 - (side - 1) * FRACTION / 2;
     int32_t const right = im->width - b.nx, low = im->height - b.ny;
-    places corner;
     uint16_t sum[BOX_BYTES];
     for (int32_t i = 0; i < VIEW_SIZE; i++) {
-        corner.u[i] = i_clamp((at->u[i] + offset) >> 8, 0, right);
-        corner.v[i] = i_clamp((at->v[i] + offset) >> 8, 0, low);
+        at->u[i] = i_clamp((at->u[i] + offset) >> 8, 0, right);
+        at->v[i] = i_clamp((at->v[i] + offset) >> 8, 0, low);
     }
     for (int32_t begin = 0, end; begin < VIEW_SIZE; begin = end) {
         int32_t from, to;
-        end = run_end(&corner, begin, &from, &to);
-        box_sums(im->data + (size_t)corner.v[begin] * (size_t)im->stride + (size_t)(from * step), im->stride,
+        end = run_end(at, begin, &from, &to);
+        box_sums(im->data + (size_t)at->v[begin] * (size_t)im->stride + (size_t)(from * step), im->stride,
                  step, &b, (to - from + b.nx) * step, sum);
         for (int32_t c = 0; c < step; c++)
             for (int32_t i = begin; i < end; i++)
-                row[c][i] = (uint8_t)((sum[(corner.u[i] - from) * step + c] + b.half) * b.over >> 24);
+                row[c][i] = (uint8_t)((sum[(at->u[i] - from) * step + c] + b.half) * b.over >> 24);
     }
 }
 

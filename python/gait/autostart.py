@@ -41,7 +41,7 @@ _DOUBT = 0.7  # radians: a heading known worse counts as unknown
 _NEAR = 0.05  # metres per second: the least error of a velocity
 _USUAL_SPEED, _SPEED_SHARE = 1.2, 0.35  # metres per second, and the deviation between people
 _HEADING_SD = 0.2  # radians, at least: people do not walk exactly where their blob moves
-_BUILD_SHARE = 0.25  # of the deviations of scores and posture: few particles find the phase first, the rest follows
+_BUILD_SHARE = 0.25  # of the deviations of scores and posture: few particles find the phase first
 
 _Seen = list[tuple[Frame, Sighting]]  # of one person, oldest first
 

@@ -45,6 +45,13 @@ def test_units_by_suffix_or_range(tmp_path, suffix, scale):
     assert table.root is None and table.stature is None
 
 
+def test_legs_that_turn_round_are_refused(tmp_path):
+    with pytest.raises(UserError, match=r"l_hip_flexion_rad .* \d{4} degrees; if it is in degrees, name it l_hip_"):
+        readers.read(write(tmp_path / "a.csv", "_rad", scale=DEGREES))
+    with pytest.raises(UserError, match=r"l_hip_flexion_deg has a range of \d{4} degrees; repair it"):
+        readers.read(write(tmp_path / "a.csv", scale=20 * DEGREES))
+
+
 def test_columns_that_are_not_there_are_missing(tmp_path):
     table = readers.read(write(tmp_path / "a.csv", names=LEGS))
     seen = np.isfinite(table.angles).all(axis=0)

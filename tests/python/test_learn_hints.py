@@ -103,3 +103,12 @@ def test_labels_of_no_marker_and_a_mapping_without_markers_are_told(amc, tmp_pat
     assert (
         f"--markers {mapping}: not used: no file is a .c3d or .trc\n" in err and err.count("--markers") == 1
     )
+
+
+def test_zeros_are_hinted_at_where_they_may_be_why_a_file_is_refused(amc, tmp_path, capsys):
+    (amc.parent / "77_02.amc").write_bytes(amc.read_bytes())
+    for source in (amc, amc.parent):
+        words = ("learn", source, "-o", tmp_path / "m.gait", "--activity", "run", "--segments", "none")
+        assert gait.cli.main([*map(str, words)]) == 1
+        err = capsys.readouterr().err
+        assert "not learnt as 'run'" in err and err.count("give --zeros-missing") == 1

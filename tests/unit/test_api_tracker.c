@@ -65,34 +65,20 @@ static void test_floats(void)
         const char *name;
         float low, high;
     } number[] = {
-        FLOAT(term_weight[0], -1e-3f, 2e6f),
-        FLOAT(term_weight[1], -1e-3f, 2e6f),
-        FLOAT(term_weight[2], -1e-3f, 2e6f),
-        FLOAT(term_weight[3], -1e-3f, 2e6f),
-        FLOAT(term_weight[4], -1e-3f, 2e6f),
-        FLOAT(missed_weight, -0.01f, 1.01f),
-        FLOAT(girth, 0.49f, 2.01f),
-        FLOAT(resample_ess, -0.01f, 1.01f),
-        FLOAT(max_dt, 0.0f, 11.0f),
-        FLOAT(phase_noise, -1e-3f, 1e9f),
-        FLOAT(rate_noise, -1e-3f, 1e9f),
-        FLOAT(rate_noise_start, -1e-3f, 1e9f),
-        FLOAT(settle_time, -1e-3f, 1e9f),
-        FLOAT(rate_time, -1e-3f, 1e9f),
-        FLOAT(forward_noise, -1e-3f, 1e9f),
-        FLOAT(lateral_noise, -1e-3f, 1e9f),
-        FLOAT(vertical_noise, -1e-3f, 1e9f),
-        FLOAT(heading_noise, -1e-3f, 1e9f),
-        FLOAT(tilt_noise, -1e-3f, 1e9f),
-        FLOAT(tilt_time, -1e-3f, 1e9f),
-        FLOAT(coef_noise, -1e-3f, 1e9f),
-        FLOAT(coef_time, -1e-3f, 1e9f),
-        FLOAT(stature_noise, -1e-3f, 1e9f),
-        FLOAT(stature_noise_start, -1e-3f, 1e9f),
-        FLOAT(offset_noise, -1e-3f, 1e9f),
-        FLOAT(proportion_noise, -1e-3f, 1e9f),
-        FLOAT(evidence_time, -1e-3f, 1e9f),
-        FLOAT(mingle_time, -1e-3f, 1e9f),
+        FLOAT(term_weight[0], -1e-3f, 2e6f), FLOAT(term_weight[1], -1e-3f, 2e6f),
+        FLOAT(term_weight[2], -1e-3f, 2e6f), FLOAT(term_weight[3], -1e-3f, 2e6f),
+        FLOAT(term_weight[4], -1e-3f, 2e6f), FLOAT(missed_weight, -0.01f, 1.01f),
+        FLOAT(girth, 0.49f, 2.01f),          FLOAT(resample_ess, -0.01f, 1.01f),
+        FLOAT(max_dt, 0.0f, 11.0f),          FLOAT(phase_noise, -1e-3f, 1e9f),
+        FLOAT(rate_noise, -1e-3f, 1e9f),     FLOAT(rate_noise_start, -1e-3f, 1e9f),
+        FLOAT(settle_time, -1e-3f, 1e9f),    FLOAT(rate_time, -1e-3f, 1e9f),
+        FLOAT(forward_noise, -1e-3f, 1e9f),  FLOAT(lateral_noise, -1e-3f, 1e9f),
+        FLOAT(vertical_noise, -1e-3f, 1e9f), FLOAT(heading_noise, -1e-3f, 1e9f),
+        FLOAT(tilt_noise, -1e-3f, 1e9f),     FLOAT(tilt_time, -1e-3f, 1e9f),
+        FLOAT(coef_noise, -1e-3f, 1e9f),     FLOAT(coef_time, -1e-3f, 1e9f),
+        FLOAT(stature_noise, -1e-3f, 1e9f),  FLOAT(stature_noise_start, -1e-3f, 1e9f),
+        FLOAT(offset_noise, -1e-3f, 1e9f),   FLOAT(proportion_noise, -1e-3f, 1e9f),
+        FLOAT(evidence_time, -1e-3f, 1e9f),  FLOAT(mingle_time, -1e-3f, 1e9f),
         FLOAT(joint_sd_model, -1e-3f, 1.1f),
     };
 #undef FLOAT
@@ -102,8 +88,8 @@ static void test_floats(void)
     for (uint32_t i = 0; i < count; i++)
         if (f[i].field && strcmp(f[i].type, "gait_tracker_config") == 0 &&
             f[i].offset >= offsetof(gait_tracker_config, term_weight) &&
-            f[i].offset < offsetof(gait_tracker_config, camera) &&
-            strcmp(f[i].field, "offset_angles") != 0 && strcmp(f[i].field, "cpu_mask") != 0)
+            f[i].offset < offsetof(gait_tracker_config, camera) && strcmp(f[i].field, "offset_angles") != 0 &&
+            strcmp(f[i].field, "cpu_mask") != 0)
             floats += f[i].size / sizeof(float);
     CHECK(floats == sizeof number / sizeof *number);
     for (size_t k = 0; k < sizeof number / sizeof *number; k++) {

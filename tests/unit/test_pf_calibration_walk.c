@@ -96,7 +96,7 @@ static void truth_move(const gait_model *m, const double n[NORMALS], double *x)
     x[F_STATURE] *= 1.0 + 0.03 * root * n[8];
     for (int k = 0; k < 2; k++)
         x[F_COEF + k] = relaxed(x[F_COEF + k], 2.0, 0.8, n[9 + k]);
-    x[F_COEF + 2] = relaxed(x[F_COEF + 2], 2.0 / (0.8 * 0.8), 0.8, n[11]); /* stationary deviation 1 */
+    x[F_COEF + 2] = relaxed(x[F_COEF + 2], 2.0 / (0.8 * 0.8), 0.8, n[11]);  /* stationary deviation 1 */
     x[F_COEF + 3] = relaxed(x[F_COEF + 3], 2.0 / (1.2 * 1.2), 0.06, n[12]); /* 1.2 of 0.05 */
 }
 

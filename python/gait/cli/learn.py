@@ -46,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=subjects.RULES[0],
         help="which files are of one person. prefix: those whose names begin alike up to '_'. folder: those "
         "of one folder. file: each alone. auto (the default): prefix; but folder for files without '_', and "
-        "for all if one prefix is in several folders, such as Anna/walk_01 and Ben/walk_01",
+        "for all if one prefix is in several folders, such as Anna/walk_01 and Ben/walk_01. Lengths of limbs "
+        "are found from all recordings of a person with markers",
     )
     parser.add_argument(
         "--components",

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gait import blob
 from gait.cli import learn_hints, learn_prior, learn_segments, learn_text
-from gait.errors import UsageError
+from gait.errors import UsageError, UserError
 from gait.files import require_folder, require_writable
 from gait.learn import activity, fit, fork_server, marker_map, model, report_place, segment_sections, sources
 from gait.learn.readers import KINDS
@@ -122,8 +122,10 @@ def _read(args: argparse.Namespace, corpus: Corpus) -> tuple[list[Sequence], lis
                 bodies=bodies,
                 noticed=noticed,
             )
-        except sources.NothingLeft as error:
-            _tell(closed + error.refused[1:], args.quiet, "")
+        except UserError as error:
+            if isinstance(error, sources.NothingLeft):
+                _tell(closed + error.refused[1:], args.quiet, "")
+            _say(learn_hints.hints(args.markers, noticed), args.quiet)  # what is noticed may be the reason
             raise
     refused = closed + refused
     _tell(refused, args.quiet, " (see --json or --report)")

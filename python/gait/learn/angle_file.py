@@ -30,6 +30,7 @@ SUFFIXES = ("_deg", "_rad", "")
 RADIANS = 4.0  # in a walk some joint turns by more degrees than that, and none by more radians
 LEGS = [f"{s}_{joint}_flexion" for s in SIDES for joint in ("hip", "knee")]
 LEAST_RANGE = 4.0  # degrees: a range of a radian or so under the name of degrees is less
+MOST_RANGE = 361.0  # degrees: no leg turns round, and angles that wrap do not leave a turn
 LONGEST = 100.0  # statures that the root may be away or move in a cycle
 STATURE = 0.5, 2.5  # metres that people are tall
 LENGTHS = ("root_forward", "root_sway", "root_height")
@@ -129,15 +130,25 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Angle
 
 
 def _require_plausible(path: Path, columns: dict[str, list[str]], values: dict[str, Floats]) -> None:
-    """Refuse radians in columns of degrees: no knee that cycles bends so little."""
-    knees = [name for name in LEGS if "knee" in name and np.isfinite(values[name]).any()]
-    ranges = {name: float(np.degrees(np.ptp(values[name][np.isfinite(values[name])]))) for name in knees}
-    if ranges and max(ranges.values()) < LEAST_RANGE:
-        name = max(ranges, key=lambda knee: ranges[knee])
+    """Refuse radians in columns of degrees, since no knee that cycles bends so little, and the reverse."""
+    ranges = {name: _range(values[name]) for name in LEGS if np.isfinite(values[name]).any()}
+    wide = next((name for name, degrees in ranges.items() if degrees > MOST_RANGE), None)
+    if wide is not None:
+        column = columns[wide][0]
+        remedy = f"if it is in degrees, name it {wide}_deg" if column == f"{wide}_rad" else "repair it"
+        raise UserError(f"{path}: {column} has a range of {ranges[wide]:.0f} degrees; {remedy}")
+    knees = {name: degrees for name, degrees in ranges.items() if "knee" in name}
+    if knees and max(knees.values()) < LEAST_RANGE:
+        name = max(knees, key=lambda knee: knees[knee])
         raise UserError(
-            f"{path}: {columns[name][0]} has a range of {ranges[name]:.2g} degrees; if it is in radians, "
+            f"{path}: {columns[name][0]} has a range of {knees[name]:.2g} degrees; if it is in radians, "
             f"name it {name}_rad"
         )
+
+
+def _range(values: Floats) -> float:
+    """Degrees between the least and the largest of values in radians."""
+    return float(np.degrees(np.ptp(values[np.isfinite(values)])))
 
 
 def _columns(names: list[str], wanted: Sequence[str]) -> dict[str, list[str]]:

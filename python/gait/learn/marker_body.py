@@ -85,7 +85,6 @@ def information(
 
     Parameters and errors are those of `body`.
     """
-    points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
     columns, places = _placed(path, labels, points, markers)
     found, rms = skeleton_fit.information(points[:, columns], places)
     return found if rms < WORST_RMS else None

@@ -20,8 +20,12 @@ Floats = npt.NDArray[np.float64]
 NOISE = 0.01  # metres: skin over bone and what 24 angles cannot do
 ANGLE_SD = 1.5  # radians about the rest pose: only counts for what is not seen
 LIMIT_SD = 0.05  # radians beyond a limit that count as one sd
-ROUNDS = 30
+ROOT_SD = 100.0  # metres and radians: hardly anything, but a pelvis that no point ties stays in place
+ROUNDS = 30  # at most
 CHUNK = 128  # frames solved at once
+#: Levenberg-Marquardt: first damping, least, most, and its factors after a step that was better or worse.
+DAMPING, LEAST_DAMPING, MOST_DAMPING, BETTER, WORSE = 1e-3, 1e-7, 1e4, 0.2, 10.0
+GAIN = 1e-4  # of the loss: a step that gains less is the last
 _RANGES = {
     "neck": (-80, 80), "shoulder_flexion": (-120, 190), "shoulder_abduction": (-60, 120),
     "shoulder_rotation": (-120, 120), "elbow": (-5, 160), "hip_flexion": (-60, 140),
@@ -32,6 +36,10 @@ _RANGES = {
 LIMITS = np.radians(
     [[next(r[k] for part, r in _RANGES.items() if part in name) for name in ANGLES] for k in (0, 1)]
 )
+
+
+#: Weights of the segments' points where the whole body is laid onto them: limbs move, the trunk hardly.
+TRUNK = np.array([1.0 if name in ("pelvis", "torso") else 0.05 for name in articulated.SEGMENTS])
 
 
 @dataclass
@@ -51,20 +59,19 @@ def at_rest(frames: int) -> Pose:
     return Pose(np.zeros((frames, 3)), np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, len(ANGLES))))
 
 
-TRUNK = np.array([1.0 if name in ("pelvis", "torso") else 0.05 for name in articulated.SEGMENTS])
-
-
 def rooted(pose: Pose, local: Floats, offsets: Floats, data: Data) -> tuple[Pose, Floats]:
     """Turn and move bodies of given angles onto the points, trunk first; the ratios of their sizes (T,)."""
-    still = Pose(*(part for part in (np.zeros_like(pose.place), at_rest(len(pose)).turn, pose.angles)))
+    still = at_rest(len(pose))
+    still.angles = pose.angles
     model = articulated.posed(still, offsets).points(local, data.segment)
     w = (data.weight * TRUNK[data.segment])[..., None] + 1e-12 * data.weight[..., None]
     total = np.maximum(w.sum(axis=1), 1e-30)
     middle, goal = (w * model).sum(axis=1) / total, (w * data.observed).sum(axis=1) / total
     a, b = (model - middle[:, None]) * np.sqrt(w), (data.observed - goal[:, None]) * np.sqrt(w)
     u, s, vt = np.linalg.svd(np.swapaxes(b, 1, 2) @ a)
-    s[:, 2] *= np.sign(np.linalg.det(u @ vt))
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    side = np.sign(np.linalg.det(u @ vt))  # a rotation, not a mirror image
+    s[:, 2] *= side
+    u[:, :, 2] *= side[:, None]
     turn = u @ vt
     ratio = s.sum(axis=1) / np.maximum((a**2).sum(axis=(1, 2)), 1e-30)
     place = goal - np.einsum("tij,tj->ti", turn, middle)
@@ -93,7 +100,7 @@ def add_prior(hessian: Floats, gradient: Floats, angles: Floats) -> None:
     beyond, k = _beyond(angles), np.arange(ROOT, FREEDOMS)
     hessian[:, k, k] += ANGLE_SD**-2 + (beyond != 0) * LIMIT_SD**-2
     gradient[:, k] += angles / ANGLE_SD**2 + beyond / LIMIT_SD**2
-    hessian[:, range(ROOT), range(ROOT)] += 1e-4
+    hessian[:, range(ROOT), range(ROOT)] += ROOT_SD**-2
 
 
 def normal_equations(
@@ -141,7 +148,7 @@ def _descend(
     loss: Callable[[Pose, Data], Floats],
 ) -> tuple[Pose, Floats]:
     """Levenberg-Marquardt on frames that do not depend on each other, each with its own damping."""
-    cost, damping = loss(pose, data), np.full(len(pose), 1e-3)
+    cost, damping = loss(pose, data), np.full(len(pose), DAMPING)
     active = np.arange(len(pose))
     for _ in range(ROUNDS):
         hessian, gradient = normal(pose[active], data[active])
@@ -154,8 +161,8 @@ def _descend(
         gain = (cost[active] - tried) / np.maximum(cost[active], 1e-9)
         won = active[better]
         pose[won], cost[won] = moved[np.flatnonzero(better)], tried[better]
-        damping[active] = np.clip(damping[active] * np.where(better, 0.2, 10.0), 1e-7, 1e7)
-        active = active[(better & (gain > 1e-4)) | (~better & (damping[active] < 1e4))]
+        damping[active] = np.maximum(damping[active] * np.where(better, BETTER, WORSE), LEAST_DAMPING)
+        active = active[(better & (gain > GAIN)) | (~better & (damping[active] < MOST_DAMPING))]
         if not len(active):
             break
     return pose, cost

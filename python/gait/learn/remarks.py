@@ -12,11 +12,8 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 LONG = 5  # frames in a row in which nothing that moves stays at exactly 0
-BONES, JOINTS, ANGLES = (
-    3,
-    1,
-    3,
-)  # of them at 0 together: an angle may be clipped at 0, no joint stays at the origin
+#: So many at 0 together: an angle may be clipped at 0, but no joint stays at the origin.
+BONES, JOINTS, ANGLES = 3, 1, 3
 
 
 @dataclass(frozen=True)

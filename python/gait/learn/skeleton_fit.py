@@ -24,6 +24,8 @@ Floats = npt.NDArray[np.float64]
 SIZES = (0.5, 2.5)  # metres of stature to start from
 SUBJECT_FRAMES = 60
 FEWEST = 3  # points seen in a frame that is fitted
+MANY = 0.7  # of the most points seen in a frame: so many tell of the subject
+BAD = 4  # times the median loss per point: a frame that may have come to rest elsewhere
 
 
 @dataclass(frozen=True)
@@ -73,11 +75,10 @@ def turned(angles: Floats, points: Points, observed: Floats) -> Floats:
 
     `observed` is as for `fit`; turns are NaN where fewer than three points or not all angles are known.
     """
-    seen = np.asarray(np.isfinite(observed).all(axis=2))
-    known = (seen.sum(axis=1) >= FEWEST) & np.isfinite(angles).all(axis=1)
+    data = _data(observed, points)
+    known = (data.weight.sum(axis=1) >= FEWEST) & np.isfinite(angles).all(axis=1)
     pose = pose_fit.at_rest(len(angles))
     pose.angles[known] = angles[known]
-    data = pose_fit.Data(np.where(seen[..., None], observed, 0.0), seen.astype(float), points.segment)
     turn = pose_fit.rooted(pose, points.at, articulated.ORIGINS, data)[0].turn
     return np.where(known[:, None, None], turn, np.nan)
 
@@ -126,8 +127,6 @@ def enough(observed: Floats) -> bool:
 
 def _data(observed: Floats, points: Points) -> pose_fit.Data:
     """Points as the fit takes them."""
-    if not enough(observed):
-        raise ValueError("no frame has three points")
     seen = np.asarray(np.isfinite(observed).all(axis=2))
     return pose_fit.Data(np.where(seen[..., None], observed, 0.0), seen.astype(float), points.segment)
 
@@ -151,7 +150,9 @@ def _subject(few: pose_fit.Data, points: Points, known: Floats | None) -> Subjec
 def _spread(seen: npt.NDArray[np.bool_]) -> Indices:
     """Frames spread over the recording in which many points are seen."""
     count = seen.sum(axis=1)
-    good = np.flatnonzero(count >= max(FEWEST, 0.7 * count.max()))
+    if not (count >= FEWEST).any():
+        raise ValueError("no frame has three points")
+    good = np.flatnonzero(count >= max(FEWEST, MANY * count.max()))
     bins = np.array_split(good, min(SUBJECT_FRAMES, len(good)))
     return np.array([frames[np.argmax(count[frames])] for frames in bins])
 
@@ -165,7 +166,7 @@ def _all_poses(data: pose_fit.Data, subject: Subject, picked: Indices) -> Pose:
     pose, cost = pose_fit.solve(data, local, offsets, start, OUTLIERS[-1])
     count = (data.weight > 0).sum(axis=1)
     mean = cost / np.maximum(count, 1)
-    good = (mean <= 4 * np.median(mean[count >= FEWEST])) & (count >= FEWEST)
+    good = (mean <= BAD * np.median(mean[count >= FEWEST])) & (count >= FEWEST)
     bad = np.flatnonzero(~good & (count >= FEWEST))
     if good.any() and len(bad):
         closest = np.flatnonzero(good)[np.argmin(np.abs(bad[:, None] - np.flatnonzero(good)[None]), axis=1)]

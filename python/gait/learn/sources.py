@@ -195,7 +195,7 @@ def load_all(
     for sequence, channels in zip(sequences, views, strict=True):
         sequence.channels = channels
     if others is not None:
-        others += _strangers(persons, measures, {s.subject for s in sequences})
+        others += _left_over(persons, measures, {s.subject for s in sequences})
     return sequences, refused
 
 
@@ -229,7 +229,7 @@ def _done(tasks: list[Task], jobs: int, dask: str | None) -> Generator[Prepared,
     return cluster.prepared(tasks, dask) if dask else pool.prepared(tasks, jobs)
 
 
-def _strangers(persons: list[str], bodies: list[Measures | None], known: set[str]) -> list[Measures]:
+def _left_over(persons: list[str], bodies: list[Measures | None], known: set[str]) -> list[Measures]:
     """One body of each person who is not known, in the order of their names."""
     best: dict[str, Measures] = {}
     for person, body in zip(persons, bodies, strict=True):

@@ -12,13 +12,13 @@ import numpy.typing as npt
 
 from gait.learn import articulated, pose_fit
 from gait.learn.articulated import Pose
+from gait.learn.pose_fit import BETTER, DAMPING, GAIN, LEAST_DAMPING, MOST_DAMPING, ROUNDS, WORSE
 from gait.learn.stretch_information import GOAL, SD, STATURE, Information
 
 Floats = npt.NDArray[np.float64]
 
 OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many NOISE lose weight: first rounds to last
 EFFECTIVE = 5.0  # frames that all of them count for: neighbours share their errors
-ROUNDS = 30
 STRETCHES = len(SD)
 
 
@@ -86,7 +86,7 @@ def fit(marked: Marked, stretch: Floats, pose: Pose, held: bool = False) -> Subj
         return float(data.sum() + marked.share * (((shape - goal) / sd) ** 2).sum())
 
     for outlier in OUTLIERS:
-        damping, cost = 1e-3, loss(shape, pose, outlier)
+        damping, cost = DAMPING, loss(shape, pose, outlier)
         for _ in range(ROUNDS):
             equations = _reduced(Subject(marked, shape, pose), outlier, damping, (weight, goal))
             step, steps = equations.steps(free)
@@ -94,12 +94,12 @@ def fit(marked: Marked, stretch: Floats, pose: Pose, held: bool = False) -> Subj
             tried = loss(trial, moved, outlier)
             if tried < cost:
                 gain, cost, shape, pose = cost - tried, tried, trial, moved
-                damping = max(0.2 * damping, 1e-7)
-                if gain < 1e-4 * cost:
+                damping = max(BETTER * damping, LEAST_DAMPING)
+                if gain < GAIN * cost:
                     break
             else:
-                damping *= 10
-                if damping > 1e4:
+                damping *= WORSE
+                if damping > MOST_DAMPING:
                     break
     return Subject(marked, shape, pose)
 
