@@ -8,7 +8,7 @@ import pytest
 from test_marker_files import write_c3d
 
 from gait.errors import UserError
-from gait.learn import body, joint_file, mocap_asf, readers, retarget
+from gait.learn import body, joint_file, mocap_asf, readers, retarget, torn_joint
 from gait.learn.reading import Reading
 from gait.learn.recording import Y_UP
 from gait.learn.sequence import load
@@ -177,3 +177,65 @@ def test_y_up_is_seen(walker, tmp_path):
 def test_any_other_up_is_named(walker, tmp_path, turn, words):
     with pytest.raises(UserError, match=f"a.csv: {words}"):
         joint_file.read_csv(write_csv(tmp_path / "a.csv", turned(walker, turn)))
+
+
+def moved(walker, joint, by, frames=(50,)):
+    """The same walker with a joint elsewhere in some frames."""
+    place = walker.joints[joint].copy()
+    place[list(frames)] += by
+    return replace(walker, joints={**walker.joints, joint: place})
+
+
+@pytest.mark.parametrize("joint", joint_file.NEEDED)
+@pytest.mark.parametrize("by", [(900, 0, 0), (0, 3, 0), (-0.8, 0.8, 0)])
+def test_the_joint_that_is_off_the_body_is_named(walker, joint, by):
+    names = {name: name for name in joint_file.NEEDED}
+    with pytest.raises(UserError, match=rf"^50: {joint} is \S+ m from .*, mostly \S+ m; .* or empty it$"):
+        torn_joint.refuse(moved(walker, joint, by).joints, names, str)
+
+
+@pytest.mark.parametrize("by", [3, 20, 900])
+def test_it_is_told_with_its_line_before_the_axis_that_is_up(walker, tmp_path, by):
+    path = write_csv(tmp_path / "a.csv", moved(walker, "head", (by, 0, 0)))
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:21] + lines[26:]))  # five rows are left out
+    with pytest.raises(UserError, match="a.csv:47: head_top is"):
+        readers.read(path)
+    path = write_csv(tmp_path / "a.csv", moved(walker, "r_ankle", (by, 0, 0)))
+    with pytest.raises(UserError, match="a.csv:52: r_ankle is"):
+        readers.read(path)
+
+
+def test_centres_in_trc_off_the_body_are_named_with_their_frame(walker, tmp_path):
+    path = write_trc(tmp_path / "a.trc", moved(walker, "r_ankle", (3, 0, 0), range(50, 54)))
+    with pytest.raises(UserError, match=r"a.trc: frame 51: RAnkle is .* \(4 such frames\)$"):
+        readers.read(path)
+
+
+def test_an_emptied_place_is_bridged(walker, tmp_path):
+    path = write_csv(tmp_path / "a.csv", moved(walker, "r_ankle", np.nan))
+    assert readers.read(path).joints["r_ankle"][50] == pytest.approx(walker.joints["r_ankle"][50], abs=0.01)
+
+
+def test_a_bone_half_as_long_again_is_left(walker, tmp_path):
+    foot = walker.joints["r_toe"][50] - walker.joints["r_ankle"][50]
+    path = write_csv(tmp_path / "a.csv", moved(walker, "r_toe", foot / 2))
+    expected = walker.joints["r_toe"][50] + foot / 2
+    assert joint_file.read_csv(path).joints["r_toe"][50] == pytest.approx(expected, abs=1e-4)
+
+
+def test_few_zeros_are_off_the_body_unless_they_are_missing(walker, tmp_path):
+    wrist = walker.joints["l_wrist"][50:54]
+    path = write_csv(tmp_path / "a.csv", moved(walker, "l_wrist", -wrist, range(50, 54)))
+    with pytest.raises(UserError, match="a.csv:52: l_wrist is"):
+        readers.read(path)
+    assert readers.read(path, Reading(zero_runs=True)).joints["l_wrist"][50] == pytest.approx(
+        wrist[0], abs=0.05
+    )
+
+
+@pytest.mark.parametrize("value", [0, np.nan])
+def test_joints_without_places_are_not_judged(value):
+    places = {name: np.full((5, 3), float(value)) for name in joint_file.NEEDED}
+    torn_joint.refuse(places, {name: name for name in places}, str)
+    torn_joint.refuse(places, {}, str)

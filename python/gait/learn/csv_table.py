@@ -37,11 +37,14 @@ class Table:
         rows of a track that is lost.
     fps : float
         Rows per second.
+    lines : (T,)
+        Of the file; 0 for rows left out.
     """
 
     names: list[str]
     values: Floats
     fps: float
+    lines: npt.NDArray[np.intp]
 
     def __getitem__(self, name: str) -> Floats:
         return self.values[:, self.names.index(name)]
@@ -77,17 +80,20 @@ def read(path: Path, fps: float | None = None) -> Table:
         raise UserError(f"{path}:1: column {quoted(twice)} is there twice; remove one")
     values = np.array([_numbers(row, names, path, line) for line, row in rows])
     require_frames(path, len(values))
-    _require_ranges(path, names, values, [line for line, _ in rows])
+    lines = [line for line, _ in rows]
+    _require_ranges(path, names, values, lines)
     if "status" in names:
         status = [row[names.index("status")].strip() for _, row in rows]
         values[[k for k, word in enumerate(status) if word == LOST]] = np.nan
     if "time" not in names:
-        return Table(names, values, float(fps or 0))
+        return Table(names, values, float(fps or 0), np.array(lines, np.intp))
     times = np.array([_number(row[names.index("time")], "time", path, line) for line, row in rows])
-    place, rate = _places(path, times, [line for line, _ in rows])
+    place, rate = _places(path, times, lines)
     even = np.full((place[-1] + 1, len(names)), np.nan)
     even[place] = values
-    return Table(names, even, fps or rate)
+    even_lines = np.zeros(len(even), np.intp)
+    even_lines[place] = lines
+    return Table(names, even, fps or rate, even_lines)
 
 
 def _require_ranges(path: Path, names: list[str], values: Floats, lines: list[int]) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn import csv_table, remarks, skeleton_fit
+from gait.learn import csv_table, remarks, skeleton_fit, torn_joint
 from gait.learn.articulated import HINGES, ORIGINS, SEGMENTS, Pose, posed
 from gait.learn.body import Body
 from gait.learn.gaps import bridged
@@ -52,8 +52,12 @@ def read_csv(path: Path, fps: float | None = None, zero_runs: bool = False) -> B
             f"{path}:1: column {error.args[0].split()[0]} is missing; each joint needs x, y, z"
         ) from None
     zeros = "" if zero_runs else remarks.zero_run(places, remarks.JOINTS)
+    judged = places  # without zeros that are missing, or that a remark tells of
+    if zero_runs or zeros:
+        judged = {name: mask_zero_runs(place) for name, place in places.items()}
+    torn_joint.refuse(judged, find(names), lambda frame: f"{path}:{table.lines[frame]}")
     if zero_runs:
-        places = {name: mask_zero_runs(place) for name, place in places.items()}
+        places = judged
     walker = replace(body(path, _upright(path, places), table.fps), remarks=remarks.Remarks(zeros=zeros))
     columns = [f"{name}_deg" for name in ANGLES]
     if not set(columns) <= set(table.names):

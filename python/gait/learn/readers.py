@@ -19,6 +19,7 @@ from gait.learn import (
     mocap_bvh,
     remarks,
     root,
+    torn_joint,
 )
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body, body
@@ -103,7 +104,9 @@ def _points(path: Path, reading: Reading, stretch: Floats | None) -> Body:
     fps = reading.fps or rate
     if _of_joints(labels, reading):
         upright = points @ Y_UP.T
-        return joint_file.body(path, {name: upright[:, k] for k, name in enumerate(labels)}, fps)
+        places = {name: upright[:, k] for k, name in enumerate(labels)}
+        torn_joint.refuse(places, joint_file.find(labels), lambda frame: f"{path}: frame {frame + 1}")
+        return joint_file.body(path, places, fps)
     walker = marker_body.body(path, labels, points, fps, reading.markers, stretch)
     known = map(marker_sets.plain, labels) if reading.markers else ()
     return replace(walker, remarks=remarks.Remarks(frozenset(known)))
