@@ -55,8 +55,8 @@ def test_components_are_no_more_than_cycles_allow(cycles, wanted, count):
     ("cycles", "wanted", "message"),
     [
         (6, 5, "6 cycles are too few for 5 components; add recordings or ask for 4 at most"),
-        (2, None, "2 cycles are too few for 1 component; add recordings"),
-        (0, "auto", "0 cycles are too few for 1 component; add recordings"),
+        (2, None, "2 cycles are too few for 1 component; add recordings, 3 cycles at least"),
+        (0, "auto", "0 cycles are too few for 1 component; add recordings, 3 cycles at least"),
     ],
 )
 def test_more_components_than_cycles_allow_are_an_error(cycles, wanted, message):

@@ -216,10 +216,10 @@ def most_components(cycles: int, wanted: int | str | None, files: list[str] | No
         least, wanted = 1, min(rank.LARGEST if wanted == "auto" else DEFAULT_COMPONENTS, allowed)
     if allowed < least:
         what = "1 component" if least == 1 else f"{least} components"
-        remedy = "add recordings" if allowed < 1 else f"add recordings or ask for {allowed} at most"
+        more = f" or ask for {allowed} at most" if allowed >= 1 else ", 3 cycles at least"
         named = " ".join((files or [])[:MOST_NAMES]) + (" ..." if len(files or []) > MOST_NAMES else "")
         held = "1 cycle is" if cycles == 1 else f"{cycles} cycles are"
-        raise UserError(f"{named}{': ' * bool(named)}{held} too few for {what}; {remedy}")
+        raise UserError(f"{named}{': ' * bool(named)}{held} too few for {what}; add recordings{more}")
     return wanted
 
 

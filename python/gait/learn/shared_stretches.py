@@ -6,6 +6,7 @@ and with it what is known of people.  Places of markers are each recording's own
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
@@ -73,7 +74,8 @@ def shared(
     result: list[Shared | None] = [None] * len(paths)
     marked = [i for i, path in enumerate(paths) if path.suffix.lower() in MARKED]
     count = Counter(persons[i] for i in marked)
-    several = sorted((i for i in marked if count[persons[i]] > 1), key=lambda i: (persons[i], paths[i]))
+    order = [(persons[i], os.path.abspath(path)) for i, path in enumerate(paths)]
+    several = sorted((i for i in marked if count[persons[i]] > 1), key=lambda i: order[i])
     with closing(done([Task(paths[i], reading, measuring=True) for i in several])) as outcomes:
         for person, files in groupby(enumerate(several, 1), key=lambda item: persons[item[1]]):
             bodies: list[_Body] = []
