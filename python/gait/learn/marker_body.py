@@ -124,9 +124,10 @@ def assign(path: Path, labels: list[str], points: Floats, markers: Path | None) 
         best = max(best, places, key=len)
     if len(best) < FEWEST_LABELS:
         examples = ", ".join(labels[k] for k in seen[:5])
-        remedy = 'name more in the --markers file, or its "set"' if markers else "name them in a --markers file"
+        remedy = 'name more in it, or its "set"' if markers else "name them in a --markers file"
+        where = f" with {markers}" if markers else ""
         raise UserError(
-            f"{path}: {len(best)} of {len(seen)} marker labels are known ({examples} ...); {remedy}"
+            f"{path}: {len(best)} of {len(seen)} marker labels are known{where} ({examples} ...); {remedy}"
         )
     return dict(sorted(best.items()))
 
