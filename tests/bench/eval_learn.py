@@ -4,7 +4,8 @@
     make eval-learn
 
 Each part is a script of its own that publishes tables (table.py) and fails if a bound is missed.  All parts
-are run; those that fail are named in learn.md and at the end.
+are run; those that fail are named in learn.md and at the end.  `--only PART` runs one and joins it with the others'
+last tables; learn.md says which commit made which.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 import time
 from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 
 import table
 from facts import facts
@@ -23,9 +25,25 @@ from facts import facts
 from gait.files import replacing
 
 HERE = Path(__file__).resolve().parent
-PARTS = ("learn_period.py", "learn_impute.py", "learn_floor.py", "learn_size.py", "learn_speed.py")
+PARTS = (
+    "learn_period.py",
+    "learn_impute.py",
+    "learn_floor.py",
+    "learn_lengths.py",
+    "learn_size.py",
+    "learn_speed.py",
+)
 WITH_MOCAP = PARTS[1:]  # parts that want the folder of walks as argument
-JOINED = "learn.md"
+JOINED, RUNS = "learn.md", "learn_runs.csv"
+
+
+class Run(NamedTuple):
+    """What a part published (tables' names, apart by blanks), made with what, in how long, and what failed."""
+
+    tables: str
+    made: str
+    seconds: int
+    failed: str
 
 
 def main() -> int:
@@ -33,28 +51,53 @@ def main() -> int:
     parser.add_argument("mocap", type=Path, help="folder of .amc walks")
     parser.add_argument("--only", choices=PARTS, action="append", help="run this part only (may be repeated)")
     args = parser.parse_args()
-    tables: list[Path] = []
-    missed: list[str] = []
-    took: list[str] = []
+    runs = _known()
     for part in args.only or PARTS:
         print(f"== {part}", flush=True)
-        before, begun = _stamps(), time.perf_counter()
-        command = [sys.executable, str(HERE / part), *([str(args.mocap)] if part in WITH_MOCAP else [])]
-        code = subprocess.run(command, check=False).returncode
-        took.append(f"{part} {time.perf_counter() - begun:.0f} s")
-        fresh = [path for path, stamp in _stamps().items() if before.get(path) != stamp]
-        tables = [path for path in tables if path not in fresh] + fresh
-        if code:
-            missed.append(f"{part} ({'a bound is missed' if fresh else 'no table: run it by itself'})")
-    if not args.only:
-        head = ["# Evaluation of learning", facts("make eval-learn"), f"Took: {', '.join(took)}."]
-        head += [f"**Failed: {', '.join(missed)}.**"] if missed else []
-        pages = [*head, _summary(tables), *[t.read_text().strip() for t in tables]]
-        with replacing(table.RESULTS / JOINED) as path:
-            path.write_text("\n\n".join(pages) + "\n")
-    if missed:
-        print(f"eval-learn: failed: {', '.join(missed)}", file=sys.stderr)
-    return bool(missed)
+        runs[part] = _run(part, args.mocap)
+        _write(runs)
+    failed = [f"{part} ({runs[part].failed})" for part in args.only or PARTS if runs[part].failed]
+    if failed:
+        print(f"eval-learn: failed: {', '.join(failed)}", file=sys.stderr)
+    return bool(failed)
+
+
+def _run(part: str, mocap: Path) -> Run:
+    before, begun = _stamps(), time.perf_counter()
+    command = [sys.executable, str(HERE / part), *([str(mocap)] if part in WITH_MOCAP else [])]
+    code = subprocess.run(command, check=False).returncode
+    fresh = [path.stem for path, stamp in _stamps().items() if before.get(path) != stamp]
+    failed = ("a bound is missed" if fresh else "no table: run it by itself") if code else ""
+    return Run(" ".join(fresh), facts("make eval-learn"), round(time.perf_counter() - begun), failed)
+
+
+def _known() -> dict[str, Run]:
+    """Runs of the parts that were recorded, in their order."""
+    path = table.RESULTS / RUNS
+    if not path.is_file():
+        return {}
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {r["part"]: Run(r["tables"], r["made"], int(r["seconds"]), r["failed"]) for r in rows}
+
+
+def _write(runs: dict[str, Run]) -> None:
+    """Record the runs and join their tables, whatever part was run last."""
+    rows = [(part, runs[part]) for part in PARTS if part in runs]
+    with replacing(table.RESULTS / RUNS) as path, path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("part", *Run._fields))
+        writer.writerows((part, *run) for part, run in rows)
+    tables = [table.RESULTS / f"{name}.md" for _, run in rows for name in run.tables.split()]
+    made = dict.fromkeys(run.made for _, run in rows)
+    head = ["# Evaluation of learning"]
+    for facts_of in made:
+        parts = ", ".join(f"{part} {run.seconds} s" for part, run in rows if run.made == facts_of)
+        head.append(f"{facts_of} Took: {parts}.")
+    failed = [f"{part} ({run.failed})" for part, run in rows if run.failed]
+    head += [f"**Failed: {', '.join(failed)}.**"] if failed else []
+    with replacing(table.RESULTS / JOINED) as path:
+        path.write_text("\n\n".join([*head, _summary(tables), *[t.read_text().strip() for t in tables]]) + "\n")
 
 
 def _summary(tables: list[Path]) -> str:

@@ -226,6 +226,22 @@ def test_an_edited_clip_has_the_truth_of_its_frames(tmp_path):
     assert eval_edits._frames(cut)[0].shape == (120, 80, 3)
 
 
+def test_a_part_run_alone_is_joined_with_the_last_tables_of_the_others(tmp_path, monkeypatch):
+    monkeypatch.setattr(eval_learn.table, "RESULTS", tmp_path)
+    for name in ("learn_size", "learn_speed"):
+        (tmp_path / f"{name}.csv").write_text("measure,met\nsize,yes\n")
+        (tmp_path / f"{name}.md").write_text(f"## {name}\n")
+    runs = {"learn_speed.py": eval_learn.Run("learn_speed", "at commit b", 7, "a bound is missed")}
+    eval_learn._write(runs)
+    runs = eval_learn._known() | {"learn_size.py": eval_learn.Run("learn_size", "at commit a", 3, "")}
+    eval_learn._write(runs)
+    assert eval_learn._known() == runs
+    page = (tmp_path / "learn.md").read_text()
+    lines = ("a Took: learn_size.py 3 s.", "b Took: learn_speed.py 7 s.", "Failed:", "## learn_si", "## learn_sp")
+    parts = [page.index(line) for line in lines]
+    assert parts == sorted(parts) and "| size | 2 | 0 |" in page
+
+
 def test_bounds_of_learning_are_counted_by_measure(tmp_path):
     rows = ["measure,met", "auto,yes", "L10,yes", "L5,yes", "L5,NO", "L5 by style,NO", "L6,"]
     (tmp_path / "learn_a.csv").write_text("\n".join(rows) + "\n")
