@@ -49,7 +49,8 @@ def rows(
     for limb in LIMBS:
         for kind, bodies in kinds.items():
             run, walk = (limbs(measure(body))[limb] for body in bodies)
-            yield [f"{limb.replace('_', ' ')}, mm", kind, *(f"{mm:.1f}" for mm in (run, walk, abs(run - walk)))]
+            name = f"{limb.replace('_', ' ')}, mm"
+            yield [name, kind, *(f"{mm:.1f}" for mm in (run, walk, abs(run - walk)))]
     for kind, bodies in kinds.items():
         yield ["residual, mm", kind, *(f"{1000 * (body.residual or np.nan):.2f}" for body in bodies), None]
     for kind, spent in zip(kinds, seconds, strict=True):
