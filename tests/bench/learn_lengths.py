@@ -23,7 +23,7 @@ from gait.learn.reading import DEFAULT
 from gait.learn.retarget import Measures, measure
 from gait.learn.stage import one_thread
 
-MARKERS = "trc"  # folder beside the walks: a walk and a run of one person, marker set of OpenSim's Rajagopal model
+MARKERS = "trc"  # folder beside the walks: a walk and a run of one person, markers of OpenSim
 LIMBS = ("upper_arm", "forearm", "thigh", "shank", "foot")
 NAMES = ("run", "walk")
 COLUMNS = ("figure", "fitted", *NAMES, "apart")
