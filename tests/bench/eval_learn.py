@@ -96,8 +96,9 @@ def _write(runs: dict[str, Run]) -> None:
         head.append(f"{facts_of} Took: {parts}.")
     failed = [f"{part} ({run.failed})" for part, run in rows if run.failed]
     head += [f"**Failed: {', '.join(failed)}.**"] if failed else []
+    pages = [*head, _summary(tables), *(t.read_text().strip() for t in tables)]
     with replacing(table.RESULTS / JOINED) as path:
-        path.write_text("\n\n".join([*head, _summary(tables), *[t.read_text().strip() for t in tables]]) + "\n")
+        path.write_text("\n\n".join(pages) + "\n")
 
 
 def _summary(tables: list[Path]) -> str:
