@@ -38,7 +38,7 @@ JOINED, RUNS = "learn.md", "learn_runs.csv"
 
 
 class Run(NamedTuple):
-    """What a part published (tables' names, apart by blanks), made with what, in how long, and what failed."""
+    """What a part published (names of tables), made with what, in how many seconds, and what failed."""
 
     tables: str
     made: str
