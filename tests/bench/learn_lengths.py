@@ -41,9 +41,7 @@ def limbs(found: Measures) -> dict[str, float]:
     return {name: 1000 * float(np.mean(getattr(found, name))) for name in LIMBS}
 
 
-def rows(
-    alone: list[Body], together: list[Body], seconds: tuple[float, float]
-) -> Iterable[list[Any]]:
+def rows(alone: list[Body], together: list[Body], seconds: tuple[float, float]) -> Iterable[list[Any]]:
     """Cells of the table."""
     kinds = {"each by itself": alone, "together": together}
     for limb in LIMBS:
