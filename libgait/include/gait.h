@@ -16,7 +16,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 2          /* SONAME; bumped by any incompatible change below, struct layout included */
+#define GAIT_ABI 3          /* SONAME; bumped by any incompatible change below, struct layout included */
 #define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 

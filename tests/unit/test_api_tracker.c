@@ -185,6 +185,7 @@ static void test_prior(void)
     CHECK(mean.stride_hz == 0.92f && sd.stride_hz == 0.07f && mean.stature == 1.72f && sd.stature == 0.09f);
     CHECK(sd.phase >= 0.5f && sd.heading >= 3.1415f && sd.coef[0] == 1.0f && sd.coef[1] == 1.0f &&
           sd.coef[2] == 0.0f);
+    CHECK(sd.offset[0] == 0.05f && sd.offset[TOY_ANGLES - 1] == 0.05f && sd.offset[TOY_ANGLES] == 0.0f);
     CHECK_NEAR(mean.pelvis[2], 0.53 * 1.72, 0.05);
     CHECK(gait_tracker_start(t, &mean, &sd, 0, NULL) == GAIT_OK);
     CHECK(gait_tracker_prior(NULL, &mean, &sd) == GAIT_ERR_ARG);
