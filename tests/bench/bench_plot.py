@@ -49,10 +49,9 @@ def draw_stages(axes: Axes, rows: list[Row]) -> None:
 def draw_sizes(axes: Axes, rows: list[Row]) -> None:
     """Cost of a particle by their number."""
     runs = [r for r in rows if r["what"] == "default" and r["isa"] == rows[0]["isa"] and r["height"] == "480"]
-    runs = sorted(
-        (r for r in runs if r["threads"] == "1" and r["features_ms"]), key=lambda r: int(r["particles"])
-    )
-    many = [int(r["particles"]) for r in runs]
+    last = {int(r["particles"]): r for r in runs if r["threads"] == "1" and r["features_ms"]}  # one each
+    many = sorted(last)
+    runs = [last[n] for n in many]
     axes.semilogx(many, [per_particle(r, "cpu_ms") for r in runs], "o-", label="whole step")
     axes.semilogx(many, [per_particle(r, "likelihood_ms") for r in runs], "s-", label="likelihood")
     axes.set_ylim(bottom=0)
