@@ -52,45 +52,52 @@ static void scatter(limit_limb *limb, int32_t *parent)
     }
 }
 
-static double best_ms(limit_kernel *kernel, const limit_work *w)
+static void choose(bench_limit *b, uint32_t usable)
+{
+#define CONSIDER(isa, bit)                                                                                   \
+    if (((bit) & ~usable) == 0) {                                                                            \
+        b->both = limit_both_##isa;                                                                          \
+        b->kept = limit_kept_##isa;                                                                          \
+    }
+    ISAS(CONSIDER)
+}
+
+typedef struct arrays {
+    uint32_t frame[2][LIMIT_SIZE * LIMIT_SIZE];
+    limit_limb limb[LIMBS];
+    int32_t parent[LIMIT_PARTICLES];
+    uint8_t seen[2][BYTES];
+    float cost[LIMBS];
+} arrays;
+
+bool bench_limit_make(bench_limit *b, uint32_t cpu_mask, message *why)
+{
+    arrays *const a = calloc(1, sizeof *a);
+    *b = (bench_limit){.memory = a};
+    if (!a)
+        return message_set(why, "not enough memory for the limit kernel");
+    b->work = (limit_work){a->frame[0], a->frame[1], a->limb, a->parent, a->seen[0], a->seen[1], a->cost};
+    choose(b, cpu_mask & gait_cpu_features());
+    draw(a->frame[0], 1);
+    draw(a->frame[1], 2);
+    scatter(a->limb, a->parent);
+    return true;
+}
+
+void bench_limit_free(bench_limit *b)
+{
+    free(b->memory);
+    b->memory = NULL;
+}
+
+double bench_limit_ms(const bench_limit *b, limit_kernel *kernel)
 {
     double best = 1e9;
     for (int run = 0; run < RUNS; run++) {
         int64_t const begin = bench_cpu_ns();
-        kernel(w);
+        kernel(&b->work);
         double const ms = (double)(bench_cpu_ns() - begin) * 1e-6;
         best = ms < best ? ms : best;
     }
     return best;
-}
-
-bool bench_limit(uint32_t cpu_mask, double *both_ms, double *kept_ms, message *why)
-{
-    static uint32_t frame[2][LIMIT_SIZE * LIMIT_SIZE];
-    uint32_t const usable = cpu_mask & gait_cpu_features();
-    limit_kernel *both = NULL, *kept = NULL;
-    limit_limb *const limb = malloc(LIMBS * sizeof *limb);
-    int32_t *const parent = malloc(LIMIT_PARTICLES * sizeof *parent);
-    uint8_t *const seen = calloc(2, BYTES);
-    float *const cost = malloc(LIMBS * sizeof *cost);
-    bool const ok = limb && parent && seen && cost;
-    if (ok) {
-        limit_work const w = {frame[0], frame[1], limb, parent, seen, seen + BYTES, cost};
-#define CONSIDER(isa, bit)                                                                                   \
-    if (((bit) & ~usable) == 0) {                                                                            \
-        both = limit_both_##isa;                                                                             \
-        kept = limit_kept_##isa;                                                                             \
-    }
-        ISAS(CONSIDER)
-        draw(frame[0], 1);
-        draw(frame[1], 2);
-        scatter(limb, parent);
-        *both_ms = best_ms(both, &w);
-        *kept_ms = best_ms(kept, &w);
-    }
-    free(limb);
-    free(parent);
-    free(seen);
-    free(cost);
-    return ok || message_set(why, "not enough memory for the limit kernel");
 }

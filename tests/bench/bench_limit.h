@@ -23,7 +23,16 @@ typedef struct limit_work {
 
 typedef void limit_kernel(const limit_work *w);
 
-/* Milliseconds of CPU for all particles, the best of some runs: with both frames looked up, and with the ancestor's
- * samples kept from the previous frame, with the best instruction set in the mask (GAIT_CPU_*). */
-bool bench_limit(uint32_t cpu_mask, double *both_ms, double *kept_ms, message *why);
+typedef struct bench_limit {
+    limit_kernel *both,
+        *kept; /* both frames looked up; the ancestor's samples kept from the previous frame */
+    limit_work work;
+    void *memory;
+} bench_limit;
+
+/* With the best instruction set in the mask (GAIT_CPU_*). */
+bool bench_limit_make(bench_limit *b, uint32_t cpu_mask, message *why);
+void bench_limit_free(bench_limit *b);
+/* Milliseconds of CPU for all particles, the best of some runs. */
+double bench_limit_ms(const bench_limit *b, limit_kernel *kernel);
 #endif

@@ -1,5 +1,6 @@
 #include "bench_measure.h"
 #include "bench_clock.h"
+#include "bench_limit.h"
 #include "common/workers.h"
 
 #include <stdlib.h>
@@ -8,7 +9,8 @@
 enum { MAX_STEPS = 2000, TURN = 3 }; /* steps in turn: of the first alone the data are in no cache */
 
 typedef struct times { /* of each step, milliseconds */
-    double wall[MAX_STEPS], cpu[MAX_STEPS], stage[BENCH_STAGES][MAX_STEPS];
+    double wall[MAX_STEPS], cpu[MAX_STEPS], limit_wall[MAX_STEPS], limit_cpu[MAX_STEPS];
+    double stage[BENCH_STAGES][MAX_STEPS];
 } times;
 
 typedef struct runner { /* what takes turns: a tracker, or two at the same time */
@@ -19,6 +21,7 @@ typedef struct runner { /* what takes turns: a tracker, or two at the same time 
     gait_tracker *tracker[2];
     int32_t frame, count; /* next in the scene; steps measured */
     times *spent;
+    double limit_wall, limit_cpu; /* nanoseconds, in this turn */
 } runner;
 
 static int32_t trackers(const runner *r)
@@ -54,6 +57,8 @@ static void note_times(runner *r, double wall, double cpu)
 {
     r->spent->wall[r->count] = wall * 1e-6;
     r->spent->cpu[r->count] = cpu * 1e-6;
+    r->spent->limit_wall[r->count] = r->limit_wall * 1e-6;
+    r->spent->limit_cpu[r->count] = r->limit_cpu * 1e-6;
     for (int k = 0; k < BENCH_STAGES; k++)
         r->spent->stage[k][r->count] = bench_stages_take(k);
 }
@@ -89,10 +94,20 @@ static bool start(const runner *r, const bench_scene *s, message *why)
     return true;
 }
 
+static void run_limit(runner *r, const bench_limit *limit)
+{
+    int64_t const wall = bench_wall_ns(), cpu = bench_cpu_ns();
+    limit->both(&limit->work);
+    r->limit_wall = (double)(bench_wall_ns() - wall);
+    r->limit_cpu = (double)(bench_cpu_ns() - cpu);
+}
+
 /* From the start to the scene's end, again and again, until enough steps are there. */
-static bool take_turn(runner *r, const bench_scene *s, int32_t steps, message *why)
+static bool take_turn(runner *r, const bench_scene *s, int32_t steps, const bench_limit *limit, message *why)
 {
     bool ok = true;
+    if (r->result->plan.limit)
+        run_limit(r, limit);
     bench_stages_enable(r->tracker[0], r->result->plan.stages);
     for (int i = 0; ok && i < TURN && r->count < steps; i++) {
         ok = (r->frame > 0 || start(r, s, why)) && step(r, s, why);
@@ -106,13 +121,13 @@ static bool take_turn(runner *r, const bench_scene *s, int32_t steps, message *w
 }
 
 /* Every other time in the opposite order. */
-static bool take_turns(runner *r, int32_t count, const bench_scene *s, message *why)
+static bool take_turns(runner *r, int32_t count, const bench_scene *s, const bench_limit *limit, message *why)
 {
     int32_t const steps = r->result->plan.steps < MAX_STEPS ? r->result->plan.steps : MAX_STEPS;
     bool ok = true;
     for (int32_t turn = 0; ok && r[0].count < steps; turn++)
         for (int32_t k = 0; ok && k < count; k++)
-            ok = take_turn(&r[turn % 2 ? count - 1 - k : k], s, steps, why);
+            ok = take_turn(&r[turn % 2 ? count - 1 - k : k], s, steps, limit, why);
     return ok;
 }
 
@@ -139,16 +154,19 @@ static double particle_ms(const runner *r, int32_t step)
 
 static void sum_up(const runner *r, const runner *first)
 {
-    static double ratio[MAX_STEPS], particle[MAX_STEPS];
+    static double ratio[MAX_STEPS], particle[MAX_STEPS], limit[MAX_STEPS];
     bench_result *const out = r->result;
     for (int32_t i = 0; i < r->count; i++) {
         ratio[i] = r->spent->wall[i] / first->spent->wall[i];
         particle[i] = particle_ms(r, i) / particle_ms(first, i);
+        limit[i] = out->plan.limit ? r->spent->wall[i] / r->spent->limit_wall[i] : 0.0;
     }
     out->median_ms = quantile(r->spent->wall, r->count, 0.5);
     out->p99_ms = quantile(r->spent->wall, r->count, 0.99);
     out->cpu_ms = quantile(r->spent->cpu, r->count, 0.5);
     out->cpu_p99_ms = quantile(r->spent->cpu, r->count, 0.99);
+    out->limit_ms = quantile(r->spent->limit_cpu, r->count, 0.5);
+    out->limit_ratio = quantile(limit, r->count, 0.5);
     out->ratio = quantile(ratio, r->count, 0.5);
     out->particle_ratio = quantile(particle, r->count, 0.5);
     for (int k = 0; k < BENCH_STAGES; k++)
@@ -196,7 +214,9 @@ bool bench_measure(const gait_model *model, const bench_scene *s, bench_result *
 {
     static times spent[BENCH_TURNS];
     runner r[BENCH_TURNS] = {0};
+    bench_limit limit = {0};
     bool ok = count <= BENCH_TURNS || message_set(why, "more than %d trackers in turns", BENCH_TURNS);
+    ok = ok && bench_limit_make(&limit, ~0u, why);
     for (int32_t k = 0; ok && k < count; k++) {
         results[k].width = s->camera.width;
         results[k].height = s->camera.height;
@@ -204,9 +224,10 @@ bool bench_measure(const gait_model *model, const bench_scene *s, bench_result *
         r[k] = (runner){.result = &results[k], .spent = &spent[k]};
         ok = make(&r[k], model, s, why);
     }
-    ok = ok && take_turns(r, count, s, why);
+    ok = ok && take_turns(r, count, s, &limit, why);
     for (int32_t k = 0; ok && k < count; k++)
         sum_up(&r[k], &r[0]);
+    bench_limit_free(&limit);
     for (int32_t k = 0; k < BENCH_TURNS; k++) {
         workers_stop(&r[k].crew);
         free(r[k].memory);

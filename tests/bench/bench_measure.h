@@ -14,7 +14,9 @@ typedef struct bench_plan {
     uint32_t cpu_mask;
     int32_t steps; /* over all rounds through the scene; of the first for all that take turns */
     bool stages;   /* time the stages as well, which takes a little time itself */
-    bool twins;    /* two trackers at the same time, each on one of the two threads */
+    bool
+        limit; /* the texture-only limit takes turns with it, on one core and with the best instruction set */
+    bool twins; /* two trackers at the same time, each on one of the two threads */
 } bench_plan;
 
 typedef struct bench_result {
@@ -25,6 +27,7 @@ typedef struct bench_result {
     double median_ms, p99_ms;      /* of a step, time of day */
     double cpu_ms, cpu_p99_ms;     /* of the calling thread, which other programs do not lengthen */
     double stage_ms[BENCH_STAGES]; /* median, CPU; 0 without stages */
+    double limit_ms, limit_ratio;  /* CPU of the limit in these turns; a step to it by time of day; medians */
     double ratio; /* step by step to the first that took turns with it, median: time of day, */
     double
         particle_ratio; /* and CPU time per particle without the features, which are the same for any number */

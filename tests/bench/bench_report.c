@@ -90,21 +90,24 @@ bool bench_report_csv(const char *path, message *why)
     FILE *const f = fopen(path, "w");
     if (!f)
         return message_set(why, "%.120s: cannot be written: %s", path, strerror(errno));
-    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms,ratio,particle_ratio");
+    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms,ratio,particle_ratio,"
+               "limit_ratio");
     for (int k = 0; k < BENCH_STAGES; k++)
         fprintf(f, ",%s_ms", bench_stage_name[k]);
     fprintf(f, "\n");
     for (int i = 0; i < count; i++) {
         const bench_result *const r = &results[i];
-        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f", mode_of(r), r->isa, (int)r->width,
+        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f,", mode_of(r), r->isa, (int)r->width,
                 (int)r->height, (int)r->plan.particles, (int)r->plan.threads, r->bytes, r->median_ms,
                 r->p99_ms, r->cpu_ms, r->ratio, r->particle_ratio);
+        if (r->plan.limit)
+            fprintf(f, "%.4f", r->limit_ratio);
         for (int k = 0; k < BENCH_STAGES; k++)
             r->plan.stages ? fprintf(f, ",%.4f", r->stage_ms[k]) : fprintf(f, ",");
         fprintf(f, "\n");
     }
     for (int i = 0; i < other_count; i++) {
-        fprintf(f, "%s,%s,,,,1,,,,%.4f,,", others[i].what, others[i].isa, others[i].ms);
+        fprintf(f, "%s,%s,,,,1,,,,%.4f,,,", others[i].what, others[i].isa, others[i].ms);
         for (int k = 0; k < BENCH_STAGES; k++)
             fprintf(f, ",");
         fprintf(f, "\n");

@@ -10,7 +10,6 @@ typedef struct verdict {
     int isas;
     const bench_result *picture[3]; /* 640x480, 1280x720, 1920x1080 */
     double least, most;             /* particle_ratio from 1,000 to 100,000 of them */
-    double limit_ms, kept_ms;       /* best instruction set */
 } verdict;
 
 /* Take a number of particles into least and most: one thread, with stages. */
