@@ -218,7 +218,7 @@ fuzz-run: $(FUZZ)
 fuzz: ## damaged models and snapshots under the sanitizers (COUNT=500 SEED=0)
 	@$(MAKE) --no-print-directory config=sanitize fuzz-run
 
-golden-check: ## the tracker's digest is the same at -O0, -O2 and -O3, with every compiler found
+golden-check: ## tracker and lifter have their pinned digests at -O0, -O2 and -O3, with every compiler found
 	@tests/check/golden.sh
 
 # ---- work ----------------------------------------------------------------------------------------------------

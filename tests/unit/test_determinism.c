@@ -1,15 +1,16 @@
 /* The same bits always: one golden digest, whatever the threads, the pieces, their order, the address, the instruction
  * set or a stop in between.
  *
- * With the argument `digest` it only prints `digest HEX ISA` for each instruction set of this CPU, for
- * tests/check/golden.sh, which compares compilers and optimisation levels. */
+ * With the argument `digest` it only prints `digest HAVE WANTED NAME` of both modes for each instruction set of this
+ * CPU, for tests/check/golden.sh, which compares compilers and optimisation levels. */
 #include "gait_pool.h"
 #include "toy_film.h"
 
 #include "check.h"
 
-/* To refresh after a deliberate change of the tracker's numbers: run this test, read the line it prints. */
-#define GOLDEN UINT64_C(0x18eba6ecbc43d8b3)
+/* To refresh after a deliberate change of the tracker's numbers: run this test, read the lines it prints. */
+#define GOLDEN       UINT64_C(0x18eba6ecbc43d8b3)
+#define GOLDEN_PAPER UINT64_C(0xe11635656519bd4f)
 
 /* Under a sanitizer, many times as slow, every 7th number of pieces must do: it still has threads from 1 to 16. */
 #if defined(__has_feature)
@@ -78,23 +79,37 @@ static uint64_t run(const gait_tracker_config *cfg, int save_at)
     return hash;
 }
 
-/* Every instruction set of this CPU, lowest first: masks 0 (scalar), 1, 3, 7. */
-static const uint32_t MASK[] = {0, GAIT_CPU_BASE, GAIT_CPU_BASE | GAIT_CPU_AVX2,
-                                GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512};
-enum { MASKS = sizeof MASK / sizeof *MASK };
-
-static bool runs_here(uint32_t mask)
+/* The paper's mode: texture alone, a multinomial draw at every frame, random walks. */
+static gait_tracker_config config_paper(void)
 {
-    return (mask & ~gait_cpu_features()) == 0;
+    gait_tracker_config cfg = config();
+    cfg.mode = GAIT_MODE_PAPER;
+    cfg.terms = GAIT_TERM_TEXTURE;
+    cfg.resample_ess = 1.0f;
+    cfg.evidence_time = cfg.mingle_time = cfg.tilt_time = cfg.coef_time = cfg.rate_time = 0.0f;
+    cfg.offset_angles = 0;
+    return cfg;
+}
+
+/* Masks of instruction sets: each of them alone, any together, none (scalar). */
+enum { MASKS = (GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512) + 1 };
+
+static uint64_t print_digest(gait_tracker_config cfg, uint32_t mask, uint64_t wanted, const char *mode)
+{
+    cfg.cpu_mask = mask;
+    uint64_t const have = run(&cfg, 0);
+    printf("digest %016llx %016llx %s-%s\n", (unsigned long long)have, (unsigned long long)wanted, mode,
+           gait_cpu_name(mask));
+    return have;
 }
 
 static int print_digests(void)
 {
-    for (int k = 0; k < MASKS; k++) {
-        gait_tracker_config cfg = config();
-        cfg.cpu_mask = MASK[k];
-        if (runs_here(MASK[k]))
-            printf("digest %016llx %s\n", (unsigned long long)run(&cfg, 0), gait_cpu_name(MASK[k]));
+    for (uint32_t mask = 0; mask < MASKS; mask = 2 * mask + 1) {
+        if (mask & ~gait_cpu_features())
+            continue;
+        print_digest(config(), mask, GOLDEN, "default");
+        print_digest(config_paper(), mask, GOLDEN_PAPER, "paper");
     }
     return 0;
 }
@@ -109,7 +124,7 @@ static void test_pieces_and_threads(void)
         CHECK(gait_pool_init(memory, sizeof memory, 1 + (tasks - 1) % 16, &pool, NULL) == GAIT_OK);
         cfg.tasks = tasks <= 64 ? tasks : 256;
         cfg.exec = gait_pool_tasks(pool);
-        cfg.cpu_mask = MASK[(tasks / 16 + tasks) % MASKS];
+        cfg.cpu_mask = (uint32_t)(tasks / 16 + tasks) % MASKS;
         CHECK(run(&cfg, tasks % 5 ? 0 : SAVE_AT) == GOLDEN);
         gait_pool_stop(pool);
     }
@@ -117,10 +132,11 @@ static void test_pieces_and_threads(void)
 
 static void test_instruction_sets(void)
 {
-    for (int k = 0; k < MASKS; k++) {
-        gait_tracker_config cfg = config();
-        cfg.cpu_mask = MASK[k];
+    for (uint32_t mask = 0; mask < MASKS; mask++) {
+        gait_tracker_config cfg = config(), paper = config_paper();
+        cfg.cpu_mask = paper.cpu_mask = mask;
         CHECK(run(&cfg, 0) == GOLDEN && run(&cfg, SAVE_AT) == GOLDEN);
+        CHECK(run(&paper, mask & 1 ? SAVE_AT : 0) == GOLDEN_PAPER);
     }
 }
 
@@ -141,14 +157,12 @@ static void test_another_seed(void)
 
 int main(int argc, char **argv)
 {
-    gait_tracker_config const cfg = config();
     _Static_assert(sizeof(gait_estimate) % 8 == 0, "hashed in words of 8 bytes");
     film_make(SCENE_CAMERAS, STEPS);
     if (argc > 1)
         return strcmp(argv[1], "digest") == 0 ? print_digests() : 2;
-    uint64_t const digest = run(&cfg, 0);
-    printf("digest %016llx\n", (unsigned long long)digest);
-    CHECK(digest == GOLDEN);
+    CHECK(print_digest(config(), ~0u, GOLDEN, "default") == GOLDEN);
+    CHECK(print_digest(config_paper(), ~0u, GOLDEN_PAPER, "paper") == GOLDEN_PAPER);
     test_instruction_sets();
     test_pieces_and_threads();
     test_order();

@@ -9,6 +9,9 @@
 
 enum { STREAM = 120, RATE = 30 };
 
+/* Digest of the film's estimates; after a deliberate change of the lifter's numbers the one that this test prints. */
+#define GOLDEN UINT64_C(0xe4b47ef69ffbd53f)
+
 static gait_lift_frame out;
 static double uv[TOY_MARKERS * 2], seen[TOY_MARKERS];
 
@@ -196,12 +199,20 @@ static uint64_t digest(uint32_t mask)
     return h;
 }
 
+static uint64_t print_digest(uint32_t mask)
+{
+    uint64_t const have = digest(mask);
+    printf("digest %016llx %016llx %s\n", (unsigned long long)have, (unsigned long long)GOLDEN,
+           gait_cpu_name(mask));
+    return have;
+}
+
 /* One line for each instruction set of this CPU, for tests/check/golden.sh. */
 static int print_digests(void)
 {
     for (uint32_t mask = 0; mask <= 7; mask = 2 * mask + 1)
         if ((mask & ~gait_cpu_features()) == 0)
-            printf("digest %016llx %s\n", (unsigned long long)digest(mask), gait_cpu_name(mask));
+            print_digest(mask);
     return 0;
 }
 
@@ -217,9 +228,8 @@ int main(int argc, char **argv)
     test_order();
     test_report();
     test_misfit();
-    uint64_t const first = digest(0);
-    for (uint32_t mask = 1; mask <= 7; mask = 2 * mask + 1)
-        CHECK(digest(mask) == first);
-    printf("digest %016llx\n", (unsigned long long)first);
+    CHECK(print_digest(0) == GOLDEN);
+    for (uint32_t mask = 1; mask <= 7; mask++)
+        CHECK(digest(mask) == GOLDEN);
     return CHECK_DONE();
 }
