@@ -1,4 +1,4 @@
-/* Nothing is allocated between the making of a tracker and its end: a malloc in between aborts the program.
+/* Nothing is allocated between the making of a tracker, or a lifter, and its end: a malloc in between aborts.
  *
  * The program's own malloc takes the C library's place, so that calls from anywhere in the process are seen. */
 #include "check.h"
@@ -11,6 +11,7 @@ int main(void)
 #else
 #include "gait_pool.h"
 #include "toy_film.h"
+#include "toy_passer.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -138,6 +139,21 @@ static void test_no_allocation(int32_t mode)
     gait_pool_stop(pool);
 }
 
+/* A lifter: segments alone and a stream that is followed, lost and found. */
+static void test_lifting_allocates_nothing(void)
+{
+    toy_lift_model(2, 0);
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.sd = 1.0;
+    gait_lift *l = NULL;
+    armed = true;
+    bool ok = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_blob, toy_lift_blob_bytes, &c,
+                             &l, NULL) == GAIT_OK;
+    ok = ok && passer_segment(l, &c) && passer_stream(l, &c, 3 * PASSER_WAY);
+    armed = false;
+    CHECK(ok);
+}
+
 static void fall(int kind)
 {
     void *volatile p = malloc(8);
@@ -170,6 +186,7 @@ int main(void)
     test_the_guard();
     test_no_allocation(GAIT_MODE_DEFAULT);
     test_no_allocation(GAIT_MODE_PAPER);
+    test_lifting_allocates_nothing();
     return CHECK_DONE();
 }
 #endif

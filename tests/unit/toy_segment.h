@@ -28,7 +28,7 @@ typedef struct toy_segments { /* what the blob holds */
 } toy_segments;
 
 /* Mean of a marker at a moment: a narrow body as tall as 1 that walks along x while its limbs swing. */
-static inline void toy_mean(int component, int frame, int j, float out[3])
+static inline void toy_marker_mean(int component, int frame, int j, float out[3])
 {
     float const side = j % 2 ? 0.11f : -0.11f, height = 0.1f * (float)(j + 1);
     float const swing = 0.2f * (0.5f - height) * (float)cos(0.6 * frame + 0.3 * j + component);
@@ -53,7 +53,7 @@ static inline void toy_segments_fill(toy_segments *s, int components, int headin
     for (int c = 0; c < components; c++) {
         s->weight[c] = components == 1 ? 1.0f : c ? 0.3f : 0.7f;
         for (int i = 0; i < TOY_SEGMENT; i++)
-            toy_mean(c, i / TOY_MARKERS, i % TOY_MARKERS, s->mean[c][i]);
+            toy_marker_mean(c, i / TOY_MARKERS, i % TOY_MARKERS, s->mean[c][i]);
         for (int k = 0; k < TOY_MODES; k++) {
             double a[TOY_MARKERS][3], b[TOY_MARKERS][3];
             for (int i = 0; i < 3 * TOY_MARKERS; i++) {
