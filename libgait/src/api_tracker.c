@@ -52,7 +52,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
         .cpu_mask = ~0u,
     };
-    if (paper) { /* random walks of eqs. 5-9 (spec 1.4), rates that the papers left open */
+    if (paper) { /* random walks of Ormoneit et al. 2000, eqs. 5-9, who leave the rates open */
         cfg->phase_noise = 0.022f;
         cfg->rate_noise = cfg->rate_noise_start = 0.055f;
         cfg->forward_noise = cfg->lateral_noise = 0.044f;

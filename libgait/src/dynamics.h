@@ -38,7 +38,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
 /* Fold a stride rate back into its range. */
 static inline float dynamics_reflect_rate(float x)
 {
-    float const lo = 1.0f / 2.1f, hi = 1.0f / 0.4f; /* strides per second (spec, eq. 7) */
+    float const lo = 1.0f / 2.1f, hi = 1.0f / 0.4f; /* strides of 0.4 to 2.1 s */
     float const y = x < lo ? 2.0f * lo - x : x > hi ? 2.0f * hi - x : x;
     return f_clamp(y, lo, hi);
 }

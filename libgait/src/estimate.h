@@ -1,4 +1,4 @@
-/* estimate.h - what to report of the weighted particles (spec 1.9). */
+/* estimate.h - what to report of the weighted particles (doc/design.md, estimates). */
 #ifndef GAIT_ESTIMATE_H
 #define GAIT_ESTIMATE_H
 #include "tracker.h"

@@ -1,8 +1,8 @@
 /* like.h - the likelihood of one body in one camera: terms behind one small interface.
  *
- * Each term is an average (per limb, per area, per outline) times a weight in nats, so that pixels which
- * are not independent do not count as if they were (spec R13).  log p(frames | body) is the sum over terms
- * and cameras. */
+ * Each term is an average (per limb, per area, per outline) times a weight in nats, so that pixels which are not
+ * independent do not count as if they were (as in Ormoneit et al. 2000, eq. 11).  log p(frames | body) is the sum over
+ * terms and cameras. */
 #ifndef GAIT_LIKE_H
 #define GAIT_LIKE_H
 #include "features.h"
@@ -17,7 +17,7 @@ enum {
         2 * LIKE_AZIMUTHS,          /* rings are staggered by half a step: two points face each of these */
     LIKE_FACING = LIKE_SAMPLES / 2, /* points of the half turned to the camera */
     LIKE_RING = LIKE_SAMPLES + LIKE_FACING, /* once around and on, so that every half is in one piece */
-    LIKE_FEW = 8, /* points seen in both frames below which a limb counts as occluded (R19, R20) */
+    LIKE_FEW = 8, /* points seen in both frames below which a limb counts as occluded */
     LIKE_TERMS = 5,
     LIKE_COSTS = 256,        /* entries of a cost table */
     LIKE_COST_ONE = 256,     /* 1 nat in the robust one */
@@ -26,9 +26,9 @@ enum {
 
 /* Visibility of an outline's point is looked up so far on its way to the limb's middle. */
 #define LIKE_INWARD         0.3f
-#define LIKE_PAPER_OCCLUDED (-6.3200f) /* log 0.0018 per grey level (R18) */
+#define LIKE_PAPER_OCCLUDED (-6.3200f) /* log 0.0018 per grey level: N(0, 10^2) at 2.5 sd */
 
-/* Fixed points on one limb (spec 1.6.2), statures; same for every particle.  Points 2 d and 2 d + 1 face
+/* Fixed points on one limb, statures; same for every particle.  Points 2 d and 2 d + 1 face
  * direction d; direction d + LIKE_AZIMUTHS is the opposite one. */
 typedef struct like_surface {
     float point[3][LIKE_RING];

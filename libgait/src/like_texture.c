@@ -1,4 +1,4 @@
-/* Brightness constancy along each particle's own history (Ormoneit et al. 2000, eqs. 10-13; spec R11-R20). */
+/* Brightness constancy along each particle's own history (Ormoneit et al. 2000, eqs. 10-13). */
 #include "like.h"
 
 static float log_likelihood(const like_body *b)

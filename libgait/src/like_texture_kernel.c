@@ -1,4 +1,4 @@
-/* What limbs look like and looked like (Ormoneit et al. 2000, eqs. 10-13; spec R11-R20). */
+/* What limbs look like and looked like (Ormoneit et al. 2000, eqs. 10-13). */
 #include "fmath.h"
 #include "kernels.h"
 #include "like.h"
@@ -93,7 +93,7 @@ static inline float robust(int32_t both, int32_t cost, float facing)
 /* Literal form: mean squared grey-level difference, normal density, sigma growing with the viewing angle. */
 static inline float literal(int32_t both, int32_t squares, float facing)
 {
-    float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared (R14, R17) */
+    float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared */
     float const tan2 = f_min((1.0f - facing * facing) / f_max(facing * facing, 1e-3f), 9.0f);
     float const var = 2.0f * image_var + model_var * (1.0f + tan2);
     float const log_visible =

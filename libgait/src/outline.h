@@ -21,7 +21,7 @@ void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out);
 typedef struct limb_polygon {
     float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES]; /* working pixels */
     float depth;                                      /* metres, of the limb's middle; 0: behind the camera */
-    float facing; /* cosine of the angle between limb and image plane (R16) */
+    float facing;                                     /* cosine of the angle between limb and image plane */
 } limb_polygon;
 
 typedef struct outline_lanes { /* the same in BLOCK bodies */

@@ -132,7 +132,7 @@ def lost_at_end(series: dict[str, np.ndarray]) -> bool:
 
 
 class Spread:
-    """Normalised squared error of all joints together, by the particles' own covariance (spec 3.3, C3)."""
+    """NEES (Bar-Shalom et al. 2001) of all joints together, by the particles' own covariance."""
 
     def __init__(self, truth: Path | None, model: Model) -> None:
         self._truth = read_truth(truth) if truth else None

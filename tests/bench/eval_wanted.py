@@ -1,4 +1,4 @@
-"""What the tracker must show: each measure of the issue's table, what is wanted, what was reached."""
+"""What the tracker must show: each measure, what is wanted, what was reached."""
 
 from __future__ import annotations
 

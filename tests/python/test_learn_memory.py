@@ -1,4 +1,4 @@
-"""Memory while learning: it grows by little more than what the components need (issue 3, part 7)."""
+"""Memory while learning: it grows by little more than what the components need."""
 
 import json
 import subprocess

@@ -98,7 +98,7 @@ def test_a_camera_projects_as_the_camera_does_and_moves_nothing_along_its_rays()
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("headings", [0, 2])
 def test_the_energy_has_an_exact_jacobian(view, headings):
-    """F9 of the evaluation protocol: 1e-5 relative."""
+    """To 1e-5 relative."""
     energy, state = energy_of(VIEWS[view], headings)
     _, slope = energy.rows(state)
     wanted = by_differences(lambda s: energy.rows(s)[0], state)

@@ -1,4 +1,4 @@
-"""Posterior of a segment: identities that hold exactly (F2, F3, F5, F6, F7, F11 of the specification)."""
+"""Posterior of a segment: identities that hold exactly."""
 
 from dataclasses import replace
 

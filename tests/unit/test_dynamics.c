@@ -1,4 +1,4 @@
-/* How particles move: every field's mean and spread against closed forms (spec 1.4, 3.4 K6). */
+/* How particles move: every field's mean and spread against closed forms. */
 #include "kernel_check.h"
 #include "toy_prior.h"
 #include "toy_shifted.h"

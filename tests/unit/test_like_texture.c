@@ -77,7 +77,7 @@ static void test_paper(void)
         }
     }
     CHECK_NEAR(limb(GAIT_MODE_PAPER, 1.0, 5, 0), log(0.0018), 0.01);
-    /* The figure of spec R18: a fronto-parallel limb falls by about 3 nats at most, then occlusion explains it. */
+    /* A fronto-parallel limb falls by about 3 nats at most, then occlusion explains it. */
     CHECK(limb(GAIT_MODE_PAPER, 0.99, 16, 120) > (float)log(0.0018 * 0.01) - 0.01f);
 }
 

@@ -1,4 +1,4 @@
-/* Weights: exact and broken cases, and what resampling does to them (spec 3.5, S4). */
+/* Weights: exact and broken cases, and what resampling does to them. */
 #include "toy_filter.h"
 
 static float uniform(uint32_t index, uint32_t draw)

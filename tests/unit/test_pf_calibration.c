@@ -1,4 +1,4 @@
-/* Simulation-based calibration (spec 3.3, C6; Talts et al. 2018): a truth drawn from the filter's own
+/* Simulation-based calibration (Talts et al. 2018): a truth drawn from the filter's own
  * model ranks uniformly among draws of the posterior given what is seen of it.  Here: a linear system. */
 #include "toy_linear.h"
 

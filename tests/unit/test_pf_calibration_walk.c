@@ -1,4 +1,4 @@
-/* Simulation-based calibration of the library's dynamics (spec 3.3, C6): truths walk by eqs. 5-9 written
+/* Simulation-based calibration of the library's dynamics (Talts et al. 2018): truths walk by eqs. 5-9 written
  * out here in double precision, every field is seen with normal noise, and the truth ranks uniformly among
  * draws of the filter's posterior: an error in the prior, the motion, the weights or resampling shows. */
 #include "toy_crowd.h"

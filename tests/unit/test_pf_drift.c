@@ -1,4 +1,4 @@
-/* The library's own motion over many walkers against closed forms within 2 % (spec 3.4, K6): phase and
+/* The library's own motion over many walkers against closed forms within 2 %: phase and
  * rate, then every field that relaxes.  With 10^5 draws 2 % are 4.5 standard errors of a variance. */
 #include "toy_filter.h"
 #include "toy_prior.h"

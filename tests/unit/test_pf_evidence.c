@@ -1,10 +1,10 @@
-/* The evidence of the particle filter's core is unbiased: the mean of Z / Z_Kalman is 1 (spec 3.4, K3). */
+/* The evidence of the particle filter's core is unbiased: the mean of Z / Z_Kalman is 1 (Del Moral 2004). */
 #include "toy_linear.h"
 
 enum { RUNS = 200, STEPS = 20, N = 2000 };
 
 /* Mean of exp(log Z - log Z_Kalman) within three standard errors of 1, resampling now and then and in
- * every step.  Fewer steps than in the spec keep its logarithm's deviation below 0.5 at this N. */
+ * every step.  So few steps keep its logarithm's deviation below 0.5 at this N. */
 static void test_unbiased(void)
 {
     static const double thresholds[] = {0.5, 1.1};

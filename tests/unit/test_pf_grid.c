@@ -1,4 +1,4 @@
-/* Phase alone, moved by the library's dynamics and seen ambiguously, against a filter on a grid (3.4, K5). */
+/* Phase alone, moved by the library's dynamics and seen ambiguously, against a filter on a grid. */
 #include "toy_crowd.h"
 
 enum { CELLS = 4096, BINS = 32, FRAMES = 50, SEEDS = 3 };

@@ -1,5 +1,5 @@
 /* Thirteen dimensions and sharp observations: particles proposed blindly, and by a guided proposal whose
- * weights are p(y | x') p(x' | x) / q(x' | x, y) (spec 3.4, K4). */
+ * weights are p(y | x') p(x' | x) / q(x' | x, y) (Doucet et al. 2000). */
 #include "toy_linear.h"
 
 enum { DIM = 13, SEEDS = 4, STEPS = 50, N = 10000 };

@@ -1,4 +1,4 @@
-/* Mean and variance of the particle filter's core against a Kalman filter (spec 3.4, K1 and K2). */
+/* Mean and variance of the particle filter's core against a Kalman filter. */
 #include "toy_linear.h"
 
 enum { SEEDS = 20, STEPS = 50, FEW = 2000, MANY = 10000 };

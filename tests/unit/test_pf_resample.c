@@ -1,4 +1,4 @@
-/* Resampling: statistics of the counts and what they do to a mean (spec 3.5, S1 to S3 and S5). */
+/* Resampling: statistics of the counts and what they do to a mean (Douc et al. 2005). */
 #include "toy_filter.h"
 
 enum { N = 100, KINDS = 3 };

@@ -1,5 +1,5 @@
 /* toy_linear.h - a linear-Gaussian system, where a Kalman filter is exact, and the particle filter's core
- * on it (spec 3.4): x' = A x + N(0, Q), y = H x + N(0, R), x_0 ~ N(0, 0.3).
+ * on it: x' = A x + N(0, Q), y = H x + N(0, R), x_0 ~ N(0, 0.3).
  *
  *   linear const s = linear_new(5);
  *   linear_world w = linear_start(&s, seed);        a truth, what is seen of it, and the exact posterior

@@ -108,7 +108,7 @@ static const struct {
 
 /* ---- curves ---- */
 
-/* Right side in degrees at phases 0, 0.1 .. 0.9 (spec, appendix A; ankle: usual textbook shape). */
+/* Right side in degrees at phases 0, 0.1 .. 0.9 (about the usual textbook shapes). */
 enum { TOY_CURVES = 9 };
 static const struct {
     int channel, pair; /* left channel, distance to the right one */

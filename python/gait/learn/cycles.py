@@ -1,4 +1,4 @@
-"""Sequences cut into cycles and resampled on the reference grid (Ormoneit 2000, Fig. 5 step 1; R5, R6)."""
+"""Sequences cut into cycles and resampled on the reference grid (Ormoneit 2000, Fig. 5 step 1)."""
 
 from __future__ import annotations
 

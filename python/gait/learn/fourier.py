@@ -1,4 +1,4 @@
-"""Curves over a cycle in the real orthonormal Fourier basis of their first harmonics (R9)."""
+"""Curves over a cycle in the real orthonormal Fourier basis of their first harmonics."""
 
 from __future__ import annotations
 

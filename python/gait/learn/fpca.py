@@ -1,4 +1,4 @@
-"""Functional principal components of cycles with missing entries (Ormoneit 2000, Fig. 5 steps 2-9; R7-R10).
+"""Functional principal components of cycles with missing entries (Ormoneit 2000, Fig. 5 steps 2-9).
 
 Rows are cycles on a grid of T phases for M channels.  Everything happens in the real orthonormal Fourier
 basis of the first harmonics, so means and components close smoothly, and distances are those of the curves.

@@ -75,12 +75,12 @@ class Folder:
         self.stacked = np.concatenate([values, masks.astype(float)], axis=1)
 
     def literal(self, periods: npt.ArrayLike) -> Floats:
-        """Ratios (n, A) of folding at whole numbers of frames (R1-R3); NaN if observations are too few."""
+        """Ratios (n, A) of folding at whole numbers of frames; NaN if observations are too few."""
         frames = np.arange(len(self.stacked))
         return self._anova(frames % period for period in np.asarray(periods, int))
 
     def binned(self, periods: npt.ArrayLike, bins: int) -> Floats:
-        """Signal-to-noise ratios (n, A) with a fixed number of phase bins (R4)."""
+        """Signal-to-noise ratios (n, A) with a fixed number of phase bins."""
         frames = np.arange(len(self.stacked))
         phases = (frames / period % 1.0 for period in np.asarray(periods, float))
         return self._anova(np.minimum((bins * phase).astype(int), bins - 1) for phase in phases)

@@ -1,6 +1,6 @@
 """Sensors of the picture: gradient magnitude over local contrast, blurred, read on a grid about the person.
 
-Spec 1.11.1 (Leventon & Freeman 1998).  The blurred fields vary slowly, so they are kept at a lower
+After Leventon & Freeman 1998, eq. 7.  The blurred fields vary slowly, so they are kept at a lower
 resolution: a clip of any size takes little memory, and the grid may move while the estimate is found.
 """
 
