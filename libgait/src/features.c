@@ -7,7 +7,7 @@ features features_layout(arena *a)
     features f = {0};
     f.edge = TAKE(a, edge_cell, VIEW_PIXELS);
     f.surface = TAKE(a, int8_t, VIEW_PIXELS);
-    f.quads = TAKE(a, uint32_t, VIEW_PIXELS);
+    f.pairs = TAKE(a, uint16_t, VIEW_PIXELS);
     f.fg = (uint64_t (*)[RAST_SIZE][RAST_WORDS])arena_take(a, sizeof *f.fg, FG_PLANES);
     f.inside = (uint64_t (*)[RAST_WORDS])arena_take(a, sizeof *f.inside, RAST_SIZE);
     f.words = (uint64_t (*)[FG_PLANES + 1][RAST_SIZE]) arena_take(a, sizeof *f.words, RAST_STARTS);
@@ -85,7 +85,7 @@ static void surface(const kernels *run, features *f, bool raw, const features_sc
             f->surface[i] = (int8_t)i_max(s->grey[i] - 128, -127);
     else
         run->features_contrast(s->grey, f->surface);
-    run->features_quads(f->surface, f->quads);
+    run->features_pairs(f->surface, f->pairs);
 }
 
 void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,

@@ -25,13 +25,12 @@ typedef struct features_tracks {                  /* joints located in the frame
 
 typedef struct features {
     view_map map;
-    bool seen;       /* this frame had an image */
-    bool has_fg;     /* and a background plate */
-    edge_cell *edge; /* VIEW_PIXELS */
-    int8_t *surface; /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
-    uint32_t
-        *quads; /* VIEW_PIXELS: each with its right, lower and lower right neighbours in the bytes above it */
-    int32_t fg_total;                      /* sum of foreground over the grid, FG_ONE = 1 */
+    bool seen;        /* this frame had an image */
+    bool has_fg;      /* and a background plate */
+    edge_cell *edge;  /* VIEW_PIXELS */
+    int8_t *surface;  /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
+    uint16_t *pairs;  /* VIEW_PIXELS: each with its lower neighbour in the byte above it */
+    int32_t fg_total; /* sum of foreground over the grid, FG_ONE = 1 */
     uint64_t (*fg)[RAST_SIZE][RAST_WORDS]; /* FG_PLANES bit planes of the foreground probability */
     uint64_t (*inside)[RAST_WORDS];        /* cells that the camera sees, */
     view_map inside_map;                   /* found for this place of the region */
@@ -75,7 +74,7 @@ enum { FEATURES_EDGES, FEATURES_SURFACE, FEATURES_FOREGROUND, FEATURES_MAPS };
  *   features_foreground  fg and fg_total where inside
  *   features_edges       edge tensors of a grey plane
  *   features_contrast    local contrast of a grey plane
- *   features_quads       each value of the surface with its neighbours */
+ *   features_pairs       each value of the surface with that below it */
 void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,
                   const view_planes *plate, bool raw, features_scratch *s);
 #endif

@@ -70,7 +70,7 @@ struct walker_block;
       (struct features * f, const struct view_planes *im, const struct view_planes *plate))                  \
     K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))               \
     K(void, features_contrast, (const uint8_t *grey, int8_t *out))                                           \
-    K(void, features_quads, (const int8_t *surface, uint32_t *quads))                                        \
+    K(void, features_pairs, (const int8_t *surface, uint16_t *pairs))                                        \
     /* A block of particles over one interval, and their weights. */                                         \
     K(void, dynamics_move,                                                                                   \
       (const struct dynamics_step *s, int32_t first, const struct walker_block *from,                        \

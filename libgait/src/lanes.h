@@ -1,38 +1,146 @@
 /* lanes.h - for kernels, what compilers do not find out in loops over sixteen elements. */
 #ifndef GAIT_LANES_H
 #define GAIT_LANES_H
+#include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 enum { LANES = 16 };
 
 #if defined(__AVX2__)
 #include <immintrin.h>
 
-/* An unconditional gather would wait for what its register held before. */
-static inline __m256i lookup8(const void *table, __m256i index, __m256i take)
+/* An unconditional gather would wait for what its register held before.  The distance is part of the instruction. */
+static inline __m256i lookup8(const void *table, int32_t bytes, __m256i index, __m256i take)
 {
-    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), table, index, take, 4);
+    __m256i const none = _mm256_setzero_si256();
+    return bytes == 2 ? _mm256_mask_i32gather_epi32(none, table, index, take, 2)
+                      : _mm256_mask_i32gather_epi32(none, table, index, take, 4);
 }
 #endif
 
-/* out[i] = table[index[i]] where take[i] is -1, and 0 where it is 0. */
-static inline void lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
+/* out[i] = the word `bytes` (2 or 4) times index[i] into the table where take[i] is negative, elsewhere 0. */
+static inline void lookup_every(int32_t bytes, const void *table, const int32_t *index, const int32_t *take,
+                                int32_t *out)
 {
 #if defined(__AVX512F__) /* two of eight are faster than one of sixteen */
     __m512i const at = _mm512_loadu_si512(index), on = _mm512_loadu_si512(take);
-    __m256i const low = lookup8(table, _mm512_castsi512_si256(at), _mm512_castsi512_si256(on));
-    __m256i const high = lookup8(table, _mm512_extracti64x4_epi64(at, 1), _mm512_extracti64x4_epi64(on, 1));
+    __m256i const low = lookup8(table, bytes, _mm512_castsi512_si256(at), _mm512_castsi512_si256(on));
+    __m256i const high =
+        lookup8(table, bytes, _mm512_extracti64x4_epi64(at, 1), _mm512_extracti64x4_epi64(on, 1));
     _mm512_storeu_si512(out, _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1));
 #elif defined(__AVX2__)
     for (int32_t i = 0; i < LANES; i += 8)
         _mm256_storeu_si256((__m256i_u *)(out + i),
-                            lookup8(table, _mm256_loadu_si256((const __m256i_u *)(index + i)),
+                            lookup8(table, bytes, _mm256_loadu_si256((const __m256i_u *)(index + i)),
                                     _mm256_loadu_si256((const __m256i_u *)(take + i))));
 #else
-    typedef int32_t __attribute__((may_alias)) word;
-    for (int32_t i = 0; i < LANES; i++)
-        out[i] = take[i] ? ((const word *)table)[index[i]] : 0;
+    for (int32_t i = 0; i < LANES; i++) {
+        int32_t found = 0;
+        if (take[i] < 0)
+            memcpy(&found, (const char *)table + (ptrdiff_t)bytes * index[i], sizeof found);
+        out[i] = found; /* which can be the indices' place */
+    }
 #endif
+}
+
+/* out[i] = table[index[i]] where take[i] is negative, elsewhere 0. */
+static inline void lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
+{
+    lookup_every(4, table, index, take, out);
+}
+
+#if defined(__AVX512BW__)
+#define LANES_WORDS 16 /* words in a register */
+typedef __m512i lanes_words;
+static inline lanes_words words_load(const int32_t *v)
+{
+    return _mm512_loadu_si512(v);
+}
+
+static inline void words_store(int32_t *v, lanes_words w)
+{
+    _mm512_storeu_si512(v, w);
+}
+#define WORDS_OP(op) _mm512_##op
+#define WORDS_AND    _mm512_and_si512
+#elif defined(__AVX2__)
+#define LANES_WORDS  8
+typedef __m256i lanes_words;
+static inline lanes_words words_load(const int32_t *v)
+{
+    return _mm256_loadu_si256((const __m256i_u *)v);
+}
+
+static inline void words_store(int32_t *v, lanes_words w)
+{
+    _mm256_storeu_si256((__m256i_u *)v, w);
+}
+#define WORDS_OP(op) _mm256_##op
+#define WORDS_AND    _mm256_and_si256
+#endif
+
+#if defined(LANES_WORDS)
+/* What is left of a fraction of 256 in the low half of each word, the fraction in the high one. */
+static inline lanes_words words_shares(lanes_words v)
+{
+    lanes_words const f = WORDS_AND(v, WORDS_OP(set1_epi32)(255));
+    return WORDS_OP(add_epi32)(WORDS_OP(slli_epi32)(f, 16),
+                               WORDS_OP(sub_epi32)(WORDS_OP(set1_epi32)(256), f));
+}
+#endif
+
+/* Between four neighbours, the bytes left, left below, right, right below of a word, at 1/256 of their distance, in the
+ * low bytes of u and v; rounded towards 0. */
+static inline void bilinear(const int32_t *four, const int32_t *u, const int32_t *v, int32_t *out)
+{
+#if defined(LANES_WORDS)
+    for (int32_t i = 0; i < LANES; i += LANES_WORDS) {
+        lanes_words const w = words_load(four + i), across = words_shares(words_load(u + i));
+        lanes_words const even = WORDS_OP(srai_epi16)(WORDS_OP(slli_epi16)(w, 8), 8);
+        lanes_words const top = WORDS_OP(madd_epi16)(even, across);
+        lanes_words const low = WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(w, 8), across);
+        lanes_words const both =
+            WORDS_OP(add_epi32)(WORDS_OP(slli_epi32)(low, 16), WORDS_AND(top, WORDS_OP(set1_epi32)(65535)));
+        lanes_words const sum = WORDS_OP(madd_epi16)(both, words_shares(words_load(v + i)));
+        lanes_words const up = WORDS_OP(srli_epi32)(WORDS_OP(srai_epi32)(sum, 31), 16);
+        words_store(out + i, WORDS_OP(srai_epi32)(WORDS_OP(add_epi32)(sum, up), 16));
+    }
+#else
+    for (int32_t i = 0; i < LANES; i++) {
+        int32_t const fx = u[i] & 255, fy = v[i] & 255;
+        uint32_t const w = (uint32_t)four[i];
+        int32_t const left = (int32_t)(w << 24) >> 24, left_low = (int32_t)(w << 16) >> 24;
+        int32_t const right = (int32_t)(w << 8) >> 24, right_low = (int32_t)w >> 24;
+        int32_t const top = left * 256 + (right - left) * fx;
+        int32_t const low = left_low * 256 + (right_low - left_low) * fx;
+        out[i] = (top * 256 + (low - top) * fy) / 65536;
+    }
+#endif
+}
+
+/* The sum over `count` words, a multiple of LANES, of byte 1 times the low half of the pair and byte 3 times the high
+ * one. */
+static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, int32_t count)
+{
+    int32_t sum = 0;
+#if defined(LANES_WORDS)
+    int32_t part[LANES_WORDS];
+    lanes_words all = WORDS_OP(set1_epi32)(0);
+    for (int32_t i = 0; i < count; i += LANES_WORDS)
+        all = WORDS_OP(add_epi32)(
+            all, WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(words_load(bytes + i), 8), words_load(pair + i)));
+    words_store(part, all);
+    for (int32_t i = 0; i < LANES_WORDS; i++)
+        sum += part[i];
+#else
+    for (int32_t i = 0; i < count; i++) {
+        uint32_t const v = (uint32_t)bytes[i], p = (uint32_t)pair[i];
+        sum +=
+            ((int32_t)(v << 16) >> 24) * ((int32_t)(p << 16) >> 16) + ((int32_t)v >> 24) * ((int32_t)p >> 16);
+    }
+#endif
+    return sum;
 }
 
 /* Bytes to words: in pieces, what follows would wait for them. */

@@ -46,9 +46,8 @@ enum {
     LIKE_SIDE_Y = 2,
     LIKE_SIDE_DX = 4,
     LIKE_SIDE_DY = 6,
-    LIKE_SIDE_COS2 = 8,
-    LIKE_SIDE_SIN2 = 10,
-    LIKE_SIDE_INNER = 12
+    LIKE_SIDE_NORMAL = 8,
+    LIKE_SIDE_INNER = 10
 };
 
 /* A limb of BLOCK bodies: image (3 x 3), shift (3), eye (3), graze.  A surface point p shows at
@@ -65,10 +64,10 @@ typedef struct like_pose {
 } like_pose;
 
 /* Sides of a limb's outline in BLOCK bodies, body by body, so that each reads few lines of the cache: where they begin
- * and their vectors (x, y, dx, dy), working pixels; the double-angle form of their normals (cos2, sin2), 64 = 1, which
- * counts in whole numbers; LIKE_INWARD times the limb's middle (inner_x, inner_y), cells. */
+ * and their vectors (x, y, dx, dy), working pixels; the double-angle form of their normals, cos2 + 2^16 sin2 in whole
+ * numbers, 64 = 1, cos2 modulo 2^16; LIKE_INWARD times the limb's middle (inner_x, inner_y), cells. */
 typedef struct like_sides {
-    float part[4][BLOCK][LIKE_WORDS];
+    float part[3][BLOCK][LIKE_WORDS];
 } like_sides;
 
 typedef struct like_outline {

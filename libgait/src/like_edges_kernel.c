@@ -8,7 +8,7 @@
 /* A limb has LANES points: eight along each side of a cone, two along each side of an ellipsoid's octagon. */
 
 typedef struct sides { /* of each point */
-    float x[LANES], y[LANES], dx[LANES], dy[LANES], cos2[LANES], sin2[LANES], share[LANES];
+    float x[LANES], y[LANES], dx[LANES], dy[LANES], normal[LANES], share[LANES];
 } sides;
 
 static inline void cone(const float *w, sides *restrict out)
@@ -16,16 +16,14 @@ static inline void cone(const float *w, sides *restrict out)
     float const x0 = w[LIKE_SIDE_X], x1 = w[LIKE_SIDE_X + 1], y0 = w[LIKE_SIDE_Y], y1 = w[LIKE_SIDE_Y + 1];
     float const dx0 = w[LIKE_SIDE_DX], dx1 = w[LIKE_SIDE_DX + 1], dy0 = w[LIKE_SIDE_DY],
                 dy1 = w[LIKE_SIDE_DY + 1];
-    float const cos0 = w[LIKE_SIDE_COS2], cos1 = w[LIKE_SIDE_COS2 + 1], sin0 = w[LIKE_SIDE_SIN2],
-                sin1 = w[LIKE_SIDE_SIN2 + 1];
+    float const n0 = w[LIKE_SIDE_NORMAL], n1 = w[LIKE_SIDE_NORMAL + 1];
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++) {
         out->x[i] = i < 8 ? x0 : x1;
         out->y[i] = i < 8 ? y0 : y1;
         out->dx[i] = i < 8 ? dx0 : dx1;
         out->dy[i] = i < 8 ? dy0 : dy1;
-        out->cos2[i] = i < 8 ? cos0 : cos1;
-        out->sin2[i] = i < 8 ? sin0 : sin1;
+        out->normal[i] = i < 8 ? n0 : n1;
         out->share[i] = ((float)(i & 7) + 0.5f) / 8.0f;
     }
 }
@@ -43,20 +41,18 @@ static inline void ellipsoid(const like_sides *s, int32_t lane, sides *restrict 
     twice(s->part[0][lane] + 8, out->y);
     twice(s->part[1][lane], out->dx);
     twice(s->part[1][lane] + 8, out->dy);
-    twice(s->part[2][lane], out->cos2);
-    twice(s->part[2][lane] + 8, out->sin2);
+    twice(s->part[2][lane], out->normal);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++)
         out->share[i] = i < 8 ? 0.25f : 0.75f;
 }
 
 typedef struct spots {                     /* points of the limbs' outlines */
-    int32_t cell[MODEL_MAX_LIMBS][LANES];  /* of the edge map; then n'Tn there, */
-    int32_t word[MODEL_MAX_LIMBS][LANES];  /* of the limb's mask; then half the trace of T, */
-    int32_t shown[MODEL_MAX_LIMBS][LANES]; /* -1: in the image; otherwise 0 */
-    int32_t bit[MODEL_MAX_LIMBS][LANES];   /* in the word */
-    int32_t cos2[MODEL_MAX_LIMBS][LANES],
-        sin2[MODEL_MAX_LIMBS][LANES]; /* double-angle form of the side's normal (dy, -dx), 64 = 1 */
+    int32_t cell[MODEL_MAX_LIMBS][LANES];  /* of the edge map: where, then what is there */
+    int32_t word[MODEL_MAX_LIMBS][LANES];  /* of the limb's mask */
+    int32_t shown[MODEL_MAX_LIMBS][LANES]; /* negative: in the image */
+    int32_t left[MODEL_MAX_LIMBS][LANES];  /* bits of the word beyond the point's */
+    int32_t normal[MODEL_MAX_LIMBS][LANES];
 } spots;
 
 static inline void place(const sides *s, const float inner[2], const rast_mask *mask, int32_t k,
@@ -72,11 +68,10 @@ static inline void place(const sides *s, const float inner[2], const rast_mask *
         int32_t const u = (int32_t)x, v = (int32_t)y;
         /* A little inside the limb its own mask tells whether something nearer hides this point. */
         int32_t const c = (int32_t)(outer * x + inner_x) - column, r = (int32_t)(outer * y + inner_y);
-        out->cos2[k][i] = (int32_t)s->cos2[i];
-        out->sin2[k][i] = (int32_t)s->sin2[i];
+        out->normal[k][i] = (int32_t)s->normal[i];
         out->cell[k][i] = v * VIEW_SIZE + u;
         out->word[k][i] = rast_half(c, r);
-        out->bit[k][i] = c & 31;
+        out->left[k][i] = ~c & 31;
         out->shown[k][i] =
             -(((uint32_t)(u | v) < VIEW_SIZE) & ((uint32_t)c < width) & ((uint32_t)(r - first) < rows));
     }
@@ -88,31 +83,21 @@ static inline void hide(const rast_mask *mask, int32_t k, spots *restrict p)
     lookup(mask->word, p->word[k], p->shown[k], bits);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++)
-        p->shown[k][i] = -((int32_t)((uint32_t)bits[i] >> p->bit[k][i]) & 1);
+        p->shown[k][i] = (int32_t)((uint32_t)bits[i] << p->left[k][i]);
 }
 
-/* n'Tn = (trace + (xx - yy) cos 2a + 2 xy sin 2a) / 2, doubled; nothing where nothing is shown. */
-static inline void respond(const edge_cell *edge, int32_t k, spots *restrict p)
+/* Apart from the look-ups, which might read the sums: they would be kept in memory.  n'Tn = (trace + (xx - yy) cos 2a +
+ * 2 xy sin 2a) / 2, doubled; nothing where nothing is shown. */
+static like_edge_tally tally(const spots *p, int32_t limbs)
 {
-    int32_t cell[LANES];
-    lookup(edge, p->cell[k], p->shown[k], cell);
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LANES; i++) {
-        uint32_t const e = (uint32_t)cell[i];
-        int32_t const trace = (int32_t)(e << 24) >> 24, xx_yy = (int32_t)(e << 16) >> 24;
-        int32_t const xy2 = (int32_t)e >> 24;
-        p->cell[k][i] = trace * 64 + xx_yy * p->cos2[k][i] + xy2 * p->sin2[k][i];
-        p->word[k][i] = trace * 64;
+    const int32_t *const cell = p->cell[0], *const shown = p->shown[0];
+    int32_t const n = limbs * LANES;
+    int32_t trace = 0, points = 0;
+    for (int32_t i = 0; i < n; i++) {
+        trace += (int32_t)((uint32_t)cell[i] << 24) >> 24;
+        points += shown[i] < 0;
     }
-}
-
-/* Apart from the look-ups, which might read the sum: it would be kept in memory. */
-static inline int32_t sum(const int32_t *v, int32_t limbs)
-{
-    int32_t all = 0;
-    for (int32_t i = 0; i < limbs * LANES; i++)
-        all += v[i];
-    return all;
+    return (like_edge_tally){trace * 64 + odd_bytes_dot(cell, p->normal[0], n), trace * 64, points};
 }
 
 void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
@@ -125,7 +110,7 @@ void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
         sides s;
         if (b->setup->geometry[l].shape == LIMB_ELLIPSOID) {
             ellipsoid(o, lane, &s);
-            place(&s, o->part[3][lane], &visible[l], l, &p);
+            place(&s, o->part[2][lane] + 8, &visible[l], l, &p);
         } else { /* twice, so that the sides need not be written down */
             cone(o->part[0][lane], &s);
             place(&s, o->part[0][lane] + LIKE_SIDE_INNER, &visible[l], l, &p);
@@ -134,6 +119,6 @@ void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
     for (int32_t l = 0; l < limbs; l++)
         hide(&visible[l], l, &p);
     for (int32_t l = 0; l < limbs; l++)
-        respond(b->features->edge, l, &p);
-    *out = (like_edge_tally){sum(p.cell[0], limbs), sum(p.word[0], limbs), -sum(p.shown[0], limbs)};
+        lookup(b->features->edge, p.cell[l], p.shown[l], p.cell[l]);
+    *out = tally(&p, limbs);
 }

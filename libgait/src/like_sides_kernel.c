@@ -4,7 +4,7 @@
 #include "like.h"
 
 typedef struct side_words { /* where the words of one side go */
-    float *x, *y, *dx, *dy, *cos2, *sin2;
+    float *x, *y, *dx, *dy, *normal;
 } side_words;
 
 /* The side between two corners; what is behind the camera, short or no number lies outside the picture. */
@@ -22,8 +22,8 @@ static void side(const outline_lanes *o, int32_t from, int32_t next, side_words 
         out.y[i] = real ? f_clamp(y0[i], -far, far) : outside;
         out.dx[i] = a;
         out.dy[i] = b;
-        out.cos2[i] = (b * b - a * a) * turn;
-        out.sin2[i] = -2.0f * a * b * turn;
+        int32_t const cos2 = (int32_t)((b * b - a * a) * turn), sin2 = (int32_t)(-2.0f * a * b * turn);
+        out.normal[i] = (float)(sin2 * 65536 + (cos2 & 65535));
     }
 }
 
@@ -44,23 +44,22 @@ static void prepare_cone(const outline_lanes *o, like_sides *restrict out)
     for (int32_t k = 0; k < 2; k++)
         side(o, k ? 3 : 0, k ? 2 : 1,
              (side_words){w[LIKE_SIDE_X + k], w[LIKE_SIDE_Y + k], w[LIKE_SIDE_DX + k], w[LIKE_SIDE_DY + k],
-                          w[LIKE_SIDE_COS2 + k], w[LIKE_SIDE_SIN2 + k]});
+                          w[LIKE_SIDE_NORMAL + k]});
     middle(o->x, corners, w[LIKE_SIDE_INNER]);
     middle(o->y, corners, w[LIKE_SIDE_INNER + 1]);
     deal((const body_lanes *)w, out->part[0]);
 }
 
-/* In parts: x and y of the eight sides, dx and dy, cos2 and sin2, the middle. */
+/* In parts: x and y of the eight sides, dx and dy, normals and the middle. */
 static void prepare_ellipsoid(const outline_lanes *o, like_sides *restrict out)
 {
     static const int32_t corners[4] = {0, 2, 4, 6};
-    body_lanes w[4][LIKE_WORDS] = {{{0.0f}}};
+    body_lanes w[3][LIKE_WORDS] = {{{0.0f}}};
     for (int32_t k = 0; k < 8; k++)
-        side(o, k, (k + 1) & 7,
-             (side_words){w[0][k], w[0][8 + k], w[1][k], w[1][8 + k], w[2][k], w[2][8 + k]});
-    middle(o->x, corners, w[3][0]);
-    middle(o->y, corners, w[3][1]);
-    for (int32_t k = 0; k < 4; k++)
+        side(o, k, (k + 1) & 7, (side_words){w[0][k], w[0][8 + k], w[1][k], w[1][8 + k], w[2][k]});
+    middle(o->x, corners, w[2][8]);
+    middle(o->y, corners, w[2][9]);
+    for (int32_t k = 0; k < 3; k++)
         deal((const body_lanes *)w[k], out->part[k]);
 }
 

@@ -7,7 +7,7 @@
 
 typedef struct spots {                      /* where the points of half a limb are */
     int32_t u[LIKE_FACING], v[LIKE_FACING]; /* 1/256 working pixels, 0 where not shown */
-    int32_t shown[LIKE_FACING];             /* -1: faces the camera well enough, in the image; otherwise 0 */
+    int32_t shown[LIKE_FACING];             /* negative: faces the camera well enough, in the image */
 } spots;
 
 static inline void place(const like_surface *s, const like_pose_limb *pose, int32_t lane, spots *restrict out)
@@ -53,7 +53,7 @@ static inline void hide(const rast_mask *mask, spots *restrict p)
     lookup(mask->word, at, p->shown, bits);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++)
-        p->shown[i] = -((int32_t)((uint32_t)bits[i] >> (((p->u[i] >> 9) - mask->column) & 31)) & 1);
+        p->shown[i] = (int32_t)((uint32_t)bits[i] << (~((p->u[i] >> 9) - mask->column) & 31));
 }
 
 /* Bilinear look-up in the surface map, rounded towards 0. */
@@ -63,18 +63,11 @@ static inline void look_up(const features *f, const spots *p, int8_t *restrict v
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++)
         at[i] = p->v[i] >> 8 << 8 | p->u[i] >> 8;
-    lookup(f->quads, at, p->shown, quad);
+    lookup_every(2, f->pairs, at, p->shown, quad);
+    bilinear(quad, p->u, p->v, all);
 #pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++) {
-        int32_t const fx = p->u[i] & 255, fy = p->v[i] & 255;
-        uint32_t const four = (uint32_t)quad[i];
-        int32_t const left_top = (int32_t)(four << 24) >> 24, right_top = (int32_t)(four << 16) >> 24;
-        int32_t const left_low = (int32_t)(four << 8) >> 24, right_low = (int32_t)four >> 24;
-        int32_t const top = left_top * 256 + (right_top - left_top) * fx;
-        int32_t const low = left_low * 256 + (right_low - left_low) * fx;
-        int32_t const grey = (top * 256 + (low - top) * fy) / 65536;
-        all[i] = p->shown[i] ? grey : TEXTURE_HIDDEN;
-    }
+    for (int32_t i = 0; i < LIKE_FACING; i++)
+        all[i] = p->shown[i] < 0 ? all[i] : TEXTURE_HIDDEN;
     narrow(all, value);
 }
 

@@ -10,7 +10,7 @@
 
 #include <stdlib.h>
 
-enum { PLANES = 3, CASES = 40, QUADS = VIEW_PIXELS - VIEW_SIZE - 1 };
+enum { PLANES = 3, CASES = 40, PAIRS = VIEW_PIXELS - VIEW_SIZE };
 
 static uint32_t noise(uint32_t i)
 {
@@ -86,7 +86,7 @@ static void sample_case(uint32_t n)
 typedef struct maps {
     unsigned char grey[VIEW_PIXELS + 2 * GUARD], edge[VIEW_PIXELS * sizeof(edge_cell) + 2 * GUARD];
     unsigned char surface[VIEW_PIXELS + 2 * GUARD], fg[FG_PLANES * RAST_SIZE * RAST_WORDS * 8 + 2 * GUARD];
-    unsigned char quads[QUADS * sizeof(uint32_t) + 2 * GUARD];
+    unsigned char pairs[PAIRS * sizeof(uint16_t) + 2 * GUARD];
     int32_t fg_total;
 } maps;
 
@@ -97,12 +97,12 @@ static void compute(const kernels *run, const view_planes *im, const view_planes
     guarded const g[] = {
         guard_fill(out->grey, VIEW_PIXELS), guard_fill(out->edge, VIEW_PIXELS * sizeof(edge_cell)),
         guard_fill(out->surface, VIEW_PIXELS), guard_fill(out->fg, FG_PLANES * RAST_SIZE * RAST_WORDS * 8),
-        guard_fill(out->quads, QUADS * sizeof(uint32_t))};
+        guard_fill(out->pairs, PAIRS * sizeof(uint16_t))};
     features f = {.inside = inside, .fg = (uint64_t (*)[RAST_SIZE][RAST_WORDS])(void *)g[3].begin};
     run->view_grey(im, 0, VIEW_SIZE, g[0].begin);
     run->features_edges(g[0].begin, (edge_cell *)(void *)g[1].begin, &rows);
     run->features_contrast(g[0].begin, (int8_t *)g[2].begin);
-    run->features_quads((int8_t *)g[2].begin, (uint32_t *)(void *)g[4].begin);
+    run->features_pairs((int8_t *)g[2].begin, (uint16_t *)(void *)g[4].begin);
     run->features_foreground(&f, im, plate);
     out->fg_total = f.fg_total;
     for (size_t i = 0; i < sizeof g / sizeof *g; i++)
@@ -136,7 +136,7 @@ static void maps_case(uint32_t n)
         CHECK(memcmp(want.grey, have.grey, sizeof want.grey) == 0);
         CHECK(memcmp(want.edge, have.edge, sizeof want.edge) == 0);
         CHECK(memcmp(want.surface, have.surface, sizeof want.surface) == 0);
-        CHECK(memcmp(want.quads, have.quads, sizeof want.quads) == 0);
+        CHECK(memcmp(want.pairs, have.pairs, sizeof want.pairs) == 0);
         CHECK(memcmp(want.fg, have.fg, sizeof want.fg) == 0 && want.fg_total == have.fg_total);
     }
 }

@@ -115,14 +115,14 @@ static void test_sample(void)
         toy_look_at(v, frame, NULL);
         for (int32_t i = 0; i < VIEW_PIXELS && round % 6 == 5; i++) { /* the extremes */
             v->f.surface[i] = (int8_t)(draw((uint32_t)i, round) & 1 ? 127 : -127);
-            v->f.quads[i] = 0;
+            v->f.pairs[i] = 0;
         }
-        for (int32_t i = 0; i < VIEW_PIXELS - VIEW_SIZE - 1; i++)
-            for (int32_t k = 0; k < 4; k++) {
-                uint32_t const value = (uint8_t)v->f.surface[i + k / 2 * VIEW_SIZE + k % 2];
+        for (int32_t i = 0; i < VIEW_PIXELS - VIEW_SIZE; i++)
+            for (int32_t k = 0; k < 2; k++) {
+                int32_t const value = (uint8_t)v->f.surface[i + k * VIEW_SIZE];
                 if (round % 6 == 5)
-                    v->f.quads[i] |= value << 8 * k;
-                wrong += (v->f.quads[i] >> 8 * k & 255) != value;
+                    v->f.pairs[i] = (uint16_t)(v->f.pairs[i] | value << 8 * k);
+                wrong += (v->f.pairs[i] >> 8 * k & 255) != value;
             }
         toy_project(v->setup.geometry, TOY_LIMBS, &v->body, &v->cam, &v->f.map, &v->outline);
         isa_scalar()->surface_pose(&v->setup, &v->cam, &v->f.map, &v->body, &v->pose);
