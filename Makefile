@@ -257,8 +257,8 @@ bench-lift: $(B)/bench/lift ## time lifting a frame, a segment, by instruction s
 CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null | head -n 1 | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9-')
 BENCH_CSV = $(if $(filter --record,$(ARGS)),tests/bench/results,build/bench)/$(or $(CPU_NAME),$(MACHINE)).csv
 bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage (ARGS='-s 40'; --record keeps it)
-	@mkdir -p $(dir $(BENCH_CSV)) && $< --csv $(BENCH_CSV) $(filter-out --record,$(ARGS))
-	@$(PY) tests/bench/bench_plot.py $(BENCH_CSV) build/bench/speed.png
+	@$(PY) tests/bench/bench.py --cc '$(CC)' $(if $(filter --record,$(ARGS)),--page tests/bench/results/bench.md) \
+	    $< $(BENCH_CSV) $(filter-out --record,$(ARGS))
 
 eval: setup lib ## errors on the clips of ../shared/data
 	@$(PY) tests/bench/eval.py $(ARGS)

@@ -9,7 +9,7 @@
 enum { MAX_STEPS = 2000, TURN = 3 }; /* steps in turn: of the first alone the data are in no cache */
 
 typedef struct times { /* of each step, milliseconds */
-    double wall[MAX_STEPS], cpu[MAX_STEPS], limit_wall[MAX_STEPS], limit_cpu[MAX_STEPS];
+    double wall[MAX_STEPS], cpu[MAX_STEPS], limit_wall[MAX_STEPS], limit_cpu[2][MAX_STEPS];
     double stage[BENCH_STAGES][MAX_STEPS];
 } times;
 
@@ -21,7 +21,7 @@ typedef struct runner { /* what takes turns: a tracker, or two at the same time 
     gait_tracker *tracker[2];
     int32_t frame, count; /* next in the scene; steps measured */
     times *spent;
-    double limit_wall, limit_cpu; /* nanoseconds, in this turn */
+    double limit_wall, limit_cpu[2]; /* nanoseconds, in this turn */
 } runner;
 
 static int32_t trackers(const runner *r)
@@ -58,7 +58,8 @@ static void note_times(runner *r, double wall, double cpu)
     r->spent->wall[r->count] = wall * 1e-6;
     r->spent->cpu[r->count] = cpu * 1e-6;
     r->spent->limit_wall[r->count] = r->limit_wall * 1e-6;
-    r->spent->limit_cpu[r->count] = r->limit_cpu * 1e-6;
+    for (int k = 0; k < 2; k++)
+        r->spent->limit_cpu[k][r->count] = r->limit_cpu[k] * 1e-6;
     for (int k = 0; k < BENCH_STAGES; k++)
         r->spent->stage[k][r->count] = bench_stages_take(k);
 }
@@ -94,12 +95,20 @@ static bool start(const runner *r, const bench_scene *s, message *why)
     return true;
 }
 
+static double limit_ns(const bench_limit *limit, limit_kernel *kernel)
+{
+    int64_t const cpu = bench_cpu_ns();
+    kernel(&limit->work);
+    return (double)(bench_cpu_ns() - cpu);
+}
+
 static void run_limit(runner *r, const bench_limit *limit)
 {
-    int64_t const wall = bench_wall_ns(), cpu = bench_cpu_ns();
-    limit->both(&limit->work);
+    int64_t const wall = bench_wall_ns();
+    r->limit_cpu[0] = limit_ns(limit, limit->both);
     r->limit_wall = (double)(bench_wall_ns() - wall);
-    r->limit_cpu = (double)(bench_cpu_ns() - cpu);
+    if (r->result->plan.stages)
+        r->limit_cpu[1] = limit_ns(limit, limit->kept);
 }
 
 /* From the start to the scene's end, again and again, until enough steps are there. */
@@ -152,6 +161,15 @@ static double particle_ms(const runner *r, int32_t step)
     return (r->spent->cpu[step] - r->spent->stage[STAGE_FEATURES][step]) / r->result->plan.particles;
 }
 
+/* The likelihood stage to a limit of the same turn. */
+static double stage_ratio(const runner *r, int which)
+{
+    static double ratio[MAX_STEPS];
+    for (int32_t i = 0; i < r->count; i++)
+        ratio[i] = r->spent->stage[STAGE_LIKELIHOOD][i] / r->spent->limit_cpu[which][i];
+    return quantile(ratio, r->count, 0.5);
+}
+
 static void sum_up(const runner *r, const runner *first)
 {
     static double ratio[MAX_STEPS], particle[MAX_STEPS], limit[MAX_STEPS];
@@ -165,10 +183,12 @@ static void sum_up(const runner *r, const runner *first)
     out->p99_ms = quantile(r->spent->wall, r->count, 0.99);
     out->cpu_ms = quantile(r->spent->cpu, r->count, 0.5);
     out->cpu_p99_ms = quantile(r->spent->cpu, r->count, 0.99);
-    out->limit_ms = quantile(r->spent->limit_cpu, r->count, 0.5);
+    out->limit_ms = quantile(r->spent->limit_cpu[0], r->count, 0.5);
     out->limit_ratio = quantile(limit, r->count, 0.5);
     out->ratio = quantile(ratio, r->count, 0.5);
     out->particle_ratio = quantile(particle, r->count, 0.5);
+    for (int k = 0; k < 2 && out->plan.limit && out->plan.stages; k++)
+        out->stage_ratio[k] = stage_ratio(r, k);
     for (int k = 0; k < BENCH_STAGES; k++)
         out->stage_ms[k] = out->plan.stages ? quantile(r->spent->stage[k], r->count, 0.5) : 0.0;
 }

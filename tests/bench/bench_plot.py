@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 from pathlib import Path
 
@@ -95,24 +94,16 @@ def draw_modes(axes: Axes, rows: list[Row]) -> None:
     axes.set_title("speed")
 
 
-def main() -> None:
+def draw(path: Path, png: Path) -> None:
     """Read the CSV, write the figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("csv", type=Path)
-    parser.add_argument("png", type=Path)
-    args = parser.parse_args()
-    with args.csv.open(encoding="utf-8", newline="") as f:
+    with path.open(encoding="utf-8", newline="") as f:
         rows = list(csv.DictReader(f))
     figure, axes = plt.subplots(2, 2, figsize=(13, 9), layout="constrained")
     draw_modes(axes[0][0], rows)
     draw_stages(axes[0][1], rows)
     draw_sizes(axes[1][0], rows)
     draw_pictures(axes[1][1], rows)
-    figure.suptitle(args.csv.stem)
-    args.png.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(args.png, dpi=110)
-    print(args.png)
-
-
-if __name__ == "__main__":
-    main()
+    figure.suptitle(path.stem)
+    png.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(png, dpi=110)
+    print(png)

@@ -67,6 +67,27 @@ static void thread_lines(const bench_result *one)
            2 / twins->ratio);
 }
 
+/* The slowest steps: by time of day, and on one core by its own time. */
+static void latency_lines(const verdict *v)
+{
+    const struct {
+        const char *what;
+        const bench_result *run;
+    } row[] = {
+        {"p99 of a step against its median, default mode, 10,000", v->many[0]},
+        {"    two threads", v->many[0] + 1},
+        {"    paper mode, 10,000", v->many[1]},
+        {"    paper mode, two threads", v->many[1] + 1},
+        {"    default number of particles", v->usual},
+    };
+    for (size_t k = 0; k < sizeof row / sizeof *row; k++) {
+        const bench_result *const r = row[k].run;
+        line(row[k].what, 1.3, r->p99_ms / r->median_ms, false, "times");
+        if (r->plan.threads == 1)
+            line("        by CPU time", 1.3, r->cpu_p99_ms / r->cpu_ms, false, "times");
+    }
+}
+
 static void speed_lines(const verdict *v)
 {
     const bench_result *const many = v->many[0], *const paper = v->many[1];
@@ -76,20 +97,21 @@ static void speed_lines(const verdict *v)
     rate_lines("paper mode, 10,000 particles, two cores", 55, paper + 1);
     rate_lines("default number of particles, one core", 200, v->usual);
     thread_lines(many);
-    line("p99 of a step against its median", 1.3, many->p99_ms / many->median_ms, false, "times");
+    latency_lines(v);
     line("by CPU time of the calling thread: default mode, one core", 30, 1e3 / many->cpu_ms, true, "fps");
     line("    paper mode", 30, 1e3 / paper->cpu_ms, true, "fps");
     line("    default number of particles", 200, 1e3 / v->usual->cpu_ms, true, "fps");
-    line("    p99 of a step against its median", 1.3, many->cpu_p99_ms / many->cpu_ms, false, "times");
 }
 
 static void kernel_lines(const verdict *v)
 {
     const bench_result *const best = v->isa[v->isas - 1];
-    double const stage = best->stage_ms[STAGE_LIKELIHOOD];
     line("likelihood stage, scalar against the best instruction set", 5,
-         v->isa[0]->stage_ms[STAGE_LIKELIHOOD] / stage, true, "times");
-    line("likelihood stage against the texture-only limit", 2, stage / best->limit_ms, false, "times");
+         v->isa[0]->stage_ms[STAGE_LIKELIHOOD] / best->stage_ms[STAGE_LIKELIHOOD], true, "times");
+    line("likelihood stage against the texture-only limit, two look-ups", 2, best->stage_ratio[0], false,
+         "times");
+    line("    the ancestor's samples kept, as the tracker keeps them", 2, best->stage_ratio[1], false,
+         "times");
 }
 
 static void parsec_lines(const verdict *v, const gait_model *m)
@@ -101,8 +123,8 @@ static void parsec_lines(const verdict *v, const gait_model *m)
     line("a step against PARSEC bodytrack's 43 ms (quoted)", 0.5, step / PARSEC_MS[0], false, "times");
     line("    as the limit's time here against its 17 ms there", 0.5,
          many->limit_ratio * LIMIT_MS / PARSEC_MS[0], false, "times");
-    line("samples per likelihood against PARSEC's", PARSEC_SAMPLES, ours, true, "");
-    printf("    %.0f of surface and edges, %.0f cells of the silhouette\n", looked, cells);
+    line("samples per likelihood, surface and edges, against PARSEC's", PARSEC_SAMPLES, looked, true, "");
+    line("    with the silhouette's cells, 64 of them compared at once", PARSEC_SAMPLES, ours, true, "");
     printf(
         "    million samples a second: %.0f in a step (%.0f without the silhouette's); PARSEC %.0f to %.0f\n",
         rate * ours / step, rate * looked / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],

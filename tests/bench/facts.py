@@ -35,7 +35,6 @@ def _commit() -> str:
         done = subprocess.run(["git", "-C", str(HERE), *words], capture_output=True, text=True, check=False)
         return done.stdout.strip()
 
-    dirty = git(
-        "status", "--porcelain", "--untracked-files=no", "--", ":/python", ":/libgait", ":/tests/bench/*.py"
-    )
+    sources = (":/python", ":/libgait", ":/tests/bench/*.py", ":/tests/bench/*.[ch]")
+    dirty = git("status", "--porcelain", "--untracked-files=no", "--", *sources)
     return (git("rev-parse", "--short", "HEAD") or "unknown") + (" with changes" if dirty else "")

@@ -1,6 +1,7 @@
 """What `make lib` needs elsewhere: no Python, Eigen from wherever it is, a cross compiler's own tools."""
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -94,5 +95,6 @@ def test_figures_of_a_machine_are_kept_only_if_asked(words, folder):
     done = subprocess.run(
         ["make", "-n", "bench", *words], cwd=ROOT, capture_output=True, text=True, timeout=120, check=True
     )
-    command = next(line for line in done.stdout.splitlines() if "bench/step --csv" in line)
-    assert f"--csv {folder}" in command and "--record" not in command
+    command = next(line for line in done.stdout.replace("\\\n", "").splitlines() if "bench/bench.py" in line)
+    assert re.search(rf"bench/step {folder}\S+\.csv", command) and "--record" not in command
+    assert ("--page tests/bench/results/bench.md" in command) == (folder == "tests/bench/results/")

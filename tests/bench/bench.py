@@ -1,0 +1,62 @@
+"""Run the bench of a step, show and keep its figures, draw them; a record also says what made them."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from datetime import datetime, timezone
+from pathlib import Path
+
+import bench_plot
+from facts import facts
+
+from gait.files import replacing
+
+PLOT = Path("build/bench/speed.png")
+
+
+def run(command: list[str]) -> str:
+    """What a program prints, shown meanwhile; ends as it does where it fails."""
+    lines = []
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        for line in process.stdout or ():
+            print(line, end="", flush=True)
+            lines.append(line)
+    if process.returncode:
+        sys.exit(process.returncode)
+    return "".join(lines)
+
+
+def compiler(command: str) -> str:
+    """First line that a compiler says of itself."""
+    done = subprocess.run([*command.split(), "--version"], capture_output=True, text=True, check=False)
+    return (done.stdout.splitlines() or [f"{command}, version unknown"])[0]
+
+
+def page(said: str, table: Path, cc: str) -> str:
+    """The record as Markdown: on what, by what and when it was made, and all that was printed."""
+    date = datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
+    made = f"{facts('make bench ARGS=--record')} {compiler(cc)}; {date}. All figures: {table.name}."
+    note = "MISSED: wanted, and not reached in this run."
+    return f"# Speed of a step\n\n{made} {note}\n\n```\n{said.strip()}\n```\n"
+
+
+def main() -> None:
+    """Run it with the options that are not of this script."""
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
+    parser.add_argument("--cc", default="cc", help="compiler that built the program")
+    parser.add_argument("--page", type=Path, help="keep all that is printed there, as Markdown")
+    parser.add_argument("program")
+    parser.add_argument("csv", type=Path)
+    args, others = parser.parse_known_args()
+    args.csv.parent.mkdir(parents=True, exist_ok=True)
+    said = run([args.program, "--csv", str(args.csv), *others])
+    bench_plot.draw(args.csv, PLOT)
+    if args.page:
+        with replacing(args.page) as temporary:
+            temporary.write_text(page(said, args.csv, args.cc), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
