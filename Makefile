@@ -63,7 +63,7 @@ TIGHT := $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
 FAST  := fmath.c $(patsubst %,%_kernel.c,outline like_edges like_pose like_silhouette like_surface)
-MANY  := $(patsubst %,%.c,dense kinematics like_edges like_joints like_silhouette like_template like_texture lift \
+MANY  := $(patsubst %,%.c,dense eye kinematics like_edges like_joints like_silhouette like_template like_texture lift \
          lift_batch lift_fit lift_read lift_spread loss mingle pf population weigh)
 C_FLAGS = $(if $(filter $(FAST),$(1)),,$(if $(filter $(MANY),$(1)),$(SMALL),$(LEAST)))
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)

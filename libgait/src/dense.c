@@ -2,25 +2,6 @@
 
 #include "fmath.h"
 
-bool dense_factor(const kernels *k, double *A, int32_t n, int32_t ld)
-{
-    for (int32_t p = 0; p < n; p += 4) {
-        int32_t const end = i_min(p + 4, n);
-        for (int32_t i = p; i < end; i++) {
-            double *const row = A + (size_t)i * (size_t)ld;
-            if (!(row[i] > 0.0))
-                return false;
-            double const root = sqrt(row[i]), inverse = 1.0 / root;
-            for (int32_t j = i + 1; j <= n; j++)
-                row[j] *= inverse;
-            row[i] = root;
-            k->dense_rank(A, ld, i + 1, end, row, 1, -1.0);
-        }
-        k->dense_rank(A, ld, end, n + 1, A + (size_t)p * (size_t)ld, end - p, -1.0);
-    }
-    return true;
-}
-
 /* Sum of u[j] v[j], j in [first, last), in four chains. */
 static double dot(const double *u, const double *v, int32_t first, int32_t last)
 {

@@ -1,7 +1,8 @@
 /* dense.h - symmetric positive definite systems in double, of any size, in the caller's memory.
  *
- * The normal equations of rows w theta = y are kept as one matrix [W y]'[W y]: upper triangle, row-major, n
- * + 1 columns, ld numbers a row (a multiple of DENSE_LANES). What lies below the diagonal means nothing. */
+ * The normal equations of rows w theta = y are kept as one matrix [W y]'[W y]: upper triangle, row-major, ld
+ * x ld, ld = dense_padded(n + 1).  Rows past n are those of the identity; what lies below the diagonal means
+ * nothing. */
 #ifndef GAIT_DENSE_H
 #define GAIT_DENSE_H
 #include "kernels.h"
@@ -13,9 +14,6 @@ static inline int32_t dense_padded(int32_t n)
     return (n + DENSE_LANES - 1) / DENSE_LANES * DENSE_LANES;
 }
 
-/* Factor the leading n rows of A (n + 1 of them) in place: A = U'U, column n becomes z = U^-T b, and A[n][n]
- * what the best theta leaves, y'y - z'z.  false: not positive definite. */
-bool dense_factor(const kernels *k, double *A, int32_t n, int32_t ld);
 /* theta = U^-1 z, from a factored A. */
 void dense_solve(const double *A, int32_t n, int32_t ld, double *theta);
 /* sum of log U_ii. */

@@ -1,59 +1,75 @@
 /* Inner loops of normal equations: each element is a sum in the order of the rows, so that lanes change
- * nothing. */
+ * nothing.  Blocks of eight rows stay in registers while the others go by. */
 #include "dense.h"
+#include "wide.h"
 
-/* One row of a rank-4 update, lanes side by side; j begins at a multiple of DENSE_LANES. */
-static inline void add_four(double *restrict a, const double *restrict w, int32_t ld, const double f[4],
-                            int32_t first, int32_t width)
-{
-    const double *restrict const w1 = w + ld, *restrict const w2 = w + 2 * ld,
-                                 *restrict const w3 = w + 3 * ld;
-    for (int32_t j = first / DENSE_LANES * DENSE_LANES; j < width; j++)
-        a[j] = (((a[j] + f[0] * w[j]) + f[1] * w1[j]) + f[2] * w2[j]) + f[3] * w3[j];
-}
+enum { ROWS = DENSE_LANES };
 
-static inline void add_one(double *restrict a, const double *restrict w, double f, int32_t first,
-                           int32_t width)
-{
-    for (int32_t j = first / DENSE_LANES * DENSE_LANES; j < width; j++)
-        a[j] += f * w[j];
-}
+#define EACH_ROW(k) _Pragma("GCC unroll 8") for (int32_t k = 0; k < ROWS; k++)
 
-void KERNEL(dense_rank)(double *A, int32_t ld, int32_t first, int32_t last, const double *W, int32_t rows,
-                        double sign)
+#define NUMBER double
+#define WIDES  wide
+#define UPDATE update
+#include "dense_update.h"
+#undef NUMBER
+#undef WIDES
+#undef UPDATE
+#define NUMBER float
+#define WIDES  wide_float
+#define UPDATE update_float
+#include "dense_update.h"
+
+void KERNEL(dense_rank)(double *A, int32_t ld, const double *W, int32_t count)
 {
-    int32_t r = 0;
-    for (; r + 4 <= rows; r += 4) {
-        const double *const w = W + (size_t)r * (size_t)ld;
-        for (int32_t i = first; i < last; i++) {
-            const double f[4] = {sign * w[i], sign * w[ld + i], sign * w[2 * ld + i], sign * w[3 * ld + i]};
-            add_four(A + (size_t)i * (size_t)ld, w, ld, f, i, ld);
-        }
-    }
-    for (; r < rows; r++) {
-        const double *const w = W + (size_t)r * (size_t)ld;
-        for (int32_t i = first; i < last; i++)
-            add_one(A + (size_t)i * (size_t)ld, w, sign * w[i], i, ld);
-    }
+    for (int32_t i = 0; i < ld; i += ROWS)
+        update(A, ld, i, i, ld, 1.0, W, ld, W, ld, count, NULL);
 }
 
 void KERNEL(dense_forward)(const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width)
 {
-    for (int32_t i = 0; i < n; i += 4) {
-        int32_t const end = i_min(i + 4, n);
-        for (int32_t p = i; p < end; p++) {
-            const double *const u = U + (size_t)p * (size_t)ld;
-            double *const zp = Z + (size_t)p * (size_t)ldz;
-            double const inverse = 1.0 / u[p];
-            for (int32_t c = 0; c < width; c++)
-                zp[c] *= inverse;
-            for (int32_t j = p + 1; j < end; j++)
-                add_one(Z + (size_t)j * (size_t)ldz, zp, -u[j], 0, width);
-        }
-        const double *const u = U + (size_t)i * (size_t)ld;
-        for (int32_t j = end; j < n; j++) { /* only after four full rows */
-            const double f[4] = {-u[j], -u[ld + j], -u[2 * ld + j], -u[3 * ld + j]};
-            add_four(Z + (size_t)j * (size_t)ldz, Z + (size_t)i * (size_t)ldz, ldz, f, 0, width);
-        }
+    for (int32_t i = 0; i < n; i += ROWS)
+        update(Z, ldz, i, 0, width, -1.0, U, ld, Z, ldz, i, U + (size_t)i * (size_t)(ld + 1));
+}
+
+void KERNEL(dense_forward_float)(const double *U, int32_t n, int32_t ld, const double *Z, int32_t width,
+                                 float *V)
+{
+    float *const T = V + ld * width;
+    for (int32_t i = 0; i < ld * width; i++)
+        V[i] = (float)Z[i];
+    for (int32_t i = 0; i < ld; i++)
+        for (int32_t j = i / ROWS * ROWS; j < ld; j++)
+            T[i * ld + j] = (float)U[i * ld + j];
+    for (int32_t i = 0; i < n; i += ROWS)
+        update_float(V, width, i, 0, width, -1.0f, T, ld, V, width, i, T + i * (ld + 1));
+}
+
+/* Factor a block on the diagonal, the first n of its rows. */
+static bool factor_corner(double *A, int32_t ld, int32_t n)
+{
+    for (int32_t i = 0; i < n; i++) {
+        double *const row = A + i * ld;
+        if (!(row[i] > 0.0))
+            return false;
+        double const root = sqrt(row[i]), inverse = 1.0 / root;
+        row[i] = root;
+        for (int32_t j = i + 1; j < ROWS; j++)
+            row[j] *= inverse;
+        for (int32_t k = i + 1; k < ROWS; k++)
+            for (int32_t j = k; j < ROWS; j++)
+                A[k * ld + j] -= row[k] * row[j];
     }
+    return true;
+}
+
+bool KERNEL(dense_factor)(double *A, int32_t n, int32_t ld)
+{
+    for (int32_t i = 0; i < n; i += ROWS) {
+        double *const corner = A + (size_t)i * (size_t)(ld + 1);
+        update(A, ld, i, i, i + ROWS, -1.0, A, ld, A, ld, i, NULL);
+        if (!factor_corner(corner, ld, n - i < ROWS ? n - i : ROWS))
+            return false;
+        update(A, ld, i, i + ROWS, ld, -1.0, A, ld, A, ld, i, corner);
+    }
+    return true;
 }

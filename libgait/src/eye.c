@@ -77,7 +77,7 @@ double eye_whiten(eye_rows *r, double sd, double residual)
     }
     r->y[0] /= l11;
     r->y[1] = (r->y[1] - l21 * r->y[0]) / l22;
-    return 2.0 * m_log64(l11 * l22);
+    return l11 * l22;
 }
 
 void eye_gain(const eye_rows *r, double sd, double residual, double K[3][2])

@@ -22,7 +22,7 @@ void eye_rows_near(const eye *e, const double ideal[2], const double about[3], e
 /* Rows of a point of which only a rough depth is known: it lies on the ray through the pixel. */
 void eye_rows_ray(const eye *e, const double ideal[2], double depth, eye_rows *out);
 /* Make the noise white: sd^2 of the observation, `residual` variance of each coordinate of the point.
- * Returns the log of the determinant of the noise. */
+ * Returns the root of the determinant of the noise. */
 double eye_whiten(eye_rows *r, double sd, double residual);
 /* Gain of the point's residual by the rows' residuals: K = residual G'(sd^2 I + residual G G')^-1. */
 void eye_gain(const eye_rows *r, double sd, double residual, double K[3][2]);

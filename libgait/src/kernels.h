@@ -33,11 +33,15 @@ struct walker_block;
 
 /* Result, name, parameters. */
 #define KERNELS(K)                                                                                           \
-    /* A[i][j] += sign sum_r W[r][i] W[r][j], i in [first, last), from the lane of i on; rows of ld */       \
-    K(void, dense_rank,                                                                                      \
-      (double *A, int32_t ld, int32_t first, int32_t last, const double *W, int32_t rows, double sign))      \
-    /* Z = U^-T Z, the first `width` (a multiple of DENSE_LANES) columns of rows of ldz numbers */           \
+    /* Upper triangle of A += W'W, A and W of ld columns (dense.h) */                                        \
+    K(void, dense_rank, (double *A, int32_t ld, const double *W, int32_t rows))                              \
+    /* A = U'U in place, n rows; A[.][n]: b -> U^-T b, y'y -> what theta leaves; false: not definite */      \
+    K(bool, dense_factor, (double *A, int32_t n, int32_t ld))                                                \
+    /* Z = U^-T Z, `width` columns (a multiple of DENSE_LANES), dense_padded(n) rows of ldz numbers */       \
     K(void, dense_forward, (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))  \
+    /* V = U^-T Z with floats, ld x width both (width as above); past V lies room for ld x ld more */        \
+    K(void, dense_forward_float,                                                                             \
+      (const double *U, int32_t n, int32_t ld, const double *Z, int32_t width, float *V))                    \
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
     K(void, lift_sum,                                                                                        \
       (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
@@ -47,11 +51,10 @@ struct walker_block;
        const double *theta, int32_t modes, double moved[3]))                                                 \
     /* w[i] = g . shape[.][i], i < lanes */                                                                  \
     K(void, lift_row, (double *w, const double *shape, int32_t lanes, const double g[3]))                    \
-    /* z[i * stride + a] = M[a] . shape[.][i], a < 3, i < modes */                                           \
-    K(void, lift_columns,                                                                                    \
-      (double *z, size_t stride, const double *shape, int32_t lanes, int32_t modes, double M[3][3]))         \
+    /* z[i * stride + a] = M[a] . shape[.][i], a < 3, i < lanes */                                           \
+    K(void, lift_columns, (double *z, size_t stride, const double *shape, int32_t lanes, double M[3][3]))    \
     /* x[j] += sum_i Z[i * stride + j]^2, j < width */                                                       \
-    K(void, lift_squares, (double *x, int32_t width, const double *Z, size_t stride, int32_t rows))          \
+    K(void, lift_squares, (double *x, int32_t width, const float *Z, size_t stride, int32_t rows))           \
     /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. */    \
     K(void, kin_curves,                                                                                      \
       (const struct gait_model *m, const struct kin_input *in, int32_t components,                           \

@@ -6,9 +6,9 @@
 
 void lift_clear(const lift_table *t, lift_belief *b)
 {
-    memset(b->A, 0, (size_t)(t->n + 1) * (size_t)t->ld * sizeof *b->A);
-    for (int32_t i = 0; i < t->n; i++)
-        b->A[i * (t->ld + 1)] = 1.0;
+    memset(b->A, 0, (size_t)t->ld * (size_t)t->ld * sizeof *b->A);
+    for (int32_t i = 0; i < t->ld; i++)
+        b->A[i * (t->ld + 1)] = i != t->n;
     b->observed = 0;
     b->log_noise = b->miss = 0.0;
 }
@@ -63,9 +63,9 @@ typedef struct adding { /* what is the same for all markers of a frame */
     double depth;
 } adding;
 
-/* Two white rows of marker j. */
-static void add_marker(const lift_table *t, lift_belief *b, const adding *a, const double *ideal, double sd,
-                       int32_t j, const lift_marker *m, const double *about, double *w)
+/* Two white rows of marker j; returns the root of the determinant of their noise. */
+static double add_marker(const lift_table *t, lift_belief *b, const adding *a, const double *ideal, double sd,
+                         int32_t j, const lift_marker *m, const double *about, double *w)
 {
     eye_rows r;
     double spin[2] = {-(about[1] - a->now.place[1]), about[0] - a->now.place[0]};
@@ -75,12 +75,13 @@ static void add_marker(const lift_table *t, lift_belief *b, const adding *a, con
     } else {
         eye_rows_near(&t->eye, ideal, about, &r);
     }
-    b->log_noise += eye_whiten(&r, sd, lift_residual(t, b, j));
+    double const det = eye_whiten(&r, sd, lift_residual(t, b, j));
     for (int32_t i = 0; i < 2; i++) {
         double const miss = r.y[i] - ((r.g[i][0] * about[0] + r.g[i][1] * about[1]) + r.g[i][2] * about[2]);
         b->miss += miss * miss;
         put_row(t, b, &a->prior, m, spin, r.g[i], r.y[i], w + (size_t)i * (size_t)t->ld);
     }
+    return det;
 }
 
 int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
@@ -88,6 +89,7 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
 {
     lift_moment const m = lift_find_moment(t, at);
     adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
+    double det = 1.0; /* a log for many is as good as one for each */
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
         lift_marker r;
@@ -98,10 +100,15 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
         lift_to_world(&a.now, x, own);
         if (said)
             memcpy(said + 3 * j, own, sizeof own);
-        add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, &r, guess ? guess + 3 * j : own,
-                   t->W + (size_t)rows * (size_t)t->ld);
+        det *= add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, &r, guess ? guess + 3 * j : own,
+                          t->W + (size_t)rows * (size_t)t->ld);
         rows += 2;
+        if (!(det > 1e-100 && det < 1e100)) {
+            b->log_noise += 2.0 * m_log64(det);
+            det = 1.0;
+        }
     }
+    b->log_noise += 2.0 * m_log64(det);
     b->observed += rows;
     return rows;
 }
@@ -110,13 +117,13 @@ void lift_add(const lift_table *t, lift_belief *b, double at, const lift_seen *s
               double depth, double *said)
 {
     int32_t const rows = lift_rows(t, b, at, seen, guess, depth, said);
-    t->run->dense_rank(b->A, t->ld, 0, t->n + 1, t->W, rows, 1.0);
+    t->run->dense_rank(b->A, t->ld, t->W, rows);
 }
 
 bool lift_solve(const lift_table *t, lift_belief *b)
 {
-    memcpy(b->U, b->A, (size_t)(t->n + 1) * (size_t)t->ld * sizeof *b->U);
-    if (!dense_factor(t->run, b->U, t->n, t->ld))
+    memcpy(b->U, b->A, (size_t)t->ld * (size_t)t->ld * sizeof *b->U);
+    if (!t->run->dense_factor(b->U, t->n, t->ld))
         return false;
     dense_solve(b->U, t->n, t->ld, b->theta);
     bool ok = true;

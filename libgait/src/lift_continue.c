@@ -5,12 +5,11 @@
 
 #include <string.h>
 
-static void all_markers(const lift_table *t, const lift_belief *b, double at, double *mean)
+/* Mean of some markers at a moment. */
+static void places(const lift_table *t, const lift_belief *b, double at, const int32_t *marker, int32_t count,
+                   double *mean)
 {
-    int32_t all[GAIT_MAX_MARKERS];
-    for (int32_t j = 0; j < t->prior.markers; j++)
-        all[j] = j;
-    lift_query const q = {.at = at, .marker = all, .count = t->prior.markers};
+    lift_query const q = {.at = at, .marker = marker, .count = count};
     lift_read(t, b, &q, mean, NULL);
 }
 
@@ -24,48 +23,53 @@ static void middle(const double *x, int32_t count, double out[2])
     }
 }
 
-/* Index of a marker, -1: the prior does not know it. */
-static int32_t marker_named(const lift_table *t, const char *name)
+/* Where every marker begins by the prior alone. */
+static void beginning(const lift_table *t, const lift_belief *b, double *mean)
 {
-    for (int32_t j = 0; j < t->prior.markers; j++)
-        if (strcmp(t->prior.name[j], name) == 0)
-            return j;
-    return -1;
+    lift_axes const axes = lift_axes_prior(t, b);
+    const float *const m = segment_mean(&t->prior, b->component, 0);
+    for (int32_t j = 0; j < t->prior.markers; j++) {
+        const double x[3] = {(double)m[3 * j], (double)m[3 * j + 1], (double)m[3 * j + 2]};
+        lift_to_world(&axes, x, mean + 3 * j);
+    }
 }
 
-/* Turn of the trunk about z from x to y, radians: of the lines through hips and shoulders together, because
- * limbs that swing turn most of all. 0 if the prior knows neither. */
-static double turn_between(const lift_table *t, const double *x, const double *y)
+/* Turn of the trunk about z within `hop` frames, radians: of the lines through hips and shoulders together,
+ * because limbs that swing turn most of all. `last`: every marker at its end. */
+static double turn_of(const lift_table *t, const lift_belief *b, const double *last)
 {
-    static const char *const pair[2][2] = {{"r_hip", "l_hip"}, {"r_shoulder", "l_shoulder"}};
-    double a[2] = {0.0}, b[2] = {0.0};
-    for (int32_t k = 0; k < 2; k++) {
-        int32_t const from = marker_named(t, pair[k][0]), to = marker_named(t, pair[k][1]);
-        for (int32_t i = 0; from >= 0 && to >= 0 && i < 2; i++) {
-            a[i] += x[3 * to + i] - x[3 * from + i];
-            b[i] += y[3 * to + i] - y[3 * from + i];
+    double first[6], a[2] = {0.0}, c[2] = {0.0};
+    for (const int32_t *pair = t->trunk; pair < t->trunk + 4; pair += 2) {
+        if (pair[0] < 0 || pair[1] < 0)
+            continue;
+        places(t, b, 0.0, pair, 2, first);
+        for (int32_t i = 0; i < 2; i++) {
+            a[i] += first[3 + i] - first[i];
+            c[i] += last[3 * pair[1] + i] - last[3 * pair[0] + i];
         }
     }
-    return (double)m_atan2((float)(a[0] * b[1] - a[1] * b[0]), (float)(a[0] * b[0] + a[1] * b[1]));
+    return (double)m_atan2((float)(a[0] * c[1] - a[1] * c[0]), (float)(a[0] * c[0] + a[1] * c[1]));
 }
 
 void lift_continue(const lift_table *t, const lift_belief *before, int32_t c, lift_belief *next,
-                   double *first, double *then)
+                   double *spare)
 {
     int32_t const J = t->prior.markers;
+    int32_t all[GAIT_MAX_MARKERS];
     double was[2], is[2];
-    all_markers(t, before, 0.0, first);
-    all_markers(t, before, t->prior.hop, then);
+    for (int32_t j = 0; j < J; j++)
+        all[j] = j;
+    places(t, before, t->prior.hop, all, J, spare);
+    middle(spare, J, is);
     next->component = c;
-    next->heading = lift_heading(t, before) + (t->turn < 0 ? 0.0 : turn_between(t, first, then));
+    next->heading = lift_heading(t, before) + (t->turn < 0 ? 0.0 : turn_of(t, before, spare));
     next->centre = next->heading;
     next->turn_sd = t->cfg.turn_sd;
     memcpy(next->place, t->cfg.place, sizeof next->place);
     memset(next->theta, 0, (size_t)t->n * sizeof *next->theta);
     lift_clear(t, next);
-    all_markers(t, next, 0.0, first);
-    middle(then, J, is);
-    middle(first, J, was);
+    beginning(t, next, spare);
+    middle(spare, J, was);
     for (int32_t i = 0; i < 2; i++)
         next->place[i] += is[i] - was[i];
 }

@@ -4,9 +4,9 @@
 #include "lift_read.h"
 
 /* Prior of component c of the next segment, from what `before` says of its frame `hop`: heading turned on
- * by as much as the body has turned, the body's middle where it will be. first, then: scratch, J x 3 each. */
+ * by as much as the body has turned, the body's middle where it will be. spare: J x 3. */
 void lift_continue(const lift_table *t, const lift_belief *before, int32_t c, lift_belief *next,
-                   double *first, double *then);
+                   double *spare);
 /* Squared residuals in deviations, of a solved belief. */
 double lift_misfit(const lift_table *t, const lift_belief *b);
 #endif

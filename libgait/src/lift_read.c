@@ -6,27 +6,30 @@
 
 /* What moves a marker by one deviation of each unknown, turned by P: columns 3 r to 3 r + 2 of t->Z. */
 static void put_columns(const lift_table *t, const lift_belief *b, const lift_axes *axes,
-                        const lift_marker *m, const double own[3], double P[3][3], int32_t r)
+                        const lift_marker *m, const double own[3], double P[3][3], int32_t r, size_t width)
 {
     int32_t const k = t->prior.modes;
-    size_t const width = (size_t)t->width;
     double *const z = t->Z + 3 * r;
     double const away[2] = {own[0] - axes->place[0], own[1] - axes->place[1]};
-    double grown[3][3];
+    double turned[3][3], grown[3][3];
     for (int32_t a = 0; a < 3; a++) {
-        double const turned[3] = {P[a][0] * axes->c + P[a][1] * axes->s,
-                                  P[a][1] * axes->c - P[a][0] * axes->s, P[a][2] * axes->z};
-        for (int32_t i = 0; i < 3; i++) {
-            grown[a][i] = m->grown * turned[i];
+        turned[a][0] = P[a][0] * axes->c + P[a][1] * axes->s;
+        turned[a][1] = P[a][1] * axes->c - P[a][0] * axes->s;
+        turned[a][2] = P[a][2] * axes->z;
+        for (int32_t i = 0; i < 3; i++)
+            grown[a][i] = m->grown * turned[a][i];
+    }
+    t->run->lift_columns(z, width, t->shape, t->lanes, grown); /* the rows past k are written again below */
+    for (int32_t a = 0; a < 3; a++) {
+        for (int32_t i = 0; i < 3; i++)
             z[(size_t)(k + i) * width + (size_t)a] = P[a][i] * t->cfg.place_sd[i];
-        }
         if (t->size >= 0)
             z[(size_t)t->size * width + (size_t)a] =
-                t->growth * ((turned[0] * m->shape[0] + turned[1] * m->shape[1]) + turned[2] * m->shape[2]);
+                t->growth *
+                ((turned[a][0] * m->shape[0] + turned[a][1] * m->shape[1]) + turned[a][2] * m->shape[2]);
         if (t->turn >= 0)
             z[(size_t)t->turn * width + (size_t)a] = b->turn_sd * (P[a][1] * away[0] - P[a][0] * away[1]);
     }
-    t->run->lift_columns(z, width, t->shape, t->lanes, k, grown);
 }
 
 /* P (3 x 3) = I - K G of marker j, and the mean moved by K times what the rows leave; I where it was not
@@ -59,6 +62,7 @@ void lift_modes(const lift_table *t, const lift_belief *b, const lift_query *q, 
 {
     lift_axes const axes = lift_axes_now(t, b);
     lift_moment const moment = lift_find_moment(t, q->at);
+    size_t const width = (size_t)dense_padded(3 * q->count);
     double P[3][3];
     set_identity(P);
     for (int32_t r = 0; r < q->count; r++) {
@@ -66,7 +70,7 @@ void lift_modes(const lift_table *t, const lift_belief *b, const lift_query *q, 
         double x[3];
         lift_marker_at(t, b, &moment, q->marker[r], &m, x);
         lift_to_world(&axes, x, mean + 3 * r);
-        put_columns(t, b, &axes, &m, mean + 3 * r, P, r);
+        put_columns(t, b, &axes, &m, mean + 3 * r, P, r, width);
     }
 }
 
@@ -74,7 +78,9 @@ void lift_read(const lift_table *t, const lift_belief *b, const lift_query *q, d
 {
     lift_axes const axes = lift_axes_now(t, b);
     lift_moment const moment = lift_find_moment(t, q->at);
-    int32_t const count = 3 * q->count;
+    int32_t const count = 3 * q->count, width = dense_padded(count);
+    for (int32_t i = 0; sd && count < width && i < t->n; i++)
+        memset(t->Z + i * width + count, 0, (size_t)(width - count) * sizeof *t->Z);
     for (int32_t r = 0; r < q->count; r++) {
         lift_marker m;
         double x[3], own[3], P[3][3];
@@ -87,12 +93,12 @@ void lift_read(const lift_table *t, const lift_belief *b, const lift_query *q, d
             continue;
         for (int32_t a = 0; a < 3; a++)
             sd[3 * r + a] = lift_residual(t, b, q->marker[r]) * P[a][a];
-        put_columns(t, b, &axes, &m, own, P, r);
+        put_columns(t, b, &axes, &m, own, P, r, (size_t)width);
     }
     if (!sd)
         return;
-    t->run->dense_forward(b->U, t->n, t->ld, t->Z, t->width, dense_padded(count));
-    t->run->lift_squares(sd, count, t->Z, (size_t)t->width, t->n);
+    t->run->dense_forward_float(b->U, t->n, t->ld, t->Z, width, t->V);
+    t->run->lift_squares(sd, count, t->V, (size_t)width, t->n);
     for (int32_t x = 0; x < count; x++)
         sd[x] = sqrt(sd[x]);
 }

@@ -13,7 +13,7 @@ typedef struct lift_query { /* what is asked of a moment */
 
 /* Posterior mean (count x 3) and standard deviation (may be NULL) of markers at a moment. */
 void lift_read(const lift_table *t, const lift_belief *b, const lift_query *q, double *mean, double *sd);
-/* Displacement of one deviation of each unknown: n rows of t->Z, markers as asked; mean as above without
+/* Displacement of one deviation of each unknown: n rows of t->Z, markers as asked and padded; mean as above without
  * the part outside the modes. */
 void lift_modes(const lift_table *t, const lift_belief *b, const lift_query *q, double *mean);
 #endif

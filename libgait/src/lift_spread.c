@@ -14,7 +14,7 @@ static void gram(const lift_table *t, const lift_belief *b, double *G)
     double mean[3 * GAIT_MAX_MARKERS];
     for (int32_t j = 0; j < J; j++)
         all[j] = j;
-    memset(G, 0, (size_t)(t->n + 1) * (size_t)t->ld * sizeof *G);
+    memset(G, 0, (size_t)t->ld * (size_t)t->ld * sizeof *G);
     for (int32_t f = 0; f < t->prior.frames; f++) {
         lift_query const q = {.at = f, .marker = all, .count = J};
         lift_modes(t, b, &q, mean);
@@ -60,7 +60,7 @@ void lift_likelihood_only(const lift_table *t, const lift_window *w, const lift_
         length[i] = sqrt(S[i * (ld + 1)]);
     fit.A = S;
     fit.centre = fit.heading; /* the turn takes no part */
-    memset(S, 0, (size_t)(t->n + 1) * (size_t)ld * sizeof *S);
+    memset(S, 0, (size_t)ld * (size_t)ld * sizeof *S);
     for (int32_t f = 0; f < w->frames; f++) {
         lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
         lift_add(&plain, &fit, w->at[f], &seen, NULL, 0.0, NULL);
@@ -150,7 +150,7 @@ void lift_covariance(const lift_table *t, const lift_belief *b, lift_belief *spa
 {
     int32_t const n = t->n, ld = t->ld;
     double *const Y = spare->A;
-    memset(Y, 0, (size_t)(n + 1) * (size_t)ld * sizeof *Y);
+    memset(Y, 0, (size_t)ld * (size_t)ld * sizeof *Y);
     for (int32_t i = 0; i < n; i++)
         Y[i * (ld + 1)] = 1.0;
     t->run->dense_forward(b->U, n, ld, Y, ld, ld);

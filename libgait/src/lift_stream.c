@@ -131,6 +131,21 @@ static bool solve_part(const lift_table *t, lift_part *part)
     return ok;
 }
 
+/* Where a segment puts what is seen in a frame: s->guess. */
+static void guess_frame(const lift_table *t, lift_stream *s, const lift_part *part, uint64_t frame)
+{
+    lift_seen const seen = lift_stream_frame(t, s, frame);
+    int32_t marker[GAIT_MAX_MARKERS];
+    lift_query q = {.at = lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)),
+                    .marker = marker};
+    for (int32_t j = 0; j < t->prior.markers; j++)
+        if (lift_seen_at(&seen, j))
+            marker[q.count++] = j;
+    lift_read(t, &part->belief[part->best], &q, s->mean, NULL);
+    for (int32_t r = 0; r < q.count; r++)
+        memcpy(s->guess + 3 * marker[r], s->mean + 3 * r, 3 * sizeof *s->mean);
+}
+
 /* Begin segment `index` where the one before it will be, and add the frames that fall into it. */
 static bool open_part(const lift_table *t, lift_stream *s, int64_t index)
 {
@@ -138,18 +153,11 @@ static bool open_part(const lift_table *t, lift_stream *s, int64_t index)
     lift_part *const part = lift_stream_part(s, index);
     *part = (lift_part){.index = index, .best = before->best, .belief = part->belief};
     for (int32_t c = 0; c < t->prior.components; c++)
-        lift_continue(t, &before->belief[before->best], c, &part->belief[c], s->guess, s->mean);
-    lift_query q = {.count = t->prior.markers};
-    int32_t all[GAIT_MAX_MARKERS];
-    for (int32_t j = 0; j < t->prior.markers; j++)
-        all[j] = j;
-    q.marker = all;
+        lift_continue(t, &before->belief[before->best], c, &part->belief[c], s->guess);
     for (uint64_t f = oldest(s); f < s->pushed; f++) {
-        double const time = lift_stream_time(s, f);
-        if (!lift_stream_covers(s, index, time))
+        if (!lift_stream_covers(s, index, lift_stream_time(s, f)))
             continue;
-        q.at = lift_stream_moment(t, s, index - 1, time);
-        lift_read(t, &before->belief[before->best], &q, s->guess, NULL);
+        guess_frame(t, s, before, f);
         add_frame(t, s, part, f, s->guess, NULL);
     }
     return solve_part(t, part);

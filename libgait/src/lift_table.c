@@ -17,18 +17,31 @@ void lift_table_layout(arena *a, lift_table *t)
     t->row = TAKE(a, float, points * 3 * (size_t)t->lanes);
     t->W = TAKE(a, double, 2 * (size_t)p->markers * (size_t)t->ld);
     t->shape = TAKE(a, double, 3 * (size_t)t->lanes);
-    t->Z = TAKE(a, double, (size_t)t->n *(size_t)t->width);
+    t->V = TAKE(a, float, (size_t)t->ld *(size_t)(t->width + t->ld));
+    t->Z = TAKE(a, double, (size_t)t->ld *(size_t)t->width);
+}
+
+/* Index of a marker, -1: the prior does not know it. */
+static int32_t marker_named(const segment_prior *p, const char *name)
+{
+    for (int32_t j = 0; j < p->markers; j++)
+        if (strcmp(p->name[j], name) == 0)
+            return j;
+    return -1;
 }
 
 void lift_table_fill(lift_table *t)
 {
+    static const char *const trunk[4] = {"r_hip", "l_hip", "r_shoulder", "l_shoulder"};
     const segment_prior *const p = &t->prior;
     int32_t const J3 = 3 * p->markers;
     t->stature = t->cfg.stature > 0.0 ? t->cfg.stature : (double)p->stature;
     t->growth = t->cfg.stature_sd / t->stature;
     t->gamma = t->cfg.residual < 0.0 ? (double)p->gamma : t->cfg.residual;
+    for (int32_t i = 0; i < 4; i++)
+        t->trunk[i] = marker_named(p, trunk[i]);
     memset(t->W, 0, 2 * (size_t)p->markers * (size_t)t->ld * sizeof *t->W);
-    memset(t->Z, 0, (size_t)t->n * (size_t)t->width * sizeof *t->Z);
+    memset(t->Z, 0, (size_t)t->ld * (size_t)t->width * sizeof *t->Z);
     float *to = t->row;
     for (int32_t c = 0; c < p->components; c++)
         for (int32_t f = 0; f < p->frames; f++)
@@ -39,7 +52,7 @@ void lift_table_fill(lift_table *t)
 
 void lift_belief_layout(arena *a, const lift_table *t, lift_belief *b)
 {
-    size_t const square = (size_t)(t->n + 1) * (size_t)t->ld;
+    size_t const square = (size_t)t->ld * (size_t)t->ld;
     b->theta = TAKE(a, double, (size_t)t->n);
     b->A = TAKE(a, double, square);
     b->U = TAKE(a, double, square);

@@ -35,17 +35,19 @@ typedef struct lift_table { /* sizes and places that every segment shares */
     gait_lift_config cfg;
     eye eye;
     const kernels *run;
-    int32_t n, ld; /* unknowns; padded n + 1 */
-    int32_t size;  /* index of the stature, -1: known */
-    int32_t turn;  /* index of the heading, the last; -1: known */
-    int32_t lanes; /* modes padded */
-    int32_t width; /* 3 J padded */
+    int32_t n, ld;    /* unknowns; padded n + 1 */
+    int32_t size;     /* index of the stature, -1: known */
+    int32_t turn;     /* index of the heading, the last; -1: known */
+    int32_t lanes;    /* modes padded */
+    int32_t width;    /* 3 J padded */
+    int32_t trunk[4]; /* right and left hip, right and left shoulder; -1: the prior does not know it */
     double stature, gamma;
     double growth; /* share of the stature that is one deviation */
     float *row;    /* K x F x J x 3 x lanes: modes, side by side */
     double *W;     /* 2 J x ld: white rows of a frame */
     double *shape; /* 3 x lanes: the modes of one marker at one moment */
-    double *Z;     /* n x width */
+    float *V;      /* ld x (width + ld): the same by what is left of it after observing */
+    double *Z;     /* ld x width: what an unknown moves; rows of as many numbers as are asked for, padded */
 } lift_table;
 
 void lift_table_layout(arena *a, lift_table *t);

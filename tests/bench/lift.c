@@ -1,5 +1,5 @@
 /* lift.c - speed of lifting: microseconds of CPU per frame of a stream of 15 points, estimate included, by instruction
- * set; segments per second by the gain and one by one. */
+ * set; segments per second by the gain and one by one; what is wanted of the best set, and whether it was reached. */
 #include "common/file.h"
 #include "common/options.h"
 #include "gait.h"
@@ -11,6 +11,9 @@
 #include <time.h>
 
 enum { POINTS = 15, RATE = 30, BATCH = 200 };
+
+#define WANTED_US       50.0    /* of a frame, on one core */
+#define WANTED_SEGMENTS 10000.0 /* a second */
 
 static struct settings {
     char model[OPTION_TEXT];
@@ -31,7 +34,8 @@ typedef struct bench {
     gait_lift *lift;
     void *memory;
     size_t bytes;
-    double *uv, *sd, *mean; /* a segment; BATCH of them */
+    double *uv, *sd, *mean;    /* a segment; BATCH of them */
+    double frame_us, segments; /* of the last instruction set: mean of a frame; by the gain, a second */
 } bench;
 
 /* CPU time of this thread, microseconds. */
@@ -121,10 +125,11 @@ static bool stream(bench *b, uint32_t mask)
         }
     }
     if (ok && count > 0) {
+        b->frame_us = sum / count;
         qsort(took, (size_t)count, sizeof *took, by_size);
         printf("stream  %-7s %3d points  us/frame mean %6.1f median %6.1f p99 %6.1f max %6.1f  start %.0f us "
                " %zu bytes\n",
-               gait_cpu_name(mask), POINTS, sum / count, took[count / 2], took[(int)(0.99 * count)],
+               gait_cpu_name(mask), POINTS, b->frame_us, took[count / 2], took[(int)(0.99 * count)],
                took[count - 1], start_us, b->bytes);
     }
     free(took);
@@ -151,8 +156,9 @@ static bool batch(bench *b, uint32_t mask)
         if (gait_lift_segment(b->lift, b->uv + (size_t)k * points * 2, b->sd, &fit, NULL) != GAIT_OK)
             return false;
     double const each_us = (now() - middle) / BATCH;
+    b->segments = 1e6 / gain_us;
     printf("batch   %-7s %3d points  segments/s by the gain %.0f, one by one %.0f (%.1f and %.1f us)\n",
-           gait_cpu_name(mask), POINTS, 1e6 / gain_us, 1e6 / each_us, gain_us, each_us);
+           gait_cpu_name(mask), POINTS, b->segments, 1e6 / each_us, gain_us, each_us);
     return true;
 }
 
@@ -173,6 +179,15 @@ static bool prepare(bench *b, message *why)
     return (b->uv && b->mean && b->sd) || message_set(why, "not enough memory");
 }
 
+static void verdict(const bench *b)
+{
+    printf("\nThe best instruction set                 wanted  this run\n");
+    printf("stream, us/frame of %d points, mean      < %4.0f  %8.1f  %s\n", POINTS, WANTED_US, b->frame_us,
+           b->frame_us < WANTED_US ? "reached" : "MISSED");
+    printf("batch by the gain, segments a second   >= %5.0f  %8.0f  %s\n", WANTED_SEGMENTS, b->segments,
+           b->segments >= WANTED_SEGMENTS ? "reached" : "MISSED");
+}
+
 int main(int argc, char **argv)
 {
     static bench b;
@@ -188,6 +203,8 @@ int main(int argc, char **argv)
         fprintf(stderr, "lift: %s\n", why.text);
     for (uint32_t mask = 0; ok && mask <= gait_cpu_features(); mask = 2 * mask + 1)
         ok = stream(&b, mask) && batch(&b, mask);
+    if (ok)
+        verdict(&b);
     free(b.uv);
     free(b.mean);
     free(b.sd);

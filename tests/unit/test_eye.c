@@ -102,7 +102,7 @@ static void test_noise(void)
     double const c11 = sd * sd + residual * dot(raw.g[0], raw.g[0]);
     double const c22 = sd * sd + residual * dot(raw.g[1], raw.g[1]), c12 = residual * dot(raw.g[0], raw.g[1]);
     double const det = c11 * c22 - c12 * c12;
-    CHECK_NEAR(eye_whiten(&white, sd, residual), log(det), 1e-14);
+    CHECK_NEAR(eye_whiten(&white, sd, residual), sqrt(det), 1e-14);
     double const want =
         (raw.y[0] * raw.y[0] * c22 - 2 * raw.y[0] * raw.y[1] * c12 + raw.y[1] * raw.y[1] * c11) / det;
     CHECK_NEAR(white.y[0] * white.y[0] + white.y[1] * white.y[1], want, 1e-14);

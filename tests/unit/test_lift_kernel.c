@@ -61,7 +61,8 @@ static void compare(int32_t width, int32_t modes, int32_t off)
 enum { MOST_MODES = 19, LANES = 24, MARKERS = 5, WIDTH = 3 * MARKERS + 1 };
 
 typedef struct shapes { /* what the kernels about one marker make */
-    double shape[3 * LANES], moved[3], row[LANES], columns[MOST_MODES * WIDTH], squares[WIDTH];
+    double shape[3 * LANES], moved[3], row[LANES], columns[LANES * WIDTH], squares[WIDTH];
+    float about[LANES * WIDTH]; /* columns */
 } shapes;
 
 static void run(const kernels *k, int32_t modes, shapes *s)
@@ -81,8 +82,10 @@ static void run(const kernels *k, int32_t modes, shapes *s)
     k->lift_shape(s->shape, mode[0], mode[1], 0.75, 0.25, LANES, theta, modes, s->moved);
     k->lift_row(s->row, s->shape, LANES, M[0]);
     for (int32_t r = 0; r < MARKERS; r++)
-        k->lift_columns(s->columns + 3 * r, WIDTH, s->shape, LANES, modes, M);
-    k->lift_squares(s->squares, WIDTH, s->columns, WIDTH, modes);
+        k->lift_columns(s->columns + 3 * r, WIDTH, s->shape, LANES, M);
+    for (int32_t i = 0; i < LANES * WIDTH; i++)
+        s->about[i] = (float)s->columns[i];
+    k->lift_squares(s->squares, WIDTH, s->about, WIDTH, modes);
 }
 
 /* One marker's modes: against sums in plain order, and every instruction set against the scalar one. */
@@ -93,9 +96,9 @@ static void compare_shapes(int32_t modes)
     for (int32_t a = 0; a < 3; a++) {
         double moved = 0.0, squares = 0.0;
         for (int32_t i = 0; i < modes; i++) {
-            double const column = want.columns[i * WIDTH + a];
+            double const column = want.columns[i * WIDTH + a], about = (double)want.about[i * WIDTH + a];
             moved += want.shape[a * LANES + i] * (double)number(400 + (uint32_t)i);
-            squares += column * column;
+            squares += about * about;
             CHECK(column == want.columns[i * WIDTH + 3 * (MARKERS - 1) + a]);
             CHECK(a > 0 || column == want.row[i]);
         }

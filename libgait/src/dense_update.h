@@ -1,0 +1,33 @@
+/* dense_update.h - what factoring and forward substitution spend their time in; included once for each type
+ * of NUMBER: WIDES as many as a register holds, UPDATE the function's name. */
+
+/* Columns [first, last) of rows i to i + 7 of C: += sign F'W, `count` rows of both one after the other; then,
+ * with a block T on the diagonal of F, T^-T of that. */
+static void UPDATE(NUMBER *C, int32_t ldc, int32_t i, int32_t first, int32_t last, NUMBER sign,
+                   const NUMBER *F, int32_t ldf, const NUMBER *W, int32_t ldw, int32_t count, const NUMBER *T)
+{
+    NUMBER corner[ROWS][ROWS];
+    for (int32_t k = 0; T && k < ROWS; k++) {
+        memcpy(corner[k], T + k * ldf, sizeof corner[k]);
+        corner[k][k] = 1 / corner[k][k];
+    }
+    for (int32_t j = first; j < last; j += (int32_t)(sizeof(WIDES) / sizeof(NUMBER))) {
+        NUMBER *const c = C + (size_t)i * (size_t)ldc + j;
+        const NUMBER *f = F + i, *w = W + j;
+        WIDES a[ROWS];
+        EACH_ROW(k) a[k] = sign * *(WIDES *)(void *)(c + k * ldc);
+        for (int32_t r = 0; r < count; r++, f += ldf, w += ldw) {
+            WIDES const x = *(const WIDES *)(const void *)w;
+            EACH_ROW(k) a[k] += f[k] * x;
+        }
+        EACH_ROW(k) a[k] *= sign;
+        __asm__("" : "+m"(corner)); /* else all of it is widened first, and through memory again */
+        if (T)
+            EACH_ROW(p)
+            {
+                a[p] *= corner[p][p];
+                EACH_ROW(k) if (k > p) a[k] -= corner[p][k] * a[p];
+            }
+        EACH_ROW(k) * (WIDES *)(void *)(c + k * ldc) = a[k];
+    }
+}
