@@ -203,14 +203,18 @@ def play(log: Path, *options: object) -> Outcome:
 
 
 class Listener:
-    """Collects what a tracker publishes, and sends to it."""
+    """Collects what a tracker publishes, and sends to it; `pid` is the tracker's."""
+
+    pid = 0
 
     def __init__(self, url: str) -> None:
         self._lcm = open_lcm(url)
         self.estimates: list[Any] = []
         self.statuses: list[Any] = []
+        self.lifted: list[Any] = []
         self._keep("GAIT_ESTIMATE", gaitmsg.estimate_t, self.estimates)
         self._keep("GAIT_STATUS", gaitmsg.status_t, self.statuses)
+        self._keep("GAIT_LIFT", gaitmsg.estimate_t, self.lifted)
 
     def _keep(self, channel: str, kind: Any, into: list[Any]) -> None:
         subscription = self._lcm.subscribe(channel, lambda _, data: into.append(kind.decode(data)))
@@ -242,6 +246,15 @@ class Listener:
             self._lcm.handle_timeout(200)
 
 
+def peak_kb(pid: int) -> int:
+    """Largest resident memory that a process has had; skips where the kernel does not say."""
+    lines = Path(f"/proc/{pid}/status")
+    said = re.search(r"VmHWM:\s+(\d+) kB", lines.read_text() if lines.exists() else "")
+    if not said:
+        pytest.skip("no VmHWM in /proc/PID/status")
+    return int(said.group(1))
+
+
 @contextmanager
 def daemon(url: str, *options: object) -> Iterator[tuple[Listener, Callable[[], Outcome]]]:
     """gait-trackd on a network; yields a listener and a function that ends it in good order."""
@@ -249,6 +262,7 @@ def daemon(url: str, *options: object) -> Iterator[tuple[Listener, Callable[[], 
     process = subprocess.Popen(
         command("--url", url, *options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
+    listener.pid = process.pid
 
     def finish() -> Outcome:
         process.send_signal(signal.SIGINT)

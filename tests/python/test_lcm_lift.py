@@ -15,12 +15,14 @@ import pytest
 from toy_segments import toy_blob, toy_prior
 
 from gait.camera import Camera
+from gait.lcm.link import private_url
 from gait.lcm.messages import camera_message, tracks_message
 from gait.lcm.types import gaitmsg
 from gait.lifter import LiftConfig, Lifter
 
 CAMERA = Camera.looking([0.0, -6.0, 1.4], [0.0, 0.0, 1.0], (640, 480), 700.0)
 NAMES_SEEN, FRAMES, LAG, SD = 15, 45, 4, 2.0
+GROWTH_KB = 225  # of 900 frames: 256 bytes of each message kept would be seen
 
 
 @cache
@@ -111,10 +113,22 @@ def test_the_lifter_alone_costs_the_tracker_nothing(tmp_path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_the_stream(tmp_path: Path) -> None:
-    short, _ = lift(tmp_path, events()[:10])
-    long, _ = lift(tmp_path, events())
-    size = [o.printed.split("memory_bytes ")[1].split()[0] for o in (short, long)]
-    assert size[0] == size[1]
+    """Resident memory: once every segment's place has been in use, 900 frames more add less than a page each."""
+    rig.need_multicast()
+    blob = tmp_path / "lift.gait"
+    blob.write_bytes(model()[0])
+    seen, names, peaks = observations(), model()[1][:NAMES_SEEN], []
+    with rig.daemon(private_url(), "--lift", "--lift-model", blob, "--lift-lag", LAG) as (listener, finish):
+        listener.ask(events()[:1], lambda s: s.state != s.WAITING, "the camera")
+        for first, stop in ((0, 100), (100, 1000)):
+            for i in range(first, stop):
+                _, uv, confidence = seen[i % FRAMES]
+                listener.send([("GAIT_TRACKS_0", tracks_message(names, uv, rig.utime(i), i, confidence))])
+                listener.until(lambda i=i: len(listener.lifted) > i - LAG, f"frame {i} lifted")
+            peaks.append(rig.peak_kb(listener.pid))
+        outcome = finish()
+    assert "lift_frames 1000 " in outcome.printed
+    assert peaks[1] - peaks[0] < GROWTH_KB, f"{peaks} kB after 100 and 1,000 frames"
 
 
 def damaged() -> list[tuple[str, bytes, str]]:
