@@ -113,7 +113,7 @@ def test_the_lifter_alone_costs_the_tracker_nothing(tmp_path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_the_stream(tmp_path: Path) -> None:
-    """Resident memory: once every segment's place has been in use, 900 frames more add less than a page each."""
+    """Resident memory: once every segment has been in use, 900 frames more add no more."""
     rig.need_multicast()
     blob = tmp_path / "lift.gait"
     blob.write_bytes(model()[0])
