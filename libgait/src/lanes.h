@@ -44,6 +44,21 @@ static inline void lookup_every(int32_t bytes, const void *table, const int32_t 
 #endif
 }
 
+#if defined(__AVX512F__)
+#define LANES_TABLE 64 /* words in registers */
+
+/* out[i] = table[index[i] % LANES_TABLE]; the table begins with a line of the cache. */
+static inline void lookup_table(const void *table, const int32_t *index, int32_t *out)
+{
+    const __m512i *const t = table;
+    __m512i const at = _mm512_loadu_si512(index);
+    __m512i const low = _mm512_permutex2var_epi32(_mm512_load_si512(t), at, _mm512_load_si512(t + 1));
+    __m512i const high = _mm512_permutex2var_epi32(_mm512_load_si512(t + 2), at, _mm512_load_si512(t + 3));
+    __mmask16 const beyond = _mm512_test_epi32_mask(at, _mm512_set1_epi32(LANES_TABLE / 2));
+    _mm512_storeu_si512(out, _mm512_mask_blend_epi32(beyond, low, high));
+}
+#endif
+
 /* out[i] = table[index[i]] where take[i] is negative, elsewhere 0. */
 static inline void lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
 {
@@ -212,6 +227,17 @@ static inline void bytes_costs(const int8_t *const *a, const int8_t *const *b, i
     _mm_storeu_si128((__m128i_u *)sum, _mm256_cvtepi64_epi32(_mm512_castsi512_si256(first)));
 }
 #endif
+
+/* Eight numbers, and again. */
+static inline void twice(const float *eight, float *restrict out)
+{
+#if defined(__AVX512DQ__) /* in pieces, what follows would wait for them */
+    _mm512_storeu_ps(out, _mm512_broadcast_f32x8(_mm256_loadu_ps(eight)));
+#else
+    memcpy(out, eight, 8 * sizeof *out);
+    memcpy(out + 8, eight, 8 * sizeof *out);
+#endif
+}
 
 /* Sixteen numbers of sixteen bodies: from in[number][body] to out[body][number], a cache line each. */
 static inline void deal(const float (*restrict in)[LANES], float (*restrict out)[LANES])

@@ -39,7 +39,11 @@ typedef struct like_surface {
 } like_surface;
 
 /* Numbers of one body about one limb, a line of the cache: of its view and, in one part, of a cone's sides. */
-enum { LIKE_WORDS = 16, LIKE_SUBPIXELS = 256 /* of a working pixel, in one direction */ };
+enum {
+    LIKE_WORDS = 16,
+    LIKE_SUBPIXELS = 256, /* of a working pixel, in one direction */
+    LIKE_CELL_BITS = 9    /* of them in a cell of the grid, which has two pixels */
+};
 enum { LIKE_VIEW_IMAGE = 0, LIKE_VIEW_SHIFT = 9, LIKE_VIEW_EYE = 12, LIKE_VIEW_GRAZE = 15 };
 enum {
     LIKE_SIDE_X = 0,

@@ -2,6 +2,7 @@
 #include "kernels.h"
 #include "lanes.h"
 #include "like.h"
+#include "like_hide.h"
 
 #include <string.h>
 
@@ -29,12 +30,6 @@ static inline void cone(const float *w, sides *restrict out)
 }
 
 /* The octagon's sides, twice round. */
-static inline void twice(const float *eight, float *restrict out)
-{
-    memcpy(out, eight, 8 * sizeof *out);
-    memcpy(out + 8, eight, 8 * sizeof *out);
-}
-
 static inline void ellipsoid(const like_sides *s, int32_t lane, sides *restrict out)
 {
     twice(s->part[0][lane], out->x);
@@ -47,43 +42,28 @@ static inline void ellipsoid(const like_sides *s, int32_t lane, sides *restrict 
         out->share[i] = i < 8 ? 0.25f : 0.75f;
 }
 
-typedef struct spots {                     /* points of the limbs' outlines */
-    int32_t cell[MODEL_MAX_LIMBS][LANES];  /* of the edge map: where, then what is there */
-    int32_t word[MODEL_MAX_LIMBS][LANES];  /* of the limb's mask */
-    int32_t shown[MODEL_MAX_LIMBS][LANES]; /* negative: in the image */
-    int32_t left[MODEL_MAX_LIMBS][LANES];  /* bits of the word beyond the point's */
+typedef struct spots {                    /* points of the limbs' outlines */
+    int32_t cell[MODEL_MAX_LIMBS][LANES]; /* of the edge map: where, then what is there */
+    int32_t x[MODEL_MAX_LIMBS][LANES], y[MODEL_MAX_LIMBS][LANES]; /* cell of the grid a little inside */
+    int32_t shown[MODEL_MAX_LIMBS][LANES];                        /* negative: in the image */
     int32_t normal[MODEL_MAX_LIMBS][LANES];
 } spots;
 
-static inline void place(const sides *s, const float inner[2], const rast_mask *mask, int32_t k,
-                         spots *restrict out)
+static inline void place(const sides *s, const float inner[2], int32_t k, spots *restrict out)
 {
     float const outer = 0.5f * (1.0f - LIKE_INWARD); /* cells */
-    int32_t const first = mask->first, column = mask->column;
     float const inner_x = inner[0], inner_y = inner[1];
-    uint32_t const rows = (uint32_t)(mask->last - first), width = (uint32_t)mask->width;
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++) {
         float const x = s->x[i] + s->share[i] * s->dx[i], y = s->y[i] + s->share[i] * s->dy[i];
         int32_t const u = (int32_t)x, v = (int32_t)y;
-        /* A little inside the limb its own mask tells whether something nearer hides this point. */
-        int32_t const c = (int32_t)(outer * x + inner_x) - column, r = (int32_t)(outer * y + inner_y);
         out->normal[k][i] = (int32_t)s->normal[i];
         out->cell[k][i] = v * VIEW_SIZE + u;
-        out->word[k][i] = rast_half(c, r);
-        out->left[k][i] = ~c & 31;
-        out->shown[k][i] =
-            -(((uint32_t)(u | v) < VIEW_SIZE) & ((uint32_t)c < width) & ((uint32_t)(r - first) < rows));
+        /* There the limb's own mask tells whether something nearer hides this point. */
+        out->x[k][i] = (int32_t)(outer * x + inner_x);
+        out->y[k][i] = (int32_t)(outer * y + inner_y);
+        out->shown[k][i] = -((uint32_t)(u | v) < VIEW_SIZE);
     }
-}
-
-static inline void hide(const rast_mask *mask, int32_t k, spots *restrict p)
-{
-    int32_t bits[LANES];
-    lookup(mask->word, p->word[k], p->shown[k], bits);
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LANES; i++)
-        p->shown[k][i] = (int32_t)((uint32_t)bits[i] << p->left[k][i]);
 }
 
 /* Apart from the look-ups, which might read the sums: they would be kept in memory.  n'Tn = (trace + (xx - yy) cos 2a +
@@ -103,21 +83,20 @@ static like_edge_tally tally(const spots *p, int32_t limbs)
 void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
 {
     int32_t const limbs = b->setup->limbs, lane = b->lane;
-    const rast_mask *const visible = b->layers->visible;
     spots p;
     for (int32_t l = 0; l < limbs; l++) {
         const like_sides *const o = &b->sides->limb[l];
         sides s;
         if (b->setup->geometry[l].shape == LIMB_ELLIPSOID) {
             ellipsoid(o, lane, &s);
-            place(&s, o->part[2][lane] + 8, &visible[l], l, &p);
+            place(&s, o->part[2][lane] + 8, l, &p);
         } else { /* twice, so that the sides need not be written down */
             cone(o->part[0][lane], &s);
-            place(&s, o->part[0][lane] + LIKE_SIDE_INNER, &visible[l], l, &p);
+            place(&s, o->part[0][lane] + LIKE_SIDE_INNER, l, &p);
         }
     }
     for (int32_t l = 0; l < limbs; l++)
-        hide(&visible[l], l, &p);
+        hide(&b->layers->visible[l], p.x[l], p.y[l], 0, p.shown[l]);
     for (int32_t l = 0; l < limbs; l++)
         lookup(b->features->edge, p.cell[l], p.shown[l], p.cell[l]);
     *out = tally(&p, limbs);

@@ -3,6 +3,7 @@
 #include "kernels.h"
 #include "lanes.h"
 #include "like.h"
+#include "like_hide.h"
 #include <string.h>
 
 typedef struct spots {                      /* where the points of half a limb are */
@@ -38,24 +39,6 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
     }
 }
 
-/* Points hidden by what is nearer are not shown. */
-static inline void hide(const rast_mask *mask, spots *restrict p)
-{
-    int32_t at[LIKE_FACING], bits[LIKE_FACING];
-    uint32_t const width = (uint32_t)mask->width, rows = (uint32_t)(mask->last - mask->first);
-    /* A cell of the grid has two pixels. */
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++) {
-        int32_t const x = (p->u[i] >> 9) - mask->column, y = p->v[i] >> 9;
-        at[i] = rast_half(x, y);
-        p->shown[i] &= -(((uint32_t)x < width) & ((uint32_t)(y - mask->first) < rows));
-    }
-    lookup(mask->word, at, p->shown, bits);
-#pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++)
-        p->shown[i] = (int32_t)((uint32_t)bits[i] << (~((p->u[i] >> 9) - mask->column) & 31));
-}
-
 /* Bilinear look-up in the surface map, rounded towards 0. */
 static inline void look_up(const features *f, const spots *p, int8_t *restrict value)
 {
@@ -79,7 +62,7 @@ void KERNEL(surface_sample)(const like_setup *s, const features *f, const like_p
     for (int32_t l = 0; l < s->limbs; l++)
         place(&s->surface[l], &pose->limb[l], lane, &p[l]);
     for (int32_t l = 0; l < s->limbs; l++)
-        hide(&drawn->visible[l], &p[l]);
+        hide(&drawn->visible[l], p[l].u, p[l].v, LIKE_CELL_BITS, p[l].shown);
     for (int32_t l = 0; l < s->limbs; l++) {
         seen[l].turn = (uint8_t)pose->limb[l].turn[lane];
         look_up(f, &p[l], seen[l].value);

@@ -39,11 +39,10 @@ static inline uint64_t rast_bits(int32_t begin, int32_t end)
     return (ones >> ((uint32_t)(begin - end) & 63u)) << ((uint32_t)begin & 63u);
 }
 
-/* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y; x may be
- * negative, then it is none. */
+/* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y. */
 static inline int32_t rast_half(int32_t x, int32_t y)
 {
-    return (x >> 6) * 2 * (RAST_SIZE + RAST_SPARE) + (y << 1) + (x >> 5 & 1);
+    return (y << 1) + (x >> 5) + (x < 64 ? 0 : 2 * (RAST_SIZE + RAST_SPARE) - 2);
 }
 
 /* Number of set bits, without a table or an ISA extension. */

@@ -303,8 +303,8 @@ static void test_edges(void)
             rast_mask *const mask = &v->drawn.visible[l];
             v->setup.geometry[l].shape = draw(l, round + 100) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
             v->outline.limb[l].depth[lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
-            mask->first = (int32_t)(draw(l, round + 300) % 5 * 16);
-            mask->last = mask->first + (int32_t)(draw(l, round + 400) % 5 * 16);
+            mask->first = (int32_t)(draw(l, round + 300) % 65);
+            mask->last = mask->first + (int32_t)(draw(l, round + 400) % 64);
             mask->width = round % 4 ? 64 : RAST_SIZE;
             mask->column = round % 4 ? (int32_t)(draw(l, round + 500) % 8 * RAST_STEP) : 0;
             for (uint32_t y = 0; y < RAST_SIZE; y++)
