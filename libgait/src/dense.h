@@ -7,11 +7,17 @@
 #define GAIT_DENSE_H
 #include "kernels.h"
 
-enum { DENSE_LANES = 8 };
+enum { DENSE_LANES = 8, DENSE_FLOATS = 16 }; /* numbers in the widest register: doubles, floats */
 
 static inline int32_t dense_padded(int32_t n)
 {
     return (n + DENSE_LANES - 1) / DENSE_LANES * DENSE_LANES;
+}
+
+/* Columns for dense_forward_float. */
+static inline int32_t dense_padded_float(int32_t n)
+{
+    return (n + DENSE_FLOATS - 1) / DENSE_FLOATS * DENSE_FLOATS;
 }
 
 /* theta = U^-1 z, from a factored A. */

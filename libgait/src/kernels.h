@@ -39,7 +39,7 @@ struct walker_block;
     K(bool, dense_factor, (double *A, int32_t n, int32_t ld))                                                \
     /* Z = U^-T Z, `width` columns (a multiple of DENSE_LANES), dense_padded(n) rows of ldz numbers */       \
     K(void, dense_forward, (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))  \
-    /* V = U^-T Z with floats, ld x width both (width as above); past V lies room for ld x ld more */        \
+    /* V = U^-T Z with floats, ld x width both (of DENSE_FLOATS); past V lies room for ld x ld more */       \
     K(void, dense_forward_float,                                                                             \
       (const double *U, int32_t n, int32_t ld, const double *Z, int32_t width, float *V))                    \
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \

@@ -62,7 +62,7 @@ void lift_modes(const lift_table *t, const lift_belief *b, const lift_query *q, 
 {
     lift_axes const axes = lift_axes_now(t, b);
     lift_moment const moment = lift_find_moment(t, q->at);
-    size_t const width = (size_t)dense_padded(3 * q->count);
+    size_t const width = (size_t)dense_padded_float(3 * q->count);
     double P[3][3];
     set_identity(P);
     for (int32_t r = 0; r < q->count; r++) {
@@ -78,7 +78,7 @@ void lift_read(const lift_table *t, const lift_belief *b, const lift_query *q, d
 {
     lift_axes const axes = lift_axes_now(t, b);
     lift_moment const moment = lift_find_moment(t, q->at);
-    int32_t const count = 3 * q->count, width = dense_padded(count);
+    int32_t const count = 3 * q->count, width = dense_padded_float(count);
     for (int32_t i = 0; sd && count < width && i < t->n; i++)
         memset(t->Z + i * width + count, 0, (size_t)(width - count) * sizeof *t->Z);
     for (int32_t r = 0; r < q->count; r++) {

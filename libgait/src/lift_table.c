@@ -13,7 +13,7 @@ void lift_table_layout(arena *a, lift_table *t)
     t->turn = t->cfg.heading_sd == 0.0 ? -1 : t->n++;
     t->ld = dense_padded(t->n + 1);
     t->lanes = dense_padded(p->modes);
-    t->width = dense_padded(3 * p->markers);
+    t->width = dense_padded_float(3 * p->markers);
     t->row = TAKE(a, float, points * 3 * (size_t)t->lanes);
     t->W = TAKE(a, double, 2 * (size_t)p->markers * (size_t)t->ld);
     t->shape = TAKE(a, double, 3 * (size_t)t->lanes);

@@ -1,4 +1,5 @@
 /* Positions by modes: every instruction set against the scalar definition, and that against the sum in order. */
+#include "dense.h"
 #include "rng.h"
 
 #include "check.h"
@@ -58,57 +59,83 @@ static void compare(int32_t width, int32_t modes, int32_t off)
     }
 }
 
-enum { MOST_MODES = 19, LANES = 24, MARKERS = 5, WIDTH = 3 * MARKERS + 1 };
+/* ---- the kernels about one marker ---- */
+enum { MOST_MODES = 27, MOST_LANES = 32, MARKERS = 5, WIDTH = 3 * MARKERS + 1, OFFSETS = 8 };
+enum { SHAPE, MOVED, ROW, COLUMNS, SQUARES, PARTS };
 
-typedef struct shapes { /* what the kernels about one marker make */
-    double shape[3 * LANES], moved[3], row[LANES], columns[LANES * WIDTH], squares[WIDTH];
-    float about[LANES * WIDTH]; /* columns */
+typedef struct shapes { /* what they make, each between canaries */
+    _Alignas(64) unsigned char memory[PARTS][(MOST_LANES * WIDTH + OFFSETS) * sizeof(double) + 2 * GUARD];
+    guarded in[PARTS];
+    double *part[PARTS];
+    float about[MOST_LANES * WIDTH + OFFSETS]; /* columns */
 } shapes;
 
-static void run(const kernels *k, int32_t modes, shapes *s)
+static void clear(shapes *s, int32_t lanes, size_t off)
 {
-    float mode[2][3 * LANES];
-    double theta[MOST_MODES], M[3][3];
-    for (uint32_t i = 0; i < 3 * LANES; i++) {
-        bool const used = (int32_t)(i % LANES) < modes;
-        mode[0][i] = used ? number(i) : 0.0f;
-        mode[1][i] = used ? number(200 + i) : 0.0f;
+    const int32_t numbers[PARTS] = {3 * lanes, 3, lanes, lanes * WIDTH, WIDTH};
+    for (int k = 0; k < PARTS; k++) {
+        s->in[k] = guard_fill(s->memory[k] + off * sizeof(double), (size_t)numbers[k] * sizeof(double));
+        memset(s->in[k].begin, 0, s->in[k].bytes);
+        s->part[k] = (double *)(void *)s->in[k].begin;
     }
-    for (uint32_t i = 0; i < MOST_MODES; i++)
-        theta[i] = (double)number(400 + i);
-    for (uint32_t i = 0; i < 9; i++)
-        M[i / 3][i % 3] = (double)number(600 + i);
-    memset(s, 0, sizeof *s);
-    k->lift_shape(s->shape, mode[0], mode[1], 0.75, 0.25, LANES, theta, modes, s->moved);
-    k->lift_row(s->row, s->shape, LANES, M[0]);
-    for (int32_t r = 0; r < MARKERS; r++)
-        k->lift_columns(s->columns + 3 * r, WIDTH, s->shape, LANES, M);
-    for (int32_t i = 0; i < LANES * WIDTH; i++)
-        s->about[i] = (float)s->columns[i];
-    k->lift_squares(s->squares, WIDTH, s->about, WIDTH, modes);
 }
 
-/* One marker's modes: against sums in plain order, and every instruction set against the scalar one. */
-static void compare_shapes(int32_t modes)
+/* Everything begins `off` numbers past an aligned place. */
+static void run(const kernels *k, int32_t modes, size_t off, shapes *s)
 {
-    static shapes want, have;
-    run(isa_scalar(), modes, &want);
+    static _Alignas(64) float mode[2][3 * MOST_LANES + OFFSETS];
+    static _Alignas(64) double theta[MOST_MODES + OFFSETS];
+    int32_t const lanes = dense_padded(modes);
+    double M[3][3];
+    clear(s, lanes, off);
+    for (int32_t i = 0; i < 3 * lanes; i++)
+        for (int32_t frame = 0; frame < 2; frame++)
+            mode[frame][off + (size_t)i] = i % lanes < modes ? number((uint32_t)(i + 200 * frame)) : 0.0f;
+    for (int32_t i = 0; i < modes; i++)
+        theta[off + (size_t)i] = (double)number(400 + (uint32_t)i);
+    for (uint32_t i = 0; i < 9; i++)
+        M[i / 3][i % 3] = (double)number(600 + i);
+    k->lift_shape(s->part[SHAPE], mode[0] + off, mode[1] + off, 0.75, 0.25, lanes, theta + off, modes,
+                  s->part[MOVED]);
+    k->lift_row(s->part[ROW], s->part[SHAPE], lanes, M[0]);
+    for (int32_t r = 0; r < MARKERS; r++)
+        k->lift_columns(s->part[COLUMNS] + 3 * r, WIDTH, s->part[SHAPE], lanes, M);
+    for (int32_t i = 0; i < lanes * WIDTH; i++)
+        s->about[off + (size_t)i] = (float)s->part[COLUMNS][i];
+    k->lift_squares(s->part[SQUARES], (int32_t)(modes % WIDTH) + 1, s->about + off, WIDTH, modes);
+}
+
+/* In plain order, about the same sums. */
+static void check_sums(const shapes *s, int32_t modes)
+{
+    int32_t const lanes = dense_padded(modes);
+    const double *const columns = s->part[COLUMNS];
     for (int32_t a = 0; a < 3; a++) {
         double moved = 0.0, squares = 0.0;
         for (int32_t i = 0; i < modes; i++) {
-            double const column = want.columns[i * WIDTH + a], about = (double)want.about[i * WIDTH + a];
-            moved += want.shape[a * LANES + i] * (double)number(400 + (uint32_t)i);
+            double const column = columns[i * WIDTH + a], about = (double)(float)column;
+            moved += s->part[SHAPE][a * lanes + i] * (double)number(400 + (uint32_t)i);
             squares += about * about;
-            CHECK(column == want.columns[i * WIDTH + 3 * (MARKERS - 1) + a]);
-            CHECK(a > 0 || column == want.row[i]);
+            CHECK(column == columns[i * WIDTH + 3 * (MARKERS - 1) + a]);
+            CHECK(a > 0 || column == s->part[ROW][i]);
         }
-        CHECK(fabs(moved - want.moved[a]) < 1e-12 && fabs(squares - want.squares[a]) < 1e-12);
+        CHECK(fabs(moved - s->part[MOVED][a]) < 1e-12);
+        CHECK(fabs((a <= modes % WIDTH ? squares : 0.0) - s->part[SQUARES][a]) < 1e-12);
     }
-    for (int32_t i = 0; i < modes; i++)
-        CHECK(want.columns[i * WIDTH + WIDTH - 1] == 0.0); /* past the last marker */
-    for (int k = 0; k < isa_count(); k++) {
-        run(isa_at(k), modes, &have);
-        CHECK(memcmp(&have, &want, sizeof have) == 0);
+    for (int32_t i = 0; i < lanes; i++)
+        CHECK(columns[i * WIDTH + WIDTH - 1] == 0.0); /* past the last marker */
+}
+
+static void compare_shapes(int32_t modes)
+{
+    static shapes want, have;
+    size_t const off = (size_t)modes % OFFSETS;
+    run(isa_scalar(), modes, off, &want);
+    check_sums(&want, modes);
+    for (int k = -1; k < isa_count(); k++) {
+        run(k < 0 ? isa_scalar() : isa_at(k), modes, off, &have);
+        for (int p = 0; p < PARTS; p++)
+            CHECK(guard_whole(&have.in[p]) && memcmp(have.part[p], want.part[p], have.in[p].bytes) == 0);
     }
 }
 
@@ -116,7 +143,6 @@ int main(void)
 {
     for (int32_t modes = 1; modes <= MOST_MODES; modes++)
         compare_shapes(modes);
-
     for (int32_t width = 1; width <= WIDEST; width++)
         for (int32_t modes = 0; modes <= MODES; modes++)
             compare(width, modes, width % MISALIGNED);
