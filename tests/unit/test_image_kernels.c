@@ -66,16 +66,17 @@ static void sample_case(uint32_t n)
     map.u0 = (float)(noise(9 * n + 2) % 1000) * 1e-3f * (float)w - 127.5f / map.scale;
     map.v0 = (float)(noise(9 * n + 3) % 1000) * 1e-3f * (float)h - 127.5f / map.scale;
     view_planes out[2];
-    uint64_t inside[2][RAST_SIZE][2];
+    static _Alignas(8) unsigned char inside[2][RAST_SIZE * RAST_WORDS * 8 + 2 * GUARD];
     for (int k = -1; k < isa_count(); k++) {
         const kernels *const run = k < 0 ? isa_scalar() : isa_at(k);
         int const to = k >= 0;
-        guarded const g = guard_fill(memory[to], PLANES * VIEW_PIXELS);
+        guarded const g = guard_fill(memory[to], PLANES * VIEW_PIXELS),
+                      in = guard_fill(inside[to], RAST_SIZE * RAST_WORDS * 8);
         for (int32_t c = 0; c < PLANES; c++)
             out[to].channel[c] = g.begin + c * VIEW_PIXELS;
         view_sample(run, &map, &cam, &im, &out[to]);
-        run->view_inside(&map, &cam, inside[to]);
-        CHECK(guard_whole(&g) && out[to].channels == channels);
+        run->view_inside(&map, &cam, (uint64_t (*)[2])(void *)in.begin);
+        CHECK(guard_whole(&g) && guard_whole(&in) && out[to].channels == channels);
         CHECK(!to || memcmp(memory[0], memory[1], sizeof memory[0]) == 0);
         CHECK(!to || memcmp(inside[0], inside[1], sizeof inside[0]) == 0);
     }
