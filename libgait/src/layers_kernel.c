@@ -1,6 +1,7 @@
 /* The limbs of a block of bodies as lines in the grid, one lane a body; then one body's lines as masks, one lane a
  * row, each limb without what stands before it. */
 #include "kernels.h"
+#include "lanes.h"
 #include "layers.h"
 
 #include <string.h>
@@ -192,21 +193,11 @@ static inline void bound(pair p, float y, float *left, float *right)
     *right = f_min(p.right_at + p.right_slope * y, *right);
 }
 
-/* The first cell whose centre is at or right of a line; so little left of it is rounding. */
+/* The first cell of the word whose centre is at or right of a line; so little left of it is rounding. */
 static inline int32_t cell_from(float x)
 {
     float const slack = 1.0f / 1024.0f; /* cells */
-    return (int32_t)(x + (1.0f - slack));
-}
-
-/* The limb's bits in a word go behind those of the body; none in rows that are not the limb's. */
-static inline void cover(float left, float right, int32_t row, int32_t rows, uint64_t *restrict whole,
-                         uint64_t *restrict seen)
-{
-    int32_t const begin = cell_from(left), end = cell_from(right);
-    uint64_t const mine = rast_bits(begin, (uint32_t)row < (uint32_t)rows ? end : 0), nearer = *whole;
-    *whole = nearer | mine;
-    *seen = mine & ~nearer;
+    return i_clamp((int32_t)(x + (1.0f - slack)), 0, 64);
 }
 
 /* The bits in the word that begins at column `base`, by LAYERS_ROWS at once, so that there is no remainder; what was
@@ -217,15 +208,17 @@ KERNEL_ROW void draw_cone(const layers_limb *limb, int32_t lane, int32_t base, u
     int32_t const top = limb->top[lane], end = limb->end[lane];
     pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
     pair const c = pair_of(limb, 2, lane, base);
-    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS)
-        KERNEL_LANES
-    for (int32_t i = 0; i < LAYERS_ROWS; i++) {
-        float const y = (float)(strip + i);
-        float left = 0.0f, right = 64.0f;
-        bound(a, y, &left, &right);
-        bound(b, y, &left, &right);
-        bound(c, y, &left, &right);
-        cover(left, right, strip + i - top, end - top, whole + strip + i, seen + strip + i);
+    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS) {
+        int32_t from[LAYERS_ROWS], to[LAYERS_ROWS];
+        for (int32_t i = 0; i < LAYERS_ROWS; i++) {
+            float const y = (float)(strip + i);
+            float left = a.left_at + a.left_slope * y, right = a.right_at + a.right_slope * y;
+            bound(b, y, &left, &right);
+            bound(c, y, &left, &right);
+            from[i] = cell_from(left);
+            to[i] = (uint32_t)(strip + i - top) < (uint32_t)(end - top) ? cell_from(right) : 0;
+        }
+        cover(from, to, whole + strip, seen + strip);
     }
 }
 
@@ -235,16 +228,18 @@ KERNEL_ROW void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t ba
     int32_t const top = limb->top[lane], end = limb->end[lane];
     pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
     pair const c = pair_of(limb, 2, lane, base), d = pair_of(limb, 3, lane, base);
-    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS)
-        KERNEL_LANES
-    for (int32_t i = 0; i < LAYERS_ROWS; i++) {
-        float const y = (float)(strip + i);
-        float left = 0.0f, right = 64.0f;
-        bound(a, y, &left, &right);
-        bound(b, y, &left, &right);
-        bound(c, y, &left, &right);
-        bound(d, y, &left, &right);
-        cover(left, right, strip + i - top, end - top, whole + strip + i, seen + strip + i);
+    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS) {
+        int32_t from[LAYERS_ROWS], to[LAYERS_ROWS];
+        for (int32_t i = 0; i < LAYERS_ROWS; i++) {
+            float const y = (float)(strip + i);
+            float left = a.left_at + a.left_slope * y, right = a.right_at + a.right_slope * y;
+            bound(b, y, &left, &right);
+            bound(c, y, &left, &right);
+            bound(d, y, &left, &right);
+            from[i] = cell_from(left);
+            to[i] = (uint32_t)(strip + i - top) < (uint32_t)(end - top) ? cell_from(right) : 0;
+        }
+        cover(from, to, whole + strip, seen + strip);
     }
 }
 
