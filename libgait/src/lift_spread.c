@@ -146,14 +146,33 @@ void lift_uncertain(const lift_table *t, const lift_belief *b, lift_belief *spar
     displacements(t, b, V, count, mode);
 }
 
+/* U^-T (ld x ld), of which Q is the product with its transpose. */
+static double *inverse_root(const lift_table *t, const lift_belief *b, lift_belief *spare)
+{
+    double *const Y = spare->A;
+    memset(Y, 0, (size_t)t->ld * (size_t)t->ld * sizeof *Y);
+    for (int32_t i = 0; i < t->n; i++)
+        Y[i * (t->ld + 1)] = 1.0;
+    t->run->dense_forward(b->U, t->n, t->ld, Y, t->ld, t->ld);
+    return Y;
+}
+
+double lift_scale(const lift_table *t, const lift_belief *b, lift_belief *spare)
+{
+    const double *const Y = inverse_root(t, b, spare);
+    double size = LIFT_FREEDOM, observed = LIFT_FREEDOM + t->prior.modes; /* and less what Q leaves open */
+    for (int32_t i = 0; i < t->prior.modes; i++) {
+        size += b->theta[i] * b->theta[i];
+        for (int32_t k = i; k < t->n; k++)
+            observed -= Y[k * t->ld + i] * Y[k * t->ld + i];
+    }
+    return size / observed;
+}
+
 void lift_covariance(const lift_table *t, const lift_belief *b, lift_belief *spare, double *Q)
 {
     int32_t const n = t->n, ld = t->ld;
-    double *const Y = spare->A;
-    memset(Y, 0, (size_t)ld * (size_t)ld * sizeof *Y);
-    for (int32_t i = 0; i < n; i++)
-        Y[i * (ld + 1)] = 1.0;
-    t->run->dense_forward(b->U, n, ld, Y, ld, ld);
+    const double *const Y = inverse_root(t, b, spare);
     for (int32_t i = 0; i < n; i++)
         for (int32_t j = i; j < n; j++) {
             double sum = 0.0;

@@ -120,6 +120,7 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_lift_positions", [_HANDLE, c_void_p, c_void_p], _STATUS),
     ("gait_lift_unknowns", [_HANDLE], c_int32),
     ("gait_lift_posterior", [_HANDLE, c_void_p, c_void_p], _STATUS),
+    ("gait_lift_scale", [_HANDLE], c_double),
     ("gait_lift_least_squares", [_HANDLE, c_void_p], _STATUS),
     ("gait_lift_uncertain", [_HANDLE, c_int32, c_void_p, c_void_p], _STATUS),
     ("gait_lift_fix", [_HANDLE, c_void_p, _ERR], _STATUS),

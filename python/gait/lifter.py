@@ -280,6 +280,14 @@ class Lifter:
         check(library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data))
         return mean, covariance
 
+    def scale(self) -> float:
+        """By what to multiply deviations for a motion as far from the prior's mean as the last segment.
+
+        Above 1 where its modes are larger than the prior expects, below 1 where they are smaller (a scale
+        of all variances with an inverse gamma prior, as of Student's t).
+        """
+        return float(library().gait_lift_scale(self._handle))
+
     def least_squares(self) -> Array:
         """Fit the last segment's observations alone (F, J, 3): least squares of minimum norm."""
         mean = np.empty((*self._shape, 3))

@@ -20,6 +20,7 @@ from gait.lifter import LiftConfig, Lifter, LiftFlag
 from gait.skeleton import axis_rotation
 
 FRAMES, MARKERS = 10, 19
+FREEDOM = 10  # of the scale of a motion
 CAMERA = Camera(
     width=1280,
     height=720,
@@ -80,6 +81,10 @@ def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float
     np.testing.assert_allclose(alpha, papers, atol=1e-7)  # the paper's own form
     np.testing.assert_allclose(covariance, want.covariance, atol=1e-12)
     assert np.linalg.eigvalsh(np.eye(len(alpha)) - covariance).min() > -1e-12  # Q <= Lambda
+    modes = slice(len(alpha) - gaussian.rigid)
+    resolved = 1 - np.diag(covariance)[modes]
+    scale = np.sqrt((FREEDOM + np.sum(alpha[modes] ** 2)) / (FREEDOM + resolved.sum()))
+    assert lifter.scale() == pytest.approx(scale, rel=1e-9)
     np.testing.assert_allclose(lifter.least_squares(), reference.likelihood_only(gaussian, rows), atol=1e-8)
 
 
@@ -118,6 +123,23 @@ def test_drawn_from_the_prior_intervals_cover_what_they_say() -> None:
         count += len(alpha)
     assert np.mean(inside) == pytest.approx(0.9, abs=0.01)
     assert squares / count == pytest.approx(1.0, abs=3 * np.sqrt(2 / count) + 0.05)
+
+
+@pytest.mark.parametrize("far", [1.0, 2.0, 4.0])
+def test_scaled_intervals_hold_motions_of_any_distance_from_the_mean(far: float) -> None:
+    contents, prior = model(size=20)
+    lifter = Lifter(contents, AXES, known(heading_sd=0.0, place_sd=(0.0, 0.0, 0.0)))
+    rng = np.random.default_rng(8)
+    gaussian = posterior.place(prior, ground_sd=0.0, height_sd=0.0)
+    inside = {"plain": [], "scaled": []}
+    for _ in range(100):
+        truth = gaussian.mean + far * (gaussian.draw(rng) - gaussian.mean)
+        lifter.segment(truth @ AXES.T + rng.normal(size=(FRAMES, MARKERS, 2)) * 0.003, 0.003)
+        mean, sd = lifter.positions()
+        for kind, scale in (("plain", 1.0), ("scaled", lifter.scale())):
+            inside[kind].append(np.abs(mean - truth)[..., 1] < 1.6449 * scale * sd[..., 1])
+    assert 0.8 < np.mean(inside["scaled"]) < 0.95
+    assert far == 1.0 or np.mean(inside["plain"]) < 0.8
 
 
 def _scores(gaussian: posterior.Gaussian, truth: np.ndarray) -> np.ndarray:

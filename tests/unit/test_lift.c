@@ -189,6 +189,36 @@ static void test_uncertain(void)
     CHECK(gait_lift_uncertain(l, gait_lift_unknowns(l) + 1, mode[0][0], deviation) == GAIT_ERR_ARG);
 }
 
+/* The scale is 1 where nothing tells of the modes, and grows with how far the motion is from the mean. */
+static void test_scale(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
+    c.heading_sd = 0.0;
+    gait_lift *const l = toy_lift_open(&c);
+    const double place[3] = {0.0};
+    double last = 0.0;
+    gait_lift_fit fit;
+    CHECK(gait_lift_scale(l) == 0.0 && gait_lift_scale(NULL) == 0.0);
+    for (int far = 0; far < 4; far++) {
+        toy_draw(&toy_lift_prior, 0, 2, 0.0, place, X);
+        for (int i = 0; i < TOY_SEGMENT; i++)
+            for (int a = 0; a < 3; a++) {
+                double const middle = (double)toy_lift_prior.mean[0][i][a] * (double)TOY_STATURE;
+                X[i][a] = middle + far * (X[i][a] - middle);
+            }
+        toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.001, 1, uv);
+        see_all(0.001);
+        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_scale(l) > last);
+        last = gait_lift_scale(l);
+        CHECK(far > 0 || last < 1.0);
+    }
+    CHECK(last > 1.0);
+    see_all(INFINITY);
+    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+    CHECK_NEAR(gait_lift_scale(l), 1.0, 1e-12);
+}
+
 static void test_arguments(void)
 {
     gait_lift_config const good = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -257,6 +287,7 @@ int main(void)
     test_mixture();
     test_batch();
     test_uncertain();
+    test_scale();
     test_arguments();
     test_world_axes();
     return CHECK_DONE();

@@ -1,0 +1,37 @@
+"""F1: how much of the variance of recorded motion leading modes hold, against plain singular values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gait.learn import readers, segment_corpus, segment_fit, segment_motion
+from gait.learn.segment_corpus import Corpus
+from gait.learn.segment_options import Segments
+
+MOCAP = Path(__file__).parents[3] / "shared" / "data" / "mocap" / "cmu_misc"
+FILES = ("01/01_14.amc", "02/02_04.amc", "02/02_05.amc", "02/02_07.amc")
+MODES = 50
+
+
+@pytest.mark.skipif(not MOCAP.is_dir(), reason="no motion capture here")
+def test_modes_hold_as_much_variance_as_singular_values_say() -> None:
+    wanted = Segments(source="only", people=False, modes=MODES)
+    with Corpus() as corpus:
+        for file in FILES:
+            path = MOCAP / file
+            corpus.put(path.stem, path.parent.name, path, segment_motion.of(path, readers.read(path), wanted))
+        recordings = corpus.recordings()
+        prior = segment_fit.fit(recordings, wanted)
+        rows = np.concatenate([segment_corpus.segments(r, prior.names, wanted) for r in recordings])
+    flat = rows.reshape(len(rows), -1)
+    values = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False) ** 2
+    want = np.cumsum(values / values.sum())
+    variance = prior.sd[0] ** 2
+    outside = 3 * prior.frames * prior.residual[0].sum()
+    have = np.cumsum(variance / (variance.sum() + outside))
+    assert np.abs(have - want[:MODES]).max() < 1e-3
+    assert have[[39, 49]] == pytest.approx([0.9948, 0.9972], abs=1e-3)
+    assert np.searchsorted(have, 0.91) + 1 == 10
