@@ -240,13 +240,20 @@ static inline void twice(const float *eight, float *restrict out)
 #endif
 }
 
+/* Rows of masks at once, as many as fill a register: fewer are drawn in vain. */
+#if defined(__AVX512F__)
+enum { LANES_ROWS = 16 };
+#else
+enum { LANES_ROWS = 8 };
+#endif
+
 /* Bits [begin, end) of each word, 0 to 64, go behind those of `whole`: what is seen of them, and all. */
 static inline void cover(const int32_t *begin, const int32_t *end, uint64_t *restrict whole,
                          uint64_t *restrict seen)
 {
 #if defined(__AVX512F__)
     __m512i const ones = _mm512_set1_epi64(-1);
-    for (int32_t i = 0; i < LANES; i += 8) {
+    for (int32_t i = 0; i < LANES_ROWS; i += 8) {
         __m512i const b = _mm512_cvtepu32_epi64(_mm256_loadu_si256((const __m256i_u *)(begin + i)));
         __m512i const e = _mm512_cvtepu32_epi64(_mm256_loadu_si256((const __m256i_u *)(end + i)));
         __m512i const from = _mm512_sllv_epi64(ones, b), to = _mm512_sllv_epi64(ones, e);
@@ -256,7 +263,7 @@ static inline void cover(const int32_t *begin, const int32_t *end, uint64_t *res
     }
 #elif defined(__AVX2__)
     __m256i const ones = _mm256_set1_epi64x(-1);
-    for (int32_t i = 0; i < LANES; i += 4) {
+    for (int32_t i = 0; i < LANES_ROWS; i += 4) {
         __m256i const b = _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i_u *)(begin + i)));
         __m256i const e = _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i_u *)(end + i)));
         __m256i const mine = _mm256_andnot_si256(_mm256_sllv_epi64(ones, e), _mm256_sllv_epi64(ones, b));
@@ -265,7 +272,7 @@ static inline void cover(const int32_t *begin, const int32_t *end, uint64_t *res
         _mm256_storeu_si256((__m256i_u *)(seen + i), _mm256_andnot_si256(nearer, mine));
     }
 #else
-    for (int32_t i = 0; i < LANES; i++) {
+    for (int32_t i = 0; i < LANES_ROWS; i++) {
         uint64_t const mine = rast_bits(begin[i], end[i]), nearer = whole[i];
         whole[i] = nearer | mine;
         seen[i] = mine & ~nearer;

@@ -4,9 +4,8 @@
 #include "outline.h"
 
 enum {
-    LAYERS_BAND = 8,          /* bodies, and where limbs begin, are at multiples of so many rows; */
-    LAYERS_ROWS = RAST_SPARE, /* a limb is drawn by so many at once */
-    LAYERS_LINES = 4          /* most lines that bound a polygon on one side: an octagon's */
+    LAYERS_BAND = 8, /* bodies, and where limbs begin, are at multiples of so many rows */
+    LAYERS_LINES = 4 /* most lines that bound a polygon on one side: an octagon's */
 };
 
 typedef struct layers {

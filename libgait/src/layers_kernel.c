@@ -200,7 +200,7 @@ static inline int32_t cell_from(float x)
     return i_clamp((int32_t)(x + (1.0f - slack)), 0, 64);
 }
 
-/* The bits in the word that begins at column `base`, by LAYERS_ROWS at once, so that there is no remainder; what was
+/* The bits in the word that begins at column `base`, by LANES_ROWS at once, so that there is no remainder; what was
  * stored eight rows at a time is loaded so. */
 KERNEL_ROW void draw_cone(const layers_limb *limb, int32_t lane, int32_t base, uint64_t *restrict whole,
                           uint64_t *restrict seen)
@@ -208,9 +208,9 @@ KERNEL_ROW void draw_cone(const layers_limb *limb, int32_t lane, int32_t base, u
     int32_t const top = limb->top[lane], end = limb->end[lane];
     pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
     pair const c = pair_of(limb, 2, lane, base);
-    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS) {
-        int32_t from[LAYERS_ROWS], to[LAYERS_ROWS];
-        for (int32_t i = 0; i < LAYERS_ROWS; i++) {
+    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LANES_ROWS) {
+        int32_t from[LANES_ROWS], to[LANES_ROWS];
+        for (int32_t i = 0; i < LANES_ROWS; i++) {
             float const y = (float)(strip + i);
             float left = a.left_at + a.left_slope * y, right = a.right_at + a.right_slope * y;
             bound(b, y, &left, &right);
@@ -228,9 +228,9 @@ KERNEL_ROW void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t ba
     int32_t const top = limb->top[lane], end = limb->end[lane];
     pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
     pair const c = pair_of(limb, 2, lane, base), d = pair_of(limb, 3, lane, base);
-    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LAYERS_ROWS) {
-        int32_t from[LAYERS_ROWS], to[LAYERS_ROWS];
-        for (int32_t i = 0; i < LAYERS_ROWS; i++) {
+    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LANES_ROWS) {
+        int32_t from[LANES_ROWS], to[LANES_ROWS];
+        for (int32_t i = 0; i < LANES_ROWS; i++) {
             float const y = (float)(strip + i);
             float left = a.left_at + a.left_slope * y, right = a.right_at + a.right_slope * y;
             bound(b, y, &left, &right);
