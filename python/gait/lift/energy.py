@@ -158,7 +158,7 @@ class Energy:
         """Residuals (R,) in standard deviations, and their slopes (R, k + 6) by the state."""
         parts = [((state - self.mean) / self.sd, np.diag(1 / self.sd))]
         if self.reading is not None and len(self.reading.value):
-            parts.append(self._sensor_rows(self.reading, state))
+            parts.append(self.sensor_rows(self.reading, state))
         if self.springs is not None and len(self.springs.frame):
             parts.append(self._spring_rows(self.springs, state))
         if self.anchor is not None:
@@ -169,9 +169,10 @@ class Energy:
         """Difference (T * S,) of what the figure gives and what the sensors read; empty without sensors."""
         if self.reading is None:
             return np.zeros(0)
-        return self._sensor_rows(self.reading, state)[0] * self.reading.sd
+        return self.sensor_rows(self.reading, state)[0] * self.reading.sd
 
-    def _sensor_rows(self, reading: Reading, state: Floats) -> tuple[Floats, Floats]:
+    def sensor_rows(self, reading: Reading, state: Floats) -> tuple[Floats, Floats]:
+        """Residuals (T * S,) of the sensors in deviations, and their slopes (T * S, k + 6) by the state."""
         places, by_state = self.shape.positions(state, self.weights, self.sticks.markers)
         uv, by_place = self.view.project(places)
         response, by_uv = self.sticks.responses(uv, reading.places, reading.blur)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.lift import common
 from gait.lift.clip_segments import CORRELATED, ClipSegments
 from gait.lift.descent import Link, descend, information
 from gait.lift.energy import HEADING, PLACE, Anchor, Energy
@@ -249,11 +250,12 @@ def _continuous(clip: ClipSegments, sequence: Sequence) -> Sequence:
 
 
 def _finished(clip: ClipSegments, sequence: Sequence) -> ClipFit:
-    """Blend the segments linearly; deviations from the information of all of them."""
+    """Blend the segments linearly; deviations from the information of all of them and what they share."""
     chain, link = _chain(clip, sequence, looking=True)
     factor = information(chain, link if clip.settings.joined else None, sequence.states)
     overlap = clip.prior.frames / clip.prior.hop  # every frame counts in so many segments
-    covariance = overlap * factor.covariance()[0]
+    alike = common.moves(chain, factor, sequence.states)
+    covariance = overlap * factor.covariance()[0] + alike @ alike.swapaxes(1, 2)
     count, markers = len(clip.film.times), len(clip.prior.names)
     places, variance, total = np.zeros((count, markers, 3)), np.zeros((count, markers, 3)), np.zeros(count)
     for s, energy in enumerate(chain):

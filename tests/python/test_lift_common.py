@@ -1,0 +1,117 @@
+"""What a clip gets wrong from end to end: the estimate moves as foretold, intervals hold what they say."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gait.lift import common
+from gait.lift.descent import Link, information, normal
+from gait.lift.fit_clip import fit_clip
+from gait.lift.prior import SegmentPrior
+from gait.lift.tridiagonal import factor
+from gait.simulate.scenario import Scenario
+from gait.simulate.stage import set_stage
+from gait.skeleton import EVAL15, JOINTS
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
+import lift_clicks
+import lift_sticks
+from test_lift_video import walk
+
+ROUNDS = 6
+SMALL = 0.05  # deviations
+LEAST = 0.03  # metres
+
+
+def settled(energies, link, states):
+    """States of least energy, by undamped steps: a descent ends before changes that small."""
+    for _ in range(ROUNDS):
+        at = normal(energies, link, states)
+        states = states - factor(at.diagonal, at.below).solve(at.gradient)
+    return states
+
+
+@pytest.fixture(scope="module")
+def chain():
+    """Two segments tied together, seen as the prior's mean, and their states of least energy."""
+    prior = SegmentPrior.load()
+    clip = lift_sticks.stick_clip(prior, walk(), np.radians(60), seed=1)
+    state = clip.mean_state()
+    state[-6:-3] = [*walk().joints[0, JOINTS.index("pelvis"), :2], 0.0]
+    energies, states = [], []
+    for segment in (0, 1):
+        start = state.copy()
+        start[-6] += segment * clip.hop * 1.2
+        energy = clip.energy(segment, 0, start)
+        seen = energy.reading.value + energy.misfit(start).reshape(energy.reading.value.shape)
+        energies.append(replace(energy, reading=replace(energy.reading, value=seen)))
+        states.append(start)
+    link = Link(prior.hop, np.sqrt(2) * energies[0].shape.residual)
+    return energies, link, settled(energies, link, np.array(states))
+
+
+def seen_elsewhere(energy, state, error):
+    """The same values read where the figure with an error (in deviations) would give them."""
+    reading = energy.reading
+    places, _ = energy.shape.positions(state, energy.weights, energy.sticks.markers)
+    uv, _ = energy.view.project(places)
+    pixels = np.array([energy.view.scale(body.mean(axis=0)) for body in places])
+    middle = (uv.min(axis=1) + uv.max(axis=1)) / 2
+    shift = pixels[:, None] * np.array(common.SHIFT_SD) * error[:2]
+    wrong = uv + shift[:, None] + error[2] * common.SIZE_SD * (uv - middle[:, None])
+    more, plain = (energy.sticks.responses(at, reading.places, reading.blur)[0] for at in (wrong, uv))
+    return replace(energy, reading=replace(reading, value=reading.value - np.exp(state[-2]) * (more - plain)))
+
+
+def markers(energies, states):
+    """Places of all markers."""
+    return np.array(
+        [e.shape.positions(s, e.weights, slice(None))[0] for e, s in zip(energies, states, strict=True)]
+    )
+
+
+@pytest.mark.parametrize("which", [0, 1, 2], ids=["across", "along", "size"])
+def test_an_error_moves_the_estimate_as_foretold(chain, which):
+    energies, link, states = chain
+    moves = common.moves(energies, information(energies, link, states), states)
+    error = np.zeros(3)
+    error[which] = SMALL
+    wrong = [seen_elsewhere(e, s, error) for e, s in zip(energies, states, strict=True)]
+    moved = markers(energies, settled(wrong, link, states)) - markers(energies, states)
+    foretold = markers(energies, states + SMALL * moves[..., which]) - markers(energies, states)
+    assert np.linalg.norm(foretold, axis=-1).mean() > 0.5 * SMALL * LEAST
+    assert np.linalg.norm(moved - foretold) < 0.1 * np.linalg.norm(foretold)
+
+
+def test_without_sensors_there_is_nothing_to_get_wrong(chain):
+    energies, link, states = chain
+    blind = [replace(energy, reading=None) for energy in energies]
+    assert not common.moves(blind, information(blind, link, states), states).any()
+
+
+def stranger(seed):
+    """Somebody of a normative gait, whom the prior does not know."""
+    stage = set_stage(Scenario(frames=24, fps=20.0, seed=seed))
+    points = stage.walk.points(stage.frames)
+    joints = np.stack([points[name] for name in JOINTS], axis=1)
+    heading = float(stage.walk.heading[stage.frames[0]])
+    return lift_sticks.Walk(list(JOINTS), joints, 20.0, heading, stage.body.stature)
+
+
+def test_intervals_hold_what_they_say(monkeypatch):
+    """Sticks of strangers from ahead to the side; deviations are neither thrice too small nor too large."""
+    prior, squares, held = SegmentPrior.load(), [], []
+    for angle, seed in ((15, 201), (45, 202), (90, 203)):
+        walker = stranger(seed)
+        clip = lift_sticks.stick_clip(prior, walker, np.radians(angle), seed)
+        truth = walker.joints[:, [JOINTS.index(name) for name in EVAL15]]
+        fit, markers = fit_clip(clip), prior.index(EVAL15)
+        held.append(lift_clicks.score(clip, fit, truth, EVAL15).coverage)
+        squares.append(np.mean(((fit.places[:, markers] - truth) / fit.sd[:, markers]) ** 2))
+    assert min(held) > 0.8
+    assert 0.4 < np.sqrt(np.mean(squares)) < 1.2
+    monkeypatch.setattr(common, "moves", lambda chain, factor, states: np.zeros((*states.shape, 3)))
+    assert np.median(fit_clip(clip, fit.sequence).sd) < 0.95 * np.median(fit.sd)  # it counts
