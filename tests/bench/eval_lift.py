@@ -27,6 +27,7 @@ PARTS = {
     "lift_stream.py": ("lift_stream",),
     "lift_people.py": ("lift_people",),
     "lift_images.py": ("lift_sticks", "lift_clips", "lift_outdoor"),
+    "tracks_term.py": ("tracks_term",),
 }
 
 

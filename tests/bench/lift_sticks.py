@@ -1,4 +1,4 @@
-"""Pictures of walking stick figures with known truth, for the estimate from images (F9)."""
+"""Pictures of walking stick figures with known truth, for the estimate from images (F9, F10)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from gait.camera import Camera
 from gait.lift.clip_segments import ClipSegments, Settings
+from gait.lift.energy import PLACE
+from gait.lift.fit_clip import ClipFit, Sequence
 from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Placement
@@ -69,3 +71,28 @@ def stick_clip(prior: SegmentPrior, walk: Walk, angle: float, seed: int = 0) -> 
     placed = Placement(0, pelvis[:2] + noise[:2], walk.heading + noise[2], walk.stature)
     film = Film.make(pictures(walk, view.camera, seed), walk.stature * view.scale(pelvis))
     return ClipSegments(prior, view, film, placed, (), Settings())
+
+
+def depth_gaps(clip: ClipSegments, sequence: Sequence) -> Array:
+    """How much nearer (B - 1,) each segment has what it shares with the one before, on average, metres."""
+    frames, hop = clip.prior.frames, clip.prior.hop
+    places = [
+        clip.shapes[int(c)].positions(state, np.eye(frames), slice(None))[0]
+        for c, state in zip(sequence.components, sequence.states, strict=True)
+    ]
+    away = [clip.view.away(state[PLACE]) for state in sequence.states[1:]]
+    pairs = zip(places[:-1], places[1:], away, strict=True)
+    return np.array([((early[hop:] - late[: frames - hop]) @ line).mean() for early, late, line in pairs])
+
+
+def jumps(clip: ClipSegments, fit: ClipFit) -> tuple[float, float]:
+    """Largest jump of a marker where segments begin or end, and elsewhere, metres.
+
+    A jump is what a step from one frame to the next differs from the mean of the steps before and after it.
+    """
+    step = np.diff(fit.places, axis=0)
+    size = np.linalg.norm(step[1:-1] - (step[:-2] + step[2:]) / 2, axis=2).max(axis=1)
+    ends = np.concatenate([clip.starts, clip.starts + clip.span])
+    near = np.abs(fit.time[:, None] - ends).min(axis=1) < 1e-3
+    touches = near[1:-2] | near[2:-1]
+    return float(size[touches].max()), float(size[~touches].max())

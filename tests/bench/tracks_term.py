@@ -4,7 +4,7 @@
     tracks_term.py [CLIP...]
 
 A detector is the truth in the picture with 3 px of noise and 10 % missing.  Models leave out the walker's
-subject; every clip is tracked from three starts.
+subject; every clip is tracked from three starts.  A part of make eval-lift.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ import io
 import json
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import eval_clips
 import lift_tracks
@@ -54,11 +56,27 @@ def main() -> int:
             update(done)
     note = (
         f"Joints of the truth in the picture, {lift_tracks.NOISE:g} px of noise, {lift_tracks.GAPS:.0%} "
-        f"missing, --tracks-sd {PIXEL_SD:g}. Median mm over frames, mean of {len(SEEDS)} starts."
+        f"missing, --tracks-sd {PIXEL_SD:g}. Median mm over frames, mean of {len(SEEDS)} starts. "
+        f"{_losses(rows)}"
     )
     head = ["clip", "cues", "root mm", "abs mm", "px", "lost %"]
     table.publish("tracks_term", "Joints of a detector beside the pictures", head, rows, note)
     return 0
+
+
+def _losses(rows: Sequence[Sequence[Any]]) -> str:
+    """Which errors are larger with the joints than with the pictures alone."""
+    arms = {(row[0], row[1]): row[2:5] for row in rows}
+    worse = [
+        f"{clip} {what} ({before:.3g} to {after:.3g})"
+        for clip, cues in arms
+        if cues == "pictures"
+        for what, before, after in zip(
+            ("root", "abs", "px"), arms[clip, cues], arms[clip, "with joints"], strict=True
+        )
+        if after > before
+    ]
+    return f"Worse with joints: {', '.join(worse)}." if worse else "Nothing is worse with joints."
 
 
 def _rows(clip: Clip, model: Path, folder: Path) -> list[list[object]]:
