@@ -14,6 +14,25 @@ static layers drawn[BLOCK];
 static _Alignas(GAIT_ALIGN) unsigned char memory[sizeof(layers_block) + sizeof(outline_block) +
                                                  sizeof(layers) + 2 * GUARD];
 
+/* Rows beyond a mask's are nobody's: each set may have drawn others in vain. */
+static bool same_mask(const rast_mask *a, const rast_mask *b)
+{
+    bool same = a->first == b->first && a->last == b->last && a->column == b->column && a->width == b->width;
+    for (int32_t w = 0; same && 64 * w < a->width; w++)
+        for (int32_t y = a->first; y < a->last; y++)
+            same &= a->word[w][y] == b->word[w][y];
+    return same;
+}
+
+static bool same_layers(const layers *a, const layers *b, int32_t count)
+{
+    bool same = same_mask(&a->whole, &b->whole);
+    for (int32_t l = 0; l < count; l++)
+        same &= same_mask(&a->visible[l], &b->visible[l]);
+    return same && memcmp(&a->visible[count], &b->visible[count],
+                          (size_t)(MODEL_MAX_LIMBS - count) * sizeof *a->visible) == 0;
+}
+
 /* Each other set draws the block as `outline`, `edges` and `drawn` say. */
 static void compare_layers(const limb_geometry *limbs, int32_t count)
 {
@@ -30,7 +49,7 @@ static void compare_layers(const limb_geometry *limbs, int32_t count)
         for (int32_t lane = 0; lane < BLOCK; lane++) {
             g = guard_fill(memory, sizeof(layers));
             isa_at(k)->layers_draw(&edges, lane, (layers *)(void *)g.begin);
-            CHECK(guard_whole(&g) && memcmp(g.begin, &drawn[lane], sizeof(layers)) == 0);
+            CHECK(guard_whole(&g) && same_layers((const layers *)(void *)g.begin, &drawn[lane], count));
         }
     }
 }
