@@ -45,7 +45,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .coef_noise = 0.5f,
         .coef_time = 4.5f,
         .stature_noise = 0.2f,
-        .stature_noise_start = 1.0f,
+        .stature_noise_start = 2.0f,
         .proportion_noise = 0.15f,
         .joint_sd_model = 0.018f,
         .offset_noise = 0.58f,
