@@ -83,6 +83,40 @@ def test_volume_ratio_is_the_closed_form_and_falls_with_the_noise():
     assert (np.diff(ratios) > 0).all() and ratios[-1] < 0
 
 
+def test_the_slope_of_the_volume_counts_the_modes_that_the_noise_leaves():
+    """F5: a mode of s >> sigma adds 1 to d log10 V / d log10 sigma, one of s << sigma none (no residual)."""
+    gaussian = place(toy_prior(5, 8, 10), height_sd=0, ground_sd=1)
+    gaussian = replace(gaussian, residual=np.zeros(8))
+    _, unit = measured(gaussian, 1.0)
+    s = np.linalg.svd(infer(gaussian, unit).system.design, compute_uv=False)
+    depth = s < 1e-6 * s[0]  # displacement along y, which is never seen
+    assert depth.sum() == 1
+    step, volumes = 1e-4, []
+    few, all_seen = 1e4 * s[0], 1e-4 * s[~depth].min()
+    for sd in (all_seen, *np.geomspace(0.001, 10, 9), few):
+        low, at, high = (infer(gaussian, measured(gaussian, sd * 10**x)[1]) for x in (-step, 0, step))
+        assert at.log10_volume == pytest.approx(-0.5 * np.log10(1 + s**2 / sd**2).sum(), rel=1e-9, abs=1e-12)
+        slope = (high.log10_volume - low.log10_volume) / (2 * step)
+        assert at.resolved == pytest.approx(slope, abs=1e-5)
+        assert at.resolved == pytest.approx(np.sum(s**2 / (s**2 + sd**2)), abs=1e-6)
+        volumes += [low.log10_volume, at.log10_volume, high.log10_volume]
+        if sd in (few, all_seen):
+            assert at.resolved == pytest.approx((s > sd).sum(), abs=1e-5)
+    assert (np.diff(volumes) > 0).all()
+
+
+def test_what_is_projected_is_the_nearest_segment_of_the_modes():
+    gaussian = place(toy_prior(5, 8, 10))
+    rng = np.random.default_rng(7)
+    inside = gaussian.draw(rng, residual=False)
+    np.testing.assert_allclose(gaussian.projected(inside), inside, atol=1e-10)
+    x = gaussian.draw(rng)
+    found = gaussian.projected(x)
+    flat = gaussian.modes.reshape(len(gaussian.modes), -1)
+    np.testing.assert_allclose(flat @ (x - found).ravel(), 0, atol=1e-10)
+    assert np.linalg.norm(x - found) > 0
+
+
 def test_posterior_covers_what_is_drawn_from_the_prior():
     """F3: 90 % intervals of scores and of coordinates cover 0.900 +- 0.005; NEES per dimension is 1."""
     gaussian, rng, draws = place(toy_prior(4, 6, 8), ground_sd=0.5), np.random.default_rng(3), 4000

@@ -48,6 +48,12 @@ class Gaussian:
     residual: Floats
     rigid: int = 0
 
+    def projected(self, x: Floats) -> Floats:
+        """Nearest segment to x (F, J, 3) in the span of the modes about the mean."""
+        flat = self.modes.reshape(len(self.modes), -1).T
+        scores = np.linalg.lstsq(flat, (x - self.mean).ravel(), rcond=None)[0]
+        return np.asarray(self.mean + (flat @ scores).reshape(x.shape))
+
     def draw(self, rng: np.random.Generator, residual: bool = True) -> Floats:
         """Segment (F, J, 3) from the prior."""
         x = self.mean + np.tensordot(rng.normal(size=len(self.modes)), self.modes, 1)
@@ -191,6 +197,15 @@ class Posterior:
     def log10_volume(self) -> float:
         """log10 of sqrt(det Q / det Lambda): how much smaller the posterior is than the prior."""
         return float(np.linalg.slogdet(self.covariance)[1] / (2 * LN10))
+
+    @property
+    def resolved(self) -> float:
+        """How many modes the measurements resolve: m - tr Q, sum_i s_i^2 / (1 + s_i^2).
+
+        s_i are the singular values of the whitened design.  Without a residual it is the slope of
+        log10_volume against log10 of the noise's deviation.
+        """
+        return float(len(self.alpha) - np.trace(self.covariance))
 
 
 def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
