@@ -4,12 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lift_reference import dual, likelihood_only, log10_volume, share_along, share_rigid, uncertain_modes
+from lift_reference import dual, likelihood_only, log10_volume
 from toy_segments import FRONT as AXES
 from toy_segments import toy_prior
 
+from gait.errors import UserError
+from gait.lift import uncertain
+from gait.lift.equations import Parallel, looking_along
 from gait.lift.observe import Observations, Rows, orthographic
-from gait.lift.posterior import infer, place
+from gait.lift.posterior import by_likelihood, infer, place
+from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
 
 DEPTH = np.array([0.0, 1, 0])
 
@@ -212,3 +216,33 @@ def test_subspace_estimate_is_the_papers():
     assert np.abs(unseen[..., 1]).max() < 1e-12  # what was not measured, depth, is not moved
     assert (found.sd**2 <= variance + 1e-12).all()
     assert np.allclose(found.sd[..., 1] ** 2, variance[..., 1])
+
+
+def test_the_likelihood_is_the_limit_of_a_prior_ever_wider_in_its_modes():
+    """Places and deviations; what moves the whole body keeps its prior."""
+    gaussian = place(toy_prior(4, 6, 8), ground_sd=0.5)
+    _, rows = measured(gaussian)
+    wide = gaussian.modes.copy()
+    wide[: len(wide) - gaussian.rigid] *= 1e4
+    found = by_likelihood(infer(gaussian, rows))
+    limit = infer(replace(gaussian, modes=wide), rows)
+    np.testing.assert_allclose(found.points, limit.points, atol=1e-5)
+    np.testing.assert_allclose(found.sd, limit.sd, rtol=1e-4)
+    assert (found.sd > infer(gaussian, rows).sd).all()
+
+
+def test_the_likelihood_alone_refuses_modes_that_nothing_tells():
+    gaussian = place(toy_prior(3, 5, 40, seed=4))  # 30 numbers seen
+    _, rows = measured(gaussian)
+    with pytest.raises(UserError, match="of 40 modes"):
+        by_likelihood(infer(gaussian, rows))
+
+
+def test_what_segments_leave_is_the_median_and_depth_comes_first():
+    gaussian = place(toy_prior(5, 10, 12))
+    segments = [infer(gaussian, measured(gaussian, sd)[1]) for sd in (0.01, 0.03, 0.2)]
+    left = uncertain.of(segments, Parallel(looking_along("y"), 1.0, np.zeros(2)))
+    assert left.log10_volume == segments[1].log10_volume
+    assert left.along[0] >= 0.999 and left.rigid[0] >= 0.99 and (np.diff(left.sd) <= 0).all()
+    # a displacement of all markers by the ground's deviation is that many metres of each
+    assert left.sd[0] == pytest.approx(10, rel=0.01)

@@ -11,12 +11,13 @@ The first is the paper's form (dual), the second the information form, which is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from gait.errors import UserError
 from gait.lift.observe import Rows
 from gait.lift.prior import SegmentPrior
 from gait.skeleton import axis_rotation
@@ -218,6 +219,29 @@ def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
     spread = np.linalg.slogdet(precision)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
     evidence = -0.5 * float(fit + spread + len(s.y) * np.log(2 * np.pi))
     return Posterior(gaussian, rows, s, alpha, (covariance + covariance.T) / 2, evidence)
+
+
+def by_likelihood(found: Posterior) -> Posterior:
+    """Estimate the modes by the measurements alone: least squares, the limit of ever larger deviations.
+
+    What moves the body as a whole keeps what is known of it: no view from far away tells a distance.
+
+    Raises
+    ------
+    UserError
+        If the measurements leave a combination of modes open.
+    """
+    count, rigid = len(found.alpha), found.gaussian.rigid
+    design = np.concatenate([found.system.design, np.eye(count)[count - rigid :]])
+    rank = int(np.linalg.matrix_rank(design))
+    if rank < count:
+        raise UserError(
+            f"the points seen in a segment tell {rank - rigid} of {count - rigid} modes, and the likelihood "
+            "alone says nothing of the others; give more points, or use --method blend"
+        )
+    inverse = np.linalg.pinv(design)
+    alpha = inverse[:, : len(found.system.y)] @ found.system.y
+    return replace(found, alpha=alpha, covariance=inverse @ inverse.T)
 
 
 def _inverse(precision: Floats) -> Floats:
