@@ -27,7 +27,7 @@ OUTDOOR = "outdoor"
 OUTDOOR_FRAMES = (64, 187)  # she is in full view
 OUTDOOR_HEIGHT = 1.65  # metres
 SPREAD = {"pelvis": 0.03, "heading_rad": 0.05, "phase": 0.03, "stride_hz": 0.03, "stature_m": 0.003}
-"""Standard deviations of a start, and of its noise about the truth; the stature is known (to 3 mm, without noise)."""
+"""Standard deviations of a start, and of its noise about the truth; the stature is known to 3 mm."""
 
 
 def shared_clips(names: list[str] | None) -> list[Clip]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -378,6 +378,23 @@ def test_numbers_out_of_range_are_refused_in_one_line(monkeypatch):
     for method in ("smooth", "blend"):
         with pytest.raises(UserError, match="no motion that the model knows"):
             motion.lift(prior, tracks, view, result.Options(method=method), prior.names)
+
+
+def test_nothing_before_the_lens_is_refused_in_one_line(monkeypatch):
+    """As where v runs up: the smoother puts the walker behind the camera."""
+    rows = Perspective.rows
+
+    def none(self, *around):
+        found = rows(self, *around)
+        return replace(found, **{part.name: getattr(found, part.name)[:0] for part in fields(found)})
+
+    prior = toy_prior(6, 19, 4)
+    camera = Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600)
+    uv = 320.0 + 50.0 * np.random.default_rng(1).standard_normal((12, 19, 2))
+    tracks = Tracks(np.arange(12), np.arange(12) / 20.0, prior.names, uv, np.ones((12, 19)))
+    monkeypatch.setattr(Perspective, "rows", none)
+    with pytest.raises(UserError, match="v points down"):
+        motion.lift(prior, tracks, Perspective(camera), result.Options(), prior.names)
 
 
 def test_variances_below_zero_by_rounding_are_zero():

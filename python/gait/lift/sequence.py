@@ -234,6 +234,8 @@ class _Problem:
         near, scale = self._at_video(shape), self._at_video(state.lengths)
         guess = self._at_video(state.places)[:, self.seen.markers]
         seen = self.view.rows(self.points, near[:, self.seen.markers], scale, guess)
+        if not len(seen.frame):
+            raise np.linalg.LinAlgError("no point is before the lens")
         factors = None
         if isinstance(self.view, Parallel) and self.view.scaled:
             seen, factors = scale_free(seen, near[:, self.seen.markers], scale)
