@@ -381,7 +381,6 @@ def test_numbers_out_of_range_are_refused_in_one_line(monkeypatch):
 
 
 def test_nothing_before_the_lens_is_refused_in_one_line(monkeypatch):
-    """As where v runs up: the smoother puts the walker behind the camera."""
     rows = Perspective.rows
 
     def none(self, *around):
