@@ -47,7 +47,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .stature_noise = 0.2f,
         .stature_noise_start = 2.0f,
         .proportion_noise = 0.15f,
-        .joint_sd_model = 0.018f,
+        .joint_sd_model = 0.015f,
         .offset_noise = 0.58f,
         .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
         .cpu_mask = ~0u,

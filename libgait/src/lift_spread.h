@@ -3,8 +3,8 @@
 #define GAIT_LIFT_SPREAD_H
 #include "lift_fit.h"
 
-#define LIFT_FREEDOM                                                                                         \
-    10.0 /* chosen on sequences that are not reported (make eval-lift, lift_modes) */
+/* Degrees of freedom of lift_scale, chosen on sequences that are not reported (make eval-lift, lift_modes). */
+#define LIFT_FREEDOM 10.0
 
 /* theta of minimum norm over unit displacements that fits best whatever the prior says, in spare->theta;
  * the heading is b's. spare->A and U are lost. */

@@ -22,7 +22,9 @@ from gait.files import replacing
 
 HERE = Path(__file__).resolve().parent
 PARTS = {
-    "lift_mocap.py": ("lift_mocap", "lift_modes", "lift_missing"),
+    "lift_mocap.py": ("lift_mocap", "lift_missing"),
+    "lift_modes.py": ("lift_modes",),
+    "lift_volume.py": ("lift_volume",),
     "lift_tracks.py": ("lift_dev", "lift_balancing"),
     "lift_stream.py": ("lift_stream",),
     "lift_people.py": ("lift_people",),

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.lift.observe import Rows
-from gait.lift.posterior import Gaussian, Posterior, system
+from gait.lift.posterior import Gaussian, system
 
 Floats = npt.NDArray[np.float64]
 
@@ -42,31 +42,3 @@ def likelihood_only(gaussian: Gaussian, rows: Rows) -> Floats:
     flat = (design * weight[..., None]).reshape(y.size, -1)
     scores = np.linalg.lstsq(flat, y.ravel(), rcond=1e-10)[0]
     return np.asarray(gaussian.mean + np.tensordot(scores, unit, 1))
-
-
-def uncertain_modes(found: Posterior, count: int) -> tuple[Floats, Floats]:
-    """Directions of largest posterior deviation, within the modes.
-
-    Returns
-    -------
-    sd : (count,)
-        Metres, along the unit vectors below, largest first.
-    modes : (count, F, J, 3)
-        Unit vectors over all coordinates.
-    """
-    q, r = np.linalg.qr(found.gaussian.modes.reshape(len(found.gaussian.modes), -1).T)
-    values, vectors = np.linalg.eigh(r @ found.covariance @ r.T)
-    order = np.argsort(values)[::-1][:count]
-    modes = (q @ vectors[:, order]).T.reshape(-1, *found.gaussian.mean.shape)
-    return np.sqrt(np.maximum(values[order], 0)), modes
-
-
-def share_along(mode: Floats, axis: Floats) -> float:
-    """Share of a mode's energy (F, J, 3) that is along a unit vector (3,)."""
-    return float(np.sum((mode @ axis) ** 2) / np.sum(mode**2))
-
-
-def share_rigid(mode: Floats) -> float:
-    """Share of a mode's energy (F, J, 3) that is one displacement of all markers in all frames."""
-    points = mode.reshape(-1, 3)
-    return float(len(points) * np.sum(points.mean(axis=0) ** 2) / np.sum(points**2))

@@ -13,6 +13,7 @@ from toy_segments import toy_blob, toy_prior
 from gait.camera import Camera
 from gait.cli import main
 from gait.lift import motion
+from gait.lift.result import METHODS
 from gait.lift.tracks_file import Tracks, read, write
 from gait.trc import read_trc
 
@@ -45,7 +46,7 @@ def lifted(path, names):
     return np.array([[[float(row[f"{n}_{a}"]) for a in "xyz"] for n in names] for row in rows])
 
 
-@pytest.mark.parametrize("method", ["smooth", "blend", "segment"])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("view", VIEWS)
 def test_lifts(folder, capsys, view, method):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--height", "1.7", "--pixel-sd", "1"]
@@ -60,6 +61,48 @@ def test_lifts(folder, capsys, view, method):
     shape, true = (p - p.mean(axis=1, keepdims=True) for p in (found, truth))
     across = np.linalg.norm((shape - true)[..., [0, 2]], axis=2)
     assert np.median(across) < 0.03  # what the picture shows
+
+
+@pytest.mark.parametrize("view", ["camera", "flat"])
+def test_says_what_segments_leave_uncertain(folder, capsys, view):
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--pixel-sd", "1", *VIEWS[view]]
+    assert main([*command, "--json"]) == 0
+    segments = json.loads(capsys.readouterr().out)["segments"]
+    assert segments["log10_volume_ratio"] < 0
+    first, *others = segments["least_certain"]
+    assert first["in_depth"] > 0.9 and first["rigid"] > 0.9  # how far away somebody is
+    assert [first["sd_mm"] > other["sd_mm"] > 0 for other in others] == [True, True]
+    assert main(command) == 0
+    printed = capsys.readouterr().out.splitlines()[-1]
+    assert f"volume 1e{segments['log10_volume_ratio']:.0f} " in printed
+    assert (
+        f"least certain {first['sd_mm']:.0f}, " in printed and f"({100 * first['in_depth']:.0f}, " in printed
+    )
+
+
+def test_the_likelihood_alone_is_less_sure_and_has_the_same_columns(folder, capsys):
+    said, heads = {}, {}
+    for method in ("blend", "likelihood"):
+        command = ["lift", "t.csv", "-m", "m.gait", "-o", f"{method}.csv", "--camera", "cam.json", "--json"]
+        assert main([*command, "--method", method]) == 0
+        said[method] = json.loads(capsys.readouterr().out)
+        heads[method] = (folder / f"{method}.csv").read_text().splitlines()[0]
+    assert said["likelihood"]["sd_mm"] > said["blend"]["sd_mm"]
+    assert heads["likelihood"] == heads["blend"]
+
+
+def test_the_likelihood_alone_needs_more_points_than_the_prior(folder, capsys):
+    prior = toy_prior(FRAMES, MARKERS, 60, seed=5)
+    (folder / "m.gait").write_bytes(toy_blob(prior))
+    tracks, _ = read("t.csv", prior.names)
+    few = Tracks(tracks.frame, tracks.time, tracks.names[:4], tracks.uv[:, :4], tracks.confidence[:, :4])
+    write("few.csv", few)
+    command = ["lift", "few.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--quiet"]
+    assert main([*command, "--method", "likelihood"]) == 1
+    said = capsys.readouterr().err
+    assert "few.csv: the points seen" in said and "of 60 modes" in said and said.count("\n") == 1
+    assert not (folder / "out.csv").exists()
+    assert main([*command, "--method", "blend"]) == 0
 
 
 @pytest.mark.parametrize(("axis", "vector"), [("-y", "0,-1,0"), ("-x", "-1,0,0"), ("-z", "-0.0,0,-2.5")])

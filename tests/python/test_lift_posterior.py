@@ -4,12 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lift_reference import dual, likelihood_only, log10_volume, share_along, share_rigid, uncertain_modes
+from lift_reference import dual, likelihood_only, log10_volume
 from toy_segments import FRONT as AXES
 from toy_segments import toy_prior
 
+from gait.errors import UserError
+from gait.lift import uncertain
+from gait.lift.equations import Parallel, looking_along
 from gait.lift.observe import Observations, Rows, orthographic
-from gait.lift.posterior import infer, place
+from gait.lift.posterior import by_likelihood, infer, place
+from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
 
 DEPTH = np.array([0.0, 1, 0])
 
@@ -81,6 +85,40 @@ def test_volume_ratio_is_the_closed_form_and_falls_with_the_noise():
         ratios.append(infer(gaussian, rows).log10_volume)
         assert ratios[-1] == pytest.approx(log10_volume(gaussian, rows), rel=1e-9)
     assert (np.diff(ratios) > 0).all() and ratios[-1] < 0
+
+
+def test_the_slope_of_the_volume_counts_the_modes_that_the_noise_leaves():
+    """F5: a mode of s >> sigma adds 1 to d log10 V / d log10 sigma, one of s << sigma none (no residual)."""
+    gaussian = place(toy_prior(5, 8, 10), height_sd=0, ground_sd=1)
+    gaussian = replace(gaussian, residual=np.zeros(8))
+    _, unit = measured(gaussian, 1.0)
+    s = np.linalg.svd(infer(gaussian, unit).system.design, compute_uv=False)
+    depth = s < 1e-6 * s[0]  # displacement along y, which is never seen
+    assert depth.sum() == 1
+    step, volumes = 1e-4, []
+    few, all_seen = 1e4 * s[0], 1e-4 * s[~depth].min()
+    for sd in (all_seen, *np.geomspace(0.001, 10, 9), few):
+        low, at, high = (infer(gaussian, measured(gaussian, sd * 10**x)[1]) for x in (-step, 0, step))
+        assert at.log10_volume == pytest.approx(-0.5 * np.log10(1 + s**2 / sd**2).sum(), rel=1e-9, abs=1e-12)
+        slope = (high.log10_volume - low.log10_volume) / (2 * step)
+        assert at.resolved == pytest.approx(slope, abs=1e-5)
+        assert at.resolved == pytest.approx(np.sum(s**2 / (s**2 + sd**2)), abs=1e-6)
+        volumes += [low.log10_volume, at.log10_volume, high.log10_volume]
+        if sd in (few, all_seen):
+            assert at.resolved == pytest.approx((s > sd).sum(), abs=1e-5)
+    assert (np.diff(volumes) > 0).all()
+
+
+def test_what_is_projected_is_the_nearest_segment_of_the_modes():
+    gaussian = place(toy_prior(5, 8, 10))
+    rng = np.random.default_rng(7)
+    inside = gaussian.draw(rng, residual=False)
+    np.testing.assert_allclose(gaussian.projected(inside), inside, atol=1e-10)
+    x = gaussian.draw(rng)
+    found = gaussian.projected(x)
+    flat = gaussian.modes.reshape(len(gaussian.modes), -1)
+    np.testing.assert_allclose(flat @ (x - found).ravel(), 0, atol=1e-10)
+    assert np.linalg.norm(x - found) > 0
 
 
 def test_posterior_covers_what_is_drawn_from_the_prior():
@@ -178,3 +216,33 @@ def test_subspace_estimate_is_the_papers():
     assert np.abs(unseen[..., 1]).max() < 1e-12  # what was not measured, depth, is not moved
     assert (found.sd**2 <= variance + 1e-12).all()
     assert np.allclose(found.sd[..., 1] ** 2, variance[..., 1])
+
+
+def test_the_likelihood_is_the_limit_of_a_prior_ever_wider_in_its_modes():
+    """Places and deviations; what moves the whole body keeps its prior."""
+    gaussian = place(toy_prior(4, 6, 8), ground_sd=0.5)
+    _, rows = measured(gaussian)
+    wide = gaussian.modes.copy()
+    wide[: len(wide) - gaussian.rigid] *= 1e4
+    found = by_likelihood(infer(gaussian, rows))
+    limit = infer(replace(gaussian, modes=wide), rows)
+    np.testing.assert_allclose(found.points, limit.points, atol=1e-5)
+    np.testing.assert_allclose(found.sd, limit.sd, rtol=1e-4)
+    assert (found.sd > infer(gaussian, rows).sd).all()
+
+
+def test_the_likelihood_alone_refuses_modes_that_nothing_tells():
+    gaussian = place(toy_prior(3, 5, 40, seed=4))  # 30 numbers seen
+    _, rows = measured(gaussian)
+    with pytest.raises(UserError, match="of 40 modes"):
+        by_likelihood(infer(gaussian, rows))
+
+
+def test_what_segments_leave_is_the_median_and_depth_comes_first():
+    gaussian = place(toy_prior(5, 10, 12))
+    segments = [infer(gaussian, measured(gaussian, sd)[1]) for sd in (0.01, 0.03, 0.2)]
+    left = uncertain.of(segments, Parallel(looking_along("y"), 1.0, np.zeros(2)))
+    assert left.log10_volume == segments[1].log10_volume
+    assert left.along[0] >= 0.999 and left.rigid[0] >= 0.99 and (np.diff(left.sd) <= 0).all()
+    # a displacement of all markers by the ground's deviation is that many metres of each
+    assert left.sd[0] == pytest.approx(10, rel=0.01)

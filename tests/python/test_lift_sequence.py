@@ -19,9 +19,11 @@ from gait.lift.observe import Observations
 from gait.lift.refuse import Unlike
 from gait.lift.sequence import Seen, Start, smooth
 from gait.lift.tracks_file import Tracks
+from gait.lift.uncertain import Uncertain
 from gait.skeleton import axis_rotation
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
+LEFT = Uncertain(0.0, *np.zeros((3, 3)))
 
 
 @pytest.fixture
@@ -281,11 +283,15 @@ def lifted_by(monkeypatch, outcomes):
     def attempt(prior, tracks, view, options, grid, update):
         nothing = np.zeros((9, 4, 3))
         if options.method == "blend":
-            return result.Motion(prior.names, nothing, nothing, nothing, nothing[..., 0], 1.8, 0, True, 0.0)
+            return result.Motion(
+                prior.names, nothing, nothing, nothing, nothing[..., 0], 1.8, 0, True, 0.0, LEFT
+            )
         ends = pending.pop(0)
         if isinstance(ends, Exception):
             raise ends
-        whole = result.Motion(prior.names, nothing + 1, nothing, nothing, nothing[..., 0], 1.7, 9, False, 0.0)
+        whole = result.Motion(
+            prior.names, nothing + 1, nothing, nothing, nothing[..., 0], 1.7, 9, False, 0.0, LEFT
+        )
         return replace(whole, evidence=-ends, misfit=ends)
 
     monkeypatch.setattr(motion, "_lift", attempt)

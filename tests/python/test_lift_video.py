@@ -11,13 +11,25 @@ import pytest
 
 from gait import blob
 from gait.cli import lift_video, main
+from gait.errors import UserError
 from gait.evaluate import root_errors
 from gait.lift.clip_segments import Settings
 from gait.lift.cylinder import LIMBS, Figure
 from gait.lift.cylinder_picture import draw_figure
 from gait.lift.fit_clip import fit_clip
 from gait.lift.prior import TAGS, SegmentPrior
-from gait.lift.springs import Correction, as_json
+from gait.lift.springs import (
+    CLICK_SD,
+    HEADING_SD,
+    PHASE_SD,
+    PLACE_SD,
+    RATE_SD,
+    STATURE_SD,
+    Correction,
+    as_json,
+    read_corrections,
+    read_placement,
+)
 from gait.lift.suggest import suggest
 from gait.model import read_blob
 from gait.skeleton import EVAL15, JOINTS, pose
@@ -252,3 +264,28 @@ def test_a_model_without_a_cycle_takes_the_phase_of_the_shipped_one(prior, tmp_p
     blob.write(path, {tag: shipped[tag] for tag in ("META", *TAGS)})
     assert set(lift_video._cycle(str(path))) == set(lift_video._cycle(None))
     assert lift_video._cycle(str(path))["CURV"].tobytes() == shipped["CURV"].tobytes()
+
+
+def test_the_documented_files_are_read(prior, tmp_path):
+    page = (Path(__file__).parents[2] / "libgait/doc/lift-formats.md").read_text()
+    calibrated, flat, corrections = (block.split("```")[0] for block in page.split("```json")[1:])
+    path = tmp_path / "file.json"
+    path.write_text(calibrated)
+    assert read_placement(path, prior, True).phase == 0.3
+    path.write_text(flat)
+    assert read_placement(path, prior, False).height_px == 415
+    path.write_text(corrections)
+    found = read_corrections(path, prior, 100)
+    assert [c.joint for c in found] == ["l_knee", "r_ankle"] and found[1].sd_px == CLICK_SD
+    usual = f"{PLACE_SD:g} m, {HEADING_SD:g}, {STATURE_SD:g} m, {PHASE_SD:g}, {RATE_SD:g} |"
+    assert usual in page and f"| {CLICK_SD:g} |" in page
+
+
+@pytest.mark.parametrize(("option", "joined"), [([], True), (["--alone"], False)])
+def test_the_papers_way_is_an_option(refused, files, monkeypatch, option, joined):
+    def seen(clip, quiet):
+        raise UserError(f"joined {clip.settings.joined}")
+
+    monkeypatch.setattr(lift_video, "_fits", seen)
+    words = ["--camera", files / "camera.json", "--placement", files / "placement.json", *option]
+    assert f"joined {joined}" in refused(*words)

@@ -16,6 +16,7 @@ from gait.camera import Camera
 from gait.errors import GaitError
 from gait.lift import heading, observe, posterior
 from gait.lift.prior import SegmentPrior
+from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
 from gait.lifter import LiftConfig, Lifter, LiftFlag
 from gait.skeleton import axis_rotation
 
@@ -95,15 +96,15 @@ def test_uncertain_displacements_equal_the_numpy_ones() -> None:
     sd = deviations(rng, 0.01, 0.05)
     uv = noisy(gaussian.draw(rng) @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
-    want_sd, want = reference.uncertain_modes(posterior.infer(gaussian, rows), 4)
+    want_sd, want = uncertain_modes(posterior.infer(gaussian, rows), 4)
     lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     lifter.segment(uv, sd)
     got_sd, got = lifter.uncertain(4)
     np.testing.assert_allclose(got_sd, want_sd, rtol=1e-8)
     for one, other, size in zip(got, want, want_sd, strict=True):
         assert abs(np.sum(one * other)) == pytest.approx(size, rel=1e-6)
-    assert reference.share_along(got[0], np.array([0.0, 1, 0])) > 0.99  # rigid translation in depth
-    assert reference.share_rigid(got[0]) > 0.98
+    assert share_along(got[0], np.array([0.0, 1, 0])) > 0.99  # rigid translation in depth
+    assert share_rigid(got[0]) > 0.98
 
 
 def test_drawn_from_the_prior_intervals_cover_what_they_say() -> None:

@@ -16,6 +16,7 @@ from gait.cli import main
 from gait.lift import figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.tracks_file import Tracks, read, write
+from gait.lift.uncertain import Uncertain
 
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
 FIGURES = {"spectrum", "synthesis", "draws", "estimates", "uncertain"}
@@ -57,7 +58,8 @@ def test_dots_are_where_a_right_estimate_is(far):
     uv = 150 * places @ view.axes[:2].T + (40, 30) if far else camera.project(places)
     uv[1, 2] = np.nan
     tracks = Tracks(np.arange(2), np.arange(2) / 20, ("a", "b", "c"), uv, np.ones((2, 3)))
-    found = result.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0)
+    left = Uncertain(0.0, *np.zeros((3, 3)))
+    found = result.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0, left)
     for frame, seen in ((0, 3), (1, 2)):
         drawn, points = figures_clip._in_picture(view, found, frame, tracks)
         assert drawn.shape == (3, 2) and points.shape == (seen, 2)

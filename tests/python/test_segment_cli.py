@@ -5,7 +5,6 @@ import json
 import mocap_files as files
 import numpy as np
 import pytest
-from lift_reference import share_along, share_rigid, uncertain_modes
 from marked_walker import FULL, walker
 from test_marker_files import write_trc
 from toy_segments import FRONT
@@ -16,6 +15,7 @@ from gait.errors import UserError
 from gait.lift.observe import Observations, orthographic
 from gait.lift.posterior import infer, place
 from gait.lift.prior import TAGS, SegmentPrior
+from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
 from gait.model import Model
 from gait.skeleton import EVAL15, JOINTS
 

@@ -32,6 +32,7 @@ from gait.initial import STATURE
 from gait.lift import lifted_file, motion, result
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import FURTHEST, Tracks
+from gait.lift.uncertain import Uncertain
 from gait.trc import write_trc
 
 NAME = "lift"
@@ -97,7 +98,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=result.METHODS,
         help="smooth (default): one Gaussian over the whole sequence; blend: overlapping segments, each "
-        "estimated alone, mixed as in the paper; segment: one after another",
+        "estimated alone, mixed as in the paper; segment: one after another; likelihood: as blend without "
+        "the prior of the modes (least squares), for comparison",
     )
     add("--no-contact", action="store_true", help="smooth: let feet on the ground slide")
     add("--no-bones", action="store_true", help="smooth: let bones change their length")
@@ -233,11 +235,21 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: result.Motion) -> 
         "iterations": found.steps,
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
+        "segments": _segments(found.uncertain),
         "misfit": found.misfit if np.isfinite(found.misfit) else None,
         "prior_widened": found.wider,
         "segments_alone": found.alone,
         "doubted": 0 if found.doubted is None else int(found.doubted.sum()),
         "resized": found.resized,
+    }
+
+
+def _segments(left: Uncertain) -> dict[str, Any]:
+    """Medians over segments, each alone: volume, and the displacements that are least certain."""
+    each = zip((1000 * left.sd).tolist(), left.along.tolist(), left.rigid.tolist(), strict=True)
+    return {
+        "log10_volume_ratio": left.log10_volume,
+        "least_certain": [{"sd_mm": sd, "in_depth": along, "rigid": rigid} for sd, along, rigid in each],
     }
 
 
@@ -253,4 +265,15 @@ def _text(s: dict[str, Any]) -> str:
         lines.append(
             f"{s['iterations']} iterations; posterior volume 1e{s['log10_volume_ratio']:.0f} of the prior's"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, _left(s["segments"])])
+
+
+def _left(segments: dict[str, Any]) -> str:
+    """Say what segments leave uncertain."""
+    modes = segments["least_certain"]
+    sd = ", ".join(f"{mode['sd_mm']:.0f}" for mode in modes)
+    depth = ", ".join(f"{100 * mode['in_depth']:.0f}" for mode in modes)
+    volume = segments["log10_volume_ratio"]
+    return (
+        f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth)"
+    )

@@ -42,6 +42,11 @@ class Perspective:
         """Pixels (T, J, 2) of places (T, J, 3)."""
         return self.camera.project(places)
 
+    def sight(self, places: Floats) -> Floats:
+        """Direction (3,) from the lens to the middle of places (F, J, 3)."""
+        ray = places.mean(axis=(0, 1)) - self.camera.centre
+        return np.asarray(ray / np.linalg.norm(ray))
+
 
 @dataclass(frozen=True)
 class Parallel:
@@ -78,6 +83,10 @@ class Parallel:
     def project(self, places: Floats, lengths: Floats) -> Floats:
         """Picture coordinates (T, J, 2) of places (T, J, 3)."""
         return np.asarray(places @ self.axes[:2].T / lengths[:, None, None] + self.origin)
+
+    def sight(self, places: Floats) -> Floats:
+        """Direction (3,) of view, the same for all places."""
+        return self.axes[2]
 
     def lengths(self, seen: Observations, mean: Floats, stature: float) -> Floats:
         """Guess the lengths (T,) of a unit from the extents of what is seen and of a mean body (J, 3)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -120,23 +120,15 @@ def spectrum(c: Case) -> Drawing:
 def synthesis(c: Case) -> Drawing:
     """Draw the segment beside its projection on the first modes (fig. 2)."""
     used = c.gaussian.modes[:SYNTHESIS]
-    projected, error = _projection(c, used)
+    projected = replace(c.gaussian, modes=used).projected(c.truth)
     figure, panels = rows(2, ("from the side", "from ahead"))
     for axes, across in zip(panels, (SIDE, AHEAD), strict=True):
         strip(axes, c.truth, c.prior.names, across, DARK, ghost=True, size=c.prior.stature)
         strip(axes, projected, c.prior.names, across, ORANGE, size=c.prior.stature, path=c.truth)
     line_legend(figure, {"original": GREY, f"{len(used)} modes": ORANGE})
-    caption = f"{c.what.capitalize()} (grey) and its projection on {len(used)} modes: {error:.0f} mm off."
+    caption = f"{c.what.capitalize()} (grey) and its projection on {len(used)} modes: "
+    caption += f"{_apart(projected, c.truth):.0f} mm off."
     return Drawing("synthesis", "Synthesis", caption, figure)
-
-
-def _projection(c: Case, modes: Floats) -> tuple[Floats, float]:
-    """Nearest segment in the span of modes, and its mean distance in mm."""
-    flat = modes.reshape(len(modes), -1).T
-    apart = (c.truth - c.gaussian.mean).ravel()
-    scores = np.linalg.lstsq(flat, apart, rcond=None)[0]
-    found = c.gaussian.mean + (flat @ scores).reshape(c.truth.shape)
-    return found, _apart(found, c.truth)
 
 
 def _apart(found: Floats, truth: Floats) -> float:
@@ -156,10 +148,10 @@ def draws(c: Case, seed: int) -> Drawing:
 
 def estimates(c: Case) -> Drawing:
     """Original, projection, likelihood alone and Bayes, from where the depth shows (fig. 5)."""
-    projected, floor = _projection(c, c.gaussian.modes)
+    projected = c.gaussian.projected(c.truth)
     found = {
         "original": (c.truth, DARK),
-        f"projection\n{floor:.0f} mm": (projected, DARK),
+        f"projection\n{_apart(projected, c.truth):.0f} mm": (projected, DARK),
         f"likelihood only\n{_apart(c.likelihood, c.truth):.0f} mm": (c.likelihood, BLUE),
         f"Bayes\n{_apart(c.bayes, c.truth):.0f} mm": (c.bayes, ORANGE),
     }

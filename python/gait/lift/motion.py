@@ -1,7 +1,8 @@
-"""From tracks of points in one view to motion in space, by any of the three methods.
+"""From tracks of points in one view to motion in space, by any of four methods.
 
 smooth: one Gaussian over the whole sequence (`gait.lift.sequence`).  blend: overlapping segments estimated
 alone and mixed by triangular weights (Leventon and Freeman 1998).  segment: segments one after another.
+likelihood: as blend, by least squares in the modes instead of the prior, for comparison (their fig. 5).
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.lift import sequence, size, start
+from gait.lift import sequence, size, start, uncertain
 from gait.lift.chain import Freedom, blended, in_turn, restricted
 from gait.lift.equations import Parallel, View
 from gait.lift.grid import Grid, interpolated
 from gait.lift.heading import Explanation, Person
 from gait.lift.observe import Observations, resampled
+from gait.lift.posterior import by_likelihood
 from gait.lift.prior import SegmentPrior
 from gait.lift.refuse import Unlike, require_seen, require_size
 from gait.lift.result import Motion, Options
@@ -171,8 +173,10 @@ def _lift(
     found = start.explanations(prior, sampled, view, lengths, person, update)
     require_seen(found, grid, alone=options.method != "smooth")
     chosen = start.course(found)
+    if options.method == "likelihood":
+        chosen = [replace(e, posterior=by_likelihood(e.posterior)) for e in chosen]
     if options.method != "smooth":
-        return _alone(prior, chosen, tracks, view, grid, lengths, stature, options.method == "blend")
+        return _alone(prior, chosen, tracks, view, grid, lengths, stature, options.method != "segment")
     first = Start(
         heading=np.array([e.heading for e in chosen]),
         component=np.array([e.component for e in chosen]),
@@ -199,6 +203,7 @@ def _lift(
         found_motion.steps,
         found_motion.settled,
         found_motion.log_volume_ratio,
+        uncertain.of([e.posterior for e in chosen], view),
         found_motion.evidence,
         found_motion.misfit,
         resized=sized.factor,
@@ -256,6 +261,7 @@ def _alone(
         steps=0,
         settled=True,
         log_volume_ratio=float(np.mean([e.posterior.log10_volume for e in chosen])),
+        uncertain=uncertain.of([e.posterior for e in chosen], view),
     )
 
 

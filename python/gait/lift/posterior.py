@@ -11,12 +11,13 @@ The first is the paper's form (dual), the second the information form, which is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from gait.errors import UserError
 from gait.lift.observe import Rows
 from gait.lift.prior import SegmentPrior
 from gait.skeleton import axis_rotation
@@ -47,6 +48,12 @@ class Gaussian:
     modes: Floats
     residual: Floats
     rigid: int = 0
+
+    def projected(self, x: Floats) -> Floats:
+        """Nearest segment to x (F, J, 3) in the span of the modes about the mean."""
+        flat = self.modes.reshape(len(self.modes), -1).T
+        scores = np.linalg.lstsq(flat, (x - self.mean).ravel(), rcond=None)[0]
+        return np.asarray(self.mean + (flat @ scores).reshape(x.shape))
 
     def draw(self, rng: np.random.Generator, residual: bool = True) -> Floats:
         """Segment (F, J, 3) from the prior."""
@@ -192,6 +199,15 @@ class Posterior:
         """log10 of sqrt(det Q / det Lambda): how much smaller the posterior is than the prior."""
         return float(np.linalg.slogdet(self.covariance)[1] / (2 * LN10))
 
+    @property
+    def resolved(self) -> float:
+        """How many modes the measurements resolve: m - tr Q, sum_i s_i^2 / (1 + s_i^2).
+
+        s_i are the singular values of the whitened design.  Without a residual it is the slope of
+        log10_volume against log10 of the noise's deviation.
+        """
+        return float(len(self.alpha) - np.trace(self.covariance))
+
 
 def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
     """Posterior of a Gaussian given measurements, by the information form."""
@@ -203,6 +219,29 @@ def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
     spread = np.linalg.slogdet(precision)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
     evidence = -0.5 * float(fit + spread + len(s.y) * np.log(2 * np.pi))
     return Posterior(gaussian, rows, s, alpha, (covariance + covariance.T) / 2, evidence)
+
+
+def by_likelihood(found: Posterior) -> Posterior:
+    """Estimate the modes by the measurements alone: least squares, the limit of ever larger deviations.
+
+    What moves the body as a whole keeps what is known of it: no view from far away tells a distance.
+
+    Raises
+    ------
+    UserError
+        If the measurements leave a combination of modes open.
+    """
+    count, rigid = len(found.alpha), found.gaussian.rigid
+    design = np.concatenate([found.system.design, np.eye(count)[count - rigid :]])
+    rank = int(np.linalg.matrix_rank(design))
+    if rank < count:
+        raise UserError(
+            f"the points seen in a segment tell {rank - rigid} of {count - rigid} modes, and the likelihood "
+            "alone says nothing of the others; give more points, or use --method blend"
+        )
+    inverse = np.linalg.pinv(design)
+    alpha = inverse[:, : len(found.system.y)] @ found.system.y
+    return replace(found, alpha=alpha, covariance=inverse @ inverse.T)
 
 
 def _inverse(precision: Floats) -> Floats:

@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.lift.posterior import FLOOR_SD
+from gait.lift.uncertain import Uncertain
 
 Floats = npt.NDArray[np.float64]
 
-METHODS = ("smooth", "blend", "segment")
+METHODS = ("smooth", "blend", "segment", "likelihood")
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ class Motion:
     settled : bool
     log_volume_ratio : float
         Logarithm to base 10 of the posterior's volume over the prior's; of segments alone, their mean.
+    uncertain : Uncertain
+        What its segments, each alone, leave open.
     evidence : float
         Logarithm of the density of what is seen, but for a constant; NaN for segments alone.
     misfit : float
@@ -83,6 +86,7 @@ class Motion:
     steps: int
     settled: bool
     log_volume_ratio: float
+    uncertain: Uncertain
     evidence: float = float("nan")
     misfit: float = float("nan")
     wider: float = 1.0

@@ -1,0 +1,55 @@
+"""What soft constraints of the smoother are for: standing feet slide less, bones change less."""
+
+import numpy as np
+import pytest
+
+from gait.lift import motion, result
+from gait.lift.equations import Perspective
+from gait.lift.prior import SegmentPrior
+from gait.lift.soft import BONES, FEET
+from gait.lift.tracks_file import Tracks
+from gait.simulate.scenario import Scenario
+from gait.simulate.stage import set_stage
+from gait.skeleton import EVAL15, JOINTS
+
+FRAMES, FPS, NOISE = 40, 25.0, 6.0  # pixels: less noise leaves less to mend
+STANDING = 0.05  # m/s
+
+
+@pytest.fixture(scope="module")
+def stage():
+    """A walker of a normative gait, whom the prior does not know."""
+    return set_stage(Scenario(frames=FRAMES, fps=FPS, seed=301))
+
+
+@pytest.fixture(scope="module")
+def figures(stage):
+    """Sliding speed of standing feet (m/s), and variation of bones (m), by what is asked for."""
+    points = stage.walk.points(stage.frames)
+    truth = np.stack([points[name] for name in EVAL15], axis=1)
+    uv = stage.camera.project(truth) + NOISE * np.random.default_rng(5).standard_normal((FRAMES, 15, 2))
+    number = np.arange(FRAMES)
+    tracks = Tracks(number, number / FPS, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
+
+    def of(contact, bones):
+        options = result.Options(pixel_sd=NOISE, stature=stage.body.stature, contact=contact, bones=bones)
+        found = motion.lift(SegmentPrior.load(), tracks, Perspective(stage.camera), options, tuple(JOINTS))
+        places = dict(zip(found.names, np.moveaxis(found.places, 1, 0), strict=True))
+        slide = [speed(places[f])[speed(points[f]) < STANDING] for f in FEET if f in places]
+        lengths = [np.linalg.norm(places[a] - places[b], axis=1).std() for a, b in BONES]
+        return float(np.median(np.concatenate(slide))), float(np.mean(lengths))
+
+    return {arms: of(*arms) for arms in ((True, True), (False, True), (True, False))}
+
+
+def speed(places):
+    """Metres per second between frames."""
+    return FPS * np.linalg.norm(np.diff(places, axis=0), axis=1)
+
+
+def test_feet_slide_less_with_contact(figures):
+    assert figures[True, True][0] < 0.9 * figures[False, True][0]
+
+
+def test_bones_vary_less_where_their_lengths_are_kept(figures):
+    assert figures[True, True][1] < 0.6 * figures[True, False][1]
