@@ -12,7 +12,7 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.camera import Camera
 from gait.cli import main
-from gait.lift import motion
+from gait.lift import motion, outliers
 from gait.lift.result import METHODS
 from gait.lift.tracks_file import Tracks, read, write
 from gait.trc import read_trc
@@ -298,11 +298,13 @@ def test_doubts_are_told(folder, capsys, monkeypatch):
         return replace(lift(prior, tracks, *args), doubted=doubted, alone=True, steps=0, wider=2.0)
 
     monkeypatch.setattr(motion, "lift", doubting)
+    monkeypatch.setattr(outliers, "shake", lambda tracks: 5.0)
     command = ["lift", "t.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv"]
     assert main([*command, "--json"]) == 0
     said = capsys.readouterr()
     names = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].names
     assert f"far from where the rest has them: {names[3]} in 4 frames\n" in said.err
+    assert "the points shake by 5 from frame to frame, not 3: try --pixel-sd 5\n" in said.err
     assert "segments are estimated alone" in said.err and "widened 2 times" in said.err
     figures = json.loads(said.out)
     assert figures["doubted"] == 5 and figures["segments_alone"]

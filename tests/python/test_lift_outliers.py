@@ -1,9 +1,11 @@
-"""Points that jump are taken out of 2-D tracks, quick motion is not."""
+"""Points that jump are taken out of 2-D tracks, quick motion is not; noise is told from motion."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gait.lift.outliers import without_jumps
+from gait.lift.outliers import shake, without_jumps
 from gait.lift.tracks_file import Tracks
 
 
@@ -46,3 +48,19 @@ def test_few_points_are_left_alone():
     tracks = swinging(30, frames=4)
     tracks.uv[1] += 500
     assert without_jumps(tracks, 3.0)[1] == []
+
+
+@pytest.mark.parametrize("noise", [0.0, 4.0, 12.0])
+def test_noise_is_told_from_motion(noise):
+    """The tracks have 3 px of their own."""
+    tracks = swinging(30, frames=300)
+    more = noise * np.random.default_rng(7).standard_normal(tracks.uv.shape)
+    assert shake(replace(tracks, uv=tracks.uv + more)) == pytest.approx(np.hypot(3, noise), rel=0.12)
+
+
+def test_noise_is_not_told_of_slow_pictures_or_single_frames():
+    tracks = swinging(10)
+    assert np.isnan(shake(tracks))
+    gaps = tracks.uv.copy()
+    gaps[::3] = np.nan
+    assert np.isnan(shake(replace(tracks, time=tracks.time / 10, uv=gaps)))

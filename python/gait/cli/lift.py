@@ -29,7 +29,7 @@ from gait.cli import lift_tracks, lift_video, values
 from gait.errors import UsageError, UserError
 from gait.files import require_outputs
 from gait.initial import STATURE
-from gait.lift import lifted_file, motion, result
+from gait.lift import lifted_file, motion, outliers, result
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
@@ -45,6 +45,7 @@ _ONLY_TRACKS = (
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
 PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
 FAR = 4.0  # noise alone gives a median of 1.2
+SHAKY = 1.3  # times --pixel-sd from which a motion that does not fit may be noise
 DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
 
 
@@ -135,7 +136,7 @@ def run(args: argparse.Namespace) -> int:
     found = lift_tracks.lift(args.input, prior, tracks, view, _options(args, pixel_sd), names, args.quiet)
     _require_person(args, found)
     if not args.quiet:
-        for words in _doubts(found, tracks.names, pixel_sd):
+        for words in _doubts(found, tracks.names, pixel_sd, outliers.shake(tracks)):
             print(words, file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
@@ -177,12 +178,14 @@ def _require_person(args: argparse.Namespace, found: result.Motion) -> None:
         )
 
 
-def _doubts(found: result.Motion, names: tuple[str, ...], pixel_sd: float) -> list[str]:
+def _doubts(found: result.Motion, names: tuple[str, ...], pixel_sd: float, shake: float) -> list[str]:
     """Why the result may be wrong, a line each."""
     far = float(np.nanmedian(found.error)) / pixel_sd
     doubted = _doubted(found, names)
     doubts = {
         f"left with little say, far from where the rest has them: {doubted}": bool(doubted),
+        f"the points shake by {shake:.2g} from frame to frame, not {pixel_sd:g}: "
+        f"try --pixel-sd {shake:.2g}": (shake > SHAKY * pixel_sd and found.wider > 1),
         f"not a motion like those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
         "the smoother goes astray in such a motion: its segments are estimated alone, as by --method blend": (
             found.alone

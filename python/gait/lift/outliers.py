@@ -1,4 +1,4 @@
-"""Single points of 2-D tracks that a detector put elsewhere for a frame or two."""
+"""Noise of 2-D tracks: points that a detector put elsewhere for a frame or two, and how much all shake."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 LIMIT = 8.0  # deviations from the line between neighbours beyond which a point is no noise
 SPREAD = 1.4826  # median absolute deviation to standard deviation, normal noise
+QUICK = 0.05  # seconds from frame to frame: with longer steps motion looks like noise
 PAIR = np.sqrt(1.5)  # sd of a point against the middle of its neighbours, over that of one point
 
 
@@ -34,6 +35,18 @@ def without_jumps(tracks: Tracks, sd: float) -> tuple[Tracks, list[tuple[int, st
     for j, name in enumerate(tracks.names):
         gone += [(int(tracks.frame[t]), name) for t in _clear(tracks.time, uv[:, j], sd)]
     return replace(tracks, uv=uv), sorted(gone)
+
+
+def shake(tracks: Tracks) -> float:
+    """Noise of the points that no motion explains, pixels; NaN where too few frames follow soon.
+
+    By third differences: white noise's are sqrt(20) times as large, and a walk's at `QUICK` a pixel.
+    """
+    third = np.abs(np.diff(tracks.uv, 3, axis=0))
+    seen = third[np.isfinite(third)]
+    if not seen.size or np.median(np.diff(tracks.time)) > QUICK:
+        return np.nan
+    return float(SPREAD * np.median(seen) / np.sqrt(20))
 
 
 def _clear(time: Array, uv: Array, sd: float) -> list[int]:
