@@ -67,13 +67,17 @@ def test_a_file_that_workers_do_not_see_is_named_with_the_remedy(walks, schedule
         sources.load_all([(tmp_path / "absent.amc", True)], dask=scheduler)
 
 
-def test_a_worker_of_another_version_is_refused(walks, scheduler, monkeypatch):
+@pytest.mark.parametrize("package", ["gait", "scipy"])
+def test_a_worker_of_another_version_is_refused(package, walks, scheduler, monkeypatch):
     here = os.getpid()
     true = importlib.metadata.version
     monkeypatch.setattr(
-        cluster.metadata, "version", lambda name: "0.0.1" if os.getpid() == here else true(name)
+        cluster.metadata,
+        "version",
+        lambda name: "0.0.1" if here == os.getpid() and name == package else true(name),
     )
-    with pytest.raises(UserError, match=r"worker tcp://.* has \d.* of gait, this machine 0.0.1; install"):
+    words = rf"worker tcp://.* has \d.* of {package}, this machine 0.0.1; install"
+    with pytest.raises(UserError, match=words):
         sources.load_all([(walks / "01_00.amc", True)], dask=scheduler)
 
 
@@ -102,7 +106,7 @@ def test_a_file_that_kills_its_workers_is_named(walks, scheduler, tmp_path, monk
     monkeypatch.setattr(
         cluster,
         "_done",
-        lambda task: os._exit(9) if task.path.name == "05_01.amc" else true(task),
+        lambda task, wanted: os._exit(9) if task.path.name == "05_01.amc" else true(task, wanted),
     )
     _, refused = sources.load_all([(walks / "01_01.amc", True), (bad, True)], dask=scheduler)
     assert len(refused) == 1 and refused[0].startswith(f"{bad}: the workers that read it were killed")

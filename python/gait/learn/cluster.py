@@ -12,7 +12,7 @@ import re
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,6 +31,35 @@ AHEAD = 4  # files in flight per thread of the workers
 SAME = ("gait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
 
 
+@dataclass(frozen=True)
+class Unlike:
+    """A worker that would give other results: its version of a package, or other kernels (no package)."""
+
+    worker: str
+    package: str = ""
+    found: str = ""
+
+    def refusal(self, address: str) -> UserError:
+        """Tell what to do about it."""
+        if self.package:
+            return UserError(
+                f"--dask {address}: worker {self.worker} has {self.found} of {self.package}, "
+                f"this machine {metadata.version(self.package)}; install the same versions on both"
+            )
+        return UserError(
+            f"--dask {address}: last digits would depend on the CPU of worker {self.worker}; "
+            f"start it with 'dask worker --preload-nanny {kernels.__name__} {address}'"
+        )
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What results depend on besides the task: versions of packages, and the kernels."""
+
+    versions: dict[str, str]
+    kernels: dict[str, str]
+
+
 def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, None]:
     """Outcomes of files in their order, from the workers of the scheduler at `address`.
 
@@ -40,16 +69,19 @@ def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, N
         If dask is not installed, nothing answers, the workers have other versions or do not see the files.
     """
     with _connected(address) as client:
-        _require_same_versions(client, address)
-        _require_same_kernels(client, address)
+        _require_package(client, address)
+        wanted = _surroundings()
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
         waiting, flying = deque(tasks), deque[tuple[Path, "Future"]]()
         while waiting or flying:
             while waiting and len(flying) < ahead:
                 task = waiting.popleft()
-                flying.append((task.path, client.submit(_done, _absolute(task), pure=False)))
+                flying.append((task.path, client.submit(_done, _absolute(task), wanted, pure=False)))
             path, future = flying.popleft()
-            yield _as_named(_result(client, address, path, future), path)
+            outcome = _result(client, address, path, future)
+            if isinstance(outcome, Unlike):
+                raise outcome.refusal(address)
+            yield _as_named(outcome, path)
 
 
 def _absolute(task: Task) -> Task:
@@ -60,10 +92,31 @@ def _absolute(task: Task) -> Task:
     return replace(task, path=task.path.absolute(), reading=reading)
 
 
-def _done(task: Task) -> Prepared | None:
-    """Do a task on a worker; None if the worker does not see the file."""
+def _surroundings() -> Surroundings:
+    """Surroundings of this process."""
+    return Surroundings({package: metadata.version(package) for package in SAME}, kernels.chosen())
+
+
+def _done(task: Task, wanted: Surroundings) -> Prepared | Unlike | None:
+    """Do a task on a worker that is like the client; None if it does not see the file.
+
+    Every task looks: a worker may come while others are at work.
+    """
+    if (here := _surroundings()) != wanted:
+        return _difference(here, wanted)
     one_thread_for_good()
     return task.done() if task.path.is_file() else None
+
+
+def _difference(here: Surroundings, wanted: Surroundings) -> Unlike:
+    """Name what makes this worker unlike the client."""
+    from distributed import get_worker
+
+    worker: str = get_worker().address
+    for package, version in wanted.versions.items():
+        if here.versions[package] != version:
+            return Unlike(worker, package, here.versions[package])
+    return Unlike(worker)
 
 
 @contextmanager
@@ -96,28 +149,17 @@ def _connected(address: str) -> Iterator[Client]:
         log.setLevel(before)
 
 
-def _require_same_versions(client: Client, address: str) -> None:
-    for package in SAME:
-        here = metadata.version(package)
-        for worker, there in client.run(metadata.version, package, on_error="return").items():
-            if there != here:
-                found = there if isinstance(there, str) else "none"
-                raise UserError(
-                    f"--dask {address}: worker {worker} has {found} of {package}, this machine {here}; "
-                    "install the same versions on both"
-                )
+def _require_package(client: Client, address: str) -> None:
+    """Refuse workers on which this package is absent or another: they could not even read a task."""
+    package = SAME[0]
+    for worker, there in client.run(metadata.version, package, on_error="return").items():
+        if isinstance(there, metadata.PackageNotFoundError):
+            raise Unlike(worker, package, "none").refusal(address)
+        if isinstance(there, str) and there != metadata.version(package):
+            raise Unlike(worker, package, there).refusal(address)
 
 
-def _require_same_kernels(client: Client, address: str) -> None:
-    for worker, there in client.run(kernels.chosen).items():
-        if there != kernels.chosen():
-            raise UserError(
-                f"--dask {address}: last digits would depend on the CPU of worker {worker}; "
-                f"start it with 'dask worker --preload-nanny {kernels.__name__} {address}'"
-            )
-
-
-def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | None:
+def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | Unlike | None:
     """Wait for a result while there are workers."""
     from distributed import CancelledError, KilledWorker
     from distributed.comm import CommClosedError
@@ -125,7 +167,7 @@ def _result(client: Client, address: str, path: Path, future: Future) -> Prepare
     lost = UserError(f"--dask {address}: the connection was lost at {path}; start again")
     while True:
         try:
-            outcome: Prepared | None = future.result(timeout=PATIENCE)
+            outcome: Prepared | Unlike | None = future.result(timeout=PATIENCE)
             return outcome
         except KilledWorker:
             killed = UserError(
