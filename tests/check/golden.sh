@@ -5,10 +5,10 @@
 cd "$(dirname "$0")/../.." || exit 1
 release=$(sed -n 's/^OPT_release *:= *//p' Makefile)
 failed=0 runs=0 skipped=''
-compare() { # CC FOLDER OPT [RUNNER]
+compare() { # CC BUILD_FOLDER OPT [RUNNER]
     for part in determinism lift_stream; do
-        test=build/golden/$2/unit/test_$part
-        ${MAKE:-make} -s -j"$(getconf _NPROCESSORS_ONLN)" B="build/golden/$2" OPT="$3" CC="$1" "$test" >/dev/null || exit 1
+        test=$2/unit/test_$part
+        ${MAKE:-make} -s -j"$(getconf _NPROCESSORS_ONLN)" B="$2" OPT="$3" CC="$1" "$test" >/dev/null || exit 1
         lines=$($4 "$test" digest | sed -n 's/^digest //p')
         [ -n "$lines" ] || { echo "golden: $test printed no digest" >&2; exit 1; }
         while read -r have want name; do
@@ -31,15 +31,15 @@ for cc in gcc clang; do
     cxx=$(echo $cc | sed 's/gcc/g++/; s/clang/clang++/')
     here $cc "$cxx" || { skip "$cc and $cxx" "$(echo $cc | sed 's/gcc/g++/')"; continue; }
     for level in 0 2 3; do
-        compare "$cc" "$cc-O$level" "-O$level"
+        compare "$cc" "build/golden/$cc-O$level" "-O$level"
     done
-    compare "$cc" "$cc-release" "$release"
+    compare "$cc" "build/golden/$cc-release" "$release"
 done
-# Another instruction set, under emulation.
+# Another instruction set, under emulation, in the folder of `make lib CC=$arm-gcc`: the tests of the example made it.
 arm=aarch64-linux-gnu
 if here $arm-gcc $arm-g++ qemu-aarch64; then
     LDFLAGS=-static && export LDFLAGS
-    compare $arm-gcc $arm "$release" qemu-aarch64
+    compare $arm-gcc build/$arm-release "$release" qemu-aarch64
 else
     skip "$arm-gcc, $arm-g++ and qemu-aarch64" "g++-$arm qemu-user"
 fi

@@ -1,5 +1,11 @@
 """What all Python tests share."""
 
+import os
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # Before numpy is loaded: threads of processes side by side would only wait for each other's processors.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 def pytest_terminal_summary(terminalreporter):
     """Print the counts in the form of the C tests: an error outside a test counts as a failed one."""

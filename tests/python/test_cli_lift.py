@@ -107,7 +107,7 @@ def test_the_likelihood_alone_needs_more_points_than_the_prior(folder, capsys):
 
 @pytest.mark.parametrize(("axis", "vector"), [("-y", "0,-1,0"), ("-x", "-1,0,0"), ("-z", "-0.0,0,-2.5")])
 def test_views_the_other_way(folder, axis, vector):
-    command = ["lift", "t.csv", "-m", "m.gait", "--quiet"]
+    command = ["lift", "t.csv", "-m", "m.gait", "--quiet", "--pixel-sd", "1", "--method", "segment"]
     assert main([*command, "-o", "a.csv", "--orthographic", axis]) == 0
     assert main([*command, "--orthographic", vector, "-o", "b.csv"]) == 0
     assert main([*command, "-o", "c.csv", f"--orthographic={axis.replace('-', '')}"]) == 0

@@ -70,11 +70,11 @@ def test_save_says_when_nothing_came(tmp_path):
 def test_browsers_get_the_page_and_the_moving_picture():
     screen = Screen(0)
     try:
-        with urllib.request.urlopen(screen.address, timeout=10) as page:
+        with urllib.request.urlopen(screen.address, timeout=rig.PATIENCE) as page:
             assert b'src="/stream"' in page.read()
         first, second = rig.picture(0), rig.picture(5)
         screen.show(first)
-        with urllib.request.urlopen(f"{screen.address}stream", timeout=10) as stream:
+        with urllib.request.urlopen(f"{screen.address}stream", timeout=rig.PATIENCE) as stream:
             for image in (first, second):
                 head = [stream.readline() for _ in range(4)]
                 jpeg = stream.read(int(head[2].split(b":")[1]))
@@ -82,10 +82,10 @@ def test_browsers_get_the_page_and_the_moving_picture():
                 seen = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
                 assert np.abs(seen.astype(int) - image).mean() < 12
                 screen.show(second)
-        with urllib.request.urlopen(f"{screen.address}frame.jpg", timeout=10) as frame:
+        with urllib.request.urlopen(f"{screen.address}frame.jpg", timeout=rig.PATIENCE) as frame:
             assert frame.headers["Content-Type"] == "image/jpeg" and frame.read()[:2] == b"\xff\xd8"
         with pytest.raises(urllib.error.HTTPError, match="404"):
-            urllib.request.urlopen(f"{screen.address}other", timeout=10)
+            urllib.request.urlopen(f"{screen.address}other", timeout=rig.PATIENCE)
         with pytest.raises(UserError, match="give another"):
             Screen(int(screen.address.split(":")[2].rstrip("/")))
     finally:

@@ -98,7 +98,8 @@ def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch
     uv[6, 3] += 500
     write("t.csv", replace(tracks, uv=uv))
     monkeypatch.setattr(motion, "lift", watched)
-    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 0
+    with threadpoolctl.threadpool_limits(2):
+        assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 0
     threads, used = seen[0]
     assert threads == {1} and not used.seen[6, 3] and used.seen.sum() == used.seen.size - 1
     assert "left out, far from" in capsys.readouterr().err

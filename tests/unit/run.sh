@@ -1,9 +1,15 @@
 #!/bin/sh
-# Run C tests (arguments) and add up what they print; a crash, a hang (LIMIT seconds) or a silent exit is a failed test.
+# Run C tests (arguments), as many at a time as there are processors, and add up what they print; a crash, a hang (LIMIT
+# seconds) or a silent exit is a failed test.
+results=$(mktemp -d) || exit 1
+trap 'rm -rf "$results"' EXIT
+for test; do
+    printf '%s\0%s\0' "$test" "$results/${test##*/}"
+done | xargs -0 -n 2 -P "$(getconf _NPROCESSORS_ONLN)" sh -c 'timeout "${LIMIT:-300}" "$0" >"$1.out"; echo $? >"$1.status"'
 passed=0 failed=0
 for test; do
-    out=$(timeout "${LIMIT:-300}" "$test")
-    status=$?
+    out=$(cat "$results/${test##*/}.out")
+    status=$(cat "$results/${test##*/}.status")
     [ -n "$out" ] && printf '%s\n' "$out"
     counts=$(printf '%s\n' "$out" | sed -n 's/^.* \([0-9]*\) passed, \([0-9]*\) failed$/\1 \2/p' | tail -n 1)
     p=${counts% *} f=${counts#* }
