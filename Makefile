@@ -93,7 +93,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan fuzz fuzz-run golden-check \
         lint format install uninstall clean
 
 help: ## list the targets
@@ -187,7 +187,12 @@ $(B)/tools/%.c.o: tools/%.c Makefile build/lcm/.stamp | $(B)/tools/common/
 	    $(JPEG_CFLAGS) $(CFLAGS) -c $< -o $@
 
 # ---- tests ---------------------------------------------------------------------------------------------------
-test: setup lib tools check unit python-test ## everything below that can fail
+test: built check unit python-test ## everything below that can fail
+
+PROCESSORS = $(shell getconf _NPROCESSORS_ONLN)
+# As many compilers at a time as there are processors, unless make was told how many.
+built:
+	@$(if $(filter -j% --jobserver%,$(MAKEFLAGS)),:,$(MAKE) --no-print-directory -j$(PROCESSORS) setup lib tools $(UNIT))
 
 check: lib ## symbols, heap, threads, globals, size, layers, stack, recursion, headers, hygiene
 	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
@@ -200,8 +205,10 @@ $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile | $(B)/unit/
 	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -iquote libgait/src $(CFLAGS) \
 	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
 
+# A process for each processor; the tests of a file stay together, they share what is slow to make.
+PYTEST_AT_ONCE := -n logical --maxprocesses 8 --dist loadfile
 python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
-	@$(PY) -m pytest -q -c python/pyproject.toml --rootdir . tests/python $(ARGS)
+	@$(PY) -m pytest -q -c python/pyproject.toml --rootdir . $(PYTEST_AT_ONCE) tests/python $(ARGS)
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
 	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit

@@ -1,10 +1,14 @@
 """What all Python tests share."""
 
 import os
+import signal
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     # Before numpy is loaded: threads of processes side by side would only wait for each other's processors.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    # A shell that starts something in the background lets it, and all that it starts, ignore interruptions.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_terminal_summary(terminalreporter):
