@@ -113,7 +113,7 @@ def test_a_file_that_kills_its_workers_is_named(walks, scheduler, tmp_path, monk
 
 
 def test_a_worker_with_other_kernels_is_refused_with_the_remedy(walks, scheduler, monkeypatch):
-    monkeypatch.setenv("OPENBLAS_CORETYPE", "none that the worker has")
+    monkeypatch.setattr(cluster.kernels, "chosen", lambda: {"OPENBLAS_CORETYPE": "none that a worker has"})
     with pytest.raises(UserError, match=r"CPU of worker tcp://.*--preload-nanny gait\.kernels tcp://"):
         sources.load_all([(walks / "01_00.amc", True)], dask=scheduler)
 
