@@ -134,12 +134,16 @@ static void read_frame(const gait_lift *l, const lift_belief *b, int32_t f, bool
 {
     const lift_table *const t = &l->table;
     size_t const J = (size_t)t->prior.markers, first = (size_t)f * J;
-    int32_t all[GAIT_MAX_MARKERS];
-    for (int32_t j = 0; j < t->prior.markers; j++)
-        all[j] = j;
+    double x[3 * GAIT_MAX_MARKERS], each[3 * GAIT_MAX_MARKERS];
     lift_seen const seen = {.uv = l->uv + first * 2, .sd = l->sd + first};
-    lift_query const q = {.at = f, .marker = all, .count = t->prior.markers, .seen = residual ? &seen : NULL};
-    lift_read(t, b, &q, mean + 3 * first, sd ? sd + 3 * first : NULL);
+    lift_query const q = {.at = f, .count = t->prior.markers, .seen = residual ? &seen : NULL};
+    lift_read(t, b, &q, x, sd ? each : NULL);
+    for (int32_t r = 0; r < q.count; r++) {
+        size_t const to = 3 * (first + (size_t)t->order[r]);
+        memcpy(mean + to, x + 3 * r, 3 * sizeof *x);
+        if (sd)
+            memcpy(sd + to, each + 3 * r, 3 * sizeof *each);
+    }
 }
 
 gait_status gait_lift_positions(gait_lift *l, double *mean, double *sd)

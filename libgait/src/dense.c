@@ -1,21 +1,20 @@
 #include "dense.h"
 
 #include "fmath.h"
+#include "wide.h"
 
-/* Sum of u[j] v[j], j in [first, last), in four chains. */
-static double dot(const double *u, const double *v, int32_t first, int32_t last)
+/* Sum of u[j] v[j], j < count, a multiple of DENSE_LANES, in so many chains. */
+static double dot(const double *u, const double *v, int32_t count)
 {
-    double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0;
-    int32_t j = first;
-    for (; j + 4 <= last; j += 4) {
-        s0 += u[j] * v[j];
-        s1 += u[j + 1] * v[j + 1];
-        s2 += u[j + 2] * v[j + 2];
-        s3 += u[j + 3] * v[j + 3];
-    }
-    for (; j < last; j++)
-        s0 += u[j] * v[j];
-    return (s0 + s1) + (s2 + s3);
+    wide sum[DENSE_LANES / WIDE] = {{0.0}};
+    double s[DENSE_LANES];
+    for (int32_t j = 0; j < count; j += DENSE_LANES)
+        _Pragma("GCC unroll 8") for (int32_t k = 0; k < DENSE_LANES / WIDE; k++)
+        {
+            sum[k] += wide_load(u + j + k * WIDE) * wide_load(v + j + k * WIDE);
+        }
+    memcpy(s, sum, sizeof s);
+    return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
 }
 
 void dense_ahead(const double *A, int32_t n, int32_t ld, double *v)
@@ -30,9 +29,21 @@ void dense_ahead(const double *A, int32_t n, int32_t ld, double *v)
 
 void dense_back(const double *A, int32_t n, int32_t ld, double *v)
 {
-    for (int32_t i = n - 1; i >= 0; i--) {
-        const double *const u = A + (size_t)i * (size_t)ld;
-        v[i] = (v[i] - dot(u, v, i + 1, n)) / u[i];
+    memset(v + n, 0, (size_t)(ld - n) * sizeof *v);
+    for (int32_t first = dense_padded(n) - DENSE_LANES; first >= 0; first -= DENSE_LANES) {
+        int32_t const last = first + DENSE_LANES;
+        const double *const rows = A + (size_t)first * (size_t)ld;
+        double inverse[DENSE_LANES];
+        for (int32_t i = first; i < i_min(last, n); i++) { /* what the blocks behind have settled */
+            const double *const u = A + (size_t)i * (size_t)ld;
+            inverse[i - first] = 1.0 / u[i];
+            v[i] -= dot(u + last, v + last, ld - last);
+        }
+        for (int32_t i = i_min(last, n) - 1; i >= first; i--) {
+            v[i] *= inverse[i - first];
+            for (int32_t k = first; k < i; k++)
+                v[k] -= rows[(size_t)(k - first) * (size_t)ld + (size_t)i] * v[i];
+        }
     }
 }
 

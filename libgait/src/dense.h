@@ -20,13 +20,13 @@ static inline int32_t dense_padded_float(int32_t n)
     return (n + DENSE_FLOATS - 1) / DENSE_FLOATS * DENSE_FLOATS;
 }
 
-/* theta = U^-1 z, from a factored A. */
+/* theta = U^-1 z, from a factored A; ld numbers. */
 void dense_solve(const double *A, int32_t n, int32_t ld, double *theta);
 /* sum of log U_ii. */
 double dense_log_det(const double *A, int32_t n, int32_t ld);
 /* v = U^-T v, in place. */
 void dense_ahead(const double *A, int32_t n, int32_t ld, double *v);
-/* v = U^-1 v, in place. */
+/* v = U^-1 v, in place; ld numbers, those past n become 0. */
 void dense_back(const double *A, int32_t n, int32_t ld, double *v);
 /* Eigenvectors of a symmetric S (n x n, full, ld) by Jacobi rotations: S becomes diagonal, row i of V (ld)
  * the vector of S[i][i]. Largest first. */

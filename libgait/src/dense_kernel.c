@@ -22,54 +22,57 @@ enum { ROWS = DENSE_LANES };
 void KERNEL(dense_rank)(double *A, int32_t ld, const double *W, int32_t count)
 {
     for (int32_t i = 0; i < ld; i += ROWS)
-        update(A, ld, i, i, ld, 1.0, W, ld, W, ld, count, NULL);
+        update(A, A, ld, i, i, ld, 1.0, W, ld, W, ld, count, NULL);
 }
 
 void KERNEL(dense_forward)(const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width)
 {
     for (int32_t i = 0; i < n; i += ROWS)
-        update(Z, ldz, i, 0, width, -1.0, U, ld, Z, ldz, i, U + (size_t)i * (size_t)(ld + 1));
+        update(Z, Z, ldz, i, 0, width, -1.0, U, ld, Z, ldz, i, U + (size_t)i * (size_t)(ld + 1));
 }
 
-void KERNEL(dense_forward_float)(const double *U, int32_t n, int32_t ld, const double *Z, int32_t width,
-                                 float *V)
+void KERNEL(dense_forward_float)(const double *U, int32_t n, int32_t ld, float *V, int32_t width)
 {
     float *const T = V + ld * width;
-    for (int32_t i = 0; i < ld * width; i++)
-        V[i] = (float)Z[i];
     for (int32_t i = 0; i < ld; i++)
-        for (int32_t j = i / ROWS * ROWS; j < ld; j++)
-            T[i * ld + j] = (float)U[i * ld + j];
+        for (int32_t j = i / ROWS * ROWS; j < ld; j += WIDE)
+            wide_store_float(T + i * ld + j, wide_load(U + i * ld + j));
     for (int32_t i = 0; i < n; i += ROWS)
-        update_float(V, width, i, 0, width, -1.0f, T, ld, V, width, i, T + i * (ld + 1));
+        update_float(V, V, width, i, 0, width, -1.0f, T, ld, V, width, i, T + i * (ld + 1));
 }
 
-/* Factor a block on the diagonal, the first n of its rows. */
+/* Factor a block on the diagonal, the first n of its rows: first as L D L', whose pivots wait for no root. */
 static bool factor_corner(double *A, int32_t ld, int32_t n)
 {
     for (int32_t i = 0; i < n; i++) {
-        double *const row = A + i * ld;
+        const double *const row = A + i * ld;
         if (!(row[i] > 0.0))
             return false;
-        double const root = sqrt(row[i]), inverse = 1.0 / root;
+        double const inverse = 1.0 / row[i];
+        for (int32_t k = i + 1; k < ROWS; k++) {
+            double const part = row[k] * inverse;
+            double *const to = A + k * ld;
+            _Pragma("GCC unroll 8") for (int32_t j = 0; j < ROWS; j += WIDE) /* left of k they mean nothing */
+                wide_store(to + j, wide_load(to + j) - part * wide_load(row + j));
+        }
+    }
+    for (int32_t i = 0; i < n; i++) {
+        double *const row = A + i * ld, root = sqrt(row[i]), inverse = 1.0 / root;
+        _Pragma("GCC unroll 8") for (int32_t j = 0; j < ROWS; j += WIDE)
+            wide_store(row + j, wide_load(row + j) * inverse);
         row[i] = root;
-        for (int32_t j = i + 1; j < ROWS; j++)
-            row[j] *= inverse;
-        for (int32_t k = i + 1; k < ROWS; k++)
-            for (int32_t j = k; j < ROWS; j++)
-                A[k * ld + j] -= row[k] * row[j];
     }
     return true;
 }
 
-bool KERNEL(dense_factor)(double *A, int32_t n, int32_t ld)
+bool KERNEL(dense_factor)(const double *A, double *U, int32_t n, int32_t ld)
 {
     for (int32_t i = 0; i < n; i += ROWS) {
-        double *const corner = A + (size_t)i * (size_t)(ld + 1);
-        update(A, ld, i, i, i + ROWS, -1.0, A, ld, A, ld, i, NULL);
+        double *const corner = U + (size_t)i * (size_t)(ld + 1);
+        update(A, U, ld, i, i, i + ROWS, -1.0, U, ld, U, ld, i, NULL);
         if (!factor_corner(corner, ld, n - i < ROWS ? n - i : ROWS))
             return false;
-        update(A, ld, i, i + ROWS, ld, -1.0, A, ld, A, ld, i, corner);
+        update(A, U, ld, i, i + ROWS, ld, -1.0, U, ld, U, ld, i, corner);
     }
     return true;
 }

@@ -1,10 +1,11 @@
 /* dense_update.h - what factoring and forward substitution spend their time in; included once for each type
  * of NUMBER: WIDES as many as a register holds, UPDATE the function's name. */
 
-/* Columns [first, last) of rows i to i + 7 of C: += sign F'W, `count` rows of both one after the other; then,
+/* Columns [first, last) of rows i to i + 7: C = B + sign F'W, `count` rows of both one after the other; then,
  * with a block T on the diagonal of F, T^-T of that. */
-static void UPDATE(NUMBER *C, int32_t ldc, int32_t i, int32_t first, int32_t last, NUMBER sign,
-                   const NUMBER *F, int32_t ldf, const NUMBER *W, int32_t ldw, int32_t count, const NUMBER *T)
+static void UPDATE(const NUMBER *B, NUMBER *C, int32_t ldc, int32_t i, int32_t first, int32_t last,
+                   NUMBER sign, const NUMBER *F, int32_t ldf, const NUMBER *W, int32_t ldw, int32_t count,
+                   const NUMBER *T)
 {
     NUMBER corner[ROWS][ROWS];
     for (int32_t k = 0; T && k < ROWS; k++) {
@@ -12,10 +13,12 @@ static void UPDATE(NUMBER *C, int32_t ldc, int32_t i, int32_t first, int32_t las
         corner[k][k] = 1 / corner[k][k];
     }
     for (int32_t j = first; j < last; j += (int32_t)(sizeof(WIDES) / sizeof(NUMBER))) {
-        NUMBER *const c = C + (size_t)i * (size_t)ldc + j;
+        size_t const at = (size_t)i * (size_t)ldc + (size_t)j;
+        const NUMBER *const b = B + at;
+        NUMBER *const c = C + at;
         const NUMBER *f = F + i, *w = W + j;
         WIDES a[ROWS];
-        EACH_ROW(k) a[k] = sign * *(WIDES *)(void *)(c + k * ldc);
+        EACH_ROW(k) a[k] = sign * *(const WIDES *)(const void *)(b + k * ldc);
         for (int32_t r = 0; r < count; r++, f += ldf, w += ldw) {
             WIDES const x = *(const WIDES *)(const void *)w;
             EACH_ROW(k) a[k] += f[k] * x;

@@ -35,13 +35,12 @@ struct walker_block;
 #define KERNELS(K)                                                                                           \
     /* Upper triangle of A += W'W, A and W of ld columns (dense.h) */                                        \
     K(void, dense_rank, (double *A, int32_t ld, const double *W, int32_t rows))                              \
-    /* A = U'U in place, n rows; A[.][n]: b -> U^-T b, y'y -> what theta leaves; false: not definite */      \
-    K(bool, dense_factor, (double *A, int32_t n, int32_t ld))                                                \
+    /* A = U'U, n rows, U may be A; A[.][n]: b -> U^-T b, y'y -> what theta leaves; false: not definite */   \
+    K(bool, dense_factor, (const double *A, double *U, int32_t n, int32_t ld))                               \
     /* Z = U^-T Z, `width` columns (a multiple of DENSE_LANES), dense_padded(n) rows of ldz numbers */       \
     K(void, dense_forward, (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))  \
-    /* V = U^-T Z with floats, ld x width both (of DENSE_FLOATS); past V lies room for ld x ld more */       \
-    K(void, dense_forward_float,                                                                             \
-      (const double *U, int32_t n, int32_t ld, const double *Z, int32_t width, float *V))                    \
+    /* V = U^-T V with floats, ld x width (of DENSE_FLOATS); past V lies room for ld x ld more */            \
+    K(void, dense_forward_float, (const double *U, int32_t n, int32_t ld, float *V, int32_t width))          \
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
     K(void, lift_sum,                                                                                        \
       (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
@@ -51,9 +50,14 @@ struct walker_block;
        const double *theta, int32_t modes, double moved[3]))                                                 \
     /* w[i] = g . shape[.][i], i < lanes */                                                                  \
     K(void, lift_row, (double *w, const double *shape, int32_t lanes, const double g[3]))                    \
-    /* z[i * stride + a] = M[a] . shape[.][i], a < 3, i < lanes */                                           \
-    K(void, lift_columns, (double *z, size_t stride, const double *shape, int32_t lanes, double M[3][3]))    \
-    /* x[j] += sum_i Z[i * stride + j]^2, j < width */                                                       \
+    /* One coordinate of eight markers, modes x 8: out = w0 s0 + w1 s1; where theta moves each */            \
+    K(void, lift_eight,                                                                                      \
+      (double *out, const float *s0, const float *s1, double w0, double w1, const double *theta,             \
+       int32_t modes, double moved[8]))                                                                      \
+    /* v[i * stride + a * apart + r] = M[a][.][r] . shape[.][i][r], a < 3, i < modes, r < 8 */               \
+    K(void, lift_turn,                                                                                       \
+      (float *v, size_t stride, size_t apart, const double *shape, int32_t modes, double M[9][8]))           \
+    /* x[j] += sum_i Z[i * stride + j]^2, j < width, of DENSE_LANES */                                       \
     K(void, lift_squares, (double *x, int32_t width, const float *Z, size_t stride, int32_t rows))           \
     /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. */    \
     K(void, kin_curves,                                                                                      \

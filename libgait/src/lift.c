@@ -13,19 +13,14 @@ void lift_clear(const lift_table *t, lift_belief *b)
     b->log_noise = b->miss = 0.0;
 }
 
-void lift_marker_at(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
-                    lift_marker *r, double x[3])
+void lift_marker_moved(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
+                       const double moved[3], lift_marker *r, double x[3])
 {
     const segment_prior *const p = &t->prior;
     bool const whole = t->eye.perspective;
     double const growth = t->size < 0 ? 0.0 : t->growth * b->theta[t->size], w1 = m->part, w0 = 1.0 - w1;
     const float *const m0 = segment_mean(p, b->component, m->f) + 3 * j;
     const float *const m1 = segment_mean(p, b->component, m->next) + 3 * j;
-    size_t const J = (size_t)p->markers, first = (size_t)b->component * (size_t)p->frames;
-    const float *const s0 = t->row + ((first + (size_t)m->f) * J + (size_t)j) * 3 * (size_t)t->lanes;
-    const float *const s1 = t->row + ((first + (size_t)m->next) * J + (size_t)j) * 3 * (size_t)t->lanes;
-    double moved[3];
-    t->run->lift_shape(t->shape, s0, s1, w0, w1, t->lanes, b->theta, p->modes, moved);
     r->grown = whole ? 1.0 + growth : 1.0;
     for (int32_t i = 0; i < 3; i++) {
         double const mean = w0 * (double)m0[i] + w1 * (double)m1[i];
@@ -33,6 +28,18 @@ void lift_marker_at(const lift_table *t, const lift_belief *b, const lift_moment
         x[i] = mean + moved[i] + growth * r->shape[i];
         r->base[i] = mean - (r->grown - 1.0) * moved[i];
     }
+}
+
+void lift_marker_at(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
+                    lift_marker *r, double x[3])
+{
+    const segment_prior *const p = &t->prior;
+    size_t const J = (size_t)p->markers, first = (size_t)b->component * (size_t)p->frames;
+    const float *const s0 = t->row + ((first + (size_t)m->f) * J + (size_t)j) * 3 * (size_t)t->lanes;
+    const float *const s1 = t->row + ((first + (size_t)m->next) * J + (size_t)j) * 3 * (size_t)t->lanes;
+    double moved[3];
+    t->run->lift_shape(t->shape, s0, s1, 1.0 - m->part, m->part, t->lanes, b->theta, p->modes, moved);
+    lift_marker_moved(t, b, m, j, moved, r, x);
 }
 
 /* The white row g . X = y of a marker as a row of the unknowns, with y last. */
@@ -122,8 +129,7 @@ void lift_add(const lift_table *t, lift_belief *b, double at, const lift_seen *s
 
 bool lift_solve(const lift_table *t, lift_belief *b)
 {
-    memcpy(b->U, b->A, (size_t)t->ld * (size_t)t->ld * sizeof *b->U);
-    if (!t->run->dense_factor(b->U, t->n, t->ld))
+    if (!t->run->dense_factor(b->A, b->U, t->n, t->ld))
         return false;
     dense_solve(b->U, t->n, t->ld, b->theta);
     bool ok = true;

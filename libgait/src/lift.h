@@ -15,6 +15,9 @@ typedef struct lift_marker { /* linear about theta, statures */
  * is linear. */
 void lift_marker_at(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
                     lift_marker *r, double x[3]);
+/* The same without t->shape: theta moves the marker so far. */
+void lift_marker_moved(const lift_table *t, const lift_belief *b, const lift_moment *m, int32_t j,
+                       const double moved[3], lift_marker *r, double x[3]);
 /* Normal equations of the prior alone. */
 void lift_clear(const lift_table *t, lift_belief *b);
 /* White rows t->W of a frame at moment `at`, in frames [0, F - 1]; returns how many. They are linearised

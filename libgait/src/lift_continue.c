@@ -5,14 +5,6 @@
 
 #include <string.h>
 
-/* Mean of some markers at a moment. */
-static void places(const lift_table *t, const lift_belief *b, double at, const int32_t *marker, int32_t count,
-                   double *mean)
-{
-    lift_query const q = {.at = at, .marker = marker, .count = count};
-    lift_read(t, b, &q, mean, NULL);
-}
-
 /* Middle of the markers on the ground. */
 static void middle(const double *x, int32_t count, double out[2])
 {
@@ -42,7 +34,7 @@ static double turn_of(const lift_table *t, const lift_belief *b, const double *l
     for (const int32_t *pair = t->trunk; pair < t->trunk + 4; pair += 2) {
         if (pair[0] < 0 || pair[1] < 0)
             continue;
-        places(t, b, 0.0, pair, 2, first);
+        lift_places(t, b, 0.0, pair, 2, first);
         for (int32_t i = 0; i < 2; i++) {
             a[i] += first[3 + i] - first[i];
             c[i] += last[3 * pair[1] + i] - last[3 * pair[0] + i];
@@ -59,7 +51,7 @@ void lift_continue(const lift_table *t, const lift_belief *before, int32_t c, li
     double was[2], is[2];
     for (int32_t j = 0; j < J; j++)
         all[j] = j;
-    places(t, before, t->prior.hop, all, J, spare);
+    lift_places(t, before, t->prior.hop, all, J, spare);
     middle(spare, J, is);
     next->component = c;
     next->heading = lift_heading(t, before) + (t->turn < 0 ? 0.0 : turn_of(t, before, spare));

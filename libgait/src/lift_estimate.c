@@ -17,21 +17,12 @@ static double weight_at(const lift_table *t, double at)
     return edge + 0.5 > 1e-3 ? edge + 0.5 : 1e-3;
 }
 
-static int32_t reported(const lift_table *t, int32_t marker[GAIT_MAX_MARKERS])
-{
-    int32_t count = 0;
-    for (int32_t j = 0; j < t->prior.markers; j++)
-        if (t->cfg.report >> j & 1)
-            marker[count++] = j;
-    return count;
-}
-
 /* Mix in what a segment says: running mean and spread of a weighted mixture. */
-static void mix(const lift_query *q, const double *mean, const double *sd, double share, gait_lift_frame *out)
+static void mix(const lift_table *t, const double *mean, const double *sd, double share, gait_lift_frame *out)
 {
-    for (int32_t r = 0; r < q->count; r++)
+    for (int32_t r = 0; r < t->reported; r++)
         for (int32_t a = 0; a < 3; a++) {
-            double *const m = &out->marker[q->marker[r]][a], *const v = &out->sd[q->marker[r]][a];
+            double *const m = &out->marker[t->order[r]][a], *const v = &out->sd[t->order[r]][a];
             double const off = mean[3 * r + a] - *m, own = sd[3 * r + a];
             *v = (1.0 - share) * (*v + share * off * off) + share * own * own;
             *m += share * off;
@@ -50,7 +41,7 @@ static void add_part(const lift_table *t, const lift_stream *s, const lift_part 
         b->heaviest = weight;
         b->main = belief;
     }
-    mix(q, s->mean, s->var, weight / b->total, out);
+    mix(t, s->mean, s->var, weight / b->total, out);
 }
 
 /* The frame asked for, or the first that a segment still kept covers. */
@@ -65,7 +56,6 @@ static uint64_t frame_of(const lift_table *t, const lift_stream *s)
 
 bool lift_estimate(const lift_table *t, const lift_stream *s, gait_lift_frame *out)
 {
-    int32_t marker[GAIT_MAX_MARKERS];
     if (s->pushed <= (uint64_t)t->cfg.lag)
         return false;
     uint64_t const frame = s->next ? frame_of(t, s) : s->pushed - 1 - (uint64_t)t->cfg.lag;
@@ -76,7 +66,7 @@ bool lift_estimate(const lift_table *t, const lift_stream *s, gait_lift_frame *o
     if (!s->next)
         return true;
     lift_seen const seen = lift_stream_frame(t, s, frame);
-    lift_query q = {.marker = marker, .count = reported(t, marker), .seen = &seen};
+    lift_query q = {.count = t->reported, .seen = &seen};
     double const time = lift_stream_time(s, frame);
     blend b = {0};
     for (int64_t i = s->next > s->parts ? s->next - s->parts : 0; i < s->next; i++)
@@ -91,7 +81,7 @@ bool lift_estimate(const lift_table *t, const lift_stream *s, gait_lift_frame *o
     }
     for (int32_t r = 0; r < q.count; r++)
         for (int32_t a = 0; a < 3; a++)
-            out->sd[marker[r]][a] = sqrt(out->sd[marker[r]][a]);
+            out->sd[t->order[r]][a] = sqrt(out->sd[t->order[r]][a]);
     out->status = GAIT_STATUS_TRACKING;
     out->heading = lift_heading(t, b.main);
     out->misfit = b.main->observed ? lift_misfit(t, b.main) / b.main->observed : 0.0;

@@ -60,29 +60,57 @@ void KERNEL(lift_row)(double *w, const double *shape, int32_t lanes, const doubl
         to[i] = (g0 * x[i] + g1 * y[i]) + g2 * z[i];
 }
 
-void KERNEL(lift_columns)(double *z, size_t stride, const double *shape, int32_t lanes, double M[3][3])
+/* Eight numbers between two frames into `to`. */
+static inline wide mixed(double *to, const float *s0, const float *s1, double w0, double w1)
 {
-    double *to = z;
-    for (int32_t i = 0; i < lanes; i += DENSE_LANES) {
-        double turned[3][DENSE_LANES];
-        for (int32_t a = 0; a < 3; a++)
-            for (int32_t k = 0; k < DENSE_LANES; k += WIDE) {
-                const double *const s = shape + i + k;
-                wide_store(turned[a] + k, (M[a][0] * wide_load(s) + M[a][1] * wide_load(s + lanes)) +
-                                              M[a][2] * wide_load(s + 2 * lanes));
-            }
-        for (int32_t k = 0; k < DENSE_LANES; k++, to += stride)
-            for (int32_t a = 0; a < 3; a++)
-                to[a] = turned[a][k];
+    wide const x = w0 * wide_load_float(s0) + w1 * wide_load_float(s1);
+    wide_store(to, x);
+    return x;
+}
+
+void KERNEL(lift_eight)(double *out, const float *s0, const float *s1, double w0, double w1,
+                        const double *theta, int32_t modes, double moved[DENSE_LANES])
+{
+    for (int32_t c = 0; c < DENSE_LANES; c += WIDE) {
+        wide even = {0.0}, odd = {0.0};
+        int32_t i = 0, at = c;
+        for (; i + 2 <= modes; i += 2, at += 2 * DENSE_LANES) {
+            even += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
+            odd += mixed(out + at + DENSE_LANES, s0 + at + DENSE_LANES, s1 + at + DENSE_LANES, w0, w1) *
+                   theta[i + 1];
+        }
+        if (i < modes)
+            even += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
+        wide_store(moved + c, even + odd);
+    }
+}
+
+void KERNEL(lift_turn)(float *v, size_t stride, size_t apart, const double *shape, int32_t modes,
+                       double M[9][8])
+{
+    int32_t const plane = modes * DENSE_LANES;
+    for (int32_t c = 0; c < DENSE_LANES; c += WIDE) {
+        wide m[9];
+        _Pragma("GCC unroll 9") for (int32_t i = 0; i < 9; i++) m[i] = wide_load(M[i] + c);
+        const double *s = shape + c;
+        float *to = v + c;
+        for (int32_t i = 0; i < modes; i++, s += DENSE_LANES, to += stride) {
+            wide const x = wide_load(s), y = wide_load(s + plane), z = wide_load(s + 2 * plane);
+            wide_store_float(to, (m[0] * x + m[1] * y) + m[2] * z);
+            wide_store_float(to + apart, (m[3] * x + m[4] * y) + m[5] * z);
+            wide_store_float(to + 2 * apart, (m[6] * x + m[7] * y) + m[8] * z);
+        }
     }
 }
 
 void KERNEL(lift_squares)(double *x, int32_t width, const float *Z, size_t stride, int32_t rows)
 {
-    double *restrict const to = x;
-    for (int32_t i = 0; i < rows; i++) {
-        const float *restrict const z = Z + (size_t)i * stride;
-        for (int32_t j = 0; j < width; j++)
-            to[j] += (double)z[j] * (double)z[j];
+    for (int32_t j = 0; j < width; j += WIDE) {
+        wide sum = wide_load(x + j);
+        for (int32_t i = 0; i < rows; i++) {
+            wide const z = wide_load_float(Z + (size_t)i * stride + j);
+            sum += z * z;
+        }
+        wide_store(x + j, sum);
     }
 }

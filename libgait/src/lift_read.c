@@ -4,31 +4,31 @@
 
 #include <string.h>
 
-/* What moves a marker by one deviation of each unknown, turned by P: columns 3 r to 3 r + 2 of t->Z. */
-static void put_columns(const lift_table *t, const lift_belief *b, const lift_axes *axes,
-                        const lift_marker *m, const double own[3], double P[3][3], int32_t r, size_t width)
+enum { OTHERS = 5 }; /* unknowns that are no modes, at most */
+
+typedef struct moving { /* what the unknowns of a marker do to it */
+    double M[3][3];     /* to its modes */
+    double other[OTHERS][3];
+} moving;
+
+/* The displacement turned by P. */
+static void find_moving(const lift_table *t, const lift_belief *b, const lift_axes *axes,
+                        const lift_marker *m, const double own[3], double P[3][3], moving *out)
 {
     int32_t const k = t->prior.modes;
-    double *const z = t->Z + 3 * r;
     double const away[2] = {own[0] - axes->place[0], own[1] - axes->place[1]};
-    double turned[3][3], grown[3][3];
     for (int32_t a = 0; a < 3; a++) {
-        turned[a][0] = P[a][0] * axes->c + P[a][1] * axes->s;
-        turned[a][1] = P[a][1] * axes->c - P[a][0] * axes->s;
-        turned[a][2] = P[a][2] * axes->z;
-        for (int32_t i = 0; i < 3; i++)
-            grown[a][i] = m->grown * turned[a][i];
-    }
-    t->run->lift_columns(z, width, t->shape, t->lanes, grown); /* the rows past k are written again below */
-    for (int32_t a = 0; a < 3; a++) {
-        for (int32_t i = 0; i < 3; i++)
-            z[(size_t)(k + i) * width + (size_t)a] = P[a][i] * t->cfg.place_sd[i];
+        const double turned[3] = {P[a][0] * axes->c + P[a][1] * axes->s,
+                                  P[a][1] * axes->c - P[a][0] * axes->s, P[a][2] * axes->z};
+        for (int32_t i = 0; i < 3; i++) {
+            out->M[a][i] = m->grown * turned[i];
+            out->other[i][a] = P[a][i] * t->cfg.place_sd[i];
+        }
         if (t->size >= 0)
-            z[(size_t)t->size * width + (size_t)a] =
-                t->growth *
-                ((turned[a][0] * m->shape[0] + turned[a][1] * m->shape[1]) + turned[a][2] * m->shape[2]);
+            out->other[t->size - k][a] =
+                t->growth * ((turned[0] * m->shape[0] + turned[1] * m->shape[1]) + turned[2] * m->shape[2]);
         if (t->turn >= 0)
-            z[(size_t)t->turn * width + (size_t)a] = b->turn_sd * (P[a][1] * away[0] - P[a][0] * away[1]);
+            out->other[t->turn - k][a] = b->turn_sd * (P[a][1] * away[0] - P[a][0] * away[1]);
     }
 }
 
@@ -58,47 +58,115 @@ static void set_identity(double P[3][3])
         P[i / 3][i % 3] = i % 4 == 0;
 }
 
-void lift_modes(const lift_table *t, const lift_belief *b, const lift_query *q, double *mean)
+void lift_places(const lift_table *t, const lift_belief *b, double at, const int32_t *marker, int32_t count,
+                 double *mean)
 {
     lift_axes const axes = lift_axes_now(t, b);
-    lift_moment const moment = lift_find_moment(t, q->at);
-    size_t const width = (size_t)dense_padded_float(3 * q->count);
-    double P[3][3];
-    set_identity(P);
-    for (int32_t r = 0; r < q->count; r++) {
+    lift_moment const moment = lift_find_moment(t, at);
+    for (int32_t r = 0; r < count; r++) {
         lift_marker m;
         double x[3];
-        lift_marker_at(t, b, &moment, q->marker[r], &m, x);
+        lift_marker_at(t, b, &moment, marker[r], &m, x);
         lift_to_world(&axes, x, mean + 3 * r);
-        put_columns(t, b, &axes, &m, mean + 3 * r, P, r, width);
     }
+}
+
+void lift_modes(const lift_table *t, const lift_belief *b, double at)
+{
+    lift_axes const axes = lift_axes_now(t, b);
+    lift_moment const moment = lift_find_moment(t, at);
+    int32_t const k = t->prior.modes;
+    double *z = t->Z;
+    for (int32_t j = 0; j < t->prior.markers; j++) {
+        lift_marker m;
+        moving by;
+        double x[3], own[3], P[3][3];
+        lift_marker_at(t, b, &moment, j, &m, x);
+        lift_to_world(&axes, x, own);
+        set_identity(P);
+        find_moving(t, b, &axes, &m, own, P, &by);
+        for (int32_t a = 0; a < 3; a++, z += t->ld) {
+            t->run->lift_row(z, t->shape, t->lanes, by.M[a]); /* the lanes past k are written again below */
+            for (int32_t i = 0; i < OTHERS; i++)
+                if (k + i < t->n)
+                    z[k + i] = by.other[i][a];
+        }
+    }
+}
+
+typedef struct reading { /* what is the same for all markers that are read */
+    lift_axes axes;
+    lift_moment moment;
+    int32_t columns;   /* as many as are read, padded */
+    int32_t width;     /* of a row of t->V: 3 columns, padded */
+    double *mean, *sd; /* sd: 3 x columns, variances, may be NULL */
+} reading;
+
+/* One marker, `moved` so far by the modes; what moves it goes to column r of each coordinate. */
+static void read_marker(const lift_table *t, const lift_belief *b, const reading *to, const lift_seen *seen,
+                        int32_t r, const double moved[3], double M[9][DENSE_LANES])
+{
+    int32_t const j = t->order[r];
+    lift_marker m;
+    moving by;
+    double x[3], own[3], P[3][3], *const mean = to->mean + 3 * r;
+    lift_marker_moved(t, b, &to->moment, j, moved, &m, x);
+    lift_to_world(&to->axes, x, own);
+    memcpy(mean, own, sizeof own);
+    set_identity(P);
+    take_residual(t, b, seen, j, mean, P);
+    if (!to->sd)
+        return;
+    find_moving(t, b, &to->axes, &m, own, P, &by);
+    for (int32_t a = 0; a < 3; a++) {
+        float *const v = t->V + t->prior.modes * to->width + a * to->columns + r;
+        to->sd[a * to->columns + r] = lift_residual(t, b, j) * P[a][a];
+        for (int32_t i = 0; i < 3; i++)
+            M[3 * a + i][r % DENSE_LANES] = by.M[a][i];
+        for (int32_t i = 0; i < t->n - t->prior.modes; i++)
+            v[i * to->width] = (float)by.other[i][a];
+    }
+}
+
+/* Markers r to r + 7 of the order, as far as they are asked for. */
+static void read_eight(const lift_table *t, const lift_belief *b, const reading *to, const lift_query *q,
+                       int32_t r)
+{
+    size_t const plane = (size_t)(t->prior.modes * DENSE_LANES),
+                 frame = 3 * (size_t)(t->prior.modes * t->columns);
+    const float *const s =
+        t->column + (size_t)(b->component * t->prior.frames) * frame + 3 * plane * (size_t)(r / DENSE_LANES);
+    double moved[3][DENSE_LANES], M[9][DENSE_LANES] = {{0.0}};
+    for (size_t a = 0; a < 3; a++)
+        t->run->lift_eight(t->shape + a * plane, s + (size_t)to->moment.f * frame + a * plane,
+                           s + (size_t)to->moment.next * frame + a * plane, 1.0 - to->moment.part,
+                           to->moment.part, b->theta, t->prior.modes, moved[a]);
+    for (int32_t i = r; i < r + DENSE_LANES && i < q->count; i++) {
+        int32_t const c = i - r;
+        read_marker(t, b, to, q->seen, i, (const double[3]){moved[0][c], moved[1][c], moved[2][c]}, M);
+    }
+    if (to->sd)
+        t->run->lift_turn(t->V + r, (size_t)to->width, (size_t)to->columns, t->shape, t->prior.modes, M);
 }
 
 void lift_read(const lift_table *t, const lift_belief *b, const lift_query *q, double *mean, double *sd)
 {
-    lift_axes const axes = lift_axes_now(t, b);
-    lift_moment const moment = lift_find_moment(t, q->at);
-    int32_t const count = 3 * q->count, width = dense_padded_float(count);
-    for (int32_t i = 0; sd && count < width && i < t->n; i++)
-        memset(t->Z + i * width + count, 0, (size_t)(width - count) * sizeof *t->Z);
-    for (int32_t r = 0; r < q->count; r++) {
-        lift_marker m;
-        double x[3], own[3], P[3][3];
-        lift_marker_at(t, b, &moment, q->marker[r], &m, x);
-        lift_to_world(&axes, x, own);
-        memcpy(mean + 3 * r, own, sizeof own);
-        set_identity(P);
-        take_residual(t, b, q->seen, q->marker[r], mean + 3 * r, P);
-        if (!sd)
-            continue;
-        for (int32_t a = 0; a < 3; a++)
-            sd[3 * r + a] = lift_residual(t, b, q->marker[r]) * P[a][a];
-        put_columns(t, b, &axes, &m, own, P, r, (size_t)width);
-    }
+    double variance[3 * GAIT_MAX_MARKERS] = {0.0};
+    reading to = {.axes = lift_axes_now(t, b),
+                  .moment = lift_find_moment(t, q->at),
+                  .columns = dense_padded(q->count),
+                  .mean = mean,
+                  .sd = sd ? variance : NULL};
+    to.width = dense_padded_float(3 * to.columns);
+    int32_t const clean = to.width > 3 * to.columns ? 0 : t->prior.modes; /* rows of which all is written */
+    memset(t->V + clean * to.width, 0, (size_t)((t->ld - clean) * to.width) * sizeof *t->V);
+    for (int32_t r = 0; r < q->count; r += DENSE_LANES)
+        read_eight(t, b, &to, q, r);
     if (!sd)
         return;
-    t->run->dense_forward_float(b->U, t->n, t->ld, t->Z, width, t->V);
-    t->run->lift_squares(sd, count, t->V, (size_t)width, t->n);
-    for (int32_t x = 0; x < count; x++)
-        sd[x] = sqrt(sd[x]);
+    t->run->dense_forward_float(b->U, t->n, t->ld, t->V, to.width);
+    t->run->lift_squares(variance, 3 * to.columns, t->V, (size_t)to.width, t->n);
+    for (int32_t r = 0; r < q->count; r++)
+        for (int32_t a = 0; a < 3; a++)
+            sd[3 * r + a] = sqrt(variance[a * to.columns + r]);
 }

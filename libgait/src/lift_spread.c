@@ -9,24 +9,10 @@
 /* Sum over all markers and frames of products of displacements: G (n x n, upper), square metres. */
 static void gram(const lift_table *t, const lift_belief *b, double *G)
 {
-    int32_t const J = t->prior.markers;
-    int32_t all[GAIT_MAX_MARKERS];
-    double mean[3 * GAIT_MAX_MARKERS];
-    for (int32_t j = 0; j < J; j++)
-        all[j] = j;
     memset(G, 0, (size_t)t->ld * (size_t)t->ld * sizeof *G);
     for (int32_t f = 0; f < t->prior.frames; f++) {
-        lift_query const q = {.at = f, .marker = all, .count = J};
-        lift_modes(t, b, &q, mean);
-        for (int32_t i = 0; i < t->n; i++)
-            for (int32_t k = i; k < t->n; k++) {
-                const double *const x = t->Z + (size_t)i * (size_t)t->width;
-                const double *const y = t->Z + (size_t)k * (size_t)t->width;
-                double sum = 0.0;
-                for (int32_t c = 0; c < 3 * J; c++)
-                    sum += x[c] * y[c];
-                G[i * t->ld + k] += sum;
-            }
+        lift_modes(t, b, f);
+        t->run->dense_rank(G, t->ld, t->Z, 3 * t->prior.markers);
     }
 }
 
@@ -105,19 +91,14 @@ static void displacements(const lift_table *t, const lift_belief *b, const doubl
                           double *out)
 {
     size_t const J3 = 3 * (size_t)t->prior.markers, whole = J3 * (size_t)t->prior.frames;
-    int32_t all[GAIT_MAX_MARKERS];
-    double mean[3 * GAIT_MAX_MARKERS];
-    for (int32_t j = 0; j < t->prior.markers; j++)
-        all[j] = j;
     memset(out, 0, (size_t)count * whole * sizeof *out);
     for (int32_t f = 0; f < t->prior.frames; f++) {
-        lift_query const q = {.at = f, .marker = all, .count = t->prior.markers};
-        lift_modes(t, b, &q, mean);
+        lift_modes(t, b, f);
         for (int32_t m = 0; m < count; m++) {
             double *const x = out + (size_t)m * whole + (size_t)f * J3;
-            for (int32_t i = 0; i < t->n; i++)
-                for (size_t c = 0; c < J3; c++)
-                    x[c] += unknowns[m * t->ld + i] * t->Z[(size_t)i * (size_t)t->width + c];
+            for (size_t c = 0; c < J3; c++)
+                for (int32_t i = 0; i < t->n; i++)
+                    x[c] += unknowns[m * t->ld + i] * t->Z[c * (size_t)t->ld + (size_t)i];
         }
     }
     for (int32_t m = 0; m < count; m++)

@@ -135,14 +135,13 @@ static bool solve_part(const lift_table *t, lift_part *part)
 static void guess_frame(const lift_table *t, lift_stream *s, const lift_part *part, uint64_t frame)
 {
     lift_seen const seen = lift_stream_frame(t, s, frame);
-    int32_t marker[GAIT_MAX_MARKERS];
-    lift_query q = {.at = lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)),
-                    .marker = marker};
+    int32_t marker[GAIT_MAX_MARKERS], count = 0;
     for (int32_t j = 0; j < t->prior.markers; j++)
         if (lift_seen_at(&seen, j))
-            marker[q.count++] = j;
-    lift_read(t, &part->belief[part->best], &q, s->mean, NULL);
-    for (int32_t r = 0; r < q.count; r++)
+            marker[count++] = j;
+    lift_places(t, &part->belief[part->best],
+                lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)), marker, count, s->mean);
+    for (int32_t r = 0; r < count; r++)
         memcpy(s->guess + 3 * marker[r], s->mean + 3 * r, 3 * sizeof *s->mean);
 }
 

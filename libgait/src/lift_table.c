@@ -7,18 +7,20 @@
 void lift_table_layout(arena *a, lift_table *t)
 {
     const segment_prior *const p = &t->prior;
-    size_t const points = (size_t)p->components * (size_t)p->frames * (size_t)p->markers;
+    size_t const frames = (size_t)p->components * (size_t)p->frames, points = frames * (size_t)p->markers;
     t->n = p->modes + 3;
     t->size = t->cfg.stature_sd > 0.0 ? t->n++ : -1;
     t->turn = t->cfg.heading_sd == 0.0 ? -1 : t->n++;
     t->ld = dense_padded(t->n + 1);
     t->lanes = dense_padded(p->modes);
-    t->width = dense_padded_float(3 * p->markers);
+    t->columns = dense_padded(p->markers);
+    t->width = dense_padded_float(3 * t->columns);
     t->row = TAKE(a, float, points * 3 * (size_t)t->lanes);
+    t->column = TAKE(a, float, frames * 3 * (size_t)(p->modes * t->columns));
     t->W = TAKE(a, double, 2 * (size_t)p->markers * (size_t)t->ld);
-    t->shape = TAKE(a, double, 3 * (size_t)t->lanes);
+    t->Z = TAKE(a, double, 3 * (size_t)p->markers * (size_t)t->ld);
+    t->shape = TAKE(a, double, 3 * DENSE_LANES * (size_t)t->lanes);
     t->V = TAKE(a, float, (size_t)t->ld *(size_t)(t->width + t->ld));
-    t->Z = TAKE(a, double, (size_t)t->ld *(size_t)t->width);
 }
 
 /* Index of a marker, -1: the prior does not know it. */
@@ -28,6 +30,32 @@ static int32_t marker_named(const segment_prior *p, const char *name)
         if (strcmp(p->name[j], name) == 0)
             return j;
     return -1;
+}
+
+/* Those that are reported first. */
+static void set_order(lift_table *t)
+{
+    int32_t count = 0;
+    for (uint64_t report = t->cfg.report, pass = 0; pass < 2; pass++, report = ~report) {
+        for (int32_t j = 0; j < t->prior.markers; j++)
+            if (report >> j & 1)
+                t->order[count++] = j;
+        t->reported = pass == 0 ? count : t->reported;
+    }
+}
+
+/* Modes of a frame; numbers past the last mode and the last marker are 0. */
+static void set_frame(const lift_table *t, int32_t c, int32_t f, float *row, float *column)
+{
+    int32_t const J = t->prior.markers, k = t->prior.modes;
+    for (int32_t x = 0; x < 3 * J; x++, row += t->lanes)
+        for (int32_t i = 0; i < t->lanes; i++)
+            row[i] = i < k ? segment_mode(&t->prior, c, i, f)[x] : 0.0f;
+    for (int32_t first = 0; first < t->columns; first += DENSE_LANES)
+        for (int32_t a = 0; a < 3; a++)
+            for (int32_t i = 0; i < k; i++)
+                for (int32_t r = first; r < first + DENSE_LANES; r++)
+                    *column++ = r < J ? segment_mode(&t->prior, c, i, f)[3 * t->order[r] + a] : 0.0f;
 }
 
 void lift_table_fill(lift_table *t)
@@ -41,19 +69,18 @@ void lift_table_fill(lift_table *t)
     for (int32_t i = 0; i < 4; i++)
         t->trunk[i] = marker_named(p, trunk[i]);
     memset(t->W, 0, 2 * (size_t)p->markers * (size_t)t->ld * sizeof *t->W);
-    memset(t->Z, 0, (size_t)t->ld * (size_t)t->width * sizeof *t->Z);
-    float *to = t->row;
+    memset(t->Z, 0, 3 * (size_t)p->markers * (size_t)t->ld * sizeof *t->Z);
+    set_order(t);
+    float *row = t->row, *column = t->column;
     for (int32_t c = 0; c < p->components; c++)
-        for (int32_t f = 0; f < p->frames; f++)
-            for (int32_t x = 0; x < J3; x++, to += t->lanes)
-                for (int32_t i = 0; i < t->lanes; i++)
-                    to[i] = i < p->modes ? segment_mode(p, c, i, f)[x] : 0.0f;
+        for (int32_t f = 0; f < p->frames; f++, row += J3 * t->lanes, column += 3 * p->modes * t->columns)
+            set_frame(t, c, f, row, column);
 }
 
 void lift_belief_layout(arena *a, const lift_table *t, lift_belief *b)
 {
     size_t const square = (size_t)t->ld * (size_t)t->ld;
-    b->theta = TAKE(a, double, (size_t)t->n);
+    b->theta = TAKE(a, double, (size_t)t->ld);
     b->A = TAKE(a, double, square);
     b->U = TAKE(a, double, square);
 }

@@ -20,7 +20,7 @@ typedef struct lift_belief { /* one segment under one component of the prior */
     double place[3];        /* prior mean of the place, metres */
     double log_noise;       /* log of the determinant of the noise */
     double miss;            /* squared white residuals where it was linearised */
-    double *theta;          /* n */
+    double *theta;          /* n, ld */
     double *A;              /* normal equations with the prior, dense.h */
     double *U;              /* their factor */
 } lift_belief;
@@ -39,15 +39,19 @@ typedef struct lift_table { /* sizes and places that every segment shares */
     int32_t size;     /* index of the stature, -1: known */
     int32_t turn;     /* index of the heading, the last; -1: known */
     int32_t lanes;    /* modes padded */
-    int32_t width;    /* 3 J padded */
+    int32_t columns;  /* J padded */
+    int32_t width;    /* 3 columns padded */
+    int32_t reported; /* markers of the config's report, the first of: */
+    int32_t order[GAIT_MAX_MARKERS];
     int32_t trunk[4]; /* right and left hip, right and left shoulder; -1: the prior does not know it */
     double stature, gamma;
     double growth; /* share of the stature that is one deviation */
     float *row;    /* K x F x J x 3 x lanes: modes, side by side */
+    float *column; /* K x F x columns / 8 x 3 x k x 8: the same, eight markers of `order` side by side */
     double *W;     /* 2 J x ld: white rows of a frame */
-    double *shape; /* 3 x lanes: the modes of one marker at one moment */
-    float *V;      /* ld x (width + ld): the same by what is left of it after observing */
-    double *Z;     /* ld x width: what an unknown moves; rows of as many numbers as are asked for, padded */
+    double *Z;     /* 3 J x ld: what the unknowns move */
+    double *shape; /* 3 x lanes: the modes of one marker at one moment; 3 x k x 8 of eight */
+    float *V;      /* ld x (width + ld): what each unknown moves by what is left of it after observing */
 } lift_table;
 
 void lift_table_layout(arena *a, lift_table *t);

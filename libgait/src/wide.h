@@ -3,6 +3,9 @@
 #define GAIT_WIDE_H
 #include <stdint.h>
 #include <string.h>
+#if defined(__AVX512F__)
+#include <immintrin.h>
+#endif
 
 /* Anywhere in memory, beside plain numbers. */
 #define WIDE_OF(T, bytes) typedef T __attribute__((vector_size(bytes), aligned(sizeof(T)), may_alias))
@@ -10,7 +13,8 @@
 #if defined(KERNEL_SCALAR)
 typedef double wide;
 typedef float narrow, wide_float;
-#define WIDEN(x) ((double)(x))
+#define WIDEN(x)  ((double)(x))
+#define NARROW(x) ((float)(x))
 #else
 #if defined(__AVX512F__)
 #define WIDE_BYTES 64
@@ -22,7 +26,13 @@ typedef float narrow, wide_float;
 WIDE_OF(double, WIDE_BYTES) wide;
 WIDE_OF(float, WIDE_BYTES / 2) narrow;
 WIDE_OF(float, WIDE_BYTES) wide_float;
-#define WIDEN(x) __builtin_convertvector(x, wide)
+#if defined(__AVX512F__)
+#define WIDEN(x)  ((wide)_mm512_cvtps_pd((__m256)(x))) /* gcc converts halves */
+#define NARROW(x) ((narrow)_mm512_cvtpd_ps((__m512d)(x)))
+#else
+#define WIDEN(x)  __builtin_convertvector(x, wide)
+#define NARROW(x) __builtin_convertvector(x, narrow)
+#endif
 #endif
 
 enum { WIDE = (int32_t)(sizeof(wide) / sizeof(double)) };
@@ -40,5 +50,10 @@ static inline wide wide_load_float(const float *from)
 static inline void wide_store(double *to, wide x)
 {
     *(wide *)(void *)to = x;
+}
+
+static inline void wide_store_float(float *to, wide x)
+{
+    *(narrow *)(void *)to = NARROW(x);
 }
 #endif

@@ -26,7 +26,7 @@ static void test_system(int32_t n)
 {
     const kernels *const k = kernels_choose(~0u);
     int32_t const ld = dense_padded(n + 1);
-    double theta[MOST], left = 0.0, log_det = 0.0;
+    double theta[WIDEST], left = 0.0, log_det = 0.0;
     make(k, n, ld);
     for (int32_t i = 0; i < n; i++)
         for (int32_t j = i; j <= n; j++) {
@@ -35,8 +35,7 @@ static void test_system(int32_t n)
                 sum += W[r * ld + i] * W[r * ld + j];
             CHECK_NEAR(A[i * ld + j], sum, 1e-11);
         }
-    memcpy(U, A, sizeof A);
-    CHECK(k->dense_factor(U, n, ld));
+    CHECK(k->dense_factor(A, U, n, ld));
     dense_solve(U, n, ld, theta);
     for (int32_t i = 0; i < n; i++) {
         double sum = 0.0;
@@ -59,13 +58,14 @@ static void test_forward(int32_t n)
     static float about[2 * WIDEST * WIDEST];
     double one[MOST], largest = 0.0;
     make(k, n, ld);
-    memcpy(U, A, sizeof A);
-    CHECK(k->dense_factor(U, n, ld));
+    CHECK(k->dense_factor(A, U, n, ld));
     for (int32_t i = 0; i < n * ld; i++)
         V[i] = toy_random(&seed);
     for (int32_t i = 0; i < n; i++)
         one[i] = V[i * ld + 2];
-    k->dense_forward_float(U, n, ld, V, ld, about);
+    for (int32_t i = 0; i < n * ld; i++)
+        about[i] = (float)V[i];
+    k->dense_forward_float(U, n, ld, about, ld);
     k->dense_forward(U, n, ld, V, ld, DENSE_LANES);
     dense_ahead(U, n, ld, one);
     for (int32_t i = 0; i < n; i++)
@@ -104,10 +104,10 @@ static void test_refused(void)
     const kernels *const k = kernels_choose(~0u);
     make(k, 7, 8);
     A[3 * 9] = -1e6;
-    CHECK(!k->dense_factor(A, 7, 8));
+    CHECK(!k->dense_factor(A, A, 7, 8));
     make(k, 7, 8);
     A[5 * 9] = NAN;
-    CHECK(!k->dense_factor(A, 7, 8));
+    CHECK(!k->dense_factor(A, A, 7, 8));
 }
 
 /* Every instruction set gives the bits of the scalar code. */
@@ -119,10 +119,10 @@ static void test_kernels(void)
         const kernels *const k = kernels_choose(mask);
         uint32_t seed = 5;
         make(k, MOST, WIDEST);
-        CHECK(k->dense_factor(A, MOST, WIDEST));
+        CHECK(k->dense_factor(A, A, MOST, WIDEST));
         for (int32_t i = 0; i < MOST * WIDEST; i++)
-            V[i] = toy_random(&seed);
-        k->dense_forward_float(A, MOST, WIDEST, V, WIDEST, about);
+            about[i] = (float)(V[i] = toy_random(&seed));
+        k->dense_forward_float(A, MOST, WIDEST, about, WIDEST);
         k->dense_forward(A, MOST, WIDEST, V, WIDEST, 40);
         if (mask == 0) {
             memcpy(first, A, sizeof A);

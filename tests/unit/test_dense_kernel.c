@@ -64,21 +64,20 @@ static void run(const kernels *k, const shape *s, system_of *out)
     size_t const square = (size_t)(s->ld * s->ld) * sizeof(double), off = s->off * sizeof(double);
     double *const A = begin(&out->rank, square, off), *const U = begin(&out->factor, square, off);
     double *const Z = begin(&out->forward, (size_t)(dense_padded(s->n) * s->ldz) * sizeof(double), off);
-    static double padded[NUMBERS]; /* Z in rows of `floats` */
     float *const V = begin(&out->about, (size_t)(s->ld * (s->floats + s->ld)) * sizeof(float), off / 2);
     uint32_t seed = 17;
     for (int32_t i = 0; i < s->ld * s->ld; i++)
         A[i] = start(s, i / s->ld, i % s->ld);
     k->dense_rank(A, s->ld, W, s->rows);
-    memcpy(U, A, square);
-    out->definite = k->dense_factor(U, s->n, s->ld);
+    out->definite = k->dense_factor(A, U, s->n, s->ld);
     for (int32_t i = 0; i < dense_padded(s->n) * s->ldz; i++)
         Z[i] = toy_random(&seed);
-    memset(padded, 0, sizeof padded);
-    for (int32_t i = 0; i < s->n * s->width; i++)
-        padded[i / s->width * s->floats + i % s->width] = Z[i / s->width * s->ldz + i % s->width];
+    for (int32_t i = 0; i < s->ld * s->floats; i++) {
+        int32_t const row = i / s->floats, column = i % s->floats;
+        V[i] = row < s->n && column < s->width ? (float)Z[row * s->ldz + column] : 0.0f;
+    }
     k->dense_forward(U, s->n, s->ld, Z, s->ldz, s->width);
-    k->dense_forward_float(U, s->n, s->ld, padded, s->floats, V);
+    k->dense_forward_float(U, s->n, s->ld, V, s->floats);
 }
 
 /* Rows of `ld` from the diagonal on. */

@@ -114,6 +114,25 @@ static void test_missing(void)
     CHECK_NEAR(fit.log_evidence, 0.0, 1e-12);
 }
 
+/* Positions are in the prior's order, whichever markers a stream reports. */
+static void test_report(void)
+{
+    static double each[2][2][TOY_SEGMENT * 3];
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    const double place[3] = {0.1, 0.2, 0.0};
+    gait_lift_fit fit;
+    toy_draw(&toy_lift_prior, 0, 5, 0.4, place, X);
+    toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 3, uv);
+    see_all(1.0);
+    for (int k = 0; k < 2; k++) {
+        c.report = k == 0 ? ~UINT64_C(0) : 5u << (TOY_MARKERS - 3);
+        gait_lift *const l = toy_lift_open(&c);
+        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_positions(l, each[k][0], each[k][1]) == GAIT_OK);
+    }
+    CHECK(memcmp(each[0], each[1], sizeof each[0]) == 0);
+}
+
 /* The component that made a body explains it. */
 static void test_mixture(void)
 {
@@ -284,6 +303,7 @@ int main(void)
     test_coverage(GAIT_LIFT_PERSPECTIVE, 2.0);
     test_coverage(GAIT_LIFT_ORTHOGRAPHIC, 0.02);
     test_missing();
+    test_report();
     test_mixture();
     test_batch();
     test_uncertain();

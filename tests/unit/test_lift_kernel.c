@@ -59,71 +59,103 @@ static void compare(int32_t width, int32_t modes, int32_t off)
     }
 }
 
-/* ---- the kernels about one marker ---- */
-enum { MOST_MODES = 27, MOST_LANES = 32, MARKERS = 5, WIDTH = 3 * MARKERS + 1, OFFSETS = 8 };
-enum { SHAPE, MOVED, ROW, COLUMNS, SQUARES, PARTS };
+/* ---- the kernels about the markers of a frame ---- */
+enum { MOST_MODES = 27, MOST_LANES = 32, EIGHT = DENSE_LANES, APART = 16, WIDTH = 3 * APART, OFFSETS = 8 };
+enum { SHAPE, MOVED, ROW, SHAPES, ALL_MOVED, SQUARES, PARTS };
 
 typedef struct shapes { /* what they make, each between canaries */
-    _Alignas(64) unsigned char memory[PARTS][(MOST_LANES * WIDTH + OFFSETS) * sizeof(double) + 2 * GUARD];
-    guarded in[PARTS];
+    _Alignas(64) unsigned char memory[PARTS][(3 * MOST_LANES * EIGHT + OFFSETS) * sizeof(double) + 2 * GUARD];
+    _Alignas(64) unsigned char floats[(MOST_LANES * WIDTH + OFFSETS) * sizeof(float) + 2 * GUARD];
+    guarded in[PARTS], turned_in;
     double *part[PARTS];
-    float about[MOST_LANES * WIDTH + OFFSETS]; /* columns */
+    float *turned; /* modes x WIDTH: three coordinates of the last eight of sixteen columns each */
 } shapes;
 
-static void clear(shapes *s, int32_t lanes, size_t off)
+static void clear(shapes *s, int32_t modes, size_t off)
 {
-    const int32_t numbers[PARTS] = {3 * lanes, 3, lanes, lanes * WIDTH, WIDTH};
+    int32_t const lanes = dense_padded(modes);
+    const int32_t numbers[PARTS] = {3 * lanes, 3, lanes, 3 * modes * EIGHT, 3 * EIGHT, WIDTH};
     for (int k = 0; k < PARTS; k++) {
         s->in[k] = guard_fill(s->memory[k] + off * sizeof(double), (size_t)numbers[k] * sizeof(double));
         memset(s->in[k].begin, 0, s->in[k].bytes);
         s->part[k] = (double *)(void *)s->in[k].begin;
     }
+    s->turned_in = guard_fill(s->floats + off * sizeof(float), (size_t)(modes * WIDTH) * sizeof(float));
+    memset(s->turned_in.begin, 0, s->turned_in.bytes);
+    s->turned = (float *)(void *)s->turned_in.begin;
+}
+
+/* Mode i of a coordinate of marker r in a frame; marker 0 is the one that is made alone. */
+static float mode_of(int32_t frame, int32_t a, int32_t i, int32_t r)
+{
+    return number((uint32_t)(((2 * r + frame) * 3 + a) * MOST_MODES + i));
+}
+
+static double theta_of(int32_t i)
+{
+    return (double)number(4000 + (uint32_t)i);
+}
+
+static double turn_of(int32_t a, int32_t i, int32_t r)
+{
+    return (double)number(5000 + (uint32_t)(9 * r + 3 * a + i));
 }
 
 /* Everything begins `off` numbers past an aligned place. */
 static void run(const kernels *k, int32_t modes, size_t off, shapes *s)
 {
-    static _Alignas(64) float mode[2][3 * MOST_LANES + OFFSETS];
+    static _Alignas(64) float row[2][3 * MOST_LANES + OFFSETS], column[2][MOST_MODES * EIGHT + OFFSETS];
     static _Alignas(64) double theta[MOST_MODES + OFFSETS];
     int32_t const lanes = dense_padded(modes);
-    double M[3][3];
-    clear(s, lanes, off);
-    for (int32_t i = 0; i < 3 * lanes; i++)
-        for (int32_t frame = 0; frame < 2; frame++)
-            mode[frame][off + (size_t)i] = i % lanes < modes ? number((uint32_t)(i + 200 * frame)) : 0.0f;
+    double M[9][EIGHT], g[3];
+    clear(s, modes, off);
     for (int32_t i = 0; i < modes; i++)
-        theta[off + (size_t)i] = (double)number(400 + (uint32_t)i);
-    for (uint32_t i = 0; i < 9; i++)
-        M[i / 3][i % 3] = (double)number(600 + i);
-    k->lift_shape(s->part[SHAPE], mode[0] + off, mode[1] + off, 0.75, 0.25, lanes, theta + off, modes,
+        theta[off + (size_t)i] = theta_of(i);
+    for (int32_t i = 0; i < 9 * EIGHT; i++)
+        M[i / EIGHT][i % EIGHT] = turn_of(i / EIGHT / 3, i / EIGHT % 3, i % EIGHT);
+    for (int32_t a = 0; a < 3; a++) {
+        g[a] = M[a][0];
+        for (int32_t frame = 0; frame < 2; frame++) {
+            for (int32_t i = 0; i < lanes; i++)
+                row[frame][off + (size_t)(a * lanes + i)] = i < modes ? mode_of(frame, a, i, 0) : 0.0f;
+            for (int32_t i = 0; i < modes * EIGHT; i++)
+                column[frame][off + (size_t)i] = mode_of(frame, a, i / EIGHT, i % EIGHT);
+        }
+        k->lift_eight(s->part[SHAPES] + a * modes * EIGHT, column[0] + off, column[1] + off, 0.75, 0.25,
+                      theta + off, modes, s->part[ALL_MOVED] + a * EIGHT);
+    }
+    k->lift_shape(s->part[SHAPE], row[0] + off, row[1] + off, 0.75, 0.25, lanes, theta + off, modes,
                   s->part[MOVED]);
-    k->lift_row(s->part[ROW], s->part[SHAPE], lanes, M[0]);
-    for (int32_t r = 0; r < MARKERS; r++)
-        k->lift_columns(s->part[COLUMNS] + 3 * r, WIDTH, s->part[SHAPE], lanes, M);
-    for (int32_t i = 0; i < lanes * WIDTH; i++)
-        s->about[off + (size_t)i] = (float)s->part[COLUMNS][i];
-    k->lift_squares(s->part[SQUARES], (int32_t)(modes % WIDTH) + 1, s->about + off, WIDTH, modes);
+    k->lift_row(s->part[ROW], s->part[SHAPE], lanes, g);
+    k->lift_turn(s->turned + EIGHT, WIDTH, APART, s->part[SHAPES], modes, M);
+    k->lift_squares(s->part[SQUARES], EIGHT * (1 + modes % (WIDTH / EIGHT)), s->turned, WIDTH, modes);
 }
 
-/* In plain order, about the same sums. */
+/* One marker as eight, and plain sums. */
 static void check_sums(const shapes *s, int32_t modes)
 {
-    int32_t const lanes = dense_padded(modes);
-    const double *const columns = s->part[COLUMNS];
-    for (int32_t a = 0; a < 3; a++) {
-        double moved = 0.0, squares = 0.0;
-        for (int32_t i = 0; i < modes; i++) {
-            double const column = columns[i * WIDTH + a], about = (double)(float)column;
-            moved += s->part[SHAPE][a * lanes + i] * (double)number(400 + (uint32_t)i);
-            squares += about * about;
-            CHECK(column == columns[i * WIDTH + 3 * (MARKERS - 1) + a]);
-            CHECK(a > 0 || column == s->part[ROW][i]);
+    int32_t const lanes = dense_padded(modes), squared = EIGHT * (1 + modes % (WIDTH / EIGHT));
+    for (int32_t a = 0; a < 3; a++)
+        for (int32_t r = 0; r < EIGHT; r++) {
+            int32_t const c = APART * a + EIGHT + r;
+            double moved = 0.0, squares = 0.0;
+            for (int32_t i = 0; i < modes; i++) {
+                const double *const x = s->part[SHAPES] + i * EIGHT + r, *const y = x + modes * EIGHT;
+                double const turned =
+                    (turn_of(a, 0, r) * *x + turn_of(a, 1, r) * *y) + turn_of(a, 2, r) * y[modes * EIGHT];
+                double const v = (double)s->turned[i * WIDTH + c];
+                CHECK(s->turned[i * WIDTH + c] == (float)turned && s->turned[i * WIDTH + c - EIGHT] == 0.0f);
+                CHECK(x[a * modes * EIGHT] ==
+                      0.75 * (double)mode_of(0, a, i, r) + 0.25 * (double)mode_of(1, a, i, r));
+                CHECK(r > 0 || x[a * modes * EIGHT] == s->part[SHAPE][a * lanes + i]);
+                CHECK(r > 0 || a > 0 || turned == s->part[ROW][i]);
+                moved += x[a * modes * EIGHT] * theta_of(i);
+                squares += v * v;
+            }
+            CHECK(fabs(moved - s->part[ALL_MOVED][a * EIGHT + r]) < 1e-12);
+            CHECK(r > 0 || fabs(moved - s->part[MOVED][a]) < 1e-12);
+            CHECK(s->part[SQUARES][c] == (c < squared ? squares : 0.0));
         }
-        CHECK(fabs(moved - s->part[MOVED][a]) < 1e-12);
-        CHECK(fabs((a <= modes % WIDTH ? squares : 0.0) - s->part[SQUARES][a]) < 1e-12);
-    }
-    for (int32_t i = 0; i < lanes; i++)
-        CHECK(columns[i * WIDTH + WIDTH - 1] == 0.0); /* past the last marker */
 }
 
 static void compare_shapes(int32_t modes)
@@ -136,6 +168,7 @@ static void compare_shapes(int32_t modes)
         run(k < 0 ? isa_scalar() : isa_at(k), modes, off, &have);
         for (int p = 0; p < PARTS; p++)
             CHECK(guard_whole(&have.in[p]) && memcmp(have.part[p], want.part[p], have.in[p].bytes) == 0);
+        CHECK(guard_whole(&have.turned_in) && memcmp(have.turned, want.turned, have.turned_in.bytes) == 0);
     }
 }
 
