@@ -81,13 +81,13 @@ def version_text(number: int) -> str:
     return f"{number // 10000}.{number // 100 % 100}.{number % 100}"
 
 
-def check(status: int, error: _abi.Error | None = None) -> int:
-    """Raise what a negative status means; return any other."""
+def check(status: int, error: _abi.Error | None = None, words: str = "") -> int:
+    """Raise what a negative status means, in the library's words or these; return any other."""
     if status >= 0:
         return status
     name = library().gait_status_name(status).decode()
     kind = _RAISES.get(_abi.Status(status), GaitError)
-    text, index = (error.text.decode(errors="replace"), error.index) if error else ("", -1)
+    text, index = (error.text.decode(errors="replace"), error.index) if error else (words, -1)
     raise kind(status, name, text, index)
 
 

@@ -23,6 +23,9 @@ from gait.model import camera_c, read_blob
 
 Array = NDArray[np.float64]
 
+FITTED = "there is no segment yet; call segment() first"
+GAIN = "there is no gain yet; call fix() first"
+
 
 @dataclass(frozen=True)
 class LiftConfig:
@@ -168,10 +171,10 @@ class Lifter:
     Parameters
     ----------
     source : path or bytes, optional
-        Blob with a segment prior; the model of the package if left out.
+        Blob with a segment prior; the model of the package if left out or None.
     view : Camera, or array_like of shape (2, 3)
         Calibrated camera, tracks in pixels; or the directions of u and v in the world of an orthographic
-        view, tracks in metres.
+        view, tracks in metres.  It must be given: ``Lifter(view=camera)``.
     config : LiftConfig, optional
         The library's defaults if left out.
 
@@ -185,10 +188,13 @@ class Lifter:
 
     Raises
     ------
+    TypeError
+        If there is no view.
     UserError
         If the file cannot be read.
     GaitError
-        If the blob holds no sound segment prior, or a setting is out of its range.
+        If the blob holds no sound segment prior, or a setting is out of its range; later, if a method is
+        called before the one that it needs.
 
     Notes
     -----
@@ -198,10 +204,12 @@ class Lifter:
 
     def __init__(
         self,
-        source: str | os.PathLike[str] | bytes | None,
-        view: Camera | ArrayLike,
+        source: str | os.PathLike[str] | bytes | None = None,
+        view: Camera | ArrayLike | None = None,
         config: LiftConfig | None = None,
     ) -> None:
+        if isinstance(source, Camera) or view is None:
+            raise TypeError("a view is missing; write Lifter(view=camera), or Lifter(model, camera)")
         contents = source if isinstance(source, bytes) else read_blob(source)
         self._blob = aligned(len(contents))
         self._blob[:] = np.frombuffer(contents, np.uint8)
@@ -270,14 +278,16 @@ class Lifter:
     def positions(self) -> tuple[Array, Array]:
         """Give posterior mean and standard deviation (F, J, 3) of the last segment or of `fix`; metres."""
         mean, sd = np.empty((*self._shape, 3)), np.empty((*self._shape, 3))
-        check(library().gait_lift_positions(self._handle, mean.ctypes.data, sd.ctypes.data))
+        status = library().gait_lift_positions(self._handle, mean.ctypes.data, sd.ctypes.data)
+        check(status, words=FITTED)
         return mean, sd
 
     def posterior(self) -> tuple[Array, Array]:
         """Mean (n,) and covariance (n, n) of modes, place, stature and heading; each N(0, 1) a priori."""
         count = library().gait_lift_unknowns(self._handle)
         mean, covariance = np.empty(count), np.empty((count, count))
-        check(library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data))
+        status = library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data)
+        check(status, words=FITTED)
         return mean, covariance
 
     def scale(self) -> float:
@@ -286,12 +296,15 @@ class Lifter:
         Above 1 where its modes are larger than the prior expects, below 1 where they are smaller (a scale
         of all variances with an inverse gamma prior, as of Student's t).
         """
-        return float(library().gait_lift_scale(self._handle))
+        scale = float(library().gait_lift_scale(self._handle))
+        if not scale > 0:
+            check(_abi.Status.STATE, words=FITTED)
+        return scale
 
     def least_squares(self) -> Array:
         """Fit the last segment's observations alone (F, J, 3): least squares of minimum norm."""
         mean = np.empty((*self._shape, 3))
-        check(library().gait_lift_least_squares(self._handle, mean.ctypes.data))
+        check(library().gait_lift_least_squares(self._handle, mean.ctypes.data), words=FITTED)
         return mean
 
     def uncertain(self, count: int = 3) -> tuple[Array, Array]:
@@ -304,8 +317,12 @@ class Lifter:
         modes : (count, F, J, 3)
             The displacements, one deviation long.
         """
+        most = library().gait_lift_unknowns(self._handle)
+        if not 1 <= count <= most:
+            raise ValueError(f"count is {count}; give one from 1 to {most}")
         sd, modes = np.empty(count), np.empty((count, *self._shape, 3))
-        check(library().gait_lift_uncertain(self._handle, count, modes.ctypes.data, sd.ctypes.data))
+        status = library().gait_lift_uncertain(self._handle, count, modes.ctypes.data, sd.ctypes.data)
+        check(status, words=FITTED)
         return sd, modes
 
     def fix(self, sd: ArrayLike) -> None:
@@ -318,7 +335,8 @@ class Lifter:
         count = len(np.asarray(uv))
         seen, _ = self._observations(uv, None, count, *self._shape)
         mean = np.empty((*seen.shape[:-1], 3))
-        check(library().gait_lift_batch(self._handle, count, seen.ctypes.data, mean.ctypes.data))
+        status = library().gait_lift_batch(self._handle, count, seen.ctypes.data, mean.ctypes.data)
+        check(status, words=GAIN)
         return mean
 
     def push(self, utime: int, uv: ArrayLike, sd: ArrayLike | None = None) -> None:

@@ -304,11 +304,37 @@ def test_doubts_are_told(folder, capsys, monkeypatch):
     said = capsys.readouterr()
     names = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].names
     assert f"far from where the rest has them: {names[3]} in 4 frames\n" in said.err
-    assert "the points shake by 5 from frame to frame, not 3: try --pixel-sd 5\n" in said.err
+    assert (
+        "the points shake by 5 from frame to frame: taken for their noise instead of 3 (--pixel-sd)\n"
+        in said.err
+    )
     assert "segments are estimated alone" in said.err and "widened 2 times" in said.err
     figures = json.loads(said.out)
-    assert figures["doubted"] == 5 and figures["segments_alone"]
-    assert main(command) == 0 and "iterations" not in capsys.readouterr().out
+    assert figures["doubted"] == 5 and figures["segments_alone"] and figures["pixel_sd"] == 5
+    assert main([*command, "--pixel-sd", "3"]) == 0
+    said = capsys.readouterr()
+    assert "the points shake by 5 from frame to frame, not 3: try --pixel-sd 5\n" in said.err
+    assert "iterations" not in said.out
+
+
+@pytest.mark.parametrize(("recordings", "told"), [(0, False), (1, True), (3, True), (4, False)])
+def test_a_prior_of_few_recordings_is_told(folder, capsys, recordings, told):
+    prior = replace(toy_prior(FRAMES, MARKERS, 4, seed=5), recordings=recordings)
+    (folder / "few.gait").write_bytes(toy_blob(prior))
+    assert main(["lift", "t.csv", "-m", "few.gait", "--camera", "cam.json", "-o", "out.csv"]) == 0
+    assert ("deviations may come out too small" in capsys.readouterr().err) == told
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_tracks_may_be_separated_by_semicolons_or_tabs(folder, mark):
+    text = (folder / "t.csv").read_text()
+    if mark == ";":
+        text = text.replace(",", ";").replace(".", ",")
+    (folder / "other.csv").write_text("\ufeff" + text.replace(",", mark) if mark == "\t" else text)
+    names = toy_prior(FRAMES, MARKERS, 4, seed=5).names
+    one, other = read("t.csv", names)[0], read("other.csv", names)[0]
+    assert other.names == one.names
+    assert np.array_equal(other.time, one.time) and np.array_equal(other.uv, one.uv, equal_nan=True)
 
 
 @pytest.mark.parametrize("stature", [24.0, -7.0, np.nan])

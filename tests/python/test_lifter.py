@@ -295,6 +295,15 @@ def test_wrong_shapes_and_settings_are_refused() -> None:
         lifter.segment(np.zeros((FRAMES, MARKERS)))
     with pytest.raises(ValueError, match="shape"):
         lifter.push(1, np.zeros((3, 2)))
+    for call in (lifter.positions, lifter.posterior, lifter.scale, lifter.least_squares, lifter.uncertain):
+        with pytest.raises(GaitError, match=r"no segment yet; call segment\(\) first"):
+            call()
+    with pytest.raises(GaitError, match=r"no gain yet; call fix\(\) first"):
+        lifter.batch(np.zeros((1, FRAMES, MARKERS, 2)))
+    with pytest.raises(ValueError, match="count is 0; give one from 1 to"):
+        lifter.uncertain(0)
+    with pytest.raises(TypeError, match=r"Lifter\(view=camera\)"):
+        Lifter(CAMERA)
     with pytest.raises(GaitError, match="stature"):
         Lifter(contents, CAMERA, LiftConfig.default(stature=-1.0))
     for wrong in (-0.5, 1.5, np.nan):

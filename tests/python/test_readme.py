@@ -86,7 +86,7 @@ def test_the_commands_track_the_clip(walk):
 
 
 def test_the_python_example_follows_the_walker(walk):
-    (code,) = blocks("python")
+    code, _ = blocks("python")
     done = run(BIN / "python", "-c", code, cwd=walk)
     *rows, last = done.stdout.splitlines()
     found = {int(row.split()[0]): float(row.split()[1]) for row in rows}
@@ -95,6 +95,16 @@ def test_the_python_example_follows_the_walker(walk):
     assert sorted(found) == sorted(truth)
     assert np.median([abs(found[k] - truth[k]) for k in truth]) < 0.1
     assert re.fullmatch(r"\d+ bytes, digest [0-9a-f]{16}", last)
+
+
+def test_the_lifter_example_follows_a_knee(walk):
+    _, code = blocks("python")
+    rows = [row.split() for row in run(BIN / "python", "-c", code, cwd=walk).stdout.splitlines()]
+    with (walk / "walk/truth.csv").open(encoding="utf-8", newline="") as f:
+        truth = [[float(row[f"l_knee_{axis}"]) for axis in "xyz"] for row in csv.DictReader(f)]
+    off = [np.linalg.norm(np.array(row[1:4], float) - truth[int(row[0])]) for row in rows]
+    assert len(off) > len(truth) - 20
+    assert np.median(off) < 0.4  # how far away somebody of unknown stature is
 
 
 @pytest.fixture(scope="module")

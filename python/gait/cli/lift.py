@@ -25,12 +25,11 @@ from typing import Any
 
 import numpy as np
 
-from gait.cli import lift_tracks, lift_video, values
+from gait.cli import lift_prior, lift_tracks, lift_video, values
 from gait.errors import UsageError, UserError
 from gait.files import require_outputs
 from gait.initial import STATURE
 from gait.lift import lifted_file, motion, outliers, result
-from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
 from gait.trc import write_trc
@@ -45,7 +44,6 @@ _ONLY_TRACKS = (
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
 PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
 FAR = 4.0  # noise alone gives a median of 1.2
-SHAKY = 1.3  # times --pixel-sd from which a motion that does not fit may be noise
 DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
 
 
@@ -86,7 +84,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--pixel-sd",
         type=values.between(1e-6, FURTHEST, "a standard deviation"),
         metavar="SD",
-        help=f"standard deviation of u and v at full confidence, in their unit (default: {PIXEL_SD:g})",
+        help="standard deviation of u and v at full confidence, in their unit (default: how much the points "
+        f"shake from frame to frame, at least {PIXEL_SD:g})",
     )
     add(
         "--floor-sd",
@@ -126,9 +125,9 @@ def run(args: argparse.Namespace) -> int:
     if video:
         return lift_video.run(args)
     _check(args)
-    prior, pixel_sd = SegmentPrior.load(args.model), args.pixel_sd or PIXEL_SD
-    tracks = lift_tracks.read(args.input, prior, pixel_sd, args.ignore_unknown, args.quiet)
-    jumps = 0
+    prior = lift_prior.load(args.model, args.quiet)
+    tracks = lift_tracks.read(args.input, prior, args.pixel_sd or PIXEL_SD, args.ignore_unknown, args.quiet)
+    pixel_sd, jumps = args.pixel_sd or lift_tracks.noise(tracks, args.quiet), 0
     if not args.keep_jumps:
         tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
     names = motion.output_names(prior, tracks, args.all_markers)
@@ -141,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
-    summary = _summary(args, tracks, found) | {"jumps": jumps}
+    summary = _summary(args, tracks, found) | {"jumps": jumps, "pixel_sd": pixel_sd}
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
 
@@ -185,7 +184,7 @@ def _doubts(found: result.Motion, names: tuple[str, ...], pixel_sd: float, shake
     doubts = {
         f"left with little say, far from where the rest has them: {doubted}": bool(doubted),
         f"the points shake by {shake:.2g} from frame to frame, not {pixel_sd:g}: "
-        f"try --pixel-sd {shake:.2g}": (shake > SHAKY * pixel_sd and found.wider > 1),
+        f"try --pixel-sd {shake:.2g}": (shake > lift_tracks.SHAKY * pixel_sd and found.wider > 1),
         f"not a motion like those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
         "the smoother goes astray in such a motion: its segments are estimated alone, as by --method blend": (
             found.alone

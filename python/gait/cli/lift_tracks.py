@@ -17,6 +17,7 @@ from gait.lift.tracks_file import Tracks
 from gait.progress import progress
 
 MOST_JUMPS = 5  # named
+SHAKY = 1.3  # times a standard deviation from which points shake more than it says
 
 
 def read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, quiet: bool) -> Tracks:
@@ -27,6 +28,20 @@ def read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, quiet:
     if ignored and not quiet:
         print(f"left out, unknown to the model: {' '.join(ignored)}", file=sys.stderr)
     return tracks
+
+
+def noise(tracks: Tracks, quiet: bool) -> float:
+    """Tell the points' deviation at full confidence: the usual one, or how much they shake if it is more."""
+    shake, usual = outliers.shake(tracks), Options.pixel_sd
+    if not shake > SHAKY * usual:
+        return usual
+    if not quiet:
+        print(
+            f"the points shake by {shake:.2g} from frame to frame: taken for their noise instead of "
+            f"{usual:g} (--pixel-sd)",
+            file=sys.stderr,
+        )
+    return shake
 
 
 def without_jumps(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, int]:

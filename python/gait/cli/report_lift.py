@@ -15,6 +15,7 @@ import html
 import io
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,7 @@ def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, Motion
     """Lift the tracks of the clip as `gait lift` does."""
     options = Options(args.method or METHODS[0])
     tracks = lift_tracks.read(args.clip, prior, options.pixel_sd, ignore_unknown=True, quiet=args.quiet)
+    options = replace(options, pixel_sd=lift_tracks.noise(tracks, args.quiet))
     tracks, _ = lift_tracks.without_jumps(tracks, options.pixel_sd, args.quiet)
     view = lift_tracks.view(tracks, args.camera)
     found = lift_tracks.lift(args.clip, prior, tracks, view, options, output_names(prior, tracks), args.quiet)

@@ -38,7 +38,7 @@ def without_jumps(tracks: Tracks, sd: float) -> tuple[Tracks, list[tuple[int, st
 
 
 def shake(tracks: Tracks) -> float:
-    """Noise of the points that no motion explains, pixels; NaN where too few frames follow soon.
+    """Noise at full confidence that no motion explains, pixels; NaN where too few frames follow soon.
 
     By third differences: white noise's are sqrt(20) times as large, and a walk's at `QUICK` a pixel.
     """
@@ -46,7 +46,7 @@ def shake(tracks: Tracks) -> float:
     seen = third[np.isfinite(third)]
     if not seen.size or np.median(np.diff(tracks.time)) > QUICK:
         return np.nan
-    return float(SPREAD * np.median(seen) / np.sqrt(20))
+    return float(SPREAD * np.median(seen) / np.sqrt(20) * np.median(tracks.confidence[tracks.seen]))
 
 
 def _clear(time: Array, uv: Array, sd: float) -> list[int]:

@@ -1,4 +1,7 @@
-"""Files of 2-D joint tracks: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``, empty cells = not seen."""
+"""Files of 2-D joint tracks: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``, empty cells = not seen.
+
+Columns may also be separated by tabs, or by semicolons with decimal commas.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from gait.errors import UserError
 from gait.fields import frame_numbers
 from gait.files import replacing
 from gait.frame import Joints
+from gait.learn.csv_table import DELIMITERS
 
 Array = NDArray[np.float64]
 
@@ -212,11 +216,16 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
         raise UserError(f"{path}: no such file of tracks")
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
-            lines = [line for line in csv.reader(file) if line]
+            first = file.readline()
+            file.seek(0)
+            delimiter = max(DELIMITERS, key=first.count)
+            lines = [line for line in csv.reader(file, delimiter=delimiter) if line]
     except (UnicodeDecodeError, csv.Error) as exc:
         raise UserError(f"{path}: not a CSV file ({exc})") from None
     if len(lines) < 2:
         raise UserError(f"{path}: has no rows; tracks are a header and one row per frame")
+    if delimiter == ";":  # where numbers have decimal commas
+        lines[1:] = [[cell.replace(",", ".") for cell in row] for row in lines[1:]]
     head = [name.strip() for name in lines[0]]
     twice = next((name for name in head if head.count(name) > 1), None)
     if twice is not None:
