@@ -42,7 +42,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .heading_noise = 0.044f,
         .tilt_noise = 0.033f,
         .tilt_time = 1.1f,
-        .coef_noise = 0.5f,
+        .coef_noise = 0.667f, /* with coef_time: the population's unit variance */
         .coef_time = 4.5f,
         .stature_noise = 0.2f,
         .stature_noise_start = 2.0f,
@@ -59,6 +59,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->vertical_noise = 0.022f;
         cfg->heading_noise = 0.11f;
         cfg->tilt_noise = 0.055f;
+        cfg->coef_noise = 0.5f;
         cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
         cfg->stature_noise = cfg->stature_noise_start = 0.0f;
         cfg->offset_angles = 0;
