@@ -63,12 +63,12 @@ def _drawn(uv: dict[str, Array], rng: np.random.Generator) -> Image:
     return np.asarray(np.clip(image + NOISE * rng.standard_normal(image.shape), 0, 255), np.uint8)
 
 
-def stick_clip(prior: SegmentPrior, walk: Walk, angle: float, seed: int = 0) -> ClipSegments:
-    """Clip of a stick figure, roughly placed."""
+def stick_clip(prior: SegmentPrior, walk: Walk, angle: float, seed: int = 0, frame: int = 0) -> ClipSegments:
+    """Clip of a stick figure, roughly placed in a frame."""
     rng, view = np.random.default_rng(seed), CameraView(camera(walk, angle))
-    pelvis = walk.joints[0, walk.names.index("pelvis")]
+    pelvis = walk.joints[frame, walk.names.index("pelvis")]
     noise = PLACED * rng.standard_normal(3)
-    placed = Placement(0, pelvis[:2] + noise[:2], walk.heading + noise[2], walk.stature)
+    placed = Placement(frame, pelvis[:2] + noise[:2], walk.heading + noise[2], walk.stature)
     film = Film.make(pictures(walk, view.camera, seed), walk.stature * view.scale(pelvis))
     return ClipSegments(prior, view, film, placed, (), Settings())
 
@@ -85,14 +85,23 @@ def depth_gaps(clip: ClipSegments, sequence: Sequence) -> Array:
     return np.array([((early[hop:] - late[: frames - hop]) @ line).mean() for early, late, line in pairs])
 
 
-def jumps(clip: ClipSegments, fit: ClipFit) -> tuple[float, float]:
-    """Largest jump of a marker where segments begin or end, and elsewhere, metres.
+def at_joins(clip: ClipSegments) -> NDArray[np.bool_]:
+    """Frames (T,) where a segment begins or ends."""
+    ends = np.concatenate([clip.starts, clip.starts + clip.span])
+    return np.asarray(np.abs(clip.film.times[:, None] - ends).min(axis=1) < 1e-3)
+
+
+def jump(clip: ClipSegments, fit: ClipFit) -> float:
+    """Largest jump of a marker where segments begin or end, metres.
 
     A jump is what a step from one frame to the next differs from the mean of the steps before and after it.
     """
-    step = np.diff(fit.places, axis=0)
-    size = np.linalg.norm(step[1:-1] - (step[:-2] + step[2:]) / 2, axis=2).max(axis=1)
-    ends = np.concatenate([clip.starts, clip.starts + clip.span])
-    near = np.abs(fit.time[:, None] - ends).min(axis=1) < 1e-3
-    touches = near[1:-2] | near[2:-1]
-    return float(size[touches].max()), float(size[~touches].max())
+    step, near = np.diff(fit.places, axis=0), at_joins(clip)
+    size = np.linalg.norm(step[1:-1] - (step[:-2] + step[2:]) / 2, axis=2)
+    return float(size[near[1:-2] | near[2:-1]].max())
+
+
+def bends(clip: ClipSegments, fit: ClipFit) -> tuple[Array, Array]:
+    """Second differences of the markers' places where segments begin or end, and elsewhere, metres."""
+    size, near = np.linalg.norm(np.diff(fit.places, 2, axis=0), axis=2), at_joins(clip)[1:-1]
+    return size[near].ravel(), size[~near].ravel()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gait.lift import common
+from gait.lift import common, likeness
 from gait.lift.descent import Link, information, normal
 from gait.lift.fit_clip import fit_clip
 from gait.lift.prior import SegmentPrior
@@ -76,7 +76,7 @@ def markers(energies, states):
 @pytest.mark.parametrize("which", [0, 1, 2], ids=["across", "along", "size"])
 def test_an_error_moves_the_estimate_as_foretold(chain, which):
     energies, link, states = chain
-    moves = common.moves(energies, information(energies, link, states), states)
+    moves = common.moves(energies, information(energies, link, states), states, np.zeros(2))
     error = np.zeros(3)
     error[which] = SMALL
     wrong = [seen_elsewhere(e, s, error) for e, s in zip(energies, states, strict=True)]
@@ -89,7 +89,41 @@ def test_an_error_moves_the_estimate_as_foretold(chain, which):
 def test_without_sensors_there_is_nothing_to_get_wrong(chain):
     energies, link, states = chain
     blind = [replace(energy, reading=None) for energy in energies]
-    assert not common.moves(blind, information(blind, link, states), states).any()
+    assert not common.moves(blind, information(blind, link, states), states, np.ones(2)).any()
+    assert np.isnan(likeness.likeness(blind, states))
+
+
+def test_a_drift_is_a_shift_of_each_segment_by_how_far_it_drifted(chain):
+    energies, link, states = chain
+    factor = information(energies, link, states)
+    both, first, second = (
+        common.moves(energies, factor, states, np.array(drifted))
+        for drifted in ((0.5, 0.5), (0.5, 0.0), (0.0, 0.5))
+    )
+    for axis in (0, 1):
+        alike = 0.5 / common.SHIFT_SD[axis] * both[..., axis]
+        assert both[..., 3 + axis] == pytest.approx(alike, abs=1e-9)
+        assert (first + second)[..., 3 + axis] == pytest.approx(alike, abs=1e-9)
+
+
+def test_likeness_is_the_share_of_the_sensors_that_the_figure_explains(chain):
+    energies, _, states = chain
+    assert likeness.likeness(energies, states) > 0.99
+    rng, found = np.random.default_rng(0), []
+    for noise in (0.5, 5.0):
+        blurred = []
+        for energy in energies:
+            value = energy.reading.value
+            more = noise * value.std() * rng.normal(size=value.shape)
+            blurred.append(replace(energy, reading=replace(energy.reading, value=value + more)))
+        found.append(likeness.likeness(blurred, states))
+    assert found[0] > 0.8 and abs(found[1]) < 0.4
+
+
+def test_a_figure_that_explains_little_may_have_drifted():
+    drifts = [likeness.drift(alike) for alike in (np.nan, 1.0, likeness.HELD, 0.6, 0.3, -0.5)]
+    assert drifts[:3] == [0.0, 0.0, 0.0]
+    assert 0 < drifts[3] < drifts[4] == drifts[5] < 0.3
 
 
 def stranger(seed):
@@ -113,5 +147,5 @@ def test_intervals_hold_what_they_say(monkeypatch):
         squares.append(np.mean(((fit.places[:, markers] - truth) / fit.sd[:, markers]) ** 2))
     assert min(held) > 0.8
     assert 0.4 < np.sqrt(np.mean(squares)) < 1.2
-    monkeypatch.setattr(common, "moves", lambda chain, factor, states: np.zeros((*states.shape, 3)))
+    monkeypatch.setattr(common, "moves", lambda chain, factor, states, drifted: np.zeros((*states.shape, 3)))
     assert np.median(fit_clip(clip, fit.sequence).sd) < 0.95 * np.median(fit.sd)  # it counts

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from gait.blob import decode
 from gait.camera import Camera
-from gait.cli import values
+from gait.cli import lift_prior, values
 from gait.errors import UsageError, UserError
 from gait.learn.stage import one_thread
 from gait.lift import lifted_file, suggest
@@ -23,6 +23,7 @@ from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.cylinder import Figure
 from gait.lift.cylinder_picture import draw_figure
 from gait.lift.fit_clip import ClipFit, fit_clip, work
+from gait.lift.likeness import DOUBTFUL, HELD
 from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_corrections, read_placement
@@ -90,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--placement: a video needs it; say where the person roughly is in one frame")
     if args.overlay:
         require_video_name(args.overlay)
-    video, prior = Video(args.input), SegmentPrior.load(args.model)
+    video, prior = Video(args.input), lift_prior.load(args.model, args.quiet)
     camera = Camera.read(args.camera, video.size) if args.camera else None
     placement = read_placement(args.placement, prior, camera is not None)
     if placement.unused and not args.quiet:
@@ -110,6 +111,8 @@ def run(args: argparse.Namespace) -> int:
     beginning = Beginning.of(prior, _cycle(args.model), placement)
     clip = ClipSegments(prior, view, film, placement, used, Settings(joined=not args.alone), beginning)
     free, fit = _fits(clip, args.quiet)
+    if fit.likeness < DOUBTFUL and not args.quiet:
+        print(_doubt(args, fit.likeness), file=sys.stderr)
     figure = Figure.fit(fit.places, prior.names)
     shown = [i for i, name in enumerate(prior.names) if name in JOINTS or args.all_markers]
     names = [prior.names[i] for i in shown]
@@ -119,6 +122,15 @@ def run(args: argparse.Namespace) -> int:
     summary = _summary(clip, free, fit, figure, args.suggest or 0)
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
+
+
+def _doubt(args: argparse.Namespace, likeness: float) -> str:
+    remedy = "--background or --corrections" if args.background == "none" else "--corrections"
+    return (
+        f"{args.input}: little of what the sensors read is the person (it correlates by {likeness:.2f} with "
+        f"the stick figure, by {HELD:g} before a known background): the figure may have left, deviations are "
+        f"widened; look with --overlay and give {remedy}"
+    )
 
 
 def _frames(args: argparse.Namespace, video: Video, placement: Placement) -> tuple[int, int]:
@@ -247,6 +259,7 @@ def _summary(clip: ClipSegments, free: ClipFit, fit: ClipFit, figure: Figure, mo
             "wanted": len(wanted),
             "wanted_per_frame": len(wanted) / frames,
         },
+        "likeness": fit.likeness if np.isfinite(fit.likeness) else None,
         "sd_mm": 1000 * float(np.median(fit.sd[:, joints])),
         "figure": {
             "stature_m": figure.stature,

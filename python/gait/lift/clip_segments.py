@@ -24,7 +24,7 @@ Indices = npt.NDArray[np.intp]
 
 FAR = 10.0  # metres: a segment may start anywhere on the ground
 TURN = 10.0  # radians: and look anywhere
-CORRELATED = 6.0  # root of the sensors that count as one independent reading
+CORRELATED = 6.0  # root of the sensors, or of the markers shared by segments, that count as one reading
 BODY = 0.02  # metres: where a joint is in a clothed body is seen no better
 FIRST_SD = 1.0  # of a sensor, before anything is known
 

@@ -23,17 +23,20 @@ SHIFT_SD = (0.03, 0.05)  # metres, across and along the picture: where sensors s
 SIZE_SD = 0.03  # share by which they see it larger
 
 
-def moves(chain: Sequence[Energy], factor: Factor, states: Floats) -> Floats:
-    """How one deviation of each error (two shifts, size) moves the states (B, n): (B, n, 3).
+def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floats) -> Floats:
+    """How one deviation of each error (two shifts, size, two drifts) moves the states (B, n): (B, n, 5).
 
     Parameters
     ----------
     chain : sequence of B Energy
     factor : Factor
         Of the chain's information matrix at the states.
+    drifted : (B,)
+        How far the figure may have drifted in each segment, metres, in one sense: `gait.lift.likeness`.
     """
-    pulls = [_pull(energy, state) for energy, state in zip(chain, states, strict=True)]
-    return -factor.solve(np.stack(pulls))
+    pulls = np.stack([_pull(energy, state) for energy, state in zip(chain, states, strict=True)])
+    drifts = pulls[..., :2] * drifted[:, None, None] / SHIFT_SD
+    return -factor.solve(np.concatenate([pulls, drifts], axis=-1))
 
 
 def _pull(energy: Energy, state: Floats) -> Floats:

@@ -1,9 +1,9 @@
 """The motion of a clip: segments every hop, each the minimum of its energy, joined to one sequence.
 
-Each segment starts from the one before (Leventon & Freeman 1998).  By default all are then solved together,
-neighbours tied where they overlap, so that a correction in one helps the others.  The paper's way
-(`Settings.joined` False) leaves them as they are and moves each in depth until it goes on where the one
-before ended.  Either way the segments are blended linearly.
+Each segment starts from the one before (Leventon & Freeman 1998), and what both describe is one more
+observation of it.  By default all are then solved together, neighbours tied where they overlap, so that a
+correction in one helps the others.  The paper's way (`Settings.joined` False) leaves them as they are and
+moves each in depth until it goes on where the one before ended.  Either way they are blended linearly.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from gait.lift import common
 from gait.lift.clip_segments import CORRELATED, ClipSegments
 from gait.lift.descent import Link, descend, information
 from gait.lift.energy import HEADING, PLACE, Anchor, Energy
+from gait.lift.likeness import drift, likeness
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -58,6 +59,8 @@ class ClipFit:
     sequence : Sequence
     covariance : (B, k + 6, k + 6)
         Of the segments' states.
+    likeness : float
+        Correlation of what the sensors read and the figure gives; NaN without sensors.
     """
 
     frame: Indices
@@ -66,6 +69,7 @@ class ClipFit:
     sd: Floats
     sequence: Sequence
     covariance: Floats
+    likeness: float
 
 
 def fit_clip(clip: ClipSegments, known: Sequence | None = None, update: Update | None = None) -> ClipFit:
@@ -138,8 +142,7 @@ def _one_after_the_other(clip: ClipSegments, first: Settled, update: Update | No
         tried = []
         for component in range(len(clip.shapes)):
             start, anchor = _continued(clip, component, int(components[old]), states[old], step)
-            held = anchor if clip.settings.joined else None
-            tried.append(_settled(clip, segment, component, start, held))
+            tried.append(_settled(clip, segment, component, start, anchor))
         cost, components[segment], states[segment] = min(tried, key=lambda t: t[0])
         energy += cost
         if update is not None:
@@ -166,7 +169,7 @@ def _continued(
     """Start of the segment after (step 1) or before (-1) a known one, and what holds it to that one."""
     frames, hop = clip.prior.frames, clip.prior.hop
     places, _ = clip.shapes[old].positions(state, np.eye(frames), slice(None))
-    sd = np.hypot(clip.shapes[component].residual, LOOSE * clip.placement.stature)
+    sd = CORRELATED * np.hypot(clip.shapes[component].residual, LOOSE * clip.placement.stature)
     shared = slice(hop, None) if step > 0 else slice(frames - hop)
     there = slice(frames - hop) if step > 0 else slice(hop, None)
     anchor = Anchor(there, places[shared], sd)
@@ -249,19 +252,31 @@ def _continuous(clip: ClipSegments, sequence: Sequence) -> Sequence:
     return Sequence(sequence.components, states, sequence.energy)
 
 
+def _share(clip: ClipSegments, segment: int) -> Floats:
+    """Triangular weights (T,) of a segment's frames in the blend.
+
+    The triangle is half a frame longer than the segment at both ends: a segment that came in at full slope in
+    one frame would leave a kink there.
+    """
+    half = 0.5 / clip.prior.fps
+    since = clip.film.times[clip.frames(segment)] - clip.starts[segment] + half
+    return np.maximum(1 - np.abs(2 * since / (clip.span + 2 * half) - 1), LEAST)
+
+
 def _finished(clip: ClipSegments, sequence: Sequence) -> ClipFit:
     """Blend the segments linearly; deviations from the information of all of them and what they share."""
     chain, link = _chain(clip, sequence, looking=True)
     factor = information(chain, link if clip.settings.joined else None, sequence.states)
     overlap = clip.prior.frames / clip.prior.hop  # every frame counts in so many segments
-    alike = common.moves(chain, factor, sequence.states)
-    covariance = overlap * factor.covariance()[0] + alike @ alike.swapaxes(1, 2)
+    alike = likeness(chain, sequence.states)
+    drifted = drift(alike) * (clip.starts + 0.5 * clip.span - clip.placed)
+    pulled = common.moves(chain, factor, sequence.states, drifted)
+    covariance = overlap * factor.covariance()[0] + pulled @ pulled.swapaxes(1, 2)
     count, markers = len(clip.film.times), len(clip.prior.names)
     places, variance, total = np.zeros((count, markers, 3)), np.zeros((count, markers, 3)), np.zeros(count)
     for s, energy in enumerate(chain):
         frames = clip.frames(s)
-        since = (clip.film.times[frames] - clip.starts[s]) / max(clip.span, 1e-9)
-        share = np.maximum(1 - np.abs(2 * since - 1), LEAST)
+        share = _share(clip, s)
         found, slope = energy.shape.positions(sequence.states[s], energy.weights, slice(None))
         spread = np.einsum("tjin,nm,tjim->tji", slope, covariance[s], slope, optimize=True)
         places[frames] += share[:, None, None] * found
@@ -277,4 +292,5 @@ def _finished(clip: ClipSegments, sequence: Sequence) -> ClipFit:
         sd=np.sqrt(variance / total[:, None, None] + size**2),
         sequence=sequence,
         covariance=covariance,
+        likeness=alike,
     )
