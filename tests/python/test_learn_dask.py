@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import marked_walker as mw
@@ -28,9 +29,21 @@ def walks(tmp_path_factory):
     return files.write_trials(tmp_path_factory.mktemp("walks"), 6)
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """Scheduler and workers are there, and on a busy machine slow to answer."""
+    monkeypatch.setattr(cluster, "CONNECT", 120.0)
+
+
 @pytest.fixture(scope="module")
 def scheduler():
     """Address of a cluster of two processes."""
+    with _two_workers() as address:
+        yield address
+
+
+@contextmanager
+def _two_workers():
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
     ) as local:
@@ -99,7 +112,7 @@ def test_without_dask_the_remedy_is_named(walks, monkeypatch):
         sources.load_all([(walks / "01_00.amc", True)], dask="127.0.0.1:9")
 
 
-def test_a_file_that_kills_its_workers_is_named(walks, scheduler, tmp_path, monkeypatch):
+def test_a_file_that_kills_its_workers_is_named(walks, tmp_path, monkeypatch):
     """Workers that die on a task are KilledWorker to the client; here a task that ends its process."""
     bad = Path(shutil.copy(walks / "01_00.amc", tmp_path / "05_01.amc"))
     true = cluster._done
@@ -108,7 +121,8 @@ def test_a_file_that_kills_its_workers_is_named(walks, scheduler, tmp_path, monk
         "_done",
         lambda task, wanted: os._exit(9) if task.path.name == "05_01.amc" else true(task, wanted),
     )
-    _, refused = sources.load_all([(walks / "01_01.amc", True), (bad, True)], dask=scheduler)
+    with _two_workers() as address:  # of their own: they are gone for a while
+        _, refused = sources.load_all([(walks / "01_01.amc", True), (bad, True)], dask=address)
     assert len(refused) == 1 and refused[0].startswith(f"{bad}: the workers that read it were killed")
 
 
