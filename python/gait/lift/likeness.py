@@ -17,9 +17,7 @@ Floats = npt.NDArray[np.float64]
 
 HELD = 0.9  # likeness of figures that follow a person before a known background
 CHANCE = 0.3  # likeness that a figure anywhere in a scene may have
-DRIFT_SD = (
-    0.04  # metres a second at twice the noise of `HELD`; most likely without a background, as in `common`
-)
+DRIFT_SD = 0.04  # metres a second at twice the noise of `HELD`; the likeliest without a background
 DOUBTFUL = 0.5  # below it figures left the person in half of the clips that this was found on
 
 
