@@ -114,7 +114,10 @@ struct walker_block;
     K(void, surface_sample,                                                                                  \
       (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,     \
        const struct layers *drawn, struct like_patch *seen))                                                 \
-    K(void, texture_logs, (const struct like_body *b, float *log))                                           \
+    K(void, texture_costs, (const struct like_body *b, int32_t (*cost)[16]))                                 \
+    K(void, texture_logs,                                                                                    \
+      (const struct like_setup *s, const struct outline_block *outline, const int32_t (*cost)[16],           \
+       float *restrict log))                                                                                 \
     K(int64_t, template_cost, (const struct like_body *b))                                                   \
     /* The sides of a block's limbs, and the edges along one body's. */                                      \
     K(void, edges_prepare,                                                                                   \

@@ -24,12 +24,11 @@ static inline __m256i lookup8(const void *table, int32_t bytes, __m256i index, _
 static inline void lookup_every(int32_t bytes, const void *table, const int32_t *index, const int32_t *take,
                                 int32_t *out)
 {
-#if defined(__AVX512F__) /* two of eight are faster than one of sixteen */
-    __m512i const at = _mm512_loadu_si512(index), on = _mm512_loadu_si512(take);
-    __m256i const low = lookup8(table, bytes, _mm512_castsi512_si256(at), _mm512_castsi512_si256(on));
-    __m256i const high =
-        lookup8(table, bytes, _mm512_extracti64x4_epi64(at, 1), _mm512_extracti64x4_epi64(on, 1));
-    _mm512_storeu_si512(out, _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1));
+#if defined(__AVX512F__)
+    __m512i const at = _mm512_loadu_si512(index), none = _mm512_setzero_si512();
+    __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take));
+    _mm512_storeu_si512(out, bytes == 2 ? _mm512_mask_i32gather_epi32(none, on, at, table, 2)
+                                        : _mm512_mask_i32gather_epi32(none, on, at, table, 4));
 #elif defined(__AVX2__)
     for (int32_t i = 0; i < LANES; i += 8)
         _mm256_storeu_si256((__m256i_u *)(out + i),
@@ -44,21 +43,6 @@ static inline void lookup_every(int32_t bytes, const void *table, const int32_t 
     }
 #endif
 }
-
-#if defined(__AVX512F__)
-#define LANES_TABLE 64 /* words in registers */
-
-/* out[i] = table[index[i] % LANES_TABLE]; the table begins with a line of the cache. */
-static inline void lookup_table(const void *table, const int32_t *index, int32_t *out)
-{
-    const __m512i *const t = table;
-    __m512i const at = _mm512_loadu_si512(index);
-    __m512i const low = _mm512_permutex2var_epi32(_mm512_load_si512(t), at, _mm512_load_si512(t + 1));
-    __m512i const high = _mm512_permutex2var_epi32(_mm512_load_si512(t + 2), at, _mm512_load_si512(t + 3));
-    __mmask16 const beyond = _mm512_test_epi32_mask(at, _mm512_set1_epi32(LANES_TABLE / 2));
-    _mm512_storeu_si512(out, _mm512_mask_blend_epi32(beyond, low, high));
-}
-#endif
 
 /* out[i] = table[index[i]] where take[i] is negative, elsewhere 0. */
 static inline void lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
@@ -135,6 +119,33 @@ static inline void bilinear(const int32_t *four, const int32_t *u, const int32_t
 #endif
 }
 
+#if defined(__AVX512VBMI__)
+#define LANES_BETWEEN
+/* Bilinear look-up of bytes: pairs of one with that below it, 256 in a row; at u, v, 1/256 of their distance, rounded
+ * towards 0, where shown (negative), elsewhere `hidden`. */
+static inline void between(const uint16_t *pairs, const int32_t *u, const int32_t *v, const int32_t *shown,
+                           int8_t hidden, int8_t *out)
+{
+    __m512i const x = _mm512_loadu_si512(u), y = _mm512_loadu_si512(v), low = _mm512_set1_epi32(255);
+    __m512i const at = _mm512_ternarylogic_epi32(_mm512_srai_epi32(x, 8), y, low, 0xf4);
+    __mmask16 const take = _mm512_movepi32_mask(_mm512_loadu_si512(shown));
+    __m512i const four = _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), take, at, pairs, 2);
+    __m512i const bytes = _mm512_set4_epi32(0x0c0c0c0c, 0x08080808, 0x04040404, 0);
+    __m512i const words = _mm512_or_si512(bytes, _mm512_set1_epi16((short)0x8000));
+    __m512i const down = _mm512_xor_si512(_mm512_shuffle_epi8(y, bytes), _mm512_set1_epi32(0x00ff00ff));
+    __m512i const left = _mm512_srai_epi16(_mm512_slli_epi16(four, 8), 8);
+    __m512i const both = _mm512_add_epi16(_mm512_maddubs_epi16(down, four), left);
+    __m512i const fx = _mm512_shuffle_epi8(x, words);
+    __m512i const across = _mm512_mask_sub_epi16(fx, 0x55555555, _mm512_set1_epi16(256), fx);
+    __m512i const sum = _mm512_madd_epi16(both, across);
+    __m512i const whole =
+        _mm512_mask_add_epi32(sum, _mm512_movepi32_mask(sum), sum, _mm512_set1_epi32(65535));
+    __m512i const third = _mm512_set_epi64(0, 0, 0, 0, 0, 0, 0x3e3a36322e2a2622, 0x1e1a16120e0a0602);
+    __m512i const value = _mm512_mask_permutexvar_epi8(_mm512_set1_epi8(hidden), take, third, whole);
+    _mm_storeu_si128((__m128i_u *)out, _mm512_castsi512_si128(value));
+}
+#endif
+
 /* The sum over `count` words, a multiple of LANES, of byte 1 times the low half of the pair and byte 3 times the high
  * one. */
 static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, int32_t count)
@@ -159,6 +170,16 @@ static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, i
     return sum;
 }
 
+/* Sixteen numbers to be read again and again: in registers. */
+static inline void once(const float *in, float *restrict out)
+{
+#if defined(__AVX512F__)
+    _mm512_storeu_ps(out, _mm512_loadu_ps(in));
+#else
+    memcpy(out, in, LANES * sizeof *out);
+#endif
+}
+
 /* Bytes to words: in pieces, what follows would wait for them. */
 static inline void widen(const int8_t *in, int32_t *out)
 {
@@ -176,9 +197,7 @@ static inline void widen(const int8_t *in, int32_t *out)
 /* Words to bytes, which they fit. */
 static inline void narrow(const int32_t *in, int8_t *out)
 {
-#if defined(__AVX512F__)
-    _mm_storeu_si128((__m128i_u *)out, _mm512_cvtepi32_epi8(_mm512_loadu_si512(in)));
-#elif defined(__AVX2__)
+#if defined(__AVX2__)
     __m256i const low = _mm256_loadu_si256((const __m256i_u *)in);
     __m256i const high = _mm256_loadu_si256((const __m256i_u *)(in + 8));
     __m256i const half = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xd8);
@@ -229,6 +248,25 @@ static inline void bytes_costs(const int8_t *const *a, const int8_t *const *b, i
 }
 #endif
 
+/* Two numbers in turn, `count` in all, a multiple of eight. */
+static inline void repeat(const float *two, int32_t count, float *restrict out)
+{
+#if defined(__AVX512F__)
+    double both;
+    memcpy(&both, two, sizeof both);
+    for (int32_t i = 0; i < count; i += 16)
+        _mm512_storeu_pd((double *)(void *)(out + i), _mm512_set1_pd(both));
+#elif defined(__AVX2__)
+    double both;
+    memcpy(&both, two, sizeof both);
+    for (int32_t i = 0; i < count; i += 8)
+        _mm256_storeu_pd((double *)(void *)(out + i), _mm256_set1_pd(both));
+#else
+    for (int32_t i = 0; i < count; i += 2)
+        memcpy(out + i, two, 2 * sizeof *out);
+#endif
+}
+
 /* Eight numbers, and again. */
 static inline void twice(const float *eight, float *restrict out)
 {
@@ -240,40 +278,34 @@ static inline void twice(const float *eight, float *restrict out)
 #endif
 }
 
-/* Rows of masks at once, as many as fill a register: fewer are drawn in vain. */
-#if defined(__AVX512F__)
-enum { LANES_ROWS = 16 };
+/* Rows of masks at once, as many as the two ends of fill a register. */
+#if defined(__AVX2__) && !defined(__AVX512F__)
+enum { LANES_ROWS = 4 };
 #else
 enum { LANES_ROWS = 8 };
 #endif
 
-/* Bits [begin, end) of each word, 0 to 64, go behind those of `whole`: what is seen of them, and all. */
-static inline void cover(const int32_t *begin, const int32_t *end, uint64_t *restrict whole,
-                         uint64_t *restrict seen)
+/* Of each word the bits from the first to the second number of a pair, 0 to 64, go behind those of `whole`: what is seen
+ * of them, and all. */
+static inline void cover(const int32_t *span, uint64_t *restrict whole, uint64_t *restrict seen)
 {
 #if defined(__AVX512F__)
-    __m512i const ones = _mm512_set1_epi64(-1);
-    for (int32_t i = 0; i < LANES_ROWS; i += 8) {
-        __m512i const b = _mm512_cvtepu32_epi64(_mm256_loadu_si256((const __m256i_u *)(begin + i)));
-        __m512i const e = _mm512_cvtepu32_epi64(_mm256_loadu_si256((const __m256i_u *)(end + i)));
-        __m512i const from = _mm512_sllv_epi64(ones, b), to = _mm512_sllv_epi64(ones, e);
-        __m512i const nearer = _mm512_loadu_si512(whole + i);
-        _mm512_storeu_si512(whole + i, _mm512_ternarylogic_epi64(nearer, from, to, 0xf4));
-        _mm512_storeu_si512(seen + i, _mm512_ternarylogic_epi64(nearer, from, to, 0x04));
-    }
+    __m512i const ones = _mm512_set1_epi64(-1), both = _mm512_loadu_si512(span);
+    __m512i const from = _mm512_sllv_epi64(ones, _mm512_maskz_mov_epi32(0x5555, both));
+    __m512i const to = _mm512_sllv_epi64(ones, _mm512_srli_epi64(both, 32));
+    __m512i const nearer = _mm512_loadu_si512(whole);
+    _mm512_storeu_si512(whole, _mm512_ternarylogic_epi64(nearer, from, to, 0xf4));
+    _mm512_storeu_si512(seen, _mm512_ternarylogic_epi64(nearer, from, to, 0x04));
 #elif defined(__AVX2__)
-    __m256i const ones = _mm256_set1_epi64x(-1);
-    for (int32_t i = 0; i < LANES_ROWS; i += 4) {
-        __m256i const b = _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i_u *)(begin + i)));
-        __m256i const e = _mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i_u *)(end + i)));
-        __m256i const mine = _mm256_andnot_si256(_mm256_sllv_epi64(ones, e), _mm256_sllv_epi64(ones, b));
-        __m256i const nearer = _mm256_loadu_si256((const __m256i_u *)(whole + i));
-        _mm256_storeu_si256((__m256i_u *)(whole + i), _mm256_or_si256(nearer, mine));
-        _mm256_storeu_si256((__m256i_u *)(seen + i), _mm256_andnot_si256(nearer, mine));
-    }
+    __m256i const ones = _mm256_set1_epi64x(-1), both = _mm256_loadu_si256((const __m256i_u *)span);
+    __m256i const from = _mm256_sllv_epi64(ones, _mm256_and_si256(both, _mm256_set1_epi64x(0xffffffff)));
+    __m256i const mine = _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_srli_epi64(both, 32)), from);
+    __m256i const nearer = _mm256_loadu_si256((const __m256i_u *)whole);
+    _mm256_storeu_si256((__m256i_u *)whole, _mm256_or_si256(nearer, mine));
+    _mm256_storeu_si256((__m256i_u *)seen, _mm256_andnot_si256(nearer, mine));
 #else
     for (int32_t i = 0; i < LANES_ROWS; i++) {
-        uint64_t const mine = rast_bits(begin[i], end[i]), nearer = whole[i];
+        uint64_t const mine = rast_bits(span[2 * i], span[2 * i + 1]), nearer = whole[i];
         whole[i] = nearer | mine;
         seen[i] = mine & ~nearer;
     }

@@ -10,23 +10,22 @@ enum {
 
 typedef struct layers {
     rast_mask whole;                    /* the body; [first, last) are whole bands */
-    rast_mask visible[MODEL_MAX_LIMBS]; /* by limb; the same, with the columns of the whole body */
+    rast_mask visible[MODEL_MAX_LIMBS]; /* by limb, first as the whole body's; with its columns */
 } layers;
 
 /* A convex polygon in the grid, in the bodies of a block: in rows top <= y < end what lies right of all of its left
- * lines and left of all of its right ones, the lines going on beyond the corners.  Columns are at + slope y. */
+ * lines and left of all of its right ones, the lines going on beyond the corners.  Columns, from the body's first on,
+ * are at + slope y; those of right lines are negative, so that of either side the greatest counts. */
 typedef struct layers_limb {
-    float left_at[LAYERS_LINES][BLOCK], left_slope[LAYERS_LINES][BLOCK];
-    float right_at[LAYERS_LINES][BLOCK], right_slope[LAYERS_LINES][BLOCK];
-    int32_t top[BLOCK], end[BLOCK]; /* none behind the camera */
+    float line[BLOCK][4 * LAYERS_LINES]; /* at left, right; slope left, right; of each line */
+    int32_t top[BLOCK], end[BLOCK];      /* none behind the camera */
 } layers_limb;
 
 typedef struct layers_block {
     int32_t lines[MODEL_MAX_LIMBS]; /* on either side: 3 of a cone, LAYERS_LINES of an ellipsoid */
     int32_t count;                  /* limbs */
-    int32_t drawn[BLOCK];           /* of them in front of the camera */
     int32_t first[BLOCK], last[BLOCK], column[BLOCK], width[BLOCK]; /* of the masks of the whole body */
-    uint8_t order[BLOCK][MODEL_MAX_LIMBS]; /* from near to far; equal depths by index */
+    uint8_t order[BLOCK][MODEL_MAX_LIMBS]; /* near to far, behind the camera last; equal depths by index */
     _Alignas(GAIT_ALIGN) layers_limb limb[MODEL_MAX_LIMBS];
 } layers_block;
 

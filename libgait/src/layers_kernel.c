@@ -75,9 +75,11 @@ static void corners_of(const outline_lanes *limb, int32_t n, corners *restrict c
         }
 }
 
+/* Where a limb's lines go: at, slope; left, right; body. */
+typedef float line_lanes[2][2][BLOCK];
+
 /* The side from corner j to corner k, which goes down on the right if the corners go round clockwise. */
-static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwise, int32_t slot,
-                 layers_limb *restrict out)
+static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwise, line_lanes *restrict out)
 {
     KERNEL_LANES
     for (int32_t i = 0; i < BLOCK; i++) {
@@ -90,35 +92,48 @@ static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwis
         float const steep = f_clamp(slope, -SHALLOW, SHALLOW);
         float const at = x0 + slope * ((float)first - y0) - steep * (float)first;
         bool const to_left = crosses & !right, to_right = crosses & right;
-        out->left_at[slot][i] = to_left ? at : out->left_at[slot][i];
-        out->left_slope[slot][i] = to_left ? steep : out->left_slope[slot][i];
-        out->right_at[slot][i] = to_right ? at : out->right_at[slot][i];
-        out->right_slope[slot][i] = to_right ? steep : out->right_slope[slot][i];
+        (*out)[0][0][i] = to_left ? at : (*out)[0][0][i];
+        (*out)[0][1][i] = to_right ? -at : (*out)[0][1][i];
+        (*out)[1][0][i] = to_left ? steep : (*out)[1][0][i];
+        (*out)[1][1][i] = to_right ? -steep : (*out)[1][1][i];
     }
 }
 
 /* Opposite sides of an octagon, and the ends of a cone, are parallel: one is on the left, the other on the right. */
-static void limb_lines(const outline_lanes *limb, int32_t n, int32_t lines, box *restrict body,
-                       layers_limb *restrict out)
+static void limb_lines(const outline_lanes *limb, int32_t n, box *restrict body, layers_limb *restrict out)
 {
     corners c;
     int32_t clockwise[BLOCK];
     box own = box_empty();
+    line_lanes *const line = (line_lanes *)out->line; /* dealt out when the columns are known */
     corners_of(limb, n, &c, &own);
     for (int32_t i = 0; i < BLOCK; i++) {
         int32_t const a = n / 4, b = n / 2, d = n / 4 + n / 2;
         clockwise[i] = (c.x[b][i] - c.x[0][i]) * (c.y[d][i] - c.y[a][i]) >
                        (c.y[b][i] - c.y[0][i]) * (c.x[d][i] - c.x[a][i]);
     }
-    for (int32_t slot = 0; slot < lines; slot++)
-        for (int32_t i = 0; i < BLOCK; i++) {
-            out->left_at[slot][i] = -NOWHERE;
-            out->right_at[slot][i] = NOWHERE;
-            out->left_slope[slot][i] = out->right_slope[slot][i] = 0.0f;
-        }
+    for (int32_t slot = 0; slot < LAYERS_LINES; slot++)
+        for (int32_t right = 0; right < 2; right++)
+            for (int32_t i = 0; i < BLOCK; i++) {
+                line[slot][0][right][i] = -NOWHERE;
+                line[slot][1][right][i] = 0.0f;
+            }
     for (int32_t k = 0; k < n; k++)
-        side(&c, k, (k + 1) % n, clockwise, n == 4 && k == 3 ? 1 : k % LAYERS_LINES, out);
+        side(&c, k, (k + 1) % n, clockwise, &line[n == 4 && k == 3 ? 1 : k % LAYERS_LINES]);
     box_join(body, &own, limb->depth, out);
+}
+
+/* Columns from the body's first on, body by body. */
+static void deal_lines(const int32_t *column, layers_limb *restrict out)
+{
+    line_lanes line[LAYERS_LINES];
+    memcpy(line, out->line, sizeof line);
+    for (int32_t slot = 0; slot < LAYERS_LINES; slot++)
+        for (int32_t i = 0; i < BLOCK; i++) {
+            line[slot][0][0][i] -= (float)column[i];
+            line[slot][0][1][i] += (float)column[i];
+        }
+    deal((const float (*)[LANES])line, (float (*)[LANES])out->line);
 }
 
 /* Most bodies are no wider than a word; its first column is a multiple of RAST_STEP. */
@@ -138,12 +153,10 @@ static void choose_columns(const box *body, layers_block *restrict out)
 static void depth_order(const outline_lanes *limb, int32_t count, layers_block *restrict out)
 {
     float key[MODEL_MAX_LIMBS][BLOCK];
-    memset(out->drawn, 0, sizeof out->drawn);
     for (int32_t l = 0; l < count; l++)
         for (int32_t i = 0; i < BLOCK; i++) {
             int32_t const front = limb[l].depth[i] > 0.0f;
             key[l][i] = front ? f_min(limb[l].depth[i], FLT_MAX) : INFINITY;
-            out->drawn[i] += front;
         }
     for (int32_t l = 0; l < count; l++) {
         int32_t before[BLOCK] = {0};
@@ -166,111 +179,90 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
     for (int32_t l = 0; l < count; l++) {
         int32_t const n = outline_vertices(&limbs[l]);
         out->lines[l] = n == 4 ? 3 : LAYERS_LINES;
-        limb_lines(&outline->limb[l], n, out->lines[l], &body, &out->limb[l]);
+        limb_lines(&outline->limb[l], n, &body, &out->limb[l]);
     }
     choose_columns(&body, out);
+    for (int32_t l = 0; l < count; l++)
+        deal_lines(out->column, &out->limb[l]);
     depth_order(outline->limb, count, out);
 }
 
 /* ---- masks, lanes are rows ---- */
 
-typedef struct pair { /* a left line and a right one of one body */
-    float left_at, left_slope, right_at, right_slope;
-} pair;
-
-static inline pair pair_of(const layers_limb *limb, int32_t k, int32_t lane, int32_t base)
-{
-    return (pair){.left_at = limb->left_at[k][lane] - (float)base,
-                  .left_slope = limb->left_slope[k][lane],
-                  .right_at = limb->right_at[k][lane] - (float)base,
-                  .right_slope = limb->right_slope[k][lane]};
-}
-
-/* Narrow a row's span to what lies between the lines. */
-static inline void bound(pair p, float y, float *left, float *right)
-{
-    *left = f_max(p.left_at + p.left_slope * y, *left);
-    *right = f_min(p.right_at + p.right_slope * y, *right);
-}
-
-/* The first cell of the word whose centre is at or right of a line; so little left of it is rounding. */
+/* The first cell of a word whose centre is at or right of a column; so little left of it is rounding. */
 static inline int32_t cell_from(float x)
 {
     float const slack = 1.0f / 1024.0f; /* cells */
     return i_clamp((int32_t)(x + (1.0f - slack)), 0, 64);
 }
 
-/* The bits in the word that begins at column `base`, by LANES_ROWS at once, so that there is no remainder; what was
- * stored eight rows at a time is loaded so. */
-KERNEL_ROW void draw_cone(const layers_limb *limb, int32_t lane, int32_t base, uint64_t *restrict whole,
-                          uint64_t *restrict seen)
+/* The bits in a word, LANES_ROWS rows at once, each as its left and its right column; what was stored so is loaded so. */
+static inline __attribute__((always_inline)) void draw_limb(const float *line, int32_t lines, int32_t top,
+                                                            int32_t end, uint64_t *restrict whole,
+                                                            uint64_t *restrict seen)
 {
-    int32_t const top = limb->top[lane], end = limb->end[lane];
-    pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
-    pair const c = pair_of(limb, 2, lane, base);
-    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LANES_ROWS) {
-        int32_t from[LANES_ROWS], to[LANES_ROWS];
-        for (int32_t i = 0; i < LANES_ROWS; i++) {
-            float const y = (float)(strip + i);
-            float left = a.left_at + a.left_slope * y, right = a.right_at + a.right_slope * y;
-            bound(b, y, &left, &right);
-            bound(c, y, &left, &right);
-            from[i] = cell_from(left);
-            to[i] = (uint32_t)(strip + i - top) < (uint32_t)(end - top) ? cell_from(right) : 0;
-        }
-        cover(from, to, whole + strip, seen + strip);
+    float at[LAYERS_LINES][2 * LANES_ROWS], slope[LAYERS_LINES][2 * LANES_ROWS], y[2 * LANES_ROWS];
+    int32_t const first = top / LAYERS_BAND * LAYERS_BAND;
+    int32_t row[2 * LANES_ROWS];
+    repeat(line, 2 * LANES_ROWS, at[0]);
+    repeat(line + 2, 2 * LANES_ROWS, slope[0]);
+    repeat(line + 4, 2 * LANES_ROWS, at[1]);
+    repeat(line + 6, 2 * LANES_ROWS, slope[1]);
+    repeat(line + 8, 2 * LANES_ROWS, at[2]);
+    repeat(line + 10, 2 * LANES_ROWS, slope[2]);
+    if (lines > 3) {
+        repeat(line + 12, 2 * LANES_ROWS, at[3]);
+        repeat(line + 14, 2 * LANES_ROWS, slope[3]);
     }
-}
-
-KERNEL_ROW void draw_ellipsoid(const layers_limb *limb, int32_t lane, int32_t base, uint64_t *restrict whole,
-                               uint64_t *restrict seen)
-{
-    int32_t const top = limb->top[lane], end = limb->end[lane];
-    pair const a = pair_of(limb, 0, lane, base), b = pair_of(limb, 1, lane, base);
-    pair const c = pair_of(limb, 2, lane, base), d = pair_of(limb, 3, lane, base);
-    for (int32_t strip = top / LAYERS_BAND * LAYERS_BAND; strip < end; strip += LANES_ROWS) {
-        int32_t from[LANES_ROWS], to[LANES_ROWS];
-        for (int32_t i = 0; i < LANES_ROWS; i++) {
-            float const y = (float)(strip + i);
-            float left = a.left_at + a.left_slope * y, right = a.right_at + a.right_slope * y;
-            bound(b, y, &left, &right);
-            bound(c, y, &left, &right);
-            bound(d, y, &left, &right);
-            from[i] = cell_from(left);
-            to[i] = (uint32_t)(strip + i - top) < (uint32_t)(end - top) ? cell_from(right) : 0;
+    for (int32_t i = 0; i < 2 * LANES_ROWS; i++) {
+        row[i] = first - top + (i >> 1);
+        y[i] = (float)(first + (i >> 1));
+    }
+    for (int32_t strip = first; strip < end; strip += LANES_ROWS) {
+        int32_t span[2 * LANES_ROWS];
+        for (int32_t i = 0; i < 2 * LANES_ROWS; i++) {
+            float const sign = (float)(1 - 2 * (i & 1));
+            float x = at[0][i] + slope[0][i] * y[i];
+            x = f_max(at[1][i] + slope[1][i] * y[i], x);
+            x = f_max(at[2][i] + slope[2][i] * y[i], x);
+            x = lines > 3 ? f_max(at[3][i] + slope[3][i] * y[i], x) : x;
+            span[i] = (uint32_t)row[i] < (uint32_t)(end - top) ? cell_from(sign * x) : 0;
+            row[i] += LANES_ROWS;
+            y[i] += (float)LANES_ROWS;
         }
-        cover(from, to, whole + strip, seen + strip);
+        cover(span, whole + strip, seen + strip);
     }
 }
 
 /* One word of every row. */
 static void draw_word(const layers_block *block, int32_t lane, int32_t word, layers *restrict out)
 {
-    int32_t const base = out->whole.column + 64 * word;
     uint64_t *const whole = out->whole.word[word];
     memset(whole + out->whole.first, 0, (size_t)(out->whole.last - out->whole.first) * sizeof *whole);
-    for (int32_t k = 0; k < block->drawn[lane]; k++) {
+    for (int32_t k = 0; k < block->count; k++) {
         int32_t const l = block->order[lane][k];
+        const layers_limb *const limb = &block->limb[l];
+        float const *line = limb->line[lane];
+        float moved[LANES];
+        if (word) {
+            for (int32_t i = 0; i < LANES; i++)
+                moved[i] = line[i] + (i & 2 ? 0.0f : (float)(i & 1 ? 64 : -64));
+            line = moved;
+        }
         if (block->lines[l] == 3)
-            draw_cone(&block->limb[l], lane, base, whole, out->visible[l].word[word]);
+            draw_limb(line, 3, limb->top[lane], limb->end[lane], whole, out->visible[l].word[word]);
         else
-            draw_ellipsoid(&block->limb[l], lane, base, whole, out->visible[l].word[word]);
+            draw_limb(line, 4, limb->top[lane], limb->end[lane], whole, out->visible[l].word[word]);
     }
 }
 
 void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restrict out)
 {
     int32_t const column = block->column[lane], width = block->width[lane];
-    out->whole.first = block->first[lane];
-    out->whole.last = block->last[lane];
-    out->whole.column = column;
-    out->whole.width = width;
-    for (int32_t l = 0; l < block->count; l++) {
-        out->visible[l].first = block->limb[l].top[lane];
-        out->visible[l].last = block->limb[l].end[lane];
-        out->visible[l].column = column;
-        out->visible[l].width = width;
-    }
+    rast_frame(&out->whole, block->first[lane], block->last[lane], column, width);
+    for (int32_t l = 0; l < block->count; l++)
+        rast_frame(&out->visible[l], block->limb[l].top[lane] / LAYERS_BAND * LAYERS_BAND,
+                   block->limb[l].end[lane], column, width);
     for (int32_t word = 0; 64 * word < width; word++)
         draw_word(block, lane, word, out);
 }

@@ -78,20 +78,28 @@ void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_conf
     costs_init(s);
 }
 
-float like_one(const like_body *b, const like_term *term)
+void like_evaluate(const like_body *b)
 {
-    for (int32_t k = 0; k < LIKE_TERMS; k++)
-        if (TERMS[k] == term && (b->setup->terms & term->flag))
-            return b->setup->weight[k] * term->log_likelihood(b);
-    return 0.0f;
+    const like_setup *const s = b->setup;
+    if ((s->terms & GAIT_TERM_TEXTURE) && b->ancestor)
+        s->run->texture_costs(b, b->terms->cost);
+    for (int32_t k = 1; k < LIKE_TERMS; k++)
+        b->terms->nats[k][b->lane] =
+            s->terms & TERMS[k]->flag ? s->weight[k] * TERMS[k]->log_likelihood(b) : 0.0f;
 }
 
-float like_evaluate(const like_body *b)
+void like_sum(const like_setup *s, const outline_block *outline, bool ancestors, like_block *terms,
+              float sum[BLOCK])
 {
-    float sum = 0.0f;
-    for (int32_t k = 0; k < LIKE_TERMS; k++)
-        sum += like_one(b, TERMS[k]);
-    return sum;
+    float log[BLOCK] = {0.0f};
+    if ((s->terms & GAIT_TERM_TEXTURE) && ancestors)
+        s->run->texture_logs(s, outline, (const int32_t (*)[BLOCK])terms->cost, log);
+    for (int32_t i = 0; i < BLOCK; i++) {
+        terms->nats[0][i] = s->weight[0] * log[i];
+        sum[i] = 0.0f;
+        for (int32_t k = 0; k < LIKE_TERMS; k++)
+            sum[i] += terms->nats[k][i];
+    }
 }
 
 float like_support(const like_body *b)

@@ -104,6 +104,12 @@ typedef struct like_setup { /* constant while a tracker lives */
     like_costs square; /* the difference squared */
 } like_setup;
 
+/* What the terms say of a block's bodies. */
+typedef struct like_block {
+    int32_t cost[MODEL_MAX_LIMBS][BLOCK]; /* by limb: its surface and its ancestor's */
+    float nats[LIKE_TERMS][BLOCK];        /* weighted; those in use */
+} like_block;
+
 typedef struct like_body { /* one body in one camera, as the terms see it */
     const like_setup *setup;
     const features *features;
@@ -115,6 +121,7 @@ typedef struct like_body { /* one body in one camera, as the terms see it */
     const like_patch *ancestor; /* the same of its ancestor in the previous frame, or NULL */
     const gait_camera *camera;
     const float (*points)[3][BLOCK]; /* joints in the world, metres; read if the features have tracks */
+    like_block *terms;               /* its block's */
     const int8_t *known;             /* limbs x LIKE_RING: running appearance (like_template.h), or NULL */
     int32_t area,
         covered; /* cells of the body that the camera sees, and the foreground in them; FG_ONE = 1 */
@@ -144,11 +151,12 @@ static inline void like_sample(const like_setup *s, const features *f, const lik
     s->run->surface_sample(s, f, pose, lane, drawn, seen);
 }
 
-/* Sum of the weighted terms in use. */
-float like_evaluate(const like_body *b);
+/* One body's terms into its block's, of the texture what its block goes on with. */
+void like_evaluate(const like_body *b);
 
-/* One term's part in it. */
-float like_one(const like_body *b, const like_term *term);
+/* The rest of the texture, if the bodies have ancestors, and sums over the terms. */
+void like_sum(const like_setup *s, const outline_block *outline, bool ancestors, like_block *terms,
+              float sum[BLOCK]);
 
 /* Sum of the weighted terms over the hypothesis that nobody is there: positive if the frame shows this
  * body. */

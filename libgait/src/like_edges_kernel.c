@@ -14,19 +14,14 @@ typedef struct sides { /* of each point */
 
 static inline void cone(const float *w, sides *restrict out)
 {
-    float const x0 = w[LIKE_SIDE_X], x1 = w[LIKE_SIDE_X + 1], y0 = w[LIKE_SIDE_Y], y1 = w[LIKE_SIDE_Y + 1];
-    float const dx0 = w[LIKE_SIDE_DX], dx1 = w[LIKE_SIDE_DX + 1], dy0 = w[LIKE_SIDE_DY],
-                dy1 = w[LIKE_SIDE_DY + 1];
-    float const n0 = w[LIKE_SIDE_NORMAL], n1 = w[LIKE_SIDE_NORMAL + 1];
+    repeat(w + LIKE_SIDE_X, LANES, out->x);
+    repeat(w + LIKE_SIDE_Y, LANES, out->y);
+    repeat(w + LIKE_SIDE_DX, LANES, out->dx);
+    repeat(w + LIKE_SIDE_DY, LANES, out->dy);
+    repeat(w + LIKE_SIDE_NORMAL, LANES, out->normal);
 #pragma GCC unroll 1
-    for (int32_t i = 0; i < LANES; i++) {
-        out->x[i] = i < 8 ? x0 : x1;
-        out->y[i] = i < 8 ? y0 : y1;
-        out->dx[i] = i < 8 ? dx0 : dx1;
-        out->dy[i] = i < 8 ? dy0 : dy1;
-        out->normal[i] = i < 8 ? n0 : n1;
-        out->share[i] = ((float)(i & 7) + 0.5f) / 8.0f;
-    }
+    for (int32_t i = 0; i < LANES; i++)
+        out->share[i] = ((float)(i >> 1) + 0.5f) / 8.0f;
 }
 
 /* The octagon's sides, twice round. */
@@ -74,8 +69,8 @@ static like_edge_tally tally(const spots *p, int32_t limbs)
     int32_t const n = limbs * LANES;
     int32_t trace = 0, points = 0;
     for (int32_t i = 0; i < n; i++) {
-        trace += (int32_t)((uint32_t)cell[i] << 24) >> 24;
-        points += shown[i] < 0;
+        trace += cell[i] & 255;
+        points += (int32_t)((uint32_t)shown[i] >> 31);
     }
     return (like_edge_tally){trace * 64 + odd_bytes_dot(cell, p->normal[0], n), trace * 64, points};
 }

@@ -1,5 +1,6 @@
 /* Surface points of one body: where they are and what the frame shows there. */
 #include "camera.h"
+#include "fmath.h"
 #include "kernels.h"
 #include "lanes.h"
 #include "like.h"
@@ -11,6 +12,12 @@ typedef struct spots {                      /* where the points of half a limb a
     int32_t shown[LIKE_FACING];             /* negative: faces the camera well enough, in the image */
 } spots;
 
+static inline uint32_t u_max(uint32_t a, uint32_t b)
+{
+    return a > b ? a : b;
+}
+
+/* Points of half a limb; what is read again stays in registers. */
 static inline void place(const like_surface *s, const like_pose_limb *pose, int32_t lane, spots *restrict out)
 {
     float const end = (float)((VIEW_SIZE - 1) * LIKE_SUBPIXELS); /* a pixel more has no neighbours */
@@ -23,16 +30,21 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
     float const E0 = E[0], E1 = E[1], E2 = E[2], S0 = w[LIKE_VIEW_SHIFT], S1 = w[LIKE_VIEW_SHIFT + 1],
                 S2 = w[LIKE_VIEW_SHIFT + 2];
     float const graze = w[LIKE_VIEW_GRAZE];
+    float px[LIKE_FACING], py[LIKE_FACING], pz[LIKE_FACING];
+    once(s->point[0] + first, px);
+    once(s->point[1] + first, py);
+    once(s->point[2] + first, pz);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++) {
         int32_t const j = first + i;
-        float const px = s->point[0][j], py = s->point[1][j], pz = s->point[2][j];
+
         float const nx = s->normal[0][j], ny = s->normal[1][j], nz = s->normal[2][j];
-        float const z = f_max(Z0 * px + Z1 * py + Z2 * pz + S2, CAMERA_NEAR), inv = 1.0f / z;
-        float const x = (X0 * px + X1 * py + X2 * pz + S0) * inv;
-        float const y = (Y0 * px + Y1 * py + Y2 * pz + S1) * inv;
+        float const z = f_max(Z0 * px[i] + Z1 * py[i] + Z2 * pz[i] + S2, CAMERA_NEAR), inv = 1.0f / z;
+        float const x = (X0 * px[i] + X1 * py[i] + X2 * pz[i] + S0) * inv;
+        float const y = (Y0 * px[i] + Y1 * py[i] + Y2 * pz[i] + S1) * inv;
         float const away = nx * E0 + ny * E1 + nz * E2 + s->outward[j];
-        int32_t const shown = -((away < graze) & (x >= 0.0f) & (y >= 0.0f) & (x < end) & (y < end));
+        /* Floats that are not negative are in the order of their bits; the others' are greater. */
+        int32_t const shown = -((away < graze) & (u_max(m_bits(x), m_bits(y)) < m_bits(end)));
         out->shown[i] = shown;
         out->u[i] = shown ? (int32_t)x : 0;
         out->v[i] = shown ? (int32_t)y : 0;
@@ -42,6 +54,9 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
 /* Bilinear look-up in the surface map, rounded towards 0. */
 static inline void look_up(const features *f, const spots *p, int8_t *restrict value)
 {
+#ifdef LANES_BETWEEN
+    between(f->pairs, p->u, p->v, p->shown, TEXTURE_HIDDEN, value);
+#else
     int32_t at[LIKE_FACING], quad[LIKE_FACING], all[LIKE_FACING];
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++)
@@ -52,6 +67,7 @@ static inline void look_up(const features *f, const spots *p, int8_t *restrict v
     for (int32_t i = 0; i < LIKE_FACING; i++)
         all[i] = p->shown[i] < 0 ? all[i] : TEXTURE_HIDDEN;
     narrow(all, value);
+#endif
 }
 
 /* One step for all limbs after the other: what a limb waits for is filled with the next one's work. */

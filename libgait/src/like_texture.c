@@ -1,15 +1,18 @@
 /* Brightness constancy along each particle's own history (Ormoneit et al. 2000, eqs. 10-13). */
 #include "like.h"
 
+#include <string.h>
+
 static float log_likelihood(const like_body *b)
 {
-    float log[MODEL_MAX_LIMBS], sum = 0.0f;
+    int32_t (*const cost)[BLOCK] = b->terms->cost;
+    float log[BLOCK];
     if (!b->ancestor)
         return 0.0f;
-    b->setup->run->texture_logs(b, log);
-    for (int32_t l = 0; l < b->setup->limbs; l++)
-        sum += log[l];
-    return sum;
+    memset(cost, 0, sizeof b->terms->cost); /* of the other bodies */
+    b->setup->run->texture_costs(b, cost);
+    b->setup->run->texture_logs(b->setup, b->outline, (const int32_t (*)[BLOCK])cost, log);
+    return log[b->lane];
 }
 
 /* With nobody there every limb is as good as occluded.  Only the paper's mode asks: its other evidence is

@@ -102,21 +102,29 @@ static inline float literal(int32_t both, int32_t squares, float facing)
     return both < LIKE_FEW ? LIKE_PAPER_OCCLUDED : seen;
 }
 
-void KERNEL(texture_logs)(const like_body *b, float *restrict log)
+void KERNEL(texture_costs)(const like_body *b, int32_t (*cost)[BLOCK])
 {
-    int32_t const limbs = b->setup->limbs,
-                  whole = (limbs + 15) & ~15; /* in full vectors; the rest says nothing */
-    int32_t sum[PLACES] = {0};
-    float facing[MODEL_MAX_LIMBS] = {0};
+    int32_t const limbs = b->setup->limbs;
+    int32_t sum[PLACES];
     compare_limbs(b->seen, b->ancestor, limbs, b->setup->paper ? &b->setup->square : &b->setup->robust, sum);
     for (int32_t l = 0; l < limbs; l++)
-        facing[l] = b->outline->limb[l].facing[b->lane];
-    if (b->setup->paper)
-        for (int32_t l = 0; l < whole; l++)
-            log[l] = literal(sum[l] / LIKE_COUNT_ONE, sum[l] % LIKE_COUNT_ONE, facing[l]);
-    else
-        for (int32_t l = 0; l < whole; l++)
-            log[l] = robust(sum[l] / LIKE_COUNT_ONE, sum[l] % LIKE_COUNT_ONE, facing[l]);
+        cost[l][b->lane] = sum[l];
+}
+
+void KERNEL(texture_logs)(const like_setup *s, const outline_block *outline, const int32_t (*cost)[BLOCK],
+                          float *restrict log)
+{
+    for (int32_t i = 0; i < BLOCK; i++)
+        log[i] = 0.0f;
+    for (int32_t l = 0; l < s->limbs; l++) {
+        const float *const facing = outline->limb[l].facing;
+        if (s->paper)
+            for (int32_t i = 0; i < BLOCK; i++)
+                log[i] += literal(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, facing[i]);
+        else
+            for (int32_t i = 0; i < BLOCK; i++)
+                log[i] += robust(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, facing[i]);
+    }
 }
 
 int64_t KERNEL(template_cost)(const like_body *b)

@@ -10,6 +10,7 @@ enum {
     RAST_SIZE = 128, /* the grid is RAST_SIZE x RAST_SIZE cells */
     RAST_WORDS = 2,  /* 64-bit words per row of the grid */
     RAST_SPARE = 16, /* rows of a mask beyond the grid: written in passing, never read */
+    RAST_SMALL = 32, /* rows of 64 columns that are looked up in registers */
     RAST_STEP = 8,   /* a word can begin at any multiple of this many columns */
     RAST_STARTS = 64 / RAST_STEP + 1,
     RAST_MAX_VERTICES = 8,
@@ -26,7 +27,24 @@ typedef struct rast_mask {
     _Alignas(
         GAIT_ALIGN) uint64_t word[RAST_WORDS][RAST_SIZE + RAST_SPARE]; /* from column, and from column + 64 */
     int32_t first, last, column, width; /* width: 64, or 128 from column 0 on */
+    /* For look-ups: the last of 64 columns, twice `first` less one, twice the rows; small: 64 columns and at most
+     * RAST_SMALL rows, of which the first begins a line of the cache. */
+    int32_t edge, half, halves;
+    bool small;
 } rast_mask;
+
+/* What a mask holds, and what follows from it. */
+static inline void rast_frame(rast_mask *m, int32_t first, int32_t last, int32_t column, int32_t width)
+{
+    m->first = first;
+    m->last = last;
+    m->column = column;
+    m->width = width;
+    m->edge = column + 63;
+    m->half = 2 * first - 1;
+    m->halves = 2 * (last - first);
+    m->small = (width == 64) & (last - first <= RAST_SMALL) & (first % 8 == 0);
+}
 
 /* Spans of a convex polygon of n vertices in the window of RAST_SIZE rows from top and width columns from
  * 0. */

@@ -52,6 +52,7 @@ typedef struct weigh_scratch { /* one per task; its arrays hold the model's limb
     like_outline *sides;
     like_pose *pose;
     layers *layers;
+    like_block terms;
     float (*points)[3][BLOCK];
 } weigh_scratch;
 

@@ -46,6 +46,7 @@ static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t
                    .seen = seen,
                    .camera = &t->cfg.camera[c],
                    .points = (const float (*)[3][BLOCK])w->points,
+                   .terms = &w->terms,
                    .known = t->known[side][c]};
     t->like->run->layers_draw(w->lines, lane, w->layers);
     if (seen)
@@ -66,13 +67,26 @@ static void weigh_one(gait_tracker *t, int32_t c, int32_t i, int32_t lane, weigh
     like_patch seen[MODEL_MAX_LIMBS], *const texture = texture_of(t, i, c);
     like_body b = look_at(t, c, modes_side(t, i), lane, w, texture ? seen : NULL);
     b.ancestor = t->core->textured >> c & 1u ? texture : NULL;
-    float const ll = like_evaluate(&b);
-    t->ll[i] += ll;
+    like_evaluate(&b);
     t->used[i] += like_silhouette_parts(&b).explained;
-    if (t->core->modes.stage == MODES_FORKED)
-        t->inner[i] += ll - like_one(&b, &like_silhouette);
     if (texture)
         memcpy(texture, seen, (size_t)t->like->limbs * sizeof *seen);
+}
+
+/* The particles of a block in one camera. */
+static void weigh_view(gait_tracker *t, int32_t c, int32_t begin, int32_t lanes, weigh_scratch *w)
+{
+    float ll[BLOCK];
+    outline_limbs(t, c, w);
+    memset(&w->terms, 0, sizeof w->terms);
+    for (int32_t lane = 0; lane < lanes; lane++)
+        weigh_one(t, c, begin + lane, lane, w);
+    like_sum(t->like, w->outline, t->core->textured >> c & 1u, &w->terms, ll);
+    for (int32_t lane = 0; lane < lanes; lane++) {
+        t->ll[begin + lane] += ll[lane];
+        if (t->core->modes.stage == MODES_FORKED)
+            t->inner[begin + lane] += ll[lane] - w->terms.nats[1][lane];
+    }
 }
 
 static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scratch *w)
@@ -85,13 +99,9 @@ static void weigh_block(gait_tracker *t, int32_t begin, int32_t lanes, weigh_scr
             block_copy(t->joint + (size_t)(3 * p + k) * (size_t)n + (size_t)begin, w->points[p][k], lanes);
     for (int32_t lane = 0; lane < lanes; lane++)
         t->ll[begin + lane] = t->inner[begin + lane] = t->used[begin + lane] = 0.0f;
-    for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        if (!t->camera[c].seen.seen)
-            continue;
-        outline_limbs(t, c, w);
-        for (int32_t lane = 0; lane < lanes; lane++)
-            weigh_one(t, c, begin + lane, lane, w);
-    }
+    for (int32_t c = 0; c < t->cfg.cameras; c++)
+        if (t->camera[c].seen.seen)
+            weigh_view(t, c, begin, lanes, w);
 }
 
 static void weigh_range(void *ctx, int32_t begin, int32_t end, int32_t task)

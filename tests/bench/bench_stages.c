@@ -117,9 +117,15 @@ static void surface_sample(const struct like_setup *s, const struct features *f,
     PART(STAGE_SAMPLES, b.plain->surface_sample(s, f, pose, lane, drawn, seen));
 }
 
-static void texture_logs(const struct like_body *body, float *log)
+static void texture_costs(const struct like_body *body, int32_t (*cost)[BLOCK])
 {
-    PART(STAGE_TEXTURE, b.plain->texture_logs(body, log));
+    PART(STAGE_TEXTURE, b.plain->texture_costs(body, cost));
+}
+
+static void texture_logs(const struct like_setup *s, const struct outline_block *outline,
+                         const int32_t (*cost)[BLOCK], float *log)
+{
+    PART(STAGE_TEXTURE, b.plain->texture_logs(s, outline, cost, log));
 }
 
 static int64_t template_cost(const struct like_body *body)
@@ -146,6 +152,7 @@ void bench_stages_enable(gait_tracker *t, bool on)
         b.timed.edges_prepare = edges_prepare;
         b.timed.surface_pose = surface_pose;
         b.timed.surface_sample = surface_sample;
+        b.timed.texture_costs = texture_costs;
         b.timed.texture_logs = texture_logs;
         b.timed.template_cost = template_cost;
     }
@@ -281,12 +288,10 @@ WRAP(void, kin_points, (const gait_model *m, const kin_body *body, float (*xyz)[
 }
 
 /* The terms: what the kernels of the others do not take is that of the edges. */
-WRAP(float, like_evaluate, (const like_body *body))
+WRAP(void, like_evaluate, (const like_body *body))
 {
     double const others = b.ticks[STAGE_TEXTURE] + b.ticks[STAGE_SILHOUETTE] + b.ticks[STAGE_TEMPLATE];
-    float ll;
-    PART(STAGE_EDGES, ll = __real_like_evaluate(body));
+    PART(STAGE_EDGES, __real_like_evaluate(body));
     b.ticks[STAGE_EDGES] +=
         others - b.ticks[STAGE_TEXTURE] - b.ticks[STAGE_SILHOUETTE] - b.ticks[STAGE_TEMPLATE];
-    return ll;
 }

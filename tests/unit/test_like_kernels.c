@@ -187,7 +187,8 @@ static void test_compare(void)
 {
     static like_patch now[LIMBS], then[LIMBS];
     static int8_t known[LIMBS * LIKE_RING];
-    static unsigned char memory[LIMBS * sizeof(float) + 2 * GUARD];
+    static _Alignas(GAIT_ALIGN) unsigned char memory[sizeof(int32_t[LIMBS][BLOCK]) + 2 * GUARD];
+    static unsigned char sums[sizeof(float[BLOCK]) + 2 * GUARD];
     int32_t differ = 0, broken = 0;
     for (uint32_t round = 0; round < 600; round++) {
         like_body const b = {.setup = &v->setup,
@@ -196,22 +197,37 @@ static void test_compare(void)
                              .seen = now,
                              .ancestor = then,
                              .known = known};
-        float want[LIMBS] = {0};
+        static int32_t want[LIMBS][BLOCK];
+        float log[BLOCK];
         v->setup.limbs = (int32_t)(1 + round % LIMBS);
+        size_t const bytes = (size_t)v->setup.limbs * sizeof *want;
         v->setup.paper = round & 1;
         fill(now, round, 0);
         fill(then, round, 2);
         for (uint32_t i = 0; i < sizeof known; i++)
             known[i] = (int8_t)draw(i, round);
-        for (int32_t l = 0; l < LIMBS; l++)
-            v->outline.limb[l].facing[b.lane] = fabsf(uniform((uint32_t)l, round));
-        isa_scalar()->texture_logs(&b, want);
+        for (uint32_t l = 0; l < LIMBS; l++)
+            for (uint32_t i = 0; i < BLOCK; i++)
+                v->outline.limb[l].facing[i] = fabsf(uniform(l * BLOCK + i, round));
+        memset(want, 0xa5, sizeof want); /* as guard_fill: other bodies' are left alone */
+        isa_scalar()->texture_costs(&b, want);
+        for (uint32_t i = 0; i < LIMBS * BLOCK; i++) /* theirs for the sums */
+            want[i / BLOCK][i % BLOCK] =
+                (int32_t)i % BLOCK == b.lane
+                    ? want[i / BLOCK][i % BLOCK]
+                    : (int32_t)(draw(i, round) % 17 * LIKE_COUNT_ONE + draw(i, round + 1) % 40000);
+        isa_scalar()->texture_logs(&v->setup, &v->outline, (const int32_t (*)[BLOCK])want, log);
         int64_t const cost = isa_scalar()->template_cost(&b);
         for (int k = 0; k < isa_count(); k++) {
-            guarded const g = guard_fill(memory, LIMBS * sizeof(float));
-            isa_at(k)->texture_logs(&b, (float *)(void *)g.begin);
-            differ += memcmp(g.begin, want, sizeof(float[1]) * (size_t)v->setup.limbs) != 0;
-            broken += !guard_whole(&g);
+            guarded const g = guard_fill(memory, bytes), s = guard_fill(sums, sizeof log);
+            int32_t (*const have)[BLOCK] = (int32_t (*)[BLOCK])(void *)g.begin;
+            isa_at(k)->texture_costs(&b, have);
+            for (int32_t l = 0; l < v->setup.limbs; l++)
+                differ += have[l][b.lane] != want[l][b.lane];
+            isa_at(k)->texture_logs(&v->setup, &v->outline, (const int32_t (*)[BLOCK])want,
+                                    (float *)(void *)s.begin);
+            differ += memcmp(s.begin, log, sizeof log) != 0;
+            broken += !guard_whole(&g) || !guard_whole(&s);
             differ += isa_at(k)->template_cost(&b) != cost;
         }
     }
@@ -294,19 +310,19 @@ static void test_edges(void)
         for (uint32_t i = 0; i < VIEW_PIXELS && round % 20 == 0; i++) {
             int32_t const r = (int32_t)draw(i, round);
             v->f.edge[i] =
-                (edge_cell){.trace = (int8_t)r, .xx_yy = (int8_t)(r >> 8), .xy2 = (int8_t)(r >> 16)};
+                (edge_cell){.trace = (int8_t)(r & 127), .xx_yy = (int8_t)(r >> 8), .xy2 = (int8_t)(r >> 16)};
             if (round % 40) /* the extremes */
                 v->f.edge[i] = (edge_cell){
-                    .trace = r & 1 ? 127 : -128, .xx_yy = r & 2 ? 127 : -128, .xy2 = r & 4 ? 127 : -128};
+                    .trace = r & 1 ? 127 : 0, .xx_yy = r & 2 ? 127 : -128, .xy2 = r & 4 ? 127 : -128};
         }
         for (uint32_t l = 0; l < LIMBS; l++) {
             rast_mask *const mask = &v->drawn.visible[l];
             v->setup.geometry[l].shape = draw(l, round + 100) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
             v->outline.limb[l].depth[lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
-            mask->first = (int32_t)(draw(l, round + 300) % 65);
-            mask->last = mask->first + (int32_t)(draw(l, round + 400) % 64);
-            mask->width = round % 4 ? 64 : RAST_SIZE;
-            mask->column = round % 4 ? (int32_t)(draw(l, round + 500) % 8 * RAST_STEP) : 0;
+            int32_t const first = (int32_t)(draw(l, round + 300) % 9 * LAYERS_BAND);
+            rast_frame(mask, first, first + (int32_t)(draw(l, round + 400) % 64),
+                       round % 4 ? (int32_t)(draw(l, round + 500) % 8 * RAST_STEP) : 0,
+                       round % 4 ? 64 : RAST_SIZE);
             for (uint32_t y = 0; y < RAST_SIZE; y++)
                 for (uint32_t w = 0; w < RAST_WORDS; w++)
                     mask->word[w][y] = round % 3

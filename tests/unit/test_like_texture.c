@@ -24,6 +24,7 @@ static float limb(int32_t mode, double facing, int n, int d)
                          .outline = &v->outline,
                          .lane = LANE,
                          .seen = now,
+                         .terms = &v->terms,
                          .ancestor = then};
     return like_texture.log_likelihood(&b);
 }
@@ -99,6 +100,7 @@ static void test_turned(void)
                                  .outline = &v->outline,
                                  .lane = LANE,
                                  .seen = now,
+                                 .terms = &v->terms,
                                  .ancestor = then};
             double const share = fmin(both / 12.8, 1.0);
             CHECK_NEAR(like_texture.log_likelihood(&b), both < 8 ? -1.6 : mixture(share, 0.0, -1.6), 1e-4);
@@ -120,6 +122,7 @@ static void test_limbs(void)
                    .outline = &v->outline,
                    .lane = LANE,
                    .seen = now,
+                   .terms = &v->terms,
                    .ancestor = then};
     CHECK_NEAR(like_texture.log_likelihood(&b), 2.0f * one - 1.6f, 1e-4);
     b.ancestor = NULL;

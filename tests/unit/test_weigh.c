@@ -83,7 +83,7 @@ static void test_particles(void)
         like_body const b = toy_look_body(v, &s[i]);
         gait_pose pose;
         CHECK(gait_model_pose(toy_model(), &s[i], &pose) == GAIT_OK);
-        worst = fmax(worst, fabs((double)(t->ll[i] - like_evaluate(&b))));
+        worst = fmax(worst, fabs((double)(t->ll[i] - toy_likelihood(&b))));
         for (int32_t p = 0; p < 3 * TOY_POINTS; p++)
             place = fmax(place, fabs((double)(t->joint[p * N + i] - pose.joint[p / 3][p % 3])));
     }
@@ -139,8 +139,9 @@ static void test_ancestor(void)
                                  .features = &t->camera[0].seen,
                                  .outline = outline_of(t, i),
                                  .seen = t->texture + i * TOY_LIMBS,
+                                 .terms = &t->work[0].terms,
                                  .ancestor = then + parent * TOY_LIMBS};
-            CHECK_NEAR(t->ll[i], like_evaluate(&b), 1e-5);
+            CHECK_NEAR(t->ll[i], toy_likelihood(&b), 1e-5);
         }
     }
     toy_tracker_free(t);

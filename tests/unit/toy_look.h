@@ -25,6 +25,7 @@ typedef struct toy_look {
     like_pose pose;
     layers drawn;
     like_patch seen[TOY_LIMBS];
+    like_block terms;
 } toy_look;
 
 static inline toy_look *toy_look_new(int camera, int32_t mode)
@@ -85,8 +86,19 @@ static inline like_body toy_look_body(toy_look *v, const gait_state *s)
                    .sides = &v->sides,
                    .lane = LANE,
                    .layers = &v->drawn,
-                   .seen = v->seen};
+                   .seen = v->seen,
+                   .terms = &v->terms};
     like_silhouette_look(&b);
     return b;
+}
+
+/* Sum of the weighted terms of one body. */
+static inline float toy_likelihood(const like_body *b)
+{
+    float sum[BLOCK];
+    memset(b->terms, 0, sizeof *b->terms);
+    like_evaluate(b);
+    like_sum(b->setup, b->outline, b->ancestor, b->terms, sum);
+    return sum[b->lane];
 }
 #endif
