@@ -20,15 +20,25 @@ static inline __m256i lookup8(const void *table, int32_t bytes, __m256i index, _
 }
 #endif
 
+#if defined(__AVX512F__)
+#pragma GCC diagnostic push /* unoptimised, gcc's gather is a macro that changes the sign of a mask */
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+static inline __m512i lookup16(const void *table, int32_t bytes, __m512i index, __mmask16 take)
+{
+    __m512i const none = _mm512_setzero_si512();
+    return bytes == 2 ? _mm512_mask_i32gather_epi32(none, take, index, table, 2)
+                      : _mm512_mask_i32gather_epi32(none, take, index, table, 4);
+}
+#pragma GCC diagnostic pop
+#endif
+
 /* out[i] = the word `bytes` (2 or 4) times index[i] into the table where take[i] is negative, elsewhere 0. */
 static inline void lookup_every(int32_t bytes, const void *table, const int32_t *index, const int32_t *take,
                                 int32_t *out)
 {
 #if defined(__AVX512F__)
-    __m512i const at = _mm512_loadu_si512(index), none = _mm512_setzero_si512();
     __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take));
-    _mm512_storeu_si512(out, bytes == 2 ? _mm512_mask_i32gather_epi32(none, on, at, table, 2)
-                                        : _mm512_mask_i32gather_epi32(none, on, at, table, 4));
+    _mm512_storeu_si512(out, lookup16(table, bytes, _mm512_loadu_si512(index), on));
 #elif defined(__AVX2__)
     for (int32_t i = 0; i < LANES; i += 8)
         _mm256_storeu_si256((__m256i_u *)(out + i),
@@ -129,7 +139,7 @@ static inline void between(const uint16_t *pairs, const int32_t *u, const int32_
     __m512i const x = _mm512_loadu_si512(u), y = _mm512_loadu_si512(v), low = _mm512_set1_epi32(255);
     __m512i const at = _mm512_ternarylogic_epi32(_mm512_srai_epi32(x, 8), y, low, 0xf4);
     __mmask16 const take = _mm512_movepi32_mask(_mm512_loadu_si512(shown));
-    __m512i const four = _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), take, at, pairs, 2);
+    __m512i const four = lookup16(pairs, 2, at, take);
     __m512i const bytes = _mm512_set4_epi32(0x0c0c0c0c, 0x08080808, 0x04040404, 0);
     __m512i const words = _mm512_or_si512(bytes, _mm512_set1_epi16((short)0x8000));
     __m512i const down = _mm512_xor_si512(_mm512_shuffle_epi8(y, bytes), _mm512_set1_epi32(0x00ff00ff));
