@@ -37,7 +37,6 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++) {
         int32_t const j = first + i;
-
         float const nx = s->normal[0][j], ny = s->normal[1][j], nz = s->normal[2][j];
         float const z = f_max(Z0 * px[i] + Z1 * py[i] + Z2 * pz[i] + S2, CAMERA_NEAR), inv = 1.0f / z;
         float const x = (X0 * px[i] + X1 * py[i] + X2 * pz[i] + S0) * inv;
