@@ -69,7 +69,7 @@ def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, N
         If dask is not installed, nothing answers, the workers have other versions or do not see the files.
     """
     with _connected(address) as client:
-        _require_package(client, address)
+        _require_packages(client, address)
         wanted = _surroundings()
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
         waiting, flying = deque(tasks), deque[tuple[Path, "Future"]]()
@@ -149,14 +149,14 @@ def _connected(address: str) -> Iterator[Client]:
         log.setLevel(before)
 
 
-def _require_package(client: Client, address: str) -> None:
-    """Refuse workers on which this package is absent or another: they could not even read a task."""
-    package = SAME[0]
-    for worker, there in client.run(metadata.version, package, on_error="return").items():
-        if isinstance(there, metadata.PackageNotFoundError):
-            raise Unlike(worker, package, "none").refusal(address)
-        if isinstance(there, str) and there != metadata.version(package):
-            raise Unlike(worker, package, there).refusal(address)
+def _require_packages(client: Client, address: str) -> None:
+    """Refuse workers on which a package is absent or another: they might not even read a task."""
+    for package in SAME:
+        for worker, there in client.run(metadata.version, package, on_error="return").items():
+            if isinstance(there, metadata.PackageNotFoundError):
+                raise Unlike(worker, package, "none").refusal(address)
+            if isinstance(there, str) and there != metadata.version(package):
+                raise Unlike(worker, package, there).refusal(address)
 
 
 def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | Unlike | None:
