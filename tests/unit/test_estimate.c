@@ -276,7 +276,7 @@ static void test_fields(void)
                 (k ? mean[F_COEF + k - 1] : 1.0) / TOY_PHASES *
                 (double)toy_model()->curves[(k * TOY_PHASES + j) * TOY_CHANNELS + TOY_ROOT + ROOT_FORWARD];
     CHECK_NEAR(e.speed, mean[F_STATURE] * mean[F_RATE] * forward, 1e-4);
-    walker const place = estimate_place(people, t->filter.weight);
+    walker const place = population_place(people, t->filter.weight);
     CHECK_NEAR(place.f[F_X], mean[F_X], 1e-6);
     CHECK_NEAR(place.f[F_Y], mean[F_Y], 1e-6);
     CHECK_NEAR(place.f[F_Z], mean[F_Z], 1e-6);
