@@ -94,6 +94,12 @@ def find_start(
         start = spotter.start() if spotter.enough() else None
         if start and (spotter.sees_change or start.sd.heading < np.pi):
             return start
+    few = min(video.count, video.count if stop is None else stop) - first
+    if few < ENOUGH:
+        raise UserError(
+            f"{video.path}: only {few} frame{'s'[: few != 1]} to track, --init auto needs {ENOUGH}; "
+            "give --init FILE.json"
+        )
     raise UserError(
         f"{video.path}: --init auto found nobody in full view for {ENOUGH} frames; give --init FILE.json"
     )

@@ -141,12 +141,12 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
         If no foot strikes twice in the track.
     """
     if len(track.frame) < 3:
-        raise UserError("track: fewer than three frames; gait parameters need a whole stride")
+        raise UserError("has fewer than three frames; track at least two strides")
     events = find_events(track)
     stride = stride_time(events)
     if not np.isfinite(stride):
         seconds = track.time[-1] - track.time[0]
-        raise UserError(f"track: no whole stride in {seconds:.2f} s; track at least two strides")
+        raise UserError(f"has no whole stride in {seconds:.2f} s; track at least two strides")
     feet = {side: contacts(track, events, side, stride) for side in SIDES}
     drawn, event_sd, source = draw_contacts(track, events, feet, stride, draws)
     strides = {}

@@ -160,7 +160,7 @@ def read_estimates(path: str | os.PathLike[str]) -> Track:
     Lifted motion has joints alone: every status is then ``tracking`` and the phase NaN.
     """
     table = _Table(path, "track")
-    if not {"status", "phase"} & table.rows.keys():
+    if _has_no_state(table):
         count = len(table.frames())
         return _track(table, ["tracking"] * count, np.full(count, np.nan))
     return read_track(path)
@@ -169,11 +169,18 @@ def read_estimates(path: str | os.PathLike[str]) -> Track:
 def read_track(path: str | os.PathLike[str]) -> Track:
     """Read what ``gait track`` wrote."""
     table = _Table(path, "track")
+    if _has_no_state(table):
+        raise UserError(f"{path}: has joints alone, as gait lift writes; give a track of gait track")
     status = table.column("status")
     for line, word in enumerate(status, 2):
         if word not in STATUSES:
             raise UserError(f"{path}: line {line}: status {word!r} is not one of {' '.join(STATUSES)}")
     return _track(table, status, table.numbers("phase"))
+
+
+def _has_no_state(table: _Table) -> bool:
+    """Whether it is lifted motion, or a truth: joints alone."""
+    return not {"status", "phase"} & table.rows.keys()
 
 
 def _track(table: _Table, status: list[str], phase: Array) -> Track:
@@ -206,12 +213,18 @@ class _Table:
                 lines = list(csv.reader(file))
         except (UnicodeDecodeError, csv.Error) as exc:
             raise UserError(f"{path}: not a CSV file ({exc})") from None
+        form = f"give a {what} CSV with a header and one row per frame"
         if len(lines) < 2:
-            raise UserError(f"{path}: has no rows; give a {what} CSV with a header and one row per frame")
+            raise UserError(f"{path}: has no rows; {form}")
         names, *rows = lines
+        if "frame" not in names:
+            raise UserError(f"{path}: not a {what} file, its header names no frame; {form}")
         for number, row in enumerate(rows, 2):
             if len(row) != len(names):
-                raise UserError(f"{path}: line {number} has {len(row)} cells, the header {len(names)}")
+                raise UserError(
+                    f"{path}: line {number} has {len(row)} cells, the header {len(names)}; "
+                    "cut off? write it anew"
+                )
         self.rows = dict(zip(names, zip(*rows, strict=True), strict=True))
 
     def column(self, name: str) -> list[str]:

@@ -113,6 +113,28 @@ def test_automatic_start_says_what_it_found(scene, capsys):
     assert err.startswith("start found at frame 0: x ") and "20 frames, " in out and "digest " in out
 
 
+def test_a_start_outside_of_the_picture_is_told(scene, capsys):
+    init = json.loads((scene / "init.json").read_text())
+    (scene / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))
+    for name, words in (("far", "far.json: the start is outside of the picture; check pelvis"), ("init", "")):
+        assert track(scene, "--init", scene / f"{name}.json", "--stop", 2) == 0
+        assert words in (said := capsys.readouterr().err) and ("outside" in said) == bool(words)
+
+
+def test_a_track_is_not_its_own_truth(scene, capsys):
+    truth = str(scene / "truth.csv")
+    assert main(["eval", f"{scene}/../{scene.name}/truth.csv", "--truth", truth]) == 1
+    assert re.search(
+        "truth.csv: is given as the track and as its truth; give two files", capsys.readouterr().err
+    )
+
+
+def test_a_camera_is_not_a_track(scene, capsys):
+    assert main(["eval", str(scene / "camera.json"), "--truth", str(scene / "truth.csv")]) == 1
+    said = capsys.readouterr().err
+    assert re.search(r"camera.json: (not a track file|has no rows).*; give a track CSV", said)
+
+
 def test_paper_mode_and_no_background(scene, capsys):
     assert track(scene, "--mode", "paper", "--background", "none", "--json") == 0
     assert json.loads(capsys.readouterr().out)["frames"] == 20

@@ -191,6 +191,15 @@ def test_somebody_standing_has_no_heading(tmp_path):
     assert found.mean.stride_hz == pytest.approx(MODEL.info.stride_hz)
 
 
+@pytest.mark.parametrize("count, words", [(1, "1 frame to"), (5, "5 frames to")])
+def test_too_few_frames_to_find_somebody_in_are_told(tmp_path, count, words):
+    write(tmp_path / "few.mp4", [wall()] * count)
+    with pytest.raises(
+        UserError, match=f"few.mp4: only {words} track, --init auto needs 8; give --init FILE"
+    ):
+        find_start(Video(tmp_path / "few.mp4"), camera(), wall(), MODEL)
+
+
 def test_nobody_in_the_picture_is_told(tmp_path):
     write(tmp_path / "empty.mp4", [wall()] * 12)
     with pytest.raises(UserError, match="empty.mp4: --init auto found nobody .*give --init FILE.json"):

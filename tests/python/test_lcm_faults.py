@@ -56,7 +56,7 @@ def test_a_damaged_model(tmp_path):
 def test_files_that_are_not_there(tmp_path):
     nothing = tmp_path / "nothing"
     fails(["-m", nothing], nothing, "model", "No such file")
-    fails(["-m", tmp_path], tmp_path, "model")
+    fails(["-m", tmp_path], tmp_path, "no model file, as it is no regular file", "; give the name of one")
     for option, what in (("--camera", "camera"), ("--init", "init")):
         fails(options(tmp_path, option, nothing), nothing, what, "No such file")
     fails(rig.command("--config", nothing)[1:], nothing, "configuration", code=2)
@@ -273,6 +273,8 @@ def test_configuration_file_and_command_line(tmp_path):
         ("seed\n", "line 1: 'seed' is not of the form name = value"),
         ("threads = 0\n", "line 1: --threads 0"),
         ("quiet = perhaps\n", "line 1: --quiet perhaps"),
+        ("\x1b[2J\x07 = 1\n", "trackd.conf: is not text; give lines `name = value`"),
+        ("seed = 1\n\0seed = 2\n", "trackd.conf: is not text"),
     ],
 )
 def test_a_wrong_configuration_file(tmp_path, text, words):

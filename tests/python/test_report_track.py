@@ -99,10 +99,30 @@ def test_a_track_that_was_lost_all_along_still_has_a_page(folder):
     assert "null" in (folder / "lost_gait/parameters.json").read_text()
 
 
+def cut(source, target, lines):
+    """Copy the first lines of a file."""
+    target.write_text("".join(source.read_text().splitlines(keepends=True)[:lines]))
+
+
+def lifted(source, target):
+    """Write a track as gait lift does, joints alone."""
+    rows = table(source)
+    names = [name for name in rows[0] if name in ("frame", "time") or re.fullmatch(r"\w+_s?[xyz]", name)]
+    with open(target, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, names, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda here: write_track(here / "x.csv", walking_track(seconds=0.9)), "no whole stride"),
+        (
+            lambda here: write_track(here / "x.csv", walking_track(seconds=0.9)),
+            "x.csv: has no whole stride in",
+        ),
+        (lambda here: cut(here / "walk.csv", here / "x.csv", 3), "x.csv: has fewer than three frames; track"),
+        (lambda here: lifted(here / "walk.csv", here / "x.csv"), "x.csv: has joints alone, as gait lift"),
         (lambda here: (here / "x.csv").write_text("frame\n"), "x.csv: has no rows"),
         (lambda here: (here / "x.csv").unlink(missing_ok=True), "x.csv: no such track file"),
     ],

@@ -114,7 +114,10 @@ def spoil(path, change):
             lambda s: s.__setitem__(2, s[2].replace("tracking", "dancing")),
             "line 3: status 'dancing' is not one of",
         ),
-        (lambda s: s.__setitem__(2, s[2] + ",1"), "line 3 has 163 cells, the header 162"),
+        (
+            lambda s: s.__setitem__(2, s[2] + ",1"),
+            "line 3 has 163 cells, the header 162; cut off. write it anew",
+        ),
         (
             lambda s: s.__setitem__(3, s[3].replace("0.200000", "nan", 1)),
             "line 4: phase is 'nan'; give a finite",
@@ -125,6 +128,10 @@ def spoil(path, change):
             r"line \d+: frame is \d+; it must be whole numbers that increase",
         ),
         (lambda s: s.__delitem__(slice(1, None)), "has no rows"),
+        (
+            lambda s: s.__setitem__(slice(None), ['{"width": 640,', '"R": [1,', "0]}"]),
+            "not a track file, .* give",
+        ),
     ],
 )
 def test_damaged_tracks_are_told(change, words, tmp_path):

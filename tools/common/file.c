@@ -16,7 +16,9 @@ static bool read_stream(FILE *f, const char *path, const char *what, file_bytes 
     if (fseek(f, 0, SEEK_END) == 0)
         size = ftell(f);
     if (size < 0 || size > MAX_FILE || fseek(f, 0, SEEK_SET) != 0)
-        return message_set(why, "%s: no %s file: not a regular file of reasonable size", path, what);
+        return message_set(
+            why, "%s: no %s file, as it is no regular file of reasonable size; give the name of one", path,
+            what);
     size_t const room = ((size_t)size + 1 + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
     out->data = aligned_alloc(GAIT_ALIGN, room);
     if (!out->data)

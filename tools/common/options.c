@@ -136,6 +136,15 @@ static bool apply_line(const option *table, int count, char *line, message *why)
     return o ? set(o, trim(equals + 1), why) : message_set(why, "unknown option %s; --help lists them", name);
 }
 
+/* Whether it is text: bytes that terminals take for commands would get into messages. */
+static bool is_text(const file_bytes *bytes)
+{
+    for (size_t k = 0; k < bytes->size; k++)
+        if ((bytes->data[k] < ' ' && !memchr("\t\r\n", bytes->data[k], 3)) || bytes->data[k] == 127)
+            return false;
+    return true;
+}
+
 bool options_file(const option *table, int count, const char *path, message *why)
 {
     file_bytes bytes;
@@ -143,6 +152,10 @@ bool options_file(const option *table, int count, const char *path, message *why
     bool ok = true;
     if (!file_read(path, "configuration", &bytes, why))
         return false;
+    if (!is_text(&bytes)) {
+        free(bytes.data);
+        return message_set(why, "%.100s: is not text; give lines `name = value`", path);
+    }
     char *line = (char *)bytes.data;
     for (int number = 1; ok && line; number++) {
         char *const end = strchr(line, '\n');
@@ -163,7 +176,7 @@ void options_help(const option *table, int count)
         char letter[8] = "";
         if (o->letter)
             snprintf(letter, sizeof letter, "-%c, ", o->letter);
-        printf("  %s--%s %s\n        %s\n", letter, o->name, o->metavar, o->help);
+        printf("  %s--%s%s%s\n        %s\n", letter, o->name, *o->metavar ? " " : "", o->metavar, o->help);
     }
     printf("  -h, --help\n        show this text\n");
 }

@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 from gait.camera import Camera
+from gait.errors import UserError
 from gait.evaluate import Measures, evaluate
 from gait.events import strikes_of
 from gait.model import read_cyclic
@@ -48,6 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read, compare, print."""
+    if os.path.realpath(args.track) == os.path.realpath(args.truth):
+        raise UserError(f"{args.track}: is given as the track and as its truth; give two files")
     truth = read_truth(args.truth)
     beside = Path(args.truth).parent
     camera = args.camera or (beside / "camera.json" if (beside / "camera.json").is_file() else None)

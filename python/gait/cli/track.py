@@ -33,6 +33,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gait._abi import Mode, Term, TrackStatus
 from gait.autostart import Spotter, find_start
@@ -142,6 +143,8 @@ def run(args: argparse.Namespace) -> int:
     start = _start(args, video, camera, plate, model)
     frames = _frames(args, video, start.frame)
     joints = _joints(args, model, frames)
+    if not args.quiet and not _shows(camera, model.pose(start.mean)[0]):
+        print(f"{args.init}: the start is outside of the picture; check pelvis and camera", file=sys.stderr)
     config = TrackerConfig.default(Mode[args.mode.upper()], **_given(args))
     if args.tracks:
         config = replace(config, terms=config.terms | Term.TRACKS)
@@ -198,6 +201,12 @@ def _start(
             file=sys.stderr,
         )
     return start
+
+
+def _shows(camera: Camera, places: NDArray[np.float64]) -> bool:
+    """Whether any of places (n, 3) is in the picture."""
+    uv = camera.project(places)
+    return bool(((uv >= 0) & (uv < camera.size)).all(axis=1).any())
 
 
 class _Results:
