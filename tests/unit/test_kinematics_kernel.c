@@ -48,8 +48,32 @@ static void test_bits(void)
     }
 }
 
+/* Models of fewer and more channels than are made at once: each as it is made alone. */
+static void test_channels(void)
+{
+    kin_input const in = random_input(0);
+    for (int32_t count = 1; count <= TOY_CHANNELS; count++) {
+        gait_model m = *toy_model();
+        m.channels = count;
+        for (int k = 0; k < isa_count(); k++) {
+            static kin_channels ch;
+            memset(&ch, 0xa5, sizeof ch);
+            isa_at(k)->kin_curves(&m, &in, 2, &ch);
+            int same = 1;
+            for (int lane = 0; lane < BLOCK; lane++)
+                for (int32_t i = 0; i < count; i++) {
+                    float const coef[2] = {in.coef[0][lane], in.coef[1][lane]};
+                    float const one = kin_channel(&m, i, in.phase[lane], in.pace[lane], coef, 2);
+                    same &= memcmp(&one, &ch.v[i][lane], sizeof one) == 0;
+                }
+            CHECK(same);
+        }
+    }
+}
+
 int main(void)
 {
+    test_channels();
     test_bits();
     return CHECK_DONE();
 }
