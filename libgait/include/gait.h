@@ -152,7 +152,7 @@ GAIT_API gait_status gait_render(const gait_model *m, const gait_camera *cam, co
 /* ---- tracker (Ormoneit et al. 2000) ------------------------------------------------------------------- */
 typedef struct gait_tracker gait_tracker;
 enum { GAIT_MODE_DEFAULT = 0, GAIT_MODE_PAPER = 1 };
-#define GAIT_OFFSETS_TRUNK ((1u << 19) | (1u << 20)) /* torso_x, torso_y of the contract's order of angles */
+#define GAIT_OFFSETS_TRUNK ((1u << 19) | (1u << 20)) /* torso_x, torso_y of the shipped model */
 #define GAIT_OFFSETS_ARMS  ((1u << 3) | (1u << 6) | (1u << 9) | (1u << 10)) /* flexion of shoulders and elbows */
 #define GAIT_TERM_TEXTURE    0x1u /* previous frame's texture moved by each particle, eqs. 10-13 */
 #define GAIT_TERM_SILHOUETTE 0x2u /* foreground both ways; needs a background plate */
@@ -170,36 +170,48 @@ typedef struct gait_tracker_config {
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
     int32_t  proportions;      /* [0, the model's]; -1: all; default 0 (doc/design.md says why) */
-    uint32_t terms;            /* GAIT_TERM_* in use */
-    float    term_weight[5];   /* nats per unit cost of texture, silhouette, edges, template, tracks */
-    float    missed_weight;    /* foreground outside the limbs against background inside them [0, 1] */
-    float    girth;            /* limb radii against the model's (clothes) [0.5, 2] */
-    float    resample_ess;     /* resample below this fraction of particles [0, 1] */
+    uint32_t terms;            /* GAIT_TERM_* in use; default all but tracks (paper mode texture alone) */
+    float    term_weight[5];   /* nats per unit cost of texture, silhouette, edges, template, tracks, each [0, 1e6];
+                                * default 0.2 (paper mode 1), 25, 40, 4, 8 */
+    float    missed_weight;    /* cost of foreground that the body leaves out, 1: as much as background inside of it
+                                * [0, 1]; default 0.6 */
+    float    girth;            /* limb radii, as a multiple of the model's, which clothes widen [0.5, 2]; default 1 */
+    float    resample_ess;     /* resample when the effective sample size is below this fraction of the particles
+                                * [0, 1]; default 0.5 (paper mode 1: every frame) */
     float    evidence_time;    /* seconds for which errors of the image terms last; a frame's log-likelihood counts at
-                                * the time since images last supported the walker / this, at most whole; default 0.1;
-                                * 0: frames are independent (paper mode) */
-    float    mingle_time;      /* seconds in which particles forget whom they descend from; default 1.5; 0: never (paper
-                                * mode) */
-    float    max_dt;           /* longest accepted interval, seconds; default 0.5 */
-    /* Dynamics (eqs. 5-9): standard deviations per sqrt(second) unless said otherwise. */
-    float    phase_noise;      /* strides */
-    float    rate_noise;       /* fraction of the model's mean stride_hz */
-    float    rate_noise_start; /* the same while settling */
-    float    settle_time;      /* seconds with rate_noise_start, from when phase, left and right are known */
-    float    rate_time;        /* time constant of the rate's return to the population's, seconds; 0: never */
-    float    forward_noise, lateral_noise, vertical_noise; /* metres */
-    float    heading_noise, tilt_noise;                    /* radians */
-    float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds */
-    float    coef_noise;       /* score standard deviations */
-    float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never */
-    float    stature_noise;    /* deviations of stature at the start */
-    float    stature_noise_start; /* the same while settling */
+                                * the time since images last supported the walker / this, at most whole; 0: frames are
+                                * independent [0, 1e6]; default 0.1 (paper mode 0) */
+    float    mingle_time;      /* seconds in which particles forget whom they descend from; 0: never [0, 1e6]; default
+                                * 1.5 (paper mode 0) */
+    float    max_dt;           /* longest accepted interval, seconds [0.001, 10]; default 0.5 */
+    /* Dynamics (eqs. 5-9): standard deviations of random walks, per sqrt(second). */
+    float    phase_noise;      /* strides [0, 10]; default 0.0164 (paper mode 0.022) */
+    float    rate_noise;       /* fraction of the model's mean stride_hz [0, 10]; default 0.055 */
+    float    rate_noise_start; /* the same while settling [0, 10]; default 0.055 */
+    float    settle_time;      /* seconds of settling, from when phase, left and right are known [0, 1e6]; default 1 */
+    float    rate_time;        /* time constant of the rate's return to the population's, seconds; 0: never [0, 1e6];
+                                * default 3 (paper mode 0) */
+    float    forward_noise;    /* of the pelvis along the heading, metres [0, 100]; default 0.05 (paper mode 0.044) */
+    float    lateral_noise;    /* across it, metres [0, 100]; default 0.05 (paper mode 0.044) */
+    float    vertical_noise;   /* metres [0, 100]; default 0.0096 (paper mode 0.022) */
+    float    heading_noise;    /* radians [0, 100]; default 0.044 (paper mode 0.11) */
+    float    tilt_noise;       /* of pitch and roll, radians [0, 100]; default 0.033 (paper mode 0.055) */
+    float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds; 0: never
+                                * [0, 1e6]; default 1.1 (paper mode 0) */
+    float    coef_noise;       /* standard deviations of a score [0, 100]; default 0.667 (paper mode 0.5) */
+    float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never [0, 1e6]; default
+                                * 4.5 (paper mode 0) */
+    float    stature_noise;    /* deviations of stature at the start [0, 100]; default 0.2 (paper mode 0) */
+    float    stature_noise_start; /* the same while settling [0, 100]; default 2 (paper mode 0) */
     float    offset_noise;     /* posture of the angles in offset_angles, in the deviation among people learnt of each
-                                * angle, which it relaxes to */
-    float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 */
-    uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and arms */
+                                * angle, which it relaxes to [0, 100]; default 0.58 */
+    float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 [0, 100];
+                                * default 0.15 */
+    uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and
+                                * arms (paper mode none) */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
-    float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of stature */
+    float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of
+                                * stature [0, 1]; default 0.015 (paper mode 0) */
     gait_camera camera[GAIT_MAX_CAMERAS];
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;

@@ -6,8 +6,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from drawn_walker import camera
 
-from gait import LibraryError, _abi, _lib
+from gait import GaitError, LibraryError, Model, Tracker, _abi, _lib
+from gait.trackerconfig import TrackerConfig
 
 INCLUDE = Path(__file__).resolve().parents[2] / "libgait/include"
 HEADER = (INCLUDE / "gait.h").read_text()
@@ -127,3 +129,35 @@ def test_statuses_become_exceptions_with_name_and_index():
 def test_memory_is_aligned(size):
     memory = _lib.aligned(size)
     assert memory.ctypes.data % _abi.ALIGN == 0 and memory.nbytes == size
+
+
+def told(text):
+    """A number as the header writes it."""
+    return pytest.approx(float(text), rel=1e-6)
+
+
+CONFIG = HEADER[HEADER.index("typedef struct gait_tracker_config") : HEADER.index("} gait_tracker_config;")]
+TOLD = re.findall(r"float +(\w+)(?:\[5\])?; +/\*(.*?)\*/", CONFIG, re.DOTALL)
+SETTINGS = [(name, " ".join(words.replace("\n", " ").replace(" * ", " ").split())) for name, words in TOLD]
+
+
+@pytest.mark.parametrize(("name", "words"), SETTINGS[1:], ids=[name for name, _ in SETTINGS[1:]])
+def test_the_header_tells_range_and_default_of_every_setting(name, words):
+    low, high, usual, paper = re.search(
+        r"\[([\d.]+), ([\de.]+)\]; default ([\d.]+)(?: \(paper mode ([\d.]+)(?::.*)?\))?$", words
+    ).groups()
+    assert getattr(TrackerConfig.default(), name) == told(usual)
+    assert getattr(TrackerConfig.default(_abi.Mode.PAPER), name) == told(paper or usual)
+    for past in (float(low) - 1, 1.01 * float(high)):
+        with pytest.raises(GaitError, match="is outside") as refused:
+            Tracker(Model(), camera(), TrackerConfig.default(**{name: past}))
+        ends = re.search(r"outside \[(.*), (.*)\]", refused.value.text).groups()
+        assert [told(end) for end in ends] == [float(low), float(high)]
+
+
+def test_the_header_tells_the_weights_of_the_terms():
+    name, words = SETTINGS[0]
+    assert name == "term_weight" and words.endswith("each [0, 1e6]; default 0.2 (paper mode 1), 25, 40, 4, 8")
+    assert list(TrackerConfig.default().term_weight) == [told(w) for w in (0.2, 25, 40, 4, 8)]
+    assert list(TrackerConfig.default(_abi.Mode.PAPER).term_weight) == [told(w) for w in (1, 25, 40, 4, 8)]
+    assert len(SETTINGS) == len([f for f, kind in _abi.TrackerConfigC._fields_ if kind is ctypes.c_float]) + 1
