@@ -2,6 +2,7 @@
 #include "camera.h"
 #include "cpu.h"
 #include "image.h"
+#include "like.h"
 #include "render.h"
 #include "snapshot.h"
 #include <stddef.h>
@@ -24,7 +25,11 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .lag = 5,
         .terms = paper ? GAIT_TERM_TEXTURE
                        : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
-        .term_weight = {0.2f, 25.0f, 40.0f, 4.0f, 8.0f},
+        .term_weight = {[LIKE_TEXTURE] = 0.2f,
+                        [LIKE_SILHOUETTE] = 25.0f,
+                        [LIKE_EDGES] = 40.0f,
+                        [LIKE_TEMPLATE] = 4.0f,
+                        [LIKE_JOINTS] = 8.0f},
         .missed_weight = 0.6f,
         .girth = 1.0f,
         .resample_ess = paper ? 1.0f : 0.5f,
@@ -64,7 +69,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->stature_noise = cfg->stature_noise_start = 0.0f;
         cfg->offset_angles = 0;
         cfg->joint_sd_model = 0.0f;
-        cfg->term_weight[0] = 1.0f;
+        cfg->term_weight[LIKE_TEXTURE] = 1.0f;
     }
 }
 

@@ -1,8 +1,10 @@
 #include "like.h"
 #include "fmath.h"
 
-static const like_term *const TERMS[LIKE_TERMS] = {&like_texture, &like_silhouette, &like_edges,
-                                                   &like_template, &like_joints};
+static const like_term *const TERMS[LIKE_TERMS] = {
+    [LIKE_TEXTURE] = &like_texture,   [LIKE_SILHOUETTE] = &like_silhouette, [LIKE_EDGES] = &like_edges,
+    [LIKE_TEMPLATE] = &like_template, [LIKE_JOINTS] = &like_joints,
+};
 
 /* Point and outward normal on one ring, at this angle from the lateral axis; z from 0 at the start to 1. */
 static void surface_point(const limb_geometry *g, float z, float angle, float point[3], float normal[3])
@@ -83,7 +85,7 @@ void like_evaluate(const like_body *b)
     const like_setup *const s = b->setup;
     if ((s->terms & GAIT_TERM_TEXTURE) && b->ancestor)
         s->run->texture_costs(b, b->terms->cost);
-    for (int32_t k = 1; k < LIKE_TERMS; k++)
+    for (int32_t k = LIKE_TEXTURE + 1; k < LIKE_TERMS; k++) /* like_sum() has the texture's */
         b->terms->nats[k][b->lane] =
             s->terms & TERMS[k]->flag ? s->weight[k] * TERMS[k]->log_likelihood(b) : 0.0f;
 }
@@ -95,7 +97,7 @@ void like_sum(const like_setup *s, const outline_block *outline, bool ancestors,
     if ((s->terms & GAIT_TERM_TEXTURE) && ancestors)
         s->run->texture_logs(s, outline, (const int32_t (*)[BLOCK])terms->cost, log);
     for (int32_t i = 0; i < BLOCK; i++) {
-        terms->nats[0][i] = s->weight[0] * log[i];
+        terms->nats[LIKE_TEXTURE][i] = s->weight[LIKE_TEXTURE] * log[i];
         sum[i] = 0.0f;
         for (int32_t k = 0; k < LIKE_TERMS; k++)
             sum[i] += terms->nats[k][i];

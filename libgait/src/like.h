@@ -9,6 +9,9 @@
 #include "kernels.h"
 #include "layers.h"
 
+/* The terms, in the order of gait_tracker_config.term_weight. */
+enum { LIKE_TEXTURE, LIKE_SILHOUETTE, LIKE_EDGES, LIKE_TEMPLATE, LIKE_JOINTS, LIKE_TERMS };
+
 enum {
     LIKE_ROWS = 4,
     LIKE_AZIMUTHS = 8,
@@ -17,8 +20,7 @@ enum {
         2 * LIKE_AZIMUTHS,          /* rings are staggered by half a step: two points face each of these */
     LIKE_FACING = LIKE_SAMPLES / 2, /* points of the half turned to the camera */
     LIKE_RING = LIKE_SAMPLES + LIKE_FACING, /* once around and on, so that every half is in one piece */
-    LIKE_FEW = 8, /* points seen in both frames below which a limb counts as occluded */
-    LIKE_TERMS = 5,
+    LIKE_FEW = 8,            /* points seen in both frames below which a limb counts as occluded */
     LIKE_COSTS = 256,        /* entries of a cost table */
     LIKE_COST_ONE = 256,     /* 1 nat in the robust one */
     LIKE_COUNT_ONE = 1 << 24 /* in every entry: a sum of costs counts the points as well */

@@ -30,7 +30,7 @@ like_parts like_silhouette_parts(const like_body *b)
 {
     if (!b->features->has_fg || !(b->setup->terms & GAIT_TERM_SILHOUETTE))
         return (like_parts){0};
-    float const nats = b->setup->weight[1] * b->setup->missed_weight / TYPICAL;
+    float const nats = b->setup->weight[LIKE_SILHOUETTE] * b->setup->missed_weight / TYPICAL;
     return (like_parts){nats * (float)b->covered, nats * (float)(b->features->fg_total - b->covered)};
 }
 

@@ -85,7 +85,7 @@ static void weigh_view(gait_tracker *t, int32_t c, int32_t begin, int32_t lanes,
     for (int32_t lane = 0; lane < lanes; lane++) {
         t->ll[begin + lane] += ll[lane];
         if (t->core->modes.stage == MODES_FORKED)
-            t->inner[begin + lane] += ll[lane] - w->terms.nats[1][lane];
+            t->inner[begin + lane] += ll[lane] - w->terms.nats[LIKE_SILHOUETTE][lane];
     }
 }
 
