@@ -32,7 +32,7 @@ _ALIASES = {
 }
 
 
-def read_camera(path: str, size: tuple[int, int] | None = None) -> Camera:
+def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool = True) -> Camera:
     """Read a camera file of any supported kind, chosen by its suffix.
 
     Parameters
@@ -41,6 +41,8 @@ def read_camera(path: str, size: tuple[int, int] | None = None) -> Camera:
         ``.json``, ``.yaml``, ``.yml``, ``.xml``, or ``.toml`` with ``:name`` after it to choose a camera.
     size : (int, int), optional
         Width and height of the video, pixels: checked, and used by OpenCV files, which may lack it.
+    placed : bool
+        Whether rotation and translation must be there; without them the camera is at the origin.
 
     Raises
     ------
@@ -52,9 +54,9 @@ def read_camera(path: str, size: tuple[int, int] | None = None) -> Camera:
         raise UserError(f"{file}: no such camera file")
     suffix = Path(file).suffix.lower()
     if suffix == ".json":
-        camera = _from_json(file)
+        camera = _from_json(file, placed)
     elif suffix in (".yaml", ".yml", ".xml"):
-        camera = _from_opencv(file, size)
+        camera = _from_opencv(file, size, placed)
     elif suffix == ".toml":
         camera = _from_toml(file, name)
     else:
@@ -76,17 +78,17 @@ def _split(path: str) -> tuple[str, str | None]:
     return (file, name) if colon and file.lower().endswith(".toml") else (path, None)
 
 
-def _from_json(path: str) -> Camera:
+def _from_json(path: str, placed: bool) -> Camera:
     fields = read_json(path, "camera")
     remedy = "give the size of the video in pixels"
     width, height = (fields.integer(key, 1, MAX_PIXELS, remedy) for key in ("width", "height"))
     fx, fy = (fields.number(key, 1e-3, 1e9, "give the focal length in pixels") for key in ("fx", "fy"))
     cx, cy = (fields.number(key, -1e6, 1e6, "give the principal point in pixels") for key in ("cx", "cy"))
     lens = _distortion(fields, "distortion")
-    return Camera(width, height, fx, fy, cx, cy, _rotation(fields, "R"), _translation(fields, "t"), lens)
+    return Camera(width, height, fx, fy, cx, cy, *_pose(fields, placed), lens)
 
 
-def _from_opencv(path: str, size: tuple[int, int] | None) -> Camera:
+def _from_opencv(path: str, size: tuple[int, int] | None, placed: bool) -> Camera:
     fields = _file_storage(path)
     if "image_width" in fields or size is None:
         remedy = "add image_width and image_height in pixels"
@@ -94,9 +96,16 @@ def _from_opencv(path: str, size: tuple[int, int] | None) -> Camera:
             fields.integer("image_width", 1, MAX_PIXELS, remedy),
             fields.integer("image_height", 1, MAX_PIXELS, remedy),
         )
-    turn = _rodrigues(fields, "rvec") if "rvec" in fields and "R" not in fields else _rotation(fields, "R")
     lens = _distortion(fields, "distortion_coefficients")
-    return Camera(*size, *_intrinsics(fields, "camera_matrix"), turn, _translation(fields, "t"), lens)
+    return Camera(*size, *_intrinsics(fields, "camera_matrix"), *_pose(fields, placed), lens)
+
+
+def _pose(fields: Fields, placed: bool) -> tuple[Array, Array]:
+    """Return rotation and translation; none, where they need not be there and are not."""
+    if not placed and not any(key in fields for key in ("R", "rvec", "t")):
+        return np.eye(3), np.zeros(3)
+    turn = _rodrigues(fields, "rvec") if "rvec" in fields and "R" not in fields else _rotation(fields, "R")
+    return turn, _translation(fields, "t")
 
 
 def _file_storage(path: str) -> Fields:

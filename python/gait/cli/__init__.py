@@ -30,6 +30,7 @@ COMMANDS = {
     "eval": "evaluate",
     "lift": "lift",
     "render": "render",
+    "camera": "camera",
     "simulate": "simulate",
     "capture": "capture",
     "record": "record",

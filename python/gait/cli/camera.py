@@ -1,0 +1,60 @@
+"""Place a camera from points on the ground, or above it, whose places are measured.
+
+POINTS.csv has the columns u,v (pixels) and x,y[,z] (metres; z up, 0 on the ground, where it may be left out):
+four points or more, not on one line, wide apart.  --lens gives what a calibration says of the lens: the YAML
+or XML of OpenCV's calibration, or a camera file of gait, whose place is not used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+import numpy as np
+
+from gait.camera import Camera
+from gait.camerafile import read_camera
+from gait.files import replacing, require_outputs
+from gait.placing import place, read_points
+
+NAME = "camera"
+HELP = "where a camera stands, from points measured on the ground"
+
+_DOUBTFUL = 3.0  # pixels, rms, from which the points are worth a second look
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("points", metavar="POINTS.csv", help="u,v,x,y[,z] of each point")
+    parser.add_argument(
+        "--lens", required=True, metavar="FILE", help="JSON, OpenCV YAML/XML or FILE.toml:name"
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="CAMERA.json", help="the camera")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read, place, write."""
+    require_outputs((args.output,), (args.points, args.lens))
+    points = read_points(args.points)
+    camera, off = place(read_camera(args.lens, placed=False), points)
+    _write(args.output, camera)
+    worst, rms = int(off.argmax()), float(np.sqrt((off**2).mean()))
+    if rms > _DOUBTFUL and not args.quiet:
+        line = points.line[worst]
+        text = f"{args.points}: missed by {rms:.1f} px rms; look at line {line} and at the lens"
+        print(text, file=sys.stderr)
+    if args.json:
+        place_m = camera.centre.tolist()
+        print(
+            json.dumps({"points": len(off), "rms_px": rms, "worst_px": float(off[worst]), "place": place_m})
+        )
+    else:
+        print(f"{len(off)} points, {rms:.2f} px rms, {off[worst]:.2f} px at worst")
+        print("lens at x {:.2f} y {:.2f} m, {:.2f} m above the ground".format(*camera.centre))
+    return 0
+
+
+def _write(path: str, camera: Camera) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(camera.to_dict(), indent=1) + "\n")
