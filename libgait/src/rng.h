@@ -54,13 +54,4 @@ static inline void rng_normal_pair(uint32_t first, uint32_t second, float *a, fl
     *a = radius * c;
     *b = radius * s;
 }
-
-static inline void rng_normals(uint64_t seed, uint32_t stream, uint32_t frame, uint32_t index, uint32_t draw,
-                               float out[4])
-{
-    uint32_t bits[4];
-    rng_words(seed, stream, frame, index, draw, bits);
-    rng_normal_pair(bits[0], bits[1], out, out + 1);
-    rng_normal_pair(bits[2], bits[3], out + 2, out + 3);
-}
 #endif

@@ -29,7 +29,7 @@ static inline void linear_normals(uint64_t seed, uint32_t stream, uint32_t step,
                                   float out[LINEAR_NORMALS])
 {
     for (uint32_t k = 0; (int)(4 * k) < count; k++)
-        rng_normals(seed, stream, step, index, k, out + 4 * k);
+        rng_normal4(seed, stream, step, index, k, out + 4 * k);
 }
 
 static inline linear linear_new(int d, double R)

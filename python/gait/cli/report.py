@@ -18,11 +18,11 @@ import numpy as np
 
 from gait.camera import Camera
 from gait.cli.evaluate import text as evaluation_text
+from gait.durations import spread
 from gait.evaluate import Measures, evaluate
 from gait.events import Strikes, strikes_of
 from gait.files import replacing, require_outputs
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
-from gait.lcm.record import spread
 from gait.lcm.results import Run, read_run
 from gait.model import Model, read_cyclic
 from gait.overlay import Overlay
@@ -110,8 +110,7 @@ def _figures(results: Run, live: bool) -> dict[str, str]:
 
 
 def _times(values: Any) -> str:
-    s = spread(values.tolist())
-    assert s is not None
+    s = spread(values)
     return f"median {s['median']:.1f} ms, 99th percentile {s['p99']:.1f} ms, longest {s['max']:.1f} ms"
 
 

@@ -39,6 +39,7 @@ from gait._abi import Mode, Term, TrackStatus
 from gait.autostart import Spotter, find_start
 from gait.camera import Camera
 from gait.cli import defaults, values
+from gait.durations import spread
 from gait.errors import UsageError, UserError
 from gait.estimate import Estimate
 from gait.files import require_outputs
@@ -236,11 +237,7 @@ class _Results:
             "frames": len(steps),
             "particles": tracker.config.particles,
             "threads": threads,
-            "step_ms": {
-                "median": float(np.median(steps)),
-                "p99": float(np.percentile(steps, 99)),
-                "max": max(steps),
-            },
+            "step_ms": spread(steps),
             "wall_fps": len(steps) / self._wall,
             "lost": self._statuses.count(TrackStatus.LOST),
             "ambiguous": self._statuses.count(TrackStatus.AMBIGUOUS),

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from gait.errors import UserError
+from gait.lcm.types import generated
 
 try:
     import lcm
@@ -36,8 +37,10 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
     Raises
     ------
     UserError
-        If LCM refuses, with the remedy: a missing multicast route, or a log that cannot be opened.
+        If LCM refuses, with the remedy: a missing multicast route, or a log that cannot be opened; if
+        there are no classes for its messages.
     """
+    generated()
     wanted = lcm_url(url)
     try:
         with muted_stderr():

@@ -107,14 +107,6 @@ def tracks_message(
     return message
 
 
-def frame_number(message: Any) -> int:
-    """Return the running number of an ``image_t`` at its source; -1 if it does not count."""
-    for entry in message.metadata:
-        if entry.key == _FRAME_KEY and entry.n == 8:
-            return int.from_bytes(entry.value, "big", signed=True)
-    return -1
-
-
 def picture(message: Any) -> Image:
     """Pixels of an ``image_t``: (h, w) grey or (h, w, 3) BGR.
 

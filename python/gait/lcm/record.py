@@ -10,6 +10,7 @@ from typing import Any
 import lcm
 import numpy as np
 
+from gait.durations import spread
 from gait.errors import UserError
 from gait.files import replacing
 from gait.lcm.link import handle, is_log, open_lcm
@@ -51,8 +52,8 @@ class Figures:
             "dropped": last.dropped if last else 0,
             "lost": self.lost,
             "fps": (len(self.utime) - 1) / span if span > 0 else None,
-            "step_ms": spread(self.step),
-            "latency_ms": spread(self.latency) if live else None,
+            "step_ms": spread(self.step) if self.step else None,
+            "latency_ms": spread(self.latency) if live and self.latency else None,
             "model_digest": _hex(last.model_digest) if last else None,
             "digest": _hex(last.tracker_digest) if last else None,
         }
@@ -158,14 +159,6 @@ class Recorder:
         joints = tuple(joint.name for joint in first.joints)
         angles = tuple(angle.name for angle in first.angles)
         self._writer = self._stack.enter_context(TrackWriter(self._output, first.mean.ncoef, joints, angles))
-
-
-def spread(values: list[float]) -> dict[str, float] | None:
-    """Median, 99th percentile and maximum."""
-    if not values:
-        return None
-    median, p99 = np.percentile(values, [50, 99])
-    return {"median": float(median), "p99": float(p99), "max": float(max(values))}
 
 
 def _number(message: Any) -> int:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from gait.errors import UserError
 
@@ -14,7 +16,15 @@ _PLACES = (_HERE.parent / "lib", _HERE.parents[2] / "build" / "lcm" / "python")
 """Folders that may hold ``gaitmsg``: of an installed package, of the source tree."""
 
 
-def _load() -> ModuleType:
+@functools.cache
+def generated() -> ModuleType:
+    """Import the package.
+
+    Raises
+    ------
+    UserError
+        If it has not been generated.
+    """
     for place in (None, *_PLACES):
         if place is not None:
             if not (place / "gaitmsg" / "__init__.py").is_file():
@@ -27,4 +37,11 @@ def _load() -> ModuleType:
     raise UserError(f"gaitmsg: no generated LCM types in {_PLACES[-1]}; run make tools")
 
 
-gaitmsg = _load()
+class _OnUse:
+    """The package, imported when a class is asked for: the words of ``--help`` need none."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(generated(), name)
+
+
+gaitmsg = _OnUse()
