@@ -1,0 +1,97 @@
+"""The command line itself: help, versions, options out of their range, exit codes."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import gait
+from gait import _abi
+from gait.cli import COMMANDS, main, values
+from gait.trackerconfig import TrackerConfig
+
+
+@pytest.mark.parametrize(
+    "words",
+    [[], ["dance"], ["track"], ["track", "v.mp4", "--camera", "c.json", "-o", "o.csv", "--threads", "0"]]
+    + [["eval", "o.csv"], ["track", "v", "--camera", "c", "-o", "o", "--start", "-1"], ["render"]],
+)
+def test_usage_errors_exit_2(words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    err = capsys.readouterr().err
+    assert caught.value.code == 2 and err.count("\n") == 1
+    assert re.match(rf"gait{' ' + words[0] if words and words[0] in COMMANDS else ''}: error: ", err)
+
+
+def test_the_version_is_that_of_package_and_library(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"gait {gait.__version__} libgait {gait.__version__} abi {_abi.ABI}\n"
+
+
+def test_threads_end_where_the_pool_does():
+    header = Path(__file__).parents[2] / "libgait/include/gait_pool.h"
+    assert f"#define GAIT_POOL_MAX {values.THREADS[1]} " in header.read_text(encoding="utf-8")
+
+
+RANGES = [
+    *((f"--particles {n}", f"{n}: give a whole number from 16 to 1048576") for n in ("5", "0", "-3", "1e8")),
+    *((f"--threads {n}", f"{n}: give a whole number from 1 to 256") for n in ("0", "9999")),
+    *((f"--seed {n}", f"from 0 to {2**64 - 1}") for n in ("-1", str(2**64))),
+    *((f"--height {m}", f"{m}: is not a stature; give metres from 0.5 to 2.5") for m in ("17", "nan", "x")),
+    ("--start 50 --stop 20", "--stop 20: must be greater than --start 50"),
+    ("--tracks-sd 0", "0: give a number above 0"),
+    ("--tracks-sd 3", "--tracks-sd: needs --tracks"),
+    ("--stop 0", "--stop 0: must be greater than --start 0"),
+]
+
+
+@pytest.mark.parametrize("options, words", RANGES, ids=[r[0] for r in RANGES])
+def test_values_out_of_range_are_usage_errors(options, words, capsys):
+    name, value = options.split(" ", 1)
+    try:
+        code = main(["track", "v.mp4", "--camera", "c.json", "-o", "o.csv", *f"{name}={value}".split(" ")])
+    except SystemExit as exc:
+        code = exc.code
+    assert code == 2 and words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([command, "--help"])
+    text = capsys.readouterr().out
+    assert caught.value.code == 0 and f"usage: gait {command}" in text and "--quiet" in text
+
+
+@pytest.mark.parametrize("command", ["track", "demo"])
+def test_the_help_names_the_defaults_of_the_library(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    assert f"hypotheses ({TrackerConfig.default().particles}" in " ".join(capsys.readouterr().out.split())
+
+
+def test_help_without_a_library(tmp_path):
+    words = [sys.executable, "-m", "gait", "track", "--help"]
+    nowhere = os.environ | {"GAIT_LIBRARY": str(tmp_path / "none.so")}
+    done = subprocess.run(words, env=nowhere, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "hypotheses" in done.stdout, done.stderr
+
+
+def test_the_list_of_commands(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    text = capsys.readouterr().out
+    assert all(re.search(rf"^    {command}\s", text, re.MULTILINE) for command in COMMANDS)
+
+
+def test_the_module_runs_and_passes_the_exit_code(tmp_path):
+    words = [sys.executable, "-m", "gait", "eval", "track.csv", "--truth", "none.csv"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "gait eval: none.csv: no such truth file\n"
