@@ -104,6 +104,11 @@ class Camera:
             uv[front] = cv2.projectPoints(flat[front], rvec, self.t, self.matrix, self.distortion)[0][:, 0]
         return uv.reshape(*world.shape[:-1], 2)
 
+    def shows(self, points: ArrayLike) -> bool:
+        """Whether any of world points (..., 3) is in the picture."""
+        uv = self.project(points)
+        return bool(((uv >= 0) & (uv < self.size)).all(axis=-1).any())
+
     def rays(self, pixels: ArrayLike) -> Array:
         """Look along pixels (..., 2): unit directions (..., 3) in the world from `centre`."""
         uv = np.asarray(pixels, np.float64)

@@ -16,6 +16,7 @@ from gait.state import State
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
 FAR = 1e4  # metres from the origin; single precision places nothing to the millimetre further out
+OUTSIDE = "the start is outside of the picture; check pelvis and camera"
 STATURE = (0.5, 2.5)  # metres, accepted range
 
 SCALARS = {  # key in the file: attribute of State, accepted range, remedy

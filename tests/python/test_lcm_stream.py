@@ -204,6 +204,14 @@ def test_faults_of_capture_are_one_line(folder, options, words):
     assert done.returncode == 1 and words in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
+def test_a_start_outside_of_the_picture_is_told(folder, tmp_path):
+    init = json.loads((folder / "init.json").read_text())
+    (tmp_path / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))
+    words = [*capture_options(folder)[:-1], tmp_path / "far.json", "--rate", "max"]
+    done = rig.gait("capture", *words, "--url", f"file://{tmp_path / 'far.log'}?mode=w")
+    assert done.returncode == 0 and "far.json: the start is outside of the picture; check" in done.stderr
+
+
 # ---- record and report ----
 
 

@@ -204,6 +204,8 @@ def test_corrections_survive_writing(tmp_path):
         ({"phase": "left"}, "phase is not a number"),
         ({"phase": 1.5}, "phase is 1.5"),
         ({"stride_hz": 0}, "stride_hz is 0"),
+        ({"pelvis": [1, [2, 3]]}, "pelvis is not an array of numbers"),
+        ({"sd": {"pelvis": [0.1, [0.1]]}}, "pelvis is not an array of numbers"),
     ],
 )
 def test_a_wrong_placement_is_named(tmp_path, change, words):

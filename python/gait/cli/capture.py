@@ -25,7 +25,7 @@ import numpy as np
 from gait.camera import Camera
 from gait.cli import values
 from gait.errors import UserError
-from gait.initial import Start
+from gait.initial import OUTSIDE, Start
 from gait.lcm.capture import Publisher, Setup
 from gait.lcm.link import buffer_warning, lcm_url
 from gait.lcm.pacing import Pacer, parse_rate
@@ -136,7 +136,10 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
 def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: Setup) -> Start:
     model = Model(args.model)
     if args.init != "auto":
-        return Start.read(args.init, model, height=args.height)
+        start = Start.read(args.init, model, height=args.height)
+        if setup.camera and not args.quiet and not setup.camera.shows(model.pose(start.mean)[0]):
+            print(f"{args.init}: {OUTSIDE}", file=sys.stderr)
+        return start
     if isinstance(source, DeviceSource) or setup.camera is None:
         raise UserError("--init auto: needs a video file and --camera; give an init file")
     from gait.autostart import find_start  # slow to load, and only needed here

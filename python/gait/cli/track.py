@@ -33,7 +33,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait._abi import Mode, Term, TrackStatus
 from gait.autostart import Spotter, find_start
@@ -44,7 +43,7 @@ from gait.errors import UsageError, UserError
 from gait.estimate import Estimate
 from gait.files import require_outputs
 from gait.frame import Joints
-from gait.initial import Start
+from gait.initial import OUTSIDE, Start
 from gait.lift import tracks_file
 from gait.model import Model, read_cyclic
 from gait.modelcurves import ModelCurves
@@ -144,8 +143,8 @@ def run(args: argparse.Namespace) -> int:
     start = _start(args, video, camera, plate, model)
     frames = _frames(args, video, start.frame)
     joints = _joints(args, model, frames)
-    if not args.quiet and not _shows(camera, model.pose(start.mean)[0]):
-        print(f"{args.init}: the start is outside of the picture; check pelvis and camera", file=sys.stderr)
+    if not args.quiet and not camera.shows(model.pose(start.mean)[0]):
+        print(f"{args.init}: {OUTSIDE}", file=sys.stderr)
     config = TrackerConfig.default(Mode[args.mode.upper()], **_given(args))
     if args.tracks:
         config = replace(config, terms=config.terms | Term.TRACKS)
@@ -202,12 +201,6 @@ def _start(
             file=sys.stderr,
         )
     return start
-
-
-def _shows(camera: Camera, places: NDArray[np.float64]) -> bool:
-    """Whether any of places (n, 3) is in the picture."""
-    uv = camera.project(places)
-    return bool(((uv >= 0) & (uv < camera.size)).all(axis=1).any())
 
 
 class _Results:

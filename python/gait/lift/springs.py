@@ -160,8 +160,8 @@ def _optional(fields: Fields, key: str) -> float | None:
 
 def _ground(fields: Fields) -> Floats:
     remedy = "give x and y of the pelvis on the ground, metres"
-    size = np.size(fields.get("pelvis", remedy))
-    return fields.array("pelvis", (3,) if size == 3 else (2,), remedy)[:2]
+    three = fields.count("pelvis", remedy) == 3
+    return fields.array("pelvis", (3,) if three else (2,), remedy)[:2]
 
 
 def _deviation(spread: Fields, key: str, usual: float) -> float:
@@ -169,7 +169,7 @@ def _deviation(spread: Fields, key: str, usual: float) -> float:
     if key not in spread:
         return usual
     remedy = "give a positive standard deviation"
-    three = np.size(spread.get(key, remedy)) == 3
+    three = spread.count(key, remedy) == 3
     values = np.atleast_1d(spread.array(key, (3,) if three else (), remedy))
     wrong = values[(values <= 0) | (values >= FURTHEST)]
     if len(wrong):
