@@ -260,14 +260,15 @@ $(B)/bench/step: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
 $(B)/bench/lift: $(B)/bench/lift.o $(BENCH_PARTS) $(OBJ)
 	$(call say,LD   $@)$(CC) $(OPT) $(LDFLAGS) -o $@ $^ -lm -pthread
 
-bench-lift: $(B)/bench/lift ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait')
-	@$< $(ARGS)
-
 CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null | head -n 1 | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9-')
 BENCH_CSV = $(if $(filter --record,$(ARGS)),tests/bench/results,build/bench)/$(or $(CPU_NAME),$(MACHINE)).csv
+BENCH_PAGE = $(if $(filter --record,$(ARGS)),--page tests/bench/results/$(1).md)
+BENCH_RUN = $(PY) tests/bench/bench.py --cc '$(CC)'
 bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction set and stage (ARGS='-s 40'; --record keeps it)
-	@$(PY) tests/bench/bench.py --cc '$(CC)' $(if $(filter --record,$(ARGS)),--page tests/bench/results/bench.md) \
-	    $< $(BENCH_CSV) $(filter-out --record,$(ARGS))
+	@$(BENCH_RUN) $(call BENCH_PAGE,bench) --csv $(BENCH_CSV) $< $(filter-out --record,$(ARGS))
+
+bench-lift: $(B)/bench/lift | $(READY) ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait'; --record)
+	@$(BENCH_RUN) --target bench-lift --title 'Speed of lifting' $(call BENCH_PAGE,bench_lift) $< $(filter-out --record,$(ARGS))
 
 eval: setup lib ## errors on the clips of ../shared/data
 	@$(PY) tests/bench/eval.py $(ARGS)

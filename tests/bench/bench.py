@@ -1,4 +1,4 @@
-"""Run the bench of a step, show and keep its figures, draw them; a record also says what made them."""
+"""Run a bench, show what it prints, draw its figures; a record keeps all that with what made it."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ def compiler(command: str) -> str:
     return (done.stdout.splitlines() or [f"{command}, version unknown"])[0]
 
 
-def page(said: str, table: Path, cc: str) -> str:
+def page(said: str, args: argparse.Namespace) -> str:
     """The record as Markdown: on what, by what and when it was made, and all that was printed."""
     date = datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
-    made = f"{facts('make bench ARGS=--record')} {compiler(cc)}; {date}. All figures: {table.name}."
+    made = f"{facts(f'make {args.target} ARGS=--record')} {compiler(args.cc)}; {date}."
+    figures = f" All figures: {args.csv.name}." if args.csv else ""
     note = "MISSED: wanted, and not reached in this run."
-    return f"# Speed of a step\n\n{made} {note}\n\n```\n{said.strip()}\n```\n"
+    return f"# {args.title}\n\n{made}{figures} {note}\n\n```\n{said.strip()}\n```\n"
 
 
 def main() -> None:
@@ -47,15 +48,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--cc", default="cc", help="compiler that built the program")
     parser.add_argument("--page", type=Path, help="keep all that is printed there, as Markdown")
+    parser.add_argument("--target", default="bench", help="of make, that the page names")
+    parser.add_argument("--title", default="Speed of a step", help="of the page")
+    parser.add_argument("--csv", type=Path, help="keep the program's figures there, and draw them")
     parser.add_argument("program")
-    parser.add_argument("csv", type=Path)
     args, others = parser.parse_known_args()
-    args.csv.parent.mkdir(parents=True, exist_ok=True)
-    said = run([args.program, "--csv", str(args.csv), *others])
-    bench_plot.draw(args.csv, PLOT)
+    if args.csv:
+        args.csv.parent.mkdir(parents=True, exist_ok=True)
+        others += ["--csv", str(args.csv)]
+    said = run([args.program, *others])
+    if args.csv:
+        bench_plot.draw(args.csv, PLOT)
     if args.page:
         with replacing(args.page) as temporary:
-            temporary.write_text(page(said, args.csv, args.cc), encoding="utf-8")
+            temporary.write_text(page(said, args), encoding="utf-8")
 
 
 if __name__ == "__main__":

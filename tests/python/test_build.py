@@ -96,5 +96,5 @@ def test_figures_of_a_machine_are_kept_only_if_asked(words, folder):
         ["make", "-n", "bench", *words], cwd=ROOT, capture_output=True, text=True, timeout=120, check=True
     )
     command = next(line for line in done.stdout.replace("\\\n", "").splitlines() if "bench/bench.py" in line)
-    assert re.search(rf"bench/step {folder}\S+\.csv", command) and "--record" not in command
+    assert re.search(rf"--csv {folder}\S+\.csv \S+bench/step", command) and "--record" not in command
     assert ("--page tests/bench/results/bench.md" in command) == (folder == "tests/bench/results/")
