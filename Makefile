@@ -57,15 +57,17 @@ ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug or sanitize)
 endif
 # At -O3 only what a step or a live lift spends its time in, at -O2 what else runs for every particle or row of
-# numbers (a third smaller, 2 % of a step), at -Os the rest (a fifth smaller again, no slower).
+# numbers (a third smaller, 2 % of a step), with vector code where that has loops over lanes, at -Os the rest (a fifth
+# smaller again, no slower).
 GCC   := $(if $(findstring clang,$(shell $(CC) --version)),,gcc)
 TIGHT := $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
-FAST  := fmath.c lift_read.c $(patsubst %,%_kernel.c,outline like_edges like_pose like_silhouette like_surface)
+FAST  := lift_read.c $(patsubst %,%_kernel.c,outline like_edges like_pose like_silhouette like_surface)
 MANY  := $(patsubst %,%.c,dense eye kinematics like_edges like_joints like_silhouette like_template like_texture lift \
          lift_batch loss mingle pf population weigh)
-C_FLAGS = $(if $(filter $(FAST),$(1)),,$(if $(filter $(MANY),$(1)),$(SMALL),$(LEAST)))
+LANED := fmath.c
+C_FLAGS = $(if $(filter $(FAST),$(1)),,$(if $(filter $(LANED),$(1)),$(SMALL_FLAGS),$(if $(filter $(MANY),$(1)),$(SMALL),$(LEAST))))
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 COMMON := $(OPT) -g -MMD -MP -ffp-contract=off

@@ -229,7 +229,8 @@ typedef struct gait_estimate {
     gait_state sd;          /* over all particles, field by field; circular for phase and heading */
     gait_state best;        /* heaviest particle */
     gait_pose  pose;        /* joints: posterior mean (paper mode: no root motion); angles: of the mode */
-    float      joint_sd[GAIT_MAX_JOINTS][3]; /* standard deviation, metres: config joint_sd_model */
+    float      joint_sd[GAIT_MAX_JOINTS][3]; /* standard deviation, metres: with what the model cannot
+                                                express (joint_sd_model) and, of one camera, the size in doubt */
     float      ess;         /* effective sample size after weighting */
     float      phase_r;     /* resultant length of the phase, [0, 1]: 1 = certain */
     float      mode_mass;   /* weight of the dominant mode, [0, 1] */

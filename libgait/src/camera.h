@@ -28,6 +28,13 @@ static inline void camera_distort(const gait_camera *c, float u, float v, float 
  * picture. */
 void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2]);
 
+/* From the lens to a point, both in the world, metres. */
+static inline void camera_to(const gait_camera *c, const float p[3], float ray[3])
+{
+    for (int32_t k = 0; k < 3; k++)
+        ray[k] = p[k] + c->R[k] * c->t[0] + c->R[3 + k] * c->t[1] + c->R[6 + k] * c->t[2];
+}
+
 /* World point to ideal pixel; returns its depth Z.  uv is left alone when Z <= CAMERA_NEAR. */
 static inline float camera_project(const gait_camera *c, const float p[3], float uv[2])
 {

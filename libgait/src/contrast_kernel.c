@@ -9,7 +9,7 @@ typedef struct columns { /* sums over 2 RADIUS + 1 rows, with replicated ends */
     int32_t grey[WINDOW_WIDTH(RADIUS)], square[WINDOW_WIDTH(RADIUS)];
 } columns;
 
-static void columns_add(columns *c, const uint8_t *row, int32_t times)
+KERNEL_ROW void columns_add(columns *restrict c, const uint8_t *restrict row, int32_t times)
 {
     for (int32_t x = 0; x < VIEW_SIZE; x++) {
         c->grey[RADIUS + x] += times * row[x];
@@ -17,7 +17,7 @@ static void columns_add(columns *c, const uint8_t *row, int32_t times)
     }
 }
 
-static void sum_row(const int32_t *wide, int32_t *restrict sum)
+KERNEL_ROW void sum_row(const int32_t *restrict wide, int32_t *restrict sum)
 {
     int32_t eight[WINDOW_WIDTH(RADIUS)];
     window_eight(wide, RADIUS, eight);

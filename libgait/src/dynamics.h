@@ -1,6 +1,7 @@
 /* dynamics.h - temporal prior of Ormoneit et al. (2000), eqs. 5-9, as resolved in the design document. */
 #ifndef GAIT_DYNAMICS_H
 #define GAIT_DYNAMICS_H
+#include "fmath.h"
 #include "population.h"
 
 /* Streams of random numbers: one per purpose, so that none depends on how many another took. */
@@ -39,7 +40,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
 static inline float dynamics_reflect_rate(float x)
 {
     float const lo = 1.0f / 2.1f, hi = 1.0f / 0.4f; /* strides of 0.4 to 2.1 s */
-    float const y = x < lo ? 2.0f * lo - x : x > hi ? 2.0f * hi - x : x;
+    float const y = m_select(m_less(x, lo), 2.0f * lo - x, m_select(m_less(hi, x), 2.0f * hi - x, x));
     return f_clamp(y, lo, hi);
 }
 

@@ -59,7 +59,7 @@ KERNEL_ROW void speeds(const dynamics_step *s, const walker_block *restrict from
     const gait_model *const m = s->model;
     int32_t const T = m->phases, M = m->channels;
     int32_t here[BLOCK], next[BLOCK];
-    float w[BLOCK], pace[BLOCK];
+    float w[BLOCK], one[BLOCK], pace[BLOCK];
     for (int32_t lane = 0; lane < BLOCK; lane++) {
         float const at = m_wrap1(from->f[F_PHASE][lane] + 0.5f * turn[lane]) * (float)T;
         int32_t const j = i_min((int32_t)at, T - 1);
@@ -67,34 +67,38 @@ KERNEL_ROW void speeds(const dynamics_step *s, const walker_block *restrict from
         next[lane] = (j + 1 < T ? j + 1 : 0) * M;
         w[lane] = at - (float)j;
         out[lane] = 0.0f;
+        one[lane] = 1.0f;
     }
     for (int32_t lane = 0; lane < BLOCK; lane++)
         pace[lane] = kin_pace(m, from->f[F_RATE][lane]);
     for (int32_t k = m->pace_curve ? -1 : 0; k <= s->components; k++) {
         const float *const curve = (k < 0 ? m->pace_curve : m->curves + (size_t)k * (size_t)T * (size_t)M) +
                                    m->root_channel + ROOT_FORWARD;
-        for (int32_t lane = 0; lane < BLOCK; lane++) {
-            float const c = k < 0 ? pace[lane] : k ? from->f[F_COEF + k - 1][lane] : 1.0f;
-            out[lane] += c * (1.0f - w[lane]) * curve[here[lane]] + c * w[lane] * curve[next[lane]];
-        }
+        const float *const c = k < 0 ? pace : k ? from->f[F_COEF + k - 1] : one;
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            out[lane] +=
+                c[lane] * (1.0f - w[lane]) * curve[here[lane]] + c[lane] * w[lane] * curve[next[lane]];
     }
 }
 
-/* Eq. 8: forward along the previous heading by the stride's own speed; paper mode: by the rate. */
+/* Eq. 8: forward along the previous heading, so far in a stride, by so many. */
 KERNEL_ROW void walk(const dynamics_step *s, const walker_block *restrict from,
                      const float (*restrict n)[BLOCK], const float *restrict turn,
                      const float *restrict speed, walker_block *restrict to)
 {
+    float heading[BLOCK];
     for (int32_t lane = 0; lane < BLOCK; lane++) {
-        float const strides = s->plain_root ? from->f[F_RATE][lane] * s->dt : turn[lane];
-        float const ahead = from->f[F_STATURE][lane] * speed[lane] * strides + s->forward_noise * n[2][lane];
+        float const ahead =
+            from->f[F_STATURE][lane] * speed[lane] * turn[lane] + s->forward_noise * n[2][lane];
         float const aside = s->lateral_noise * n[3][lane];
         float sn, cs;
         m_sincos(from->f[F_HEADING][lane], &sn, &cs);
         to->f[F_X][lane] = from->f[F_X][lane] + (ahead * cs - aside * sn);
         to->f[F_Y][lane] = from->f[F_Y][lane] + (ahead * sn + aside * cs);
-        to->f[F_HEADING][lane] = m_wrap_pi(from->f[F_HEADING][lane] + s->heading_noise * n[5][lane]);
+        heading[lane] = from->f[F_HEADING][lane] + s->heading_noise * n[5][lane];
     }
+    for (int32_t lane = 0; lane < BLOCK; lane++)
+        to->f[F_HEADING][lane] = m_wrap_pi(heading[lane]);
 }
 
 KERNEL_ROW void grow(const dynamics_step *s, const float *restrict x, const float *restrict n,
@@ -111,8 +115,10 @@ void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const walker_b
         normals(s->seed, s->frame, (uint32_t)first, (uint32_t)(k / 4), n + k);
     advance(s, from, (const float (*)[BLOCK])n, turn, to);
     if (s->plain_root)
-        for (int32_t lane = 0; lane < BLOCK; lane++)
+        for (int32_t lane = 0; lane < BLOCK; lane++) {
             speed[lane] = s->model->stride_length;
+            turn[lane] = from->f[F_RATE][lane] * s->dt;
+        }
     else
         speeds(s, from, turn, speed);
     walk(s, from, (const float (*)[BLOCK])n, turn, speed, to);

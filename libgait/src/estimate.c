@@ -1,27 +1,9 @@
 #include "estimate.h"
+#include "camera.h"
 #include "fmath.h"
 #include "kernels.h"
 #include "linalg.h"
 #include <string.h>
-
-walker estimate_place(const population *p, const double *weight)
-{
-    const float *const x = field(p, F_X), *const y = field(p, F_Y), *const z = field(p, F_Z),
-                       *const stature = field(p, F_STATURE);
-    double sum_x = 0.0, sum_y = 0.0, sum_z = 0.0, sum_stature = 0.0; /* none waits for another */
-    for (int32_t i = 0; i < p->n; i++) {
-        sum_x += weight[i] * (double)x[i];
-        sum_y += weight[i] * (double)y[i];
-        sum_z += weight[i] * (double)z[i];
-        sum_stature += weight[i] * (double)stature[i];
-    }
-    walker w = {{0}};
-    w.f[F_X] = (float)sum_x;
-    w.f[F_Y] = (float)sum_y;
-    w.f[F_Z] = (float)sum_z;
-    w.f[F_STATURE] = (float)sum_stature;
-    return w;
-}
 
 /* Resultant of unit vectors. */
 static float resultant_length(double c, double s)
@@ -117,14 +99,32 @@ static void mean_rotation(const sums *s, walker *w)
     w->f[F_ROLL] = m_atan2(2.0f * (q[0] * q[1] + q[2] * q[3]), 1.0f - 2.0f * (q[1] * q[1] + q[2] * q[2]));
 }
 
+/* Deviation of the person's size and, with it, of the distance, as a share of them.  Soles, hair and clothes are the
+ * same in all frames of one camera: whatever the particles agree on, these tell a size that was in doubt to 1 %. */
+static float size_doubt(const gait_tracker *t)
+{
+    float const told = 0.01f, doubt = t->core->stature_doubt;
+    bool const one_view = t->cfg.cameras == 1 && t->cfg.joint_sd_model > 0.0f;
+    return one_view ? told * doubt / __builtin_sqrtf(told * told + doubt * doubt) : 0.0f;
+}
+
+static float with_doubt(double var, float a, float b)
+{
+    return (float)__builtin_sqrt(var + (double)a * (double)a + (double)b * (double)b);
+}
+
 /* Posterior mean of every joint over all particles, and its deviation as it is reported. */
 static void joints(const sums *s, float stature, gait_estimate *out)
 {
     const gait_tracker *const t = s->t;
-    double const model = (double)(t->cfg.joint_sd_model * stature);
-    for (int32_t p = 0; p < 3 * t->model->points; p++) {
-        out->pose.joint[p / 3][p % 3] = (float)s->joint[p].mean;
-        out->joint_sd[p / 3][p % 3] = (float)__builtin_sqrt(s->joint[p].var + model * model);
+    float const model = t->cfg.joint_sd_model * stature, size = size_doubt(t);
+    for (int32_t p = 0; p < t->model->points; p++) {
+        float *const at = out->pose.joint[p], ray[3];
+        for (int32_t k = 0; k < 3; k++)
+            at[k] = (float)s->joint[3 * p + k].mean;
+        camera_to(&t->cfg.camera[0], at, ray);
+        for (int32_t k = 0; k < 3; k++)
+            out->joint_sd[p][k] = with_doubt(s->joint[3 * p + k].var, model, size * ray[k]);
     }
 }
 
@@ -161,13 +161,15 @@ static void spread(const gait_tracker *t, const walker *sd, float phase_sd, floa
         out->sd.offset[t->rule.angle[k]] = sd->f[body_rule_offset(&t->rule) + k];
 }
 
-/* Means of the mode and deviations of all, field by field; phase and directions: along the line. */
+/* Means of the mode and deviations of all, field by field; phase and directions: along the line.  Stature: as it is
+ * reported. */
 static void fields(const sums *s, walker *mean, walker *sd)
 {
     for (int32_t f = 0; f < s->of->people.fields; f++) {
         mean->f[f] = (float)s->field[f].mode;
         sd->f[f] = (float)__builtin_sqrt(s->field[f].var);
     }
+    sd->f[F_STATURE] = with_doubt(s->field[F_STATURE].var, size_doubt(s->t) * mean->f[F_STATURE], 0.0f);
 }
 
 walker estimate_crowd(const gait_tracker *t, const crowd *c, int32_t best, gait_estimate *out)

@@ -3,9 +3,6 @@
 #define GAIT_ESTIMATE_H
 #include "tracker.h"
 
-/* Weighted mean of the fields that place the region of interest: track, level and stature. */
-walker estimate_place(const population *p, const double *weight);
-
 /* Metres per second along the ground: stride length times stride rate. */
 float estimate_speed(const gait_tracker *t, const walker *w);
 

@@ -13,7 +13,7 @@ typedef struct ends { /* the particles after the last whole LANES, and none that
     uint8_t use[LANES];
 } ends;
 
-static double total(const double *lane)
+KERNEL_ROW double total(const double *lane)
 {
     double sum = 0.0;
     for (int32_t i = 0; i < LANES; i++)
@@ -22,8 +22,8 @@ static double total(const double *lane)
 }
 
 /* Particles first .. n - 1; use may be NULL. */
-static ends ends_of(int32_t n, int32_t count, const float *const v[], const double *weight,
-                    const uint8_t *use)
+KERNEL_ROW ends ends_of(int32_t n, int32_t count, const float *const v[], const double *weight,
+                        const uint8_t *use)
 {
     int32_t const first = n - n % LANES;
     ends e;
@@ -107,33 +107,42 @@ void KERNEL(estimate_resultant)(const float *angle, float turn, const double *we
         out[k] = total(sum[k]);
 }
 
-KERNEL_ROW void near_to(const float *restrict phase, const float *restrict heading, int32_t n, float phase0,
+/* All angles in one array before they are wrapped: of m_wrap_pi of a difference gcc makes branches. */
+KERNEL_ROW void near_to(const float *restrict phase, const float *restrict heading, float phase0,
                         float heading0, uint8_t *restrict use)
 {
     float const near_phase = 0.15f * TWO_PI_F, near_heading = 0.5f;
-    for (int32_t i = 0; i < n; i++) {
-        float const dp = fabsf(m_wrap_pi(TWO_PI_F * (phase[i] - phase0)));
-        float const dh = fabsf(m_wrap_pi(heading[i] - heading0));
-        use[i] = (uint8_t)((dp < near_phase) & (dh < near_heading));
+    float off[2 * LANES];
+    for (int32_t i = 0; i < LANES; i++) {
+        off[i] = TWO_PI_F * (phase[i] - phase0);
+        off[LANES + i] = heading[i] - heading0;
     }
+    for (int32_t i = 0; i < 2 * LANES; i++)
+        off[i] = fabsf(m_wrap_pi(off[i]));
+    for (int32_t i = 0; i < LANES; i++)
+        use[i] = (uint8_t)(m_less(off[i], near_phase) & m_less(off[LANES + i], near_heading) & 1u);
 }
 
-KERNEL_ROW void mass_add(const double *restrict weight, const uint8_t *restrict use, int32_t n,
-                         double *restrict sum)
+KERNEL_ROW void mass_add(const double *restrict weight, const uint8_t *restrict use, double *restrict sum)
 {
-    for (int32_t i = 0; i < n; i += LANES)
-        for (int32_t lane = 0; lane < LANES; lane++)
-            sum[lane] += (double)use[i + lane] * weight[i + lane];
+    for (int32_t lane = 0; lane < LANES; lane++)
+        sum[lane] += (double)use[lane] * weight[lane];
 }
 
 double KERNEL(estimate_mode)(const float *phase, const float *heading, const double *weight, int32_t n,
                              int32_t best, uint8_t *use)
 {
+    const float *const angles[] = {phase, heading};
     double sum[LANES] = {0.0};
-    near_to(phase, heading, n, phase[best], heading[best], use);
-    ends const e = ends_of(n, 0, NULL, weight, use);
-    mass_add(weight, use, n - n % LANES, sum);
-    mass_add(e.weight, e.use, LANES, sum);
+    int32_t const whole = n - n % LANES;
+    ends e = ends_of(n, 2, angles, weight, NULL);
+    for (int32_t i = 0; i < whole; i += LANES) {
+        near_to(phase + i, heading + i, phase[best], heading[best], use + i);
+        mass_add(weight + i, use + i, sum);
+    }
+    near_to(e.v[0], e.v[1], phase[best], heading[best], e.use);
+    mass_add(e.weight, e.use, sum);
+    memcpy(use + whole, e.use, (size_t)(n - whole));
     return total(sum);
 }
 

@@ -51,15 +51,6 @@ static void take_tracks(const gait_tracker *t, int32_t c, const gait_track *trac
     }
 }
 
-/* Every particle's surface samples become its ancestor's, if there are any of the previous frame. */
-static void inherit(gait_tracker *t)
-{
-    int32_t const before = t->past.count[lag_slot(&t->past, t->core->current, 1)];
-    if (t->core->textured)
-        pf_inherit(&t->filter, before, t->texture,
-                   (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
-}
-
 typedef struct job { /* one camera's frame */
     gait_tracker *t;
     int32_t c;
@@ -67,24 +58,13 @@ typedef struct job { /* one camera's frame */
     const view_planes *plate;
 } job;
 
-/* With the first camera the samples of the ancestors, which take longest, come before the bands. */
-static int32_t inheriting(const job *j)
-{
-    return j->c == 0;
-}
-
 static void sample_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     const job *const j = ctx;
     gait_tracker *const t = j->t;
-    int32_t const first = inheriting(j);
     (void)task;
     for (int32_t i = begin; i < end; i++)
-        if (i < first)
-            inherit(t);
-        else
-            features_sample(t->like->run, &t->camera[j->c].seen, i - first, &t->cfg.camera[j->c], &j->im,
-                            &t->scratch);
+        features_sample(t->like->run, &t->camera[j->c].seen, i, &t->cfg.camera[j->c], &j->im, &t->scratch);
 }
 
 static void map_range(void *ctx, int32_t begin, int32_t end, int32_t task)
@@ -110,9 +90,10 @@ static void look(gait_tracker *t, int32_t c, const gait_frame *frame, const walk
         j.plate = &s->plate;
     }
     features_begin(&s->seen, &j.im, &t->scratch);
-    task_run(&t->cfg.exec, t->cfg.tasks, inheriting(&j) + FEATURES_BANDS, 1, sample_range, &j);
-    if (s->seen.seen)
+    if (s->seen.seen) {
+        task_run(&t->cfg.exec, t->cfg.tasks, FEATURES_BANDS, 1, sample_range, &j);
         task_run(&t->cfg.exec, t->cfg.tasks, FEATURES_MAPS, 1, map_range, &j);
+    }
     take_tracks(t, c, frame->tracks[c], &s->seen.tracks);
 }
 

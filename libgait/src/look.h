@@ -3,7 +3,6 @@
 #define GAIT_LOOK_H
 #include "tracker.h"
 
-/* Move each camera's region to the predicted walker and compute its features.  Meanwhile every particle's surface samples
- * become its ancestor's, if there are any of the previous frame.  Returns how many cameras saw. */
+/* Move each camera's region to the predicted walker and compute its features.  Returns how many cameras saw. */
 int32_t look_frame(gait_tracker *t, const gait_frame *frame, const walker *predicted);
 #endif

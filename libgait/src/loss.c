@@ -75,9 +75,14 @@ static float parts_speak(float explained, float more)
 static int32_t likeliest(const gait_tracker *t)
 {
     int32_t best = -1;
-    for (int32_t i = 0; i < t->cfg.particles; i++)
-        if (f_finite(&t->ll[i], 1) && (best < 0 || t->ll[i] > t->ll[best]))
+    float top = -INFINITY;
+    for (int32_t i = 0; i < t->cfg.particles; i++) {
+        float const ll = t->ll[i];
+        if (ll > top && ll <= FLT_MAX) {
+            top = ll;
             best = i;
+        }
+    }
     return best;
 }
 

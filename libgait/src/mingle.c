@@ -11,9 +11,12 @@ void mingling_set(mingling *m, float seconds, float time)
 void mingle_rows(const population *from, int32_t begin, int32_t end, float *row)
 {
     int32_t const stride = mingle_stride(from->fields);
-    for (int32_t f = 0; f < stride; f++)
-        for (int32_t i = begin; i < end; i++)
-            row[(size_t)i * (size_t)stride + (size_t)f] = f < from->fields ? field(from, f)[i] : 0.0f;
+    for (int32_t f = 0; f < stride; f++) {
+        float *to = row + (size_t)begin * (size_t)stride + (size_t)f;
+        const float *const v = f < from->fields ? field(from, f) : NULL;
+        for (int32_t i = begin; i < end; i++, to += stride)
+            *to = v ? v[i] : 0.0f;
+    }
 }
 
 typedef struct drawn { /* rows of a particle and of three that are drawn by weight */

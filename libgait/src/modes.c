@@ -1,4 +1,5 @@
 #include "modes.h"
+#include "camera.h"
 #include "fmath.h"
 #include "rng.h"
 #include "weigh.h"
@@ -173,10 +174,8 @@ static float half_phase(const population *p)
  * perspective the picture of a body and that of its reflection are the same. */
 static float reflected(const gait_tracker *t, const walker *w)
 {
-    const gait_camera *const cam = &t->cfg.camera[0];
-    float at[2];
-    for (int32_t k = 0; k < 2; k++)
-        at[k] = w->f[F_X + k] + cam->R[k] * cam->t[0] + cam->R[3 + k] * cam->t[1] + cam->R[6 + k] * cam->t[2];
+    float at[3];
+    camera_to(&t->cfg.camera[0], w->f + F_X, at);
     return m_wrap_pi(2.0f * m_atan2(at[1], at[0]) + PI_F - w->f[F_HEADING]);
 }
 

@@ -73,12 +73,14 @@ pf_summary pf_reweigh(pf *p, const float *ll)
     for (int32_t i = 0; i < p->n; i++)
         sum += p->weight[i];
     double const log_sum = m_log64(sum);
+    double squares = 0.0;
     for (int32_t i = 0; i < p->n; i++) {
         p->weight[i] /= sum;
         p->log_weight[i] -= log_sum;
+        squares += p->weight[i] * p->weight[i];
     }
     s.log_evidence = top + log_sum;
-    s.ess = pf_ess(p);
+    s.ess = 1.0 / squares;
     return s;
 }
 
@@ -90,7 +92,7 @@ static uint64_t make_tickets(pf *p)
     for (int32_t i = 0; i < p->n; i++)
         top = p->weight[i] > top ? p->weight[i] : top;
     for (int32_t i = 0; i < p->n; i++) {
-        total += (uint64_t)(p->weight[i] / top * 2147483648.0);
+        total += (uint64_t)(int64_t)(p->weight[i] / top * 2147483648.0);
         p->ticket[i] = total;
     }
     return total;

@@ -126,6 +126,25 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
     return w;
 }
 
+walker population_place(const population *p, const double *weight)
+{
+    const float *const x = field(p, F_X), *const y = field(p, F_Y), *const z = field(p, F_Z),
+                       *const stature = field(p, F_STATURE);
+    double sum_x = 0.0, sum_y = 0.0, sum_z = 0.0, sum_stature = 0.0; /* none waits for another */
+    for (int32_t i = 0; i < p->n; i++) {
+        sum_x += weight[i] * (double)x[i];
+        sum_y += weight[i] * (double)y[i];
+        sum_z += weight[i] * (double)z[i];
+        sum_stature += weight[i] * (double)stature[i];
+    }
+    walker w = {{0}};
+    w.f[F_X] = (float)sum_x;
+    w.f[F_Y] = (float)sum_y;
+    w.f[F_Z] = (float)sum_z;
+    w.f[F_STATURE] = (float)sum_stature;
+    return w;
+}
+
 typedef struct block { /* fields of BLOCK walker_block */
     kin_input in;
     float offset[GAIT_MAX_ANGLES][BLOCK];

@@ -86,6 +86,9 @@ void walker_block_get(const population *p, const int32_t *index, int32_t lanes, 
 /* The first lanes become particles first .. first + lanes - 1. */
 void walker_block_put(population *p, int32_t first, int32_t lanes, const walker_block *w);
 
+/* Weighted mean of the fields that place the region of interest: track, level and stature. */
+walker population_place(const population *p, const double *weight);
+
 walker walker_get(const population *p, int32_t i);
 void walker_put(population *p, int32_t i, const walker *w);
 gait_state walker_state(const body_rule *r, const walker *w);

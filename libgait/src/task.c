@@ -2,7 +2,7 @@
 
 #include <stdatomic.h>
 
-enum { SHARES = 64 }; /* of a part: so that none waits long for another */
+enum { SHARES = 512 }; /* of a part: so that none waits long for another */
 
 typedef struct work {
     task_range_fn *fn;

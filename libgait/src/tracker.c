@@ -159,11 +159,21 @@ static float seconds_since(const gait_tracker *t, int64_t utime)
     return 1e-6f * (float)(t->core->utime - utime);
 }
 
+/* Every particle's surface samples become its ancestor's, if there are any of the previous frame. */
+static void inherit(gait_tracker *t)
+{
+    int32_t const before = t->past.count[lag_slot(&t->past, t->core->current, 1)];
+    if (t->core->textured)
+        pf_inherit(&t->filter, before, t->texture,
+                   (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
+}
+
 typedef struct move_job {
     gait_tracker *t;
     population from;
     mingling mingling;
     dynamics_step step;
+    int32_t first; /* items before the particles: BLOCK if they inherit meanwhile, else 0 */
 } move_job;
 
 static void rows_range(void *ctx, int32_t begin, int32_t end, int32_t task)
@@ -174,23 +184,29 @@ static void rows_range(void *ctx, int32_t begin, int32_t end, int32_t task)
         mingle_rows(&j->from, i, i_min(i + BLOCK, end), j->t->joint);
 }
 
-static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+static void move_block(const move_job *j, int32_t begin, int32_t lanes)
 {
-    const move_job *const j = ctx;
     const gait_tracker *const t = j->t;
     population to = t->people;
     walker_block then, now;
+    if (j->mingling.pull > 0.0f)
+        mingle_block(&j->mingling, begin, lanes, &then);
+    else
+        walker_block_get(&j->from, t->filter.parent + begin, lanes, &then);
+    if (j->step.dt > 0.0f)
+        t->like->run->dynamics_move(&j->step, begin, &then, &now);
+    walker_block_put(&to, begin, lanes, j->step.dt > 0.0f ? &now : &then);
+}
+
+static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    const move_job *const j = ctx;
     (void)task;
-    for (int32_t i = begin; i < end; i += BLOCK) {
-        int32_t const lanes = i_min(BLOCK, end - i);
-        if (j->mingling.pull > 0.0f)
-            mingle_block(&j->mingling, i, lanes, &then);
+    for (int32_t i = begin; i < end; i += BLOCK)
+        if (i < j->first)
+            inherit(j->t);
         else
-            walker_block_get(&j->from, t->filter.parent + i, lanes, &then);
-        if (j->step.dt > 0.0f)
-            t->like->run->dynamics_move(&j->step, i, &then, &now);
-        walker_block_put(&to, i, lanes, j->step.dt > 0.0f ? &now : &then);
-    }
+            move_block(j, i - j->first, i_min(BLOCK, end - i));
 }
 
 /* Particles mingle where they were drawn by weight and are of one mode; between two modes there is nobody. */
@@ -210,8 +226,15 @@ static mingling mingle_after(gait_tracker *t, bool resampled, uint32_t frame)
     return m;
 }
 
+/* Will the particles still be children of those ancestors when the frame is looked at?  Not if they become two sides, or
+ * some are drawn anew. */
+static bool ancestors_stay(const gait_tracker *t)
+{
+    return t->core->modes.stage != MODES_SEARCH && !loss_is_lost(t);
+}
+
 /* Move every particle from its ancestor into the next generation, which becomes the current one. */
-static void predict(gait_tracker *t, float dt, bool resampled, uint32_t frame)
+static void predict(gait_tracker *t, float dt, bool resampled, bool stay, uint32_t frame)
 {
     dynamics const d = tracker_dynamics(t);
     move_job j = {.t = t, .from = t->people};
@@ -221,7 +244,8 @@ static void predict(gait_tracker *t, float dt, bool resampled, uint32_t frame)
     j.step = dynamics_step_init(&d, dt, modes_settled(t), frame);
     t->core->current = (t->core->current + 1) % t->past.depth;
     tracker_set_count(t, t->filter.n);
-    task_run(&t->cfg.exec, t->cfg.tasks, t->cfg.particles, BLOCK, move_range, &j);
+    j.first = stay ? BLOCK : 0;
+    task_run(&t->cfg.exec, t->cfg.tasks, j.first + t->cfg.particles, BLOCK, move_range, &j);
 }
 
 /* Does the reported phase follow from the one before? */
@@ -297,10 +321,13 @@ gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate
     if (loss_is_lost(t))
         core->ess = 0.0; /* particles drawn anew weigh what others do */
     bool const resampled = core->frame > 0 && modes_resample(t, counter);
-    predict(t, dt, resampled, counter);
+    bool const stay = ancestors_stay(t);
+    predict(t, dt, resampled, stay, counter);
     modes_fork(t);
     loss_search(t, counter);
-    walker const place = estimate_place(&t->people, t->filter.weight);
+    if (!stay)
+        inherit(t);
+    walker const place = population_place(&t->people, t->filter.weight);
     if (look_frame(t, frame, &place) > 0)
         observe(t, dt, &e);
     else

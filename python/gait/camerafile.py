@@ -128,7 +128,11 @@ def _node_value(node: cv2.FileNode) -> Any:
 def _from_toml(path: str, name: str | None) -> Camera:
     try:
         data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
+    except RecursionError:
+        raise UserError(
+            f"{path}: not valid TOML (brackets within brackets, too deep to read); export it anew"
+        ) from None
+    except ValueError as exc:  # syntax, encoding, or a number of thousands of digits
         raise UserError(f"{path}: not valid TOML ({exc}); export the calibration anew") from None
     cameras = {key: value for key, value in data.items() if isinstance(value, Mapping) and "matrix" in value}
     if name is None and len(cameras) == 1:
@@ -184,7 +188,7 @@ def _distortion(fields: Fields, key: str) -> Array:
     if key not in fields:
         return np.zeros(5)
     remedy = "give k1 k2 p1 p2 [k3] (0, 4 or 5 numbers)"
-    count = np.size(fields.get(key, remedy))
+    count = fields.count(key, remedy)
     if count not in (0, 4, 5):
         raise fields.fail(key, f"has {count} numbers", f"{remedy}, from a calibration without rational terms")
     values = fields.array(key, (count,), remedy) if count else np.zeros(0)

@@ -128,7 +128,7 @@ def _strikes(truth: Joints, reach: Array) -> Array:
 def _times(events: Fields, key: str) -> Array:
     """Increasing strike times of one foot."""
     remedy = "give a list of increasing frame numbers"
-    times = events.array(key, (np.size(events.get(key, remedy)),), remedy)
+    times = events.array(key, (events.count(key, remedy),), remedy)
     if (np.diff(times) <= 0).any():
         raise events.fail(key, "does not increase", remedy)
     return times

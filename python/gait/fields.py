@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.errors import UserError
+from gait.errors import UserError, unreadable
 
 _LAST_FRAME = 2**53  # larger whole numbers are not exact as floating point
 
@@ -47,11 +48,12 @@ class Fields:
         value = self.get(key, remedy)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.fail(key, "is not a number", remedy)
-        if not np.isfinite(value):
+        number = _double(value)
+        if not math.isfinite(number):
             raise self.fail(key, "is not finite", remedy)
-        if not low <= value <= high:
-            raise self.fail(key, f"is {value:g}, outside [{low:g}, {high:g}]", remedy)
-        return float(value)
+        if not low <= number <= high:
+            raise self.fail(key, f"is {number:g}, outside [{low:g}, {high:g}]", remedy)
+        return number
 
     def integer(self, key: str, low: int, high: int, remedy: str) -> int:
         """Whole number in [low, high]; 640.0 counts as whole."""
@@ -62,11 +64,7 @@ class Fields:
 
     def array(self, key: str, shape: Sequence[int], remedy: str) -> NDArray[np.float64]:
         """Finite numbers of exactly this shape; a column or row matrix counts as a vector."""
-        value = self.get(key, remedy)
-        try:
-            array = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise self.fail(key, "is not an array of numbers", remedy) from None
+        array = self._numbers(key, remedy)
         if len(shape) == 1 and array.ndim == 2 and 1 in array.shape:
             array = array.ravel()
         if array.shape != tuple(shape):
@@ -75,6 +73,19 @@ class Fields:
         if not np.isfinite(array).all():
             raise self.fail(key, "is not finite", remedy)
         return array
+
+    def count(self, key: str, remedy: str) -> int:
+        """How many numbers a key has, 1 for one that is no list."""
+        return self._numbers(key, remedy).size
+
+    def _numbers(self, key: str, remedy: str) -> NDArray[np.float64]:
+        value = self.get(key, remedy)
+        if value is None:
+            raise self.fail(key, "is null", remedy)
+        try:
+            return np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise self.fail(key, "is not an array of numbers", remedy) from None
 
     def only(self, known: Sequence[str]) -> None:
         """Refuse keys that nobody reads: most are misspelt."""
@@ -90,6 +101,14 @@ class Fields:
         return Fields(f"{self.where}: {key}", value)
 
 
+def _double(number: float) -> float:
+    """Nearest floating-point number; whole ones too large for any are infinite."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
+
+
 def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     """Read a JSON object.
 
@@ -101,13 +120,46 @@ def read_json(path: str | os.PathLike[str], what: str) -> Fields:
     """
     if not Path(path).is_file():
         raise UserError(f"{path}: no such {what} file")
-    try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as exc:
-        raise UserError(f"{path}: not valid JSON ({exc}); mend it or write the {what} anew") from None
-    if not isinstance(data, dict):
-        raise UserError(f"{path}: holds no JSON object; {what} files are objects of keys in braces")
+    data = json_object(
+        path, f"mend it or write the {what} anew", f"{what} files are objects of keys in braces"
+    )
     return Fields(str(path), data)
+
+
+def json_object(
+    path: str | os.PathLike[str],
+    remedy: str,
+    form: str,
+    pairs: Callable[[list[tuple[str, Any]]], dict[str, Any]] = dict,
+) -> dict[str, Any]:
+    """Content of a JSON file that holds one object.
+
+    Parameters
+    ----------
+    path : path
+    remedy, form : str
+        For messages: what to do about a file that is no JSON, and about one that holds something else.
+    pairs : callable
+        Makes a mapping of keys and values, which may be there twice.
+
+    Raises
+    ------
+    UserError
+        One line naming the file and the remedy.
+    """
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=pairs)
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except RecursionError:
+        raise UserError(
+            f"{path}: not valid JSON (brackets within brackets, too deep to read); {remedy}"
+        ) from None
+    except ValueError as error:  # syntax, encoding, or a number of thousands of digits
+        raise UserError(f"{path}: not valid JSON ({error}); {remedy}") from None
+    if not isinstance(data, dict):
+        raise UserError(f"{path}: holds no JSON object; {form}")
+    return data
 
 
 def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -101,7 +101,7 @@ def _place(fields: Fields, spread: Fields, model: Model, mean: State, sd: State)
     remedy = "give x and y (and z if known) of the pelvis in metres"
     known = 2
     if "pelvis" in fields:
-        known = 3 if np.size(fields.get("pelvis", remedy)) == 3 else 2
+        known = 3 if fields.count("pelvis", remedy) == 3 else 2
         mean.pelvis[:known] = fields.array("pelvis", (known,), remedy)
         if (np.abs(mean.pelvis) > FAR).any():
             what = f"is further than {FAR:g} m from the origin"
@@ -111,7 +111,7 @@ def _place(fields: Fields, spread: Fields, model: Model, mean: State, sd: State)
         mean.pelvis[2] = model.pelvis_height(mean)
     if "pelvis" in spread:
         remedy = "give one number or three, metres"
-        three = np.size(spread.get("pelvis", remedy)) == 3
+        three = spread.count("pelvis", remedy) == 3
         values = spread.array("pelvis", (3,) if three else (), remedy)
         if (values < 0).any():
             raise spread.fail("pelvis", "is negative", remedy)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.camera import Camera
+from gait.colours import OVER_PICTURES, side_of
 from gait.estimate import Estimate
 from gait.model import Model
 from gait.panel import draw_panel
@@ -17,11 +18,6 @@ from gait.video import Image
 
 Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
-
-LEFT: Colour = (235, 165, 60)
-RIGHT: Colour = (50, 125, 250)
-MIDDLE: Colour = (190, 215, 120)
-"""Body sides in BGR: blue, orange and a pale green."""
 
 BONES = (
     *(("pelvis", "neck"), ("neck", "head_top")),
@@ -43,7 +39,7 @@ _SUBPIXEL = 4  # bits of fraction in OpenCV's drawing coordinates
 
 def side_colour(name: str) -> Colour:
     """Colour of a joint or limb by its side."""
-    return LEFT if name.startswith("l_") else RIGHT if name.startswith("r_") else MIDDLE
+    return OVER_PICTURES[side_of(name)]
 
 
 class Overlay:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gait.anglecycles import PERCENT, AngleCycle
+from gait.colours import DARK, GREY, ON_PAPER
 from gait.footfalls import SIDES, contacts, stride_time
 from gait.parameters import QUANTITIES, Parameters
 from gait.trackfile import Track
@@ -19,8 +20,6 @@ from gait.trackfile import Track
 Array = NDArray[np.float64]
 Painter = Callable[[Axes], None]
 
-_COLOUR = {"right": "#2a6f97", "left": "#d9722e"}
-_GREY = "#9a9a9a"
 _TINT = {"lost": "#e07a7a", "ambiguous": "#f4d06f"}
 _WIDTH = 7.6  # inches
 _GROUPS = (
@@ -43,7 +42,7 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
             first = parameters.events.off[side][:1]
             if len(first) and (not len(begin) or first[0] < begin[0]):  # on the ground from the start
                 begin, ends = np.append(track.time[0], begin), np.append(first, ends)
-            axes.barh(np.full(len(ends), row), ends - begin, left=begin, height=0.5, color=_COLOUR[side])
+            axes.barh(np.full(len(ends), row), ends - begin, left=begin, height=0.5, color=ON_PAPER[side])
             for times, sds, bottom in (
                 (parameters.events.strike[side], parameters.event_sd.strike[side], 0.32),
                 (parameters.events.off[side], parameters.event_sd.off[side], -0.32),
@@ -53,7 +52,7 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
                     np.full(len(times), row + bottom),
                     xerr=2 * sds,
                     fmt="|",
-                    color="#333",
+                    color=DARK,
                     capsize=2,
                     lw=1,
                 )
@@ -82,8 +81,8 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
                         fmt="o",
                         ms=4,
                         lw=1,
-                        color=_COLOUR[side],
-                        mfc=_COLOUR[side] if sure else "white",
+                        color=ON_PAPER[side],
+                        mfc=ON_PAPER[side] if sure else "white",
                         label=side if sure else None,
                     )
             axes.set(title=title, xlabel="time, s")
@@ -121,11 +120,11 @@ def _angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:
     def paint(axes: Axes) -> None:
         first = cycles.get(f"r_{name}") or cycles.get(f"l_{name}") or cycles[name]
         low, high = first.norm_mean - 2 * first.norm_sd, first.norm_mean + 2 * first.norm_sd
-        axes.fill_between(PERCENT, low, high, color=_GREY, alpha=0.25, lw=0, label="norm, 2 deviations")
+        axes.fill_between(PERCENT, low, high, color=GREY, alpha=0.25, lw=0, label="norm, 2 deviations")
         for side, key in (("right", f"r_{name}"), ("left", f"l_{name}"), ("right", name)):
             if key not in cycles:
                 continue
-            c, colour = cycles[key], _COLOUR[side] if key != name else "#333333"
+            c, colour = cycles[key], ON_PAPER[side if key != name else "middle"]
             axes.plot(PERCENT, c.strides.T, color=colour, lw=0.5, alpha=0.5)
             axes.fill_between(PERCENT, c.mean - 2 * c.sd, c.mean + 2 * c.sd, color=colour, alpha=0.25, lw=0)
             axes.plot(PERCENT, c.mean, color=colour, label=side if key != name else None)
@@ -156,10 +155,10 @@ def path_plot(track: Track, parameters: Parameters) -> str:
     stride = stride_time(parameters.events)
 
     def paint(axes: Axes) -> None:
-        axes.plot(*track.places["pelvis"][:, :2].T, color=_GREY, lw=1, label="pelvis")
+        axes.plot(*track.places["pelvis"][:, :2].T, color=GREY, lw=1, label="pelvis")
         for side in SIDES:
             places = contacts(track, parameters.events, side, stride).place
-            axes.plot(*places[:, :2].T, "o", ms=5, color=_COLOUR[side], label=f"{side} heel")
+            axes.plot(*places[:, :2].T, "o", ms=5, color=ON_PAPER[side], label=f"{side} heel")
         axes.set(xlabel="x, m", ylabel="y, m")
         axes.set_aspect("equal", adjustable="datalim")
         axes.legend(fontsize=7)

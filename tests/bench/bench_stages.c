@@ -252,10 +252,10 @@ WRAP(void, loss_allow_hidden, (gait_tracker * t))
     WHOLE(STAGE_WEIGHTS, __real_loss_allow_hidden(t));
 }
 
-WRAP(walker, estimate_place, (const population *people, const double *weight))
+WRAP(walker, population_place, (const population *people, const double *weight))
 {
     walker w;
-    WHOLE(STAGE_ESTIMATE, w = __real_estimate_place(people, weight));
+    WHOLE(STAGE_ESTIMATE, w = __real_population_place(people, weight));
     return w;
 }
 

@@ -5,7 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* PARSEC bodytrack, one camera, 10,000 particles x 1 layer, one core of such a machine: quoted, not measured here. */
+/* PARSEC bodytrack, one camera, 10,000 particles x 1 layer, one core of such a machine: quoted, not measured here.  Its
+ * samples are points of edges and points inside the limbs that are looked up in a map of edges and in the foreground. */
 static const double PARSEC_MS[2] = {43, 58};
 enum { PARSEC_SAMPLES = 481 };
 /* The texture-only limit on that machine, the most that was quoted: this machine's, in turns with what is judged, tells
@@ -123,8 +124,10 @@ static void parsec_lines(const verdict *v, const gait_model *m)
     line("a step against PARSEC bodytrack's 43 ms (quoted)", 0.5, step / PARSEC_MS[0], false, "times");
     line("    as the limit's time here against its 17 ms there", 0.5,
          many->limit_ratio * LIMIT_MS / PARSEC_MS[0], false, "times");
-    line("samples per likelihood, surface and edges, against PARSEC's", PARSEC_SAMPLES, looked, true, "");
-    line("    with the silhouette's cells, 64 of them compared at once", PARSEC_SAMPLES, ours, true, "");
+    line("samples per likelihood, as PARSEC counts: with the foreground", PARSEC_SAMPLES, ours, true, "");
+    printf("    %.0f points of surface and edges and %.0f cells of the silhouette, 64 of which are compared "
+           "at once\n",
+           looked, cells);
     printf(
         "    million samples a second: %.0f in a step (%.0f without the silhouette's); PARSEC %.0f to %.0f\n",
         rate * ours / step, rate * looked / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],

@@ -85,13 +85,14 @@ def _abs(rows: Rows) -> Verdict:
 
 
 def _stature(rows: Rows) -> Verdict:
-    measure, wanted = "the same with a wrong stature in the start, mm", "<= 110; px unchanged (within 10 %)"
+    measure = "the same with a wrong stature in the start, believed to 30 mm instead of 3"
+    wanted = "<= 110 mm; px unchanged (within 10 %)"
     wrong = [row for row in rows if row["arm"].startswith("stature ")]
     if not wrong:
         return _nothing(measure, wanted, "--stature-error 0.05")
     far = float(np.median(list(per_clip(_dev(wrong), "abs_mm").values())))
     base, off = (np.median(list(per_clip(_dev(r), "px").values())) for r in (_of(rows, BASE), wrong))
-    reached = f"{far:.0f}; {base:.1f} -> {off:.1f} px"
+    reached = f"{far:.0f} mm; {base:.2f} -> {off:.2f} px"
     return Verdict(measure, wanted, reached, bool(far <= 110 and off <= 1.1 * base))
 
 
@@ -128,7 +129,10 @@ def _locked(rows: Rows) -> Verdict:
 
 
 def _side(rows: Rows) -> Verdict:
-    measure, wanted = "auto: right leg right, or ambiguous", ">= 95 %; wrong under tracking in <= 1 run of 28"
+    measure = (
+        "auto: right leg right, or ambiguous; wrong: over 5 % of the frames after a second, under tracking"
+    )
+    wanted = ">= 95 %; wrong in <= 1 run of 28"
     runs = _of(rows, AUTO, None)
     if not runs:
         return _nothing(measure, wanted, "--modes default --init auto")
@@ -144,7 +148,11 @@ def _coverage(rows: Rows) -> Verdict:
     if not clips:
         return _nothing(measure, wanted, "--modes default --init truth")
     mean, low = float(np.mean(list(clips.values()))), min(clips, key=lambda c: clips[c])
-    return Verdict(measure, wanted, f"{mean:.2f}; least {low} {clips[low]:.2f}", 0.80 <= mean <= 0.95)
+    reached = f"{mean:.2f}; least {low} {clips[low]:.2f}"
+    auto = [row["cover90"] for row in _of(rows, AUTO) if row["cover90"] is not None]
+    if auto:
+        reached += f" (auto: {np.mean(auto):.2f}, least run {min(auto):.2f})"
+    return Verdict(measure, wanted, reached, 0.80 <= mean <= 0.95)
 
 
 def _no_plate(rows: Rows) -> Verdict:

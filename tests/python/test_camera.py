@@ -273,3 +273,11 @@ def test_dev_cameras_project_the_truth_where_it_was_rendered(clip):
     expected = np.stack([table["l_wrist_u"], table["l_wrist_v"]], axis=1)
     found = Camera.read(str(folder / "camera.json")).project(truth.places["l_wrist"])
     np.testing.assert_allclose(found, expected, atol=0.01)
+
+
+def test_brackets_too_deep_to_read_are_one_line(tmp_path):
+    deep = "[" * 100_000
+    for name, text in (("cam.json", deep), ("cam.toml", f"matrix = {deep}")):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(UserError, match=f"{name}: not valid (JSON|TOML) .brackets within"):
+            Camera.read(str(tmp_path / name))

@@ -6,14 +6,16 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from drawn_walker import DATA, camera, clip, state_at, wall, write
 
-from gait import Model, Video, blob
-from gait.cli import COMMANDS, main
+import gait
+from gait import Model, Video, _abi, blob
+from gait.cli import COMMANDS, main, values
 from gait.lift import tracks_file
 from gait.model import read_blob
 from gait.trackerconfig import TrackerConfig
@@ -205,12 +207,26 @@ def test_every_fault_is_one_line_and_leaves_no_output(options, words, scene, cap
 def test_usage_errors_exit_2(words, capsys):
     with pytest.raises(SystemExit) as caught:
         main(words)
-    assert caught.value.code == 2 and "usage: gait" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert caught.value.code == 2 and err.count("\n") == 1
+    assert re.match(rf"gait{' ' + words[0] if words and words[0] in COMMANDS else ''}: error: ", err)
+
+
+def test_the_version_is_that_of_package_and_library(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"gait {gait.__version__} libgait {gait.__version__} abi {_abi.ABI}\n"
+
+
+def test_threads_end_where_the_pool_does():
+    header = Path(__file__).parents[2] / "libgait/include/gait_pool.h"
+    assert f"#define GAIT_POOL_MAX {values.THREADS[1]} " in header.read_text(encoding="utf-8")
 
 
 RANGES = [
     *((f"--particles {n}", f"{n}: give a whole number from 16 to 1048576") for n in ("5", "0", "-3", "1e8")),
-    *((f"--threads {n}", f"{n}: give a whole number from 1 to 64") for n in ("0", "9999")),
+    *((f"--threads {n}", f"{n}: give a whole number from 1 to 256") for n in ("0", "9999")),
     *((f"--seed {n}", f"from 0 to {2**64 - 1}") for n in ("-1", str(2**64))),
     *((f"--height {m}", f"{m}: is not a stature; give metres from 0.5 to 2.5") for m in ("17", "nan", "x")),
     ("--start 50 --stop 20", "--stop 20: must be greater than --start 50"),

@@ -115,6 +115,11 @@ FAULTS = [
     ({"stature_m": None}, "stature_m is not a number"),
     ({"frame": 1.5}, "frame is 1.5, not a whole number"),
     ({"frame": -1}, "frame is -1, outside"),
+    ({"frame": 10**30}, r"frame is 1e\+30, outside"),
+    ({"frame": 10**400}, "frame is not finite"),
+    ({"pelvis": [1, [2, 3]]}, "pelvis is not an array of numbers"),
+    ({"pelvis": [10**400, 2]}, "pelvis is not an array of numbers"),
+    ({"pelvis": None}, "pelvis is null; give x and y"),
     ({"pelvis": [1]}, "pelvis has shape 1, not 2; give x and y"),
     ({"pelvis": 3.0}, "pelvis has shape one number, not 2"),
     ({"pelvis": [1, 2, float("inf")]}, "pelvis is not finite"),
@@ -127,6 +132,8 @@ FAULTS = [
     ({"heading": 0.1}, "heading is not a known key; use frame pelvis heading_rad"),
     ("{'phase': 1}", "not valid JSON"),
     ("3", "holds no JSON object"),
+    ("[" * 100_000, r"not valid JSON \(brackets within brackets, too deep to read\); mend it"),
+    ('{"frame": ' + "1" * 5000 + "}", "not valid JSON .*; mend it"),
 ]
 
 

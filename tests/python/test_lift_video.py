@@ -115,6 +115,18 @@ def test_known_markers_without_sensors_give_the_motion(clip, prior):
     assert root(fit, prior) < 25
 
 
+def test_corrections_of_a_marker_err_alike_within_a_segment(clip):
+    """Several say no more of what the prior leaves out than one does; other markers know nothing of it."""
+
+    def lasting(*spots):
+        held = [Correction(frame, joint, (300.0, 200.0), 3.0) for frame, joint in spots]
+        energy = replace(clip, corrections=held).energy(0, 0, clip.mean_state(), looking=False)
+        return energy.springs.sd**2 - 3.0**2
+
+    (knee,), (wrist,) = lasting((0, "l_knee")), lasting((2, "r_wrist"))
+    assert lasting((0, "l_knee"), (2, "l_knee"), (2, "r_wrist")) == pytest.approx([2 * knee, 2 * knee, wrist])
+
+
 def test_the_papers_way_is_continuous_in_depth(clip, monkeypatch):
     """F10: what neighbours share is as far away in both, on average; without the moves it is not."""
     alone = replace(clip, settings=Settings(joined=False))

@@ -123,8 +123,13 @@ def test_a_mapping_may_start_from_a_set_and_drop_markers(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{", r"map.json: not JSON"),
-        ("[1]", r"map.json: not an object"),
+        ("{", r"map.json: not valid JSON"),
+        ("[1]", r"map.json: holds no JSON object"),
+        pytest.param(
+            '{"markers": ' + "[" * 100_000,
+            r"map.json: not valid JSON \(brackets within .*; correct it",
+            id="deep",
+        ),
         ('{"marker": {}}', r"map.json: unknown key 'marker'; the keys are set and markers"),
         ('{"set": "plugin-gait"}', r"map.json: set: 'plugin-gait' is not known; did you mean plug-in-gait"),
         ('{"markers": []}', r"map.json: markers is not an object"),

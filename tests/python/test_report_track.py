@@ -11,6 +11,9 @@ from test_parameters import drawn
 from walking_track import walking_track, write_track
 
 from gait.cli import main
+from gait.colours import BLUE, ORANGE
+from gait.overlay import side_colour
+from gait.parameter_plots import path_plot
 from gait.parameters import QUANTITIES, measure
 
 
@@ -63,6 +66,19 @@ def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
         ElementTree.fromstring(drawing.replace("xlink:href", "href"))
     for heading in ("Parameters", "Contacts of the feet", "Strides", "Deviation from the norm"):
         assert f"<h2>{heading}</h2>" in page
+
+
+def test_left_is_blue_and_right_orange_as_in_pictures():
+    track = walking_track()
+    legend = path_plot(track, measure(track)).split('id="legend_1"')[1]
+    drawn_in = dict(
+        zip(re.findall(r"(\w+) heel</text>", legend), re.findall(r"fill: (#\w+)", legend)[-2:], strict=True)
+    )
+    assert drawn_in == {"left": BLUE, "right": ORANGE}
+    blue, _, red = side_colour("l_knee")
+    assert blue > red
+    blue, _, red = side_colour("r_knee")
+    assert blue < red
 
 
 def test_draws_are_used_where_given(folder, capsys):

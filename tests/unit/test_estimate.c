@@ -230,6 +230,37 @@ static void test_joints(void)
     CHECK(e.pose.joint[TOY_POINTS][0] == 0.0f && e.joint_sd[TOY_POINTS][1] == 0.0f); /* unused */
 }
 
+/* Of one camera whose start was in doubt about the stature: size and distance, by a share of both. */
+static void test_size(void)
+{
+    const gait_camera *const cam = &t->cfg.camera[0];
+    double const doubt = 0.02, share = 0.01 * doubt / sqrt(0.01 * 0.01 + doubt * doubt);
+    reset();
+    weigh(11);
+    for (uint32_t i = 0; i < 3 * TOY_POINTS * N; i++)
+        t->joint[i] = 0.1f * (float)(i / N) + 0.02f * normal(i, 3);
+    gait_estimate const sure = estimate(11);
+    t->core->stature_doubt = (float)doubt;
+    gait_estimate const e = estimate(11);
+    for (int p = 0; p < TOY_POINTS; p++)
+        for (int k = 0; k < 3; k++) {
+            double lens = 0.0; /* -R't */
+            for (int r = 0; r < 3; r++)
+                lens -= (double)cam->R[3 * r + k] * (double)cam->t[r];
+            double const off = share * ((double)e.pose.joint[p][k] - lens);
+            CHECK_NEAR(pow((double)e.joint_sd[p][k], 2.0), pow((double)sure.joint_sd[p][k], 2.0) + off * off,
+                       1e-6);
+        }
+    double const tall = share * (double)e.mean.stature;
+    CHECK_NEAR(pow((double)e.sd.stature, 2.0), pow((double)sure.sd.stature, 2.0) + tall * tall, 1e-8);
+    CHECK(e.sd.stature > sure.sd.stature && e.joint_sd[0][1] > sure.joint_sd[0][1]);
+    t->cfg.cameras = 2; /* two tell the distance */
+    gait_estimate const two = estimate(11);
+    CHECK(memcmp(two.joint_sd, sure.joint_sd, sizeof sure.joint_sd) == 0);
+    t->cfg.cameras = 1;
+    t->core->stature_doubt = 0.0f;
+}
+
 /* Means of the plain fields, the pelvis they imply, speed, and angles of the mean state. */
 static void test_fields(void)
 {
@@ -276,7 +307,7 @@ static void test_fields(void)
                 (k ? mean[F_COEF + k - 1] : 1.0) / TOY_PHASES *
                 (double)toy_model()->curves[(k * TOY_PHASES + j) * TOY_CHANNELS + TOY_ROOT + ROOT_FORWARD];
     CHECK_NEAR(e.speed, mean[F_STATURE] * mean[F_RATE] * forward, 1e-4);
-    walker const place = estimate_place(people, t->filter.weight);
+    walker const place = population_place(people, t->filter.weight);
     CHECK_NEAR(place.f[F_X], mean[F_X], 1e-6);
     CHECK_NEAR(place.f[F_Y], mean[F_Y], 1e-6);
     CHECK_NEAR(place.f[F_Z], mean[F_Z], 1e-6);
@@ -345,6 +376,7 @@ int main(void)
     test_modes();
     test_rotation();
     test_joints();
+    test_size();
     test_fields();
     toy_tracker_free(t);
     return CHECK_DONE();

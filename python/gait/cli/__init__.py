@@ -17,8 +17,10 @@ import threading
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 from types import FrameType
+from typing import NoReturn
 
 from gait import kernels
+from gait._version import __version__
 from gait.errors import GaitError, UsageError, UserError
 
 COMMANDS = {
@@ -95,12 +97,31 @@ def _failed(command: str, text: str) -> int:
     return 1
 
 
+class _Parser(argparse.ArgumentParser):
+    """Parser, of the commands too, that says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: error: {message}\n")
+
+
+class _Version(argparse.Action):
+    """Say the versions, for which the library is loaded, and end."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from gait._lib import library, version_text  # here, as it loads numpy
+
+        loaded = library()
+        print(f"gait {__version__} libgait {version_text(loaded.gait_version())} abi {loaded.gait_abi()}")
+        parser.exit()
+
+
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """Parser of the command named first in `words` (so that only its imports cost time), else of all."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="gait",
         description="Learn how people walk from motion capture and track them in calibrated video.",
     )
+    parser.add_argument("--version", action=_Version, nargs=0, help="say the versions of package and library")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in words[:1] if words and words[0] in COMMANDS else COMMANDS:
         module = import_module(f"gait.cli.{COMMANDS[name]}")

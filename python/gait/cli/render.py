@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 
 import cv2
-import numpy as np
 
 from gait.camera import Camera
 from gait.cli.values import between
@@ -81,12 +80,13 @@ def _state(args: argparse.Namespace, model: Model) -> State:
             low, high = _RANGES.get(name, (-7.0, 7.0))
             setattr(state, name, fields.number(name, low, high, "see gait render --help"))
     if "coef" in fields:
-        count = np.size(fields.get("coef", ""))
+        remedy = "give a list of scores in standard deviations"
+        count = fields.count("coef", remedy)
         if count > model.info.components:
             raise fields.fail(
                 "coef", f"has {count} scores", f"the model has {model.info.components} components"
             )
-        state.coef = fields.array("coef", (count,), "give a list of scores in standard deviations")
+        state.coef = fields.array("coef", (count,), remedy)
     state.pelvis[2] = model.pelvis_height(state)
     if "pelvis" in fields:
         state.pelvis = fields.array("pelvis", (3,), "give x, y, z in metres")

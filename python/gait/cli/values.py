@@ -8,7 +8,7 @@ from collections.abc import Callable
 from gait.initial import STATURE
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
-THREADS = (1, 64)
+THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED = (0, (1 << 64) - 1)
 
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gait._abi import TrackStatus
+from gait.colours import BLUE, GREY, ORANGE
 from gait.evaluate import root_errors
 from gait.events import Strikes
 from gait.lcm.results import Run
@@ -22,7 +23,6 @@ Array = NDArray[np.float64]
 Painter = Callable[[Axes], None]
 
 _WIDTH, _HEIGHT = 7.2, 2.6  # inches of one figure
-_BLUE, _ORANGE, _GREY = "#2a6f97", "#d9722e", "#9a9a9a"
 _STATUS = {TrackStatus.INIT: "#c8c8c8", TrackStatus.AMBIGUOUS: "#f4d06f", TrackStatus.LOST: "#e07a7a"}
 
 
@@ -66,8 +66,8 @@ def error_plot(run: Run, errors: Comparison) -> str:
     """Draw the 3-D error over frames."""
 
     def paint(axes: Axes) -> None:
-        axes.plot(errors.frame, errors.abs_mm, color=_BLUE, label="as it is (abs)")
-        axes.plot(errors.frame, errors.root_mm, color=_ORANGE, label="hips aligned (root)")
+        axes.plot(errors.frame, errors.abs_mm, color=BLUE, label="as it is (abs)")
+        axes.plot(errors.frame, errors.root_mm, color=ORANGE, label="hips aligned (root)")
         axes.set(xlabel="frame", ylabel="error, mm", ylim=(0, None))
         axes.legend(loc="best")
 
@@ -81,12 +81,12 @@ def phase_plot(run: Run, errors: Comparison | None) -> str:
 
     def paint(axes: Axes) -> None:
         if errors is None or errors.phase is None:
-            axes.scatter(run.frame, phase, s=6, color=_BLUE)
+            axes.scatter(run.frame, phase, s=6, color=BLUE)
             axes.set(xlabel="frame", ylabel="phase, strides", ylim=(0, 1))
             return
-        axes.plot(errors.frame, errors.phase, color=_BLUE, label="estimate minus truth")
-        axes.fill_between(run.frame, -2 * sd, 2 * sd, color=_BLUE, alpha=0.15, lw=0, label="two deviations")
-        axes.axhline(0, color=_GREY, lw=0.8)
+        axes.plot(errors.frame, errors.phase, color=BLUE, label="estimate minus truth")
+        axes.fill_between(run.frame, -2 * sd, 2 * sd, color=BLUE, alpha=0.15, lw=0, label="two deviations")
+        axes.axhline(0, color=GREY, lw=0.8)
         axes.set(xlabel="frame", ylabel="phase error, strides")
         axes.legend(loc="best")
 
@@ -97,13 +97,13 @@ def gait_plot(run: Run) -> str:
     """Draw cadence and speed over frames."""
 
     def paint(axes: Axes) -> None:
-        axes.plot(run.frame, [120 * e.mean.stride_hz for e in run.estimates], color=_BLUE)
+        axes.plot(run.frame, [120 * e.mean.stride_hz for e in run.estimates], color=BLUE)
         axes.set(xlabel="frame", ylabel="steps per minute")
-        axes.yaxis.label.set_color(_BLUE)
+        axes.yaxis.label.set_color(BLUE)
         speed = axes.twinx()
-        speed.plot(run.frame, [e.speed for e in run.estimates], color=_ORANGE)
+        speed.plot(run.frame, [e.speed for e in run.estimates], color=ORANGE)
         speed.set(ylabel="speed, m/s", ylim=(0, None))
-        speed.yaxis.label.set_color(_ORANGE)
+        speed.yaxis.label.set_color(ORANGE)
 
     return _figure(run, paint)
 
@@ -113,11 +113,11 @@ def time_plot(run: Run, live: bool) -> str:
 
     def paint(axes: Axes) -> None:
         if live:
-            axes.plot(run.frame, run.latency_ms, color=_ORANGE, label="capture to estimate received")
-        axes.plot(run.frame, run.step_ms, color=_BLUE, label="step of the tracker")
+            axes.plot(run.frame, run.latency_ms, color=ORANGE, label="capture to estimate received")
+        axes.plot(run.frame, run.step_ms, color=BLUE, label="step of the tracker")
         if len(run.seconds) > 1:
             interval = 1000 * float(np.median(np.diff(run.seconds)))
-            axes.axhline(interval, color=_GREY, ls="--", lw=0.8, label="frame interval")
+            axes.axhline(interval, color=GREY, ls="--", lw=0.8, label="frame interval")
         axes.set(xlabel="frame", ylabel="milliseconds", ylim=(0, None))
         axes.legend(loc="best")
 
@@ -131,8 +131,8 @@ def path_plot(run: Run, errors: Comparison | None) -> str:
 
     def paint(axes: Axes) -> None:
         if errors is not None:
-            axes.plot(*errors.true_path.T, color=_GREY, lw=3, label="truth")
-        axes.plot(*path.T, color=_BLUE, label="estimate")
+            axes.plot(*errors.true_path.T, color=GREY, lw=3, label="truth")
+        axes.plot(*path.T, color=BLUE, label="estimate")
         axes.set(xlabel="x, m", ylabel="y, m")
         axes.set_aspect("equal", adjustable="datalim")
         axes.legend(loc="best")

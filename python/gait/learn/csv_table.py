@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait import delimited
 from gait.errors import UserError, quoted, unreadable
 from gait.learn.recording import DEGREES, FARTHEST, require_frames
 from gait.skeleton import ANGLES, ROOTS
 
 Floats = npt.NDArray[np.float64]
 
-DELIMITERS = ",;\t"
 LONGEST = 10.0  # a table may grow to so many times its rows by the frames that are missing in it
 LOST = "lost"  # status of rows of a track in which nobody was followed
 #: End of a column's name to the largest amount and the unit.
@@ -135,17 +135,12 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
-    first = text.split("\n", 1)[0]
-    delimiter = max(DELIMITERS, key=first.count)
     try:
-        reader = csv.reader(text.splitlines(), delimiter=delimiter)
-        lines = [(reader.line_num, row) for row in reader]
+        lines = delimited.rows(text)
     except csv.Error as error:
         raise UserError(f"{path}: not a .csv ({error}); export it again") from None
     if not lines or not any(lines[0][1]):
         raise UserError(f"{path}: the file is empty; export it again")
-    if delimiter == ";":  # where numbers have decimal commas
-        lines[1:] = [(line, [cell.replace(",", ".") for cell in row]) for line, row in lines[1:]]
     return [lines[0], *((line, row) for line, row in lines[1:] if any(row))]
 
 

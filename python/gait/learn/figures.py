@@ -39,7 +39,7 @@ def drawings(learned: Learned) -> Iterator[Drawing]:
     yield Drawing(
         "residuals",
         "Residual by angle",
-        "What the components leave of all cycles, rms; blue: right, grey: left, black: trunk and neck.",
+        "What the components leave of all cycles, rms; blue: left, orange: right, black: trunk and neck.",
         figures_model.residuals(learned),
     )
     subjects = figures_subject.errors(learned)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from gait.colours import GREY
 from gait.learn.fit import SAMPLES, Learned
 from gait.skeleton import CHANNELS
 
@@ -25,7 +26,6 @@ SHOWN = (
     "r_elbow_flexion",
     "torso_z",
 )
-BLUE, ORANGE, GREY, DARK = "#2a6f97", "#d9722e", "#9a9a9a", "#222222"
 PHASE = np.arange(SAMPLES) / SAMPLES
 PHASE_LABEL = "phase (0: right heel strike)"
 MOST_LEGEND = 10  # entries

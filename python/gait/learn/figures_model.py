@@ -6,11 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gait.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
 from gait.learn.figures_base import (
-    BLUE,
-    DARK,
-    GREY,
-    ORANGE,
     PHASE,
     PHASE_LABEL,
     SHOWN,
@@ -157,7 +154,7 @@ def residuals(learned: Learned) -> Figure:
     squares, count = learned.residuals.squares.sum(axis=0), learned.residuals.count.sum(axis=0)
     rest = np.degrees(np.sqrt(squares / np.maximum(count, 1)))[: len(ANGLES)]
     order = sorted(range(len(ANGLES)), key=lambda i: [j in ANGLES[i] for j in JOINT_ORDER].index(True))
-    shades = [{"l_": GREY, "r_": BLUE}.get(ANGLES[i][:2], DARK) for i in order]
+    shades = [ON_PAPER[side_of(ANGLES[i])] for i in order]
     axes.bar(np.arange(len(order)), rest[order], color=shades)
     for place in np.flatnonzero(count[order] == 0).tolist():
         axes.text(place, 0, " not observed", rotation=90, ha="center", va="bottom", fontsize=7, color=GREY)

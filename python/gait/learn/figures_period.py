@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gait.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn import period
-from gait.learn.figures_base import BLUE, DARK, GREY, ORANGE, Floats, grid, plain, words
+from gait.learn.figures_base import Floats, grid, plain, words
 from gait.learn.fit import Learned
 from gait.learn.sequence import Sequence
 from gait.skeleton import ANGLES

@@ -22,11 +22,11 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Iterable
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from gait.errors import UserError, unreadable
+from gait.errors import UserError
+from gait.fields import json_object
 from gait.learn.articulated import SEGMENTS
 from gait.learn.marker_sets import BONE, LANDMARKS, LOOSE, SETS, Landmark, plain
 
@@ -77,15 +77,7 @@ def _content(path: Path) -> dict[str, Any]:
             raise UserError(f"{path}: {twice!r} is there twice; remove one")
         return dict(pairs)
 
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=unique)
-    except OSError as error:
-        raise unreadable(path, error) from error
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise UserError(f"{path}: not JSON ({error}); correct it") from None
-    if not isinstance(content, dict):
-        raise UserError(f'{path}: not an object; write {{"markers": {{label: landmark}}}}')
-    return content
+    return json_object(path, "correct it", 'write {"markers": {label: landmark}}', unique)
 
 
 def _known(path: Path, field: str, value: Any, names: Iterable[str]) -> str:
@@ -115,8 +107,7 @@ def _numbers(path: Path, field: str, values: Any, count: int, least: float) -> l
     """Check numbers of statures between `least` and 1."""
     good = isinstance(values, list) and len(values) == count
     if not good or not all(
-        isinstance(v, (int, float)) and not isinstance(v, bool) and isfinite(v) and least <= v <= 1
-        for v in values
+        isinstance(v, (int, float)) and not isinstance(v, bool) and least <= v <= 1 for v in values
     ):
         raise UserError(
             f"{path}: {field} is {json.dumps(values)}; write {count} numbers in statures, at most 1"

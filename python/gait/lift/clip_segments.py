@@ -25,7 +25,7 @@ Indices = npt.NDArray[np.intp]
 FAR = 10.0  # metres: a segment may start anywhere on the ground
 TURN = 10.0  # radians: and look anywhere
 CORRELATED = 6.0  # root of the sensors, or of the markers shared by segments, that count as one reading
-BODY = 0.02  # metres: where a joint is in a clothed body is seen no better
+BODY = 0.01  # metres: where a joint is in a clothed body is seen no better, the whole segment long
 FIRST_SD = 1.0  # of a sensor, before anything is known
 
 
@@ -194,13 +194,18 @@ class ClipSegments:
         return Reading(value, grid, np.full(len(grid), self.film.blur), self.sensor_sd)
 
     def _springs(self, segment: int, shape: Shape, near: Floats) -> Springs | None:
-        """Corrections in a segment's frames; what the prior leaves out at the marker weakens them."""
+        """Corrections in a segment's frames; what the prior leaves out at the marker weakens them.
+
+        That hardly changes within a segment, and its variance counts for that in every frame (gamma): one
+        correction of a marker has its share of it, and several of the same marker no more than one.
+        """
         frames = (self.frames(segment) + self.film.first).tolist()
         held = [c for c in self.corrections if c.frame in frames]
         if not held:
             return None
         marker = self.prior.index([c.joint for c in held])
-        skin = self.view.scale(near[PLACE]) * np.hypot(BODY, shape.residual[marker])
+        lasting = BODY**2 + shape.residual[marker] ** 2 / self.prior.frames
+        skin = self.view.scale(near[PLACE]) * np.sqrt(np.bincount(marker)[marker] * lasting)
         return Springs(
             frame=np.array([frames.index(c.frame) for c in held], np.intp),
             marker=marker,

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gait.learn.figures_base import GREY, plain
+from gait.colours import GREY
+from gait.learn.figures_base import plain
 from gait.learn.figures_model import STICKS
 
 Floats = npt.NDArray[np.float64]

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from gait.learn.figures_base import BLUE, DARK, GREY, ORANGE, Drawing, plain
+from gait.colours import DARK, GREY, ON_PAPER, side_of
+from gait.learn.figures_base import Drawing, plain
 from gait.learn.figures_model import STICKS
 from gait.lift.equations import Perspective, View
 from gait.lift.figures_base import SHOWN
@@ -36,7 +37,7 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
             for side, chains in STICKS.items():
                 for chain in chains:
                     known = [index[joint] for joint in chain if joint in index]
-                    axes.plot(*flat[known].T, color=BLUE if side == "l" else ORANGE, lw=1.6)
+                    axes.plot(*flat[known].T, color=ON_PAPER[side_of(f"{side}_")], lw=1.6)
         panels[0, column].plot(*points.T, ".", color=DARK, ms=3, zorder=3)
         depth = body @ ahead
         sd = motion.rooted_sd[frame] @ np.abs(ahead)

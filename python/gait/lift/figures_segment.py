@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.learn.figures_base import BLUE, DARK, GREY, ORANGE, Drawing, grid, line_legend
+from gait.colours import BLUE, DARK, GREY, ORANGE
+from gait.learn.figures_base import Drawing, grid, line_legend
 from gait.lift.figures_base import AHEAD, SIDE, rows, strip
 from gait.lift.posterior import Gaussian, place
 from gait.lift.prior import SegmentPrior

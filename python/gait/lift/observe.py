@@ -24,6 +24,7 @@ Floats = npt.NDArray[np.float64]
 NEAREST = 0.1  # metres before the lens: noise is not taken nearer
 LONGEST_GAP = 0.15  # seconds over which tracks are interpolated
 NEAR = 0.5  # metres beside the ray: a guess is good enough to take the projection's derivatives there
+NOISE = 5.0  # deviations that noise alone puts a point off: no guess is bad for that
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ def perspective(seen: Observations, camera: Camera, about: Floats, guess: Floats
     there = places if guess is None else guess[frame, marker]
     guessed, said = _ideal(camera, places), _ideal(camera, there)
     miss = (ideal - said) * depth[:, None]
-    near = np.linalg.norm(miss, axis=1, keepdims=True) < NEAR
+    near = np.linalg.norm(miss, axis=1, keepdims=True) < NEAR + NOISE * sd.max(axis=1, keepdims=True)
     direction = camera.R[:2] - np.where(near, guessed, ideal)[:, :, None] * camera.R[2]
     tangent = miss + np.einsum("nai,ni->na", direction, there)
     return Rows(frame, marker, direction, np.where(near, tangent, ideal * camera.t[2] - camera.t[:2]), sd**2)

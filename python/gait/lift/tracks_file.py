@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gait import delimited
 from gait.errors import UserError
 from gait.fields import frame_numbers
 from gait.files import replacing
 from gait.frame import Joints
-from gait.learn.csv_table import DELIMITERS
 
 Array = NDArray[np.float64]
 
@@ -215,17 +215,12 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     if not Path(path).is_file():
         raise UserError(f"{path}: no such file of tracks")
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            first = file.readline()
-            file.seek(0)
-            delimiter = max(DELIMITERS, key=first.count)
-            lines = [line for line in csv.reader(file, delimiter=delimiter) if line]
+        text = Path(path).read_text(encoding="utf-8-sig")
+        lines = [row for _, row in delimited.rows(text) if row]
     except (UnicodeDecodeError, csv.Error) as exc:
         raise UserError(f"{path}: not a CSV file ({exc})") from None
     if len(lines) < 2:
         raise UserError(f"{path}: has no rows; tracks are a header and one row per frame")
-    if delimiter == ";":  # where numbers have decimal commas
-        lines[1:] = [[cell.replace(",", ".") for cell in row] for row in lines[1:]]
     head = [name.strip() for name in lines[0]]
     twice = next((name for name in head if head.count(name) > 1), None)
     if twice is not None:

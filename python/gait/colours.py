@@ -1,0 +1,14 @@
+"""Colours of what is drawn: left sides of bodies are blue, right ones orange, on paper and over pictures."""
+
+from __future__ import annotations
+
+BLUE, ORANGE, GREY, DARK = "#2a6f97", "#d9722e", "#9a9a9a", "#222222"
+
+ON_PAPER = {"left": BLUE, "right": ORANGE, "middle": DARK}
+OVER_PICTURES = {"left": (235, 165, 60), "right": (50, 125, 250), "middle": (190, 215, 120)}
+"""BGR; brighter, to show on dark clothes, and pale green for the middle."""
+
+
+def side_of(name: str) -> str:
+    """Side of the body that a joint, limb or angle is on, by its name: ``left``, ``right`` or ``middle``."""
+    return {"l_": "left", "r_": "right"}.get(name[:2], "middle")
