@@ -139,7 +139,9 @@ def perspective(seen: Observations, camera: Camera, about: Floats, guess: Floats
     there = places if guess is None else guess[frame, marker]
     guessed, said = _ideal(camera, places), _ideal(camera, there)
     miss = (ideal - said) * depth[:, None]
-    near = np.linalg.norm(miss, axis=1, keepdims=True) < NEAR + NOISE * sd.max(axis=1, keepdims=True)
+    near = np.linalg.norm(miss, axis=1, keepdims=True) < np.maximum(
+        NEAR, NOISE * sd.max(axis=1, keepdims=True)
+    )
     direction = camera.R[:2] - np.where(near, guessed, ideal)[:, :, None] * camera.R[2]
     tangent = miss + np.einsum("nai,ni->na", direction, there)
     return Rows(frame, marker, direction, np.where(near, tangent, ideal * camera.t[2] - camera.t[:2]), sd**2)
