@@ -184,6 +184,7 @@ static void sum_up(const runner *r, const runner *first)
     out->cpu_ms = quantile(r->spent->cpu, r->count, 0.5);
     out->cpu_p99_ms = quantile(r->spent->cpu, r->count, 0.99);
     out->limit_ms = quantile(r->spent->limit_cpu[0], r->count, 0.5);
+    out->limit_p99_ms = quantile(r->spent->limit_cpu[0], r->count, 0.99);
     out->limit_ratio = quantile(limit, r->count, 0.5);
     out->ratio = quantile(ratio, r->count, 0.5);
     out->particle_ratio = quantile(particle, r->count, 0.5);

@@ -28,6 +28,7 @@ typedef struct bench_result {
     double cpu_ms, cpu_p99_ms;     /* of the calling thread, which other programs do not lengthen */
     double stage_ms[BENCH_STAGES]; /* median, CPU; 0 without stages */
     double limit_ms, limit_ratio;  /* CPU of the limit in these turns; a step to it by time of day; medians */
+    double limit_p99_ms; /* as cpu_p99_ms; its work never changes, so that more is the machine's doing */
     /* With the stages, medians of CPU time: likelihood to the limit with two look-ups, and with one kept. */
     double stage_ratio[2];
     double ratio; /* step by step to the first that took turns with it, median: time of day, */

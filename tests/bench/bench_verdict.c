@@ -68,7 +68,8 @@ static void thread_lines(const bench_result *one)
            2 / twins->ratio);
 }
 
-/* The slowest steps: by time of day, and on one core by its own time. */
+/* The slowest steps: by time of day, and on one core by its own time, beside the slowest runs of the limit in turns
+ * with them, whose work never changes: that share of it is the machine's. */
 static void latency_lines(const verdict *v)
 {
     const struct {
@@ -84,8 +85,11 @@ static void latency_lines(const verdict *v)
     for (size_t k = 0; k < sizeof row / sizeof *row; k++) {
         const bench_result *const r = row[k].run;
         line(row[k].what, 1.3, r->p99_ms / r->median_ms, false, "times");
-        if (r->plan.threads == 1)
-            line("        by CPU time", 1.3, r->cpu_p99_ms / r->cpu_ms, false, "times");
+        if (r->plan.threads > 1)
+            continue;
+        line("        by CPU time", 1.3, r->cpu_p99_ms / r->cpu_ms, false, "times");
+        printf("        the texture-only limit's, whose work never changes: %.2f times\n",
+               r->limit_p99_ms / r->limit_ms);
     }
 }
 
