@@ -14,38 +14,38 @@ from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryErr
 
 if TYPE_CHECKING:
     from gait._abi import Flag, Mode, Term, TrackStatus
-    from gait.camera import Camera
-    from gait.estimate import Estimate
-    from gait.frame import Joints
-    from gait.initial import Start
-    from gait.lifter import LiftConfig, LiftedFrame, Lifter
-    from gait.model import Model, ModelInfo
-    from gait.state import State
-    from gait.tracker import Tracker
-    from gait.trackerconfig import TrackerConfig
-    from gait.video import Frame, Video, VideoWriter, background
+    from gait.core.estimate import Estimate
+    from gait.core.frame import Joints
+    from gait.core.initial import Start
+    from gait.core.lifter import LiftConfig, LiftedFrame, Lifter
+    from gait.core.model import Model, ModelInfo
+    from gait.core.state import State
+    from gait.image.camera import Camera
+    from gait.image.video import Frame, Video, VideoWriter, background
+    from gait.track.tracker import Tracker
+    from gait.track.trackerconfig import TrackerConfig
 
 _HOME = {
-    "Camera": "camera",
-    "Estimate": "estimate",
+    "Camera": "image.camera",
+    "Estimate": "core.estimate",
     "Flag": "_abi",
-    "Frame": "video",
-    "Joints": "frame",
-    "LiftConfig": "lifter",
-    "LiftedFrame": "lifter",
-    "Lifter": "lifter",
+    "Frame": "image.video",
+    "Joints": "core.frame",
+    "LiftConfig": "core.lifter",
+    "LiftedFrame": "core.lifter",
+    "Lifter": "core.lifter",
     "Mode": "_abi",
-    "Model": "model",
-    "ModelInfo": "model",
-    "Start": "initial",
-    "State": "state",
+    "Model": "core.model",
+    "ModelInfo": "core.model",
+    "Start": "core.initial",
+    "State": "core.state",
     "Term": "_abi",
     "TrackStatus": "_abi",
-    "Tracker": "tracker",
-    "TrackerConfig": "trackerconfig",
-    "Video": "video",
-    "VideoWriter": "video",
-    "background": "video",
+    "Tracker": "track.tracker",
+    "TrackerConfig": "track.trackerconfig",
+    "Video": "image.video",
+    "VideoWriter": "image.video",
+    "background": "image.video",
 }
 
 __all__ = [

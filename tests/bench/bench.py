@@ -11,7 +11,7 @@ from pathlib import Path
 import bench_plot
 from facts import facts
 
-from gait.files import replacing
+from gait.io.files import replacing
 
 PLOT = Path("build/bench/speed.png")
 

@@ -38,7 +38,7 @@ from eval_run import Result, run
 from facts import facts
 
 from gait import TrackerConfig, UserError
-from gait.files import replacing
+from gait.io.files import replacing
 from gait.progress import progress
 
 OUT = eval_clips.ROOT / "build" / "eval"

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from eval_plan import Clip
 
+from gait.core.initial import DEFAULT_SD
 from gait.errors import UserError
-from gait.events import strikes_of
-from gait.initial import DEFAULT_SD
-from gait.trackfile import Joints, read_truth
+from gait.motion.events import strikes_of
+from gait.motion.trackfile import Joints, read_truth
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"

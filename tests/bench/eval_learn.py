@@ -22,7 +22,7 @@ from typing import NamedTuple
 import table
 from facts import facts
 
-from gait.files import replacing
+from gait.io.files import replacing
 
 HERE = Path(__file__).resolve().parent
 PARTS = (

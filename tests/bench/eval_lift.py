@@ -18,7 +18,7 @@ from pathlib import Path
 import table
 from facts import facts
 
-from gait.files import replacing
+from gait.io.files import replacing
 
 HERE = Path(__file__).resolve().parent
 PARTS = {

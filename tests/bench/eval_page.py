@@ -14,7 +14,7 @@ import eval_table
 import eval_wanted
 from eval_run import Result
 
-from gait.files import replacing
+from gait.io.files import replacing
 
 STYLE = """
 body{font:14px/1.45 system-ui,sans-serif;max-width:88em;margin:2em auto;padding:0 1em;color:#222}

@@ -10,10 +10,10 @@ import numpy as np
 from eval_marks import Marks
 
 from gait import Camera, Model, Video
-from gait.estimate import Estimate
-from gait.overlay import BONES, Overlay
-from gait.trackfile import read_truth
-from gait.video import Image
+from gait.core.estimate import Estimate
+from gait.draw.overlay import BONES, Overlay
+from gait.image.video import Image
+from gait.motion.trackfile import read_truth
 
 if TYPE_CHECKING:
     from eval_run import Result

@@ -11,8 +11,8 @@ from eval_run import Result
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gait.evaluate import LOST_MM
-from gait.skeleton import EVAL15
+from gait.body.skeleton import EVAL15
+from gait.motion.evaluate import LOST_MM
 
 COLOURS = ("#2a6f97", "#d9722e", "#5b8e3e", "#8a4f9e")
 STATUS = {"init": "#c8c8c8", "ambiguous": "#f4d06f", "lost": "#e07a7a"}

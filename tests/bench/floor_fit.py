@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
+from gait.body.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, curves, points
 from gait.learn import readers, retarget
 from gait.learn.fit import channel_scale
 from gait.learn.sequence import Sequence, levelled
-from gait.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, curves, points
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

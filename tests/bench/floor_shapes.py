@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from floor_fit import OFFSETS
 
+from gait.body.skeleton import ANGLES
 from gait.learn.fit import Learned
 from gait.learn.model_options import DEFAULT_COMPONENTS
-from gait.skeleton import ANGLES
-from gait.trackerconfig import TrackerConfig
+from gait.track.trackerconfig import TrackerConfig
 
 MOST = 12  # dimensions of a particle for its shape
 LENGTHS = MOST - DEFAULT_COMPONENTS

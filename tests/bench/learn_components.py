@@ -18,12 +18,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import gait_generator as g
 import learn_cases as cases
 
+from gait.body.skeleton import CHANNELS, default_skeleton, points
 from gait.learn import fit, fpca, impute, rank
 from gait.learn.model import anova
 from gait.learn.sequence import load
 from gait.learn.stage import one_thread_for_good
 from gait.progress import progress
-from gait.skeleton import CHANNELS, default_skeleton, points
 
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 SEEDS = 5

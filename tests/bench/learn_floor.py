@@ -27,13 +27,13 @@ import numpy.typing as npt
 import table
 from floor_shapes import ALL_OFFSETS, BARE, DIVIDED, MOST, OURS, SHAPES, TRACKED, UNMOVED
 
+from gait.body.pace import series
+from gait.body.skeleton import CHANNELS, Proportions, default_skeleton
 from gait.errors import UserError
 from gait.learn import cycles, fit, fpca, model, pace, prior, readers, retarget, subjects
 from gait.learn.sequence import Sequence, load, measured
 from gait.learn.stage import one_thread, one_thread_for_good
-from gait.pace import series
 from gait.progress import progress
-from gait.skeleton import CHANNELS, Proportions, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 Sections = dict[str, Any]

@@ -14,14 +14,14 @@ import numpy as np
 import numpy.typing as npt
 import table
 
-from gait import blob
+from gait.body.pace import series, waves
+from gait.body.skeleton import default_skeleton, points
 from gait.errors import UserError
+from gait.io import blob
 from gait.learn import between, fit, model, pace
 from gait.learn.fourier import HARMONICS
 from gait.learn.sequence import load
 from gait.learn.stage import one_thread
-from gait.pace import series, waves
-from gait.skeleton import default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 

@@ -21,11 +21,12 @@ import table
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import machines
 
-from gait import blob, skeleton
+from gait.body import skeleton
+from gait.core.model import Model
+from gait.core.state import State
 from gait.errors import UserError
-from gait.model import Model
+from gait.io import blob
 from gait.progress import progress
-from gait.state import State
 
 RUNS, JOBS = 3, (1, 2)
 SECONDS = 20  # wanted on two cores

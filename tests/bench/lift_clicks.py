@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.evaluate import root_errors
+from gait.body.skeleton import EVAL15
 from gait.lift.clip_segments import ClipSegments
 from gait.lift.fit_clip import ClipFit, fit_clip
 from gait.lift.springs import Correction
-from gait.skeleton import EVAL15
+from gait.motion.evaluate import root_errors
 
 Array = NDArray[np.float64]
 

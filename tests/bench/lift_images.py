@@ -25,7 +25,10 @@ from lift_clicks import POINTING, Score, corrected, score
 from lift_sticks import Walk, bends, depth_gaps, jump, stick_clip
 from scipy import stats
 
-from gait.camera import Camera
+from gait.body.skeleton import EVAL15, JOINTS
+from gait.core.model import read_cyclic
+from gait.image.camera import Camera
+from gait.image.video import Video, read_plate
 from gait.learn import readers, segment_motion
 from gait.learn.segment_options import Segments
 from gait.lift.beginning import Beginning
@@ -35,11 +38,8 @@ from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_placement
 from gait.lift.views import CameraView
-from gait.model import read_cyclic
+from gait.motion.trackfile import read_truth
 from gait.progress import progress
-from gait.skeleton import EVAL15, JOINTS
-from gait.trackfile import read_truth
-from gait.video import Video, read_plate
 
 PARTS = ("sticks", "clips", "outdoor")
 WALKS = {"35": "35_08", "07": "07_02", "16": "16_31"}

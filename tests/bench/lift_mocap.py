@@ -22,15 +22,15 @@ import numpy.typing as npt
 import table
 from eval_clips import DATA
 
+from gait.body.skeleton import axis_rotation
+from gait.core.lifter import Lifter
 from gait.learn import readers, segment_corpus, segment_motion
 from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.posterior import place
 from gait.lift.prior import SegmentPrior
-from gait.lifter import Lifter
 from gait.progress import progress
-from gait.skeleton import axis_rotation
 
 Floats = npt.NDArray[np.float64]
 

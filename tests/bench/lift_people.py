@@ -24,16 +24,16 @@ import numpy.typing as npt
 import table
 from eval_plan import Clip
 
-from gait.camera import Camera
+from gait.body.skeleton import EVAL15, axis_rotation
+from gait.core.lifter import LiftConfig
+from gait.image.camera import Camera
 from gait.learn import readers, segment_motion
 from gait.learn.segment_options import Segments
 from gait.learn.stage import one_thread
 from gait.lift import motion
 from gait.lift.prior import SegmentPrior
-from gait.lifter import LiftConfig
+from gait.motion.trackfile import Joints, read_truth
 from gait.progress import progress
-from gait.skeleton import EVAL15, axis_rotation
-from gait.trackfile import Joints, read_truth
 
 Floats = npt.NDArray[np.float64]
 

@@ -8,7 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.camera import Camera
+from gait.draw.overlay import BONES
+from gait.image.camera import Camera
+from gait.image.video import Frame, Image
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.energy import PLACE
 from gait.lift.fit_clip import ClipFit, Sequence
@@ -16,8 +18,6 @@ from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Placement
 from gait.lift.views import CameraView
-from gait.overlay import BONES
-from gait.video import Frame, Image
 
 Array = NDArray[np.float64]
 

@@ -17,12 +17,12 @@ import table
 from eval_plan import Clip
 
 from gait import TrackStatus
-from gait.camera import Camera
+from gait.body.skeleton import EVAL15
+from gait.core.lifter import LiftConfig, Lifter
+from gait.image.camera import Camera
 from gait.lift.tracks_file import Tracks
-from gait.lifter import LiftConfig, Lifter
+from gait.motion.trackfile import read_truth
 from gait.progress import progress
-from gait.skeleton import EVAL15
-from gait.trackfile import read_truth
 
 Floats = npt.NDArray[np.float64]
 

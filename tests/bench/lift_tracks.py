@@ -18,17 +18,17 @@ import numpy as np
 import numpy.typing as npt
 import table
 
-from gait.camera import Camera
+from gait.body.skeleton import EVAL15, axis_rotation
 from gait.errors import UserError
+from gait.image.camera import Camera
+from gait.io.trc import read_trc
 from gait.learn.stage import one_thread
 from gait.lift import motion, result
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
+from gait.motion.trackfile import Joints, read_truth
 from gait.progress import progress
-from gait.skeleton import EVAL15, axis_rotation
-from gait.trackfile import Joints, read_truth
-from gait.trc import read_trc
 
 Floats = npt.NDArray[np.float64]
 

@@ -19,10 +19,10 @@ import table
 from lift_mocap import AXES, MOCAP, MODES, SEQUENCES, HeldOut, held_out
 from scipy.optimize import brentq
 
+from gait.core.lifter import Lifter
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.observe import Observations, orthographic
 from gait.lift.posterior import Gaussian, Posterior, infer, place
-from gait.lifter import Lifter
 from gait.progress import progress
 
 LEFT_OUT = ("walk", "punch")  # one of each prior

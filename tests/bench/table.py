@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from gait.files import replacing
+from gait.io.files import replacing
 
 RESULTS = Path(__file__).resolve().parent / "results"
 DIGITS = 4  # significant ones of a number that is not whole

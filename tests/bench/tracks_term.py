@@ -24,11 +24,11 @@ import numpy as np
 import table
 from eval_plan import Clip
 
-from gait.camera import Camera
 from gait.cli import main as gait
+from gait.image.camera import Camera
 from gait.lift import tracks_file
+from gait.motion.trackfile import read_truth
 from gait.progress import progress
-from gait.trackfile import read_truth
 
 SEEDS = (1, 2, 3)
 PIXEL_SD = 4.0

@@ -19,6 +19,7 @@ check threads     $here/threads.sh "$B"/src/*.o
 check static_init $here/static_init.sh "$B"/src/*.o
 check headers     $here/headers.sh libgait/include/*.h
 check layers      python3 $here/layers.py libgait/LAYERS libgait/src
+check py_layers   python3 $here/py_layers.py python/LAYERS python/gait
 check stack       python3 $here/stack.py 16384 "$B"/src/*.su
 if ls "$B"/src/*.ci >/dev/null 2>&1; then
     check calls   python3 $here/calls.py 49152 "$B"/src/*.ci

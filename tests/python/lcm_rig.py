@@ -20,14 +20,14 @@ import lcm
 import numpy as np
 import pytest
 
-from gait.camera import Camera
+from gait.core.model import Model
+from gait.core.state import State
 from gait.errors import UserError
+from gait.image.camera import Camera
+from gait.image.video import VideoWriter
 from gait.lcm.link import open_lcm, private_url
 from gait.lcm.messages import camera_message, command_message, image_message
 from gait.lcm.types import gaitmsg
-from gait.model import Model
-from gait.state import State
-from gait.video import VideoWriter
 
 ROOT = Path(__file__).resolve().parents[2]
 TRACKD = Path(os.environ.get("GAIT_TRACKD", ROOT / "build" / "bin" / "gait-trackd"))

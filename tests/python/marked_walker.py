@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from gait.body.skeleton import ANGLES, SIDES, Proportions
 from gait.learn import articulated, retarget, rotations
 from gait.learn.articulated import SEGMENTS
 from gait.learn.marker_sets import LANDMARKS, SETS
-from gait.skeleton import ANGLES, SIDES, Proportions
 
 #: Labels of Plug-in-Gait's full body, as in Vicon's files.
 CENTRAL = ["SACR", "C7", "T10", "CLAV", "STRN"]

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import pytest
 from drawn_walker import camera
 
-from gait import GaitError, LibraryError, Model, Tracker, _abi, _lib
-from gait.trackerconfig import TrackerConfig
+from gait import GaitError, LibraryError, Model, Tracker, _abi
+from gait._abi import library as loader
+from gait.track.trackerconfig import TrackerConfig
 
 INCLUDE = Path(__file__).resolve().parents[2] / "libgait/include"
 HEADER = (INCLUDE / "gait.h").read_text()
-REAL = _lib.library()
+REAL = loader.library()
 
 
 def rows():
@@ -83,9 +84,9 @@ def test_enumerations_and_limits_equal_the_header():
 def test_missing_library_lists_every_candidate_with_its_reason(monkeypatch, tmp_path):
     text = tmp_path / "libgait.so"
     text.write_text("no library")
-    monkeypatch.setattr(_lib, "candidates", lambda: iter([str(tmp_path / "none.so"), str(text)]))
+    monkeypatch.setattr(loader, "candidates", lambda: iter([str(tmp_path / "none.so"), str(text)]))
     with pytest.raises(LibraryError) as caught:
-        _lib.library.__wrapped__()
+        loader.library.__wrapped__()
     words = str(caught.value)
     assert "none.so: no such file" in words and f"{text}: " in words and "make lib" in words
     assert "\n" not in words
@@ -93,41 +94,41 @@ def test_missing_library_lists_every_candidate_with_its_reason(monkeypatch, tmp_
 
 def test_environment_names_the_only_candidate(monkeypatch):
     monkeypatch.setenv("GAIT_LIBRARY", "/nowhere/libgait.so")
-    assert list(_lib.candidates()) == ["/nowhere/libgait.so"]
+    assert list(loader.candidates()) == ["/nowhere/libgait.so"]
 
 
 def test_another_library_is_refused():
-    path = next(p for p in _lib.candidates() if Path(p).is_file())
+    path = next(p for p in loader.candidates() if Path(p).is_file())
     with pytest.raises(LibraryError, match="not this version of libgait"):
-        _lib.open_library("libc.so.6")
-    assert _lib.open_library(path)
+        loader.open_library("libc.so.6")
+    assert loader.open_library(path)
 
 
 @pytest.mark.parametrize(
     "where, name, value, words",
     [
         (_abi, "ABI", 99, "ABI 3, this package needs 99"),
-        (_lib, "__version__", "9.9.9", "this package is 9.9.9"),
+        (loader, "__version__", "9.9.9", "this package is 9.9.9"),
     ],
 )
 def test_version_and_abi_mismatch_name_the_file(monkeypatch, where, name, value, words):
-    path = next(p for p in _lib.candidates() if Path(p).is_file())
+    path = next(p for p in loader.candidates() if Path(p).is_file())
     monkeypatch.setattr(where, name, value)
     with pytest.raises(LibraryError, match=re.escape(path) + ".*" + re.escape(words)):
-        _lib.open_library(path)
+        loader.open_library(path)
 
 
 def test_statuses_become_exceptions_with_name_and_index():
     error = _abi.Error(status=-1, index=3, text=b"fx is not positive")
     with pytest.raises(ValueError, match="GAIT_ERR_ARG: fx is not positive") as caught:
-        _lib.check(-1, error)
+        loader.check(-1, error)
     assert (caught.value.status, caught.value.name, caught.value.index) == (-1, "GAIT_ERR_ARG", 3)
-    assert _lib.check(0) == 0
+    assert loader.check(0) == 0
 
 
 @pytest.mark.parametrize("size", [1, 64, 1000])
 def test_memory_is_aligned(size):
-    memory = _lib.aligned(size)
+    memory = loader.aligned(size)
     assert memory.ctypes.data % _abi.ALIGN == 0 and memory.nbytes == size
 
 

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gait.body.skeleton import ANGLES, JOINTS, ROOTS, default_skeleton
 from gait.errors import UserError
 from gait.learn import angle_file, readers, retarget
 from gait.learn.angle_file import AngleTable
 from gait.learn.articulated import posed
 from gait.learn.body import Body
 from gait.learn.reading import Reading
-from gait.skeleton import ANGLES, JOINTS, ROOTS, default_skeleton
-from gait.trackfile import header
+from gait.motion.trackfile import header
 
 TABLE = mw.walk_angles(240, 100.0)
 DEGREES = np.degrees(1)

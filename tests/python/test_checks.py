@@ -158,6 +158,36 @@ def test_layers_sees_a_module_without_source(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("low.py", "from walk.high import a", "low.py:1: high is not below low"),
+        ("low.py", "def f():\n    from walk import high", "low.py:2: high is not below low"),
+        ("low.py", "import walk.high.a", "high is not below low"),
+        ("low.py", "from walk import Name", "__init__ is not below low"),
+        ("high/b.py", "from . import a", "__init__ is not below high"),
+        ("new.py", "import os", "new is not in LAYERS"),
+    ],
+)
+def test_py_layers_sees_an_upward_import(tmp_path, name, text, words):
+    layers, package = tmp_path / "LAYERS", tmp_path / "walk"
+    (package / "high").mkdir(parents=True)
+    layers.write_text("# comment\nlow\nhigh\n__init__\n")
+    (package / "__init__.py").write_text("from walk.high.a import x")
+    (package / "low.py").write_text("import numpy as np")
+    (package / "high" / "a.py").write_text("from walk.high import b\nfrom walk.low import y")
+    (package / "high" / "b.py").write_text("import walk.low")
+    assert run("py_layers.py", layers, package).returncode == 0
+    (package / name).write_text(text)
+    assert fails(run("py_layers.py", layers, package), words)
+
+
+def test_py_layers_sees_a_part_without_source(tmp_path):
+    (tmp_path / "LAYERS").write_text("ghost\n")
+    (tmp_path / "walk").mkdir()
+    assert fails(run("py_layers.py", tmp_path / "LAYERS", tmp_path / "walk"), "no source of ghost")
+
+
+@pytest.mark.parametrize(
     "code",
     [
         "void g(char *); void f(void) { char b[20000]; g(b); }",

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait.camera import Camera
 from gait.cli import main
+from gait.image.camera import Camera
+from gait.io.trc import read_trc
 from gait.lift import motion, outliers
 from gait.lift.result import METHODS
 from gait.lift.tracks_file import Tracks, read, write
-from gait.trc import read_trc
 
 FRAMES, MARKERS = 6, 12
 VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "none": []}

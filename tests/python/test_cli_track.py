@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from drawn_walker import DATA, camera, clip, state_at, wall, write
 
-from gait import Model, Video, blob
+from gait import Model, Video
 from gait.cli import main
+from gait.core.model import read_blob
+from gait.io import blob
 from gait.lift import tracks_file
-from gait.model import read_blob
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))

@@ -11,7 +11,7 @@ import pytest
 import gait
 from gait import _abi
 from gait.cli import COMMANDS, main, values
-from gait.trackerconfig import TrackerConfig
+from gait.track.trackerconfig import TrackerConfig
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,16 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
 from toy_segments import toy_prior
 
-from gait import Camera, UserError, blob, skeleton
-from gait.baselines import free_run, root_path, static_pose, stature
-from gait.calibration import calibration, coverage, crps
-from gait.evaluate import (
+from gait import Camera, UserError
+from gait.body import skeleton
+from gait.body.skeleton import EVAL15, JOINTS
+from gait.core.model import read_blob, read_cyclic
+from gait.io import blob
+from gait.learn import segment_sections
+from gait.lift import lifted_file
+from gait.motion.baselines import free_run, root_path, static_pose, stature
+from gait.motion.calibration import calibration, coverage, crps
+from gait.motion.evaluate import (
     LIMBS,
     evaluate,
     phase_errors,
@@ -23,12 +29,8 @@ from gait.evaluate import (
     root_errors,
     trust,
 )
-from gait.events import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
-from gait.learn import segment_sections
-from gait.lift import lifted_file
-from gait.model import read_blob, read_cyclic
-from gait.skeleton import EVAL15, JOINTS
-from gait.trackfile import Joints, Track, read_estimates, read_truth
+from gait.motion.events import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
+from gait.motion.trackfile import Joints, Track, read_estimates, read_truth
 
 SECTIONS = blob.decode(read_blob(None))
 RATE, FIRST_PHASE, HEIGHT = 0.9, 0.3, 1.7

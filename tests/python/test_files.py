@@ -6,7 +6,7 @@ import os
 import pytest
 
 from gait.errors import UserError
-from gait.files import filling, replacing, require_folder, require_writable
+from gait.io.files import filling, replacing, require_folder, require_writable
 
 
 def test_a_link_stays_and_its_file_is_written(tmp_path):

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
 
-from gait import Camera, Model, Start, UserError, Video, blob
-from gait.autostart import Spotter, find_start
-from gait.initial import DEFAULT_SD
-from gait.model import read_blob
-from gait.sighting import standing
-from gait.trackfile import read_truth
-from gait.video import Frame
+from gait import Camera, Model, Start, UserError, Video
+from gait.core.initial import DEFAULT_SD
+from gait.core.model import read_blob
+from gait.image.sighting import standing
+from gait.image.video import Frame
+from gait.io import blob
+from gait.motion.trackfile import read_truth
+from gait.track.autostart import Spotter, find_start
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -287,7 +288,7 @@ def test_looks_alone_do_at_any_frame_rate(monkeypatch, rate):
         seen.append(standing(foot, head, view, 1.0, 0.04))
         return seen[-1:]
 
-    monkeypatch.setattr("gait.autostart.people", one)
+    monkeypatch.setattr("gait.track.autostart.people", one)
     spotter = Spotter(view, None, MODEL)
     for n in range(2 * rate):
         frame = Frame(n, n / rate, wall())

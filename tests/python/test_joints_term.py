@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from drawn_walker import FPS, camera, clip
 
-from gait import Model, State, Term, Tracker, TrackerConfig, blob
-from gait.frame import Joints
-from gait.model import read_blob
+from gait import Model, State, Term, Tracker, TrackerConfig
+from gait.core.frame import Joints
+from gait.core.model import read_blob
+from gait.io import blob
 
 MODEL = Model()
 FRAMES, TRUE = clip(MODEL, blob.decode(read_blob(None)), 14)

@@ -3,9 +3,9 @@
 import lcm_rig as rig
 import numpy as np
 
+from gait.core.state import State
 from gait.lcm.messages import command_message, image_message
 from gait.lcm.types import gaitmsg
-from gait.state import State
 
 LOST = gaitmsg.estimate_t.LOST
 SCENE = rig.opening()[:2]  # camera and empty scene, no START

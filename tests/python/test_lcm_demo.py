@@ -9,7 +9,7 @@ import lcm_rig as rig
 import pytest
 
 from gait.cli import main
-from gait.trackfile import read_track
+from gait.motion.trackfile import read_track
 
 COUNT = 20
 

@@ -10,10 +10,10 @@ import pytest
 
 import gait
 from gait._abi import Mode
+from gait.core.model import Model
 from gait.errors import GaitError
-from gait.model import Model
-from gait.tracker import Tracker
-from gait.trackerconfig import TrackerConfig
+from gait.track.tracker import Tracker
+from gait.track.trackerconfig import TrackerConfig
 
 CAMERA = rig.CAMERA.to_dict()
 INIT = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": 0.1}}

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait.camera import Camera
+from gait.core.lifter import LiftConfig, Lifter
+from gait.image.camera import Camera
 from gait.lcm.link import private_url
 from gait.lcm.messages import camera_message, tracks_message
 from gait.lcm.types import gaitmsg
-from gait.lifter import LiftConfig, Lifter
 
 CAMERA = Camera.looking([0.0, -6.0, 1.4], [0.0, 0.0, 1.0], (640, 480), 700.0)
 NAMES_SEEN, FRAMES, LAG, SD = 15, 45, 4, 2.0
@@ -202,7 +202,7 @@ def test_a_model_without_the_prior_is_refused_with_the_remedy(tmp_path: Path) ->
 
 
 def _cyclic_only() -> bytes:
-    from gait import blob
+    from gait.io import blob
 
     sections = blob.decode(rig.MODEL.read_bytes(), "walk.gait")
     return blob.encode({k: v for k, v in sections.items() if not k.startswith("SG")})

@@ -273,8 +273,8 @@ def test_a_long_pause_stops_the_tracker_which_says_so(tmp_path):
 
 def test_a_shorter_pause_is_bridged_by_prediction(tmp_path):
     """As the library does when it is stepped without an image in between."""
-    from gait.tracker import Tracker
-    from gait.trackerconfig import TrackerConfig
+    from gait.track.tracker import Tracker
+    from gait.track.trackerconfig import TrackerConfig
 
     late = [rig.frame_message(i, utime=rig.utime(i) + 1_200_000) for i in range(3, 5)]
     events = [*rig.opening(), *rig.frames(0, 3), *(("GAIT_IMAGE_0", m) for m in late)]
@@ -330,7 +330,7 @@ def test_camera_scene_and_start_by_file_are_the_same_as_by_message(tmp_path):
     by_file = track(tmp_path, rig.frames(0, 6), *options)
     assert tracked(by_file) == [2, 3, 4, 5]
 
-    from gait.initial import Start
+    from gait.core.initial import Start
 
     read = Start.read(init, rig.model())
     start = command_message(gaitmsg.command_t.START, rig.utime(2), read.mean, read.sd)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gait.lcm.link import open_lcm, private_url
-from gait.trackfile import read_track
+from gait.motion.trackfile import read_track
 
 COUNT = 20
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from gait._abi import Term
-from gait.frame import Joints
+from gait.core.frame import Joints
 from gait.lcm.messages import image_message, tracks_message
 from gait.lcm.types import gaitmsg
-from gait.tracker import Tracker
-from gait.trackerconfig import TrackerConfig
+from gait.track.tracker import Tracker
+from gait.track.trackerconfig import TrackerConfig
 
 FRAMES, SD = 16, 1.0
 SAID = re.compile(r"tracks (\d+) tracks_used (\d+) tracks_late (\d+)")

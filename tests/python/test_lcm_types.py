@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gait.core.state import State
 from gait.errors import UserError
 from gait.lcm.messages import (
     camera_message,
@@ -23,7 +24,6 @@ from gait.lcm.messages import (
     state_of,
 )
 from gait.lcm.types import gaitmsg
-from gait.state import State
 
 # A published type is frozen: whoever must change one makes another (estimate2_t) and leaves this line alone.
 FINGERPRINTS = {
@@ -166,8 +166,8 @@ def test_commands_have_ids_of_their_own():
 
 def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
     """Encoded by C, decoded by Python, beside the binding's own estimate of the same frames."""
-    from gait.tracker import Tracker
-    from gait.trackerconfig import TrackerConfig
+    from gait.track.tracker import Tracker
+    from gait.track.trackerconfig import TrackerConfig
 
     outcome = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 6)]))
     config = TrackerConfig.default(particles=rig.PARTICLES)

@@ -10,10 +10,10 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
+from gait.draw.overlay import Overlay
 from gait.errors import UserError
 from gait.lcm.messages import estimate_of
 from gait.lcm.viewer import Screen, Viewer
-from gait.overlay import Overlay
 
 
 @pytest.fixture

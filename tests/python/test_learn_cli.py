@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 import gait.cli
-from gait import blob, skeleton
+from gait.body import skeleton
+from gait.body.skeleton import ANGLES, CHANNELS, JOINTS
 from gait.cli import info
+from gait.io import blob
 from gait.learn import fit, model, sources
 from gait.lift.prior import TAGS
-from gait.skeleton import ANGLES, CHANNELS, JOINTS
 
-SHIPPED = Path(skeleton.__file__).parent / "data/walk.gait"
+SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
 
 

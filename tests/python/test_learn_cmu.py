@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gait.body.skeleton import ANGLES, CHANNELS
 from gait.errors import UserError
 from gait.learn.reading import Reading
 from gait.learn.sequence import load
-from gait.skeleton import ANGLES, CHANNELS
 
 FPS = 120.0
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"

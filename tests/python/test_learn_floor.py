@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gait.blob import decode
-from gait.model import read_blob
-from gait.skeleton import CHANNELS, curves
+from gait.body.skeleton import CHANNELS, curves
+from gait.core.model import read_blob
+from gait.io.blob import decode
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import floor_fit

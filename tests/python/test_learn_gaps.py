@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import gait.cli
+from gait.body.skeleton import ANGLES
 from gait.errors import UserError
 from gait.learn import body, cycles, gaps, joint_file, marker_map, mocap_asf, retarget, sequence
 from gait.learn.fit import SAMPLES
 from gait.learn.reading import Reading
-from gait.skeleton import ANGLES
 
 RATE = 120
 

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import gait.cli
-from gait import Model, blob, skeleton
+from gait import Model
+from gait.body.skeleton import CHANNELS, Proportions
+from gait.io import blob
 from gait.learn import between, ground, report, sources
-from gait.skeleton import CHANNELS, Proportions
 
-SHIPPED = Path(skeleton.__file__).parent / "data/walk.gait"
+SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 
 
 @pytest.fixture(scope="module")

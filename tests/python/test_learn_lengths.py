@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gait import Model, State, blob, skeleton
+from gait import Model, State
+from gait.body import skeleton
+from gait.body.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
+from gait.core.model import read_blob
+from gait.io import blob
 from gait.learn import lengths, retarget
 from gait.learn.retarget import Measures
-from gait.model import read_blob
-from gait.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
 
 MEAN = Proportions()
 FRAMES = default_skeleton(MEAN).frames

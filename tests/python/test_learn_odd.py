@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import gait.cli
-from gait import Model, blob
+from gait import Model
+from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
 from gait.errors import UserError
+from gait.io import blob
 from gait.learn import fit, fpca, model, model_options, sources
-from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for name in ANGLES])
 

@@ -5,15 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gait import GaitError, Model, State, blob, skeleton
+from gait import GaitError, Model, State
+from gait.body import skeleton
+from gait.body.modelcurves import ModelCurves
+from gait.body.pace import MOST, pace, series, slope_of
+from gait.body.skeleton import CHANNELS
 from gait.cli import main
+from gait.core.model import read_blob, read_cyclic
 from gait.errors import UserError
+from gait.io import blob
 from gait.learn import pace as learnt
 from gait.learn.prior import mirrored
-from gait.model import read_blob, read_cyclic
-from gait.modelcurves import ModelCurves
-from gait.pace import MOST, pace, series, slope_of
-from gait.skeleton import CHANNELS
 
 SAMPLES = 64
 GAIT = np.array([0.9, 0.07])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import subspace_angles
 
+from gait.body.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
 from gait.learn import prior, singular
 from gait.learn.fourier import decode, encode, fourier_basis
-from gait.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
 
 SAMPLES, HARMONICS = 64, 5
 BODY = Proportions()

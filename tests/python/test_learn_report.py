@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import gait.cli
+from gait.body.skeleton import ANGLES, CHANNELS
 from gait.learn import (
     figures_cycle,
     figures_model,
@@ -23,7 +24,6 @@ from gait.learn import (
 from gait.learn.figures_base import SHOWN, column
 from gait.learn.stage import one_thread
 from gait.learn.subject_residuals import subject_residuals
-from gait.skeleton import ANGLES, CHANNELS
 
 
 @pytest.fixture(scope="module", autouse=True)

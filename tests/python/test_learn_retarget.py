@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gait import skeleton
+from gait.body import skeleton
+from gait.body.skeleton import ANGLES, CHANNELS, SIDES
 from gait.learn import readers, retarget, root, rotations
 from gait.learn.body import Body
-from gait.skeleton import ANGLES, CHANNELS, SIDES
 
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
 MODEL = skeleton.default_skeleton().sections() | {"CHNM": None}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import gait.cli
-from gait import blob
+from gait.io import blob
 from gait.learn import lengths, model, pace
 
 PEOPLE = 14  # more than META has rows

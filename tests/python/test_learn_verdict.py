@@ -6,12 +6,14 @@ import gait_generator as g
 import numpy as np
 import pytest
 
-from gait import blob, skeleton
+import gait
+from gait.body import skeleton
+from gait.body.skeleton import ANGLES
+from gait.io import blob
 from gait.learn import activity, period, verdict
-from gait.skeleton import ANGLES
 
 FPS, PERIOD = 100, 110.0
-SHIPPED = Path(skeleton.__file__).parent / "data/walk.gait"
+SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 PLACE = {"hip_flexion": 4, "knee_flexion": 7, "shoulder_flexion": 0, "elbow_flexion": 3}
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gait.body.skeleton import EVAL15, JOINTS
 from gait.lift import common, likeness
 from gait.lift.descent import Link, information, normal
 from gait.lift.fit_clip import fit_clip
@@ -14,7 +15,6 @@ from gait.lift.prior import SegmentPrior
 from gait.lift.tridiagonal import factor
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
-from gait.skeleton import EVAL15, JOINTS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import lift_clicks

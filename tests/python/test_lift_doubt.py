@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gait.camera import Camera
+from gait.body.skeleton import EVAL15
+from gait.image.camera import Camera
 from gait.lift import motion, result
 from gait.lift.doubt import FAR, doubted, price
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
 from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
-from gait.skeleton import EVAL15
 
 SD = 3.0
 CAMERA = Camera.looking((1.5, -6.0, 1.4), (1.0, 0, 0.9), (960, 720), 900)

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from toy_segments import toy_prior
 
-from gait.camera import Camera
+from gait.body.skeleton import JOINTS
+from gait.core.model import read_cyclic
 from gait.errors import UserError
+from gait.image.camera import Camera
+from gait.image.video import Frame
 from gait.lift import sensors
 from gait.lift.beginning import Beginning
 from gait.lift.descent import Link, normal
@@ -17,9 +20,6 @@ from gait.lift.prior import SegmentPrior
 from gait.lift.springs import CLICK_SD, as_json, read_corrections, read_placement
 from gait.lift.stick import Sticks, stick_responses
 from gait.lift.views import CameraView, FlatView
-from gait.model import read_cyclic
-from gait.skeleton import JOINTS
-from gait.video import Frame
 
 CAMERA = replace(
     Camera.looking((6, -1, 1.4), (0, 0, 0.9), (640, 480), 500.0),

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from toy_segments import toy_prior
 
-from gait.camera import Camera
+from gait.body.skeleton import axis_rotation
 from gait.errors import UserError
+from gait.image.camera import Camera
 from gait.lift import bordered, motion, result, sequence, soft, tridiagonal
 from gait.lift import chain as chains
 from gait.lift.chain import Around, Freedom, Segment, overlapping, restricted
@@ -20,7 +21,6 @@ from gait.lift.refuse import Unlike
 from gait.lift.sequence import Seen, Start, smooth
 from gait.lift.tracks_file import Tracks
 from gait.lift.uncertain import Uncertain
-from gait.skeleton import axis_rotation
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
 LEFT = Uncertain(0.0, *np.zeros((3, 3)))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from toy_segments import toy_prior
 
-from gait.camera import Camera
+from gait.body.skeleton import EVAL15, JOINTS
+from gait.image.camera import Camera
 from gait.lift import chain as chains
 from gait.lift import motion, size
 from gait.lift.chain import Around, Freedom, overlapping, restricted
@@ -16,7 +17,6 @@ from gait.lift.prior import SegmentPrior
 from gait.lift.result import Options
 from gait.lift.sequence import Seen, Start, smooth
 from gait.lift.tracks_file import Tracks
-from gait.skeleton import EVAL15, JOINTS
 
 STATURE, SECONDS, EXACT = 1.7, 2, 0.3  # metres, s, pixels
 SHAKY, FARTHEST_OFF = 40.0, 0.03  # pixels; share of the distance

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gait.body.skeleton import EVAL15, JOINTS
 from gait.lift import motion, result
 from gait.lift.equations import Perspective
 from gait.lift.prior import SegmentPrior
@@ -10,7 +11,6 @@ from gait.lift.soft import BONES, FEET
 from gait.lift.tracks_file import Tracks
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
-from gait.skeleton import EVAL15, JOINTS
 
 FRAMES, FPS, NOISE = 40, 25.0, 6.0  # pixels: less noise leaves less to mend
 STANDING = 0.05  # m/s

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gait import blob
+from gait.body.skeleton import EVAL15, JOINTS, pose
 from gait.cli import lift_video, main
+from gait.core.model import read_blob
 from gait.errors import UserError
-from gait.evaluate import root_errors
+from gait.image.video import Video, VideoWriter
+from gait.io import blob
 from gait.lift.clip_segments import Settings
 from gait.lift.cylinder import LIMBS, Figure
 from gait.lift.cylinder_picture import draw_figure
@@ -31,9 +33,7 @@ from gait.lift.springs import (
     read_placement,
 )
 from gait.lift.suggest import suggest
-from gait.model import read_blob
-from gait.skeleton import EVAL15, JOINTS, pose
-from gait.video import Video, VideoWriter
+from gait.motion.evaluate import root_errors
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import lift_clicks

@@ -11,14 +11,14 @@ import pytest
 from toy_segments import FRONT as AXES
 from toy_segments import toy_blob, toy_prior
 
-from gait import blob
-from gait.camera import Camera
+from gait.body.skeleton import axis_rotation
+from gait.core.lifter import LiftConfig, Lifter, LiftFlag
 from gait.errors import GaitError
+from gait.image.camera import Camera
+from gait.io import blob
 from gait.lift import heading, observe, posterior
 from gait.lift.prior import SegmentPrior
 from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
-from gait.lifter import LiftConfig, Lifter, LiftFlag
-from gait.skeleton import axis_rotation
 
 FRAMES, MARKERS = 10, 19
 FREEDOM = 10  # of the scale of a motion

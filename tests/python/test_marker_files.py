@@ -9,14 +9,14 @@ import marked_walker as mw
 import numpy as np
 import pytest
 
+from gait.body.skeleton import ANGLES
 from gait.errors import UserError
+from gait.io.trc import read_trc
 from gait.learn import c3d_file, marker_map, marker_sets, readers, retarget, root
 from gait.learn.articulated import SEGMENTS
 from gait.learn.period import find
 from gait.learn.reading import Reading
 from gait.learn.recording import Y_UP
-from gait.skeleton import ANGLES
-from gait.trc import read_trc
 
 DATA = Path(__file__).parents[2] / "../shared/data/mocap"
 

@@ -9,8 +9,10 @@ from drawn_walker import camera
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gait import GaitArgumentError, GaitError, Model, State, UserError, blob, skeleton
-from gait.model import read_blob
+from gait import GaitArgumentError, GaitError, Model, State, UserError
+from gait.body import skeleton
+from gait.core.model import read_blob
+from gait.io import blob
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))

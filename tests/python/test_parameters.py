@@ -8,16 +8,17 @@ import pytest
 from drawn_walker import DATA
 from walking_track import STANCE, STEP, walking_track
 
-from gait import Model, UserError, blob
-from gait.anglecycles import angle_cycles
-from gait.events import strikes_from_meta
-from gait.fields import read_json
-from gait.footfall_draws import Draws
-from gait.footfalls import SIDES, find_events, stride_time
-from gait.model import read_blob
-from gait.modelcurves import ModelCurves
-from gait.parameters import QUANTITIES, measure
-from gait.trackfile import read_truth
+from gait import Model, UserError
+from gait.body.modelcurves import ModelCurves
+from gait.core.model import read_blob
+from gait.io import blob
+from gait.io.fields import read_json
+from gait.motion.anglecycles import angle_cycles
+from gait.motion.events import strikes_from_meta
+from gait.motion.footfall_draws import Draws
+from gait.motion.footfalls import SIDES, find_events, stride_time
+from gait.motion.parameters import QUANTITIES, measure
+from gait.motion.trackfile import read_truth
 
 MODEL = Model()
 CURVES = ModelCurves(blob.decode(read_blob(None)))

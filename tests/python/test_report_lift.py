@@ -11,8 +11,8 @@ import pytest
 import threadpoolctl
 from toy_segments import toy_blob, toy_prior
 
-from gait.camera import Camera
 from gait.cli import main
+from gait.image.camera import Camera
 from gait.lift import figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.tracks_file import Tracks, read, write

@@ -11,10 +11,10 @@ from test_parameters import drawn
 from walking_track import walking_track, write_track
 
 from gait.cli import main
-from gait.colours import BLUE, ORANGE
-from gait.overlay import side_colour
-from gait.parameter_plots import path_plot
-from gait.parameters import QUANTITIES, measure
+from gait.draw.colours import BLUE, ORANGE
+from gait.draw.overlay import side_colour
+from gait.draw.parameter_plots import path_plot
+from gait.motion.parameters import QUANTITIES, measure
 
 
 @pytest.fixture(scope="module")

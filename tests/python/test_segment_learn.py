@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mocap_files import write_toy
 
+from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, Proportions, default_skeleton, points
 from gait.errors import UserError
 from gait.learn import (
     readers,
@@ -22,7 +23,6 @@ from gait.learn.angle_file import AngleTable
 from gait.learn.segment_corpus import Corpus, Recorded
 from gait.learn.segment_options import Segments
 from gait.learn.virtual_markers import MARKERS, SKIN, marked_skeleton
-from gait.skeleton import ANGLES, CHANNELS, JOINTS, Proportions, default_skeleton, points
 
 PLAIN = Segments(people=False)
 

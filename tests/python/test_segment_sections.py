@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait import blob
 from gait.errors import UserError
+from gait.io import blob
 from gait.learn.segment_sections import sections
 from gait.lift.prior import TAGS, SegmentPrior
 

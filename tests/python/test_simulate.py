@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from gait import blob
-from gait.camera import Camera
 from gait.cli import main
 from gait.errors import UserError
+from gait.image.camera import Camera
+from gait.image.video import Video
+from gait.io import blob
 from gait.simulate import FILES, PRESETS, Scenario
 from gait.simulate.anatomy import PARENTS, POINT_BONE, POINTS
 from gait.simulate.clip import background, pictures, simulate
@@ -22,7 +23,6 @@ from gait.simulate.raster import rasterise
 from gait.simulate.stage import Stage, build_set, set_stage
 from gait.simulate.truth import find_events
 from gait.simulate.views import VIEWS
-from gait.video import Video
 
 TINY = Scenario(frames=5, size=(160, 120), seed=3)
 SEGMENTS = {

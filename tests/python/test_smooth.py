@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from drawn_walker import camera, clip, state_at, wall, write
 
-from gait import Model, State, Tracker, TrackerConfig, UserError, blob
+from gait import Model, State, Tracker, TrackerConfig, UserError
 from gait._abi import Mode, TrackStatus
+from gait.body.modelcurves import ModelCurves
 from gait.cli import main
-from gait.footfall_draws import Draws
-from gait.model import read_blob
-from gait.modelcurves import ModelCurves
-from gait.smooth import Spool, draw_motions
-from gait.trackfile import read_track
-from gait.transitions import Step, Transitions
+from gait.core.model import read_blob
+from gait.io import blob
+from gait.motion.footfall_draws import Draws
+from gait.motion.trackfile import read_track
+from gait.track.smooth import Spool, draw_motions
+from gait.track.transitions import Step, Transitions
 
 SECTIONS = blob.decode(read_blob(None))
 if "PROP" not in SECTIONS:  # two ways in which limbs differ in length

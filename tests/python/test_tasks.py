@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gait import GaitLimitError, _abi
-from gait.tasks import threads
+from gait.track.tasks import threads
 
 LISTING = Path("/proc/self/task")
 

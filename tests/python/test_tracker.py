@@ -22,9 +22,9 @@ from gait import (
     UserError,
     Video,
     _abi,
-    blob,
 )
-from gait.model import read_blob
+from gait.core.model import read_blob
+from gait.io import blob
 
 MODEL = Model()
 FRAMES, TRUE = clip(MODEL, blob.decode(read_blob(None)), 14)
@@ -70,7 +70,7 @@ def test_defaults_come_from_the_library_and_survive_the_way_there(mode):
 
 
 def _abi_library():
-    from gait._lib import library
+    from gait._abi.library import library
 
     return library()
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gait import Estimate, Flag, Frame, Model, State, TrackStatus, UserError
-from gait.skeleton import EVAL15, JOINTS
-from gait.trackfile import TrackWriter, read_track, read_truth
-from gait.trc import write_trc
+from gait.body.skeleton import EVAL15, JOINTS
+from gait.io.trc import write_trc
+from gait.motion.trackfile import TrackWriter, read_track, read_truth
 
 MODEL = Model()
 HEADER = (

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from drawn_walker import clip, wall, write
 
-from gait import Model, UserError, Video, VideoWriter, background, blob
-from gait.model import read_blob
-from gait.video import median_plate
+from gait import Model, UserError, Video, VideoWriter, background
+from gait.core.model import read_blob
+from gait.image.video import median_plate
+from gait.io import blob
 
 
 def pattern(i, width=64, height=48):

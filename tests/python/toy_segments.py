@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gait import blob
+from gait.body.skeleton import JOINTS
+from gait.io import blob
 from gait.learn.segment_sections import sections
 from gait.lift.prior import SegmentPrior
-from gait.skeleton import JOINTS
 
 #: Axes of a picture taken along +y: to the right and up.
 FRONT = np.array([[1.0, 0, 0], [0, 0, 1]])
@@ -18,7 +18,7 @@ def toy_prior(
 ) -> SegmentPrior:
     """Random prior: markers of a stature's extent, modes smooth in time, a small residual.
 
-    The markers are the first of gait.skeleton.JOINTS (19 at most), then m19, m20 ...
+    The markers are the first of gait.body.skeleton.JOINTS (19 at most), then m19, m20 ...
     """
     rng = np.random.default_rng(seed)
     names = tuple(JOINTS[:markers]) + tuple(f"m{i}" for i in range(len(JOINTS), markers))

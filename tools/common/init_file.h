@@ -1,4 +1,4 @@
-/* init_file.h - where the walker is at one frame, by the project's init JSON; same rules as gait/initial.py. */
+/* init_file.h - where the walker is at one frame, by the project's init JSON; same rules as gait/core/initial.py. */
 #ifndef TOOLS_INIT_FILE_H
 #define TOOLS_INIT_FILE_H
 #include "gait.h"

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* As in gait/autostart.py and gait/sighting.py. */
+/* As in gait/track/autostart.py and gait/image/sighting.py. */
 static const double WINDOW = 1.0, KEEP = 1.5; /* seconds */
 static const double LEAD = 0.1;               /* statures the lowest foot is nearer than the pelvis */
 static const double DEPTH_SD = 0.10,

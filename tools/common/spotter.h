@@ -1,5 +1,5 @@
 /* spotter.h - somebody walks into the empty scene: from a second of blobs to a first state; as
- * gait/autostart.py. */
+ * gait/track/autostart.py. */
 #ifndef TOOLS_SPOTTER_H
 #define TOOLS_SPOTTER_H
 #include "blob_finder.h"

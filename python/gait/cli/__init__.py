@@ -109,7 +109,7 @@ class _Version(argparse.Action):
     """Say the versions, for which the library is loaded, and end."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from gait._lib import library, version_text  # here, as it loads numpy
+        from gait._abi.library import library, version_text  # here, as it loads numpy
 
         loaded = library()
         print(f"gait {__version__} libgait {version_text(loaded.gait_version())} abi {loaded.gait_abi()}")

@@ -13,10 +13,10 @@ import sys
 
 import numpy as np
 
-from gait.camera import Camera
-from gait.camerafile import read_camera
-from gait.files import replacing, require_outputs
-from gait.placing import place, read_points
+from gait.image.camera import Camera
+from gait.image.camerafile import read_camera
+from gait.image.placing import place, read_points
+from gait.io.files import replacing, require_outputs
 
 NAME = "camera"
 HELP = "where a camera stands, from points measured on the ground"

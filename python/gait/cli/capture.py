@@ -22,17 +22,17 @@ from itertools import chain
 import cv2
 import numpy as np
 
-from gait.camera import Camera
 from gait.cli import values
+from gait.core.initial import OUTSIDE, Start
+from gait.core.model import Model
 from gait.errors import UserError
-from gait.initial import OUTSIDE, Start
+from gait.image.camera import Camera
+from gait.image.video import Frame, background, read_plate
 from gait.lcm.capture import Publisher, Setup
 from gait.lcm.link import buffer_warning, lcm_url
 from gait.lcm.pacing import Pacer, parse_rate
 from gait.lcm.source import DeviceSource, FileSource, is_device
-from gait.model import Model
 from gait.progress import progress
-from gait.video import Frame, background, read_plate
 
 NAME = "capture"
 HELP = "send the frames of a video or a camera over LCM"
@@ -142,7 +142,7 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
         return start
     if isinstance(source, DeviceSource) or setup.camera is None:
         raise UserError("--init auto: needs a video file and --camera; give an init file")
-    from gait.autostart import find_start  # slow to load, and only needed here
+    from gait.track.autostart import find_start  # slow to load, and only needed here
 
     return find_start(source.video, setup.camera, setup.plate, model, height=args.height)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gait._abi import Mode
 from gait.errors import LibraryError
-from gait.trackerconfig import TrackerConfig
+from gait.track.trackerconfig import TrackerConfig
 
 
 def particles(mode: Mode = Mode.DEFAULT) -> str:

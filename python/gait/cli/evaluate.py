@@ -18,12 +18,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-from gait.camera import Camera
+from gait.core.model import read_cyclic
 from gait.errors import UserError
-from gait.evaluate import Measures, evaluate
-from gait.events import strikes_of
-from gait.model import read_cyclic
-from gait.trackfile import read_estimates, read_truth
+from gait.image.camera import Camera
+from gait.motion.evaluate import Measures, evaluate
+from gait.motion.events import strikes_of
+from gait.motion.trackfile import read_estimates, read_truth
 
 NAME = "eval"
 HELP = "errors of a track against the truth"

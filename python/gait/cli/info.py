@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from gait import blob
+from gait.body.pace import slope_of
 from gait.cli import segment_text
+from gait.io import blob
 from gait.lift.prior import TAGS, SegmentPrior
-from gait.pace import slope_of
 
 NAME = "info"
 HELP = "what a model holds"

@@ -6,9 +6,9 @@ import argparse
 import json
 import sys
 
-from gait import blob
 from gait.cli import segment_text
 from gait.errors import UserError
+from gait.io import blob
 from gait.learn import model, segment_fit, segment_sections
 from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments

@@ -9,10 +9,10 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from gait import blob
 from gait.cli import learn_hints, learn_prior, learn_segments, learn_text
 from gait.errors import UsageError, UserError
-from gait.files import require_folder, require_writable
+from gait.io import blob
+from gait.io.files import require_folder, require_writable
 from gait.learn import activity, fit, fork_server, marker_map, model, report_place, segment_sections, sources
 from gait.learn.readers import KINDS
 from gait.learn.reading import Reading

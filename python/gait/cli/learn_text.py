@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait import blob
+from gait.body.skeleton import ANGLES
 from gait.cli import segment_text
+from gait.io import blob
 from gait.learn import fit, ground, model, unseen
 from gait.learn.model_options import DEFAULT_COMPONENTS
 from gait.learn.sequence import Sequence
 from gait.lift.prior import SegmentPrior
-from gait.skeleton import ANGLES
 
 Floats = npt.NDArray[np.float64]
 

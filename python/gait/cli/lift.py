@@ -26,13 +26,13 @@ from typing import Any
 import numpy as np
 
 from gait.cli import lift_prior, lift_tracks, lift_video, values
+from gait.core.initial import STATURE
 from gait.errors import UsageError, UserError
-from gait.files import require_outputs
-from gait.initial import STATURE
+from gait.io.files import require_outputs
+from gait.io.trc import write_trc
 from gait.lift import lifted_file, motion, outliers, result
 from gait.lift.tracks_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
-from gait.trc import write_trc
 
 NAME = "lift"
 HELP = "2-D joint tracks, or a video, to 3-D"

@@ -6,8 +6,8 @@ import sys
 
 import numpy as np
 
-from gait.camera import Camera
 from gait.errors import UserError
+from gait.image.camera import Camera
 from gait.learn.stage import one_thread
 from gait.lift import motion, outliers, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along

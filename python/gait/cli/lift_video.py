@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.blob import decode
-from gait.camera import Camera
+from gait.body.skeleton import JOINTS
 from gait.cli import lift_prior, values
+from gait.core.model import read_blob, read_cyclic
 from gait.errors import UsageError, UserError
+from gait.image.camera import Camera
+from gait.image.video import Video, VideoWriter, background, require_video_name
+from gait.io.blob import decode
 from gait.learn.stage import one_thread
 from gait.lift import lifted_file, suggest
 from gait.lift.beginning import Beginning
@@ -28,10 +31,7 @@ from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_corrections, read_placement
 from gait.lift.views import CameraView, FlatView, View
-from gait.model import read_blob, read_cyclic
 from gait.progress import progress
-from gait.skeleton import JOINTS
-from gait.video import Video, VideoWriter, background, require_video_name
 
 Floats = npt.NDArray[np.float64]
 

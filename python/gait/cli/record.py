@@ -16,7 +16,7 @@ import signal
 import sys
 from typing import Any
 
-from gait.files import require_outputs
+from gait.io.files import require_outputs
 from gait.lcm.link import lcm_url
 from gait.lcm.record import ESTIMATE, LAGGED, Recorder
 

@@ -14,14 +14,14 @@ import argparse
 
 import cv2
 
-from gait.camera import Camera
 from gait.cli.values import between
+from gait.core.model import Model
+from gait.core.state import SCALARS, State
+from gait.draw.strip import draw_room, draw_strip, room_camera
 from gait.errors import UserError
-from gait.fields import Fields, read_json
-from gait.files import replacing, require_outputs
-from gait.model import Model
-from gait.state import SCALARS, State
-from gait.strip import draw_room, draw_strip, room_camera
+from gait.image.camera import Camera
+from gait.io.fields import Fields, read_json
+from gait.io.files import replacing, require_outputs
 
 NAME = "render"
 HELP = "draw a pose or a model"

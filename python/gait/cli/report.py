@@ -16,20 +16,20 @@ from typing import Any
 
 import numpy as np
 
-from gait.camera import Camera
 from gait.cli.evaluate import text as evaluation_text
+from gait.core.model import Model, read_cyclic
+from gait.draw.overlay import Overlay
+from gait.draw.page import Page
 from gait.durations import spread
-from gait.evaluate import Measures, evaluate
-from gait.events import Strikes, strikes_of
-from gait.files import replacing, require_outputs
+from gait.image.camera import Camera
+from gait.image.video import Image, Video, VideoWriter
+from gait.io.files import replacing, require_outputs
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
 from gait.lcm.results import Run, read_run
-from gait.model import Model, read_cyclic
-from gait.overlay import Overlay
-from gait.page import Page
+from gait.motion.evaluate import Measures, evaluate
+from gait.motion.events import Strikes, strikes_of
+from gait.motion.trackfile import Joints, Track, read_track, read_truth
 from gait.progress import progress
-from gait.trackfile import Joints, Track, read_track, read_truth
-from gait.video import Image, Video, VideoWriter
 
 NAME = "report"
 HELP = "overlay video and HTML page of a tracked clip"

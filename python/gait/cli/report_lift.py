@@ -23,8 +23,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.cli import lift_tracks, values
+from gait.draw.page import Page
 from gait.errors import UsageError, UserError
-from gait.files import filling, require_folder
+from gait.io.files import filling, require_folder
 from gait.learn import readers, segment_corpus, segment_motion
 from gait.learn.figures_base import Drawing
 from gait.learn.segment_corpus import Corpus
@@ -36,7 +37,6 @@ from gait.lift.motion import output_names
 from gait.lift.prior import SegmentPrior
 from gait.lift.result import METHODS, Motion, Options
 from gait.lift.tracks_file import Tracks
-from gait.page import Page
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

@@ -14,17 +14,17 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gait import parameter_files
-from gait.anglecycles import AngleCycle, angle_cycles
+from gait.body.modelcurves import ModelCurves
+from gait.core.model import read_cyclic
+from gait.draw.page import Page
+from gait.draw.parameter_plots import angle_plot, deviation_plot, footfall_plot, path_plot, stride_plot
 from gait.errors import UserError
-from gait.files import filling, require_folder
-from gait.footfall_draws import Draws
-from gait.model import read_cyclic
-from gait.modelcurves import ModelCurves
-from gait.page import Page
-from gait.parameter_plots import angle_plot, deviation_plot, footfall_plot, path_plot, stride_plot
-from gait.parameters import QUANTITIES, Parameters, measure
-from gait.trackfile import Track, read_track
+from gait.io.files import filling, require_folder
+from gait.motion import parameter_files
+from gait.motion.anglecycles import AngleCycle, angle_cycles
+from gait.motion.footfall_draws import Draws
+from gait.motion.parameters import QUANTITIES, Parameters, measure
+from gait.motion.trackfile import Track, read_track
 
 NAME = "report track"
 HELP = "gait parameters of a track, with plots"

@@ -35,26 +35,26 @@ from typing import Any
 import numpy as np
 
 from gait._abi import Mode, Term, TrackStatus
-from gait.autostart import Spotter, find_start
-from gait.camera import Camera
+from gait.body.modelcurves import ModelCurves
 from gait.cli import defaults, values
+from gait.core.estimate import Estimate
+from gait.core.frame import Joints
+from gait.core.initial import OUTSIDE, Start
+from gait.core.model import Model, read_cyclic
+from gait.draw.overlay import Overlay
 from gait.durations import spread
 from gait.errors import UsageError, UserError
-from gait.estimate import Estimate
-from gait.files import require_outputs
-from gait.frame import Joints
-from gait.initial import OUTSIDE, Start
+from gait.image.camera import Camera
+from gait.image.video import Frame, Image, Video, VideoWriter, background
+from gait.io.files import require_outputs
+from gait.io.trc import write_trc
 from gait.lift import tracks_file
-from gait.model import Model, read_cyclic
-from gait.modelcurves import ModelCurves
-from gait.overlay import Overlay
+from gait.motion.trackfile import TrackWriter
 from gait.progress import progress
-from gait.smoothed import Smoother
-from gait.tracker import Tracker
-from gait.trackerconfig import TrackerConfig
-from gait.trackfile import TrackWriter
-from gait.trc import write_trc
-from gait.video import Frame, Image, Video, VideoWriter, background
+from gait.track.autostart import Spotter, find_start
+from gait.track.smoothed import Smoother
+from gait.track.tracker import Tracker
+from gait.track.trackerconfig import TrackerConfig
 
 TRACKS_SD = 4.0  # pixels
 

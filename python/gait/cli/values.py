@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentTypeError
 from collections.abc import Callable
 
-from gait.initial import STATURE
+from gait.core.initial import STATURE
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
 THREADS = (1, 256)  # GAIT_POOL_MAX

@@ -13,13 +13,13 @@ import time
 
 import cv2
 
-from gait.camera import Camera
+from gait.core.model import Model
 from gait.errors import UserError
-from gait.files import replacing
+from gait.image.camera import Camera
+from gait.image.video import Image
+from gait.io.files import replacing
 from gait.lcm.link import lcm_url
 from gait.lcm.viewer import Screen, Viewer
-from gait.model import Model
-from gait.video import Image
 
 NAME = "view"
 HELP = "watch the estimates of gait-trackd in a browser"

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gait.camera import Camera
+from gait.core.initial import Start
 from gait.errors import UserError
-from gait.initial import Start
+from gait.image.camera import Camera
+from gait.image.video import Frame, Image
 from gait.lcm.ahead import ahead
 from gait.lcm.link import handle, is_log, open_lcm
 from gait.lcm.messages import camera_message, command_message, decode, image_message
 from gait.lcm.pacing import Pacer
 from gait.lcm.source import DeviceSource, FileSource
 from gait.lcm.types import gaitmsg
-from gait.video import Frame, Image
 
 ANNOUNCE = 2.0  # seconds of video between two announcements of camera and empty scene
 _AHEAD = 8  # frames decoded before they are due

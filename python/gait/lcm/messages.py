@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gait._abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
-from gait.camera import Camera
+from gait.core.estimate import Estimate
+from gait.core.state import SCALARS, State
 from gait.errors import UserError
-from gait.estimate import Estimate
+from gait.image.camera import Camera
+from gait.image.video import Image
 from gait.lcm.types import gaitmsg
-from gait.state import SCALARS, State
-from gait.video import Image
 
 _FRAME_KEY = "frame"
 _UNKNOWN = math.nan

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gait._abi import TrackStatus
-from gait.colours import BLUE, GREY, ORANGE
-from gait.evaluate import root_errors
-from gait.events import Strikes
+from gait.draw.colours import BLUE, GREY, ORANGE
 from gait.lcm.results import Run
-from gait.trackfile import Joints, Track
+from gait.motion.evaluate import root_errors
+from gait.motion.events import Strikes
+from gait.motion.trackfile import Joints, Track
 
 Array = NDArray[np.float64]
 Painter = Callable[[Axes], None]

@@ -12,12 +12,12 @@ import numpy as np
 
 from gait.durations import spread
 from gait.errors import UserError
-from gait.files import replacing
+from gait.image.video import Frame
+from gait.io.files import replacing
 from gait.lcm.link import handle, is_log, open_lcm
 from gait.lcm.messages import decode, estimate_of, now
 from gait.lcm.types import gaitmsg
-from gait.trackfile import TrackWriter
-from gait.video import Frame
+from gait.motion.trackfile import TrackWriter
 
 _NO_IMAGE = np.empty((0, 0), np.uint8)
 _TURN = 0.1  # seconds, longest wait before looking whether to stop

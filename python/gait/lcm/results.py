@@ -10,8 +10,8 @@ import lcm
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.core.estimate import Estimate
 from gait.errors import UserError
-from gait.estimate import Estimate
 from gait.lcm.messages import decode, estimate_of
 from gait.lcm.types import gaitmsg
 

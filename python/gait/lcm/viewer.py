@@ -11,14 +11,14 @@ from typing import Any
 
 import cv2
 
-from gait.camera import Camera
+from gait.core.model import Model
+from gait.draw.overlay import Overlay
 from gait.errors import UserError
+from gait.image.camera import Camera
+from gait.image.video import Image
 from gait.lcm.link import handle, is_log, open_lcm
 from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.lcm.types import gaitmsg
-from gait.model import Model
-from gait.overlay import Overlay
-from gait.video import Image
 
 _KEPT = 64  # frames that wait for their estimate
 _PART = "gait-frame"

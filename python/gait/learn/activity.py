@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import JOINTS, SIDES, default_skeleton, points
 from gait.learn.body import Body
-from gait.skeleton import JOINTS, SIDES, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 

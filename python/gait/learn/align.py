@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES
 from gait.learn.fourier import first_harmonic
 from gait.learn.periodic import Curve
 from gait.learn.shift import BINS, Shift
-from gait.skeleton import ANGLES
 
 Floats = npt.NDArray[np.float64]
 

@@ -2,10 +2,10 @@
 
     frame,time,l_hip_flexion_deg,l_knee_flexion_deg,...
 
-Columns are named like `gait.skeleton.ANGLES`, with `_deg`, `_rad` or no suffix; at least flexion of both hips
-and knees, the rest is missing.  Angles without suffix are degrees if any of them is beyond `RADIANS`, else
-radians.
-Columns named like `gait.skeleton.ROOTS` (statures, or angles as above) and `stature_m` are used if present.
+Columns are named like `ANGLES` of `gait.body.skeleton`, with `_deg`, `_rad` or no suffix; at least flexion of
+both hips and knees, the rest is missing.  Angles without suffix are degrees if any of them is beyond
+`RADIANS`, else radians.
+Columns named like its `ROOTS` (statures, or angles as above) and `stature_m` are used if present.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, ROOTS, SIDES
 from gait.errors import UserError
 from gait.learn import csv_table, joint_file, remarks
 from gait.learn.recording import DEGREES, mask_zero_runs, require_range
 from gait.learn.remarks import NOTHING, Remarks
 from gait.learn.rotations import unwrap
-from gait.skeleton import ANGLES, ROOTS, SIDES
 
 Floats = npt.NDArray[np.float64]
 
@@ -47,9 +47,9 @@ class AngleTable:
     fps : float
         Frames per second.
     angles : (T, 24)
-        In the order of `gait.skeleton.ANGLES`, radians; NaN where missing.
+        In the order of `gait.body.skeleton.ANGLES`, radians; NaN where missing.
     root : (T, 6) or None
-        In the order of `gait.skeleton.ROOTS`, radians and statures; None if the file has no such column.
+        In the order of `gait.body.skeleton.ROOTS`, radians and statures; None if the file has no such column.
     stature : float or None
         Metres, if the file says.
     remarks : Remarks

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gait.skeleton import ANGLES, SIDES, axis_rotation, default_skeleton
+from gait.body.skeleton import ANGLES, SIDES, axis_rotation, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import SIDES
 from gait.errors import UserError
 from gait.learn.recording import Recording
 from gait.learn.remarks import NOTHING, Remarks
 from gait.learn.rotations import rotation_vectors, unit
-from gait.skeleton import SIDES
 
 Floats = npt.NDArray[np.float64]
 

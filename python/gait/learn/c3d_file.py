@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.trc import METRES
+from gait.io.trc import METRES
 
 Floats = npt.NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gait import delimited
+from gait.body.skeleton import ANGLES, ROOTS
 from gait.errors import UserError, quoted, unreadable
+from gait.io import delimited
 from gait.learn.recording import DEGREES, FARTHEST, require_frames
-from gait.skeleton import ANGLES, ROOTS
 
 Floats = npt.NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from gait.colours import GREY
+from gait.body.skeleton import CHANNELS
+from gait.draw.colours import GREY
 from gait.learn.fit import SAMPLES, Learned
-from gait.skeleton import CHANNELS
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
+from gait.body.skeleton import CHANNELS
 from gait.learn.figures_base import (
     PHASE,
     PHASE_LABEL,
@@ -22,7 +23,6 @@ from gait.learn.figures_base import (
     words,
 )
 from gait.learn.fit import Learned
-from gait.skeleton import CHANNELS
 
 ALIGNED = ("r_hip_flexion", "r_knee_flexion", "l_shoulder_flexion")
 MOST_SEQUENCES = 40  # drawn before and after

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gait.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
+from gait.body.skeleton import ANGLES, JOINTS, default_skeleton, points
+from gait.draw.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
 from gait.learn.figures_base import (
     PHASE,
     PHASE_LABEL,
@@ -22,7 +23,6 @@ from gait.learn.figures_base import (
     words,
 )
 from gait.learn.fit import Learned
-from gait.skeleton import ANGLES, JOINTS, default_skeleton, points
 
 PHASES = 8  # of a strip
 TURNS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}

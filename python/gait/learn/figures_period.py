@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gait.colours import BLUE, DARK, GREY, ORANGE
+from gait.body.skeleton import ANGLES
+from gait.draw.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn import period
 from gait.learn.figures_base import Floats, grid, plain, words
 from gait.learn.fit import Learned
 from gait.learn.sequence import Sequence
-from gait.skeleton import ANGLES
 
 FLAT = 5.0  # least top of a row's scale, so that the ratio of noise, about 1, looks as flat as it is
 MOST_NAMES = 60  # rows of the map that are named

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from gait.colours import BLUE, ORANGE
+from gait.draw.colours import BLUE, ORANGE
 from gait.learn.between import ADULT_STATURE
 from gait.learn.figures_base import grid
 from gait.learn.fit import Learned

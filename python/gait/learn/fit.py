@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
 from gait.errors import UserError
 from gait.learn import align, cycles, fpca, ground, lengths, pace, prior, rank, retarget, unseen
 from gait.learn.model_options import DEFAULT_COMPONENTS
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
 from gait.learn.subject_residuals import SubjectResiduals, subject_residuals
-from gait.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 

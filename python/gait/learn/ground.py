@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 from gait.learn.fourier import decode, encode, fourier_basis
 from gait.learn.fpca import Components
-from gait.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, JOINTS, SIDES, default_skeleton
 from gait.errors import UserError
 from gait.learn import csv_table, remarks, skeleton_fit, torn_joint
 from gait.learn.articulated import HINGES, ORIGINS, SEGMENTS, Pose, posed
@@ -20,7 +21,6 @@ from gait.learn.body import Body
 from gait.learn.gaps import bridged
 from gait.learn.recording import Y_UP, mask_zero_runs
 from gait.learn.rotations import frame_from, unit
-from gait.skeleton import ANGLES, JOINTS, SIDES, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 

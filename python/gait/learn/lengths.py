@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import SIDES, Proportions, default_skeleton, points
 from gait.learn.retarget import Measures, own_proportions
-from gait.skeleton import SIDES, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 

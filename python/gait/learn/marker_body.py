@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import JOINTS, SIDES, default_skeleton
 from gait.errors import UserError
 from gait.learn import articulated, marker_map, marker_sets, skeleton_fit
 from gait.learn.articulated import HINGES, SEGMENTS
 from gait.learn.body import RECORDED, Body
 from gait.learn.marker_sets import LANDMARKS, Landmark, plain
 from gait.learn.stretch_information import Information
-from gait.skeleton import JOINTS, SIDES, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 

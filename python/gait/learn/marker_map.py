@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from gait.errors import UserError
-from gait.fields import json_object
+from gait.io.fields import json_object
 from gait.learn.articulated import SEGMENTS
 from gait.learn.marker_sets import BONE, LANDMARKS, LOOSE, SETS, Landmark, plain
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from gait.body.skeleton import SIDES, Proportions
 from gait.learn.articulated import SEGMENTS
-from gait.skeleton import SIDES, Proportions
 
 _P = Proportions()
 

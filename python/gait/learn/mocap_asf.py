@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UserError, quoted
-from gait.files import text_lines
+from gait.io.files import text_lines
 from gait.learn import remarks
 from gait.learn.recording import (
     DEGREES,

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait import blob
 from gait._version import __version__
+from gait.body.pace import series
+from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
+from gait.io import blob
 from gait.learn.between import ADULT_STATURE, LENGTH_SD, RATE_SD, by_subject
 from gait.learn.fit import Learned
 from gait.learn.pace import TERMS
 from gait.learn.rounded import rounded
 from gait.learn.spool import by_rows, release
-from gait.pace import series
-from gait.skeleton import ANGLES, CHANNELS, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 

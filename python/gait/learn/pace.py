@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.pace import pace, series, waves
+from gait.body.skeleton import CHANNELS
 from gait.errors import UserError
 from gait.learn.between import RATE_SD, by_subject
 from gait.learn.prior import mirrored
 from gait.learn.sequence import Sequence
 from gait.learn.spool import by_rows, release, stored
-from gait.pace import pace, series, waves
-from gait.skeleton import CHANNELS
 
 Floats = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.intp]
@@ -34,7 +34,7 @@ STEEPEST = 1.0
 
 
 def of(sequences: list[Sequence], subject: Groups) -> Floats:
-    """Pace of sequences (n,): stride rates as `gait.pace` tells them; `subject` (n,) owns them."""
+    """Pace of sequences (n,): stride rates as `gait.body.pace` tells them; `subject` (n,) owns them."""
     rates = np.array([s.fps / s.period.frames for s in sequences])
     return pace(by_subject(rates, subject, RATE_SD), rates)
 

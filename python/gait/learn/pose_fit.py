@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES
 from gait.learn import articulated
 from gait.learn.articulated import FREEDOMS, ROOT, Indices, Pose
-from gait.skeleton import ANGLES
 
 Floats = npt.NDArray[np.float64]
 

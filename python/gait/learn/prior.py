@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 from gait.learn.fourier import HARMONICS, decode, encode, fourier_basis
 from gait.learn.fpca import Components
 from gait.learn.singular import leading, right_singular
 from gait.learn.spool import by_rows
-from gait.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.intp]

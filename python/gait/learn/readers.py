@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import SIDES
 from gait.errors import UserError
+from gait.io.trc import read_trc
 from gait.learn import (
     angle_file,
     c3d_file,
@@ -26,8 +28,6 @@ from gait.learn.body import Body, body
 from gait.learn.reading import DEFAULT, Reading
 from gait.learn.recording import FARTHEST, Y_UP, require_frames, require_range
 from gait.learn.stretch_information import Information
-from gait.skeleton import SIDES
-from gait.trc import read_trc
 
 Floats = npt.NDArray[np.float64]
 

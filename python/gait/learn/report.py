@@ -8,7 +8,7 @@ import io
 from pathlib import Path
 
 from gait.errors import UserError
-from gait.files import filling
+from gait.io.files import filling
 from gait.learn import model, report_place
 from gait.learn.figures import drawings
 from gait.learn.figures_base import Drawing

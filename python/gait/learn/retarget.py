@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, SIDES, Proportions
 from gait.learn.body import Body
 from gait.learn.rotations import decompose_yxz, decompose_zyx, frame_from, unit, unwrap
-from gait.skeleton import ANGLES, SIDES, Proportions
 
 Floats = npt.NDArray[np.float64]
 
@@ -37,7 +37,7 @@ STANCE_SHARE = 0.15  # share of frames in which a foot moves least: it is flat o
 
 @dataclass(frozen=True)
 class Measures:
-    """A body's own size, metres, of the same meaning as `gait.skeleton.Proportions` times the stature.
+    """A body's own size, metres, of the same meaning as `gait.body.skeleton.Proportions` times the stature.
 
     Lengths of parts that were never seen are NaN; the stature is then that of a person with the rest.
     """
@@ -127,7 +127,7 @@ def torso_frames(body: Body) -> Floats:
 
 
 def angles(body: Body, measures: Measures) -> Floats:
-    """Angles (T, 24) in the order of `gait.skeleton.ANGLES`, radians; NaN where a joint is missing."""
+    """Angles (T, 24) in the order of `gait.body.skeleton.ANGLES`, radians; NaN where a joint is missing."""
     j = body.joints
     result: dict[str, Floats] = {}
     torso = torso_frames(body)

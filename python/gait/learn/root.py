@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import SIDES, Proportions, axis_rotation
 from gait.learn.body import Body
 from gait.learn.retarget import BALL, Measures, median, stance
 from gait.learn.rotations import decompose_zyx, frame_from, unit, unwrap
-from gait.skeleton import SIDES, Proportions, axis_rotation
 
 Floats = npt.NDArray[np.float64]
 

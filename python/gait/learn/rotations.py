@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from gait.skeleton import axis_rotation
+from gait.body.skeleton import axis_rotation
 
 Floats = npt.NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, CHANNELS, ROOTS, SIDES, Proportions
 from gait.learn.angle_file import AngleTable
 from gait.learn.segment_people import Pose
 from gait.learn.virtual_markers import MARKERS
-from gait.skeleton import ANGLES, CHANNELS, ROOTS, SIDES, Proportions
 
 Floats = npt.NDArray[np.float64]
 

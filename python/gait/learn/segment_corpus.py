@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import axis_rotation
 from gait.learn.segment_motion import Motion
 from gait.learn.segment_options import Segments
 from gait.learn.spool import Spool, release, stored
-from gait.skeleton import axis_rotation
 
 Floats = npt.NDArray[np.float64]
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from gait.body.skeleton import ANGLES, CHANNELS, SIDES
 from gait.errors import UserError
 from gait.learn import retarget, root, segment_angles, segment_people
 from gait.learn.angle_file import AngleTable
@@ -22,7 +23,6 @@ from gait.learn.rotations import decompose_zyx
 from gait.learn.segment_options import Segments
 from gait.learn.segment_people import Pose
 from gait.learn.virtual_markers import MARKERS
-from gait.skeleton import ANGLES, CHANNELS, SIDES
 
 Floats = npt.NDArray[np.float64]
 

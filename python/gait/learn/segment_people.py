@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, CHANNELS, SIDES, Proportions, points
 from gait.learn.lengths import GROUPS
 from gait.learn.virtual_markers import MARKERS, marked_skeleton
-from gait.skeleton import ANGLES, CHANNELS, SIDES, Proportions, points
 
 Floats = npt.NDArray[np.float64]
 
@@ -32,7 +32,7 @@ FEET = [MARKERS.index(f"{s}_{part}") for s in SIDES for part in ("toe", "heel")]
 
 @dataclass(frozen=True)
 class Pose:
-    """A body's proportions and its channels (T, 30) over time; `gait.skeleton` says what they mean."""
+    """A body's proportions and its channels (T, 30) over time; `gait.body.skeleton` says what they mean."""
 
     proportions: Proportions
     channels: Floats

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gait import blob
+from gait.io import blob
 from gait.learn.rounded import rounded
 from gait.lift.prior import SegmentPrior
 

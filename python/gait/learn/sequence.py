@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, ROOTS, SIDES
 from gait.errors import UserError
 from gait.learn import activity, cycles, period, readers, retarget, root, subjects, trim, verdict
 from gait.learn.angle_file import AngleTable
 from gait.learn.body import Body
 from gait.learn.reading import DEFAULT, Reading
 from gait.learn.rotations import unwrap
-from gait.skeleton import ANGLES, ROOTS, SIDES
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, EVAL15, JOINTS, Proportions, default_skeleton, points
 from gait.learn import fpca
 from gait.learn.between import ADULT_STATURE
-from gait.skeleton import ANGLES, EVAL15, JOINTS, Proportions, default_skeleton, points
 
 Floats = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.bool_]

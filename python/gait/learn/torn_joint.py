@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import SIDES
 from gait.errors import UserError
-from gait.skeleton import SIDES
 
 Floats = npt.NDArray[np.float64]
 

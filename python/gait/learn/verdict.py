@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ANGLES, SIDES
 from gait.learn.activity import NAMES, Footing
 from gait.learn.fourier import first_harmonic
 from gait.learn.period import CYCLES, Period
-from gait.skeleton import ANGLES, SIDES
 
 Floats = npt.NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def judge(
     Parameters
     ----------
     angles : (T, 24)
-        In the order of `gait.skeleton.ANGLES`; NaN where missing.
+        In the order of `gait.body.skeleton.ANGLES`; NaN where missing.
     found : Period
     feet : Footing or None
         None if the feet were not seen.

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.skeleton import ELLIPSOID, JOINTS, SIDES, Proportions, Skeleton, default_skeleton
+from gait.body.skeleton import ELLIPSOID, JOINTS, SIDES, Proportions, Skeleton, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 

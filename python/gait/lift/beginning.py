@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait import blob
+from gait.body.skeleton import pose
+from gait.io import blob
 from gait.lift.prior import SegmentPrior
 from gait.lift.springs import Placement
-from gait.skeleton import pose
 
 Floats = npt.NDArray[np.float64]
 

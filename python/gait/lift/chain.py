@@ -19,9 +19,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
+from gait.body.skeleton import axis_rotation
 from gait.lift.bordered import Information
 from gait.lift.prior import SegmentPrior
-from gait.skeleton import axis_rotation
 
 Floats = npt.NDArray[np.float64]
 

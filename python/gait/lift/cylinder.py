@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import ELLIPSOID, JOINTS, default_skeleton
 from gait.errors import UserError
 from gait.learn import articulated, skeleton_fit
 from gait.learn.articulated import Pose
 from gait.learn.virtual_markers import MARKERS, SKIN, marked_skeleton
-from gait.skeleton import ELLIPSOID, JOINTS, default_skeleton
 
 Floats = npt.NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class Figure:
         return float(np.exp(self.stretch[0]))
 
     def joints(self) -> Floats:
-        """Places (T, 19, 3) of `gait.skeleton.JOINTS`, metres."""
+        """Places (T, 19, 3) of `gait.body.skeleton.JOINTS`, metres."""
         segment = _BODY.point_frames.astype(np.intp)
         local = articulated.scales(self.stretch)[segment] * _BODY.point_positions
         posed = articulated.posed(self.pose, articulated.origins(self.stretch))

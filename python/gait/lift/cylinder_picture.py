@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import JOINTS
+from gait.draw.overlay import draw_bones, tinted
+from gait.image.video import Image
 from gait.lift.cylinder import LIMBS
 from gait.lift.springs import Correction
 from gait.lift.views import View
-from gait.overlay import draw_bones, tinted
-from gait.skeleton import JOINTS
-from gait.video import Image
 
 Floats = npt.NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def draw_figure(
     surfaces : (L, P, 3)
         Points whose hulls are the limbs, metres.
     joints : (19, 3)
-        `gait.skeleton.JOINTS`.
+        `gait.body.skeleton.JOINTS`.
     springs : sequence of (Correction, (3,))
         Corrections of this frame and where their markers are, metres.
     """

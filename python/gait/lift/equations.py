@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gait.camera import Camera
 from gait.errors import UsageError
+from gait.image.camera import Camera
 from gait.lift.observe import Observations, Rows, orthographic, perspective
 
 Floats = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gait.colours import GREY
+from gait.draw.colours import GREY
 from gait.learn.figures_base import plain
 from gait.learn.figures_model import STICKS
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from gait.colours import DARK, GREY, ON_PAPER, side_of
+from gait.draw.colours import DARK, GREY, ON_PAPER, side_of
 from gait.learn.figures_base import Drawing, plain
 from gait.learn.figures_model import STICKS
 from gait.lift.equations import Perspective, View

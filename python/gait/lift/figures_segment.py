@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.colours import BLUE, DARK, GREY, ORANGE
+from gait.core.lifter import LiftConfig, Lifter
+from gait.draw.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn.figures_base import Drawing, grid, line_legend
 from gait.lift.figures_base import AHEAD, SIDE, rows, strip
 from gait.lift.posterior import Gaussian, place
 from gait.lift.prior import SegmentPrior
-from gait.lifter import LiftConfig, Lifter
 
 Floats = npt.NDArray[np.float64]
 

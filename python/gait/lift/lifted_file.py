@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from gait.files import replacing
+from gait.io.files import replacing
 
 Floats = npt.NDArray[np.float64]
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import JOINTS
 from gait.errors import UserError
 from gait.lift import sequence, size, start, uncertain
 from gait.lift.chain import Freedom, blended, in_turn, restricted
@@ -27,7 +28,6 @@ from gait.lift.refuse import Unlike, require_seen, require_size
 from gait.lift.result import Motion, Options
 from gait.lift.sequence import Lifted, Seen, Start
 from gait.lift.tracks_file import Tracks
-from gait.skeleton import JOINTS
 
 Floats = npt.NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import axis_rotation
 from gait.errors import UserError
 from gait.lift.observe import Rows
 from gait.lift.prior import SegmentPrior
-from gait.skeleton import axis_rotation
 
 Floats = npt.NDArray[np.float64]
 

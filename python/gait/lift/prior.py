@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait import blob
 from gait.errors import UserError
+from gait.io import blob
 
 Floats = npt.NDArray[np.float64]
 
@@ -107,7 +107,7 @@ class SegmentPrior:
         UserError
             If the file is no sound blob, or holds no such prior.
         """
-        from gait.model import read_blob  # the model's module loads the C library's bindings
+        from gait.core.model import read_blob  # the model's module loads the C library's bindings
 
         name = os.fspath(path) if path is not None else "walk.gait"
         return cls.from_sections(blob.decode(read_blob(path), name), name)

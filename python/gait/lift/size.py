@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.camera import Camera
+from gait.image.camera import Camera
 from gait.lift.prior import SegmentPrior
 from gait.lift.soft import BONES
 

@@ -26,9 +26,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gait.core.initial import DEFAULT_SD, SCALARS, STATURE
 from gait.errors import UserError
-from gait.fields import Fields, read_json
-from gait.initial import DEFAULT_SD, SCALARS, STATURE
+from gait.io.fields import Fields, read_json
 from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtr
 
+from gait.draw.overlay import BONES
 from gait.errors import UserError
-from gait.overlay import BONES
 
 Floats = npt.NDArray[np.float64]
 

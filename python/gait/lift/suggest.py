@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.body.skeleton import JOINTS
 from gait.lift.clip_segments import ClipSegments
 from gait.lift.fit_clip import ClipFit
 from gait.lift.springs import CLICK_SD
-from gait.skeleton import JOINTS
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

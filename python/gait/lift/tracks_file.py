@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gait import delimited
+from gait.core.frame import Joints
 from gait.errors import UserError
-from gait.fields import frame_numbers
-from gait.files import replacing
-from gait.frame import Joints
+from gait.io import delimited
+from gait.io.fields import frame_numbers
+from gait.io.files import replacing
 
 Array = NDArray[np.float64]
 

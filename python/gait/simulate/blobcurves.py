@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gait import blob
+from gait.body.pace import pace, slope_of
 from gait.errors import UserError
-from gait.pace import pace, slope_of
+from gait.io import blob
 from gait.simulate.arrays import Array
 from gait.simulate.curves import NAMES, Curves, fit_series, stride_modes
 

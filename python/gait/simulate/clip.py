@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 
 from gait.errors import UserError
-from gait.files import replacing, require_writable
+from gait.image.video import VideoWriter
+from gait.io.files import replacing, require_writable
 from gait.simulate.arrays import Picture
 from gait.simulate.render import Renderer, develop
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import Set, Stage, build_set, set_stage
 from gait.simulate.truth import CRF, describe, find_events, first_state, write_truth
-from gait.video import VideoWriter
 
 FILES = ("video.mp4", "background.png", "camera.json", "truth.csv", "init.json", "meta.json", "contact.jpg")
 _CONTACTS = (3, 2)  # pictures across and down in contact.jpg

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gait.camera import Camera
+from gait.image.camera import Camera
 from gait.simulate.anatomy import Anatomy, draw_anatomy
 from gait.simulate.arrays import Array, Ints
 from gait.simulate.blobcurves import curves_of_model

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from gait._version import __version__
-from gait.files import replacing
-from gait.initial import DEFAULT_SD
+from gait.core.initial import DEFAULT_SD
+from gait.io.files import replacing
 from gait.simulate.anatomy import BONE_INDEX, SIDES
 from gait.simulate.arrays import Array, Ints
 from gait.simulate.render import DEFOCUS_PX, SHUTTER

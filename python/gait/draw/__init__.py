@@ -1,0 +1,1 @@
+"""Pictures, plots and pages of models, estimates and parameters."""

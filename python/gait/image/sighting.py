@@ -1,0 +1,109 @@
+"""See a person against the background: person-sized blobs, their place on the ground and their stature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.image.camera import Camera
+from gait.image.video import Image
+
+Array = NDArray[np.float64]
+
+STATURE = (1.2, 2.4)  # metres by foot and head ray alone, so with room for shadows
+_GREY_STEP = 14.0  # least difference from the plate that counts, grey levels
+_NOISE_STEPS = 5.0  # and in robust standard deviations of the picture's noise
+_FILL = 0.15  # a standing person covers at least this share of the box round it
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One blob that may be a person.
+
+    Attributes
+    ----------
+    foot, head : ndarray of shape (2,)
+        Lowest and highest point on the blob's middle line, pixels.
+    place : ndarray of shape (3,)
+        Where the ray of `foot` meets the ground, metres.
+    stature : float
+        Height of the head ray over `place`, metres.
+    strength : float
+        How much there is of it: pixels of a blob, votes of a detector.
+    spread : float
+        Standard deviation of `foot` and `head` beyond a pixel or two, as a share of the person's height.
+    """
+
+    foot: Array
+    head: Array
+    place: Array
+    stature: float
+    strength: float
+    spread: float = 0.0
+
+    @property
+    def tall(self) -> float:
+        """Height in the picture, pixels."""
+        return float(self.foot[1] - self.head[1])
+
+
+def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
+    """Mask (h, w), 255 where a BGR picture differs from the plate by more than noise and exposure explain."""
+    step = image.astype(np.float32) - plate
+    step -= np.median(step[::4, ::4], axis=(0, 1))  # exposure: most of the picture is background
+    change = cv2.GaussianBlur(np.abs(step).max(axis=2), (0, 0), 1.2)
+    noise = 1.4826 * float(np.median(change[::4, ::4]))
+    mask = (change > max(_GREY_STEP, _NOISE_STEPS * noise)).astype(np.uint8) * 255
+    reach = max(3, image.shape[0] // 90) | 1  # joins what low contrast tears apart, mostly at neck and knees
+    mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return np.asarray(
+        cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3 * reach, reach), np.uint8)), np.uint8
+    )
+
+
+def sightings(image: Image, plate: Image, camera: Camera) -> list[Sighting]:
+    """Find blobs of a person's size standing on the ground in full view, largest first."""
+    mask = foreground(image, plate)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    found = []
+    for i in range(1, count):
+        x, y, width, height, area = (int(value) for value in stats[i])
+        inside = x > 1 and y > 1 and x + width < camera.width - 1 and y + height < camera.height - 1
+        if inside and height > 30 and height > width and area > _FILL * width * height:
+            blob = labels[y : y + height, x : x + width] == i
+            one = _measure(blob, x, y, area, camera)
+            if one is not None:
+                found.append(one)
+    return sorted(found, key=lambda one: -one.strength)
+
+
+def _measure(blob: NDArray[np.bool_], x: int, y: int, area: int, camera: Camera) -> Sighting | None:
+    """Measure a blob whose box begins at (x, y); None if it cannot be a person on the ground."""
+    height = len(blob)
+    columns = np.nonzero(blob)[1]
+    middle = x + float(np.median(columns))
+    crown = np.nonzero(blob[: max(1, height // 10)])[1]
+    foot = np.array([middle, y + height - 0.5])
+    head = np.array([x + float(np.median(crown)), y - 0.5])
+    return standing(foot, head, camera, area)
+
+
+def standing(
+    foot: Array, head: Array, camera: Camera, strength: float, spread: float = 0.0
+) -> Sighting | None:
+    """Sighting of somebody between two pixels; None if a person on the ground is not there and that tall."""
+    place = camera.on_plane(foot)
+    if not np.isfinite(place).all():
+        return None
+    stature = height_over(camera, head, float(np.hypot(*(place - camera.centre)[:2])))
+    fits = STATURE[0] <= stature <= STATURE[1]
+    return Sighting(foot, head, place, stature, strength, spread) if fits else None
+
+
+def height_over(camera: Camera, pixel: Array, distance: float) -> float:
+    """Height over ground of a pixel's ray at a horizontal distance from the camera, metres."""
+    ray = camera.rays(pixel)
+    return float(camera.centre[2] + distance * ray[2] / np.hypot(ray[0], ray[1]))

@@ -1,0 +1,227 @@
+"""Video files in and out (PyAV, so no system FFmpeg), and the plate of the empty scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+import av
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.errors import UserError
+from gait.io.files import replacing
+
+Image = NDArray[np.uint8]
+"""A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
+
+_CONTAINERS = (".mp4", ".mkv", ".mov")
+
+
+class Frame(NamedTuple):
+    """One frame of a video."""
+
+    number: int
+    """Position in the file, from 0."""
+    time: float
+    """Presentation time since the first frame of the file, seconds."""
+    image: Image
+
+    @property
+    def utime(self) -> int:
+        """The time in integer microseconds, as the tracker wants it."""
+        return round(self.time * 1e6)
+
+
+class Video:
+    """A video file that can be read any number of times.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+    width, height : int
+        Pixels, after the rotation that a telephone stores beside the picture.
+    fps : float
+        Mean frames per second.
+    count : int
+        Frames in the file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing or holds no video that can be decoded.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        if not self.path.is_file():
+            raise UserError(f"{self.path}: no such video file")
+        try:
+            self._probe()
+        except av.error.FFmpegError as exc:
+            raise self._unreadable(exc) from exc
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.width, self.height
+
+    def frames(self, start: int = 0, stop: int | None = None, *, grey: bool = False) -> Iterator[Frame]:
+        """Yield the frames `start` <= index < `stop` in order, as BGR or grey."""
+        pixels = "gray" if grey else "bgr24"
+        for index, time, frame in self._decode(stop):
+            if index >= start:
+                yield Frame(index, time, _upright(frame, pixels))
+
+    def _probe(self) -> None:
+        """Read the first frame for the size, the stream's header or its packets for count and rate."""
+        with av.open(str(self.path)) as container:
+            if not container.streams.video:
+                raise UserError(f"{self.path}: holds no video stream; give a file with pictures")
+            stream = container.streams.video[0]
+            self.fps = float(stream.average_rate or stream.guessed_rate or 30)
+            self.count = stream.frames or sum(1 for p in container.demux(stream) if p.pts is not None)
+        for _, _, frame in self._decode(1):
+            self.height, self.width = _upright(frame, "gray").shape
+            return
+        raise UserError(f"{self.path}: holds no frame that can be decoded; convert it with ffmpeg first")
+
+    def _decode(self, stop: int | None) -> Iterator[tuple[int, float, av.VideoFrame]]:
+        """Yield index, time and raw frame; times missing or not increasing are set by the frame rate."""
+        last: float | None = None
+        try:
+            with av.open(str(self.path)) as container:
+                container.streams.video[0].thread_type = "AUTO"
+                origin = None
+                for index, frame in enumerate(container.decode(video=0)):
+                    if stop is not None and index >= stop:
+                        return
+                    raw = frame.time
+                    origin = raw if origin is None else origin
+                    time = index / self.fps if raw is None or origin is None else raw - origin
+                    if last is not None and time <= last:
+                        time = last + 1 / self.fps
+                    last = time
+                    yield index, time, frame
+        except av.error.FFmpegError as exc:
+            raise self._unreadable(exc) from exc
+
+    def _unreadable(self, exc: av.error.FFmpegError) -> UserError:
+        reason = exc.strerror or type(exc).__name__
+        return UserError(f"{self.path}: cannot be read as video ({reason}); give a file that ffmpeg plays")
+
+
+def _upright(frame: av.VideoFrame, pixels: str) -> Image:
+    """Picture in the pixel format asked for, turned counter-clockwise as the container says."""
+    image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
+    return np.ascontiguousarray(np.rot90(image, frame.rotation // 90)) if frame.rotation % 360 else image
+
+
+def require_video_name(path: str | os.PathLike[str]) -> None:
+    """Raise UserError if the suffix of `path` is of no container that `VideoWriter` writes."""
+    if Path(path).suffix.lower() not in _CONTAINERS:
+        raise UserError(f"{path}: unknown video suffix; use one of {' '.join(_CONTAINERS)}")
+
+
+class VideoWriter:
+    """H.264 file that every player and browser shows; appears under its name when closed without error.
+
+    Use as a context manager and call `write` with equal-sized images.  An odd width or height is extended by
+    one repeated pixel, because 4:2:0 video has even sizes.
+
+    Parameters
+    ----------
+    path : path
+        Ends in .mp4, .mkv or .mov.
+    fps : float
+    crf : int
+        Quality of x264, 0 (lossless) to 51; 18 is visually clean.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], fps: float, *, crf: int = 18) -> None:
+        self.path = Path(path)
+        require_video_name(path)
+        self._rate = Fraction(fps).limit_denominator(1001)
+        self._crf = crf
+        self._stack = ExitStack()
+        self._stream: av.VideoStream | None = None
+
+    def __enter__(self) -> VideoWriter:
+        temporary = self._stack.enter_context(replacing(self.path))
+        self._container = self._stack.enter_context(av.open(str(temporary), "w"))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
+    ) -> bool | None:
+        if kind is None and self._stream is not None:
+            self._container.mux(self._stream.encode(None))
+        return self._stack.__exit__(kind, exc, trace)
+
+    def write(self, image: Image) -> None:
+        """Append one picture, (h, w) grey or (h, w, 3) BGR."""
+        height, width = image.shape[:2]
+        if self._stream is None:
+            self._stream = self._open(width + width % 2, height + height % 2)
+        if height % 2 or width % 2:
+            edges = ((0, height % 2), (0, width % 2), (0, 0))[: image.ndim]
+            image = np.pad(image, edges, mode="edge")
+        if image.shape[:2] != (self._stream.height, self._stream.width):
+            raise ValueError(f"{self.path}: frame of {width}x{height} in a video of another size")
+        pixels = "gray" if image.ndim == 2 else "bgr24"
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format=pixels)
+        self._container.mux(self._stream.encode(frame))
+
+    def _open(self, width: int, height: int) -> av.VideoStream:
+        stream: av.VideoStream = self._container.add_stream(
+            "libx264", rate=self._rate, options={"crf": str(self._crf)}
+        )
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        return stream
+
+
+def median_plate(video: Video, samples: int = 40, progress: Callable[[int], None] | None = None) -> Image:
+    """Empty scene as the temporal median of `samples` frames spread evenly over the clip, BGR.
+
+    Right where every pixel shows the background in more than half of the samples: a static camera and a
+    person who walks through.  `progress` is called with the index of each frame decoded.
+    """
+    wanted = set(np.linspace(0, video.count - 1, min(samples, video.count)).round().astype(int).tolist())
+    picked = []
+    for frame in video.frames():
+        if frame.number in wanted:
+            picked.append(frame.image)
+        if progress is not None:
+            progress(frame.number)
+    plate = np.empty_like(picked[0])
+    for row in range(plate.shape[0]):  # row by row: a median of the whole stack would need it twice in memory
+        plate[row] = np.median([image[row] for image in picked], axis=0)
+    return plate
+
+
+def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:
+    """Read the empty scene from an image file, BGR, and check its (width, height)."""
+    if not Path(path).is_file():
+        raise UserError(f"{path}: no such background image; give an image file, auto or none")
+    plate = cv2.imread(str(path), cv2.IMREAD_COLOR_BGR)
+    if plate is None:
+        raise UserError(f"{path}: cannot be read as an image; give a PNG or JPEG of the empty scene")
+    height, width = plate.shape[:2]
+    if (width, height) != tuple(size):
+        raise UserError(f"{path}: is {width}x{height}, the video {size[0]}x{size[1]}; take both alike")
+    return np.asarray(plate, np.uint8)
+
+
+def background(choice: str, video: Video, progress: Callable[[int], None] | None = None) -> Image | None:
+    """Plate by the word of the ``--background`` option: ``auto`` (median), ``none`` or an image file."""
+    if choice == "none":
+        return None
+    if choice == "auto":
+        return median_plate(video, progress=progress)
+    return read_plate(choice, video.size)

@@ -1,0 +1,130 @@
+"""TRC, the marker format of OpenSim: joints written, points read."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.errors import UserError, quoted
+from gait.io.files import replacing, text_lines
+
+Array = NDArray[np.float64]
+
+METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}  #: one unit of a file
+NAMED = {"DataRate", "NumMarkers", "Units"}  #: fields that a header must name
+HEAD = 5  # lines of the header; an empty one may follow
+
+
+def read_trc(path: Path) -> tuple[list[str], Array, float]:
+    """Read the points of a .trc.
+
+    Returns
+    -------
+    labels : list of str
+        M labels.
+    points : ndarray of shape (T, M, 3)
+        Metres, axes of the file; NaN where cells are empty.
+    rate : float
+        Frames per second.
+
+    Raises
+    ------
+    UserError
+        Naming file, line and remedy.
+    """
+    lines = text_lines(path)
+    if len(lines) < HEAD or not set(lines[1].split()) >= NAMED:
+        raise UserError(f"{path}: not a .trc header of five lines; export the file again")
+    head = dict(zip(lines[1].split(), lines[2].split(), strict=False))
+    labels = [cell.strip() for cell in lines[3].split("\t")[2:] if cell.strip()]
+    rate, scale, count = *_rate_and_scale(path, head), len(labels)
+    if head.get("NumMarkers") != str(count):
+        promised = quoted(head.get("NumMarkers", ""))
+        raise UserError(f"{path}:4: {count} labels where NumMarkers is {promised}; correct it")
+    numbered = [(i, line) for i, line in enumerate(lines[HEAD:], HEAD + 1) if line.strip()]
+    rows = [_row(line, 2 + 3 * count, f"{path}:{i}") for i, line in numbered]
+    if len(rows) < 3:
+        raise UserError(f"{path}: too few frames ({len(rows)}); a recording of a few seconds is needed")
+    _require_consistent(path, head, labels, [(i, row[1]) for (i, _), row in zip(numbered, rows, strict=True)])
+    return labels, np.array(rows)[:, 2:].reshape(len(rows), count, 3) * scale, rate
+
+
+def _rate_and_scale(path: Path, head: dict[str, str]) -> tuple[float, float]:
+    """Frames per second and metres per unit as the header has them."""
+    rate, units = head.get("DataRate", ""), head.get("Units", "")
+    if not _NUMBER.fullmatch(rate) or not 0 < float(rate) < np.inf:
+        raise UserError(f"{path}:3: DataRate is {quoted(rate)}; write the frames per second")
+    if units.lower() not in METRES:
+        raise UserError(f"{path}:3: Units is {quoted(units)}; write one of {' '.join(METRES)}")
+    return float(rate), METRES[units.lower()]
+
+
+def _require_consistent(
+    path: Path, head: dict[str, str], labels: list[str], times: list[tuple[int, float]]
+) -> None:
+    """Refuse labels that are not unique, frames that are not all there, and times that fall."""
+    twice = next((label for label in labels if labels.count(label) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path}:4: label {quoted(twice)} is there twice; rename or remove one")
+    promised = head.get("NumFrames", str(len(times)))
+    if promised != str(len(times)):
+        raise UserError(
+            f"{path}:3: NumFrames is {promised} but {len(times)} frames are there; fetch the file "
+            "again or correct it"
+        )
+    late = next((k for k in range(1, len(times)) if times[k][1] <= times[k - 1][1]), None)
+    if late is not None:
+        raise UserError(f"{path}:{times[late][0]}: the times do not increase; correct column Time")
+
+
+def _row(line: str, width: int, where: str) -> list[float]:
+    """Cells as numbers, empty ones NaN; exporters leave out empty cells at the end of a line."""
+    cells = line.rstrip("\r\n").split("\t")
+    if len(cells) < 2 or any(cell.strip() for cell in cells[width:]):
+        raise UserError(f"{where}: {len(cells)} cells where {width} belong; restore the file")
+    try:
+        values = [float(cell) if cell.strip() else float("nan") for cell in cells[:width]]
+    except ValueError:
+        bad = next(cell for cell in cells if cell.strip() and not _NUMBER.fullmatch(cell.strip()))
+        raise UserError(f"{where}: {quoted(bad.strip())} is not a number; restore the file") from None
+    return values + [float("nan")] * (width - len(values))
+
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.IGNORECASE)
+
+
+def write_trc(
+    path: str | os.PathLike[str], names: tuple[str, ...], times: Array, joints: Array, rate: float
+) -> None:
+    """Write joints (n, P, 3) in metres, z up, as OpenSim's y-up frame: x_trc = y, y_trc = z, z_trc = x.
+
+    Parameters
+    ----------
+    path : path
+    names : tuple of str
+        The P joints.
+    times : ndarray of shape (n,)
+        Seconds.
+    rate : float
+        Frames per second.
+    """
+    count, markers = joints.shape[:2]
+    head = [
+        f"PathFileType\t4\t(X/Y/Z)\t{os.path.basename(path)}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate:g}\t{rate:g}\t{count}\t{markers}\tm\t{rate:g}\t1\t{count}",
+        "Frame#\tTime\t" + "".join(f"{name}\t\t\t" for name in names).rstrip("\t"),
+        "\t\t" + "\t".join(f"{axis}{i + 1}" for i in range(markers) for axis in "XYZ"),
+        "",
+    ]
+    turned = joints[..., [1, 2, 0]].reshape(count, -1)
+    body = [
+        f"{i + 1}\t{time:.6f}\t" + "\t".join(f"{value:.5f}" for value in row)
+        for i, (time, row) in enumerate(zip(times, turned, strict=True))
+    ]
+    with replacing(path) as temporary:
+        temporary.write_text("\n".join([*head, *body, ""]), encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Known and tracked motion: its files, footfalls and parameters, and its errors against the truth."""

@@ -1,0 +1,1 @@
+"""Following a walker through frames: automatic start, particle filter, smoothing."""

@@ -1,0 +1,204 @@
+"""Smoothing: motions drawn from the posterior of a whole clip, from its last frame back to the first.
+
+Plain backward simulation (Godsill, Doucet and West 2004, JASA 99:156) picks for each frame one of the
+filter's particles, by its weight and by how well the state already drawn for the next frame follows from
+it.  With 16 numbers in a state that move little between frames hardly more than its true parent fits: of
+100 motions 8 were different.  So the pick is by a wide kernel, and what then does not fit is put right by
+linear regression (as Beaumont, Zhang and Balding 2002, Genetics 162:2025): with pairs (x, x') of a particle
+and its drawn successor and J = cov(x, x') cov(x')^-1, the state before s is x + J (s - x').  For linear
+dynamics with normal noise this is exact whatever the kernel: the smoother of Rauch, Tung and Striebel
+(1965) in draws.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait._abi import Mode, TrackStatus
+from gait.core.estimate import Estimate
+from gait.track.tracker import Tracker
+from gait.track.transitions import HEADING, PHASE, Step, Transitions, wrap
+
+Array = NDArray[np.float64]
+
+_PAIRS = 1000  # particles with successors, per frame
+_WIDTH = 1.5  # of the kernel, in deviations of the successors
+_MODE = (0.25, 0.8)  # strides and radians within which motions and particles belong together
+
+
+class Spool:
+    """Particles of every frame in a temporary file, so that memory does not grow with the clip.
+
+    Use it in a ``with`` block; the file goes with it.
+
+    Parameters
+    ----------
+    transitions : Transitions
+
+    Attributes
+    ----------
+    utime, step : list of int
+        Capture time and steps since start of each frame.
+    """
+
+    def __init__(self, transitions: Transitions) -> None:
+        self._transitions = transitions
+        self._rows: list[tuple[int, int]] = []  # offset and count of each frame
+        self.utime: list[int] = []
+        self.step: list[int] = []
+        self._known: list[int] = []
+        self._doubt: list[float] = []
+
+    def __enter__(self) -> Spool:
+        self._file = tempfile.TemporaryFile(prefix="gait-")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def add(self, tracker: Tracker, estimate: Estimate) -> None:
+        """Keep the particles after a step."""
+        states, weights = tracker.particles()
+        table = np.column_stack([self._transitions.table(states), weights]).astype(np.float32)
+        self._rows.append((self._file.tell(), len(table)))
+        self._file.write(table.tobytes())
+        self.utime.append(estimate.utime)
+        self._known.append(self._known_since(estimate))
+        self._doubt.append(tracker.stature_doubt)
+        self.step.append(estimate.frame)
+
+    def _known_since(self, estimate: Estimate) -> int:
+        """Index of the frame from which on phase, left and right are known; -1 if they are not."""
+        now = len(self._known)
+        goes_on = now > 0 and estimate.frame == self.step[now - 1] + 1
+        before = self._known[-1] if goes_on else -1
+        if estimate.status == TrackStatus.LOST:
+            return before
+        if estimate.status != TrackStatus.TRACKING and self._transitions.config.mode != Mode.PAPER:
+            return -1
+        return before if before >= 0 else now
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def read(self, index: int) -> tuple[Array, Array]:
+        """States (N, columns) and weights (N,) of a frame."""
+        offset, count = self._rows[index]
+        columns = self._transitions.columns + 1
+        self._file.seek(offset)
+        table = np.frombuffer(self._file.read(4 * count * columns), np.float32).reshape(count, columns)
+        return table[:, :-1].astype(float), table[:, -1].astype(float)
+
+    def step_to(self, index: int) -> Step | None:
+        """Return the interval that ends at a frame; None at a start."""
+        since = self.step[index]
+        if index == 0 or since != self.step[index - 1] + 1:
+            return None
+        known = self._known[index - 1]
+        settle_time = 1e6 * self._transitions.config.settle_time
+        settling = known < 0 or self.utime[index] - self.utime[known] < settle_time
+        return Step(1e-6 * (self.utime[index] - self.utime[index - 1]), settling, self._doubt[index])
+
+
+def draw_motions(
+    spool: Spool,
+    transitions: Transitions,
+    count: int,
+    seed: int,
+    update: Callable[[int], None] = lambda done: None,
+) -> Array:
+    """Draw motions from the posterior given all frames.
+
+    Parameters
+    ----------
+    spool : Spool
+        Filled by a tracker from its start on; a new start within it begins motions of its own.
+    transitions : Transitions
+    count : int
+        How many motions, M.
+    seed : int
+        Of the random numbers.
+    update : callable, optional
+        Told how many frames are done.
+
+    Returns
+    -------
+    ndarray of shape (M, n, columns)
+        Tables of states, see `Transitions.states`.
+    """
+    frames = len(spool)
+    random = np.random.default_rng(seed)
+    out = np.empty((count, frames, transitions.columns))
+    for i in range(frames - 1, -1, -1):
+        states, weights = spool.read(i)
+        step = spool.step_to(i + 1) if i + 1 < frames else None
+        if step is None:
+            out[:, i] = states[_pick(weights, count, random)]
+        else:
+            before = states[_pick(weights, _PAIRS, random)]
+            after = transitions.move(before, step, random)
+            for these in _modes(out[:, i + 1]):
+                out[these, i] = _before(transitions, before, after, out[these, i + 1], random)
+        update(frames - i)
+    out[..., PHASE] %= 1.0
+    return out
+
+
+def _before(t: Transitions, before: Array, after: Array, s: Array, random: np.random.Generator) -> Array:
+    """Draw a predecessor of each state of `s` (M, columns) from pairs of states and successors."""
+    close = _near(after, s[0])
+    if close.sum() > 4 * t.columns:
+        before, after = before[close], after[close]
+    a = t.difference(after, s[0])  # all relative to one of the states: phase and heading are angles
+    b = t.difference(before, s[0])
+    gain, scatter = _regression(b, a)
+    root = np.linalg.cholesky(scatter)
+    gap = t.difference(s[:, None], after)  # (M, N, columns)
+    distance = np.sum(np.linalg.solve(root, gap.reshape(-1, t.columns).T) ** 2, axis=0)
+    logs = -0.5 * distance.reshape(len(s), -1) / _WIDTH**2
+    weights = np.exp(logs - logs.max(axis=1, keepdims=True))
+    sums = np.cumsum(weights, axis=1)
+    chosen = np.sum(sums < random.random((len(s), 1)) * sums[:, -1:], axis=1)
+    chosen = np.minimum(chosen, len(after) - 1)
+    out = before[chosen] + gap[np.arange(len(s)), chosen] @ gain.T
+    out[:, HEADING] = wrap(out[:, HEADING], 2 * np.pi)
+    return np.asarray(out)
+
+
+def _regression(b: Array, a: Array) -> tuple[Array, Array]:
+    """Gain J (columns, columns) of b on a, and the covariance of a, made regular."""
+    b, a = b - b.mean(axis=0), a - a.mean(axis=0)
+    scatter = a.T @ a / len(a)
+    scatter[np.diag_indices_from(scatter)] += 1e-6 * np.diag(scatter) + 1e-14
+    return np.linalg.solve(scatter, a.T @ b / len(a)).T, scatter
+
+
+def _near(states: Array, one: Array) -> NDArray[np.bool_]:
+    """Which states are of the same mode as `one`: alike in phase and heading."""
+    phase = np.abs(wrap(states[:, PHASE] - one[PHASE], 1.0)) < _MODE[0]
+    return np.asarray(phase & (np.abs(wrap(states[:, HEADING] - one[HEADING], 2 * np.pi)) < _MODE[1]))
+
+
+def _modes(states: Array) -> list[NDArray[np.int64]]:
+    """Group the indices of states that are alike, each group around its first."""
+    left = np.arange(len(states))
+    groups = []
+    while len(left):
+        near = _near(states[left], states[left[0]])
+        groups.append(left[near])
+        left = left[~near]
+    return groups
+
+
+def _pick(weights: Array, count: int, random: np.random.Generator) -> NDArray[np.int64]:
+    """Choose `count` particles by weight (systematic), in random order."""
+    at = (random.random() + np.arange(count)) / count * weights.sum()
+    chosen = np.minimum(np.searchsorted(np.cumsum(weights), at, side="right"), len(weights) - 1)
+    return random.permutation(chosen)

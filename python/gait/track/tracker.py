@@ -1,0 +1,258 @@
+"""Track a walker through frames: a particle filter over the states of a walking model (Ormoneit 2000)."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait import _abi
+from gait._abi import TrackStatus
+from gait._abi.library import aligned, check, library
+from gait.core.estimate import Estimate
+from gait.core.frame import Joints, image_view, per_camera, track_array
+from gait.core.initial import Start
+from gait.core.model import Model, camera_c
+from gait.core.state import LEAST_STATURE, State
+from gait.errors import UserError
+from gait.image.camera import Camera
+from gait.image.video import Frame, Image, Video
+from gait.track.autostart import Spotter
+from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
+from gait.track.trackerconfig import TrackerConfig
+
+
+class Tracker:
+    """Particle filter in memory of fixed size.
+
+    Parameters
+    ----------
+    model : Model
+    cameras : Camera or sequence of Camera
+    config : TrackerConfig, optional
+        The library's defaults if left out.
+    background : image, or sequence of image or None, optional
+        Empty scene as each camera sees it.
+    tasks : int, callable or TaskSource
+        Number of threads; or a callable that runs tasks (see `gait.track.tasks.Runner`); or a pool.
+
+    Attributes
+    ----------
+    memory_bytes, isa : int, str
+        All the memory the filter uses; the instruction set in use: scalar, base, avx2 or avx512.
+    step_seconds : float
+        Time that the last `step` spent in the C library.
+    stature_doubt : float
+        Deviation of stature at the last start, fraction of it.
+
+    Notes
+    -----
+    Same input, configuration and seed give the same bits, whatever `tasks` is.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        cameras: Camera | Sequence[Camera],
+        config: TrackerConfig | None = None,
+        *,
+        background: Image | Sequence[Image | None] | None = None,
+        tasks: int | Runner | TaskSource = 1,
+    ) -> None:
+        self._lib = library()
+        self.model = model
+        self.cameras = [cameras] if isinstance(cameras, Camera) else list(cameras)
+        self._tasks, config = _task_source(tasks), config or TrackerConfig.default()
+        self.config = replace(config, tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
+        self._error = _abi.Error()
+        c = self._c_config()
+        size, handle = ctypes.c_size_t(), ctypes.c_void_p()
+        settings, err = ctypes.byref(c), ctypes.byref(self._error)
+        self._check(self._lib.gait_tracker_bytes(model.handle, settings, ctypes.byref(size), err))
+        self.memory_bytes = size.value
+        self.isa: str = self._lib.gait_cpu_name(c.cpu_mask).decode()
+        self._memory = aligned(size.value)
+        where = (self._memory.ctypes.data, size.value)
+        self._check(self._lib.gait_tracker_init(*where, model.handle, settings, ctypes.byref(handle), err))
+        self._handle = handle
+        self._plates: dict[int, Image] = {}
+        self.stature_doubt = 0.0
+        self.step_seconds = 0.0
+        for i, plate in enumerate(per_camera(background)):
+            self.set_background(plate, i)
+
+    def set_background(self, plate: Image | None, camera: int = 0) -> None:
+        """Give the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None takes it away."""
+        view = None
+        if plate is not None:
+            plate = np.ascontiguousarray(plate)
+            view = ctypes.byref(image_view(plate, self.cameras[camera], "background"))
+        check(self._lib.gait_tracker_set_background(self._handle, camera, view))
+        if plate is None:
+            self._plates.pop(camera, None)
+        else:
+            self._plates[camera] = plate  # the library borrows the pixels
+
+    def start(self, mean: State, sd: State, utime: int = 0) -> None:
+        """Draw the particles from independent normals.
+
+        Parameters
+        ----------
+        mean, sd : State
+            A phase or heading whose sd is a half turn or more is uniform.
+        utime : int
+            Time of the first frame, microseconds.
+        """
+        means, sds = ctypes.byref(mean.to_c()), ctypes.byref(sd.to_c())
+        err = ctypes.byref(self._error)
+        self._check(self._lib.gait_tracker_start(self._handle, means, sds, utime, err))
+        self.stature_doubt = sd.stature / max(mean.stature, LEAST_STATURE)
+
+    def step(
+        self,
+        frames: Image | Sequence[Image | None] | None,
+        utime: int,
+        joints: Joints | Sequence[Joints | None] | None = None,
+    ) -> Estimate:
+        """Take in one frame and estimate.
+
+        Parameters
+        ----------
+        frames : image, or sequence of image or None
+            (h, w) grey or (h, w, 3) BGR uint8 of each camera; None where a camera missed this frame.
+        utime : int
+            Capture time, microseconds; must increase.
+        joints : Joints, or sequence of Joints or None, optional
+            Joints found in each camera's picture; they count if ``config.terms`` has ``Term.TRACKS``.
+        """
+        images = [None if image is None else np.ascontiguousarray(image) for image in per_camera(frames)]
+        if len(images) > len(self.cameras):
+            raise ValueError(f"{len(images)} images for {len(self.cameras)} cameras")
+        frame = _abi.FrameC(utime=utime)
+        for i, image in enumerate(images):
+            if image is not None:
+                frame.image[i] = image_view(image, self.cameras[i], "frame")
+        found = [one and track_array(one, self.model.joint_names) for one in per_camera(joints)]
+        for i, array in enumerate(found[: len(self.cameras)]):
+            if array is not None:
+                frame.tracks[i] = array
+        out = _abi.EstimateC()
+        arguments = (ctypes.byref(frame), ctypes.byref(out), ctypes.byref(self._error))
+        begun = time.perf_counter()
+        status = self._lib.gait_tracker_step(self._handle, *arguments)
+        self.step_seconds = time.perf_counter() - begun
+        self._check(status)
+        return Estimate.from_c(out, self.model)
+
+    def lagged(self, back: int | None = None) -> Estimate | None:
+        """Estimate of the frame `back` steps ago given every frame since, by tracing ancestors.
+
+        Parameters
+        ----------
+        back : int, optional
+            At most ``config.lag``, which is also the default.
+
+        Returns
+        -------
+        Estimate or None
+            None if there were not so many steps since the start.
+        """
+        out = _abi.EstimateC()
+        steps = self.config.lag if back is None else back
+        arguments = (ctypes.byref(out), ctypes.byref(self._error))
+        status = self._lib.gait_tracker_lagged(self._handle, steps, *arguments)
+        if status == _abi.Status.STATE:
+            return None
+        self._check(status)
+        return Estimate.from_c(out, self.model)
+
+    def follow(
+        self,
+        video: Video,
+        start: Start,
+        stop: int | None = None,
+        spotter: Spotter | None = None,
+        joints: Mapping[int, Joints] | None = None,
+    ) -> Iterator[tuple[Frame, Estimate]]:
+        """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
+
+        Parameters
+        ----------
+        video : Video
+            As seen by the only camera.
+        start : Start
+        stop : int, optional
+            First frame not to use.
+        spotter : Spotter, optional
+            Looks for the person while the tracker has lost them; where it finds one the track starts anew.
+        joints : mapping of int to Joints, optional
+            Joints found in frames, by number; see `step`.
+        """
+        found = joints or {}
+        for frame in video.frames(start.frame, stop):
+            if frame.number == start.frame:
+                self.start(start.mean, start.sd, frame.utime)
+            estimate = self.step(frame.image, frame.utime, found.get(frame.number))
+            yield frame, estimate
+            if spotter and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
+                spotter.forget()
+            elif spotter and estimate.status == TrackStatus.LOST:
+                spotter.see(frame)
+                if spotter.walks_in(frame):
+                    anew = spotter.start(latest=True)
+                    self.start(anew.mean, anew.sd, frame.utime)
+
+    def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
+        """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
+        count = self.config.particles
+        states = (_abi.StateC * count)()
+        weights = np.zeros(count, np.float32)
+        pointer = weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float))
+        check(self._lib.gait_tracker_particles(self._handle, states, pointer, count))
+        return np.ctypeslib.as_array(states), weights
+
+    def digest(self) -> int:
+        """Hash of the whole state: equal after equal input, whatever the threads or the machine."""
+        return int(self._lib.gait_tracker_digest(self._handle))
+
+    def save(self) -> bytes:
+        """Copy of the whole state, for `restore` into a tracker of the same model and configuration."""
+        size = ctypes.c_size_t()
+        check(self._lib.gait_tracker_save(self._handle, None, 0, ctypes.byref(size)))
+        room = aligned(size.value)
+        check(self._lib.gait_tracker_save(self._handle, room.ctypes.data, size.value, ctypes.byref(size)))
+        return room[: size.value].tobytes()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Take over a state from `save`; a failure leaves this one as it was."""
+        room = aligned(len(snapshot))
+        room[:] = np.frombuffer(snapshot, np.uint8)
+        err = ctypes.byref(self._error)
+        self._check(self._lib.gait_tracker_restore(self._handle, room.ctypes.data, len(snapshot), err))
+
+    def _check(self, status: int) -> None:
+        """Raise what happened in a callback, else what the status means."""
+        if self._tasks is not None:
+            self._tasks.reraise()
+        check(status, self._error)
+
+    def _c_config(self) -> _abi.TrackerConfigC:
+        c = self.config.to_c()
+        if not 1 <= len(self.cameras) <= _abi.MAX_CAMERAS:
+            raise UserError(f"cameras: {len(self.cameras)} given; use 1 to {_abi.MAX_CAMERAS}")
+        c.cameras = len(self.cameras)
+        for i, camera in enumerate(self.cameras):
+            c.camera[i] = camera_c(camera)
+        if self._tasks is not None:
+            c.exec = self._tasks.struct
+        return c
+
+
+def _task_source(tasks: int | Runner | TaskSource) -> TaskSource | None:
+    if isinstance(tasks, int):
+        return threads(tasks)
+    return PythonTasks(tasks) if callable(tasks) else tasks
