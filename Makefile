@@ -72,7 +72,10 @@ WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(we
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 COMMON := $(OPT) -g -MMD -MP -ffp-contract=off
 CALLS := $(shell $(CC) -fcallgraph-info=su -E -x c /dev/null >/dev/null 2>&1 && echo -fcallgraph-info=su)
-LIBGAIT := $(COMMON) -fPIC -fvisibility=hidden -fno-asynchronous-unwind-tables -fstack-usage $(CALLS) -Wframe-larger-than=16384 -Ilibgait/include
+# Atomics of aarch64 in line: libgcc's would bring a constructor and a writable global.
+ATOMICS := $(shell $(CC) -Werror -mno-outline-atomics -E -x c /dev/null >/dev/null 2>&1 && echo -mno-outline-atomics)
+LIBGAIT := $(COMMON) $(ATOMICS) -fPIC -fvisibility=hidden -fno-asynchronous-unwind-tables -fstack-usage $(CALLS) -Wframe-larger-than=16384 \
+           -Ilibgait/include
 EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_NO_IO
 NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
 

@@ -30,7 +30,7 @@ struct gait_pool {
     atomic_int next;    /* task to hand out */
 };
 
-enum { LOOKS = 20000 }; /* about 400 microseconds, of all helpers together: there may be more than cores */
+enum { LOOKS = 20000 }; /* 0.4 to 0.5 ms, of all helpers together: there may be more than cores */
 
 /* While *value is `known`, or while it is not, but not for long. */
 static void look_on(const gait_pool *p, const atomic_uint *value, unsigned known, bool same)

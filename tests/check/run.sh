@@ -16,7 +16,7 @@ check deps        $here/deps.sh "$B/libgait.so"
 check size        $here/size.sh "$B/libgait.so" 400000
 check symbols     python3 $here/symbols.py libgait/include/*.h "$B/libgait.so" "$B/libgait.a"
 check threads     $here/threads.sh "$B"/src/*.o
-check static_init $here/static_init.sh "$B"/src/*.o
+check static_init $here/static_init.sh "$B/libgait.so" "$B"/src/*.o
 check headers     $here/headers.sh libgait/include/*.h
 check layers      python3 $here/layers.py libgait/LAYERS libgait/src
 check py_layers   python3 $here/py_layers.py python/LAYERS python/gait
