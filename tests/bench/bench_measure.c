@@ -64,8 +64,9 @@ static void note_times(runner *r, double wall, double cpu)
         r->spent->stage[k][r->count] = bench_stages_take(k);
 }
 
-static bool step(runner *r, const bench_scene *s, message *why)
+static bool step(runner *r, message *why)
 {
+    const bench_scene *const s = r->result->plan.scene;
     job j = {.r = r,
              .frame = {.utime = (int64_t)r->frame * 1000000 / 30, .image = {bench_scene_frame(s, r->frame)}}};
     int64_t const wall = bench_wall_ns(), cpu = bench_cpu_ns();
@@ -79,7 +80,7 @@ static bool step(runner *r, const bench_scene *s, message *why)
 }
 
 /* ---- a turn ---- */
-static bool start(const runner *r, const bench_scene *s, message *why)
+static bool start(const runner *r, message *why)
 {
     gait_state const sd = {.phase = 0.05f,
                            .stride_hz = 0.05f,
@@ -90,7 +91,7 @@ static bool start(const runner *r, const bench_scene *s, message *why)
                            .roll = 0.02f};
     gait_error err = {.text = ""};
     for (int k = 0; k < trackers(r); k++)
-        if (gait_tracker_start(r->tracker[k], &s->start, &sd, 0, &err) != GAIT_OK)
+        if (gait_tracker_start(r->tracker[k], &r->result->plan.scene->start, &sd, 0, &err) != GAIT_OK)
             return message_set(why, "%s", err.text);
     return true;
 }
@@ -112,16 +113,17 @@ static void run_limit(runner *r, const bench_limit *limit)
 }
 
 /* From the start to the scene's end, again and again, until enough steps are there. */
-static bool take_turn(runner *r, const bench_scene *s, int32_t steps, const bench_limit *limit, message *why)
+static bool take_turn(runner *r, int32_t steps, const bench_limit *limit, message *why)
 {
+    int32_t const frames = r->result->plan.scene->frames;
     bool ok = true;
     if (r->result->plan.limit)
         run_limit(r, limit);
     bench_stages_enable(r->tracker[0], r->result->plan.stages);
     for (int i = 0; ok && i < TURN && r->count < steps; i++) {
-        ok = (r->frame > 0 || start(r, s, why)) && step(r, s, why);
-        r->frame = (r->frame + 1) % s->frames;
-        bool const first_round = r->count < s->frames;
+        ok = (r->frame > 0 || start(r, why)) && step(r, why);
+        r->frame = (r->frame + 1) % frames;
+        bool const first_round = r->count < frames;
         if (first_round && (r->frame == 0 || r->count == steps))
             r->result->digest = gait_tracker_digest(r->tracker[0]);
     }
@@ -130,13 +132,16 @@ static bool take_turn(runner *r, const bench_scene *s, int32_t steps, const benc
 }
 
 /* Every other time in the opposite order. */
-static bool take_turns(runner *r, int32_t count, const bench_scene *s, const bench_limit *limit, message *why)
+static bool take_turns(runner *r, int32_t count, const bench_limit *limit, message *why)
 {
-    int32_t const steps = r->result->plan.steps < MAX_STEPS ? r->result->plan.steps : MAX_STEPS;
+    const bench_plan *const plan = &r->result->plan;
+    int32_t const round = plan->scene->frames - 1, wanted = plan->rounds ? plan->rounds * round : plan->steps,
+                  most = plan->rounds ? MAX_STEPS / round * round : MAX_STEPS,
+                  steps = wanted < most ? wanted : most;
     bool ok = true;
     for (int32_t turn = 0; ok && r[0].count < steps; turn++)
         for (int32_t k = 0; ok && k < count; k++)
-            ok = take_turn(&r[turn % 2 ? count - 1 - k : k], s, steps, limit, why);
+            ok = take_turn(&r[turn % 2 ? count - 1 - k : k], steps, limit, why);
     return ok;
 }
 
@@ -154,6 +159,18 @@ static double quantile(const double *values, int32_t count, double share)
     qsort(sorted, (size_t)count, sizeof *sorted, ascending);
     int32_t const at = (int32_t)(share * (double)count);
     return count ? sorted[at < count ? at : count - 1] : 0.0;
+}
+
+/* Step i of a round is one of the same frame in every round. */
+static double slowest_frame(const double *ms, int32_t count, int32_t frames)
+{
+    static double least[MAX_STEPS];
+    if (count < 2 * frames)
+        return 0.0;
+    memcpy(least, ms, (size_t)frames * sizeof *least);
+    for (int32_t i = frames; i < count; i++)
+        least[i % frames] = ms[i] < least[i % frames] ? ms[i] : least[i % frames];
+    return quantile(least, frames, 1.0) / quantile(least, frames, 0.5);
 }
 
 static double particle_ms(const runner *r, int32_t step)
@@ -174,6 +191,7 @@ static void sum_up(const runner *r, const runner *first)
 {
     static double ratio[MAX_STEPS], particle[MAX_STEPS], limit[MAX_STEPS];
     bench_result *const out = r->result;
+    int32_t const frames = out->plan.scene->frames - 1;
     for (int32_t i = 0; i < r->count; i++) {
         ratio[i] = r->spent->wall[i] / first->spent->wall[i];
         particle[i] = particle_ms(r, i) / particle_ms(first, i);
@@ -184,7 +202,10 @@ static void sum_up(const runner *r, const runner *first)
     out->cpu_ms = quantile(r->spent->cpu, r->count, 0.5);
     out->cpu_p99_ms = quantile(r->spent->cpu, r->count, 0.99);
     out->limit_ms = quantile(r->spent->limit_cpu[0], r->count, 0.5);
+    out->kept_ms = quantile(r->spent->limit_cpu[1], r->count, 0.5);
     out->limit_p99_ms = quantile(r->spent->limit_cpu[0], r->count, 0.99);
+    out->slowest = slowest_frame(r->spent->wall, r->count, frames);
+    out->cpu_slowest = slowest_frame(r->spent->cpu, r->count, frames);
     out->limit_ratio = quantile(limit, r->count, 0.5);
     out->ratio = quantile(ratio, r->count, 0.5);
     out->particle_ratio = quantile(particle, r->count, 0.5);
@@ -205,9 +226,10 @@ static bool make_tracker(runner *r, int k, const gait_model *model, const gait_t
            message_set(why, "%s", err.text);
 }
 
-static bool make(runner *r, const gait_model *model, const bench_scene *s, message *why)
+static bool make(runner *r, const gait_model *model, message *why)
 {
     const bench_plan *const plan = &r->result->plan;
+    const bench_scene *const s = plan->scene;
     gait_tracker_config cfg;
     gait_error err = {.text = ""};
     gait_image const plate = bench_scene_plate(s);
@@ -230,8 +252,7 @@ static bool make(runner *r, const gait_model *model, const bench_scene *s, messa
     return ok;
 }
 
-bool bench_measure(const gait_model *model, const bench_scene *s, bench_result *results, int32_t count,
-                   message *why)
+bool bench_measure(const gait_model *model, bench_result *results, int32_t count, message *why)
 {
     static times spent[BENCH_TURNS];
     runner r[BENCH_TURNS] = {0};
@@ -239,13 +260,13 @@ bool bench_measure(const gait_model *model, const bench_scene *s, bench_result *
     bool ok = count <= BENCH_TURNS || message_set(why, "more than %d trackers in turns", BENCH_TURNS);
     ok = ok && bench_limit_make(&limit, ~0u, why);
     for (int32_t k = 0; ok && k < count; k++) {
-        results[k].width = s->camera.width;
-        results[k].height = s->camera.height;
+        results[k].width = results[k].plan.scene->camera.width;
+        results[k].height = results[k].plan.scene->camera.height;
         results[k].isa = gait_cpu_name(results[k].plan.cpu_mask);
         r[k] = (runner){.result = &results[k], .spent = &spent[k]};
-        ok = make(&r[k], model, s, why);
+        ok = make(&r[k], model, why);
     }
-    ok = ok && take_turns(r, count, s, &limit, why);
+    ok = ok && take_turns(r, count, &limit, why);
     for (int32_t k = 0; ok && k < count; k++)
         sum_up(&r[k], &r[0]);
     bench_limit_free(&limit);

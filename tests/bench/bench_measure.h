@@ -10,10 +10,12 @@
 enum { BENCH_TURNS = 8 }; /* trackers that can take turns */
 
 typedef struct bench_plan {
+    const bench_scene *scene; /* until it is measured */
     int32_t mode, particles, threads;
     uint32_t cpu_mask;
-    int32_t steps; /* over all rounds through the scene; of the first for all that take turns */
-    bool stages;   /* time the stages as well, which takes a little time itself */
+    int32_t steps;  /* of the first for all that take turns; or */
+    int32_t rounds; /* whole ones through the scene, every frame but the first measured in each */
+    bool stages;    /* time the stages as well, which takes a little time itself */
     bool
         limit; /* the texture-only limit takes turns with it, on one core and with the best instruction set */
     bool twins; /* two trackers at the same time, each on one of the two threads */
@@ -28,7 +30,11 @@ typedef struct bench_result {
     double cpu_ms, cpu_p99_ms;     /* of the calling thread, which other programs do not lengthen */
     double stage_ms[BENCH_STAGES]; /* median, CPU; 0 without stages */
     double limit_ms, limit_ratio;  /* CPU of the limit in these turns; a step to it by time of day; medians */
+    double kept_ms;                /* CPU of the limit with the ancestor's samples kept, with the stages */
     double limit_p99_ms; /* as cpu_p99_ms; its work never changes, so that more is the machine's doing */
+    /* Each frame's least time over the rounds, which is the work's own: the slowest frame's to their median.  By time of
+     * day, by the calling thread's; 0 of fewer than two rounds. */
+    double slowest, cpu_slowest;
     /* With the stages, medians of CPU time: likelihood to the limit with two look-ups, and with one kept. */
     double stage_ratio[2];
     double ratio; /* step by step to the first that took turns with it, median: time of day, */
@@ -38,6 +44,5 @@ typedef struct bench_result {
 } bench_result;
 
 /* Measure by the plans that results[0 .. count) hold. */
-bool bench_measure(const gait_model *model, const bench_scene *s, bench_result *results, int32_t count,
-                   message *why);
+bool bench_measure(const gait_model *model, bench_result *results, int32_t count, message *why);
 #endif

@@ -15,15 +15,15 @@ static struct {
 } others[MAX_OTHERS];
 static int other_count;
 
-const bench_result *bench_report_measure(const gait_model *model, const bench_scene *s,
-                                         const bench_plan *plans, int32_t n, message *why)
+const bench_result *bench_report_measure(const gait_model *model, const bench_plan *plans, int32_t n,
+                                         message *why)
 {
     bench_result *const first = results + count;
     if (count + n > MAX_RESULTS)
         return message_set(why, "more than %d measurements", MAX_RESULTS) ? NULL : NULL;
     for (int32_t k = 0; k < n; k++)
         first[k] = (bench_result){.plan = plans[k]};
-    if (!bench_measure(model, s, first, n, why))
+    if (!bench_measure(model, first, n, why))
         return NULL;
     count += n;
     return first;
@@ -90,24 +90,25 @@ bool bench_report_csv(const char *path, message *why)
     FILE *const f = fopen(path, "w");
     if (!f)
         return message_set(why, "%.120s: cannot be written: %s", path, strerror(errno));
-    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms,ratio,particle_ratio,"
-               "limit_ratio");
+    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms,cpu_p99_ms,ratio,"
+               "particle_ratio,slowest,cpu_slowest,limit_ratio,limit_ms,limit_p99_ms");
     for (int k = 0; k < BENCH_STAGES; k++)
         fprintf(f, ",%s_ms", bench_stage_name[k]);
     fprintf(f, "\n");
     for (int i = 0; i < count; i++) {
         const bench_result *const r = &results[i];
-        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f,", mode_of(r), r->isa, (int)r->width,
+        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,", mode_of(r), r->isa, (int)r->width,
                 (int)r->height, (int)r->plan.particles, (int)r->plan.threads, r->bytes, r->median_ms,
-                r->p99_ms, r->cpu_ms, r->ratio, r->particle_ratio);
-        if (r->plan.limit)
-            fprintf(f, "%.4f", r->limit_ratio);
+                r->p99_ms, r->cpu_ms, r->cpu_p99_ms, r->ratio, r->particle_ratio);
+        r->slowest > 0.0 ? fprintf(f, "%.4f,%.4f,", r->slowest, r->cpu_slowest) : fprintf(f, ",,");
+        r->plan.limit ? fprintf(f, "%.4f,%.4f,%.4f", r->limit_ratio, r->limit_ms, r->limit_p99_ms)
+                      : fprintf(f, ",,");
         for (int k = 0; k < BENCH_STAGES; k++)
             r->plan.stages ? fprintf(f, ",%.4f", r->stage_ms[k]) : fprintf(f, ",");
         fprintf(f, "\n");
     }
     for (int i = 0; i < other_count; i++) {
-        fprintf(f, "%s,%s,,,,1,,,,%.4f,,,", others[i].what, others[i].isa, others[i].ms);
+        fprintf(f, "%s,%s,,,,1,,,,%.4f,,,,,,,,", others[i].what, others[i].isa, others[i].ms);
         for (int k = 0; k < BENCH_STAGES; k++)
             fprintf(f, ",");
         fprintf(f, "\n");

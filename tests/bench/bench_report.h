@@ -4,8 +4,8 @@
 #include "bench_measure.h"
 
 /* Results of trackers that take turns, kept until the program ends; NULL (why says so) when it fails. */
-const bench_result *bench_report_measure(const gait_model *model, const bench_scene *s,
-                                         const bench_plan *plans, int32_t count, message *why);
+const bench_result *bench_report_measure(const gait_model *model, const bench_plan *plans, int32_t count,
+                                         message *why);
 /* A time of something else than a tracker: CPU milliseconds. */
 void bench_report_add(const char *what, const char *isa, double ms);
 

@@ -24,7 +24,11 @@ static struct {
     double ns[BENCH_STAGES];    /* of whole stages, */
     double ticks[BENCH_STAGES]; /* and of parts of the likelihood */
     double cells, bodies;       /* of the silhouettes counted */
+    double surface, edges;      /* points in sight of every SPARSE-th body */
+    int64_t looked, counted;    /* bodies; those whose points were counted */
 } b;
+
+enum { SPARSE = 64 }; /* counting takes time that the stages should not have */
 
 /* ---- clocks: the thread's for whole stages, the CPU's counter for their parts, which are short ---- */
 static uint64_t now(void)
@@ -99,6 +103,25 @@ static void silhouette_count(const struct features *f, const struct rast_mask *w
     b.bodies++;
 }
 
+static int32_t shown_of(const struct like_body *body)
+{
+    int32_t shown = 0;
+    for (int32_t l = 0; l < body->setup->limbs; l++)
+        for (int i = 0; i < LIKE_FACING; i++)
+            shown += body->seen[l].value[i] != TEXTURE_HIDDEN;
+    return shown;
+}
+
+static void edges_count(const struct like_body *body, struct like_edge_tally *out)
+{
+    b.plain->edges_count(body, out);
+    if (b.looked++ % SPARSE == 0 && body->seen) {
+        b.surface += shown_of(body);
+        b.edges += out->points;
+        b.counted++;
+    }
+}
+
 static void edges_prepare(const struct outline_block *outline, const struct limb_geometry *limbs,
                           int32_t count, struct like_outline *out)
 {
@@ -150,6 +173,7 @@ void bench_stages_enable(gait_tracker *t, bool on)
         b.timed.layers_draw = layers_draw;
         b.timed.silhouette_count = silhouette_count;
         b.timed.edges_prepare = edges_prepare;
+        b.timed.edges_count = edges_count;
         b.timed.surface_pose = surface_pose;
         b.timed.surface_sample = surface_sample;
         b.timed.texture_costs = texture_costs;
@@ -166,9 +190,10 @@ double bench_stages_take(int stage)
     return ms;
 }
 
-double bench_stages_cells(void)
+bench_samples bench_stages_samples(void)
 {
-    return b.bodies > 0.0 ? b.cells / b.bodies : 0.0;
+    double const bodies = b.bodies > 0.0 ? b.bodies : 1.0, counted = b.counted > 0 ? (double)b.counted : 1.0;
+    return (bench_samples){b.cells / bodies, b.surface / counted, b.edges / counted};
 }
 
 /* ---- functions of the library (-Wl,--wrap) ---- */

@@ -36,6 +36,10 @@ static inline bool bench_stage_is_part(int stage) /* of the likelihood */
 void bench_stages_enable(gait_tracker *t, bool on);
 /* Milliseconds of a stage since the last call for it. */
 double bench_stages_take(int stage);
-/* Mean number of grid cells that a body covered while stages were timed. */
-double bench_stages_cells(void);
+/* What a likelihood compares, means over bodies while stages were timed: cells of the silhouette's grid that the body
+ * covers; points of its surface and of its edges that are in sight and looked up, of those it has. */
+typedef struct bench_samples {
+    double cells, surface, edges;
+} bench_samples;
+bench_samples bench_stages_samples(void);
 #endif

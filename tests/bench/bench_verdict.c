@@ -1,4 +1,5 @@
 #include "bench_verdict.h"
+#include "bench_limit.h"
 #include "like.h"
 #include "model.h"
 
@@ -13,12 +14,6 @@ enum { PARSEC_SAMPLES = 481 };
  * how fast it is at the moment. */
 static const double LIMIT_MS = 17;
 
-/* Per particle, CPU; what does not depend on the particles is left out. */
-static double particle_ns(const bench_result *r)
-{
-    return (r->cpu_ms - r->stage_ms[STAGE_FEATURES]) * 1e6 / r->plan.particles;
-}
-
 void verdict_size(verdict *v, const bench_result *r)
 {
     double const cost = r->particle_ratio;
@@ -28,7 +23,7 @@ void verdict_size(verdict *v, const bench_result *r)
     v->most = cost > v->most ? cost : v->most;
 }
 
-/* Points of the picture that one likelihood looks up: surface and edges. */
+/* Points of surface and edges that a body has; those out of sight are not looked up. */
 static int32_t points(const gait_model *m)
 {
     enum { EDGE_POINTS = 16 }; /* of a limb: edges_count */
@@ -68,8 +63,8 @@ static void thread_lines(const bench_result *one)
            2 / twins->ratio);
 }
 
-/* The slowest steps: by time of day, and on one core by its own time, beside the slowest runs of the limit in turns
- * with them, whose work never changes: that share of it is the machine's. */
+/* The slowest steps of all, beside the slowest runs of the limit in turns with them, whose work never changes: that
+ * share is the machine's.  And the slowest frame when each takes its least time over the rounds: what is the work's. */
 static void latency_lines(const verdict *v)
 {
     const struct {
@@ -81,15 +76,19 @@ static void latency_lines(const verdict *v)
         {"    paper mode, 10,000", v->many[1]},
         {"    paper mode, two threads", v->many[1] + 1},
         {"    default number of particles", v->usual},
+        {"    default number of particles, two threads", v->usual + 1},
     };
     for (size_t k = 0; k < sizeof row / sizeof *row; k++) {
         const bench_result *const r = row[k].run;
+        bool const alone = r->plan.threads == 1;
         line(row[k].what, 1.3, r->p99_ms / r->median_ms, false, "times");
-        if (r->plan.threads > 1)
-            continue;
-        line("        by CPU time", 1.3, r->cpu_p99_ms / r->cpu_ms, false, "times");
+        if (alone)
+            line("        by CPU time", 1.3, r->cpu_p99_ms / r->cpu_ms, false, "times");
         printf("        the texture-only limit's, whose work never changes: %.2f times\n",
                r->limit_p99_ms / r->limit_ms);
+        line("        slowest frame, least over the rounds, to the median", 1.3, r->slowest, false, "times");
+        if (alone)
+            line("        slowest frame, by CPU time", 1.3, r->cpu_slowest, false, "times");
     }
 }
 
@@ -111,33 +110,44 @@ static void speed_lines(const verdict *v)
 static void kernel_lines(const verdict *v)
 {
     const bench_result *const best = v->isa[v->isas - 1];
+    bench_samples const seen = bench_stages_samples();
+    double const limit_ns = 1e6 / ((double)LIMIT_PARTICLES * LIMIT_LIMBS * LIMIT_SAMPLES),
+                 stage_ns = 1e6 * best->stage_ms[STAGE_LIKELIHOOD] / best->plan.particles;
+    for (int k = 0; k < v->isas; k++)
+        if (v->isa[k]->plan.cpu_mask == (GAIT_CPU_BASE | GAIT_CPU_AVX2))
+            line("AVX2 at most, 10,000 particles, one core, stages timed", 30, fps(v->isa[k]), true, "fps");
     line("likelihood stage, scalar against the best instruction set", 5,
          v->isa[0]->stage_ms[STAGE_LIKELIHOOD] / best->stage_ms[STAGE_LIKELIHOOD], true, "times");
     line("likelihood stage against the texture-only limit, two look-ups", 2, best->stage_ratio[0], false,
          "times");
     line("    the ancestor's samples kept, as the tracker keeps them", 2, best->stage_ratio[1], false,
          "times");
+    printf("    a sample of the limit %.2f ns with two look-ups, %.2f with one; the stage %.2f ns for each "
+           "point of\n"
+           "    surface and edges in sight, the silhouette and all else included\n",
+           limit_ns * best->limit_ms, limit_ns * best->kept_ms, stage_ns / (seen.surface + seen.edges));
 }
 
 static void parsec_lines(const verdict *v, const gait_model *m)
 {
     const bench_result *const best = v->isa[v->isas - 1], *const many = v->many[0];
-    double const looked = points(m), cells = bench_stages_cells(), ours = looked + cells;
+    bench_samples const seen = bench_stages_samples();
+    double const looked = seen.surface + seen.edges, ours = looked + seen.cells;
     double const stage = best->stage_ms[STAGE_LIKELIHOOD], step = many->cpu_ms;
     double const rate = 1e-3 * best->plan.particles, ns = 1e6 * stage / best->plan.particles;
     line("a step against PARSEC bodytrack's 43 ms (quoted)", 0.5, step / PARSEC_MS[0], false, "times");
     line("    as the limit's time here against its 17 ms there", 0.5,
          many->limit_ratio * LIMIT_MS / PARSEC_MS[0], false, "times");
     line("samples per likelihood, as PARSEC counts: with the foreground", PARSEC_SAMPLES, ours, true, "");
-    printf("    %.0f points of surface and edges and %.0f cells of the silhouette, 64 of which are compared "
-           "at once\n",
-           looked, cells);
+    printf("    of %d points %.0f of the surface and %.0f of the edges are in sight and looked up; %.0f "
+           "cells of the\n"
+           "    silhouette, 64 of which are compared at once\n",
+           (int)points(m), seen.surface, seen.edges, seen.cells);
     printf(
         "    million samples a second: %.0f in a step (%.0f without the silhouette's); PARSEC %.0f to %.0f\n",
         rate * ours / step, rate * looked / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],
         rate * PARSEC_SAMPLES / PARSEC_MS[0]);
-    printf("    likelihood stage: %.0f ns a particle, %.2f ns a sample of surface and edges\n", ns,
-           ns / looked);
+    printf("    likelihood stage: %.0f ns a particle\n", ns);
     printf("    whole step: %.0f thousand particles a second and core\n", best->plan.particles / step);
 }
 
@@ -154,12 +164,11 @@ void verdict_print(const verdict *v, const gait_model *model)
     kernel_lines(v);
     parsec_lines(v, model);
     line("cost of a particle, most against least, by their number", 1.15, v->most / v->least, false, "times");
-    line("cost of a particle, 1920x1080 against 640x480", 1.1,
-         particle_ns(v->picture[2]) / particle_ns(v->picture[0]), false, "times");
+    line("cost of a particle, 1920x1080 against 640x480", 1.1, v->picture[2]->particle_ratio, false, "times");
     line("memory of the tracker, 10,000 particles", 12, (double)v->many[0][0].bytes / 1e6, false, "MB");
     line("    with two threads", 12, (double)v->many[0][1].bytes / 1e6, false, "MB");
-    printf(
-        "threads and numbers of particles took turns: their ratios are medians of those of single steps\n");
+    printf("threads, numbers of particles and picture sizes took turns: their ratios are medians of those of "
+           "single steps\n");
     if (getloadavg(&load, 1) == 1 && load > 2.5)
         printf("the machine was busy (load %.1f): only CPU times and their ratios mean something\n", load);
 }
