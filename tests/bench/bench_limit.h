@@ -1,5 +1,5 @@
 /* bench_limit.h - the limit of any texture likelihood on this machine: nothing but affine sample places, bilinear
- * look-ups and squared differences (the texture-only limit of doc/design.md). */
+ * look-ups and squared differences (the texture-only limit of doc/limits.md). */
 #ifndef BENCH_LIMIT_H
 #define BENCH_LIMIT_H
 #include "common/message.h"

@@ -17,6 +17,7 @@ ABSENT = re.compile(  # documents that only the authors had, by name or by the l
     r"\b[Ss]pec,? (?:R?\d|appendix)|\b[Ii]ssue \d|\((?:R\d+[-,)]|\d\.\d, [A-Z]\d)"
     r"|\b(?:spec|interfaces|prototype)\.md\b"
 )
+LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(?:#([^)\s]+))?\)")
 MAX_LINES, MAX_BYTES = 400, 300_000
 LARGE = {"python/gait/data/walk.gait": 400_000}  # 229 kB of it are 50 modes of 10 frames of 37 markers
 SOURCE = {".c", ".cpp", ".h", ".py", ".sh", ".lcm"}
@@ -45,6 +46,24 @@ def text_faults(name: str, text: str) -> list[str]:
     return found
 
 
+def anchors(page: Path) -> set[str]:
+    """What links can name in a page, as the sites that show it spell headings."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)
+    return {re.sub(r"[^\w -]", "", h.lower()).replace(" ", "-") for h in headings}
+
+
+def link_faults(root: Path, name: str, text: str) -> list[str]:
+    """Links of a page to files or headings that are not there."""
+    found = []
+    for target, heading in LINK.findall(text):
+        page = (root / name).parent / target if target else root / name
+        if not page.exists():
+            found.append(f"{name}: link to {target}, which is not there")
+        elif heading and heading not in anchors(page):
+            found.append(f"{name}: link to {target}#{heading}, a heading that is not there")
+    return found
+
+
 def faults(root: Path, name: str) -> list[str]:
     """What is wrong with one tracked file."""
     data = (root / name).read_bytes()
@@ -57,7 +76,10 @@ def faults(root: Path, name: str) -> list[str]:
         return [f"{name}: {len(data)} bytes, over {most}"]
     if b"\0" in data[:65536]:
         return [] if matches(name, BINARY) else [f"{name}: binary file"]
-    return [] if matches(name, BINARY) else text_faults(name, data.decode("utf-8", "replace"))
+    if matches(name, BINARY):
+        return []
+    text = data.decode("utf-8", "replace")
+    return text_faults(name, text) + (link_faults(root, name, text) if name.endswith(".md") else [])
 
 
 def version_faults(root: Path) -> list[str]:

@@ -274,6 +274,8 @@ def checkout(tmp_path):
         ("a.h", b"/* as in spe" + b"c 1.6 */\n", "a.h:1: refers to"),
         ("b.md", b"see interfaces" + b".md\n", "b.md:1: refers to"),
         ("c.md", b"by issue" + b" 3\n", "c.md:1: refers to"),
+        ("d.md", b"# D\n[a](libgait/src/a.c) [b](b.c)\n", "d.md: link to b.c"),
+        ("e.md", b"# E\n## The [O 3], of `e`\n[a](#the-o-3-of-e) [b](#f)\n", "e.md: link to #f"),
         ("a.py", b"x = 1 \n", "blank at the end"),
         ("b.py", b"x = 1", "no newline"),
         ("python/gait/_version.py", b'__version__ = "1.1.2"\n', "gait.h has 1.1.1"),
