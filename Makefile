@@ -105,7 +105,9 @@ help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
 	@echo 'make test     build and test everything'
 	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
-	@echo; echo 'config=release|debug|sanitize (now $(config)), werror=1: warnings are errors'
+	@echo; echo '* needs the data beside the repository (../shared/data); without it, tests that need some are skipped'
+	@echo 'eval, eval-learn, eval-lift fail if a bound is missed; bench, bench-lift say MISSED: rates hang on the host'
+	@echo 'config=release|debug|sanitize (now $(config)), werror=1: warnings are errors'
 
 # ---- python environment --------------------------------------------------------------------------------------
 setup: $(READY) ## make .venv with the pinned packages (once; later builds work offline)
@@ -137,8 +139,8 @@ lib: $(LIBS) ## libgait.so and libgait.a in build/<config>
 
 # Linked by the C compiler: a C++ runtime dependency would not link.
 $(B)/libgait.so: $(OBJ)
-	$(call say,LD   $@)$(CC) $(OPT) -shared -Wl,--no-undefined,-z,noseparate-code -Wl,-soname,$(@F).$(ABI) $(LDFLAGS) -o $@.tmp $(OBJ) -lm -pthread
-	@mv $@.tmp $@.$(ABI)
+	$(call say,LD   $@)$(CC) $(OPT) -shared -Wl,--no-undefined,-z,noseparate-code -Wl,-soname,$(@F).$(ABI) $(LDFLAGS) -o $@.$$$$ $(OBJ) -lm -pthread && \
+	    mv $@.$$$$ $@.$(ABI)
 	@ln -sf $(@F).$(ABI) $@
 
 # One object whose internal names are local, so that nothing unprefixed meets the user's own names.
@@ -240,7 +242,7 @@ demo: setup lib tools ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT
 	@$(VENV)/bin/gait demo $(pass) $(ARGS)
 
 MOCAP ?= ../shared/data/mocap/cmu_walk
-model: setup lib ## learn the default model from MOCAP=
+model: setup lib ## learn the default model from MOCAP= *
 	$(VENV)/bin/gait learn $(MOCAP) -o python/gait/data/walk.gait $(ARGS)
 
 # The bench calls internal functions, and the linker puts its clocks round those that __wrap_ names.
@@ -273,7 +275,7 @@ bench: $(B)/bench/step | $(READY) ## speed by particles, threads, instruction se
 bench-lift: $(B)/bench/lift | $(READY) ## time lifting a frame, a segment, by instruction set (ARGS='-m MODEL.gait'; --record)
 	@$(BENCH_RUN) --target bench-lift --title 'Speed of lifting' $(call BENCH_PAGE,bench_lift) $< $(filter-out --record,$(ARGS))
 
-eval: setup lib ## errors on the clips of ../shared/data
+eval: setup lib ## errors on the clips beside what is wanted of them *
 	@$(PY) tests/bench/eval.py $(ARGS)
 
 # Other packages to compare with, in an environment of their own; without a network they are left out.
@@ -283,10 +285,10 @@ $(PEERS): tests/bench/requirements-peers.txt | $(READY)
 	    $(@D)/bin/pip install --quiet --disable-pip-version-check -r $< && touch $@ || \
 	    { rm -rf $(@D); echo 'eval-learn: other packages cannot be installed and are left out' >&2; }
 
-eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/results/learn.md
+eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/results/learn.md *
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
 
-eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md
+eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md *
 	@$(PY) tests/bench/eval_lift.py $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------

@@ -215,7 +215,7 @@ def earlier(path: Path) -> list[dict[str, Any]]:
 
 
 def main() -> int:
-    """Evaluate and report."""
+    """Evaluate and report; 1 if something wanted is not reached."""
     args = arguments()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the workers as well
     if not eval_clips.DATA.is_dir() and not (args.folder or args.simulated):
@@ -243,7 +243,10 @@ def main() -> int:
         record(args.record, rows, parts, f"make eval ARGS='{' '.join(map(str, sys.argv[1:]))}'")
     if not args.no_pictures:
         print(f"pictures and plots: {args.html / 'index.html'}", file=sys.stderr)
-    return 0
+    missed = [] if args.simulated else eval_wanted.missed(rows)
+    if missed:
+        print(f"eval: not reached: {'; '.join(missed)}", file=sys.stderr)
+    return bool(missed)
 
 
 if __name__ == "__main__":

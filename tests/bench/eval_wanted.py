@@ -36,6 +36,11 @@ def verdicts(rows: Rows) -> list[Verdict]:
     return [check(rows) for check in _CHECKS]
 
 
+def missed(rows: Rows) -> list[str]:
+    """Measures of the lines that fail."""
+    return [verdict.measure for verdict in verdicts(rows) if verdict.passed is False]
+
+
 def grid(lines: list[Verdict]) -> list[list[str]]:
     """Head and lines for a table."""
     head = ["measure", "wanted", "reached", ""]

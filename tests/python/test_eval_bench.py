@@ -109,6 +109,7 @@ def test_every_wanted_line_passes_on_good_runs_and_fails_on_bad_ones():
     arms = (eval_plan.BASE, eval_wanted.AUTO, "stature +5 %", "background none", "every 2", "every 3")
     good = [row(clip, seed, arm) for arm in arms for clip in clips for seed in (1, 2, 3)]
     assert [v.passed for v in eval_wanted.verdicts(good)][:-1] == [True] * 12
+    assert eval_wanted.missed(good) == []
     bad = {
         "root-aligned": {"root_mm": 66.0},
         "absolute": {"abs_mm": 151.0},
@@ -127,6 +128,7 @@ def test_every_wanted_line_passes_on_good_runs_and_fails_on_bad_ones():
         arm = values.get("arm", eval_plan.BASE)
         rows = [r | values if r["arm"] == arm else r for r in good]
         assert verdict(rows, words).passed is False, words
+        assert verdict(rows, words).measure in eval_wanted.missed(rows)
 
 
 def test_what_was_not_run_is_neither_passed_nor_failed():
