@@ -234,6 +234,15 @@ def test_info_of_something_else_fails(tmp_path, capsys):
     assert "not a .gait model" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("meta", [b"{", b"[1]", b"\xff{}", b"[" * 99_999])
+def test_info_of_a_model_with_damaged_words_names_them(tmp_path, capsys, meta):
+    path = tmp_path / "x.gait"
+    blob.write(path, {"META": np.frombuffer(meta, np.uint8)})
+    assert run("info", path) == 1
+    err = capsys.readouterr().err
+    assert f"{path}: section META: " in err and "learn the model anew" in err and err.count("\n") == 1
+
+
 def test_the_shipped_model_is_small_and_acknowledges_its_source():
     s = {tag: array for tag, array in blob.read(SHIPPED).items() if tag not in TAGS}
     assert len(blob.encode(s)) < 145_000  # nine curves over 120 phases of 30 channels are 130 kB

@@ -61,6 +61,13 @@ def test_amc(tmp_path, bone, words):
         readers.read(damaged(path, put(row, 1, "1e300")))
 
 
+def test_amc_in_radians_says_so(tmp_path):
+    path = files.write_toy(tmp_path, frames=5)
+    path.write_text(path.read_text().replace(":DEGREES", ":RADIANS"))
+    with pytest.raises(UserError, match=r"degrees \(radians in the file\), at most"):
+        readers.read(path)
+
+
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [(0, "1e300", "frame 5: root .position .* metres"), (4, "1e308", "frame 5: root .rotation .* degrees")],

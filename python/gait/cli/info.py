@@ -13,6 +13,7 @@ import numpy as np
 from gait.body.pace import slope_of
 from gait.cli import segment_text
 from gait.io import blob
+from gait.io.fields import json_of
 from gait.lift.prior import TAGS, SegmentPrior
 
 NAME = "info"
@@ -57,7 +58,8 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
     if any(tag in sections for tag in TAGS):
         result["segments"] = segment_text.summary(SegmentPrior.from_sections(sections, name))
     if "META" in sections:
-        result["meta"] = json.loads(sections["META"].tobytes().decode())
+        text, remedy = sections["META"].tobytes(), "learn the model anew"
+        result["meta"] = json_of(f"{name}: section META", text, remedy, remedy)
     return result
 
 

@@ -132,33 +132,48 @@ def json_object(
     form: str,
     pairs: Callable[[list[tuple[str, Any]]], dict[str, Any]] = dict,
 ) -> dict[str, Any]:
-    """Content of a JSON file that holds one object.
+    """Content of a JSON file that holds one object; see `json_of`."""
+    try:
+        text = Path(path).read_bytes()
+    except OSError as error:
+        raise unreadable(path, error) from error
+    return json_of(str(path), text, remedy, form, pairs)
+
+
+def json_of(
+    name: str,
+    text: bytes,
+    remedy: str,
+    form: str,
+    pairs: Callable[[list[tuple[str, Any]]], dict[str, Any]] = dict,
+) -> dict[str, Any]:
+    """Content of UTF-8 text that holds one JSON object.
 
     Parameters
     ----------
-    path : path
+    name : str
+        For messages: where the text is from.
+    text : bytes
     remedy, form : str
-        For messages: what to do about a file that is no JSON, and about one that holds something else.
+        For messages: what to do about a text that is no JSON, and about one that holds something else.
     pairs : callable
         Makes a mapping of keys and values, which may be there twice.
 
     Raises
     ------
     UserError
-        One line naming the file and the remedy.
+        One line with the name and the remedy.
     """
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=pairs)
-    except OSError as error:
-        raise unreadable(path, error) from error
+        data = json.loads(text.decode("utf-8"), object_pairs_hook=pairs)
     except RecursionError:
         raise UserError(
-            f"{path}: not valid JSON (brackets within brackets, too deep to read); {remedy}"
+            f"{name}: not valid JSON (brackets within brackets, too deep to read); {remedy}"
         ) from None
     except ValueError as error:  # syntax, encoding, or a number of thousands of digits
-        raise UserError(f"{path}: not valid JSON ({error}); {remedy}") from None
+        raise UserError(f"{name}: not valid JSON ({error}); {remedy}") from None
     if not isinstance(data, dict):
-        raise UserError(f"{path}: holds no JSON object; {form}")
+        raise UserError(f"{name}: holds no JSON object; {form}")
     return data
 
 

@@ -85,12 +85,12 @@ def read(path: Path, fps: float | None = None, zero_runs: bool = False) -> Recor
 
 def _require_ranges(path: Path, skeleton: Skeleton, values: dict[str, Floats]) -> None:
     """Refuse places and angles that no walker reaches."""
-    turn = 1.0 if skeleton.degrees else np.degrees(1.0)
+    turn, unit = (1.0, "degrees") if skeleton.degrees else (np.degrees(1.0), "degrees (radians in the file)")
     for bone in skeleton.bones:
         for k, name in enumerate(bone.dof if bone.name in values else []):
             column, what = values[bone.name][:, k : k + 1], f"{bone.name} {name}"
             if name[0] == "r":
-                require_range(path, what, turn * column, DEGREES, "degrees")
+                require_range(path, what, turn * column, DEGREES, unit)
             else:
                 require_range(path, what, skeleton.metres * column, FARTHEST, "metres")
 
