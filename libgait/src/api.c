@@ -69,18 +69,16 @@ gait_status gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_
 {
     if (!mem || !blob || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "gait_model_init: null pointer");
-    if ((uintptr_t)mem % GAIT_ALIGN)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "gait_model_init: mem is not aligned to %d", GAIT_ALIGN);
     gait_model m;
-    gait_status const s = model_open(blob, blob_bytes, &m, err);
+    gait_status s = model_open(blob, blob_bytes, &m, err);
     if (s != GAIT_OK)
         return s;
-    arena a = {.base = mem, .cap = mem_bytes};
-    gait_model *const self = model_layout(&a, &m);
-    if (!self)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "gait_model_init: %zu bytes are too few", mem_bytes);
-    *out = self;
-    return GAIT_OK;
+    arena a = {.base = NULL};
+    (void)model_layout(&a, &m);
+    s = arena_place(&a, mem, mem_bytes, err);
+    if (s == GAIT_OK)
+        *out = model_layout(&a, &m);
+    return s;
 }
 
 gait_status gait_model_get_info(const gait_model *m, gait_model_info *out)

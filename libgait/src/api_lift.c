@@ -51,16 +51,16 @@ gait_status gait_lift_init(void *mem, size_t mem_bytes, const void *blob, size_t
 {
     if (!mem || !blob || !cfg || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_init: null pointer");
-    if ((uintptr_t)mem % GAIT_ALIGN)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "gait_lift_init: mem is not aligned to %d", GAIT_ALIGN);
     segment_prior prior;
-    gait_status const s = lifter_open(blob, blob_bytes, cfg, &prior, err);
+    gait_status s = lifter_open(blob, blob_bytes, cfg, &prior, err);
     if (s != GAIT_OK)
         return s;
-    arena a = {.base = mem, .cap = mem_bytes};
+    arena a = {.base = NULL};
+    (void)lifter_layout(&a, &prior, cfg);
+    s = arena_place(&a, mem, mem_bytes, err);
+    if (s != GAIT_OK)
+        return s;
     gait_lift *const self = lifter_layout(&a, &prior, cfg);
-    if (!self)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "gait_lift_init: %zu bytes are too few", mem_bytes);
     lift_stream_reset(&self->stream);
     for (int32_t f = 0; f < prior.frames; f++)
         self->at[f] = f;

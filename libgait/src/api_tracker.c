@@ -189,16 +189,14 @@ gait_status gait_tracker_bytes(const gait_model *m, const gait_tracker_config *c
 gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
                               const gait_tracker_config *cfg, gait_tracker **out, gait_error *err)
 {
-    size_t need = 0;
-    gait_status const s = gait_tracker_bytes(m, cfg, &need, err);
-    arena a = {.base = mem, .cap = mem_bytes};
-    if (s != GAIT_OK)
-        return s;
     if (!mem || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "mem or out is NULL");
-    if ((uintptr_t)mem % GAIT_ALIGN != 0 || mem_bytes < need)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "need %zu bytes aligned to %d, got %zu", need, GAIT_ALIGN,
-                         mem_bytes);
+    arena a = {.base = NULL};
+    gait_status s = gait_tracker_bytes(m, cfg, &a.used, err);
+    if (s == GAIT_OK)
+        s = arena_place(&a, mem, mem_bytes, err);
+    if (s != GAIT_OK)
+        return s;
     gait_tracker *const t = tracker_layout(&a, m, cfg);
     tracker_clear(t);
     *out = t;

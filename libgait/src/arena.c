@@ -31,3 +31,13 @@ void *arena_take(arena *a, size_t elem, size_t count)
     }
     return block;
 }
+
+gait_status arena_place(arena *a, void *mem, size_t bytes, gait_error *err)
+{
+    size_t const need = a->used;
+    if ((uintptr_t)mem % GAIT_ALIGN != 0 || bytes < need)
+        return base_fail(err, GAIT_ERR_MEMORY, -1, "need %zu bytes aligned to %d, got %zu", need, GAIT_ALIGN,
+                         bytes);
+    *a = (arena){.base = mem, .cap = bytes};
+    return GAIT_OK;
+}

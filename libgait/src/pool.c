@@ -143,16 +143,14 @@ static bool start_helpers(gait_pool *p, int32_t count)
 
 gait_status gait_pool_init(void *mem, size_t mem_bytes, int32_t threads, gait_pool **out, gait_error *err)
 {
-    size_t need = 0;
-    gait_status const s = gait_pool_bytes(threads, &need, err);
-    arena a = {.base = mem, .cap = mem_bytes};
-    if (s != GAIT_OK)
-        return s;
     if (!mem || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "mem or out is NULL");
-    if ((uintptr_t)mem % GAIT_ALIGN != 0 || mem_bytes < need)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "need %zu bytes aligned to %d, got %zu", need, GAIT_ALIGN,
-                         mem_bytes);
+    arena a = {.base = NULL};
+    gait_status s = gait_pool_bytes(threads, &a.used, err);
+    if (s == GAIT_OK)
+        s = arena_place(&a, mem, mem_bytes, err);
+    if (s != GAIT_OK)
+        return s;
     gait_pool *const p = layout(&a, threads);
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->work, NULL);
