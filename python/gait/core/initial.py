@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,12 +65,9 @@ class Start:
         UserError
             One line naming file, key and remedy.
         """
-        fields = read_json(path, "init")
-        fields.only(KEYS)
-        spread = fields.table("sd", "give standard deviations by key")
-        spread.only(tuple(DEFAULT_SD))
+        fields, spread = read_start(path, "init", KEYS)
         if "frame" in fields:
-            own = fields.integer("frame", 0, 1 << 31, "give the frame number, from 0")
+            own = frame_number(fields)
             if frame not in (None, own):
                 raise fields.fail("frame", f"is {own}, --start says {frame}", "leave one of them out")
             frame = own
@@ -85,6 +83,26 @@ class Start:
         _place(fields, spread, model, mean, sd)
         mean.phase %= 1.0
         return Start(frame or 0, mean, sd)
+
+
+def read_start(path: str | os.PathLike[str], what: str, keys: Sequence[str]) -> tuple[Fields, Fields]:
+    """Fields of a file that says where somebody is, which may have `keys`, and of its standard deviations.
+
+    Raises
+    ------
+    UserError
+        One line naming file, key and remedy.
+    """
+    fields = read_json(path, what)
+    fields.only(keys)
+    spread = fields.table("sd", "give standard deviations by key")
+    spread.only(tuple(DEFAULT_SD))
+    return fields, spread
+
+
+def frame_number(fields: Fields) -> int:
+    """Read the frame that a start describes."""
+    return fields.integer("frame", 0, 1 << 31, "give the frame number, from 0")
 
 
 def set_height(mean: State, sd: State, height: float) -> None:
@@ -112,8 +130,7 @@ def _place(fields: Fields, spread: Fields, model: Model, mean: State, sd: State)
         mean.pelvis[2] = model.pelvis_height(mean)
     if "pelvis" in spread:
         remedy = "give one number or three, metres"
-        three = spread.count("pelvis", remedy) == 3
-        values = spread.array("pelvis", (3,) if three else (), remedy)
+        values = spread.one_or_three("pelvis", remedy)
         if (values < 0).any():
             raise spread.fail("pelvis", "is negative", remedy)
         sd.pelvis[:] = values

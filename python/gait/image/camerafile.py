@@ -12,7 +12,7 @@ import numpy as np
 
 from gait.errors import UserError
 from gait.image.camera import Array, Camera
-from gait.io.fields import Fields, read_json
+from gait.io.fields import Fields, parsing, read_json
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -135,14 +135,8 @@ def _node_value(node: cv2.FileNode) -> Any:
 
 
 def _from_toml(path: str, name: str | None) -> Camera:
-    try:
+    with parsing(path, "TOML", "export the calibration anew"):
         data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except RecursionError:
-        raise UserError(
-            f"{path}: not valid TOML (brackets within brackets, too deep to read); export it anew"
-        ) from None
-    except ValueError as exc:  # syntax, encoding, or a number of thousands of digits
-        raise UserError(f"{path}: not valid TOML ({exc}); export the calibration anew") from None
     cameras = {key: value for key, value in data.items() if isinstance(value, Mapping) and "matrix" in value}
     if name is None and len(cameras) == 1:
         name = next(iter(cameras))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,10 @@ class Fields:
     def count(self, key: str, remedy: str) -> int:
         """How many numbers a key has, 1 for one that is no list."""
         return self._numbers(key, remedy).size
+
+    def one_or_three(self, key: str, remedy: str) -> NDArray[np.float64]:
+        """Finite number () or three (3,)."""
+        return self.array(key, (3,) if self.count(key, remedy) == 3 else (), remedy)
 
     def _numbers(self, key: str, remedy: str) -> NDArray[np.float64]:
         value = self.get(key, remedy)
@@ -164,17 +169,29 @@ def json_of(
     UserError
         One line with the name and the remedy.
     """
-    try:
+    with parsing(name, "JSON", remedy):
         data = json.loads(text.decode("utf-8"), object_pairs_hook=pairs)
-    except RecursionError:
-        raise UserError(
-            f"{name}: not valid JSON (brackets within brackets, too deep to read); {remedy}"
-        ) from None
-    except ValueError as error:  # syntax, encoding, or a number of thousands of digits
-        raise UserError(f"{name}: not valid JSON ({error}); {remedy}") from None
     if not isinstance(data, dict):
         raise UserError(f"{name}: holds no JSON object; {form}")
     return data
+
+
+@contextmanager
+def parsing(name: str, kind: str, remedy: str) -> Iterator[None]:
+    """Turn what makes a text no valid JSON or TOML into one line.
+
+    Raises
+    ------
+    UserError
+        With the name of the file, the `kind` that it is not and the remedy.
+    """
+    try:
+        yield
+    except RecursionError:
+        why = "brackets within brackets, too deep to read"
+        raise UserError(f"{name}: not valid {kind} ({why}); {remedy}") from None
+    except ValueError as error:  # syntax, encoding, or a number of thousands of digits
+        raise UserError(f"{name}: not valid {kind} ({error}); {remedy}") from None
 
 
 def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> NDArray[np.int64]:

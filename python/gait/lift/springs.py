@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.initial import DEFAULT_SD, SCALARS, STATURE
+from gait.core.initial import SCALARS, STATURE, frame_number, read_start
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
 from gait.lift.prior import SegmentPrior
@@ -44,7 +44,6 @@ HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 
 FURTHEST = 1e6  # pixels or metres
 _SPACE, _PICTURE = ("pelvis",), ("pelvis_px", "height_px")  # where the person is, with and without a camera
 _KNOWN = ("frame", *_SPACE, *_PICTURE, "heading_rad", "stature_m", "phase", "stride_hz", "sd")
-_SPREAD = tuple(DEFAULT_SD)  # as in a start of the tracker
 
 
 @dataclass(frozen=True)
@@ -119,15 +118,12 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
     UserError
         One line naming file, key and remedy.
     """
-    fields = read_json(path, "placement")
-    fields.only(_KNOWN)
-    spread = fields.table("sd", "give standard deviations by key")
-    spread.only(_SPREAD)
+    fields, spread = read_start(path, "placement", _KNOWN)
     stature = prior.stature
     if "stature_m" in fields:
         stature = fields.number("stature_m", *STATURE, "give the person's height in metres")
     placed = Placement(
-        frame=fields.integer("frame", 0, 1 << 31, "give the frame number, from 0"),
+        frame=frame_number(fields),
         ground=_ground(fields) if calibrated else np.zeros(2),
         heading=fields.number("heading_rad", -7.0, 7.0, "give the body's direction about z in radians"),
         stature=stature,
@@ -169,8 +165,7 @@ def _deviation(spread: Fields, key: str, usual: float) -> float:
     if key not in spread:
         return usual
     remedy = "give a positive standard deviation"
-    three = spread.count(key, remedy) == 3
-    values = np.atleast_1d(spread.array(key, (3,) if three else (), remedy))
+    values = np.atleast_1d(spread.one_or_three(key, remedy))
     wrong = values[(values <= 0) | (values >= FURTHEST)]
     if len(wrong):
         raise spread.fail(key, f"is {wrong[0]:g}", remedy)
