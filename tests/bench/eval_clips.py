@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import itertools
 import json
 import subprocess
 import sys
@@ -109,9 +110,10 @@ def models(clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], N
 def _learning_key() -> str:
     """Digest of the sources that learning uses and of the names and sizes of the data."""
     package = ROOT / "python" / "gait"
-    others = ("skeleton.py", "blob.py", "pace.py", "kernels.py", "cli/learn.py", "cli/learn_run.py")
+    folders = [package.glob(f"{name}/*.py") for name in ("body", "io", "learn")]
+    others = (package / name for name in ("kernels.py", "cli/learn.py", "cli/learn_run.py"))
     digest = hashlib.sha256()
-    for path in sorted([*package.glob("learn/**/*.py"), *(package / name for name in others)]):
+    for path in sorted(itertools.chain(*folders, others)):
         digest.update(path.read_bytes())
     for path in sorted(p for p in MOCAP.rglob("*") if p.is_file()):
         digest.update(f"{path.relative_to(MOCAP)} {path.stat().st_size}".encode())

@@ -228,6 +228,10 @@ def test_an_edited_clip_has_the_truth_of_its_frames(tmp_path):
     assert eval_edits._frames(cut)[0].shape == (120, 80, 3)
 
 
+def test_models_of_an_evaluation_are_known_by_the_sources_they_are_learned_by(tmp_path):
+    assert eval_clips.models([], tmp_path, 1, lambda done: None) == {}
+
+
 def test_a_part_run_alone_is_joined_with_the_last_tables_of_the_others(tmp_path, monkeypatch):
     monkeypatch.setattr(eval_learn.table, "RESULTS", tmp_path)
     for name in ("learn_size", "learn_speed"):
