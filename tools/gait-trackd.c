@@ -2,6 +2,7 @@
 #include "common/camera_file.h"
 #include "common/jpeg.h"
 #include "common/link.h"
+#include "common/log_scan.h"
 #include "common/pnm.h"
 #include "common/receiver.h"
 #include "common/settings.h"
@@ -33,6 +34,7 @@ static void set_signals(sigset_t *unblocked)
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); /* a log that grows too large is an error of writing */
 }
 
 static bool read_background(service *s, const char *path, message *why)
@@ -56,7 +58,7 @@ typedef struct parts { /* those that a service may lack */
 } parts;
 
 /* The second service, if it is asked for. */
-static bool load_lift(service *s, const settings *want, lift_service *lift, lcm_t *out, message *why)
+static bool load_lift(service *s, const settings *want, lift_service *lift, sink *out, message *why)
 {
     lift_settings const set = {.stature = want->lift_stature,
                                .sd = want->lift_sd > 0 ? want->lift_sd : 3,
@@ -73,7 +75,7 @@ static bool load_lift(service *s, const settings *want, lift_service *lift, lcm_
 }
 
 /* Model, start, camera and empty scene, as far as the command line gives them. */
-static bool load(service *s, const settings *want, parts *p, workers *threads, lcm_t *out, message *why)
+static bool load(service *s, const settings *want, parts *p, workers *threads, sink *out, message *why)
 {
     gait_tracker_config config;
     gait_camera camera;
@@ -130,6 +132,17 @@ static void print_summary(const service *s, bool live)
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }
 
+/* Say where a log that was played breaks off. */
+static void check_log(const char *url)
+{
+    char path[LINK_PATH];
+    message why;
+    link_log(url, path);
+    log_scan(path, &why);
+    if (why.text[0])
+        fprintf(stderr, "gait-trackd: %s\n", why.text);
+}
+
 /* Everything between the settings and the exit code. */
 static bool serve(service *s, const settings *want, parts *p, workers *threads, const sigset_t *unblocked,
                   message *why)
@@ -138,17 +151,23 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     bool const log = link_is_log(url);
     const char *const to = want->out[0] ? want->out : log ? NULL : url;
     receiver r = {0};
-    lcm_t *const out = to ? link_open(to, why) : NULL;
-    bool const ok = (!to || out) && load(s, want, p, threads, out, why) && receiver_open(&r, s, url, why) &&
-                    receiver_run(&r, &quit, unblocked, why);
+    sink out = {0};
+    message lost;
+    bool const ready = (!to || sink_open(&out, to, why)) && load(s, want, p, threads, &out, why) &&
+                       receiver_open(&r, s, url, why);
+    if (ready && !log && !want->quiet)
+        fprintf(stderr, "gait-trackd: listening on %s\n", url);
+    bool ok = ready && receiver_run(&r, &quit, unblocked, why);
+    if (ok && log)
+        check_log(url);
     if (ok) {
         service_send_status(s);
         if (!want->quiet)
             print_summary(s, !log);
     }
     receiver_close(&r);
-    if (out)
-        lcm_destroy(out);
+    if (!sink_close(&out, &lost) && ok)
+        ok = message_set(why, "%s", lost.text);
     return ok;
 }
 

@@ -306,4 +306,4 @@ def test_no_multicast_route_is_one_line_with_the_remedy():
 
 def test_an_output_that_cannot_be_opened(tmp_path):
     out = f"file://{tmp_path}/no/such/folder.log?mode=w"
-    fails(options(tmp_path, "--out", out), "folder.log", "cannot open this log")
+    fails(options(tmp_path, "--out", out), "folder.log", "cannot be written: No such file")

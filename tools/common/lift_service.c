@@ -16,7 +16,7 @@ static int64_t monotonic_us(void)
     return (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000;
 }
 
-bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, lcm_t *out, message *why)
+bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why)
 {
     gait_error err = {.text = ""};
     gait_lift_config *const c = &s->config;
@@ -124,9 +124,7 @@ static void send(lift_service *s, int64_t step_us)
             s->joint[j].sd[i] = (float)e->sd[j][i];
         }
     }
-    int const size = gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &m);
-    if (s->out && size > 0)
-        lcm_publish(s->out, "GAIT_LIFT", room, (unsigned)size);
+    sink_publish(s->out, "GAIT_LIFT", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &m));
     s->lifted++;
 }
 

@@ -5,9 +5,8 @@
 #include "gait.h"
 #include "gaitmsg_joint_t.h"
 #include "histogram.h"
+#include "sink.h"
 #include "tracks_view.h"
-
-#include <lcm/lcm.h>
 
 enum { LIFT_SERVICE_PAST = 65 }; /* more than the longest lag */
 
@@ -23,7 +22,7 @@ typedef struct lift_past { /* what the source said of a frame */
 } lift_past;
 
 typedef struct lift_service {
-    lcm_t *out; /* NULL: nowhere */
+    sink *out;
     file_bytes blob;
     gait_lift_config config;
     gait_lift_info info;
@@ -40,8 +39,7 @@ typedef struct lift_service {
 } lift_service;
 
 /* Read the segment prior of a blob and take all memory; s is all zero before. */
-bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, lcm_t *out,
-                       message *why);
+bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why);
 void lift_service_close(lift_service *s);
 /* The first camera starts the service; another one later is an error. */
 bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why);

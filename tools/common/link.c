@@ -1,5 +1,7 @@
 #include "link.h"
 
+#include "log_scan.h"
+
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,16 +44,29 @@ bool link_is_log(const char *url)
     return strncmp(url, "file://", 7) == 0;
 }
 
+char link_log(const char *url, char path[LINK_PATH])
+{
+    const char *const name = url + (link_is_log(url) ? 7 : 0), *at = strchr(name, '?');
+    char mode = 'r';
+    snprintf(path, LINK_PATH, "%.*s", at ? (int)(at - name) : LINK_PATH - 1, name);
+    for (; at; at = strchr(at + 1, '&'))
+        if (strncmp(at + 1, "mode=", 5) == 0)
+            mode = at[6] && strchr("rwa", at[6]) && (at[7] == '\0' || at[7] == '&') ? at[6] : 0;
+    return mode;
+}
+
 lcm_t *link_open(const char *url, message *why)
 {
+    char path[LINK_PATH];
     int const saved = mute();
     lcm_t *const lcm = lcm_create(url);
     unmute(saved);
-    if (!lcm && link_is_log(url))
+    link_log(url, path);
+    if (!lcm && link_is_log(url) && log_scan(path, why) != 0)
         message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", url);
-    else if (!lcm && strstr(url, "udpm://")) /* or mpudpm:// */
+    else if (!lcm && !link_is_log(url) && strstr(url, "udpm://")) /* or mpudpm:// */
         message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
-    else if (!lcm)
+    else if (!lcm && !link_is_log(url))
         message_set(why, "%.120s: cannot open LCM; give udpm://ADDRESS:PORT or file:///PATH?speed=0", url);
     return lcm;
 }

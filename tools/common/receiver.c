@@ -195,6 +195,8 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
         int const ready = ppoll(fd, r->log ? 1 : 2, &wait, unblocked);
         if (ready < 0 && errno != EINTR)
             return message_set(why, "cannot wait for messages: %s", strerror(errno));
+        if (sink_ended(r->service->out, why))
+            return false;
         if (ready > 0 && !serve(r)) {
             flush(r);
             return r->log || message_set(why, "the LCM connection has failed");

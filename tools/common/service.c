@@ -73,6 +73,7 @@ static void rearm(service *s)
     s->last_frame = s->last_utime = -1;
     s->start = (arming){0};
     s->complaint.text[0] = '\0';
+    s->idle = SERVICE_IDLE_NOT;
     s->seek = !s->has_init;
     spotter_forget(&s->spotter);
     if (s->has_init)
@@ -95,7 +96,7 @@ static bool open_particles(service *s, message *why)
            message_set(why, "not enough memory for --particles-channel with %zu particles", n);
 }
 
-bool service_open(service *s, lcm_t *out, int stream, int threads, const init_state *init, bool particles,
+bool service_open(service *s, sink *out, int stream, int threads, const init_state *init, bool particles,
                   message *why)
 {
     s->out = out;

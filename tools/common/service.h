@@ -9,12 +9,11 @@
 #include "gaitmsg_status_t.h"
 #include "histogram.h"
 #include "lift_service.h"
+#include "sink.h"
 #include "strides.h"
 #include "spotter.h"
 #include "tracking.h"
 #include "tracks_cue.h"
-
-#include <lcm/lcm.h>
 
 /* Since the program's start or the last RESET. */
 typedef struct service_counts {
@@ -30,11 +29,14 @@ typedef struct past_frame { /* what the source said of a frame that was tracked 
     int32_t step_us;
 } past_frame;
 
+/* Why frames that come are not tracked. */
+enum { SERVICE_IDLE_NOT, SERVICE_IDLE_CAMERA, SERVICE_IDLE_START, SERVICE_IDLE_SCENE };
+
 typedef struct service {
     tracking track;
     lift_service *lift; /* the second service; NULL: not asked for */
     tracks_cue *cue;    /* joints of a detector for the tracker; NULL: not asked for */
-    lcm_t *out;         /* where messages go; NULL: nowhere */
+    sink *out;          /* where messages go */
     int threads;
     int stream; /* number of the camera, [0, 30] */
     bool has_init;
@@ -54,6 +56,7 @@ typedef struct service {
     int32_t wanted;          /* particles asked for last; 0 before there is a tracker */
     size_t pool_bytes;       /* of the threads */
     double max_gap;          /* longest pause that is bridged by prediction, seconds */
+    int idle;                /* SERVICE_IDLE_*: said last of frames that nobody tracks */
     message text, complaint; /* what the status says; the last line on stderr */
     estimate_message estimate;
     past_frame past[SERVICE_PAST];
@@ -65,7 +68,7 @@ typedef struct service {
 } service;
 
 /* `track` is open.  With `particles` the memory for GAIT_PARTICLES is taken now. */
-bool service_open(service *s, lcm_t *out, int stream, int threads, const init_state *init, bool particles,
+bool service_open(service *s, sink *out, int stream, int threads, const init_state *init, bool particles,
                   message *why);
 void service_close(service *s);
 

@@ -14,6 +14,15 @@ static void count_gap(service *s, const image_view *v)
     s->last_frame = v->frame > s->last_frame ? v->frame : s->last_frame;
 }
 
+/* Not tracking any more, or not yet, for a reason that is said. */
+static void stop(service *s, const message *why)
+{
+    service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
+    service_complain(s, why);
+    if (!s->seek)
+        s->idle = SERVICE_IDLE_START; /* `why` says it */
+}
+
 /* Begin to track if the armed start has come; true when the tracker runs. */
 static bool begin(service *s, const image_view *v)
 {
@@ -29,8 +38,7 @@ static bool begin(service *s, const image_view *v)
     if (answer != ARMING_MISSED && status != GAIT_OK)
         message_set(&why, "cannot start: %s (%s)", err.text, gait_status_name(status));
     if (status != GAIT_OK) {
-        service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
-        service_complain(s, &why);
+        stop(s, &why);
         return false;
     }
     s->last_utime = utime;
@@ -41,12 +49,6 @@ static bool begin(service *s, const image_view *v)
     s->meter.running = false;
     service_set_state(s, GAITMSG_STATUS_T_RUNNING, "tracking");
     return true;
-}
-
-static void stop(service *s, const message *why)
-{
-    service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
-    service_complain(s, why);
 }
 
 /* Can this frame follow the last one?  A pause that is too long stops the tracker, or it would wait for
@@ -175,10 +177,38 @@ static bool fresh(service *s, bool newest, int64_t birth, int64_t now)
     return false;
 }
 
+/* Say once why frames come and nobody is tracked, and again when the reason is another one. */
+static void say_idle(service *s)
+{
+    int const i = s->stream;
+    int const idle = s->state == GAITMSG_STATUS_T_WAITING ? SERVICE_IDLE_CAMERA
+                     : s->state != GAITMSG_STATUS_T_READY ? SERVICE_IDLE_NOT
+                     : !s->seek                           ? SERVICE_IDLE_START
+                     : !s->track.background.data          ? SERVICE_IDLE_SCENE
+                                                          : SERVICE_IDLE_NOT;
+    if (idle == s->idle)
+        return;
+    s->idle = idle;
+    if (idle == SERVICE_IDLE_CAMERA)
+        fprintf(stderr,
+                "gait-trackd: frames come, but no camera: give --camera or announce it on GAIT_CAMERA_%d\n",
+                i);
+    if (idle == SERVICE_IDLE_START)
+        fprintf(stderr,
+                "gait-trackd: frames come, but no START: send it on GAIT_COMMAND, or run with --init\n");
+    if (idle == SERVICE_IDLE_SCENE)
+        fprintf(stderr,
+                "gait-trackd: frames come, but --init auto needs the empty scene to find somebody: give "
+                "--background, "
+                "send GAIT_BACKGROUND_%d, or send START on GAIT_COMMAND\n",
+                i);
+}
+
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
 {
     int64_t const now = service_now(), birth = budget_birth(v->utime, arrival_utime);
     count_gap(s, v);
+    say_idle(s);
     if (s->state == GAITMSG_STATUS_T_ARMED && !begin(s, v))
         return;
     if (s->state == GAITMSG_STATUS_T_READY && newest && !spot_first(s, v))

@@ -6,12 +6,6 @@
 
 enum { MESSAGE_ROOM = 1 << 16 }; /* estimate and status, with room to spare */
 
-static void publish(service *s, const char *channel, const uint8_t *bytes, int size)
-{
-    if (s->out && size > 0)
-        lcm_publish(s->out, channel, bytes, (unsigned)size);
-}
-
 static void send_particles(service *s, const image_view *v)
 {
     int32_t const n =
@@ -21,8 +15,8 @@ static void send_particles(service *s, const image_view *v)
     s->cloud.n = n < 0 ? 0 : n;
     for (int32_t i = 0; i < s->cloud.n; i++)
         convert_state(&s->hypothesis[i], &s->track.info, &s->cloud.state[i]);
-    publish(s, "GAIT_PARTICLES", s->particles,
-            gaitmsg_particles_t_encode(s->particles, 0, (int)s->particles_bytes, &s->cloud));
+    sink_publish(s->out, "GAIT_PARTICLES", s->particles,
+                 gaitmsg_particles_t_encode(s->particles, 0, (int)s->particles_bytes, &s->cloud));
 }
 
 /* Number the message as the source and the stream number the frame. */
@@ -62,7 +56,7 @@ static void send_stride(service *s, const gait_estimate *e, int64_t frame)
         .speed = found.speed,
         .speed_sd = found.speed_sd,
     };
-    publish(s, "GAIT_STRIDE", bytes, gaitmsg_stride_t_encode(bytes, 0, sizeof bytes, &m));
+    sink_publish(s->out, "GAIT_STRIDE", bytes, gaitmsg_stride_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
 /* The frame of `lag` steps ago as it looks now; steps without a frame of their own are passed over. */
@@ -78,7 +72,8 @@ static void send_lagged(service *s)
         return;
     convert_estimate(s->track.model, &s->track.info, &e, &lagged);
     number(&lagged.msg, s, p);
-    publish(s, "GAIT_ESTIMATE_LAG", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &lagged.msg));
+    sink_publish(s->out, "GAIT_ESTIMATE_LAG", room,
+                 gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &lagged.msg));
     send_stride(s, &e, p->frame);
 }
 
@@ -91,7 +86,7 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
     past_frame *const now = &s->past[e->frame % SERVICE_PAST];
     *now = (past_frame){e->frame, v->frame, s->steps, received, (int32_t)step_us};
     number(m, s, now);
-    publish(s, "GAIT_ESTIMATE", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, m));
+    sink_publish(s->out, "GAIT_ESTIMATE", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, m));
     if (s->track.config.lag > 0)
         send_lagged(s);
     else
@@ -129,6 +124,6 @@ void service_send_status(service *s)
         .memory_bytes = (int64_t)s->track.memory_bytes,
         .text = s->text.text,
     };
-    publish(s, "GAIT_STATUS", room, gaitmsg_status_t_encode(room, 0, MESSAGE_ROOM, &msg));
+    sink_publish(s->out, "GAIT_STATUS", room, gaitmsg_status_t_encode(room, 0, MESSAGE_ROOM, &msg));
     s->news = false;
 }

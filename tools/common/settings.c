@@ -5,6 +5,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #define TEXT(field)           OPTION_TEXTUAL, s->field, 0, 0
 #define INT(field, low, high) OPTION_INT, &s->field, low, high
@@ -32,7 +33,9 @@ static void make_table(settings *s, option *table)
          "LCM to listen on, default $LCM_DEFAULT_URL or " LINK_DEFAULT_URL ";\n"
          "        file://LOG?speed=0 plays a log without loss and ends with it",
          TEXT(url)},
-        {"out", 0, "URL", "LCM to publish on, default --url; for a log: nowhere, or file://NEW?mode=w",
+        {"out", 0, "URL",
+         "LCM to publish on, default --url; for a log: nowhere, or file://NEW?mode=w, or mode=a\n        to "
+         "add to one",
          TEXT(out)},
         {"config", 0, "FILE",
          "lines `name = value` with the long names of these options; the command line wins", TEXT(config)},
@@ -85,7 +88,7 @@ static void make_table(settings *s, option *table)
          OPTION_FLOAT, &s->lift_sd, 0.01, 1000},
         {"lift-lag", 0, "N", "frames that GAIT_LIFT waits for later ones, default 5", INT(lift_lag, 0, 64)},
         {"version", 0, "", "say the version, and whether JPEG frames are understood", FLAG(version)},
-        {"quiet", 'q', "", "no summary at the end", FLAG(quiet)},
+        {"quiet", 'q', "", "no word of where it listens, no summary at the end", FLAG(quiet)},
     };
     _Static_assert(sizeof own / sizeof *own == OWN, "every option has a place");
     memcpy(table, own, sizeof own);
@@ -167,6 +170,33 @@ static bool check_company(const settings *s, message *why)
     return true;
 }
 
+static bool same_file(const char *a, const char *b)
+{
+    struct stat x, y;
+    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
+/* The log played is only read; the one written is new, and none of the files that are read. */
+static bool check_logs(const settings *s, message *why)
+{
+    char from[LINK_PATH] = "", to[LINK_PATH];
+    const char *const read[] = {from, s->model, s->camera, s->background, s->init, s->config, s->lift_model};
+    if (link_is_log(link_url(s->url)) && link_log(link_url(s->url), from) != 'r')
+        return message_set(why, "--url %.160s: a log to listen to is only read; leave ?mode= out",
+                           link_url(s->url));
+    if (!link_is_log(s->out))
+        return true;
+    char const mode = link_log(s->out, to);
+    if (mode != 'w' && mode != 'a')
+        return message_set(
+            why, "--out %.160s: gives no log to write; add ?mode=w (new) or ?mode=a (at its end)", s->out);
+    for (size_t i = 0; i < sizeof read / sizeof *read; i++)
+        if (read[i][0] && same_file(read[i], to))
+            return message_set(why, "--out %.160s: would overwrite %.40s, which is read; give another name",
+                               s->out, i ? "a file" : "the log of --url");
+    return true;
+}
+
 option_result settings_read(settings *s, int argc, char **argv, message *why)
 {
     option table[OPTIONS];
@@ -186,7 +216,7 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
          message_set(why, "--url memq://: reaches nobody outside one process; give udpm:// or file://")) &&
         (s->budget_ms == 0 || !link_is_log(link_url(s->url)) ||
          message_set(why, "--budget-ms: a log is played without loss; leave it out")) &&
-        check_company(s, why) &&
+        check_company(s, why) && check_logs(s, why) &&
         (s->adapt_particles <= particles(s) ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,
                      (int)particles(s)));

@@ -1,0 +1,69 @@
+"""gait-trackd says once why frames come and nobody is tracked, and where it listens."""
+
+import lcm_rig as rig
+
+from gait.core.state import State
+from gait.lcm.link import private_url
+from gait.lcm.messages import command_message
+from gait.lcm.types import gaitmsg
+
+CAMERA, SCENE, START = rig.opening()
+NO_CAMERA = "frames come, but no camera"
+NO_START = "frames come, but no START"
+NO_SCENE = "frames come, but --init auto needs the empty scene"
+
+
+def said(tmp_path, events, *options):
+    """What was said of idle frames, in order."""
+    outcome = rig.play(rig.write_log(tmp_path / "a.log", events), *options)
+    return [line.split(": ")[1] for line in outcome.words.splitlines() if "frames come" in line], outcome
+
+
+def test_no_camera(tmp_path):
+    words, outcome = said(tmp_path, rig.frames(0, 5))
+    assert words == [NO_CAMERA] and outcome.frames == 0
+
+
+def test_a_camera_and_no_empty_scene(tmp_path):
+    words, _ = said(tmp_path, [CAMERA, *rig.frames(0, 5)])
+    assert len(words) == 1 and words[0].startswith(NO_SCENE)
+
+
+def test_no_start_after_stop(tmp_path):
+    stop = ("GAIT_COMMAND", command_message(gaitmsg.command_t.STOP, rig.utime(0), State(), State()))
+    words, _ = said(tmp_path, [CAMERA, SCENE, stop, *rig.frames(0, 5)])
+    assert words == [NO_START]
+
+
+def test_begun_in_the_middle_of_a_stream(tmp_path):
+    """Frames, then the announcement that comes every few seconds, then the START of another run."""
+    events = [*rig.frames(0, 3), CAMERA, *rig.frames(3, 6), SCENE, START]
+    words, outcome = said(tmp_path, [*events, *rig.frames(6, 9)])
+    assert words[0] == NO_CAMERA and words[1].startswith(NO_SCENE) and len(words) == 2
+    assert outcome.frames == 3
+
+
+def test_a_track_that_begins_says_nothing(tmp_path):
+    assert said(tmp_path, [*rig.opening(), *rig.frames(0, 5)])[0] == []
+
+
+def test_who_was_stopped_by_a_pause_is_told_once(tmp_path):
+    later = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i + 300))) for i in range(3, 6)]
+    words, outcome = said(tmp_path, [*rig.opening(), *rig.frames(0, 3), *later], "--init", "auto")
+    assert words == [] and "send START" in outcome.words
+
+
+def test_live_it_says_where_it_listens_and_what_it_lacks():
+    rig.need_multicast()
+    url = private_url()
+    with rig.daemon(url) as (listener, finish):
+        for i in range(3):
+            listener.send(rig.frames(i, i + 1))
+        listener.statuses.clear()
+        listener.until(lambda: len(listener.statuses) > 1, "two statuses")
+        words = finish().words.splitlines()
+    assert words[0] == f"gait-trackd: listening on {url}"
+    assert len(words) == 2 and NO_CAMERA in words[1]
+    with rig.daemon(url, "--quiet") as (_, finish):
+        outcome = finish()
+    assert outcome.words == outcome.printed == ""

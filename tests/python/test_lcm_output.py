@@ -1,0 +1,103 @@
+"""Logs that gait-trackd reads and writes: none is destroyed, no loss goes unnoticed."""
+
+import resource
+import subprocess
+
+import lcm_rig as rig
+import pytest
+
+from gait.lcm.types import gaitmsg
+
+
+def log(tmp_path, count=3, name="in.log"):
+    return rig.write_log(tmp_path / name, [*rig.opening(), *rig.frames(0, count)])
+
+
+def run(source, out, *more, **how):
+    """Play a log, estimates to the URL `out`; stdout, stderr and the code."""
+    words = rig.command("--url", f"file://{source}?speed=0", "--out", out, *more)
+    return subprocess.run(words, capture_output=True, text=True, timeout=rig.PATIENCE, check=False, **how)
+
+
+def one_line(done, code, *expected):
+    lines = [line for line in done.stderr.splitlines() if " particles, " not in line]
+    assert done.returncode == code and len(lines) == 1, done
+    for words in expected:
+        assert words in lines[0], lines[0]
+
+
+@pytest.mark.parametrize("link", ["same", "symbolic", "hard"])
+def test_the_log_that_is_played_is_never_overwritten(tmp_path, link):
+    source, out = log(tmp_path), tmp_path / "other.log"
+    before = source.read_bytes()
+    if link == "symbolic":
+        out.symlink_to(source)
+    elif link == "hard":
+        out.hardlink_to(source)
+    else:
+        out = source
+    done = run(source, f"file://{out}?mode=w")
+    one_line(done, 2, "would overwrite the log of --url", "another name")
+    assert source.read_bytes() == before
+
+
+def test_a_file_that_is_read_is_never_overwritten(tmp_path):
+    camera = tmp_path / "camera.json"
+    camera.write_text("{}")
+    one_line(run(log(tmp_path), f"file://{camera}?mode=w", "--camera", camera), 2, "would overwrite a file")
+    assert camera.read_text() == "{}"
+
+
+def test_the_log_that_is_played_is_not_opened_for_writing(tmp_path):
+    source = log(tmp_path)
+    before = source.read_bytes()
+    outcome = rig.run(*rig.command("--url", f"file://{source}?mode=w")[1:])
+    assert outcome.code == 2 and "leave ?mode= out" in outcome.words and source.read_bytes() == before
+
+
+@pytest.mark.parametrize("mode", ["", "?mode=r", "?speed=0", "?mode=", "?mode=write"])
+def test_a_log_without_the_mode_of_writing_is_refused(tmp_path, mode):
+    old = log(tmp_path, name="old.log")
+    before = old.read_bytes()
+    one_line(run(log(tmp_path), f"file://{old}{mode}"), 2, "add ?mode=w")
+    assert old.read_bytes() == before
+
+
+def test_a_log_can_be_added_to(tmp_path):
+    source, out = log(tmp_path), tmp_path / "out.log"
+    assert run(source, f"file://{out}?mode=w").returncode == 0
+    assert run(source, f"file://{out}?speed=0&mode=a").returncode == 0
+    assert [m.frame for m in rig.read_log(out, "GAIT_ESTIMATE", gaitmsg.estimate_t)] == [0, 1, 2, 0, 1, 2]
+
+
+def test_a_full_disk_is_noticed(tmp_path):
+    one_line(run(log(tmp_path), "file:///dev/full?mode=w"), 1, "cannot be written: No space left")
+
+
+def test_a_log_that_may_not_grow_is_noticed(tmp_path):
+    def small():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+
+    done = run(log(tmp_path, 12), f"file://{tmp_path}/out.log?mode=w", preexec_fn=small)
+    one_line(done, 1, "cannot be written: File too large")
+
+
+def test_a_log_in_no_folder_is_refused_with_the_reason(tmp_path):
+    done = run(log(tmp_path), f"file://{tmp_path}/no/x.log?mode=w")
+    one_line(done, 1, "no/x.log", "cannot be written: No such file or directory")
+
+
+def test_a_log_that_breaks_off_is_told_and_tracked_as_far_as_it_goes(tmp_path):
+    source = log(tmp_path)
+    whole = source.read_bytes()
+    source.write_bytes(whole[:-1000])
+    done = run(source, f"file://{tmp_path}/out.log?mode=w")
+    one_line(done, 0, "breaks off at byte", "after 5 messages")
+    assert "frames 2 " in done.stdout
+
+
+@pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"x" * 100, "damaged or breaks off")])
+def test_a_log_with_nothing_in_it_is_told(tmp_path, content, words):
+    source = tmp_path / "in.log"
+    source.write_bytes(content)
+    one_line(run(source, f"file://{tmp_path}/out.log?mode=w"), 1, "in.log", words)
