@@ -33,7 +33,7 @@ endif
 ifeq ($(origin CXX),default)
 CXX := $(if $(findstring gcc,$(CC))$(findstring clang,$(CC)),$(call found_or,$(subst clang,clang++,$(subst gcc,g++,$(CC))),$(CXX)),$(CXX))
 endif
-MACHINE := $(shell $(CC) -dumpmachine)
+MACHINE := $(shell $(CC) -dumpmachine 2>/dev/null)
 cpu_of   = $(firstword $(subst -, ,$(1)))
 FOREIGN := $(filter-out $(call cpu_of,$(shell cc -dumpmachine 2>/dev/null || uname -m)),$(call cpu_of,$(MACHINE)))
 B       := build/$(if $(FOREIGN),$(MACHINE)-)$(config)
@@ -59,7 +59,7 @@ endif
 # At -O3 only what a step or a live lift spends its time in, at -O2 what else runs for every particle or row of
 # numbers (a third smaller, 2 % of a step), with vector code where that has loops over lanes, at -Os the rest (a fifth
 # smaller again, no slower).
-GCC   := $(if $(findstring clang,$(shell $(CC) --version)),,gcc)
+GCC   := $(if $(findstring clang,$(shell $(CC) --version 2>/dev/null)),,gcc)
 TIGHT := $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
@@ -109,6 +109,27 @@ help: ## list the targets
 	@echo 'eval, eval-learn, eval-lift fail if a bound is missed; bench, bench-lift say MISSED: rates hang on the host'
 	@echo 'config=release|debug|sanitize (now $(config)), werror=1: warnings are errors'
 
+# What objects were made with: as it changes, they are made anew.
+MADE_WITH := CC=$(CC) CXX=$(CXX) OPT=$(OPT) CFLAGS=$(CFLAGS) CXXFLAGS=$(CXXFLAGS) LDFLAGS=$(LDFLAGS)
+MADE := $(B)/.made_with
+ifneq ($(strip $(shell cat $(MADE) 2>/dev/null)),$(strip $(MADE_WITH)))
+.PHONY: $(MADE)
+endif
+$(MADE): | $(B)/
+	@printf '%s\n' '$(subst ','\'',$(MADE_WITH))' > $@.$$$$ && mv $@.$$$$ $@
+
+# Said before anything is built or fetched.
+COMPILED := $(filter-out help setup $(READY) lint format clean uninstall,$(or $(MAKECMDGOALS),help))
+has = $(shell command -v $(firstword $(1)) 2>/dev/null)
+ifneq ($(COMPILED),)
+$(if $(call has,$(CC)),,$(error no C compiler '$(CC)': install it or set CC=))
+$(if $(call has,$(CXX)),,$(error no C++ compiler '$(CXX)': install it or set CXX=))
+endif
+ifneq ($(and $(FOREIGN),$(filter tools built test python-test demo,$(COMPILED))),)
+$(error the LCM and libjpeg found here are not for $(MACHINE): on that machine run `make tools`; \
+    `make lib CC=$(CC)` builds the library alone)
+endif
+
 # ---- python environment --------------------------------------------------------------------------------------
 setup: $(READY) ## make .venv with the pinned packages (once; later builds work offline)
 
@@ -150,14 +171,16 @@ $(B)/libgait.a: $(OBJ)
 	@rm -f $@
 	@$(AR) rcs $@ $(B)/libgait.o
 
-$(B)/src/%.c.o: libgait/src/%.c Makefile | $(B)/src/
+$(B)/src/%.c.o: libgait/src/%.c Makefile $(MADE) | $(B)/src/
 	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(call C_FLAGS,$(notdir $<)) $(CFLAGS) -c $< -o $@
 
-$(B)/src/%.cpp.o: libgait/src/%.cpp Makefile | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
+$(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
+	@test -f $(EIGEN)/Eigen/Core || { echo 'lib: no Eigen/Core in EIGEN=$(EIGEN): give the folder that has it, or install' \
+	    'libeigen3-dev' >&2; exit 1; }
 	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) $(NO_RUNTIME) $(EIGEN_FLAGS) $(WARN) $(SMALL) $(CXXFLAGS) -c $< -o $@
 
 define kernel_rule
-$(B)/src/%.$(1).o: libgait/src/%.c Makefile | $(B)/src/
+$(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(B)/src/
 	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$<) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
@@ -179,7 +202,7 @@ build/lcm/.stamp: $(LCM_TYPES) | $(READY) build/lcm/python/
 	$(call say,LCM  lcm_types)$(VENV)/bin/lcm-gen -c --c-cpath build/lcm --c-hpath build/lcm -p --ppath build/lcm/python $(LCM_TYPES)
 	@touch $@
 
-$(B)/libgaitmsg.a: build/lcm/.stamp | $(B)/lcm/
+$(B)/libgaitmsg.a: build/lcm/.stamp $(MADE) | $(B)/lcm/
 	$(call say,AR   $@)for f in $(LCM_TYPES:lcm_types/%.lcm=%); do \
 	    $(CC) $(OPT) -g $(LCM_CFLAGS) -c build/lcm/$$f.c -o $(B)/lcm/$$f.o || exit 1; done
 	@rm -f $@
@@ -189,7 +212,7 @@ TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/common/*
 $(BIN)/%: $(B)/tools/%.c.o $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
 	$(call say,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) $(JPEG_LIBS) -lm
 
-$(B)/tools/%.c.o: tools/%.c Makefile build/lcm/.stamp | $(B)/tools/common/
+$(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/common/
 	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
 	    $(JPEG_CFLAGS) $(CFLAGS) -c $< -o $@
 
@@ -208,7 +231,7 @@ unit: $(UNIT) ## C tests
 	@tests/unit/run.sh $(UNIT)
 
 # Against the objects, so that internal functions can be called.
-$(B)/unit/%: tests/unit/%.c $(OBJ) Makefile | $(B)/unit/
+$(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
 	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -iquote libgait/src $(CFLAGS) \
 	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
 
@@ -222,7 +245,7 @@ asan: ## C tests under the address and undefined-behaviour sanitizers
 
 # The plain program needs no libFuzzer; with clang: -fsanitize=fuzzer instead of standalone.c's main.
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
-$(B)/fuzz/%: tests/fuzz/%.c tests/fuzz/standalone.c tests/fuzz/fuzz.h $(OBJ) Makefile | $(B)/fuzz/
+$(B)/fuzz/%: tests/fuzz/%.c tests/fuzz/standalone.c tests/fuzz/fuzz.h $(OBJ) Makefile $(MADE) | $(B)/fuzz/
 	$(call say,CC   $<)$(CC) -std=c11 $(OPT) -g -ffp-contract=off $(CWARN) -Ilibgait/include -iquote libgait/src \
 	    $(CFLAGS) $(LDFLAGS) -o $@ $(filter %.c %.o,$^) -lm
 
@@ -253,11 +276,11 @@ BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file message options workers
 BENCH_WRAP := $(shell sed -n 's/^WRAP.[^,]*, \([a-z_]*\),.*/-Wl,--wrap=\1/p' tests/bench/bench_stages.c)
 BENCH_CC = $(CC) -std=c11 -D_DEFAULT_SOURCE -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -Ilibgait/include -iquote libgait/src -Itools $(CFLAGS)
 define bench_isa_rule
-$(B)/bench/%_kernel.$(1).o: tests/bench/%_kernel.c Makefile | $(B)/bench/
+$(B)/bench/%_kernel.$(1).o: tests/bench/%_kernel.c Makefile $(MADE) | $(B)/bench/
 	$$(call say,CC   $$< ($(1)))$$(BENCH_CC) -DKERNEL_ISA=$(1) $(FAST_FLAGS) $(FLAGS_$(1)) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call bench_isa_rule,$(isa))))
-$(B)/bench/%.o: tests/bench/%.c Makefile | $(B)/bench/
+$(B)/bench/%.o: tests/bench/%.c Makefile $(MADE) | $(B)/bench/
 	$(call say,CC   $<)$(BENCH_CC) -c $< -o $@
 $(B)/bench/step: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
 	$(call say,LD   $@)$(CC) $(OPT) $(BENCH_WRAP) $(LDFLAGS) -o $@ $^ -lm -pthread
@@ -310,17 +333,19 @@ format: setup ## rewrite in the house style
 
 # ---- installation --------------------------------------------------------------------------------------------
 install: lib ## DESTDIR= PREFIX= LIBDIR= INCLUDEDIR=
-	install -d $(DESTDIR)$(LIBDIR)/pkgconfig $(DESTDIR)$(INCLUDEDIR)
-	install -m 755 $(B)/libgait.so.$(ABI) $(DESTDIR)$(LIBDIR)/
-	ln -sf libgait.so.$(ABI) $(DESTDIR)$(LIBDIR)/libgait.so
-	install -m 644 $(B)/libgait.a $(DESTDIR)$(LIBDIR)/
-	install -m 644 $(HEADERS) $(DESTDIR)$(INCLUDEDIR)/
+	@for d in '$(PREFIX)' '$(LIBDIR)' '$(INCLUDEDIR)'; do case "$$d" in /*) ;; *) echo "install: '$$d' does not begin with /:" \
+	    'give PREFIX, LIBDIR and INCLUDEDIR from the root' >&2; exit 1;; esac; done
+	install -d '$(DESTDIR)$(LIBDIR)/pkgconfig' '$(DESTDIR)$(INCLUDEDIR)'
+	install -m 755 $(B)/libgait.so.$(ABI) '$(DESTDIR)$(LIBDIR)/'
+	ln -sf libgait.so.$(ABI) '$(DESTDIR)$(LIBDIR)/libgait.so'
+	install -m 644 $(B)/libgait.a '$(DESTDIR)$(LIBDIR)/'
+	install -m 644 $(HEADERS) '$(DESTDIR)$(INCLUDEDIR)/'
 	sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
-	    libgait/gait.pc.in > $(DESTDIR)$(LIBDIR)/pkgconfig/gait.pc
+	    libgait/gait.pc.in > '$(DESTDIR)$(LIBDIR)/pkgconfig/gait.pc'
 
 uninstall: ## remove what install put there
-	rm -f $(addprefix $(DESTDIR)$(LIBDIR)/,libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc) \
-	    $(HEADERS:libgait/include/%=$(DESTDIR)$(INCLUDEDIR)/%)
+	cd '$(DESTDIR)$(LIBDIR)' && rm -f libgait.so.$(ABI) libgait.so libgait.a pkgconfig/gait.pc
+	cd '$(DESTDIR)$(INCLUDEDIR)' && rm -f $(notdir $(HEADERS))
 
 clean: ## remove build/ (not .venv)
 	rm -rf build

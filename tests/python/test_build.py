@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-TOOLS = "sh sed tr cat mkdir dirname uname printf test awk expr ls head cut realpath make"
+TOOLS = "sh sed tr cat mkdir dirname uname printf test awk expr ls head cut realpath make mv"
 
 
 @pytest.fixture
@@ -98,3 +98,59 @@ def test_figures_of_a_machine_are_kept_only_if_asked(words, folder):
     command = next(line for line in done.stdout.replace("\\\n", "").splitlines() if "bench/bench.py" in line)
     assert re.search(rf"--csv {folder}\S+\.csv \S+bench/step", command) and "--record" not in command
     assert ("--page tests/bench/results/bench.md" in command) == (folder == "tests/bench/results/")
+
+
+def compile_one(bare, *words: str) -> str:
+    """What make does, with this machine's compilers, for one object."""
+    env = {
+        k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k not in ("CC", "CFLAGS", "OPT")
+    }
+    done = subprocess.run(
+        ["make", "build/release/src/base.c.o", *words],
+        cwd=bare / "gait",
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_objects_are_made_anew_for_other_options_only(bare):
+    made, kept = "CC   libgait/src/base.c", "is up to date"
+    for options in ((), ("CFLAGS=-DX='\"it'\\''s\"'",), ("OPT=-O1",), ("CC=gcc", "CXX=g++"), ()):
+        assert made in compile_one(bare, *options), options
+        assert kept in compile_one(bare, *options), options
+    assert "-DX" in compile_one(bare, "-n", "CFLAGS=-DX") and kept in compile_one(bare)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["CC=nocc"], "no C compiler 'nocc': install it or set CC="),
+        (["CC=gcc", "CXX=nocxx"], "no C++ compiler 'nocxx': install it or set CXX="),
+    ],
+)
+def test_a_missing_compiler_is_told_before_anything_is_done(bare, words, said):
+    program(bare, "gcc", "x86_64-linux-gnu")
+    for target in ("lib", "test"):
+        done = make(bare, target, *words)
+        assert done.returncode != 0 and done.stderr.count("\n") == 1 and said in done.stderr
+    assert not (bare / "gait/.venv").exists()
+
+
+def test_a_folder_without_eigen_is_named(bare):
+    for name in ("gcc", "g++", "cc"):
+        program(bare, name, "x86_64-linux-gnu")
+    done = make(bare, "build/release/src/linalg.cpp.o", "CC=gcc", "EIGEN=/nonexistent")
+    assert done.returncode != 0 and "no Eigen/Core in EIGEN=/nonexistent" in done.stderr
+
+
+def test_the_tools_are_not_built_for_another_cpu_and_say_what_to_do(bare):
+    program(bare, "cc", "x86_64-linux-gnu")
+    for name in ("gcc", "g++", "ar", "objcopy"):
+        program(bare, f"armv8x-none-linux-{name}", "armv8x-none-linux")
+    done = make(bare, "tools", "CC=armv8x-none-linux-gcc", "EIGEN=/opt/eigen")
+    assert done.returncode != 0 and done.stderr.count("\n") == 1
+    assert "not for armv8x-none-linux: on that machine run `make tools`" in done.stderr

@@ -16,17 +16,18 @@ int main(void) { return gait_version() == GAIT_VERSION && gait_abi() == GAIT_ABI
 """
 
 
-def make(target: str, destdir: Path) -> None:
+def make(target: str, *words: str) -> subprocess.CompletedProcess[str]:
     """Run an installation target of the Makefile."""
-    command = ["make", "-s", target, f"DESTDIR={destdir}", "PREFIX=/opt/gait"]
     env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE")}
-    subprocess.run(command, cwd=ROOT, env=env, check=True, stdout=subprocess.DEVNULL, timeout=300)
+    command = ["make", "-s", target, *words]
+    return subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, timeout=300)
 
 
 @pytest.fixture
 def installed(tmp_path):
     """Folder that stands for / with the library installed in /opt/gait."""
-    make("install", tmp_path)
+    done = make("install", f"DESTDIR={tmp_path}", "PREFIX=/opt/gait")
+    assert done.returncode == 0, done.stderr
     return tmp_path
 
 
@@ -34,7 +35,7 @@ def test_install_puts_everything_and_uninstall_removes_it(installed):
     names = {str(p.relative_to(installed / "opt/gait")) for p in installed.rglob("*") if not p.is_dir()}
     libraries = {"lib/libgait.so", f"lib/libgait.so.{ABI}", "lib/libgait.a"}
     assert names == libraries | {"lib/pkgconfig/gait.pc", "include/gait.h", "include/gait_pool.h"}
-    make("uninstall", installed)
+    assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0
     assert not [p for p in installed.rglob("*") if not p.is_dir()]
 
 
@@ -56,3 +57,25 @@ def test_a_program_builds_and_runs_against_the_installed_library(installed, tmp_
         flags = [f for f in flags if f != "-lgait"] + linked
     subprocess.run(["cc", tmp_path / "a.c", "-o", tmp_path / "a", *flags], check=True)
     assert subprocess.run([tmp_path / "a"], env=env).returncode == 0
+
+
+def test_a_prefix_with_a_space(tmp_path):
+    prefix = tmp_path / "my gait"
+    assert make("install", f"PREFIX={prefix}").returncode == 0
+    assert (prefix / "lib/libgait.so").exists() and (prefix / "include/gait.h").exists()
+    if shutil.which("pkg-config"):
+        (tmp_path / "a.c").write_text(PROGRAM)
+        env = {"PATH": "/usr/bin:/bin", "PKG_CONFIG_PATH": str(prefix / "lib/pkgconfig")}
+        told = subprocess.run(
+            ["pkg-config", "--cflags", "--libs", "gait"], env=env, check=True, capture_output=True, text=True
+        ).stdout
+        subprocess.run(["sh", "-c", f"cc '{tmp_path}/a.c' -o '{tmp_path}/a' {told}"], check=True)
+    assert make("uninstall", f"PREFIX={prefix}").returncode == 0
+    assert not [p for p in prefix.rglob("*") if not p.is_dir()]
+
+
+@pytest.mark.parametrize("words", [["PREFIX=here"], ["PREFIX="], ["PREFIX=/opt", "LIBDIR=lib"]])
+def test_a_prefix_that_is_not_absolute_is_refused(tmp_path, words):
+    done = make("install", f"DESTDIR={tmp_path}/", *words)
+    assert done.returncode != 0 and "does not begin with /" in done.stderr
+    assert not list(tmp_path.iterdir())
