@@ -10,7 +10,7 @@ found=$(size -A "$@" | awk -v sections="^$sections(\\\\.|\$)" '
     { readelf -SW "$library"; readelf -sW "$library"; } | sed 's/^ *\[ *\([0-9]*\)\]/section \1/' | awk -v file="$library" '
     $1 == "section" { size[$3] = $7 }
     $1 == "section" && $3 ~ /^\.(data|bss|tdata|tbss)$/ { writable[$2] = $3 }
-    $4 == "OBJECT" && $3 > 0 && $7 in writable && $8 !~ /^(completed(\.[0-9]+)?|__dso_handle)$/ {
+    $4 ~ /^(OBJECT|TLS)$/ && $3 > 0 && $7 in writable && $8 !~ /^(completed(\.[0-9]+)?|__dso_handle)$/ {
         print file, writable[$7], $8, $3, "bytes" }
     END { for (s in size) if (s ~ /^\.(init_array|fini_array|ctors|dtors)$/ && size[s] !~ /^0*[48]$/)
         print file, s, "0x" size[s], "bytes: more than the C runtime has" }')

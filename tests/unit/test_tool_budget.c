@@ -79,13 +79,30 @@ static int32_t settle(budget *b, int32_t particles, double us_per_particle, int 
 static void test_the_number_follows_the_time(void)
 {
     budget b = {.limit_us = 30 * MS, .low = 100, .high = 4000};
-    CHECK(settle(&b, 4000, 20, 1) == 4000); /* one slow step is no reason */
-    CHECK(settle(&b, 4000, 20, 100) == 1000);
-    CHECK(settle(&b, 1000, 20, 1000) == 1000); /* 20 of 30 ms: neither too slow nor idle */
+    CHECK(settle(&b, 4000, 20, 1) == 4000);    /* one slow step is no reason */
+    CHECK(settle(&b, 4000, 20, 1) == 750);     /* two are: as many as take half of the limit */
+    CHECK(settle(&b, 750, 20, 1000) == 750);   /* 15 of 30 ms: neither too slow nor idle */
+    CHECK(settle(&b, 750, 33, 100) == 375);    /* 25 of 30 ms: half as many */
+    CHECK(settle(&b, 1000, 20, 1000) == 1000); /* 20 of 30 ms */
     CHECK(settle(&b, 1000, 1000, 1000) == 100);
     CHECK(settle(&b, 100, 5, 80) == 100);
     CHECK(settle(&b, 100, 5, 100 * 9) == 1600); /* 8 ms: over a quarter */
     CHECK(settle(&b, 1600, 1, 2000) == 4000);
+}
+
+/* Ten times over the budget: what fits is found with the second step, and no frame is refused for the steps before. */
+static void test_far_over_the_budget_takes_two_steps(void)
+{
+    budget b = {.limit_us = 50 * MS, .low = 100, .high = 40000};
+    CHECK(settle(&b, 40000, 12.5, 2) == 2000);
+    CHECK(budget_allows(&b, 0, 10 * MS));
+    budget hiccup = {.limit_us = 50 * MS, .low = 100, .high = 1000};
+    for (int i = 0; i < 20; i++) { /* single slow steps, each as long as ten */
+        CHECK(budget_stepped(&hiccup, 0, 0, i % 10 == 5 ? 60 * MS : 20 * MS, 1000) == 1000);
+    }
+    budget two = {.limit_us = 50 * MS, .low = 100, .high = 1000}; /* the faster one decides */
+    CHECK(budget_stepped(&two, 0, 0, 900 * MS, 1000) == 1000);
+    CHECK(budget_stepped(&two, 0, 0, 100 * MS, 1000) == 250);
 }
 
 static void test_dropped_frames_halve_it(void)
@@ -124,8 +141,8 @@ static void test_steps_longer_than_the_limit_are_said_once(void)
     CHECK(said == 1 && b.slow_steps == 37);
     settle(&b, 500, 19.9, 10);
     CHECK(b.slow_steps == 37 && b.slow == 0);
-    int32_t const particles = settle(&adapting, 400, 20000, 8);
-    CHECK(particles == 200 && !budget_hopeless(&adapting, particles));
+    int32_t const particles = settle(&adapting, 400, 20000, 2);
+    CHECK(particles == 100 && !budget_hopeless(&adapting, particles));
     CHECK(settle(&adapting, particles, 20000, 20) == 100 && budget_hopeless(&adapting, 100));
 }
 
@@ -137,6 +154,7 @@ int main(void)
     test_a_fast_step_ends_the_refusals();
     test_late_estimates_are_counted();
     test_the_number_follows_the_time();
+    test_far_over_the_budget_takes_two_steps();
     test_dropped_frames_halve_it();
     test_without_adapting_it_stays();
     test_steps_longer_than_the_limit_are_said_once();

@@ -4,6 +4,7 @@ enum {
     SAME_CLOCK_US = 1000000, /* a frame does not take longer to arrive */
     LOOK = 30,               /* steps between two looks at the frames dropped */
     SETTLE = 8,              /* steps until step_us shows what another number of particles takes */
+    FAR = 2,                 /* steps in a row longer than the limit that are no accident */
     TOO_MANY = 3,            /* frames dropped between two looks */
     CALM = 90,               /* steps that are fast before the number doubles */
     RETRY = 4,               /* frames refused for the last step's time alone before one is tried again */
@@ -35,8 +36,17 @@ void budget_missed(budget *b)
     b->calm = 0;
 }
 
-static int32_t choose(budget *b, int32_t particles)
+/* As many as take half of the limit, if a step's time is in proportion to them. */
+static int32_t fitting(const budget *b, int64_t step_us, int32_t particles)
 {
+    int64_t const fit = particles * (b->limit_us / 2) / step_us;
+    return fit > b->low ? (int32_t)fit : b->low;
+}
+
+static int32_t choose(budget *b, int64_t step_us, int32_t particles)
+{
+    if (b->slow >= FAR && particles > b->low)
+        return fitting(b, step_us < b->before_us ? step_us : b->before_us, particles);
     int32_t const half = particles / 2 > b->low ? particles / 2 : b->low;
     int32_t const twice = particles * 2 < b->high ? particles * 2 : b->high;
     bool const slow = b->step_us > b->limit_us * 3 / 4 || b->dropped >= TOO_MANY;
@@ -55,11 +65,16 @@ int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, i
     b->slow = step_us > b->limit_us ? b->slow + 1 : 0;
     b->slow_steps += b->slow > 0;
     b->steps++;
-    int32_t const wanted = b->low ? choose(b, particles) : particles;
+    int32_t const wanted = b->low ? choose(b, step_us, particles) : particles;
+    b->before_us = step_us;
     if (wanted != particles || b->steps >= LOOK)
         b->steps = b->dropped = 0;
     if (wanted != particles)
         b->calm = 0;
+    if (wanted < particles) { /* so that frames are not refused for what steps took before */
+        b->step_us = b->step_us * wanted / particles;
+        b->slow = 0;
+    }
     return wanted;
 }
 

@@ -8,6 +8,7 @@ typedef struct budget {
     int64_t limit_us;   /* from capture to estimate; 0: none, and every frame is allowed */
     int32_t low, high;  /* particles between which it chooses; low 0: their number stays */
     int64_t step_us;    /* what a step has taken lately */
+    int64_t before_us;  /* what the last step took */
     int32_t steps;      /* since the last choice or look at `dropped` */
     int32_t dropped;    /* frames since then */
     int32_t refused;    /* frames in a row */
@@ -29,8 +30,8 @@ bool budget_allows(budget *b, int64_t birth, int64_t now);
 /* A frame was dropped because another waits behind it. */
 void budget_missed(budget *b);
 
-/* A frame was tracked.  Returns the number of particles to go on with: half as many when steps are too slow or frames
- * are dropped, twice as many after a while with time to spare. */
+/* A frame was tracked.  Returns the number of particles to go on with: half as many when steps are slow or frames are
+ * dropped, as many as take half of the limit after two steps that took longer than it, twice as many after a while with time to spare. */
 int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, int32_t particles);
 
 /* Do steps with so many particles take longer than the limit, and may their number not fall?  true only once. */

@@ -47,7 +47,7 @@ static void make_table(settings *s, option *table)
          "        dropped and counted; default: none",
          OPTION_FLOAT, &s->budget_ms, 1, 10000},
         {"adapt-particles", 0, "LOW",
-         "with --budget-ms: halve the particles, down to LOW, when steps are too slow or frames are\n"
+         "with --budget-ms: take fewer particles, down to LOW, when steps are too slow or frames are\n"
          "        dropped, and double them, up to --particles, when there is time to spare; results\n"
          "        then depend on time; default: their number never changes",
          INT(adapt_particles, 16, 1 << 20)},
