@@ -1,5 +1,6 @@
 """The C example follows a drawn walker: built by pkg-config's flags, and for another CPU under emulation."""
 
+import csv
 import os
 import shutil
 import subprocess
@@ -33,6 +34,7 @@ def walk(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pgm")
     plate, pictures, places = drawn_walk(FRAMES)
     cv2.imwrite(str(folder / "empty.pgm"), plate)
+    (folder / "scene.txt").write_text("800 800 320 240\n1 0 0  0 0 -1  0 1 0\n0 1.4 8\n-1 0 0\n")
     for i, picture in enumerate(pictures):
         cv2.imwrite(str(folder / f"frame{i:02d}.pgm"), picture)
     return folder, places
@@ -61,7 +63,10 @@ def track(program, folder, frames=FRAMES) -> str:
     """What the example prints."""
     pictures = sorted(folder.glob("frame*.pgm"))[:frames]
     done = subprocess.run(
-        [*program, MODEL, folder / "empty.pgm", *pictures], capture_output=True, text=True, timeout=300
+        [*program, MODEL, folder / "scene.txt", folder / "empty.pgm", *pictures],
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -76,12 +81,41 @@ def test_the_example_follows_a_drawn_walker(program, walk):
     assert rows[-1].endswith("status 1")
 
 
+def test_the_example_follows_the_walker_of_a_clip(program, tmp_path):
+    """As README says: a clip of gait simulate, made into pictures and numbers by example_clip.py."""
+    clip = tmp_path / "walk"
+    python = ROOT / ".venv/bin/python"
+    make_clip = [
+        python,
+        "-m",
+        "gait",
+        "simulate",
+        "-o",
+        clip,
+        "--size",
+        "640x480",
+        "--frames",
+        "50",
+        "--quiet",
+    ]
+    subprocess.run(make_clip, check=True, timeout=300)
+    subprocess.run([python, ROOT / "libgait/doc/example_clip.py", clip], check=True, timeout=300)
+    pictures = sorted(clip.glob("frame*.pgm"))
+    command = [*program, MODEL, clip / "scene.txt", clip / "empty.pgm", *pictures]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+    found = [float(row.split()[2]) for row in done.stdout.splitlines()[:-1]]
+    with open(clip / "truth.csv", encoding="utf-8") as truth:
+        places = [float(row["pelvis_x"]) for row in csv.DictReader(truth)]
+    assert len(found) == len(pictures) == 50
+    assert np.abs(np.array(found) - places)[25:].max() < 0.2
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ([], 2, "usage: example MODEL.gait EMPTY.pgm FRAME.pgm..."),
-        (["/nonexistent", "a", "b"], 1, "/nonexistent: "),
-        ([MODEL, "/dev/null", "b"], 1, "/dev/null: not a binary PGM of 640 x 480"),
+        ([], 2, "usage: example MODEL.gait SCENE.txt EMPTY.pgm FRAME.pgm..."),
+        (["/nonexistent", "a", "b", "c"], 1, "/nonexistent: "),
+        ([MODEL, "/dev/null", "b", "c"], 1, "/dev/null: not 19 numbers"),
     ],
 )
 def test_the_example_says_what_is_wrong(program, words, code, said):

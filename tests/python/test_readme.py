@@ -74,7 +74,7 @@ def test_every_file_and_folder_named_is_there():
 def walk(tmp_path_factory):
     """Folder in which the commands of "From a video to a track" were run."""
     folder = tmp_path_factory.mktemp("readme")
-    (block,) = (b for b in blocks("sh") if "gait simulate" in b)
+    (block,) = (b for b in blocks("sh") if "gait simulate" in b and "gait track" in b)
     run("sh", "-e", "-c", block, cwd=folder)
     return folder
 

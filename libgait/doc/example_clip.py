@@ -1,0 +1,19 @@
+"""Make of a clip of `gait simulate --size 640x480` what example.c reads: PGM pictures, and scene.txt."""
+
+import json
+import sys
+from pathlib import Path
+
+import cv2
+
+import gait
+
+folder = Path(sys.argv[1])
+camera = gait.Camera.read(str(folder / "camera.json"))
+start = json.loads((folder / "init.json").read_text(encoding="utf-8"))
+scene = [camera.fx, camera.fy, camera.cx, camera.cy, *camera.R.ravel(), *camera.t, *start["pelvis"][:2]]
+(folder / "scene.txt").write_text(" ".join(map(str, [*scene, start["heading_rad"]])), encoding="utf-8")
+cv2.imwrite(str(folder / "empty.pgm"), cv2.imread(str(folder / "background.png"), cv2.IMREAD_GRAYSCALE))
+for frame in gait.Video(str(folder / "video.mp4")).frames():
+    grey = cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY)
+    cv2.imwrite(str(folder / f"frame{frame.number:03d}.pgm"), grey)
