@@ -52,9 +52,10 @@ endif
 OPT_release  := -O3 -DNDEBUG -fno-math-errno -fno-trapping-math
 OPT_debug    := -O0
 OPT_sanitize := -O1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
+OPT_thread   := -O1 -fsanitize=thread -fno-omit-frame-pointer
 OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
-$(error unknown config=$(config): use release, debug or sanitize)
+$(error unknown config=$(config): use release, debug, sanitize or thread)
 endif
 # At -O3 only what a step or a live lift spends its time in, at -O2 what else runs for every particle or row of
 # numbers (a third smaller, 2 % of a step), with vector code where that has loops over lanes, at -Os the rest (a fifth
@@ -98,7 +99,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan tsan unit-threads fuzz fuzz-run golden-check \
         lint format install uninstall clean
 
 help: ## list the targets
@@ -107,7 +108,7 @@ help: ## list the targets
 	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo; echo '* needs the data beside the repository (../shared/data); without it, tests that need some are skipped'
 	@echo 'eval, eval-learn, eval-lift fail if a bound is missed; bench, bench-lift say MISSED: rates hang on the host'
-	@echo 'config=release|debug|sanitize (now $(config)), werror=1: warnings are errors'
+	@echo 'config=release|debug|sanitize|thread (now $(config)), werror=1: warnings are errors'
 
 # What objects were made with: as it changes, they are made anew.
 MADE_WITH := CC=$(CC) CXX=$(CXX) OPT=$(OPT) CFLAGS=$(CFLAGS) CXXFLAGS=$(CXXFLAGS) LDFLAGS=$(LDFLAGS)
@@ -242,6 +243,14 @@ python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
 
 asan: ## C tests under the address and undefined-behaviour sanitizers
 	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit
+
+# What shares data among threads; others have one.
+THREADED := $(patsubst %,$(B)/unit/test_%,pool task determinism)
+unit-threads: $(THREADED)
+	@tests/unit/run.sh $^
+
+tsan: ## C tests of threads under the thread sanitizer
+	@LIMIT=1200 $(MAKE) --no-print-directory config=thread unit-threads
 
 # The plain program needs no libFuzzer; with clang: -fsanitize=fuzzer instead of standalone.c's main.
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))

@@ -1,35 +1,55 @@
 #!/bin/sh
-# The digests of the tracker (test_determinism, both modes) and of the lifter (test_lift_stream) are those pinned in
+# The digests of the tracker (test_determinism, every film) and of the lifter (test_lift_stream) are those pinned in
 # these tests at every optimisation level, with every compiler found and for every instruction set of the CPU, here
-# and on an emulated aarch64.  What is not there is skipped, and listed at the end.
+# and on an emulated aarch64, where the tests of the kernels run as well.  What is not there is skipped, and listed at
+# the end.
 cd "$(dirname "$0")/../.." || exit 1
 release=$(sed -n 's/^OPT_release *:= *//p' Makefile)
+kernels=$(echo tests/unit/test_*kernel*.c tests/unit/test_fmath.c | sed 's|tests/unit/||g; s|\.c||g')
 failed=0 runs=0 skipped=''
+fail() {
+    failed=$((failed + 1)); echo "golden: $*" >&2
+}
+skip() { # WHAT WHY: once
+    case $skipped in *": $1 ("*) return ;; esac
+    skipped="$skipped
+golden: SKIPPED, not compared: $1 ($2)"
+}
+make_tests() { # CC BUILD_FOLDER OPT TEST...
+    cc=$1 folder=$2 opt=$3; shift 3
+    ${MAKE:-make} -s -j"$(getconf _NPROCESSORS_ONLN)" B="$folder" OPT="$opt" CC="$cc" \
+        $(printf "$folder/unit/%s " "$@") >/dev/null || exit 1
+}
+# A line for each of the four instruction sets and each film: three of the tracker, one of the lifter.
 compare() { # CC BUILD_FOLDER OPT [RUNNER]
-    for part in determinism lift_stream; do
-        test=$2/unit/test_$part
-        ${MAKE:-make} -s -j"$(getconf _NPROCESSORS_ONLN)" B="$2" OPT="$3" CC="$1" "$test" >/dev/null || exit 1
-        lines=$($4 "$test" digest | sed -n 's/^digest //p')
-        [ -n "$lines" ] || { echo "golden: $test printed no digest" >&2; exit 1; }
-        while read -r have want name; do
-            echo "golden: $part $1 $3 $name: $have"
-            runs=$((runs + 1))
-            [ "$have" = "$want" ] || { failed=$((failed + 1)); echo "golden: wanted $want" >&2; }
+    for part in determinism:12 lift_stream:4; do
+        test=test_${part%:*}
+        make_tests "$1" "$2" "$3" $test
+        said=$($4 "$2/unit/$test" digest)
+        code=$?
+        lines=$(echo "$said" | grep -cE '^(digest [0-9a-f]{16} [0-9a-f]{16} |skipped )[a-z0-9-]+$')
+        runs=$((runs + 1))
+        [ $code -eq 0 ] && [ "$lines" -eq "${part#*:}" ] ||
+            fail "$test $1 $3: ended with $code, printed $lines of ${part#*:} lines"
+        while read -r kind have want name; do
+            case $kind in
+            skipped) [ -n "$4" ] || skip "instruction set $have" "this CPU has none" ;;
+            digest)
+                echo "golden: ${part%:*} $1 $3 $name: $have"
+                runs=$((runs + 1))
+                [ "$have" = "$want" ] || fail "$name: wanted $want" ;;
+            esac
         done <<END
-$lines
+$said
 END
     done
-}
-skip() { # WHAT DEBIAN_PACKAGES
-    skipped="$skipped
-golden: SKIPPED, not compared: $1 (Debian: $2)"
 }
 here() { # PROGRAM...: all are found
     for program; do command -v "$program" >/dev/null || return 1; done
 }
 for cc in gcc clang; do
     cxx=$(echo $cc | sed 's/gcc/g++/; s/clang/clang++/')
-    here $cc "$cxx" || { skip "$cc and $cxx" "$(echo $cc | sed 's/gcc/g++/')"; continue; }
+    here $cc "$cxx" || { skip "$cc and $cxx" "Debian: $(echo $cc | sed 's/gcc/g++/')"; continue; }
     for level in 0 2 3; do
         compare "$cc" "build/golden/$cc-O$level" "-O$level"
     done
@@ -40,9 +60,15 @@ arm=aarch64-linux-gnu
 if here $arm-gcc $arm-g++ qemu-aarch64; then
     LDFLAGS=-static && export LDFLAGS
     compare $arm-gcc build/$arm-release "$release" qemu-aarch64
+    make_tests $arm-gcc build/$arm-release "$release" $kernels
+    for test in $kernels; do
+        runs=$((runs + 1))
+        said=$(qemu-aarch64 "build/$arm-release/unit/$test") || fail "$test on an emulated $arm"
+        echo "golden: $arm $said"
+    done
 else
-    skip "$arm-gcc, $arm-g++ and qemu-aarch64" "g++-$arm qemu-user"
+    skip "$arm-gcc, $arm-g++ and qemu-aarch64" "Debian: g++-$arm qemu-user"
 fi
 [ -z "$skipped" ] || echo "${skipped#?}"
 echo "golden: $((runs - failed)) passed, $failed failed"
-[ "$failed" -eq 0 ] && [ "$runs" -gt 1 ]
+[ "$failed" -eq 0 ] && [ "$runs" -gt 2 ]

@@ -6,7 +6,13 @@
 #include "kernel_check.h"
 #include "toy_segment.h"
 
-enum { MOST = 41, LD = 48, ROWS = 11, OFFSETS = 8, NUMBERS = LD * (LD + DENSE_LANES) };
+enum {
+    MOST = GAIT_MAX_MODES,
+    LD = MOST + DENSE_LANES,
+    ROWS = 11,
+    OFFSETS = 8,
+    NUMBERS = LD * (LD + DENSE_LANES)
+};
 
 typedef struct block { /* numbers between canaries */
     _Alignas(64) unsigned char memory[NUMBERS * sizeof(double) + OFFSETS * sizeof(double) + 2 * GUARD];

@@ -1,0 +1,36 @@
+/* golden.h - digests for tests/check/golden.sh, which compares compilers and optimisation levels.
+ *
+ * Prints `digest HAVE WANTED NAME` for each instruction set of this CPU, `skipped SET` for each that it does not have;
+ * every set gives one line, so that golden.sh knows how many there must be. */
+#ifndef GOLDEN_H
+#define GOLDEN_H
+#include "gait.h"
+
+#include <stdint.h>
+#include <stdio.h>
+
+static inline uint64_t golden_line(uint64_t have, uint64_t wanted, const char *name, const char *set)
+{
+    printf("digest %016llx %016llx %s-%s\n", (unsigned long long)have, (unsigned long long)wanted, name, set);
+    return have;
+}
+
+/* Lines of what `digest` makes of each mask (GAIT_CPU_*); returns how many are not as wanted. */
+static inline int golden_print(uint64_t (*digest)(uint32_t mask), uint64_t wanted, const char *name)
+{
+    static const struct {
+        uint32_t mask;
+        const char *name;
+    } set[] = {{0, "scalar"},
+               {GAIT_CPU_BASE, "base"},
+               {GAIT_CPU_BASE | GAIT_CPU_AVX2, "avx2"},
+               {GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512, "avx512"}};
+    int wrong = 0;
+    for (size_t k = 0; k < sizeof set / sizeof *set; k++)
+        if (set[k].mask & ~gait_cpu_features())
+            printf("skipped %s\n", set[k].name);
+        else
+            wrong += golden_line(digest(set[k].mask), wanted, name, set[k].name) != wanted;
+    return wrong;
+}
+#endif
