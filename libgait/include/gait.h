@@ -257,8 +257,8 @@ GAIT_API gait_status gait_tracker_bytes(const gait_model *m, const gait_tracker_
                                         gait_error *err);
 GAIT_API gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
                                        const gait_tracker_config *cfg, gait_tracker **out, gait_error *err);
-/* Empty scene of one camera, as captured (distorted).  Borrowed: its pixels must stay until replaced or the
- * tracker is done.  plate NULL: none; the silhouette term is then silent. */
+/* Empty scene of one camera, as captured (distorted), borrowed: its pixels must stay until replaced or the tracker is
+ * done; snapshots lack it, restore keeps this tracker's.  plate NULL: none; the silhouette term is then silent. */
 GAIT_API gait_status gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate);
 /* Broad prior: phase uniform, stride rate and stature of the population, heading unknown, pelvis at the origin. */
 GAIT_API gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd);

@@ -233,16 +233,16 @@ def test_particles_carry_weights():
     assert 1 / np.square(weights, dtype=float).sum() == pytest.approx(estimate.ess, rel=0.01)
 
 
-def test_model_and_plate_live_as_long_as_the_tracker():
-    model, plate = Model(), wall(1)
-    held = [weakref.ref(model), weakref.ref(plate)]
-    tracker = Tracker(model, VIEW, SMALL, background=plate)
-    del model, plate
+def test_the_model_lives_as_long_as_the_tracker():
+    model = Model()
+    held = weakref.ref(model)
+    tracker = Tracker(model, VIEW, SMALL)
+    del model
     gc.collect()
-    assert all(ref() is not None for ref in held)
-    tracker.set_background(None)
+    assert held() is not None
+    del tracker
     gc.collect()
-    assert held[1]() is None and held[0]() is not None
+    assert held() is None
 
 
 def test_memory_is_fixed_and_grows_with_particles():
@@ -303,6 +303,58 @@ def test_number_of_cameras_and_threads_is_checked():
         Tracker(MODEL, [], SMALL)
     with pytest.raises(ValueError, match="threads"):
         Tracker(MODEL, VIEW, SMALL, tasks=0)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"particles": 1.5}, "config particles = 1.5: give a whole number"),
+        ({"particles": 1 << 40}, "config particles = 1099511627776 is negative or too large"),
+        ({"seed": -1}, "config seed = -1 is negative or too large"),
+        ({"girth": "wide"}, "config girth = 'wide': give a number"),
+    ],
+)
+def test_settings_that_the_library_has_no_room_for_are_named(change, words):
+    with pytest.raises(ValueError, match=words):
+        Tracker(MODEL, VIEW, replace(SMALL, **change))
+    assert replace(SMALL, particles=np.int64(300)).to_c().particles == 300
+
+
+@pytest.mark.parametrize(
+    ("words", "options", "said"),
+    [
+        (("x.gait", VIEW), {}, r"model: 'x.gait' is no gait.Model; give gait.Model\(FILE\)"),
+        ((MODEL, None), {}, "cameras: None; give a gait.Camera or a list of them"),
+        ((MODEL, [VIEW, "c.json"]), {}, "give a gait.Camera or a list"),
+        ((MODEL, VIEW), {"tasks": 1.5}, "tasks: 1.5; give a number of threads, a callable or a pool"),
+    ],
+)
+def test_arguments_of_another_kind_are_named(words, options, said):
+    with pytest.raises(ValueError, match=said):
+        Tracker(*words, **options)
+
+
+@pytest.mark.parametrize("wrong", [1 << 63, -(1 << 63) - 1, 0.5, "now"])
+def test_a_capture_time_that_is_none_is_named(wrong):
+    tracker = started()
+    with pytest.raises(ValueError, match=f"utime = {wrong!r}: give"):
+        tracker.step(FRAMES[0], wrong)
+    with pytest.raises(ValueError, match="utime"):
+        tracker.start(TRUE[0], spread(), wrong)
+
+
+def test_the_empty_scene_is_copied_and_not_part_of_a_snapshot():
+    plate = PLATE.copy()
+    tracker = Tracker(MODEL, VIEW, SMALL, background=plate)
+    plate[:] = 0
+    tracker.start(TRUE[0], spread(), 0)
+    run(tracker, 0, 4)
+    same, other = Tracker(MODEL, VIEW, SMALL, background=PLATE), Tracker(MODEL, VIEW, SMALL)
+    for one in (same, other):
+        one.restore(tracker.save())
+    for one in (tracker, same, other):
+        run(one, 4, 8)
+    assert same.digest() == tracker.digest() != other.digest()
 
 
 def test_two_cameras_are_better_than_one():

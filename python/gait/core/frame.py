@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -38,6 +39,17 @@ def per_camera(items: Any) -> list[Any]:
     if items is None or isinstance(items, np.ndarray | Joints):
         return [items]
     return list(items)
+
+
+def capture_time(utime: Any) -> int:
+    """Check a capture time: whole microseconds that fit 64 bits; ValueError if they do not."""
+    try:
+        whole = operator.index(utime)
+    except TypeError:
+        raise ValueError(f"utime = {utime!r}: give whole microseconds") from None
+    if not -(1 << 63) <= whole < 1 << 63:
+        raise ValueError(f"utime = {utime}: give microseconds in [-2^63, 2^63)")
+    return whole
 
 
 def image_view(image: Image, camera: Camera, what: str) -> _abi.ImageView:

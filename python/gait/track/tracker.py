@@ -14,7 +14,7 @@ from gait import _abi
 from gait._abi import TrackStatus
 from gait._abi.library import aligned, check, library
 from gait.core.estimate import Estimate
-from gait.core.frame import Joints, image_view, per_camera, track_array
+from gait.core.frame import Joints, capture_time, image_view, per_camera, track_array
 from gait.core.initial import Start
 from gait.core.model import Model, camera_c
 from gait.core.state import LEAST_STATURE, State
@@ -36,7 +36,7 @@ class Tracker:
     config : TrackerConfig, optional
         The library's defaults if left out.
     background : image, or sequence of image or None, optional
-        Empty scene as each camera sees it.
+        Empty scene as each camera sees it; copied.
     tasks : int, callable or TaskSource
         Number of threads; or a callable that runs tasks (see `gait.track.tasks.Runner`); or a pool.
 
@@ -64,8 +64,10 @@ class Tracker:
         tasks: int | Runner | TaskSource = 1,
     ) -> None:
         self._lib = library()
+        if not isinstance(model, Model):
+            raise ValueError(f"model: {model!r} is no gait.Model; give gait.Model(FILE)")
         self.model = model
-        self.cameras = [cameras] if isinstance(cameras, Camera) else list(cameras)
+        self.cameras = _camera_list(cameras)
         self._tasks, config = _task_source(tasks), config or TrackerConfig.default()
         self.config = replace(config, tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
         self._error = _abi.Error()
@@ -86,10 +88,10 @@ class Tracker:
             self.set_background(plate, i)
 
     def set_background(self, plate: Image | None, camera: int = 0) -> None:
-        """Give the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None takes it away."""
+        """Copy the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None takes it away."""
         view = None
         if plate is not None:
-            plate = np.ascontiguousarray(plate)
+            plate = np.array(plate, order="C")
             view = ctypes.byref(image_view(plate, self.cameras[camera], "background"))
         check(self._lib.gait_tracker_set_background(self._handle, camera, view))
         if plate is None:
@@ -109,7 +111,7 @@ class Tracker:
         """
         means, sds = ctypes.byref(mean.to_c()), ctypes.byref(sd.to_c())
         err = ctypes.byref(self._error)
-        self._check(self._lib.gait_tracker_start(self._handle, means, sds, utime, err))
+        self._check(self._lib.gait_tracker_start(self._handle, means, sds, capture_time(utime), err))
         self.stature_doubt = sd.stature / max(mean.stature, LEAST_STATURE)
 
     def step(
@@ -132,7 +134,7 @@ class Tracker:
         images = [None if image is None else np.ascontiguousarray(image) for image in per_camera(frames)]
         if len(images) > len(self.cameras):
             raise ValueError(f"{len(images)} images for {len(self.cameras)} cameras")
-        frame = _abi.FrameC(utime=utime)
+        frame = _abi.FrameC(utime=capture_time(utime))
         for i, image in enumerate(images):
             if image is not None:
                 frame.image[i] = image_view(image, self.cameras[i], "frame")
@@ -220,7 +222,10 @@ class Tracker:
         return int(self._lib.gait_tracker_digest(self._handle))
 
     def save(self) -> bytes:
-        """Copy of the whole state, for `restore` into a tracker of the same model and configuration."""
+        """Copy of the whole state, for `restore` into a tracker of the same model and configuration.
+
+        Empty scenes are not in it: give the other tracker its own (`set_background`).
+        """
         size = ctypes.c_size_t()
         check(self._lib.gait_tracker_save(self._handle, None, 0, ctypes.byref(size)))
         room = aligned(size.value)
@@ -252,7 +257,19 @@ class Tracker:
         return c
 
 
+def _camera_list(cameras: Camera | Sequence[Camera]) -> list[Camera]:
+    if isinstance(cameras, Camera):
+        return [cameras]
+    if not isinstance(cameras, Sequence) or not all(isinstance(c, Camera) for c in cameras):
+        raise ValueError(f"cameras: {cameras!r}; give a gait.Camera or a list of them")
+    return list(cameras)
+
+
 def _task_source(tasks: int | Runner | TaskSource) -> TaskSource | None:
     if isinstance(tasks, int):
         return threads(tasks)
-    return PythonTasks(tasks) if callable(tasks) else tasks
+    if callable(tasks):
+        return PythonTasks(tasks)
+    if not hasattr(tasks, "struct"):
+        raise ValueError(f"tasks: {tasks!r}; give a number of threads, a callable or a pool")
+    return tasks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import operator
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -67,13 +68,24 @@ class TrackerConfig:
         return TrackerConfig(**(values | {"mode": Mode(c.mode), "terms": Term(c.terms)} | changes))
 
     def to_c(self) -> _abi.TrackerConfigC:
-        """Make a ``gait_tracker_config`` without cameras and tasks."""
+        """Make a ``gait_tracker_config`` without cameras and tasks; ValueError for what has no room in it."""
         c = _abi.TrackerConfigC()
         library().gait_tracker_default(ctypes.byref(c), int(self.mode))
         for item in fields(self):
             if item.name != "term_weight":
-                setattr(c, item.name, getattr(self, item.name))
+                _put(c, item.name, getattr(self, item.name))
         if len(self.term_weight) != len(c.term_weight):
             raise ValueError(f"term_weight: give {len(c.term_weight)} numbers")
         c.term_weight[:] = self.term_weight
         return c
+
+
+def _put(c: _abi.TrackerConfigC, name: str, value: Any) -> None:
+    """Set a field; ctypes would cut a number that it has no room for."""
+    whole = isinstance(getattr(c, name), int)
+    try:
+        setattr(c, name, operator.index(value) if whole else value)
+    except TypeError:
+        raise ValueError(f"config {name} = {value!r}: give a {'whole ' * whole}number") from None
+    if whole and getattr(c, name) != value:
+        raise ValueError(f"config {name} = {value} is negative or too large")
