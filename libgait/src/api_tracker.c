@@ -283,6 +283,9 @@ static gait_status check_frame(const gait_tracker *t, const gait_frame *frame, g
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         const gait_image *const im = &frame->image[c];
         const gait_camera *const cam = &t->cfg.camera[c];
+        if (im->data && !image_channels(im->format))
+            return base_fail(err, GAIT_ERR_ARG, c, "image of camera %d has unknown format %d", (int)c,
+                             (int)im->format);
         if (im->data && !image_valid(im, cam->width, cam->height))
             return base_fail(
                 err, GAIT_ERR_ARG, c, "image of camera %d is %d x %d stride %d, the camera is %d x %d",

@@ -35,9 +35,10 @@ void *arena_take(arena *a, size_t elem, size_t count)
 gait_status arena_place(arena *a, void *mem, size_t bytes, gait_error *err)
 {
     size_t const need = a->used;
-    if ((uintptr_t)mem % GAIT_ALIGN != 0 || bytes < need)
-        return base_fail(err, GAIT_ERR_MEMORY, -1, "need %zu bytes aligned to %d, got %zu", need, GAIT_ALIGN,
-                         bytes);
+    if ((uintptr_t)mem % GAIT_ALIGN != 0)
+        return base_fail(err, GAIT_ERR_MEMORY, -1, "memory not aligned to %d bytes", GAIT_ALIGN);
+    if (bytes < need)
+        return base_fail(err, GAIT_ERR_MEMORY, -1, "need %zu bytes, got %zu", need, bytes);
     *a = (arena){.base = mem, .cap = bytes};
     return GAIT_OK;
 }

@@ -81,6 +81,7 @@ def test_files_that_are_not_there(tmp_path):
         ({"t": [1, None, 2]}, ["t is not made of numbers"]),
         ({"distortion": [1, 2, 3]}, ["distortion", "0, 4 or 5"]),
         ({"distortion": "none"}, ["distortion"]),
+        ({"distorsion": [0.1, 0, 0, 0]}, ["line 1: distorsion is not a known key"]),
     ],
 )
 def test_a_wrong_camera_file(tmp_path, change, words):
@@ -88,6 +89,14 @@ def test_a_wrong_camera_file(tmp_path, change, words):
     file = tmp_path / "camera.json"
     file.write_text(json.dumps(content))
     fails(options(tmp_path, "--camera", file), file, *words)
+
+
+@pytest.mark.parametrize(("option", "content"), [("--camera", CAMERA), ("--init", INIT)])
+def test_a_key_that_is_there_twice(tmp_path, option, content):
+    file = tmp_path / "twice.json"
+    key, value = next(iter(content.items()))
+    file.write_text(json.dumps(content)[:-1] + f',\n"{key}": {value}}}')
+    fails(options(tmp_path, option, file), file, f"line 2: {key} is there twice; remove one")
 
 
 @pytest.mark.parametrize(
@@ -141,7 +150,7 @@ def test_the_cameras_of_the_python_side_are_accepted(tmp_path):
         ({"phse": 0.5}, ["phse is not a known key"]),
         ({"sd": {"speed": 1}}, ["speed is not a known key"]),
         ({"sd": 0.1}, ["sd is not an object"]),
-        ({"sd": {"pelvis": -1}}, ["pelvis is -1"]),
+        ({"sd": {"pelvis": -1}}, ["sd.pelvis is -1"]),
         ({"phase": 1.5}, ["phase is 1.5", "right heel strike"]),
         ({"stature_m": 17.5}, ["stature_m is 17.5", "metres"]),
         ({"stride_hz": 55}, ["stride_hz is 55"]),

@@ -102,6 +102,19 @@ static void test_floats(void)
     }
 }
 
+/* Memory that is not aligned, or too small: each says so, and not the other. */
+static void test_memory(void)
+{
+    static _Alignas(GAIT_ALIGN) unsigned char memory[2 * GAIT_ALIGN];
+    gait_tracker_config const cfg = toy_config(1);
+    gait_tracker *t = NULL;
+    gait_error err;
+    CHECK(gait_tracker_init(memory + 1, sizeof memory - 1, toy_model(), &cfg, &t, &err) == GAIT_ERR_MEMORY);
+    CHECK(strcmp(err.text, "memory not aligned to 64 bytes") == 0 && !t);
+    CHECK(gait_tracker_init(memory, sizeof memory, toy_model(), &cfg, &t, &err) == GAIT_ERR_MEMORY);
+    CHECK(strstr(err.text, "bytes, got 128") && !strstr(err.text, "aligned") && !t);
+}
+
 static void test_cameras(void)
 {
     for (int k = 0; k < 2; k++) {
@@ -239,6 +252,7 @@ int main(void)
 {
     test_integers();
     test_floats();
+    test_memory();
     test_cameras();
     test_defaults();
     test_start();

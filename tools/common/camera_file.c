@@ -58,6 +58,10 @@ static bool lens(const fields *f, float out[5], message *why)
 
 static bool parse(const fields *f, gait_camera *c, message *why)
 {
+    static const char *const known[] = {"width", "height", "fx", "fy",         "cx",
+                                        "cy",    "R",      "t",  "distortion", "note"};
+    if (!fields_only(f, 0, known, sizeof known / sizeof *known, why))
+        return false;
     const char *const focal = "give the focal length in pixels", *const middle =
                                                                      "give the principal point in pixels";
     if (!whole(f, "width", &c->width, why) || !whole(f, "height", &c->height, why) ||

@@ -1,6 +1,7 @@
 #include "fields.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -37,19 +38,25 @@ int fields_find(const fields *f, int object, const char *key)
 bool fields_numbers(const fields *f, int object, const char *key, double *out, int count, double low,
                     double high, const char *remedy, message *why)
 {
+    char name[64];
     int const value = fields_find(f, object, key);
+    if (object > 0) /* its own key stands before it */
+        snprintf(name, sizeof name, "%.*s.%s", (int)f->node[object - 1].length, f->node[object - 1].text,
+                 key);
+    else
+        snprintf(name, sizeof name, "%s", key);
     if (value < 0)
-        return message_set(why, "%s: %s is missing; %s", f->path, key, remedy);
+        return message_set(why, "%s: %s is missing; %s", f->path, name, remedy);
     int const found = json_numbers(&f->doc, value, out, count);
     if (found < 0)
-        return message_set(why, "%s: %s is not made of numbers; %s", f->path, key, remedy);
+        return message_set(why, "%s: %s is not made of numbers; %s", f->path, name, remedy);
     if (found != count)
-        return message_set(why, "%s: %s has %d numbers, not %d; %s", f->path, key, found, count, remedy);
+        return message_set(why, "%s: %s has %d numbers, not %d; %s", f->path, name, found, count, remedy);
     for (int i = 0; i < count; i++)
         if (!isfinite(out[i]))
-            return message_set(why, "%s: %s is not finite; %s", f->path, key, remedy);
+            return message_set(why, "%s: %s is not finite; %s", f->path, name, remedy);
         else if (out[i] < low || out[i] > high)
-            return message_set(why, "%s: %s is %g, outside [%g, %g]; %s", f->path, key, out[i], low, high,
+            return message_set(why, "%s: %s is %g, outside [%g, %g]; %s", f->path, name, out[i], low, high,
                                remedy);
     return true;
 }
@@ -64,6 +71,11 @@ bool fields_only(const fields *f, int object, const char *const *known, int coun
         if (!found)
             return message_set(why, "%s: line %d: %.*s is not a known key; correct or remove it", f->path,
                                f->node[i].line, (int)f->node[i].length, f->node[i].text);
+        for (int k = f->node[i + 1].next; k < f->node[object].next; k = f->node[k + 1].next)
+            if (f->node[k].length == f->node[i].length &&
+                memcmp(f->node[k].text, f->node[i].text, f->node[i].length) == 0)
+                return message_set(why, "%s: line %d: %.*s is there twice; remove one", f->path,
+                                   f->node[k].line, (int)f->node[k].length, f->node[k].text);
     }
     return true;
 }

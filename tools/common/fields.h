@@ -22,6 +22,6 @@ int fields_find(const fields *f, int object, const char *key);
 /* Exactly `count` numbers in [low, high] under the key, nested or not; the remedy ends the line of failure. */
 bool fields_numbers(const fields *f, int object, const char *key, double *out, int count, double low,
                     double high, const char *remedy, message *why);
-/* Every key of `object` must be one of the `count` known ones. */
+/* Every key of `object` must be one of the `count` known ones, and there once. */
 bool fields_only(const fields *f, int object, const char *const *known, int count, message *why);
 #endif
