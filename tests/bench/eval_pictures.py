@@ -10,8 +10,9 @@ import numpy as np
 from eval_marks import Marks
 
 from gait import Camera, Model, Video
+from gait.body.skeleton import BONES
 from gait.core.estimate import Estimate
-from gait.draw.overlay import BONES, Overlay
+from gait.draw.overlay import Overlay
 from gait.image.video import Image
 from gait.motion.trackfile import read_truth
 

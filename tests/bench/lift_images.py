@@ -27,6 +27,7 @@ from scipy import stats
 
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.core.model import read_cyclic
+from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.image.video import Video, read_plate
 from gait.learn import readers, segment_motion
@@ -34,7 +35,6 @@ from gait.learn.segment_options import Segments
 from gait.lift.beginning import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.fit_clip import fit_clip
-from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_placement
 from gait.lift.views import CameraView

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.draw.overlay import BONES
+from gait.body.skeleton import BONES
+from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.image.video import Frame, Image
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.energy import PLACE
 from gait.lift.fit_clip import ClipFit, Sequence
-from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Placement
 from gait.lift.views import CameraView

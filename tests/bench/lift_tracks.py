@@ -19,13 +19,13 @@ import numpy.typing as npt
 import table
 
 from gait.body.skeleton import EVAL15, axis_rotation
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.io.trc import read_trc
 from gait.learn.stage import one_thread
 from gait.lift import motion, result
 from gait.lift.equations import Parallel, Perspective, View, looking_along
-from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
 from gait.motion.trackfile import Joints, read_truth
 from gait.progress import progress

@@ -13,9 +13,9 @@ import gait.cli
 from gait.body import skeleton
 from gait.body.skeleton import ANGLES, CHANNELS, JOINTS
 from gait.cli import info
+from gait.core.segment_prior import TAGS
 from gait.io import blob
 from gait.learn import fit, model, sources
-from gait.lift.prior import TAGS
 
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"

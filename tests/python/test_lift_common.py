@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from gait.body.skeleton import EVAL15, JOINTS
+from gait.core.segment_prior import SegmentPrior
 from gait.lift import common, likeness
 from gait.lift.descent import Link, information, normal
 from gait.lift.fit_clip import fit_clip
-from gait.lift.prior import SegmentPrior
 from gait.lift.tridiagonal import factor
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage

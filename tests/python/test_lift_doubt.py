@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gait.body.skeleton import EVAL15
+from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.lift import motion, result
 from gait.lift.doubt import FAR, doubted, price
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
-from gait.lift.prior import SegmentPrior
 from gait.lift.tracks_file import Tracks
 
 SD = 3.0

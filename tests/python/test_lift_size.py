@@ -7,13 +7,13 @@ import pytest
 from toy_segments import toy_prior
 
 from gait.body.skeleton import EVAL15, JOINTS
+from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.lift import chain as chains
 from gait.lift import motion, size
 from gait.lift.chain import Around, Freedom, overlapping, restricted
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
-from gait.lift.prior import SegmentPrior
 from gait.lift.result import Options
 from gait.lift.sequence import Seen, Start, smooth
 from gait.lift.tracks_file import Tracks

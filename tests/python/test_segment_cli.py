@@ -12,11 +12,11 @@ from toy_segments import FRONT
 import gait.cli
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.core.model import Model
+from gait.core.segment_prior import TAGS, SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
 from gait.lift.observe import Observations, orthographic
 from gait.lift.posterior import infer, place
-from gait.lift.prior import TAGS, SegmentPrior
 from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
 
 

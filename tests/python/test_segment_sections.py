@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
+from gait.core.segment_prior import TAGS, SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
 from gait.learn.segment_sections import sections
-from gait.lift.prior import TAGS, SegmentPrior
 
 
 @pytest.mark.parametrize("components", [1, 3])

@@ -35,6 +35,18 @@ EVAL15 = ["pelvis", "neck", "head_top"] + [
     f"{s}_{j}" for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for s in SIDES
 ]
 JOINTS = EVAL15 + [f"{s}_{j}" for j in ("toe", "heel") for s in SIDES]
+#: As they are drawn.
+BONES = (
+    *(("pelvis", "neck"), ("neck", "head_top")),
+    *(("neck", f"{s}_shoulder") for s in "lr"),
+    *((f"{s}_shoulder", f"{s}_elbow") for s in "lr"),
+    *((f"{s}_elbow", f"{s}_wrist") for s in "lr"),
+    *(("pelvis", f"{s}_hip") for s in "lr"),
+    *((f"{s}_hip", f"{s}_knee") for s in "lr"),
+    *((f"{s}_knee", f"{s}_ankle") for s in "lr"),
+    *((f"{s}_ankle", f"{s}_heel") for s in "lr"),
+    *((f"{s}_heel", f"{s}_toe") for s in "lr"),
+)
 
 
 @dataclass(frozen=True)

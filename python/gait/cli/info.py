@@ -12,9 +12,9 @@ import numpy as np
 
 from gait.body.pace import slope_of
 from gait.cli import segment_text
+from gait.core.segment_prior import TAGS, SegmentPrior
 from gait.io import blob
 from gait.io.fields import json_of
-from gait.lift.prior import TAGS, SegmentPrior
 
 NAME = "info"
 HELP = "what a model holds"

@@ -7,12 +7,12 @@ import json
 import sys
 
 from gait.cli import segment_text
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
 from gait.learn import model, segment_fit, segment_sections
 from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments
-from gait.lift.prior import SegmentPrior
 
 
 def learn(corpus: Corpus, wanted: Segments, quiet: bool) -> SegmentPrior | None:

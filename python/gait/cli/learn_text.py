@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from gait.body.skeleton import ANGLES
 from gait.cli import segment_text
+from gait.core.segment_prior import SegmentPrior
 from gait.io import blob
 from gait.learn import fit, ground, model, unseen
 from gait.learn.model_options import DEFAULT_COMPONENTS
 from gait.learn.sequence import Sequence
-from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 

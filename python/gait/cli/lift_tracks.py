@@ -6,12 +6,12 @@ import sys
 
 import numpy as np
 
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.learn.stage import one_thread
 from gait.lift import motion, outliers, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
-from gait.lift.prior import SegmentPrior
 from gait.lift.result import Motion, Options
 from gait.lift.tracks_file import Tracks
 from gait.progress import progress

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from gait.body.skeleton import JOINTS
 from gait.cli import lift_prior, values
 from gait.core.model import read_blob, read_cyclic
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UsageError, UserError
 from gait.image.camera import Camera
 from gait.image.video import Video, VideoWriter, background, require_video_name
@@ -27,7 +28,6 @@ from gait.lift.cylinder import Figure
 from gait.lift.cylinder_picture import draw_figure
 from gait.lift.fit_clip import ClipFit, fit_clip, work
 from gait.lift.likeness import DOUBTFUL, HELD
-from gait.lift.prior import SegmentPrior
 from gait.lift.sensors import Film
 from gait.lift.springs import Correction, Placement, read_corrections, read_placement
 from gait.lift.views import CameraView, FlatView, View

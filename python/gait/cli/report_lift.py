@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.cli import lift_tracks, values
+from gait.core.segment_prior import SegmentPrior
 from gait.draw.page import Page
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
@@ -34,7 +35,6 @@ from gait.lift import figures_clip
 from gait.lift.equations import View
 from gait.lift.figures_segment import Case, case, drawings
 from gait.lift.motion import output_names
-from gait.lift.prior import SegmentPrior
 from gait.lift.result import METHODS, Motion, Options
 from gait.lift.tracks_file import Tracks
 from gait.progress import progress

@@ -1,7 +1,7 @@
 """3-D motion from 2-D tracks by the C library: one segment, many at once, or a stream.
 
-After Leventon and Freeman (1998).  The prior is that of `gait.lift.prior.SegmentPrior`; `gait.lift` holds the
-same inference in numpy, which is the reference in tests.
+After Leventon and Freeman (1998).  The prior is that of `gait.core.segment_prior.SegmentPrior`; `gait.lift`
+holds the same inference in numpy, which is the reference in tests.
 """
 
 from __future__ import annotations

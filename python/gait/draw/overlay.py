@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.body.skeleton import BONES
 from gait.core.estimate import Estimate
 from gait.core.model import Model
 from gait.core.state import State
@@ -19,17 +20,6 @@ from gait.image.video import Image
 Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
-BONES = (
-    *(("pelvis", "neck"), ("neck", "head_top")),
-    *(("neck", f"{s}_shoulder") for s in "lr"),
-    *((f"{s}_shoulder", f"{s}_elbow") for s in "lr"),
-    *((f"{s}_elbow", f"{s}_wrist") for s in "lr"),
-    *(("pelvis", f"{s}_hip") for s in "lr"),
-    *((f"{s}_hip", f"{s}_knee") for s in "lr"),
-    *((f"{s}_knee", f"{s}_ankle") for s in "lr"),
-    *((f"{s}_ankle", f"{s}_heel") for s in "lr"),
-    *((f"{s}_heel", f"{s}_toe") for s in "lr"),
-)
 ENDS = ("l_wrist", "r_wrist", "l_ankle", "r_ankle")
 _DARK: Colour = (30, 30, 30)
 _FILL = 0.28  # opacity of the body

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.learn import segment_heldout, segment_mixture
 from gait.learn.segment_basis import Basis, basis, filled
 from gait.learn.segment_corpus import Recorded, Table, tabulate
 from gait.learn.segment_heldout import Fitted
 from gait.learn.segment_options import Segments
-from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 

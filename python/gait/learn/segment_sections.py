@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gait.core.segment_prior import SegmentPrior
 from gait.io import blob
 from gait.learn.rounded import rounded
-from gait.lift.prior import SegmentPrior
 
 
 def sections(prior: SegmentPrior) -> dict[str, blob.Array]:

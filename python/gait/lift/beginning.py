@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import pose
+from gait.core.segment_prior import SegmentPrior
 from gait.io import blob
-from gait.lift.prior import SegmentPrior
 from gait.lift.springs import Placement
 
 Floats = npt.NDArray[np.float64]

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.core.lifter import LiftConfig, Lifter
+from gait.core.segment_prior import SegmentPrior
 from gait.draw.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn.figures_base import Drawing, grid, line_legend
 from gait.lift.figures_base import AHEAD, SIDE, rows, strip
 from gait.lift.posterior import Gaussian, place
-from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.core.segment_prior import SegmentPrior
 from gait.lift.chain import LEADING
 from gait.lift.observe import Rows
 from gait.lift.posterior import GROUND_SD, Gaussian, Posterior, infer, place
-from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 

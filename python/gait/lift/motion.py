@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.lift import sequence, size, start, uncertain
 from gait.lift.chain import Freedom, blended, in_turn, restricted
@@ -23,7 +24,6 @@ from gait.lift.grid import Grid, interpolated
 from gait.lift.heading import Explanation, Person
 from gait.lift.observe import Observations, resampled
 from gait.lift.posterior import by_likelihood
-from gait.lift.prior import SegmentPrior
 from gait.lift.refuse import Unlike, require_seen, require_size
 from gait.lift.result import Motion, Options
 from gait.lift.sequence import Lifted, Seen, Start

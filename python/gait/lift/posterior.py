@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import axis_rotation
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.lift.observe import Rows
-from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.lift.grid import Grid
 from gait.lift.heading import Explanation
-from gait.lift.prior import SegmentPrior
 from gait.lift.start import FEWEST
 
 Floats = npt.NDArray[np.float64]

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gait.core.segment_prior import SegmentPrior
 from gait.lift import bordered, doubt, soft
 from gait.lift.bordered import Information
 from gait.lift.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
 from gait.lift.equations import Parallel, View, scale_free
 from gait.lift.grid import Grid, interpolated
 from gait.lift.observe import Observations
-from gait.lift.prior import SegmentPrior
 from gait.lift.soft import Layout, Rows
 
 Floats = npt.NDArray[np.float64]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
-from gait.lift.prior import SegmentPrior
 from gait.lift.soft import BONES
 
 Floats = npt.NDArray[np.float64]

@@ -27,9 +27,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.core.initial import SCALARS, STATURE, frame_number, read_start
+from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
-from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 Size = tuple[int, int]

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from gait.core.segment_prior import SegmentPrior
 from gait.lift import doubt
 from gait.lift.equations import View
 from gait.lift.heading import Explanation, Person, explain
 from gait.lift.observe import Observations, Rows
-from gait.lift.prior import SegmentPrior
 
 Floats = npt.NDArray[np.float64]
 

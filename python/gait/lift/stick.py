@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtr
 
-from gait.draw.overlay import BONES
+from gait.body.skeleton import BONES
 from gait.errors import UserError
 
 Floats = npt.NDArray[np.float64]
