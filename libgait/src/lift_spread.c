@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#define ROUNDS         100   /* of the scale; a fifth of them settle it to 1e-8 */
 #define NO_INFORMATION 1e-13 /* eigenvalues below this part of the largest are rounding */
 
 /* Sum over all markers and frames of products of displacements: G (n x n, upper), square metres. */
@@ -138,27 +139,46 @@ static double *inverse_root(const lift_table *t, const lift_belief *b, lift_beli
     return Y;
 }
 
-double lift_scale(const lift_table *t, const lift_belief *b, lift_belief *spare)
+/* Q of the first k unknowns, rows of `stride`; spare->A is lost. */
+static void covariance(const lift_table *t, const lift_belief *b, lift_belief *spare, int32_t k, double *Q,
+                       int32_t stride)
 {
     const double *const Y = inverse_root(t, b, spare);
-    double size = LIFT_FREEDOM, observed = LIFT_FREEDOM + t->prior.modes; /* and less what Q leaves open */
-    for (int32_t i = 0; i < t->prior.modes; i++) {
-        size += b->theta[i] * b->theta[i];
-        for (int32_t k = i; k < t->n; k++)
-            observed -= Y[k * t->ld + i] * Y[k * t->ld + i];
-    }
-    return size / observed;
+    for (int32_t i = 0; i < k; i++)
+        for (int32_t j = i; j < k; j++) {
+            double sum = 0.0;
+            for (int32_t l = j; l < t->n; l++)
+                sum += Y[l * t->ld + i] * Y[l * t->ld + j];
+            Q[i * stride + j] = Q[j * stride + i] = sum;
+        }
 }
 
 void lift_covariance(const lift_table *t, const lift_belief *b, lift_belief *spare, double *Q)
 {
-    int32_t const n = t->n, ld = t->ld;
-    const double *const Y = inverse_root(t, b, spare);
-    for (int32_t i = 0; i < n; i++)
-        for (int32_t j = i; j < n; j++) {
-            double sum = 0.0;
-            for (int32_t k = j; k < n; k++)
-                sum += Y[k * ld + i] * Y[k * ld + j];
-            Q[i * n + j] = Q[j * n + i] = sum;
+    covariance(t, b, spare, t->n, Q, t->n);
+}
+
+/* MacKay's fixed point of the evidence, along the axes in which the observations tell the modes apart. */
+double lift_scale(const lift_table *t, const lift_belief *b, lift_belief *spare)
+{
+    int32_t const k = t->prior.modes, ld = t->ld;
+    double *const Q = spare->U, *const V = spare->A, *const x = spare->theta;
+    double scale = 1.0;
+    covariance(t, b, spare, k, Q, ld);
+    dense_eigen(Q, V, k, ld);
+    for (int32_t i = 0; i < k; i++) {
+        x[i] = 0.0;
+        for (int32_t j = 0; j < k; j++)
+            x[i] += V[i * ld + j] * b->theta[j];
+    }
+    for (int32_t round = 0; round < ROUNDS; round++) {
+        double size = LIFT_FREEDOM, told = LIFT_FREEDOM;
+        for (int32_t i = 0; i < k; i++) {
+            double const q = Q[i * (ld + 1)], part = scale / (q + scale * (1.0 - q));
+            size += part * part * x[i] * x[i];
+            told += part * (1.0 - q);
         }
+        scale = size / told;
+    }
+    return scale;
 }

@@ -4,7 +4,7 @@
 #include "lift_fit.h"
 
 /* Degrees of freedom of lift_scale, chosen on sequences that are not reported (make eval-lift, lift_modes). */
-#define LIFT_FREEDOM 10.0
+#define LIFT_FREEDOM 4.0
 
 /* theta of minimum norm over unit displacements that fits best whatever the prior says, in spare->theta;
  * the heading is b's. spare->A and U are lost. */
@@ -16,7 +16,7 @@ void lift_uncertain(const lift_table *t, const lift_belief *b, lift_belief *spar
                     double *mode, double *sd);
 /* Q, n x n. */
 void lift_covariance(const lift_table *t, const lift_belief *b, lift_belief *spare, double *Q);
-/* How much further from its mean than the prior expects the motion is, by as many of its modes as were observed.  With
- * s^2 ~ LIFT_FREEDOM / chi^2(LIFT_FREEDOM) a priori and modes ~ N(0, s^2): s^2 given them. spare is lost. */
+/* How much further from its mean than the prior expects the motion is.  With s^2 ~ LIFT_FREEDOM / chi^2(LIFT_FREEDOM)
+ * a priori and modes ~ N(0, s^2), but noise and residual as they are: the likeliest s^2. spare is lost. */
 double lift_scale(const lift_table *t, const lift_belief *b, lift_belief *spare);
 #endif

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import table
-from lift_mocap import MOCAP, NOISE, SEQUENCES, errors_of, held_out
+from lift_mocap import MOCAP, NOISE, SEQUENCES, WITHIN_SCALED, errors_of, held_out
 
 from gait.progress import progress
 
@@ -61,7 +61,8 @@ def _publish(modes: list[list[object]]) -> None:
         "Least squares are tamed by few modes as Bayes is by the prior, so that with few the ratio is small "
         "though nothing is gained: Bayes alone is better with more. Chosen on the first sequences, whose "
         "Bayes errors count: mm at 5 and at 50 mm of noise; ratio and coverages at 50 mm. "
-        "The freedom of the scale (LIFT_FREEDOM) was chosen by the same sequences."
+        "The freedom of the scale (LIFT_FREEDOM) and its +- "
+        f"{WITHIN_SCALED} for 90 % were chosen by the same sequences."
     )
     head = ["use", "left out", "modes", "likelihood 5", "Bayes 5", "likelihood 50", "Bayes 50", "ratio"]
     table.publish("lift_modes", "How many modes", [*head, "coverage", "scaled"], modes, note)

@@ -293,8 +293,9 @@ class Lifter:
     def scale(self) -> float:
         """By what to multiply deviations for a motion as far from the prior's mean as the last segment.
 
-        Above 1 where its modes are larger than the prior expects, below 1 where they are smaller (a scale
-        of all variances with an inverse gamma prior, as of Student's t).
+        Above 1 where its modes are larger than the prior expects, below 1 where they are smaller (the
+        likeliest scale of the modes' variances, with an inverse gamma prior).  Errors over deviations so
+        multiplied are about Student's t of ten degrees: 90 % are within 1.81.  Takes milliseconds.
         """
         scale = float(library().gait_lift_scale(self._handle))
         if not scale > 0:
