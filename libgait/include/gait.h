@@ -16,7 +16,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 3          /* SONAME; bumped by any incompatible change below, struct layout included */
+#define GAIT_ABI 4          /* SONAME; bumped by any incompatible change below, struct layout included */
 #define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 
@@ -95,6 +95,7 @@ typedef struct gait_state {          /* one hypothesis: everything that places a
     float stature;                   /* metres */
     float heading;                   /* walking direction about world z, radians; 0 = along +x */
     float pitch, roll;               /* tilt of the pelvis beyond the model's own, radians */
+    float turn_rate;                 /* of the heading, radians per second; positive to the left; poses do not need it */
     float pelvis[3];                 /* pelvis joint, metres, world */
     float coef[GAIT_MAX_COMPONENTS]; /* principal-component scores, in standard deviations; unused are 0 */
     float offset[GAIT_MAX_ANGLES];   /* posture: added to the model's joint angles, radians; unused are 0 */
@@ -195,6 +196,10 @@ typedef struct gait_tracker_config {
     float    lateral_noise;    /* across it, metres [0, 100]; default 0.05 (paper mode 0.044) */
     float    vertical_noise;   /* metres [0, 100]; default 0.0096 (paper mode 0.022) */
     float    heading_noise;    /* radians [0, 100]; default 0.044 (paper mode 0.11) */
+    float    turn_sd;          /* of the turn rates that walkers take, radians per second [0, 100]; default 0.5 (paper
+                                * mode 0) */
+    float    turn_time;        /* mean seconds until a walker takes another, every second time straight on; 0: always
+                                * straight on [0, 1e6]; default 12 (paper mode 0) */
     float    tilt_noise;       /* of pitch and roll, radians [0, 100]; default 0.033 (paper mode 0.055) */
     float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds; 0: never
                                 * [0, 1e6]; default 1.1 (paper mode 0) */

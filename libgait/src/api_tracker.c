@@ -45,6 +45,8 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .lateral_noise = 0.05f,
         .vertical_noise = 0.0096f,
         .heading_noise = 0.044f,
+        .turn_sd = 0.5f,
+        .turn_time = 12.0f,
         .tilt_noise = 0.033f,
         .tilt_time = 1.1f,
         .coef_noise = 0.667f, /* with coef_time: the population's unit variance */
@@ -63,6 +65,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         cfg->forward_noise = cfg->lateral_noise = 0.044f;
         cfg->vertical_noise = 0.022f;
         cfg->heading_noise = 0.11f;
+        cfg->turn_sd = cfg->turn_time = 0.0f;
         cfg->tilt_noise = 0.055f;
         cfg->coef_noise = 0.5f;
         cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
@@ -104,6 +107,8 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(lateral_noise, 0.0f, 100.0f),
         RANGE(vertical_noise, 0.0f, 100.0f),
         RANGE(heading_noise, 0.0f, 100.0f),
+        RANGE(turn_sd, 0.0f, 100.0f),
+        RANGE(turn_time, 0.0f, 1e6f),
         RANGE(tilt_noise, 0.0f, 100.0f),
         RANGE(tilt_time, 0.0f, 1e6f),
         RANGE(coef_noise, 0.0f, 100.0f),

@@ -26,6 +26,7 @@ walker dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state
     s.roll += sd->roll * n[5];
     s.pelvis[0] += sd->pelvis[0] * n[6];
     s.pelvis[1] += sd->pelvis[1] * n[7];
+    s.turn_rate += sd->turn_rate * n[F_TURN];
     for (int32_t k = 0; k < q; k++)
         s.coef[k] += sd->coef[k] * n[F_COEF + k];
     for (int32_t k = 0; k < d->rule.proportions; k++)
@@ -83,6 +84,8 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .stature_noise = (settling ? c->stature_noise_start : c->stature_noise) * d->stature_doubt * root_dt,
         .rate = relax(dt, c->rate_time, (settling ? c->rate_noise_start : c->rate_noise) * mean_rate),
         .level = relax(dt, c->tilt_time, c->vertical_noise),
+        .turn_chance = c->turn_time > 0.0f && age > 0.0f ? 1.0f - m_exp(-dt / c->turn_time) : 0.0f,
+        .turn_sd = c->turn_sd,
         .tilt = relax(dt, c->tilt_time, c->tilt_noise),
         .score = relax(dt, c->coef_time, c->coef_noise),
         .shape = relax_to_one(dt, c->proportion_noise),

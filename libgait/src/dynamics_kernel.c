@@ -81,7 +81,7 @@ KERNEL_ROW void speeds(const dynamics_step *s, const walker_block *restrict from
     }
 }
 
-/* Eq. 8: forward along the previous heading, so far in a stride, by so many. */
+/* Eq. 8: forward along the heading, so far in a stride, by so many. */
 KERNEL_ROW void walk(const dynamics_step *s, const walker_block *restrict from,
                      const float (*restrict n)[BLOCK], const float *restrict turn,
                      const float *restrict speed, walker_block *restrict to)
@@ -91,14 +91,35 @@ KERNEL_ROW void walk(const dynamics_step *s, const walker_block *restrict from,
         float const ahead =
             from->f[F_STATURE][lane] * speed[lane] * turn[lane] + s->forward_noise * n[2][lane];
         float const aside = s->lateral_noise * n[3][lane];
+        float const curve = from->f[F_TURN][lane] * s->dt;
         float sn, cs;
-        m_sincos(from->f[F_HEADING][lane], &sn, &cs);
+        m_sincos(from->f[F_HEADING][lane] + 0.5f * curve, &sn, &cs);
         to->f[F_X][lane] = from->f[F_X][lane] + (ahead * cs - aside * sn);
         to->f[F_Y][lane] = from->f[F_Y][lane] + (ahead * sn + aside * cs);
-        heading[lane] = from->f[F_HEADING][lane] + s->heading_noise * n[5][lane];
+        heading[lane] = from->f[F_HEADING][lane] + curve + s->heading_noise * n[5][lane];
     }
     for (int32_t lane = 0; lane < BLOCK; lane++)
         to->f[F_HEADING][lane] = m_wrap_pi(heading[lane]);
+}
+
+/* Now and then a walker takes another turn rate, every second time none: a course that wanders by so much at all times
+ * would let swaying hips pass for turning. */
+KERNEL_ROW void take_turns(const dynamics_step *s, const uint32_t *restrict when,
+                           const uint32_t *restrict which, const float *restrict n, const float *restrict x,
+                           float *restrict out)
+{
+    for (int32_t lane = 0; lane < BLOCK; lane++) {
+        float const at = (float)(when[lane] >> 8) * 0x1p-24f;
+        float const rate = which[lane] >> 31 ? s->turn_sd * n[lane] : 0.0f;
+        out[lane] = at < s->turn_chance ? rate : x[lane];
+    }
+}
+
+static void steer(const dynamics_step *s, int32_t first, const float *n, const float *x, float *out)
+{
+    uint32_t bits[4][BLOCK];
+    words(s->seed, s->frame, (uint32_t)first, NORMALS / 4, bits);
+    take_turns(s, bits[0], bits[1], n, x, out);
 }
 
 KERNEL_ROW void grow(const dynamics_step *s, const float *restrict x, const float *restrict n,
@@ -126,6 +147,7 @@ void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const walker_b
     relax(s->level, from->f[F_Z], n[4], to->f[F_Z]);
     relax(s->tilt, from->f[F_PITCH], n[6], to->f[F_PITCH]);
     relax(s->tilt, from->f[F_ROLL], n[7], to->f[F_ROLL]);
+    steer(s, first, n[9], from->f[F_TURN], to->f[F_TURN]);
     grow(s, from->f[F_STATURE], n[8], to->f[F_STATURE]);
     /* the scores relax to the population (eq. 5); proportions and posture hardly change */
     for (int32_t k = F_COEF; k < s->fields; k++)

@@ -150,7 +150,8 @@ static void spread(const gait_tracker *t, const walker *sd, float phase_sd, floa
                            .stature = sd->f[F_STATURE],
                            .heading = heading_sd,
                            .pitch = sd->f[F_PITCH],
-                           .roll = sd->f[F_ROLL]};
+                           .roll = sd->f[F_ROLL],
+                           .turn_rate = sd->f[F_TURN]};
     for (int32_t k = 0; k < 3; k++)
         out->sd.pelvis[k] = out->joint_sd[0][k];
     for (int32_t k = 0; k < t->rule.components; k++)

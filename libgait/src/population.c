@@ -86,7 +86,8 @@ gait_state walker_state(const body_rule *r, const walker *w)
                     .stature = w->f[F_STATURE],
                     .heading = w->f[F_HEADING],
                     .pitch = w->f[F_PITCH],
-                    .roll = w->f[F_ROLL]};
+                    .roll = w->f[F_ROLL],
+                    .turn_rate = w->f[F_TURN]};
     float sway, height, sn, cs;
     pelvis_offset(r, w, &sway, &height);
     m_sincos(s.heading, &sn, &cs);
@@ -112,6 +113,7 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
     w.f[F_HEADING] = s->heading;
     w.f[F_PITCH] = s->pitch;
     w.f[F_ROLL] = s->roll;
+    w.f[F_TURN] = s->turn_rate;
     for (int32_t k = 0; k < r->components; k++)
         w.f[F_COEF + k] = s->coef[k];
     for (int32_t k = 0; k < r->proportions; k++)
@@ -147,6 +149,7 @@ walker population_place(const population *p, const double *weight)
 
 typedef struct block { /* fields of BLOCK walker_block */
     kin_input in;
+    float turn[BLOCK]; /* which no pose depends on */
     float offset[GAIT_MAX_ANGLES][BLOCK];
 } block;
 
@@ -203,6 +206,8 @@ static float *block_field(const body_rule *r, block *b, int32_t f)
         return in->roll;
     case F_STATURE:
         return in->stature;
+    case F_TURN:
+        return b->turn;
     default:
         return f < body_rule_proportion(r) ? in->coef[f - F_COEF]
                : f < body_rule_offset(r)   ? in->proportion[f - body_rule_proportion(r)]

@@ -19,6 +19,7 @@ enum {
     F_PITCH,
     F_ROLL,
     F_STATURE,
+    F_TURN, /* rate of the heading */
     F_COEF, /* the scores, then the limbs' proportions, then the posture of the angles that have an offset */
     F_MAX = F_COEF + GAIT_MAX_COMPONENTS + GAIT_MAX_PROPORTIONS + GAIT_MAX_ANGLES
 };

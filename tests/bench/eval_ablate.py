@@ -20,6 +20,7 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "posture": {"offset_angles": 0},
     "limb proportions": {"proportions": 0},
     "stature search": {"stature_noise": 0.0, "stature_noise_start": 0.0},
+    "turning": {"turn_time": 0.0},
     "tilt": {"tilt_noise": 0.0},
     "frames alike": {"evidence_time": 0.0},
     "mingling": {"mingle_time": 0.0},

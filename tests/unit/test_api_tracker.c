@@ -74,6 +74,7 @@ static void test_floats(void)
         FLOAT(settle_time, -1e-3f, 1e9f),    FLOAT(rate_time, -1e-3f, 1e9f),
         FLOAT(forward_noise, -1e-3f, 1e9f),  FLOAT(lateral_noise, -1e-3f, 1e9f),
         FLOAT(vertical_noise, -1e-3f, 1e9f), FLOAT(heading_noise, -1e-3f, 1e9f),
+        FLOAT(turn_sd, -1e-3f, 1e9f),        FLOAT(turn_time, -1e-3f, 1e9f),
         FLOAT(tilt_noise, -1e-3f, 1e9f),     FLOAT(tilt_time, -1e-3f, 1e9f),
         FLOAT(coef_noise, -1e-3f, 1e9f),     FLOAT(coef_time, -1e-3f, 1e9f),
         FLOAT(stature_noise, -1e-3f, 1e9f),  FLOAT(stature_noise_start, -1e-3f, 1e9f),

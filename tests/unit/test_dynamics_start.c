@@ -3,28 +3,22 @@
 
 #include "fmath.h"
 
-enum { STATE_FIELDS = 11 }; /* phase, rate, stature, heading, pitch, roll, pelvis x y, scores, offset */
+enum {
+    STATE_FIELDS = 12
+}; /* phase, rate, stature, heading, pitch, roll, turn rate, pelvis x y, scores, offset */
 
 static float *state_number(gait_state *s, size_t k)
 {
-    float *const at[] = {&s->phase,
-                         &s->stride_hz,
-                         &s->stature,
-                         &s->heading,
-                         &s->pitch,
-                         &s->roll,
-                         &s->pelvis[0],
-                         &s->pelvis[1],
-                         &s->coef[0],
-                         &s->coef[1],
-                         &s->offset[OFFSET_ANGLE]};
+    float *const at[] = {&s->phase,     &s->stride_hz, &s->stature,   &s->heading,
+                         &s->pitch,     &s->roll,      &s->turn_rate, &s->pelvis[0],
+                         &s->pelvis[1], &s->coef[0],   &s->coef[1],   &s->offset[OFFSET_ANGLE]};
     return at[k];
 }
 
 static void test_draw(void)
 {
-    static double v[11][DRAWS];
-    static const float sds[] = {0.05f, 0.04f, 0.06f, 0.3f, 0.05f, 0.04f, 0.2f, 0.3f, 1.0f, 0.5f, 0.07f};
+    static double v[STATE_FIELDS][DRAWS];
+    static const float sds[] = {0.05f, 0.04f, 0.06f, 0.3f, 0.05f, 0.04f, 0.1f, 0.2f, 0.3f, 1.0f, 0.5f, 0.07f};
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 5);
     gait_state mean = toy_state(0.5f), sd = {0};
     mean.heading = 0.8f;
@@ -44,7 +38,7 @@ static void test_draw(void)
         for (size_t k = 0; k < STATE_FIELDS; k++)
             v[k][i] = (double)*state_number(&s, k);
     }
-    moments have[11];
+    moments have[STATE_FIELDS];
     for (size_t k = 0; k < STATE_FIELDS; k++) {
         have[k] = moments_of(v[k], DRAWS);
         check_moments(have[k], (double)*state_number(&mean, k), (double)sds[k], DRAWS);

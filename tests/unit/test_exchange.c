@@ -82,7 +82,7 @@ static void test_twice_is_nothing(void)
                      twice = exchange_apply(&x, &r, &once);
         for (int32_t f = 0; f < body_rule_fields(&r); f++)
             CHECK_NEAR(twice.f[f], w.f[f], 1e-3);
-        static const int32_t SAME[] = {F_RATE, F_X, F_Y, F_Z, F_HEADING, F_PITCH, F_STATURE};
+        static const int32_t SAME[] = {F_RATE, F_X, F_Y, F_Z, F_HEADING, F_PITCH, F_STATURE, F_TURN};
         for (size_t k = 0; k < sizeof SAME / sizeof *SAME; k++)
             CHECK(once.f[SAME[k]] == w.f[SAME[k]]);
         CHECK_NEAR(once.f[F_PHASE], w.f[F_PHASE] + (w.f[F_PHASE] < 0.5f ? 0.5f : -0.5f), 1e-6);

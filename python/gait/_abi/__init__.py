@@ -102,6 +102,8 @@ class TrackerConfigC(ctypes.Structure):
         ("lateral_noise", c_float),
         ("vertical_noise", c_float),
         ("heading_noise", c_float),
+        ("turn_sd", c_float),
+        ("turn_time", c_float),
         ("tilt_noise", c_float),
         ("tilt_time", c_float),
         ("coef_noise", c_float),

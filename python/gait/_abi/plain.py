@@ -13,7 +13,7 @@ from ctypes import (
 )
 from enum import IntEnum, IntFlag
 
-ABI = 3
+ABI = 4
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_MARKERS = 64
@@ -140,6 +140,7 @@ class StateC(ctypes.Structure):
         ("heading", c_float),
         ("pitch", c_float),
         ("roll", c_float),
+        ("turn_rate", c_float),
         ("pelvis", c_float * 3),
         ("coef", c_float * MAX_COMPONENTS),
         ("offset", c_float * MAX_ANGLES),

@@ -14,7 +14,7 @@ from gait import _abi
 Array = NDArray[np.float64]
 LIMITS = {"coef": _abi.MAX_COMPONENTS, "offset": _abi.MAX_ANGLES, "proportion": _abi.MAX_PROPORTIONS}
 LEAST_STATURE = 0.3  # metres, of a particle (population.h)
-SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
+SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll", "turn_rate")
 
 
 @dataclass
@@ -33,6 +33,8 @@ class State:
         Walking direction about world z, radians; 0 = along +x.
     pitch, roll : float
         Tilt of the pelvis beyond the model's own, radians.
+    turn_rate : float
+        Of the heading, radians per second, positive to the left.
     pelvis : ndarray of shape (3,)
         Pelvis joint in the world, metres.
     coef : ndarray of shape (q,)
@@ -49,6 +51,7 @@ class State:
     heading: float = 0.0
     pitch: float = 0.0
     roll: float = 0.0
+    turn_rate: float = 0.0
     pelvis: Array = field(default_factory=lambda: np.zeros(3))
     coef: Array = field(default_factory=lambda: np.zeros(0))
     offset: Array = field(default_factory=lambda: np.zeros(0))

@@ -40,6 +40,8 @@ class TrackerConfig:
     lateral_noise: float
     vertical_noise: float
     heading_noise: float
+    turn_sd: float
+    turn_time: float
     tilt_noise: float
     tilt_time: float
     coef_noise: float
