@@ -33,6 +33,8 @@ def coasting(mode, count):
     It settles soon, because without a picture it is lost after a third of a second and searches then.
     """
     noise = {"stature_noise": 0.3, "stature_noise_start": 0.6}
+    if mode is Mode.DEFAULT:
+        noise["turn_time"] = 0.2  # so that turn rates change in the few steps looked at
     changes = {"particles": 8000, "resample_ess": 0.0, "settle_time": 0.15} | noise
     config = TrackerConfig.default(mode, proportions=-1 if mode is Mode.DEFAULT else 0, **changes)
     tracker, moves = Tracker(MODEL, camera(), config, tasks=2), Transitions(CURVES, config)
@@ -53,7 +55,9 @@ def test_the_twin_moves_states_as_the_library_does(mode):
     tracker, moves, tables = coasting(mode, 9)
     for i, settling in ((1, True), (7, False)):
         before, theirs = tables[i], tables[i + 1]
-        ours = moves.move(before, Step(0.033333, settling, tracker.stature_doubt), np.random.default_rng(0))
+        ours = moves.move(
+            before, Step(0.033333, settling, True, tracker.stature_doubt), np.random.default_rng(0)
+        )
         a, b = moves.difference(ours, before), moves.difference(theirs, before)
         tolerance = 5 * np.hypot(a.std(axis=0), b.std(axis=0)) / np.sqrt(len(a)) + 1e-7
         np.testing.assert_array_less(np.abs(a.mean(axis=0) - b.mean(axis=0)), tolerance)
@@ -95,7 +99,7 @@ class Particles:
         return self.frames[index]
 
     def step_to(self, index):
-        return None if index in self.starts else Step(1.0, False, 0.0)
+        return None if index in self.starts else Step(1.0, False, False, 0.0)
 
 
 def test_linear_normal_dynamics_give_the_exact_smoother():
@@ -174,7 +178,7 @@ def test_the_spool_gives_back_what_it_took_and_knows_the_starts():
             np.testing.assert_allclose(states, moves.table(kept[i][0]), atol=1e-5)
             np.testing.assert_array_equal(weights.astype(np.float32), kept[i][1])
         assert spool.step_to(0) is None and spool.step_to(35) is None
-        assert spool.step_to(1) == Step(pytest.approx(0.033333), True, tracker.stature_doubt)
+        assert spool.step_to(1) == Step(pytest.approx(0.033333), True, False, tracker.stature_doubt)
         assert spool.step_to(31).settling and not spool.step_to(34).settling  # a second after frame 2
         assert spool.step_to(36).settling and not spool.step_to(69).settling
 

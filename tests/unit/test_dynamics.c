@@ -282,6 +282,51 @@ static void test_settling(void)
     check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.05 * 0.02 * sqrt(0.1), DRAWS);
 }
 
+/* Turn rates: kept for a while, then others, half of them none, at any frame rate; not while the phase is searched. */
+static void test_turn_rates(void)
+{
+    static const float steps[] = {1.0f / 30.0f, 0.25f};
+    double const kept = exp(-1.0 / 2.0), other = 0.5 * (1.0 - kept);
+    for (size_t k = 0; k < 2; k++) {
+        dynamics const d = quiet(GAIT_MODE_DEFAULT, 70 + k);
+        walker from = standing();
+        from.f[F_TURN] = 0.25f;
+        cfg.turn_time = 2.0f;
+        cfg.turn_sd = 0.5f;
+        spread_after(&d, &from, steps[k], 1.0f, 0.1f, sampled[0]);
+        double as_before = 0.0, straight = 0.0, square = 0.0;
+        for (int i = 0; i < DRAWS; i++) {
+            double const rate = sampled[0][F_TURN][i];
+            as_before += rate == 0.25;
+            straight += rate == 0.0;
+            square += rate == 0.25 ? 0.0 : rate * rate;
+        }
+        double const slack = 4.5 * sqrt(0.25 / DRAWS);
+        CHECK_NEAR(as_before / DRAWS, kept, slack);
+        CHECK_NEAR(straight / DRAWS, other, slack);
+        CHECK_NEAR(square / DRAWS, other * 0.25, 4.5 * 0.25 * sqrt(3.0 * other / DRAWS));
+        spread_after(&d, &from, steps[k], steps[k], 0.0f, sampled[0]); /* one step, of age 0 */
+        for (int i = 0; i < DRAWS; i++)
+            CHECK(sampled[0][F_TURN][i] == 0.25);
+    }
+}
+
+/* Who turns walks on a circle. */
+static void test_circle(void)
+{
+    dynamics d = quiet(GAIT_MODE_DEFAULT, 1);
+    double const rate = 0.5, seconds = 0.5 * 3.14159265358979 / rate; /* a quarter */
+    for (int32_t steps = 20; steps <= 80; steps *= 2) {
+        walker w = standing();
+        w.f[F_TURN] = (float)rate;
+        for (int32_t k = 0; k < steps; k++)
+            w = move_one(&d, &w, (float)seconds / (float)steps, 1.0f, (uint32_t)k, 3);
+        CHECK_NEAR(w.f[F_HEADING], 0.5 * 3.14159265358979, 1e-5);
+        CHECK_NEAR(w.f[F_X] / w.f[F_Y], 1.0, 0.05); /* but for the speed within the stride */
+        CHECK_NEAR(w.f[F_Y], 1.75 * 0.8 * (double)toy_model()->stride_hz / rate, 0.08);
+    }
+}
+
 /* Noise of different fields, frames and particles is independent; the same arguments give the same. */
 static void test_independent(void)
 {
@@ -306,7 +351,7 @@ static void test_independent(void)
     walker const seed = move_one(&other, &from, 0.04f, 0.0f, 3, 7);
     CHECK(memcmp(&w, &same, sizeof w) == 0);
     for (int f = 0; f < FIELDS; f++)
-        CHECK(w.f[f] != frame.f[f] && w.f[f] != index.f[f] && w.f[f] != seed.f[f]);
+        CHECK(f == F_TURN || (w.f[f] != frame.f[f] && w.f[f] != index.f[f] && w.f[f] != seed.f[f]));
 }
 
 /* Every instruction set moves every lane to the same bits, and writes only the fields there are. */
@@ -349,6 +394,8 @@ int main(void)
     test_slow();
     test_frame_rate();
     test_reflect();
+    test_turn_rates();
+    test_circle();
     test_settling();
     test_independent();
     test_instruction_sets();

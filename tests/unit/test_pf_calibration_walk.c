@@ -9,9 +9,9 @@ static const double DT = 0.1, PI = 3.14159265358979324;
 
 /* Deviations of the start. */
 static const double start_sd[FIELDS] = {
-    [F_PHASE] = 0.05,   [F_RATE] = 0.05,    [F_X] = 0.1,        [F_Y] = 0.1,        [F_Z] = 0.02,
-    [F_HEADING] = 0.2,  [F_PITCH] = 0.05,   [F_ROLL] = 0.05,    [F_STATURE] = 0.05, [F_COEF] = 0.7,
-    [F_COEF + 1] = 0.7, [F_COEF + 2] = 0.7, [F_COEF + 3] = 0.05};
+    [F_PHASE] = 0.05,  [F_RATE] = 0.05,    [F_X] = 0.1,        [F_Y] = 0.1,        [F_Z] = 0.02,
+    [F_HEADING] = 0.2, [F_PITCH] = 0.05,   [F_ROLL] = 0.05,    [F_STATURE] = 0.05, [F_TURN] = 0.3,
+    [F_COEF] = 0.7,    [F_COEF + 1] = 0.7, [F_COEF + 2] = 0.7, [F_COEF + 3] = 0.05};
 
 static dynamics lively(uint64_t seed)
 {
@@ -23,6 +23,8 @@ static dynamics lively(uint64_t seed)
     cfg.lateral_noise = 0.06f;
     cfg.vertical_noise = 0.03f;
     cfg.heading_noise = 0.2f;
+    cfg.turn_sd = 0.5f;
+    cfg.turn_time = 0.5f;
     cfg.tilt_noise = 0.08f;
     cfg.coef_noise = 0.8f;
     cfg.coef_time = 2.0f;
@@ -65,6 +67,7 @@ static void truth_start(const body_rule *rule, const gait_state *mean, const dou
         .heading = mean->heading + (float)s[F_HEADING],
         .pitch = mean->pitch + (float)s[F_PITCH],
         .roll = mean->roll + (float)s[F_ROLL],
+        .turn_rate = (float)s[F_TURN],
         .pelvis = {mean->pelvis[0] + (float)s[F_X], mean->pelvis[1] + (float)s[F_Y], mean->pelvis[2]},
         .coef = {(float)s[F_COEF], (float)s[F_COEF + 1]},
         .proportion = {(float)s[F_COEF + 2]},
@@ -85,11 +88,15 @@ static void truth_move(const gait_model *m, const double n[NORMALS], double *x)
     double const speed =
         (double)root_channel(m, ROOT_FORWARD, (float)(middle - floor(middle)), 0.0f, score, 2);
     double const ahead = x[F_STATURE] * speed * turn + 0.1 * root * n[1], aside = 0.06 * root * n[2];
+    double const curve = x[F_TURN] * DT, way = x[F_HEADING] + 0.5 * curve;
+    double const changes = 0.9103; /* normals above it: 1 - exp(-DT / 0.5) */
     x[F_PHASE] += turn - floor(x[F_PHASE] + turn);
     x[F_RATE] = own + relaxed(x[F_RATE] - own, 5.0, 0.05 * own, n[3]);
-    x[F_X] += ahead * cos(x[F_HEADING]) - aside * sin(x[F_HEADING]);
-    x[F_Y] += ahead * sin(x[F_HEADING]) + aside * cos(x[F_HEADING]);
-    x[F_HEADING] += 0.2 * root * n[4];
+    x[F_X] += ahead * cos(way) - aside * sin(way);
+    x[F_Y] += ahead * sin(way) + aside * cos(way);
+    x[F_HEADING] += curve + 0.2 * root * n[4];
+    if (n[15] > changes)
+        x[F_TURN] = n[14] > 0.0 ? 0.5 * n[13] : 0.0;
     x[F_Z] = relaxed(x[F_Z], 1.1, 0.03, n[5]);
     x[F_PITCH] = relaxed(x[F_PITCH], 1.1, 0.08, n[6]);
     x[F_ROLL] = relaxed(x[F_ROLL], 1.1, 0.08, n[7]);
@@ -127,12 +134,21 @@ static void crowd_start(crowd *c, const gait_state *mean)
                      .heading = (float)start_sd[F_HEADING],
                      .pitch = (float)start_sd[F_PITCH],
                      .roll = (float)start_sd[F_ROLL],
+                     .turn_rate = (float)start_sd[F_TURN],
                      .pelvis = {(float)start_sd[F_X], (float)start_sd[F_Y], (float)start_sd[F_Z]},
                      .coef = {(float)start_sd[F_COEF], (float)start_sd[F_COEF + 1]},
                      .proportion = {(float)start_sd[F_COEF + 2]}};
     sd.offset[OFFSET_ANGLE] = (float)start_sd[F_COEF + 3];
     for (int32_t i = 0; i < c->p.n; i++)
         c->now[i] = dynamics_draw(&c->d, mean, &sd, i);
+}
+
+/* Next to nothing, so that chance ranks those who walk straight on, whose turn rates are equal. */
+static double lot(uint64_t run, int field, int32_t i)
+{
+    float n[4];
+    rng_normal4(run, 104, (uint32_t)field, (uint32_t)i, 0, n);
+    return 1e-9 * (double)n[0];
 }
 
 /* One truth, one filter; counts the truth's rank in every field, of the difference from what was seen
@@ -162,8 +178,8 @@ static void simulate(uint64_t run, int32_t particles, double noise, int32_t coun
     pf_resample_multinomial(&c.p, run, 103, 0);
     for (int f = 0; f < FIELDS; f++) {
         for (int32_t i = 0; i < particles; i++)
-            value[i] = apart(f, (double)c.now[i].f[f], seen[f]);
-        count[f][ranks_of(c.p.parent, value, apart(f, x[f], seen[f]))]++;
+            value[i] = apart(f, (double)c.now[i].f[f], seen[f]) + lot(run, f, i);
+        count[f][ranks_of(c.p.parent, value, apart(f, x[f], seen[f]) + lot(run, f, -1))]++;
     }
 }
 
@@ -180,7 +196,7 @@ static void test_ranks(int32_t runs, int32_t particles, double noise)
 
 int main(void)
 {
-    test_ranks(2000, 128, 1e3); /* next to nothing is seen: prior and motion alone */
-    test_ranks(400, 4096, 3.5); /* particles enough for thirteen fields */
+    test_ranks(2000, 256, 1e3); /* next to nothing is seen: prior and motion alone */
+    test_ranks(400, 4096, 3.5); /* particles enough for fourteen fields */
     return CHECK_DONE();
 }

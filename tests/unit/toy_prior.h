@@ -22,6 +22,7 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.stature_noise = cfg.stature_noise_start = 0.0f;
     cfg.forward_noise = cfg.lateral_noise = cfg.vertical_noise = 0.0f;
     cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = cfg.proportion_noise = 0.0f;
+    cfg.turn_time = 0.0f;
     cfg.settle_time = 1.0f;
     cfg.rate_time = 5.0f;
     cfg.tilt_time = 1.1f;

@@ -16,7 +16,7 @@ import cv2
 
 from gait.cli.values import between
 from gait.core.model import Model
-from gait.core.state import SCALARS, State
+from gait.core.state import POSE_SCALARS, State
 from gait.draw.strip import draw_room, draw_strip, room_camera
 from gait.errors import UserError
 from gait.image.camera import Camera
@@ -74,8 +74,8 @@ def _state(args: argparse.Namespace, model: Model) -> State:
     if args.phase is not None:
         state.phase = args.phase % 1.0
     fields = read_json(args.state, "state") if args.state else Fields("state", {})
-    fields.only((*SCALARS, "pelvis", "coef"))
-    for name in SCALARS:
+    fields.only((*POSE_SCALARS, "pelvis", "coef"))
+    for name in POSE_SCALARS:
         if name in fields:
             low, high = _RANGES.get(name, (-7.0, 7.0))
             setattr(state, name, fields.number(name, low, high, "see gait render --help"))

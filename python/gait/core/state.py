@@ -14,7 +14,8 @@ from gait import _abi
 Array = NDArray[np.float64]
 LIMITS = {"coef": _abi.MAX_COMPONENTS, "offset": _abi.MAX_ANGLES, "proportion": _abi.MAX_PROPORTIONS}
 LEAST_STATURE = 0.3  # metres, of a particle (population.h)
-SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll", "turn_rate")
+POSE_SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")  # poses need no more
+SCALARS = (*POSE_SCALARS, "turn_rate")
 
 
 @dataclass

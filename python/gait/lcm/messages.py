@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from gait._abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
 from gait.core.estimate import Estimate
-from gait.core.state import SCALARS, State
+from gait.core.state import POSE_SCALARS, State
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.image.video import Image
@@ -158,10 +158,10 @@ def camera_of(message: Any) -> Camera:
 
 
 def state_message(values: State | Mapping[str, Any]) -> Any:
-    """Make a ``state_t`` from a `State`, or from some of its fields: the others are NaN, unknown."""
+    """Make a ``state_t``, which has no room for the turn rate, from a `State`, or from some of its fields: the others are NaN, unknown."""
     known = vars(values) if isinstance(values, State) else values
     message = gaitmsg.state_t()
-    for name in SCALARS:
+    for name in POSE_SCALARS:
         setattr(message, name, float(known.get(name, _UNKNOWN)))
     message.pelvis = [float(x) for x in known.get("pelvis", [_UNKNOWN] * 3)]
     message.ncoef, message.coef = _padded(known.get("coef"), MAX_COMPONENTS)
@@ -178,7 +178,7 @@ def _padded(values: Any, room: int) -> tuple[int, list[float]]:
 def state_of(message: Any) -> State:
     """Read a ``state_t``, which has no room for the limbs' proportions: they are those of the mean body."""
     state = State(pelvis=np.array(message.pelvis, float))
-    for name in SCALARS:
+    for name in POSE_SCALARS:
         setattr(state, name, float(getattr(message, name)))
     state.coef = np.array(message.coef[: message.ncoef], float)
     state.offset = np.array(message.offset[: message.noffset], float)

@@ -103,8 +103,10 @@ class Spool:
             return None
         known = self._known[index - 1]
         settle_time = 1e6 * self._transitions.config.settle_time
-        settling = known < 0 or self.utime[index] - self.utime[known] < settle_time
-        return Step(1e-6 * (self.utime[index] - self.utime[index - 1]), settling, self._doubt[index])
+        age = self.utime[index] - self.utime[known] if known >= 0 else 0
+        return Step(
+            1e-6 * (self.utime[index] - self.utime[index - 1]), age < settle_time, age > 0, self._doubt[index]
+        )
 
 
 def draw_motions(

@@ -122,7 +122,7 @@ def smoothed(
     """
     use, mass = _dominant(states)
     mean, sd = State(coef=np.zeros(model.info.components), offset=np.zeros(model.info.angles)), State()
-    for name in ("stride_hz", "stature", "pitch", "roll"):
+    for name in ("stride_hz", "stature", "pitch", "roll", "turn_rate"):
         setattr(mean, name, float(states[name][use].mean()))
         setattr(sd, name, float(states[name].std()))
     mean.phase, sd.phase = _circular(states["phase"], use, 1.0)

@@ -28,8 +28,10 @@ TELLING = 5
 POSTURE_SD = 0.035
 """Of an angle's posture where too few people were learnt from to tell, radians (model.h)."""
 
-SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")
+SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll", "turn_rate")
 """Columns of a table of states; then x, y, z of the track, scores, proportions and posture offsets in use."""
+
+TURN, TRACK, COEF = 6, 7, 10
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,15 @@ class Step:
         Seconds.
     settling : bool
         The rate is loose and the stature moves fast, as until a while after phase, left and right are known.
+    turning : bool
+        The walker may take another turn rate: as soon as phase, left and right are known.
     stature_doubt : float
         Deviation of stature at the start, fraction of it.
     """
 
     dt: float
     settling: bool
+    turning: bool
     stature_doubt: float
 
 
@@ -78,7 +83,7 @@ class Transitions:
     @property
     def _build(self) -> int:
         """First column of the proportions."""
-        return 9 + self._scores
+        return COEF + self._scores
 
     @property
     def _posture(self) -> int:
@@ -104,14 +109,14 @@ class Transitions:
         coef, build = self._coef(table), table[:, self._build : self._posture]
         for k, name in enumerate(SCALARS):
             out[name] = table[:, k]
-        out["pelvis"] = table[:, 6:9] + self._about(table, coef, build)
+        out["pelvis"] = table[:, TRACK:COEF] + self._about(table, coef, build)
         out["coef"][:, : self._scores] = coef
         out["proportion"][:, : self._proportions] = build
         out["offset"][:, self._offsets] = table[:, self._posture :]
         return out
 
     def _coef(self, table: Array) -> Array:
-        return table[..., 9 : 9 + self._scores]
+        return table[..., COEF : COEF + self._scores]
 
     def _about(self, scalars: Array, coef: Array, build: Array) -> Array:
         """Pelvis relative to its track, (N, 3): sway to the left and height, by phase."""
@@ -142,21 +147,32 @@ class Transitions:
         after[:, 1] = _reflect(self.curves.stride_hz + away)
         grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.stature_doubt
         after[:, 2] = np.maximum(b[:, 2] * (1 + grown * root * noise[:, 2]), LEAST_STATURE)
-        after[:, 3] = wrap(b[:, 3] + c.heading_noise * root * noise[:, 3], 2 * np.pi)
+        curve = b[:, TURN] * dt
+        after[:, 3] = wrap(b[:, 3] + curve + c.heading_noise * root * noise[:, 3], 2 * np.pi)
         after[:, 4:6] = _relax(b[:, 4:6], dt, c.tilt_time, c.tilt_noise, noise[:, 4:6])
-        ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, 6]
-        aside = c.lateral_noise * root * noise[:, 7]
-        cos, sin = np.cos(b[:, 3]), np.sin(b[:, 3])
-        after[:, 6] += ahead * cos - aside * sin
-        after[:, 7] += ahead * sin + aside * cos
-        after[:, 8] = _relax(b[:, 8], dt, c.tilt_time, c.vertical_noise, noise[:, 8])
+        after[:, TURN] = self._turn_rates(b[:, TURN], step, noise[:, TURN], random)
+        ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, TRACK]
+        aside = c.lateral_noise * root * noise[:, TRACK + 1]
+        cos, sin = np.cos(b[:, 3] + curve / 2), np.sin(b[:, 3] + curve / 2)
+        after[:, TRACK] += ahead * cos - aside * sin
+        after[:, TRACK + 1] += ahead * sin + aside * cos
+        height = TRACK + 2
+        after[:, height] = _relax(b[:, height], dt, c.tilt_time, c.vertical_noise, noise[:, height])
         for first, last, tau, sd in (
-            (9, self._build, c.coef_time, c.coef_noise),
+            (COEF, self._build, c.coef_time, c.coef_noise),
             (self._build, self._posture, _time(c.proportion_noise), c.proportion_noise),
             (self._posture, self.columns, _time(c.offset_noise), c.offset_noise * self._posture_sd),
         ):
             after[:, first:last] = _relax(b[:, first:last], dt, tau, sd, noise[:, first:last])
         return after
+
+    def _turn_rates(self, before: Array, step: Step, noise: Array, random: np.random.Generator) -> Array:
+        """Keep the turn rates, or take others now and then: every second time none."""
+        c = self.config
+        if not (step.turning and c.turn_time > 0):
+            return before
+        other = random.random(len(before)) < 1 - np.exp(-step.dt / c.turn_time)
+        return np.where(other, np.where(random.random(len(before)) < 0.5, c.turn_sd * noise, 0), before)
 
     def _ahead(self, before: Array, turn: Array, dt: float) -> Array:
         """Metres along the heading while the phase advances by `turn` (eq. 8)."""
