@@ -65,7 +65,7 @@ TIGHT := $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
 FAST  := lift_read.c $(patsubst %,%_kernel.c,outline like_edges like_pose like_silhouette like_surface)
-MANY  := $(patsubst %,%.c,dense eye kinematics like_edges like_joints like_silhouette like_template like_texture lift \
+MANY  := $(patsubst %,%.c,dense eye like_edges like_silhouette like_texture lift \
          lift_batch loss mingle pf population weigh)
 LANED := fmath.c
 C_FLAGS = $(if $(filter $(FAST),$(1)),,$(if $(filter $(LANED),$(1)),$(SMALL_FLAGS),$(if $(filter $(MANY),$(1)),$(SMALL),$(LEAST))))

@@ -95,7 +95,7 @@ typedef struct gait_state {          /* one hypothesis: everything that places a
     float stature;                   /* metres */
     float heading;                   /* walking direction about world z, radians; 0 = along +x */
     float pitch, roll;               /* tilt of the pelvis beyond the model's own, radians */
-    float turn_rate;                 /* of the heading, radians per second; positive to the left; poses do not need it */
+    float turn_rate;                 /* of the heading, radians per second; has no part in poses */
     float pelvis[3];                 /* pelvis joint, metres, world */
     float coef[GAIT_MAX_COMPONENTS]; /* principal-component scores, in standard deviations; unused are 0 */
     float offset[GAIT_MAX_ANGLES];   /* posture: added to the model's joint angles, radians; unused are 0 */
@@ -190,22 +190,18 @@ typedef struct gait_tracker_config {
     float    rate_noise;       /* fraction of the model's mean stride_hz [0, 10]; default 0.055 */
     float    rate_noise_start; /* the same while settling [0, 10]; default 0.055 */
     float    settle_time;      /* seconds of settling, from when phase, left and right are known [0, 1e6]; default 1 */
-    float    rate_time;        /* time constant of the rate's return to the population's, seconds; 0: never [0, 1e6];
-                                * default 3 (paper mode 0) */
+    float    rate_time;        /* seconds in which it returns to the mean; 0: never [0, 1e6]; default 3 (paper mode 0) */
     float    forward_noise;    /* of the pelvis along the heading, metres [0, 100]; default 0.05 (paper mode 0.044) */
     float    lateral_noise;    /* across it, metres [0, 100]; default 0.05 (paper mode 0.044) */
     float    vertical_noise;   /* metres [0, 100]; default 0.0096 (paper mode 0.022) */
     float    heading_noise;    /* radians [0, 100]; default 0.044 (paper mode 0.11) */
-    float    turn_sd;          /* of the turn rates that walkers take, radians per second [0, 100]; default 0.5 (paper
-                                * mode 0) */
-    float    turn_time;        /* mean seconds until a walker takes another, every second time straight on; 0: always
-                                * straight on [0, 1e6]; default 12 (paper mode 0) */
+    float    turn_sd;          /* of turn rates, radians per second [0, 100]; default 0.5 (paper mode 0) */
+    float    turn_time;        /* mean seconds until it is another, half of them 0; 0: never [0, 1e6]; default 12
+                                * (paper mode 0) */
     float    tilt_noise;       /* of pitch and roll, radians [0, 100]; default 0.033 (paper mode 0.055) */
-    float    tilt_time;        /* time constant of the return of tilt and height to the model's, seconds; 0: never
-                                * [0, 1e6]; default 1.1 (paper mode 0) */
+    float    tilt_time;        /* seconds in which they and the height return; 0: never [0, 1e6]; default 1.1 (paper mode 0) */
     float    coef_noise;       /* standard deviations of a score [0, 100]; default 0.667 (paper mode 0.5) */
-    float    coef_time;        /* time constant of the scores' return to the mean, seconds; 0: never [0, 1e6]; default
-                                * 4.5 (paper mode 0) */
+    float    coef_time;        /* seconds in which they return; 0: never [0, 1e6]; default 4.5 (paper mode 0) */
     float    stature_noise;    /* deviations of stature at the start [0, 100]; default 0.2 (paper mode 0) */
     float    stature_noise_start; /* the same while settling [0, 100]; default 2 (paper mode 0) */
     float    offset_noise;     /* posture of the angles in offset_angles, in the deviation among people learnt of each
@@ -254,7 +250,6 @@ typedef struct gait_estimate {
     float      speed;       /* metres per second along the ground */
     int32_t    status;      /* GAIT_STATUS_* */
     uint32_t   flags;       /* GAIT_EST_* */
-    uint32_t   reserved;
 } gait_estimate;
 
 GAIT_API void        gait_tracker_default(gait_tracker_config *cfg, int32_t mode);

@@ -124,7 +124,6 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_estimate, speed),
         FIELD(gait_estimate, status),
         FIELD(gait_estimate, flags),
-        FIELD(gait_estimate, reserved),
         STRUCT(gait_lift_info),
         FIELD(gait_lift_info, markers),
         FIELD(gait_lift_info, frames),

@@ -61,6 +61,12 @@ static relaxing relax_to_one(float dt, float noise)
     return relax(dt, noise > 0.0f ? 2.0f / (noise * noise) : 0.0f, noise);
 }
 
+/* What the sum of two squared normals exceeds but for a share of cases; never if that is 1. */
+static float turns_beyond(float share)
+{
+    return (float)(-2.0 * m_log64(1.0 - (double)share));
+}
+
 dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_t frame)
 {
     const gait_tracker_config *const c = d->cfg;
@@ -84,7 +90,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .stature_noise = (settling ? c->stature_noise_start : c->stature_noise) * d->stature_doubt * root_dt,
         .rate = relax(dt, c->rate_time, (settling ? c->rate_noise_start : c->rate_noise) * mean_rate),
         .level = relax(dt, c->tilt_time, c->vertical_noise),
-        .turn_chance = c->turn_time > 0.0f && age > 0.0f ? 1.0f - m_exp(-dt / c->turn_time) : 0.0f,
+        .turn_beyond = age > 0.0f ? turns_beyond(relax(dt, c->turn_time, 0.0f).keep) : INFINITY,
         .turn_sd = c->turn_sd,
         .tilt = relax(dt, c->tilt_time, c->tilt_noise),
         .score = relax(dt, c->coef_time, c->coef_noise),

@@ -29,7 +29,8 @@ typedef struct dynamics_step { /* constants of one interval; noise: standard dev
     int32_t fields, components, proportion, offset; /* how many, and the first of the last two kinds */
     float dt, mean_rate;                            /* seconds, strides per second */
     float phase_noise, forward_noise, lateral_noise, heading_noise, stature_noise;
-    float turn_chance, turn_sd; /* that a walker takes another turn rate; of which, radians per second */
+    float turn_beyond,
+        turn_sd; /* of the square at which walkers take another turn rate; radians per second */
     relaxing rate, level, tilt, score, shape;
     relaxing posture[GAIT_MAX_ANGLES]; /* in the order of the fields */
 } dynamics_step;

@@ -4,7 +4,7 @@
 #include "kernels.h"
 #include "rng.h"
 
-enum { NORMALS = 4 * ((F_MAX + 3) / 4) };
+enum { NORMALS = 4 * ((F_MAX + 2 + 3) / 4) }; /* one for a field, two for turns */
 
 KERNEL_ROW void words(uint64_t seed, uint32_t frame, uint32_t first, uint32_t draw,
                       uint32_t (*restrict out)[BLOCK])
@@ -103,23 +103,15 @@ KERNEL_ROW void walk(const dynamics_step *s, const walker_block *restrict from,
 }
 
 /* Now and then a walker takes another turn rate, every second time none: a course that wanders by so much at all times
- * would let swaying hips pass for turning. */
-KERNEL_ROW void take_turns(const dynamics_step *s, const uint32_t *restrict when,
-                           const uint32_t *restrict which, const float *restrict n, const float *restrict x,
-                           float *restrict out)
+ * would let swaying hips pass for turning.  a and b, normal, are a point with an exponential square and any direction. */
+KERNEL_ROW void take_turns(const dynamics_step *s, const float *restrict a, const float *restrict b,
+                           const float *restrict n, const float *restrict x, float *restrict out)
 {
     for (int32_t lane = 0; lane < BLOCK; lane++) {
-        float const at = (float)(when[lane] >> 8) * 0x1p-24f;
-        float const rate = which[lane] >> 31 ? s->turn_sd * n[lane] : 0.0f;
-        out[lane] = at < s->turn_chance ? rate : x[lane];
+        float const square = a[lane] * a[lane] + b[lane] * b[lane];
+        float const other = m_select(m_less(0.0f, a[lane]), s->turn_sd * n[lane], 0.0f);
+        out[lane] = m_select(m_less(s->turn_beyond, square), other, x[lane]);
     }
-}
-
-static void steer(const dynamics_step *s, int32_t first, const float *n, const float *x, float *out)
-{
-    uint32_t bits[4][BLOCK];
-    words(s->seed, s->frame, (uint32_t)first, NORMALS / 4, bits);
-    take_turns(s, bits[0], bits[1], n, x, out);
 }
 
 KERNEL_ROW void grow(const dynamics_step *s, const float *restrict x, const float *restrict n,
@@ -132,7 +124,7 @@ KERNEL_ROW void grow(const dynamics_step *s, const float *restrict x, const floa
 void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const walker_block *from, walker_block *to)
 {
     float n[NORMALS][BLOCK], turn[BLOCK], speed[BLOCK];
-    for (int32_t k = 0; k < s->fields; k += 4)
+    for (int32_t k = 0; k < s->fields + 2; k += 4)
         normals(s->seed, s->frame, (uint32_t)first, (uint32_t)(k / 4), n + k);
     advance(s, from, (const float (*)[BLOCK])n, turn, to);
     if (s->plain_root)
@@ -147,7 +139,7 @@ void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const walker_b
     relax(s->level, from->f[F_Z], n[4], to->f[F_Z]);
     relax(s->tilt, from->f[F_PITCH], n[6], to->f[F_PITCH]);
     relax(s->tilt, from->f[F_ROLL], n[7], to->f[F_ROLL]);
-    steer(s, first, n[9], from->f[F_TURN], to->f[F_TURN]);
+    take_turns(s, n[s->fields], n[s->fields + 1], n[9], from->f[F_TURN], to->f[F_TURN]);
     grow(s, from->f[F_STATURE], n[8], to->f[F_STATURE]);
     /* the scores relax to the population (eq. 5); proportions and posture hardly change */
     for (int32_t k = F_COEF; k < s->fields; k++)

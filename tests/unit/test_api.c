@@ -96,8 +96,8 @@ static void test_state(void)
 {
     const gait_model *const m = toy_model();
     gait_state s = toy_state(0.4f);
-    float *const number[] = {&s.phase, &s.stride_hz, &s.stature,   &s.heading, &s.pitch,
-                             &s.roll,  &s.turn_rate, &s.pelvis[1], &s.coef[15]};
+    float *const number[] = {&s.phase, &s.stride_hz, &s.stature,   &s.heading,
+                             &s.pitch, &s.roll,      &s.pelvis[1], &s.coef[15]};
     gait_pose pose, before;
     memset(&pose, 0x5a, sizeof pose);
     before = pose;

@@ -286,28 +286,25 @@ static void test_settling(void)
 static void test_turn_rates(void)
 {
     static const float steps[] = {1.0f / 30.0f, 0.25f};
-    double const kept = exp(-1.0 / 2.0), other = 0.5 * (1.0 - kept);
+    double const kept = exp(-0.5), other = 0.5 * (1.0 - kept);
     for (size_t k = 0; k < 2; k++) {
         dynamics const d = quiet(GAIT_MODE_DEFAULT, 70 + k);
         walker from = standing();
-        from.f[F_TURN] = 0.25f;
+        from.f[F_TURN] = cfg.turn_sd = 0.25f;
         cfg.turn_time = 2.0f;
-        cfg.turn_sd = 0.5f;
         spread_after(&d, &from, steps[k], 1.0f, 0.1f, sampled[0]);
         double as_before = 0.0, straight = 0.0, square = 0.0;
         for (int i = 0; i < DRAWS; i++) {
             double const rate = sampled[0][F_TURN][i];
             as_before += rate == 0.25;
             straight += rate == 0.0;
-            square += rate == 0.25 ? 0.0 : rate * rate;
+            square += rate == 0.25 ? 0.0 : rate * rate / DRAWS;
         }
-        double const slack = 4.5 * sqrt(0.25 / DRAWS);
-        CHECK_NEAR(as_before / DRAWS, kept, slack);
-        CHECK_NEAR(straight / DRAWS, other, slack);
-        CHECK_NEAR(square / DRAWS, other * 0.25, 4.5 * 0.25 * sqrt(3.0 * other / DRAWS));
+        CHECK_NEAR(as_before / DRAWS, kept, 2.25 / sqrt(DRAWS));
+        CHECK_NEAR(straight / DRAWS, other, 2.25 / sqrt(DRAWS));
+        CHECK_NEAR(square, other * 0.0625, 4.5 * 0.0625 * sqrt(3.0 * other / DRAWS));
         spread_after(&d, &from, steps[k], steps[k], 0.0f, sampled[0]); /* one step, of age 0 */
-        for (int i = 0; i < DRAWS; i++)
-            CHECK(sampled[0][F_TURN][i] == 0.25);
+        CHECK_NEAR(moments_of(sampled[0][F_TURN], DRAWS).var, 0.0, 1e-12); /* all as before */
     }
 }
 
@@ -315,13 +312,13 @@ static void test_turn_rates(void)
 static void test_circle(void)
 {
     dynamics d = quiet(GAIT_MODE_DEFAULT, 1);
-    double const rate = 0.5, seconds = 0.5 * 3.14159265358979 / rate; /* a quarter */
+    double const quarter = 1.57079632679490, rate = 0.5;
     for (int32_t steps = 20; steps <= 80; steps *= 2) {
         walker w = standing();
         w.f[F_TURN] = (float)rate;
         for (int32_t k = 0; k < steps; k++)
-            w = move_one(&d, &w, (float)seconds / (float)steps, 1.0f, (uint32_t)k, 3);
-        CHECK_NEAR(w.f[F_HEADING], 0.5 * 3.14159265358979, 1e-5);
+            w = move_one(&d, &w, (float)(quarter / rate) / (float)steps, 1.0f, (uint32_t)k, 3);
+        CHECK_NEAR(w.f[F_HEADING], quarter, 1e-5);
         CHECK_NEAR(w.f[F_X] / w.f[F_Y], 1.0, 0.05); /* but for the speed within the stride */
         CHECK_NEAR(w.f[F_Y], 1.75 * 0.8 * (double)toy_model()->stride_hz / rate, 0.08);
     }

@@ -154,7 +154,6 @@ class EstimateC(ctypes.Structure):
         ("speed", c_float),
         ("status", c_int32),
         ("flags", c_uint32),
-        ("reserved", c_uint32),
     ]
 
 

@@ -34,8 +34,6 @@ class State:
         Walking direction about world z, radians; 0 = along +x.
     pitch, roll : float
         Tilt of the pelvis beyond the model's own, radians.
-    turn_rate : float
-        Of the heading, radians per second, positive to the left.
     pelvis : ndarray of shape (3,)
         Pelvis joint in the world, metres.
     coef : ndarray of shape (q,)
@@ -44,6 +42,8 @@ class State:
         Posture: added to the model's joint angles, radians; missing ones are 0.
     proportion : ndarray of shape (p,)
         Scores of the limbs' proportions in standard deviations; missing ones are 0.
+    turn_rate : float
+        Of the heading, radians per second, positive to the left.
     """
 
     phase: float = 0.0
@@ -52,11 +52,11 @@ class State:
     heading: float = 0.0
     pitch: float = 0.0
     roll: float = 0.0
-    turn_rate: float = 0.0
     pelvis: Array = field(default_factory=lambda: np.zeros(3))
     coef: Array = field(default_factory=lambda: np.zeros(0))
     offset: Array = field(default_factory=lambda: np.zeros(0))
     proportion: Array = field(default_factory=lambda: np.zeros(0))
+    turn_rate: float = 0.0
 
     @staticmethod
     def from_c(c: _abi.StateC, components: int, angles: int) -> State:
