@@ -29,8 +29,9 @@ static drawn draw(const mingling *m, int32_t i)
     uint32_t r[4];
     size_t at[3];
     rng_bits(m->seed, STREAM_MINGLE, m->frame, (uint32_t)i, 0, r);
+    int32_t const first = i < m->split ? 0 : m->split, count = (i < m->split ? m->split : m->n) - first;
     for (int32_t k = 0; k < 3; k++)
-        at[k] = (size_t)m->parent[(uint64_t)r[k] * (uint32_t)m->n >> 32];
+        at[k] = (size_t)m->parent[first + (int32_t)((uint64_t)r[k] * (uint32_t)count >> 32)];
     return (drawn){m->row + (size_t)m->parent[i] * stride,
                    m->row + at[0] * stride,
                    {m->row + at[1] * stride, m->row + at[2] * stride}};

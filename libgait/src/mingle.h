@@ -15,7 +15,7 @@ typedef struct mingling { /* of one frame, after resampling */
     int32_t fields;
     const float *row;      /* of every particle that can be a parent: mingle_rows() */
     const int32_t *parent; /* n: drawn by weight */
-    int32_t n;
+    int32_t n, split;      /* particles from `split` on are another mode, which mingles by itself */
     uint64_t seed;
     uint32_t frame;     /* counter of the random numbers */
     float pull, spread; /* a and sqrt(a (1 - a)); 0: nothing changes */

@@ -7,7 +7,7 @@
 
 static const float SEARCH = 0.5f; /* seconds until the phase is known modulo half a stride */
 static const float REFIT = 0.4f;  /* seconds in which both sides find their own best before evidence counts */
-static const float SPREAD_SCORE = 0.5f, SPREAD_HEADING = 0.1f, SPREAD_RATE = 0.02f;
+static const float SPREAD_SCORE = 0.5f, SPREAD_HEADING = 0.1f, SPREAD_RATE = 0.02f, SPREAD_PHASE = 0.05f;
 static const double ENOUGH = 0.2;  /* of the particles must keep weight while searching */
 static const double SURE = 4.5;    /* log odds from which one side is reported as the truth (0.99) */
 static const double DECIDED = 9.0; /* and from which the other is given up */
@@ -48,9 +48,9 @@ static int32_t first_of(const pf *f, int32_t side)
     return side == 0 ? 0 : side == 1 ? (f->n + 1) / 2 : f->n;
 }
 
-int32_t modes_side(const gait_tracker *t, int32_t particle)
+int32_t modes_split(const gait_tracker *t)
 {
-    return t->core->modes.stage == MODES_FORKED && particle >= first_of(&t->filter, 1);
+    return first_of(&t->filter, t->core->modes.stage == MODES_FORKED ? 1 : 2);
 }
 
 /* One side's particles as a filter of its own. */
@@ -89,18 +89,21 @@ static double total(const pf *side)
     return sum;
 }
 
-/* Draw one side anew if too few of its particles weigh anything. */
-static bool resample_side(gait_tracker *t, int32_t side, uint32_t u)
+/* Do too few of a side's particles weigh anything? */
+static bool side_is_spent(const gait_tracker *t, int32_t side)
+{
+    pf const h = side_of(&t->filter, side);
+    double const sum = total(&h);
+    return pf_ess(&h) * sum * sum < (double)t->cfg.resample_ess * (double)h.n;
+}
+
+static void resample_side(gait_tracker *t, int32_t side, uint32_t u)
 {
     pf h = side_of(&t->filter, side);
-    double const sum = total(&h);
-    if (pf_ess(&h) * sum * sum >= (double)t->cfg.resample_ess * (double)h.n)
-        return false;
     pf_resample_systematic(&h, u);
     for (int32_t i = 0; i < h.n; i++)
         h.parent[i] += first_of(&t->filter, side);
     scale(&h, log_share(t, side));
-    return true;
 }
 
 /* Give the loser up: its particles weigh nothing, and the next resampling replaces them. */
@@ -152,8 +155,11 @@ bool modes_resample(gait_tracker *t, uint32_t frame)
     }
     if (m->stage != MODES_FORKED)
         return resample_all(t, r[0], frame);
-    bool const first = resample_side(t, 0, r[0]), second = resample_side(t, 1, r[1]);
-    return first || second;
+    if (!side_is_spent(t, 0) && !side_is_spent(t, 1))
+        return false;
+    for (int32_t side = 0; side < 2; side++) /* both, since they mingle in the same step */
+        resample_side(t, side, r[side]);
+    return true;
 }
 
 /* Phase modulo half a stride that most particles agree on: the mean of the doubled angle. */
@@ -190,7 +196,7 @@ static walker other_side(const gait_tracker *t, const walker *w, int32_t i)
     return to;
 }
 
-/* Spread a particle: its side must find its own best heading and gait, not those that suited the other. */
+/* Spread a particle: its side must find its own best heading, gait and phase, not those that suited the other. */
 static void spread(const gait_tracker *t, int32_t i, walker *w)
 {
     float n[4];
@@ -202,6 +208,7 @@ static void spread(const gait_tracker *t, int32_t i, walker *w)
     rng_normal4(t->cfg.seed, STREAM_FORK, 0, (uint32_t)i, 0, n);
     w->f[F_HEADING] = m_wrap_pi(w->f[F_HEADING] + SPREAD_HEADING * n[0]);
     w->f[F_RATE] *= 1.0f + SPREAD_RATE * n[1];
+    w->f[F_PHASE] = m_wrap1(w->f[F_PHASE] + SPREAD_PHASE * n[2]);
 }
 
 /* Put the particles with even numbers first, the others behind them: the two sides. */
@@ -368,8 +375,7 @@ static pf_summary reweigh_sides(gait_tracker *t, float dt)
 
 pf_summary modes_reweigh(gait_tracker *t, float dt)
 {
-    if (!modes_searching(t)) /* else soften() sees to it */
-        temper(t->used, t->cfg.particles, share_of_news(t, seconds_unseen(t)));
+    temper(t->used, t->cfg.particles, share_of_news(t, seconds_unseen(t)));
     if (t->core->modes.stage == MODES_FORKED)
         return reweigh_sides(t, dt);
     if (t->core->modes.stage == MODES_SEARCH)

@@ -209,19 +209,20 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
             move_block(j, i - j->first, i_min(BLOCK, end - i));
 }
 
-/* Particles mingle where they were drawn by weight and are of one mode; between two modes there is nobody. */
+/* Particles mingle where they were drawn by weight, each with those of its mode; between two modes there is nobody. */
 static mingling mingle_after(gait_tracker *t, bool resampled, uint32_t frame)
 {
-    bool const one_mode = t->core->modes.stage == MODES_SINGLE && !loss_is_lost(t);
+    bool const known_mode = t->core->modes.stage != MODES_SEARCH && !loss_is_lost(t);
     mingling m = {.fields = t->people.fields,
                   .row = t->joint,
                   .parent = t->filter.parent,
                   .n = t->filter.n,
+                  .split = modes_split(t),
                   .seed = t->cfg.seed,
                   .frame = frame};
-    if (one_mode && resampled)
+    if (known_mode && resampled)
         mingling_set(&m, seconds_since(t, t->core->mingle_utime), t->cfg.mingle_time);
-    if (!one_mode || resampled)
+    if (!known_mode || resampled)
         t->core->mingle_utime = t->core->utime;
     return m;
 }

@@ -87,8 +87,13 @@ struct gait_tracker {
     weigh_scratch *work;                /* tasks, or 1 without threads; all but the first as past */
 };
 
+/* First particle of the second side; the number of particles where there is but one side. */
+int32_t modes_split(const gait_tracker *t);
 /* Which of the two sides a particle belongs to. */
-int32_t modes_side(const gait_tracker *t, int32_t particle);
+static inline int32_t modes_side(const gait_tracker *t, int32_t particle)
+{
+    return particle >= modes_split(t);
+}
 
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg);
 void tracker_clear(gait_tracker *t);

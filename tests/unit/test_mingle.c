@@ -36,7 +36,8 @@ static population normal_crowd(crowd *c)
 
 static mingling after(const population *from, const crowd *c, float seconds, uint32_t frame)
 {
-    mingling m = {.fields = FIELDS, .row = rows, .parent = c->parent, .n = N, .seed = 11, .frame = frame};
+    mingling m = {
+        .fields = FIELDS, .row = rows, .parent = c->parent, .n = N, .split = N, .seed = 11, .frame = frame};
     mingle_rows(from, 0, N, rows);
     mingling_set(&m, seconds, 1.0f);
     return m;
@@ -128,6 +129,21 @@ static void test_others_are_drawn_by_weight(void)
         CHECK(second.value[F_STATURE * N + i] < 2.0f);
 }
 
+/* Two modes far apart stay what they are. */
+static void test_modes_mingle_by_themselves(void)
+{
+    population const from = normal_crowd(&first);
+    for (int32_t i = 0; i < N; i++) {
+        first.parent[i] = i;
+        field(&from, F_STATURE)[i] = i < N / 3 ? 1.0f : 1000.0f;
+    }
+    mingling m = after(&from, &first, 0.5f, 0);
+    m.split = N / 3;
+    mingle_all(&m, &second);
+    for (int32_t i = 0; i < N; i++)
+        CHECK_NEAR(second.value[F_STATURE * N + i], i < N / 3 ? 1.0 : 1000.0, 1e-3);
+}
+
 static void test_nothing_changes_without_time(void)
 {
     population const from = normal_crowd(&first);
@@ -159,6 +175,7 @@ int main(void)
     test_mean_and_covariance_remain();
     test_angles_go_the_short_way();
     test_others_are_drawn_by_weight();
+    test_modes_mingle_by_themselves();
     test_nothing_changes_without_time();
     return CHECK_DONE();
 }
