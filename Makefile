@@ -65,8 +65,7 @@ TIGHT := $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
 FAST  := lift_read.c $(patsubst %,%_kernel.c,outline like_edges like_pose like_silhouette like_surface)
-MANY  := $(patsubst %,%.c,dense eye like_edges like_silhouette like_texture lift \
-         lift_batch mingle pf population weigh)
+MANY  := $(patsubst %,%.c,dense lift lift_batch mingle pf population weigh)
 LANED := fmath.c
 C_FLAGS = $(if $(filter $(FAST),$(1)),,$(if $(filter $(LANED),$(1)),$(SMALL_FLAGS),$(if $(filter $(MANY),$(1)),$(SMALL),$(LEAST))))
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)

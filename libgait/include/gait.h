@@ -196,8 +196,7 @@ typedef struct gait_tracker_config {
     float    vertical_noise;   /* metres [0, 100]; default 0.0096 (paper mode 0.022) */
     float    heading_noise;    /* radians [0, 100]; default 0.044 (paper mode 0.11) */
     float    turn_sd;          /* of turn rates, radians per second [0, 100]; default 0.5 (paper mode 0) */
-    float    turn_time;        /* mean seconds until it is another, half of them 0; 0: never [0, 1e6]; default 12
-                                * (paper mode 0) */
+    float    turn_time;        /* mean seconds until it changes, half to 0; 0: never [0, 1e6]; default 12 (paper mode 0) */
     float    tilt_noise;       /* of pitch and roll, radians [0, 100]; default 0.033 (paper mode 0.055) */
     float    tilt_time;        /* seconds in which they and the height return; 0: never [0, 1e6]; default 1.1 (paper mode 0) */
     float    coef_noise;       /* standard deviations of a score [0, 100]; default 0.667 (paper mode 0.5) */
