@@ -372,8 +372,8 @@ GAIT_API gait_status gait_lift_positions(gait_lift *l, double *mean, double *sd)
 GAIT_API int32_t     gait_lift_unknowns(const gait_lift *l);
 GAIT_API gait_status gait_lift_posterior(gait_lift *l, double *mean, double *covariance);
 /* by what deviations are to be multiplied for a motion as far from the prior's mean as this one: above 1 where its
- * modes are larger than the prior expects, below 1 where they are smaller; 0 on error. Errors over deviations so
- * multiplied are about Student's t of ten degrees: 90 % within 1.81. Takes milliseconds; */
+ * modes are larger than the prior expects, below 1 where they are smaller; 0: no segment. Of a parallel view, heading
+ * and size known, errors are then about Student's t of ten degrees: 90 % within 1.81. Takes milliseconds; */
 GAIT_API double      gait_lift_scale(gait_lift *l);
 /* what the observations alone say, the least-squares fit of minimum norm [F][J][3] (fig. 5c); */
 GAIT_API gait_status gait_lift_least_squares(gait_lift *l, double *mean);

@@ -176,7 +176,7 @@ gait_status gait_lift_posterior(gait_lift *l, double *mean, double *covariance)
 
 double gait_lift_scale(gait_lift *l)
 {
-    return l && l->fitted ? sqrt(lift_scale(&l->table, &l->belief, &l->spare)) : 0.0;
+    return l && l->windowed ? sqrt(lift_scale(&l->table, &l->belief, &l->spare)) : 0.0;
 }
 
 gait_status gait_lift_least_squares(gait_lift *l, double *mean)

@@ -156,6 +156,15 @@ def test_another_camera_during_the_run_is_refused(tmp_path):
     assert "another camera" in outcome.words and outcome.digest == plain.digest
 
 
+def test_a_camera_that_differs_by_rounding_is_the_same(tmp_path):
+    again = camera_message(rig.CAMERA, 1)
+    again.R = [x + 3e-8 for x in again.R]
+    outcome = track(
+        tmp_path, [*rig.opening(), *rig.frames(0, 2), ("GAIT_CAMERA_0", again), *rig.frames(2, 4)]
+    )
+    assert "another camera" not in outcome.words and outcome.frames == 4
+
+
 def test_a_repeated_announcement_changes_nothing(tmp_path):
     opening = rig.opening()
     plain = track(tmp_path, [*opening, *rig.frames(0, 4)])

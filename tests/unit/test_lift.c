@@ -236,6 +236,7 @@ static void test_scale(void)
     see_all(INFINITY);
     CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
     CHECK_NEAR(gait_lift_scale(l), 1.0, 1e-12);
+    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK && gait_lift_scale(l) == 0.0); /* of no motion */
 }
 
 static void test_arguments(void)

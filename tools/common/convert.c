@@ -3,6 +3,7 @@
 #include "camera_file.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 enum { MAX_PIXELS = 1 << 14 };
@@ -52,6 +53,18 @@ bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown,
     for (int i = 0; i < in->noffset; i++)
         out->offset[i] = known(in->offset[i], unknown->offset[i]);
     return true;
+}
+
+bool convert_same_camera(const gait_camera *a, const gait_camera *b)
+{
+    enum { BEGIN = offsetof(gait_camera, fx), NUMBERS = (sizeof *a - BEGIN) / sizeof(float) };
+    float x[NUMBERS], y[NUMBERS];
+    memcpy(x, (const char *)a + BEGIN, sizeof x);
+    memcpy(y, (const char *)b + BEGIN, sizeof y);
+    bool same = a->width == b->width && a->height == b->height;
+    for (int k = 0; k < NUMBERS; k++)
+        same = same && fabsf(x[k] - y[k]) <= 1e-5f * fmaxf(1.0f, fabsf(x[k]));
+    return same;
 }
 
 bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why)

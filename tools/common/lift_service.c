@@ -1,5 +1,6 @@
 #include "lift_service.h"
 
+#include "convert.h"
 #include "gaitmsg_estimate_t.h"
 
 #include <math.h>
@@ -49,7 +50,7 @@ bool lift_service_camera(lift_service *s, const gait_camera *camera, message *wh
 {
     gait_error err = {.text = ""};
     if (s->lift)
-        return memcmp(camera, &s->config.camera, sizeof *camera) == 0 ||
+        return convert_same_camera(camera, &s->config.camera) ||
                message_set(why,
                            "another camera than the one in use was announced and is ignored; restart for it");
     gait_lift_config c = s->config;

@@ -145,7 +145,7 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
         service_complain(s, &why);
         return;
     }
-    if (memcmp(&camera, &s->track.config.camera[0], sizeof camera) != 0) {
+    if (!convert_same_camera(&camera, &s->track.config.camera[0])) {
         message_set(&why, "another camera than the one in use was announced and is ignored; restart for it");
         service_complain(s, &why);
     }
