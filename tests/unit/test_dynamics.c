@@ -303,7 +303,7 @@ static void test_turn_rates(void)
         CHECK_NEAR(as_before / DRAWS, kept, 2.25 / sqrt(DRAWS));
         CHECK_NEAR(straight / DRAWS, other, 2.25 / sqrt(DRAWS));
         CHECK_NEAR(square, other * 0.0625, 4.5 * 0.0625 * sqrt(3.0 * other / DRAWS));
-        spread_after(&d, &from, steps[k], steps[k], 0.0f, sampled[0]); /* one step, of age 0 */
+        spread_after(&d, &from, steps[k], steps[k], 0.0f, sampled[0]);     /* one step, of age 0 */
         CHECK_NEAR(moments_of(sampled[0][F_TURN], DRAWS).var, 0.0, 1e-12); /* all as before */
     }
 }

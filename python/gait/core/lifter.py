@@ -297,7 +297,7 @@ class Lifter:
         likeliest scale of the modes' variances, with an inverse gamma prior).  Of a parallel view, heading
         and size known, errors over deviations so multiplied are about Student's t of ten degrees: 90 % are
         within 1.81.  With a camera the doubt about size and place is in the deviations as well and does not
-        shrink with the motion: do not multiply by less than 1.  Takes milliseconds; after `fix` there is none.
+        shrink with the motion: do not multiply by less than 1.  Takes milliseconds; none after `fix`.
         """
         scale = float(library().gait_lift_scale(self._handle))
         if not scale > 0:

@@ -158,7 +158,10 @@ def camera_of(message: Any) -> Camera:
 
 
 def state_message(values: State | Mapping[str, Any]) -> Any:
-    """Make a ``state_t``, which has no room for the turn rate, from a `State`, or from some of its fields: the others are NaN, unknown."""
+    """Make a ``state_t`` from a `State`, or from some of its fields: the others are NaN, unknown.
+
+    It has no room for the turn rate.
+    """
     known = vars(values) if isinstance(values, State) else values
     message = gaitmsg.state_t()
     for name in POSE_SCALARS:
