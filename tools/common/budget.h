@@ -31,7 +31,8 @@ bool budget_allows(budget *b, int64_t birth, int64_t now);
 void budget_missed(budget *b);
 
 /* A frame was tracked.  Returns the number of particles to go on with: half as many when steps are slow or frames are
- * dropped, as many as take half of the limit after two steps that took longer than it, twice as many after a while with time to spare. */
+ * dropped, as many as take half of the limit after two steps that took longer than it, twice as many after a while
+ * with time to spare. */
 int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, int32_t particles);
 
 /* Do steps with so many particles take longer than the limit, and may their number not fall?  true only once. */
