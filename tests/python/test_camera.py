@@ -182,6 +182,7 @@ FAULTS = [({key: "absent"}, f"{key} is missing; ") for key in KEYS] + [
     ({"t": [1, 2]}, "t has shape 2, not 3"),
     ({"t": ["a", "b", "c"]}, "t is not an array of numbers"),
     ({"t": [0, float("inf"), 0]}, "t is not finite"),
+    ({"distorsion": [0.1] * 4}, "distorsion is not a known key; use width height fx"),
     ({"distortion": [0.1]}, r"distortion has 1 numbers; give k1 k2 p1 p2 \[k3\]"),
     ({"distortion": [0.0] * 8}, "distortion has 8 numbers; .*without rational terms"),
 ]

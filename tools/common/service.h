@@ -30,7 +30,7 @@ typedef struct past_frame { /* what the source said of a frame that was tracked 
 } past_frame;
 
 /* Why frames that come are not tracked. */
-enum { SERVICE_IDLE_NOT, SERVICE_IDLE_CAMERA, SERVICE_IDLE_START, SERVICE_IDLE_SCENE };
+enum { SERVICE_IDLE_NOT, SERVICE_IDLE_CAMERA, SERVICE_IDLE_START, SERVICE_IDLE_SCENE, SERVICE_IDLE_LOOKING };
 
 typedef struct service {
     tracking track;

@@ -3,6 +3,7 @@
 
 #include "service_send.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -81,7 +82,12 @@ static bool spot(service *s, const image_view *v, const gait_image *frame)
         return false;
     spotter_forget(&s->spotter);
     arming_by_time(&s->start, &mean, &sd, v->utime);
-    return begin(s, v);
+    if (!begin(s, v))
+        return false;
+    fprintf(stderr,
+            "gait-trackd: somebody found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees\n",
+            v->frame, (double)mean.pelvis[0], (double)mean.pelvis[1], (double)mean.heading * 57.29578);
+    return true;
 }
 
 /* Nobody is tracked: start with whoever walks in. */
@@ -185,7 +191,7 @@ static void say_idle(service *s)
                      : s->state != GAITMSG_STATUS_T_READY ? SERVICE_IDLE_NOT
                      : !s->seek                           ? SERVICE_IDLE_START
                      : !s->track.background.data          ? SERVICE_IDLE_SCENE
-                                                          : SERVICE_IDLE_NOT;
+                                                          : SERVICE_IDLE_LOOKING;
     if (idle == s->idle)
         return;
     s->idle = idle;
@@ -202,6 +208,8 @@ static void say_idle(service *s)
                 "--background, "
                 "send GAIT_BACKGROUND_%d, or send START on GAIT_COMMAND\n",
                 i);
+    if (idle == SERVICE_IDLE_LOOKING)
+        fprintf(stderr, "gait-trackd: looking for somebody who walks in full view\n");
 }
 
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)

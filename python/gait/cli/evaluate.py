@@ -1,7 +1,7 @@
 """Compare a track, or lifted motion, with the truth.
 
 Prints, over the frames that both have: the 3-D error of 15 joints in mm, as they are (abs) and with
-the hip midpoints laid on each other (root); the share of frames lost; the error of the phase,
+the hip midpoints laid on each other (root); the share of frames far off or lost; the error of the phase,
 half-cycle flips counted apart; the distance in the picture; how often the 50 % and 90 % intervals hold
 the truth; and the same for two baselines that look at no image: the mean pose at the true place
 (static) and the mean cycle running free from the true start (free).
@@ -21,7 +21,7 @@ from typing import Any
 from gait.core.model import read_cyclic
 from gait.errors import UserError
 from gait.image.camera import Camera
-from gait.motion.evaluate import Measures, evaluate
+from gait.motion.evaluate import LOST_MM, Measures, evaluate
 from gait.motion.events import strikes_of
 from gait.motion.trackfile import read_estimates, read_truth
 
@@ -88,8 +88,8 @@ def text(m: Measures) -> str:
         "status: " + ", ".join(f"{word} {share:.1%}" for word, share in m["status"].items() if share)
     )
     lines.append(
-        f"lost {m['lost']:.1%} of {m['frames']} frames; "
-        f"{m['trust']['wrong_tracking']:.1%} of all are far off while it says tracking"
+        f"far off (root over {LOST_MM:.0f} mm) or lost: {m['lost']:.1%} of {m['frames']} frames; "
+        f"far off while it says tracking: {m['trust']['wrong_tracking']:.1%}"
     )
     return "\n".join([*lines, MEANING])
 

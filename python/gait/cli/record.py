@@ -66,7 +66,7 @@ def text(figures: dict[str, Any]) -> str:
     """Lay the figures out for people."""
     lines = [
         f"{figures['frames']} frames, {figures['dropped']} dropped by the tracker, "
-        f"{figures['lost']} estimates lost",
+        f"{figures['lost']} estimates lost on the way",
         _times("step", figures["step_ms"]),
     ]
     if figures["latency_ms"]:

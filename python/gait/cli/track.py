@@ -151,6 +151,8 @@ def run(args: argparse.Namespace) -> int:
     tracker = Tracker(model, camera, config, background=plate, tasks=args.threads)
     spotter = None if args.smooth else Spotter(camera, plate, model, args.height)
     results = _track(args, video, tracker, start, frames, spotter, joints)
+    for frame, x, y in () if args.quiet else results.found_anew:
+        print(f"lost, and somebody found at frame {frame}: x {x:.2f} y {y:.2f} m", file=sys.stderr)
     if args.trc:
         write_trc(args.trc, model.joint_names, np.array(results.times), np.array(results.joints), video.fps)
     summary = results.summary(args.threads)
@@ -213,8 +215,11 @@ class _Results:
         self._begun = time.perf_counter()
         self.times: list[float] = []
         self.joints: list[np.ndarray[Any, Any]] = []
+        self.found_anew: list[tuple[int, float, float]] = []  # frame and place of each start but the first
 
     def step(self, frame: Frame, estimate: Estimate) -> None:
+        if self._steps and estimate.frame == 0:
+            self.found_anew.append((frame.number, *estimate.mean.pelvis[:2]))
         self._steps.append(1000 * self._tracker.step_seconds)
         self._wall = time.perf_counter() - self._begun
 
@@ -295,7 +300,7 @@ def _smooth(args: argparse.Namespace, video: Video, smoother: Smoother, sinks: l
 def _text(summary: dict[str, Any]) -> str:
     step, threads = summary["step_ms"], summary["threads"]
     return (
-        f"{summary['frames']} frames, {summary['lost']} lost, {summary['ambiguous']} ambiguous\n"
+        f"{summary['frames']} frames, status lost in {summary['lost']}, ambiguous in {summary['ambiguous']}\n"
         f"{summary['particles']} particles, {threads} thread{'s' if threads > 1 else ''}, "
         f"{summary['memory_bytes']} bytes\n"
         f"step {step['median']:.1f} ms median, {step['p99']:.1f} ms p99, {step['max']:.1f} ms max; "

@@ -22,6 +22,8 @@ else:
 MAX_PIXELS = 1 << 14
 LONGEST_LENS = 1000  #: focal length over the width of the picture; the longest made have a few hundred
 
+_JSON_KEYS = ("width", "height", "fx", "fy", "cx", "cy", "R", "t", "distortion", "note")
+
 # Names in use for the same thing in OpenCV's own samples and in ROS; the first is the documented one.
 _ALIASES = {
     "camera_matrix": ("cameraMatrix", "K"),
@@ -80,6 +82,7 @@ def _split(path: str) -> tuple[str, str | None]:
 
 def _from_json(path: str, placed: bool) -> Camera:
     fields = read_json(path, "camera")
+    fields.only(_JSON_KEYS)
     remedy = "give the size of the video in pixels"
     width, height = (fields.integer(key, 1, MAX_PIXELS, remedy) for key in ("width", "height"))
     fx, fy = (fields.number(key, 1e-3, 1e9, "give the focal length in pixels") for key in ("fx", "fy"))
