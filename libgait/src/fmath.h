@@ -122,22 +122,10 @@ static inline void m_sincos(float x, float *s, float *c)
     *c = m_from_bits(m_bits(m_select(swap, sn, cs)) ^ (((q + 1u) & 2u) << 30));
 }
 
+void m_sincos_one(float x, float *s, float *c); /* the same, where there are few */
+
 /* Absolute error < 3e-7; in [-pi, pi]; 0 for y = x = 0.  Arguments finite and below 1e37. */
-static inline float m_atan2(float y, float x)
-{
-    float const ax = fabsf(x), ay = fabsf(y);
-    float const lo = f_min(ax, ay), hi = f_max(f_max(ax, ay), FLT_MIN);
-    /* over 22.5 degrees: atan t = pi/4 + atan((t - 1)/(t + 1)) */
-    uint32_t const fold = m_less(0.41421356f * hi, lo);
-    float const t = m_select(fold, lo - hi, lo) / m_select(fold, lo + hi, hi);
-    float const z = t * t;
-    float p = (8.05374449538e-2f * z - 1.38776856032e-1f) * z + 1.99777106478e-1f;
-    p = p * z - 3.33329491539e-1f;
-    float a = p * z * t + t + m_select(fold, 0.25f * PI_F, 0.0f);
-    a = m_select(m_less(ax, ay), 0.5f * PI_F - a, a);
-    a = m_select(m_less(x, 0.0f), PI_F - a, a);
-    return m_from_bits(m_bits(a) | (m_bits(y) & 0x80000000u));
-}
+float m_atan2(float y, float x);
 
 /* Absolute error < 2e-7; arguments outside [-1, 1] are clamped. */
 static inline float m_asin(float x)

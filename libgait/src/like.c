@@ -10,7 +10,7 @@ static const like_term *const TERMS[LIKE_TERMS] = {
 static void surface_point(const limb_geometry *g, float z, float angle, float point[3], float normal[3])
 {
     float s, c, ra = g->a0 + (g->a1 - g->a0) * z, rb = g->b0 + (g->b1 - g->b0) * z, norm = 0.0f;
-    m_sincos(angle, &s, &c);
+    m_sincos_one(angle, &s, &c);
     if (g->shape == LIMB_ELLIPSOID) {
         float const bulge = 2.0f * z - 1.0f, shrink = __builtin_sqrtf(1.0f - bulge * bulge);
         ra = g->a0 * shrink;

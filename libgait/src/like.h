@@ -164,6 +164,9 @@ void like_sum(const like_setup *s, const outline_block *outline, bool ancestors,
  * body. */
 float like_support(const like_body *b);
 
+/* Edges along the visible outline, of [0, 1]; chance: what a line of any direction would meet there. */
+float like_edges_along(const like_body *b, float *chance);
+
 /* Count area and covered, which the silhouette's term reads. */
 void like_silhouette_look(like_body *b);
 

@@ -24,4 +24,13 @@ static float support(const like_body *b)
     return ((float)t.response - 1.1f * (float)t.chance) / (float)(t.points * 2 * 64 * EDGE_ONE) - least;
 }
 
+float like_edges_along(const like_body *b, float *chance)
+{
+    like_edge_tally t;
+    b->setup->run->edges_count(b, &t);
+    float const all = (float)(i_max(t.points, ENOUGH) * 2 * 64 * EDGE_ONE);
+    *chance = (float)t.chance / all;
+    return (float)t.response / all;
+}
+
 const like_term like_edges = {"edges", GAIT_TERM_EDGES, log_likelihood, support};

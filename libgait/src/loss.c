@@ -1,5 +1,6 @@
 #include "loss.h"
 #include "estimate.h"
+#include "facing.h"
 #include "fmath.h"
 #include "modes.h"
 #include "weigh.h"
@@ -16,10 +17,17 @@ static const float USUAL = 60.0f,
                    BETTER = 10.0f;    /* frames in which more, or less, unexplained foreground is usual */
 static const double ELSEWHERE = 0.01; /* probability, in a frame, that a lost walker is not where predicted */
 enum { SEARCHERS = 8 };               /* one particle of so many looks there */
+static const float FACING_TIME = 1.0f;   /* seconds over which facing_seen() is averaged, */
+static const float FACING_FIRST = 0.03f; /* and what it is taken for at first */
 
 bool loss_is_lost(const gait_tracker *t)
 {
     return seconds_unseen(t) > PATIENCE;
+}
+
+bool loss_doubts_facing(const gait_tracker *t)
+{
+    return t->core->facing < 0.0f;
 }
 
 /* Where somebody may be who was last seen as `from`, `gap` seconds ago. */
@@ -29,7 +37,7 @@ static void region(const gait_tracker *t, float gap, gait_state *mean, gait_stat
     float sn, cs;
     *mean = walker_state(&t->rule, from);
     float const way = gap * estimate_speed(t, from), far = f_min(0.1f + 0.4f * gap, 1.5f);
-    m_sincos(mean->heading, &sn, &cs);
+    m_sincos_one(mean->heading, &sn, &cs);
     mean->pelvis[0] += way * cs;
     mean->pelvis[1] += way * sn;
     *sd = (gait_state){.phase = 0.5f,
@@ -131,6 +139,18 @@ static bool seen(gait_tracker *t, bool lost, const weigh_sight *s)
     return whole || t->core->part;
 }
 
+/* Edges of what hides a part of the walker tell nothing, so only a whole one counts. */
+static void watch_facing(gait_tracker *t, bool anew, const walker *mean)
+{
+    float *const facing = &t->core->facing;
+    if (anew)
+        *facing = FACING_FIRST;
+    else if (!t->core->part && (t->cfg.terms & GAIT_TERM_EDGES)) {
+        float const now = facing_seen(t, mean), share = f_min(seconds_unseen(t) / FACING_TIME, 1.0f);
+        *facing += now == 0.0f ? 0.0f : share * (now - *facing);
+    }
+}
+
 void loss_watch(gait_tracker *t, const walker *mean)
 {
     bool const lost = loss_is_lost(t);
@@ -143,6 +163,7 @@ void loss_watch(gait_tracker *t, const walker *mean)
     bool const keeps = t->core->modes.known || t->core->modes.stage == MODES_FORKED;
     if (lost && !(keeps && as_predicted(t, mean)))
         modes_search(t);
+    watch_facing(t, lost || !t->core->met, mean);
     t->core->support_utime = t->core->utime;
     t->core->last = *mean;
     t->core->met = 1;

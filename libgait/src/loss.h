@@ -13,6 +13,9 @@
 
 bool loss_is_lost(const gait_tracker *t);
 
+/* Would the walker, turned round, fit what was seen lately as well, so that the pose is not to be trusted? */
+bool loss_doubts_facing(const gait_tracker *t);
+
 /* After the prediction: while lost, draw some particles anew.  The others are even, as resampled. */
 void loss_search(gait_tracker *t, uint32_t frame);
 

@@ -226,7 +226,7 @@ static void unfold_pace(const gait_model *m, float *curve)
         for (int32_t h = 1; 2 * h < m->pace_terms; h++) {
             const float *const a = m->pace_series + (2 * h - 1) * M;
             float s, c;
-            m_sincos(TWO_PI_F * (float)(h * j % T) / (float)T, &s, &c);
+            m_sincos_one(TWO_PI_F * (float)(h * j % T) / (float)T, &s, &c);
             for (int32_t i = 0; i < M; i++)
                 at[i] += c * a[i] + s * a[M + i];
         }

@@ -169,7 +169,7 @@ static float half_phase(const population *p)
     double c = 0.0, s = 0.0;
     for (int32_t i = 0; i < p->n; i++) {
         float sn, cs;
-        m_sincos(2.0f * TWO_PI_F * phase[i], &sn, &cs);
+        m_sincos_one(2.0f * TWO_PI_F * phase[i], &sn, &cs);
         c += (double)cs;
         s += (double)sn;
     }

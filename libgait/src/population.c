@@ -90,7 +90,7 @@ gait_state walker_state(const body_rule *r, const walker *w)
                     .turn_rate = w->f[F_TURN]};
     float sway, height, sn, cs;
     pelvis_offset(r, w, &sway, &height);
-    m_sincos(s.heading, &sn, &cs);
+    m_sincos_one(s.heading, &sn, &cs);
     s.pelvis[0] = w->f[F_X] - sway * sn;
     s.pelvis[1] = w->f[F_Y] + sway * cs;
     s.pelvis[2] = w->f[F_Z] + height;
@@ -121,7 +121,7 @@ walker walker_from_state(const body_rule *r, const gait_state *s)
     for (int32_t k = 0; k < r->offsets; k++)
         w.f[body_rule_offset(r) + k] = s->offset[r->angle[k]];
     pelvis_offset(r, &w, &sway, &height);
-    m_sincos(s->heading, &sn, &cs);
+    m_sincos_one(s->heading, &sn, &cs);
     w.f[F_X] = s->pelvis[0] + sway * sn;
     w.f[F_Y] = s->pelvis[1] - sway * cs;
     w.f[F_Z] = s->pelvis[2] - height;

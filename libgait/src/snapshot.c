@@ -66,6 +66,7 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     ok &= c.start_utime <= c.utime && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
     ok &= c.mingle_utime <= c.utime && c.mingle_utime >= c.start_utime;
     ok &= c.missed >= 0.0f && c.missed < 1e9f && c.stature_doubt >= 0.0f && c.stature_doubt < 1e9f;
+    ok &= f_finite(&c.facing, 1);
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
         ok &= f_finite(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;

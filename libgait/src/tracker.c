@@ -265,7 +265,8 @@ static int32_t judge(const gait_tracker *t, float dt, bool degenerate, const gai
         return GAIT_STATUS_INIT;
     if (e->mode_mass < 0.7f)
         return seconds_since(t, t->core->start_utime) < acquire ? GAIT_STATUS_INIT : GAIT_STATUS_AMBIGUOUS;
-    return modes_open(t) || phase_jumps(t, dt, e) ? GAIT_STATUS_AMBIGUOUS : GAIT_STATUS_TRACKING;
+    bool const open = modes_open(t) || loss_doubts_facing(t) || phase_jumps(t, dt, e);
+    return open ? GAIT_STATUS_AMBIGUOUS : GAIT_STATUS_TRACKING;
 }
 
 /* Which cameras saw this frame, as bits. */

@@ -30,6 +30,7 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int32_t part;        /* this frame supports but a part of it */
     float stature_doubt; /* as in dynamics */
     float missed;        /* foreground that is usually left unexplained, nats */
+    float facing;        /* facing_seen() lately */
     double ess;
     modes_state modes;
     walker last;       /* when the images last supported it */

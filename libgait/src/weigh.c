@@ -22,7 +22,7 @@ void weigh_scratch_layout(arena *a, const gait_model *m, weigh_scratch *w)
 }
 
 /* The block's limbs in one camera, and in its working image and grid. */
-static void outline_limbs(const gait_tracker *t, int32_t c, weigh_scratch *w)
+void weigh_outline(const gait_tracker *t, int32_t c, weigh_scratch *w)
 {
     const like_setup *const s = t->like;
     const gait_camera *const cam = &t->cfg.camera[c];
@@ -34,8 +34,8 @@ static void outline_limbs(const gait_tracker *t, int32_t c, weigh_scratch *w)
 }
 
 /* One body of a block in one camera, ready for the terms. */
-static like_body look_at(const gait_tracker *t, int32_t c, int32_t side, int32_t lane, weigh_scratch *w,
-                         like_patch *seen)
+like_body weigh_look(const gait_tracker *t, int32_t c, int32_t side, int32_t lane, weigh_scratch *w,
+                     like_patch *seen)
 {
     like_body b = {.setup = t->like,
                    .features = &t->camera[c].seen,
@@ -65,7 +65,7 @@ like_patch *texture_of(const gait_tracker *t, int32_t i, int32_t c)
 static void weigh_one(gait_tracker *t, int32_t c, int32_t i, int32_t lane, weigh_scratch *w)
 {
     like_patch seen[MODEL_MAX_LIMBS], *const texture = texture_of(t, i, c);
-    like_body b = look_at(t, c, modes_side(t, i), lane, w, texture ? seen : NULL);
+    like_body b = weigh_look(t, c, modes_side(t, i), lane, w, texture ? seen : NULL);
     b.ancestor = t->core->textured >> c & 1u ? texture : NULL;
     like_evaluate(&b);
     t->used[i] += like_silhouette_parts(&b).explained;
@@ -77,7 +77,7 @@ static void weigh_one(gait_tracker *t, int32_t c, int32_t i, int32_t lane, weigh
 static void weigh_view(gait_tracker *t, int32_t c, int32_t begin, int32_t lanes, weigh_scratch *w)
 {
     float ll[BLOCK];
-    outline_limbs(t, c, w);
+    weigh_outline(t, c, w);
     memset(&w->terms, 0, sizeof w->terms);
     for (int32_t lane = 0; lane < lanes; lane++)
         weigh_one(t, c, begin + lane, lane, w);
@@ -129,9 +129,9 @@ weigh_sight weigh_walker(gait_tracker *t, const walker *person)
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         if (!t->camera[c].seen.seen)
             continue;
-        outline_limbs(t, c, w);
+        weigh_outline(t, c, w);
         like_patch *const seen = t->seen ? t->seen + c * t->like->limbs : NULL;
-        like_body const b = look_at(t, c, 0, 0, w, seen);
+        like_body const b = weigh_look(t, c, 0, 0, w, seen);
         like_parts const parts = like_silhouette_parts(&b);
         sight.support += like_support(&b);
         sight.parts.explained += parts.explained;

@@ -21,4 +21,10 @@ typedef struct weigh_sight {
 
 /* Also takes the walker's surface samples into t->seen. */
 weigh_sight weigh_walker(gait_tracker *t, const walker *w);
+
+/* For bodies apart from the particles: outlines of those in w->body in camera c, and one of them, ready for the terms;
+ * seen: where its surface samples go, or NULL. */
+void weigh_outline(const gait_tracker *t, int32_t c, weigh_scratch *w);
+like_body weigh_look(const gait_tracker *t, int32_t c, int32_t side, int32_t lane, weigh_scratch *w,
+                     like_patch *seen);
 #endif

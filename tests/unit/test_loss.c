@@ -1,7 +1,9 @@
 /* Loss and recovery: nobody there, hidden for a while, back where expected or elsewhere. */
 #include "loss.h"
 
+#include "facing.h"
 #include "kernel_check.h"
+#include "fmath.h"
 #include "rng.h"
 #include "toy_film.h"
 
@@ -158,6 +160,31 @@ static void test_elsewhere(void)
     CHECK(careful >= 2);
 }
 
+/* From a side the picture tells which way somebody looks, and not that the estimate turned round does; from in front it
+ * has no opinion.  What it said lately decides, and no longer than it lasts. */
+static void test_facing(void)
+{
+    gait_tracker *const t = begin();
+    gait_estimate e;
+    for (int n = 0; n < 30; n++) {
+        show(t, n, n, &e);
+        CHECK(!loss_doubts_facing(t) && e.status == GAIT_STATUS_TRACKING);
+    }
+    walker const right = walker_from_state(&t->rule, &e.mean);
+    walker turned = right, away = right;
+    turned.f[F_HEADING] = m_wrap_pi(turned.f[F_HEADING] + PI_F);
+    away.f[F_HEADING] = 0.5f * PI_F;
+    CHECK(facing_seen(t, &right) > 0.01f && facing_seen(t, &turned) < -0.01f);
+    CHECK(facing_seen(t, &away) == 0.0f);
+    t->core->facing = -0.02f;
+    show(t, 30, 30, &e);
+    CHECK(loss_doubts_facing(t) && e.status == GAIT_STATUS_AMBIGUOUS);
+    for (int n = 31; n < 60; n++)
+        show(t, n, n, &e);
+    CHECK(!loss_doubts_facing(t) && e.status == GAIT_STATUS_TRACKING);
+    toy_tracker_free(t);
+}
+
 /* No particle counts as less likely than somebody hidden. */
 static void test_the_bound(void)
 {
@@ -219,6 +246,7 @@ int main(void)
     test_hidden_in_part();
     test_something_else();
     test_elsewhere();
+    test_facing();
     test_the_bound();
     return CHECK_DONE();
 }
