@@ -208,12 +208,17 @@ def test_tracks_that_cannot_be(folder, capsys, change, words):
 
 
 def test_video_needs_placement(folder, capsys):
+    (folder / "clip.mp4").touch()
     assert main(["lift", "clip.mp4", "-m", "m.gait", "-o", "out.csv"]) == 2
     assert "--placement" in capsys.readouterr().err
     assert main(["lift", "clip.mp4", "-o", "out.csv", "--height", "1.7"]) == 2
     assert "--height is for tracks, and clip.mp4 is a video" in capsys.readouterr().err
     assert main(["lift", "clip.mp4", "-o", "out.csv", "--method", "smooth"]) == 2
     assert "--method is for tracks" in capsys.readouterr().err
+    assert main(["lift", "absent", "-o", "out.csv", "--method", "smooth"]) == 1
+    assert "absent: no such file" in capsys.readouterr().err
+    assert main(["lift", "absent.mp4", "-o", "out.csv", "--method", "smooth"]) == 1
+    assert "absent.mp4: no such file" in capsys.readouterr().err
 
 
 def damaged(change):

@@ -162,6 +162,8 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
     for option in _ONLY_TRACKS if video else _ONLY_VIDEO:
         value = getattr(args, option)
         if value is not None and value is not False:
+            if not Path(args.input).exists():
+                raise UserError(f"{args.input}: no such file")
             raise UsageError(f"--{option.replace('_', '-')} is for {other}, and {args.input} {kind}")
 
 

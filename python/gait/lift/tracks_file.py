@@ -148,7 +148,20 @@ def read(
     uv[confidence < LEAST_CONFIDENCE] = np.nan
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
+    _refuse_zeros(path, names, uv)
     return Tracks(frame, time, tuple(names), uv, confidence), ignored
+
+
+def _refuse_zeros(path: str | os.PathLike[str], names: list[str], uv: Array) -> None:
+    """Raise UserError at points that a detector put at 0, 0; a single one may be the origin of all others."""
+    zero = (uv == 0).all(axis=2)
+    wrong = zero & ~(zero.all(axis=0) & (zero.sum(axis=1) == 1)[:, None])
+    if wrong.any():
+        t, j = np.argwhere(wrong)[0]
+        raise UserError(
+            f"{path}: line {t + 2}: {names[j]} is at exactly 0, 0, as detectors put what they do not see; leave "
+            f"both cells empty, or give {names[j]}_c 0"
+        )
 
 
 def write(path: str | os.PathLike[str], tracks: Tracks) -> None:
