@@ -159,8 +159,8 @@ def _refuse_zeros(path: str | os.PathLike[str], names: list[str], uv: Array) -> 
     if wrong.any():
         t, j = np.argwhere(wrong)[0]
         raise UserError(
-            f"{path}: line {t + 2}: {names[j]} is at exactly 0, 0, as detectors put what they do not see; leave "
-            f"both cells empty, or give {names[j]}_c 0"
+            f"{path}: line {t + 2}: {names[j]} is at exactly 0, 0, as detectors put what they do not see; "
+            f"leave both cells empty, or give {names[j]}_c 0"
         )
 
 
