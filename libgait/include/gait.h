@@ -165,7 +165,7 @@ typedef struct gait_tracker_config {
     uint32_t struct_size;      /* set by gait_tracker_default() */
     int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
     uint64_t seed;             /* default 1 */
-    int32_t  particles;        /* [16, 1 << 20]; default 1500 (paper mode 10000) */
+    int32_t  particles;        /* [16, 1 << 20]; default 2000 (paper mode 10000) */
     int32_t  components;       /* [0, the model's]; default -1: the first 5, in paper mode all */
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
@@ -191,12 +191,12 @@ typedef struct gait_tracker_config {
     float    rate_noise_start; /* the same while settling [0, 10]; default 0.055 */
     float    settle_time;      /* seconds of settling, from when phase, left and right are known [0, 1e6]; default 1 */
     float    rate_time;        /* seconds in which it returns to the mean; 0: never [0, 1e6]; default 3 (paper mode 0) */
-    float    forward_noise;    /* of the pelvis along the heading, metres [0, 100]; default 0.05 (paper mode 0.044) */
-    float    lateral_noise;    /* across it, metres [0, 100]; default 0.05 (paper mode 0.044) */
+    float    forward_noise;    /* of the pelvis along the heading, metres [0, 100]; default 0.08 (paper mode 0.044) */
+    float    lateral_noise;    /* across it, metres [0, 100]; default 0.02 (paper mode 0.044) */
     float    vertical_noise;   /* metres [0, 100]; default 0.0096 (paper mode 0.022) */
     float    heading_noise;    /* radians [0, 100]; default 0.044 (paper mode 0.11) */
     float    turn_sd;          /* of turn rates, radians per second [0, 100]; default 0.5 (paper mode 0) */
-    float    turn_time;        /* mean seconds until it changes, half to 0; 0: never [0, 1e6]; default 12 (paper mode 0) */
+    float    turn_time;        /* mean seconds until it changes, half to 0; 0: never [0, 1e6]; default 6 (paper mode 0) */
     float    tilt_noise;       /* of pitch and roll, radians [0, 100]; default 0.033 (paper mode 0.055) */
     float    tilt_time;        /* seconds in which they and the height return; 0: never [0, 1e6]; default 1.1 (paper mode 0) */
     float    coef_noise;       /* standard deviations of a score [0, 100]; default 0.667 (paper mode 0.5) */

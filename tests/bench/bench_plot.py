@@ -66,7 +66,7 @@ def draw_pictures(axes: Axes, rows: list[Row]) -> None:
         {
             r["width"]: r
             for r in rows
-            if r["what"] == "default" and r["particles"] == "1500" and r["features_ms"]
+            if r["what"] == "default" and r["particles"] == "2000" and r["features_ms"]
         }.values()
     )
     names = [f"{r['width']}x{r['height']}" for r in runs]
@@ -74,7 +74,7 @@ def draw_pictures(axes: Axes, rows: list[Row]) -> None:
     rest = [number(r, "cpu_ms") - f for r, f in zip(runs, features, strict=True)]
     axes.bar(names, features, label="features")
     axes.bar(names, rest, bottom=features, label="the rest")
-    axes.set_ylabel("CPU ms per step, 1500 particles")
+    axes.set_ylabel("CPU ms per step, 2000 particles")
     axes.margins(y=0.25)
     axes.legend(ncols=2, loc="upper center")
     axes.set_title("cost by size of the picture, the person as large")

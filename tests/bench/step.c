@@ -187,7 +187,7 @@ static bool pictures(bench *b)
     for (int k = 0; ok && k < SIZES; k++) {
         ok = bench_scene_make(&scenes[k], b->model, size[k][0], size[k][1], LARGE_FRAMES, b->why);
         plans[k] = (bench_plan){
-            .scene = &scenes[k], .particles = 1500, .threads = 1, .cpu_mask = ~0u, .stages = true};
+            .scene = &scenes[k], .particles = 2000, .threads = 1, .cpu_mask = ~0u, .stages = true};
     }
     const bench_result *const r = ok ? run(b, plans, SIZES) : NULL;
     for (int k = 0; k < SIZES; k++) {
