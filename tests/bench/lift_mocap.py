@@ -243,7 +243,7 @@ def _publish(rows: list[list[object]], missing: list[list[object]]) -> None:
         f"all together; of all together Bayes at most {NEAR_BEST} of the best weight's."
     )
     head = ["measure", "left out", "noise mm", "segments", "mean", "likelihood", "Bayes", "floor", "ratio"]
-    head += ["best", "over", "coverage", "held", "scaled", "held", "volume", "met"]
+    head += ["best", "over", "coverage", "held", "scaled", "scaled held", "volume", "met"]
     table.publish("lift_mocap", "Held-out motion capture", head, rows, note)
     note = (
         "The same with points missing at random, noise 20 mm: mm per marker. Growth: at 30 % over none, as "

@@ -175,8 +175,8 @@ def _publish(rows: list[list[object]]) -> None:
         "says; coverage of the 90 % intervals of places in the world, and about the hips; live and as a "
         f"whole. Wanted of all together: coverage from {COVERAGE[0]:g} to {COVERAGE[1]:g}."
     )
-    head = ["clip", "walks", "live: mean %", "rms %", "said %", "coverage"]
-    head += ["whole: mean %", "rms %", "said %", "coverage", "about hips", "met"]
+    head = ["clip", "walks", "live: mean %", "live: rms %", "live: said %", "live: coverage"]
+    head += ["whole: mean %", "whole: rms %", "whole: said %", "whole: coverage", "about hips", "met"]
     table.publish("lift_people", "People of any stature", head, rows, note)
 
 

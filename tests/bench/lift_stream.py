@@ -39,7 +39,8 @@ def main() -> int:
     with progress("learning", None) as update:
         paths = eval_clips.models(clips, models, 1, update)
     rows = [_row(clip, paths[str(clip.subject)]) for clip in clips]
-    head = ["clip", "root mm", "abs mm", "coverage", "given: root mm", "abs mm", "coverage", "exact", "met"]
+    head = ["clip", "root mm", "abs mm", "coverage"]
+    head += ["given: root mm", "given: abs mm", "given: coverage", "exact", "met"]
     note = (
         f"As for lift_dev, frame by frame with a lag of {LiftConfig.default().lag}: stature unknown; given "
         "(the true one); exact: coverage if the mean stature is taken for the person's (stature_sd 0). "

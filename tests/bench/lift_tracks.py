@@ -167,7 +167,7 @@ def _clips() -> list[list[object]]:
         "coverage",
         "about hips",
         "known: abs mm",
-        "coverage",
+        "known: coverage",
     ]
     table.publish("lift_dev", "Tracks of the development clips", [*head, "met"], rows, note)
     return rows
