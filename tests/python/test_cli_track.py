@@ -191,6 +191,7 @@ FAULTS = [
     (["--init", "{}/init.json", "--start", "3"], "init.json: frame is 0, --start says 3"),
     (["--background", "{}/none.png"], "none.png: no such background image"),
     (["--background", "{}/small.png"], "small.png: is 32x24, the video 320x240"),
+    (["--background", "{}/other.png"], "other.png: half of frame 0 differs from it; give the empty scene"),
     (["--background", "none", "--init", "auto"], "walk.mp4: --init auto found nobody in full view"),
     (["-m", "{}/camera.json"], "camera.json: .*"),
     (["-m", "{}/none.gait"], "none.gait: no such model file"),
@@ -210,6 +211,7 @@ FAULTS = [
 @pytest.mark.parametrize("options, words", FAULTS, ids=[" ".join(f[0]) for f in FAULTS])
 def test_every_fault_is_one_line_and_leaves_no_output(options, words, scene, capsys):
     cv2.imwrite(str(scene / "small.png"), np.zeros((24, 32), np.uint8))
+    cv2.imwrite(str(scene / "other.png"), wall(seed=1))
     (scene / "late.json").write_text('{"frame": 20}')
     before = {path: path.read_bytes() for path in scene.iterdir()}
     assert track(scene, *(str(o).format(scene) for o in options), out="fault.csv") == 1

@@ -9,7 +9,7 @@ from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
 from gait import Camera, Model, Start, UserError, Video
 from gait.core.initial import DEFAULT_SD
 from gait.core.model import read_blob
-from gait.image.sighting import standing
+from gait.image.sighting import another_scene, standing
 from gait.image.video import Frame
 from gait.io import blob
 from gait.motion.trackfile import read_truth
@@ -307,3 +307,10 @@ def test_who_stands_is_not_started_with_by_looks_alone(tmp_path):
     video = Video(tmp_path / "held.mp4")
     with pytest.raises(UserError, match="held.mp4: --init auto found nobody .*give --init FILE.json"):
         find_start(video, Camera.read(str(folder / "camera.json"), video.size), None, MODEL)
+
+
+def test_another_scene_is_told_and_exposure_is_none():
+    bright = np.clip(1.2 * wall() + 10, 0, 255).astype(np.uint8)
+    noisy = np.clip(wall() + np.random.default_rng(2).normal(0, 8, wall().shape), 0, 255).astype(np.uint8)
+    assert not another_scene(bright, wall()) and not another_scene(noisy, wall())
+    assert another_scene(wall(seed=1), wall()) and another_scene(wall(), np.roll(wall(), 12, axis=1))

@@ -48,3 +48,18 @@ def test_who_comes_back_is_tracked_again(tmp_path):
     status = {m.frame: m.status for m in got.estimates}
     assert status[40] == LOST and status[49] == LOST
     assert all(status[i] != LOST for i in range(100, 110))
+
+
+def test_the_scene_of_another_camera_is_told_once(tmp_path):
+    other = np.full_like(rig.plate(), 60)
+    other[:, ::2] = 180
+    scene = [SCENE[0], ("GAIT_BACKGROUND_0", image_message(other, rig.utime(0), -1))]
+    for begin in (scene, [*scene, rig.opening()[2]]):  # while looking for somebody, and while tracking
+        told = track(tmp_path, [*begin, *rig.frames(0, 10)]).words
+        assert told.count("half of the picture differs from the empty scene: give that of this camera") == 1
+
+
+def test_who_is_looked_for_and_found_is_told(tmp_path):
+    told = track(tmp_path, [*SCENE, *empty(0, 20), *later(range(45), 20)]).words
+    assert told.count("looking for somebody who walks in full view") == 1
+    assert told.count("somebody found at frame") == 1 and "differs" not in told

@@ -6,6 +6,7 @@
 enum {
     LEAST_STEP = 14, /* grey levels of change that count, at least, */
     NOISE_STEPS = 5, /* and in robust deviations of the picture's noise */
+    ANOTHER = 18,    /* by which half of a picture differs from another scene, at least */
     GAP = 3,         /* cells of low contrast that a body may be torn by */
     LEAST_HEIGHT = 15
 };
@@ -126,15 +127,26 @@ static void measure(const blob_finder *f, const patch *p, blob *out)
     out->area = p->area;
 }
 
-bool blob_find(blob_finder *f, const gait_image *image, const gait_image *plate, blob *out)
+/* Fill f->smooth; returns four times the median. */
+static int32_t change(blob_finder *f, const gait_image *image, const gait_image *plate)
 {
     int32_t const larger = image->width > image->height ? image->width : image->height;
     f->step = (larger + 319) / 320;
     f->width = image->width / f->step;
     f->height = image->height / f->step;
-    out->area = 0;
     compare(f, image, plate);
-    int32_t const noise = NOISE_STEPS * smooth(f) * 3 / 2,
+    return smooth(f);
+}
+
+bool blob_another_scene(blob_finder *f, const gait_image *image, const gait_image *plate)
+{
+    return change(f, image, plate) > 4 * ANOTHER;
+}
+
+bool blob_find(blob_finder *f, const gait_image *image, const gait_image *plate, blob *out)
+{
+    out->area = 0;
+    int32_t const noise = NOISE_STEPS * change(f, image, plate) * 3 / 2,
                   least = noise > 4 * LEAST_STEP ? noise : 4 * LEAST_STEP;
     for (int32_t i = 0; i < f->width * f->height; i++)
         f->mask[i] = f->smooth[i] > least;

@@ -20,6 +20,9 @@ typedef struct blob {        /* pixels */
     int32_t area;            /* cells */
 } blob;
 
+/* Does half of a picture differ from the empty scene, so that it shows another one?  Both have the same size. */
+bool blob_another_scene(blob_finder *f, const gait_image *image, const gait_image *plate);
+
 /* Both pictures have the same size.  False: nobody stands in full view. */
 bool blob_find(blob_finder *f, const gait_image *image, const gait_image *plate, blob *out);
 #endif

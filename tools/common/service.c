@@ -172,6 +172,7 @@ void service_background(service *s, const image_view *v)
         set_idle(s);
     else
         s->news = s->news || first;
+    s->compared = false;
 }
 
 static void command_start(service *s, const gaitmsg_command_t *msg)

@@ -42,6 +42,7 @@ typedef struct service {
     bool has_init;
     init_state init; /* of --init FILE */
     arming start;
+    bool compared;   /* the empty scene with a frame */
     bool seek;       /* start with whoever walks in, and again when lost */
     spotter spotter; /* looks for them */
     int8_t state;    /* GAITMSG_STATUS_T_* */

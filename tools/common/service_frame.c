@@ -72,6 +72,23 @@ static bool in_time(service *s, const image_view *v)
     return true;
 }
 
+/* Say if the empty scene is another one than the frame's. */
+static void compare_scene(service *s, const gait_image *frame)
+{
+    message why;
+    if (s->compared || !s->track.background.data)
+        return;
+    s->compared = true;
+    if (blob_another_scene(&s->spotter.finder, frame, &s->track.background)) {
+        message_set(
+            &why,
+            "half of the picture differs from the empty scene: give that of this camera (--background, "
+            "GAIT_BACKGROUND_%d)",
+            s->stream);
+        service_complain(s, &why);
+    }
+}
+
 /* Look for somebody to start with; true when the tracker has begun with this frame. */
 static bool spot(service *s, const image_view *v, const gait_image *frame)
 {
@@ -95,7 +112,10 @@ static bool spot_first(service *s, const image_view *v)
 {
     gait_image frame;
     message why;
-    return s->seek && service_pixels(s, v, &frame, &why) && spot(s, v, &frame);
+    if (!s->seek || !service_pixels(s, v, &frame, &why))
+        return false;
+    compare_scene(s, &frame);
+    return spot(s, v, &frame);
 }
 
 /* Predict through a pause longer than one step may be, in equal steps without an image. */
@@ -141,6 +161,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
         service_reject(s, &why);
         return false;
     }
+    compare_scene(s, &frame.image[0]);
     if (s->cue)
         frame.tracks[0] = tracks_cue_use(s->cue, v->utime);
     gait_status status = bridge(s, v->utime, &estimate, &err);

@@ -45,6 +45,7 @@ from gait.draw.overlay import Overlay
 from gait.durations import spread
 from gait.errors import UsageError, UserError
 from gait.image.camera import Camera
+from gait.image.sighting import another_scene
 from gait.image.video import Frame, Image, Video, VideoWriter, background
 from gait.io.files import require_outputs
 from gait.io.trc import write_trc
@@ -160,6 +161,21 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _require_scene(args: argparse.Namespace, video: Video, plate: Image | None, first: int) -> None:
+    """Refuse a given plate of another scene than the first frame's; tell of such a median."""
+    frame = next(iter(video.frames(first, first + 1)), None)
+    if plate is None or frame is None or not another_scene(frame.image, plate):
+        return
+    differs = f"half of frame {first} differs from"
+    if args.background != "auto":
+        raise UserError(f"{args.background}: {differs} it; give the empty scene of this camera, auto or none")
+    if not args.quiet:
+        print(
+            f"{differs} the median of the clip, the background: if the camera moves, --background none",
+            file=sys.stderr,
+        )
+
+
 def _frames(args: argparse.Namespace, video: Video, start: int) -> range:
     """Frames from `start` that are chosen; UserError if there are none."""
     stop = video.count if args.stop is None else min(args.stop, video.count)
@@ -192,8 +208,11 @@ def _start(
 ) -> Start:
     """First state by --init, --start and --height."""
     if args.init != "auto":
-        return Start.read(args.init, model, frame=args.start, height=args.height)
+        start = Start.read(args.init, model, frame=args.start, height=args.height)
+        _require_scene(args, video, plate, start.frame)
+        return start
     _frames(args, video, args.start or 0)
+    _require_scene(args, video, plate, args.start or 0)
     start = find_start(video, camera, plate, model, first=args.start or 0, stop=args.stop, height=args.height)
     if not args.quiet:
         at, turn, unsure = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)

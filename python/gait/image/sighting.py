@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 STATURE = (1.2, 2.4)  # metres by foot and head ray alone, so with room for shadows
 _GREY_STEP = 14.0  # least difference from the plate that counts, grey levels
 _NOISE_STEPS = 5.0  # and in robust standard deviations of the picture's noise
+_ANOTHER = 18.0  # grey levels by which half of a picture differs from the plate of another scene, at least
 _FILL = 0.15  # a standing person covers at least this share of the box round it
 
 
@@ -50,17 +51,27 @@ class Sighting:
         return float(self.foot[1] - self.head[1])
 
 
-def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
-    """Mask (h, w), 255 where a BGR picture differs from the plate by more than noise and exposure explain."""
+def _change(image: Image, plate: Image) -> Array:
+    """Largest difference (h, w) of the channels of two BGR pictures, without exposure, in grey levels."""
     step = image.astype(np.float32) - plate
     step -= np.median(step[::4, ::4], axis=(0, 1))  # exposure: most of the picture is background
-    change = cv2.GaussianBlur(np.abs(step).max(axis=2), (0, 0), 1.2)
+    return np.asarray(cv2.GaussianBlur(np.abs(step).max(axis=2), (0, 0), 1.2), np.float64)
+
+
+def another_scene(image: Image, plate: Image) -> bool:
+    """Whether half of a picture differs from the plate: it shows another scene, or the camera has moved."""
+    return bool(np.median(_change(image, plate)[::4, ::4]) > _ANOTHER)
+
+
+def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
+    """Mask (h, w), 255 where a BGR picture differs from the plate by more than noise and exposure explain."""
+    change = _change(image, plate)
     noise = 1.4826 * float(np.median(change[::4, ::4]))
     mask = (change > max(_GREY_STEP, _NOISE_STEPS * noise)).astype(np.uint8) * 255
     reach = max(3, image.shape[0] // 90) | 1  # joins what low contrast tears apart, mostly at neck and knees
-    mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     return np.asarray(
-        cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3 * reach, reach), np.uint8)), np.uint8
+        cv2.morphologyEx(opened, cv2.MORPH_CLOSE, np.ones((3 * reach, reach), np.uint8)), np.uint8
     )
 
 
