@@ -1,6 +1,7 @@
 """First states: from a file, with every fault told, and found in the pictures."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -314,3 +315,14 @@ def test_another_scene_is_told_and_exposure_is_none():
     noisy = np.clip(wall() + np.random.default_rng(2).normal(0, 8, wall().shape), 0, 255).astype(np.uint8)
     assert not another_scene(bright, wall()) and not another_scene(noisy, wall())
     assert another_scene(wall(seed=1), wall()) and another_scene(wall(), np.roll(wall(), 12, axis=1))
+
+
+def test_a_camera_whose_height_is_wrong_is_told(tmp_path):
+    pictures, _ = clip(MODEL, SECTIONS, 20)
+    write(tmp_path / "walk.mp4", pictures)
+    true = camera()
+    low = replace(true, t=-true.R @ (true.centre * [1, 1, 0.4]))
+    with pytest.raises(
+        UserError, match=r"saw somebody in \d+ frames whom the camera makes 0\.\d+ m tall; check the"
+    ):
+        find_start(Video(tmp_path / "walk.mp4"), low, wall(), MODEL)

@@ -75,8 +75,13 @@ def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
     )
 
 
-def sightings(image: Image, plate: Image, camera: Camera) -> list[Sighting]:
-    """Find blobs of a person's size standing on the ground in full view, largest first."""
+def sightings(
+    image: Image, plate: Image, camera: Camera, misplaced: list[float] | None = None
+) -> list[Sighting]:
+    """Find blobs of a person's size standing on the ground in full view, largest first.
+
+    Statures of blobs shaped like one, but not of one's size where they would stand, go to `misplaced`.
+    """
     mask = foreground(image, plate)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     found = []
@@ -85,33 +90,42 @@ def sightings(image: Image, plate: Image, camera: Camera) -> list[Sighting]:
         inside = x > 1 and y > 1 and x + width < camera.width - 1 and y + height < camera.height - 1
         if inside and height > 30 and height > width and area > _FILL * width * height:
             blob = labels[y : y + height, x : x + width] == i
-            one = _measure(blob, x, y, area, camera)
+            foot, head = _ends(blob, x, y)
+            one = standing(foot, head, camera, area)
             if one is not None:
                 found.append(one)
+            elif misplaced is not None:
+                misplaced.append(_stature(foot, head, camera))
     return sorted(found, key=lambda one: -one.strength)
 
 
-def _measure(blob: NDArray[np.bool_], x: int, y: int, area: int, camera: Camera) -> Sighting | None:
-    """Measure a blob whose box begins at (x, y); None if it cannot be a person on the ground."""
+def _ends(blob: NDArray[np.bool_], x: int, y: int) -> tuple[Array, Array]:
+    """Pixels of foot and head of a blob whose box begins at (x, y)."""
     height = len(blob)
     columns = np.nonzero(blob)[1]
     middle = x + float(np.median(columns))
     crown = np.nonzero(blob[: max(1, height // 10)])[1]
     foot = np.array([middle, y + height - 0.5])
     head = np.array([x + float(np.median(crown)), y - 0.5])
-    return standing(foot, head, camera, area)
+    return foot, head
 
 
 def standing(
     foot: Array, head: Array, camera: Camera, strength: float, spread: float = 0.0
 ) -> Sighting | None:
     """Sighting of somebody between two pixels; None if a person on the ground is not there and that tall."""
+    stature = _stature(foot, head, camera)
+    if not STATURE[0] <= stature <= STATURE[1]:
+        return None
+    return Sighting(foot, head, camera.on_plane(foot), stature, strength, spread)
+
+
+def _stature(foot: Array, head: Array, camera: Camera) -> float:
+    """Stature of whoever stands between two pixels, metres; not a number where no ground is under the foot."""
     place = camera.on_plane(foot)
     if not np.isfinite(place).all():
-        return None
-    stature = height_over(camera, head, float(np.hypot(*(place - camera.centre)[:2])))
-    fits = STATURE[0] <= stature <= STATURE[1]
-    return Sighting(foot, head, place, stature, strength, spread) if fits else None
+        return float("nan")
+    return height_over(camera, head, float(np.hypot(*(place - camera.centre)[:2])))
 
 
 def height_over(camera: Camera, pixel: Array, distance: float) -> float:

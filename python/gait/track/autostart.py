@@ -86,7 +86,9 @@ def find_start(
     UserError
         If no person stands in full view for long enough.
     """
+    misplaced: list[float] = []
     for spotter in _spotters(camera, plate, model, height):
+        spotter.misplaced = misplaced
         for frame in video.frames(first, stop):
             if spotter.full_second(frame):
                 break
@@ -99,6 +101,13 @@ def find_start(
         raise UserError(
             f"{video.path}: only {few} frame{'s'[: few != 1]} to track, --init auto needs {ENOUGH}; "
             "give --init FILE.json"
+        )
+    if len(misplaced) >= ENOUGH:
+        tall = float(np.median(misplaced))
+        raise UserError(
+            f"{video.path}: --init auto saw somebody in {len(misplaced)} frames whom the camera "
+            f"{f'makes {tall:.2g} m tall' if np.isfinite(tall) else 'puts above the horizon'}; "
+            "check the camera's height and tilt, or give --init FILE.json"
         )
     raise UserError(
         f"{video.path}: --init auto found nobody in full view for {ENOUGH} frames; give --init FILE.json"
@@ -128,6 +137,7 @@ class Spotter:
         self, camera: Camera, plate: Image | None, model: Model, height: float | None = None
     ) -> None:
         self._camera, self._plate, self._model, self._height = camera, plate, model, height
+        self.misplaced: list[float] | None = None  # statures of blobs of no person's, if given
         self._everybody: list[_Seen] = []
         self._looked = -np.inf  # when, without a plate
 
@@ -182,7 +192,7 @@ class Spotter:
     def _look(self, image: Image) -> list[Sighting]:
         if self._plate is None:
             return people(image, self._camera)
-        return sightings(image, self._plate, self._camera)
+        return sightings(image, self._plate, self._camera, self.misplaced)
 
 
 def _apart(seen: _Seen, frame: Frame, one: Sighting) -> float:
