@@ -121,7 +121,7 @@ def standing(
 
 
 def _stature(foot: Array, head: Array, camera: Camera) -> float:
-    """Stature of whoever stands between two pixels, metres; not a number where no ground is under the foot."""
+    """Stature of whoever stands between two pixels, metres; not a number without ground under the foot."""
     place = camera.on_plane(foot)
     if not np.isfinite(place).all():
         return float("nan")
