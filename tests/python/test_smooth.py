@@ -210,7 +210,8 @@ def test_the_command_smooths_and_repeats_itself(folder):
     assert (folder / "s.csv").read_bytes() == (folder / "again.csv").read_bytes()
     filtered, smooth = read_track(folder / "f.csv"), read_track(folder / "s.csv")
     np.testing.assert_array_equal(smooth.frame, filtered.frame)
-    assert smooth.eval15_sd().mean() < 0.9 * filtered.eval15_sd().mean()
+    assert smooth.eval15_sd().mean() < filtered.eval15_sd().mean()
+    assert smooth.eval15_sd().min() > 0.015 * 1.7  # what the model cannot express stays
     assert np.abs(smooth.eval15() - filtered.eval15()).mean() < 0.03
     draws = Draws.read(folder / "d.npz", smooth)
     for i, name in enumerate(draws.joint_names):

@@ -44,6 +44,8 @@ class Spool:
     ----------
     utime, step : list of int
         Capture time and steps since start of each frame.
+    doubt : list of float
+        Deviation of stature at the start that each frame follows, fraction of it.
     """
 
     def __init__(self, transitions: Transitions) -> None:
@@ -52,7 +54,7 @@ class Spool:
         self.utime: list[int] = []
         self.step: list[int] = []
         self._known: list[int] = []
-        self._doubt: list[float] = []
+        self.doubt: list[float] = []
 
     def __enter__(self) -> Spool:
         self._file = tempfile.TemporaryFile(prefix="gait-")
@@ -71,7 +73,7 @@ class Spool:
         self._file.write(table.tobytes())
         self.utime.append(estimate.utime)
         self._known.append(self._known_since(estimate))
-        self._doubt.append(tracker.stature_doubt)
+        self.doubt.append(tracker.stature_doubt)
         self.step.append(estimate.frame)
 
     def _known_since(self, estimate: Estimate) -> int:
@@ -105,7 +107,7 @@ class Spool:
         settle_time = 1e6 * self._transitions.config.settle_time
         age = self.utime[index] - self.utime[known] if known >= 0 else 0
         return Step(
-            1e-6 * (self.utime[index] - self.utime[index - 1]), age < settle_time, age > 0, self._doubt[index]
+            1e-6 * (self.utime[index] - self.utime[index - 1]), age < settle_time, age > 0, self.doubt[index]
         )
 
 

@@ -26,6 +26,7 @@ MOTIONS = 100
 _NOTHING = np.empty((0, 0, 3), np.uint8)
 
 _NEAR = (0.15, 0.5)  # strides and radians around a mode, as in estimate.c
+_TOLD = 0.01  # share of the size to which pictures tell it, as in estimate.c
 _SURE = 0.7  # least mass of the mode under `tracking`
 
 
@@ -73,7 +74,7 @@ class Smoother:
         joints, angles = pose_all(model, states)
         frames = [frame for frame, _ in self._seen]
         rows = [
-            (frame, smoothed(estimate, model, states[:, i], joints[:, i], angles[:, i]))
+            (frame, self._widened(i, smoothed(estimate, model, states[:, i], joints[:, i], angles[:, i])))
             for i, (frame, estimate) in enumerate(self._seen)
         ]
         return rows, Draws(
@@ -85,6 +86,19 @@ class Smoother:
             angles,
             states["phase"].copy(),
         )
+
+    def _widened(self, index: int, now: Estimate) -> Estimate:
+        """Add to a frame's deviations what no number of frames makes less, as estimate.c does.
+
+        That is what the model cannot express and, of one camera, the size that its pictures leave in doubt.
+        """
+        tracker, doubt = self._tracker, self._spool.doubt[index]
+        share, one_view = tracker.config.joint_sd_model, len(tracker.cameras) == 1
+        size = _TOLD * doubt / np.hypot(_TOLD, doubt) if one_view and share > 0 else 0.0
+        rays = size * (now.joints - tracker.cameras[0].centre)
+        joint_sd = np.sqrt(now.joint_sd**2 + (share * now.mean.stature) ** 2 + rays**2)
+        stature = float(np.hypot(now.sd.stature, size * now.mean.stature))
+        return replace(now, joint_sd=joint_sd, sd=replace(now.sd, stature=stature, pelvis=joint_sd[0]))
 
 
 def pose_all(model: Model, states: NDArray[np.void]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
