@@ -78,6 +78,7 @@ def test_says_what_segments_leave_uncertain(folder, capsys, view):
     assert (
         f"least certain {first['sd_mm']:.0f}, " in printed and f"({100 * first['in_depth']:.0f}, " in printed
     )
+    assert ("which the view does not tell" in printed) == (view == "flat")
 
 
 def test_the_likelihood_alone_is_less_sure_and_has_the_same_columns(folder, capsys):

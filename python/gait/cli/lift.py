@@ -44,6 +44,7 @@ _ONLY_TRACKS = (
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
 PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
 FAR = 4.0  # noise alone gives a median of 1.2
+UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view without perspective
 DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
 
 
@@ -278,6 +279,6 @@ def _left(segments: dict[str, Any]) -> str:
     sd = ", ".join(f"{mode['sd_mm']:.0f}" for mode in modes)
     depth = ", ".join(f"{100 * mode['in_depth']:.0f}" for mode in modes)
     volume = segments["log10_volume_ratio"]
-    return (
-        f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth)"
-    )
+    words = f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth)"
+    untold = modes[0]["sd_mm"] > UNTOLD_MM
+    return words + "; the first is how far away the person is, which the view does not tell" * bool(untold)
