@@ -279,6 +279,8 @@ def _left(segments: dict[str, Any]) -> str:
     sd = ", ".join(f"{mode['sd_mm']:.0f}" for mode in modes)
     depth = ", ".join(f"{100 * mode['in_depth']:.0f}" for mode in modes)
     volume = segments["log10_volume_ratio"]
-    words = f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth)"
+    words = (
+        f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth)"
+    )
     untold = modes[0]["sd_mm"] > UNTOLD_MM
     return words + "; the first is how far away the person is, which the view does not tell" * bool(untold)
