@@ -259,7 +259,7 @@ def test_lost_estimates_are_counted(logged, tmp_path):
     assert recorder.summary()["lost"] == 3 and len(read_track(tmp_path / "t.csv").frame) == COUNT - 5
 
 
-def test_one_file_holds_one_stream(logged, tmp_path):
+def test_one_file_holds_one_stream(logged, recorded, tmp_path):
     estimates = rig.read_log(logged.with_suffix(".out"), "GAIT_ESTIMATE", gaitmsg.estimate_t)
     log = rig.write_log(tmp_path / "two.log", [("GAIT_ESTIMATE", e) for e in estimates + estimates[:5]])
     recorder = Recorder(f"file://{log}?speed=0", str(tmp_path / "t.csv"))
@@ -268,7 +268,7 @@ def test_one_file_holds_one_stream(logged, tmp_path):
 
 
 @pytest.mark.parametrize("frames", [1, 2, 5])
-def test_a_recording_ends_after_its_frames(logged, tmp_path, frames):
+def test_a_recording_ends_after_its_frames(logged, recorded, tmp_path, frames):
     recorder = Recorder(f"file://{logged.with_suffix('.out')}?speed=0", str(tmp_path / "t.csv"))
     recorder.run(frames=frames)
     assert len(read_track(tmp_path / "t.csv").frame) == frames
