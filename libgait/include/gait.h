@@ -16,7 +16,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 4          /* SONAME; bumped by any incompatible change below, struct layout included */
+#define GAIT_ABI 5          /* SONAME; bumped by any incompatible change below, struct layout included */
 #define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 
@@ -166,6 +166,7 @@ typedef struct gait_tracker_config {
     int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
     uint64_t seed;             /* default 1 */
     int32_t  particles;        /* [16, 1 << 20]; default 2000 (paper mode 10000) */
+    int32_t  search_particles; /* twice as many in a search, up to these [0, 1 << 20]; default 4000 (paper mode 0) */
     int32_t  components;       /* [0, the model's]; default -1: the first 5, in paper mode all */
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
@@ -188,7 +189,6 @@ typedef struct gait_tracker_config {
     /* Dynamics (eqs. 5-9): standard deviations of random walks, per sqrt(second). */
     float    phase_noise;      /* strides [0, 10]; default 0.0164 (paper mode 0.022) */
     float    rate_noise;       /* fraction of the model's mean stride_hz [0, 10]; default 0.055 */
-    float    rate_noise_start; /* the same while settling [0, 10]; default 0.055 */
     float    settle_time;      /* seconds of settling, from when phase, left and right are known [0, 1e6]; default 1 */
     float    rate_time;        /* seconds in which it returns to the mean; 0: never [0, 1e6]; default 3 (paper mode 0) */
     float    forward_noise;    /* of the pelvis along the heading, metres [0, 100]; default 0.08 (paper mode 0.044) */
@@ -205,8 +205,7 @@ typedef struct gait_tracker_config {
     float    stature_noise_start; /* the same while settling [0, 100]; default 2 (paper mode 0) */
     float    offset_noise;     /* posture of the angles in offset_angles, in the deviation among people learnt of each
                                 * angle, which it relaxes to [0, 100]; default 0.58 */
-    float    proportion_noise; /* of the proportions' scores, which relax to a standard deviation of 1 [0, 100];
-                                * default 0.15 */
+    float    proportion_noise; /* of the proportions' scores, which relax to a deviation of 1 [0, 100]; default 0.15 */
     uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and
                                 * arms (paper mode none) */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */

@@ -18,6 +18,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .mode = mode,
         .seed = 1,
         .particles = paper ? 10000 : 2000,
+        .search_particles = paper ? 0 : 4000,
         .components = -1,
         .proportions = 0,
         .tasks = 8,
@@ -38,7 +39,6 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .max_dt = 0.5f,
         .phase_noise = 0.0164f,
         .rate_noise = 0.055f,
-        .rate_noise_start = 0.055f,
         .settle_time = 1.0f,
         .rate_time = 3.0f,
         .forward_noise = 0.08f,
@@ -61,7 +61,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
     };
     if (paper) { /* random walks of Ormoneit et al. 2000, eqs. 5-9, who leave the rates open */
         cfg->phase_noise = 0.022f;
-        cfg->rate_noise = cfg->rate_noise_start = 0.055f;
+        cfg->rate_noise = 0.055f;
         cfg->forward_noise = cfg->lateral_noise = 0.044f;
         cfg->vertical_noise = 0.022f;
         cfg->heading_noise = 0.11f;
@@ -100,7 +100,6 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(max_dt, 1e-3f, 10.0f),
         RANGE(phase_noise, 0.0f, 10.0f),
         RANGE(rate_noise, 0.0f, 10.0f),
-        RANGE(rate_noise_start, 0.0f, 10.0f),
         RANGE(settle_time, 0.0f, 1e6f),
         RANGE(rate_time, 0.0f, 1e6f),
         RANGE(forward_noise, 0.0f, 100.0f),
@@ -142,6 +141,9 @@ static gait_status check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->particles < 16 || cfg->particles > 1 << 20)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config particles = %d is outside [16, 1048576]",
                          (int)cfg->particles);
+    if (cfg->search_particles < 0 || cfg->search_particles > 1 << 20)
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config search_particles = %d is outside [0, 1048576]",
+                         (int)cfg->search_particles);
     if (cfg->components < -1 || cfg->components > m->components)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d",
                          (int)cfg->components, (int)m->components);
@@ -326,9 +328,9 @@ gait_status gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_
 {
     if (!t)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker is NULL");
-    if (particles < 16 || particles > t->room)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "%d particles are outside [16, %d], the tracker's room",
-                         (int)particles, (int)t->room);
+    if (particles < 16 || particles > t->most)
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "%d particles are outside [16, %d], the tracker's own",
+                         (int)particles, (int)t->most);
     t->wanted = particles;
     return GAIT_OK;
 }

@@ -149,8 +149,8 @@ bool modes_resample(gait_tracker *t, uint32_t frame)
     pf_keep(&t->filter);
     if (m->stage == MODES_FORKED && (m->odds > DECIDED || m->odds < -DECIDED))
         close_fork(t);
-    if (m->stage != MODES_FORKED && t->wanted != t->filter.n) {
-        pf_resize(&t->filter, t->wanted, r[0]);
+    if (m->stage != MODES_FORKED && tracker_count(t) != t->filter.n) {
+        pf_resize(&t->filter, tracker_count(t), r[0]);
         return true;
     }
     if (m->stage != MODES_FORKED)

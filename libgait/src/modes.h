@@ -33,7 +33,7 @@ pf_summary modes_reweigh(gait_tracker *t, float dt);
 /* Whether left and right are still open. */
 bool modes_open(const gait_tracker *t);
 
-/* Seconds since phase, left and right have been known: from then on rate and stature settle. */
+/* Seconds since phase, left and right have been known: from then on stature settles. */
 float modes_settled(const gait_tracker *t);
 
 /* Too early to tell anything. */

@@ -22,7 +22,7 @@ static size_t state_bytes(const gait_tracker *t)
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;
-    c.particles = t->room;
+    c.particles = t->most;
     memset(&c.camera[c.cameras], 0, (size_t)(GAIT_MAX_CAMERAS - c.cameras) * sizeof *c.camera);
     memset(&c.exec, 0, sizeof c.exec);
     c.tasks = 0;
@@ -154,8 +154,8 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
         !template_plausible(t, body))
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot holds a number outside its range");
     memcpy(t->core, body, state_bytes(t));
-    t->wanted = t->room - t->core->fewer;
-    tracker_set_count(t, t->wanted);
+    tracker_set_count(t, t->room - t->core->fewer);
+    t->wanted = i_min(t->cfg.particles, t->most);
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         t->camera[c].plate_stale = true;
     return GAIT_OK;

@@ -84,10 +84,23 @@ static void layout_work(arena *a, gait_tracker *t)
     layout_tasks(a, t);
 }
 
+/* Two sides need twice the particles of one, and so does a phase that is open. */
+static int32_t searching_count(const gait_tracker *t)
+{
+    int32_t const twice = t->wanted > INT32_MAX / 2 ? t->wanted : 2 * t->wanted;
+    return i_max(t->wanted, i_min(twice, t->cfg.search_particles));
+}
+
+int32_t tracker_count(const gait_tracker *t)
+{
+    return t->core->modes.stage == MODES_SEARCH ? searching_count(t) : t->wanted;
+}
+
 gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg)
 {
     gait_tracker *const self = TAKE(a, gait_tracker, 1);
-    gait_tracker t = {.model = m, .cfg = *cfg, .room = cfg->particles, .wanted = cfg->particles};
+    gait_tracker t = {.model = m, .cfg = *cfg, .most = cfg->particles, .wanted = cfg->particles};
+    t.cfg.particles = t.room = searching_count(&t);
     t.rule = body_rule_init(m, &t.cfg);
     t.cfg.components = t.rule.components;
     t.cfg.proportions = t.rule.proportions;
@@ -111,6 +124,13 @@ void tracker_set_count(gait_tracker *t, int32_t particles)
     t->core->fewer = t->room - particles;
 }
 
+static void even_weights(gait_tracker *t)
+{
+    pf_uniform(&t->filter);
+    pf_keep(&t->filter);
+    t->core->ess = (double)t->cfg.particles;
+}
+
 void tracker_clear(gait_tracker *t)
 {
     memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
@@ -120,9 +140,7 @@ void tracker_clear(gait_tracker *t)
         for (int32_t side = 0; side < 2 && t->template[side][c]; side++)
             template_clear(t->template[side][c], t->model->limbs);
     }
-    pf_uniform(&t->filter);
-    pf_keep(&t->filter);
-    t->core->ess = (double)t->cfg.particles;
+    even_weights(t);
 }
 
 dynamics tracker_dynamics(const gait_tracker *t)
@@ -144,6 +162,8 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
         modes_single(t);
     else
         modes_search(t);
+    tracker_set_count(t, tracker_count(t));
+    even_weights(t);
     t->core->last = walker_from_state(&t->rule, mean);
     t->core->phase = mean->phase;
     t->core->rate = mean->stride_hz;

@@ -60,8 +60,8 @@ typedef struct weigh_scratch { /* one per task; its arrays hold the model's limb
 struct gait_tracker {
     const gait_model *model;
     gait_tracker_config cfg; /* particles: those in use now */
-    int32_t room;            /* particles that there is memory for: the caller's config */
-    int32_t wanted;          /* particles from the next step on that can change their number */
+    int32_t most, room;      /* particles of the caller's config; that there is memory for */
+    int32_t wanted;          /* particles that the caller wants when nothing is searched */
     body_rule rule;
     like_setup *like;
     /* Mutable state: one stretch of memory from core to state_end. */
@@ -106,6 +106,9 @@ static inline float seconds_unseen(const gait_tracker *t)
 
 /* From now on so many particles are in use. */
 void tracker_set_count(gait_tracker *t, int32_t particles);
+
+/* Particles from the next step on that can change their number: more while the phase is searched. */
+int32_t tracker_count(const gait_tracker *t);
 dynamics tracker_dynamics(const gait_tracker *t);
 void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime);
 gait_status tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out);

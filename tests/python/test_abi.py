@@ -107,7 +107,7 @@ def test_another_library_is_refused():
 @pytest.mark.parametrize(
     "where, name, value, words",
     [
-        (_abi, "ABI", 99, "ABI 4, this package needs 99"),
+        (_abi, "ABI", 99, "ABI 5, this package needs 99"),
         (loader, "__version__", "9.9.9", "this package is 9.9.9"),
     ],
 )

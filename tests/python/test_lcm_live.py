@@ -81,7 +81,7 @@ def test_a_stream_at_thirty_hertz_arrives_and_is_tracked_in_time(url, tmp_path):
 def test_the_newest_frame_wins_and_the_others_are_counted(url):
     """Five times faster than a slow tracker: it skips ahead instead of lagging behind."""
     count = 80
-    with rig.daemon(url, "-n", 20000, "--max-gap", 60) as (listener, finish):
+    with rig.daemon(url, "-n", 60000, "--max-gap", 60) as (listener, finish):
         ready(listener)
         begin(listener, Pacer())
         pacer = Pacer(60.0)

@@ -92,36 +92,75 @@ static void test_the_loser_is_given_up(void)
     }
 }
 
-static double rate_spread(const gait_tracker *t)
+static double stature_spread(const gait_tracker *t)
 {
-    const float *const rate = field(&t->people, F_RATE);
+    const float *const x = field(&t->people, F_STATURE);
     double sum = 0.0, square = 0.0;
     for (int32_t i = 0; i < N; i++) {
-        sum += (double)rate[i] / N;
-        square += (double)rate[i] * (double)rate[i] / N;
+        sum += (double)x[i] / N;
+        square += (double)x[i] * (double)x[i] / N;
     }
     return sqrt(square - sum * sum);
 }
 
-/* The rate stays loose as long as left and right are open, and settles when they are known. */
-static void test_rates_settle_when_all_is_known(void)
+/* Stature stays loose as long as left and right are open, and settles when they are known. */
+static void test_stature_settles_when_all_is_known(void)
 {
     double spread[2];
     for (int known = 0; known < 2; known++) {
         gait_tracker *const t = begin(0.5f);
         gait_estimate e;
-        t->cfg.rate_noise = 0.0f;
-        t->cfg.rate_noise_start = 0.3f;
+        t->cfg.stature_noise = 0.0f;
+        t->cfg.stature_noise_start = 3.0f;
         t->cfg.settle_time = 0.1f;
         for (int n = 0; n < 45; n++) {
             if (t->core->modes.stage == MODES_FORKED)
                 t->core->modes.odds = known ? 30.0 : 0.0;
             film_step(t, 1, n, 0, &e);
         }
-        spread[known] = rate_spread(t);
+        spread[known] = stature_spread(t);
         toy_tracker_free(t);
     }
     CHECK(spread[0] > 1.5 * spread[1]);
+}
+
+static void copy_into(gait_tracker *to, const gait_tracker *from)
+{
+    size_t bytes = 0;
+    gait_error err;
+    CHECK(gait_tracker_save(from, NULL, 0, &bytes) == GAIT_OK);
+    void *const snapshot = malloc(bytes);
+    CHECK(snapshot && gait_tracker_save(from, snapshot, bytes, &bytes) == GAIT_OK);
+    CHECK(gait_tracker_restore(to, snapshot, bytes, &err) == GAIT_OK);
+    free(snapshot);
+}
+
+/* A search takes more particles, and gives them back when all is known; a copy made meanwhile goes on alike. */
+static void test_a_search_takes_more(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    gait_error err;
+    cfg.particles = N;
+    cfg.search_particles = 3 * N;
+    gait_tracker *const t = film_doubtful(&cfg, 0.5f), *const other = film_doubtful(&cfg, 0.5f);
+    for (int n = 0; n < 45; n++) {
+        gait_estimate e[2];
+        bool const open = t->core->modes.stage != MODES_SINGLE;
+        CHECK(!open || gait_tracker_particles(t, NULL, NULL, 0) == 2 * N);
+        if (t->core->modes.stage == MODES_FORKED && n > 30)
+            t->core->modes.odds = 30.0;
+        if (n == 20)
+            copy_into(other, t);
+        film_step(t, 1, n, 0, &e[0]);
+        if (n < 20 || n > 30)
+            continue;
+        film_step(other, 1, n, 0, &e[1]);
+        CHECK(gait_tracker_digest(t) == gait_tracker_digest(other));
+    }
+    CHECK(t->core->modes.stage == MODES_SINGLE && gait_tracker_particles(t, NULL, NULL, 0) == N);
+    CHECK(gait_tracker_set_particles(t, N + 1, &err) == GAIT_ERR_LIMIT);
+    toy_tracker_free(t);
+    toy_tracker_free(other);
 }
 
 /* Status: ambiguous while the odds are open, never tracking. */
@@ -169,6 +208,7 @@ int main(void)
     test_sides_live_on();
     test_the_loser_is_given_up();
     test_open_odds_are_ambiguous();
-    test_rates_settle_when_all_is_known();
+    test_stature_settles_when_all_is_known();
+    test_a_search_takes_more();
     return CHECK_DONE();
 }

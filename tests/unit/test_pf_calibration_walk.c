@@ -17,8 +17,8 @@ static dynamics lively(uint64_t seed)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, seed);
     cfg.settle_time = 9.0f; /* stature may change all along */
+    cfg.rate_noise = 0.05f;
     cfg.phase_noise = 0.05f;
-    cfg.rate_noise_start = 0.05f;
     cfg.forward_noise = 0.1f;
     cfg.lateral_noise = 0.06f;
     cfg.vertical_noise = 0.03f;

@@ -18,7 +18,7 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.components = 2;
     cfg.offset_angles = 1u << OFFSET_ANGLE;
     cfg.proportions = mode == GAIT_MODE_PAPER ? 0 : -1;
-    cfg.phase_noise = cfg.rate_noise = cfg.rate_noise_start = 0.0f;
+    cfg.phase_noise = cfg.rate_noise = 0.0f;
     cfg.stature_noise = cfg.stature_noise_start = 0.0f;
     cfg.forward_noise = cfg.lateral_noise = cfg.vertical_noise = 0.0f;
     cfg.heading_noise = cfg.tilt_noise = cfg.coef_noise = cfg.offset_noise = cfg.proportion_noise = 0.0f;

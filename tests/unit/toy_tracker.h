@@ -15,6 +15,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     gait_tracker_default(&c, GAIT_MODE_DEFAULT);
     c.seed = 7;
     c.particles = 300;
+    c.search_particles = 0;
     c.components = TOY_COMPONENTS;
     c.tasks = 4;
     c.cameras = cameras;
@@ -32,7 +33,6 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.max_dt = 0.5f;
     c.phase_noise = 0.0164f;
     c.rate_noise = 0.02f;
-    c.rate_noise_start = 0.055f;
     c.settle_time = 1.0f;
     c.rate_time = 5.0f;
     c.forward_noise = 0.022f;

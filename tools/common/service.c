@@ -81,10 +81,18 @@ static void rearm(service *s)
     set_idle(s);
 }
 
+/* Particles when they are most: a search takes more. */
+static int32_t most_particles(const gait_tracker_config *c)
+{
+    int32_t const searching = c->search_particles < 2 * c->particles ? c->search_particles : 2 * c->particles;
+    return searching > c->particles ? searching : c->particles;
+}
+
 /* Memory for the particle cloud: taken once, as large as it can become. */
 static bool open_particles(service *s, message *why)
 {
-    size_t const n = (size_t)s->track.config.particles;
+    s->hypotheses = most_particles(&s->track.config);
+    size_t const n = (size_t)s->hypotheses;
     s->particles_bytes = 64 + n * (sizeof(float) + sizeof(gaitmsg_state_t));
     s->particles = malloc(s->particles_bytes);
     s->hypothesis = malloc(n * sizeof *s->hypothesis);

@@ -64,7 +64,8 @@ typedef struct service {
     stride_meter meter;
     uint8_t *particles; /* encoded particles_t; NULL: not sent */
     size_t particles_bytes;
-    gait_state *hypothesis; /* [particles] */
+    gait_state *hypothesis; /* [hypotheses] */
+    int32_t hypotheses;     /* the most there can be */
     gaitmsg_particles_t cloud;
 } service;
 

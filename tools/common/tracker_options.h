@@ -4,7 +4,7 @@
 #include "gait.h"
 #include "options.h"
 
-enum { TRACKER_OPTIONS = 31 };
+enum { TRACKER_OPTIONS = 30 };
 
 /* Values set by the user; NaN: the mode's default stays. */
 typedef struct tracker_values {

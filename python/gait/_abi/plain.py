@@ -13,7 +13,7 @@ from ctypes import (
 )
 from enum import IntEnum, IntFlag
 
-ABI = 4
+ABI = 5
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_MARKERS = 64

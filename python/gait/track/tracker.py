@@ -210,7 +210,7 @@ class Tracker:
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
-        count = self.config.particles
+        count = check(self._lib.gait_tracker_particles(self._handle, None, None, 0))
         states = (_abi.StateC * count)()
         weights = np.zeros(count, np.float32)
         pointer = weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float))

@@ -19,6 +19,7 @@ class TrackerConfig:
     mode: Mode
     seed: int
     particles: int
+    search_particles: int
     components: int
     tasks: int
     lag: int
@@ -33,7 +34,6 @@ class TrackerConfig:
     max_dt: float
     phase_noise: float
     rate_noise: float
-    rate_noise_start: float
     settle_time: float
     rate_time: float
     forward_noise: float

@@ -142,7 +142,7 @@ class Transitions:
         root, after = np.sqrt(dt), before.copy()
         turn = b[:, 1] * dt + c.phase_noise * root * noise[:, 0]
         after[:, 0] = (b[:, 0] + turn) % 1.0
-        rate = (c.rate_noise_start if step.settling else c.rate_noise) * self.curves.stride_hz
+        rate = c.rate_noise * self.curves.stride_hz
         away = _relax(b[:, 1] - self.curves.stride_hz, dt, c.rate_time, rate, noise[:, 1])
         after[:, 1] = _reflect(self.curves.stride_hz + away)
         grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.stature_doubt
