@@ -186,7 +186,14 @@ def _row(title: str, known: HeldOut, sd: float) -> list[object]:
     met = ratio >= RATIO if sd == NOISE[-1] else ratio > 1
     return [
         *("F4", title, round(1000 * sd), e.segments, e.mean, e.likelihood, e.bayes, e.floor, ratio),
-        *(best, e.bayes / best, *_held(e.coverage, "no"), *_held(e.scaled), e.volume, "yes" if met else "NO"),
+        *(
+            best,
+            e.bayes / best,
+            *_held(e.coverage, "no"),
+            *_held(e.scaled, "no"),
+            e.volume,
+            "yes" if met else "NO",
+        ),
     ]
 
 
@@ -239,8 +246,9 @@ def _publish(rows: list[list[object]], missing: list[list[object]]) -> None:
         "Volume: log10 of the posterior's over the prior's. The walk's prior is learnt from cmu_walk, "
         f"{MODES['cmu_walk']} modes; the others' from cmu_misc, {MODES['cmu_misc']} modes (lift_modes says "
         "why) or a quarter of the segments; all but the sequence itself (--segments only). Wanted: Bayes "
-        f"better at every noise, by {RATIO} at 50 mm (met); scaled coverage held by every motion, both by "
-        f"all together; of all together Bayes at most {NEAR_BEST} of the best weight's."
+        f"better at every noise, by {RATIO} at 50 mm (met); both coverages held by all together at every "
+        "noise, as the reference counts (which motions alone hold them is told); of all together Bayes at "
+        f"most {NEAR_BEST} of the best weight's."
     )
     head = ["measure", "left out", "noise mm", "segments", "mean", "likelihood", "Bayes", "floor", "ratio"]
     head += ["best", "over", "coverage", "held", "scaled", "scaled held", "volume", "met"]
