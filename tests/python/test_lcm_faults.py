@@ -292,6 +292,12 @@ def test_a_wrong_configuration_file(tmp_path, text, words):
     fails(rig.command("--config", config)[1:], config, words, code=2)
 
 
+def test_a_url_to_publish_on_that_lcm_refuses(tmp_path):
+    log = rig.write_log(tmp_path / "e.log", [("OTHER", b"x")])
+    words = rig.command("--url", f"file://{log}?speed=0", "--out", "nonsense://")[1:]
+    fails(words, "nonsense://: cannot open LCM", "(?mode=w to write)")
+
+
 @pytest.mark.parametrize(
     ("url", "remedy"),
     [

@@ -67,7 +67,10 @@ lcm_t *link_open(const char *url, message *why)
     else if (!lcm && !link_is_log(url) && strstr(url, "udpm://")) /* or mpudpm:// */
         message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
     else if (!lcm && !link_is_log(url))
-        message_set(why, "%.120s: cannot open LCM; give udpm://ADDRESS:PORT or file:///PATH?speed=0", url);
+        message_set(
+            why,
+            "%.120s: cannot open LCM; give udpm://ADDRESS:PORT or file:///PATH?speed=0 (?mode=w to write)",
+            url);
     return lcm;
 }
 

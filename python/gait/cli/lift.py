@@ -118,6 +118,8 @@ def run(args: argparse.Namespace) -> int:
     """Lift tracks, or pass a video on."""
     suffix = Path(args.input).suffix.lower()
     video = suffix not in (".csv", ".txt") and bool(suffix or args.placement)
+    if video and not set("%:") & set(args.input) and not Path(args.input).exists():
+        raise UserError(f"{args.input}: no such file")
     _require_own(args, video)
     require_outputs(
         (args.output, args.trc, args.overlay),
@@ -163,8 +165,6 @@ def _require_own(args: argparse.Namespace, video: bool) -> None:
     for option in _ONLY_TRACKS if video else _ONLY_VIDEO:
         value = getattr(args, option)
         if value is not None and value is not False:
-            if not Path(args.input).exists():
-                raise UserError(f"{args.input}: no such file")
             raise UsageError(f"--{option.replace('_', '-')} is for {other}, and {args.input} {kind}")
 
 
