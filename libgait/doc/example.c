@@ -8,7 +8,7 @@
 #include <stdio.h>
 
 enum { W = 640, H = 480 }; /* pixels */
-static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 19], model_memory[1 << 16], memory[4 << 20];
+static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 19], model_memory[1 << 16], memory[6 << 20];
 static uint8_t empty[H][W], picture[H][W];
 
 /* A picture of that size, without comments in its header; 0 if it is none. */
