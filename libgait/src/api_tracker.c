@@ -331,7 +331,7 @@ gait_status gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_
     if (particles < 16 || particles > t->most)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "%d particles are outside [16, %d], the tracker's own",
                          (int)particles, (int)t->most);
-    t->wanted = particles;
+    tracker_want(t, particles);
     return GAIT_OK;
 }
 

@@ -60,6 +60,7 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     memcpy(&c, body, sizeof c);
     bool ok = c.current >= 0 && c.current < t->past.depth && (c.started == 0 || c.started == 1);
     ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->room && c.fewer >= 0 && c.fewer < t->room;
+    ok &= c.less >= 0 && c.less <= t->most - 16;
     ok &= c.modes.stage >= MODES_SINGLE && c.modes.stage <= MODES_FORKED && c.modes.since <= c.utime;
     ok &=
         c.modes.odds > -1e6 && c.modes.odds < 1e6 && c.modes.lead > -1e12 && c.modes.lead < 1e12; /* no NaN */
@@ -155,7 +156,7 @@ gait_status snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot holds a number outside its range");
     memcpy(t->core, body, state_bytes(t));
     tracker_set_count(t, t->room - t->core->fewer);
-    t->wanted = i_min(t->cfg.particles, t->most);
+    tracker_want(t, t->most - t->core->less);
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         t->camera[c].plate_stale = true;
     return GAIT_OK;

@@ -124,6 +124,12 @@ void tracker_set_count(gait_tracker *t, int32_t particles)
     t->core->fewer = t->room - particles;
 }
 
+void tracker_want(gait_tracker *t, int32_t particles)
+{
+    t->wanted = particles;
+    t->core->less = t->most - particles;
+}
+
 static void even_weights(gait_tracker *t)
 {
     pf_uniform(&t->filter);
@@ -134,6 +140,7 @@ static void even_weights(gait_tracker *t)
 void tracker_clear(gait_tracker *t)
 {
     memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
+    tracker_want(t, t->wanted);
     tracker_set_count(t, t->wanted);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         t->camera[c].plate_stale = true;

@@ -36,7 +36,7 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     walker last;       /* when the images last supported it */
     float phase, rate; /* reported last: strides, strides per second */
     view_map map[GAIT_MAX_CAMERAS];
-    int32_t fewer; /* particles than there is room for */
+    int32_t fewer, less; /* particles than there is room for; wanted, than of the caller's config */
 } tracker_core;
 
 typedef struct camera_state {
@@ -106,6 +106,9 @@ static inline float seconds_unseen(const gait_tracker *t)
 
 /* From now on so many particles are in use. */
 void tracker_set_count(gait_tracker *t, int32_t particles);
+
+/* So many are to be used when nothing is searched; the state keeps it. */
+void tracker_want(gait_tracker *t, int32_t particles);
 
 /* Particles from the next step on that can change their number: more while the phase is searched. */
 int32_t tracker_count(const gait_tracker *t);

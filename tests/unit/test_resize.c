@@ -72,6 +72,20 @@ static double total_weight(const gait_tracker *t)
     return sum;
 }
 
+/* Another tracker that goes on where this one, which is gone, was. */
+static gait_tracker *saved_and_restored(gait_tracker *t, const gait_tracker_config *cfg)
+{
+    size_t bytes = 0;
+    CHECK(gait_tracker_save(t, NULL, 0, &bytes) == GAIT_OK);
+    unsigned char *const mem = malloc(bytes);
+    CHECK(mem && gait_tracker_save(t, mem, bytes, &bytes) == GAIT_OK);
+    toy_tracker_free(t);
+    gait_tracker *const to = film_tracker(cfg, 3, 1.0f);
+    CHECK(gait_tracker_restore(to, mem, bytes, NULL) == GAIT_OK);
+    free(mem);
+    return to;
+}
+
 /* 300, 40, 300: the walker is followed all the way, and what was seen before the change is still there. */
 static uint64_t follow(int32_t threads, bool store)
 {
@@ -96,14 +110,8 @@ static uint64_t follow(int32_t threads, bool store)
             CHECK(e.ess >= 1.0f && e.ess <= (float)ROOM);
         }
         if (store && n == 25) {
-            size_t bytes = 0;
-            CHECK(gait_tracker_save(t, NULL, 0, &bytes) == GAIT_OK);
-            unsigned char *const mem = malloc(bytes);
-            CHECK(mem && gait_tracker_save(t, mem, bytes, &bytes) == GAIT_OK);
-            toy_tracker_free(t);
-            t = film_tracker(&cfg, 3, 1.0f);
-            CHECK(gait_tracker_restore(t, mem, bytes, NULL) == GAIT_OK && count(t) == 40);
-            free(mem);
+            t = saved_and_restored(t, &cfg);
+            CHECK(count(t) == 40);
         }
     }
     uint64_t const digest = gait_tracker_digest(t);
@@ -141,6 +149,37 @@ static void test_waits_while_forked(void)
     toy_tracker_free(t);
 }
 
+/* Fewer particles, of which a search takes twice as many: what was asked for outlasts the search and a restore. */
+static uint64_t search(int32_t store_at)
+{
+    gait_tracker_config cfg = config(ROOM);
+    cfg.search_particles = 2 * ROOM;
+    gait_tracker *t = film_tracker(&cfg, 0, 1.0f);
+    CHECK(gait_tracker_set_particles(t, FEW, NULL) == GAIT_OK);
+    gait_state const mean = toy_walk(0.0f);
+    gait_state sd = toy_doubt(1.0f);
+    sd.phase = 0.5f; /* unknown */
+    CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
+    for (int n = 0; n < SHOTS; n++) {
+        gait_estimate e;
+        film_step(t, 1, n, 0, &e);
+        CHECK(count(t) == FEW || (n < SHOTS - 1 && count(t) == 2 * FEW));
+        if (n == store_at)
+            t = saved_and_restored(t, &cfg);
+    }
+    CHECK(count(t) == FEW);
+    uint64_t const digest = gait_tracker_digest(t);
+    toy_tracker_free(t);
+    return digest;
+}
+
+static void test_search_restored(void)
+{
+    uint64_t const digest = search(-1);
+    CHECK(search(5) == digest);
+    CHECK(search(20) == digest);
+}
+
 int main(void)
 {
     film_make(1, SHOTS);
@@ -148,5 +187,6 @@ int main(void)
     test_a_larger_room_changes_nothing();
     test_down_and_up();
     test_waits_while_forked();
+    test_search_restored();
     return CHECK_DONE();
 }
