@@ -71,7 +71,8 @@ def start_quality(track: Track, true_phase: np.ndarray) -> dict[str, Any]:
     """Is the phase locked (modulo half a cycle) a second after the start, and which leg is which after?
 
     ``side`` is ``wrong`` if more than `WRONG` of the later frames are half a cycle off while the status is
-    ``tracking``, else ``open`` if most are off but say so, else ``right``.
+    ``tracking``, else ``right`` if at least half of them are ``tracking``, ``open`` if at least half are that
+    or ``ambiguous``, else ``lost``.
     """
     since = track.time - track.time[0]
     error = phase_difference(track.phase, true_phase)
@@ -81,13 +82,22 @@ def start_quality(track: Track, true_phase: np.ndarray) -> dict[str, Any]:
     later = since >= LOCK_AFTER[0]
     if not window.any():
         return {"locked": None, "side": None}
-    silent = flipped & (np.array(track.status) == "tracking")
-    side = "wrong" if silent[later].mean() > WRONG else "open" if flipped[later].mean() > 0.5 else "right"
+    status = np.array(track.status)[later]
+    silent = float((flipped[later] & (status == "tracking")).mean())
     return {
         "locked": bool(np.median(left[window]) <= LOCK),
-        "side": side,
-        "flipped_silently": float(silent[later].mean()),
+        "side": _side(status, silent),
+        "flipped_silently": silent,
     }
+
+
+def _side(status: np.ndarray, silent: float) -> str:
+    tracked = float((status == "tracking").mean())
+    if silent > WRONG:
+        return "wrong"
+    if tracked >= 0.5:
+        return "right"
+    return "open" if tracked + float((status == "ambiguous").mean()) >= 0.5 else "lost"
 
 
 def strike_errors(track: Track, strikes: Strikes) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -135,7 +135,8 @@ def _locked(rows: Rows) -> Verdict:
 
 def _side(rows: Rows) -> Verdict:
     measure = (
-        "auto: right leg right, or ambiguous; wrong: over 5 % of the frames after a second, under tracking"
+        "auto: right leg right under tracking in most frames after a second, or ambiguous; wrong: over 5 % "
+        "of them under tracking"
     )
     wanted = ">= 95 %; wrong in <= 1 run of 28"
     runs = _of(rows, AUTO, None)
@@ -162,7 +163,23 @@ def _coverage(rows: Rows) -> Verdict:
 
 def _no_plate(rows: Rows) -> Verdict:
     measure, wanted = "no background plate", "root within 10 % of that with a plate, no run lost"
-    return _against_base(rows, "background none", measure, wanted, "--background none")
+    verdict = _against_base(rows, "background none", measure, wanted, "--background none")
+    extra = _beside(rows, "background none")
+    return replace(verdict, reached="; ".join([verdict.reached, *extra]))
+
+
+def _beside(rows: Rows, arm: str) -> list[str]:
+    """What an arm does to errors not judged: absolute in the worst clip, pixels in the real one."""
+    base, other = (per_clip(_of(rows, name), "abs_mm") for name in (BASE, arm))
+    pairs = {clip: (base[clip], other[clip]) for clip in other if clip in base}
+    told = []
+    if pairs:
+        worst = max(pairs, key=lambda clip: pairs[clip][1] - pairs[clip][0])
+        told.append("absolute, worst change {} {:.0f} -> {:.0f} mm".format(worst, *pairs[worst]))
+    before, after = (per_clip(_of(rows, name, True), "clear_px").get(OUTDOOR) for name in (BASE, arm))
+    if before is not None and after is not None:
+        told.append(f"real clip {before:.1f} -> {after:.1f} px")
+    return told
 
 
 def _slower(rows: Rows) -> Verdict:

@@ -54,6 +54,9 @@ def test_a_swapped_start_is_wrong_only_while_it_says_tracking():
     assert silent["side"] == "wrong" and silent["locked"] and silent["flipped_silently"] == 1
     honest = eval_measures.start_quality(replace(swapped, status=["ambiguous"] * 100), PHASE)
     assert honest["side"] == "open"
+    seldom = ["ambiguous"] * 75 + ["tracking"] * 25  # right only where it says so, most of the time
+    assert eval_measures.start_quality(track(status=seldom), PHASE)["side"] == "open"
+    assert eval_measures.start_quality(track(status=["lost"] * 100), PHASE)["side"] == "lost"
     late = np.where(np.arange(100) < 20, (PHASE + 0.5) % 1, PHASE)  # mended within the first second
     assert eval_measures.start_quality(track(phase=late), PHASE)["side"] == "right"
     drifting = eval_measures.start_quality(track(phase=(PHASE + 0.1) % 1), PHASE)

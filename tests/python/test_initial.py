@@ -10,7 +10,7 @@ from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
 from gait import Camera, Model, Start, UserError, Video
 from gait.core.initial import DEFAULT_SD
 from gait.core.model import read_blob
-from gait.image.sighting import another_scene, standing
+from gait.image.sighting import another_scene, sightings, standing
 from gait.image.video import Frame
 from gait.io import blob
 from gait.motion.trackfile import read_truth
@@ -326,3 +326,19 @@ def test_a_camera_whose_height_is_wrong_is_told(tmp_path):
         UserError, match=r"saw somebody in \d+ frames whom the camera makes 0\.\d+ m tall; check the"
     ):
         find_start(Video(tmp_path / "walk.mp4"), low, wall(), MODEL)
+
+
+def test_what_a_wrong_camera_makes_of_people_is_told_by_most_frames(tmp_path):
+    one, two = wall(), wall()
+    one[175:228, 40:70] = two[175:228, 40:70] = 255  # both too small where they stand
+    two[190:228, 200:215] = 255
+    seen: list[float] = []
+    for picture in (one, two):
+        assert not sightings(picture, wall(), camera(), seen)
+    assert len(seen) == 2 and seen[0] == seen[1] < 1
+    pictures, _ = clip(MODEL, SECTIONS, 20)
+    write(tmp_path / "walk.mp4", pictures)
+    up = np.array([[1, 0, 0], [0, 0.5, -0.866], [0, 0.866, 0.5]])
+    upward = replace(camera(), R=up, t=-up @ camera().centre)
+    with pytest.raises(UserError, match=r"saw somebody in \d+ frames whom the camera puts above the horizon"):
+        find_start(Video(tmp_path / "walk.mp4"), upward, wall(), MODEL)

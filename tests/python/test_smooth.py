@@ -13,10 +13,12 @@ from gait._abi import Mode, TrackStatus
 from gait.body.modelcurves import ModelCurves
 from gait.cli import main
 from gait.core.model import read_blob
+from gait.image.video import Frame
 from gait.io import blob
 from gait.motion.footfall_draws import Draws
 from gait.motion.trackfile import read_track
 from gait.track.smooth import Spool, draw_motions
+from gait.track.smoothed import Smoother, pose_all, smoothed
 from gait.track.transitions import Step, Transitions
 
 SECTIONS = blob.decode(read_blob(None))
@@ -181,6 +183,32 @@ def test_the_spool_gives_back_what_it_took_and_knows_the_starts():
         assert spool.step_to(1) == Step(pytest.approx(0.033333), True, False, tracker.stature_doubt)
         assert spool.step_to(31).settling and not spool.step_to(34).settling  # a second after frame 2
         assert spool.step_to(36).settling and not spool.step_to(69).settling
+
+
+def test_who_becomes_ambiguous_has_settled_all_the_same():
+    config = TrackerConfig.default(particles=64)
+    tracker = Tracker(MODEL, camera(), config)
+    tracker.start(state_at(MODEL, SECTIONS, 0.0), State(), 0)
+    said = [TrackStatus.AMBIGUOUS] * 2 + [TrackStatus.TRACKING] * 40 + [TrackStatus.AMBIGUOUS] * 5
+    with Spool(Transitions(CURVES, config)) as spool:
+        for i, status in enumerate([*said, TrackStatus.INIT, TrackStatus.AMBIGUOUS, TrackStatus.TRACKING]):
+            spool.add(tracker, replace(tracker.step(None, 33333 * i), status=status))
+        told = [spool.step_to(i).settling for i in range(1, len(spool))]
+        assert told[:32] == [True] * 32 and not any(told[33:47]) and all(told[48:])
+
+
+def test_what_no_number_of_frames_makes_less_is_added_as_the_library_does():
+    tracker = Tracker(MODEL, camera(), TrackerConfig.default(particles=2000))
+    spread = State(stature=0.1, phase=0.02, pelvis=np.full(3, 0.05))
+    tracker.start(state_at(MODEL, SECTIONS, 0.0), spread, 0)
+    theirs = tracker.step(None, 0)
+    states, _ = tracker.particles()
+    with Smoother(tracker, CURVES) as smoother:
+        smoother.add(Frame(0, 0.0, wall()), theirs)
+        ours = smoother._widened(0, smoothed(theirs, MODEL, states, *pose_all(MODEL, states)))
+    assert tracker.stature_doubt > 0.05
+    np.testing.assert_allclose(ours.joint_sd, theirs.joint_sd, rtol=0.02)
+    np.testing.assert_allclose(ours.sd.stature, theirs.sd.stature, rtol=0.02)
 
 
 @pytest.fixture(scope="module")

@@ -80,11 +80,12 @@ def sightings(
 ) -> list[Sighting]:
     """Find blobs of a person's size standing on the ground in full view, largest first.
 
-    Statures of blobs shaped like one, but not of one's size where they would stand, go to `misplaced`.
+    Of blobs shaped like one, but not of one's size where they would stand, the largest's stature goes to
+    `misplaced`.
     """
     mask = foreground(image, plate)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    found = []
+    found, others = [], []
     for i in range(1, count):
         x, y, width, height, area = (int(value) for value in stats[i])
         inside = x > 1 and y > 1 and x + width < camera.width - 1 and y + height < camera.height - 1
@@ -94,8 +95,10 @@ def sightings(
             one = standing(foot, head, camera, area)
             if one is not None:
                 found.append(one)
-            elif misplaced is not None:
-                misplaced.append(_stature(foot, head, camera))
+            else:
+                others.append((area, _stature(foot, head, camera)))
+    if misplaced is not None and others:
+        misplaced.append(max(others)[1])
     return sorted(found, key=lambda one: -one.strength)
 
 

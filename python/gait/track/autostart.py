@@ -103,15 +103,20 @@ def find_start(
             "give --init FILE.json"
         )
     if len(misplaced) >= ENOUGH:
-        tall = float(np.median(misplaced))
         raise UserError(
             f"{video.path}: --init auto saw somebody in {len(misplaced)} frames whom the camera "
-            f"{f'makes {tall:.2g} m tall' if np.isfinite(tall) else 'puts above the horizon'}; "
-            "check the camera's height and tilt, or give --init FILE.json"
+            f"{_puts(misplaced)}; check the camera's height and tilt, or give --init FILE.json"
         )
     raise UserError(
         f"{video.path}: --init auto found nobody in full view for {ENOUGH} frames; give --init FILE.json"
     )
+
+
+def _puts(statures: list[float]) -> str:
+    """Where a camera has people of these statures, which are not numbers where no ground is under them."""
+    if np.isnan(statures).mean() > 0.5:
+        return "puts above the horizon"
+    return f"makes {np.nanmedian(statures):.2g} m tall"
 
 
 def _spotters(camera: Camera, plate: Image | None, model: Model, height: float | None) -> Iterator[Spotter]:
@@ -137,7 +142,9 @@ class Spotter:
         self, camera: Camera, plate: Image | None, model: Model, height: float | None = None
     ) -> None:
         self._camera, self._plate, self._model, self._height = camera, plate, model, height
-        self.misplaced: list[float] | None = None  # statures of blobs of no person's, if given
+        self.misplaced: list[float] | None = (
+            None  # a stature for each frame with blobs of no person's, if given
+        )
         self._everybody: list[_Seen] = []
         self._looked = -np.inf  # when, without a plate
 

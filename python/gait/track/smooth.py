@@ -77,15 +77,18 @@ class Spool:
         self.step.append(estimate.frame)
 
     def _known_since(self, estimate: Estimate) -> int:
-        """Index of the frame from which on phase, left and right are known; -1 if they are not."""
+        """Index of the frame from which on phase, left and right are known; -1 if they are not.
+
+        Who becomes ambiguous later is still one walker: a search would begin with ``init``.
+        """
         now = len(self._known)
         goes_on = now > 0 and estimate.frame == self.step[now - 1] + 1
         before = self._known[-1] if goes_on else -1
-        if estimate.status == TrackStatus.LOST:
-            return before
-        if estimate.status != TrackStatus.TRACKING and self._transitions.config.mode != Mode.PAPER:
+        paper = self._transitions.config.mode == Mode.PAPER
+        if estimate.status == TrackStatus.INIT and not paper:
             return -1
-        return before if before >= 0 else now
+        settled = estimate.status == TrackStatus.TRACKING or paper and estimate.status != TrackStatus.LOST
+        return now if before < 0 and settled else before
 
     def __len__(self) -> int:
         return len(self._rows)
