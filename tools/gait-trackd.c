@@ -132,15 +132,16 @@ static void print_summary(const service *s, bool live)
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }
 
-/* Say where a log that was played breaks off. */
-static void check_log(const char *url)
+/* Was a log that was played whole, and could its frames be used? */
+static bool check_log(const char *url, const service *s, message *why)
 {
     char path[LINK_PATH];
-    message why;
     link_log(url, path);
-    log_scan(path, &why);
-    if (why.text[0])
-        fprintf(stderr, "gait-trackd: %s\n", why.text);
+    log_scan(path, why);
+    if (why->text[0])
+        return false;
+    return s->counts.frames > 0 || s->counts.rejected == 0 ||
+           message_set(why, "%.160s: none of its %" PRId64 " frames could be used", path, s->counts.rejected);
 }
 
 /* Everything between the settings and the exit code. */
@@ -158,13 +159,13 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     if (ready && !log && !want->quiet)
         fprintf(stderr, "gait-trackd: listening on %s\n", url);
     bool ok = ready && receiver_run(&r, &quit, unblocked, why);
-    if (ok && log)
-        check_log(url);
     if (ok) {
         service_send_status(s);
         if (!want->quiet)
             print_summary(s, !log);
     }
+    if (ok && log)
+        ok = check_log(url, s, why);
     receiver_close(&r);
     if (!sink_close(&out, &lost) && ok)
         ok = message_set(why, "%s", lost.text);

@@ -13,7 +13,7 @@ float root_channel(const gait_model *m, int32_t c, float phase, float pace, cons
     return kin_channel(m, m->root_channel + c, phase, pace, coef, components);
 }
 
-/* The first components tell people apart in pictures; more only add noise that 2,000 particles must search. */
+/* The first components tell people apart in pictures; more only add noise that particles must search. */
 enum { TELLING = 5 };
 
 static int32_t components_used(const gait_model *m, const gait_tracker_config *cfg)

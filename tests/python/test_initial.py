@@ -10,7 +10,7 @@ from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
 from gait import Camera, Model, Start, UserError, Video
 from gait.core.initial import DEFAULT_SD
 from gait.core.model import read_blob
-from gait.image.sighting import another_scene, sightings, standing
+from gait.image.sighting import another_scene, one_is_grey, sightings, standing
 from gait.image.video import Frame
 from gait.io import blob
 from gait.motion.trackfile import read_truth
@@ -315,6 +315,12 @@ def test_another_scene_is_told_and_exposure_is_none():
     noisy = np.clip(wall() + np.random.default_rng(2).normal(0, 8, wall().shape), 0, 255).astype(np.uint8)
     assert not another_scene(bright, wall()) and not another_scene(noisy, wall())
     assert another_scene(wall(seed=1), wall()) and another_scene(wall(), np.roll(wall(), 12, axis=1))
+
+
+def test_a_grey_plate_does_not_suit_colours():
+    grey = np.repeat(wall()[..., :1], 3, axis=2)
+    assert one_is_grey(wall(), grey) and one_is_grey(grey, wall())
+    assert not one_is_grey(grey, grey) and not one_is_grey(wall(), wall(seed=1))
 
 
 def test_a_camera_whose_height_is_wrong_is_told(tmp_path):

@@ -239,6 +239,7 @@ def test_help_names_the_defaults_of_the_library():
     usual, paper = (TrackerConfig.default(mode) for mode in Mode)
     printed = rig.run("--help").printed
     assert f"default {usual.particles}, paper mode {paper.particles}\n" in printed
+    assert f"up to N; default {usual.search_particles},\n" in printed
 
 
 TERMS = [f"{term}-weight" for term in ("texture", "silhouette", "edges", "template", "tracks")]

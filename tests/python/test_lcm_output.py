@@ -1,7 +1,9 @@
 """Logs that gait-trackd reads and writes: none is destroyed, no loss goes unnoticed."""
 
+import json
 import resource
 import subprocess
+from dataclasses import replace
 
 import lcm_rig as rig
 import pytest
@@ -92,7 +94,7 @@ def test_a_log_that_breaks_off_is_told_and_tracked_as_far_as_it_goes(tmp_path):
     whole = source.read_bytes()
     source.write_bytes(whole[:-1000])
     done = run(source, f"file://{tmp_path}/out.log?mode=w")
-    one_line(done, 0, "breaks off at byte", "after 5 messages")
+    one_line(done, 1, "breaks off at byte", "after 5 messages")
     assert "frames 2 " in done.stdout
 
 
@@ -101,3 +103,13 @@ def test_a_log_with_nothing_in_it_is_told(tmp_path, content, words):
     source = tmp_path / "in.log"
     source.write_bytes(content)
     one_line(run(source, f"file://{tmp_path}/out.log?mode=w"), 1, "in.log", words)
+
+
+def test_a_log_of_which_no_frame_fits_the_camera_is_told(tmp_path):
+    camera = tmp_path / "camera.json"
+    camera.write_text(json.dumps(replace(rig.CAMERA, width=320, height=240).to_dict()))
+    events = [("GAIT_COMMAND", rig.start(0)), *rig.frames(0, 3)]
+    source = rig.write_log(tmp_path / "in.log", events)
+    done = run(source, f"file://{tmp_path}/out.log?mode=w", "--camera", camera)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].endswith("none of its 3 frames could be used")

@@ -81,17 +81,11 @@ static void rearm(service *s)
     set_idle(s);
 }
 
-/* Particles when they are most: a search takes more. */
-static int32_t most_particles(const gait_tracker_config *c)
-{
-    int32_t const searching = c->search_particles < 2 * c->particles ? c->search_particles : 2 * c->particles;
-    return searching > c->particles ? searching : c->particles;
-}
-
-/* Memory for the particle cloud: taken once, as large as it can become. */
+/* Memory for the particle cloud: taken once, as large as it can become; a search may take more particles. */
 static bool open_particles(service *s, message *why)
 {
-    s->hypotheses = most_particles(&s->track.config);
+    const gait_tracker_config *const c = &s->track.config;
+    s->hypotheses = c->search_particles > c->particles ? c->search_particles : c->particles;
     size_t const n = (size_t)s->hypotheses;
     s->particles_bytes = 64 + n * (sizeof(float) + sizeof(gaitmsg_state_t));
     s->particles = malloc(s->particles_bytes);

@@ -11,8 +11,8 @@
 #define INT(field, low, high) OPTION_INT, &s->field, low, high
 #define FLAG(field)           OPTION_FLAG, &s->field, 0, 0
 
-enum { OWN = 29, OPTIONS = OWN + TRACKER_OPTIONS };
-static char particles_help[80]; /* written by say_defaults() */
+enum { OWN = 30, OPTIONS = OWN + TRACKER_OPTIONS };
+static char particles_help[80], search_help[160]; /* written by say_defaults() */
 
 /* Options that write into `s`. */
 static void make_table(settings *s, option *table)
@@ -51,6 +51,7 @@ static void make_table(settings *s, option *table)
          "        dropped, and double them, up to --particles, when there is time to spare; results\n"
          "        then depend on time; default: their number never changes",
          INT(adapt_particles, 16, 1 << 20)},
+        {"search-particles", 0, "N", search_help, INT(search_particles, 0, 1 << 20)},
         {"components", 0, "Q", "principal components in use; default the first 5, in paper mode all",
          INT(components, 0, GAIT_MAX_COMPONENTS)},
         {"lag", 0, "N",
@@ -102,6 +103,7 @@ static void set_defaults(settings *s)
                     .components = -1,
                     .threads = 1,
                     .lag = 5,
+                    .search_particles = -1,
                     .cpu_mask = -1,
                     .seed = 1,
                     .max_gap = 2,
@@ -116,6 +118,10 @@ static void say_defaults(void)
     gait_tracker_default(&paper, GAIT_MODE_PAPER);
     snprintf(particles_help, sizeof particles_help, "hypotheses; default %d, paper mode %d",
              (int)usual.particles, (int)paper.particles);
+    snprintf(search_help, sizeof search_help,
+             "a search, until left and right are known, takes twice the hypotheses, up to N; default %d,\n"
+             "        paper mode %d: no more than --particles",
+             (int)usual.search_particles, (int)paper.search_particles);
 }
 
 void settings_help(void)
@@ -227,6 +233,8 @@ void settings_tracker(const settings *s, gait_tasks exec, gait_tracker_config *c
 {
     gait_tracker_default(c, mode(s));
     c->particles = particles(s);
+    if (s->search_particles >= 0)
+        c->search_particles = s->search_particles;
     c->components = s->components;
     c->seed = s->seed;
     c->lag = s->lag;

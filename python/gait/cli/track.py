@@ -45,7 +45,7 @@ from gait.draw.overlay import Overlay
 from gait.durations import spread
 from gait.errors import UsageError, UserError
 from gait.image.camera import Camera
-from gait.image.sighting import another_scene
+from gait.image.sighting import another_scene, one_is_grey
 from gait.image.video import Frame, Image, Video, VideoWriter, background
 from gait.io.files import require_outputs
 from gait.io.trc import write_trc
@@ -162,9 +162,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _require_scene(args: argparse.Namespace, video: Video, plate: Image | None, first: int) -> None:
-    """Refuse a given plate of another scene than the first frame's; tell of such a median."""
+    """Refuse a plate of another scene than the first frame, or without its colours; tell of such a median."""
     frame = next(iter(video.frames(first, first + 1)), None)
-    if plate is None or frame is None or not another_scene(frame.image, plate):
+    if plate is None or frame is None:
+        return
+    if one_is_grey(frame.image, plate):
+        raise UserError(
+            f"{args.background}: of it and {video.path} one is grey, the other in colour; take both alike"
+        )
+    if not another_scene(frame.image, plate):
         return
     differs = f"half of frame {first} differs from"
     if args.background != "auto":

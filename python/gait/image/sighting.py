@@ -17,6 +17,7 @@ STATURE = (1.2, 2.4)  # metres by foot and head ray alone, so with room for shad
 _GREY_STEP = 14.0  # least difference from the plate that counts, grey levels
 _NOISE_STEPS = 5.0  # and in robust standard deviations of the picture's noise
 _ANOTHER = 18.0  # grey levels by which half of a picture differs from the plate of another scene, at least
+_COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
 _FILL = 0.15  # a standing person covers at least this share of the box round it
 
 
@@ -61,6 +62,12 @@ def _change(image: Image, plate: Image) -> Array:
 def another_scene(image: Image, plate: Image) -> bool:
     """Whether half of a picture differs from the plate: it shows another scene, or the camera has moved."""
     return bool(np.median(_change(image, plate)[::4, ::4]) > _ANOTHER)
+
+
+def one_is_grey(image: Image, plate: Image) -> bool:
+    """Whether one of two BGR pictures is grey throughout, the other in colour: one scene looks like two."""
+    spread = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
+    return min(spread) == 0 and max(spread) > _COLOUR
 
 
 def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
