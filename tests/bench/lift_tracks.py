@@ -189,6 +189,13 @@ def _absolute(found: result.Motion, truth: Floats, order: list[int]) -> float:
     return 1000 * float(np.median(apart.mean(axis=1)))
 
 
+def judged(found: result.Motion, truth: Floats) -> list[float]:
+    """Root-aligned and absolute median error, mm, and the share of coordinates in their 90 % intervals."""
+    order = [found.names.index(name) for name in EVAL15]
+    root = root_error(found.places[:, order], truth, HIPS)
+    return [root, _absolute(found, truth, order), _coverage(found, truth, order)[0]]
+
+
 def _coverage(found: result.Motion, truth: Floats, order: list[int]) -> tuple[float, float]:
     """Shares of coordinates in their 90 % intervals: in the world, and about the hips."""
     places, sd = found.places[:, order], found.sd[:, order]

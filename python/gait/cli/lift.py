@@ -45,6 +45,9 @@ _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone
 PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
 FAR = 4.0  # noise alone gives a median of 1.2
 UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view without perspective
+UNTOLD = (
+    "hips and ankles are hardly seen: the person may be metres nearer or further, deviations are too narrow"
+)
 DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
 
 
@@ -138,6 +141,8 @@ def run(args: argparse.Namespace) -> int:
     found = lift_tracks.lift(args.input, prior, tracks, view, _options(args, pixel_sd), names, args.quiet)
     _require_person(args, found)
     if not args.quiet:
+        if args.camera and not lift_tracks.tells_distance(tracks):
+            print(UNTOLD, file=sys.stderr)
         for words in _doubts(found, tracks.names, pixel_sd, outliers.shake(tracks)):
             print(words, file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
