@@ -112,6 +112,12 @@ def test_automatic_start_says_what_it_found(scene, capsys):
     assert err.startswith("start found at frame 0: x ") and "20 frames, " in out and "digest " in out
 
 
+def test_a_stature_that_the_pictures_contradict_is_told(scene, capsys):
+    for height, told in ((1.75, False), (2.2, True), (1.35, True)):
+        assert track(scene, "--init", "auto", "--height", height, "--stop", 12) == 0
+        assert ("tall by the camera" in capsys.readouterr().err) == told
+
+
 def test_a_start_outside_of_the_picture_is_told(scene, capsys):
     init = json.loads((scene / "init.json").read_text())
     (scene / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))

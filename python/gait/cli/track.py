@@ -227,6 +227,12 @@ def _start(
             f"stature {at.stature:.2f} m, heading {turn:.0f} +- {unsure:.0f} deg",
             file=sys.stderr,
         )
+        if start.looks:
+            print(
+                f"the person looks {start.looks:.2f} m tall by the camera, taken for {at.stature:.2f} m: "
+                f"{'check --height and' if args.height else 'give --height or check'} the camera",
+                file=sys.stderr,
+            )
     return start
 
 

@@ -38,11 +38,14 @@ class Start:
         Frame of the video that it describes.
     mean, sd : State
         Independent normals; a phase or heading whose sd is a half turn or more is uniform.
+    looks : float, optional
+        Stature that the pictures give, metres, where it is beyond doubt another than was believed.
     """
 
     frame: int
     mean: State
     sd: State
+    looks: float | None = None
 
     @staticmethod
     def read(

@@ -41,6 +41,7 @@ _DOUBT = 0.7  # radians: a heading known worse counts as unknown
 _NEAR = 0.05  # metres per second: the least error of a velocity
 _USUAL_SPEED, _SPEED_SHARE = 1.2, 0.35  # metres per second, and the deviation between people
 _HEADING_SD = 0.2  # radians, at least: people do not walk exactly where their blob moves
+_BEYOND = 4.0  # deviations by which a stature seen is another than was believed
 _BUILD_SHARE = 0.25  # of the deviations of scores and posture: few particles find the phase first
 
 _Seen = list[tuple[Frame, Sighting]]  # of one person, oldest first
@@ -193,8 +194,8 @@ class Spotter:
         often = [seen for seen in self._everybody if len(seen) >= ENOUGH]
         seen = max(often, key=lambda seen: (_speed(seen) >= _SLOW, sum(one.strength for _, one in seen)))
         at = seen[-1 if latest else 0][0]
-        mean, sd = _state(seen, self._camera, self._model, self._height, at.time)
-        return Start(at.number, mean, sd)
+        mean, sd, looks = _state(seen, self._camera, self._model, self._height, at.time)
+        return Start(at.number, mean, sd, looks)
 
     def _look(self, image: Image) -> list[Sighting]:
         if self._plate is None:
@@ -223,12 +224,12 @@ def _speed(seen: _Seen) -> float:
 
 def _state(
     seen: _Seen, camera: Camera, model: Model, height: float | None, when: float
-) -> tuple[State, State]:
-    """Mean and deviation of the walker at a time, seconds."""
+) -> tuple[State, State, float | None]:
+    """Mean and deviation of the walker at a time, seconds, and the stature seen if another was believed."""
     mean, sd = model.prior()
     if height is not None:
         set_height(mean, sd, height)
-    distances = _distances(seen, camera, model, mean, sd)
+    distances, looks = _distances(seen, camera, model, mean, sd)
     times = np.array([frame.time for frame, _ in seen])
     places = np.array([_place(camera, one, d) for (_, one), d in zip(seen, distances, strict=True)])
     path = _fit(times - times[0], places)
@@ -238,11 +239,13 @@ def _state(
     sd.pelvis[:] = _place_sd(camera, mean.pelvis[:2], seen[0][1].spread * mean.stature)
     sd.pelvis[:2] = np.hypot(sd.pelvis[:2], np.sqrt(path.scatter.diagonal()))
     sd.coef, sd.offset = _BUILD_SHARE * sd.coef, _BUILD_SHARE * sd.offset
-    return mean, sd
+    return mean, sd, looks
 
 
-def _distances(seen: _Seen, camera: Camera, model: Model, mean: State, sd: State) -> Array:
-    """Horizontal distances of the sightings from the lens; sets the stature.
+def _distances(
+    seen: _Seen, camera: Camera, model: Model, mean: State, sd: State
+) -> tuple[Array, float | None]:
+    """Horizontal distances of the sightings from the lens; sets the stature, and tells one that surprises.
 
     Unknown are the stature and one common factor on the distances by the feet; the height at which the
     head rays pass there ties the two (a linear Gaussian update).
@@ -264,7 +267,8 @@ def _distances(seen: _Seen, camera: Camera, model: Model, mean: State, sd: State
     total = stature_var + slope**2 * factor_var + _HEAD_SD**2 + spread**2
     mean.stature += stature_var / total * surprise
     sd.stature = float(np.sqrt(stature_var - stature_var**2 / total))
-    return np.asarray(by_foot * (1 - slope * factor_var / total * surprise))
+    looks = float(stature) if abs(surprise) > _BEYOND * np.sqrt(total) else None
+    return np.asarray(by_foot * (1 - slope * factor_var / total * surprise)), looks
 
 
 def _crown_share(model: Model, mean: State) -> float:
