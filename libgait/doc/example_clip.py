@@ -8,7 +8,10 @@ import cv2
 
 import gait
 
-folder = Path(sys.argv[1])
+folder = Path(sys.argv[1] if len(sys.argv) == 2 else sys.exit("usage: example_clip.py FOLDER"))
+for name in ("camera.json", "init.json", "background.png", "video.mp4"):
+    if not (folder / name).is_file():
+        sys.exit(f"{folder / name}: no such file; make the clip by gait simulate -o {folder} --size 640x480")
 camera = gait.Camera.read(str(folder / "camera.json"))
 start = json.loads((folder / "init.json").read_text(encoding="utf-8"))
 scene = [camera.fx, camera.fy, camera.cx, camera.cy, *camera.R.ravel(), *camera.t, *start["pelvis"][:2]]
