@@ -1,42 +1,33 @@
-/* example.c - follow somebody through a sequence of PGM pictures, in memory known when this is compiled.
+/* example.c - follow somebody through PGM pictures, 640 x 480, 30 a second, in memory known when this is compiled.
  *   cc example.c $(pkg-config --cflags --libs gait) -o example
  *   ./example walk.gait scene.txt empty.pgm frame*.pgm
- * 640 x 480 pixels 30 times a second; scene.txt: fx fy cx cy, R by rows and t of the camera (x_cam = R x_world + t), then
- * where somebody is in the first picture: x y (metres) and the heading (radians, 0 along +x).  example_clip.py writes such
- * files. */
+ * scene.txt: fx fy cx cy, R by rows and t of the camera (x_cam = R x_world + t), then where somebody is in the first
+ * picture: x y (metres) and heading (radians, 0 along +x).  example_clip.py writes such files. */
 #include <gait.h>
 #include <stdio.h>
+#include <string.h>
 
-enum { W = 640, H = 480 }; /* pixels */
-static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 19], model_memory[1 << 16], memory[6 << 20];
+enum { W = 640, H = 480 };
+static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 19], room[1 << 16], memory[6 << 20];
 static uint8_t empty[H][W], picture[H][W];
 
-/* A picture of that size, without comments in its header; 0 if it is none. */
-static int read_pgm(const char *name, uint8_t to[H][W])
+static int fail(const char *name, const char *why)
 {
-    FILE *f = fopen(name, "rb");
-    int w = 0, h = 0, most = 0;
-    int ok = f && fscanf(f, "P5 %d %d %d", &w, &h, &most) == 3 && fgetc(f) != EOF && w == W && h == H &&
-             most == 255 && fread(to, W, H, f) == H;
-    if (f)
-        fclose(f);
-    return ok ? 1 : (fprintf(stderr, "%s: not a binary PGM of %d x %d\n", name, W, H), 0);
+    return fprintf(stderr, "%s: %s\n", name, why), 1;
 }
 
-/* Camera and start: 19 numbers; 0 if they are not there. */
-static int read_scene(const char *name, gait_camera *c, gait_state *start)
+/* Pixels of a PGM file without comments, or 19 numbers; 0 if they are not there. */
+static int take(const char *name, uint8_t pixels[H][W], float number[19])
 {
-    float *const to[] = {&c->fx, &c->fy, &c->cx, &c->cy, c->R, c->t, start->pelvis, &start->heading};
-    const int count[] = {1, 1, 1, 1, 9, 3, 2, 1};
-    FILE *f = fopen(name, "r");
-    int ok = f != NULL;
-    *c = (gait_camera){.width = W, .height = H};
-    for (int i = 0; i < 8; i++)
-        for (int k = 0; k < count[i]; k++)
-            ok = ok && fscanf(f, "%f", &to[i][k]) == 1;
+    FILE *f = fopen(name, "rb");
+    int w = 0, h = 0, ok = f != NULL;
+    for (int i = 0; i < 19 && number; i++)
+        ok = ok && fscanf(f, "%f", &number[i]) == 1;
+    if (ok && pixels)
+        ok = fscanf(f, "P5 %d %d 255%*c", &w, &h) == 2 && w == W && h == H && fread(pixels, W, H, f) == H;
     if (f)
         fclose(f);
-    return ok ? 1 : (fprintf(stderr, "%s: not 19 numbers\n", name), 0);
+    return ok || !fail(name, pixels ? "not a binary PGM of 640 x 480" : "not 19 numbers");
 }
 
 int main(int argc, char **argv)
@@ -49,28 +40,31 @@ int main(int argc, char **argv)
     gait_model *model;
     gait_tracker *t;
     gait_error err;
+    float s[19];
     FILE *f = argc < 5 ? NULL : fopen(argv[1], "rb");
     size_t size = f ? fread(blob, 1, sizeof blob, f) : 0;
-
     if (argc < 5)
-        return fprintf(stderr, "usage: example MODEL.gait SCENE.txt EMPTY.pgm FRAME.pgm...\n"), 2;
-    gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
-    if (gait_model_init(model_memory, sizeof model_memory, blob, size, &model, &err) < 0)
-        return fprintf(stderr, "%s: %s\n", argv[1], err.text), 1;
-    gait_tracker_prior(model, &mean, &sd); /* anybody */
-    if (!read_scene(argv[2], &cfg.camera[0], &mean) || !read_pgm(argv[3], empty))
+        return fail("usage", "example MODEL.gait SCENE.txt EMPTY.pgm FRAME.pgm..."), 2;
+    if (gait_model_init(room, sizeof room, blob, size, &model, &err) < 0)
+        return fail(argv[1], err.text);
+    if (!take(argv[2], NULL, s) || !take(argv[3], empty, NULL))
         return 1;
-    if (gait_tracker_init(memory, sizeof memory, model, &cfg, &t, &err) < 0)
-        return fprintf(stderr, "%s\n", err.text), 1;
-    gait_tracker_set_background(t, 0, &plate);
-    /* there, give or take 0.1 m and radians */
+    gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
+    cfg.camera[0] = (gait_camera){.width = W, .height = H, .fx = s[0], .fy = s[1], .cx = s[2], .cy = s[3]};
+    memcpy(cfg.camera[0].R, s + 4, sizeof cfg.camera[0].R);
+    memcpy(cfg.camera[0].t, s + 13, sizeof cfg.camera[0].t);
+    gait_tracker_prior(model, &mean, &sd); /* anybody, there, give or take 0.1 m and radians */
+    mean.pelvis[0] = s[16], mean.pelvis[1] = s[17], mean.heading = s[18];
     sd.pelvis[0] = sd.pelvis[1] = sd.heading = 0.1f;
+    if (gait_tracker_init(memory, sizeof memory, model, &cfg, &t, &err) < 0)
+        return fail(argv[2], err.text);
+    gait_tracker_set_background(t, 0, &plate);
     gait_tracker_start(t, &mean, &sd, 0, NULL);
     for (int i = 4; i < argc; i++, frame.utime += 33333) {
-        if (!read_pgm(argv[i], picture))
+        if (!take(argv[i], picture, NULL))
             return 1;
         if (gait_tracker_step(t, &frame, &now, &err) < 0)
-            return fprintf(stderr, "%s: %s\n", argv[i], err.text), 1;
+            return fail(argv[i], err.text);
         printf("%3d  pelvis %6.3f %6.3f %6.3f m  phase %.3f  status %d\n", i - 4, now.mean.pelvis[0],
                now.mean.pelvis[1], now.mean.pelvis[2], now.mean.phase, now.status);
     }
