@@ -20,6 +20,7 @@ from gait.core.initial import DEFAULT_SD
 from gait.errors import UserError
 from gait.motion.events import strikes_of
 from gait.motion.trackfile import Joints, read_truth
+from gait.progress import progress
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
@@ -92,6 +93,13 @@ def meta_of(folder: Path) -> dict[str, Any]:
     """Contents of a clip's meta.json, empty if there is none."""
     path = folder / "meta.json"
     return dict(json.loads(path.read_text())) if path.is_file() else {}
+
+
+def walkers() -> tuple[list[Clip], dict[str, Path]]:
+    """Clips with true joints, and models learnt without each one's subject."""
+    clips = [clip for clip in shared_clips(None) if clip.truth]
+    with progress("learning", None) as update:
+        return clips, models(clips, ROOT / "build" / "eval" / "models", 1, update)
 
 
 def models(clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], None]) -> dict[str, Path]:

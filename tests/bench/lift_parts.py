@@ -39,9 +39,7 @@ def main() -> int:
     if not eval_clips.DATA.is_dir():
         print(f"eval-lift: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
-    clips = [c for c in eval_clips.shared_clips(None) if c.truth]
-    with progress("learning", None) as update:
-        models = eval_clips.models(clips, eval_clips.ROOT / "build" / "eval" / "models", 1, update)
+    clips, models = eval_clips.walkers()
     measured: dict[str, list[list[float]]] = {part: [] for part in PARTS}
     told = {}
     with one_thread(), progress("clips", len(clips)) as update:

@@ -71,9 +71,7 @@ def main() -> int:
     if not eval_clips.DATA.is_dir():
         print(f"lift_people: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
-    clips = [c for c in eval_clips.shared_clips(None) if c.truth]
-    with progress("learning", None) as update:
-        paths = eval_clips.models(clips, eval_clips.ROOT / "build" / "eval" / "models", 1, update)
+    clips, paths = eval_clips.walkers()
     rng, found = np.random.default_rng(SEED), []
     walks = [walk for clip in clips for walk in _walks(clip, paths[str(clip.subject)], rng)]
     with one_thread(), progress("people", len(walks)) as update:

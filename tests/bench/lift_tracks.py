@@ -119,10 +119,7 @@ def _upright(places: Floats, camera: Camera) -> Floats:
 
 def _clips() -> list[list[object]]:
     """Table of the development clips."""
-    clips = [c for c in eval_clips.shared_clips(None) if c.truth]
-    models = eval_clips.ROOT / "build" / "eval" / "models"
-    with progress("learning", None) as update:
-        paths = eval_clips.models(clips, models, 1, update)
+    clips, paths = eval_clips.walkers()
     rows: list[list[object]] = []
     with progress("clips", len(clips)) as update:
         for done, clip in enumerate(clips, 1):
