@@ -1,5 +1,6 @@
 #include "modes.h"
 #include "camera.h"
+#include "evidence.h"
 #include "fmath.h"
 #include "rng.h"
 #include "weigh.h"
@@ -8,7 +9,6 @@
 static const float SEARCH = 0.5f; /* seconds until the phase is known modulo half a stride */
 static const float REFIT = 0.4f;  /* seconds in which both sides find their own best before evidence counts */
 static const float SPREAD_SCORE = 0.5f, SPREAD_HEADING = 0.1f, SPREAD_RATE = 0.02f, SPREAD_PHASE = 0.05f;
-static const double ENOUGH = 0.2;  /* of the particles must keep weight while searching */
 static const double SURE = 4.5;    /* log odds from which one side is reported as the truth (0.99) */
 static const double DECIDED = 9.0; /* and from which the other is given up */
 
@@ -259,55 +259,11 @@ void modes_fork(gait_tracker *t)
     }
 }
 
-/* log of the mean of exp(ll) under a side's weights; -1e300 if there is none. */
-static double evidence(const pf *side, const float *ll)
-{
-    double top = -1e300, sum = 0.0;
-    for (int32_t i = 0; i < side->n; i++)
-        top = (double)ll[i] > top ? (double)ll[i] : top;
-    for (int32_t i = 0; i < side->n; i++)
-        if (ll[i] > -1e30f)
-            sum += side->weight[i] * m_exp64((double)ll[i] - top);
-    return sum > 0.0 ? top + m_log64(sum / total(side)) : -1e300;
-}
-
-/* Effective sample size that the likelihood to a power would leave. */
-static double ess_after(const pf *f, const float *ll, float power)
-{
-    double top = -1e300, sum = 0.0, square = 0.0;
-    for (int32_t i = 0; i < f->n; i++) {
-        double const l = f->log_weight[i] + (double)(power * ll[i]);
-        top = l > top && l < 1e300 ? l : top;
-    }
-    for (int32_t i = 0; i < f->n; i++) {
-        double const l = f->log_weight[i] + (double)(power * ll[i]) - top, w = l > -700.0 ? m_exp64(l) : 0.0;
-        sum += w;
-        square += w * w;
-    }
-    return square > 0.0 ? sum * sum / square : 0.0;
-}
-
-static void temper(float *ll, int32_t n, float power)
-{
-    for (int32_t i = 0; i < n; i++)
-        ll[i] *= power;
-}
-
 /* Share at which evidence counts so many seconds after the last: errors of the image terms outlast that. */
 static float share_of_news(const gait_tracker *t, float since)
 {
     float const lasting = t->cfg.evidence_time;
     return since > 0.0f && since < lasting ? since / lasting : 1.0f;
-}
-
-/* Raise the likelihood to the largest power 1, 1/2, 1/4 ... that leaves enough particles: a start from a
- * broad prior must not follow the first frame's luckiest few (annealing; Deutscher and Reid 2005). */
-static void soften(const pf *f, float *ll)
-{
-    float power = 1.0f;
-    while (power > 0.05f && ess_after(f, ll, power) < ENOUGH * (double)f->n)
-        power *= 0.5f;
-    temper(ll, f->n, power);
 }
 
 /* The looks of each side's heaviest particle. */
@@ -350,10 +306,10 @@ static pf_summary reweigh_sides(gait_tracker *t, float dt)
     for (int32_t side = 0; side < 2; side++) {
         pf h = side_of(&t->filter, side);
         int32_t const first = first_of(&t->filter, side);
-        inner[side] = evidence(&h, t->inner + first);
-        whole[side] = evidence(&h, t->ll + first);
+        inner[side] = evidence_of(&h, t->inner + first);
+        whole[side] = evidence_of(&h, t->ll + first);
         if (modes_searching(t))
-            soften(&h, t->used + first);
+            evidence_soften(&h, t->used + first);
         s[side] = pf_reweigh(&h, t->used + first);
         s[side].best += first;
         if (s[side].degenerate)
@@ -375,11 +331,11 @@ static pf_summary reweigh_sides(gait_tracker *t, float dt)
 
 pf_summary modes_reweigh(gait_tracker *t, float dt)
 {
-    temper(t->used, t->cfg.particles, share_of_news(t, seconds_unseen(t)));
+    evidence_temper(t->used, t->cfg.particles, share_of_news(t, seconds_unseen(t)));
     if (t->core->modes.stage == MODES_FORKED)
         return reweigh_sides(t, dt);
     if (t->core->modes.stage == MODES_SEARCH)
-        soften(&t->filter, t->used);
+        evidence_soften(&t->filter, t->used);
     return pf_reweigh(&t->filter, t->used);
 }
 

@@ -21,7 +21,7 @@ void modes_give_up(gait_tracker *t);
 /* One side is known: nothing to decide. */
 void modes_single(gait_tracker *t);
 
-/* Resample what has become too uneven; force: everything. */
+/* Resample what has become too uneven; true if anything was. */
 bool modes_resample(gait_tracker *t, uint32_t frame);
 
 /* After the prediction: lay the particles out as two sides if the search is over. */

@@ -82,7 +82,7 @@ static bool step(runner *r, message *why)
 /* ---- a turn ---- */
 static bool start(const runner *r, message *why)
 {
-    gait_state const sd = {.phase = 0.05f,
+    gait_state const sd = {.phase = r->result->plan.search ? 0.5f : 0.05f,
                            .stride_hz = 0.05f,
                            .stature = 0.03f,
                            .heading = 0.1f,
@@ -126,6 +126,10 @@ static bool take_turn(runner *r, int32_t steps, const bench_limit *limit, messag
         bool const first_round = r->count < frames;
         if (first_round && (r->frame == 0 || r->count == steps))
             r->result->digest = gait_tracker_digest(r->tracker[0]);
+        r->result->particles = gait_tracker_particles(r->tracker[0], NULL, NULL, 0);
+        if (ok && (r->result->particles > r->result->plan.particles) != r->result->plan.search)
+            ok = message_set(why, "frame %d is tracked with %d particles", (int)r->frame,
+                             (int)r->result->particles);
     }
     bench_stages_enable(r->tracker[0], false);
     return ok;
@@ -175,7 +179,7 @@ static double slowest_frame(const double *ms, int32_t count, int32_t frames)
 
 static double particle_ms(const runner *r, int32_t step)
 {
-    return (r->spent->cpu[step] - r->spent->stage[STAGE_FEATURES][step]) / r->result->plan.particles;
+    return (r->spent->cpu[step] - r->spent->stage[STAGE_FEATURES][step]) / r->result->particles;
 }
 
 /* The likelihood stage to a limit of the same turn. */

@@ -18,13 +18,15 @@ typedef struct bench_plan {
     bool stages;    /* time the stages as well, which takes a little time itself */
     bool
         limit; /* the texture-only limit takes turns with it, on one core and with the best instruction set */
-    bool twins; /* two trackers at the same time, each on one of the two threads */
+    bool twins;  /* two trackers at the same time, each on one of the two threads */
+    bool search; /* start with the phase unknown; the scene must end before that is settled */
 } bench_plan;
 
 typedef struct bench_result {
     bench_plan plan;
     int32_t width, height;
     const char *isa;
+    int32_t particles;             /* in the last step: more than planned while the phase is searched */
     size_t bytes;                  /* of the tracker */
     double median_ms, p99_ms;      /* of a step, time of day */
     double cpu_ms, cpu_p99_ms;     /* of the calling thread, which other programs do not lengthen */

@@ -40,7 +40,10 @@ void bench_report_add(const char *what, const char *isa, double ms)
 
 static const char *mode_of(const bench_result *r)
 {
-    return r->plan.twins ? "twins" : r->plan.mode == GAIT_MODE_PAPER ? "paper" : "default";
+    return r->plan.twins                     ? "twins"
+           : r->plan.search                  ? "search"
+           : r->plan.mode == GAIT_MODE_PAPER ? "paper"
+                                             : "default";
 }
 
 void bench_report_head(const char *title)
@@ -53,7 +56,7 @@ void bench_report_head(const char *title)
 static void row(const bench_result *r)
 {
     printf("%-7s %-7s %4dx%-4d %9d %7d %9.1f %9.2f %8.2f %8.2f %8.1f\n", mode_of(r), r->isa, (int)r->width,
-           (int)r->height, (int)r->plan.particles, (int)r->plan.threads, (double)r->bytes / 1e6, r->median_ms,
+           (int)r->height, (int)r->particles, (int)r->plan.threads, (double)r->bytes / 1e6, r->median_ms,
            r->p99_ms, r->cpu_ms, 1e3 / r->median_ms);
 }
 
@@ -71,7 +74,7 @@ void bench_report_stages(const bench_result *const *runs, int n)
         printf("%12s", runs[k]->isa);
     printf("\n%-12s", "particles");
     for (int k = 0; k < n; k++)
-        printf("%12d", (int)runs[k]->plan.particles);
+        printf("%12d", (int)runs[k]->particles);
     printf("\n");
     for (int stage = 0; stage < BENCH_STAGES; stage++) {
         printf("%s%-*s", bench_stage_is_part(stage) ? "  " : "", bench_stage_is_part(stage) ? 10 : 12,
@@ -80,7 +83,7 @@ void bench_report_stages(const bench_result *const *runs, int n)
             if (stage == STAGE_FEATURES)
                 printf("%9.3f ms", runs[k]->stage_ms[stage]);
             else
-                printf("%12.1f", runs[k]->stage_ms[stage] * 1e6 / runs[k]->plan.particles);
+                printf("%12.1f", runs[k]->stage_ms[stage] * 1e6 / runs[k]->particles);
         printf("\n");
     }
 }
@@ -98,8 +101,8 @@ bool bench_report_csv(const char *path, message *why)
     for (int i = 0; i < count; i++) {
         const bench_result *const r = &results[i];
         fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,", mode_of(r), r->isa, (int)r->width,
-                (int)r->height, (int)r->plan.particles, (int)r->plan.threads, r->bytes, r->median_ms,
-                r->p99_ms, r->cpu_ms, r->cpu_p99_ms, r->ratio, r->particle_ratio);
+                (int)r->height, (int)r->particles, (int)r->plan.threads, r->bytes, r->median_ms, r->p99_ms,
+                r->cpu_ms, r->cpu_p99_ms, r->ratio, r->particle_ratio);
         r->slowest > 0.0 ? fprintf(f, "%.4f,%.4f,", r->slowest, r->cpu_slowest) : fprintf(f, ",,");
         r->plan.limit ? fprintf(f, "%.4f,%.4f,%.4f", r->limit_ratio, r->limit_ms, r->limit_p99_ms)
                       : fprintf(f, ",,");

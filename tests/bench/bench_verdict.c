@@ -17,7 +17,7 @@ static const double LIMIT_MS = 17;
 void verdict_size(verdict *v, const bench_result *r)
 {
     double const cost = r->particle_ratio;
-    if (r->plan.particles < 1000 || r->plan.particles > 100000)
+    if (r->particles < 1000 || r->particles > 100000)
         return;
     v->least = v->least == 0.0 || cost < v->least ? cost : v->least;
     v->most = cost > v->most ? cost : v->most;
@@ -67,6 +67,7 @@ static void thread_lines(const bench_result *one)
  * share is the machine's.  And the slowest frame when each takes its least time over the rounds: what is the work's. */
 static void latency_lines(const verdict *v)
 {
+    const bench_result *const twins = v->many[0] + 2;
     const struct {
         const char *what;
         const bench_result *run;
@@ -77,6 +78,8 @@ static void latency_lines(const verdict *v)
         {"    paper mode, two threads", v->many[1] + 1},
         {"    default number of particles", v->usual},
         {"    default number of particles, two threads", v->usual + 1},
+        {"    a search", v->search},
+        {"    a search, two threads", v->search + 1},
     };
     for (size_t k = 0; k < sizeof row / sizeof *row; k++) {
         const bench_result *const r = row[k].run;
@@ -87,6 +90,9 @@ static void latency_lines(const verdict *v)
         printf("        the texture-only limit's, whose work never changes: %.2f times\n",
                r->limit_p99_ms / r->limit_ms);
         line("        slowest frame, least over the rounds, to the median", 1.3, r->slowest, false, "times");
+        if (r == twins - 1)
+            printf("        two trackers with nothing in common, one on each core: %.2f times\n",
+                   twins->p99_ms / twins->median_ms);
         if (alone)
             line("        slowest frame, by CPU time", 1.3, r->cpu_slowest, false, "times");
     }
@@ -100,6 +106,7 @@ static void speed_lines(const verdict *v)
     rate_lines("paper mode, 10,000 particles, one core", 30, paper);
     rate_lines("paper mode, 10,000 particles, two cores", 55, paper + 1);
     rate_lines("default number of particles, one core", 200, v->usual);
+    rate_lines("    while it searches for the phase, with twice as many", 30, v->search);
     thread_lines(many);
     latency_lines(v);
     line("by CPU time of the calling thread: default mode, one core", 30, 1e3 / many->cpu_ms, true, "fps");
@@ -112,7 +119,7 @@ static void kernel_lines(const verdict *v)
     const bench_result *const best = v->isa[v->isas - 1];
     bench_samples const seen = bench_stages_samples();
     double const limit_ns = 1e6 / ((double)LIMIT_PARTICLES * LIMIT_LIMBS * LIMIT_SAMPLES),
-                 stage_ns = 1e6 * best->stage_ms[STAGE_LIKELIHOOD] / best->plan.particles;
+                 stage_ns = 1e6 * best->stage_ms[STAGE_LIKELIHOOD] / best->particles;
     for (int k = 0; k < v->isas; k++)
         if (v->isa[k]->plan.cpu_mask == (GAIT_CPU_BASE | GAIT_CPU_AVX2))
             line("AVX2 at most, 10,000 particles, one core, stages timed", 30, fps(v->isa[k]), true, "fps");
@@ -134,7 +141,7 @@ static void parsec_lines(const verdict *v, const gait_model *m)
     bench_samples const seen = bench_stages_samples();
     double const looked = seen.surface + seen.edges, ours = looked + seen.cells;
     double const stage = best->stage_ms[STAGE_LIKELIHOOD], step = many->cpu_ms;
-    double const rate = 1e-3 * best->plan.particles, ns = 1e6 * stage / best->plan.particles;
+    double const rate = 1e-3 * best->particles, ns = 1e6 * stage / best->particles;
     line("a step against PARSEC bodytrack's 43 ms (quoted)", 0.5, step / PARSEC_MS[0], false, "times");
     line("    as the limit's time here against its 17 ms there", 0.5,
          many->limit_ratio * LIMIT_MS / PARSEC_MS[0], false, "times");
@@ -148,7 +155,7 @@ static void parsec_lines(const verdict *v, const gait_model *m)
         rate * ours / step, rate * looked / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],
         rate * PARSEC_SAMPLES / PARSEC_MS[0]);
     printf("    likelihood stage: %.0f ns a particle\n", ns);
-    printf("    whole step: %.0f thousand particles a second and core\n", best->plan.particles / step);
+    printf("    whole step: %.0f thousand particles a second and core\n", best->particles / step);
 }
 
 void verdict_print(const verdict *v, const gait_model *model)

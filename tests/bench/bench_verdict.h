@@ -4,7 +4,8 @@
 #include "bench_measure.h"
 
 typedef struct verdict {
-    const bench_result *usual;   /* default number of particles */
+    const bench_result *usual;   /* default number of particles: one thread, two */
+    const bench_result *search;  /* the same while the phase is unknown */
     const bench_result *many[2]; /* 10,000, by mode: one thread, two; in the first two trackers as well */
     const bench_result *isa[4];  /* the same with the stages, scalar first, best last */
     int isas;

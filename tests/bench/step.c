@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FRAMES = 90, LARGE_FRAMES = 30, MANY = 10000 };
+enum { FRAMES = 90, SEARCH_FRAMES = 30, LARGE_FRAMES = 30, MANY = 10000 };
 
 typedef struct settings {
     char model[OPTION_TEXT], particles[OPTION_TEXT], threads[OPTION_TEXT], csv[OPTION_TEXT];
@@ -69,22 +69,43 @@ static bool same_bits(bench *b, const bench_result *x, const bench_result *y)
                        (int)x->plan.particles);
 }
 
-/* The settings in use: default and paper, on one core and two, and what two trackers do at the same time. */
+/* Whole rounds, as many as a 99th percentile and a frame's least time want. */
+static int32_t rounds_of(const bench *b, int32_t frames)
+{
+    enum { ROUNDS = 5 };
+    int32_t const steps = b->set->steps > FRAMES ? b->set->steps : FRAMES;
+    return ROUNDS * steps / frames;
+}
+
+/* One core and two, with the default number of particles; NULL if that fails or their bits differ. */
+static const bench_result *usual(bench *b, const bench_scene *scene, bool search)
+{
+    gait_tracker_config cfg;
+    gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
+    bench_plan plans[2];
+    plans[0] = plans[1] = (bench_plan){.scene = scene,
+                                       .particles = cfg.particles,
+                                       .threads = 1,
+                                       .cpu_mask = ~0u,
+                                       .rounds = rounds_of(b, scene->frames),
+                                       .limit = true,
+                                       .search = search};
+    plans[1].threads = 2;
+    const bench_result *const r = run(b, plans, 2);
+    return r && same_bits(b, &r[0], &r[1]) ? r : NULL;
+}
+
+/* The settings in use: default, also while it searches, and paper, on one core and two; and what two trackers do at the
+ * same time. */
 static bool modes(bench *b)
 {
-    gait_tracker_config usual;
-    gait_tracker_default(&usual, GAIT_MODE_DEFAULT);
-    enum {
-        ROUNDS = 5
-    }; /* a 99th percentile is of some hundreds of steps, a frame's least time of some rounds */
-    int32_t const more = ROUNDS * b->set->steps / FRAMES, rounds = more > ROUNDS ? more : ROUNDS;
+    int32_t const rounds = rounds_of(b, FRAMES);
+    bench_scene opening = b->scene;
+    opening.frames = SEARCH_FRAMES;
     bench_report_head("modes, colour frames");
-    bench_plan few[2];
-    few[0] = few[1] = (bench_plan){
-        .particles = usual.particles, .threads = 1, .cpu_mask = ~0u, .rounds = rounds, .limit = true};
-    few[1].threads = 2;
-    b->found.usual = run(b, few, 2);
-    if (b->found.usual && !same_bits(b, &b->found.usual[0], &b->found.usual[1]))
+    b->found.usual = usual(b, &b->scene, false);
+    b->found.search = b->found.usual ? usual(b, &opening, true) : NULL;
+    if (!b->found.search)
         return false;
     for (int32_t mode = GAIT_MODE_DEFAULT; b->found.usual && mode <= GAIT_MODE_PAPER; mode++) {
         bench_plan const one = {
@@ -98,7 +119,7 @@ static bool modes(bench *b)
             return false;
         b->found.many[mode] = r;
     }
-    return b->found.usual;
+    return true;
 }
 
 /* The same with each instruction set, with the stages' times. */

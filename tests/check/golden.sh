@@ -20,9 +20,9 @@ make_tests() { # CC BUILD_FOLDER OPT TEST...
     ${MAKE:-make} -s -j"$(getconf _NPROCESSORS_ONLN)" B="$folder" OPT="$opt" CC="$cc" \
         $(printf "$folder/unit/%s " "$@") >/dev/null || exit 1
 }
-# A line for each of the four instruction sets and each film: three of the tracker, one of the lifter.
+# A line for each of the four instruction sets and each film: four of the tracker, one of the lifter.
 compare() { # CC BUILD_FOLDER OPT [RUNNER]
-    for part in determinism:12 lift_stream:4; do
+    for part in determinism:16 lift_stream:4; do
         test=test_${part%:*}
         make_tests "$1" "$2" "$3" $test
         said=$($4 "$2/unit/$test" digest)

@@ -5,13 +5,15 @@
 #include "gait_pool.h"
 #include "golden.h"
 #include "toy_film.h"
+#include "tracker.h"
 
 #include "check.h"
 
 /* To refresh after a deliberate change of the tracker's numbers: run this test, read the lines it prints. */
-#define GOLDEN       UINT64_C(0x3eae5ccb12506b54)
-#define GOLDEN_PAPER UINT64_C(0xf59f7cc212dfee2a)
-#define GOLDEN_GIVEN UINT64_C(0x1ca09ab84ee1e64a)
+#define GOLDEN        UINT64_C(0x3eae5ccb12506b54)
+#define GOLDEN_PAPER  UINT64_C(0xf59f7cc212dfee2a)
+#define GOLDEN_GIVEN  UINT64_C(0x1ca09ab84ee1e64a)
+#define GOLDEN_SEARCH UINT64_C(0xfbc527de60df021b)
 
 /* Under a sanitizer, many times as slow, every 7th number of pieces must do, which still has threads from 1 to 16; and
  * under that of threads every 13th, and nothing but the threads. */
@@ -117,10 +119,23 @@ static bool is_given(const gait_tracker_config *cfg)
     return cfg->terms & GAIT_TERM_TRACKS;
 }
 
+/* ---- a film whose phase is unknown: a search with more particles, two sides, a decision ---- */
+static gait_tracker_config config_search(void)
+{
+    gait_tracker_config cfg = config();
+    cfg.search_particles = 2 * cfg.particles;
+    return cfg;
+}
+
+static bool is_search(const gait_tracker_config *cfg)
+{
+    return cfg->search_particles > 0;
+}
+
 static gait_tracker *start(const gait_tracker_config *cfg, int n, float wide)
 {
     static colours wall[SCENE_CAMERAS]; /* the tracker looks at it again */
-    gait_tracker *const t = film_tracker(cfg, n, wide);
+    gait_tracker *const t = is_search(cfg) ? film_doubtful(cfg, 0.5f) : film_tracker(cfg, n, wide);
     for (int k = 0; is_given(cfg) && k < cfg->cameras; k++) {
         gait_image const plate = coloured(film_wall[k], k, wall[k]);
         CHECK(gait_tracker_set_background(t, k, &plate) == GAIT_OK);
@@ -214,10 +229,28 @@ static uint64_t digest_given(uint32_t mask)
     return masked(config_given(), mask);
 }
 
+static uint64_t digest_search(uint32_t mask)
+{
+    return masked(config_search(), mask);
+}
+
 static int print_digests(void)
 {
     return golden_print(digest_usual, GOLDEN, "default") + golden_print(digest_paper, GOLDEN_PAPER, "paper") +
-           golden_print(digest_given, GOLDEN_GIVEN, "given");
+           golden_print(digest_given, GOLDEN_GIVEN, "given") +
+           golden_print(digest_search, GOLDEN_SEARCH, "search");
+}
+
+/* The film of the search has all its stages: more particles, two sides, one of them given up. */
+static void test_search_is_decided(void)
+{
+    gait_tracker_config const cfg = config_search();
+    gait_tracker *const t = start(&cfg, 0, 1.0f);
+    advance(&cfg, t, 0, SAVE_AT, 0);
+    CHECK(t->core->modes.stage == MODES_FORKED && t->cfg.particles == cfg.search_particles);
+    advance(&cfg, t, SAVE_AT, STEPS, 0);
+    CHECK(t->core->modes.stage == MODES_SINGLE && t->cfg.particles == cfg.particles);
+    toy_tracker_free(t);
 }
 
 /* Pieces 1 .. 64 and more on 1 .. 16 threads; the instruction set and a stop in between change along. */
@@ -232,6 +265,8 @@ static void test_pieces_and_threads(void)
         cfg.exec = gait_pool_tasks(pool);
         cfg.cpu_mask = (uint32_t)(tasks / 16 + tasks) % MASKS;
         CHECK(run(&cfg, tasks % 5 ? 0 : SAVE_AT) == GOLDEN);
+        cfg.search_particles = 2 * cfg.particles;
+        CHECK(tasks % 4 || run(&cfg, tasks % 8 ? 0 : SAVE_AT) == GOLDEN_SEARCH);
         gait_pool_stop(pool);
     }
 }
@@ -260,9 +295,11 @@ static void test_a_crowd_in_pieces(void)
 static void test_instruction_sets(void)
 {
     for (uint32_t mask = 0; mask < MASKS; mask++) {
-        gait_tracker_config cfg = config(), paper = config_paper(), given = config_given();
-        cfg.cpu_mask = paper.cpu_mask = given.cpu_mask = mask;
+        gait_tracker_config cfg = config(), paper = config_paper(), given = config_given(),
+                            search = config_search();
+        cfg.cpu_mask = paper.cpu_mask = given.cpu_mask = search.cpu_mask = mask;
         given.tasks = 1 + (int32_t)mask;
+        CHECK(run(&search, mask & 1 ? SAVE_AT : 0) == GOLDEN_SEARCH);
         CHECK(run(&given, mask & 1 ? 0 : SAVE_AT) == GOLDEN_GIVEN);
         CHECK(run(&cfg, 0) == GOLDEN && run(&cfg, SAVE_AT) == GOLDEN);
         CHECK(run(&paper, mask & 1 ? SAVE_AT : 0) == GOLDEN_PAPER);
@@ -293,6 +330,8 @@ int main(int argc, char **argv)
     CHECK(golden_line(digest_usual(~0u), GOLDEN, "default", "best") == GOLDEN);
     CHECK(golden_line(digest_paper(~0u), GOLDEN_PAPER, "paper", "best") == GOLDEN_PAPER);
     CHECK(golden_line(digest_given(~0u), GOLDEN_GIVEN, "given", "best") == GOLDEN_GIVEN);
+    CHECK(golden_line(digest_search(~0u), GOLDEN_SEARCH, "search", "best") == GOLDEN_SEARCH);
+    test_search_is_decided();
     test_pieces_and_threads();
     test_a_crowd_in_pieces();
     if (!THREADS_WATCHED) {

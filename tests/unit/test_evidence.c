@@ -1,0 +1,87 @@
+/* What likelihoods say of weighted particles: against libm's sums, whatever their number; broken ones; annealing. */
+#include "evidence.h"
+#include "toy_filter.h"
+
+enum { MOST = 200 };
+
+/* Weights that do not sum to 1, likelihoods over `wide` nats. */
+static pf uneven(int32_t n, float wide, float ll[MOST])
+{
+    pf p = toy_filter(n);
+    for (int32_t i = 0; i < n; i++) {
+        p.weight[i] = 0.1 + (double)toy_uniform(3, (uint32_t)i, 0);
+        p.log_weight[i] = log(p.weight[i]);
+        ll[i] = wide * toy_uniform(3, (uint32_t)i, 1);
+    }
+    return p;
+}
+
+static double ess_of(const pf *p, const float *ll, float power, float top)
+{
+    double sum = 0.0, square = 0.0;
+    for (int32_t i = 0; i < p->n; i++) {
+        double const w = p->weight[i] * exp((double)(power * (ll[i] - top)));
+        sum += w;
+        square += w * w;
+    }
+    return sum * sum / square;
+}
+
+static void test_mean(void)
+{
+    for (int32_t n = 1; n <= MOST; n++) {
+        float ll[MOST];
+        double sum = 0.0, total = 0.0;
+        pf const p = uneven(n, 30.0f, ll);
+        for (int32_t i = 0; i < n; i++) {
+            sum += p.weight[i] * exp((double)ll[i]);
+            total += p.weight[i];
+        }
+        CHECK_NEAR(evidence_of(&p, ll), log(sum / total), 1e-12 * (1.0 + fabs(log(sum / total))));
+    }
+}
+
+/* Impossible particles weigh, but say nothing; where all are, there is no evidence. */
+static void test_broken(void)
+{
+    static const float broken[] = {NAN, -INFINITY, -2e30f};
+    for (size_t k = 0; k < sizeof broken / sizeof *broken; k++) {
+        float ll[MOST];
+        double sum = 0.0, total = 0.0;
+        pf const p = uneven(MOST, 5.0f, ll);
+        for (int32_t i = 0; i < MOST; i++) {
+            if (i % 3 == 0)
+                ll[i] = broken[k];
+            sum += i % 3 == 0 ? 0.0 : p.weight[i] * exp((double)ll[i]);
+            total += p.weight[i];
+        }
+        CHECK_NEAR(evidence_of(&p, ll), log(sum / total), 1e-12);
+        for (int32_t i = 0; i < MOST; i++)
+            ll[i] = broken[k];
+        CHECK(evidence_of(&p, ll) <= -1e30);
+    }
+}
+
+/* The largest power of 1, 1/2 ... 1/32 that leaves a fifth of the particles. */
+static void test_soften(void)
+{
+    for (float wide = 1.0f; wide < 3e4f; wide *= 1.7f) {
+        float ll[MOST], was[MOST], power = 1.0f;
+        pf const p = uneven(MOST, wide, ll);
+        while (power > 0.05f && ess_of(&p, ll, power, wide) < 0.2 * MOST)
+            power *= 0.5f;
+        for (int32_t i = 0; i < MOST; i++)
+            was[i] = ll[i];
+        evidence_soften(&p, ll);
+        for (int32_t i = 0; i < MOST; i++)
+            CHECK(ll[i] == power * was[i]);
+    }
+}
+
+int main(void)
+{
+    test_mean();
+    test_broken();
+    test_soften();
+    return CHECK_DONE();
+}
