@@ -25,14 +25,12 @@ static int take(const char *name, uint8_t pixels[H][W], float number[19])
         ok = ok && fscanf(f, "%f", &number[i]) == 1;
     if (ok && pixels)
         ok = fscanf(f, "P5 %d %d 255%*c", &w, &h) == 2 && w == W && h == H && fread(pixels, W, H, f) == H;
-    if (f)
-        fclose(f);
+    ok = f && fclose(f) == 0 && ok;
     return ok || !fail(name, pixels ? "not a binary PGM of 640 x 480" : "not 19 numbers");
 }
 
 int main(int argc, char **argv)
 {
-    gait_image plate = {empty[0], W, H, W, GAIT_GREY8};
     gait_frame frame = {.image = {{picture[0], W, H, W, GAIT_GREY8}}};
     gait_tracker_config cfg;
     gait_state mean, sd;
@@ -58,7 +56,7 @@ int main(int argc, char **argv)
     sd.pelvis[0] = sd.pelvis[1] = sd.heading = 0.1f;
     if (gait_tracker_init(memory, sizeof memory, model, &cfg, &t, &err) < 0)
         return fail(argv[2], err.text);
-    gait_tracker_set_background(t, 0, &plate);
+    gait_tracker_set_background(t, 0, &(gait_image){empty[0], W, H, W, GAIT_GREY8});
     gait_tracker_start(t, &mean, &sd, 0, NULL);
     for (int i = 4; i < argc; i++, frame.utime += 33333) {
         if (!take(argv[i], picture, NULL))

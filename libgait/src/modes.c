@@ -229,25 +229,38 @@ static void deal(gait_tracker *t)
         f->parent[i] = (int32_t)f->ticket[i < second ? 2 * i : 2 * (i - second) + 1];
 }
 
-/* The particles are even, as resampled.  All are first brought to one side, those of the other by the
- * exchange, then dealt in turn to both: the odds begin even whatever the search made of left and right. */
+typedef struct fork_job {
+    const gait_tracker *t;
+    population people;
+    float middle; /* phase of the first side */
+} fork_job;
+
+/* Bring particles to the side they were dealt to. */
+static void fork_range(void *ctx, int32_t begin, int32_t end, int32_t task)
+{
+    fork_job *const j = ctx;
+    (void)task;
+    for (int32_t i = begin; i < end; i++) {
+        int32_t const side = i >= first_of(&j->t->filter, 1);
+        walker w = walker_get(&j->people, i);
+        bool const far = fabsf(m_wrap_pi(TWO_PI_F * (w.f[F_PHASE] - j->middle))) > 0.5f * PI_F;
+        if (far != (side == 1))
+            w = other_side(j->t, &w, i);
+        spread(j->t, i, &w);
+        walker_put(&j->people, i, &w);
+    }
+}
+
+/* The particles are even, as resampled.  They are dealt in turn to both sides, those that are of the other one exchanged:
+ * the odds begin even whatever the search made of left and right. */
 void modes_fork(gait_tracker *t)
 {
     pf *const f = &t->filter;
-    population *const now = &t->people;
     if (!search_is_over(t))
         return;
-    float const middle = half_phase(now);
+    fork_job j = {.t = t, .people = t->people, .middle = half_phase(&t->people)};
     deal(t);
-    for (int32_t i = 0; i < f->n; i++) {
-        int32_t const side = i >= first_of(f, 1);
-        walker w = walker_get(now, i);
-        bool const far = fabsf(m_wrap_pi(TWO_PI_F * (w.f[F_PHASE] - middle))) > 0.5f * PI_F;
-        if (far != (side == 1))
-            w = other_side(t, &w, i);
-        spread(t, i, &w);
-        walker_put(now, i, &w);
-    }
+    task_run(&t->cfg.exec, t->cfg.tasks, f->n, BLOCK, fork_range, &j);
     t->core->textured = 0; /* what the ancestors looked like is not what their exchanged bodies would */
     enter(t, MODES_FORKED);
     for (int32_t side = 0; side < 2; side++) {
