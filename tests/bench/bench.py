@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import bench_plot
+import bench_runs
 from facts import facts
 
 from gait.io.files import replacing
@@ -34,13 +35,26 @@ def compiler(command: str) -> str:
     return (done.stdout.splitlines() or [f"{command}, version unknown"])[0]
 
 
-def page(said: str, args: argparse.Namespace) -> str:
-    """The record as Markdown: on what, by what and when it was made, and all that was printed."""
+def page(runs: list[str], args: argparse.Namespace) -> str:
+    """The record as Markdown: on what, by what and when it was made, and all that the last run printed."""
     date = datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
-    made = f"{facts(f'make {args.target} ARGS=--record')} {compiler(args.cc)}; {date}."
+    options = "--record" if len(runs) == 1 else f"'--record --runs {len(runs)}'"
+    made = f"{facts(f'make {args.target} ARGS={options}')} {compiler(args.cc)}; {date}."
     figures = f" All figures: {args.csv.name}." if args.csv else ""
     note = "MISSED: wanted, and not reached in this run."
-    return f"# {args.title}\n\n{made}{figures} {note}\n\n```\n{said.strip()}\n```\n"
+    text = f"# {args.title}\n\n{made}{figures} {note}\n"
+    if len(runs) > 1:
+        text += (
+            f"\nBy the medians of the runs:\n\n```\n{bench_runs.summary(runs)}\n```\n\nThe last of them:\n"
+        )
+    return f"{text}\n```\n{runs[-1].strip()}\n```\n"
+
+
+def count(text: str) -> int:
+    """Number of runs, from 1 on."""
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 on")
+    return int(text)
 
 
 def main() -> None:
@@ -51,17 +65,22 @@ def main() -> None:
     parser.add_argument("--target", default="bench", help="of make, that the page names")
     parser.add_argument("--title", default="Speed of a step", help="of the page")
     parser.add_argument("--csv", type=Path, help="keep the program's figures there, and draw them")
+    parser.add_argument(
+        "--runs", type=count, default=1, help="one after the other; rows then by their medians"
+    )
     parser.add_argument("program")
     args, others = parser.parse_known_args()
     if args.csv:
         args.csv.parent.mkdir(parents=True, exist_ok=True)
         others += ["--csv", str(args.csv)]
-    said = run([args.program, *others])
+    runs = [run([args.program, *others]) for _ in range(args.runs)]
+    if args.runs > 1:
+        print(f"\n{bench_runs.summary(runs)}")
     if args.csv:
         bench_plot.draw(args.csv, PLOT)
     if args.page:
         with replacing(args.page) as temporary:
-            temporary.write_text(page(said, args), encoding="utf-8")
+            temporary.write_text(page(runs, args), encoding="utf-8")
 
 
 if __name__ == "__main__":

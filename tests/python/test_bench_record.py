@@ -35,6 +35,30 @@ def test_a_record_without_a_table_of_figures(tmp_path, monkeypatch):
     assert "All figures" not in page and "```\nrate  8.57 fps  MISSED\n```" in page
 
 
+def test_several_runs_are_judged_by_their_medians(tmp_path, monkeypatch, capsys):
+    said = "echo $((n + 1)) >n; echo rate '>= 30.00' 2$n fps reached; echo '  time <= 1.30' 1.$n times MISSED"
+    program = tmp_path / "program"
+    program.write_text(f"#!/bin/sh\nn=$(cat n)\n{said}\n")
+    program.chmod(0o755)
+    (tmp_path / "n").write_text("1")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["bench.py", "--page", "page.md", "--runs", "3", str(program)])
+    bench.main()
+    page, shown = (tmp_path / "page.md").read_text(), capsys.readouterr().out
+    assert "ARGS='--record --runs 3'" in page and page.endswith("\n  time <= 1.30 1.3 times MISSED\n```\n")
+    for text in page, shown:
+        assert re.search(r"\n3 runs .*\nrate +>= +30\.00 +22\.00 +21\.00 +23\.00  0 of 3  MISSED\n", text)
+        assert re.search(r"\n  time +<= +1\.30 +1\.20 +1\.10 +1\.30  3 of 3  reached\n", text)
+
+
+@pytest.mark.parametrize("runs", ["0", "-1", "many"])
+def test_a_number_of_runs_that_is_none(runs, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["bench.py", f"--runs={runs}", "true"])
+    with pytest.raises(SystemExit) as stop:
+        bench.main()
+    assert stop.value.code == 2 and f"{runs} is not a number from 1 on" in capsys.readouterr().err
+
+
 def test_a_bench_that_fails_leaves_no_record(tmp_path, monkeypatch, capsys):
     table, page = tmp_path / "new/a.csv", tmp_path / "bench.md"
     monkeypatch.chdir(tmp_path)
