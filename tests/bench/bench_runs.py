@@ -32,7 +32,7 @@ def wanted(said: str) -> list[Wanted]:
 
 
 def summary(runs: Sequence[str]) -> str:
-    """Median, least and most of each figure; how many runs reached what was wanted, and whether the median did.
+    """Median, least and most of each figure; how many runs reach what is wanted, and whether the median does.
 
     Parameters
     ----------
