@@ -15,10 +15,10 @@ import numpy as np
 import table
 
 from gait.body.skeleton import EVAL15
-from gait.cli.lift_tracks import tells_distance
 from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.learn.stage import one_thread
+from gait.lift.size import tells_distance
 from gait.lift.tracks_file import Tracks
 from gait.motion.trackfile import read_truth
 from gait.progress import progress

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait.cli import lift_tracks, main
+from gait.cli import main
 from gait.image.camera import Camera
 from gait.io.trc import read_trc
-from gait.lift import motion, outliers
+from gait.lift import motion, outliers, size
 from gait.lift.result import METHODS
 from gait.lift.tracks_file import Tracks, read, write
 
@@ -295,25 +295,10 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
     assert code == 1 or "do not rely on" in said
 
 
-def test_parts_that_hardly_tell_the_distance():
-    def tracks(*names, share=1.0):
-        uv = np.zeros((10, len(names), 2))
-        uv[round(10 * share) :] = np.nan
-        return Tracks(np.arange(10), np.arange(10) / 30, names, uv, np.ones(uv.shape[:2]))
-
-    assert lift_tracks.tells_distance(tracks("r_hip", "l_ankle")) and lift_tracks.tells_distance(
-        tracks("pelvis", "r_ankle", "head_top")
-    )
-    assert not lift_tracks.tells_distance(
-        tracks("l_hip", "r_hip", "l_shoulder")
-    ) and not lift_tracks.tells_distance(tracks("r_ankle"))
-    assert not lift_tracks.tells_distance(tracks("r_hip", "l_ankle", share=0.4))
-
-
 def test_few_joints_are_told(folder, capsys, monkeypatch):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv"]
     for tells, view in ((True, "camera"), (False, "camera"), (False, "none")):
-        monkeypatch.setattr(lift_tracks, "tells_distance", lambda tracks, tells=tells: tells)
+        monkeypatch.setattr(size, "tells_distance", lambda tracks, tells=tells: tells)
         assert main([*command, *VIEWS[view]]) == 0
         told = "hips and ankles are hardly seen" in capsys.readouterr().err
         assert told == (view == "camera" and not tells)

@@ -167,3 +167,30 @@ def test_a_likely_size_is_left_alone_and_its_deviations_follow_the_misfit():
         np.testing.assert_allclose(found.sd, grown * sd)
         np.testing.assert_allclose(found.rooted_sd, grown * sd)
         assert found.factor == 1
+
+
+def test_parts_that_hardly_tell_the_distance():
+    def tracks(*names, share=1.0):
+        uv = np.zeros((10, len(names), 2))
+        uv[round(10 * share) :] = np.nan
+        return Tracks(np.arange(10), np.arange(10) / 30, names, uv, np.ones(uv.shape[:2]))
+
+    assert size.tells_distance(tracks("r_hip", "l_ankle"))
+    assert size.tells_distance(tracks("pelvis", "r_ankle", "head_top"))
+    assert not size.tells_distance(tracks("l_hip", "r_hip", "l_shoulder"))
+    assert not size.tells_distance(tracks("r_ankle"))
+    assert not size.tells_distance(tracks("r_hip", "l_ankle", share=0.4))
+
+
+@pytest.mark.parametrize(("seen", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)])
+def test_without_ankles_the_distance_is_as_open_as_the_size(walk, seen, sure):
+    """Legs that nobody sees stand on the floor by the prior alone, which seemed to tell the distance."""
+    prior, places = walk
+    camera = Camera.looking(VIEWS["towards"], (0, 0, 0.9), (640, 480), 900)
+    uv = camera.project(places[:, prior.index(seen)])
+    time = np.arange(len(places)) / prior.fps
+    tracks = Tracks(np.arange(len(places)), time, tuple(seen), uv, np.ones(uv.shape[:2]))
+    found = motion.lift(prior, tracks, Perspective(camera), Options(pixel_sd=1.0), prior.names)
+    distance = float(np.linalg.norm(places - (-camera.R.T @ camera.t), axis=2).mean())
+    spread = float(np.median(np.sqrt(found.sd**2 @ camera.R[2] ** 2))) / distance
+    assert (spread < size.PROPORTION_SD) == sure

@@ -30,7 +30,7 @@ from gait.core.initial import STATURE
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
 from gait.io.trc import write_trc
-from gait.lift import lifted_file, motion, outliers, result
+from gait.lift import lifted_file, motion, outliers, result, size
 from gait.lift.tracks_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
 
@@ -46,7 +46,7 @@ PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels,
 FAR = 4.0  # noise alone gives a median of 1.2
 UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view without perspective
 UNTOLD = (
-    "hips and ankles are hardly seen: the person may be metres nearer or further, deviations are too narrow"
+    "hips and ankles are hardly seen, which tell the distance: the person may be metres nearer or further"
 )
 DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
 
@@ -141,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
     found = lift_tracks.lift(args.input, prior, tracks, view, _options(args, pixel_sd), names, args.quiet)
     _require_person(args, found)
     if not args.quiet:
-        if args.camera and not lift_tracks.tells_distance(tracks):
+        if args.camera and not size.tells_distance(tracks):
             print(UNTOLD, file=sys.stderr)
         for words in _doubts(found, tracks.names, pixel_sd, outliers.shake(tracks)):
             print(words, file=sys.stderr)

@@ -59,13 +59,6 @@ def _jumped(jumps: list[tuple[int, str]]) -> str:
     return f"left out, far from where they were a frame before and after: {named}{more}"
 
 
-def tells_distance(tracks: Tracks) -> bool:
-    """Whether hips and an ankle are seen in half of the frames: other parts leave the distance open."""
-    shares = dict(zip(tracks.names, tracks.seen.mean(axis=0).tolist(), strict=True))
-    parts = (("l_hip", "r_hip", "pelvis"), ("l_ankle", "r_ankle"))
-    return all(max(shares.get(name, 0.0) for name in part) >= 0.5 for part in parts)
-
-
 def view(tracks: Tracks, camera: str | None, axis: str | None = None, metres: float | None = None) -> View:
     """See tracks through a calibrated camera, or else from far away.
 

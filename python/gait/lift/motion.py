@@ -116,8 +116,7 @@ def _unlike(
     except UserError:  # segments in which next to nothing is seen
         return found
     misfit = max(found.misfit, 1.0) * found.wider**2
-    stature, size_sd = options.stature or prior.stature, KNOWN_SD if options.stature else PEOPLE_SD
-    sized = _sized(prior, view, alone, misfit, options, stature, size_sd / stature)
+    sized = _sized(prior, tracks, view, options, alone, misfit)
     return replace(
         alone,
         places=sized.places,
@@ -163,8 +162,7 @@ def _lift(
     markers = prior.index(tracks.names)
     points = Observations(tracks.uv, tracks.deviations(options.pixel_sd))
     sampled = resampled(points, tracks.time, grid.time).among(markers, len(prior.names))
-    stature = options.stature or prior.stature
-    stature_sd = KNOWN_SD if options.stature else PEOPLE_SD
+    stature, stature_sd = _stature(prior, options)
     lengths = np.ones(len(grid.time))
     if isinstance(view, Parallel):
         lengths = view.lengths(sampled, prior.mean[0].mean(axis=0), stature)
@@ -189,7 +187,7 @@ def _lift(
     found_motion = sequence.smooth(
         prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
     )
-    sized = _sized(prior, view, found_motion, found_motion.misfit, options, stature, stature_sd / stature)
+    sized = _sized(prior, tracks, view, options, found_motion, found_motion.misfit)
     places = sized.places
     require_size(places, prior, stature)
     error = _error(view, places[:, markers], found_motion.lengths, tracks.uv)
@@ -211,25 +209,30 @@ def _lift(
     )
 
 
+def _stature(prior: SegmentPrior, options: Options) -> tuple[float, float]:
+    """Metres, and how well it is known."""
+    return options.stature or prior.stature, KNOWN_SD if options.stature else PEOPLE_SD
+
+
 def _sized(
-    prior: SegmentPrior,
-    view: View,
-    found: Lifted | Motion,
-    misfit: float,
-    options: Options,
-    stature: float,
-    size_sd: float,
+    prior: SegmentPrior, tracks: Tracks, view: View, options: Options, found: Lifted | Motion, misfit: float
 ) -> size.Resized:
     """Give the estimate a person's size if it has none; only a lens leaves it open.
 
-    One that fits is of its prior's kind, and prior and floor know more of its size than the bones do.
+    One that fits is of its prior's kind, and prior and floor know more of its size than the bones do, unless
+    joints that nobody sees were put there by the prior to suit them.
     """
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
     if isinstance(view, Parallel) or not options.bones:
         return size.widened(fitted, misfit)
+    stature, stature_sd = _stature(prior, options)
+    own = float(np.hypot(stature_sd / stature, size.PROPORTION_SD))
     ratio = size.bones_ratio(prior, found.places, stature)
     limit = size.UNLIKELY if misfit > MISFIT else size.IMPOSSIBLE
-    return size.resized(fitted, view.camera, ratio, size_sd, misfit, limit)
+    sized = size.resized(fitted, view.camera, ratio, own, misfit, limit)
+    if sized.factor != 1 or size.tells_distance(tracks):
+        return sized
+    return size.of_any_size(sized, view.camera, own)
 
 
 def _alone(

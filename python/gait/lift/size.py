@@ -15,6 +15,7 @@ import numpy.typing as npt
 from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.lift.soft import BONES
+from gait.lift.tracks_file import Tracks
 
 Floats = npt.NDArray[np.float64]
 
@@ -41,6 +42,13 @@ class Resized:
     factor: float = 1.0
 
 
+def tells_distance(tracks: Tracks) -> bool:
+    """Whether hips and an ankle are seen in half of the frames: other parts leave the distance open."""
+    shares = dict(zip(tracks.names, tracks.seen.mean(axis=0).tolist(), strict=True))
+    parts = (("l_hip", "r_hip", "pelvis"), ("l_ankle", "r_ankle"))
+    return all(max(shares.get(name, 0.0) for name in part) >= 0.5 for part in parts)
+
+
 def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
     """Median over bones and frames of their length in places (T, J, 3) over that of most people; 1 without.
 
@@ -63,7 +71,7 @@ def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
 
 
 def resized(
-    found: Resized, camera: Camera, ratio: float, size_sd: float, misfit: float, limit: float = UNLIKELY
+    found: Resized, camera: Camera, ratio: float, own: float, misfit: float, limit: float = UNLIKELY
 ) -> Resized:
     """Divide a motion's size by `ratio` about the lens if it is off by `limit` deviations or more.
 
@@ -76,23 +84,30 @@ def resized(
         With deviations as the fit has them.
     ratio : float
         Of `bones_ratio`.
-    size_sd : float
-        Relative deviation of people's statures, as far as it is not known.
+    own : float
+        Relative deviation of the size of one person's bones.
     misfit : float
         As in `result.Motion`.
     """
-    own = float(np.hypot(size_sd, PROPORTION_SD))
     off = abs(float(np.log(ratio))) / own
     if off < limit:
         return widened(found, misfit)
     lens = -camera.R.T @ camera.t
-    away = (found.places - lens) / ratio
     grown = max(off, float(np.sqrt(misfit))) / ratio
-    return Resized(
-        lens + away,
-        np.hypot(grown * found.sd, own * np.abs(away)),
-        np.hypot(grown * found.rooted_sd, own * np.abs(away - away.mean(axis=1, keepdims=True))),
-        1 / ratio,
+    sized = Resized(
+        lens + (found.places - lens) / ratio, grown * found.sd, grown * found.rooted_sd, 1 / ratio
+    )
+    return of_any_size(sized, camera, own)
+
+
+def of_any_size(found: Resized, camera: Camera, own: float) -> Resized:
+    """Deviations of a motion whose size, and with it the distance, has the relative deviation `own`."""
+    away = found.places - (-camera.R.T @ camera.t)
+    rooted = away - away.mean(axis=1, keepdims=True)
+    return replace(
+        found,
+        sd=np.hypot(found.sd, own * np.abs(away)),
+        rooted_sd=np.hypot(found.rooted_sd, own * np.abs(rooted)),
     )
 
 
