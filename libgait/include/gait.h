@@ -16,7 +16,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 5          /* SONAME; bumped by any incompatible change below, struct layout included */
+#define GAIT_ABI 6          /* SONAME; bumped by any incompatible change below, struct layout included */
 #define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 
@@ -56,9 +56,9 @@ typedef struct gait_error { /* optional detail, written on failure only; there i
     char    text[120];      /* one line, NUL-terminated */
 } gait_error;
 
-typedef struct gait_abi_field { /* one row per struct (field NULL) and per field */
-    const char *type, *field;
-    uint32_t    offset, size;   /* bytes */
+typedef struct gait_abi_field { /* one row per struct (field "") and per field */
+    char     type[20], field[20];
+    uint32_t offset, size;      /* bytes */
 } gait_abi_field;
 
 GAIT_API const char           *gait_status_name(gait_status s);  /* "GAIT_ERR_CORRUPT"; never NULL */
@@ -347,7 +347,7 @@ typedef struct gait_lift_frame { /* one frame of a stream, `lag` frames ago */
     int32_t  status;             /* GAIT_STATUS_TRACKING, or INIT: before a first whole segment; fields below are 0 */
     uint32_t flags;              /* GAIT_LIFT_* */
     double   marker[GAIT_MAX_MARKERS][3]; /* posterior mean, metres, world; 0 for those not in config report */
-    double   sd[GAIT_MAX_MARKERS][3];     /* standard deviation */
+    double   sd[GAIT_MAX_MARKERS][3];     /* standard deviation; wider by the root of a misfit above 1 */
 } gait_lift_frame;
 
 /* A blob may hold a cyclic model, a segment prior or both. */
@@ -360,7 +360,8 @@ GAIT_API gait_status gait_lift_init(void *mem, size_t mem_bytes, const void *blo
                                     const gait_lift_config *cfg, gait_lift **out, gait_error *err);
 GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL out of range */
 
-/* One segment.  uv [F][J][2]; sd [F][J] or NULL (config sd): infinite, NaN or <= 0 is not seen, as is a NaN in uv. */
+/* One segment.  uv [F][J][2]; sd [F][J] or NULL (config sd): infinite, NaN or <= 0 is not seen, as is a uv
+ * that is NaN or beyond 1e6. */
 GAIT_API gait_status gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
 /* Of the last gait_lift_segment() (GAIT_ERR_STATE without one): posterior mean [F][J][3] and standard deviation (may
@@ -387,7 +388,8 @@ GAIT_API gait_status gait_lift_fix(gait_lift *l, const double *sd, gait_error *e
 GAIT_API gait_status gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean);
 
 /* A stream: one frame uv [J][2], sd [J] or NULL; utime must increase.  Segments begin every hop / fps seconds from the
- * first frame on; each frame is added to those that it falls into, at its own time (linear between their frames). */
+ * first frame on; each frame is added to those that it falls into, at its own time (linear between their frames).
+ * Points far from where the segments have them, as wrong detections are, have little or nothing to say. */
 GAIT_API gait_status gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
 /* The frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: not so many frames since the start. */
 GAIT_API gait_status gait_lift_estimate(gait_lift *l, gait_lift_frame *out);

@@ -2,7 +2,7 @@
 #include "base.h"
 
 /* A struct's own row comes first, then its fields in order. */
-#define STRUCT(T)   {#T, NULL, 0, (uint32_t)sizeof(T)}
+#define STRUCT(T)   {#T, "", 0, (uint32_t)sizeof(T)}
 #define FIELD(T, f) {#T, #f, (uint32_t)offsetof(T, f), (uint32_t)sizeof(((T *)0)->f)}
 
 const gait_abi_field *gait_abi_fields(uint32_t *count)

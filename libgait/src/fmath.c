@@ -107,3 +107,14 @@ float m_atan2(float y, float x)
     a = m_select(m_less(x, 0.0f), PI_F - a, a);
     return m_from_bits(m_bits(a) | (m_bits(y) & 0x80000000u));
 }
+
+double m_median(double *x, int32_t count)
+{
+    for (int32_t i = 1; i < count; i++)
+        for (int32_t k = i; k > 0 && x[k] < x[k - 1]; k--) {
+            double const larger = x[k - 1];
+            x[k - 1] = x[k];
+            x[k] = larger;
+        }
+    return x[count / 2];
+}

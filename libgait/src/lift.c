@@ -70,9 +70,9 @@ typedef struct adding { /* what is the same for all markers of a frame */
     double depth;
 } adding;
 
-/* Two white rows of marker j; returns the root of the determinant of their noise. */
+/* Two white rows of marker j and their squared residuals; returns the root of the determinant of their noise. */
 static double add_marker(const lift_table *t, lift_belief *b, const adding *a, const double *ideal, double sd,
-                         int32_t j, const lift_marker *m, const double *about, double *w)
+                         int32_t j, const lift_marker *m, const double *about, double *w, double square[2])
 {
     eye_rows r;
     double spin[2] = {-(about[1] - a->now.place[1]), about[0] - a->now.place[0]};
@@ -85,14 +85,15 @@ static double add_marker(const lift_table *t, lift_belief *b, const adding *a, c
     double const det = eye_whiten(&r, sd, lift_residual(t, b, j));
     for (int32_t i = 0; i < 2; i++) {
         double const miss = r.y[i] - ((r.g[i][0] * about[0] + r.g[i][1] * about[1]) + r.g[i][2] * about[2]);
-        b->miss += miss * miss;
+        square[i] = miss * miss;
+        b->miss += square[i];
         put_row(t, b, &a->prior, m, spin, r.g[i], r.y[i], w + (size_t)i * (size_t)t->ld);
     }
     return det;
 }
 
 int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
-                  double depth, double *said)
+                  double depth, const lift_said *said)
 {
     lift_moment const m = lift_find_moment(t, at);
     adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
@@ -100,15 +101,17 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
         lift_marker r;
-        double x[3], own[3];
+        double x[3], own[3], square[2];
         if (!lift_seen_at(seen, j))
             continue;
         lift_marker_at(t, b, &m, j, &r, x);
         lift_to_world(&a.now, x, own);
-        if (said)
-            memcpy(said + 3 * j, own, sizeof own);
         det *= add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, &r, guess ? guess + 3 * j : own,
-                          t->W + (size_t)rows * (size_t)t->ld);
+                          t->W + (size_t)rows * (size_t)t->ld, square);
+        if (said) {
+            memcpy(said->place + 3 * j, own, sizeof own);
+            memcpy(said->square + rows, square, sizeof square);
+        }
         rows += 2;
         if (!(det > 1e-100 && det < 1e100)) {
             b->log_noise += 2.0 * m_log64(det);
@@ -121,9 +124,9 @@ int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_see
 }
 
 void lift_add(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
-              double depth, double *said)
+              double depth)
 {
-    int32_t const rows = lift_rows(t, b, at, seen, guess, depth, said);
+    int32_t const rows = lift_rows(t, b, at, seen, guess, depth, NULL);
     t->run->dense_rank(b->A, t->ld, t->W, rows);
 }
 

@@ -20,14 +20,19 @@ void lift_marker_moved(const lift_table *t, const lift_belief *b, const lift_mom
                        const double moved[3], lift_marker *r, double x[3]);
 /* Normal equations of the prior alone. */
 void lift_clear(const lift_table *t, lift_belief *b);
+typedef struct lift_said { /* what a belief says of the markers seen in a frame */
+    double *place;         /* J x 3 */
+    double *square;        /* squared white residuals of their rows */
+} lift_said;
+
 /* White rows t->W of a frame at moment `at`, in frames [0, F - 1]; returns how many. They are linearised
  * about guess (J x 3, what is unseen is not read); NULL: about what theta says; depth > 0: about nothing
- * but a rough depth. said (J x 3, may be NULL) receives where theta puts those seen. */
+ * but a rough depth. said may be NULL. */
 int32_t lift_rows(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
-                  double depth, double *said);
+                  double depth, const lift_said *said);
 /* The same, added to the equations. */
 void lift_add(const lift_table *t, lift_belief *b, double at, const lift_seen *seen, const double *guess,
-              double depth, double *said);
+              double depth);
 /* Solve for theta; false: not positive definite (numbers out of range). */
 bool lift_solve(const lift_table *t, lift_belief *b);
 /* log p(observations), nats. */

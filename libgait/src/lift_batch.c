@@ -64,7 +64,7 @@ bool lift_gain_fix(const lift_table *t, lift_gain *g, lift_belief *b, const doub
     lift_clear(t, b);
     for (int32_t f = 0; f < t->prior.frames; f++) {
         lift_seen const seen = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
-        lift_add(t, b, f, &seen, NULL, 0.0, NULL);
+        lift_add(t, b, f, &seen, NULL, 0.0);
     }
     if (!lift_solve(t, b))
         return false;

@@ -53,7 +53,7 @@ static void add_window(const lift_table *t, const lift_window *w, lift_belief *b
     lift_clear(t, b);
     for (int32_t f = 0; f < w->frames; f++) {
         lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
-        lift_add(t, b, w->at[f], &seen, NULL, depth, NULL);
+        lift_add(t, b, w->at[f], &seen, NULL, depth);
     }
 }
 
@@ -90,18 +90,26 @@ static double change(const lift_table *t, const lift_belief *b, const double *be
     return largest;
 }
 
-/* Back half way to the pass before, whose objective was lower. */
-static void halve(const lift_table *t, lift_belief *b, const double *before, double heading)
+/* Back by a share of the way to the pass before, whose objective was lower. */
+static void retreat(const lift_table *t, lift_belief *b, const double *before, double heading, double share)
 {
     for (int32_t i = 0; i < t->n; i++)
-        b->theta[i] = 0.5 * (b->theta[i] + before[i]);
-    b->heading = 0.5 * (b->heading + heading);
+        b->theta[i] += share * (before[i] - b->theta[i]);
+    b->heading += share * (heading - b->heading);
     if (t->turn >= 0 && t->cfg.heading_sd < 0.0)
         b->centre = b->heading;
 }
 
+/* log p(observations) by what they say at `objective`'s theta, where b->U is linear: Laplace's method. */
+static double evidence_at(const lift_table *t, const lift_belief *b, double lowest)
+{
+    double const log_two_pi = 1.83787706640934548356;
+    return -0.5 * (log_two_pi * b->observed + lowest) - dense_log_det(b->U, t->n, t->ld);
+}
+
 /* Gauss-Newton passes (perspective, unknown heading); one where all is linear. `first`: theta means nothing
- * yet. */
+ * yet.  Passes that end before they converge leave theta where its objective was lowest: what comes after has not been
+ * looked at. */
 static bool refine(const lift_table *t, const lift_window *w, lift_belief *b, double *before, bool first,
                    int32_t passes, lift_outcome *out)
 {
@@ -115,7 +123,7 @@ static bool refine(const lift_table *t, const lift_window *w, lift_belief *b, do
         add_window(t, w, b, rough ? (t->eye.perspective ? rough_depth(t, w, b) : 1.0) : 0.0);
         double const now = rough ? DBL_MAX : objective(t, b);
         if (now > lowest + 1e-9 * (1.0 + fabs(lowest))) {
-            halve(t, b, before, heading);
+            retreat(t, b, before, heading, 0.5);
             continue;
         }
         lowest = now;
@@ -126,6 +134,9 @@ static bool refine(const lift_table *t, const lift_window *w, lift_belief *b, do
         out->converged = linear || (!rough && change(t, b, before) < t->cfg.tolerance);
         follow_heading(t, b);
     }
+    if (!out->converged)
+        retreat(t, b, before, heading, 1.0);
+    out->evidence = out->converged ? lift_evidence(t, b) : evidence_at(t, b, lowest);
     return true;
 }
 
@@ -146,7 +157,7 @@ static bool follow(const lift_table *t, lift_search *s, const lift_window *w, li
         memcpy(b->theta, trial->theta, (size_t)t->n * sizeof *b->theta);
     if (!refine(t, w, b, s->before, first, first ? SCOUT_PASSES : t->cfg.max_iterations, out))
         return false;
-    trial->evidence = lift_evidence(t, b) + m_log64((double)t->prior.weight[b->component]);
+    trial->evidence = out->evidence + m_log64((double)t->prior.weight[b->component]);
     trial->heading = b->heading;
     memcpy(trial->theta, b->theta, (size_t)t->n * sizeof *b->theta);
     return true;

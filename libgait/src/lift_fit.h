@@ -26,7 +26,8 @@ typedef struct lift_window { /* observations of a segment */
 } lift_window;
 
 typedef struct lift_outcome {
-    double share; /* of the component among all, by evidence */
+    double share;    /* of the component among all, by evidence */
+    double evidence; /* log p(observations), nats */
     int32_t iterations;
     bool converged;
 } lift_outcome;

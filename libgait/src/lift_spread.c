@@ -50,7 +50,7 @@ void lift_likelihood_only(const lift_table *t, const lift_window *w, const lift_
     memset(S, 0, (size_t)ld * (size_t)ld * sizeof *S);
     for (int32_t f = 0; f < w->frames; f++) {
         lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
-        lift_add(&plain, &fit, w->at[f], &seen, NULL, 0.0, NULL);
+        lift_add(&plain, &fit, w->at[f], &seen, NULL, 0.0);
     }
     double *const y = t->W; /* free again: n numbers */
     for (int32_t i = 0; i < n; i++) {

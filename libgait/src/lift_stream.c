@@ -2,11 +2,14 @@
 
 #include "fmath.h"
 #include "lift_continue.h"
+#include "lift_doubt.h"
 #include "lift_read.h"
 
 #include <string.h>
 
 #define SLOWEST 10.0 /* frames per second down to which `lag` frames are kept */
+#define DOUBTS  0.25 /* share of doubted numbers from which a segment is the one that is wrong */
+enum { FITS = 4 };   /* of a segment at most, while they doubt points */
 
 static int32_t round_up(double x)
 {
@@ -25,9 +28,13 @@ void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s)
     s->past.utime = TAKE(a, int64_t, room);
     s->past.uv = TAKE(a, double, room * J * 2);
     s->past.sd = TAKE(a, double, room *J);
+    s->past.raw = TAKE(a, double, room *J);
     s->at = TAKE(a, double, room);
     s->uv = TAKE(a, double, room * J * 2);
     s->sd = TAKE(a, double, room *J);
+    s->calm = TAKE(a, double, room *J);
+    s->jump.frame = TAKE(a, int32_t, room);
+    s->jump.apart = TAKE(a, double, room);
     s->guess = TAKE(a, double, J * 3);
     s->mean = TAKE(a, double, J * 3);
     s->var = TAKE(a, double, J * 3);
@@ -68,29 +75,78 @@ static void keep_frame(const lift_table *t, lift_stream *s, int64_t utime, const
     s->past.utime[i] = s->last = utime;
     memcpy(s->past.uv + i * J * 2, seen->uv, J * 2 * sizeof(double));
     memcpy(s->past.sd + i * J, seen->sd, J * sizeof(double));
+    memcpy(s->past.raw + i * J, seen->sd, J * sizeof(double));
     s->pushed++;
 }
 
-/* Fit segment `index` to the frames that fall into it, whatever was thought of it before. */
-static bool fit_part(const lift_table *t, lift_search *search, lift_stream *s, int64_t index)
+/* A frame with the deviations that were observed. */
+static lift_seen raw_frame(const lift_table *t, const lift_stream *s, uint64_t frame)
+{
+    lift_seen seen = lift_stream_frame(t, s, frame);
+    seen.sd += s->past.raw - s->past.sd;
+    return seen;
+}
+
+/* The frames that fall into segment `index`; points that jump are not in `calm`. */
+static lift_window window_of(const lift_table *t, lift_stream *s, int64_t index)
 {
     size_t const J = (size_t)t->prior.markers;
     lift_window w = {.at = s->at, .uv = s->uv, .sd = s->sd};
-    lift_part *const part = lift_stream_part(s, index);
-    lift_outcome outcome;
     for (uint64_t f = oldest(s); f < s->pushed; f++) {
-        lift_seen const seen = lift_stream_frame(t, s, f);
+        lift_seen const seen = raw_frame(t, s, f);
         if (!lift_stream_covers(s, index, lift_stream_time(s, f)))
             continue;
         s->at[w.frames] = lift_stream_moment(t, s, index, lift_stream_time(s, f));
         memcpy(s->uv + (size_t)w.frames * J * 2, seen.uv, J * 2 * sizeof(double));
-        memcpy(s->sd + (size_t)w.frames * J, seen.sd, J * sizeof(double));
+        memcpy(s->calm + (size_t)w.frames * J, seen.sd, J * sizeof(double));
         w.frames++;
     }
+    lift_jump_clear(t, &w, s->calm, &s->jump);
+    return w;
+}
+
+/* Doubt points of a segment by a fit to them, whatever was doubted before; how many. */
+static int32_t doubt_window(const lift_table *t, lift_stream *s, const lift_window *w, const lift_belief *b)
+{
+    size_t const J = (size_t)t->prior.markers;
+    int32_t doubted = 0;
+    for (int32_t f = 0; f < w->frames; f++) {
+        lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = s->calm + (size_t)f * J};
+        doubted += lift_doubt(t, b, w->at[f], &seen, true, s->guess, s->sd + (size_t)f * J);
+    }
+    return doubted;
+}
+
+/* The frames of a window keep what was thought of their points. */
+static void keep_doubts(const lift_table *t, const lift_stream *s, int64_t index)
+{
+    size_t const J = (size_t)t->prior.markers;
+    const double *sd = s->sd;
+    for (uint64_t f = oldest(s); f < s->pushed; f++)
+        if (lift_stream_covers(s, index, lift_stream_time(s, f))) {
+            memcpy(s->past.sd + f % (uint64_t)s->past.room * J, sd, J * sizeof *sd);
+            sd += J;
+        }
+}
+
+/* Fit segment `index` to the frames that fall into it, whatever was thought of it before: to all points, then
+ * without those far from where the rest has them. */
+static bool fit_part(const lift_table *t, lift_search *search, lift_stream *s, int64_t index)
+{
+    lift_part *const part = lift_stream_part(s, index);
     lift_belief *const b = &part->belief[0];
-    memcpy(b->place, t->cfg.place, sizeof b->place);
-    if (!lift_fit(t, search, &w, b, &outcome))
-        return false;
+    lift_outcome outcome;
+    lift_window const w = window_of(t, s, index);
+    memcpy(s->sd, s->calm, (size_t)w.frames * (size_t)t->prior.markers * sizeof *s->sd);
+    int32_t doubted = 0, before = -1;
+    for (int32_t fits = 0; doubted != before && fits < FITS; fits++) {
+        before = doubted;
+        memcpy(b->place, t->cfg.place, sizeof b->place);
+        if (!lift_fit(t, search, &w, b, &outcome))
+            return false;
+        doubted = doubt_window(t, s, &w, b);
+    }
+    keep_doubts(t, s, index);
     int32_t const c = b->component;
     if (c != 0) { /* every component has a belief of its own */
         lift_belief const found = *b;
@@ -99,18 +155,30 @@ static bool fit_part(const lift_table *t, lift_search *search, lift_stream *s, i
     }
     part->index = index;
     part->best = c;
+    part->doubted = 2 * doubted;
     part->closed = true; /* the other components are not followed in this segment */
     return true;
 }
 
-/* Add a frame to every component of a segment.  Its first frames are linearised about the guess. */
-static void add_frame(const lift_table *t, const lift_stream *s, lift_part *part, uint64_t frame,
-                      const double *guess, double *said)
+/* Add a frame to every component of a segment, linearised about the guess. */
+static void add_frame(const lift_table *t, const lift_stream *s, lift_part *part, uint64_t frame)
 {
-    lift_seen const seen = lift_stream_frame(t, s, frame);
+    lift_seen const seen = lift_stream_frame(t, s, frame), raw = raw_frame(t, s, frame);
     for (int32_t c = 0; c < t->prior.components; c++)
         lift_add(t, &part->belief[c], lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)),
-                 &seen, guess, 0.0, c == part->best ? said : NULL);
+                 &seen, s->guess, 0.0);
+    for (int32_t j = 0; j < t->prior.markers; j++)
+        part->doubted += lift_seen_at(&raw, j) && seen.sd[j] > raw.sd[j] ? 2 : 0;
+}
+
+/* Where a segment has the points of the newest frame, and which are far from there. */
+static void judge_frame(const lift_table *t, lift_stream *s, const lift_part *part)
+{
+    uint64_t const frame = s->pushed - 1;
+    lift_seen const seen = raw_frame(t, s, frame);
+    (void)lift_doubt(t, &part->belief[part->best],
+                     lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)), &seen, false,
+                     s->guess, s->past.sd + frame % (uint64_t)s->past.room * (size_t)t->prior.markers);
 }
 
 static bool solve_part(const lift_table *t, lift_part *part)
@@ -145,6 +213,12 @@ static void guess_frame(const lift_table *t, lift_stream *s, const lift_part *pa
         memcpy(s->guess + 3 * marker[r], s->mean + 3 * r, 3 * sizeof *s->mean);
 }
 
+/* Are so many points of a segment doubted that it is the segment which is wrong? */
+static bool doubtful(const lift_part *part)
+{
+    return part->doubted > DOUBTS * part->belief[part->best].observed;
+}
+
 /* Begin segment `index` where the one before it will be, and add the frames that fall into it. */
 static bool open_part(const lift_table *t, lift_stream *s, int64_t index)
 {
@@ -157,7 +231,7 @@ static bool open_part(const lift_table *t, lift_stream *s, int64_t index)
         if (!lift_stream_covers(s, index, lift_stream_time(s, f)))
             continue;
         guess_frame(t, s, before, f);
-        add_frame(t, s, part, f, s->guess, NULL);
+        add_frame(t, s, part, f);
     }
     return solve_part(t, part);
 }
@@ -182,8 +256,8 @@ static bool close_part(const lift_table *t, lift_search *search, lift_stream *s,
         lift_stream_reset(s);
         return true;
     }
-    s->misfit =
-        t->cfg.misfit > 0.0 && t->cfg.heading_sd < 0.0 && lift_misfit(t, b) > t->cfg.misfit * b->observed;
+    bool const wrong = lift_misfit(t, b) > t->cfg.misfit * b->observed || doubtful(part);
+    s->misfit = wrong && t->cfg.misfit > 0.0 && t->cfg.heading_sd < 0.0;
     if (!s->misfit)
         return true;
     bool ok = fit_part(t, search, s, part->index);
@@ -193,8 +267,8 @@ static bool close_part(const lift_table *t, lift_search *search, lift_stream *s,
     return ok;
 }
 
-/* Add the newest frame to the segments it falls into, the oldest first: it says where the next is to be
- * linearised. */
+/* Add the newest frame to the segments it falls into, the oldest first: it says where all are to be linearised, and
+ * which points are doubted. */
 static bool follow(const lift_table *t, lift_search *search, lift_stream *s)
 {
     uint64_t const frame = s->pushed - 1;
@@ -210,11 +284,29 @@ static bool follow(const lift_table *t, lift_search *search, lift_stream *s)
                 return ok; /* begun anew: the frame has been added, or there is nobody */
             continue;
         }
-        add_frame(t, s, part, frame, first ? NULL : s->guess, first ? s->guess : NULL);
+        if (first)
+            judge_frame(t, s, part);
+        add_frame(t, s, part, frame);
         ok = ok && solve_part(t, part);
         first = false;
     }
     return ok;
+}
+
+/* Fit the first segment; where points contradict one another it begins with the next frame instead. */
+static bool begin(const lift_table *t, lift_search *search, lift_stream *s)
+{
+    if (lift_stream_time(s, s->pushed - 1) < s->span - 1e-9)
+        return true;
+    if (!fit_part(t, search, s, 0))
+        return false;
+    s->next = !doubtful(lift_stream_part(s, 0));
+    for (uint64_t f = oldest(s); !s->next && f < s->pushed; f++)
+        if (lift_stream_time(s, f) > 0.0) {
+            s->origin = s->past.utime[f % (uint64_t)s->past.room];
+            break;
+        }
+    return true;
 }
 
 static bool anybody(const lift_table *t, const lift_seen *seen)
@@ -238,16 +330,9 @@ bool lift_stream_push(const lift_table *t, lift_search *search, lift_stream *s, 
         s->origin = utime;
     }
     keep_frame(t, s, utime, seen);
-    bool ok = true;
-    if (s->next == 0) {
-        if (lift_stream_time(s, s->pushed - 1) < s->span - 1e-9)
-            return true;
-        ok = fit_part(t, search, s, 0);
-        s->next = 1;
-    } else {
-        ok = follow(t, search, s);
-    }
-    ok = ok && (s->origin < 0 || open_parts(t, s));
+    bool ok = s->next == 0 ? begin(t, search, s) : follow(t, search, s);
+    if (ok && s->origin >= 0 && s->next > 0)
+        ok = open_parts(t, s);
     if (!ok)
         lift_stream_reset(s);
     return ok;

@@ -2,26 +2,30 @@
  * it falls into, and an estimate blends those that cover a moment. */
 #ifndef GAIT_LIFT_STREAM_H
 #define GAIT_LIFT_STREAM_H
-#include "lift_fit.h"
+#include "lift_jump.h"
 
 typedef struct lift_part { /* one segment */
     int64_t index;         /* it begins at index x hop / fps */
     int32_t best;          /* component of the largest evidence */
     bool closed;           /* no frame will be added any more */
+    int32_t doubted;       /* numbers observed that have lost their say */
     lift_belief *belief;   /* K */
 } lift_part;
 
 typedef struct lift_past { /* frames that may be needed again, a ring */
     int32_t room;
     int64_t *utime;
-    double *uv, *sd; /* room x J x 2, ideal; room x J */
+    double *uv;       /* room x J x 2, ideal */
+    double *sd, *raw; /* room x J: what the points have to say; as observed */
 } lift_past;
 
 typedef struct lift_stream {
     lift_past past;
     lift_part *part; /* ring of `parts`: those of the last indices */
     int32_t parts;
-    double *at, *uv, *sd;       /* window for a fit: past.room moments and observations */
+    double *at, *uv, *sd; /* window for a fit: past.room moments and observations */
+    double *calm;         /* deviations of the points in it that do not jump */
+    lift_jump_room jump;
     double *guess, *mean, *var; /* J x 3 */
     double *new_uv, *new_sd;    /* the frame that comes in */
     double span, step; /* seconds: from a segment's first frame to its last; to the next segment's first */

@@ -5,6 +5,7 @@
 
 #define KNOWN_STATURE_SD                                                                                     \
     0.04 /* metres, of a stature that somebody gives: shoes, posture, where markers are */
+#define FURTHEST          1e6  /* pixels or metres; what is further off is not seen */
 #define PEOPLE_STATURE_SD 0.09 /* metres, among people */
 
 /* x is in [low, high]; NaN is not. */
@@ -102,8 +103,8 @@ void lifter_take(const gait_lift *l, size_t points, const double *uv, const doub
 {
     const lift_table *const t = &l->table;
     for (size_t i = 0; i < points; i++) {
-        bool const finite = fabs(uv[2 * i]) <= DBL_MAX && fabs(uv[2 * i + 1]) <= DBL_MAX;
-        to_sd[i] = finite ? (sd ? sd[i] : t->cfg.sd) : -1.0;
+        bool const there = fabs(uv[2 * i]) <= FURTHEST && fabs(uv[2 * i + 1]) <= FURTHEST;
+        to_sd[i] = there ? (sd ? sd[i] : t->cfg.sd) : -1.0;
         to_uv[2 * i] = to_uv[2 * i + 1] = 0.0;
         if (to_sd[i] > 0.0 && to_sd[i] <= DBL_MAX)
             eye_ideal(&t->eye, uv + 2 * i, to_uv + 2 * i);

@@ -39,11 +39,14 @@ int main(void)
     const gait_abi_field *const table = gait_abi_fields(&count);
     CHECK(gait_abi_fields(NULL) == table);
     uint32_t rows = 0;
+    for (uint32_t i = 0; i < count; i++)
+        CHECK(memchr(table[i].type, 0, sizeof table[i].type) &&
+              memchr(table[i].field, 0, sizeof table[i].field));
     for (size_t s = 0; s < sizeof structs / sizeof *structs; s++) {
         int const first = find(table, count, structs[s].type);
-        CHECK(first >= 0 && !table[first].field && table[first].size == structs[s].size);
+        CHECK(first >= 0 && !table[first].field[0] && table[first].size == structs[s].size);
         uint32_t at = 0, i = (uint32_t)first + 1;
-        for (; i < count && table[i].field; i++) {
+        for (; i < count && table[i].field[0]; i++) {
             CHECK(strcmp(table[i].type, structs[s].type) == 0 && table[i].offset == at && table[i].size > 0);
             at = table[i].offset + table[i].size;
         }

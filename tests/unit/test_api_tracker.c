@@ -103,7 +103,7 @@ static void test_floats(void)
     uint32_t count = 0;
     const gait_abi_field *const f = gait_abi_fields(&count);
     for (uint32_t i = 0; i < count; i++)
-        if (f[i].field && strcmp(f[i].type, "gait_tracker_config") == 0 &&
+        if (strcmp(f[i].type, "gait_tracker_config") == 0 &&
             f[i].offset >= offsetof(gait_tracker_config, term_weight) &&
             f[i].offset < offsetof(gait_tracker_config, camera) && strcmp(f[i].field, "offset_angles") != 0 &&
             strcmp(f[i].field, "cpu_mask") != 0)

@@ -11,7 +11,7 @@
 enum { STREAM = 120, RATE = 30 };
 
 /* Digest of the film's estimates; after a deliberate change of the lifter's numbers the one that this test prints. */
-#define GOLDEN UINT64_C(0x9a316708155f2472)
+#define GOLDEN UINT64_C(0xff9c4523489a26d4)
 
 static gait_lift_frame out;
 static double uv[TOY_MARKERS * 2], seen[TOY_MARKERS];
@@ -47,8 +47,8 @@ static void body(int frame, double (*X)[3])
     memcpy(X, segment, TOY_MARKERS * sizeof *X);
 }
 
-/* Push a frame; returns what the call did. */
-static gait_status push(gait_lift *l, const gait_lift_config *c, int frame, double noise)
+/* What is seen of a frame: uv and seen. */
+static void see(const gait_lift_config *c, int frame, double noise)
 {
     double X[TOY_MARKERS][3];
     uint32_t seed = 77u + (uint32_t)frame;
@@ -56,6 +56,12 @@ static gait_status push(gait_lift *l, const gait_lift_config *c, int frame, doub
     toy_lift_see(c, (const double (*)[3])X, TOY_MARKERS, noise, seed, uv);
     for (int j = 0; j < TOY_MARKERS; j++)
         seen[j] = toy_random(&seed) > 0.7 ? INFINITY : noise;
+}
+
+/* Push a frame; returns what the call did. */
+static gait_status push(gait_lift *l, const gait_lift_config *c, int frame, double noise)
+{
+    see(c, frame, noise);
     return gait_lift_push(l, utime_of(frame), uv, seen, NULL);
 }
 
@@ -171,6 +177,49 @@ static void test_report(void)
     }
 }
 
+/* Points far off, from the first segment on, are left out: nothing that is estimated goes with them. */
+static void test_wrong_points(double off)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    c.lag = 5;
+    gait_lift *const l = toy_lift_open(&c);
+    double most = 0.0, worst = 0.0;
+    int count = 0;
+    for (int i = 0; i < STREAM; i++) {
+        see(&c, i, 1.0);
+        if (i % 7 == 3)
+            for (int a = 0; a < 2; a++)
+                uv[2 * (i % TOY_MARKERS) + a] += i % 2 ? off : -off;
+        CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+        if (gait_lift_estimate(l, &out) != GAIT_OK || out.status != GAIT_STATUS_TRACKING)
+            continue;
+        most = fmax(most, error_of(&out, &worst));
+        count++;
+    }
+    CHECK(count > STREAM / 2);
+    CHECK(most < 0.1 && worst < 6.0);
+}
+
+/* Noise that is four times what was said widens the deviations by as much. */
+static void test_noise(void)
+{
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    double sd[2] = {0.0};
+    for (int loud = 0; loud < 2; loud++) {
+        gait_lift *const l = toy_lift_open(&c);
+        for (int i = 0; i < STREAM; i++) {
+            see(&c, i, loud ? 4.0 : 1.0);
+            for (int j = 0; j < TOY_MARKERS; j++)
+                seen[j] = isfinite(seen[j]) ? 1.0 : seen[j];
+            CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+            if (gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING)
+                sd[loud] += out.sd[3][1] / STREAM;
+        }
+        CHECK(loud ? out.misfit > 4.0 : out.misfit < 2.0);
+    }
+    CHECK(sd[1] > 2.0 * sd[0] && sd[1] < 4.0 * sd[0]);
+}
+
 /* A segment that does not fit is looked for anew: somebody else walks the other way. */
 static void test_misfit(void)
 {
@@ -179,12 +228,11 @@ static void test_misfit(void)
     c.misfit = 4.0;
     c.sd = 0.5;
     gait_lift *const l = toy_lift_open(&c);
-    double worst = 0.0;
+    double X[TOY_MARKERS][3];
     int flagged = 0;
     for (int i = 0; i < STREAM; i++) {
-        double X[TOY_MARKERS][3];
-        body(i < 60 ? i : STREAM - i, X);
-        for (int j = 0; i >= 60 && j < TOY_MARKERS; j++) /* turned about by half a turn, too */
+        body(i, X);
+        for (int j = 0; i >= 60 && j < TOY_MARKERS; j++) /* turned about by half a turn */
             for (int a = 0; a < 2; a++)
                 X[j][a] = -X[j][a];
         toy_lift_see(&c, (const double (*)[3])X, TOY_MARKERS, 0.5, (uint32_t)i, uv);
@@ -192,8 +240,9 @@ static void test_misfit(void)
         CHECK(i < 20 || gait_lift_estimate(l, &out) == GAIT_OK);
         flagged += (out.flags & GAIT_LIFT_MISFIT) != 0;
     }
-    CHECK(flagged > 0 && out.status == GAIT_STATUS_TRACKING && isfinite(out.marker[1][0]));
-    CHECK(error_of(&out, &worst) < 10.0);
+    CHECK(flagged > 0 && out.status == GAIT_STATUS_TRACKING);
+    for (int j = 0; j < TOY_MARKERS; j++)
+        CHECK(toy_distance(out.marker[j], X[j]) < 0.1);
 }
 
 /* Hash of every estimate of the film. */
@@ -225,6 +274,9 @@ int main(int argc, char **argv)
     test_order();
     test_report();
     test_misfit();
+    test_noise();
+    for (double off = 50.0; off < 1e31; off *= 10.0)
+        test_wrong_points(off);
     CHECK(golden_line(digest(0), GOLDEN, "stream", "scalar") == GOLDEN);
     for (uint32_t mask = 1; mask <= 7; mask++)
         CHECK(digest(mask) == GOLDEN);

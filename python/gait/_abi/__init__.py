@@ -245,10 +245,7 @@ def verify(library: ctypes.CDLL) -> list[str]:
     """Compare the layout compiled into the library with `layout`; return one line per difference."""
     count = c_uint32()
     rows = library.gait_abi_fields(ctypes.byref(count))
-    theirs = {
-        (row.type.decode(), (row.field or b"").decode()): (row.offset, row.size)
-        for row in rows[: count.value]
-    }
+    theirs = {(row.type.decode(), row.field.decode()): (row.offset, row.size) for row in rows[: count.value]}
     ours = layout()
     faults = []
     for key in sorted(ours.keys() | theirs.keys()):

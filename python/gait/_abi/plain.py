@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from ctypes import (
     c_char,
-    c_char_p,
     c_float,
     c_int32,
     c_uint32,
@@ -13,7 +12,7 @@ from ctypes import (
 )
 from enum import IntEnum, IntFlag
 
-ABI = 5
+ABI = 6
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_MARKERS = 64
@@ -99,7 +98,7 @@ class Error(ctypes.Structure):
 class AbiField(ctypes.Structure):
     """``gait_abi_field``."""
 
-    _fields_ = [("type", c_char_p), ("field", c_char_p), ("offset", c_uint32), ("size", c_uint32)]
+    _fields_ = [("type", c_char * 20), ("field", c_char * 20), ("offset", c_uint32), ("size", c_uint32)]
 
 
 class ImageView(ctypes.Structure):
