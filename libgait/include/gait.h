@@ -305,7 +305,7 @@ typedef struct gait_lift_config {
     double   stature;         /* metres; default 0: the learners' mean */
     double   stature_sd;      /* metres; default -1: 0.04, or 0.09 where stature is 0; 0: exactly that */
     double   sd;              /* of an observation where none is given, pixels or metres; default 3 */
-    double   residual;        /* factor of what the modes leave over [0, 100]; default -1: the blob's; 0: the paper's form */
+    double   residual;        /* factor of what the modes leave over [0, 1e4]; default -1: the blob's; 0: the paper's form */
     double   place[3];        /* where the pelvis of the first frame is expected, metres; default 0 (z: of the floor) */
     double   place_sd[3];     /* default 10 10 0.03; 0: exactly there */
     double   heading;         /* of the body in the first frame about z, radians; 0 = along +x */

@@ -3,7 +3,7 @@
 
     make eval-lift, or lift_mocap.py
 
-Every sequence is left out of what its prior is learnt from.  Segments are placed as in the prior (pelvis over
+The whole subject of a sequence is left out of what its prior is learnt from.  Segments are placed as in the prior (pelvis over
 the origin in the first frame, heading known, as in the paper's axes) and seen from eight sides; the C core
 lifts them.
 """
@@ -100,8 +100,8 @@ def main() -> int:
 
 
 def learnt_without(file: Path, model: Path, sources: tuple[str, ...], modes: int = 50) -> SegmentPrior:
-    """Prior of all recordings of folders but one."""
-    out = f"{file.parent.name}/{file.name}"
+    """Prior of all recordings of folders but those of a file's subject, whose folder it is in."""
+    out = f"{file.parent.name}/*"
     command = ["learn", *(str(MOCAP / source) for source in sources), "--segments", "only"]
     command += ["--exclude", out, "--segment-modes", str(modes), "-o", str(model), "--jobs", "1", "--quiet"]
     subprocess.run([sys.executable, "-m", "gait", *command], check=True, stdout=subprocess.DEVNULL)
@@ -245,7 +245,7 @@ def _publish(rows: list[list[object]], missing: list[list[object]]) -> None:
         f"held: whether from {COVERAGE[0]} to {COVERAGE[1]}. "
         "Volume: log10 of the posterior's over the prior's. The walk's prior is learnt from cmu_walk, "
         f"{MODES['cmu_walk']} modes; the others' from cmu_misc, {MODES['cmu_misc']} modes (lift_modes says "
-        "why) or a quarter of the segments; all but the sequence itself (--segments only). Wanted: Bayes "
+        "why) or a quarter of the segments; all but what the sequence's subject did (--segments only). Wanted: Bayes "
         f"better at every noise, by {RATIO} at 50 mm (met); both coverages held by all together at every "
         "noise, as the reference counts (which motions alone hold them is told); of all together Bayes at "
         f"most {NEAR_BEST} of the best weight's."
