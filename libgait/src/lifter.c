@@ -39,10 +39,10 @@ static gait_status check_config(const gait_lift_config *c, gait_error *err)
         : !within(c->stature, 0.0, 10.0) ? "stature is not in [0, 10] metres"
         : c->stature_sd != -1.0 && !within(c->stature_sd, 0.0, 1.0)
             ? "stature_sd is neither -1 nor in [0, 1] metres"
-        : !within(c->sd, 1e-9, 1e9)                               ? "sd is not in [1e-9, 1e9]"
-        : c->residual != -1.0 && !within(c->residual, 0.0, 1e4)   ? "residual is neither -1 nor in [0, 10000]"
-        : !place                                                  ? "place or place_sd is out of range"
-        : !within(c->heading, -100.0, 100.0)                      ? "heading is not in [-100, 100] radians"
+        : !within(c->sd, 1e-9, 1e9)                             ? "sd is not in [1e-9, 1e9]"
+        : c->residual != -1.0 && !within(c->residual, 0.0, 1e4) ? "residual is neither -1 nor in [0, 10000]"
+        : !place                                                ? "place or place_sd is out of range"
+        : !within(c->heading, -100.0, 100.0)                    ? "heading is not in [-100, 100] radians"
         : c->heading_sd != -1.0 && !within(c->heading_sd, 0.0, 10.0)
             ? "heading_sd is neither -1 nor in [0, 10] radians"
         : !within(c->turn_sd, 1e-6, 10.0)                  ? "turn_sd is not in [1e-6, 10] radians"

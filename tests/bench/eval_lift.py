@@ -27,6 +27,7 @@ PARTS = {
     "lift_volume.py": ("lift_volume",),
     "lift_tracks.py": ("lift_dev", "lift_balancing"),
     "lift_parts.py": ("lift_parts",),
+    "lift_sides.py": ("lift_sides",),
     "lift_stream.py": ("lift_stream",),
     "lift_people.py": ("lift_people",),
     "lift_images.py": ("lift_sticks", "lift_clips", "lift_outdoor"),

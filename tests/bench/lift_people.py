@@ -71,18 +71,23 @@ def main() -> int:
     if not eval_clips.DATA.is_dir():
         print(f"lift_people: {eval_clips.DATA} is not there, left out", file=sys.stderr)
         return 0
-    clips, paths = eval_clips.walkers()
-    rng, found = np.random.default_rng(SEED), []
-    walks = [walk for clip in clips for walk in _walks(clip, paths[str(clip.subject)], rng)]
-    with one_thread(), progress("people", len(walks)) as update:
-        for done, walk in enumerate(walks, 1):
+    everybody, found = walks(np.random.default_rng(SEED)), []
+    with one_thread(), progress("people", len(everybody)) as update:
+        for done, walk in enumerate(everybody, 1):
             found.append((walk.clip, *_lifted(walk)))
             update(done)
-    of = {clip.name: [one for one in found if one[0] == clip.name] for clip in clips}
-    rows = [_row(name, its) for name, its in of.items() if its]
+    names = dict.fromkeys(walk.clip for walk in everybody)
+    of = {name: [one for one in found if one[0] == name] for name in names}
+    rows = [_row(name, its) for name, its in of.items()]
     rows.append(_row("all", found))
     _publish(rows)
     return "NO" in rows[-1]
+
+
+def walks(rng: np.random.Generator) -> list[Walk]:
+    """Walks of all clips' people, each of them `TIMES` in a row."""
+    clips, paths = eval_clips.walkers()
+    return [walk for clip in clips for walk in _walks(clip, paths[str(clip.subject)], rng)]
 
 
 def _walks(clip: Clip, model: Path, rng: np.random.Generator) -> Iterator[Walk]:

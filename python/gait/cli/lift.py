@@ -39,7 +39,7 @@ HELP = "2-D joint tracks, or a video, to 3-D"
 
 _ONLY_TRACKS = (
     *("orthographic", "metres_per_unit", "height", "pixel_sd", "floor_sd", "method", "no_contact"),
-    *("no_bones", "ignore_unknown", "keep_jumps", "trc"),
+    *("no_bones", "ignore_unknown", "keep_sides", "keep_jumps", "trc"),
 )
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
 PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
@@ -109,6 +109,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--no-bones", action="store_true", help="smooth: let bones change their length")
     add("--ignore-unknown", action="store_true", help="leave out points that the model does not know")
     add(
+        "--keep-sides",
+        action="store_true",
+        help="keep left and right as they are where they seem exchanged for some frames",
+    )
+    add(
         "--keep-jumps",
         action="store_true",
         help="keep points that are far from where they were a frame before and after",
@@ -133,7 +138,9 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     prior = lift_prior.load(args.model, args.quiet)
     tracks = lift_tracks.read(args.input, prior, args.pixel_sd or PIXEL_SD, args.ignore_unknown, args.quiet)
-    pixel_sd, jumps = args.pixel_sd or lift_tracks.noise(tracks, args.quiet), 0
+    pixel_sd, exchanged, jumps = args.pixel_sd or lift_tracks.noise(tracks, args.quiet), 0, 0
+    if not args.keep_sides:
+        tracks, exchanged = lift_tracks.with_sides(tracks, pixel_sd, args.quiet, " (--keep-sides)")
     if not args.keep_jumps:
         tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
     names = motion.output_names(prior, tracks, args.all_markers)
@@ -148,7 +155,7 @@ def run(args: argparse.Namespace) -> int:
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
-    summary = _summary(args, tracks, found) | {"jumps": jumps, "pixel_sd": pixel_sd}
+    summary = _summary(args, tracks, found) | {"exchanged": exchanged, "jumps": jumps, "pixel_sd": pixel_sd}
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
 

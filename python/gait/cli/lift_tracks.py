@@ -10,13 +10,13 @@ from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.learn.stage import one_thread
-from gait.lift import motion, outliers, tracks_file
+from gait.lift import motion, outliers, sides, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.result import Motion, Options
 from gait.lift.tracks_file import Tracks
 from gait.progress import progress
 
-MOST_JUMPS = 5  # named
+MOST_JUMPS, MOST_SPANS = 5, 4  # named
 SHAKY = 1.3  # times a standard deviation from which points shake more than it says
 
 
@@ -42,6 +42,30 @@ def noise(tracks: Tracks, quiet: bool) -> float:
             file=sys.stderr,
         )
     return shake
+
+
+def with_sides(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, int]:
+    """Put left and right back where they were exchanged, tell where (`hint`: and what to do), count the points."""
+    found, exchanged = sides.put_back(tracks, sd)
+    if exchanged and not quiet:
+        print(_exchanged(exchanged) + hint, file=sys.stderr)
+        unclear = [each.joint for each in exchanged if each.share > sides.UNCLEAR]
+        if unclear:
+            print(f"left and right of {', '.join(unclear)} may be wrong in all other frames", file=sys.stderr)
+    moved = (found.uv != tracks.uv).any(axis=2) & tracks.seen
+    return found, int(moved.sum())
+
+
+def _exchanged(exchanged: list[sides.Exchanged]) -> str:
+    """Name stretches of frames, the longest first, and what was exchanged in them."""
+    joints: dict[tuple[int, int], list[str]] = {}
+    for each in exchanged:
+        for span in each.spans:
+            joints.setdefault(span, []).append(each.joint)
+    spans = sorted(joints, key=lambda span: span[0] - span[1])
+    named = [f"{', '.join(joints[span])} in frames {span[0]} to {span[1]}" for span in spans[:MOST_SPANS]]
+    more = f" and {len(spans) - MOST_SPANS} more stretches" if len(spans) > MOST_SPANS else ""
+    return f"left and right were exchanged and are put back: {'; '.join(named)}{more}"
 
 
 def without_jumps(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, int]:

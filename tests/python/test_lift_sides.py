@@ -1,0 +1,96 @@
+"""Left and right points that were exchanged for some frames are put back; others stay."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gait.lift.sides import put_back
+from gait.lift.tracks_file import Tracks
+
+NAMES = ("pelvis", "l_knee", "r_knee", "l_ankle", "r_ankle")
+LEFT, RIGHT = [1, 3], [2, 4]
+FRAMES, NOISE = 90, 2.0
+
+
+def walking(rate=30.0, gaps=0.0, noise=NOISE):
+    """Legs that swing past each other once a second, as from the side, while the body moves on."""
+    rng = np.random.default_rng(6)
+    time = np.arange(FRAMES) / rate
+    swing = np.sin(2 * np.pi * (time + 0.13))
+    u = 50 * time[:, None] + np.stack([0 * swing, 25 * swing, -25 * swing, 40 * swing, -40 * swing], axis=1)
+    v = np.array([200, 260, 260, 310, 310]) + 8 * np.abs(swing)[:, None] * [0, 1, -1, 2, -2]
+    uv = np.stack([u, v + np.zeros_like(u)], axis=2) + noise * rng.normal(size=(FRAMES, 5, 2))
+    uv[rng.random((FRAMES, 5)) < gaps] = np.nan
+    return Tracks(np.arange(FRAMES) + 7, time, NAMES, uv, rng.uniform(0.8, 1, (FRAMES, 5)))
+
+
+def exchanged(tracks, first, last, left=LEFT, right=RIGHT):
+    """Tracks with sides exchanged in rows `first` to `last`."""
+    uv, confidence = tracks.uv.copy(), tracks.confidence.copy()
+    for values in (uv, confidence):
+        values[first : last + 1, left + right] = values[first : last + 1, right + left]
+    return replace(tracks, uv=uv, confidence=confidence)
+
+
+@pytest.mark.parametrize("rate", [25, 30, 60])
+@pytest.mark.parametrize("gaps", [0.0, 0.1])
+def test_what_is_right_stays(rate, gaps):
+    tracks = walking(rate, gaps)
+    kept, found = put_back(tracks, NOISE)
+    assert found == []
+    np.testing.assert_array_equal(kept.uv, tracks.uv)
+    np.testing.assert_array_equal(kept.confidence, tracks.confidence)
+
+
+@pytest.mark.parametrize("rate", [30, 60])
+@pytest.mark.parametrize(("first", "last"), [(20, 20), (31, 36), (30, 50), (0, 9), (75, 89)])
+def test_exchanged_legs_are_put_back_and_named(rate, first, last):
+    tracks = walking(rate)
+    back, found = put_back(exchanged(tracks, first, last), NOISE)
+    assert [each.joint for each in found] == ["knee", "ankle"]
+    for each in found:
+        assert each.share == pytest.approx((last - first + 1) / FRAMES, abs=0.03)
+        assert abs(each.spans[0][0] - 7 - first) <= 1 and abs(each.spans[-1][1] - 7 - last) <= 1
+    off = np.linalg.norm(back.uv - tracks.uv, axis=2)
+    assert off.max() < 20  # where the legs meet either reading may be right
+    assert np.array_equal(back.confidence[off == 0], tracks.confidence[off == 0])
+
+
+def test_one_joint_alone_and_gaps():
+    tracks = walking(gaps=0.15)
+    back, found = put_back(exchanged(tracks, 40, 55, [3], [4]), NOISE)
+    assert [each.joint for each in found] == ["ankle"]
+    assert np.nanmax(np.linalg.norm(back.uv - tracks.uv, axis=2)) < 20
+
+
+def test_several_stretches():
+    spoilt = exchanged(exchanged(walking(), 10, 14), 60, 70)
+    _, found = put_back(spoilt, NOISE)
+    assert [len(each.spans) for each in found] == [2, 2]
+
+
+def test_most_frames_are_right():
+    """Exchanged from the middle on: the shorter part is put back, and its share says how clear that is."""
+    tracks = walking()
+    back, found = put_back(exchanged(tracks, 50, 89), NOISE)
+    np.testing.assert_allclose(back.uv[:49], tracks.uv[:49])
+    assert all(0.4 < each.share < 0.5 for each in found)
+
+
+def test_slow_pictures_and_few_frames_are_left_alone():
+    spoilt = exchanged(walking(10), 30, 50)
+    assert put_back(spoilt, NOISE) == (spoilt, [])
+    few = exchanged(walking(), 1, 1)
+    few = replace(few, frame=few.frame[:2], time=few.time[:2], uv=few.uv[:2], confidence=few.confidence[:2])
+    assert put_back(few, NOISE) == (few, [])
+    alone = replace(walking(), names=("pelvis", "l_knee", "r_hip", "neck", "r_ankle"))
+    assert put_back(alone, NOISE)[1] == []
+    never = replace(walking(), uv=np.full((FRAMES, 5, 2), np.nan))
+    assert put_back(never, NOISE)[1] == []
+
+
+def test_an_outlier_is_no_exchange():
+    tracks = walking()
+    tracks.uv[33, 3] += [150, -60]
+    assert put_back(tracks, NOISE)[1] == []
