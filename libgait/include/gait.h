@@ -361,7 +361,7 @@ GAIT_API gait_status gait_lift_init(void *mem, size_t mem_bytes, const void *blo
 GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL out of range */
 
 /* One segment.  uv [F][J][2]; sd [F][J] or NULL (config sd): infinite, NaN or <= 0 is not seen, as is a uv
- * that is NaN or beyond 1e6. */
+ * that is NaN, beyond 1e6 or, in perspective, exactly 0, 0, where detectors put what they do not see. */
 GAIT_API gait_status gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
 /* Of the last gait_lift_segment() (GAIT_ERR_STATE without one): posterior mean [F][J][3] and standard deviation (may

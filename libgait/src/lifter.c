@@ -103,7 +103,10 @@ void lifter_take(const gait_lift *l, size_t points, const double *uv, const doub
 {
     const lift_table *const t = &l->table;
     for (size_t i = 0; i < points; i++) {
-        bool const there = fabs(uv[2 * i]) <= FURTHEST && fabs(uv[2 * i + 1]) <= FURTHEST;
+        double const u = fabs(uv[2 * i]), v = fabs(uv[2 * i + 1]);
+        bool const corner =
+            t->eye.perspective && u == 0.0 && v == 0.0; /* where detectors put what they do not see */
+        bool const there = u <= FURTHEST && v <= FURTHEST && !corner;
         to_sd[i] = there ? (sd ? sd[i] : t->cfg.sd) : -1.0;
         to_uv[2 * i] = to_uv[2 * i + 1] = 0.0;
         if (to_sd[i] > 0.0 && to_sd[i] <= DBL_MAX)

@@ -200,6 +200,24 @@ static void test_wrong_points(double off)
     CHECK(most < 0.1 && worst < 6.0);
 }
 
+/* Points at 0, 0 are not seen. */
+static void test_zeros(void)
+{
+    static gait_lift_frame other;
+    gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
+    for (int zeros = 0; zeros < 2; zeros++) {
+        gait_lift *const l = toy_lift_open(&c);
+        for (int i = 0; i < STREAM; i++) {
+            see(&c, i, 1.0);
+            int const j = i % TOY_MARKERS;
+            uv[2 * j] = uv[2 * j + 1] = zeros ? 0.0 : NAN;
+            CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+        }
+        CHECK(gait_lift_estimate(l, zeros ? &out : &other) == GAIT_OK);
+    }
+    CHECK(memcmp(&out, &other, sizeof out) == 0);
+}
+
 /* Noise that is four times what was said widens the deviations by as much. */
 static void test_noise(void)
 {
@@ -277,6 +295,7 @@ int main(int argc, char **argv)
     test_noise();
     for (double off = 50.0; off < 1e31; off *= 10.0)
         test_wrong_points(off);
+    test_zeros();
     CHECK(golden_line(digest(0), GOLDEN, "stream", "scalar") == GOLDEN);
     for (uint32_t mask = 1; mask <= 7; mask++)
         CHECK(digest(mask) == GOLDEN);

@@ -45,7 +45,7 @@ def noise(tracks: Tracks, quiet: bool) -> float:
 
 
 def with_sides(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, int]:
-    """Put left and right back where they were exchanged, tell where (`hint`: and what to do), count the points."""
+    """Put left and right back where they were exchanged, tell where (and `hint`), count the points."""
     found, exchanged = sides.put_back(tracks, sd)
     if exchanged and not quiet:
         print(_exchanged(exchanged) + hint, file=sys.stderr)

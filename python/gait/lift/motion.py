@@ -252,7 +252,7 @@ def _alone(
     at = grid.between(tracks.time)
     placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
     markers = prior.index(tracks.names)
-    # neighbours see the same points: mixing them does not make the estimate surer, and where they differ it is less sure
+    # neighbours see the same points: mixed they are no surer, and where they differ less sure
     apart = join(places**2, grid.frames) - join(places, grid.frames) ** 2
     spread = np.sqrt(join(spread, grid.frames) ** 2 + np.maximum(apart, 0.0))
     sd = interpolated(spread, at[0], np.abs(at[1]))
