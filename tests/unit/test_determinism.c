@@ -4,7 +4,7 @@
  * With the argument `digest` it only prints those of every film (golden.h). */
 #include "gait_pool.h"
 #include "golden.h"
-#include "toy_film.h"
+#include "toy_films.h"
 #include "tracker.h"
 
 #include "check.h"
@@ -35,7 +35,9 @@
 #define THREADS_WATCHED 0
 #endif
 
-enum { STEPS = 50, SAVE_AT = 25, MOST_PIECES = 65, NEXT_PIECES = THREADS_WATCHED ? 13 : SANITIZED ? 7 : 1 };
+/* Of 50 frames two are never sent: 48 steps. */
+enum { SHOTS = 50, GAP = 30, GAP_END = 32, SAVE_AT = 25 };
+enum { MOST_PIECES = 65, NEXT_PIECES = THREADS_WATCHED ? 13 : SANITIZED ? 7 : 1 };
 
 /* gait_tasks that does the last piece first. */
 static void run_backwards(void *user, gait_task_fn *fn, void *ctx, int32_t count)
@@ -45,117 +47,24 @@ static void run_backwards(void *user, gait_task_fn *fn, void *ctx, int32_t count
         fn(ctx, count);
 }
 
-static gait_tracker_config config(void)
-{
-    gait_tracker_config cfg = toy_config(2);
-    cfg.particles = 100; /* not a multiple of a block */
-    cfg.offset_angles = GAIT_OFFSETS_TRUNK;
-    return cfg;
-}
-
-/* ---- a film with all that a frame may bring: colours, a lens, joints that a detector found ---- */
-typedef uint8_t colours[3 * SCENE_PIXELS];
-
-static gait_image coloured(const uint8_t *grey, int k, uint8_t *pixels)
-{
-    for (int32_t i = 0; i < SCENE_PIXELS; i++) {
-        uint8_t *const p = pixels + 3 * (ptrdiff_t)i;
-        p[0] = grey[i];
-        p[1] = (uint8_t)(20 + grey[i] * 3 / 4);
-        p[2] = (uint8_t)(60 + grey[i] * 5 / 8 + i % 7);
-    }
-    return (gait_image){.data = pixels,
-                        .width = SCENE_W,
-                        .height = SCENE_H,
-                        .stride = 3 * SCENE_W,
-                        .format = k ? GAIT_RGB8 : GAIT_BGR8};
-}
-
-static void detect(const gait_camera *cam, int n, gait_track *out)
-{
-    gait_state const truth = toy_walk((float)n / 30.0f);
-    gait_pose pose;
-    gait_model_info info;
-    CHECK(gait_model_pose(toy_model(), &truth, &pose) == GAIT_OK);
-    CHECK(gait_model_get_info(toy_model(), &info) == GAIT_OK);
-    for (int32_t j = 0; j < info.joints; j++) {
-        uint32_t const chance = toy_hash((uint32_t)n, (uint32_t)j, 91);
-        float uv[2] = {0}, u, v;
-        camera_project(cam, pose.joint[j], uv);
-        camera_distort(cam, uv[0], uv[1], &u, &v);
-        out[j] = (gait_track){.u = u + (float)(chance % 5) - 2.0f,
-                              .v = v + (float)(chance / 5 % 5) - 2.0f,
-                              .sd = chance % 11 ? 2.0f : 0.0f};
-    }
-}
-
-static gait_tracker_config config_given(void)
-{
-    static const float lens[5] = {-0.11f, 0.03f, 0.002f, -0.001f, 0.004f};
-    gait_tracker_config cfg = config();
-    cfg.terms |= GAIT_TERM_TRACKS;
-    for (int k = 0; k < cfg.cameras; k++)
-        memcpy(cfg.camera[k].distortion, lens, sizeof lens);
-    return cfg;
-}
-
-static void step_given(const gait_tracker_config *cfg, gait_tracker *t, int n, uint32_t missing,
-                       gait_estimate *e)
-{
-    static colours shot[SCENE_CAMERAS];
-    gait_track track[SCENE_CAMERAS][GAIT_MAX_JOINTS];
-    gait_frame f = toy_frame(n);
-    for (int k = 0; k < cfg->cameras; k++) {
-        detect(&cfg->camera[k], n, track[k]);
-        f.tracks[k] = n % 5 == 2 ? NULL : track[k];
-        if (!(missing >> k & 1u))
-            f.image[k] = coloured(film[k][n], k, shot[k]);
-    }
-    CHECK(gait_tracker_step(t, &f, e, NULL) == GAIT_OK);
-}
-
-static bool is_given(const gait_tracker_config *cfg)
-{
-    return cfg->terms & GAIT_TERM_TRACKS;
-}
-
-/* ---- a film whose phase is unknown: a search with more particles, two sides, a decision ---- */
-static gait_tracker_config config_search(void)
-{
-    gait_tracker_config cfg = config();
-    cfg.search_particles = 2 * cfg.particles;
-    return cfg;
-}
-
-static bool is_search(const gait_tracker_config *cfg)
-{
-    return cfg->search_particles > 0;
-}
-
 static gait_tracker *start(const gait_tracker_config *cfg, int n, float wide)
 {
-    static colours wall[SCENE_CAMERAS]; /* the tracker looks at it again */
-    gait_tracker *const t = is_search(cfg) ? film_doubtful(cfg, 0.5f) : film_tracker(cfg, n, wide);
-    for (int k = 0; is_given(cfg) && k < cfg->cameras; k++) {
-        gait_image const plate = coloured(film_wall[k], k, wall[k]);
-        CHECK(gait_tracker_set_background(t, k, &plate) == GAIT_OK);
-    }
+    gait_tracker *const t = toy_tracker_new(cfg);
+    films_start(t, cfg, n, wide);
     return t;
 }
 
 /* ---- digests ---- */
-/* Cameras that miss now and then, a gap, and the digest of all that was reported on the way. */
+/* Steps of frames from .. to: cameras miss now and then, a gap; the digest of all that was reported on the way. */
 static uint64_t advance(const gait_tracker_config *cfg, gait_tracker *t, int from, int to, uint64_t hash)
 {
     for (int n = from; n < to; n++) {
         uint32_t const missing = n % 9 == 4 ? 2u : n == 40 ? 3u : 0u;
         gait_estimate e;
-        if (n == 30 || n == 31)
+        if (n >= GAP && n < GAP_END)
             continue;
-        if (is_given(cfg))
-            step_given(cfg, t, n, missing, &e);
-        else
-            film_step(t, 2, n, missing, &e);
+        gait_frame const f = films_frame(cfg, n, missing);
+        CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
         uint32_t part[2];
         for (size_t i = 0; i < sizeof e; i += sizeof part) {
             memcpy(part, (const char *)&e + i, sizeof part);
@@ -166,8 +75,8 @@ static uint64_t advance(const gait_tracker_config *cfg, gait_tracker *t, int fro
     return hash;
 }
 
-/* Digest of so many steps: state at the end and every estimate; save_at: saved, and continued by another tracker. */
-static uint64_t run_steps(const gait_tracker_config *cfg, int save_at, int steps)
+/* Digest of so many frames: state at the end and every estimate; save_at: saved, and continued by another tracker. */
+static uint64_t run_frames(const gait_tracker_config *cfg, int save_at, int frames)
 {
     gait_tracker *t = start(cfg, 0, 1.0f);
     uint64_t hash = 0;
@@ -182,7 +91,7 @@ static uint64_t run_steps(const gait_tracker_config *cfg, int save_at, int steps
         CHECK(gait_tracker_restore(t, mem, bytes, NULL) == GAIT_OK);
         free(mem);
     }
-    hash = advance(cfg, t, save_at, steps, hash);
+    hash = advance(cfg, t, save_at, frames, hash);
     hash ^= gait_tracker_digest(t);
     toy_tracker_free(t);
     return hash;
@@ -190,19 +99,7 @@ static uint64_t run_steps(const gait_tracker_config *cfg, int save_at, int steps
 
 static uint64_t run(const gait_tracker_config *cfg, int save_at)
 {
-    return run_steps(cfg, save_at, STEPS);
-}
-
-/* The paper's mode: texture alone, a multinomial draw at every frame, random walks. */
-static gait_tracker_config config_paper(void)
-{
-    gait_tracker_config cfg = config();
-    cfg.mode = GAIT_MODE_PAPER;
-    cfg.terms = GAIT_TERM_TEXTURE;
-    cfg.resample_ess = 1.0f;
-    cfg.evidence_time = cfg.mingle_time = cfg.tilt_time = cfg.coef_time = cfg.rate_time = 0.0f;
-    cfg.offset_angles = 0;
-    return cfg;
+    return run_frames(cfg, save_at, SHOTS);
 }
 
 /* Masks of instruction sets: each of them alone, any together, none (scalar). */
@@ -216,22 +113,22 @@ static uint64_t masked(gait_tracker_config cfg, uint32_t mask)
 
 static uint64_t digest_usual(uint32_t mask)
 {
-    return masked(config(), mask);
+    return masked(films_config(FILMS_USUAL), mask);
 }
 
 static uint64_t digest_paper(uint32_t mask)
 {
-    return masked(config_paper(), mask);
+    return masked(films_config(FILMS_PAPER), mask);
 }
 
 static uint64_t digest_given(uint32_t mask)
 {
-    return masked(config_given(), mask);
+    return masked(films_config(FILMS_GIVEN), mask);
 }
 
 static uint64_t digest_search(uint32_t mask)
 {
-    return masked(config_search(), mask);
+    return masked(films_config(FILMS_SEARCH), mask);
 }
 
 static int print_digests(void)
@@ -244,11 +141,11 @@ static int print_digests(void)
 /* The film of the search has all its stages: more particles, two sides, one of them given up. */
 static void test_search_is_decided(void)
 {
-    gait_tracker_config const cfg = config_search();
+    gait_tracker_config const cfg = films_config(FILMS_SEARCH);
     gait_tracker *const t = start(&cfg, 0, 1.0f);
     advance(&cfg, t, 0, SAVE_AT, 0);
     CHECK(t->core->modes.stage == MODES_FORKED && t->cfg.particles == cfg.search_particles);
-    advance(&cfg, t, SAVE_AT, STEPS, 0);
+    advance(&cfg, t, SAVE_AT, SHOTS, 0);
     CHECK(t->core->modes.stage == MODES_SINGLE && t->cfg.particles == cfg.particles);
     toy_tracker_free(t);
 }
@@ -258,7 +155,7 @@ static void test_pieces_and_threads(void)
 {
     static unsigned char memory[16384] __attribute__((aligned(GAIT_ALIGN)));
     for (int32_t tasks = MOST_PIECES; tasks > 0; tasks -= NEXT_PIECES) {
-        gait_tracker_config cfg = config();
+        gait_tracker_config cfg = films_config(FILMS_USUAL);
         gait_pool *pool = NULL;
         CHECK(gait_pool_init(memory, sizeof memory, 1 + (tasks - 1) % 16, &pool, NULL) == GAIT_OK);
         cfg.tasks = tasks <= 64 ? tasks : 256;
@@ -277,17 +174,17 @@ static void test_a_crowd_in_pieces(void)
     static const int32_t pieces[][2] = {{2, 2},   {5, 3},  {16, 4}, {23, 1},
                                         {64, 16}, {68, 5}, {69, 2}, {256, 3}};
     static unsigned char memory[16384] __attribute__((aligned(GAIT_ALIGN)));
-    enum { CROWD = 1099, CROWD_STEPS = SANITIZED || THREADS_WATCHED ? 4 : 12 };
-    gait_tracker_config cfg = config();
+    enum { CROWD = 1099, CROWD_SHOTS = SANITIZED || THREADS_WATCHED ? 4 : 12 };
+    gait_tracker_config cfg = films_config(FILMS_USUAL);
     cfg.particles = CROWD;
     cfg.tasks = 1;
-    uint64_t const alone = run_steps(&cfg, 0, CROWD_STEPS);
+    uint64_t const alone = run_frames(&cfg, 0, CROWD_SHOTS);
     for (size_t k = 0; k < sizeof pieces / sizeof *pieces; k++) {
         gait_pool *pool = NULL;
         CHECK(gait_pool_init(memory, sizeof memory, pieces[k][1], &pool, NULL) == GAIT_OK);
         cfg.tasks = pieces[k][0];
         cfg.exec = gait_pool_tasks(pool);
-        CHECK(run_steps(&cfg, k % 3 ? 0 : CROWD_STEPS / 2, CROWD_STEPS) == alone);
+        CHECK(run_frames(&cfg, k % 3 ? 0 : CROWD_SHOTS / 2, CROWD_SHOTS) == alone);
         gait_pool_stop(pool);
     }
 }
@@ -295,8 +192,8 @@ static void test_a_crowd_in_pieces(void)
 static void test_instruction_sets(void)
 {
     for (uint32_t mask = 0; mask < MASKS; mask++) {
-        gait_tracker_config cfg = config(), paper = config_paper(), given = config_given(),
-                            search = config_search();
+        gait_tracker_config cfg = films_config(FILMS_USUAL), paper = films_config(FILMS_PAPER),
+                            given = films_config(FILMS_GIVEN), search = films_config(FILMS_SEARCH);
         cfg.cpu_mask = paper.cpu_mask = given.cpu_mask = search.cpu_mask = mask;
         given.tasks = 1 + (int32_t)mask;
         CHECK(run(&search, mask & 1 ? SAVE_AT : 0) == GOLDEN_SEARCH);
@@ -308,7 +205,7 @@ static void test_instruction_sets(void)
 
 static void test_order(void)
 {
-    gait_tracker_config cfg = config();
+    gait_tracker_config cfg = films_config(FILMS_USUAL);
     cfg.exec.run = run_backwards;
     CHECK(run(&cfg, 0) == GOLDEN);
     CHECK(run(&cfg, 41) == GOLDEN); /* stopped right after a frame that nobody saw */
@@ -316,7 +213,7 @@ static void test_order(void)
 
 static void test_another_seed(void)
 {
-    gait_tracker_config cfg = config();
+    gait_tracker_config cfg = films_config(FILMS_USUAL);
     cfg.seed++;
     CHECK(run(&cfg, 0) != GOLDEN);
 }
@@ -324,7 +221,7 @@ static void test_another_seed(void)
 int main(int argc, char **argv)
 {
     _Static_assert(sizeof(gait_estimate) % 8 == 0, "hashed in words of 8 bytes");
-    film_make(SCENE_CAMERAS, STEPS);
+    film_make(SCENE_CAMERAS, SHOTS);
     if (argc > 1)
         return strcmp(argv[1], "digest") == 0 ? (print_digests() + check_failed) != 0 : 2;
     CHECK(golden_line(digest_usual(~0u), GOLDEN, "default", "best") == GOLDEN);

@@ -33,11 +33,7 @@ static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, 
 static inline gait_tracker *film_doubtful(const gait_tracker_config *cfg, float phase_sd)
 {
     gait_tracker *const t = film_tracker(cfg, 0, 1.0f);
-    gait_state const mean = toy_walk(0.0f);
-    gait_state sd = toy_doubt(1.0f);
-    sd.phase = phase_sd;
-    if (gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) != GAIT_OK)
-        abort();
+    toy_tracker_doubt(t, phase_sd);
     return t;
 }
 

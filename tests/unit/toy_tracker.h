@@ -2,7 +2,8 @@
  *
  *   gait_tracker_config cfg = toy_config(1);         300 particles, all terms; change what the test needs
  *   gait_tracker *t = toy_tracker_new(&cfg);         in exactly the memory it asks for; stops the test on failure
- *   toy_tracker_start(t, seconds, 0.5f);             near the truth: a normal start of half the usual spread
+ *   toy_tracker_start(t, n, 0.5f);                   near the truth of frame n, with half the usual spread
+ *   toy_tracker_doubt(t, 0.5f);                      at frame 0, with so wide a phase
  *   toy_tracker_step(t, n, shots, &e);               frame n of the scene; shots[camera] NULL: missed
  *   toy_tracker_free(t); */
 #ifndef TOY_TRACKER_H
@@ -95,12 +96,25 @@ static inline gait_state toy_doubt(float wide)
     return sd;
 }
 
+static inline void toy_tracker_begin(gait_tracker *t, int n, const gait_state *sd)
+{
+    gait_state const mean = toy_walk((float)n / 30.0f);
+    gait_error err = {0};
+    if (gait_tracker_start(t, &mean, sd, toy_frame(n).utime, &err) != GAIT_OK)
+        toy_stop("start", &err);
+}
+
 static inline void toy_tracker_start(gait_tracker *t, int n, float wide)
 {
-    gait_state const mean = toy_walk((float)n / 30.0f), sd = toy_doubt(wide);
-    gait_error err = {0};
-    if (gait_tracker_start(t, &mean, &sd, toy_frame(n).utime, &err) != GAIT_OK)
-        toy_stop("start", &err);
+    gait_state const sd = toy_doubt(wide);
+    toy_tracker_begin(t, n, &sd);
+}
+
+static inline void toy_tracker_doubt(gait_tracker *t, float phase_sd)
+{
+    gait_state sd = toy_doubt(1.0f);
+    sd.phase = phase_sd;
+    toy_tracker_begin(t, 0, &sd);
 }
 
 static inline void toy_tracker_step(gait_tracker *t, int n, const uint8_t *const shots[SCENE_CAMERAS],
