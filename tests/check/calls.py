@@ -1,36 +1,106 @@
 #!/usr/bin/env python3
-"""calls.py [-v] LIMIT FILE.ci...: no function calls itself, and no path takes more than LIMIT bytes of stack.
+"""calls.py LIMIT FILE.ci...: no function calls itself, and no path takes more than LIMIT bytes of stack.
 
-The files are gcc's call graphs (-fcallgraph-info=su).  A call through a pointer can reach every function that
-nothing calls by name and that is not exported: `NESTED` of them (pool, piece, range, term), then one kernel.
--v: say the deepest.
+The files are gcc's call graphs (-fcallgraph-info=su), read where gcc ran.  A call through a pointer reaches
+the kernels of that name, or what POINTERS names; any other every function whose address is taken.  The stack
+of functions that are not in the graphs is not counted: libc's, and those of a caller who brings threads.
 """
 
 import re
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
-NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "[^"]*\\n(\d+) bytes \(', re.M)
-EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', re.M)
-ISA = re.compile(r"_(scalar|base|avx2|avx512)$")
-POINTER, NESTED = "__indirect_call", 4
+NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "[^"]*\\n([^"]*?):\d+:\d+\\n(\d+) bytes \(', re.M)
+EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"(?: label: "([^"]*)")?', re.M)
+UNIT = re.compile(r'^graph: \{ title: "([^"]+)"', re.M)
+NO_CODE = re.compile(r"""/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])+'""", re.S)
+VALUE = re.compile(r"(?:[,(){=&?:]|\breturn\b)\s*(?!return\b)(\w+)\b(?!\s*\()")
+ISA = r"_(scalar|base|avx2|avx512)"
+POINTER = "__indirect_call"
+POINTERS = {  # file and name of a pointer: functions it may point to
+    "task.c:run": "run",
+    "pool.c:fn": "run_one",
+    "task.c:fn": r"\w+_range",
+    "like.c:log_likelihood": "log_likelihood",
+    "like.c:support": "support",
+}
+THREADS = {"pool.c:helper"}  # on a stack of their own
 
 
-def read(paths: list[str]) -> tuple[dict[str, int], dict[str, set[str]]]:
-    """Stack of each function in bytes and whom it calls; statics are named by their object file as well."""
-    stack: dict[str, int] = {}
-    calls: dict[str, set[str]] = {}
+class Function(NamedTuple):
+    """Name without what gcc adds, frame in bytes, sources that it is compiled from."""
+
+    name: str
+    stack: int
+    files: frozenset[str]
+    static: bool
+
+
+class Graph(NamedTuple):
+    """Functions by title, whom they call by name, and the places where they call through pointers."""
+
+    functions: dict[str, Function]
+    calls: dict[str, set[str]]
+    places: dict[str, set[str]]
+
+
+def read(paths: list[str]) -> Graph:
+    """All graphs as one; statics are titled by their object file as well."""
+    graph = Graph({}, {}, {})
     for path in paths:
         text = Path(path).read_text(encoding="utf-8")
+        unit = UNIT.findall(text)[0]
 
-        def unique(name: str, path: str = path) -> str:
-            return f"{Path(path).stem}:{name.rsplit(':', 1)[1]}" if ":" in name else name
+        def unique(title: str, path: str = path) -> str:
+            return f"{Path(path).stem}:{title.rsplit(':', 1)[1]}" if ":" in title else title
 
-        for name, size in NODE.findall(text):
-            stack[unique(name)] = int(size)
-        for source, target in EDGE.findall(text):
-            calls.setdefault(unique(source), set()).add(unique(target))
-    return stack, calls
+        for title, file, size in NODE.findall(text):
+            name = title.rsplit(":", 1)[-1].split(".")[0]
+            graph.functions[unique(title)] = Function(name, int(size), frozenset({unit, file}), ":" in title)
+        for source, target, place in EDGE.findall(text):
+            into = graph.places if target == POINTER else graph.calls
+            into.setdefault(unique(source), set()).add(place if target == POINTER else unique(target))
+    return graph
+
+
+def taken(graph: Graph) -> set[str]:
+    """Functions whose name stands in the sources as a value; of statics in their own."""
+    files = {f for function in graph.functions.values() for f in function.files}
+    values = {f: set(VALUE.findall(NO_CODE.sub(" ", Path(f).read_text(encoding="utf-8")))) for f in files}
+    return {
+        title
+        for title, function in graph.functions.items()
+        if any(function.name in values[f] for f in (function.files if function.static else files))
+    }
+
+
+def pointer(place: str) -> str:
+    """File and name of what is called at file:line:column."""
+    file, line, column = place.rsplit(":", 2)
+    code = Path(file).read_text(encoding="utf-8").splitlines()[int(line) - 1][int(column) - 1 :]
+    name = re.match(r"[^(]*?(\w+)\s*\(", code)
+    return f"{Path(file).name}:{name[1] if name else '?'}"
+
+
+def reached(graph: Graph, values: set[str], name: str) -> set[str]:
+    """Functions that a call through a pointer may reach."""
+    kernels = re.compile(name.rsplit(":", 1)[1] + ISA)
+    found = {title for title in graph.functions if kernels.fullmatch(title)}
+    wanted = POINTERS.get(name, ".*")
+    return found or {t for t in values if re.fullmatch(wanted, graph.functions[t].name)}
+
+
+def resolve(graph: Graph) -> set[str]:
+    """Add what pointers reach to the calls; returns functions that are values of none."""
+    values = taken(graph)
+    left = values - THREADS
+    for source, places in graph.places.items():
+        for name in map(pointer, places):
+            to = reached(graph, values, name)
+            graph.calls.setdefault(source, set()).update(to)
+            left -= to
+    return left
 
 
 def cycle(calls: dict[str, set[str]]) -> list[str] | None:
@@ -51,41 +121,35 @@ def cycle(calls: dict[str, set[str]]) -> list[str] | None:
     return next((found for name in sorted(calls) if (found := visit(name, []))), None)
 
 
-def deepest(stack: dict[str, int], calls: dict[str, set[str]]) -> tuple[int, list[str]]:
-    """Bytes of the deepest path and the functions on it; no function is on it twice (`cycle`)."""
-    known: dict[str, tuple[int, list[str]]] = {POINTER: (0, [])}
+def deepest(graph: Graph) -> tuple[int, list[str]]:
+    """Bytes of the deepest path and the functions on it; there are no circles."""
+    known: dict[str, tuple[int, list[str]]] = {}
     nothing: tuple[int, list[str]] = (0, [])
 
-    def depth(name: str) -> tuple[int, list[str]]:
-        if name not in known:
-            below = max((depth(t) for t in calls.get(name, ())), default=nothing)
-            known[name] = (stack.get(name, 0) + below[0], [name, *below[1]])
-        return known[name]
+    def depth(title: str) -> tuple[int, list[str]]:
+        if title not in known:
+            below = max((depth(t) for t in graph.calls.get(title, ())), default=nothing)
+            own = graph.functions[title].stack if title in graph.functions else 0
+            known[title] = (own + below[0], [title, *below[1]])
+        return known[title]
 
-    named = {target for targets in calls.values() for target in targets}
-    pointed = [n for n in stack if n not in named and not n.startswith("gait_")]
-    kernel = max((depth(n) for n in pointed if ISA.search(n)), default=nothing)  # they call no others
-    others = sorted(depth(n) for n in pointed if not ISA.search(n))
-    exported = (depth(n) for n in stack if n.startswith("gait_"))
-    path = [max(exported, default=nothing), *others[: -NESTED - 1 : -1], kernel]
-    if not any(POINTER in targets for targets in calls.values()):
-        path = [max(map(depth, stack), default=nothing)]
-    return sum(size for size, _ in path), [name for _, names in path for name in names]
+    return max(map(depth, graph.functions), default=nothing)
 
 
 def main() -> int:
-    words = [word for word in sys.argv[1:] if word != "-v"]
-    limit, files = int(words[0]), words[1:]
-    stack, calls = read(files)
-    if not stack:
+    limit, files = int(sys.argv[1]), sys.argv[2:]
+    graph = read(files)
+    if not graph.functions:
         print("no call graphs: build with gcc")
         return 1
-    if circle := cycle(calls):
+    if left := resolve(graph):
+        print(f"called through a pointer that POINTERS does not name: {' '.join(sorted(left))}")
+        return 1
+    if circle := cycle(graph.calls):
         print(f"recursion: {' -> '.join(circle)}")
         return 1
-    size, path = deepest(stack, calls)
-    if size > limit or "-v" in sys.argv:
-        print(f"{size} bytes of stack: {' > '.join(path)}")
+    size, path = deepest(graph)
+    print(f"{size} bytes of stack at most, libc's own not counted: {' > '.join(path)}")
     return size > limit
 
 

@@ -6,7 +6,8 @@ text='mem(cpy|set|move|cmp|chr)|str(len|cmp|ncmp|chr|rchr|nlen)|vsnprintf'
 exact='(sqrt|floor|ceil|trunc|rint|nearbyint|fabs|fmod|ldexp|frexp|scalbn)f?'
 threads='pthread_(create|join|sigmask|(mutex|cond)_(init|destroy)|mutex_(un)?lock|cond_(wait|signal|broadcast))|sigfillset'
 frame='__cxa_finalize|_ITM_(de)?registerTMCloneTable|__gmon_start__|__stack_chk_fail|__assert_fail|__(memcpy|memset|memmove|vsnprintf)_chk'
-needed=$(readelf -d "$1" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | grep -vE "^($libs)\$")
+needed=$(readelf -d "$1") && calls=$(nm -D -u "$1") || exit 1
+needed=$(echo "$needed" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | grep -vE "^($libs)\$")
 [ -z "$needed" ] || { printf 'depends on:\n%s\n' "$needed"; exit 1; }
-calls=$(nm -D -u "$1" | awk '{ sub("@.*", "", $2); print $2 }' | grep -vE "^($text|$exact|$threads|$frame)\$")
+calls=$(echo "$calls" | awk '{ sub("@.*", "", $2); print $2 }' | grep -vE "^($text|$exact|$threads|$frame)\$")
 [ -z "$calls" ] || { printf 'calls outside the list of this script:\n%s\n' "$calls"; exit 1; }

@@ -3,11 +3,12 @@
 # none that a compiler's own library brought into the linked one, where only the C runtime has some.
 library=$1; shift
 sections='\.(data|bss|tdata|tbss|init_array|fini_array|ctors|dtors)'
-found=$(size -A "$@" | awk -v sections="^$sections(\\\\.|\$)" '
+sizes=$(size -A "$@") && linked=$(readelf -SsW "$library") || exit 1
+found=$(echo "$sizes" | awk -v sections="^$sections(\\\\.|\$)" '
     / :$/ { file = $1 }
     $2 > 0 && $1 !~ /^\.data\.rel\.ro/ && $1 ~ sections { print file, $1, $2, "bytes" }
     $1 == "COMMON" && $2 > 0 { print file, $1, $2, "bytes" }'
-    { readelf -SW "$library"; readelf -sW "$library"; } | sed 's/^ *\[ *\([0-9]*\)\]/section \1/' | awk -v file="$library" '
+    echo "$linked" | sed 's/^ *\[ *\([0-9]*\)\]/section \1/' | awk -v file="$library" '
     $1 == "section" { size[$3] = $7 }
     $1 == "section" && $3 ~ /^\.(data|bss|tdata|tbss)$/ { writable[$2] = $3 }
     $4 ~ /^(OBJECT|TLS)$/ && $3 > 0 && $7 in writable && $8 !~ /^(completed(\.[0-9]+)?|__dso_handle)$/ {

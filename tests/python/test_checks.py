@@ -67,13 +67,35 @@ def test_deps_sees_a_library_and_an_inexact_function(tmp_path):
 )
 def test_static_init_sees_a_writable_global(tmp_path, code):
     table = CLEAN + 'const char *const names[] = {"a", "b"};'
-    assert run("static_init.sh", build(tmp_path, table, "-c", "-fPIC")).returncode == 0
-    assert fails(run("static_init.sh", build(tmp_path, code)), "a.o")
+    clean = build(tmp_path, table, "-c", "-fPIC")
+    assert run("static_init.sh", clean, clean).returncode == 0
+    writes = build(tmp_path, code)
+    assert fails(run("static_init.sh", writes, writes), "a.o")
 
 
 def test_static_init_sees_a_constructor(tmp_path):
     code = "int g(); const int hits = g();"
-    assert fails(run("static_init.sh", build(tmp_path, code, suffix=".cpp")), "a.o")
+    runs = build(tmp_path, code, suffix=".cpp")
+    assert fails(run("static_init.sh", runs, runs), "a.o")
+
+
+def test_size_sees_a_large_library(tmp_path):
+    (tmp_path / "release").mkdir()
+    library = build(tmp_path, CLEAN, "-shared", "-fPIC", out="release/liba.so")
+    assert run("size.sh", library, 100_000).returncode == 0
+    about = subprocess.run(
+        ["readelf", "-h", "-p", ".comment", library], capture_output=True, text=True
+    ).stdout
+    if "X86-64" in about and "clang" not in about:
+        assert fails(run("size.sh", library, 1000), "bytes when stripped")
+
+
+@pytest.mark.parametrize("script", ["no_heap.sh", "deps.sh", "threads.sh", "size.sh", "static_init.sh"])
+def test_a_file_that_is_not_there_proves_nothing(tmp_path, script):
+    there = build(tmp_path, CLEAN)
+    for files in [tmp_path / "absent.o", there], [there, tmp_path / "absent.o"]:
+        if script not in {"deps.sh", "size.sh"} or files[1] == there:
+            assert fails(run(script, *files), "absent.o")
 
 
 def library_pair(tmp_path: Path, code: str) -> tuple[Path, Path]:
@@ -225,6 +247,12 @@ def graphs() -> bool:
             DEEP + "void *p(void) { return k; } void gait_f(void (*h)(void)) { char b[9000]; g(b); h(); }",
             "> a:k",
         ),
+        (
+            "static int b(int); int gait_a(int n) { int (*p)(int) = b; return p(n); } "
+            "int b(int n) { return gait_a(n); }",
+            "recursion: a:b -> gait_a -> a:b",
+        ),
+        (DEEP + "void *p(void) { return k; }", "POINTERS does not name: a:k"),
     ],
 )
 def test_calls_sees_recursion_and_a_deep_path(tmp_path, code, words):
