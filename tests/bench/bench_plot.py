@@ -1,4 +1,4 @@
-"""Draw what ``make bench`` wrote: stages by instruction set, cost by particles and picture, steps by mode."""
+"""Draw what ``make bench`` wrote: speed, stages, and cost by particles, threads, memory and picture size."""
 
 from __future__ import annotations
 
@@ -10,10 +10,14 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-PARTS = ["kinematics", "projection", "raster", "samples", "texture", "silhouette", "edges", "template"]
-WHOLE = ["features", "resample", "propagate", "weights", "estimate", "lag"]
 Row = dict[str, str]
+
+
+def section(rows: list[Row], name: str) -> list[Row]:
+    """Rows of one table of the bench."""
+    return [r for r in rows if r["section"] == name]
 
 
 def number(row: Row, name: str) -> float:
@@ -26,84 +30,133 @@ def per_particle(row: Row, name: str) -> float:
     return 1e6 * number(row, name) / number(row, "particles")
 
 
+def by_threads(rows: list[Row]) -> dict[str, list[Row]]:
+    """Rows of each number of threads, in the order of the table."""
+    return {n: [r for r in rows if r["threads"] == n] for n in dict.fromkeys(r["threads"] for r in rows)}
+
+
+def threads(count: str) -> str:
+    """Words for a number of threads."""
+    return f"{count} thread{'s' if count != '1' else ''}"
+
+
+def stages(row: Row) -> list[str]:
+    """Columns of a step's stages, the likelihood's parts in its place."""
+    parts = [name for name in row if name.startswith("likelihood_")]
+    whole = [name for name in row if name.startswith("stage_")]
+    at = whole.index("stage_likelihood_ms")
+    return whole[:at] + parts + whole[at + 1 :]
+
+
+def draw_modes(axes: Axes, rows: list[Row]) -> None:
+    """Frames a second of the settings in use, by time of day."""
+    runs = by_threads([r for r in section(rows, "modes") if r["what"] != "twins"])
+    for k, (count, of) in enumerate(runs.items()):
+        at = [i + 0.4 * k for i in range(len(of))]
+        rates = [1e3 / number(r, "median_ms") for r in of]
+        bars = axes.bar(at, rates, 0.4, label=threads(count))
+        axes.bar_label(bars, [f"{x:.0f}" for x in rates])
+    names = [f"{r['what']}\n{int(r['particles']):,}" for r in runs["1"]]
+    axes.set_xticks([i + 0.2 * (len(runs) - 1) for i in range(len(names))], names)
+    axes.axhline(30, color="grey", lw=0.8, ls="--", label="30 frames a second")
+    axes.margins(y=0.15)
+    axes.set_ylabel("frames a second, median step by time of day")
+    axes.legend()
+    axes.set_title("speed by mode and number of particles")
+
+
 def draw_stages(axes: Axes, rows: list[Row]) -> None:
-    """Where the time goes with each instruction set, 10,000 particles."""
-    runs = [r for r in rows if r["what"] == "default" and r["particles"] == "10000" and r["features_ms"]]
-    runs = list({r["isa"]: r for r in reversed(runs)}.values())[::-1]
-    names = [r["isa"] for r in runs]
+    """Where the time goes with each instruction set."""
+    runs = section(rows, "isa")
+    names = [f"{r['isa']}\n{per_particle(r, 'cpu_ms'):,.0f} ns" for r in runs]
     left = [0.0] * len(runs)
-    for k, part in enumerate(PARTS + WHOLE):
-        wide = [per_particle(r, f"{part}_ms") for r in runs]
-        axes.barh(names, wide, left=left, label=part, color=plt.get_cmap("tab20")(k))
+    for k, stage in enumerate(stages(runs[0])):
+        wide = [100 * number(r, stage) / number(r, "cpu_ms") for r in runs]
+        label = stage.split("_")[1]
+        axes.barh(names, wide, left=left, label=label, color=plt.get_cmap("tab20")(k))
         left = [a + b for a, b in zip(left, wide, strict=True)]
-    for name, end in zip(names, left, strict=True):
-        axes.text(end, name, f" {end:.0f}", va="center")
-    axes.set_xlim(0, 1.12 * max(left))
+    rest = [100 - a for a in left]
+    axes.barh(names, rest, left=left, label="the rest", color="lightgrey")
+    axes.set_xlim(0, 100)
     axes.invert_yaxis()
-    axes.set_xlabel("CPU ns per particle, 10,000 particles, one thread")
-    axes.legend(fontsize=7, ncols=2, loc="lower right")
-    axes.set_title("stages of a step")
+    axes.set_xlabel("% of a step's CPU time")
+    axes.legend(fontsize=8, ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.15))
+    axes.set_title(f"stages by instruction set, ns per particle, {int(runs[0]['particles']):,} of them")
 
 
-def draw_sizes(axes: Axes, rows: list[Row]) -> None:
+def draw_particles(axes: Axes, rows: list[Row]) -> None:
     """Cost of a particle by their number."""
-    runs = [r for r in rows if r["what"] == "default" and r["isa"] == rows[0]["isa"] and r["height"] == "480"]
-    last = {int(r["particles"]): r for r in runs if r["threads"] == "1" and r["features_ms"]}  # one each
-    many = sorted(last)
-    runs = [last[n] for n in many]
-    axes.semilogx(many, [per_particle(r, "cpu_ms") for r in runs], "o-", label="whole step")
-    axes.semilogx(many, [per_particle(r, "likelihood_ms") for r in runs], "s-", label="likelihood")
+    runs = section(rows, "particles")
+    many = [number(r, "particles") for r in runs]
+    axes.semilogx(many, [per_particle(r, "cpu_ms") for r in runs], "o-", label="whole step, features too")
+    axes.semilogx(many, [per_particle(r, "stage_likelihood_ms") for r in runs], "s-", label="likelihood")
     axes.set_ylim(bottom=0)
     axes.set_xlabel("particles")
-    axes.set_ylabel("CPU ns per particle")
-    axes.legend()
-    axes.set_title(f"cost by number of particles ({rows[0]['isa']})")
+    axes.set_ylabel("CPU ns per particle, one thread")
+    axes.legend(loc="lower right")
+    axes.set_title("cost of a particle by their number")
+
+
+def draw_threads(axes: Axes, rows: list[Row]) -> None:
+    """What more threads make of a step, and what two trackers that share nothing make of the cores."""
+    for count, of in by_threads(section(rows, "threads")).items():
+        gain = [1 / number(r, "ratio") for r in of]
+        axes.semilogx([number(r, "particles") for r in of], gain, "o-", label=threads(count))
+    for r in section(rows, "modes"):
+        if r["what"] == "twins":
+            label = "two trackers at the same time, together"
+            axes.plot(number(r, "particles"), 2 / number(r, "ratio"), "kx", label=label)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("particles")
+    axes.set_ylabel("steps in the time of one by one thread")
+    axes.legend(loc="lower right")
+    axes.set_title("speed by threads")
+
+
+def draw_memory(axes: Axes, rows: list[Row]) -> None:
+    """Memory of the tracker, which is all that it ever takes."""
+    for marker, (count, of) in zip("osd^v", by_threads(section(rows, "threads")).items(), strict=False):
+        many, size = ([scale * number(r, c) for r in of] for c, scale in (("particles", 1), ("bytes", 1e-6)))
+        axes.loglog(many, size, f"{marker}-", fillstyle="none", label=threads(count))
+    for x, y in zip(many, size, strict=True):
+        axes.annotate(f"{y:.1f}", (x, y), (0, 8), textcoords="offset points", ha="center")
+    axes.set_xlabel("particles")
+    axes.set_ylabel("MB")
+    axes.margins(0.1, 0.15)
+    axes.legend(loc="lower right")
+    axes.set_title("peak memory of the tracker, all taken at the start")
 
 
 def draw_pictures(axes: Axes, rows: list[Row]) -> None:
     """Cost of a step by the picture's size."""
-    runs = list(
-        {
-            r["width"]: r
-            for r in rows
-            if r["what"] == "default" and r["particles"] == "2000" and r["features_ms"]
-        }.values()
-    )
+    runs = section(rows, "pictures")
     names = [f"{r['width']}x{r['height']}" for r in runs]
-    features = [number(r, "features_ms") for r in runs]
+    features = [number(r, "stage_features_ms") for r in runs]
     rest = [number(r, "cpu_ms") - f for r, f in zip(runs, features, strict=True)]
     axes.bar(names, features, label="features")
     axes.bar(names, rest, bottom=features, label="the rest")
-    axes.set_ylabel("CPU ms per step, 2000 particles")
+    axes.set_ylabel(f"CPU ms per step, {int(runs[0]['particles']):,} particles")
     axes.margins(y=0.25)
     axes.legend(ncols=2, loc="upper center")
     axes.set_title("cost by size of the picture, the person as large")
 
 
-def draw_modes(axes: Axes, rows: list[Row]) -> None:
-    """Frames a second of the settings in use, by time of day."""
-    runs = [r for r in rows if r["what"] in {"default", "paper"} and not r["features_ms"]][:5]
-    names = [f"{r['what']} {r['particles']}\n{r['threads']} thread{'s'[: r['threads'] != '1']}" for r in runs]
-    rates = [1e3 / number(r, "median_ms") for r in runs]
-    bars = axes.bar(names, rates)
-    axes.bar_label(bars, [f"{x:.0f}" for x in rates])
-    axes.axhline(30, color="grey", lw=0.8, ls="--")
-    axes.margins(y=0.15)
-    axes.set_ylabel("frames per second (time of day, median step)")
-    axes.tick_params(axis="x", labelsize=8)
-    axes.set_title("speed")
+PANELS = [draw_modes, draw_stages, draw_particles, draw_threads, draw_memory, draw_pictures]
+
+
+def figure_of(path: Path) -> Figure:
+    """Read the CSV, draw all its sections."""
+    with path.open(encoding="utf-8", newline="") as f:
+        rows = list(csv.DictReader(f))
+    figure, axes = plt.subplots(3, 2, figsize=(13, 13.5), layout="constrained")
+    for panel, place in zip(PANELS, axes.flat, strict=True):
+        panel(place, rows)
+    figure.suptitle(f"{path.stem}, {section(rows, 'modes')[0]['isa']}")
+    return figure
 
 
 def draw(path: Path, png: Path) -> None:
     """Read the CSV, write the figure."""
-    with path.open(encoding="utf-8", newline="") as f:
-        rows = list(csv.DictReader(f))
-    figure, axes = plt.subplots(2, 2, figsize=(13, 9), layout="constrained")
-    draw_modes(axes[0][0], rows)
-    draw_stages(axes[0][1], rows)
-    draw_sizes(axes[1][0], rows)
-    draw_pictures(axes[1][1], rows)
-    figure.suptitle(path.stem)
     png.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(png, dpi=110)
+    figure_of(path).savefig(png, dpi=110)
     print(png)

@@ -8,6 +8,7 @@
 enum { MAX_RESULTS = 128, MAX_OTHERS = 16 };
 
 static bench_result results[MAX_RESULTS];
+static const char *section_of[MAX_RESULTS], *section;
 static int count;
 static struct {
     const char *what, *isa;
@@ -19,10 +20,14 @@ const bench_result *bench_report_measure(const gait_model *model, const bench_pl
                                          message *why)
 {
     bench_result *const first = results + count;
-    if (count + n > MAX_RESULTS)
-        return message_set(why, "more than %d measurements", MAX_RESULTS) ? NULL : NULL;
-    for (int32_t k = 0; k < n; k++)
+    if (count + n > MAX_RESULTS) {
+        message_set(why, "more than %d measurements", MAX_RESULTS);
+        return NULL;
+    }
+    for (int32_t k = 0; k < n; k++) {
         first[k] = (bench_result){.plan = plans[k]};
+        section_of[count + k] = section;
+    }
     if (!bench_measure(model, first, n, why))
         return NULL;
     count += n;
@@ -46,8 +51,9 @@ static const char *mode_of(const bench_result *r)
                                              : "default";
 }
 
-void bench_report_head(const char *title)
+void bench_report_head(const char *name, const char *title)
 {
+    section = name;
     printf(
         "\n%s\nmode    isa         size  particles threads memory_MB median_ms   p99_ms   cpu_ms      fps\n",
         title);
@@ -86,6 +92,8 @@ void bench_report_stages(const bench_result *const *runs, int n)
                 printf("%12.1f", runs[k]->stage_ms[stage] * 1e6 / runs[k]->particles);
         printf("\n");
     }
+    printf("edges: all that the kernels of the other terms leave of them, calls and the counting of points "
+           "included\n");
 }
 
 bool bench_report_csv(const char *path, message *why)
@@ -93,16 +101,17 @@ bool bench_report_csv(const char *path, message *why)
     FILE *const f = fopen(path, "w");
     if (!f)
         return message_set(why, "%.120s: cannot be written: %s", path, strerror(errno));
-    fprintf(f, "what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms,cpu_p99_ms,ratio,"
-               "particle_ratio,slowest,cpu_slowest,limit_ratio,limit_ms,limit_p99_ms");
+    fprintf(f,
+            "section,what,isa,width,height,particles,threads,bytes,median_ms,p99_ms,cpu_ms,cpu_p99_ms,ratio,"
+            "particle_ratio,slowest,cpu_slowest,limit_ratio,limit_ms,limit_p99_ms");
     for (int k = 0; k < BENCH_STAGES; k++)
-        fprintf(f, ",%s_ms", bench_stage_name[k]);
+        fprintf(f, ",%s_%s_ms", bench_stage_is_part(k) ? "likelihood" : "stage", bench_stage_name[k]);
     fprintf(f, "\n");
     for (int i = 0; i < count; i++) {
         const bench_result *const r = &results[i];
-        fprintf(f, "%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,", mode_of(r), r->isa, (int)r->width,
-                (int)r->height, (int)r->particles, (int)r->plan.threads, r->bytes, r->median_ms, r->p99_ms,
-                r->cpu_ms, r->cpu_p99_ms, r->ratio, r->particle_ratio);
+        fprintf(f, "%s,%s,%s,%d,%d,%d,%d,%zu,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,", section_of[i], mode_of(r),
+                r->isa, (int)r->width, (int)r->height, (int)r->particles, (int)r->plan.threads, r->bytes,
+                r->median_ms, r->p99_ms, r->cpu_ms, r->cpu_p99_ms, r->ratio, r->particle_ratio);
         r->slowest > 0.0 ? fprintf(f, "%.4f,%.4f,", r->slowest, r->cpu_slowest) : fprintf(f, ",,");
         r->plan.limit ? fprintf(f, "%.4f,%.4f,%.4f", r->limit_ratio, r->limit_ms, r->limit_p99_ms)
                       : fprintf(f, ",,");
@@ -111,7 +120,7 @@ bool bench_report_csv(const char *path, message *why)
         fprintf(f, "\n");
     }
     for (int i = 0; i < other_count; i++) {
-        fprintf(f, "%s,%s,,,,1,,,,%.4f,,,,,,,,", others[i].what, others[i].isa, others[i].ms);
+        fprintf(f, "limit,%s,%s,,,,1,,,,%.4f,,,,,,,,", others[i].what, others[i].isa, others[i].ms);
         for (int k = 0; k < BENCH_STAGES; k++)
             fprintf(f, ",");
         fprintf(f, "\n");

@@ -9,9 +9,10 @@ const bench_result *bench_report_measure(const gait_model *model, const bench_pl
 /* A time of something else than a tracker: CPU milliseconds. */
 void bench_report_add(const char *what, const char *isa, double ms);
 
-void bench_report_head(const char *title);
+/* Begin a table; rows of the CSV until the next have the section's name. */
+void bench_report_head(const char *section, const char *title);
 void bench_report_rows(const bench_result *r, int32_t count);
-/* Stages of several runs side by side, nanoseconds a particle; for features and resampling milliseconds a step. */
+/* Stages of several runs side by side, nanoseconds a particle; for features milliseconds a step. */
 void bench_report_stages(const bench_result *const *runs, int count);
 bool bench_report_csv(const char *path, message *why);
 #endif

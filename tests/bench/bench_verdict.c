@@ -53,65 +53,65 @@ static void rate_lines(const char *what, double wanted, const bench_result *r)
 
 /* What a second thread adds, and whether that is as much as a second core adds to trackers that have nothing to do with
  * each other: two "cores" may be threads of one, as on virtual machines, and share its units and caches. */
-static void thread_lines(const bench_result *one)
+static void thread_lines(const by_threads *many)
 {
-    const bench_result *const two = one + 1, *const twins = one + 2;
-    line("two threads against one, 10,000 particles", 1.8, 1 / two->ratio, true, "times");
-    line("    against a tracker on each core at the same time", 0.9, 0.5 * twins->ratio / two->ratio, true,
-         "times");
+    line("two threads against one, 10,000 particles", 1.8, 1 / many->two->ratio, true, "times");
+    line("    against a tracker on each core at the same time", 0.9,
+         0.5 * many->twins->ratio / many->two->ratio, true, "times");
     printf("    those two do %.2f times the steps of one alone: more is not in these cores\n",
-           2 / twins->ratio);
+           2 / many->twins->ratio);
+}
+
+static double tail(const bench_result *r)
+{
+    return r->p99_ms / r->median_ms;
 }
 
 /* The slowest steps of all, beside the slowest runs of the limit in turns with them, whose work never changes: that
  * share is the machine's.  And the slowest frame when each takes its least time over the rounds: what is the work's. */
+static void latency_line(const char *what, const bench_result *r, const bench_result *twins)
+{
+    bool const alone = r->plan.threads == 1;
+    line(what, 1.3, tail(r), false, "times");
+    if (alone)
+        line("        by CPU time", 1.3, r->cpu_p99_ms / r->cpu_ms, false, "times");
+    printf("        the texture-only limit's, whose work never changes: %.2f times\n",
+           r->limit_p99_ms / r->limit_ms);
+    line("        slowest frame, least over the rounds, to the median", 1.3, r->slowest, false, "times");
+    if (twins)
+        line("        against two trackers with nothing in common, a core each", 1.0, tail(r) / tail(twins),
+             false, "times");
+    if (alone)
+        line("        slowest frame, by CPU time", 1.3, r->cpu_slowest, false, "times");
+}
+
 static void latency_lines(const verdict *v)
 {
-    const bench_result *const twins = v->many[0] + 2;
-    const struct {
-        const char *what;
-        const bench_result *run;
-    } row[] = {
-        {"p99 of a step against its median, default mode, 10,000", v->many[0]},
-        {"    two threads", v->many[0] + 1},
-        {"    paper mode, 10,000", v->many[1]},
-        {"    paper mode, two threads", v->many[1] + 1},
-        {"    default number of particles", v->usual},
-        {"    default number of particles, two threads", v->usual + 1},
-        {"    a search", v->search},
-        {"    a search, two threads", v->search + 1},
-    };
-    for (size_t k = 0; k < sizeof row / sizeof *row; k++) {
-        const bench_result *const r = row[k].run;
-        bool const alone = r->plan.threads == 1;
-        line(row[k].what, 1.3, r->p99_ms / r->median_ms, false, "times");
-        if (alone)
-            line("        by CPU time", 1.3, r->cpu_p99_ms / r->cpu_ms, false, "times");
-        printf("        the texture-only limit's, whose work never changes: %.2f times\n",
-               r->limit_p99_ms / r->limit_ms);
-        line("        slowest frame, least over the rounds, to the median", 1.3, r->slowest, false, "times");
-        if (r == twins - 1)
-            line("        against two trackers with nothing in common, a core each", 1.0,
-                 r->p99_ms / r->median_ms / (twins->p99_ms / twins->median_ms), false, "times");
-        if (alone)
-            line("        slowest frame, by CPU time", 1.3, r->cpu_slowest, false, "times");
-    }
+    latency_line("p99 of a step against its median, default mode, 10,000", v->many[0].one, NULL);
+    latency_line("    two threads", v->many[0].two, v->many[0].twins);
+    latency_line("    paper mode, 10,000", v->many[1].one, NULL);
+    latency_line("    paper mode, two threads", v->many[1].two, NULL);
+    latency_line("    default number of particles", v->usual.one, NULL);
+    latency_line("    default number of particles, two threads", v->usual.two, NULL);
+    latency_line("    a search", v->search.one, NULL);
+    latency_line("    a search, two threads", v->search.two, NULL);
 }
 
 static void speed_lines(const verdict *v)
 {
-    const bench_result *const many = v->many[0], *const paper = v->many[1];
-    rate_lines("default mode, 10,000 particles, one core", 30, many);
-    rate_lines("default mode, 10,000 particles, two cores", 55, many + 1);
-    rate_lines("paper mode, 10,000 particles, one core", 30, paper);
-    rate_lines("paper mode, 10,000 particles, two cores", 55, paper + 1);
-    rate_lines("default number of particles, one core", 200, v->usual);
-    rate_lines("    while it searches for the phase, with twice as many", 30, v->search);
+    const by_threads *const many = &v->many[0], *const paper = &v->many[1];
+    rate_lines("default mode, 10,000 particles, one core", 30, many->one);
+    rate_lines("default mode, 10,000 particles, two cores", 55, many->two);
+    rate_lines("paper mode, 10,000 particles, one core", 30, paper->one);
+    rate_lines("paper mode, 10,000 particles, two cores", 55, paper->two);
+    rate_lines("default number of particles, one core", 200, v->usual.one);
+    rate_lines("    while it searches for the phase, with twice as many", 30, v->search.one);
     thread_lines(many);
     latency_lines(v);
-    line("by CPU time of the calling thread: default mode, one core", 30, 1e3 / many->cpu_ms, true, "fps");
-    line("    paper mode", 30, 1e3 / paper->cpu_ms, true, "fps");
-    line("    default number of particles", 200, 1e3 / v->usual->cpu_ms, true, "fps");
+    line("by CPU time of the calling thread: default mode, one core", 30, 1e3 / many->one->cpu_ms, true,
+         "fps");
+    line("    paper mode", 30, 1e3 / paper->one->cpu_ms, true, "fps");
+    line("    default number of particles", 200, 1e3 / v->usual.one->cpu_ms, true, "fps");
 }
 
 static void kernel_lines(const verdict *v)
@@ -137,7 +137,7 @@ static void kernel_lines(const verdict *v)
 
 static void parsec_lines(const verdict *v, const gait_model *m)
 {
-    const bench_result *const best = v->isa[v->isas - 1], *const many = v->many[0];
+    const bench_result *const best = v->isa[v->isas - 1], *const many = v->many[0].one;
     bench_samples const seen = bench_stages_samples();
     double const looked = seen.surface + seen.edges, ours = looked + seen.cells;
     double const stage = best->stage_ms[STAGE_LIKELIHOOD], step = many->cpu_ms;
@@ -165,15 +165,15 @@ void verdict_print(const verdict *v, const gait_model *model)
            "on the\n"
            "machine that rates were wanted of: each rate is given as measured and, as a reckoning, at that "
            "speed\n",
-           v->many[0]->limit_ms, LIMIT_MS);
+           v->many[0].one->limit_ms, LIMIT_MS);
     printf("\n%-65s %8s %10s\n", "", "wanted", "this run");
     speed_lines(v);
     kernel_lines(v);
     parsec_lines(v, model);
     line("cost of a particle, most against least, by their number", 1.15, v->most / v->least, false, "times");
     line("cost of a particle, 1920x1080 against 640x480", 1.1, v->picture[2]->particle_ratio, false, "times");
-    line("memory of the tracker, 10,000 particles", 12, (double)v->many[0][0].bytes / 1e6, false, "MB");
-    line("    with two threads", 12, (double)v->many[0][1].bytes / 1e6, false, "MB");
+    line("memory of the tracker, 10,000 particles", 12, (double)v->many[0].one->bytes / 1e6, false, "MB");
+    line("    with two threads", 12, (double)v->many[0].two->bytes / 1e6, false, "MB");
     printf("threads, numbers of particles and picture sizes took turns: their ratios are medians of those of "
            "single steps\n");
     if (getloadavg(&load, 1) == 1 && load > 2.5)

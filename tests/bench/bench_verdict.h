@@ -3,11 +3,16 @@
 #define BENCH_VERDICT_H
 #include "bench_measure.h"
 
+typedef struct by_threads {
+    const bench_result *one, *two; /* threads of a tracker */
+    const bench_result *twins;     /* two trackers at the same time, a thread each; or NULL */
+} by_threads;
+
 typedef struct verdict {
-    const bench_result *usual;   /* default number of particles: one thread, two */
-    const bench_result *search;  /* the same while the phase is unknown */
-    const bench_result *many[2]; /* 10,000, by mode: one thread, two; in the first two trackers as well */
-    const bench_result *isa[4];  /* the same with the stages, scalar first, best last */
+    by_threads usual;           /* default number of particles */
+    by_threads search;          /* the same while the phase is unknown */
+    by_threads many[2];         /* 10,000, by mode */
+    const bench_result *isa[4]; /* the same with the stages, scalar first, best last */
     int isas;
     const bench_result *picture[3]; /* 640x480, 1280x720, 1920x1080 */
     double least, most;             /* particle_ratio from 1,000 to 100,000 of them */

@@ -49,7 +49,8 @@ static int32_t steps_for(const bench *b, int32_t particles)
     return particles <= MANY ? b->set->steps : fewer > LEAST ? fewer : LEAST;
 }
 
-/* Trackers that take turns, before the common scene if they have none of their own, as many steps each as the first one's number of particles allows. */
+/* Trackers that take turns, before the common scene if they have none of their own; as many steps each as the first
+ * one's number of particles allows. */
 static const bench_result *run(bench *b, bench_plan *plans, int32_t count)
 {
     if (plans->steps == 0 && plans->rounds == 0)
@@ -77,8 +78,8 @@ static int32_t rounds_of(const bench *b, int32_t frames)
     return ROUNDS * steps / frames;
 }
 
-/* One core and two, with the default number of particles; NULL if that fails or their bits differ. */
-static const bench_result *usual(bench *b, const bench_scene *scene, bool search)
+/* One core and two, with the default number of particles. */
+static bool usual(bench *b, const bench_scene *scene, bool search, by_threads *out)
 {
     gait_tracker_config cfg;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
@@ -92,7 +93,10 @@ static const bench_result *usual(bench *b, const bench_scene *scene, bool search
                                        .search = search};
     plans[1].threads = 2;
     const bench_result *const r = run(b, plans, 2);
-    return r && same_bits(b, &r[0], &r[1]) ? r : NULL;
+    if (!r || !same_bits(b, &r[0], &r[1]))
+        return false;
+    *out = (by_threads){.one = &r[0], .two = &r[1]};
+    return true;
 }
 
 /* The settings in use: default, also while it searches, and paper, on one core and two; and what two trackers do at the
@@ -102,22 +106,21 @@ static bool modes(bench *b)
     int32_t const rounds = rounds_of(b, FRAMES);
     bench_scene opening = b->scene;
     opening.frames = SEARCH_FRAMES;
-    bench_report_head("modes, colour frames");
-    b->found.usual = usual(b, &b->scene, false);
-    b->found.search = b->found.usual ? usual(b, &opening, true) : NULL;
-    if (!b->found.search)
+    bench_report_head("modes", "modes, colour frames");
+    if (!usual(b, &b->scene, false, &b->found.usual) || !usual(b, &opening, true, &b->found.search))
         return false;
-    for (int32_t mode = GAIT_MODE_DEFAULT; b->found.usual && mode <= GAIT_MODE_PAPER; mode++) {
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
         bench_plan const one = {
             .mode = mode, .particles = MANY, .threads = 1, .cpu_mask = ~0u, .rounds = rounds, .limit = true};
         bench_plan plans[] = {one, one, one};
         plans[1].threads = plans[2].threads = 2;
         plans[2].twins = true;
         plans[2].limit = false;
-        const bench_result *const r = run(b, plans, mode == GAIT_MODE_DEFAULT ? 3 : 2);
+        bool const twins = mode == GAIT_MODE_DEFAULT;
+        const bench_result *const r = run(b, plans, twins ? 3 : 2);
         if (!r || !same_bits(b, &r[0], &r[1]))
             return false;
-        b->found.many[mode] = r;
+        b->found.many[mode] = (by_threads){.one = &r[0], .two = &r[1], .twins = twins ? &r[2] : NULL};
     }
     return true;
 }
@@ -136,7 +139,7 @@ static bool instruction_sets(bench *b)
                 (bench_plan){.particles = MANY, .threads = 1, .cpu_mask = masks[k], .stages = true};
     plans[count - 1].limit = true;
     plans[0].steps = b->set->steps < 40 ? b->set->steps : 40;
-    bench_report_head("instruction sets, with the stages timed");
+    bench_report_head("isa", "instruction sets, with the stages timed");
     const bench_result *const r = run(b, plans, count);
     for (int k = 0; k < count; k++) {
         if (!r || !same_bits(b, &r[0], &r[k]))
@@ -158,7 +161,7 @@ static bool sizes(bench *b, const int32_t *particles, int count)
         int32_t const steps = steps_for(b, particles[k]);
         plans[0].steps = k == 0 || steps < plans[0].steps ? steps : plans[0].steps;
     }
-    bench_report_head("particles, with the stages timed");
+    bench_report_head("particles", "particles, with the stages timed");
     const bench_result *const r = run(b, plans, count);
     for (int k = 0; r && k < count; k++) {
         of[k] = &r[k];
@@ -190,7 +193,7 @@ static bool sweep(bench *b)
         return message_set(b->why, "--particles and --threads want up to %d numbers like 100,1000",
                            BENCH_TURNS);
     bool ok = sizes(b, particles, count);
-    bench_report_head("particles and threads");
+    bench_report_head("threads", "particles and threads");
     for (int i = 0; ok && i < count; i++)
         ok = threads_of(b, particles[i], threads, counts);
     return ok;
@@ -204,7 +207,7 @@ static bool pictures(bench *b)
     bench_scene scenes[SIZES] = {0};
     bench_plan plans[SIZES];
     bool ok = true;
-    bench_report_head("picture size, the person as large in all, with the stages timed");
+    bench_report_head("pictures", "picture size, the person as large in all, with the stages timed");
     for (int k = 0; ok && k < SIZES; k++) {
         ok = bench_scene_make(&scenes[k], b->model, size[k][0], size[k][1], LARGE_FRAMES, b->why);
         plans[k] = (bench_plan){
