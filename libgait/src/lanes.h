@@ -12,7 +12,7 @@ enum { LANES = 16 };
 #include <immintrin.h>
 
 /* An unconditional gather would wait for what its register held before.  The distance is part of the instruction. */
-static inline __m256i lookup8(const void *table, int32_t bytes, __m256i index, __m256i take)
+static inline __m256i lanes_lookup8(const void *table, int32_t bytes, __m256i index, __m256i take)
 {
     __m256i const none = _mm256_setzero_si256();
     return bytes == 2 ? _mm256_mask_i32gather_epi32(none, table, index, take, 2)
@@ -23,7 +23,7 @@ static inline __m256i lookup8(const void *table, int32_t bytes, __m256i index, _
 #if defined(__AVX512F__)
 #pragma GCC diagnostic push /* unoptimised, gcc's gather is a macro that changes the sign of a mask */
 #pragma GCC diagnostic ignored "-Wsign-conversion"
-static inline __m512i lookup16(const void *table, int32_t bytes, __m512i index, __mmask16 take)
+static inline __m512i lanes_lookup16(const void *table, int32_t bytes, __m512i index, __mmask16 take)
 {
     __m512i const none = _mm512_setzero_si512();
     return bytes == 2 ? _mm512_mask_i32gather_epi32(none, take, index, table, 2)
@@ -33,17 +33,17 @@ static inline __m512i lookup16(const void *table, int32_t bytes, __m512i index, 
 #endif
 
 /* out[i] = the word `bytes` (2 or 4) times index[i] into the table where take[i] is negative, elsewhere 0. */
-static inline void lookup_every(int32_t bytes, const void *table, const int32_t *index, const int32_t *take,
-                                int32_t *out)
+static inline void lanes_lookup_every(int32_t bytes, const void *table, const int32_t *index,
+                                      const int32_t *take, int32_t *out)
 {
 #if defined(__AVX512F__)
     __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take));
-    _mm512_storeu_si512(out, lookup16(table, bytes, _mm512_loadu_si512(index), on));
+    _mm512_storeu_si512(out, lanes_lookup16(table, bytes, _mm512_loadu_si512(index), on));
 #elif defined(__AVX2__)
     for (int32_t i = 0; i < LANES; i += 8)
         _mm256_storeu_si256((__m256i_u *)(out + i),
-                            lookup8(table, bytes, _mm256_loadu_si256((const __m256i_u *)(index + i)),
-                                    _mm256_loadu_si256((const __m256i_u *)(take + i))));
+                            lanes_lookup8(table, bytes, _mm256_loadu_si256((const __m256i_u *)(index + i)),
+                                          _mm256_loadu_si256((const __m256i_u *)(take + i))));
 #else
     for (int32_t i = 0; i < LANES; i++) {
         int32_t found = 0;
@@ -55,9 +55,9 @@ static inline void lookup_every(int32_t bytes, const void *table, const int32_t 
 }
 
 /* out[i] = table[index[i]] where take[i] is negative, elsewhere 0. */
-static inline void lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
+static inline void lanes_lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
 {
-    lookup_every(4, table, index, take, out);
+    lanes_lookup_every(4, table, index, take, out);
 }
 
 #if defined(__AVX512BW__)
@@ -102,7 +102,7 @@ static inline lanes_words words_shares(lanes_words v)
 
 /* Between four neighbours, the bytes left, left below, right, right below of a word, at 1/256 of their distance, in the
  * low bytes of u and v; rounded towards 0. */
-static inline void bilinear(const int32_t *four, const int32_t *u, const int32_t *v, int32_t *out)
+static inline void lanes_bilinear(const int32_t *four, const int32_t *u, const int32_t *v, int32_t *out)
 {
 #if defined(LANES_WORDS)
     for (int32_t i = 0; i < LANES; i += LANES_WORDS) {
@@ -133,13 +133,13 @@ static inline void bilinear(const int32_t *four, const int32_t *u, const int32_t
 #define LANES_BETWEEN
 /* Bilinear look-up of bytes: pairs of one with that below it, 256 in a row; at u, v, 1/256 of their distance, rounded
  * towards 0, where shown (negative), elsewhere `hidden`. */
-static inline void between(const uint16_t *pairs, const int32_t *u, const int32_t *v, const int32_t *shown,
-                           int8_t hidden, int8_t *out)
+static inline void lanes_between(const uint16_t *pairs, const int32_t *u, const int32_t *v,
+                                 const int32_t *shown, int8_t hidden, int8_t *out)
 {
     __m512i const x = _mm512_loadu_si512(u), y = _mm512_loadu_si512(v), low = _mm512_set1_epi32(255);
     __m512i const at = _mm512_ternarylogic_epi32(_mm512_srai_epi32(x, 8), y, low, 0xf4);
     __mmask16 const take = _mm512_movepi32_mask(_mm512_loadu_si512(shown));
-    __m512i const four = lookup16(pairs, 2, at, take);
+    __m512i const four = lanes_lookup16(pairs, 2, at, take);
     __m512i const bytes = _mm512_set4_epi32(0x0c0c0c0c, 0x08080808, 0x04040404, 0);
     __m512i const words = _mm512_or_si512(bytes, _mm512_set1_epi16((short)0x8000));
     __m512i const down = _mm512_xor_si512(_mm512_shuffle_epi8(y, bytes), _mm512_set1_epi32(0x00ff00ff));
@@ -181,7 +181,7 @@ static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, i
 }
 
 /* Sixteen numbers to be read again and again: in registers. */
-static inline void once(const float *in, float *restrict out)
+static inline void lanes_once(const float *in, float *restrict out)
 {
 #if defined(__AVX512F__)
     _mm512_storeu_ps(out, _mm512_loadu_ps(in));
@@ -191,7 +191,7 @@ static inline void once(const float *in, float *restrict out)
 }
 
 /* Bytes to words: in pieces, what follows would wait for them. */
-static inline void widen(const int8_t *in, int32_t *out)
+static inline void lanes_widen(const int8_t *in, int32_t *out)
 {
 #if defined(__AVX512F__)
     _mm512_storeu_si512(out, _mm512_cvtepi8_epi32(_mm_loadu_si128((const __m128i_u *)in)));
@@ -205,7 +205,7 @@ static inline void widen(const int8_t *in, int32_t *out)
 }
 
 /* Words to bytes, which they fit. */
-static inline void narrow(const int32_t *in, int8_t *out)
+static inline void lanes_narrow(const int32_t *in, int8_t *out)
 {
 #if defined(__AVX2__)
     __m256i const low = _mm256_loadu_si256((const __m256i_u *)in);
@@ -259,7 +259,7 @@ static inline void bytes_costs(const int8_t *const *a, const int8_t *const *b, i
 #endif
 
 /* Two numbers in turn, `count` in all, a multiple of eight. */
-static inline void repeat(const float *two, int32_t count, float *restrict out)
+static inline void lanes_repeat(const float *two, int32_t count, float *restrict out)
 {
 #if defined(__AVX512F__)
     double both;
@@ -278,7 +278,7 @@ static inline void repeat(const float *two, int32_t count, float *restrict out)
 }
 
 /* Eight numbers, and again. */
-static inline void twice(const float *eight, float *restrict out)
+static inline void lanes_twice(const float *eight, float *restrict out)
 {
 #if defined(__AVX512DQ__) /* in pieces, what follows would wait for them */
     _mm512_storeu_ps(out, _mm512_broadcast_f32x8(_mm256_loadu_ps(eight)));
@@ -297,7 +297,7 @@ enum { LANES_ROWS = 8 };
 
 /* Of each word the bits from the first to the second number of a pair, 0 to 64, go behind those of `whole`: what is seen
  * of them, and all. */
-static inline void cover(const int32_t *span, uint64_t *restrict whole, uint64_t *restrict seen)
+static inline void lanes_cover(const int32_t *span, uint64_t *restrict whole, uint64_t *restrict seen)
 {
 #if defined(__AVX512F__)
     __m512i const ones = _mm512_set1_epi64(-1), both = _mm512_loadu_si512(span);
@@ -323,7 +323,7 @@ static inline void cover(const int32_t *span, uint64_t *restrict whole, uint64_t
 }
 
 /* Sixteen numbers of sixteen bodies: from in[number][body] to out[body][number], a cache line each. */
-static inline void deal(const float (*restrict in)[LANES], float (*restrict out)[LANES])
+static inline void lanes_deal(const float (*restrict in)[LANES], float (*restrict out)[LANES])
 {
 #if defined(__AVX2__)
     for (int32_t a = 0; a < LANES; a += 8)

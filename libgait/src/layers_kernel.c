@@ -133,7 +133,7 @@ static void deal_lines(const int32_t *column, layers_limb *restrict out)
             line[slot][0][0][i] -= (float)column[i];
             line[slot][0][1][i] += (float)column[i];
         }
-    deal((const float (*)[LANES])line, (float (*)[LANES])out->line);
+    lanes_deal((const float (*)[LANES])line, (float (*)[LANES])out->line);
 }
 
 /* Most bodies are no wider than a word; its first column is a multiple of RAST_STEP. */
@@ -204,15 +204,15 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
     float at[LAYERS_LINES][2 * LANES_ROWS], slope[LAYERS_LINES][2 * LANES_ROWS], y[2 * LANES_ROWS];
     int32_t const first = top / LAYERS_BAND * LAYERS_BAND;
     int32_t row[2 * LANES_ROWS];
-    repeat(line, 2 * LANES_ROWS, at[0]);
-    repeat(line + 2, 2 * LANES_ROWS, slope[0]);
-    repeat(line + 4, 2 * LANES_ROWS, at[1]);
-    repeat(line + 6, 2 * LANES_ROWS, slope[1]);
-    repeat(line + 8, 2 * LANES_ROWS, at[2]);
-    repeat(line + 10, 2 * LANES_ROWS, slope[2]);
+    lanes_repeat(line, 2 * LANES_ROWS, at[0]);
+    lanes_repeat(line + 2, 2 * LANES_ROWS, slope[0]);
+    lanes_repeat(line + 4, 2 * LANES_ROWS, at[1]);
+    lanes_repeat(line + 6, 2 * LANES_ROWS, slope[1]);
+    lanes_repeat(line + 8, 2 * LANES_ROWS, at[2]);
+    lanes_repeat(line + 10, 2 * LANES_ROWS, slope[2]);
     if (lines > 3) {
-        repeat(line + 12, 2 * LANES_ROWS, at[3]);
-        repeat(line + 14, 2 * LANES_ROWS, slope[3]);
+        lanes_repeat(line + 12, 2 * LANES_ROWS, at[3]);
+        lanes_repeat(line + 14, 2 * LANES_ROWS, slope[3]);
     }
     for (int32_t i = 0; i < 2 * LANES_ROWS; i++) {
         row[i] = first - top + (i >> 1);
@@ -230,7 +230,7 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
             row[i] += LANES_ROWS;
             y[i] += (float)LANES_ROWS;
         }
-        cover(span, whole + strip, seen + strip);
+        lanes_cover(span, whole + strip, seen + strip);
     }
 }
 

@@ -14,11 +14,11 @@ typedef struct sides { /* of each point */
 
 static inline void cone(const float *w, sides *restrict out)
 {
-    repeat(w + LIKE_SIDE_X, LANES, out->x);
-    repeat(w + LIKE_SIDE_Y, LANES, out->y);
-    repeat(w + LIKE_SIDE_DX, LANES, out->dx);
-    repeat(w + LIKE_SIDE_DY, LANES, out->dy);
-    repeat(w + LIKE_SIDE_NORMAL, LANES, out->normal);
+    lanes_repeat(w + LIKE_SIDE_X, LANES, out->x);
+    lanes_repeat(w + LIKE_SIDE_Y, LANES, out->y);
+    lanes_repeat(w + LIKE_SIDE_DX, LANES, out->dx);
+    lanes_repeat(w + LIKE_SIDE_DY, LANES, out->dy);
+    lanes_repeat(w + LIKE_SIDE_NORMAL, LANES, out->normal);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++)
         out->share[i] = ((float)(i >> 1) + 0.5f) / 8.0f;
@@ -27,11 +27,11 @@ static inline void cone(const float *w, sides *restrict out)
 /* The octagon's sides, twice round. */
 static inline void ellipsoid(const like_sides *s, int32_t lane, sides *restrict out)
 {
-    twice(s->part[0][lane], out->x);
-    twice(s->part[0][lane] + 8, out->y);
-    twice(s->part[1][lane], out->dx);
-    twice(s->part[1][lane] + 8, out->dy);
-    twice(s->part[2][lane], out->normal);
+    lanes_twice(s->part[0][lane], out->x);
+    lanes_twice(s->part[0][lane] + 8, out->y);
+    lanes_twice(s->part[1][lane], out->dx);
+    lanes_twice(s->part[1][lane] + 8, out->dy);
+    lanes_twice(s->part[2][lane], out->normal);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++)
         out->share[i] = i < 8 ? 0.25f : 0.75f;
@@ -93,6 +93,6 @@ void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
     for (int32_t l = 0; l < limbs; l++)
         hide(&b->layers->visible[l], p.x[l], p.y[l], 0, p.shown[l]);
     for (int32_t l = 0; l < limbs; l++)
-        lookup(b->features->edge, p.cell[l], p.shown[l], p.cell[l]);
+        lanes_lookup(b->features->edge, p.cell[l], p.shown[l], p.cell[l]);
     *out = tally(&p, limbs);
 }

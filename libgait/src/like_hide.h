@@ -23,7 +23,7 @@ HIDE_ANY void hide_any(const rast_mask *mask, const int32_t *x, const int32_t *y
         shown[i] &= -(((uint32_t)column[i] < width) & ((uint32_t)(row - mask->first) < rows));
         at[i] = rast_half(column[i], row);
     }
-    lookup(mask->word, at, shown, bits);
+    lanes_lookup(mask->word, at, shown, bits);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LANES; i++)
         shown[i] &= (int32_t)((uint32_t)bits[i] << (~column[i] & 31));

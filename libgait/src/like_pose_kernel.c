@@ -83,6 +83,6 @@ void KERNEL(surface_pose)(const like_setup *s, const gait_camera *cam, const vie
         for (int32_t r = 0; r < 2; r++)
             to_image(focus[r], middle[r], t[r], t[2], w[LIKE_VIEW_SHIFT + r]);
         choose_half(&s->surface[l], w, scale, out->limb[l].turn);
-        deal((const body_lanes *)w, out->limb[l].view);
+        lanes_deal((const body_lanes *)w, out->limb[l].view);
     }
 }

@@ -31,9 +31,9 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
                 S2 = w[LIKE_VIEW_SHIFT + 2];
     float const graze = w[LIKE_VIEW_GRAZE];
     float px[LIKE_FACING], py[LIKE_FACING], pz[LIKE_FACING];
-    once(s->point[0] + first, px);
-    once(s->point[1] + first, py);
-    once(s->point[2] + first, pz);
+    lanes_once(s->point[0] + first, px);
+    lanes_once(s->point[1] + first, py);
+    lanes_once(s->point[2] + first, pz);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++) {
         int32_t const j = first + i;
@@ -54,18 +54,18 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
 static inline void look_up(const features *f, const spots *p, int8_t *restrict value)
 {
 #ifdef LANES_BETWEEN
-    between(f->pairs, p->u, p->v, p->shown, TEXTURE_HIDDEN, value);
+    lanes_between(f->pairs, p->u, p->v, p->shown, TEXTURE_HIDDEN, value);
 #else
     int32_t at[LIKE_FACING], quad[LIKE_FACING], all[LIKE_FACING];
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++)
         at[i] = p->v[i] >> 8 << 8 | p->u[i] >> 8;
-    lookup_every(2, f->pairs, at, p->shown, quad);
-    bilinear(quad, p->u, p->v, all);
+    lanes_lookup_every(2, f->pairs, at, p->shown, quad);
+    lanes_bilinear(quad, p->u, p->v, all);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++)
         all[i] = p->shown[i] < 0 ? all[i] : TEXTURE_HIDDEN;
-    narrow(all, value);
+    lanes_narrow(all, value);
 #endif
 }
 

@@ -27,14 +27,14 @@ static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b
 {
     int32_t x[LIKE_FACING], y[LIKE_FACING], difference[LIKE_FACING], both[LIKE_FACING], one[LIKE_FACING],
         sum = 0;
-    widen(a, x);
-    widen(b, y);
+    lanes_widen(a, x);
+    lanes_widen(b, y);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++) {
         difference[i] = i_max(x[i] - y[i], y[i] - x[i]);
         both[i] = -((x[i] != TEXTURE_HIDDEN) & (y[i] != TEXTURE_HIDDEN));
     }
-    lookup(cost, difference, both, one);
+    lanes_lookup(cost, difference, both, one);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < LIKE_FACING; i++)
         sum += one[i];

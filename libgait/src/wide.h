@@ -12,7 +12,7 @@
 
 #if defined(KERNEL_SCALAR)
 typedef double wide;
-typedef float narrow, wide_float;
+typedef float wide_half, wide_float;
 #define WIDEN(x)  ((double)(x))
 #define NARROW(x) ((float)(x))
 #else
@@ -24,14 +24,14 @@ typedef float narrow, wide_float;
 #define WIDE_BYTES 16
 #endif
 WIDE_OF(double, WIDE_BYTES) wide;
-WIDE_OF(float, WIDE_BYTES / 2) narrow;
+WIDE_OF(float, WIDE_BYTES / 2) wide_half;
 WIDE_OF(float, WIDE_BYTES) wide_float;
 #if defined(__AVX512F__)
 #define WIDEN(x)  ((wide)_mm512_cvtps_pd((__m256)(x))) /* gcc converts halves */
-#define NARROW(x) ((narrow)_mm512_cvtpd_ps((__m512d)(x)))
+#define NARROW(x) ((wide_half)_mm512_cvtpd_ps((__m512d)(x)))
 #else
 #define WIDEN(x)  __builtin_convertvector(x, wide)
-#define NARROW(x) __builtin_convertvector(x, narrow)
+#define NARROW(x) __builtin_convertvector(x, wide_half)
 #endif
 #endif
 
@@ -44,7 +44,7 @@ static inline wide wide_load(const double *from)
 
 static inline wide wide_load_float(const float *from)
 {
-    return WIDEN(*(const narrow *)(const void *)from);
+    return WIDEN(*(const wide_half *)(const void *)from);
 }
 
 static inline void wide_store(double *to, wide x)
@@ -54,6 +54,6 @@ static inline void wide_store(double *to, wide x)
 
 static inline void wide_store_float(float *to, wide x)
 {
-    *(narrow *)(void *)to = NARROW(x);
+    *(wide_half *)(void *)to = NARROW(x);
 }
 #endif
