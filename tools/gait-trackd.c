@@ -132,16 +132,31 @@ static void print_summary(const service *s, bool live)
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }
 
-/* Was a log that was played whole, and could its frames be used? */
+/* Did anything come of a log?  If not, what is lacking? */
+static bool check_yield(const char *path, const service *s, message *why)
+{
+    int64_t const tracks = s->lift ? s->lift->frames : 0;
+    message lack = s->complaint;
+    if (s->tracked > 0 || (s->lift && s->lift->lifted > 0))
+        return true;
+    if (s->came == 0 && tracks == 0)
+        return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream chooses another camera", path,
+                           s->stream, s->lift ? " and no tracks of a known camera" : "");
+    if (s->came == 0)
+        return message_set(why, "%.80s: none of its %" PRId64 " messages of tracks was lifted: %.110s", path,
+                           tracks, lack.text[0] ? lack.text : "too few");
+    service_lack(s, &lack);
+    return message_set(why, "%.80s: none of its %" PRId64 " frames was tracked: %.130s", path, s->came,
+                       lack.text);
+}
+
+/* Was a log that was played whole, and of use? */
 static bool check_log(const char *url, const service *s, message *why)
 {
     char path[LINK_PATH];
     link_log(url, path);
     log_scan(path, why);
-    if (why->text[0])
-        return false;
-    return s->counts.frames > 0 || s->counts.rejected == 0 ||
-           message_set(why, "%.160s: none of its %" PRId64 " frames could be used", path, s->counts.rejected);
+    return !why->text[0] && check_yield(path, s, why);
 }
 
 /* Everything between the settings and the exit code. */

@@ -192,12 +192,13 @@ def run(*words: object) -> Outcome:
 
 
 def play(log: Path, *options: object) -> Outcome:
-    """Track a log; the estimates come from what gait-trackd publishes."""
+    """Track a log; the estimates come from what gait-trackd publishes.  Nothing is a failure."""
     out = log.with_suffix(".out")
     out.unlink(missing_ok=True)
     outcome = run(*command("--url", f"file://{log}?speed=0", "--out", f"file://{out}?mode=w", *options)[1:])
-    assert outcome.code == 0, outcome.words
     outcome.estimates = read_log(out, "GAIT_ESTIMATE", gaitmsg.estimate_t)
+    came = outcome.estimates or read_log(out, "GAIT_LIFT", gaitmsg.estimate_t)
+    assert outcome.code == (0 if came else 1), outcome.words
     outcome.particles = read_log(out, "GAIT_PARTICLES", gaitmsg.particles_t)
     return outcome
 

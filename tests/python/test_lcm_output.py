@@ -8,6 +8,8 @@ from dataclasses import replace
 import lcm_rig as rig
 import pytest
 
+from gait.core.state import State
+from gait.lcm.messages import command_message
 from gait.lcm.types import gaitmsg
 
 
@@ -112,4 +114,30 @@ def test_a_log_of_which_no_frame_fits_the_camera_is_told(tmp_path):
     source = rig.write_log(tmp_path / "in.log", events)
     done = run(source, f"file://{tmp_path}/out.log?mode=w", "--camera", camera)
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].endswith("none of its 3 frames could be used")
+    said = "in.log: none of its 3 frames was tracked: picture of 160x120, the camera has 320x240"
+    assert said in done.stderr.splitlines()[-1]
+
+
+CAMERA, SCENE, START = rig.opening()
+STOP = ("GAIT_COMMAND", command_message(gaitmsg.command_t.STOP, rig.utime(0), State(), State()))
+
+
+@pytest.mark.parametrize(
+    ("events", "options", "words"),
+    [
+        ([("GAIT_ESTIMATE", b"x")], [], "no frames on GAIT_IMAGE_0; --stream"),
+        ([CAMERA, START], [], "no frames on GAIT_IMAGE_0; --stream"),
+        ([*rig.opening(), *rig.frames(0, 3)], ["--stream", 1], "no frames on GAIT_IMAGE_1; --stream"),
+        ([START, *rig.frames(0, 3)], [], "none of its 3 frames was tracked: no camera: give --camera"),
+        ([CAMERA, SCENE, STOP, *rig.frames(0, 3)], [], "was tracked: no START: send it on GAIT_COMMAND"),
+        ([CAMERA, *rig.frames(0, 3)], [], "was tracked: --init auto needs the empty scene"),
+        ([CAMERA, SCENE, *rig.frames(0, 3)], [], "was tracked: nobody walks in full view"),
+        ([*rig.opening(9), *rig.frames(0, 3)], [], "was tracked: the frame of the start did not come"),
+        ([CAMERA], ["--lift"], "no frames on GAIT_IMAGE_0 and no tracks of a known camera"),
+    ],
+)
+def test_a_log_of_which_nothing_is_tracked_ends_with_1_and_the_reason(tmp_path, events, options, words):
+    source = rig.write_log(tmp_path / "in.log", events)
+    done = run(source, f"file://{tmp_path}/out.log?mode=w", *options)
+    assert done.returncode == 1, done
+    assert words in done.stderr.splitlines()[-1] and "in.log: " in done.stderr.splitlines()[-1]

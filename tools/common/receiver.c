@@ -48,6 +48,7 @@ static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
     image_view v;
     tracks_cue *const cue = r->service->cue;
     flush(r);
+    r->service->came++;
     if (!open_view(r->service, buf, channel, &v))
         return;
     bool const wait = cue && !tracks_cue_at(cue, v.utime);

@@ -49,6 +49,7 @@ typedef struct service {
     bool news;       /* the state has changed since the last status */
     int64_t command_id;
     service_counts counts;
+    int64_t came, tracked;   /* frames since the program's start, whatever RESET says */
     int64_t dropped_before;  /* value of counts.dropped at START */
     int64_t last_frame;      /* number of the last frame that came; -1: none */
     int64_t last_utime;      /* capture time of the last frame tracked, or of the start */
@@ -87,6 +88,8 @@ void service_reject(service *s, const message *why);
 void service_set_state(service *s, int8_t state, const char *text);
 /* Pixels of a frame or plate as the tracker takes them. */
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why);
+/* Why no frame that came was tracked. */
+void service_lack(const service *s, message *why);
 void service_send_status(service *s);
 uint64_t service_digest(const service *s); /* 0 before the camera is known */
 /* Wall clock, microseconds since the Unix epoch. */

@@ -175,6 +175,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     int64_t const step_us = service_ticks() - begun;
     s->last_utime = v->utime;
     s->counts.frames++;
+    s->tracked++;
     message_set(&s->text, "tracking");
     histogram_add(&s->counts.step, step_us);
     service_send_estimate(s, v, &estimate, received, step_us);
@@ -204,33 +205,58 @@ static bool fresh(service *s, bool newest, int64_t birth, int64_t now)
     return false;
 }
 
+/* Why are frames that come not tracked?  SERVICE_IDLE_*. */
+static int idle_of(const service *s)
+{
+    if (s->state == GAITMSG_STATUS_T_WAITING)
+        return SERVICE_IDLE_CAMERA;
+    if (s->state != GAITMSG_STATUS_T_READY)
+        return SERVICE_IDLE_NOT;
+    if (!s->seek)
+        return SERVICE_IDLE_START;
+    return s->track.background.data ? SERVICE_IDLE_LOOKING : SERVICE_IDLE_SCENE;
+}
+
+/* What is lacking in such a state. */
+static void say_lack(const service *s, int idle, message *why)
+{
+    int const i = s->stream;
+    if (idle == SERVICE_IDLE_CAMERA)
+        message_set(why, "no camera: give --camera or announce it on GAIT_CAMERA_%d", i);
+    else if (idle == SERVICE_IDLE_START)
+        message_set(why, "no START: send it on GAIT_COMMAND, or run with --init");
+    else if (idle == SERVICE_IDLE_SCENE)
+        message_set(why,
+                    "--init auto needs the empty scene to find somebody: give --background, send "
+                    "GAIT_BACKGROUND_%d, or send START on GAIT_COMMAND",
+                    i);
+    else if (idle == SERVICE_IDLE_LOOKING)
+        message_set(why, "nobody walks in full view for a second");
+    else
+        message_set(why, "the frame of the start did not come");
+}
+
 /* Say once why frames come and nobody is tracked, and again when the reason is another one. */
 static void say_idle(service *s)
 {
-    int const i = s->stream;
-    int const idle = s->state == GAITMSG_STATUS_T_WAITING ? SERVICE_IDLE_CAMERA
-                     : s->state != GAITMSG_STATUS_T_READY ? SERVICE_IDLE_NOT
-                     : !s->seek                           ? SERVICE_IDLE_START
-                     : !s->track.background.data          ? SERVICE_IDLE_SCENE
-                                                          : SERVICE_IDLE_LOOKING;
+    message why;
+    int const idle = idle_of(s);
     if (idle == s->idle)
         return;
     s->idle = idle;
-    if (idle == SERVICE_IDLE_CAMERA)
-        fprintf(stderr,
-                "gait-trackd: frames come, but no camera: give --camera or announce it on GAIT_CAMERA_%d\n",
-                i);
-    if (idle == SERVICE_IDLE_START)
-        fprintf(stderr,
-                "gait-trackd: frames come, but no START: send it on GAIT_COMMAND, or run with --init\n");
-    if (idle == SERVICE_IDLE_SCENE)
-        fprintf(stderr,
-                "gait-trackd: frames come, but --init auto needs the empty scene to find somebody: give "
-                "--background, "
-                "send GAIT_BACKGROUND_%d, or send START on GAIT_COMMAND\n",
-                i);
+    say_lack(s, idle, &why);
     if (idle == SERVICE_IDLE_LOOKING)
         fprintf(stderr, "gait-trackd: looking for somebody who walks in full view\n");
+    else if (idle != SERVICE_IDLE_NOT)
+        fprintf(stderr, "gait-trackd: frames come, but %s\n", why.text);
+}
+
+void service_lack(const service *s, message *why)
+{
+    if (s->state != GAITMSG_STATUS_T_WAITING && s->complaint.text[0])
+        *why = s->complaint;
+    else
+        say_lack(s, idle_of(s), why);
 }
 
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
