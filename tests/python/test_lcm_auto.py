@@ -50,13 +50,27 @@ def test_who_comes_back_is_tracked_again(tmp_path):
     assert all(status[i] != LOST for i in range(100, 110))
 
 
+def test_a_clock_set_back_far_is_a_new_search(tmp_path):
+    """Whoever is there is found again a second later."""
+    back = [
+        ("GAIT_IMAGE_0", image_message(rig.picture(i), rig.utime(i) - 9_000_000, i)) for i in range(15, 60)
+    ]
+    got = track(tmp_path, [*rig.opening(), *rig.frames(0, 15), *back])
+    assert got.words.count("went back by 8.967 s (at most 2.000): stopped; looking for somebody anew") == 1
+    assert got.words.count("somebody found at frame") == 1 and got.rejected == 0
+    assert {m.frame for m in got.estimates} >= {*range(15), *range(55, 60)}
+
+
 def test_the_scene_of_another_camera_is_told_once(tmp_path):
     other = np.full_like(rig.plate(), 60)
     other[:, ::2] = 180
     scene = [SCENE[0], ("GAIT_BACKGROUND_0", image_message(other, rig.utime(0), -1))]
     for begin in (scene, [*scene, rig.opening()[2]]):  # while looking for somebody, and while tracking
         told = track(tmp_path, [*begin, *rig.frames(0, 10)]).words
-        assert told.count("half of the picture differs from the empty scene: give that of this camera") == 1
+        assert (
+            told.count("trackd: half of the picture differs from the empty scene: give that of this camera")
+            == 1
+        )
 
 
 def test_who_is_looked_for_and_found_is_told(tmp_path):

@@ -1,5 +1,6 @@
 """gait-trackd on LCM logs: nothing is lost, everything is repeatable, no message can hurt it."""
 
+import json
 import struct
 
 import lcm_rig as rig
@@ -270,7 +271,30 @@ def test_time_that_runs_backwards_is_refused_frame_by_frame(tmp_path):
     late = ("GAIT_IMAGE_0", rig.frame_message(3, utime=rig.utime(1)))
     frames = rig.frames(0, 6)
     outcome = track(tmp_path, [*rig.opening(), *frames[:3], late, frames[2], *frames[4:]])
-    assert (outcome.frames, outcome.rejected) == (5, 2) and "did not advance" in outcome.words
+    assert (outcome.frames, outcome.rejected) == (5, 2) and outcome.words.count("did not advance") == 1
+
+
+def test_a_clock_set_back_a_little_is_waited_for_and_said_once(tmp_path):
+    back = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i) - 300_000)) for i in range(6, 20)]
+    outcome = track(tmp_path, [*rig.opening(), *rig.frames(0, 6), *back])
+    assert tracked(outcome) == [*range(6), *range(15, 20)]
+    assert outcome.rejected == 9 and outcome.words.count("did not advance") == 1
+
+
+def test_a_clock_set_back_far_stops_the_tracker_which_says_so_once(tmp_path):
+    """As a long pause does: every later frame was rejected for ever, each with a line of its own."""
+    back = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i) - 900_000)) for i in range(3, 9)]
+    again = ("GAIT_COMMAND", rig.start(6, at=0))
+    init = tmp_path / "i.json"
+    init.write_text(json.dumps({"pelvis": rig.walker(0).pelvis.tolist(), "phase": 0.1, "heading_rad": 0}))
+    outcome = track(
+        tmp_path,
+        [*rig.opening()[:2], *rig.frames(0, 3), *back[:3], again, *back[3:]],
+        *("--init", init, "--max-gap", 0.8),
+    )
+    assert tracked(outcome) == [0, 1, 2, 6, 7, 8] and outcome.rejected == 0
+    assert outcome.words.count("went back by 0.867 s (at most 0.800): stopped; send START") == 1
+    assert outcome.words.count("\n") == 2
 
 
 def test_a_long_pause_stops_the_tracker_which_says_so(tmp_path):
@@ -317,8 +341,6 @@ def test_the_cloud_is_the_posterior(tmp_path):
 
 
 def test_camera_scene_and_start_by_file_are_the_same_as_by_message(tmp_path):
-    import json
-
     import cv2
 
     camera, scene, init = tmp_path / "c.json", tmp_path / "p.ppm", tmp_path / "i.json"
@@ -352,8 +374,6 @@ def test_camera_scene_and_start_by_file_are_the_same_as_by_message(tmp_path):
 
 
 def test_a_start_at_a_lost_frame_is_dated_between_its_neighbours(tmp_path):
-    import json
-
     init = tmp_path / "i.json"
     init.write_text(json.dumps({"frame": 2, "pelvis": rig.walker(2).pelvis.tolist(), "phase": 0.2}))
     frames = rig.frames(0, 6)
@@ -364,8 +384,6 @@ def test_a_start_at_a_lost_frame_is_dated_between_its_neighbours(tmp_path):
 
 
 def test_reset_puts_the_init_file_in_force_again(tmp_path):
-    import json
-
     init = tmp_path / "i.json"
     init.write_text(json.dumps({"pelvis": rig.walker(0).pelvis.tolist(), "phase": 0.1, "heading_rad": 0}))
     reset = ("GAIT_COMMAND", command_message(RESET))

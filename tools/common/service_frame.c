@@ -4,6 +4,7 @@
 #include "service_send.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -52,20 +53,28 @@ static bool begin(service *s, const image_view *v)
     return true;
 }
 
-/* Can this frame follow the last one?  A pause that is too long stops the tracker, or it would wait for
- * ever. */
+/* What becomes of somebody who is not tracked any more. */
+static const char *remedy(const service *s)
+{
+    return s->seek ? "looking for somebody anew" : "send START";
+}
+
+/* Can this frame follow the last one?  A pause that is too long stops the tracker, and so does a clock that was set
+ * back as far, or it would wait for ever. */
 static bool in_time(service *s, const image_view *v)
 {
     message why;
-    int64_t const gap = v->utime - s->last_utime;
-    double const pause = (double)gap * 1e-6;
-    if (pause > s->max_gap) {
-        message_set(&why, "no frame for %.3f s (at most %.3f): stopped; send START", pause, s->max_gap);
+    double const pause = 1e-6 * ((double)v->utime - (double)s->last_utime); /* of any two numbers */
+    if (fabs(pause) > s->max_gap) {
+        message_set(&why,
+                    pause > 0 ? "no frame for %.3f s (at most %.3f): stopped; %s"
+                              : "capture time went back by %.3f s (at most %.3f): stopped; %s",
+                    fabs(pause), s->max_gap, remedy(s));
         stop(s, &why);
         return false;
     }
-    if (gap < 0 || (gap == 0 && s->steps > 0)) {
-        message_set(&why, "capture time did not advance (%.6f s); stamp frames in order", pause);
+    if (pause < 0 || (pause == 0 && s->steps > 0)) {
+        message_set(&why, "capture time did not advance; stamp frames in order");
         service_reject(s, &why);
         return false;
     }
@@ -168,7 +177,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     if (status == GAIT_OK)
         status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);
     if (status != GAIT_OK) {
-        message_set(&why, "stopped: %s (%s); send START", err.text, gait_status_name(status));
+        message_set(&why, "stopped: %s (%s); %s", err.text, gait_status_name(status), remedy(s));
         stop(s, &why);
         return false;
     }
