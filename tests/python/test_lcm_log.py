@@ -260,6 +260,31 @@ def test_lost_frames_are_counted_by_their_numbers(tmp_path):
     assert [m.dropped for m in outcome.estimates] == [0, 0, 0, 2, 4, 4]
 
 
+def test_repeats_are_not_dropped_frames(tmp_path):
+    """`dropped` is of frames that were never tracked: by number and time, by time alone, by number alone."""
+    twice = [event for event in rig.frames(0, 8) for _ in range(2)]
+    bare = [("GAIT_IMAGE_0", rig.frame_message(i // 2, metadata=[], nmetadata=0)) for i in range(16)]
+    late = [("GAIT_IMAGE_0", rig.frame_message(i // 2, utime=rig.utime(i))) for i in range(16)]
+    for frames, count in ((twice, 8), (bare, 8), (late, 16)):
+        outcome = track(tmp_path, [*rig.opening(), *frames])
+        assert (outcome.frames, outcome.dropped) == (count, 0)
+        assert not any(m.dropped for m in outcome.estimates)
+
+
+def test_a_frame_sent_again_because_it_was_damaged_is_not_dropped(tmp_path):
+    frames, bad = rig.frames(0, 6), ("GAIT_IMAGE_0", rig.frame_message(3, width=8))
+    outcome = track(tmp_path, [*rig.opening(), *frames[:3], bad, bad, *frames[3:]])
+    assert [m.dropped for m in outcome.estimates] == [0] * 6 and outcome.dropped == 0
+    outcome = track(tmp_path, [*rig.opening(), *frames[:3], bad, bad, *frames[4:]])
+    assert [m.dropped for m in outcome.estimates] == [0, 0, 0, 1, 1]
+
+
+def test_a_frame_that_comes_after_a_later_one_is_dropped_once(tmp_path):
+    frames = rig.frames(0, 6)
+    outcome = track(tmp_path, [*rig.opening(), *frames[:2], frames[3], frames[2], *frames[4:]])
+    assert tracked(outcome) == [0, 1, 3, 4, 5] and [m.dropped for m in outcome.estimates] == [0, 0, 1, 1, 1]
+
+
 def test_frames_of_a_source_that_does_not_count(tmp_path):
     """A bot_core publisher sends no frame numbers: nothing is counted as lost, estimates say -1."""
     events = [("GAIT_IMAGE_0", rig.frame_message(i, metadata=[], nmetadata=0)) for i in range(4)]

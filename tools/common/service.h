@@ -51,7 +51,9 @@ typedef struct service {
     service_counts counts;
     int64_t came, tracked;   /* frames since the program's start, whatever RESET says */
     int64_t dropped_before;  /* value of counts.dropped at START */
-    int64_t last_frame;      /* number of the last frame that came; -1: none */
+    int64_t last_frame;      /* highest number of a frame that came; -1: none */
+    int64_t last_came;       /* capture time of the last frame that came */
+    bool missed;             /* that one was not tracked, and is counted as dropped */
     int64_t last_utime;      /* capture time of the last frame tracked, or of the start */
     int64_t steps;           /* frames tracked since START */
     budget budget;           /* limit 0 in a log, which is played without loss */

@@ -16,6 +16,14 @@ static void count_gap(service *s, const image_view *v)
     s->last_frame = v->frame > s->last_frame ? v->frame : s->last_frame;
 }
 
+/* Has this frame been here, or been counted as one that never arrived? */
+static bool again(const service *s, const image_view *v)
+{
+    bool const numbered = v->frame >= 0 && s->last_frame >= 0;
+    return v->utime == s->last_came ||
+           (numbered && (v->frame == s->last_frame || (v->frame < s->last_frame && v->utime < s->last_came)));
+}
+
 /* Not tracking any more, or not yet, for a reason that is said. */
 static void stop(service *s, const message *why)
 {
@@ -46,6 +54,8 @@ static bool begin(service *s, const image_view *v)
     s->last_utime = utime;
     s->dropped_before = s->counts.dropped;
     s->last_frame = v->frame;
+    s->last_came = v->utime;
+    s->missed = false;
     s->steps = 0;
     memset(s->past, 0xff, sizeof s->past); /* no step has such a number */
     s->meter.running = false;
@@ -271,6 +281,7 @@ void service_lack(const service *s, message *why)
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
 {
     int64_t const now = service_now(), birth = budget_birth(v->utime, arrival_utime);
+    bool const repeated = s->state == GAITMSG_STATUS_T_RUNNING && again(s, v);
     count_gap(s, v);
     say_idle(s);
     if (s->state == GAITMSG_STATUS_T_ARMED && !begin(s, v))
@@ -279,6 +290,9 @@ void service_frame(service *s, const image_view *v, bool newest, int64_t arrival
         return;
     if (s->state != GAITMSG_STATUS_T_RUNNING)
         return;
-    if (!fresh(s, newest, birth, now) || !in_time(s, v) || !step(s, v, now, birth))
-        s->counts.dropped++;
+    s->last_came = v->utime;
+    bool const due = !repeated || s->missed; /* counts as dropped unless it is tracked */
+    s->counts.dropped -= repeated && s->missed;
+    s->missed = !(fresh(s, newest, birth, now) && in_time(s, v) && step(s, v, now, birth)) && due;
+    s->counts.dropped += s->missed;
 }
