@@ -242,7 +242,8 @@ gait_status gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const 
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "gait_lift_push: config lag is -1: there is no room for a stream");
     if (utime < 0 || (l->stream.last >= 0 && utime <= l->stream.last))
-        return base_fail(err, GAIT_ERR_STATE, -1, "gait_lift_push: utime %lld does not follow %lld",
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "gait_lift_push: utime %lld does not follow %lld; gait_lift_reset() begins anew",
                          (long long)utime, (long long)l->stream.last);
     lift_seen const seen = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
     lifter_take(l, (size_t)t->prior.markers, uv, sd, l->stream.new_uv, l->stream.new_sd);

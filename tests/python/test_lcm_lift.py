@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
+from gait._abi import LiftFlag, TrackStatus
 from gait.core.lifter import LiftConfig, Lifter
 from gait.image.camera import Camera
 from gait.lcm.link import private_url
@@ -155,13 +156,54 @@ def test_damaged_tracks_are_named_and_passed_over(tmp_path: Path, name: str, dat
 
 def test_tracks_out_of_order_or_of_strangers_are_named(tmp_path: Path) -> None:
     happenings = events()
-    happenings.insert(20, happenings[10])
-    outcome, _ = lift(tmp_path, happenings)
-    assert "does not follow" in outcome.words and "lift_rejected 1" in outcome.printed
+    happenings[20:20] = happenings[10:14]
+    outcome, lifted = lift(tmp_path, happenings)
+    assert outcome.words.count("tracks: capture time did not advance") == 1
+    assert "lift_rejected 4" in outcome.printed and len(lifted) == FRAMES - LAG
     happenings = events()
     happenings.insert(20, ("GAIT_TRACKS_0", tracks_message(["tail"], [[1.0, 2.0]], rig.utime(3))))
     outcome, _ = lift(tmp_path, happenings)
     assert "no point that the model knows" in outcome.words
+
+
+def test_one_stamp_far_ahead_does_not_end_the_lift(tmp_path: Path) -> None:
+    """It begins anew with the next tracks: all of them were rejected until a restart."""
+    happenings, names = events(), model()[1][:NAMES_SEEN]
+    ahead = tracks_message(names, observations()[9][1], rig.utime(9) + 3_600_000_000, 7777)
+    happenings[10:11] = [("GAIT_TRACKS_0", ahead)]
+    outcome, lifted = lift(tmp_path, happenings)
+    assert "lift_rejected 0" in outcome.printed
+    assert outcome.words.count("tracks: capture time went back by") == 1
+    assert [m.frame for m in lifted[-(FRAMES - 10 - LAG) :]] == list(range(110, 100 + FRAMES - LAG))
+    assert lifted[-1].status == lifted[-1].TRACKING
+
+
+def test_who_is_suddenly_elsewhere_is_ambiguous(tmp_path: Path) -> None:
+    """While the library says that what it saw did not fit and was searched for anew."""
+    blob, names = model()
+    lifter = Lifter(blob, camera(), LiftConfig.default(lag=LAG, sd=SD))
+    happenings, want = events()[:1], []
+    for i, (utime, uv, _) in enumerate(observations()):
+        uv = (uv + (0 if i < 22 else 60)).astype(np.float32)
+        happenings.append(("GAIT_TRACKS_0", tracks_message(names[:NAMES_SEEN], uv, utime, i)))
+        pixels = np.full((19, 2), np.nan)
+        pixels[:NAMES_SEEN] = uv
+        lifter.push(utime, pixels)
+        now = lifter.estimate()
+        if now is not None:
+            want.append(TrackStatus.AMBIGUOUS if now.flags & LiftFlag.MISFIT else now.status)
+    _, lifted = lift(tmp_path, happenings)
+    assert [m.status for m in lifted] == want and want.count(TrackStatus.AMBIGUOUS) > 3
+    assert want[-1] == TrackStatus.TRACKING
+
+
+def test_what_is_not_finite_is_not_published(tmp_path: Path) -> None:
+    far = camera_message(CAMERA, rig.utime(0))
+    far.t, far.fx, far.fy = [0, 0, 1e6], 1e30, 1e30
+    outcome, lifted = lift(tmp_path, [("GAIT_CAMERA_0", far), *events()[1:]])
+    assert "tracks: joints that are not finite came of them" in outcome.words
+    assert all(np.isfinite([[*j.position, *j.sd] for j in m.joints]).all() for m in lifted)
+    assert f"lift_frames {FRAMES} lifted {len(lifted)} " in outcome.printed
 
 
 def spoilt(message: Any) -> Any:

@@ -4,11 +4,15 @@
 #include "gaitmsg_estimate_t.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-enum { MESSAGE_ROOM = 1 << 14 }; /* an estimate of all markers, with room to spare */
+enum {
+    MESSAGE_ROOM = 1 << 14, /* an estimate of all markers, with room to spare */
+    BACK_US = 1000000,      /* tracks that are older than the last by more are of another time */
+};
 
 static int64_t monotonic_us(void)
 {
@@ -22,6 +26,7 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
     gait_error err = {.text = ""};
     gait_lift_config *const c = &s->config;
     s->out = out;
+    s->last = -1;
     gait_lift_default(c);
     c->stature = (double)set->stature;
     c->sd = (double)set->sd;
@@ -99,7 +104,24 @@ static const lift_past *past_of(const lift_service *s, int64_t utime)
     return &s->past[s->frames % LIFT_SERVICE_PAST];
 }
 
-static void send(lift_service *s, int64_t step_us)
+/* What did not fit where it was expected was searched for anew: nobody knows yet whether it has been found. */
+static int8_t status_of(const gait_lift_frame *e)
+{
+    bool const doubtful = e->status == GAIT_STATUS_TRACKING && e->flags & GAIT_LIFT_MISFIT;
+    return (int8_t)(doubtful ? GAIT_STATUS_AMBIGUOUS : e->status);
+}
+
+static bool finite_joints(const gaitmsg_estimate_t *m)
+{
+    bool finite = isfinite(m->mean.heading);
+    for (int32_t j = 0; j < m->njoints; j++)
+        for (int32_t i = 0; i < 3; i++)
+            finite = finite && isfinite(m->joints[j].position[i]) && isfinite(m->joints[j].sd[i]);
+    return finite;
+}
+
+/* What is not finite is not published. */
+static bool send(lift_service *s, int64_t step_us, message *why)
 {
     static uint8_t room[MESSAGE_ROOM];
     const gait_lift_frame *const e = &s->estimate;
@@ -110,7 +132,7 @@ static void send(lift_service *s, int64_t step_us)
                             .step = (int64_t)e->frame,
                             .receive_utime = past->receive_utime,
                             .step_us = (int32_t)step_us,
-                            .status = (int8_t)e->status,
+                            .status = status_of(e),
                             .model_digest = (int64_t)s->info.digest,
                             .njoints = known ? s->info.markers : 0,
                             .joints = s->joint};
@@ -125,8 +147,29 @@ static void send(lift_service *s, int64_t step_us)
             s->joint[j].sd[i] = (float)e->sd[j][i];
         }
     }
+    if (!finite_joints(&m)) {
+        gait_lift_reset(s->lift);
+        s->rejected++;
+        return message_set(why, "tracks: joints that are not finite came of them; the lift begins anew");
+    }
     sink_publish(s->out, "GAIT_LIFT", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &m));
     s->lifted++;
+    return true;
+}
+
+/* May tracks of this time follow the last ones, perhaps in a new stream? */
+static bool in_time(lift_service *s, int64_t utime, message *why)
+{
+    if (utime < 0 || (utime <= s->last && utime >= s->last - BACK_US))
+        return message_set(why, "tracks: capture time did not advance; stamp them in order");
+    if (utime > s->last)
+        return true;
+    gait_lift_reset(s->lift);
+    if (!s->told_back)
+        fprintf(stderr, "gait-trackd: tracks: capture time went back by %.3f s: the lift begins anew\n",
+                1e-6 * (double)(s->last - utime));
+    s->told_back = true;
+    return true;
 }
 
 bool lift_service_tracks(lift_service *s, tracks_view *v, int64_t receive_utime, message *why)
@@ -140,7 +183,12 @@ bool lift_service_tracks(lift_service *s, tracks_view *v, int64_t receive_utime,
         s->rejected++;
         return tracks_view_strangers(why);
     }
+    if (!in_time(s, v->utime, why)) {
+        s->rejected++;
+        return false;
+    }
     int64_t const before = monotonic_us();
+    s->last = v->utime;
     if (gait_lift_push(s->lift, v->utime, s->uv, s->sd, &err) != GAIT_OK) {
         s->rejected++;
         return message_set(why, "tracks: %s", err.text);
@@ -149,7 +197,5 @@ bool lift_service_tracks(lift_service *s, tracks_view *v, int64_t receive_utime,
     bool const there = gait_lift_estimate(s->lift, &s->estimate) == GAIT_OK;
     int64_t const step_us = monotonic_us() - before;
     histogram_add(&s->step, step_us);
-    if (there)
-        send(s, step_us);
-    return true;
+    return !there || send(s, step_us, why);
 }

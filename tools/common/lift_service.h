@@ -30,6 +30,8 @@ typedef struct lift_service {
     void *memory;    /* taken once */
     size_t memory_bytes;
     int64_t frames, lifted, rejected;
+    int64_t last;   /* capture time of the last frame lifted; -1: none */
+    bool told_back; /* that time went back, once on stderr */
     histogram step; /* microseconds */
     tracks_sieve sieve;
     double uv[2 * GAIT_MAX_MARKERS], sd[GAIT_MAX_MARKERS];
@@ -43,6 +45,7 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
 void lift_service_close(lift_service *s);
 /* The first camera starts the service; another one later is an error. */
 bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why);
-/* One frame's tracks, received at `receive_utime`: pushed, and what they tell published on GAIT_LIFT. */
+/* One frame's tracks, received at `receive_utime`: pushed, and what they tell published on GAIT_LIFT.
+ * Tracks from more than a second before the last ones begin anew: a clock was set, or one stamp was wrong. */
 bool lift_service_tracks(lift_service *s, tracks_view *v, int64_t receive_utime, message *why);
 #endif
