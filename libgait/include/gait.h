@@ -260,7 +260,9 @@ GAIT_API gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_m
 GAIT_API gait_status gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate);
 /* Broad prior: phase uniform, stride rate and stature of the population, heading unknown, pelvis at the origin. */
 GAIT_API gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd);
-/* Draw the particles from independent normals; a phase or heading whose sd is >= a half turn is uniform. */
+/* Draw the particles from independent normals; a phase or heading whose sd is >= a half turn is uniform.  GAIT_ERR_ARG
+ * names the number that is out of range.  Means: phase [0, 1], stride_hz [0.1, 4], stature [0.5, 2.5], heading [-7, 7],
+ * pelvis [-1e4, 1e4], all others [-10, 10]; deviations [0, 10]. */
 GAIT_API gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
                                         gait_error *err);
 /* One frame: resample, predict, weigh, estimate.  The first frame after start at the same utime is not moved. */

@@ -244,21 +244,42 @@ gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2]);
 }
 
-static bool state_finite(const gait_state *s)
-{
-    float v[sizeof *s / sizeof(float)];
-    memcpy(v, s, sizeof *s);
-    return f_finite(v, sizeof v / sizeof *v);
-}
+typedef struct state_range { /* means of one field of a state, which may be an array */
+    char name[11];
+    uint8_t count;
+    uint16_t offset;
+    float low, high;
+} state_range;
 
-static bool state_nonnegative(const gait_state *s)
+#define STATE(member, count, low, high) {#member, count, offsetof(gait_state, member), low, high}
+
+/* Every number of a state is in its range; deviations have one of their own. */
+static gait_status check_state(const char *which, const gait_state *s, bool deviations, gait_error *err)
 {
-    float v[sizeof *s / sizeof(float)];
-    memcpy(v, s, sizeof *s);
-    for (size_t k = 0; k < sizeof v / sizeof *v; k++)
-        if (v[k] < 0.0f)
-            return false;
-    return true;
+    static const state_range RANGES[] = {
+        STATE(phase, 1, 0.0f, 1.0f),
+        STATE(stride_hz, 1, 0.1f, 4.0f),
+        STATE(stature, 1, 0.5f, 2.5f),
+        STATE(heading, 1, -7.0f, 7.0f),
+        STATE(pitch, 1, -10.0f, 10.0f),
+        STATE(roll, 1, -10.0f, 10.0f),
+        STATE(turn_rate, 1, -10.0f, 10.0f),
+        STATE(pelvis, 3, -1e4f, 1e4f),
+        STATE(coef, GAIT_MAX_COMPONENTS, -10.0f, 10.0f),
+        STATE(offset, GAIT_MAX_ANGLES, -10.0f, 10.0f),
+        STATE(proportion, GAIT_MAX_PROPORTIONS, -10.0f, 10.0f),
+    };
+    for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
+        const state_range *const r = &RANGES[k];
+        float const low = deviations ? 0.0f : r->low, high = deviations ? 10.0f : r->high;
+        float v[GAIT_MAX_ANGLES];
+        memcpy(v, (const char *)s + r->offset, r->count * sizeof *v);
+        for (int32_t i = 0; i < r->count; i++)
+            if (!(v[i] >= low && v[i] <= high)) /* also false for NaN */
+                return base_fail(err, GAIT_ERR_ARG, i, "start %s.%s = %g is outside [%g, %g]", which, r->name,
+                                 (double)v[i], (double)low, (double)high);
+    }
+    return GAIT_OK;
 }
 
 gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
@@ -266,15 +287,12 @@ gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const ga
 {
     if (!t || !mean || !sd)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker, mean or sd is NULL");
-    if (!state_finite(mean) || !state_finite(sd))
-        return base_fail(err, GAIT_ERR_ARG, -1, "start: mean or sd holds a number that is not finite");
-    if (!state_nonnegative(sd))
-        return base_fail(err, GAIT_ERR_ARG, -1, "start: a standard deviation is negative");
-    if (!(mean->stride_hz > 0.0f) || !(mean->stature > 0.2f && mean->stature < 3.0f))
-        return base_fail(err, GAIT_ERR_ARG, -1,
-                         "start: stride_hz must be positive and stature within 0.2 .. 3 m");
-    tracker_start(t, mean, sd, utime);
-    return GAIT_OK;
+    gait_status status = check_state("mean", mean, false, err);
+    if (status == GAIT_OK)
+        status = check_state("sd", sd, true, err);
+    if (status == GAIT_OK)
+        tracker_start(t, mean, sd, utime);
+    return status;
 }
 
 static gait_status check_frame(const gait_tracker *t, const gait_frame *frame, gait_error *err)

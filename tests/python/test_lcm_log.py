@@ -418,10 +418,30 @@ def test_reset_puts_the_init_file_in_force_again(tmp_path):
     assert [m.step for m in outcome.estimates] == [0, 1, 2, 0, 1, 2] and outcome.frames == 3
 
 
-def test_state_of_start_is_checked(tmp_path):
-    for change, words in (({"stature": -1.0}, "cannot start"), ({"ncoef": 99}, "ncoef 99")):
-        start = rig.start(0)
-        for name, value in change.items():
-            setattr(start.mean, name, value)
-        outcome = track(tmp_path, [*rig.opening()[:2], ("GAIT_COMMAND", start), *rig.frames(0, 2)])
-        assert outcome.frames == 0 and words in outcome.words
+def bad_start(part, **change):
+    start = rig.start(0)
+    for name, value in change.items():
+        setattr(getattr(start, part), name, value)
+    return ("GAIT_COMMAND", start)
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "words"),
+    [
+        ("mean", {"ncoef": 99}, "ncoef 99"),
+        ("mean", {"stature": -1.0}, "start mean.stature = -1 is outside [0.5, 2.5]; send another START"),
+        ("mean", {"pelvis": [1e30, 0, 1]}, "start mean.pelvis = 1e+30 is outside"),
+        ("sd", {"stature": 1e6}, "start sd.stature = 1e+06 is outside [0, 10]"),
+        ("sd", {"heading": float("inf")}, "start sd.heading = inf is outside"),
+    ],
+)
+def test_a_senseless_start_is_refused_at_once(tmp_path, part, change, words):
+    """Before a frame or the camera comes, and while somebody is tracked, who goes on being tracked."""
+    camera, scene, good = rig.opening()
+    bad = bad_start(part, **change)
+    for events in ([camera, scene, bad], [bad, camera, scene]):
+        assert track(tmp_path, events).words.count(words) == 1
+    running = track(tmp_path, [camera, scene, good, *rig.frames(0, 3), bad, *rig.frames(3, 6)])
+    assert running.words.count(words) == 1
+    plain = track(tmp_path, [camera, scene, good, *rig.frames(0, 6)])
+    assert running.digest == plain.digest and tracked(running) == list(range(6))

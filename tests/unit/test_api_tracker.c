@@ -1,5 +1,5 @@
 /* Configurations and starts that make no sense are refused, each with an error that names what is wrong. */
-#include "toy_tracker.h"
+#include "toy_film.h"
 
 #include "check.h"
 
@@ -205,6 +205,100 @@ static void test_start(void)
     toy_tracker_free(t);
 }
 
+/* A number of a state by its place. */
+static void set_number(gait_state *s, size_t k, float value)
+{
+    memcpy((char *)s + k * sizeof value, &value, sizeof value);
+}
+
+/* A start that is finite but absurd gave estimates that are not numbers. */
+static void test_absurd_starts(void)
+{
+    static const struct {
+        size_t member;
+        float mean, sd;
+        const char *said;
+    } starts[] = {
+        {offsetof(gait_state, stature), 0.0f, 1e6f, "start sd.stature = 1e+06 is outside [0, 10]"},
+        {offsetof(gait_state, pelvis), 0.0f, 3e38f, "start sd.pelvis = 3e+38 is outside [0, 10]"},
+        {offsetof(gait_state, coef), 0.0f, 1e38f, "start sd.coef = 1e+38 is outside [0, 10]"},
+        {offsetof(gait_state, pelvis), 1e30f, 0.0f, "start mean.pelvis = 1e+30 is outside [-10000, 10000]"},
+        {offsetof(gait_state, stride_hz), 1e9f, 0.0f, "start mean.stride_hz = 1e+09 is outside [0.1, 4]"},
+        {offsetof(gait_state, phase), 2.0f, 0.0f, "start mean.phase = 2 is outside [0, 1]"},
+    };
+    gait_tracker_config const cfg = toy_config(1);
+    gait_tracker *const t = toy_tracker_new(&cfg);
+    gait_error err;
+    for (size_t k = 0; k < sizeof starts / sizeof *starts; k++) {
+        gait_state mean = toy_walk(0.2f), sd = toy_doubt(1.0f);
+        if (starts[k].mean != 0.0f)
+            set_number(&mean, starts[k].member / sizeof(float), starts[k].mean);
+        else
+            set_number(&sd, starts[k].member / sizeof(float), starts[k].sd);
+        CHECK(gait_tracker_start(t, &mean, &sd, 0, &err) == GAIT_ERR_ARG &&
+              strcmp(err.text, starts[k].said) == 0);
+    }
+    toy_tracker_free(t);
+}
+
+static bool estimate_finite(const gait_estimate *e)
+{
+    bool finite = isfinite(e->log_evidence) && isfinite(e->ess) && isfinite(e->speed);
+    const gait_state *const states[] = {&e->mean, &e->sd, &e->best};
+    for (size_t k = 0; k < sizeof e->mean / sizeof(float); k++)
+        for (int i = 0; i < 3; i++) {
+            float v;
+            memcpy(&v, (const char *)states[i] + k * sizeof v, sizeof v);
+            finite = finite && isfinite(v);
+        }
+    for (int j = 0; j < TOY_POINTS; j++)
+        for (int i = 0; i < 3; i++)
+            finite = finite && isfinite(e->pose.joint[j][i]) && isfinite(e->joint_sd[j][i]);
+    return finite;
+}
+
+/* Put number k of the mean as far out as a start may have it, up or down. */
+static void set_far(gait_tracker *t, gait_state *mean, const gait_state *sd, size_t k, float sign)
+{
+    static const float far[] = {1e4f, 10.0f, 7.0f, 4.0f, 2.5f, 1.0f, 0.5f, 0.1f, 0.0f};
+    int const most = sizeof far / sizeof *far;
+    for (int i = 0; i < most; i++) {
+        set_number(mean, k,
+                   sign > 0.0f ? far[i]
+                   : k < 3     ? far[most - 1 - i]
+                               : -far[i]); /* three are positive */
+        if (gait_tracker_start(t, mean, sd, toy_frame(0).utime, NULL) == GAIT_OK)
+            return;
+    }
+    CHECK(!"a number has no range");
+}
+
+/* Whatever start is accepted, its estimates are numbers: one number after the other goes as far out as it may. */
+static void test_the_widest_starts_stay_finite(void)
+{
+    gait_tracker_config cfg = toy_config(1);
+    cfg.offset_angles = ~0u;
+    film_make(1, 3);
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    for (int way = 0; way < 4; way++) { /* each alone or all together, up or down */
+        gait_state mean = toy_walk(0.0f), sd = toy_doubt(1.0f);
+        for (size_t k = 0; k < sizeof mean / sizeof(float); k++) {
+            gait_estimate e;
+            if (way < 2) {
+                mean = toy_walk(0.0f);
+                sd = toy_doubt(1.0f);
+            }
+            set_number(&sd, k, 10.0f);
+            set_far(t, &mean, &sd, k, way % 2 ? 1.0f : -1.0f);
+            for (int n = 0; n < 3; n++) {
+                film_step(t, 1, n, 0, &e);
+                CHECK(estimate_finite(&e));
+            }
+        }
+    }
+    toy_tracker_free(t);
+}
+
 /* The broad prior is a start that works: no phase, no heading, the population's rate and stature. */
 static void test_prior(void)
 {
@@ -273,6 +367,8 @@ int main(void)
     test_cameras();
     test_defaults();
     test_start();
+    test_absurd_starts();
+    test_the_widest_starts_stay_finite();
     test_prior();
     test_background();
     test_particles();

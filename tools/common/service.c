@@ -120,12 +120,24 @@ void service_close(service *s)
     tracking_close(&s->track);
 }
 
+/* Would the tracker take such a start?  It is begun anew when its frame comes; before there is a tracker nobody knows,
+ * and it is asked as soon as the camera is known. */
+static bool start_usable(service *s, const gait_state *mean, const gait_state *sd)
+{
+    message why;
+    if (!s->track.tracker || tracking_start(&s->track, mean, sd, 0, &why))
+        return true;
+    service_complain(s, &why);
+    return false;
+}
+
 bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
     if (!tracking_set_camera(&s->track, camera, why) || (s->cue && !tracks_cue_room(s->cue, camera, why)))
         return false;
     s->track.memory_bytes += s->cue ? s->cue->room : 0;
     const tracking *const t = &s->track;
+    bool const armed = s->start.armed;
     fprintf(stderr,
             "gait-trackd: model %016" PRIx64
             ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
@@ -134,7 +146,11 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
             s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), t->memory_bytes, t->model_bytes,
             t->tracker_bytes, s->pool_bytes, t->picture_bytes);
     s->wanted = s->track.config.particles;
-    set_idle(s);
+    s->start.armed = s->start.armed && start_usable(s, &s->start.mean, &s->start.sd);
+    if (s->start.armed == armed)
+        set_idle(s);
+    else
+        service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
     return true;
 }
 
@@ -186,6 +202,8 @@ static void command_start(service *s, const gaitmsg_command_t *msg)
         service_complain(s, &why);
         return;
     }
+    if (!start_usable(s, &mean, &sd))
+        return;
     arming_by_time(&s->start, &mean, &sd, msg->utime);
     s->seek = !s->has_init;
     set_idle(s);

@@ -37,17 +37,11 @@ static void stop(service *s, const message *why)
 static bool begin(service *s, const image_view *v)
 {
     message why;
-    gait_error err = {.text = ""};
     int64_t utime;
     arming_answer const answer = arming_reached(&s->start, v, s->max_gap, &utime, &why);
     if (answer == ARMING_WAIT)
         return false;
-    gait_status const status = answer == ARMING_MISSED ? GAIT_ERR_STATE
-                                                       : gait_tracker_start(s->track.tracker, &s->start.mean,
-                                                                            &s->start.sd, utime, &err);
-    if (answer != ARMING_MISSED && status != GAIT_OK)
-        message_set(&why, "cannot start: %s (%s)", err.text, gait_status_name(status));
-    if (status != GAIT_OK) {
+    if (answer == ARMING_MISSED || !tracking_start(&s->track, &s->start.mean, &s->start.sd, utime, &why)) {
         stop(s, &why);
         return false;
     }

@@ -93,3 +93,10 @@ bool tracking_set_background(tracking *t, const gait_image *plate, message *why)
     gait_status const status = gait_tracker_set_background(t->tracker, 0, &t->background);
     return status == GAIT_OK || message_set(why, "background refused: %s", gait_status_name(status));
 }
+
+bool tracking_start(tracking *t, const gait_state *mean, const gait_state *sd, int64_t utime, message *why)
+{
+    gait_error err = {.text = ""};
+    return gait_tracker_start(t->tracker, mean, sd, utime, &err) == GAIT_OK ||
+           message_set(why, "%s; send another START", err.text);
+}

@@ -27,4 +27,6 @@ void tracking_close(tracking *t);
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why);
 /* Copy the empty scene; one that is already there is left alone.  It must have the camera's size. */
 bool tracking_set_background(tracking *t, const gait_image *plate, message *why);
+/* Begin with a state; one that makes no sense is refused and changes nothing. */
+bool tracking_start(tracking *t, const gait_state *mean, const gait_state *sd, int64_t utime, message *why);
 #endif
