@@ -42,12 +42,12 @@ typedef enum gait_status {
     GAIT_ERR_ARG     = -1, /* null pointer, non-finite number, value outside its documented range */
     GAIT_ERR_STRUCT  = -2, /* struct_size unset or unknown: call gait_*_default() first */
     GAIT_ERR_MEMORY  = -3, /* mem too small or not aligned to GAIT_ALIGN */
-    GAIT_ERR_LIMIT   = -4, /* exceeds a GAIT_MAX_* of this build */
+    GAIT_ERR_LIMIT   = -4, /* of tracker, pool, model: a count or size out of its range, as particles 0, lag -1, tasks 0 */
     GAIT_ERR_MAGIC   = -5, /* not a libgait blob or snapshot */
     GAIT_ERR_VERSION = -6, /* format major or snapshot layout is not the one this build reads */
     GAIT_ERR_CORRUPT = -7, /* checksum, bounds or cross-reference check failed */
     GAIT_ERR_STATE   = -8, /* call out of order: step before start, time running backwards */
-    GAIT_ERR_NUMERIC = -9  /* reserved: this version flags GAIT_EST_DEGENERATE instead */
+    GAIT_ERR_NUMERIC = -9  /* lifting ran out of the range of numbers; the tracker flags GAIT_EST_DEGENERATE instead */
 } gait_status;
 
 typedef struct gait_error { /* optional detail, written on failure only; there is no global "last error" */
@@ -91,12 +91,12 @@ typedef struct gait_camera { /* u = fx X/Z + cx, v = fy Y/Z + cy with (X,Y,Z) = 
 
 typedef struct gait_state {          /* one hypothesis: everything that places and poses a walker */
     float phase;                     /* [0, 1) of the stride; 0 = right heel strike */
-    float stride_hz;                 /* strides per second; in poses 0 stands for the model's mean */
-    float stature;                   /* metres */
-    float heading;                   /* walking direction about world z, radians; 0 = along +x */
+    float stride_hz;                 /* strides per second, [0.1, 4] in starts; in poses 0 stands for the model's mean */
+    float stature;                   /* metres, [0.5, 2.5] in starts */
+    float heading;                   /* walking direction about world z, radians, [-7, 7] in starts; 0 = along +x */
     float pitch, roll;               /* tilt of the pelvis beyond the model's own, radians */
     float turn_rate;                 /* of the heading, radians per second; has no part in poses */
-    float pelvis[3];                 /* pelvis joint, metres, world */
+    float pelvis[3];                 /* pelvis joint, metres, world, [-1e4, 1e4] in starts */
     float coef[GAIT_MAX_COMPONENTS]; /* principal-component scores, in standard deviations; unused are 0 */
     float offset[GAIT_MAX_ANGLES];   /* posture: added to the model's joint angles, radians; unused are 0 */
     float proportion[GAIT_MAX_PROPORTIONS]; /* scores of the limbs' proportions, standard deviations; unused are 0 */
@@ -206,8 +206,7 @@ typedef struct gait_tracker_config {
     float    offset_noise;     /* posture of the angles in offset_angles, in the deviation among people learnt of each
                                 * angle, which it relaxes to [0, 100]; default 0.58 */
     float    proportion_noise; /* of the proportions' scores, which relax to a deviation of 1 [0, 100]; default 0.15 */
-    uint32_t offset_angles;    /* bit i: angle i has one; bits past the model's have no effect; default trunk and
-                                * arms (paper mode none) */
+    uint32_t offset_angles;    /* bit i: angle i has one, past the model's nothing; default trunk and arms (paper mode none) */
     uint32_t cpu_mask;         /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
     float    joint_sd_model;   /* in reported joint_sd, in quadrature: what the model cannot express, fraction of
                                 * stature [0, 1]; default 0.015 (paper mode 0) */
@@ -217,8 +216,7 @@ typedef struct gait_tracker_config {
 
 typedef struct gait_track { /* one joint located in an image */
     float u, v; /* pixels, as captured (distorted) */
-    float sd;   /* standard deviation, pixels, what the model's joints miss the detector's by included; not a positive
-                 * number: not seen */
+    float sd;   /* standard deviation, pixels, with what the model's joints miss the detector's by; not positive: not seen */
 } gait_track;
 
 typedef struct gait_frame {
@@ -260,9 +258,8 @@ GAIT_API gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_m
 GAIT_API gait_status gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate);
 /* Broad prior: phase uniform, stride rate and stature of the population, heading unknown, pelvis at the origin. */
 GAIT_API gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd);
-/* Draw the particles from independent normals; a phase or heading whose sd is >= a half turn is uniform.  GAIT_ERR_ARG
- * names the number that is out of range.  Means: phase [0, 1], stride_hz [0.1, 4], stature [0.5, 2.5], heading [-7, 7],
- * pelvis [-1e4, 1e4], all others [-10, 10]; deviations [0, 10]. */
+/* Draw the particles from independent normals; a phase or heading whose sd is >= a half turn is uniform.  GAIT_ERR_ARG:
+ * a number is out of range: deviations [0, 10]; means as said at gait_state, phase [0, 1], the others [-10, 10]. */
 GAIT_API gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
                                         gait_error *err);
 /* One frame: resample, predict, weigh, estimate.  The first frame after start at the same utime is not moved. */

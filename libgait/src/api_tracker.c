@@ -76,13 +76,31 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
     }
 }
 
-typedef struct range { /* one float of the configuration */
-    const char *name;
-    size_t offset;
+typedef struct range { /* one float of a struct, or `count` of them */
+    char name[20];
+    uint16_t offset, count;
     float low, high;
 } range;
 
-#define RANGE(member, low, high) {#member, offsetof(gait_tracker_config, member), low, high}
+#define RANGE(member, low, high)        {#member, offsetof(gait_tracker_config, member), 1, low, high}
+#define STATE(member, count, low, high) {#member, offsetof(gait_state, member), count, low, high}
+#define MOST_SD                         10.0f /* of any number of a start */
+
+/* Every number of a struct is in its range; of deviations [0, MOST_SD]. */
+static gait_status check_ranges(const range *ranges, size_t count, const void *of, const char *what, bool sds,
+                                gait_error *err)
+{
+    for (size_t k = 0; k < count; k++)
+        for (int32_t i = 0; i < ranges[k].count; i++) {
+            float const low = sds ? 0.0f : ranges[k].low, high = sds ? MOST_SD : ranges[k].high;
+            float v;
+            memcpy(&v, (const char *)of + ranges[k].offset + (size_t)i * sizeof v, sizeof v);
+            if (!(v >= low && v <= high)) /* also false for NaN */
+                return base_fail(err, GAIT_ERR_ARG, (int)k, "%s%s = %g is outside [%g, %g]", what,
+                                 ranges[k].name, (double)v, (double)low, (double)high);
+        }
+    return GAIT_OK;
+}
 
 static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err)
 {
@@ -118,14 +136,7 @@ static gait_status check_numbers(const gait_tracker_config *cfg, gait_error *err
         RANGE(proportion_noise, 0.0f, 100.0f),
         RANGE(joint_sd_model, 0.0f, 1.0f),
     };
-    for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
-        float v;
-        memcpy(&v, (const char *)cfg + RANGES[k].offset, sizeof v);
-        if (!(v >= RANGES[k].low && v <= RANGES[k].high)) /* also false for NaN */
-            return base_fail(err, GAIT_ERR_ARG, (int)k, "config %s = %g is outside [%g, %g]", RANGES[k].name,
-                             (double)v, (double)RANGES[k].low, (double)RANGES[k].high);
-    }
-    return GAIT_OK;
+    return check_ranges(RANGES, sizeof RANGES / sizeof *RANGES, cfg, "config ", false, err);
 }
 
 static gait_status check_config(const gait_model *m, const gait_tracker_config *cfg, gait_error *err)
@@ -244,19 +255,9 @@ gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2]);
 }
 
-typedef struct state_range { /* means of one field of a state, which may be an array */
-    char name[11];
-    uint8_t count;
-    uint16_t offset;
-    float low, high;
-} state_range;
-
-#define STATE(member, count, low, high) {#member, count, offsetof(gait_state, member), low, high}
-
-/* Every number of a state is in its range; deviations have one of their own. */
-static gait_status check_state(const char *which, const gait_state *s, bool deviations, gait_error *err)
+static gait_status check_start(const gait_state *mean, const gait_state *sd, gait_error *err)
 {
-    static const state_range RANGES[] = {
+    static const range RANGES[] = {
         STATE(phase, 1, 0.0f, 1.0f),
         STATE(stride_hz, 1, 0.1f, 4.0f),
         STATE(stature, 1, 0.5f, 2.5f),
@@ -269,17 +270,9 @@ static gait_status check_state(const char *which, const gait_state *s, bool devi
         STATE(offset, GAIT_MAX_ANGLES, -10.0f, 10.0f),
         STATE(proportion, GAIT_MAX_PROPORTIONS, -10.0f, 10.0f),
     };
-    for (size_t k = 0; k < sizeof RANGES / sizeof *RANGES; k++) {
-        const state_range *const r = &RANGES[k];
-        float const low = deviations ? 0.0f : r->low, high = deviations ? 10.0f : r->high;
-        float v[GAIT_MAX_ANGLES];
-        memcpy(v, (const char *)s + r->offset, r->count * sizeof *v);
-        for (int32_t i = 0; i < r->count; i++)
-            if (!(v[i] >= low && v[i] <= high)) /* also false for NaN */
-                return base_fail(err, GAIT_ERR_ARG, i, "start %s.%s = %g is outside [%g, %g]", which, r->name,
-                                 (double)v[i], (double)low, (double)high);
-    }
-    return GAIT_OK;
+    enum { COUNT = sizeof RANGES / sizeof *RANGES };
+    gait_status const s = check_ranges(RANGES, COUNT, mean, "start mean.", false, err);
+    return s == GAIT_OK ? check_ranges(RANGES, COUNT, sd, "start sd.", true, err) : s;
 }
 
 gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
@@ -287,12 +280,10 @@ gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const ga
 {
     if (!t || !mean || !sd)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker, mean or sd is NULL");
-    gait_status status = check_state("mean", mean, false, err);
-    if (status == GAIT_OK)
-        status = check_state("sd", sd, true, err);
-    if (status == GAIT_OK)
+    gait_status const s = check_start(mean, sd, err);
+    if (s == GAIT_OK)
         tracker_start(t, mean, sd, utime);
-    return status;
+    return s;
 }
 
 static gait_status check_frame(const gait_tracker *t, const gait_frame *frame, gait_error *err)

@@ -54,4 +54,4 @@ class GaitArgumentError(GaitError, ValueError):
 
 
 class GaitLimitError(GaitError, ValueError):
-    """``GAIT_ERR_LIMIT``: more joints, cameras or components than the library was built for."""
+    """``GAIT_ERR_LIMIT``: a count or size out of its range, as of particles, tasks or cameras."""
