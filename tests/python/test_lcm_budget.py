@@ -6,7 +6,7 @@ import lcm_rig as rig
 import pytest
 
 from gait.lcm.link import private_url
-from gait.lcm.messages import image_message, now
+from gait.lcm.messages import command_message, image_message, now
 from gait.lcm.types import gaitmsg
 
 STATUS = gaitmsg.status_t
@@ -73,6 +73,9 @@ def test_particles_follow_the_budget_only_if_asked(url):
             listener.until(lambda: len(listener.statuses) > shown or listener.estimates, "a sign")  # noqa: B023
             listener.estimates.clear()
         assert low <= listener.last.particles < many
+        reset = ("GAIT_COMMAND", command_message(gaitmsg.command_t.RESET))
+        listener.ask([reset], lambda s: s.frames == 0, "the RESET")
+        assert listener.last.particles == many, "as at the program's start"
         outcome = finish()
     assert "particles instead of 40000: a step took" in outcome.words
     with rig.daemon(url, "-n", 3000, "--budget-ms", 1) as (listener, finish):

@@ -120,6 +120,61 @@ static void test_dropped_frames_halve_it(void)
     }
 }
 
+/* Changes of the number in `steps` steps where frames are dropped, one in ten, as long as there are more than `most`. */
+static int changes(budget *b, int32_t *particles, int32_t most, int steps)
+{
+    int count = 0;
+    for (int i = 0; i < steps; i++) {
+        if (*particles > most && i % 10 == 0)
+            budget_missed(b);
+        int32_t const wanted = budget_stepped(b, 0, 0, 9 * MS, *particles);
+        if (wanted < *particles)
+            CHECK(b->reason == BUDGET_DROPPED && b->lost == TOO_MANY);
+        if (wanted > *particles)
+            CHECK(b->reason == BUDGET_SPARE && b->took_us > 8 * MS && b->took_us <= 9 * MS);
+        count += wanted != *particles;
+        *particles = wanted;
+    }
+    return count;
+}
+
+/* It doubled every three seconds for ever, and halved again a second later. */
+static void test_what_was_too_many_is_tried_less_and_less_often(void)
+{
+    enum { SECOND = 30 };
+    budget b = {.limit_us = 50 * MS, .low = 500, .high = 4000};
+    int32_t particles = 1022;
+    CHECK(changes(&b, &particles, 1022, 600 * SECOND) < 24);
+    int const tries = changes(&b, &particles, 1022, 600 * SECOND);
+    CHECK(tries > 4 && tries < 16); /* it does not give up */
+    CHECK(b.failed == 2044 && b.patience == PATIENCE);
+    changes(&b, &particles, 4000, 600 * SECOND); /* whatever took the time is gone */
+    CHECK(particles == 4000 && b.failed == 0 && b.patience == 0);
+    CHECK(changes(&b, &particles, 1022, 3 * SECOND) == 2 && particles == 1000);
+    particles = 511;
+    CHECK(changes(&b, &particles, 1022, 4 * SECOND) == 1 &&
+          particles == 1022); /* less than that is not waited for */
+}
+
+static void test_a_step_that_is_too_long_is_the_reason(void)
+{
+    budget b = {.limit_us = 50 * MS, .low = 100, .high = 4000};
+    CHECK(settle(&b, 1000, 60, 2) == 416 && b.reason == BUDGET_SLOW && b.took_us == 60 * MS);
+    budget half = {.limit_us = 50 * MS, .low = 100, .high = 4000};
+    CHECK(settle(&half, 1000, 40, SETTLE) == 500 && half.reason == BUDGET_SLOW && half.took_us == 40 * MS);
+}
+
+static void test_reset_keeps_the_limits(void)
+{
+    budget b = {.limit_us = 10 * MS, .low = 100, .high = 4000};
+    int32_t const particles = settle(&b, 400, 20000, 40);
+    CHECK(budget_hopeless(&b, particles) && !budget_allows(&b, 0, 9 * MS));
+    budget_reset(&b);
+    CHECK(b.limit_us == 10 * MS && b.low == 100 && b.high == 4000);
+    CHECK(b.step_us == 0 && b.late == 0 && b.over == 0 && b.slow_steps == 0 && !b.hopeless);
+    CHECK(budget_allows(&b, 0, 9 * MS));
+}
+
 static void test_without_adapting_it_stays(void)
 {
     budget b = {.limit_us = 10 * MS, .high = 4000};
@@ -156,6 +211,9 @@ int main(void)
     test_the_number_follows_the_time();
     test_far_over_the_budget_takes_two_steps();
     test_dropped_frames_halve_it();
+    test_what_was_too_many_is_tried_less_and_less_often();
+    test_a_step_that_is_too_long_is_the_reason();
+    test_reset_keeps_the_limits();
     test_without_adapting_it_stays();
     test_steps_longer_than_the_limit_are_said_once();
     return CHECK_DONE();

@@ -8,7 +8,14 @@ enum {
     TOO_MANY = 3,            /* frames dropped between two looks */
     CALM = 90,               /* steps that are fast before the number doubles */
     RETRY = 4,               /* frames refused for the last step's time alone before one is tried again */
+    TRIAL = 900,             /* steps after a doubling in which less again means that it was one too many */
+    PATIENCE = 32,           /* times CALM, the longest wait before so many are tried again */
 };
+
+void budget_reset(budget *b)
+{
+    *b = (budget){.limit_us = b->limit_us, .low = b->low, .high = b->high};
+}
 
 int64_t budget_birth(int64_t capture_utime, int64_t arrival_utime)
 {
@@ -45,14 +52,39 @@ static int32_t fitting(const budget *b, int64_t step_us, int32_t particles)
 
 static int32_t choose(budget *b, int64_t step_us, int32_t particles)
 {
-    if (b->slow >= FAR && particles > b->low)
-        return fitting(b, step_us < b->before_us ? step_us : b->before_us, particles);
+    b->reason = BUDGET_SLOW;
+    b->took_us = b->step_us;
+    if (b->slow >= FAR && particles > b->low) {
+        b->took_us = step_us < b->before_us ? step_us : b->before_us;
+        return fitting(b, b->took_us, particles);
+    }
     int32_t const half = particles / 2 > b->low ? particles / 2 : b->low;
     int32_t const twice = particles * 2 < b->high ? particles * 2 : b->high;
-    bool const slow = b->step_us > b->limit_us * 3 / 4 || b->dropped >= TOO_MANY;
-    if (slow && b->steps >= SETTLE && half < particles)
+    bool const slow = b->step_us > b->limit_us * 3 / 4;
+    if ((slow || b->dropped >= TOO_MANY) && b->steps >= SETTLE && half < particles) {
+        b->reason = slow ? BUDGET_SLOW : BUDGET_DROPPED;
         return half;
-    return b->calm >= CALM && twice > particles ? twice : particles;
+    }
+    b->reason = BUDGET_SPARE;
+    bool const soon = b->wait > 0 && twice >= b->failed;
+    return b->calm >= CALM && twice > particles && !soon ? twice : particles;
+}
+
+/* Learn from a change how long to wait before so many are tried again. */
+static void judge(budget *b, int32_t wanted, int32_t particles)
+{
+    b->wait -= b->wait > 0;
+    if (wanted > particles) {
+        b->trial = TRIAL;
+    } else if (wanted < particles && b->trial > 0) {
+        b->patience = b->patience ? 2 * b->patience : 2;
+        b->patience = b->patience < PATIENCE ? b->patience : PATIENCE;
+        b->wait = CALM * b->patience;
+        b->failed = particles;
+        b->trial = 0;
+    } else if (b->trial > 0 && --b->trial == 0 && particles >= b->failed) {
+        b->patience = b->failed = b->wait = 0;
+    }
 }
 
 int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, int32_t particles)
@@ -66,7 +98,9 @@ int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, i
     b->slow_steps += b->slow > 0;
     b->steps++;
     int32_t const wanted = b->low ? choose(b, step_us, particles) : particles;
+    judge(b, wanted, particles);
     b->before_us = step_us;
+    b->lost = b->dropped;
     if (wanted != particles || b->steps >= LOOK)
         b->steps = b->dropped = 0;
     if (wanted != particles)

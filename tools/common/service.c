@@ -64,11 +64,20 @@ static void set_idle(service *s)
                               : "waiting for the empty scene to look for somebody, or for START");
 }
 
+/* As many particles as were asked for. */
+static void want_all(service *s)
+{
+    s->wanted = s->track.config.particles;
+    gait_tracker_set_particles(s->track.tracker, s->wanted, NULL);
+}
+
 /* As after the program's start. */
 static void rearm(service *s)
 {
     memset(&s->counts, 0, sizeof s->counts);
-    s->budget.late = s->budget.over = s->budget.slow_steps = 0;
+    budget_reset(&s->budget);
+    if (s->track.tracker)
+        want_all(s);
     s->dropped_before = 0;
     s->last_frame = s->last_utime = -1;
     s->start = (arming){0};
@@ -145,7 +154,7 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why)
             t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
             s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), t->memory_bytes, t->model_bytes,
             t->tracker_bytes, s->pool_bytes, t->picture_bytes);
-    s->wanted = s->track.config.particles;
+    want_all(s);
     s->start.armed = s->start.armed && start_usable(s, &s->start.mean, &s->start.sd);
     if (s->start.armed == armed)
         set_idle(s);

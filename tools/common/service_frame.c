@@ -145,6 +145,18 @@ static gait_status bridge(service *s, int64_t utime, gait_estimate *out, gait_er
     return GAIT_OK;
 }
 
+static void say_particles(const service *s, int32_t had)
+{
+    const budget *const b = &s->budget;
+    if (b->reason == BUDGET_DROPPED)
+        fprintf(stderr, "gait-trackd: %d particles instead of %d: %d frames were dropped\n", (int)s->wanted,
+                (int)had, (int)b->lost);
+    else
+        fprintf(stderr, "gait-trackd: %d particles instead of %d: a step %s %.1f ms of %.1f\n",
+                (int)s->wanted, (int)had, b->reason == BUDGET_SPARE ? "takes only" : "took",
+                (double)b->took_us / 1e3, (double)b->limit_us / 1e3);
+}
+
 /* Go on with another number of particles if the budget says so. */
 static void adapt(service *s, int64_t birth, int64_t step_us)
 {
@@ -157,8 +169,7 @@ static void adapt(service *s, int64_t birth, int64_t step_us)
                 (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
     if (s->wanted == had || gait_tracker_set_particles(s->track.tracker, s->wanted, NULL) != GAIT_OK)
         return;
-    fprintf(stderr, "gait-trackd: %d particles instead of %d: a step took %.1f ms of %.1f\n", (int)s->wanted,
-            (int)had, (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
+    say_particles(s, had);
     s->news = true;
 }
 
