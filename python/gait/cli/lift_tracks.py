@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -10,13 +11,14 @@ from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.learn.stage import one_thread
-from gait.lift import motion, outliers, sides, tracks_file
+from gait.lift import motion, outliers, sentinels, sides, switches, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.result import Motion, Options
 from gait.lift.tracks_file import Tracks
 from gait.progress import progress
 
 MOST_JUMPS, MOST_SPANS = 5, 4  # named
+BESIDE = 0.1  # of the points: fewer are those of somebody whom the picture cuts off
 SHAKY = 1.3  # times a standard deviation from which points shake more than it says
 
 
@@ -27,7 +29,28 @@ def read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, quiet:
     tracks.require_spread(path, sd)
     if ignored and not quiet:
         print(f"left out, unknown to the model: {' '.join(ignored)}", file=sys.stderr)
+    if not quiet:
+        for words in _remarks(tracks):
+            print(words, file=sys.stderr)
     return tracks
+
+
+def _remarks(tracks: Tracks) -> Iterator[str]:
+    """Tell what in tracks is no motion of one person."""
+    if found := sentinels.suspected(tracks.uv):
+        (u, v), count = found
+        yield (
+            f"{count} points are at exactly {u:g}, {v:g}: if a detector puts there what it does not see, "
+            "leave the cells empty"
+        )
+    if changes := switches.switches(tracks)[:MOST_JUMPS]:
+        places = [
+            f"at frame {first}" if last is None else f"in frames {first} to {last}" for first, last in changes
+        ]
+        yield (
+            f"most points jump at once: the track changes person {', '.join(places)}; leave one person's "
+            "points alone"
+        )
 
 
 def noise(tracks: Tracks, quiet: bool) -> float:
@@ -83,8 +106,14 @@ def _jumped(jumps: list[tuple[int, str]]) -> str:
     return f"left out, far from where they were a frame before and after: {named}{more}"
 
 
-def view(tracks: Tracks, camera: str | None, axis: str | None = None, metres: float | None = None) -> View:
-    """See tracks through a calibrated camera, or else from far away.
+def view(
+    tracks: Tracks,
+    camera: str | None,
+    axis: str | None = None,
+    metres: float | None = None,
+    quiet: bool = False,
+) -> View:
+    """See tracks through a calibrated camera, or else from far away; tell if they cannot be of its picture.
 
     Parameters
     ----------
@@ -96,7 +125,16 @@ def view(tracks: Tracks, camera: str | None, axis: str | None = None, metres: fl
         Of a unit of u and v along `axis`; unknown if left out.
     """
     if camera:
-        return Perspective(Camera.read(camera))
+        calibrated = Camera.read(camera)
+        beside = tracks.outside(calibrated.size)
+        if beside > BESIDE and not quiet:
+            picture = "{}x{}".format(*calibrated.size)
+            print(
+                f"{beside:.0%} of the points lie outside of the camera's {picture} picture: is {camera} the "
+                "calibration of this video?",
+                file=sys.stderr,
+            )
+        return Perspective(calibrated)
     middle = np.nanmean(tracks.uv, axis=(0, 1))
     return Parallel(looking_along(axis or "y"), metres, middle, steady=bool(axis))
 

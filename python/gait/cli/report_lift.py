@@ -108,7 +108,7 @@ def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, Motion
     options = replace(options, pixel_sd=lift_tracks.noise(tracks, args.quiet))
     tracks, _ = lift_tracks.with_sides(tracks, options.pixel_sd, args.quiet)
     tracks, _ = lift_tracks.without_jumps(tracks, options.pixel_sd, args.quiet)
-    view = lift_tracks.view(tracks, args.camera)
+    view = lift_tracks.view(tracks, args.camera, quiet=args.quiet)
     found = lift_tracks.lift(args.clip, prior, tracks, view, options, output_names(prior, tracks), args.quiet)
     return tracks, found, view
 

@@ -20,6 +20,7 @@ from gait.errors import UserError
 from gait.io import delimited
 from gait.io.fields import frame_numbers
 from gait.io.files import replacing
+from gait.lift import sentinels
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,11 @@ class Tracks:
     def seen(self) -> NDArray[np.bool_]:
         """Which points are seen, shape (T, J)."""
         return np.asarray(np.isfinite(self.uv).all(axis=2))
+
+    def outside(self, size: tuple[int, int]) -> float:
+        """Share of the points seen that lie outside of a picture of `size` (width, height)."""
+        seen = self.uv[self.seen]
+        return float(((seen < -0.5) | (seen > np.array(size) - 0.5)).any(axis=1).mean())
 
     def require_spread(self, path: str | os.PathLike[str], sd: float) -> None:
         """Raise UserError if several points all lie within `sd`: not in its unit, they tell nothing."""
@@ -148,20 +154,8 @@ def read(
     uv[confidence < LEAST_CONFIDENCE] = np.nan
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
-    _refuse_zeros(path, names, uv)
+    sentinels.refuse(path, names, uv)
     return Tracks(frame, time, tuple(names), uv, confidence), ignored
-
-
-def _refuse_zeros(path: str | os.PathLike[str], names: list[str], uv: Array) -> None:
-    """Raise UserError at points that a detector put at 0, 0; a single one may be the origin of all others."""
-    zero = (uv == 0).all(axis=2)
-    wrong = zero & ~(zero.all(axis=0) & (zero.sum(axis=1) == 1)[:, None])
-    if wrong.any():
-        t, j = np.argwhere(wrong)[0]
-        raise UserError(
-            f"{path}: line {t + 2}: {names[j]} is at exactly 0, 0, as detectors put what they do not see; "
-            f"leave both cells empty, or give {names[j]}_c 0"
-        )
 
 
 def write(path: str | os.PathLike[str], tracks: Tracks) -> None:
