@@ -25,12 +25,12 @@ from typing import Any
 
 import numpy as np
 
-from gait.cli import lift_prior, lift_tracks, lift_video, values
+from gait.cli import lift_doubts, lift_prior, lift_tracks, lift_video, values
 from gait.core.initial import STATURE
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
 from gait.io.trc import write_trc
-from gait.lift import lifted_file, motion, outliers, result, size
+from gait.lift import lifted_file, motion, result
 from gait.lift.tracks_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
 
@@ -43,12 +43,7 @@ _ONLY_TRACKS = (
 )
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
 PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
-FAR = 4.0  # noise alone gives a median of 1.2
 UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view without perspective
-UNTOLD = (
-    "hips and ankles are hardly seen, which tell the distance: the person may be metres nearer or further"
-)
-DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -144,13 +139,12 @@ def run(args: argparse.Namespace) -> int:
     if not args.keep_jumps:
         tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
     names = motion.output_names(prior, tracks, args.all_markers)
-    view = lift_tracks.view(tracks, args.camera, args.orthographic, args.metres_per_unit)
-    found = lift_tracks.lift(args.input, prior, tracks, view, _options(args, pixel_sd), names, args.quiet)
+    view = lift_tracks.view(tracks, args.camera, args.orthographic, args.metres_per_unit, args.quiet)
+    options = _options(args, pixel_sd)
+    found = lift_tracks.lift(args.input, prior, tracks, view, options, names, args.quiet)
     _require_person(args, found)
     if not args.quiet:
-        if args.camera and not size.tells_distance(tracks):
-            print(UNTOLD, file=sys.stderr)
-        for words in _doubts(found, tracks.names, pixel_sd, outliers.shake(tracks)):
+        for words in lift_doubts.of(found, tracks, options, prior.stature, bool(args.camera)):
             print(words, file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
@@ -190,35 +184,6 @@ def _require_person(args: argparse.Namespace, found: result.Motion) -> None:
         raise UserError(
             f"{args.input}: the person came out {found.stature:.3g} m tall; check {view} and the names"
         )
-
-
-def _doubts(found: result.Motion, names: tuple[str, ...], pixel_sd: float, shake: float) -> list[str]:
-    """Why the result may be wrong, a line each."""
-    far = float(np.nanmedian(found.error)) / pixel_sd
-    doubted = _doubted(found, names)
-    doubts = {
-        f"left with little say, far from where the rest has them: {doubted}": bool(doubted),
-        f"the points shake by {shake:.2g} from frame to frame, not {pixel_sd:g}: "
-        f"try --pixel-sd {shake:.2g}": (shake > lift_tracks.SHAKY * pixel_sd and found.wider > 1),
-        f"not a motion like those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
-        "the smoother goes astray in such a motion: its segments are estimated alone, as by --method blend": (
-            found.alone
-        ),
-        f"the motion's size was told by the bones ({found.resized:.2f} times the fit's): it is unlike those "
-        "learnt, or the camera is wrong; deviations are wide, do not rely on the places": found.resized != 1,
-        f"the estimate did not rest in {found.steps} iterations: do not rely on it": not found.settled,
-        f"the estimate is {far:.0f} times --pixel-sd from what was seen: do not rely on it; check camera, "
-        "the names of the points and --pixel-sd": far > FAR,
-    }
-    return [words for words, holds in doubts.items() if holds]
-
-
-def _doubted(found: result.Motion, names: tuple[str, ...]) -> str:
-    """Points of the tracks that were doubted, and in how many frames."""
-    if found.doubted is None:
-        return ""
-    counts = zip(names, found.doubted.sum(axis=0).tolist(), strict=True)
-    return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= DOUBTED)
 
 
 def _check(args: argparse.Namespace) -> None:

@@ -19,12 +19,12 @@ from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.lift import sequence, size, start, uncertain
 from gait.lift.chain import Freedom, blended, in_turn, restricted
-from gait.lift.equations import Parallel, View
+from gait.lift.equations import Parallel, Perspective, View
 from gait.lift.grid import Grid, interpolated
 from gait.lift.heading import Explanation, Person
 from gait.lift.observe import Observations, resampled
 from gait.lift.posterior import by_likelihood
-from gait.lift.refuse import Unlike, require_seen, require_size
+from gait.lift.refuse import Unlike, require_metres, require_seen, require_size
 from gait.lift.result import Motion, Options
 from gait.lift.sequence import Lifted, Seen, Start
 from gait.lift.tracks_file import Tracks
@@ -65,6 +65,8 @@ def lift(
     if prior.frames < 4:
         raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
     prior = restricted(prior, names)
+    if isinstance(view, Perspective):
+        require_metres(view.camera, tracks, prior, believed_stature(options, prior.stature)[0], options)
     grid = Grid.over(tracks.time, prior)
     if options.method != "smooth":
         return _lift(prior, tracks, view, options, grid, update)
@@ -162,14 +164,14 @@ def _lift(
     markers = prior.index(tracks.names)
     points = Observations(tracks.uv, tracks.deviations(options.pixel_sd))
     sampled = resampled(points, tracks.time, grid.time).among(markers, len(prior.names))
-    stature, stature_sd = _stature(prior, options)
+    stature, stature_sd = believed_stature(options, prior.stature)
     lengths = np.ones(len(grid.time))
     if isinstance(view, Parallel):
         lengths = view.lengths(sampled, prior.mean[0].mean(axis=0), stature)
     # a start must not shrink a motion that does not fit: its noise in the picture would grow
     person = Person(stature=stature, stature_sd=0.0 if options.method == "smooth" else stature_sd)
     found = start.explanations(prior, sampled, view, lengths, person, update)
-    require_seen(found, grid, alone=options.method != "smooth")
+    require_seen(found, grid, tracks, alone=options.method != "smooth")
     chosen = start.course(found)
     if options.method == "likelihood":
         chosen = [replace(e, posterior=by_likelihood(e.posterior)) for e in chosen]
@@ -209,9 +211,9 @@ def _lift(
     )
 
 
-def _stature(prior: SegmentPrior, options: Options) -> tuple[float, float]:
-    """Metres, and how well it is known."""
-    return options.stature or prior.stature, KNOWN_SD if options.stature else PEOPLE_SD
+def believed_stature(options: Options, usual: float) -> tuple[float, float]:
+    """Give the stature before anything is seen and how well it is known, metres; `usual`: of people."""
+    return options.stature or usual, KNOWN_SD if options.stature else PEOPLE_SD
 
 
 def _sized(
@@ -225,7 +227,7 @@ def _sized(
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
     if isinstance(view, Parallel) or not options.bones:
         return size.widened(fitted, misfit)
-    stature, stature_sd = _stature(prior, options)
+    stature, stature_sd = believed_stature(options, prior.stature)
     own = float(np.hypot(stature_sd / stature, size.PROPORTION_SD))
     ratio = size.bones_ratio(prior, found.places, stature)
     limit = size.UNLIKELY if misfit > MISFIT else size.IMPOSSIBLE

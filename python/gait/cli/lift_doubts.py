@@ -1,0 +1,73 @@
+"""Why a motion that `gait lift` estimated from tracks may be wrong, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gait.cli import lift_tracks
+from gait.lift import motion, outliers, size
+from gait.lift.result import Motion, Options
+from gait.lift.tracks_file import Tracks
+
+FAR = 4.0  # noise alone gives a median of 1.2
+UNTOLD = (
+    "hips and ankles are hardly seen, which tell the distance: the person may be metres nearer or further"
+)
+DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
+UNUSUAL = 2.5  # deviations of a stature; one of 80 people is as unusual
+
+
+def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bool) -> list[str]:
+    """Say why the result may be wrong, a line each.
+
+    Parameters
+    ----------
+    usual : float
+        Stature of the people learnt from, metres.
+    camera : bool
+        Whether the view has one.
+    """
+    far = float(np.nanmedian(found.error)) / options.pixel_sd
+    doubted, shake = _doubted(found, tracks.names), outliers.shake(tracks)
+    shaky = shake > lift_tracks.SHAKY * options.pixel_sd and found.wider > 1
+    doubts = {
+        UNTOLD: camera and not size.tells_distance(tracks),
+        f"left with little say, far from where the rest has them: {doubted}": bool(doubted),
+        f"the points shake by {shake:.2g} from frame to frame, not {options.pixel_sd:g}: "
+        f"try --pixel-sd {shake:.2g}": shaky,
+        f"not a motion like those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
+        "the smoother goes astray in such a motion: its segments are estimated alone, as by --method blend": (
+            found.alone
+        ),
+        _unusual(found, options, usual, camera): _off(found, options, usual) > UNUSUAL,
+        f"the motion's size was told by the bones ({found.resized:.2f} times the fit's): it is unlike those "
+        "learnt, or the camera is wrong; deviations are wide, do not rely on the places": found.resized != 1,
+        f"the estimate did not rest in {found.steps} iterations: do not rely on it": not found.settled,
+        f"the estimate is {far:.0f} times --pixel-sd from what was seen: do not rely on it; check camera, "
+        "the names of the points, that v points down, and --pixel-sd": far > FAR,
+    }
+    return [words for words, holds in doubts.items() if holds]
+
+
+def _doubted(found: Motion, names: tuple[str, ...]) -> str:
+    """Points of the tracks that were doubted, and in how many frames."""
+    if found.doubted is None:
+        return ""
+    counts = zip(names, found.doubted.sum(axis=0).tolist(), strict=True)
+    return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= DOUBTED)
+
+
+def _off(found: Motion, options: Options, usual: float) -> float:
+    """How many deviations the stature came out from what was believed; segments alone have none of it."""
+    believed, sd = motion.believed_stature(options, usual)
+    return abs(found.stature - believed) / sd if found.steps else 0.0
+
+
+def _unusual(found: Motion, options: Options, usual: float, camera: bool) -> str:
+    """Name what makes a stature come out wrong."""
+    believed, _ = motion.believed_stature(options, usual)
+    lens = "the camera's focal length" if camera else "--metres-per-unit"
+    return (
+        f"the person came out {found.stature:.2f} m tall, where {believed:.2f} was believed: check {lens}, "
+        "time (the frame rate) and --height"
+    )

@@ -1,0 +1,172 @@
+"""`gait lift` of what detectors and calibrations deliver: refused, or told in a line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy_segments import toy_blob, toy_prior
+
+from gait.cli import main
+from gait.image.camera import Camera
+from gait.lift import motion, sentinels, switches
+from gait.lift.tracks_file import Tracks, read, write
+
+FRAMES, MARKERS = 6, 12
+FRONT = (640, 480)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A model, a camera and tracks of the mean motion with noise."""
+    monkeypatch.chdir(tmp_path)
+    prior = toy_prior(FRAMES, MARKERS, 4, seed=5)
+    (tmp_path / "m.gait").write_bytes(toy_blob(prior))
+    camera = Camera.looking((0, -6, 1.0), (0, 0, 1.0), FRONT, 600)
+    (tmp_path / "cam.json").write_text(json.dumps(camera.to_dict()))
+    drift = np.arange(30)[:, None, None] * (prior.mean[0, 1] - prior.mean[0, 0])
+    uv = camera.project(1.7 * (prior.mean[0, 0] + drift))
+    uv += np.random.default_rng(0).normal(size=uv.shape)
+    save("t.csv", uv)
+    return tmp_path
+
+
+def save(path, uv, step=1 / 20):
+    names = toy_prior(FRAMES, MARKERS, 4, seed=5).names
+    write(path, Tracks(np.arange(len(uv)), np.arange(len(uv)) * step, names, uv, np.ones(uv.shape[:2])))
+
+
+def pixels():
+    return read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].uv.copy()
+
+
+def lift(capsys, tracks="t.csv", camera="cam.json", *options):
+    code = main(["lift", tracks, "-m", "m.gait", "--camera", camera, "-o", "out.csv", *options])
+    return code, capsys.readouterr().err
+
+
+def other_camera(**changes):
+    with open("cam.json") as file:
+        camera = json.load(file)
+    with open("other.json", "w") as file:
+        json.dump(camera | changes, file)
+    return camera
+
+
+def test_a_calibration_of_another_size_is_told(folder, capsys):
+    told = "of the points lie outside of the camera's 320x240 picture: is other.json the calibration"
+    other_camera(width=320, height=240)
+    assert told in lift(capsys, "t.csv", "other.json")[1]
+    assert told not in lift(capsys, "t.csv", "other.json", "--quiet")[1]
+    other_camera(width=1920, height=1080)
+    for camera in ("other.json", "cam.json"):
+        assert "outside" not in lift(capsys, "t.csv", camera)[1]
+
+
+def test_the_share_outside_counts_points_that_are_seen():
+    uv = np.array([[[0.0, 0], [639, 479], [640, 5], [np.nan, np.nan], [3, -1]]])
+    tracks = Tracks(np.arange(1), np.zeros(1), tuple("abcde"), uv, np.ones((1, 5)))
+    assert tracks.outside(FRONT) == 0.5
+
+
+def test_minus_one_is_refused_as_zero_is(folder, capsys):
+    uv = pixels()
+    uv[3, 5] = -1
+    save("u.csv", uv)
+    code, said = lift(capsys, "u.csv")
+    assert code == 1 and said.count("\n") == 1
+    assert "u.csv: line 5: l_elbow is at exactly -1, -1, as detectors put" in said
+
+
+@pytest.mark.parametrize(
+    ("joints", "place", "told"), [(2, -1000.0, True), (1, -1000.0, False), (5, 300.0, True)]
+)
+def test_points_at_one_place_are_told(folder, capsys, joints, place, told):
+    uv = pixels()
+    uv[5:20, :joints] = place, place
+    assert (sentinels.suspected(uv) is not None) == told
+    save("u.csv", uv)
+    words = f"{15 * joints} points are at exactly {place:g}, {place:g}: if a detector"
+    assert (words in lift(capsys, "u.csv", "cam.json")[1]) == told
+
+
+def test_joints_may_meet():
+    """Whole pixels of somebody who stands, seen from the side: hips at one place, ankles lowest of all."""
+    uv = np.tile(
+        np.array([[10.0, 0], [12, 40], [12, 40], [12, 40], [11, 65], [11, 90], [11, 90]]), (50, 1, 1)
+    )
+    assert sentinels.suspected(uv) is None
+
+
+def test_an_unusual_stature_is_told(folder, capsys, monkeypatch):
+    lifted = motion.lift
+    usual = toy_prior(FRAMES, MARKERS, 4, seed=5).stature
+    for stature, options, told in (
+        (usual - 3 * motion.PEOPLE_SD, [], True),
+        (usual + 2 * motion.PEOPLE_SD, [], False),
+        (1.72 + 3 * motion.KNOWN_SD, ["--height", "1.72"], True),
+        (1.72 + 2 * motion.KNOWN_SD, ["--height", "1.72"], False),
+    ):
+        monkeypatch.setattr(motion, "lift", lambda *args, s=stature: replace(lifted(*args), stature=s))
+        believed = 1.72 if options else usual
+        words = f"{stature:.2f} m tall, where {believed:.2f} was believed: check the camera's focal length"
+        said = lift(capsys, "t.csv", "cam.json", *options)[1]
+        assert (words in said) == told and ("m tall" in said) == told
+
+
+@pytest.mark.parametrize("factor", [100, 1000])
+def test_a_camera_in_centimetres_or_millimetres_is_refused(folder, capsys, factor):
+    camera = other_camera()
+    other_camera(t=[factor * value for value in camera["t"]])
+    code, said = lift(capsys, "t.csv", "other.json")
+    assert code == 1 and said.count("\n") == 1 and not (folder / "out.csv").exists()
+    assert f"t.csv: the camera stands {factor} m over the floor" in said and "give its t in metres" in said
+
+
+def test_a_camera_on_a_mast_is_not_refused(folder, capsys):
+    camera = Camera.looking((0, -30, 40.0), (0, 0, 1.0), FRONT, 3000)
+    (folder / "mast.json").write_text(json.dumps(camera.to_dict()))
+    prior = toy_prior(FRAMES, MARKERS, 4, seed=5)
+    drift = np.arange(15)[:, None, None] * (prior.mean[0, 1] - prior.mean[0, 0])
+    save("u.csv", camera.project(1.7 * (prior.mean[0, 0] + drift)))
+    assert "give its t in metres" not in lift(capsys, "u.csv", "mast.json")[1]
+
+
+@pytest.mark.parametrize("blank", [False, True])
+def test_too_few_frames_per_second_are_named(folder, capsys, blank):
+    uv = pixels()
+    if blank:  # rows at the camera's rate, a detector at a fifth of it
+        uv[np.arange(len(uv)) % 4 > 0] = np.nan
+    save("u.csv", uv, 1 / 20 if blank else 1 / 5)
+    code, said = lift(capsys, "u.csv")
+    assert code == 1 and said.count("\n") == 1
+    assert "u.csv: 5 frames per second with points are too few to follow a motion; give 7 or more" in said
+
+
+@pytest.mark.parametrize(("stop", "where"), [(20, "in frames 10 to 19"), (99, "at frame 10")])
+def test_a_change_of_person_is_told(folder, capsys, stop, where):
+    uv = pixels()
+    uv[10:stop, :, 0] += 250
+    save("u.csv", uv)
+    said = lift(capsys, "u.csv")[1]
+    assert f"most points jump at once: the track changes person {where}; leave" in said
+
+
+def test_wild_points_are_no_other_person(folder):
+    uv, rng = pixels(), np.random.default_rng(2)
+    wild = rng.random(uv.shape[:2]) < 0.7
+    uv[wild] += rng.normal(size=uv.shape)[wild] * 100
+    names = toy_prior(FRAMES, MARKERS, 4, seed=5).names
+    tracks = Tracks(np.arange(30), np.arange(30) / 20, names, uv, np.ones(uv.shape[:2]))
+    assert switches.switches(tracks) == []
+    assert switches.switches(replace(tracks, uv=pixels())) == []
+
+
+def test_a_picture_upside_down_names_v(folder, capsys):
+    uv = pixels()
+    uv[..., 1] = 479 - uv[..., 1]
+    save("u.csv", uv)
+    code, said = lift(capsys, "u.csv")
+    assert code == 1 or "that v points down" in said
