@@ -63,8 +63,18 @@ def test_evidence_is_the_density_of_the_measurements():
     gain = covariance @ pick.T @ np.linalg.inv(noise)
     mean = gaussian.mean + (gain @ y).reshape(gaussian.mean.shape)
     assert np.allclose(found.points, mean, atol=1e-9)
-    variance = np.diag(covariance - gain @ pick @ covariance).reshape(gaussian.mean.shape)
-    assert np.allclose(found.sd**2, variance, rtol=1e-6, atol=1e-11)
+    after = covariance - gain @ pick @ covariance
+    assert np.allclose(found.sd**2, np.diag(after).reshape(gaussian.mean.shape), rtol=1e-6, atol=1e-11)
+    about = _about_the_middle(gaussian.mean.shape, 1, 3)
+    rooted = np.diag(about @ after @ about.T).reshape(gaussian.mean.shape)
+    assert np.allclose(found.rooted_sd(1, 3) ** 2, rooted, rtol=1e-6, atol=1e-11)
+
+
+def _about_the_middle(shape, left, right):
+    """Matrix that takes the middle of two markers from all places (F, J, 3)."""
+    every = np.eye(np.prod(shape)).reshape(*shape, -1)
+    middle = (every[:, [left]] + every[:, [right]]) / 2
+    return (every - middle).reshape(-1, every.shape[-1])
 
 
 def test_the_posterior_is_symmetric_positive_and_within_the_prior():

@@ -346,7 +346,8 @@ def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
     assert feet and np.quantile(found.places[:, feet, 2].min(axis=1), 0.1) == pytest.approx(floor)
 
 
-def test_deviations_about_the_hips_are_those_of_differences():
+@pytest.mark.parametrize("method", result.METHODS)
+def test_deviations_about_the_hips_are_those_of_differences(method):
     """About the hips the common displacement, which a far view does not tell, drops out."""
     prior = toy_prior(FRAMES, 12, 4, seed=5)
     time = np.arange(FRAMES * 2) / 20
@@ -355,7 +356,7 @@ def test_deviations_about_the_hips_are_those_of_differences():
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     uv = view.project(places, np.ones(len(time)))
     tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
-    options = result.Options(stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    options = result.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
     found = motion.lift(prior, tracks, view, options, prior.names)
     assert found.sd[..., 1].min() > 5  # metres of depth
     assert found.rooted_sd[..., 1].max() < 1

@@ -23,7 +23,7 @@ from gait.lift.equations import Parallel, Perspective, View
 from gait.lift.grid import Grid, interpolated
 from gait.lift.heading import Explanation, Person
 from gait.lift.observe import Observations, resampled
-from gait.lift.posterior import by_likelihood
+from gait.lift.posterior import Posterior, by_likelihood
 from gait.lift.refuse import Unlike, require_metres, require_seen, require_size
 from gait.lift.result import Motion, Options
 from gait.lift.sequence import Lifted, Seen, Start
@@ -250,19 +250,22 @@ def _alone(
     """Segments estimated alone, mixed or one after another."""
     places = np.stack([e.posterior.points for e in chosen])
     spread = np.stack([e.posterior.sd for e in chosen])
+    about_hips = np.stack([_rooted_sd(e.posterior, prior) for e in chosen])
     join = blended if blend else in_turn
     at = grid.between(tracks.time)
     placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
     markers = prior.index(tracks.names)
-    # neighbours see the same points: mixed they are no surer, and where they differ less sure
-    apart = join(places**2, grid.frames) - join(places, grid.frames) ** 2
-    spread = np.sqrt(join(spread, grid.frames) ** 2 + np.maximum(apart, 0.0))
-    sd = interpolated(spread, at[0], np.abs(at[1]))
+    hips = prior.index(sequence.HIPS) if set(sequence.HIPS) <= set(prior.names) else []
+    rooted = places - places[:, :, hips].mean(axis=2, keepdims=True) if hips else places
+    sd, rooted_sd = (
+        interpolated(_mixed(*of, join, grid.frames), at[0], np.abs(at[1]))
+        for of in ((places, spread), (rooted, about_hips))
+    )
     return Motion(
         names=prior.names,
         places=placed if view.grounded else _on_floor(placed, prior),
         sd=sd,
-        rooted_sd=sd,
+        rooted_sd=rooted_sd,
         error=_error(view, placed[:, markers], scale, tracks.uv),
         stature=stature,
         steps=0,
@@ -270,6 +273,23 @@ def _alone(
         log_volume_ratio=float(np.mean([e.posterior.log10_volume for e in chosen])),
         uncertain=uncertain.of([e.posterior for e in chosen], view),
     )
+
+
+def _mixed(places: Floats, sd: Floats, join: Callable[[Floats, int], Floats], half: int) -> Floats:
+    """Deviations of overlapping segments that are mixed.
+
+    Neighbours see the same points: together they are no surer than alone, and where they differ less sure.
+    """
+    apart = join(places**2, half) - join(places, half) ** 2
+    return np.asarray(np.sqrt(join(sd, half) ** 2 + np.maximum(apart, 0.0)))
+
+
+def _rooted_sd(found: Posterior, prior: SegmentPrior) -> Floats:
+    """Deviations (F, J, 3) about the middle of the hips; of the places if there are no hips."""
+    if not set(sequence.HIPS) <= set(prior.names):
+        return found.sd
+    left, right = prior.index(sequence.HIPS)
+    return found.rooted_sd(int(left), int(right))
 
 
 def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:

@@ -177,9 +177,9 @@ class Posterior:
         np.add.at(x, (self.rows.frame, self.rows.marker), np.einsum("nia,na->ni", self._gain, rest))
         return x
 
-    @property
-    def covariances(self) -> Floats:
-        """Posterior covariance of each marker in each frame, (F, J, 3, 3)."""
+    @cached_property
+    def _spread(self) -> tuple[Floats, Floats]:
+        """Places by the scores (F, J, 3, m), and covariance (F, J, 3, 3) of each apart from them."""
         by_scores = np.moveaxis(self.gaussian.modes, 0, -1).copy()  # (F, J, 3, m)
         frames, markers = self.gaussian.mean.shape[:2]
         outside = np.eye(3) * np.broadcast_to(self.gaussian.residual, (frames, markers))[..., None, None]
@@ -187,12 +187,28 @@ class Posterior:
         count = len(self.alpha)
         np.subtract.at(by_scores, at, gain @ self.system.design.reshape(-1, 2, count))
         np.subtract.at(outside, at, gain @ gain.transpose(0, 2, 1))
+        return by_scores, outside
+
+    @property
+    def covariances(self) -> Floats:
+        """Posterior covariance of each marker in each frame, (F, J, 3, 3)."""
+        by_scores, outside = self._spread
         return np.asarray(by_scores @ self.covariance @ by_scores.swapaxes(-1, -2) + outside)
 
     @property
     def sd(self) -> Floats:
         """Posterior standard deviation of each coordinate, (F, J, 3)."""
-        return np.sqrt(np.maximum(np.diagonal(self.covariances, axis1=2, axis2=3), 0))
+        return _deviations(self.covariances)
+
+    def rooted_sd(self, left: int, right: int) -> Floats:
+        """Standard deviations (F, J, 3) of the places about the middle of two markers."""
+        by_scores, outside = self._spread
+        ends = [left, right]
+        apart = by_scores - by_scores[:, ends].mean(axis=1, keepdims=True)
+        middle = outside[:, ends].sum(axis=1, keepdims=True) / 4
+        own = outside + middle
+        own[:, ends] -= outside[:, ends]  # half of an end is in the middle
+        return _deviations(apart @ self.covariance @ apart.swapaxes(-1, -2) + own)
 
     @property
     def log10_volume(self) -> float:
@@ -242,6 +258,11 @@ def by_likelihood(found: Posterior) -> Posterior:
     inverse = np.linalg.pinv(design)
     alpha = inverse[:, : len(found.system.y)] @ found.system.y
     return replace(found, alpha=alpha, covariance=inverse @ inverse.T)
+
+
+def _deviations(covariances: Floats) -> Floats:
+    """Square roots of the diagonals (..., 3) of covariances, none below zero but for rounding."""
+    return np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0))
 
 
 def _inverse(precision: Floats) -> Floats:

@@ -51,7 +51,7 @@ class Motion:
     places, sd : (T, J, 3)
         Metres, and posterior standard deviations.
     rooted_sd : (T, J, 3)
-        Deviations of the places about the middle of the hips; of segments alone, as `sd`.
+        Deviations of the places about the middle of the hips.
     error : (T, P)
         Distance in the picture from what was seen, pixels; NaN where nothing was.
     stature : float
