@@ -11,8 +11,9 @@ import pytest
 import threadpoolctl
 from toy_segments import toy_blob, toy_prior
 
-from gait.cli import main
+from gait.cli import main, report_lift
 from gait.image.camera import Camera
+from gait.learn import segment_motion
 from gait.lift import figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.tracks_file import Tracks, read, write
@@ -138,3 +139,27 @@ def test_a_recording(folder, capsys):
         pytest.skip(f"{path} is not there")
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--mocap", str(path), "--quiet"]) == 0
     assert "a segment of 35_01.amc" in (folder / "r" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("recording", ["walk", "run"])
+def test_markers_that_a_recording_lacks_are_named(folder, capsys, recording):
+    """They hold seconds of motion, but the head has no markers."""
+    path = MOCAP / "trc" / f"motion_capture_{recording}.trc"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--mocap", str(path)]) == 1
+    assert (
+        f"{path}: never shows neck head_top, which the model's prior has; choose" in capsys.readouterr().err
+    )
+    assert not (folder / "r").exists()
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"), [(4, "lasts 0.2 s, a segment of the model 0.3 s"), (9, "has gaps")]
+)
+def test_why_a_recording_has_no_segment(frames, words):
+    prior = toy_prior(6, 19, 4)
+    places = np.full((frames, 19, 3), np.nan)
+    places[::2] = 0
+    read = segment_motion.Motion(prior.names, places, places[:, 0], 1.7, places[:0, None])
+    assert words in report_lift._why_no_segment(read, prior)

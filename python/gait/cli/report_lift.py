@@ -135,9 +135,21 @@ def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
         cut = segment_corpus.segments(corpus.recordings()[0], prior.names, wanted)
     cut = cut[np.isfinite(cut).all(axis=(1, 2, 3))]
     if not len(cut):
-        raise UserError(f"{path}: no whole segment of {prior.frames / prior.fps:g} s; choose another file")
+        raise UserError(f"{path}: {_why_no_segment(read, prior)}; choose another recording")
     stature = read.stature if np.isfinite(read.stature) else prior.stature
     return cut[cut.var(axis=1).sum(axis=(1, 2)).argmax()] * stature, stature
+
+
+def _why_no_segment(read: segment_motion.Motion, prior: SegmentPrior) -> str:
+    """Say why a recording has no segment with all markers of a prior."""
+    wanted = prior.frames / prior.fps
+    if len(read.places) < prior.frames:
+        return f"lasts {len(read.places) / prior.fps:.2g} s, a segment of the model {wanted:g} s"
+    seen = dict(zip(read.names, np.isfinite(read.places).all(axis=2).any(axis=0).tolist(), strict=True))
+    absent = [name for name in prior.names if not seen[name]]
+    if absent:
+        return f"never shows {' '.join(absent)}, which the model's prior has"
+    return f"has gaps in every {wanted:g} s, the length of the model's segments"
 
 
 def _written(folder: Path, drawing: Drawing) -> str:

@@ -201,7 +201,7 @@ class Posterior:
         return _deviations(self.covariances)
 
     def rooted_sd(self, left: int, right: int) -> Floats:
-        """Standard deviations (F, J, 3) of the places about the middle of two markers."""
+        """Give standard deviations (F, J, 3) of the places about the middle of two markers."""
         by_scores, outside = self._spread
         ends = [left, right]
         apart = by_scores - by_scores[:, ends].mean(axis=1, keepdims=True)
