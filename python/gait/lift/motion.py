@@ -255,8 +255,9 @@ def _alone(
     at = grid.between(tracks.time)
     placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
     markers = prior.index(tracks.names)
-    hips = prior.index(sequence.HIPS) if set(sequence.HIPS) <= set(prior.names) else []
-    rooted = places - places[:, :, hips].mean(axis=2, keepdims=True) if hips else places
+    rooted = places
+    if set(sequence.HIPS) <= set(prior.names):
+        rooted = places - places[:, :, prior.index(sequence.HIPS)].mean(axis=2, keepdims=True)
     sd, rooted_sd = (
         interpolated(_mixed(*of, join, grid.frames), at[0], np.abs(at[1]))
         for of in ((places, spread), (rooted, about_hips))

@@ -1,8 +1,8 @@
 """Left and right in 2-D tracks: points that a detector exchanged for some frames, put back.
 
-A detector that takes one leg for the other exchanges two points.  Their difference then changes its sign at
-once, where that of a body goes on as it did.  For every pair the signs are sought that let the difference go on
-best: the Viterbi algorithm over frames, with a Kalman filter of constant velocity along each of two survivors.
+A detector that takes one leg for the other exchanges two points.  Their difference then changes its sign
+at once, where that of a body goes on as it did.  For every pair the signs are sought that let it go on best:
+the Viterbi algorithm over frames, with a Kalman filter of constant velocity along each of two survivors.
 Pairs are looked at again with what the others say, because detectors exchange limbs rather than joints.
 """
 
@@ -149,7 +149,7 @@ def _flips(wrong: Flags, seen: Flags) -> Flags:
 
 
 def _course(pairs: _Pairs, easy: Flags, others: Floats) -> Flags:
-    """Most probable states (T, P): exchanges begin or end easily where `easy`, and follow the share of `others`."""
+    """Most probable states (T, P): as the share of `others`, and changing easily where `easy`."""
     count, size = pairs.seen.shape
     filters = _Filters(pairs)
     total = np.tile([0.0, STAY], (size, 1))
