@@ -83,7 +83,7 @@ typedef struct gait_image { /* borrowed view */
 } gait_image;
 
 typedef struct gait_camera { /* u = fx X/Z + cx, v = fy Y/Z + cy with (X,Y,Z) = R p + t */
-    int32_t width, height;   /* pixels */
+    int32_t width, height;   /* pixels, [1, 16000] */
     float   fx, fy, cx, cy;  /* pixels */
     float   R[9], t[3];      /* world to camera; metres */
     float   distortion[5];   /* k1 k2 p1 p2 k3 (OpenCV); applied to the incoming frame */

@@ -302,10 +302,15 @@ static gait_status check_frame(const gait_tracker *t, const gait_frame *frame, g
         if (im->data && !image_channels(im->format))
             return base_fail(err, GAIT_ERR_ARG, c, "image of camera %d has unknown format %d", (int)c,
                              (int)im->format);
+        int32_t const least = cam->width * image_channels(im->format);
+        if (im->data && im->width == cam->width && im->stride < least)
+            return base_fail(err, GAIT_ERR_ARG, c,
+                             "image of camera %d has stride %d, %d pixels of %s take at least %d", (int)c,
+                             (int)im->stride, (int)cam->width,
+                             least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (int)least);
         if (im->data && !image_valid(im, cam->width, cam->height))
-            return base_fail(
-                err, GAIT_ERR_ARG, c, "image of camera %d is %d x %d stride %d, the camera is %d x %d",
-                (int)c, (int)im->width, (int)im->height, (int)im->stride, (int)cam->width, (int)cam->height);
+            return base_fail(err, GAIT_ERR_ARG, c, "image of camera %d is %d x %d, the camera is %d x %d",
+                             (int)c, (int)im->width, (int)im->height, (int)cam->width, (int)cam->height);
     }
     return GAIT_OK;
 }

@@ -82,6 +82,7 @@ def test_files_that_are_not_there(tmp_path):
         ({"cx": [1, 2]}, ["cx has 2 numbers, not 1"]),
         ({"width": 160.5}, ["width is 160.5"]),
         ({"height": 0}, ["height is 0"]),
+        ({"width": 16200}, ["camera.json: width is 16200, outside [1, 16000]"]),
         ({"R": [[1, 0, 0], [0, 1, 0]]}, ["R has 6 numbers, not 9"]),
         ({"R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, ["R is not a rotation"]),
         ({"R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}, ["R is not a rotation"]),
@@ -164,6 +165,7 @@ def test_the_cameras_of_the_python_side_are_accepted(tmp_path):
         ({"pelvis": [1.1e4, 0]}, ["pelvis is 11000, outside [-10000, 10000]"]),
         ({"pelvis": [1]}, ["pelvis has 1 numbers", "x and y"]),
         ({"frame": -4}, ["frame is -4"]),
+        ({"frame": 1.5}, ["frame is 1.5, no whole number", "frame number, from 0"]),
         ({"heading_rad": "north"}, ["heading_rad is not made of numbers"]),
     ],
 )
@@ -242,6 +244,14 @@ def test_help_lists_every_option():
         assert option in outcome.printed
 
 
+def test_help_says_what_an_option_does_when_it_is_not_given_or_too_small():
+    printed = " ".join(rig.run("--help").printed.split())
+    assert "auto, the default: start with whoever walks through" in printed
+    assert "one longer than --max-dt is bridged by predictions of at most --max-dt each" in printed
+    assert "--init FILE waits for a START" in printed
+    assert "more than a second off, or of the future, counts from its arrival" in printed
+
+
 def test_help_names_the_defaults_of_the_library():
     usual, paper = (TrackerConfig.default(mode) for mode in Mode)
     printed = rig.run("--help").printed
@@ -290,6 +300,8 @@ def test_configuration_file_and_command_line(tmp_path):
         ("seed\n", "line 1: 'seed' is not of the form name = value"),
         ("threads = 0\n", "line 1: --threads 0"),
         ("quiet = perhaps\n", "line 1: --quiet perhaps"),
+        ("seed = 1\nlag = 3\nseed = 1\n", "line 3: seed is already given in line 1; remove one"),
+        ("config = other.conf\n", "line 1: config is for the command line; a file names no other"),
         ("\x1b[2J\x07 = 1\n", "trackd.conf: is not text; give lines `name = value`"),
         ("seed = 1\n\0seed = 2\n", "trackd.conf: is not text"),
     ],
@@ -317,6 +329,12 @@ def test_a_url_that_lcm_refuses(url, remedy):
     fails(rig.command("--url", url)[1:], url, "cannot open LCM", remedy)
     done = rig.gait("record", "--url", url, "-o", "x.csv")
     assert done.returncode == 1 and remedy in done.stderr
+
+
+@pytest.mark.parametrize("address", ["10.0.0.1", "127.0.0.1", "240.0.0.1"])
+def test_an_address_that_is_not_multicast_is_told(address):
+    said = f"{address} is not a multicast address; give one from 224.0.0.0 to 239.255.255.255"
+    fails(rig.command("--url", f"udpm://{address}:7667?ttl=0")[1:], said)
 
 
 def test_no_multicast_route_is_one_line_with_the_remedy():

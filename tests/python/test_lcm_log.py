@@ -126,6 +126,22 @@ def test_damaged_images_are_counted_and_passed_over(tmp_path, name, data, channe
     assert outcome.dropped in (expected, 1)
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"row_stride": 479}, "row_stride 479 for 160 pixels of BGR; send at least 480"),
+        (
+            {"row_stride": 160, "pixelformat": gaitmsg.image_t.PIXEL_FORMAT_RGB},
+            "row_stride 160 for 160 pixels of RGB; send at least 480",
+        ),
+        ({"row_stride": 490}, "size 57600 of a picture of 120 rows of 490 bytes; send all of them"),
+    ],
+)
+def test_rows_that_are_too_short_are_told_with_the_least(tmp_path, change, words):
+    events = [*rig.opening(), *rig.frames(0, 2), ("GAIT_IMAGE_0", rig.frame_message(2, **change))]
+    assert words in track(tmp_path, events).words
+
+
 @pytest.mark.parametrize("channel", ["GAIT_CAMERA_0", "GAIT_COMMAND"])
 @pytest.mark.parametrize("cut", [0, 7, 8, 20, 60])
 def test_damaged_cameras_and_commands_are_passed_over(tmp_path, channel, cut):
@@ -139,7 +155,7 @@ def test_a_wrong_camera_message_is_named(tmp_path):
     for change, words in (
         ({"fx": 0.0}, "focal"),
         ({"R": [0.0] * 9}, "not a rotation"),
-        ({"width": 1 << 20}, "size"),
+        ({"width": 16001}, "camera message with a size of 16001x120; send 1 to 16000"),
     ):
         message = camera_message(rig.CAMERA, 1)
         for name, value in change.items():

@@ -58,6 +58,13 @@ static void test_refusals(void)
     f.utime = INT64_MAX;
     refuse(t, f, GAIT_ERR_STATE, "max_dt");
     gait_image const good = toy_image(film[0][11]);
+    _Static_assert(SCENE_W == 384, "as said below");
+    static const char *const said[] = {"image of camera 1 is 383 x",
+                                       "image of camera 1 is 384 x",
+                                       "stride 383, 384 pixels of GAIT_GREY8 take at least 384",
+                                       "image of camera 1 has unknown format 0",
+                                       "stride -384, 384 pixels of GAIT_GREY8 take at least 384",
+                                       "stride 384, 384 pixels of GAIT_RGB8 or GAIT_BGR8 take at least 1152"};
     for (int k = 0; k < 6; k++) {
         gait_image bad = good;
         int32_t *const number[] = {&bad.width,  &bad.height, &bad.stride,
@@ -67,8 +74,7 @@ static void test_refusals(void)
         f = toy_frame(11);
         f.image[0] = good;
         f.image[1] = bad;
-        refuse(t, f, GAIT_ERR_ARG,
-               k == 3 ? "image of camera 1 has unknown format 0" : "image of camera 1 is");
+        refuse(t, f, GAIT_ERR_ARG, said[k]);
     }
     f = toy_frame(11);
     CHECK(gait_tracker_step(NULL, &f, &e, NULL) == GAIT_ERR_ARG);

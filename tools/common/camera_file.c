@@ -5,8 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-enum { MAX_PIXELS = 1 << 14 };
-
 static double dot(const float *a, const float *b)
 {
     return (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
@@ -25,12 +23,11 @@ bool camera_rotation_ok(const gait_camera *camera)
 
 static bool whole(const fields *f, const char *key, int32_t *out, message *why)
 {
-    const char *const remedy = "give the size of the video in whole pixels";
-    double value;
-    if (!fields_numbers(f, 0, key, &value, 1, 1, MAX_PIXELS, remedy, why))
-        return false;
+    int64_t value = 0;
+    bool const ok =
+        fields_whole(f, key, &value, 1, CAMERA_PIXELS, "give the size of the video in whole pixels", why);
     *out = (int32_t)value;
-    return value == floor(value) || message_set(why, "%s: %s is %g; %s", f->path, key, value, remedy);
+    return ok;
 }
 
 static bool real(const fields *f, const char *key, float *out, int count, double low, double high,

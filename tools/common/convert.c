@@ -6,7 +6,6 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { MAX_PIXELS = 1 << 14 };
 _Static_assert(sizeof((gaitmsg_state_t *)0)->coef == sizeof((gait_state *)0)->coef,
                "state_t holds every component");
 _Static_assert(sizeof((gaitmsg_state_t *)0)->offset == sizeof((gait_state *)0)->offset,
@@ -80,9 +79,9 @@ bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, messag
         c.t[i] = (float)in->t[i];
     for (int i = 0; i < 5; i++)
         c.distortion[i] = (float)in->distortion[i];
-    if (c.width < 1 || c.height < 1 || c.width > MAX_PIXELS || c.height > MAX_PIXELS)
+    if (c.width < 1 || c.height < 1 || c.width > CAMERA_PIXELS || c.height > CAMERA_PIXELS)
         return message_set(why, "camera message with a size of %dx%d; send 1 to %d", c.width, c.height,
-                           MAX_PIXELS);
+                           CAMERA_PIXELS);
     if (!(c.fx > 0) || !(c.fy > 0))
         return message_set(why, "camera message with focal lengths %g and %g; send pixels", in->fx, in->fy);
     if (!camera_rotation_ok(&c))

@@ -61,6 +61,18 @@ bool fields_numbers(const fields *f, int object, const char *key, double *out, i
     return true;
 }
 
+bool fields_whole(const fields *f, const char *key, int64_t *out, double low, double high, const char *remedy,
+                  message *why)
+{
+    double value;
+    if (!fields_numbers(f, 0, key, &value, 1, low, high, remedy, why))
+        return false;
+    if (value != floor(value))
+        return message_set(why, "%s: %s is %g, no whole number; %s", f->path, key, value, remedy);
+    *out = (int64_t)value;
+    return true;
+}
+
 bool fields_only(const fields *f, int object, const char *const *known, int count, message *why)
 {
     for (int i = object + 1; i < f->node[object].next; i = f->node[i + 1].next) {

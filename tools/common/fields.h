@@ -4,6 +4,8 @@
 #include "file.h"
 #include "json.h"
 
+#include <stdint.h>
+
 enum { FIELDS_NODES = 256 };
 
 typedef struct fields {
@@ -22,6 +24,9 @@ int fields_find(const fields *f, int object, const char *key);
 /* Exactly `count` numbers in [low, high] under the key, nested or not; the remedy ends the line of failure. */
 bool fields_numbers(const fields *f, int object, const char *key, double *out, int count, double low,
                     double high, const char *remedy, message *why);
+/* One whole number in [low, high] under a key of the file. */
+bool fields_whole(const fields *f, const char *key, int64_t *out, double low, double high, const char *remedy,
+                  message *why);
 /* Every key of `object` must be one of the `count` known ones, and there once. */
 bool fields_only(const fields *f, int object, const char *const *known, int count, message *why);
 #endif

@@ -40,10 +40,11 @@ bool image_view_pixels(const image_view *v, int32_t width, int32_t height, gait_
 {
     static const struct {
         int32_t pixelformat, format, bytes;
+        const char *name;
     } formats[] = {
-        {GAITMSG_IMAGE_T_PIXEL_FORMAT_GRAY, GAIT_GREY8, 1},
-        {GAITMSG_IMAGE_T_PIXEL_FORMAT_RGB, GAIT_RGB8, 3},
-        {GAITMSG_IMAGE_T_PIXEL_FORMAT_BGR, GAIT_BGR8, 3},
+        {GAITMSG_IMAGE_T_PIXEL_FORMAT_GRAY, GAIT_GREY8, 1, "grey"},
+        {GAITMSG_IMAGE_T_PIXEL_FORMAT_RGB, GAIT_RGB8, 3, "RGB"},
+        {GAITMSG_IMAGE_T_PIXEL_FORMAT_BGR, GAIT_BGR8, 3, "BGR"},
     };
     if (v->width != width || v->height != height)
         return message_set(why, "picture of %dx%d, the camera has %dx%d; send both alike", v->width,
@@ -51,9 +52,13 @@ bool image_view_pixels(const image_view *v, int32_t width, int32_t height, gait_
     for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
         if (v->pixelformat != formats[i].pixelformat)
             continue;
-        if (v->stride < width * formats[i].bytes || (int64_t)v->stride * height > v->size)
-            return message_set(why, "row_stride %d or size %d too small for %dx%d", v->stride, v->size, width,
-                               height);
+        int32_t const least = width * formats[i].bytes;
+        if (v->stride < least)
+            return message_set(why, "row_stride %d for %d pixels of %s; send at least %d", v->stride, width,
+                               formats[i].name, least);
+        if ((int64_t)v->stride * height > v->size)
+            return message_set(why, "size %d of a picture of %d rows of %d bytes; send all of them", v->size,
+                               height, v->stride);
         *out = (gait_image){v->data, width, height, v->stride, formats[i].format};
         return true;
     }

@@ -89,7 +89,6 @@ static bool read_pelvis(const fields *f, int spread, const gait_model *model, in
 static bool parse(const fields *f, const gait_model *model, init_state *io, message *why)
 {
     int const spread = fields_find(f, 0, "sd");
-    double frame = -1;
     if (!fields_only(f, 0, known, KNOWN, why))
         return false;
     if (spread >= 0 && f->node[spread].type != JSON_OBJECT)
@@ -97,13 +96,12 @@ static bool parse(const fields *f, const gait_model *model, init_state *io, mess
     if (spread >= 0 && !fields_only(f, spread, known, SCALARS + 1, why))
         return false;
     if (fields_find(f, 0, "frame") >= 0 &&
-        !fields_numbers(f, 0, "frame", &frame, 1, 0, 1u << 31, "give the frame number, from 0", why))
+        !fields_whole(f, "frame", &io->frame, 0, 1u << 31, "give the frame number, from 0", why))
         return false;
     for (int k = 0; k < SCALARS; k++)
         if (!read_scalar(f, spread, k, io, why))
             return false;
     io->mean.phase -= floorf(io->mean.phase);
-    io->frame = (int64_t)frame;
     return read_pelvis(f, spread, model, io, why);
 }
 

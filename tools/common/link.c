@@ -2,7 +2,9 @@
 
 #include "log_scan.h"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
+#include <netinet/in.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,15 +57,29 @@ char link_log(const char *url, char path[LINK_PATH])
     return mode;
 }
 
+/* The address of udpm://ADDRESS:PORT, if it is one that LCM cannot send to. */
+static bool not_multicast(const char *url, char address[INET_ADDRSTRLEN])
+{
+    struct in_addr in;
+    size_t const length = strncmp(url, "udpm://", 7) == 0 ? strcspn(url + 7, ":?") : 0;
+    if (length == 0 || length >= INET_ADDRSTRLEN)
+        return false;
+    snprintf(address, INET_ADDRSTRLEN, "%.*s", (int)length, url + 7);
+    return inet_pton(AF_INET, address, &in) == 1 && !IN_MULTICAST(ntohl(in.s_addr));
+}
+
 lcm_t *link_open(const char *url, message *why)
 {
-    char path[LINK_PATH];
+    char path[LINK_PATH], address[INET_ADDRSTRLEN];
     int const saved = mute();
     lcm_t *const lcm = lcm_create(url);
     unmute(saved);
     link_log(url, path);
     if (!lcm && link_is_log(url) && log_scan(path, why) != 0)
         message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", url);
+    else if (!lcm && not_multicast(url, address))
+        message_set(why, "%.100s: %s is not a multicast address; give one from 224.0.0.0 to 239.255.255.255",
+                    url, address);
     else if (!lcm && !link_is_log(url) && strstr(url, "udpm://")) /* or mpudpm:// */
         message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
     else if (!lcm && !link_is_log(url))

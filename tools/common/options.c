@@ -120,8 +120,25 @@ static char *trim(char *s)
     return s;
 }
 
+typedef struct options_source { /* the file being read */
+    const char *path;
+    int number;              /* of the line */
+    int given[OPTIONS_MOST]; /* line that sets an option; 0: none */
+} options_source;
+
+/* May this line set the option? */
+static bool take_turn(options_source *file, const option *o, int *given, message *why)
+{
+    if (o->value == file->path)
+        return message_set(why, "%s is for the command line; a file names no other", o->name);
+    if (*given)
+        return message_set(why, "%s is already given in line %d; remove one", o->name, *given);
+    *given = file->number;
+    return true;
+}
+
 /* Apply one line of the file, which is cut up. */
-static bool apply_line(const option *table, int count, char *line, message *why)
+static bool apply_line(const option *table, int count, options_source *file, char *line, message *why)
 {
     line[strcspn(line, "#")] = '\0';
     line = trim(line);
@@ -133,7 +150,9 @@ static bool apply_line(const option *table, int count, char *line, message *why)
     *equals = '\0';
     const char *const name = trim(line);
     const option *const o = find(table, count, name, strlen(name));
-    return o ? set(o, trim(equals + 1), why) : message_set(why, "unknown option %s; --help lists them", name);
+    if (!o)
+        return message_set(why, "unknown option %s; --help lists them", name);
+    return take_turn(file, o, &file->given[o - table], why) && set(o, trim(equals + 1), why);
 }
 
 /* Whether it is text: bytes that terminals take for commands would get into messages. */
@@ -150,6 +169,7 @@ bool options_file(const option *table, int count, const char *path, message *why
     file_bytes bytes;
     message bad;
     bool ok = true;
+    options_source file = {.path = path};
     if (!file_read(path, "configuration", &bytes, why))
         return false;
     if (!is_text(&bytes)) {
@@ -157,12 +177,13 @@ bool options_file(const option *table, int count, const char *path, message *why
         return message_set(why, "%.100s: is not text; give lines `name = value`", path);
     }
     char *line = (char *)bytes.data;
-    for (int number = 1; ok && line; number++) {
+    while (ok && line) {
         char *const end = strchr(line, '\n');
         if (end)
             *end = '\0';
-        ok = apply_line(table, count, line, &bad) ||
-             message_set(why, "%.100s: line %d: %.120s", path, number, bad.text);
+        file.number++;
+        ok = apply_line(table, count, &file, line, &bad) ||
+             message_set(why, "%.100s: line %d: %.120s", path, file.number, bad.text);
         line = end ? end + 1 : NULL;
     }
     free(bytes.data);

@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-enum { OPTION_TEXT = 1024 };
+enum { OPTION_TEXT = 1024, OPTIONS_MOST = 128 };
 
 typedef enum option_kind {
     OPTION_FLAG,    /* bool */
@@ -28,7 +28,8 @@ typedef enum option_result { OPTION_OK, OPTION_HELP, OPTION_BAD } option_result;
 
 /* Set values from argv[1..]. */
 option_result options_parse(const option *table, int count, int argc, char **argv, message *why);
-/* Set values from lines `name = value`; # starts a comment; flags take yes or no. */
+/* Set values from lines `name = value`, each name once; # starts a comment; flags take yes or no.  A file names no
+ * other: `path` is the value of an option that it may not set. */
 bool options_file(const option *table, int count, const char *path, message *why);
 /* One paragraph per option to stdout. */
 void options_help(const option *table, int count);

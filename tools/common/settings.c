@@ -26,8 +26,9 @@ static void make_table(settings *s, option *table)
         {"background", 0, "FILE", "empty scene, PGM or PPM; without it GAIT_BACKGROUND_<i>",
          TEXT(background)},
         {"init", 0, "FILE|auto",
-         "where the walker is at one frame (JSON); auto: start with whoever walks\n"
-         "        through the empty scene in full view for a second, or wait for START on GAIT_COMMAND",
+         "where the walker is at one frame (JSON); auto, the default: start with whoever walks through\n"
+         "        the empty scene in full view for a second, and again after losing them; a START on\n"
+         "        GAIT_COMMAND begins as well, with either",
          TEXT(init)},
         {"url", 0, "URL",
          "LCM to listen on, default $LCM_DEFAULT_URL or " LINK_DEFAULT_URL ";\n"
@@ -44,7 +45,9 @@ static void make_table(settings *s, option *table)
         {"particles", 'n', "N", particles_help, INT(particles, 16, 1 << 20)},
         {"budget-ms", 0, "MS",
          "live: frames that cannot be answered within so many milliseconds of their capture are\n"
-         "        dropped and counted; default: none",
+         "        dropped and counted; a frame whose stamp is more than a second off, or of the future, "
+         "counts\n"
+         "        from its arrival; default: none",
          OPTION_FLOAT, &s->budget_ms, 1, 10000},
         {"adapt-particles", 0, "LOW",
          "with --budget-ms: take fewer particles, down to LOW, when steps are too slow or frames are\n"
@@ -67,7 +70,10 @@ static void make_table(settings *s, option *table)
          "instruction sets that may be used, added up: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none;\n"
          "        default all that the CPU has; results do not depend on it",
          INT(cpu_mask, 0, GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512)},
-        {"max-gap", 0, "S", "longest pause between frames that is bridged by prediction, default 2 seconds",
+        {"max-gap", 0, "S",
+         "longest pause between frames, default 2 seconds: one longer than --max-dt is bridged by\n"
+         "        predictions of at most --max-dt each; after one longer than this, or a clock set back as\n"
+         "        far, the tracker stops: --init auto looks for somebody anew, --init FILE waits for a START",
          OPTION_FLOAT, &s->max_gap, 0, 60},
         {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
         {"tracks-term", 0, "",
@@ -92,6 +98,7 @@ static void make_table(settings *s, option *table)
         {"quiet", 'q', "", "no word of where it listens, no summary at the end", FLAG(quiet)},
     };
     _Static_assert(sizeof own / sizeof *own == OWN, "every option has a place");
+    _Static_assert((int)OPTIONS <= (int)OPTIONS_MOST, "a configuration file can set every option");
     memcpy(table, own, sizeof own);
     tracker_options_table(&s->tracker, table + OWN);
 }
