@@ -44,7 +44,7 @@ int main(int argc, char **argv)
     if (argc < 5)
         return fail("usage", "example MODEL.gait SCENE.txt EMPTY.pgm FRAME.pgm..."), 2;
     if (gait_model_init(room, sizeof room, blob, size, &model, &err) < 0)
-        return fail(argv[1], err.text);
+        return fail(argv[1], f ? err.text : "cannot be read");
     if (!take(argv[2], NULL, s) || !take(argv[3], empty, NULL))
         return 1;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);

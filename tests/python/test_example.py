@@ -114,7 +114,7 @@ def test_the_example_follows_the_walker_of_a_clip(program, tmp_path):
     ("words", "code", "said"),
     [
         ([], 2, "usage: example MODEL.gait SCENE.txt EMPTY.pgm FRAME.pgm..."),
-        (["/nonexistent", "a", "b", "c"], 1, "/nonexistent: "),
+        (["/nonexistent", "a", "b", "c"], 1, "/nonexistent: cannot be read\n"),
         ([MODEL, "/dev/null", "b", "c"], 1, "/dev/null: not 19 numbers"),
     ],
 )
