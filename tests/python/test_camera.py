@@ -34,6 +34,19 @@ def write_json(path, **changes):
     return str(path)
 
 
+def write_opencv(path, view, turn="R", sized=True):
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    if sized:
+        storage.write("image_width", 640)
+        storage.write("image_height", 480)
+    storage.write("camera_matrix", view.matrix)
+    storage.write("distortion_coefficients", view.distortion.reshape(1, 5))
+    storage.write(turn, view.R if turn == "R" else cv2.Rodrigues(view.R)[0])
+    storage.write("t", view.t.reshape(3, 1))
+    storage.release()
+    return str(path)
+
+
 def same(a, b):
     assert a.size == b.size
     np.testing.assert_allclose(a.matrix, b.matrix)
@@ -112,16 +125,7 @@ def test_distortion_may_have_0_4_or_5_numbers(count, tmp_path):
 @pytest.mark.parametrize("sized", [True, False])
 def test_opencv_files(suffix, turn, sized, tmp_path):
     expected = Camera.read(write_json(tmp_path / "cam.json"))
-    path = str(tmp_path / f"cam.{suffix}")
-    storage = cv2.FileStorage(path, cv2.FILE_STORAGE_WRITE)
-    if sized:
-        storage.write("image_width", 640)
-        storage.write("image_height", 480)
-    storage.write("camera_matrix", expected.matrix)
-    storage.write("distortion_coefficients", expected.distortion.reshape(1, 5))
-    storage.write(turn, expected.R if turn == "R" else cv2.Rodrigues(expected.R)[0])
-    storage.write("t", expected.t.reshape(3, 1))
-    storage.release()
+    path = write_opencv(tmp_path / f"cam.{suffix}", expected, turn, sized)
     same(expected, Camera.read(path, (640, 480)))
     if not sized:
         with pytest.raises(UserError, match="image_width is missing; add image_width"):
@@ -164,6 +168,21 @@ def test_pose2sim_toml_by_name(tmp_path):
         ):
             Camera.read(f"{path}{asked}")
     path.write_text(TOML.format(name="only"))
+    same(Camera.read(str(path)), view)
+
+
+@pytest.mark.parametrize("suffix", ["json", "toml", "yaml", "xml"])
+def test_a_byte_order_mark_is_passed_over(suffix, tmp_path):
+    """As Windows' editors write it."""
+    path = tmp_path / f"cam.{suffix}"
+    if suffix == "json":
+        write_json(path)
+    elif suffix == "toml":
+        path.write_text(TOML.format(name="only"))
+    else:
+        write_opencv(path, Camera.read(write_json(tmp_path / "view.json")))
+    view = Camera.read(str(path))
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
     same(Camera.read(str(path)), view)
 
 

@@ -107,6 +107,10 @@ def test_frame_comes_from_the_file_or_from_the_caller(init):
     assert Start.read(init({"phase": 0.2}), MODEL, frame=7).frame == 7
 
 
+def test_a_byte_order_mark_is_passed_over(init):
+    assert Start.read(init("\ufeff" + json.dumps(FULL)), MODEL).frame == 64
+
+
 FAULTS = [
     ({"phase": float("nan")}, "phase is not finite; give the phase"),
     ({"phase": 1.2}, "phase is 1.2, outside"),

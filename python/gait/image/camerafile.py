@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -114,8 +115,9 @@ def _pose(fields: Fields, placed: bool) -> tuple[Array, Array]:
 def _file_storage(path: str) -> Fields:
     """Read the top-level nodes of an OpenCV FileStorage into a mapping under their documented names."""
     broken = UserError(f"{path}: not an OpenCV FileStorage file; write it with cv2.FileStorage")
+    text = Path(path).read_bytes().removeprefix(BOM_UTF8).decode("latin-1")  # only ASCII is looked at
     try:
-        storage = cv2.FileStorage(path, cv2.FILE_STORAGE_READ)
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     except (cv2.error, SystemError):  # the constructor's binding wraps the one in the other
         raise broken from None
     if not storage.isOpened():
@@ -139,7 +141,7 @@ def _node_value(node: cv2.FileNode) -> Any:
 
 def _from_toml(path: str, name: str | None) -> Camera:
     with parsing(path, "TOML", "export the calibration anew"):
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     cameras = {key: value for key, value in data.items() if isinstance(value, Mapping) and "matrix" in value}
     if name is None and len(cameras) == 1:
         name = next(iter(cameras))

@@ -152,7 +152,7 @@ def json_of(
     form: str,
     pairs: Callable[[list[tuple[str, Any]]], dict[str, Any]] = dict,
 ) -> dict[str, Any]:
-    """Content of UTF-8 text that holds one JSON object.
+    """Content of UTF-8 text, with or without a byte order mark, that holds one JSON object.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def json_of(
         One line with the name and the remedy.
     """
     with parsing(name, "JSON", remedy):
-        data = json.loads(text.decode("utf-8"), object_pairs_hook=pairs)
+        data = json.loads(text.decode("utf-8-sig"), object_pairs_hook=pairs)
     if not isinstance(data, dict):
         raise UserError(f"{name}: holds no JSON object; {form}")
     return data
