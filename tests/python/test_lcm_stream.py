@@ -186,22 +186,28 @@ def test_repetition_goes_on_counting(folder):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "code", "words"),
     [
-        (["--jpeg", "0"], "--jpeg 0"),
-        (["--rate", "slow"], "--rate slow"),
-        (["--start", "99"], "has no frame 99"),
-        (["--start", "5"], "frame 2 comes before --start 5"),
-        (["--camera", "nothing.json"], "nothing.json"),
-        (["--wait", "0.6"], "no tracker knows the camera after 0.6 s"),
+        (["--jpeg", "0"], 2, "--jpeg: 0: give a whole number from 1 to 100"),
+        (["--rate", "slow"], 2, "--rate slow"),
+        (["--rate", "0"], 2, "--rate 0"),
+        (["--stream", "-1"], 2, "-1: give a whole number from 0 to 30"),
+        (["--start", "9", "--stop", "5"], 2, "--stop 5: must be greater than --start 9"),
+        (["--start", "99"], 1, "has no frame 99"),
+        (["--start", "5"], 1, "frame 2 comes before --start 5"),
+        (["--stop", "2"], 1, "frame 2 is not sent with --stop 2"),
+        (["--camera", "nothing.json"], 1, "nothing.json"),
+        (["--wait", "0.6"], 1, "no tracker knows the camera after 0.6 s"),
+        (["--wait", "nan"], 2, "nan: give seconds from 0 up"),
+        (["--wait", "1", "--url", "file://x.log?mode=w"], 2, "--wait: no tracker listens to the log"),
     ],
 )
-def test_faults_of_capture_are_one_line(folder, options, words):
-    if "--wait" in options:
+def test_faults_of_capture_are_one_line(folder, options, code, words):
+    if "0.6" in options:
         rig.need_multicast()
         options = [*options, "--url", link.private_url()]
     done = rig.gait("capture", *capture_options(folder), "--quiet", *options)
-    assert done.returncode == 1 and words in done.stderr and done.stderr.count("\n") == 1, done.stderr
+    assert done.returncode == code and words in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
 def test_a_start_outside_of_the_picture_is_told(folder, tmp_path):

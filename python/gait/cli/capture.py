@@ -8,28 +8,33 @@ are announced at the start and every two seconds.  With --init the tracker gets 
 and START.  Without it the stream begins at once.
 
 --url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd plays without loss.
+
+Ends after the last frame, or with an interrupt (Ctrl-C, SIGTERM) after a whole one.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import sys
 from collections.abc import Iterator
+from contextlib import closing, suppress
 from itertools import chain
 
 import cv2
 import numpy as np
 
 from gait.cli import values
+from gait.cli.ending import Ending
 from gait.core.initial import OUTSIDE, Start
 from gait.core.model import Model
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
 from gait.image.camera import Camera
 from gait.image.video import Frame, background, read_plate
+from gait.io.files import require_unread
 from gait.lcm.capture import Publisher, Setup
-from gait.lcm.link import buffer_warning, lcm_url
+from gait.lcm.link import buffer_warning, is_log, lcm_url
+from gait.lcm.log import log_of
 from gait.lcm.pacing import Pacer, parse_rate
 from gait.lcm.source import DeviceSource, FileSource, is_device
 from gait.progress import progress
@@ -61,36 +66,65 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--stop", type=values.whole(0), metavar="F", help="first frame not to send")
     parser.add_argument("--rate", default="true", metavar="true|max|HZ", help="speed of sending (true)")
-    parser.add_argument("--jpeg", type=int, metavar="Q", help="compress frames with this quality, 1 to 100")
+    parser.add_argument(
+        "--jpeg", type=values.whole(1, 100), metavar="Q", help="compress frames with this quality, 1 to 100"
+    )
     parser.add_argument("--grey", action="store_true", help="send grey frames")
     parser.add_argument("--loop", action="store_true", help="repeat the file until interrupted")
-    parser.add_argument("--stream", type=int, default=0, metavar="I", help="number of the camera (0)")
     parser.add_argument(
-        "--wait", type=float, default=0.0, metavar="S", help="for a tracker, at most S seconds (0)"
+        "--stream", type=values.whole(*values.STREAM), default=0, metavar="I", help="number of the camera (0)"
+    )
+    parser.add_argument(
+        "--wait", type=values.seconds, default=0.0, metavar="S", help="for a tracker, at most S seconds (0)"
     )
     parser.add_argument("--url", metavar="URL", help="LCM (LCM_DEFAULT_URL or multicast on this machine)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Send and report."""
-    if args.jpeg is not None and not 1 <= args.jpeg <= 100:
-        raise UserError(f"--jpeg {args.jpeg}: give a quality from 1 to 100")
     url, rate = lcm_url(args.url), parse_rate(args.rate)
-    source = _source(args)
-    publisher = Publisher(url, _setup(args, source))
-    warning = buffer_warning(url)
-    if warning and not args.quiet:
-        print(f"gait capture: {warning}", file=sys.stderr)
+    _require_sense(args, url)
+    with Ending() as ending:
+        source = _source(args)
+        setup = _setup(args, source)
+        warning = buffer_warning(url)
+        if warning and not args.quiet:
+            print(f"gait capture: {warning}", file=sys.stderr)
+        with closing(Publisher(url, setup)) as publisher:
+            pacer = _send(args, source, publisher, rate, ending)
+    _report(args, publisher, pacer)
+    return 0
+
+
+def _require_sense(args: argparse.Namespace, url: str) -> None:
+    """Raise unless the options go together, and a log to write is none of the files to read."""
+    if args.stop is not None:
+        values.require_order(args.start, args.stop)
+    if args.height is not None and not args.init:
+        raise UsageError("--height: is for --init; give an init file, or auto")
+    if not is_log(url):
+        return
+    if args.wait > 0:
+        raise UsageError(f"--wait: no tracker listens to the log {url}; leave it out")
+    require_unread(log_of(url)[0], (args.source, args.camera, args.background, args.init, args.model))
+
+
+def _send(
+    args: argparse.Namespace,
+    source: FileSource | DeviceSource,
+    publisher: Publisher,
+    rate: float | None,
+    ending: Ending,
+) -> Pacer:
+    """Send all, or until an interrupt, which is the way to end a camera or a loop."""
     if args.wait > 0:
         publisher.meet(args.wait)
     frames = _primed(source)
     pacer = publisher.begin(source, float("inf") if source.live else rate, args.wait)
     total = None if isinstance(source, DeviceSource) or args.loop else (args.stop or source.video.count)
-    interrupt = contextlib.suppress(KeyboardInterrupt)  # the way to end a camera or a loop
-    with progress("sending", total, args.quiet) as update, interrupt:
-        publisher.send(frames, pacer, update)
-    _report(args, publisher, pacer)
-    return 0
+    with progress("sending", total, args.quiet) as update, suppress(KeyboardInterrupt):
+        publisher.send(frames, pacer, update, ending.whole)
+    return pacer
 
 
 def _primed(source: FileSource | DeviceSource) -> Iterator[Frame]:
@@ -105,7 +139,7 @@ def _source(args: argparse.Namespace) -> FileSource | DeviceSource:
     if not is_device(args.source):
         return FileSource(args.source, args.start, args.stop, grey=args.grey, loop=args.loop)
     if args.start or args.stop is not None or args.loop or args.rate != "true" or args.background == "auto":
-        raise UserError(
+        raise UsageError(
             f"{args.source}: is a camera: --start --stop --loop --rate and --background auto are for files"
         )
     return DeviceSource(args.source, grey=args.grey)
@@ -128,6 +162,10 @@ def _setup(args: argparse.Namespace, source: FileSource | DeviceSource) -> Setup
             raise UserError(
                 f"{args.init}: frame {setup.start.frame} comes before --start {args.start}; begin earlier"
             )
+        if args.stop is not None and setup.start.frame >= args.stop:
+            raise UserError(
+                f"{args.init}: frame {setup.start.frame} is not sent with --stop {args.stop}; end later"
+            )
     if args.grey and setup.plate is not None and setup.plate.ndim == 3:
         setup.plate = np.asarray(cv2.cvtColor(setup.plate, cv2.COLOR_BGR2GRAY), np.uint8)
     return setup
@@ -141,7 +179,7 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
             print(f"{args.init}: {OUTSIDE}", file=sys.stderr)
         return start
     if isinstance(source, DeviceSource) or setup.camera is None:
-        raise UserError("--init auto: needs a video file and --camera; give an init file")
+        raise UsageError("--init auto: needs a video file and --camera; give an init file")
     from gait.track.autostart import find_start  # slow to load, and only needed here
 
     return find_start(source.video, setup.camera, setup.plate, model, height=args.height)

@@ -126,8 +126,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track and report."""
-    if args.stop is not None and args.stop <= (args.start or 0):
-        raise UsageError(f"--stop {args.stop}: must be greater than --start {args.start or 0}")
+    if args.stop is not None:
+        values.require_order(args.start or 0, args.stop)
     if args.draws and not args.smooth:
         raise UsageError("--draws: needs --smooth")
     if args.tracks_sd and not args.tracks:

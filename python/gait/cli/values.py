@@ -6,10 +6,12 @@ from argparse import ArgumentTypeError
 from collections.abc import Callable
 
 from gait.core.initial import STATURE
+from gait.errors import UsageError
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
 THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED = (0, (1 << 64) - 1)
+STREAM = (0, 30)
 
 
 def whole(low: int, high: int | None = None) -> Callable[[str], int]:
@@ -55,6 +57,20 @@ def positive(text: str) -> float:
     if not 0 < value < float("inf"):
         raise ArgumentTypeError(f"{text}: give a number above 0")
     return value
+
+
+def seconds(text: str) -> float:
+    """Finite times, none or more, in seconds."""
+    value = _number(text)
+    if not 0 <= value < float("inf"):
+        raise ArgumentTypeError(f"{text}: give seconds from 0 up")
+    return value
+
+
+def require_order(start: int, stop: int) -> None:
+    """Raise UsageError unless there are frames from `start` up to, without, `stop`."""
+    if stop <= start:
+        raise UsageError(f"--stop {stop}: must be greater than --start {start}")
 
 
 def _number(text: str) -> float:

@@ -66,18 +66,22 @@ def require_outputs(outputs: Sequence[str | None], inputs: Sequence[str | None])
     outputs, inputs : sequence of str or None
         Files, None where the user names none.
     """
-    read = {os.path.realpath(path) for path in inputs if path}
     written: set[str] = set()
     for path in outputs:
         if path is None:
             continue
         require_writable(path)
+        require_unread(path, inputs)
         real = os.path.realpath(path)
-        if real in read:
-            raise UserError(f"{path}: is read by this command; give the output another name")
         if real in written:
             raise UserError(f"{path}: two outputs have this name; give each its own")
         written.add(real)
+
+
+def require_unread(path: str, inputs: Sequence[str | None]) -> None:
+    """Raise UserError if the output `path` is one of the inputs, None where the user names none."""
+    if os.path.realpath(path) in {os.path.realpath(name) for name in inputs if name}:
+        raise UserError(f"{path}: is read by this command; give the output another name")
 
 
 @contextmanager

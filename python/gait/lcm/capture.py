@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,7 +14,8 @@ from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.image.video import Frame, Image
 from gait.lcm.ahead import ahead
-from gait.lcm.link import handle, is_log, open_lcm
+from gait.lcm.link import handle, publisher
+from gait.lcm.log import LogWriter
 from gait.lcm.messages import camera_message, command_message, decode, image_message
 from gait.lcm.pacing import Pacer
 from gait.lcm.source import DeviceSource, FileSource
@@ -62,13 +64,12 @@ class Publisher:
     """
 
     def __init__(self, url: str, setup: Setup) -> None:
-        self._setup, self._lcm = setup, open_lcm(url)
-        self._log = is_log(url)
+        self._setup, self._out = setup, publisher(url)
         self._status: Any = None
         self._announced = 0.0
         self.sent = 0
-        if not self._log:
-            self._lcm.subscribe("GAIT_STATUS", self._on_status).set_queue_capacity(8)
+        if not isinstance(self._out, LogWriter):
+            self._out.subscribe("GAIT_STATUS", self._on_status).set_queue_capacity(8)
 
     def meet(self, patience: float) -> None:
         """Announce until a tracker has said that it knows camera and empty scene.
@@ -87,7 +88,7 @@ class Publisher:
         START of a file is for one capture time; that of a live camera is for the frame that comes next.
         """
         self._announced = source.first
-        if self._setup.start is None or patience <= 0 or self._log:
+        if self._setup.start is None or patience <= 0 or isinstance(self._out, LogWriter):
             pacer = Pacer(rate, source.first)
             self.announce(pacer.utime(source.first))
             if self._setup.start is not None:
@@ -103,16 +104,32 @@ class Publisher:
             f"no tracker confirmed START within {patience:g} s; is gait-trackd running on this URL?"
         )
 
-    def send(self, frames: Iterable[Frame], pacer: Pacer, done: Callable[[int], None]) -> None:
-        """Send each frame when it is due; `done` is told the number of each."""
+    def close(self) -> None:
+        """Write what waits, into a log."""
+        if isinstance(self._out, LogWriter):
+            self._out.close()
+
+    def send(
+        self,
+        frames: Iterable[Frame],
+        pacer: Pacer,
+        done: Callable[[int], None],
+        whole: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
+        """Send each frame when it is due; `done` is told the number of each.
+
+        What goes out does so in a block of `whole`, where no interrupt may come.
+        """
         channel = f"GAIT_IMAGE_{self._setup.stream}"
         for number, seconds, data in ahead(self._encoded(frames, pacer), _AHEAD):
             if seconds - self._announced >= ANNOUNCE:
                 self._announced = seconds
-                self.announce(pacer.utime(seconds))
+                with whole():
+                    self.announce(pacer.utime(seconds))
             pacer.wait(seconds)
-            self._lcm.publish(channel, data)
-            self.sent += 1
+            with whole():
+                self._out.publish(channel, data)
+                self.sent += 1
             done(number)
 
     def _encoded(self, frames: Iterable[Frame], pacer: Pacer) -> Iterator[tuple[int, float, bytes]]:
@@ -125,16 +142,16 @@ class Publisher:
         """Send calibration and empty scene, as far as they are known."""
         stream, setup = self._setup.stream, self._setup
         if setup.camera is not None:
-            self._lcm.publish(f"GAIT_CAMERA_{stream}", camera_message(setup.camera, utime).encode())
+            self._out.publish(f"GAIT_CAMERA_{stream}", camera_message(setup.camera, utime).encode())
         if setup.plate is not None:
-            self._lcm.publish(f"GAIT_BACKGROUND_{stream}", image_message(setup.plate, utime, -1).encode())
+            self._out.publish(f"GAIT_BACKGROUND_{stream}", image_message(setup.plate, utime, -1).encode())
 
     def _send_start(self, utime: int) -> int:
         """Send START for capture time `utime`; return its id."""
         start = self._setup.start
         assert start is not None
         command = command_message(gaitmsg.command_t.START, utime, start.mean, start.sd)
-        self._lcm.publish("GAIT_COMMAND", command.encode())
+        self._out.publish("GAIT_COMMAND", command.encode())
         return int(command.id)
 
     def _is_ready(self, status: Any) -> bool:
@@ -156,9 +173,10 @@ class Publisher:
 
     def _listen(self, seconds: float, wanted: Callable[[Any], bool]) -> bool:
         """Wait for a status that is `wanted`."""
+        assert not isinstance(self._out, LogWriter), "a log does not answer"
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:
-            handle(self._lcm, left, self._log)
+            handle(self._out, left, log=False)
             if self._status is not None and wanted(self._status):
                 return True
         return False

@@ -10,7 +10,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from gait.errors import UserError
+from gait.errors import UsageError, UserError
+from gait.lcm.log import PREFIX, LogWriter, log_of
 from gait.lcm.types import generated
 
 try:
@@ -54,6 +55,24 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
         raise UserError(f"{wanted}: cannot open LCM; {remedy}") from None
 
 
+def listener(url: str) -> lcm.LCM:
+    """Connect to listen, which leaves a log as it is."""
+    if is_log(url) and log_of(url)[1] != "r":
+        raise UsageError(f"--url {url}: a log to listen to is only read; leave ?mode= out")
+    return open_lcm(url)
+
+
+def publisher(url: str) -> lcm.LCM | LogWriter:
+    """Connect to send: to a network, or into a log."""
+    if not is_log(url):
+        return open_lcm(url)
+    generated()
+    path, mode = log_of(url)
+    if mode not in ("w", "a"):
+        raise UsageError(f"--url {url}: gives no log to write; add ?mode=w (new) or ?mode=a (at its end)")
+    return LogWriter(path, mode)
+
+
 def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
     """Take in a message, waiting at most so long; False at the end of a `log`.
 
@@ -72,7 +91,7 @@ def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
 
 def is_log(url: str) -> bool:
     """Tell a log file, which loses nothing, from a network."""
-    return url.startswith("file://")
+    return url.startswith(PREFIX)
 
 
 def private_url() -> str:

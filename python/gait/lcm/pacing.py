@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from gait.errors import UserError
+from gait.errors import UsageError
 from gait.lcm.messages import now
 
 _MAX_HZ = 1000.0
@@ -75,5 +75,5 @@ def parse_rate(text: str) -> float | None:
     except ValueError:
         hertz = 0.0
     if not 0 < hertz <= _MAX_HZ:
-        raise UserError(f"--rate {text}: give true, max or frames per second up to {_MAX_HZ:g}")
+        raise UsageError(f"--rate {text}: give true, max or frames per second up to {_MAX_HZ:g}")
     return hertz

@@ -1,0 +1,104 @@
+"""gait capture as a process: logs that it writes, and its end by a signal."""
+
+import resource
+import signal
+import subprocess
+import time
+
+import lcm_rig as rig
+import pytest
+
+from gait.lcm.types import gaitmsg
+
+COUNT = 12
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A clip as files: video, camera, empty scene, init."""
+    return rig.write_clip(tmp_path_factory.mktemp("clip"), COUNT)
+
+
+def capture(folder, url, *options, **how):
+    words = [folder / "video.mp4", "--camera", folder / "camera.json", "--rate", "max", "--url", url]
+    command = [str(rig.PYTHON), "-m", "gait", "capture", *map(str, [*words, *options])]
+    return subprocess.run(command, capture_output=True, text=True, timeout=rig.PATIENCE, check=False, **how)
+
+
+def one_line(done, code, words):
+    assert done.returncode == code and words in done.stderr, done
+    assert done.stdout == "" and done.stderr.count("\n") == 1, done
+
+
+def test_a_full_disk_is_told(folder):
+    done = capture(folder, "file:///dev/full?mode=w")
+    one_line(done, 1, "/dev/full: the log cannot be written: No space left on device")
+
+
+@pytest.mark.parametrize("missing", [COUNT * 50_000, 100], ids=["early", "in the last bytes"])
+def test_a_log_that_may_not_grow_is_told(folder, tmp_path, missing):
+    log = tmp_path / "x.log"
+    assert capture(folder, f"file://{log}?mode=w").returncode == 0
+    room = log.stat().st_size - missing
+    assert room > 0
+
+    def small():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+
+    done = capture(folder, f"file://{log}?mode=w", preexec_fn=small)
+    one_line(done, 1, "x.log: the log cannot be written: File too large")
+
+
+def test_a_log_can_be_added_to(folder, tmp_path):
+    log = tmp_path / "x.log"
+    for mode in "wa":
+        assert capture(folder, f"file://{log}?speed=0&mode={mode}").returncode == 0
+    assert len(rig.read_log(log, "GAIT_IMAGE_0", gaitmsg.image_t)) == 2 * COUNT
+
+
+@pytest.mark.parametrize("mode", ["", "?speed=0", "?mode=r", "?mode=write"])
+def test_a_log_without_the_mode_of_writing_is_refused(folder, tmp_path, mode):
+    log = rig.write_log(tmp_path / "x.log", rig.opening())
+    before = log.read_bytes()
+    one_line(capture(folder, f"file://{log}{mode}"), 2, "add ?mode=w (new) or ?mode=a")
+    assert log.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["video.mp4", "camera.json"])
+def test_what_is_read_is_never_overwritten(folder, name):
+    before = (folder / name).read_bytes()
+    done = capture(folder, f"file://{folder / name}?mode=w")
+    one_line(done, 1, f"{name}: is read by this command")
+    assert (folder / name).read_bytes() == before
+
+
+def test_a_folder_that_is_missing_is_told(folder, tmp_path):
+    done = capture(folder, f"file://{tmp_path}/none/x.log?mode=w")
+    one_line(done, 1, "none/x.log: the log cannot be written: No such file or directory")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_after_a_whole_frame(folder, tmp_path, number):
+    """As a script starts it with &, where SIGINT is ignored."""
+    log = tmp_path / "x.log"
+    words = [folder / "video.mp4", "--loop", "--rate", "200", "--url", f"file://{log}?mode=w"]
+    process = subprocess.Popen(
+        [str(rig.PYTHON), "-m", "gait", "capture", *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )
+    try:
+        while not log.exists() or log.stat().st_size < 1_000_000:
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(number)
+        printed, words = process.communicate(timeout=rig.PATIENCE)
+    finally:
+        process.kill()
+        process.communicate()
+    assert (process.returncode, words) == (0, "")
+    images = rig.read_log(log, "GAIT_IMAGE_0", gaitmsg.image_t)
+    assert printed.startswith(f"{len(images)} frames sent"), printed
+    assert log.stat().st_size == sum(28 + len("GAIT_IMAGE_0") + len(i.encode()) for i in images)
