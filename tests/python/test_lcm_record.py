@@ -1,8 +1,10 @@
-"""gait record as a process that is interrupted: the track so far must be whole."""
+"""gait record as a process: whatever ends it, the track so far is whole and the reason is told."""
 
+import resource
 import signal
 import subprocess
 import threading
+from copy import copy
 
 import lcm_rig as rig
 import numpy as np
@@ -12,6 +14,7 @@ from gait.lcm.link import open_lcm, private_url
 from gait.motion.trackfile import read_track
 
 COUNT = 20
+SECOND = 1_000_000  # microseconds
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +77,92 @@ def test_a_missing_folder_is_named_before_anybody_listens(tmp_path, option):
     done = rig.gait("record", "--url", f"file://{tmp_path}/absent.log", *words)
     assert done.returncode == 1 and done.stderr.count("\n") == 1
     assert "none does not exist" in done.stderr and not list(tmp_path.iterdir())
+
+
+def record(tmp_path, estimates, *options):
+    """Record estimates that came one after the other; the process, and the frames of the track."""
+    log, out = tmp_path / "in.log", tmp_path / "t.csv"
+    rig.write_log(log, [("GAIT_ESTIMATE", e) for e in estimates])
+    done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", out, *options)
+    return done, read_track(out).frame.tolist() if out.exists() else None
+
+
+def later(estimate, microseconds=0, **changes):
+    """An estimate as another tracker, or the same one at another time, would have sent it."""
+    other = copy(estimate)
+    for name, value in changes.items():
+        setattr(other, name, value)
+    other.receive_utime += microseconds
+    return other
+
+
+@pytest.mark.parametrize("case", ["in turn", "one frame each", "one falls behind"])
+def test_two_trackers_on_one_url_are_told(estimates, tmp_path, case):
+    """Both track the same frames; each receives them at its own time."""
+    one, two = estimates, [later(e, 300) for e in estimates]
+    order = [e for pair in zip(one, two, strict=True) for e in pair]
+    if case == "one frame each":  # both too slow for every frame: numbers alone look like one stream
+        order = [later((one, two)[i % 2][i], step=i // 2, dropped=i - i // 2) for i in range(COUNT)]
+    if case == "one falls behind":
+        order = [*one[:5], two[0], *one[5:]]
+    done, frames = record(tmp_path, order)
+    assert done.returncode == 1 and "two trackers publish on this URL" in done.stderr
+    assert done.stderr.splitlines()[1:] == [done.stderr.splitlines()[-1]], done.stderr
+    assert frames == list(range(len(frames))) and f"holds the {len(frames)} frames" in done.stderr
+
+
+def test_another_stream_that_begins_is_told(estimates, tmp_path):
+    again = [later(e, 60 * SECOND, utime=e.utime + 60 * SECOND) for e in estimates]
+    done, frames = record(tmp_path, [*estimates, *again])
+    assert done.returncode == 0 and frames == list(range(COUNT))
+    assert f"ended, as another stream began (frame 0 after {COUNT - 1})" in done.stderr
+    quiet, _ = record(tmp_path, [*estimates, *again], "--quiet")
+    assert quiet.returncode == 0 and quiet.stderr == ""
+
+
+def test_a_log_played_again_is_another_stream(estimates, tmp_path):
+    done, frames = record(tmp_path, [*estimates, *estimates])
+    assert done.returncode == 0 and "another stream began" in done.stderr and len(frames) == COUNT
+
+
+def test_a_start_in_the_middle_is_the_same_stream(estimates, tmp_path):
+    """Somebody is found anew: steps count from 0 again, frames go on; the very first of them may be lost."""
+    anew = [later(e, step=e.frame - 8, dropped=0) for e in estimates[8:]]
+    for rest in (anew, anew[1:]):
+        done, frames = record(tmp_path, [*estimates[:8], *rest], "--quiet")
+        assert done.returncode == 0 and done.stderr == "" and len(frames) == 8 + len(rest)
+
+
+def test_the_log_that_is_listened_to_stays_as_it_is(estimates, tmp_path):
+    log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
+    before = log.read_bytes()
+    for words, code, said in (
+        (["--url", f"file://{log}?mode=w", "-o", tmp_path / "t.csv"], 2, "only read; leave ?mode= out"),
+        (["--url", f"file://{log}", "-o", tmp_path / "t.csv", "--log", log], 1, "is read by this command"),
+    ):
+        done = rig.gait("record", *words)
+        assert done.returncode == code and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
+    assert log.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["in.log"]
+
+
+@pytest.mark.parametrize("option", ["--frames", "--until-idle", "--patience"])
+def test_ends_that_cannot_be_are_usage_errors(tmp_path, option):
+    done = rig.gait("record", "-o", tmp_path / "t.csv", option, "-1")
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and option in done.stderr
+
+
+def test_a_log_for_which_there_is_no_room_is_told(estimates, tmp_path):
+    """The last bytes wait in memory: only closing tells that they do not fit."""
+    log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
+    room = log.stat().st_size - 100
+    words = [str(rig.PYTHON), "-m", "gait", "record", "--url", f"file://{log}?speed=0"]
+    done = subprocess.run(
+        [*words, "-o", tmp_path / "t.csv", "--log", tmp_path / "e.log"],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+        capture_output=True,
+        text=True,
+        timeout=rig.PATIENCE,
+        check=False,
+    )
+    assert done.returncode == 1 and "e.log: the log cannot be written: File too large" in done.stderr
+    assert not (tmp_path / "e.log").exists()

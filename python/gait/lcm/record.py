@@ -7,14 +7,14 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from typing import Any
 
-import lcm
 import numpy as np
 
 from gait.durations import spread
 from gait.errors import UserError
 from gait.image.video import Frame
 from gait.io.files import replacing
-from gait.lcm.link import handle, is_log, open_lcm
+from gait.lcm.link import handle, is_log, listener
+from gait.lcm.log import LogWriter
 from gait.lcm.messages import decode, estimate_of, now
 from gait.lcm.types import gaitmsg
 from gait.motion.trackfile import TrackWriter
@@ -80,18 +80,22 @@ class Recorder:
     figures : Figures
     stop : bool
         Set it to end `run` in good order.
+    other : str or None
+        Says that another stream began, where that has ended the recording.
     """
 
     def __init__(self, url: str, output: str, log: str | None = None, channel: str = ESTIMATE) -> None:
-        self._lcm, self._live = open_lcm(url), not is_log(url)
+        self._lcm, self._live = listener(url), not is_log(url)
         self._output, self._path, self._channel = output, log, channel
         self._waiting: list[Any] = []
         self._writer: TrackWriter | None = None
-        self._log: Any = None
+        self._log: LogWriter | None = None
         self._origin = 0
+        self._two, self._first = False, 0
         self._last = 0.0
         self.figures = Figures()
         self.stop = False
+        self.other: str | None = None
         self._lcm.subscribe(channel, self._on_estimate).set_queue_capacity(_QUEUE)
 
     def run(
@@ -99,18 +103,19 @@ class Recorder:
     ) -> None:
         """Record until `frames` have come, none has for `idle` seconds, the log ends, or `stop` is set.
 
+        The beginning of another stream ends it too: one file holds one.
+
         Raises
         ------
         UserError
             If nothing came at all, within `patience` seconds where that is given; no file is written then.
+            If two trackers publish at once; the file then holds what came before.
         """
         begun = time.monotonic()
         with ExitStack() as self._stack:
             if self._path is not None:
                 temporary = self._stack.enter_context(replacing(self._path))
-                self._log = self._stack.enter_context(
-                    closing(lcm.EventLog(str(temporary), "w", overwrite=True))
-                )
+                self._log = self._stack.enter_context(closing(LogWriter(temporary, name=self._path)))
             while not self.stop and handle(self._lcm, _TURN, not self._live):
                 count, clock = len(self.figures.utime), time.monotonic()
                 quiet = idle is not None and clock - self._last > idle
@@ -122,6 +127,11 @@ class Recorder:
                 raise UserError(
                     f"{self._channel}: no estimate was received; is gait-trackd tracking on this URL?"
                 )
+        if self._two:
+            raise UserError(
+                f"{self._output}: two trackers publish on this URL; end one of them (the file holds the "
+                f"{len(self.figures.utime)} frames before that showed)"
+            )
 
     def summary(self) -> dict[str, Any]:
         """Figures of the recording."""
@@ -130,17 +140,29 @@ class Recorder:
     def _on_estimate(self, channel: str, data: bytes) -> None:
         arrived = now()
         message = decode(gaitmsg.estimate_t, data, channel)
-        previous = self.figures.last
-        if previous is not None and _number(message) <= _number(previous):
-            self.stop = True  # another stream has begun: one file holds one
+        if self.figures.last is None:
+            self._first = message.receive_utime
+        elif not self._goes_on(self.figures.last, message):
+            self.stop = True
             return
         self.figures.add(message, arrived)
         if self._log is not None:
-            self._log.write_event(arrived, channel, data)
+            self._log.write(arrived, channel, data)
         self._last = time.monotonic()
         self._waiting.append(message)
         if self._writer is not None or len(self._waiting) == 2:
             self._flush()
+
+    def _goes_on(self, previous: Any, message: Any) -> bool:
+        """Whether an estimate follows the one before; what else it tells is kept."""
+        played_again = message.receive_utime == self._first  # as is the first of a log
+        if not played_again and _of_two(previous, message):
+            self._two = True
+        elif _number(message) <= _number(previous):
+            self.other = f"another stream began (frame {_number(message)} after {_number(previous)})"
+        else:
+            return True
+        return False
 
     def _flush(self) -> None:
         """Write what waits; the first two rows wait for each other, because together they date frame 0."""
@@ -164,6 +186,18 @@ class Recorder:
 def _number(message: Any) -> int:
     """Frame number of an estimate: the source's, else the count of steps."""
     return int(message.frame if message.frame >= 0 else message.step)
+
+
+def _of_two(previous: Any, message: Any) -> bool:
+    """Whether two estimates, one received after the other, are of two trackers at work at the same time.
+
+    A tracker has one estimate of a frame, receives one frame after the other, and counts its steps up; only a
+    later START makes it count from 0 again.
+    """
+    if _number(message) <= _number(previous):
+        return message.utime == previous.utime or message.receive_utime <= previous.receive_utime
+    began = message.frame - message.step - message.dropped
+    return message.frame >= 0 and message.step <= previous.step and began <= previous.frame
 
 
 def _hex(digest: int) -> str:
