@@ -1,5 +1,6 @@
 """gait view: the right estimate in the right frame, in a file and in a browser."""
 
+import signal
 import subprocess
 import urllib.error
 import urllib.request
@@ -12,6 +13,7 @@ import pytest
 
 from gait.draw.overlay import Overlay
 from gait.errors import UserError
+from gait.lcm.link import private_url
 from gait.lcm.messages import estimate_of
 from gait.lcm.viewer import Screen, Viewer
 
@@ -92,10 +94,45 @@ def test_browsers_get_the_page_and_the_moving_picture():
         screen.close()
 
 
+@pytest.mark.parametrize(
+    "words", [["--port", "70000"], ["--port", "-1"], ["--patience", "nan"], ["--stream", "-1"]], ids=" ".join
+)
+def test_options_out_of_their_range_are_usage_errors(words):
+    done = rig.gait("view", *words)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and words[0] in done.stderr
+
+
+def test_a_log_is_only_read(log):
+    before = log[0].read_bytes()
+    done = rig.gait("view", "--url", f"file://{log[0]}?mode=w", "--save", log[0].with_suffix(".png"))
+    assert done.returncode == 2 and "only read; leave ?mode= out" in done.stderr
+    assert log[0].read_bytes() == before
+
+
+def test_a_job_of_a_script_ends_by_sigint():
+    """Behind & a shell has it ignored."""
+    rig.need_multicast()
+    process = subprocess.Popen(
+        [str(rig.PYTHON), "-m", "gait", "view", "--url", private_url()],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )
+    try:
+        assert process.stdout.readline().startswith("http://127.0.0.1:")
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.5)
+        process.send_signal(signal.SIGINT)
+        _, words = process.communicate(timeout=rig.PATIENCE)
+    finally:
+        process.kill()
+        process.communicate()
+    assert (process.returncode, words) == (0, "")
+
+
 def test_the_command_shows_a_live_stream(tmp_path):
     rig.need_multicast()
-    from gait.lcm.link import private_url
-
     url = private_url()
     command = [str(rig.PYTHON), "-m", "gait", "view", "--url", url]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

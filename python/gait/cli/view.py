@@ -13,6 +13,8 @@ import time
 
 import cv2
 
+from gait.cli import values
+from gait.cli.ending import Ending
 from gait.core.model import Model
 from gait.errors import UserError
 from gait.image.camera import Camera
@@ -31,9 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--url", metavar="URL", help="LCM (LCM_DEFAULT_URL or multicast on this machine)")
     parser.add_argument("--save", metavar="PNG", help="write one picture and end")
-    parser.add_argument("--patience", type=float, default=30.0, metavar="S", help="of --save, seconds (30)")
-    parser.add_argument("--port", type=int, default=0, metavar="N", help="of the page (any that is free)")
-    parser.add_argument("--stream", type=int, default=0, metavar="I", help="number of the camera (0)")
+    parser.add_argument(
+        "--patience", type=values.seconds, default=30.0, metavar="S", help="of --save, seconds (30)"
+    )
+    port, stream = values.whole(0, 65535), values.whole(*values.STREAM)
+    parser.add_argument("--port", type=port, default=0, metavar="N", help="of the page (any that is free)")
+    parser.add_argument("--stream", type=stream, default=0, metavar="I", help="number of the camera (0)")
     parser.add_argument("--camera", metavar="CAM", help="calibration (from GAIT_CAMERA_<i>)")
     parser.add_argument("-m", "--model", metavar="M.gait", help="that tracks (the shipped one)")
 
@@ -48,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     screen = Screen(args.port)
     viewer = Viewer(url, args.stream, model, camera, screen.show)
     print(screen.address, flush=True)
-    with contextlib.suppress(KeyboardInterrupt):  # the way to end it
+    with Ending(), contextlib.suppress(KeyboardInterrupt):  # the way to end it
         while viewer.handle(_TURN):
             pass
     screen.close()

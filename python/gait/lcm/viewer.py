@@ -16,7 +16,7 @@ from gait.draw.overlay import Overlay
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.image.video import Image
-from gait.lcm.link import handle, is_log, open_lcm
+from gait.lcm.link import handle, is_log, listener
 from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.lcm.types import gaitmsg
 
@@ -46,7 +46,7 @@ class Viewer:
     def __init__(
         self, url: str, stream: int, model: Model, camera: Camera | None, show: Callable[[Image], None]
     ) -> None:
-        self._lcm, self._log = open_lcm(url), is_log(url)
+        self._lcm, self._log = listener(url), is_log(url)
         self._model, self._show = model, show
         self._overlay = Overlay(model, camera) if camera is not None else None
         self._frames: dict[int, Any] = {}
