@@ -78,7 +78,8 @@ static void weigh_view(gait_tracker *t, int32_t c, int32_t begin, int32_t lanes,
 {
     float ll[BLOCK];
     weigh_outline(t, c, w);
-    memset(&w->terms, 0, sizeof w->terms);
+    if (lanes < BLOCK) /* those without a particle are summed as well, though nobody reads what comes of it */
+        memset(&w->terms, 0, sizeof w->terms);
     for (int32_t lane = 0; lane < lanes; lane++)
         weigh_one(t, c, begin + lane, lane, w);
     like_sum(t->like, w->outline, t->core->textured >> c & 1u, &w->terms, ll);

@@ -194,6 +194,22 @@ static void test_support(void)
     toy_tracker_free(t);
 }
 
+/* The last block's lanes without a particle hold nothing of other blocks, nor of what was in the memory. */
+static void test_empty_lanes(void)
+{
+    gait_tracker *const t = tracker(1, 0, 0xf);
+    const uint8_t *const one[] = {shot[0][0], NULL};
+    gait_estimate e;
+    int32_t full = 0, empty = 0;
+    memset(&t->work[0].terms, 0xff, sizeof t->work[0].terms);
+    toy_tracker_step(t, 20, one, &e);
+    for (int32_t lane = 0; lane < BLOCK; lane++)
+        for (int32_t k = LIKE_TEXTURE + 1; k < LIKE_TERMS; k++)
+            *(lane < N % BLOCK ? &full : &empty) += t->work[0].terms.nats[k][lane] != 0.0f;
+    CHECK(full > 0 && empty == 0);
+    toy_tracker_free(t);
+}
+
 int main(void)
 {
     for (int k = 0; k < SCENE_CAMERAS; k++) {
@@ -206,5 +222,6 @@ int main(void)
     test_ancestor();
     test_missed_texture();
     test_support();
+    test_empty_lanes();
     return CHECK_DONE();
 }
