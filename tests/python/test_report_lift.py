@@ -14,7 +14,7 @@ from toy_segments import toy_blob, toy_prior
 from gait.cli import main, report_lift
 from gait.image.camera import Camera
 from gait.learn import segment_motion
-from gait.lift import figures_clip, motion, result
+from gait.lift import figures_base, figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.tracks_file import Tracks, read, write
 from gait.lift.uncertain import Uncertain
@@ -163,3 +163,36 @@ def test_why_a_recording_has_no_segment(frames, words):
     places[::2] = 0
     read = segment_motion.Motion(prior.names, places, places[:, 0], 1.7, places[:0, None])
     assert words in report_lift._why_no_segment(read, prior)
+
+
+def test_every_figure_has_a_column_of_its_own():
+    """One row wanders off as least squares do: no figure is cut off or runs into the next."""
+    rng = np.random.default_rng(1)
+    names = ("head_top", "neck", "pelvis", "l_hip", "l_knee", "l_ankle", "r_hip", "r_knee", "r_ankle")
+    truth = rng.normal(size=(9, len(names), 3)) * (0.3, 0.3, 0.4) + (0, 0, 0.8)
+    off = truth + np.linspace(0, 2, 9)[:, None, None] * (1, 0, -1)
+    strips = figures_base.Strips(("truth", "off"), names, 1.7, 20.0)
+    strips.add(0, truth, figures_base.SIDE, "black")
+    strips.add(1, truth, figures_base.SIDE, "black", ghost=True)
+    strips.add(1, off, figures_base.SIDE, "blue", path=truth)
+    figure = strips.figure()
+    assert [text.get_text() for text in figure.axes[0].texts] == [
+        f"{t:.2f} s" for t in (0, 0.1, 0.2, 0.3, 0.4)
+    ]
+    assert "0.5 m   bold: right side, thin: left" in [text.get_text() for text in figure.axes[1].texts]
+    scales = []
+    for axes, motions in zip(figure.axes, (1, 2), strict=True):
+        drawn = [line.get_xydata() for line in axes.lines if line.get_linewidth() in (0.9, 1.8, 3.4, 4.3)]
+        columns = np.array_split(np.arange(len(drawn) // motions), 5)
+        reach = [
+            [np.concatenate([drawn[m * len(drawn) // motions + k] for m in range(motions) for k in column])]
+            for column in columns
+        ]
+        left, right = ([f(r[0], axis=0) for r in reach] for f in (np.min, np.max))
+        assert all(a[0] < b[0] for a, b in zip(right, left[1:], strict=False))
+        (low, high), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+        assert low < left[0][0] and right[-1][0] < high
+        assert bottom < min(each[1] for each in left) and max(each[1] for each in right) < top
+        box = axes.get_position().bounds * np.tile(figure.get_size_inches(), 2)
+        scales += [box[2] / (high - low), box[3] / (top - bottom)]
+    np.testing.assert_allclose(scales, scales[0])  # of all rows, across and up

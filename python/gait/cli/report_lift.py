@@ -145,8 +145,8 @@ def _why_no_segment(read: segment_motion.Motion, prior: SegmentPrior) -> str:
     wanted = prior.frames / prior.fps
     if len(read.places) < prior.frames:
         return f"lasts {len(read.places) / prior.fps:.2g} s, a segment of the model {wanted:g} s"
-    seen = dict(zip(read.names, np.isfinite(read.places).all(axis=2).any(axis=0).tolist(), strict=True))
-    absent = [name for name in prior.names if not seen[name]]
+    seen = np.asarray(np.isfinite(read.places).all(axis=2))
+    absent = [name for name in prior.names if not seen[:, read.names.index(name)].any()]
     if absent:
         return f"never shows {' '.join(absent)}, which the model's prior has"
     return f"has gaps in every {wanted:g} s, the length of the model's segments"

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gait.draw.colours import DARK, GREY, ON_PAPER, side_of
-from gait.learn.figures_base import Drawing, plain
+from gait.learn.figures_base import Drawing
 from gait.learn.figures_model import STICKS
 from gait.lift.equations import Perspective, View
-from gait.lift.figures_base import SHOWN
+from gait.lift.figures_base import BELOW, SHOWN, bare, scale_bar
 from gait.lift.result import Motion
 from gait.lift.tracks_file import Tracks
 
@@ -29,11 +32,7 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
         seen, points = _in_picture(view, motion, frame, tracks)
         sides = [seen, np.column_stack([body @ ahead, body @ -down])]
         for axes, flat in zip(panels[:, column], sides, strict=True):
-            plain(axes)
-            axes.grid(visible=False)
-            axes.set_aspect("equal")
-            axes.set(xticks=[], yticks=[])
-            axes.spines[["left", "bottom"]].set_visible(False)
+            bare(axes)
             for side, chains in STICKS.items():
                 for chain in chains:
                     known = [index[joint] for joint in chain if joint in index]
@@ -45,6 +44,7 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
             depth, sides[1][:, 1], xerr=np.minimum(sd, 1.0), fmt="none", ecolor=GREY, lw=0.8
         )
         panels[0, column].set_title(f"frame {tracks.frame[frame]}", fontsize=9)
+    _one_scale(panels[1])
     panels[0, 0].set_ylabel("as seen", fontsize=9)
     panels[1, 0].set_ylabel("turned by 90°", fontsize=9)
     error = float(np.nanmedian(motion.error))
@@ -54,6 +54,16 @@ def clip(tracks: Tracks, motion: Motion, view: View, name: str) -> Drawing:
         "orange."
     )
     return Drawing("clip", "A clip", caption, figure)
+
+
+def _one_scale(panels: Sequence[Axes]) -> None:
+    """Give panels of one row the same height, and the first a bar under it."""
+    lowest = min(axes.dataLim.y0 for axes in panels)
+    highest = max(axes.dataLim.y1 for axes in panels)
+    under = lowest - BELOW * (highest - lowest)
+    scale_bar(panels[0], panels[0].dataLim.x0, under)
+    for axes in panels:
+        axes.set_ylim(under - 0.05, highest + 0.05)
 
 
 def _in_picture(view: View, motion: Motion, frame: int, tracks: Tracks) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from gait.core.lifter import LiftConfig, Lifter
 from gait.core.segment_prior import SegmentPrior
 from gait.draw.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn.figures_base import Drawing, grid, line_legend
-from gait.lift.figures_base import AHEAD, SIDE, rows, strip
+from gait.lift.figures_base import AHEAD, SIDE, Strips
 from gait.lift.posterior import Gaussian, place
 
 Floats = npt.NDArray[np.float64]
@@ -122,14 +122,20 @@ def synthesis(c: Case) -> Drawing:
     """Draw the segment beside its projection on the first modes (fig. 2)."""
     used = c.gaussian.modes[:SYNTHESIS]
     projected = replace(c.gaussian, modes=used).projected(c.truth)
-    figure, panels = rows(2, ("from the side", "from ahead"))
-    for axes, across in zip(panels, (SIDE, AHEAD), strict=True):
-        strip(axes, c.truth, c.prior.names, across, DARK, ghost=True, size=c.prior.stature)
-        strip(axes, projected, c.prior.names, across, ORANGE, size=c.prior.stature, path=c.truth)
+    strips = _strips(c, ("from the side", "from ahead"))
+    for row, across in enumerate((SIDE, AHEAD)):
+        strips.add(row, c.truth, across, DARK, ghost=True)
+        strips.add(row, projected, across, ORANGE, path=c.truth)
+    figure = strips.figure()
     line_legend(figure, {"original": GREY, f"{len(used)} modes": ORANGE})
     caption = f"{c.what.capitalize()} (grey) and its projection on {len(used)} modes: "
     caption += f"{_apart(projected, c.truth):.0f} mm off."
     return Drawing("synthesis", "Synthesis", caption, figure)
+
+
+def _strips(c: Case, titles: Sequence[str]) -> Strips:
+    """Rows for motions of a case."""
+    return Strips(titles, c.prior.names, c.prior.stature, c.prior.fps)
 
 
 def _apart(found: Floats, truth: Floats) -> float:
@@ -139,12 +145,11 @@ def _apart(found: Floats, truth: Floats) -> float:
 def draws(c: Case, seed: int) -> Drawing:
     """Segments drawn from the prior (fig. 4)."""
     rng = np.random.default_rng(seed)
-    figure, panels = rows(DRAWS, [f"draw {k + 1}" for k in range(DRAWS)])
-    for axes in panels:
-        x = c.gaussian.draw(rng, residual=False)
-        strip(axes, x, c.prior.names, SIDE, BLUE, size=c.prior.stature)
+    strips = _strips(c, [f"draw {k + 1}" for k in range(DRAWS)])
+    for row in range(DRAWS):
+        strips.add(row, c.gaussian.draw(rng, residual=False), SIDE, BLUE)
     caption = f"{DRAWS} segments drawn from the prior, seen from the side."
-    return Drawing("draws", "Random draws", caption, figure)
+    return Drawing("draws", "Random draws", caption, strips.figure())
 
 
 def estimates(c: Case) -> Drawing:
@@ -156,17 +161,17 @@ def estimates(c: Case) -> Drawing:
         f"likelihood only\n{_apart(c.likelihood, c.truth):.0f} mm": (c.likelihood, BLUE),
         f"Bayes\n{_apart(c.bayes, c.truth):.0f} mm": (c.bayes, ORANGE),
     }
-    figure, panels = rows(len(found), list(found))
-    for axes, (x, colour) in zip(panels, found.values(), strict=True):
+    strips = _strips(c, list(found))
+    for row, (x, colour) in enumerate(found.values()):
         if x is not c.truth:
-            strip(axes, c.truth, c.prior.names, SIDE, DARK, ghost=True, size=c.prior.stature)
-        strip(axes, x, c.prior.names, SIDE, colour, size=c.prior.stature, path=c.truth)
+            strips.add(row, c.truth, SIDE, DARK, ghost=True)
+        strips.add(row, x, SIDE, colour, path=c.truth)
     return Drawing(
         "estimates",
         "Estimates",
         f"{c.what.capitalize()} was seen from behind, with {1000 * NOISE:.0f} mm of noise; drawn from the "
         "side, where what was not seen shows. Grey: original. Mean distance of all markers.",
-        figure,
+        strips.figure(),
     )
 
 
@@ -174,13 +179,14 @@ def uncertain(c: Case) -> Drawing:
     """Least certain displacements, from where they show most (fig. 6)."""
     length = np.linalg.norm(c.uncertain.reshape(MODES, -1), axis=1) / np.sqrt(c.truth[..., 0].size)
     titles = [f"mode {k + 1}\n{1000 * each:.0f} mm" for k, each in enumerate(length)]
-    figure, panels = rows(MODES, titles)
-    for axes, mode in zip(panels, c.uncertain, strict=True):
-        strip(axes, c.bayes, c.prior.names, SIDE, DARK, ghost=True, size=c.prior.stature)
+    strips = _strips(c, titles)
+    for row, mode in enumerate(c.uncertain):
+        strips.add(row, c.bayes, SIDE, DARK, ghost=True)
         for sign, colour in ((1, ORANGE), (-1, BLUE)):
             moved = c.bayes + sign * SWING * mode
-            strip(axes, moved, c.prior.names, SIDE, colour, size=c.prior.stature, path=c.bayes)
+            strips.add(row, moved, SIDE, colour, path=c.bayes)
     depth = [float(np.sum(mode[..., 0] ** 2) / np.sum(mode**2)) for mode in c.uncertain]
+    figure = strips.figure()
     line_legend(figure, {f"+{SWING:g} sd": ORANGE, f"-{SWING:g} sd": BLUE})
     return Drawing(
         "uncertain",
