@@ -3,9 +3,9 @@
 
     make eval-lift, or lift_mocap.py
 
-The whole subject of a sequence is left out of what its prior is learnt from.  Segments are placed as in the prior (pelvis over
-the origin in the first frame, heading known, as in the paper's axes) and seen from eight sides; the C core
-lifts them.
+The whole subject of a sequence is left out of what its prior is learnt from.  Segments are placed as in the
+prior (pelvis over the origin in the first frame, heading known, as in the paper's axes) and seen from eight
+sides; the C core lifts them.
 """
 
 from __future__ import annotations
