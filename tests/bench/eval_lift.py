@@ -25,6 +25,7 @@ PARTS = {
     "lift_mocap.py": ("lift_mocap", "lift_missing"),
     "lift_modes.py": ("lift_modes",),
     "lift_volume.py": ("lift_volume",),
+    "lift_directions.py": ("lift_directions",),
     "lift_tracks.py": ("lift_dev", "lift_balancing"),
     "lift_parts.py": ("lift_parts",),
     "lift_sides.py": ("lift_sides",),

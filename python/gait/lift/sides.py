@@ -175,7 +175,7 @@ def _course(pairs: _Pairs, easy: Flags, others: Floats) -> Flags:
 
 
 class _Filters:
-    """Kalman filters of P pairs under two survivors each, of the same covariance: not exchanged now, exchanged."""
+    """Kalman filters of P pairs under two survivors, of the same covariance: not exchanged now, exchanged."""
 
     def __init__(self, pairs: _Pairs) -> None:
         size = pairs.seen.shape[1]
