@@ -51,6 +51,19 @@ def test_frames_older_than_the_budget_are_dropped_and_counted(url):
     assert outcome.words.count("frames too old for a budget") == 1
 
 
+def test_frames_sent_twice_are_not_dropped(url):
+    """Whichever of the two is tracked."""
+    with rig.daemon(url, "--max-gap", 60) as (listener, finish):
+        armed(listener)
+        for number in range(8):
+            stamp = now()
+            send(listener, number, stamp)
+            send(listener, number, stamp)
+            listener.until(lambda: len(listener.estimates) == number + 1, "an estimate")  # noqa: B023
+        outcome = finish()
+    assert (outcome.frames, outcome.dropped) == (8, 0)
+
+
 def test_a_source_with_another_clock_counts_from_arrival(url):
     with rig.daemon(url, "--budget-ms", 2000) as (listener, finish):
         armed(listener)

@@ -141,6 +141,17 @@ def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None
     assert outcome.words.count("tracks came after their frame was tracked") == 1
 
 
+def test_a_clock_set_back_makes_no_later_tracks_late(tmp_path: Path) -> None:
+    """But those of the frame that shows it: all frames after the next START have their joints."""
+    back = each()
+    for _, message in back:
+        message.utime -= 900_000
+    again = ("GAIT_COMMAND", rig.start(1, at=0))
+    outcome, said = play(tmp_path, [*each(0, 4), *back[:2], again, *back[2:]], "--max-gap", 0.5)
+    assert said == (4 + FRAMES, 4 + FRAMES - 1, 1) and outcome.frames == 4 + FRAMES - 1
+    assert outcome.words.count("capture time went back by") == 1
+
+
 def test_memory_holds_the_largest_frame_and_does_not_grow(tmp_path: Path) -> None:
     size = []
     for stop in (4, FRAMES):

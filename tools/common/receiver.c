@@ -174,9 +174,10 @@ static bool serve(receiver *r)
     return more >= 0 && lcm_handle_timeout(r->images, 0) >= 0;
 }
 
+/* Of a clock that nobody sets: the status comes whatever becomes of the date. */
 static struct timespec until(int64_t deadline)
 {
-    int64_t const left = deadline - service_now();
+    int64_t const left = deadline - service_ticks();
     int64_t const us = left < 0 ? 0 : left > STATUS_US ? STATUS_US : left;
     return (struct timespec){.tv_sec = (time_t)(us / 1000000), .tv_nsec = (long)(us % 1000000) * 1000};
 }
@@ -187,7 +188,7 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
     struct pollfd fd[2] = {{.fd = lcm_get_fileno(r->images), .events = POLLIN},
                            {.fd = lcm_get_fileno(r->others), .events = POLLIN}};
     while (!*quit) {
-        int64_t const now = service_now();
+        int64_t const now = service_ticks();
         if (r->service->news || now >= due) {
             service_send_status(r->service);
             due = now + STATUS_US;

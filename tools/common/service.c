@@ -31,6 +31,8 @@ void service_set_state(service *s, int8_t state, const char *text)
 {
     s->state = state;
     s->news = true;
+    if (s->cue && state != GAITMSG_STATUS_T_RUNNING)
+        tracks_cue_forget(s->cue);
     if (text)
         message_set(&s->text, "%s", text);
 }

@@ -18,6 +18,11 @@ void tracks_cue_close(tracks_cue *cue)
     *cue = (tracks_cue){0};
 }
 
+void tracks_cue_forget(tracks_cue *cue)
+{
+    cue->frame_utime = -1;
+}
+
 bool tracks_cue_room(tracks_cue *cue, const gait_camera *camera, message *why)
 {
     cue->room = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS;

@@ -29,6 +29,8 @@ typedef struct tracks_cue {
 
 /* `cue` is all zero before.  `model` must outlive it. */
 void tracks_cue_open(tracks_cue *cue, const gait_model *model, int32_t joints, float sd);
+/* Nobody is tracked any more: tracks of any time may be of a frame to come. */
+void tracks_cue_forget(tracks_cue *cue);
 void tracks_cue_close(tracks_cue *cue);
 /* Take the memory for one frame of a camera; only once. */
 bool tracks_cue_room(tracks_cue *cue, const gait_camera *camera, message *why);
