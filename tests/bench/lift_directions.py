@@ -78,12 +78,13 @@ def _along(mode: Floats, axis: int) -> float:
 
 def _publish(rows: list[list[object]]) -> None:
     note = (
-        f"The mean segment seen with {1000 * NOISE:g} mm of noise; stature and heading known, the place open or "
-        "known, as it is in the paper. First: share along the line of sight and share of a rigid translation of "
-        f"the most uncertain displacement; least: the smallest share along it of {COUNT}. Wanted where the place "
-        f"is open: {DEPTH:g}, {RIGID:g} and {OTHERS:g}; where it is known no translation is left. Of the modes "
-        f"themselves, which are not made of it (F7): share along it of the {FEW} that are reduced least, of all, "
-        "and the correlation of that share with what is left of their variance."
+        f"The mean segment seen with {1000 * NOISE:g} mm of noise; stature and heading known, the place open "
+        "or known, as it is in the paper. First: share along the line of sight and share of a rigid "
+        "translation of the most uncertain displacement; least depth: the smallest share along it of "
+        f"{COUNT}. Wanted where the place is open: {DEPTH:g}, {RIGID:g} and {OTHERS:g}; where it is known no "
+        "translation is left. Of the modes themselves, which are not made of it (F7): share along it of the "
+        f"{FEW} that are reduced least, of all, and the correlation of that share with what is left of their "
+        "variance."
     )
     head = ["prior", "view", "place", "first: depth", "first: rigid", "least depth"]
     head += [f"of {FEW} modes", "of all", "correlation", "met"]
