@@ -49,7 +49,7 @@ def main() -> int:
 def _case(
     walk: lift_people.Walk, joints: tuple[str, ...], length: int, rng: np.random.Generator
 ) -> list[float]:
-    """Root errors of a walk as it was seen, exchanged, and put back; points exchanged, left so and newly so."""
+    """Root errors of a walk as seen, exchanged and put back; points exchanged, left so and moved in vain."""
     frames = np.arange(len(walk.places))
     true = Joints(
         frames, frames / lift_people.RATE, dict(zip(EVAL15, walk.places.transpose(1, 0, 2), strict=True))
