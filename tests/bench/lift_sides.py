@@ -97,8 +97,8 @@ def _publish(found: dict[tuple[str, int], list[list[float]]]) -> None:
     note = (
         "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing; in one stretch of "
         "frames left and right are exchanged. Root-aligned error in that stretch, median mm: as seen, "
-        "exchanged (--keep-sides), put back (gait lift by itself). Points exchanged; of these and others, those "
-        "still wrong after putting back, and those moved where nothing was exchanged."
+        "exchanged (--keep-sides), put back (gait lift by itself). Points exchanged; of these and others, "
+        "those still wrong after putting back, and those moved where nothing was exchanged."
     )
     head = [
         "exchanged",
