@@ -60,7 +60,7 @@ static inline uint64_t rast_bits(int32_t begin, int32_t end)
 /* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y. */
 static inline int32_t rast_half(int32_t x, int32_t y)
 {
-    return (y << 1) + (x >> 5) + (x < 64 ? 0 : 2 * (RAST_SIZE + RAST_SPARE) - 2);
+    return 2 * y + (x >> 5) + (x < 64 ? 0 : 2 * (RAST_SIZE + RAST_SPARE) - 2);
 }
 
 /* Number of set bits, without a table or an ISA extension. */

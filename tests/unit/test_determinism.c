@@ -4,6 +4,7 @@
  * With the argument `digest` it only prints those of every film (golden.h). */
 #include "gait_pool.h"
 #include "golden.h"
+#include "sanitized.h"
 #include "toy_films.h"
 #include "tracker.h"
 
@@ -15,28 +16,11 @@
 #define GOLDEN_GIVEN  UINT64_C(0x1ca09ab84ee1e64a)
 #define GOLDEN_SEARCH UINT64_C(0xfbc527de60df021b)
 
-/* Under a sanitizer, many times as slow, every 7th number of pieces must do, which still has threads from 1 to 16; and
- * under that of threads every 13th, and nothing but the threads. */
-#if defined(__has_feature)
-#define SANITIZED       __has_feature(address_sanitizer)
-#define THREADS_WATCHED __has_feature(thread_sanitizer)
-#else
-#ifdef __SANITIZE_ADDRESS__
-#define SANITIZED 1
-#endif
-#ifdef __SANITIZE_THREAD__
-#define THREADS_WATCHED 1
-#endif
-#endif
-#ifndef SANITIZED
-#define SANITIZED 0
-#endif
-#ifndef THREADS_WATCHED
-#define THREADS_WATCHED 0
-#endif
-
 /* Of 50 frames two are never sent: 48 steps. */
 enum { SHOTS = 50, GAP = 30, GAP_END = 32, SAVE_AT = 25 };
+
+/* Under a sanitizer, many times as slow, every 7th number of pieces must do, which still has threads from 1 to 16; and
+ * under that of threads every 13th, and nothing but the threads. */
 enum { MOST_PIECES = 65, NEXT_PIECES = THREADS_WATCHED ? 13 : SANITIZED ? 7 : 1 };
 
 /* gait_tasks that does the last piece first. */

@@ -1,9 +1,11 @@
 /* Nothing is allocated between the making of a tracker, or a lifter, and its end: a malloc in between aborts.
  *
  * The program's own malloc takes the C library's place, so that calls from anywhere in the process are seen. */
+#include "sanitized.h"
+
 #include "check.h"
 
-#if defined(__SANITIZE_ADDRESS__)
+#if SANITIZED
 int main(void)
 {
     return CHECK_DONE(); /* the sanitizer has a malloc of its own */

@@ -1,0 +1,22 @@
+/* sanitized.h - is this compiled under the address sanitizer, or watched by that of threads?  Both are slow. */
+#ifndef SANITIZED_H
+#define SANITIZED_H
+
+#if defined(__has_feature)
+#define SANITIZED       __has_feature(address_sanitizer)
+#define THREADS_WATCHED __has_feature(thread_sanitizer)
+#else
+#ifdef __SANITIZE_ADDRESS__
+#define SANITIZED 1
+#endif
+#ifdef __SANITIZE_THREAD__
+#define THREADS_WATCHED 1
+#endif
+#endif
+#ifndef SANITIZED
+#define SANITIZED 0
+#endif
+#ifndef THREADS_WATCHED
+#define THREADS_WATCHED 0
+#endif
+#endif
