@@ -66,7 +66,7 @@ def put_back(tracks: Tracks, sd: float) -> tuple[Tracks, list[Exchanged]]:
     if not joints or len(tracks.time) < 3 or np.median(np.diff(tracks.time)) > QUICK:
         return tracks, []
     pairs = np.array([[tracks.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints])
-    seen = tracks.seen[:, pairs].all(axis=2)
+    seen = np.asarray(tracks.seen[:, pairs].all(axis=2))
     wrong = _exchanged(_Pairs.of(tracks, pairs, seen, sd)) & seen
     uv, confidence = tracks.uv.copy(), tracks.confidence.copy()
     for pair, rows in zip(pairs, wrong.T, strict=True):
