@@ -34,14 +34,14 @@ static void add_part(const lift_table *t, const lift_stream *s, const lift_part 
 {
     const lift_belief *const belief = &part->belief[part->best];
     double const weight = weight_at(t, q->at);
-    lift_read(t, belief, q, s->mean, s->var);
+    lift_read(t, belief, q, s->mean, s->spread);
     b->total += weight;
     b->observed += belief->observed;
     if (weight > b->heaviest) {
         b->heaviest = weight;
         b->main = belief;
     }
-    mix(t, s->mean, s->var, weight / b->total, out);
+    mix(t, s->mean, s->spread, weight / b->total, out);
 }
 
 /* The frame asked for, or the first that a segment still kept covers. */

@@ -4,12 +4,12 @@
 #include "lift_continue.h"
 #include "lift_doubt.h"
 #include "lift_read.h"
+#include "lift_refit.h"
 
 #include <string.h>
 
 #define SLOWEST 10.0 /* frames per second down to which `lag` frames are kept */
 #define DOUBTS  0.25 /* share of doubted numbers from which a segment is the one that is wrong */
-enum { FITS = 4 };   /* of a segment at most, while they doubt points */
 
 static int32_t round_up(double x)
 {
@@ -37,7 +37,7 @@ void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s)
     s->jump.apart = TAKE(a, double, room);
     s->guess = TAKE(a, double, J * 3);
     s->mean = TAKE(a, double, J * 3);
-    s->var = TAKE(a, double, J * 3);
+    s->spread = TAKE(a, double, J * 3);
     s->new_uv = TAKE(a, double, J * 2);
     s->new_sd = TAKE(a, double, J);
     s->part = TAKE(a, lift_part, (size_t)s->parts);
@@ -62,13 +62,6 @@ void lift_stream_reset(lift_stream *s)
     s->misfit = false;
 }
 
-/* First frame that is still there. */
-static uint64_t oldest(const lift_stream *s)
-{
-    uint64_t const room = (uint64_t)s->past.room;
-    return s->pushed > room ? s->pushed - room : 0;
-}
-
 static void keep_frame(const lift_table *t, lift_stream *s, int64_t utime, const lift_seen *seen)
 {
     size_t const i = (size_t)(s->pushed % (uint64_t)s->past.room), J = (size_t)t->prior.markers;
@@ -79,91 +72,10 @@ static void keep_frame(const lift_table *t, lift_stream *s, int64_t utime, const
     s->pushed++;
 }
 
-/* A frame with the deviations that were observed. */
-static lift_seen raw_frame(const lift_table *t, const lift_stream *s, uint64_t frame)
-{
-    lift_seen seen = lift_stream_frame(t, s, frame);
-    seen.sd += s->past.raw - s->past.sd;
-    return seen;
-}
-
-/* The frames that fall into segment `index`; points that jump are not in `calm`. */
-static lift_window window_of(const lift_table *t, lift_stream *s, int64_t index)
-{
-    size_t const J = (size_t)t->prior.markers;
-    lift_window w = {.at = s->at, .uv = s->uv, .sd = s->sd};
-    for (uint64_t f = oldest(s); f < s->pushed; f++) {
-        lift_seen const seen = raw_frame(t, s, f);
-        if (!lift_stream_covers(s, index, lift_stream_time(s, f)))
-            continue;
-        s->at[w.frames] = lift_stream_moment(t, s, index, lift_stream_time(s, f));
-        memcpy(s->uv + (size_t)w.frames * J * 2, seen.uv, J * 2 * sizeof(double));
-        memcpy(s->calm + (size_t)w.frames * J, seen.sd, J * sizeof(double));
-        w.frames++;
-    }
-    lift_jump_clear(t, &w, s->calm, &s->jump);
-    return w;
-}
-
-/* Doubt points of a segment by a fit to them, whatever was doubted before; how many. */
-static int32_t doubt_window(const lift_table *t, lift_stream *s, const lift_window *w, const lift_belief *b)
-{
-    size_t const J = (size_t)t->prior.markers;
-    int32_t doubted = 0;
-    for (int32_t f = 0; f < w->frames; f++) {
-        lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = s->calm + (size_t)f * J};
-        doubted += lift_doubt(t, b, w->at[f], &seen, true, s->guess, s->sd + (size_t)f * J);
-    }
-    return doubted;
-}
-
-/* The frames of a window keep what was thought of their points. */
-static void keep_doubts(const lift_table *t, const lift_stream *s, int64_t index)
-{
-    size_t const J = (size_t)t->prior.markers;
-    const double *sd = s->sd;
-    for (uint64_t f = oldest(s); f < s->pushed; f++)
-        if (lift_stream_covers(s, index, lift_stream_time(s, f))) {
-            memcpy(s->past.sd + f % (uint64_t)s->past.room * J, sd, J * sizeof *sd);
-            sd += J;
-        }
-}
-
-/* Fit segment `index` to the frames that fall into it, whatever was thought of it before: to all points, then
- * without those far from where the rest has them. */
-static bool fit_part(const lift_table *t, lift_search *search, lift_stream *s, int64_t index)
-{
-    lift_part *const part = lift_stream_part(s, index);
-    lift_belief *const b = &part->belief[0];
-    lift_outcome outcome;
-    lift_window const w = window_of(t, s, index);
-    memcpy(s->sd, s->calm, (size_t)w.frames * (size_t)t->prior.markers * sizeof *s->sd);
-    int32_t doubted = 0, before = -1;
-    for (int32_t fits = 0; doubted != before && fits < FITS; fits++) {
-        before = doubted;
-        memcpy(b->place, t->cfg.place, sizeof b->place);
-        if (!lift_fit(t, search, &w, b, &outcome))
-            return false;
-        doubted = doubt_window(t, s, &w, b);
-    }
-    keep_doubts(t, s, index);
-    int32_t const c = b->component;
-    if (c != 0) { /* every component has a belief of its own */
-        lift_belief const found = *b;
-        part->belief[0] = part->belief[c];
-        part->belief[c] = found;
-    }
-    part->index = index;
-    part->best = c;
-    part->doubted = 2 * doubted;
-    part->closed = true; /* the other components are not followed in this segment */
-    return true;
-}
-
 /* Add a frame to every component of a segment, linearised about the guess. */
 static void add_frame(const lift_table *t, const lift_stream *s, lift_part *part, uint64_t frame)
 {
-    lift_seen const seen = lift_stream_frame(t, s, frame), raw = raw_frame(t, s, frame);
+    lift_seen const seen = lift_stream_frame(t, s, frame), raw = lift_stream_raw(t, s, frame);
     for (int32_t c = 0; c < t->prior.components; c++)
         lift_add(t, &part->belief[c], lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)),
                  &seen, s->guess, 0.0);
@@ -175,7 +87,7 @@ static void add_frame(const lift_table *t, const lift_stream *s, lift_part *part
 static void judge_frame(const lift_table *t, lift_stream *s, const lift_part *part)
 {
     uint64_t const frame = s->pushed - 1;
-    lift_seen const seen = raw_frame(t, s, frame);
+    lift_seen const seen = lift_stream_raw(t, s, frame);
     (void)lift_doubt(t, &part->belief[part->best],
                      lift_stream_moment(t, s, part->index, lift_stream_time(s, frame)), &seen, false,
                      s->guess, s->past.sd + frame % (uint64_t)s->past.room * (size_t)t->prior.markers);
@@ -227,7 +139,7 @@ static bool open_part(const lift_table *t, lift_stream *s, int64_t index)
     *part = (lift_part){.index = index, .best = before->best, .belief = part->belief};
     for (int32_t c = 0; c < t->prior.components; c++)
         lift_continue(t, &before->belief[before->best], c, &part->belief[c], s->guess);
-    for (uint64_t f = oldest(s); f < s->pushed; f++) {
+    for (uint64_t f = lift_stream_oldest(s); f < s->pushed; f++) {
         if (!lift_stream_covers(s, index, lift_stream_time(s, f)))
             continue;
         guess_frame(t, s, before, f);
@@ -260,7 +172,7 @@ static bool close_part(const lift_table *t, lift_search *search, lift_stream *s,
     s->misfit = wrong && t->cfg.misfit > 0.0 && t->cfg.heading_sd < 0.0;
     if (!s->misfit)
         return true;
-    bool ok = fit_part(t, search, s, part->index);
+    bool ok = lift_refit(t, search, s, part->index);
     int64_t const opened = s->next;
     for (s->next = part->index + 1; ok && s->next < opened; s->next++)
         ok = open_part(t, s, s->next);
@@ -298,10 +210,10 @@ static bool begin(const lift_table *t, lift_search *search, lift_stream *s)
 {
     if (lift_stream_time(s, s->pushed - 1) < s->span - 1e-9)
         return true;
-    if (!fit_part(t, search, s, 0))
+    if (!lift_refit(t, search, s, 0))
         return false;
     s->next = !doubtful(lift_stream_part(s, 0));
-    for (uint64_t f = oldest(s); !s->next && f < s->pushed; f++)
+    for (uint64_t f = lift_stream_oldest(s); !s->next && f < s->pushed; f++)
         if (lift_stream_time(s, f) > 0.0) {
             s->origin = s->past.utime[f % (uint64_t)s->past.room];
             break;

@@ -26,8 +26,8 @@ typedef struct lift_stream {
     double *at, *uv, *sd; /* window for a fit: past.room moments and observations */
     double *calm;         /* deviations of the points in it that do not jump */
     lift_jump_room jump;
-    double *guess, *mean, *var; /* J x 3 */
-    double *new_uv, *new_sd;    /* the frame that comes in */
+    double *guess, *mean, *spread; /* J x 3 */
+    double *new_uv, *new_sd;       /* the frame that comes in */
     double span, step; /* seconds: from a segment's first frame to its last; to the next segment's first */
     /* from here on cleared by a reset */
     uint64_t pushed; /* frames since the start */
@@ -52,6 +52,21 @@ static inline lift_seen lift_stream_frame(const lift_table *t, const lift_stream
 {
     size_t const i = (size_t)(frame % (uint64_t)s->past.room), J = (size_t)t->prior.markers;
     return (lift_seen){.uv = s->past.uv + i * J * 2, .sd = s->past.sd + i * J};
+}
+
+/* The same with the deviations that were observed. */
+static inline lift_seen lift_stream_raw(const lift_table *t, const lift_stream *s, uint64_t frame)
+{
+    lift_seen seen = lift_stream_frame(t, s, frame);
+    seen.sd = s->past.raw + frame % (uint64_t)s->past.room * (size_t)t->prior.markers;
+    return seen;
+}
+
+/* First frame that is still there. */
+static inline uint64_t lift_stream_oldest(const lift_stream *s)
+{
+    uint64_t const room = (uint64_t)s->past.room;
+    return s->pushed > room ? s->pushed - room : 0;
 }
 
 /* Seconds since the stream's origin. */

@@ -1,0 +1,78 @@
+#include "lift_refit.h"
+
+#include "lift_doubt.h"
+
+#include <string.h>
+
+enum { FITS = 4 }; /* of a segment at most, while they doubt points */
+
+/* The frames that fall into segment `index`; points that jump are not in `calm`. */
+static lift_window window_of(const lift_table *t, lift_stream *s, int64_t index)
+{
+    size_t const J = (size_t)t->prior.markers;
+    lift_window w = {.at = s->at, .uv = s->uv, .sd = s->sd};
+    for (uint64_t f = lift_stream_oldest(s); f < s->pushed; f++) {
+        lift_seen const seen = lift_stream_raw(t, s, f);
+        if (!lift_stream_covers(s, index, lift_stream_time(s, f)))
+            continue;
+        s->at[w.frames] = lift_stream_moment(t, s, index, lift_stream_time(s, f));
+        memcpy(s->uv + (size_t)w.frames * J * 2, seen.uv, J * 2 * sizeof(double));
+        memcpy(s->calm + (size_t)w.frames * J, seen.sd, J * sizeof(double));
+        w.frames++;
+    }
+    lift_jump_clear(t, &w, s->calm, &s->jump);
+    return w;
+}
+
+/* Doubt points of a segment by a fit to them, whatever was doubted before; how many. */
+static int32_t doubt_window(const lift_table *t, lift_stream *s, const lift_window *w, const lift_belief *b)
+{
+    size_t const J = (size_t)t->prior.markers;
+    int32_t doubted = 0;
+    for (int32_t f = 0; f < w->frames; f++) {
+        lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = s->calm + (size_t)f * J};
+        doubted += lift_doubt(t, b, w->at[f], &seen, true, s->guess, s->sd + (size_t)f * J);
+    }
+    return doubted;
+}
+
+/* The frames of a window keep what was thought of their points. */
+static void keep_doubts(const lift_table *t, const lift_stream *s, int64_t index)
+{
+    size_t const J = (size_t)t->prior.markers;
+    const double *sd = s->sd;
+    for (uint64_t f = lift_stream_oldest(s); f < s->pushed; f++)
+        if (lift_stream_covers(s, index, lift_stream_time(s, f))) {
+            memcpy(s->past.sd + f % (uint64_t)s->past.room * J, sd, J * sizeof *sd);
+            sd += J;
+        }
+}
+
+bool lift_refit(const lift_table *t, lift_search *search, lift_stream *s, int64_t index)
+{
+    lift_part *const part = lift_stream_part(s, index);
+    lift_belief *const b = &part->belief[0];
+    lift_outcome outcome;
+    lift_window const w = window_of(t, s, index);
+    memcpy(s->sd, s->calm, (size_t)w.frames * (size_t)t->prior.markers * sizeof *s->sd);
+    int32_t doubted = 0, before = -1;
+    for (int32_t fits = 0; doubted != before && fits < FITS; fits++) {
+        before = doubted;
+        memcpy(b->place, t->cfg.place, sizeof b->place);
+        if (!lift_fit(t, search, &w, b, &outcome))
+            return false;
+        doubted = doubt_window(t, s, &w, b);
+    }
+    keep_doubts(t, s, index);
+    int32_t const c = b->component;
+    if (c != 0) { /* every component has a belief of its own */
+        lift_belief const found = *b;
+        part->belief[0] = part->belief[c];
+        part->belief[c] = found;
+    }
+    part->index = index;
+    part->best = c;
+    part->doubted = 2 * doubted;
+    part->closed = true; /* the other components are not followed in this segment */
+    return true;
+}
