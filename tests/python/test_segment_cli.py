@@ -133,6 +133,21 @@ def test_all_also_learns_from_what_is_no_walk(walks, tmp_path, capsys):
     assert not any("used" in line for line in json.loads(capsys.readouterr().out)["left_out"])
 
 
+def test_all_needs_a_cyclic_model_and_names_what_does_not(walks, tmp_path, capsys):
+    """Nothing is written then: no segment is used all the same."""
+    path = tmp_path / "all.gait"
+    words = ("learn", walks / "04", "-o", path, "--jobs", 1, "--segment-hop", 1, "--segments")
+    assert run(*words, "all") == 1 and not path.exists()
+    said = capsys.readouterr().err.rstrip()
+    assert "04_01.amc: not learnt as 'walk'" in said and "used all the same" not in said
+    assert said.endswith(
+        "; for gait lift alone give --segments only: all needs recordings for a cyclic model, too"
+    )
+    assert run(*words, "only") == 0 and path.exists()
+    assert run(*words, "learnt") == 1
+    assert "--segments only" not in capsys.readouterr().err
+
+
 def test_recorded_markers_need_files_that_have_them(walks, tmp_path, capsys):
     path = tmp_path / "m.gait"
     words = ("learn", walks, "-o", path, "--segment-markers", "recorded", "--segments")

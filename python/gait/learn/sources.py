@@ -22,16 +22,22 @@ from gait.learn.shared_stretches import Shared, shared
 from gait.learn.spool import Spool
 from gait.learn.stage import Prepared, Task
 
+KEPT = " (its segments are used all the same)"
+ONLY = "for gait lift alone give --segments only: all needs recordings for a cyclic model, too"
 NOT_YET = np.zeros((0, 0))  # channels of a sequence while they go to disk
 
 
 class NothingLeft(UserError):
-    """No file can be used; `refused` has one line about each."""
+    """No file can be used for a cyclic model; `refused` has one line about each.
+
+    If some have segments, the remedy is named.
+    """
 
     def __init__(self, refused: list[str]) -> None:
+        self.refused = [words.removesuffix(KEPT) for words in refused]
         others = f" (and none of the other {len(refused) - 1} files can be used)" if refused[1:] else ""
-        super().__init__(refused[0] + others)
-        self.refused = refused
+        remedy = "" if self.refused == refused else f"; {ONLY}"
+        super().__init__(self.refused[0] + others + remedy)
 
 
 def find(
@@ -185,7 +191,7 @@ def load_all(
                 sequences.append(replace(found, recordings=body.recordings) if (body := known[i]) else found)
             elif told is not None and (files[i][1] or outcome.motion is not None):
                 whole = outcome.motion is None or corpus is None
-                refused.append(f"{told}" if whole else f"{told} (its segments are used all the same)")
+                refused.append(f"{told}" if whole else f"{told}{KEPT}")
             elif told is not None:
                 raise told
             progress(i + 1)
