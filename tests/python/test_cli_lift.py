@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait.cli import main
+from gait.body.skeleton import JOINTS
+from gait.cli import lift, main
 from gait.image.camera import Camera
 from gait.io.trc import read_trc
 from gait.lift import motion, outliers, size
 from gait.lift.result import METHODS
 from gait.lift.tracks_file import Tracks, read, write
+from gait.lift.uncertain import Uncertain
 
 FRAMES, MARKERS = 6, 12
 VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "none": []}
@@ -78,7 +80,29 @@ def test_says_what_segments_leave_uncertain(folder, capsys, view):
     assert (
         f"least certain {first['sd_mm']:.0f}, " in printed and f"({100 * first['in_depth']:.0f}, " in printed
     )
+    last = others[-1]["joints"]  # those it moves most, which are not the body as one
+    assert len(set(last)) == 3 and set(last) <= set(JOINTS)
+    assert "% in depth; of the whole body; of " in printed
+    assert others[-1]["rigid"] > 0.5 or f"; of {' '.join(last)})" in printed
     assert ("which the view does not tell" in printed) == (view == "flat")
+
+
+def test_the_joints_that_a_displacement_moves_most_are_named():
+    shares = np.array([[0.1, 0.2, 0.3, 0.4], [0.7, 0.1, 0.2, 0.0], [0.25, 0.25, 0.25, 0.25]])
+    left = Uncertain(0.0, *np.zeros((3, 3)), shares)
+    found = lift._segments(left, ("head", "hip", "knee", "toe"))["least_certain"]
+    assert [each["joints"] for each in found][:2] == [["toe", "knee", "hip"], ["head", "knee", "hip"]]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_stature_is_told_where_it_was_estimated(folder, capsys, method):
+    """Segments alone keep the stature that was believed: no estimate."""
+    command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--method", method]
+    assert main([*command, "--json"]) == 0
+    stature = json.loads(capsys.readouterr().out)["stature_m"]
+    assert stature > 1 if method == "smooth" else stature is None
+    assert main(command) == 0
+    assert (", stature" in capsys.readouterr().out) == (method == "smooth")
 
 
 def test_the_likelihood_alone_is_less_sure_and_has_the_same_columns(folder, capsys):

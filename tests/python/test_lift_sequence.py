@@ -23,7 +23,7 @@ from gait.lift.tracks_file import Tracks
 from gait.lift.uncertain import Uncertain
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
-LEFT = Uncertain(0.0, *np.zeros((3, 3)))
+LEFT = Uncertain(0.0, *np.zeros((4, 3)))
 
 
 @pytest.fixture

@@ -59,7 +59,7 @@ def test_dots_are_where_a_right_estimate_is(far):
     uv = 150 * places @ view.axes[:2].T + (40, 30) if far else camera.project(places)
     uv[1, 2] = np.nan
     tracks = Tracks(np.arange(2), np.arange(2) / 20, ("a", "b", "c"), uv, np.ones((2, 3)))
-    left = Uncertain(0.0, *np.zeros((3, 3)))
+    left = Uncertain(0.0, *np.zeros((4, 3)))
     found = result.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0, left)
     for frame, seen in ((0, 3), (1, 2)):
         drawn, points = figures_clip._in_picture(view, found, frame, tracks)

@@ -43,6 +43,8 @@ _ONLY_TRACKS = (
 )
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
 PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
+MOVED = 3  # joints named that a displacement moves most
+WHOLE = 0.5  # of its energy: what moves all joints alike is of the body
 UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view without perspective
 
 
@@ -213,11 +215,11 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: result.Motion) -> 
         "seen_share": float(tracks.seen.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
         "sd_mm": 1000 * float(np.median(found.sd)),
-        "stature_m": found.stature,
+        "stature_m": found.stature if found.steps else None,  # segments alone keep what was believed
         "iterations": found.steps,
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
-        "segments": _segments(found.uncertain),
+        "segments": _segments(found.uncertain, found.names),
         "misfit": found.misfit if np.isfinite(found.misfit) else None,
         "prior_widened": found.wider,
         "segments_alone": found.alone,
@@ -226,13 +228,17 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: result.Motion) -> 
     }
 
 
-def _segments(left: Uncertain) -> dict[str, Any]:
-    """Medians over segments, each alone: volume, and the displacements that are least certain."""
-    each = zip((1000 * left.sd).tolist(), left.along.tolist(), left.rigid.tolist(), strict=True)
-    return {
-        "log10_volume_ratio": left.log10_volume,
-        "least_certain": [{"sd_mm": sd, "in_depth": along, "rigid": rigid} for sd, along, rigid in each],
+def _segments(left: Uncertain, names: tuple[str, ...]) -> dict[str, Any]:
+    """Medians over segments, each alone: volume, the displacements least certain and what they move most."""
+    most = np.argsort(-left.shares, axis=1, kind="stable")[:, :MOVED]
+    figures = {
+        "sd_mm": (1000 * left.sd).tolist(),
+        "in_depth": left.along.tolist(),
+        "rigid": left.rigid.tolist(),
+        "joints": [[names[j] for j in row] for row in most],
     }
+    each = [dict(zip(figures, values, strict=True)) for values in zip(*figures.values(), strict=True)]
+    return {"log10_volume_ratio": left.log10_volume, "least_certain": each}
 
 
 def _text(s: dict[str, Any]) -> str:
@@ -240,8 +246,8 @@ def _text(s: dict[str, Any]) -> str:
     lines = [
         f"{s['frames']} frames, {len(markers['seen'])} points seen in {s['seen_share']:.0%} of them, "
         f"{len(markers['estimated'])} estimated",
-        f"{s['reprojection_px']:.2f} px from what was seen, median sd {s['sd_mm']:.0f} mm, "
-        f"stature {s['stature_m']:.2f} m",
+        f"{s['reprojection_px']:.2f} px from what was seen, median sd {s['sd_mm']:.0f} mm"
+        + (f", stature {s['stature_m']:.2f} m" if s["stature_m"] else ""),
     ]
     if s["iterations"]:
         lines.append(
@@ -256,8 +262,10 @@ def _left(segments: dict[str, Any]) -> str:
     sd = ", ".join(f"{mode['sd_mm']:.0f}" for mode in modes)
     depth = ", ".join(f"{100 * mode['in_depth']:.0f}" for mode in modes)
     volume = segments["log10_volume_ratio"]
+    moved = ["the whole body" if mode["rigid"] > WHOLE else " ".join(mode["joints"]) for mode in modes]
     words = (
-        f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth)"
+        f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth; "
+        f"of {'; of '.join(moved)})"
     )
     untold = modes[0]["sd_mm"] > UNTOLD_MM
     return words + "; the first is how far away the person is, which the view does not tell" * bool(untold)

@@ -55,6 +55,7 @@ class Motion:
     error : (T, P)
         Distance in the picture from what was seen, pixels; NaN where nothing was.
     stature : float
+        Metres; of segments alone what was believed.
     steps : int
         Iterations over the whole sequence; 0 for segments alone.
     settled : bool

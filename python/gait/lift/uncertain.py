@@ -31,26 +31,32 @@ class Uncertain:
         Deviations of the least certain displacements, rms per marker, metres, largest first.
     along, rigid : (COUNT,)
         Shares of their energy along the line of sight, and that move the whole body as one.
+    shares : (COUNT, J)
+        Shares of their energy by marker.
     """
 
     log10_volume: float
     sd: Floats
     along: Floats
     rigid: Floats
+    shares: Floats
 
 
 def of(segments: Sequence[Posterior], view: View) -> Uncertain:
     """Sum up the segments of a sequence, each alone."""
-    sd, along, rigid = np.median([_least_certain(found, view) for found in segments], axis=0)
-    return Uncertain(float(np.median([found.log10_volume for found in segments])), sd, along, rigid)
+    each = np.median([_least_certain(found, view) for found in segments], axis=0)
+    volume = float(np.median([found.log10_volume for found in segments]))
+    return Uncertain(volume, each[:, 0], each[:, 1], each[:, 2], each[:, 3:])
 
 
 def _least_certain(found: Posterior, view: View) -> Floats:
-    """Deviations, shares along the line of sight and rigid shares of a segment, (3, COUNT)."""
+    """Deviation, share along the line of sight, rigid share and shares by marker, (COUNT, 3 + J)."""
     sd, modes = uncertain_modes(found, COUNT)
-    sight = view.sight(found.points)
-    shares = [[share_along(mode, sight) for mode in modes], [share_rigid(mode) for mode in modes]]
-    return np.array([sd / np.sqrt(modes[0, ..., 0].size), *shares])
+    sight, size = view.sight(found.points), np.sqrt(modes[0, ..., 0].size)
+    rows = zip(sd.tolist(), modes, strict=True)
+    return np.array(
+        [[s / size, share_along(m, sight), share_rigid(m), *np.sum(m**2, axis=(0, 2))] for s, m in rows]
+    )
 
 
 def uncertain_modes(found: Posterior, count: int) -> tuple[Floats, Floats]:
