@@ -316,6 +316,13 @@ def test_wrong_shapes_and_settings_are_refused() -> None:
         lifter.uncertain(0)
     with pytest.raises(TypeError, match=r"Lifter\(view=camera\)"):
         Lifter(CAMERA)
+    with pytest.raises(TypeError, match=r"takes no 'height'; .* config=LiftConfig.default\(stature=1.8"):
+        Lifter(contents, CAMERA, height=1.8)
+    with pytest.raises(TypeError, match="no setting 'height'; it has stature, "):
+        LiftConfig.default(height=1.8)
+    for view in ("x", [1, 2], [[1, 2], [3]], object()):
+        with pytest.raises(TypeError, match=r"view is .*; give a Camera \(Camera.read\(FILE\)\), or the dir"):
+            Lifter(contents, view)
     with pytest.raises(GaitError, match="stature"):
         Lifter(contents, CAMERA, LiftConfig.default(stature=-1.0))
     for wrong in (-0.5, 1.5, np.nan):

@@ -62,6 +62,9 @@ class LiftConfig:
         library().gait_lift_default(ctypes.byref(c))
         values = {item.name: getattr(c, item.name) for item in fields(LiftConfig)}
         values |= {"place": tuple(c.place), "place_sd": tuple(c.place_sd)}
+        unknown = [name for name in changes if name not in values]
+        if unknown:
+            raise TypeError(f"LiftConfig has no setting {unknown[0]!r}; it has {', '.join(values)}")
         return LiftConfig(**(values | changes))
 
     def to_c(self, view: Camera | ArrayLike) -> _abi.LiftConfigC:
@@ -78,9 +81,20 @@ class LiftConfig:
             c.projection, c.camera = Projection.PERSPECTIVE, camera_c(view)
         else:
             c.projection = Projection.ORTHOGRAPHIC
-            for row, axis in zip(c.axis, np.asarray(view, float).reshape(2, 3), strict=True):
+            for row, axis in zip(c.axis, _axes(view), strict=True):
                 row[:] = axis
         return c
+
+
+def _axes(view: ArrayLike) -> Array:
+    """Directions (2, 3) of u and v."""
+    try:
+        return np.asarray(view, np.float64).reshape(2, 3)
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"view is {view!r:.60}; give a Camera (Camera.read(FILE)), or the directions of u and v: two "
+            "rows of three numbers"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -176,7 +190,9 @@ class Lifter:
         Calibrated camera, tracks in pixels; or the directions of u and v in the world of an orthographic
         view, tracks in metres.  It must be given: ``Lifter(view=camera)``.
     config : LiftConfig, optional
-        The library's defaults if left out.
+        The library's defaults if left out; stature and lag are in it.
+    **settings
+        None: they belong into the config.
 
     Attributes
     ----------
@@ -189,7 +205,7 @@ class Lifter:
     Raises
     ------
     TypeError
-        If there is no view.
+        If there is no view or it is none, or settings are not in the config.
     UserError
         If the file cannot be read.
     GaitError
@@ -207,7 +223,14 @@ class Lifter:
         source: str | os.PathLike[str] | bytes | None = None,
         view: Camera | ArrayLike | None = None,
         config: LiftConfig | None = None,
+        **settings: object,
     ) -> None:
+        if settings:
+            name = next(iter(settings))
+            raise TypeError(
+                f"Lifter takes no {name!r}; settings, such as a person's stature, are in "
+                "config=LiftConfig.default(stature=1.8, stature_sd=0.04, lag=5)"
+            )
         if isinstance(source, Camera) or view is None:
             raise TypeError("a view is missing; write Lifter(view=camera), or Lifter(model, camera)")
         contents = source if isinstance(source, bytes) else read_blob(source)
