@@ -319,23 +319,6 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
     assert code == 1 or "do not rely on" in said
 
 
-def test_exchanged_sides_are_put_back_and_told(folder, capsys):
-    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
-    pairs = [[tracks.names.index(f"{side}_{joint}") for side in "lr"] for joint in ("shoulder", "elbow")]
-    uv = tracks.uv.copy()
-    for pair in pairs:
-        uv[np.ix_([5, 6, 7, 8], pair)] = tracks.uv[np.ix_([5, 6, 7, 8], pair[::-1])]
-    write("swapped.csv", replace(tracks, uv=uv))
-    command = ["lift", "swapped.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv", "--json"]
-    assert main(command) == 0
-    said = capsys.readouterr()
-    assert "put back: shoulder, elbow in frames 5 to 8 (--keep-sides)" in said.err
-    assert json.loads(said.out)["exchanged"] == np.isfinite(uv[5:9][:, np.ravel(pairs)]).all(axis=2).sum()
-    assert main([*command, "--keep-sides"]) == 0
-    said = capsys.readouterr()
-    assert "put back" not in said.err and json.loads(said.out)["exchanged"] == 0
-
-
 def test_few_joints_are_told(folder, capsys, monkeypatch):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv"]
     for tells, view in ((True, "camera"), (False, "camera"), (False, "none")):

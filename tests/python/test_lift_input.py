@@ -170,3 +170,16 @@ def test_a_picture_upside_down_names_v(folder, capsys):
     save("u.csv", uv)
     code, said = lift(capsys, "u.csv")
     assert code == 1 or "that v points down" in said
+
+
+def test_exchanged_sides_are_put_back_and_told(folder, capsys):
+    names, uv = toy_prior(FRAMES, MARKERS, 4, seed=5).names, pixels()
+    for joint in ("shoulder", "elbow"):
+        pair = [names.index(f"{side}_{joint}") for side in "lr"]
+        uv[np.ix_([5, 6, 7, 8], pair)] = uv[np.ix_([5, 6, 7, 8], pair[::-1])]
+    save("swapped.csv", uv)
+    code, said = lift(capsys, "swapped.csv")
+    assert code == 0 and "put back: shoulder, elbow in frames 5 to 8 (--keep-sides)" in said
+    for tracks, options in (("swapped.csv", ["--keep-sides"]), ("t.csv", [])):
+        code, said = lift(capsys, tracks, "cam.json", *options)
+        assert code == 0 and "put back" not in said
