@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 LIMIT = 8.0  # deviations from the line between neighbours beyond which a point is no noise
 SPREAD = 1.4826  # median absolute deviation to standard deviation, normal noise
-QUICK = 0.05  # seconds from frame to frame: with longer steps motion looks like noise
+QUICK = 0.051  # seconds from frame to frame (20 a second): with longer steps motion looks like noise
 PAIR = np.sqrt(1.5)  # sd of a point against the middle of its neighbours, over that of one point
 
 
