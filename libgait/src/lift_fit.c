@@ -114,7 +114,7 @@ static bool refine(const lift_table *t, const lift_window *w, lift_belief *b, do
                    int32_t passes, lift_outcome *out)
 {
     bool const linear = !t->eye.perspective && t->turn < 0;
-    double lowest = DBL_MAX, heading = b->heading;
+    double lowest = DBL_MAX, noise = 0.0, heading = b->heading;
     out->converged = false;
     for (out->iterations = 0; !out->converged && out->iterations < passes; out->iterations++) {
         bool const rough = first && out->iterations == 0;
@@ -127,6 +127,7 @@ static bool refine(const lift_table *t, const lift_window *w, lift_belief *b, do
             continue;
         }
         lowest = now;
+        noise = b->log_noise;
         heading = b->heading;
         memcpy(before, b->theta, (size_t)t->n * sizeof *before);
         if (!lift_solve(t, b))
@@ -134,8 +135,11 @@ static bool refine(const lift_table *t, const lift_window *w, lift_belief *b, do
         out->converged = linear || (!rough && change(t, b, before) < t->cfg.tolerance);
         follow_heading(t, b);
     }
-    if (!out->converged)
+    if (!out->converged) { /* squares are those at theta, not what the linear problem promised */
         retreat(t, b, before, heading, 1.0);
+        b->log_noise = noise;
+        b->U[t->n * (t->ld + 1)] = lowest - noise;
+    }
     out->evidence = out->converged ? lift_evidence(t, b) : evidence_at(t, b, lowest);
     return true;
 }
