@@ -72,9 +72,6 @@ def with_sides(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[
     found, exchanged = sides.put_back(tracks, sd)
     if exchanged and not quiet:
         print(_exchanged(exchanged) + hint, file=sys.stderr)
-        unclear = [each.joint for each in exchanged if each.share > sides.UNCLEAR]
-        if unclear:
-            print(f"left and right of {', '.join(unclear)} may be wrong in all other frames", file=sys.stderr)
     moved = (found.uv != tracks.uv).any(axis=2) & tracks.seen
     return found, int(moved.sum())
 

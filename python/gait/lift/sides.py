@@ -30,7 +30,7 @@ STEADY = 0.02  # variance of the acceleration's share in a second difference, of
 UNKNOWN = 1e6  # variance over that of a sight where nothing is known
 SIGNS = np.array([1.0, -1.0])  # of a difference as it is seen: left and right as they are, exchanged
 OTHER = 1.0 - np.eye(2)
-UNCLEAR = 1 / 3  # share of the frames from which it is open which of the two is right
+MOST = 1 / 3  # of a pair's frames: of more it is open which are right, and wild points may have deceived
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Exchanged:
 
 
 def put_back(tracks: Tracks, sd: float) -> tuple[Tracks, list[Exchanged]]:
-    """Put left and right points back where they were exchanged; most frames are taken to be right.
+    """Put left and right points back where they were exchanged in few frames; most are taken to be right.
 
     Only where frames follow one another soon: with longer steps a stride looks like an exchange.
 
@@ -68,6 +68,7 @@ def put_back(tracks: Tracks, sd: float) -> tuple[Tracks, list[Exchanged]]:
     pairs = np.array([[tracks.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints])
     seen = np.asarray(tracks.seen[:, pairs].all(axis=2))
     wrong = _exchanged(_Pairs.of(tracks, pairs, seen, sd)) & seen
+    wrong &= wrong.sum(axis=0) <= MOST * seen.sum(axis=0)
     uv, confidence = tracks.uv.copy(), tracks.confidence.copy()
     for pair, rows in zip(pairs, wrong.T, strict=True):
         for values in (uv, confidence):
