@@ -7,11 +7,14 @@ static const double SPREAD = 1.4826; /* median of distances to standard deviatio
 static const double PAIR = 1.5;      /* variance of a point off the middle of its neighbours, over its own */
 enum { FEWEST = 5 };                 /* sights of a point that tell */
 
-/* Squared distance of a point in frame f from the line through its places in frames a and b; of one beyond both a
- * quarter, as its noise and its acceleration count twice. */
-static double off_line(const lift_table *t, const lift_window *w, int32_t j, int32_t a, int32_t f, int32_t b)
+/* Squared distance of a point in frame f from the line through its places in frames a and b, as it would be half way
+ * between two neighbours `step` away: further off, or beyond both, noise and acceleration count for more. */
+static double off_line(const lift_table *t, const lift_window *w, int32_t j, int32_t a, int32_t f, int32_t b,
+                       double step)
 {
-    double const part = (w->at[f] - w->at[a]) / (w->at[b] - w->at[a]);
+    double const ahead = w->at[f] - w->at[a], span = w->at[b] - w->at[a], part = ahead / span;
+    double const lever = part * (1.0 - part) * (span * span) / (step * step), motion = lever * lever,
+                 noise = (1.0 + part * part + (1.0 - part) * (1.0 - part)) / PAIR;
     double sum = 0.0;
     for (int32_t i = 0; i < 2; i++) {
         double const at_a = w->uv[2 * (a * t->prior.markers + j) + i],
@@ -19,7 +22,7 @@ static double off_line(const lift_table *t, const lift_window *w, int32_t j, int
                      off = w->uv[2 * (f * t->prior.markers + j) + i] - (at_a + part * (at_b - at_a));
         sum += off * off;
     }
-    return f > a && f < b ? sum : 0.25 * sum;
+    return sum / (motion > noise ? motion : noise);
 }
 
 static bool there(const lift_table *t, const lift_window *w, const double *sd, int32_t f, int32_t j)
@@ -29,27 +32,36 @@ static bool there(const lift_table *t, const lift_window *w, const double *sd, i
     return lift_seen_at(&seen, j);
 }
 
+/* The sight that jumps, by squared distances of which number k is the largest.  Two at an end are as far off whichever of
+ * them jumps; the third is off, by half as far, only if it was the second. */
+static int32_t culprit(const double *apart, int32_t count, int32_t k)
+{
+    double const off = apart[k] / 16.0;
+    if (k < 2)
+        return apart[2] > off;
+    if (k > count - 3)
+        return count - 1 - (apart[count - 3] > off);
+    return k;
+}
+
 /* The frame in which a point jumps most, -1: it does not. */
 static int32_t worst(const lift_table *t, const lift_window *w, const double *sd, int32_t j,
                      lift_jump_room *room)
 {
-    int32_t count = 0, far = -1;
-    double most = 0.0;
+    int32_t count = 0, far = 0;
     for (int32_t f = 0; f < w->frames; f++)
         if (there(t, w, sd, f, j))
             room->frame[count++] = f;
     if (count < FEWEST)
         return -1;
+    double const step = (w->at[room->frame[count - 1]] - w->at[room->frame[0]]) / (count - 1);
     for (int32_t k = 0; k < count; k++) {
         int32_t const before = k > 0 ? k - 1 : 2, after = k < count - 1 ? k + 1 : count - 3;
-        room->apart[k] = off_line(t, w, j, room->frame[before], room->frame[k], room->frame[after]);
-        if (room->apart[k] > most) {
-            most = room->apart[k];
-            far = room->frame[k];
-        }
+        room->apart[k] = off_line(t, w, j, room->frame[before], room->frame[k], room->frame[after], step);
+        far = room->apart[k] > room->apart[far] ? k : far;
     }
-    if (far < 0)
-        return -1;
+    double const most = room->apart[far];
+    far = room->frame[culprit(room->apart, count, far)];
     double const own = sd[far * t->prior.markers + j], least = PAIR * own * own,
                  usual = SPREAD * SPREAD * m_median(room->apart, count);
     return most > LIMIT * LIMIT * (usual > least ? usual : least) ? far : -1;
