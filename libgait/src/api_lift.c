@@ -112,7 +112,7 @@ gait_status gait_lift_segment(gait_lift *l, const double *uv, const double *sd, 
     if (!l->fitted)
         return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: observations out of any range");
     double const log_10 = 2.30258509299404568402;
-    *out = (gait_lift_fit){.log_evidence = found.evidence,
+    *out = (gait_lift_fit){.log_evidence = lift_evidence(t, b),
                            .log10_volume = -dense_log_det(b->U, t->n, t->ld) / log_10,
                            .misfit = lift_misfit(t, b),
                            .heading = lift_heading(t, b),

@@ -100,13 +100,6 @@ static void retreat(const lift_table *t, lift_belief *b, const double *before, d
         b->centre = b->heading;
 }
 
-/* log p(observations) by what they say at `objective`'s theta, where b->U is linear: Laplace's method. */
-static double evidence_at(const lift_table *t, const lift_belief *b, double lowest)
-{
-    double const log_two_pi = 1.83787706640934548356;
-    return -0.5 * (log_two_pi * b->observed + lowest) - dense_log_det(b->U, t->n, t->ld);
-}
-
 /* Gauss-Newton passes (perspective, unknown heading); one where all is linear. `first`: theta means nothing
  * yet.  Passes that end before they converge leave theta where its objective was lowest: what comes after has not been
  * looked at. */
@@ -140,7 +133,6 @@ static bool refine(const lift_table *t, const lift_window *w, lift_belief *b, do
         b->log_noise = noise;
         b->U[t->n * (t->ld + 1)] = lowest - noise;
     }
-    out->evidence = out->converged ? lift_evidence(t, b) : evidence_at(t, b, lowest);
     return true;
 }
 
@@ -161,7 +153,7 @@ static bool follow(const lift_table *t, lift_search *s, const lift_window *w, li
         memcpy(b->theta, trial->theta, (size_t)t->n * sizeof *b->theta);
     if (!refine(t, w, b, s->before, first, first ? SCOUT_PASSES : t->cfg.max_iterations, out))
         return false;
-    trial->evidence = out->evidence + m_log64((double)t->prior.weight[b->component]);
+    trial->evidence = lift_evidence(t, b) + m_log64((double)t->prior.weight[b->component]);
     trial->heading = b->heading;
     memcpy(trial->theta, b->theta, (size_t)t->n * sizeof *b->theta);
     return true;

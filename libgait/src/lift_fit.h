@@ -26,8 +26,7 @@ typedef struct lift_window { /* observations of a segment */
 } lift_window;
 
 typedef struct lift_outcome {
-    double share;    /* of the component among all, by evidence */
-    double evidence; /* log p(observations), nats */
+    double share; /* of the component among all, by evidence */
     int32_t iterations;
     bool converged;
 } lift_outcome;
