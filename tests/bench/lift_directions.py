@@ -7,22 +7,18 @@ make eval-lift, or lift_directions.py
 from __future__ import annotations
 
 import sys
-import tempfile
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import table
-from lift_mocap import MOCAP, MODES, SEQUENCES, HeldOut, held_out
+from lift_mocap import MOCAP, HeldOut, one_of_each
 
 from gait.core.lifter import LiftConfig, Lifter
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.uncertain import share_along, share_rigid
-from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
 
-LEFT_OUT = ("walk", "punch")  # one of each prior
 VIEWS = {"side": (0, 1), "front": (1, 0)}  # across the picture, along the line of sight
 NOISE = 0.020  # metres
 FEW = 6  # modes that are reduced least
@@ -37,12 +33,8 @@ def main() -> int:
         print(f"eval-lift: {MOCAP} is not there, left out", file=sys.stderr)
         return 0
     rows = []
-    with progress("priors", len(LEFT_OUT)) as update, tempfile.TemporaryDirectory() as folder:
-        for done, title in enumerate(LEFT_OUT, 1):
-            source = SEQUENCES[title].split("/")[0]
-            known = held_out(SEQUENCES[title], Path(folder), MODES[source])
-            rows += [_row(source, known, view, free) for view in VIEWS for free in (True, False)]
-            update(done)
+    for source, known in one_of_each():
+        rows += [_row(source, known, view, free) for view in VIEWS for free in (True, False)]
     _publish(rows)
     return any("NO" in row for row in rows)
 

@@ -43,6 +43,7 @@ SEQUENCES = {
     "walk": "cmu_walk/35/35_08.amc",
 }
 MODES = {"cmu_walk": 50, "cmu_misc": 80}
+ONE_OF_EACH = ("walk", "punch")  # a prior of walks and one of other motions without them
 NOISE = (0.005, 0.020, 0.050)  # metres
 MISSING = (0.0, 0.1, 0.3, 0.5)
 SIDES = 8
@@ -118,6 +119,15 @@ def held_out(file: str, folder: Path, modes: int) -> HeldOut:
         cut = segment_corpus.segments(corpus.recordings()[0], prior.names, wanted)
     chosen = np.linspace(0, len(cut) - 1, min(MOST, len(cut))).round().astype(int)
     return HeldOut(model, prior, cut[chosen], motion.stature)
+
+
+def one_of_each() -> Iterator[tuple[str, HeldOut]]:
+    """Name and held-out sequence of one prior of walks and one of other motions, with a bar of progress."""
+    with progress("priors", len(ONE_OF_EACH)) as update, tempfile.TemporaryDirectory() as folder:
+        for done, title in enumerate(ONE_OF_EACH, 1):
+            source = SEQUENCES[title].split("/")[0]
+            yield source, held_out(SEQUENCES[title], Path(folder), MODES[source])
+            update(done)
 
 
 def _seen(known: HeldOut, sd: float, missing: float) -> Iterator[tuple[int, Floats, Floats, Floats]]:

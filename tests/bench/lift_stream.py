@@ -50,7 +50,8 @@ def main() -> int:
         "(the true one); exact: coverage if the mean stature is taken for the person's (stature_sd 0). "
         f"wrong: {WRONG:.0%} of the points, off by {OFF:g} px (a standard deviation); legs: left and right "
         f"exchanged for {EXCHANGED} frames; worst: of any frame, mm. "
-        f"Coverage of the 90 % intervals of places in the world. Wanted: at least {LEAST:g}; "
+        f"Coverage of the 90 % intervals of places in the world. Wanted: at least {LEAST:g}, of unknown "
+        "stature; "
         "whether they are too wide takes more people than six (lift_people)."
     )
     table.publish("lift_stream", "Live tracks of the development clips", head, rows, note)
@@ -115,7 +116,7 @@ def streamed(
         uv[index] = seen
         lifter.push(utime, uv)
         frame = lifter.estimate()
-        if frame is not None and frame.status == TrackStatus.TRACKING:
+        if frame is not None and frame.status != TrackStatus.INIT:
             at.append(int(np.searchsorted(utimes, frame.utime)))
             places.append(frame.markers[index])
             spread.append(frame.sd[index])

@@ -9,23 +9,19 @@ The volumes do not depend on what is seen, only on from where and how exactly.
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import table
-from lift_mocap import AXES, MOCAP, MODES, SEQUENCES, HeldOut, held_out
+from lift_mocap import AXES, MOCAP, ONE_OF_EACH, HeldOut, one_of_each
 from scipy.optimize import brentq
 
 from gait.core.lifter import Lifter
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.observe import Observations, orthographic
 from gait.lift.posterior import Gaussian, Posterior, infer, place
-from gait.progress import progress
 
-LEFT_OUT = ("walk", "punch")  # one of each prior
 NOISE = (0.005, 0.010, 0.020, 0.050, 0.100, 0.200, 0.500, 1.000)  # metres
 PAPER = -14.0  # the paper's volume; it does not say at what noise
 EXACT = 1e-9  # of the volume, by the closed form
@@ -37,11 +33,8 @@ def main() -> int:
         print(f"eval-lift: {MOCAP} is not there, left out", file=sys.stderr)
         return 0
     rows = []
-    with progress("priors", len(LEFT_OUT)) as update, tempfile.TemporaryDirectory() as folder:
-        for done, title in enumerate(LEFT_OUT, 1):
-            source = SEQUENCES[title].split("/")[0]
-            rows += _curve(source, held_out(SEQUENCES[title], Path(folder), MODES[source]))
-            update(done)
+    for source, known in one_of_each():
+        rows += _curve(source, known)
     _publish(rows)
     return any("NO" in row for row in rows)
 
@@ -82,7 +75,7 @@ def _lifted(known: HeldOut, sd: float, **changes: float) -> float:
 def _publish(rows: list[list[object]]) -> None:
     note = (
         "One parallel view from the side of all markers of a segment of half a second, heading and place "
-        f"known; priors learnt without {LEFT_OUT[0]} and without {LEFT_OUT[1]}. Volume: log10 of "
+        f"known; priors learnt without {ONE_OF_EACH[0]} and without {ONE_OF_EACH[1]}. Volume: log10 of "
         "sqrt(det Q / det Lambda), the posterior's over the prior's, of the C core without what lies outside "
         "the modes, as in the paper. Met: it is -1/2 sum log10(1 + s^2/noise^2), s the singular values of "
         f"P U Lambda^1/2, to {EXACT:g}, and grows with the noise. Slope: of the volume against log10 of the "
