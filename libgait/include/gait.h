@@ -315,8 +315,8 @@ typedef struct gait_lift_config {
     int32_t  lag;             /* streaming: frames an estimate waits for later ones [0, 64]; default 5; -1: no streaming */
     double   max_rate;        /* streaming: frames per second for which there is room [1, 1000]; default 60 */
     double   max_gap;         /* streaming: longest pause before starting anew, seconds; default 0.5 */
-    double   misfit;          /* streaming: a segment that fits worse is searched for anew (squared deviations per
-                               * number observed); default 9; 0: never */
+    double   misfit;          /* streaming: a segment that fits worse (squared deviations per number observed) is ambiguous
+                               * and, its heading unknown, searched for anew; default 9; 0: never */
     uint64_t report;          /* bit j: marker j is estimated while streaming; default all */
     double   axis[2][3];      /* orthographic: directions of u and v in the world, orthonormal; default x and z */
     gait_camera camera;
@@ -337,13 +337,13 @@ typedef struct gait_lift_fit {   /* what one segment's observations say */
 } gait_lift_fit;
 
 #define GAIT_LIFT_UNSEEN 0x1u /* nothing was observed of the segments behind this estimate: it is the prior's */
-#define GAIT_LIFT_MISFIT 0x2u /* the last segment fitted worse than config misfit and was searched for anew */
+#define GAIT_LIFT_MISFIT 0x2u /* a segment behind this fits worse than config misfit, or the last was searched for anew */
 typedef struct gait_lift_frame { /* one frame of a stream, `lag` frames ago */
     int64_t  utime;              /* its capture time */
     uint64_t frame;              /* frames pushed before it since the start */
     double   heading;            /* of the body, radians */
     double   misfit;             /* squared deviations per number observed of the segments behind it */
-    int32_t  status;             /* GAIT_STATUS_TRACKING, or INIT: before a first whole segment; fields below are 0 */
+    int32_t  status;             /* GAIT_STATUS_TRACKING; AMBIGUOUS: as GAIT_LIFT_MISFIT; INIT: none yet, all below is 0 */
     uint32_t flags;              /* GAIT_LIFT_* */
     double   marker[GAIT_MAX_MARKERS][3]; /* posterior mean, metres, world; 0 for those not in config report */
     double   sd[GAIT_MAX_MARKERS][3];     /* standard deviation; wider by the root of a misfit above 1 */
@@ -360,7 +360,7 @@ GAIT_API gait_status gait_lift_init(void *mem, size_t mem_bytes, const void *blo
 GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL out of range */
 
 /* One segment.  uv [F][J][2]; sd [F][J] or NULL (config sd): infinite, NaN or <= 0 is not seen, as is a uv
- * that is NaN, beyond 1e6 or, in perspective, exactly 0, 0, where detectors put what they do not see. */
+ * that is NaN, beyond 1e6 or, in perspective, exactly 0, 0 or -1, -1, where detectors put what they do not see. */
 GAIT_API gait_status gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
 /* Of the last gait_lift_segment() (GAIT_ERR_STATE without one): posterior mean [F][J][3] and standard deviation (may

@@ -79,13 +79,14 @@ bool lift_estimate(const lift_table *t, const lift_stream *s, gait_lift_frame *o
         q.at = t->prior.frames - 1;
         add_part(t, s, lift_stream_part(s, i), &q, &b, out);
     }
-    out->status = GAIT_STATUS_TRACKING;
     out->heading = lift_heading(t, b.main);
     out->misfit = b.main->observed ? lift_misfit(t, b.main) / b.main->observed : 0.0;
     double const wider = out->misfit > 1.0 ? out->misfit : 1.0;
     for (int32_t r = 0; r < q.count; r++)
         for (int32_t a = 0; a < 3; a++)
             out->sd[t->order[r]][a] = sqrt(wider * out->sd[t->order[r]][a]);
-    out->flags = (b.observed ? 0u : GAIT_LIFT_UNSEEN) | (s->misfit ? GAIT_LIFT_MISFIT : 0u);
+    bool const misfit = s->misfit || (t->cfg.misfit > 0.0 && out->misfit > t->cfg.misfit);
+    out->status = misfit ? GAIT_STATUS_AMBIGUOUS : GAIT_STATUS_TRACKING;
+    out->flags = (b.observed ? 0u : GAIT_LIFT_UNSEEN) | (misfit ? GAIT_LIFT_MISFIT : 0u);
     return true;
 }

@@ -103,10 +103,9 @@ void lifter_take(const gait_lift *l, size_t points, const double *uv, const doub
 {
     const lift_table *const t = &l->table;
     for (size_t i = 0; i < points; i++) {
-        double const u = fabs(uv[2 * i]), v = fabs(uv[2 * i + 1]);
-        bool const corner =
-            t->eye.perspective && u == 0.0 && v == 0.0; /* where detectors put what they do not see */
-        bool const there = u <= FURTHEST && v <= FURTHEST && !corner;
+        double const u = uv[2 * i], v = uv[2 * i + 1];
+        bool const none = t->eye.perspective && u == v && (u == 0.0 || u == -1.0); /* so say detectors */
+        bool const there = fabs(u) <= FURTHEST && fabs(v) <= FURTHEST && !none;
         to_sd[i] = there ? (sd ? sd[i] : t->cfg.sd) : -1.0;
         to_uv[2 * i] = to_uv[2 * i + 1] = 0.0;
         if (to_sd[i] > 0.0 && to_sd[i] <= DBL_MAX)

@@ -201,7 +201,7 @@ static void test_wrong_points(double off)
     CHECK(most < 0.1 && worst < 6.0);
 }
 
-/* Points at 0, 0 are not seen. */
+/* Points at 0, 0 or -1, -1 are not seen. */
 static void test_zeros(void)
 {
     static gait_lift_frame other;
@@ -211,7 +211,7 @@ static void test_zeros(void)
         for (int i = 0; i < STREAM; i++) {
             see(&c, i, 1.0);
             int const j = i % TOY_MARKERS;
-            uv[2 * j] = uv[2 * j + 1] = zeros ? 0.0 : NAN;
+            uv[2 * j] = uv[2 * j + 1] = !zeros ? NAN : i % 2 ? 0.0 : -1.0;
             CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
         }
         CHECK(gait_lift_estimate(l, zeros ? &out : &other) == GAIT_OK);
@@ -258,6 +258,7 @@ static void test_misfit(void)
         CHECK(gait_lift_push(l, utime_of(i), uv, NULL, NULL) == GAIT_OK);
         CHECK(i < 20 || gait_lift_estimate(l, &out) == GAIT_OK);
         flagged += (out.flags & GAIT_LIFT_MISFIT) != 0;
+        CHECK(i < 20 || (out.status == GAIT_STATUS_AMBIGUOUS) == ((out.flags & GAIT_LIFT_MISFIT) != 0));
     }
     CHECK(flagged > 0 && out.status == GAIT_STATUS_TRACKING);
     for (int j = 0; j < TOY_MARKERS; j++)

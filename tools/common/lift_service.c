@@ -104,13 +104,6 @@ static const lift_past *past_of(const lift_service *s, int64_t utime)
     return &s->past[s->frames % LIFT_SERVICE_PAST];
 }
 
-/* What did not fit where it was expected was searched for anew: nobody knows yet whether it has been found. */
-static int8_t status_of(const gait_lift_frame *e)
-{
-    bool const doubtful = e->status == GAIT_STATUS_TRACKING && e->flags & GAIT_LIFT_MISFIT;
-    return (int8_t)(doubtful ? GAIT_STATUS_AMBIGUOUS : e->status);
-}
-
 static bool finite_joints(const gaitmsg_estimate_t *m)
 {
     bool finite = isfinite(m->mean.heading);
@@ -132,7 +125,7 @@ static bool send(lift_service *s, int64_t step_us, message *why)
                             .step = (int64_t)e->frame,
                             .receive_utime = past->receive_utime,
                             .step_us = (int32_t)step_us,
-                            .status = status_of(e),
+                            .status = (int8_t)e->status,
                             .model_digest = (int64_t)s->info.digest,
                             .njoints = known ? s->info.markers : 0,
                             .joints = s->joint};

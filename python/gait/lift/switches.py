@@ -17,6 +17,8 @@ SOON = 2.0  # times the usual step of time: later, somebody may be anywhere
 
 def switches(tracks: Tracks) -> list[tuple[int, int | None]]:
     """Find stretches on somebody else: first and last frame; None where the track stays there."""
+    if len(tracks.time) < 2:
+        return []
     jumps = np.flatnonzero(_jumps(tracks)).tolist()
     begins, ends = jumps[::2], jumps[1::2]
     last = [int(tracks.frame[t]) for t in ends]
