@@ -42,19 +42,20 @@ static inline bool passer_segment(gait_lift *l, const gait_lift_config *c)
     return ok && gait_lift_least_squares(l, mean) == GAIT_OK;
 }
 
-/* A stream of `frames`, each asked for at once; false if a call failed or nobody was followed, lost and found. */
+/* A stream of `frames`, each asked for at once; false if a call failed or nobody was followed, in frames that fit and in
+ * frames that do not, as after a jump. */
 static inline bool passer_stream(gait_lift *l, const gait_lift_config *c, int frames)
 {
-    int followed = 0, misfits = 0;
+    int followed = 0, fits = 0;
     bool ok = true;
     for (int i = 0; i < frames; i++) {
         gait_lift_frame f;
         ok &= passer_push(l, c, i) == GAIT_OK;
-        if (gait_lift_estimate(l, &f) == GAIT_OK) {
-            followed += f.status == GAIT_STATUS_TRACKING;
-            misfits += f.flags != 0;
+        if (gait_lift_estimate(l, &f) == GAIT_OK && f.status != GAIT_STATUS_INIT) {
+            followed++;
+            fits += f.status == GAIT_STATUS_TRACKING;
         }
     }
-    return ok && followed > frames / 3 && misfits > 0;
+    return ok && followed > frames / 3 && fits > 0 && fits < followed;
 }
 #endif
