@@ -7,25 +7,58 @@ make eval-lift, or lift_sides.py
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import eval_clips
 import lift_people
 import lift_tracks
 import numpy as np
+import numpy.typing as npt
 import table
 
 from gait.body.skeleton import EVAL15
 from gait.learn.stage import one_thread
-from gait.lift import sides
+from gait.lift import motion, outliers, sides
+from gait.lift.equations import Perspective
+from gait.lift.result import Options
 from gait.lift.tracks_file import Tracks
 from gait.motion.trackfile import Joints
 from gait.progress import progress
 
 LEGS = ("hip", "knee", "ankle")
-PARTS = {"legs": LEGS, "legs and arms": (*LEGS, "shoulder", "elbow", "wrist")}
-LENGTHS = (5, 10, 20)  # frames; most frames of a walk are right
+PARTS = {
+    "legs": LEGS,
+    "legs and arms": (*LEGS, "shoulder", "elbow", "wrist"),
+    "nothing": (),
+}
+WILD_PIXELS = 150.0  # deviation of wild points
 SEED = 11
+EACH, APART = 4, 3  # cases of a walk, and how far apart they are in the list
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is exchanged for how many frames, at frames a second, among what share of wild points."""
+
+    part: str
+    length: int
+    rate: float = lift_people.RATE
+    wild: float = 0.0
+
+
+CASES = (
+    Case("legs", 5),
+    Case("legs", 10),
+    Case("legs", 20),
+    Case("legs and arms", 5),
+    Case("legs and arms", 10),
+    Case("legs and arms", 20),
+    Case("legs", 10, wild=0.05),
+    Case("legs", 5, rate=15.0),
+    Case("legs", 5, rate=10.0),
+    Case("nothing", 20, wild=0.05),
+    Case("nothing", 20, wild=0.1),
+)
 
 
 def main() -> int:
@@ -35,42 +68,56 @@ def main() -> int:
         return 0
     rng = np.random.default_rng(SEED)
     walks = lift_people.walks(rng)[:: lift_people.TIMES]
-    cases = [(part, length) for part in PARTS for length in LENGTHS]
-    found: dict[tuple[str, int], list[list[float]]] = {case: [] for case in cases}
+    found: dict[Case, list[list[float]]] = {case: [] for case in CASES}
     with one_thread(), progress("walks", len(walks)) as update:
         for done, walk in enumerate(walks, 1):
-            for part, length in (cases[done % len(cases)], cases[(done + 3) % len(cases)]):
-                found[part, length].append(_case(walk, PARTS[part], length, rng))
+            for k in range(done, done + EACH * APART, APART):
+                case = CASES[k % len(CASES)]
+                found[case].append(_case(walk, case, rng))
             update(done)
     _publish(found)
     return 0
 
 
-def _case(
-    walk: lift_people.Walk, joints: tuple[str, ...], length: int, rng: np.random.Generator
-) -> list[float]:
+def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[float]:
     """Root errors of a walk as seen, exchanged and put back; points exchanged, left so and moved in vain."""
-    frames = np.arange(len(walk.places))
+    places = walk.places[:: round(lift_people.RATE / case.rate)]
+    frames = np.arange(len(places))
     true = Joints(
-        frames, frames / lift_people.RATE, dict(zip(EVAL15, walk.places.transpose(1, 0, 2), strict=True))
+        frames,
+        frames / case.rate,
+        dict(zip(EVAL15, places.transpose(1, 0, 2), strict=True)),
     )
     tracks = lift_tracks.tracked(true, walk.camera, lift_tracks.NOISE, lift_tracks.GAPS)
-    begin = int(rng.integers(1, len(frames) - length))
-    spoilt = exchanged(tracks, joints, begin, begin + length)
-    back, _ = sides.put_back(spoilt, lift_tracks.NOISE)
-    none, _ = sides.put_back(tracks, lift_tracks.NOISE)
+    tracks = _wild(tracks, case.wild, rng)
+    begin = int(rng.integers(1, len(frames) - case.length))
+    spoilt = exchanged(tracks, PARTS[case.part], begin, begin + case.length)
+    back = put_back(walk, spoilt)
     errors = []
     for seen in (tracks, spoilt, back):
-        motion = lift_tracks.lifted(walk.prior, seen, walk.camera, lift_tracks.NOISE)
-        order = [motion.names.index(name) for name in EVAL15]
+        steady, _ = outliers.without_jumps(seen, lift_tracks.NOISE)
+        lifted = lift_tracks.lifted(walk.prior, steady, walk.camera, lift_tracks.NOISE)
+        order = [lifted.names.index(name) for name in EVAL15]
         errors.append(
             lift_tracks.root_error(
-                motion.places[:, order][begin : begin + length],
-                walk.places[begin : begin + length],
+                lifted.places[:, order][begin : begin + case.length],
+                places[begin : begin + case.length],
                 lift_tracks.HIPS,
             )
         )
-    return [*errors, _differ(spoilt, tracks), _differ(back, tracks), _differ(none, tracks)]
+    right = spoilt.seen & (spoilt.uv == tracks.uv).all(axis=2)
+    moved = (_differ(back, tracks, among) for among in (~right, right))
+    return [*errors, (spoilt.seen & ~right).sum(), *moved]
+
+
+def put_back(walk: lift_people.Walk, tracks: Tracks) -> Tracks:
+    """Tracks with sides put back as by gait lift."""
+    view, options = Perspective(walk.camera), Options(pixel_sd=lift_tracks.NOISE)
+    return sides.put_back(
+        tracks,
+        options.pixel_sd,
+        lambda part: motion.evidence(walk.prior, part, view, options),
+    )[0]
 
 
 def exchanged(tracks: Tracks, joints: tuple[str, ...], begin: int, end: int) -> Tracks:
@@ -81,28 +128,50 @@ def exchanged(tracks: Tracks, joints: tuple[str, ...], begin: int, end: int) -> 
     return replace(tracks, uv=uv)
 
 
-def _differ(one: Tracks, other: Tracks) -> float:
-    """Points that are not where the other tracks have them."""
-    return float((one.seen & (one.uv != other.uv).any(axis=2)).sum())
+def _wild(tracks: Tracks, share: float, rng: np.random.Generator) -> Tracks:
+    """Tracks with a share of the points anywhere."""
+    wild = rng.random(tracks.uv.shape[:2]) < share
+    return replace(
+        tracks,
+        uv=tracks.uv + WILD_PIXELS * wild[..., None] * rng.normal(size=tracks.uv.shape),
+    )
 
 
-def _publish(found: dict[tuple[str, int], list[list[float]]]) -> None:
+def _differ(one: Tracks, other: Tracks, among: npt.NDArray[np.bool_]) -> int:
+    """Points among some that are not where the other tracks have them."""
+    return int((among & one.seen & (one.uv != other.uv).any(axis=2)).sum())
+
+
+def _publish(found: dict[Case, list[list[float]]]) -> None:
     rows = []
-    for (part, length), walks in found.items():
+    for case, walks in found.items():
         values = np.array(walks)
-        errors, points = values[:, :3], values[:, 3:]
+        medians, points = (
+            np.median(values[:, :3], axis=0),
+            values[:, 3:].sum(axis=0).astype(int),
+        )
         rows.append(
-            [part, length, len(walks), *np.median(errors, axis=0), *points.sum(axis=0).astype(int).tolist()]
+            [
+                case.part,
+                case.length,
+                case.rate,
+                f"{case.wild:.0%}",
+                len(walks),
+                *medians,
+                *points.tolist(),
+            ]
         )
     note = (
-        "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing; in one stretch of "
-        "frames left and right are exchanged. Root-aligned error in that stretch, median mm: as seen, "
-        "exchanged (--keep-sides), put back (gait lift by itself). Points exchanged; of these and others, "
-        "those still wrong after putting back, and those moved where nothing was exchanged."
+        "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing, some of the rest "
+        f"wild ({WILD_PIXELS:g} px); in one stretch of frames left and right are exchanged. Root-aligned "
+        "error in that stretch, median mm: as seen, exchanged (--keep-sides), put back (gait lift alone). "
+        "Points exchanged; of these those still wrong after putting back; those moved that were right."
     )
     head = [
         "exchanged",
         "frames",
+        "frames/s",
+        "wild",
         "walks",
         "right mm",
         "exchanged mm",

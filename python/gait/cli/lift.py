@@ -136,13 +136,15 @@ def run(args: argparse.Namespace) -> int:
     prior = lift_prior.load(args.model, args.quiet)
     tracks = lift_tracks.read(args.input, prior, args.pixel_sd or PIXEL_SD, args.ignore_unknown, args.quiet)
     pixel_sd, exchanged, jumps = args.pixel_sd or lift_tracks.noise(tracks, args.quiet), 0, 0
+    view = lift_tracks.view(tracks, args.camera, args.orthographic, args.metres_per_unit, args.quiet)
+    options = _options(args, pixel_sd)
     if not args.keep_sides:
-        tracks, exchanged = lift_tracks.with_sides(tracks, pixel_sd, args.quiet, " (--keep-sides)")
+        tracks, exchanged = lift_tracks.with_sides(
+            prior, tracks, view, options, args.quiet, " (--keep-sides)"
+        )
     if not args.keep_jumps:
         tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
     names = motion.output_names(prior, tracks, args.all_markers)
-    view = lift_tracks.view(tracks, args.camera, args.orthographic, args.metres_per_unit, args.quiet)
-    options = _options(args, pixel_sd)
     found = lift_tracks.lift(args.input, prior, tracks, view, options, names, args.quiet)
     _require_person(args, found)
     if not args.quiet:

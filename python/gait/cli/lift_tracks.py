@@ -67,9 +67,17 @@ def noise(tracks: Tracks, quiet: bool) -> float:
     return shake
 
 
-def with_sides(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, int]:
+def with_sides(
+    prior: SegmentPrior, tracks: Tracks, seen_in: View, options: Options, quiet: bool, hint: str = ""
+) -> tuple[Tracks, int]:
     """Put left and right back where they were exchanged, tell where (and `hint`), count the points."""
-    found, exchanged = sides.put_back(tracks, sd)
+    with one_thread(), progress("sides", len(tracks.time), quiet) as update:
+
+        def evidence(part: Tracks) -> float:
+            update(int(np.searchsorted(tracks.frame, part.frame[0])))
+            return motion.evidence(prior, part, seen_in, options)
+
+        found, exchanged = sides.put_back(tracks, options.pixel_sd, evidence)
     if exchanged and not quiet:
         print(_exchanged(exchanged) + hint, file=sys.stderr)
     moved = (found.uv != tracks.uv).any(axis=2) & tracks.seen

@@ -62,9 +62,7 @@ def lift(
     UserError
         If segments are too short, or too little is seen.
     """
-    if prior.frames < 4:
-        raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
-    prior = restricted(prior, names)
+    prior = _usable(prior, names)
     if isinstance(view, Perspective):
         require_metres(view.camera, tracks, prior, believed_stature(options, prior.stature)[0], options)
     grid = Grid.over(tracks.time, prior)
@@ -74,6 +72,24 @@ def lift(
     if best.wider > 1 or not best.settled:
         return _unlike(prior, tracks, view, options, grid, best)
     return best
+
+
+def evidence(prior: SegmentPrior, tracks: Tracks, view: View, options: Options) -> float:
+    """Log density of tracks by the prior and the smoother, but for a constant; -inf if it refuses them."""
+    names = tuple(name for name in prior.names if name in {*tracks.names, *sequence.HIPS})
+    smooth = replace(options, method="smooth")
+    try:
+        prior = _usable(prior, names)
+        return _lift(prior, tracks, view, smooth, Grid.over(tracks.time, prior), lambda done: None).evidence
+    except UserError:
+        return -np.inf
+
+
+def _usable(prior: SegmentPrior, names: tuple[str, ...]) -> SegmentPrior:
+    """Prior of some of its markers; refuse one of too short segments."""
+    if prior.frames < 4:
+        raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
+    return restricted(prior, names)
 
 
 def _widest_needed(
