@@ -75,7 +75,7 @@ def put_back(tracks: Tracks, sd: float, evidence: Evidence) -> tuple[Tracks, lis
 def _without_jumps(tracks: Tracks, pairs: Ints, sd: float) -> Tracks:
     """Tracks without the points that jump whichever side they are of: they would decide the rest's."""
     kept, _ = outliers.without_jumps(tracks, sd)
-    jumped = (tracks.seen & ~kept.seen)[:, pairs].any(axis=2)
+    jumped = np.asarray((tracks.seen & ~kept.seen)[:, pairs].any(axis=2))
     other, _ = outliers.without_jumps(_exchanged(tracks, pairs, jumped), sd)
     some = kept.seen | _exchanged(other, pairs, jumped).seen
     return replace(tracks, uv=np.where(some[..., None], tracks.uv, np.nan))
