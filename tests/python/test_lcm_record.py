@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from gait.lcm.link import open_lcm, private_url
+from gait.lcm.results import read_run
+from gait.lcm.types import gaitmsg
 from gait.motion.trackfile import read_track
 
 COUNT = 20
@@ -108,7 +110,7 @@ def test_two_trackers_on_one_url_are_told(estimates, tmp_path, case):
     done, frames = record(tmp_path, order)
     assert done.returncode == 1 and "two trackers publish on this URL" in done.stderr
     assert done.stderr.splitlines()[1:] == [done.stderr.splitlines()[-1]], done.stderr
-    assert frames == list(range(len(frames))) and f"holds the {len(frames)} frames" in done.stderr
+    assert frames == list(range(len(frames))) and f"before that showed: {len(frames)})" in done.stderr
 
 
 def test_another_stream_that_begins_is_told(estimates, tmp_path):
@@ -143,6 +145,30 @@ def test_the_log_that_is_listened_to_stays_as_it_is(estimates, tmp_path):
         done = rig.gait("record", *words)
         assert done.returncode == code and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
     assert log.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["in.log"]
+
+
+def test_a_log_that_breaks_off_is_told_and_recorded_as_far_as_it_goes(estimates, tmp_path):
+    log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
+    log.write_bytes(log.read_bytes()[:-100])
+    done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--quiet")
+    assert done.returncode == 1 and f"breaks off at byte {log_end(log, COUNT - 1)}, after" in done.stderr
+    assert done.stderr.count("\n") == 1 and len(read_track(tmp_path / "t.csv").frame) == COUNT - 1
+
+
+def log_end(log, count):
+    """Bytes of the first `count` estimates of a log."""
+    messages = rig.read_log(log, "GAIT_ESTIMATE", gaitmsg.estimate_t)[:count]
+    return sum(28 + len("GAIT_ESTIMATE") + len(m.encode()) for m in messages)
+
+
+def test_what_else_a_log_holds_is_remarked(estimates, tmp_path):
+    events = [("GAIT_ESTIMATE", e) for e in estimates]
+    assert read_run(str(rig.write_log(tmp_path / "whole.log", events))).remark is None
+    twice = read_run(str(rig.write_log(tmp_path / "twice.log", events * 2)))
+    assert len(twice.frame) == COUNT and twice.remark.startswith("another stream begins with frame 0;")
+    cut = tmp_path / "cut.log"
+    cut.write_bytes((tmp_path / "whole.log").read_bytes()[:-100])
+    assert f"after {COUNT - 1} messages" in read_run(str(cut)).remark
 
 
 @pytest.mark.parametrize("option", ["--frames", "--until-idle", "--patience"])

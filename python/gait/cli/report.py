@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -67,6 +68,8 @@ def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
     video = Video(args.video)
     camera, model = Camera.read(args.camera, video.size), Model(args.model)
     results, track = read_run(args.log), read_track(args.track)
+    if results.remark and not quiet:
+        print(f"{args.log}: {results.remark}", file=sys.stderr)
     truth = read_truth(args.truth) if args.truth else None
     measures: Measures | None = None
     errors: Comparison | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import struct
 from io import BufferedWriter, FileIO
+from pathlib import Path
 
 from gait.errors import UserError
 from gait.lcm.messages import now
@@ -20,6 +21,23 @@ def log_of(url: str) -> tuple[str, str]:
     modes = [word.removeprefix("mode=") for word in options.split("&") if word.startswith("mode=")]
     mode = modes[-1] if modes else "r"
     return path, mode if mode in ("r", "w", "a") else ""
+
+
+def break_of(path: str | os.PathLike[str]) -> str | None:
+    """Say where a log that is not whole breaks off, None of one that is."""
+    size, at, events = Path(path).stat().st_size, 0, 0
+    with open(path, "rb") as file:
+        while at < size:
+            head = file.read(_HEAD.size)
+            if len(head) < _HEAD.size:
+                break
+            sync, _, _, channel, data = _HEAD.unpack(head)
+            end = at + _HEAD.size + channel + data
+            if sync != _SYNC or end > size:
+                break
+            file.seek(end)
+            at, events = end, events + 1
+    return None if at == size else f"the log is damaged or breaks off at byte {at}, after {events} messages"
 
 
 class LogWriter:

@@ -14,7 +14,7 @@ from gait.errors import UserError
 from gait.image.video import Frame
 from gait.io.files import replacing
 from gait.lcm.link import handle, is_log, listener
-from gait.lcm.log import LogWriter
+from gait.lcm.log import LogWriter, break_of, log_of
 from gait.lcm.messages import decode, estimate_of, now
 from gait.lcm.types import gaitmsg
 from gait.motion.trackfile import TrackWriter
@@ -85,7 +85,7 @@ class Recorder:
     """
 
     def __init__(self, url: str, output: str, log: str | None = None, channel: str = ESTIMATE) -> None:
-        self._lcm, self._live = listener(url), not is_log(url)
+        self._lcm, self._live, self._url = listener(url), not is_log(url), url
         self._output, self._path, self._channel = output, log, channel
         self._waiting: list[Any] = []
         self._writer: TrackWriter | None = None
@@ -109,14 +109,15 @@ class Recorder:
         ------
         UserError
             If nothing came at all, within `patience` seconds where that is given; no file is written then.
-            If two trackers publish at once; the file then holds what came before.
+            If two trackers publish at once, or a log breaks off; the file then holds what came before.
         """
         begun = time.monotonic()
         with ExitStack() as self._stack:
             if self._path is not None:
                 temporary = self._stack.enter_context(replacing(self._path))
                 self._log = self._stack.enter_context(closing(LogWriter(temporary, name=self._path)))
-            while not self.stop and handle(self._lcm, _TURN, not self._live):
+            ended = False
+            while not self.stop and not (ended := not handle(self._lcm, _TURN, not self._live)):
                 count, clock = len(self.figures.utime), time.monotonic()
                 quiet = idle is not None and clock - self._last > idle
                 late = patience is not None and clock - begun > patience
@@ -129,9 +130,11 @@ class Recorder:
                 )
         if self._two:
             raise UserError(
-                f"{self._output}: two trackers publish on this URL; end one of them (the file holds the "
-                f"{len(self.figures.utime)} frames before that showed)"
+                f"{self._output}: two trackers publish on this URL; end one of them (frames in the file, "
+                f"all from before that showed: {len(self.figures.utime)})"
             )
+        if ended and not self._live:
+            self._require_whole()
 
     def summary(self) -> dict[str, Any]:
         """Figures of the recording."""
@@ -152,6 +155,13 @@ class Recorder:
         self._waiting.append(message)
         if self._writer is not None or len(self._waiting) == 2:
             self._flush()
+
+    def _require_whole(self) -> None:
+        """Raise UserError if the log that has ended is not whole."""
+        path = log_of(self._url)[0]
+        fault = break_of(path)
+        if fault:
+            raise UserError(f"{path}: {fault}; {self._output} holds what came before")
 
     def _goes_on(self, previous: Any, message: Any) -> bool:
         """Whether an estimate follows the one before; what else it tells is kept."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gait.core.estimate import Estimate
 from gait.errors import UserError
+from gait.lcm.log import break_of
 from gait.lcm.messages import decode, estimate_of
 from gait.lcm.types import gaitmsg
 
@@ -37,6 +38,8 @@ class Run:
         Frames captured and never tracked.
     tracker_digest : int
         After the last frame, unsigned.
+    remark : str or None
+        What the log holds beyond that, or where it breaks off.
     """
 
     frame: NDArray[np.int64]
@@ -46,6 +49,7 @@ class Run:
     latency_ms: Array
     dropped: int
     tracker_digest: int
+    remark: str | None = None
 
 
 def read_run(path: str) -> Run:
@@ -56,12 +60,14 @@ def read_run(path: str) -> Run:
     if not Path(path).is_file():
         raise UserError(f"{path}: no such LCM log; make one with gait record --log or lcm-logger")
     messages: list[Any] = []
+    remark = break_of(path)
     arrived: list[int] = []
     for event in lcm.EventLog(path, "r"):
         if event.channel != "GAIT_ESTIMATE":
             continue
         message = decode(gaitmsg.estimate_t, event.data, path)
         if messages and message.frame <= messages[-1].frame:
+            remark = f"another stream begins with frame {message.frame}; only the first is used"
             break
         messages.append(message)
         arrived.append(event.timestamp)
@@ -76,4 +82,5 @@ def read_run(path: str) -> Run:
         latency_ms=(np.array(arrived, np.int64) - utime) / 1e3,
         dropped=messages[-1].dropped,
         tracker_digest=messages[-1].tracker_digest & (1 << 64) - 1,
+        remark=remark,
     )
