@@ -26,6 +26,12 @@ static bool orthonormal(const double axis[2][3])
            within(product[2], -1e-9, 1e-9);
 }
 
+/* So near that pixels tell metres in single precision. */
+static bool near(const float t[3])
+{
+    return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) && within((double)t[2], -1e4, 1e4);
+}
+
 static gait_status check_config(const gait_lift_config *c, gait_error *err)
 {
     bool place = true;
@@ -57,6 +63,8 @@ static gait_status check_config(const gait_lift_config *c, gait_error *err)
             ? "axis is not two unit vectors at right angles"
         : c->projection == GAIT_LIFT_PERSPECTIVE && !camera_valid(&c->camera)
             ? "camera is not valid: size, focal lengths and a rotation R are needed"
+        : c->projection == GAIT_LIFT_PERSPECTIVE && !near(c->camera.t)
+            ? "camera is not within 10 km: t is in metres"
             : NULL;
     return bad ? base_fail(err, GAIT_ERR_ARG, -1, "lift config: %s", bad) : GAIT_OK;
 }

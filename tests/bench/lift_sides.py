@@ -33,7 +33,7 @@ PARTS = {
 }
 WILD_PIXELS = 150.0  # deviation of wild points
 SEED = 11
-EACH, APART = 4, 3  # cases of a walk, and how far apart they are in the list
+EACH, APART = 3, 4  # cases of a walk, and how far apart they are in the list
 
 
 @dataclass(frozen=True)

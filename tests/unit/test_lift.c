@@ -254,8 +254,8 @@ static void test_arguments(void)
           GAIT_ERR_MEMORY);
     CHECK(gait_lift_bytes(NULL, 0, &good, &bytes, &err) == GAIT_ERR_ARG && !l);
     CHECK(gait_lift_segment(NULL, uv, NULL, &fit, NULL) == GAIT_ERR_ARG);
-    gait_lift_config bad[15];
-    for (int i = 0; i < 15; i++)
+    gait_lift_config bad[16];
+    for (int i = 0; i < 16; i++)
         bad[i] = good;
     bad[0].projection = 2;
     bad[1].stature = -1;
@@ -273,7 +273,8 @@ static void test_arguments(void)
     bad[13].projection = GAIT_LIFT_ORTHOGRAPHIC;
     bad[13].axis[0][1] = 0.1;
     bad[14].cpu_mask = 8;
-    for (int i = 0; i < 15; i++) {
+    bad[15].camera.t[1] = -5e4f;
+    for (int i = 0; i < 16; i++) {
         err.text[0] = '\0';
         CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, &bad[i], &bytes, &err) == GAIT_ERR_ARG);
         CHECK(strstr(err.text, "lift config") != NULL);
