@@ -29,7 +29,8 @@ static bool orthonormal(const double axis[2][3])
 /* So near that pixels tell metres in single precision. */
 static bool near(const float t[3])
 {
-    return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) && within((double)t[2], -1e4, 1e4);
+    return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) &&
+           within((double)t[2], -1e4, 1e4);
 }
 
 static gait_status check_config(const gait_lift_config *c, gait_error *err)
