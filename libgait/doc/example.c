@@ -26,7 +26,7 @@ static int take(const char *name, uint8_t pixels[H][W], float number[19])
     if (ok && pixels)
         ok = fscanf(f, "P5 %d %d 255%*c", &w, &h) == 2 && w == W && h == H && fread(pixels, W, H, f) == H;
     ok = f && fclose(f) == 0 && ok;
-    return ok || !fail(name, !f ? "cannot be read" : pixels ? "not a binary PGM of 640 x 480" : "not 19 numbers");
+    return ok || !fail(name, !f ? "unreadable" : pixels ? "not a binary PGM of 640 x 480" : "not 19 numbers");
 }
 
 int main(int argc, char **argv)
