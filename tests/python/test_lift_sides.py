@@ -98,17 +98,11 @@ def test_wild_points_do_not_hide_an_exchange():
 
 
 def test_the_motion_decides():
-    """What goes on better exchanged stays where the motion says so; what was exchanged with it is found."""
+    """What goes on better exchanged stays where the motion does not fit better for it."""
     spoilt = exchanged(walking(), 30, 50)
     back, found = put_back(spoilt, NOISE, lambda tracks: 0.0)
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
-
-    def only_ankles(tracks):
-        rest = np.isin(np.arange(5), [0, 3, 4])[:, None]
-        return model(replace(tracks, uv=np.where(rest, tracks.uv, np.nan)))
-
-    assert [each.joint for each in put_back(spoilt, NOISE, only_ankles)[1]] == ["ankle"]
 
 
 @pytest.mark.parametrize("first", [40, 50])

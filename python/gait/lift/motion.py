@@ -34,6 +34,7 @@ Floats = npt.NDArray[np.float64]
 KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
 ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
 WIDER = (1.0, 2.0, 4.0, 8.0)  # factors of the prior's deviations, tried in turn while the tracks ask for it
+FLOATS = 4.0  # deviations of the floor's height from which somebody does not stand on it
 MISFIT = 1.3  # squared deviations per number seen from which a wider prior is tried
 
 
@@ -237,8 +238,8 @@ def _sized(
 ) -> size.Resized:
     """Give the estimate a person's size if it has none; only a lens leaves it open.
 
-    One that fits is of its prior's kind, and prior and floor know more of its size than the bones do, unless
-    joints that nobody sees were put there by the prior to suit them.
+    One that fits and stands on the floor is of its prior's kind, and prior and floor know more of its size
+    than the bones do, unless joints that nobody sees were put there by the prior to suit them.
     """
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
     if isinstance(view, Parallel) or not options.bones:
@@ -246,7 +247,8 @@ def _sized(
     stature, stature_sd = believed_stature(options, prior.stature)
     own = float(np.hypot(stature_sd / stature, size.PROPORTION_SD))
     ratio = size.bones_ratio(prior, found.places, stature)
-    limit = size.UNLIKELY if misfit > MISFIT else size.IMPOSSIBLE
+    floats = abs(_height(found.places, prior)) > FLOATS * options.floor_sd
+    limit = size.UNLIKELY if misfit > MISFIT or floats else size.IMPOSSIBLE
     sized = size.resized(fitted, view.camera, ratio, own, misfit, limit)
     if sized.factor != 1 or size.tells_distance(tracks):
         return sized
@@ -321,9 +323,13 @@ def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:
 
 def _on_floor(places: Floats, prior: SegmentPrior) -> Floats:
     """Shift a motion of unknown height so that its lowest feet are on the floor."""
+    return places - np.array([0.0, 0.0, _height(places, prior)])
+
+
+def _height(places: Floats, prior: SegmentPrior) -> float:
+    """How high over the floor the lowest feet stand, metres; 0 without feet."""
     feet = [i for i, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
     if not feet:
-        return places
+        return 0.0
     lowest = prior.stature * prior.mean[:, :, feet, 2].min()
-    drop = np.quantile(places[:, feet, 2].min(axis=1), 0.1) - lowest
-    return places - np.array([0.0, 0.0, drop])
+    return float(np.quantile(places[:, feet, 2].min(axis=1), 0.1) - lowest)

@@ -2,7 +2,7 @@
 
 How points go on from frame to frame proposes where (`gait.lift.flips`); wild points and quick steps look
 like exchanges too.  The motion decides: every stretch is lifted with its surroundings, exchanged and as it
-is, and joint by joint, and what fits clearly better is taken.
+is, and limb by limb, and what fits clearly better is taken.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ SLOWEST = 0.11  # seconds from frame to frame: with longer steps strides are ste
 MOST = 1 / 3  # of a pair's frames: of more it is open which are right
 AROUND = 1.0  # seconds before and after a stretch that tell which reading of it goes on better
 NEAR = 0.5  # seconds between stretches that are judged as one
+LIMBS = (("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist", "hand"))
 CLEAR = 9.0  # log-evidence that an exchange must gain, each pair
 
 #: Log density of tracks by the model of motion.
@@ -134,7 +135,7 @@ def _exchanged(tracks: Tracks, pairs: Ints, wrong: Flags) -> Tracks:
 
 
 def _judged(tracks: Tracks, pairs: Ints, wrong: Flags, seen: Flags, evidence: Evidence) -> Flags:
-    """Take of a proposal (T, P) what the motion confirms: all or nothing, and then each pair by itself.
+    """Take of a proposal (T, P) what the motion confirms: all or nothing, and then each limb by itself.
 
     Where something was exchanged, other pairs may have been along with it for as long.
     """
@@ -146,14 +147,29 @@ def _judged(tracks: Tracks, pairs: Ints, wrong: Flags, seen: Flags, evidence: Ev
     most = score(best)
     if (proposed := score(wrong)) > most:
         best, most = wrong.copy(), proposed
-    stretch = wrong.any(axis=1)
-    for k in range(len(pairs)):
-        own = wrong[:, k] if wrong[:, k].any() else stretch & seen[:, k] & best.any()
-        other = best.copy()
-        other[:, k] = own & ~best[:, k].any()
-        if (other != best).any() and (changed := score(other)) > most:
-            best, most = other, changed
+    for limb in _limbs(tracks, pairs):
+        for other in _others(best, wrong, seen, limb):
+            if (other != best).any() and (changed := score(other)) > most:
+                best, most = other, changed
     return best
+
+
+def _limbs(tracks: Tracks, pairs: Ints) -> list[Ints]:
+    """Pairs of legs, of arms and of the rest."""
+    joints = [tracks.names[left][2:] for left in pairs[:, 0]]
+    limb = np.array([next((k for k, limb in enumerate(LIMBS) if joint in limb), -1) for joint in joints])
+    return [np.flatnonzero(limb == k) for k in np.unique(limb)]
+
+
+def _others(best: Flags, wrong: Flags, seen: Flags, limb: Ints) -> Iterator[Flags]:
+    """Readings to compare with the best one: with none of a limb, as proposed, and with all of it."""
+    proposed = wrong[:, limb].any(axis=1)
+    whole = seen[:, limb] & (proposed if proposed.any() else wrong.any(axis=1))[:, None]
+    none = np.zeros_like(whole)
+    for flags in (none, wrong[:, limb], whole) if best.any() else (wrong[:, limb],):
+        other = best.copy()
+        other[:, limb] = flags
+        yield other
 
 
 def _spans(frames: npt.NDArray[np.int64], wrong: Flags) -> list[tuple[int, int]]:
