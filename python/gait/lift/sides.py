@@ -162,7 +162,7 @@ def _limbs(tracks: Tracks, pairs: Ints) -> list[Ints]:
 
 
 def _others(best: Flags, wrong: Flags, seen: Flags, limb: Ints) -> Iterator[Flags]:
-    """Readings to compare with the best one: with none of a limb, as proposed, and with all of it."""
+    """Vary the best reading: with none of a limb, with it as proposed, and with all of it."""
     proposed = wrong[:, limb].any(axis=1)
     whole = seen[:, limb] & (proposed if proposed.any() else wrong.any(axis=1))[:, None]
     none = np.zeros_like(whole)
