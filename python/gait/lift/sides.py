@@ -163,8 +163,8 @@ def _limbs(tracks: Tracks, pairs: Ints) -> list[Ints]:
 
 def _others(best: Flags, wrong: Flags, seen: Flags, limb: Ints) -> Iterator[Flags]:
     """Vary the best reading: with none of a limb, with it as proposed, and with all of it."""
-    proposed = wrong[:, limb].any(axis=1)
-    whole = seen[:, limb] & (proposed if proposed.any() else wrong.any(axis=1))[:, None]
+    proposed = np.asarray(wrong[:, limb].any(axis=1))
+    whole = seen[:, limb] & np.asarray(proposed if proposed.any() else wrong.any(axis=1))[:, None]
     none = np.zeros_like(whole)
     for flags in (none, wrong[:, limb], whole) if best.any() else (wrong[:, limb],):
         other = best.copy()
