@@ -20,6 +20,7 @@ from gait.lift.tracks_file import Tracks
 
 STATURE, SECONDS, EXACT = 1.7, 2, 0.3  # metres, s, pixels
 SHAKY, FARTHEST_OFF = 40.0, 0.03  # pixels; share of the distance
+SHRUNK = 0.92  # of the true size
 VIEWS = {"from the side": (0.5, -6.0, 1.4), "towards": (12.0, 0.3, 1.5)}
 
 
@@ -194,3 +195,24 @@ def test_without_ankles_the_distance_is_as_open_as_the_size(walk, seen, sure):
     distance = float(np.linalg.norm(places - (-camera.R.T @ camera.t), axis=2).mean())
     spread = float(np.median(np.sqrt(found.sd**2 @ camera.R[2] ** 2))) / distance
     assert (spread < size.PROPORTION_SD) == sure
+
+
+@pytest.mark.parametrize("floats", [True, False])
+def test_one_who_fits_but_floats_is_as_large_as_the_bones(walk, floats):
+    """A walker in a circle came out small and near the lens, 0.3 m over the floor."""
+    prior, places = walk
+    camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 600)
+    lens = -camera.R.T @ camera.t
+    small = lens + SHRUNK * (places - lens)
+    if not floats:
+        small = small - [0.0, 0.0, motion._height(small, prior)]
+    time = np.arange(len(small)) / prior.fps
+    seen = np.ones(small.shape[:2])
+    tracks = Tracks(np.arange(len(small)), time, prior.names, camera.project(small), seen)
+    sd = np.full_like(small, 0.01)
+    options = Options(stature=STATURE, floor_sd=0.02)
+    found = motion._sized(
+        prior, tracks, Perspective(camera), options, size.Resized(small, sd, sd), misfit=0.5
+    )
+    ratio = size.bones_ratio(prior, small, STATURE)
+    assert found.factor == (pytest.approx(1 / ratio) if floats else 1)

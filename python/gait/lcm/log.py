@@ -33,7 +33,7 @@ def break_of(path: str | os.PathLike[str]) -> str | None:
                 break
             sync, _, _, channel, data = _HEAD.unpack(head)
             end = at + _HEAD.size + channel + data
-            if sync != _SYNC or end > size:
+            if sync != _SYNC or channel <= 0 or data < 0 or end > size:
                 break
             file.seek(end)
             at, events = end, events + 1
