@@ -20,13 +20,13 @@ static int fail(const char *name, const char *why)
 static int take(const char *name, uint8_t pixels[H][W], float number[19])
 {
     FILE *f = fopen(name, "rb");
-    int w = 0, h = 0, ok = f != NULL;
+    int w = 0, h = 0, is = f != NULL, ok = is;
     for (int i = 0; i < 19 && number; i++)
         ok = ok && fscanf(f, "%f", &number[i]) == 1;
     if (ok && pixels)
         ok = fscanf(f, "P5 %d %d 255%*c", &w, &h) == 2 && w == W && h == H && fread(pixels, W, H, f) == H;
     ok = f && fclose(f) == 0 && ok;
-    return ok || !fail(name, !f ? "unreadable" : pixels ? "not a binary PGM of 640 x 480" : "not 19 numbers");
+    return ok || !fail(name, !is ? "missing" : pixels ? "not a binary PGM of 640 x 480" : "not 19 numbers");
 }
 
 int main(int argc, char **argv)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gait.lift import flips
 from gait.lift.sides import put_back
 from gait.lift.tracks_file import Tracks
 
@@ -60,7 +61,7 @@ def test_what_is_right_stays(rate, gaps):
     np.testing.assert_array_equal(kept.confidence, tracks.confidence)
 
 
-@pytest.mark.parametrize("rate", [30, 60])
+@pytest.mark.parametrize("rate", [10, 30, 60])
 @pytest.mark.parametrize(("first", "last"), [(20, 20), (31, 36), (30, 50), (0, 9), (75, 89)])
 def test_exchanged_legs_are_put_back_and_named(rate, first, last):
     tracks = walking(rate)
@@ -136,3 +137,15 @@ def test_an_outlier_is_no_exchange():
     tracks = walking()
     tracks.uv[33, 3] += [150, -60]
     assert put_back(tracks, NOISE, model)[1] == []
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"), [((45, 60), (15, 26)), ((60, 61), (22, 41)), ((50, 65), (28, 31))]
+)
+def test_a_false_proposal_beside_a_true_one_falls_alone(monkeypatch, right, wrong):
+    flags = np.zeros((FRAMES, 2), bool)
+    for first, last in (right, wrong):
+        flags[first : last + 1] = True
+    monkeypatch.setattr(flips, "suspected", lambda *_: flags)
+    _, found = put_back(exchanged(walking(), *right), NOISE, model)
+    assert [each.spans for each in found] == [[(right[0] + 7, right[1] + 7)]] * 2

@@ -140,7 +140,7 @@ def view(
                 file=sys.stderr,
             )
         return Perspective(calibrated)
-    middle = np.nanmean(tracks.uv, axis=(0, 1))
+    middle = np.nanmedian(tracks.uv, axis=(0, 1))  # wild points do not move it
     return Parallel(looking_along(axis or "y"), metres, middle, steady=bool(axis))
 
 

@@ -61,10 +61,11 @@ def put_back(tracks: Tracks, sd: float, evidence: Evidence) -> tuple[Tracks, lis
     seen = np.asarray(tracks.seen[:, pairs].all(axis=2))
     steady = _without_jumps(tracks, pairs, sd)
     wrong = _completed(tracks, pairs, steady, flips.suspected(steady, pairs, sd)) & seen
+    wrong &= wrong.sum(axis=0) <= MOST * seen.sum(axis=0)
     for first, end in list(_stretches(tracks, wrong)):
         part = _around(tracks, first, end)
-        wrong[part] = _judged(_rows(steady, part), pairs, wrong[part], seen[part], evidence)
-    wrong &= wrong.sum(axis=0) <= MOST * seen.sum(axis=0)
+        own = slice(first - part.start, end - part.start)
+        wrong[first:end] = _judged(_rows(steady, part), pairs, wrong[part], seen[part], own, evidence)[own]
     found = [
         Exchanged(joint, _spans(tracks.frame[seen[:, k]], wrong[seen[:, k], k]))
         for k, joint in enumerate(joints)
@@ -134,21 +135,24 @@ def _exchanged(tracks: Tracks, pairs: Ints, wrong: Flags) -> Tracks:
     return replace(tracks, uv=uv, confidence=confidence)
 
 
-def _judged(tracks: Tracks, pairs: Ints, wrong: Flags, seen: Flags, evidence: Evidence) -> Flags:
-    """Take of a proposal (T, P) what the motion confirms: all or nothing, and then each limb by itself.
+def _judged(tracks: Tracks, pairs: Ints, wrong: Flags, seen: Flags, own: slice, evidence: Evidence) -> Flags:
+    """Take in `own` rows of a proposal (T, P) what the motion confirms: all or nothing, then each limb.
 
     Where something was exchanged, other pairs may have been along with it for as long.
     """
 
     def score(flags: Flags) -> float:
-        return evidence(_exchanged(tracks, pairs, flags)) - CLEAR * int(flags.any(axis=0).sum())
+        return evidence(_exchanged(tracks, pairs, flags)) - CLEAR * int(flags[own].any(axis=0).sum())
 
-    best = np.zeros_like(wrong)
+    best = wrong.copy()
+    best[own] = False
     most = score(best)
     if (proposed := score(wrong)) > most:
         best, most = wrong.copy(), proposed
     for limb in _limbs(tracks, pairs):
-        for other in _others(best, wrong, seen, limb):
+        for flags in _others(best[own], wrong[own], seen[own], limb):
+            other = best.copy()
+            other[own] = flags
             if (other != best).any() and (changed := score(other)) > most:
                 best, most = other, changed
     return best
