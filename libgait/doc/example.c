@@ -26,7 +26,7 @@ static int take(const char *name, uint8_t pixels[H][W], float number[19])
     if (ok && pixels)
         ok = fscanf(f, "P5 %d %d 255%*c", &w, &h) == 2 && w == W && h == H && fread(pixels, W, H, f) == H;
     ok = f && fclose(f) == 0 && ok;
-    return ok || !fail(name, !is ? "missing" : pixels ? "not a binary PGM of 640 x 480" : "not 19 numbers");
+    return ok || !fail(name, !is ? "unreadable" : pixels ? "no binary PGM of 640 x 480" : "not 19 numbers");
 }
 
 int main(int argc, char **argv)
@@ -66,5 +66,5 @@ int main(int argc, char **argv)
         printf("%3d  pelvis %6.3f %6.3f %6.3f m  phase %.3f  status %d\n", i - 4, now.mean.pelvis[0],
                now.mean.pelvis[1], now.mean.pelvis[2], now.mean.phase, now.status);
     }
-    return printf("digest %016llx\n", (unsigned long long)gait_tracker_digest(t)) < 0 || fflush(stdout);
+    return printf("digest %016llx\n", 0ull + gait_tracker_digest(t)), fflush(stdout) && fail("stdout", "full");
 }
