@@ -151,7 +151,10 @@ def test_a_log_that_breaks_off_is_told_and_recorded_as_far_as_it_goes(estimates,
     log = rig.write_log(tmp_path / "in.log", [("GAIT_ESTIMATE", e) for e in estimates])
     log.write_bytes(log.read_bytes()[:-100])
     done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--quiet")
-    assert done.returncode == 1 and f"breaks off at byte {log_end(log, COUNT - 1)}, after" in done.stderr
+    assert (
+        done.returncode == 1
+        and f"breaks off at byte {log_end(log, COUNT - 1)}, messages before" in done.stderr
+    )
     assert done.stderr.count("\n") == 1 and len(read_track(tmp_path / "t.csv").frame) == COUNT - 1
 
 
@@ -168,7 +171,7 @@ def test_what_else_a_log_holds_is_remarked(estimates, tmp_path):
     assert len(twice.frame) == COUNT and twice.remark.startswith("another stream begins with frame 0;")
     cut = tmp_path / "cut.log"
     cut.write_bytes((tmp_path / "whole.log").read_bytes()[:-100])
-    assert f"after {COUNT - 1} messages" in read_run(str(cut)).remark
+    assert f"messages before: {COUNT - 1}" in read_run(str(cut)).remark
 
 
 @pytest.mark.parametrize("option", ["--frames", "--until-idle", "--patience"])

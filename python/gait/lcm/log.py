@@ -37,7 +37,7 @@ def break_of(path: str | os.PathLike[str]) -> str | None:
                 break
             file.seek(end)
             at, events = end, events + 1
-    return None if at == size else f"the log is damaged or breaks off at byte {at}, after {events} messages"
+    return None if at == size else f"the log is damaged or breaks off at byte {at}, messages before: {events}"
 
 
 class LogWriter:

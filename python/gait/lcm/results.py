@@ -67,12 +67,15 @@ def read_run(path: str) -> Run:
             continue
         message = decode(gaitmsg.estimate_t, event.data, path)
         if messages and message.frame <= messages[-1].frame:
-            remark = f"another stream begins with frame {message.frame}; only the first is used"
+            begins = f"another stream begins with frame {message.frame}; only the first is used"
+            remark = f"{begins}; {remark}" if remark else begins
             break
         messages.append(message)
         arrived.append(event.timestamp)
     if not messages:
-        raise UserError(f"{path}: holds no GAIT_ESTIMATE message; record while gait-trackd is tracking")
+        raise UserError(
+            f"{path}: holds no GAIT_ESTIMATE message; {remark or 'record while gait-trackd is tracking'}"
+        )
     utime = np.array([m.utime for m in messages], np.int64)
     return Run(
         frame=np.array([m.frame for m in messages], np.int64),
