@@ -319,7 +319,7 @@ typedef struct gait_lift_config {
                                * and, its heading unknown, searched for anew; default 9; 0: never */
     uint64_t report;          /* bit j: marker j is estimated while streaming; default all */
     double   axis[2][3];      /* orthographic: directions of u and v in the world, orthonormal; default x and z */
-    gait_camera camera;
+    gait_camera camera;      /* perspective: t within 1e4 metres along each axis */
     uint32_t cpu_mask;        /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
 } gait_lift_config;
 

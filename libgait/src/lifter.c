@@ -26,7 +26,7 @@ static bool orthonormal(const double axis[2][3])
            within(product[2], -1e-9, 1e-9);
 }
 
-/* So near that pixels tell metres in single precision. */
+/* Along each axis: from further off single precision does not tell where a pixel looks. */
 static bool near(const float t[3])
 {
     return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) &&

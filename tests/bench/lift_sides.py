@@ -7,6 +7,7 @@ make eval-lift, or lift_sides.py
 from __future__ import annotations
 
 import sys
+import time
 from dataclasses import dataclass, replace
 
 import eval_clips
@@ -26,11 +27,7 @@ from gait.motion.trackfile import Joints
 from gait.progress import progress
 
 LEGS = ("hip", "knee", "ankle")
-PARTS = {
-    "legs": LEGS,
-    "legs and arms": (*LEGS, "shoulder", "elbow", "wrist"),
-    "nothing": (),
-}
+PARTS = {"legs": LEGS, "legs and arms": (*LEGS, "shoulder", "elbow", "wrist"), "nothing": ()}
 WILD_PIXELS = 150.0  # deviation of wild points
 SEED = 11
 EACH, APART = 3, 4  # cases of a walk, and how far apart they are in the list
@@ -80,19 +77,20 @@ def main() -> int:
 
 
 def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[float]:
-    """Root errors of a walk as seen, exchanged and put back; points exchanged, left so and moved in vain."""
+    """Root errors of a walk as seen, exchanged and put back, and how many lifts the putting back lasts.
+
+    Then points exchanged, left so and moved in vain.
+    """
     places = walk.places[:: round(lift_people.RATE / case.rate)]
     frames = np.arange(len(places))
-    true = Joints(
-        frames,
-        frames / case.rate,
-        dict(zip(EVAL15, places.transpose(1, 0, 2), strict=True)),
-    )
+    true = Joints(frames, frames / case.rate, dict(zip(EVAL15, places.transpose(1, 0, 2), strict=True)))
     tracks = lift_tracks.tracked(true, walk.camera, lift_tracks.NOISE, lift_tracks.GAPS)
     tracks = _wild(tracks, case.wild, rng)
     begin = int(rng.integers(1, len(frames) - case.length))
     spoilt = exchanged(tracks, PARTS[case.part], begin, begin + case.length)
+    clock = [time.perf_counter()]
     back = put_back(walk, spoilt)
+    clock.append(time.perf_counter())
     errors = []
     for seen in (tracks, spoilt, back):
         steady, _ = outliers.without_jumps(seen, lift_tracks.NOISE)
@@ -105,9 +103,11 @@ def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[
                 lift_tracks.HIPS,
             )
         )
+        clock.append(time.perf_counter())
+    judging, lifting = clock[1] - clock[0], clock[2] - clock[1]
     right = spoilt.seen & (spoilt.uv == tracks.uv).all(axis=2)
     moved = (_differ(back, tracks, among) for among in (~right, right))
-    return [*errors, (spoilt.seen & ~right).sum(), *moved]
+    return [*errors, judging / lifting, (spoilt.seen & ~right).sum(), *moved]
 
 
 def put_back(walk: lift_people.Walk, tracks: Tracks) -> Tracks:
@@ -146,26 +146,16 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
     rows = []
     for case, walks in found.items():
         values = np.array(walks)
-        medians, points = (
-            np.median(values[:, :3], axis=0),
-            values[:, 3:].sum(axis=0).astype(int),
-        )
+        medians, points = np.median(values[:, :4], axis=0), values[:, 4:].sum(axis=0).astype(int)
         rows.append(
-            [
-                case.part,
-                case.length,
-                case.rate,
-                f"{case.wild:.0%}",
-                len(walks),
-                *medians,
-                *points.tolist(),
-            ]
+            [case.part, case.length, case.rate, f"{case.wild:.0%}", len(walks), *medians, *points.tolist()]
         )
     note = (
         "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing, some of the rest "
         f"wild ({WILD_PIXELS:g} px); in one stretch of frames left and right are exchanged. Root-aligned "
         "error in that stretch, median mm: as seen, exchanged (--keep-sides), put back (gait lift alone). "
-        "Points exchanged; of these those still wrong after putting back; those moved that were right."
+        "Lifts: how long the putting back takes, over a lift of the tracks as seen, median. Points "
+        "exchanged; of these those still wrong after putting back; those moved that were right."
     )
     head = [
         "exchanged",
@@ -176,6 +166,7 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         "right mm",
         "exchanged mm",
         "put back mm",
+        "lifts",
         "points",
         "left",
         "false",

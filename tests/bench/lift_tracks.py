@@ -94,7 +94,7 @@ def _static(prior: SegmentPrior, names: tuple[str, ...], truth: Floats, hips: li
 def _view(camera: Camera | None, tracks: Tracks) -> View:
     if camera:
         return Perspective(camera)
-    return Parallel(looking_along("y"), None, np.nanmean(tracks.uv, axis=(0, 1)), steady=False)
+    return Parallel(looking_along("y"), None, np.nanmedian(tracks.uv, axis=(0, 1)), steady=False)
 
 
 def lifted(

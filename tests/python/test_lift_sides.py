@@ -27,13 +27,7 @@ def places(time):
     """Points (T, 5, 2) without noise."""
     swing = np.sin(2 * np.pi * (time + 0.13))
     u = 50 * time[:, None] + np.stack([0 * swing, 25 * swing, -25 * swing, 40 * swing, -40 * swing], axis=1)
-    v = np.array([200, 260, 260, 310, 310]) + 8 * np.abs(swing)[:, None] * [
-        0,
-        1,
-        -1,
-        2,
-        -2,
-    ]
+    v = np.array([200, 260, 260, 310, 310]) + 8 * np.abs(swing)[:, None] * [0, 1, -1, 2, -2]
     return np.stack([u, v + np.zeros_like(u)], axis=2)
 
 
@@ -149,3 +143,20 @@ def test_a_false_proposal_beside_a_true_one_falls_alone(monkeypatch, right, wron
     monkeypatch.setattr(flips, "suspected", lambda *_: flags)
     _, found = put_back(exchanged(walking(), *right), NOISE, model)
     assert [each.spans for each in found] == [[(right[0] + 7, right[1] + 7)]] * 2
+
+
+def test_a_point_whose_partner_is_missing_goes_with_its_limb():
+    tracks = walking()
+    tracks.uv[45:48, 3] = np.nan
+    back, _ = put_back(exchanged(tracks, 40, 55), NOISE, model)
+    assert np.array_equal(back.seen, tracks.seen)
+
+
+def test_a_stretch_is_judged_by_its_surroundings_without_wild_points():
+    tracks, parts = walking(), []
+    tracks.uv[33, 0] += 300
+    put_back(exchanged(tracks, 30, 40), NOISE, lambda part: parts.append(part) or model(part))
+    assert parts
+    for part in parts:
+        assert part.frame[0] == 7 and abs(int(part.frame[-1]) - (40 + 30 + 7)) <= 1  # a second more
+        assert np.isnan(part.uv[33, 0]).all() and np.isfinite(part.uv[32, 0]).all()

@@ -140,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
     options = _options(args, pixel_sd)
     if not args.keep_sides:
         tracks, exchanged = lift_tracks.with_sides(
-            prior, tracks, view, options, args.quiet, " (--keep-sides)"
+            args.input, prior, tracks, view, options, args.quiet, " (--keep-sides)"
         )
     if not args.keep_jumps:
         tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")

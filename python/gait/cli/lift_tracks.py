@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -68,9 +69,23 @@ def noise(tracks: Tracks, quiet: bool) -> float:
 
 
 def with_sides(
-    prior: SegmentPrior, tracks: Tracks, seen_in: View, options: Options, quiet: bool, hint: str = ""
+    path: str,
+    prior: SegmentPrior,
+    tracks: Tracks,
+    seen_in: View,
+    options: Options,
+    quiet: bool,
+    hint: str = "",
 ) -> tuple[Tracks, int]:
-    """Put left and right back where they were exchanged, tell where (and `hint`), count the points."""
+    """Put left and right back where they were exchanged, tell where (and `hint`), count the points.
+
+    Raises
+    ------
+    UserError
+        One line that names the file `path` of the tracks, if they cannot be lifted.
+    """
+    with _naming(path):
+        motion.require(prior, tracks, seen_in, options)
     with one_thread(), progress("sides", len(tracks.time), quiet) as update:
 
         def evidence(part: Tracks) -> float:
@@ -160,8 +175,15 @@ def lift(
     UserError
         One line that names the file `path` of the tracks.
     """
-    with one_thread(), progress("segments", motion.segments_of(prior, tracks), quiet) as update:
-        try:
-            return motion.lift(prior, tracks, seen_in, options, names, update)
-        except UserError as error:
-            raise type(error)(f"{path}: {error}") from None
+    segments = motion.segments_of(prior, tracks)
+    with one_thread(), progress("segments", segments, quiet) as update, _naming(path):
+        return motion.lift(prior, tracks, seen_in, options, names, update)
+
+
+@contextmanager
+def _naming(path: str) -> Iterator[None]:
+    """Name a file in errors."""
+    try:
+        yield
+    except UserError as error:
+        raise type(error)(f"{path}: {error}") from None

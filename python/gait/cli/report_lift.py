@@ -107,7 +107,7 @@ def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, Motion
     tracks = lift_tracks.read(args.clip, prior, options.pixel_sd, ignore_unknown=True, quiet=args.quiet)
     options = replace(options, pixel_sd=lift_tracks.noise(tracks, args.quiet))
     view = lift_tracks.view(tracks, args.camera, quiet=args.quiet)
-    tracks, _ = lift_tracks.with_sides(prior, tracks, view, options, args.quiet)
+    tracks, _ = lift_tracks.with_sides(args.clip, prior, tracks, view, options, args.quiet)
     tracks, _ = lift_tracks.without_jumps(tracks, options.pixel_sd, args.quiet)
     found = lift_tracks.lift(args.clip, prior, tracks, view, options, output_names(prior, tracks), args.quiet)
     return tracks, found, view

@@ -42,7 +42,7 @@ def suspected(tracks: Tracks, pairs: Ints, sd: float) -> Flags:
     sd : float
         Noise of a point at full confidence, pixels.
     """
-    return _exchanged(_Pairs.of(tracks, pairs, np.asarray(tracks.seen[:, pairs].all(axis=2)), sd))
+    return _most_probable(_Pairs.of(tracks, pairs, np.asarray(tracks.seen[:, pairs].all(axis=2)), sd))
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def _acceleration(time: Floats, apart: Floats, variance: Floats) -> float:
     return float(max(off, STEADY * noise) / np.median(step[:-1] * step[1:] / 2) ** 2)
 
 
-def _exchanged(pairs: _Pairs) -> Flags:
+def _most_probable(pairs: _Pairs) -> Flags:
     """Which pairs are exchanged in which frames (T, P)."""
     wrong = _course(pairs, np.zeros(pairs.seen.shape, bool), np.zeros(pairs.seen.shape))
     for _ in range(ROUNDS):

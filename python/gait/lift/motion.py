@@ -63,9 +63,8 @@ def lift(
     UserError
         If segments are too short, or too little is seen.
     """
-    prior = _usable(prior, names)
-    if isinstance(view, Perspective):
-        require_metres(view.camera, tracks, prior, believed_stature(options, prior.stature)[0], options)
+    require(prior, tracks, view, options)
+    prior = restricted(prior, names)
     grid = Grid.over(tracks.time, prior)
     if options.method != "smooth":
         return _lift(prior, tracks, view, options, grid, update)
@@ -75,22 +74,23 @@ def lift(
     return best
 
 
+def require(prior: SegmentPrior, tracks: Tracks, view: View, options: Options) -> None:
+    """Refuse a prior of too short segments, and a camera that is not in metres."""
+    if prior.frames < 4:
+        raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
+    if isinstance(view, Perspective):
+        require_metres(view.camera, tracks, prior, believed_stature(options, prior.stature)[0], options)
+
+
 def evidence(prior: SegmentPrior, tracks: Tracks, view: View, options: Options) -> float:
     """Log density of tracks by the prior and the smoother, but for a constant; -inf if it refuses them."""
     names = tuple(name for name in prior.names if name in {*tracks.names, *sequence.HIPS})
     smooth = replace(options, method="smooth")
     try:
-        prior = _usable(prior, names)
+        prior = restricted(prior, names)
         return _lift(prior, tracks, view, smooth, Grid.over(tracks.time, prior), lambda done: None).evidence
     except UserError:
         return -np.inf
-
-
-def _usable(prior: SegmentPrior, names: tuple[str, ...]) -> SegmentPrior:
-    """Prior of some of its markers; refuse one of too short segments."""
-    if prior.frames < 4:
-        raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
-    return restricted(prior, names)
 
 
 def _widest_needed(

@@ -58,7 +58,7 @@ def put_back(tracks: Tracks, sd: float, evidence: Evidence) -> tuple[Tracks, lis
     if not joints or len(tracks.time) < 3 or np.median(np.diff(tracks.time)) > SLOWEST:
         return tracks, []
     pairs = np.array([[tracks.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints])
-    seen = np.asarray(tracks.seen[:, pairs].all(axis=2))
+    seen = np.asarray(tracks.seen[:, pairs].any(axis=2))
     steady = _without_jumps(tracks, pairs, sd)
     wrong = _completed(tracks, pairs, steady, flips.suspected(steady, pairs, sd)) & seen
     wrong &= wrong.sum(axis=0) <= MOST * seen.sum(axis=0)
@@ -71,31 +71,34 @@ def put_back(tracks: Tracks, sd: float, evidence: Evidence) -> tuple[Tracks, lis
         for k, joint in enumerate(joints)
         if wrong[:, k].any()
     ]
-    return _exchanged(tracks, pairs, wrong), found
+    return _swapped(tracks, pairs, wrong), found
 
 
 def _without_jumps(tracks: Tracks, pairs: Ints, sd: float) -> Tracks:
     """Tracks without the points that jump whichever side they are of: they would decide the rest's."""
     kept, _ = outliers.without_jumps(tracks, sd)
     jumped = np.asarray((tracks.seen & ~kept.seen)[:, pairs].any(axis=2))
-    other, _ = outliers.without_jumps(_exchanged(tracks, pairs, jumped), sd)
-    some = kept.seen | _exchanged(other, pairs, jumped).seen
+    other, _ = outliers.without_jumps(_swapped(tracks, pairs, jumped), sd)
+    some = kept.seen | _swapped(other, pairs, jumped).seen
     return replace(tracks, uv=np.where(some[..., None], tracks.uv, np.nan))
 
 
 def _completed(tracks: Tracks, pairs: Ints, steady: Tracks, wrong: Flags) -> Flags:
-    """Flag (T, P) also pairs that are not in steady tracks, where one before or after is wrong.
+    """Flag (T, P) also pairs that are not whole in steady tracks, where one before or after is wrong.
 
-    They are as they lie nearer to the lines between those around; by distances, as one may be anywhere.
+    They are as they lie nearer to the lines between those around; by distances, as one may be anywhere or
+    not be seen.
     """
-    found, put = wrong.copy(), _exchanged(steady, pairs, wrong).uv
+    found, put = wrong.copy(), _swapped(steady, pairs, wrong).uv
     for k, known in enumerate(steady.seen[:, pairs].all(axis=2).T):
         rows, others = np.flatnonzero(known), np.flatnonzero(~known)
         if not rows.size:
             continue
         lines = np.stack([_along(tracks.time, rows, put[:, side])[others] for side in pairs[k]], axis=1)
         seen = tracks.uv[np.ix_(others, pairs[k])]
-        kept, other = (np.linalg.norm(seen - line, axis=2).sum(axis=1) for line in (lines, lines[:, ::-1]))
+        kept, other = (
+            np.nansum(np.linalg.norm(seen - line, axis=2), axis=1) for line in (lines, lines[:, ::-1])
+        )
         after = np.searchsorted(rows, others)
         beside = wrong[rows[np.maximum(after - 1, 0)], k] | wrong[rows[np.minimum(after, len(rows) - 1)], k]
         found[others, k] = beside & (other < kept)
@@ -126,7 +129,7 @@ def _rows(tracks: Tracks, part: slice) -> Tracks:
     return replace(tracks, **columns)
 
 
-def _exchanged(tracks: Tracks, pairs: Ints, wrong: Flags) -> Tracks:
+def _swapped(tracks: Tracks, pairs: Ints, wrong: Flags) -> Tracks:
     """Tracks with the two points of pairs (P, 2) exchanged where `wrong` (T, P)."""
     uv, confidence = tracks.uv.copy(), tracks.confidence.copy()
     for pair, rows in zip(pairs, wrong.T, strict=True):
@@ -142,7 +145,7 @@ def _judged(tracks: Tracks, pairs: Ints, wrong: Flags, seen: Flags, own: slice, 
     """
 
     def score(flags: Flags) -> float:
-        return evidence(_exchanged(tracks, pairs, flags)) - CLEAR * int(flags[own].any(axis=0).sum())
+        return evidence(_swapped(tracks, pairs, flags)) - CLEAR * int(flags[own].any(axis=0).sum())
 
     best = wrong.copy()
     best[own] = False
