@@ -66,5 +66,5 @@ int main(int argc, char **argv)
         printf("%3d  pelvis %6.3f %6.3f %6.3f m  phase %.3f  status %d\n", i - 4, now.mean.pelvis[0],
                now.mean.pelvis[1], now.mean.pelvis[2], now.mean.phase, now.status);
     }
-    return printf("digest %016llx\n", 0ull + gait_tracker_digest(t)), fflush(stdout) && fail("stdout", "full");
+    return printf("digest %016llx\n", 0ull + gait_tracker_digest(t)), fflush(stdout) && fail("disk", "full");
 }
