@@ -207,3 +207,9 @@ bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, lift_be
     out->share = share_of(t, s, best);
     return true;
 }
+
+bool lift_fit_again(const lift_table *t, lift_search *s, const lift_window *w, lift_belief *b)
+{
+    lift_outcome out;
+    return refine(t, w, b, s->before, false, t->cfg.max_iterations, &out);
+}

@@ -34,4 +34,6 @@ typedef struct lift_outcome {
 void lift_search_layout(arena *a, const lift_table *t, lift_search *s);
 /* Fit b to the window; b->place is the prior's.  false: numbers out of range. */
 bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, lift_belief *b, lift_outcome *out);
+/* Fit b again to a window in which other deviations count, from where it is. */
+bool lift_fit_again(const lift_table *t, lift_search *s, const lift_window *w, lift_belief *b);
 #endif

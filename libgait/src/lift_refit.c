@@ -1,10 +1,14 @@
 #include "lift_refit.h"
 
+#include "lift_continue.h"
 #include "lift_doubt.h"
 
 #include <string.h>
 
-enum { FITS = 4 }; /* of a segment at most, while they doubt points */
+#define ASTRAY                                                                                               \
+    4.0 /* squared deviations per number observed, 1 of noise alone: a search may have gone to wild points */
+#define ROUGH 8.0  /* times the points' deviations: nobody is so far from everybody's mean motion */
+enum { FITS = 4 }; /* from a rough one at most, while they doubt points */
 
 /* The frames that fall into segment `index`; points that jump are not in `calm`. */
 static lift_window window_of(const lift_table *t, lift_stream *s, int64_t index)
@@ -36,6 +40,43 @@ static int32_t doubt_window(const lift_table *t, lift_stream *s, const lift_wind
     return doubted;
 }
 
+/* Points that do not jump have their own deviations, so many times. */
+static void believe(const lift_table *t, lift_stream *s, const lift_window *w, double times)
+{
+    for (size_t i = 0; i < (size_t)w->frames * (size_t)t->prior.markers; i++)
+        s->sd[i] = times * s->calm[i];
+}
+
+/* Search for a segment by what is believed of its points, and believe what that leaves of them. */
+static bool look(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w,
+                 lift_belief *b, int32_t *doubted)
+{
+    lift_outcome outcome;
+    memcpy(b->place, t->cfg.place, sizeof b->place);
+    bool const ok = lift_fit(t, search, w, b, &outcome);
+    *doubted = ok ? doubt_window(t, s, w, b) : 0;
+    return ok;
+}
+
+/* Fit a segment to its points.  Where wild ones may have led the search astray it is made again while all say less, and
+ * goes on from there. */
+static bool fit(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w,
+                lift_belief *b, int32_t *doubted)
+{
+    believe(t, s, w, 1.0);
+    bool ok = look(t, search, s, w, b, doubted);
+    if (!ok || (*doubted == 0 && lift_misfit(t, b) <= ASTRAY * b->observed))
+        return ok;
+    believe(t, s, w, ROUGH);
+    ok = look(t, search, s, w, b, doubted);
+    for (int32_t fits = 0, before = -1; ok && *doubted != before && fits < FITS; fits++) {
+        before = *doubted;
+        ok = lift_fit_again(t, search, w, b);
+        *doubted = ok ? doubt_window(t, s, w, b) : 0;
+    }
+    return ok;
+}
+
 /* The frames of a window keep what was thought of their points. */
 static void keep_doubts(const lift_table *t, const lift_stream *s, int64_t index)
 {
@@ -52,17 +93,10 @@ bool lift_refit(const lift_table *t, lift_search *search, lift_stream *s, int64_
 {
     lift_part *const part = lift_stream_part(s, index);
     lift_belief *const b = &part->belief[0];
-    lift_outcome outcome;
     lift_window const w = window_of(t, s, index);
-    memcpy(s->sd, s->calm, (size_t)w.frames * (size_t)t->prior.markers * sizeof *s->sd);
-    int32_t doubted = 0, before = -1;
-    for (int32_t fits = 0; doubted != before && fits < FITS; fits++) {
-        before = doubted;
-        memcpy(b->place, t->cfg.place, sizeof b->place);
-        if (!lift_fit(t, search, &w, b, &outcome))
-            return false;
-        doubted = doubt_window(t, s, &w, b);
-    }
+    int32_t doubted;
+    if (!fit(t, search, s, &w, b, &doubted))
+        return false;
     keep_doubts(t, s, index);
     int32_t const c = b->component;
     if (c != 0) { /* every component has a belief of its own */

@@ -297,7 +297,9 @@ def test_one_wild_point_changes_little(folder, capsys):
     command = ["-m", "m.gait", "--camera", "cam.json", "--pixel-sd", "1", "--json"]
     assert main(["lift", "wild.csv", *command, "-o", "wild.out.csv"]) == 0
     said = capsys.readouterr()
-    assert json.loads(said.out)["jumps"] == 1
+    summary = json.loads(said.out)
+    assert summary["jumps"] == 1
+    assert summary["left_out"] == [{"frame": int(tracks.frame[row]), "point": tracks.names[3]}]
     assert f"{tracks.names[3]} in frame {tracks.frame[row]} (--keep-jumps)" in said.err
     assert main(["lift", "t.csv", *command, "-o", "out.csv"]) == 0
     far = np.linalg.norm(lifted("wild.out.csv", tracks.names) - lifted("out.csv", tracks.names), axis=2)

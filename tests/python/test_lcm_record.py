@@ -171,7 +171,17 @@ def test_what_else_a_log_holds_is_remarked(estimates, tmp_path):
     assert len(twice.frame) == COUNT and twice.remark.startswith("another stream begins with frame 0;")
     cut = tmp_path / "cut.log"
     cut.write_bytes((tmp_path / "whole.log").read_bytes()[:-100])
-    assert f"messages before: {COUNT - 1}" in read_run(str(cut)).remark
+    assert f"messages before: {COUNT - 1}" in read_run(str(cut)).damage
+
+
+def test_a_log_cut_in_its_first_message_is_called_damaged(tmp_path):
+    whole = rig.write_log(tmp_path / "whole.log", [("GAIT_ESTIMATE", gaitmsg.estimate_t())])
+    for size in (10, 60):
+        cut = tmp_path / "cut.log"
+        cut.write_bytes(whole.read_bytes()[:size])
+        done = rig.gait("record", "--url", f"file://{cut}?speed=0", "-o", tmp_path / "t.csv", "--quiet")
+        assert done.returncode == 1 and "cut.log" in done.stderr and done.stderr.count("\n") == 1
+        assert "damaged or breaks off at byte 0" in done.stderr
 
 
 @pytest.mark.parametrize("option", ["--frames", "--until-idle", "--patience"])

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from gait.body.skeleton import EVAL15
+from gait.core.estimate import TrackStatus
+from gait.core.lifter import Lifter
 from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.lift import motion, result
@@ -94,3 +96,41 @@ def test_a_point_wrong_for_a_second_hardly_matters(walk):
         errors.append(np.linalg.norm(apart - apart.mean(axis=1, keepdims=True), axis=2).mean())
     assert errors[1] < 1.5 * errors[0]
     assert evidence[1] < evidence[0] - 20  # each of the 20 frames pays at least one
+
+
+def live(tracks, share, seed):
+    """Frames of a live lift of tracks of which a share is anywhere, by numbers of those pushed."""
+    rng = np.random.default_rng(seed)
+    wild = (rng.random(tracks.seen.shape) < share)[..., None] * rng.normal(0, 150, tracks.uv.shape)
+    lifter = Lifter(view=CAMERA)
+    uv = np.full((len(lifter.names), 2), np.nan)
+    order = [lifter.names.index(name) for name in tracks.names]
+    for time, seen in zip(tracks.time, tracks.uv + wild, strict=True):
+        uv[order] = seen
+        lifter.push(round(1e6 * time), uv)
+        now = lifter.estimate()
+        if now is not None and now.status != TrackStatus.INIT:
+            yield now, now.markers[order], now.sd[order]
+
+
+def test_a_live_start_finds_somebody_among_wild_points(walk):
+    _, places, tracks = walk
+    for seed in range(6):
+        frames = list(live(tracks, 0.15, seed))
+        assert len(frames) == len(places) - 9
+        for now, found, _ in frames:
+            assert now.status == TrackStatus.TRACKING
+            assert np.linalg.norm(found - places[now.frame], axis=1).mean() < 0.15
+
+
+def test_what_a_live_start_gets_wrong_is_not_relied_on(walk):
+    """Three points in ten are anywhere: what is called tracked lies near, or in its intervals."""
+    _, places, tracks = walk
+    wrong = 0
+    for seed in range(12):
+        for now, found, sd in live(tracks, 0.3, seed):
+            apart = np.abs(found - places[now.frame])
+            near = apart.mean() < 0.3 or np.mean(apart < 1.645 * sd) > 0.8
+            wrong += not near
+            assert near or now.status == TrackStatus.AMBIGUOUS or now.frame > 14
+    assert wrong

@@ -44,6 +44,30 @@ def test_many_jumps_beside_gaps():
     assert jumps == [(5, "l_ankle"), (17, "l_ankle"), (18, "l_ankle"), (40, "l_ankle")]
 
 
+def test_the_furthest_goes_first_whatever_it_bends():
+    """As measured anew after each, at the ends too."""
+    rng = np.random.default_rng(3)
+    tracks = swinging(30, frames=200)
+    tracks.uv[rng.random((200, 2)) < 0.1] = np.nan
+    wild = rng.random((200, 2)) < 0.08
+    tracks.uv[wild] += rng.normal(0, 200, (wild.sum(), 2))
+    tracks.uv[[0, 1, 198, 199], 0] += (300, 0)
+    uv, gone = tracks.uv.copy(), []
+    for j, name in enumerate(tracks.names):
+        while True:
+            rows = np.flatnonzero(np.isfinite(uv[:, j, 0]))
+            on = [
+                [np.interp(tracks.time[b], tracks.time[[a, c]], uv[[a, c], j, i]) for i in range(2)]
+                for a, b, c in zip(rows, rows[1:], rows[2:], strict=False)
+            ]
+            apart = np.pad(np.linalg.norm(uv[rows[1:-1], j] - on, axis=1), 1)
+            if apart.max() <= 8 * max(np.sqrt(1.5) * 3.0, 1.4826 * np.median(apart)):
+                break
+            gone.append((int(rows[apart.argmax()]), name))
+            uv[rows[apart.argmax()], j] = np.nan
+    assert len(gone) > 15 and without_jumps(tracks, 3.0)[1] == sorted(gone)
+
+
 def test_few_points_are_left_alone():
     tracks = swinging(30, frames=4)
     tracks.uv[1] += 500

@@ -182,7 +182,15 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
         raise UsageError("--init auto: needs a video file and --camera; give an init file")
     from gait.track.autostart import find_start  # slow to load, and only needed here
 
-    return find_start(source.video, setup.camera, setup.plate, model, height=args.height)
+    return find_start(
+        source.video,
+        setup.camera,
+        setup.plate,
+        model,
+        first=args.start,
+        stop=args.stop,
+        height=args.height,
+    )
 
 
 def _report(args: argparse.Namespace, publisher: Publisher, pacer: Pacer) -> None:

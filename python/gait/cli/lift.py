@@ -135,15 +135,18 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     prior = lift_prior.load(args.model, args.quiet)
     tracks = lift_tracks.read(args.input, prior, args.pixel_sd or PIXEL_SD, args.ignore_unknown, args.quiet)
-    pixel_sd, exchanged, jumps = args.pixel_sd or lift_tracks.noise(tracks, args.quiet), 0, 0
+    pixel_sd = args.pixel_sd or lift_tracks.noise(tracks, args.quiet)
+    mended: dict[str, Any] = {"exchanged": 0, "put_back": [], "jumps": 0, "left_out": []}
     view = lift_tracks.view(tracks, args.camera, args.orthographic, args.metres_per_unit, args.quiet)
     options = _options(args, pixel_sd)
     if not args.keep_sides:
-        tracks, exchanged = lift_tracks.with_sides(
+        tracks, sides = lift_tracks.with_sides(
             args.input, prior, tracks, view, options, args.quiet, " (--keep-sides)"
         )
+        mended |= sides
     if not args.keep_jumps:
         tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
+        mended |= jumps
     names = motion.output_names(prior, tracks, args.all_markers)
     found = lift_tracks.lift(args.input, prior, tracks, view, options, names, args.quiet)
     _require_person(args, found)
@@ -153,7 +156,7 @@ def run(args: argparse.Namespace) -> int:
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
-    summary = _summary(args, tracks, found) | {"exchanged": exchanged, "jumps": jumps, "pixel_sd": pixel_sd}
+    summary = _summary(args, tracks, found) | mended | {"pixel_sd": pixel_sd}
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
 

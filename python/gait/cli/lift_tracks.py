@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -76,8 +77,8 @@ def with_sides(
     options: Options,
     quiet: bool,
     hint: str = "",
-) -> tuple[Tracks, int]:
-    """Put left and right back where they were exchanged, tell where (and `hint`), count the points.
+) -> tuple[Tracks, dict[str, Any]]:
+    """Put left and right back where they were exchanged, tell where (and `hint`); with figures of ``--json``.
 
     Raises
     ------
@@ -96,7 +97,12 @@ def with_sides(
     if exchanged and not quiet:
         print(_exchanged(exchanged) + hint, file=sys.stderr)
     moved = (found.uv != tracks.uv).any(axis=2) & tracks.seen
-    return found, int(moved.sum())
+    spans = [
+        {"joint": each.joint, "first": first, "last": last}
+        for each in exchanged
+        for first, last in each.spans
+    ]
+    return found, {"exchanged": int(moved.sum()), "put_back": spans}
 
 
 def _exchanged(exchanged: list[sides.Exchanged]) -> str:
@@ -111,12 +117,13 @@ def _exchanged(exchanged: list[sides.Exchanged]) -> str:
     return f"left and right were exchanged and are put back: {'; '.join(named)}{more}"
 
 
-def without_jumps(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, int]:
-    """Leave out single points that jump, tell which (`hint`: and what to do about it), and count them."""
+def without_jumps(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, dict[str, Any]]:
+    """Leave out single points that jump, tell which (and `hint`); with figures of ``--json``."""
     tracks, jumps = outliers.without_jumps(tracks, sd)
     if jumps and not quiet:
         print(_jumped(jumps) + hint, file=sys.stderr)
-    return tracks, len(jumps)
+    left_out = [{"frame": frame, "point": name} for frame, name in jumps]
+    return tracks, {"jumps": len(jumps), "left_out": left_out}
 
 
 def _jumped(jumps: list[tuple[int, str]]) -> str:

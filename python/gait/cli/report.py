@@ -22,6 +22,7 @@ from gait.core.model import Model, read_cyclic
 from gait.draw.overlay import Overlay
 from gait.draw.page import Page
 from gait.durations import spread
+from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.image.video import Image, Video, VideoWriter
 from gait.io.files import replacing, require_outputs
@@ -64,7 +65,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
-    """Write what `args` ask for (see `add_arguments`); return the errors, if there is a truth."""
+    """Write what `args` ask for (see `add_arguments`); return the errors, if there is a truth.
+
+    Raises
+    ------
+    UserError
+        One line; if the log breaks off, after all of what came before is written.
+    """
     video = Video(args.video)
     camera, model = Camera.read(args.camera, video.size), Model(args.model)
     results, track = read_run(args.log), read_track(args.track)
@@ -88,6 +95,8 @@ def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
         page.figure(heading, svg)
     with replacing(args.output) as path:
         path.write_text(page.text(), encoding="utf-8")
+    if results.damage:
+        raise UserError(f"{args.log}: {results.damage}; {args.output} shows what came before")
     return measures
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from gait.errors import UsageError, UserError
-from gait.lcm.log import PREFIX, LogWriter, log_of
+from gait.lcm.log import PREFIX, LogWriter, break_of, log_of
 from gait.lcm.types import generated
 
 try:
@@ -48,11 +48,16 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
             return lcm.LCM(wanted)
     except RuntimeError:
         if is_log(wanted):
-            raise UserError(
-                f"{wanted}: cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
-            ) from None
+            raise UserError(f"{wanted}: {_fault_of(wanted)}") from None
         remedy = ROUTE_REMEDY if "udpm://" in wanted else "give udpm://ADDRESS:PORT or file:///PATH?speed=0"
         raise UserError(f"{wanted}: cannot open LCM; {remedy}") from None
+
+
+def _fault_of(url: str) -> str:
+    """Say why a log cannot be opened."""
+    path, mode = log_of(url)
+    damage = break_of(path) if mode == "r" and os.path.isfile(path) else None
+    return damage or "cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
 
 
 def listener(url: str) -> lcm.LCM:

@@ -39,7 +39,9 @@ class Run:
     tracker_digest : int
         After the last frame, unsigned.
     remark : str or None
-        What the log holds beyond that, or where it breaks off.
+        What the log holds beyond that.
+    damage : str or None
+        Where the log breaks off.
     """
 
     frame: NDArray[np.int64]
@@ -50,6 +52,7 @@ class Run:
     dropped: int
     tracker_digest: int
     remark: str | None = None
+    damage: str | None = None
 
 
 def read_run(path: str) -> Run:
@@ -60,21 +63,20 @@ def read_run(path: str) -> Run:
     if not Path(path).is_file():
         raise UserError(f"{path}: no such LCM log; make one with gait record --log or lcm-logger")
     messages: list[Any] = []
-    remark = break_of(path)
+    remark, damage = None, break_of(path)
     arrived: list[int] = []
     for event in lcm.EventLog(path, "r"):
         if event.channel != "GAIT_ESTIMATE":
             continue
         message = decode(gaitmsg.estimate_t, event.data, path)
         if messages and message.frame <= messages[-1].frame:
-            begins = f"another stream begins with frame {message.frame}; only the first is used"
-            remark = f"{begins}; {remark}" if remark else begins
+            remark = f"another stream begins with frame {message.frame}; only the first is used"
             break
         messages.append(message)
         arrived.append(event.timestamp)
     if not messages:
         raise UserError(
-            f"{path}: holds no GAIT_ESTIMATE message; {remark or 'record while gait-trackd is tracking'}"
+            f"{path}: holds no GAIT_ESTIMATE message; {damage or 'record while gait-trackd is tracking'}"
         )
     utime = np.array([m.utime for m in messages], np.int64)
     return Run(
@@ -86,4 +88,5 @@ def read_run(path: str) -> Run:
         dropped=messages[-1].dropped,
         tracker_digest=messages[-1].tracker_digest & (1 << 64) - 1,
         remark=remark,
+        damage=damage,
     )

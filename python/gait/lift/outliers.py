@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 LIMIT = 8.0  # deviations from the line between neighbours beyond which a point is no noise
 SPREAD = 1.4826  # median absolute deviation to standard deviation, normal noise
+FEWEST = 5  # sights of a point that tell
 QUICK = 0.051  # seconds from frame to frame (20 a second): with longer steps motion looks like noise
 PAIR = np.sqrt(1.5)  # sd of a point against the middle of its neighbours, over that of one point
 
@@ -52,19 +53,26 @@ def shake(tracks: Tracks) -> float:
 def _clear(time: Array, uv: Array, sd: float) -> list[int]:
     """Set the jumps of one point (T, 2) to NaN; returns their rows."""
     gone: list[int] = []
-    while (seen := np.flatnonzero(np.isfinite(uv).all(axis=1))).size >= 5:
-        distance = _off_line(time[seen], uv[seen])
+    seen = np.flatnonzero(np.isfinite(uv).all(axis=1))
+    distance = _off_line(time[seen], uv[seen])
+    while seen.size >= FEWEST:
         scale = max(PAIR * sd, SPREAD * float(np.median(distance)))
         worst = int(distance.argmax())
         if distance[worst] <= LIMIT * scale:
             break
         gone.append(int(seen[worst]))
         uv[seen[worst]] = np.nan
+        seen, distance = np.delete(seen, worst), np.delete(distance, worst)
+        for beside in (worst - 1, worst):  # whose lines have changed
+            rows = seen[max(beside - 1, 0) : beside + 2]
+            distance[beside] = _off_line(time[rows], uv[rows])[1] if rows.size == 3 else 0.0
     return gone
 
 
 def _off_line(time: Array, uv: Array) -> Array:
     """Distance of each place (n, 2) from the line between its neighbours at its time; the ends: 0."""
+    if len(uv) < 3:
+        return np.zeros(len(uv))
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
     inner = uv[1:-1] - (1 - share) * uv[:-2] - share * uv[2:]
     return np.pad(np.hypot(*inner.T), 1)
