@@ -123,7 +123,7 @@ def streamed(
     config: LiftConfig,
     statuses: tuple[TrackStatus, ...] = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS),
 ) -> tuple[list[int], Floats, Floats]:
-    """Frames (n) of some statuses that come out of the live lifter, and their joints and deviations (n, 15, 3)."""
+    """Frames (n) of these statuses from the live lifter, and their joints and deviations (n, 15, 3)."""
     lifter = Lifter(model, camera, config)
     index = [lifter.names.index(name) for name in EVAL15]
     utimes = np.round(1e6 * tracks.time).astype(int)
