@@ -100,7 +100,7 @@ def _row(clip: Clip, model: Path) -> list[object]:
 
 
 def _many(tracks: Tracks, camera: Camera, model: Path, true: Floats) -> list[float]:
-    """Share of frames tracked among many wrong points, and what those are worth: median and worst mm, coverage."""
+    """Share of frames tracked among many wrong points; median and worst mm of those, and coverage."""
     spoilt = _wrong(tracks, MANY)
     count = len(streamed(spoilt, camera, model, LiftConfig.default())[0])
     relied = streamed(spoilt, camera, model, LiftConfig.default(), (TrackStatus.TRACKING,))
