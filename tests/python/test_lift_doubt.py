@@ -12,7 +12,7 @@ from gait.core.estimate import TrackStatus
 from gait.core.lifter import Lifter
 from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
-from gait.lift import motion, result
+from gait.lift import motion, outliers, result
 from gait.lift.doubt import FAR, doubted, price
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
@@ -98,14 +98,29 @@ def test_a_point_wrong_for_a_second_hardly_matters(walk):
     assert evidence[1] < evidence[0] - 20  # each of the 20 frames pays at least one
 
 
-def live(tracks, share, seed):
-    """Frames of a live lift of tracks of which a share is anywhere, by numbers of those pushed."""
+def spoilt(tracks, share, seed):
+    """Tracks of which a share of the points is anywhere."""
     rng = np.random.default_rng(seed)
-    wild = (rng.random(tracks.seen.shape) < share)[..., None] * rng.normal(0, 150, tracks.uv.shape)
+    wild = rng.random(tracks.seen.shape) < share
+    return replace(tracks, uv=tracks.uv + wild[..., None] * rng.normal(0, 150, tracks.uv.shape))
+
+
+def test_somebody_is_found_among_wild_points(walk):
+    prior, places, tracks = walk
+    names = motion.output_names(prior, tracks)
+    steady, _ = outliers.without_jumps(spoilt(tracks, 0.15, 1), SD)
+    found = motion.lift(prior, steady, Perspective(CAMERA), result.Options(pixel_sd=SD), names)
+    apart = found.places[:, [names.index(name) for name in tracks.names]] - places
+    assert found.settled and not found.alone
+    assert np.linalg.norm(apart, axis=2).mean() < 0.1
+
+
+def live(tracks, share, seed):
+    """Frames of a live lift of spoilt tracks."""
     lifter = Lifter(view=CAMERA)
     uv = np.full((len(lifter.names), 2), np.nan)
     order = [lifter.names.index(name) for name in tracks.names]
-    for time, seen in zip(tracks.time, tracks.uv + wild, strict=True):
+    for time, seen in zip(tracks.time, spoilt(tracks, share, seed).uv, strict=True):
         uv[order] = seen
         lifter.push(round(1e6 * time), uv)
         now = lifter.estimate()

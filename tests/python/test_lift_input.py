@@ -183,3 +183,15 @@ def test_exchanged_sides_are_put_back_and_told(folder, capsys):
     for tracks, options in (("swapped.csv", ["--keep-sides"]), ("t.csv", [])):
         code, said = lift(capsys, tracks, "cam.json", *options)
         assert code == 0 and "put back" not in said
+
+
+def test_more_wrong_points_than_it_bears_are_told(folder, capsys):
+    rng = np.random.default_rng(2)
+    told = "of the points are wrong, as it seems"
+    for share in (0.05, 0.2):
+        uv = pixels()
+        wild = rng.random(uv.shape[:2]) < share
+        uv[wild] += rng.normal(0, 60, (wild.sum(), 2))
+        save("wild.csv", uv)
+        _, said = lift(capsys, "wild.csv", "cam.json", "--pixel-sd", "1")
+        assert (told in said) == (share == 0.2)

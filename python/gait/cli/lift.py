@@ -145,13 +145,14 @@ def run(args: argparse.Namespace) -> int:
         )
         mended |= sides
     if not args.keep_jumps:
-        tracks, jumps = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
-        mended |= jumps
+        tracks, left_out = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
+        mended |= left_out
     names = motion.output_names(prior, tracks, args.all_markers)
     found = lift_tracks.lift(args.input, prior, tracks, view, options, names, args.quiet)
     _require_person(args, found)
     if not args.quiet:
-        for words in lift_doubts.of(found, tracks, options, prior.stature, bool(args.camera)):
+        camera, jumps = bool(args.camera), int(mended["jumps"])
+        for words in lift_doubts.of(found, tracks, options, prior.stature, camera, jumps):
             print(words, file=sys.stderr)
     lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:

@@ -14,10 +14,11 @@ UNTOLD = (
     "hips and ankles are hardly seen, which tell the distance: the person may be metres nearer or further"
 )
 DOUBTED = 3  # frames in which a point is doubted; a right one is far off once in a few thousand
+BORNE = 0.18  # share of wrong points; one in seven does little harm, one in five may
 UNUSUAL = 2.5  # deviations of a stature; one of 80 people is as unusual
 
 
-def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bool) -> list[str]:
+def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bool, jumps: int) -> list[str]:
     """Say why the result may be wrong, a line each.
 
     Parameters
@@ -26,13 +27,19 @@ def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bo
         Stature of the people learnt from, metres.
     camera : bool
         Whether the view has one.
+    jumps : int
+        Points that were left out before.
     """
     far = float(np.nanmedian(found.error)) / options.pixel_sd
     doubted, shake = _doubted(found, tracks.names), outliers.shake(tracks)
+    lost = _lost(found, tracks, jumps)
     shaky = shake > lift_tracks.SHAKY * options.pixel_sd and found.wider > 1
     doubts = {
         UNTOLD: camera and not size.tells_distance(tracks),
         f"left with little say, far from where the rest has them: {doubted}": bool(doubted),
+        f"{lost:.0%} of the points are wrong, as it seems, which is more than it bears: do not rely on it": (
+            lost > BORNE
+        ),
         f"the points shake by {shake:.2g} from frame to frame, not {options.pixel_sd:g}: "
         f"try --pixel-sd {shake:.2g}": shaky,
         f"not a motion like those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
@@ -47,6 +54,12 @@ def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bo
         "the names of the points, that v points down, and --pixel-sd": far > FAR,
     }
     return [words for words, holds in doubts.items() if holds]
+
+
+def _lost(found: Motion, tracks: Tracks, jumps: int) -> float:
+    """Share of the points that were left out or doubted."""
+    doubted = 0 if found.doubted is None else int(found.doubted.sum())
+    return (jumps + doubted) / max(int(tracks.seen.sum()) + jumps, 1)
 
 
 def _doubted(found: Motion, names: tuple[str, ...]) -> str:

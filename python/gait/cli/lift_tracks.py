@@ -56,8 +56,12 @@ def _remarks(tracks: Tracks) -> Iterator[str]:
 
 
 def noise(tracks: Tracks, quiet: bool) -> float:
-    """Tell the points' deviation at full confidence: the usual one, or how much they shake if it is more."""
-    shake, usual = outliers.shake(tracks), Options.pixel_sd
+    """Tell the points' deviation at full confidence: the usual one, or how much they shake if it is more.
+
+    Points that jump are no shaking: among many, others would pass for right.
+    """
+    usual = Options.pixel_sd
+    shake = outliers.shake(outliers.without_jumps(tracks, usual)[0])
     if not shake > SHAKY * usual:
         return usual
     if not quiet:

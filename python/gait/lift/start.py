@@ -20,7 +20,9 @@ from gait.lift.observe import Observations, Rows
 
 Floats = npt.NDArray[np.float64]
 
-DOUBTS = 4  # times at most that a segment is explained anew without the points that are far off
+ASTRAY = 4.0  # squared deviations per number, 1 of noise alone: a search may have gone to wild points
+ROUGH = 8.0  # times the points' deviations: nobody is so far from everybody's mean motion
+DOUBTS = 3  # times at most that a segment is explained anew without the points that are far off
 FEWEST = 4  # points that must be seen of a segment for an estimate of its own
 TURN_SD = 0.7  # radians by which the heading changes in half a segment
 
@@ -58,11 +60,13 @@ def explanations(
 def _trusted(
     prior: SegmentPrior, seen: Observations, view: View, lengths: Floats, person: Person
 ) -> list[Explanation]:
-    """Explain a segment by all points, then without those far from where the rest has them (`doubt`)."""
-    points = seen
-    for _ in range(DOUBTS):
+    """Explain a segment by all points, then without those far from where the rest has them (`doubt`).
 
-        def measure(places: Floats, points: Observations = points) -> Rows:
+    Where wild points may have led the search astray it is made again while all points say less.
+    """
+
+    def explained(points: Observations) -> tuple[list[Explanation], Floats]:
+        def measure(places: Floats) -> Rows:
             rows = view.rows(points, places, lengths)
             return rows if view.grounded else _centred(rows, places)
 
@@ -70,9 +74,18 @@ def _trusted(
         said = view.project(found[0].posterior.points, lengths)
         if not view.grounded:
             said = said + np.nanmedian(seen.uv - said, axis=(0, 1))
+        return found, said
+
+    found, said = explained(seen)
+    points = doubt.doubted(seen, said)
+    if points is seen and np.mean(doubt.distances(seen, said)[seen.seen] ** 2) <= 2 * ASTRAY:
+        return found
+    _, said = explained(replace(seen, sd=ROUGH * seen.sd))
+    for _ in range(DOUBTS):
         before, points = points, doubt.doubted(seen, said)
-        if points is seen and before is seen:
+        if points is before is seen:
             break
+        found, said = explained(points)
     return found
 
 
