@@ -8,7 +8,7 @@
 #define ASTRAY                                                                                               \
     4.0 /* squared deviations per number observed, 1 of noise alone: a search may have gone to wild points */
 #define ROUGH 8.0  /* times the points' deviations: nobody is so far from everybody's mean motion */
-enum { FITS = 4 }; /* from a rough one at most, while they doubt points */
+enum { FITS = 4 }; /* after a search at most, while they doubt points */
 
 /* The frames that fall into segment `index`; points that jump are not in `calm`. */
 static lift_window window_of(const lift_table *t, lift_stream *s, int64_t index)
@@ -58,22 +58,33 @@ static bool look(const lift_table *t, lift_search *search, lift_stream *s, const
     return ok;
 }
 
-/* Fit a segment to its points.  Where wild ones may have led the search astray it is made again while all say less, and
- * goes on from there. */
-static bool fit(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w,
-                lift_belief *b, int32_t *doubted)
+/* Search by all points, of deviations so many times theirs, and go on from there without those that are far off. */
+static bool fit_from(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w,
+                     lift_belief *b, double times, int32_t *doubted)
 {
-    believe(t, s, w, 1.0);
+    believe(t, s, w, times);
     bool ok = look(t, search, s, w, b, doubted);
-    if (!ok || (*doubted == 0 && lift_misfit(t, b) <= ASTRAY * b->observed))
-        return ok;
-    believe(t, s, w, ROUGH);
-    ok = look(t, search, s, w, b, doubted);
-    for (int32_t fits = 0, before = -1; ok && *doubted != before && fits < FITS; fits++) {
+    int32_t before = times > 1.0 ? -1 : 0;
+    for (int32_t fits = 0; ok && *doubted != before && fits < FITS; fits++) {
         before = *doubted;
         ok = lift_fit_again(t, search, w, b);
         *doubted = ok ? doubt_window(t, s, w, b) : 0;
     }
+    return ok;
+}
+
+/* Fit a segment to its points.  Where wild ones may have led the search astray it is made again, first while all say less;
+ * the more probable fit counts. */
+static bool fit(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w, lift_belief *b,
+                int32_t *doubted)
+{
+    bool ok = fit_from(t, search, s, w, b, 1.0, doubted);
+    if (!ok || (*doubted == 0 && lift_misfit(t, b) <= ASTRAY * b->observed))
+        return ok;
+    double const usual = lift_evidence(t, b);
+    ok = fit_from(t, search, s, w, b, ROUGH, doubted);
+    if (ok && lift_evidence(t, b) < usual)
+        ok = fit_from(t, search, s, w, b, 1.0, doubted);
     return ok;
 }
 

@@ -145,6 +145,7 @@ def _unlike(
         misfit=found.misfit,
         wider=found.wider,
         resized=sized.factor,
+        doubted=found.doubted,
         alone=True,
     )
 

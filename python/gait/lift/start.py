@@ -22,6 +22,7 @@ Floats = npt.NDArray[np.float64]
 
 ASTRAY = 4.0  # squared deviations per number, 1 of noise alone: a search may have gone to wild points
 ROUGH = 8.0  # times the points' deviations: nobody is so far from everybody's mean motion
+MANY = 0.1  # share of doubted points from which it is asked whether those are right
 DOUBTS = 3  # times at most that a segment is explained anew without the points that are far off
 FEWEST = 4  # points that must be seen of a segment for an estimate of its own
 TURN_SD = 0.7  # radians by which the heading changes in half a segment
@@ -62,7 +63,8 @@ def _trusted(
 ) -> list[Explanation]:
     """Explain a segment by all points, then without those far from where the rest has them (`doubt`).
 
-    Where wild points may have led the search astray it is made again while all points say less.
+    Where wild points may have led the search astray it is made again, first while all points say less; the
+    more probable explanation counts.
     """
 
     def explained(points: Observations) -> tuple[list[Explanation], Floats]:
@@ -76,17 +78,26 @@ def _trusted(
             said = said + np.nanmedian(seen.uv - said, axis=(0, 1))
         return found, said
 
-    found, said = explained(seen)
-    points = doubt.doubted(seen, said)
-    if points is seen and np.mean(doubt.distances(seen, said)[seen.seen] ** 2) <= 2 * ASTRAY:
-        return found
-    _, said = explained(replace(seen, sd=ROUGH * seen.sd))
-    for _ in range(DOUBTS):
-        before, points = points, doubt.doubted(seen, said)
-        if points is before is seen:
-            break
+    def doubting(points: Observations) -> tuple[list[Explanation], bool]:
         found, said = explained(points)
-    return found
+        for _ in range(DOUBTS):
+            before, points = points, doubt.doubted(seen, said)
+            if np.array_equal(points.sd > seen.sd, before.sd > seen.sd):
+                break  # the same are doubted
+            found, said = explained(points)
+        return found, _astray(seen, points, said)
+
+    found, astray = doubting(seen)
+    if not astray:
+        return found
+    other, _ = doubting(replace(seen, sd=ROUGH * seen.sd))
+    return max(found, other, key=lambda each: each[0].posterior.log_evidence)
+
+
+def _astray(seen: Observations, trusted: Observations, said: Floats) -> bool:
+    """Whether an explanation leaves the points that it trusts far, or trusts too few."""
+    misfit = np.mean(doubt.distances(trusted, said)[seen.seen] ** 2) / 2
+    return bool(misfit > ASTRAY or np.mean((trusted.sd > seen.sd)[seen.seen]) > MANY)
 
 
 def _centred(rows: Rows, places: Floats) -> Rows:
