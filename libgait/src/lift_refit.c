@@ -73,10 +73,10 @@ static bool fit_from(const lift_table *t, lift_search *search, lift_stream *s, c
     return ok;
 }
 
-/* Fit a segment to its points.  Where wild ones may have led the search astray it is made again, first while all say less;
- * the more probable fit counts. */
-static bool fit(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w, lift_belief *b,
-                int32_t *doubted)
+/* Fit a segment to its points.  Where wild ones may have led the search astray it is made again, first while all say
+ * less; the more probable fit counts. */
+static bool fit(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w,
+                lift_belief *b, int32_t *doubted)
 {
     bool ok = fit_from(t, search, s, w, b, 1.0, doubted);
     if (!ok || (*doubted == 0 && lift_misfit(t, b) <= ASTRAY * b->observed))

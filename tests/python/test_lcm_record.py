@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gait.lcm.link import open_lcm, private_url
+from gait.lcm.log import break_of
 from gait.lcm.results import read_run
 from gait.lcm.types import gaitmsg
 from gait.motion.trackfile import read_track
@@ -169,9 +170,16 @@ def test_what_else_a_log_holds_is_remarked(estimates, tmp_path):
     assert read_run(str(rig.write_log(tmp_path / "whole.log", events))).remark is None
     twice = read_run(str(rig.write_log(tmp_path / "twice.log", events * 2)))
     assert len(twice.frame) == COUNT and twice.remark.startswith("another stream begins with frame 0;")
-    cut = tmp_path / "cut.log"
-    cut.write_bytes((tmp_path / "whole.log").read_bytes()[:-100])
-    assert f"messages before: {COUNT - 1}" in read_run(str(cut)).damage
+
+
+def test_logs_break_off_where_lcm_stops(tmp_path):
+    whole = rig.write_log(tmp_path / "whole.log", [("GAIT_ESTIMATE", gaitmsg.estimate_t())] * 3)
+    assert break_of(whole) is None
+    contents = whole.read_bytes()
+    for at, value in ((0, b"\0"), (20, b"\0\0\4\0"), (20, b"\0\0\0\0"), (24, b"\xff")):
+        place = 2 * len(contents) // 3 + at
+        whole.write_bytes(contents[:place] + value + contents[place + len(value) :])
+        assert "messages before: 2" in break_of(whole)
 
 
 def test_a_log_cut_in_its_first_message_is_called_damaged(tmp_path):

@@ -196,6 +196,7 @@ def test_repetition_goes_on_counting(folder):
         (["--start", "99"], 1, "has no frame 99"),
         (["--start", "5"], 1, "frame 2 comes before --start 5"),
         (["--stop", "2"], 1, "frame 2 is not sent with --stop 2"),
+        (["--init", "auto", "--start", "2", "--stop", "5"], 1, "only 3 frames to track"),
         (["--camera", "nothing.json"], 1, "nothing.json"),
         (["--wait", "0.6"], 1, "no tracker knows the camera after 0.6 s"),
         (["--wait", "nan"], 2, "nan: give seconds from 0 up"),
@@ -285,6 +286,17 @@ def test_nothing_received_is_an_error_and_leaves_no_file(tmp_path):
     done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--quiet")
     assert done.returncode == 1 and "no estimate was received" in done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["empty.log"]
+
+
+def test_a_report_of_a_log_that_breaks_off_shows_what_came_before(folder, recorded, tmp_path):
+    cut, page = tmp_path / "cut.log", tmp_path / "r.html"
+    cut.write_bytes((folder / "e.log").read_bytes()[:-100])
+    files = ["--track", folder / "track.csv", "--video", folder / "video.mp4"]
+    files += ["--camera", folder / "camera.json"]
+    done = rig.gait("report", cut, *files, "-o", page, "--quiet")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "breaks off at byte" in done.stderr and f"{page} shows what came before" in done.stderr
+    assert "<svg" in page.read_text()
 
 
 def test_a_report_stands_alone(folder, recorded, tmp_path):

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait.cli import main
+from gait.cli import lift_tracks, main
+from gait.cli.lift import PIXEL_SD
 from gait.image.camera import Camera
-from gait.lift import motion, sentinels, switches
+from gait.lift import motion, outliers, sentinels, switches
 from gait.lift.tracks_file import Tracks, read, write
 
 FRAMES, MARKERS = 6, 12
@@ -180,6 +181,11 @@ def test_exchanged_sides_are_put_back_and_told(folder, capsys):
     save("swapped.csv", uv)
     code, said = lift(capsys, "swapped.csv")
     assert code == 0 and "put back: shoulder, elbow in frames 5 to 8 (--keep-sides)" in said
+    assert (
+        main(["lift", "swapped.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv", "--json"]) == 0
+    )
+    put = [{"joint": joint, "first": 5, "last": 8} for joint in ("shoulder", "elbow")]
+    assert json.loads(capsys.readouterr().out)["put_back"] == put
     for tracks, options in (("swapped.csv", ["--keep-sides"]), ("t.csv", [])):
         code, said = lift(capsys, tracks, "cam.json", *options)
         assert code == 0 and "put back" not in said
@@ -195,3 +201,14 @@ def test_more_wrong_points_than_it_bears_are_told(folder, capsys):
         save("wild.csv", uv)
         _, said = lift(capsys, "wild.csv", "cam.json", "--pixel-sd", "1")
         assert (told in said) == (share == 0.2)
+
+
+def test_wild_points_are_no_noise(folder):
+    rng = np.random.default_rng(2)
+    uv = pixels() + rng.normal(0, 2, pixels().shape)
+    wild = rng.random(uv.shape[:2]) < 0.15
+    uv[wild] += rng.normal(0, 60, (wild.sum(), 2))
+    save("wild.csv", uv)
+    tracks = read("wild.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0]
+    assert outliers.shake(tracks) > 1.3 * PIXEL_SD
+    assert lift_tracks.noise(tracks, True) == PIXEL_SD

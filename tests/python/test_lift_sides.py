@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gait.lift import flips
-from gait.lift.sides import put_back
+from gait.lift.sides import CLEAR, put_back
 from gait.lift.tracks_file import Tracks
 
 NAMES = ("pelvis", "l_knee", "r_knee", "l_ankle", "r_ankle")
@@ -98,6 +98,16 @@ def test_the_motion_decides():
     back, found = put_back(spoilt, NOISE, lambda tracks: 0.0)
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
+
+
+def test_what_fits_hardly_better_stays():
+    """Each pair has to gain `CLEAR` nats: two here."""
+    right = walking()
+    spoilt = exchanged(right, 30, 50)
+    gain = model(right) - model(spoilt)
+    for nats, put in ((0.7 * 2 * CLEAR, False), (1.5 * 2 * CLEAR, True)):
+        _, found = put_back(spoilt, NOISE, lambda tracks, share=nats / gain: share * model(tracks))
+        assert bool(found) == put
 
 
 @pytest.mark.parametrize("first", [40, 50])

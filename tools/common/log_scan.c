@@ -6,8 +6,9 @@
 
 enum {
     HEAD = 28,
-    SYNC = 0xEDA1DA01 - (1LL << 32)
-}; /* bytes before the channel's name, the first four of them */
+    SYNC = 0xEDA1DA01 - (1LL << 32),
+    LONGEST = 1000
+}; /* bytes before the channel's name, the first four of them, bytes of a name at which LCM stops */
 
 static int64_t big_endian(const unsigned char *at)
 {
@@ -21,7 +22,7 @@ static int64_t event_bytes(FILE *f)
     if (fread(head, 1, HEAD, f) != HEAD || big_endian(head) != SYNC)
         return 0;
     int64_t const name = big_endian(head + 20), data = big_endian(head + 24);
-    return name < 0 || data < 0 ? 0 : HEAD + name + data;
+    return name <= 0 || name >= LONGEST || data < 0 ? 0 : HEAD + name + data;
 }
 
 int64_t log_scan(const char *path, message *why)

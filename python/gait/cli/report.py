@@ -26,6 +26,7 @@ from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.image.video import Image, Video, VideoWriter
 from gait.io.files import replacing, require_outputs
+from gait.lcm.log import break_of
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
 from gait.lcm.results import Run, read_run
 from gait.motion.evaluate import Measures, evaluate
@@ -61,17 +62,14 @@ def run(args: argparse.Namespace) -> int:
     measures = make_report(args, quiet=args.quiet)
     if measures is not None:
         print(json.dumps(measures) if args.json else evaluation_text(measures))
+    damage = break_of(args.log)
+    if damage:
+        raise UserError(f"{args.log}: {damage}; {args.output} shows what came before")
     return 0
 
 
 def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
-    """Write what `args` ask for (see `add_arguments`); return the errors, if there is a truth.
-
-    Raises
-    ------
-    UserError
-        One line; if the log breaks off, after all of what came before is written.
-    """
+    """Write what `args` ask for (see `add_arguments`); return the errors, if there is a truth."""
     video = Video(args.video)
     camera, model = Camera.read(args.camera, video.size), Model(args.model)
     results, track = read_run(args.log), read_track(args.track)
@@ -95,8 +93,6 @@ def make_report(args: argparse.Namespace, quiet: bool) -> Measures | None:
         page.figure(heading, svg)
     with replacing(args.output) as path:
         path.write_text(page.text(), encoding="utf-8")
-    if results.damage:
-        raise UserError(f"{args.log}: {results.damage}; {args.output} shows what came before")
     return measures
 
 

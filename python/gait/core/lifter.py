@@ -89,7 +89,7 @@ class LiftedFrame:
     frame : int
         Frames pushed before it since the start.
     status : TrackStatus
-        TRACKING, or INIT before a first whole segment.
+        TRACKING, AMBIGUOUS where what is seen does not fit, INIT before a first whole segment.
     flags : LiftFlag
     heading : float
         Radians.

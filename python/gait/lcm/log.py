@@ -12,7 +12,8 @@ from gait.lcm.messages import now
 
 PREFIX = "file://"
 _SYNC = 0xEDA1DA01
-_HEAD = struct.Struct(">IqqiI")  # sync, number, time, lengths of channel and data
+_HEAD = struct.Struct(">Iqqii")  # sync, number, time, lengths of channel and data
+_LONGEST = 1000  # bytes of a channel's name at which LCM stops
 
 
 def log_of(url: str) -> tuple[str, str]:
@@ -33,7 +34,7 @@ def break_of(path: str | os.PathLike[str]) -> str | None:
                 break
             sync, _, _, channel, data = _HEAD.unpack(head)
             end = at + _HEAD.size + channel + data
-            if sync != _SYNC or channel <= 0 or data < 0 or end > size:
+            if sync != _SYNC or not 0 < channel < _LONGEST or data < 0 or end > size:
                 break
             file.seek(end)
             at, events = end, events + 1

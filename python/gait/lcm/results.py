@@ -40,8 +40,6 @@ class Run:
         After the last frame, unsigned.
     remark : str or None
         What the log holds beyond that.
-    damage : str or None
-        Where the log breaks off.
     """
 
     frame: NDArray[np.int64]
@@ -52,7 +50,6 @@ class Run:
     dropped: int
     tracker_digest: int
     remark: str | None = None
-    damage: str | None = None
 
 
 def read_run(path: str) -> Run:
@@ -63,7 +60,7 @@ def read_run(path: str) -> Run:
     if not Path(path).is_file():
         raise UserError(f"{path}: no such LCM log; make one with gait record --log or lcm-logger")
     messages: list[Any] = []
-    remark, damage = None, break_of(path)
+    remark = None
     arrived: list[int] = []
     for event in lcm.EventLog(path, "r"):
         if event.channel != "GAIT_ESTIMATE":
@@ -75,9 +72,8 @@ def read_run(path: str) -> Run:
         messages.append(message)
         arrived.append(event.timestamp)
     if not messages:
-        raise UserError(
-            f"{path}: holds no GAIT_ESTIMATE message; {damage or 'record while gait-trackd is tracking'}"
-        )
+        why = break_of(path) or "record while gait-trackd is tracking"
+        raise UserError(f"{path}: holds no GAIT_ESTIMATE message; {why}")
     utime = np.array([m.utime for m in messages], np.int64)
     return Run(
         frame=np.array([m.frame for m in messages], np.int64),
@@ -88,5 +84,4 @@ def read_run(path: str) -> Run:
         dropped=messages[-1].dropped,
         tracker_digest=messages[-1].tracker_digest & (1 << 64) - 1,
         remark=remark,
-        damage=damage,
     )
