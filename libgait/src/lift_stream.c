@@ -10,6 +10,7 @@
 
 #define SLOWEST 10.0 /* frames per second down to which `lag` frames are kept */
 #define DOUBTS  0.25 /* share of doubted numbers from which a segment is the one that is wrong */
+#define FIRST   0.5  /* of the misfit allowed: nothing before a first segment speaks for it */
 
 static int32_t round_up(double x)
 {
@@ -158,18 +159,24 @@ static bool open_parts(const lift_table *t, lift_stream *s)
     return ok;
 }
 
+/* Does a segment contradict what is seen, and may it be searched for?  `share`: of the misfit allowed. */
+static bool contradicts(const lift_table *t, const lift_part *part, double share)
+{
+    const lift_belief *const b = &part->belief[part->best];
+    bool const wrong = lift_misfit(t, b) > share * t->cfg.misfit * b->observed || doubtful(part);
+    return wrong && t->cfg.misfit > 0.0 && t->cfg.heading_sd < 0.0;
+}
+
 /* A segment is over. Nobody seen in it: start anew with the next who is. It does not fit: search for it,
  * and begin those after it again. */
 static bool close_part(const lift_table *t, lift_search *search, lift_stream *s, lift_part *part)
 {
     part->closed = true;
-    const lift_belief *const b = &part->belief[part->best];
-    if (b->observed == 0) {
+    if (part->belief[part->best].observed == 0) {
         lift_stream_reset(s);
         return true;
     }
-    bool const wrong = lift_misfit(t, b) > t->cfg.misfit * b->observed || doubtful(part);
-    s->misfit = wrong && t->cfg.misfit > 0.0 && t->cfg.heading_sd < 0.0;
+    s->misfit = contradicts(t, part, 1.0);
     if (!s->misfit)
         return true;
     bool ok = lift_refit(t, search, s, part->index);
@@ -205,14 +212,17 @@ static bool follow(const lift_table *t, lift_search *search, lift_stream *s)
     return ok;
 }
 
-/* Fit the first segment; where points contradict one another it begins with the next frame instead. */
+/* Fit the first segment, which is not relied on where it fits badly; where points contradict one another it begins
+ * with the next frame instead. */
 static bool begin(const lift_table *t, lift_search *search, lift_stream *s)
 {
     if (lift_stream_time(s, s->pushed - 1) < s->span - 1e-9)
         return true;
     if (!lift_refit(t, search, s, 0))
         return false;
-    s->next = !doubtful(lift_stream_part(s, 0));
+    lift_part *const first = lift_stream_part(s, 0);
+    s->next = !doubtful(first);
+    s->misfit = contradicts(t, first, FIRST);
     for (uint64_t f = lift_stream_oldest(s); !s->next && f < s->pushed; f++)
         if (lift_stream_time(s, f) > 0.0) {
             s->origin = s->past.utime[f % (uint64_t)s->past.room];

@@ -34,7 +34,7 @@ typedef struct lift_stream {
     int64_t origin;  /* utime of the first segment; -1: nobody was seen yet */
     int64_t last;    /* utime of the last frame */
     int64_t next;    /* index of the next segment; 0: none was fitted yet */
-    bool misfit;     /* the last segment was searched for anew */
+    bool misfit;     /* the last segment was searched for anew, or the first fits badly */
 } lift_stream;
 
 void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s);
