@@ -13,6 +13,7 @@ from toy_segments import toy_prior
 from gait import Camera, UserError
 from gait.body import skeleton
 from gait.body.skeleton import EVAL15, JOINTS
+from gait.cli import main
 from gait.core.model import read_blob, read_cyclic
 from gait.io import blob
 from gait.learn import segment_sections
@@ -298,3 +299,14 @@ def test_a_model_of_segments_alone_is_refused_by_name(tmp_path):
     blob.write(path, segment_sections.sections(toy_prior(4, 3, 2, 1)))
     with pytest.raises(UserError, match="segments.gait: holds no cyclic model; learn it without"):
         read_cyclic(path)
+
+
+@pytest.mark.parametrize(("rate", "told"), [(30, False), (10, True)])
+def test_frames_of_other_times_are_told(tmp_path, capsys, rate, told):
+    """Every third frame of a truth numbered by itself is paired with other moments."""
+    places = np.stack([TRUTH.places[name] for name in JOINTS], axis=1)
+    sd, frames = np.full_like(places, 0.1), np.arange(len(places))
+    lifted_file.write(tmp_path / "truth.csv", frames, frames / 30, JOINTS, places, sd)
+    lifted_file.write(tmp_path / "found.csv", frames, 7 + frames / rate, JOINTS, places, sd)
+    assert main(["eval", str(tmp_path / "found.csv"), "--truth", str(tmp_path / "truth.csv")]) == 0
+    assert ("their times run apart by 6.60 s" in capsys.readouterr().err) == told

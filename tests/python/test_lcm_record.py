@@ -1,5 +1,6 @@
 """gait record as a process: whatever ends it, the track so far is whole and the reason is told."""
 
+import json
 import resource
 import signal
 import subprocess
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from gait.lcm.link import open_lcm, private_url
-from gait.lcm.log import break_of
+from gait.lcm.log import LogWriter, break_of
 from gait.lcm.results import read_run
 from gait.lcm.types import gaitmsg
 from gait.motion.trackfile import read_track
@@ -121,6 +122,26 @@ def test_another_stream_that_begins_is_told(estimates, tmp_path):
     assert f"ended, as another stream began (frame 0 after {COUNT - 1})" in done.stderr
     quiet, _ = record(tmp_path, [*estimates, *again], "--quiet")
     assert quiet.returncode == 0 and quiet.stderr == ""
+
+
+def test_damaged_messages_are_left_out_and_told(estimates, tmp_path):
+    """Bytes of something else, an estimate cut short, and one without joints do not end a recording."""
+    bare = later(estimates[3], njoints=0, joints=[], nangles=0, angles=[])
+    log = tmp_path / "in.log"
+    writer = LogWriter(log)
+    for e in estimates[:3]:
+        writer.publish("GAIT_ESTIMATE", e.encode())
+    for spoilt in (bytes(30), estimates[3].encode()[:-20], bare.encode()):
+        writer.publish("GAIT_ESTIMATE", spoilt)
+    for e in estimates[3:]:
+        writer.publish("GAIT_ESTIMATE", e.encode())
+    writer.close()
+    done = rig.gait("record", "--url", f"file://{log}?speed=0", "-o", tmp_path / "t.csv", "--json")
+    assert done.returncode == 0 and "messages left out: 3, first: GAIT_ESTIMATE: not a" in done.stderr
+    figures = json.loads(done.stdout)
+    assert figures["damaged"] == 3 and len(read_track(tmp_path / "t.csv").frame) == COUNT
+    run = read_run(str(log))
+    assert len(run.frame) == COUNT and "a message is left out" in run.remark
 
 
 def test_a_log_played_again_is_another_stream(estimates, tmp_path):

@@ -15,19 +15,23 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import sys
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from gait.core.model import read_cyclic
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.motion.evaluate import LOST_MM, Measures, evaluate
 from gait.motion.events import strikes_of
-from gait.motion.trackfile import read_estimates, read_truth
+from gait.motion.trackfile import Joints, read_estimates, read_truth
 
 NAME = "eval"
 HELP = "errors of a track against the truth"
 
+DRIFT = 0.1  # seconds by which times of paired frames may run apart
 
 MEANING = (
     "abs: 15 joints as they stand; root: hip midpoints laid on each other; static: the mean pose, given the "
@@ -55,8 +59,16 @@ def run(args: argparse.Namespace) -> int:
     truth = read_truth(args.truth)
     beside = Path(args.truth).parent
     camera = args.camera or (beside / "camera.json" if (beside / "camera.json").is_file() else None)
+    track = read_estimates(args.track)
+    apart = _drift(track, truth)
+    if apart > DRIFT and not args.quiet:
+        print(
+            f"{args.track}: frames are paired by number, but their times run apart by {apart:.2f} s: number "
+            "them as the truth does",
+            file=sys.stderr,
+        )
     measures = evaluate(
-        read_estimates(args.track),
+        track,
         truth,
         strikes=strikes_of(truth, beside / "meta.json"),
         model=read_cyclic(args.model),
@@ -64,6 +76,12 @@ def run(args: argparse.Namespace) -> int:
     )
     print(json.dumps(measures) if args.json else text(measures))
     return 0
+
+
+def _drift(track: Joints, truth: Joints) -> float:
+    """Seconds by which the times of frames of the same numbers run apart, whatever both count from."""
+    _, ours, theirs = np.intersect1d(track.frame, truth.frame, return_indices=True)
+    return float(np.ptp(track.time[ours] - truth.time[theirs])) if ours.size else 0.0
 
 
 def text(m: Measures) -> str:

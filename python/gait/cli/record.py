@@ -67,6 +67,10 @@ def run(args: argparse.Namespace) -> int:
     if recorder.other and not args.quiet:
         print(f"gait record: ended, as {recorder.other}; record it into another file", file=sys.stderr)
     figures = recorder.summary()
+    if recorder.damage and not args.quiet:
+        print(
+            f"gait record: messages left out: {figures['damaged']}, first: {recorder.damage}", file=sys.stderr
+        )
     print(json.dumps(figures) if args.json else text(figures))
     return 0
 

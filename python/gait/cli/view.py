@@ -70,8 +70,7 @@ def _save(args: argparse.Namespace, url: str, model: Model, camera: Camera | Non
         while not pictures and time.monotonic() < deadline and viewer.handle(_TURN):
             pass
         if not pictures:
-            raise UserError(
-                "no estimate with its frame and camera came; is gait-trackd tracking on this URL?"
-            )
+            why = viewer.damage or "is gait-trackd tracking on this URL?"
+            raise UserError(f"no estimate with its frame and camera came; {why}")
         if not cv2.imwrite(str(path), pictures[0]):
             raise UserError(f"{args.save}: cannot be written as an image; give a name that ends in .png")

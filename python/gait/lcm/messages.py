@@ -44,6 +44,31 @@ def decode(kind: Any, data: bytes, channel: str) -> Any:
         raise UserError(f"{channel}: damaged gaitmsg.{kind.__name__} ({exc})") from None
 
 
+def estimate_after(data: bytes, channel: str, before: Any = None) -> Any:
+    """Decode an ``estimate_t`` of a stream, `before` its first.
+
+    Raises
+    ------
+    UserError
+        If it is damaged, or of other joints, angles or components.
+    """
+    message = decode(gaitmsg.estimate_t, data, channel)
+    if not message.joints:
+        raise UserError(f"{channel}: an estimate without joints")
+    if before is not None and _holds(message) != _holds(before):
+        raise UserError(f"{channel}: an estimate of other joints than those before")
+    return message
+
+
+def _holds(message: Any) -> tuple[list[str], list[str], int]:
+    """Joints, angles and number of components of an ``estimate_t``."""
+    return (
+        [joint.name for joint in message.joints],
+        [angle.name for angle in message.angles],
+        message.mean.ncoef,
+    )
+
+
 def image_message(image: Image, utime: int, frame: int, jpeg: int | None = None) -> Any:
     """Make an ``image_t``.
 

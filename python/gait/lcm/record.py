@@ -15,8 +15,7 @@ from gait.image.video import Frame
 from gait.io.files import replacing
 from gait.lcm.link import handle, is_log, listener
 from gait.lcm.log import LogWriter, break_of, log_of
-from gait.lcm.messages import decode, estimate_of, now
-from gait.lcm.types import gaitmsg
+from gait.lcm.messages import estimate_after, estimate_of, now
 from gait.motion.trackfile import TrackWriter
 
 _NO_IMAGE = np.empty((0, 0), np.uint8)
@@ -33,6 +32,7 @@ class Figures:
     utime: list[int] = field(default_factory=list)
     last: Any = None
     lost: int = 0
+    damaged: int = 0
 
     def add(self, message: Any, arrived: int) -> None:
         """Take in one estimate."""
@@ -51,6 +51,7 @@ class Figures:
             "frames": len(self.utime),
             "dropped": last.dropped if last else 0,
             "lost": self.lost,
+            "damaged": self.damaged,
             "fps": (len(self.utime) - 1) / span if span > 0 else None,
             "step_ms": spread(self.step) if self.step else None,
             "latency_ms": spread(self.latency) if live and self.latency else None,
@@ -82,6 +83,8 @@ class Recorder:
         Set it to end `run` in good order.
     other : str or None
         Says that another stream began, where that has ended the recording.
+    damage : str or None
+        Says of the first message that was left out what is wrong with it.
     """
 
     def __init__(self, url: str, output: str, log: str | None = None, channel: str = ESTIMATE) -> None:
@@ -96,6 +99,7 @@ class Recorder:
         self.figures = Figures()
         self.stop = False
         self.other: str | None = None
+        self.damage: str | None = None
         self._lcm.subscribe(channel, self._on_estimate).set_queue_capacity(_QUEUE)
 
     def run(
@@ -126,7 +130,8 @@ class Recorder:
             self._flush()
             if not self.figures.utime:
                 raise UserError(
-                    f"{self._channel}: no estimate was received; is gait-trackd tracking on this URL?"
+                    f"{self._channel}: no estimate was received; "
+                    f"{self.damage or 'is gait-trackd tracking on this URL?'}"
                 )
         if self._two:
             raise UserError(
@@ -142,7 +147,12 @@ class Recorder:
 
     def _on_estimate(self, channel: str, data: bytes) -> None:
         arrived = now()
-        message = decode(gaitmsg.estimate_t, data, channel)
+        try:
+            message = estimate_after(data, channel, self.figures.last)
+        except UserError as fault:  # one message does not end a recording
+            self.figures.damaged += 1
+            self.damage = self.damage or str(fault)
+            return
         if self.figures.last is None:
             self._first = message.receive_utime
         elif not self._goes_on(self.figures.last, message):

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from gait.core.estimate import Estimate
 from gait.errors import UserError
 from gait.lcm.log import break_of
-from gait.lcm.messages import decode, estimate_of
-from gait.lcm.types import gaitmsg
+from gait.lcm.messages import estimate_after, estimate_of
 
 Array = NDArray[np.float64]
 
@@ -60,19 +59,23 @@ def read_run(path: str) -> Run:
     if not Path(path).is_file():
         raise UserError(f"{path}: no such LCM log; make one with gait record --log or lcm-logger")
     messages: list[Any] = []
-    remark = None
+    remark, damage = None, None
     arrived: list[int] = []
     for event in lcm.EventLog(path, "r"):
         if event.channel != "GAIT_ESTIMATE":
             continue
-        message = decode(gaitmsg.estimate_t, event.data, path)
+        try:
+            message = estimate_after(event.data, path, messages[0] if messages else None)
+        except UserError as fault:
+            damage = damage or f"a message is left out: {fault}"
+            continue
         if messages and message.frame <= messages[-1].frame:
             remark = f"another stream begins with frame {message.frame}; only the first is used"
             break
         messages.append(message)
         arrived.append(event.timestamp)
     if not messages:
-        why = break_of(path) or "record while gait-trackd is tracking"
+        why = damage or break_of(path) or "record while gait-trackd is tracking"
         raise UserError(f"{path}: holds no GAIT_ESTIMATE message; {why}")
     utime = np.array([m.utime for m in messages], np.int64)
     return Run(
@@ -83,5 +86,5 @@ def read_run(path: str) -> Run:
         latency_ms=(np.array(arrived, np.int64) - utime) / 1e3,
         dropped=messages[-1].dropped,
         tracker_digest=messages[-1].tracker_digest & (1 << 64) - 1,
-        remark=remark,
+        remark=remark or damage,
     )

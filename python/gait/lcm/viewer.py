@@ -41,6 +41,11 @@ class Viewer:
         Taken from ``GAIT_CAMERA_<i>`` if left out.
     show : callable
         Gets each finished BGR picture.
+
+    Attributes
+    ----------
+    damage : str or None
+        Says of the first message that could not be shown what is wrong with it.
     """
 
     def __init__(
@@ -51,6 +56,7 @@ class Viewer:
         self._overlay = Overlay(model, camera) if camera is not None else None
         self._frames: dict[int, Any] = {}
         self._origin: int | None = None
+        self.damage: str | None = None
         for channel, handler, capacity in (
             (f"GAIT_IMAGE_{stream}", self._on_image, _KEPT),
             (f"GAIT_CAMERA_{stream}", self._on_camera, 1),
@@ -59,8 +65,12 @@ class Viewer:
             self._lcm.subscribe(channel, handler).set_queue_capacity(capacity)
 
     def handle(self, seconds: float) -> bool:
-        """Take in a message, waiting at most so long; False at the end of a log."""
-        return handle(self._lcm, seconds, self._log)
+        """Take in a message, waiting at most so long; False at the end of a log; damaged ones are left out."""
+        try:
+            return handle(self._lcm, seconds, self._log)
+        except UserError as fault:
+            self.damage = self.damage or str(fault)
+            return True
 
     def _on_image(self, channel: str, data: bytes) -> None:
         message = decode(gaitmsg.image_t, data, channel)
