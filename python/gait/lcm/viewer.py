@@ -65,7 +65,7 @@ class Viewer:
             self._lcm.subscribe(channel, handler).set_queue_capacity(capacity)
 
     def handle(self, seconds: float) -> bool:
-        """Take in a message, waiting at most so long; False at the end of a log; damaged ones are left out."""
+        """Take in a message, waiting at most so long, but for damaged ones; False at the end of a log."""
         try:
             return handle(self._lcm, seconds, self._log)
         except UserError as fault:
