@@ -18,6 +18,7 @@ import numpy.typing as npt
 import table
 
 from gait.body.skeleton import EVAL15
+from gait.errors import UserError
 from gait.learn.stage import one_thread
 from gait.lift import motion, outliers, sides
 from gait.lift.equations import Perspective
@@ -25,6 +26,8 @@ from gait.lift.result import Options
 from gait.lift.tracks_file import Tracks
 from gait.motion.trackfile import Joints
 from gait.progress import progress
+
+Floats = npt.NDArray[np.float64]
 
 LEGS = ("hip", "knee", "ankle")
 PARTS = {"legs": LEGS, "legs and arms": (*LEGS, "shoulder", "elbow", "wrist"), "nothing": ()}
@@ -93,21 +96,23 @@ def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[
     clock.append(time.perf_counter())
     errors = []
     for seen in (tracks, spoilt, back):
-        steady, _ = outliers.without_jumps(seen, lift_tracks.NOISE)
-        lifted = lift_tracks.lifted(walk.prior, steady, walk.camera, lift_tracks.NOISE)
-        order = [lifted.names.index(name) for name in EVAL15]
-        errors.append(
-            lift_tracks.root_error(
-                lifted.places[:, order][begin : begin + case.length],
-                places[begin : begin + case.length],
-                lift_tracks.HIPS,
-            )
-        )
+        errors.append(_error(walk, seen, places, slice(begin, begin + case.length)))
         clock.append(time.perf_counter())
     judging, lifting = clock[1] - clock[0], clock[2] - clock[1]
     right = spoilt.seen & (spoilt.uv == tracks.uv).all(axis=2)
     moved = (_differ(back, tracks, among) for among in (~right, right))
     return [*errors, judging / lifting, (spoilt.seen & ~right).sum(), *moved]
+
+
+def _error(walk: lift_people.Walk, seen: Tracks, places: Floats, rows: slice) -> float:
+    """Root error of a walk in some rows, mm; infinite if its lift is refused."""
+    steady, _ = outliers.without_jumps(seen, lift_tracks.NOISE)
+    try:
+        lifted = lift_tracks.lifted(walk.prior, steady, walk.camera, lift_tracks.NOISE)
+    except UserError:
+        return float("inf")
+    order = [lifted.names.index(name) for name in EVAL15]
+    return lift_tracks.root_error(lifted.places[:, order][rows], places[rows], lift_tracks.HIPS)
 
 
 def put_back(walk: lift_people.Walk, tracks: Tracks) -> Tracks:
@@ -148,14 +153,18 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         values = np.array(walks)
         medians, points = np.median(values[:, :4], axis=0), values[:, 4:].sum(axis=0).astype(int)
         rows.append(
-            [case.part, case.length, case.rate, f"{case.wild:.0%}", len(walks), *medians, *points.tolist()]
+            [
+                *(case.part, case.length, case.rate, f"{case.wild:.0%}", len(walks), *medians),
+                *(*points.tolist(), int(np.isinf(values[:, 1]).sum()), int(np.isinf(values[:, 2]).sum())),
+            ]
         )
     note = (
         "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing, some of the rest "
         f"wild ({WILD_PIXELS:g} px); in one stretch of frames left and right are exchanged. Root-aligned "
         "error in that stretch, median mm: as seen, exchanged (--keep-sides), put back (gait lift alone). "
         "Lifts: how long the putting back takes, over a lift of the tracks as seen, median. Points "
-        "exchanged; of these those still wrong after putting back; those moved that were right."
+        "exchanged; of these those still wrong after putting back; those moved that were right. Refused: walks "
+        "that come out of no person's size, as exchanged and as put back; their errors count as infinite."
     )
     head = [
         "exchanged",
@@ -170,6 +179,8 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         "points",
         "left",
         "false",
+        "refused",
+        "put back refused",
     ]
     table.publish("lift_sides", "Left and right exchanged", head, rows, note)
 
