@@ -163,8 +163,8 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         f"wild ({WILD_PIXELS:g} px); in one stretch of frames left and right are exchanged. Root-aligned "
         "error in that stretch, median mm: as seen, exchanged (--keep-sides), put back (gait lift alone). "
         "Lifts: how long the putting back takes, over a lift of the tracks as seen, median. Points "
-        "exchanged; of these those still wrong after putting back; those moved that were right. Refused: walks "
-        "that come out of no person's size, as exchanged and as put back; their errors count as infinite."
+        "exchanged; of these those still wrong after putting back; those moved that were right. Refused: "
+        "walks that come out of no person's size, as exchanged and as put back; their errors count as infinite."
     )
     head = [
         "exchanged",
