@@ -164,7 +164,7 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         "error in that stretch, median mm: as seen, exchanged (--keep-sides), put back (gait lift alone). "
         "Lifts: how long the putting back takes, over a lift of the tracks as seen, median. Points "
         "exchanged; of these those still wrong after putting back; those moved that were right. Refused: "
-        "walks that come out of no person's size, as exchanged and as put back; their errors count as infinite."
+        "walks that come out of no size of a person, exchanged and put back; such an error is infinite."
     )
     head = [
         "exchanged",
