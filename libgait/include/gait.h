@@ -337,8 +337,7 @@ typedef struct gait_lift_fit {   /* what one segment's observations say */
 } gait_lift_fit;
 
 #define GAIT_LIFT_UNSEEN 0x1u /* nothing was observed of the segments behind this estimate: it is the prior's */
-#define GAIT_LIFT_MISFIT 0x2u /* a segment behind this fits worse than config misfit (the first: than half of it, until the
-                               * next is over), or the last was searched for anew */
+#define GAIT_LIFT_MISFIT 0x2u /* a segment behind it fits worse than config misfit (the first: half), or was searched for anew */
 typedef struct gait_lift_frame { /* one frame of a stream, `lag` frames ago */
     int64_t  utime;              /* its capture time */
     uint64_t frame;              /* frames pushed before it since the start */
