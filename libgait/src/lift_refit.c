@@ -47,24 +47,16 @@ static void believe(const lift_table *t, lift_stream *s, const lift_window *w, d
         s->sd[i] = times * s->calm[i];
 }
 
-/* Search for a segment by what is believed of its points, and believe what that leaves of them. */
-static bool look(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w,
-                 lift_belief *b, int32_t *doubted)
-{
-    lift_outcome outcome;
-    memcpy(b->place, t->cfg.place, sizeof b->place);
-    bool const ok = lift_fit(t, search, w, b, &outcome);
-    *doubted = ok ? doubt_window(t, s, w, b) : 0;
-    return ok;
-}
-
 /* Search by all points, of deviations so many times theirs, and go on from there without those that are far off. */
 static bool fit_from(const lift_table *t, lift_search *search, lift_stream *s, const lift_window *w,
                      lift_belief *b, double times, int32_t *doubted)
 {
+    lift_outcome outcome;
+    int32_t before = times > 1.0 ? -1 : 0; /* a rough fit is never the last */
     believe(t, s, w, times);
-    bool ok = look(t, search, s, w, b, doubted);
-    int32_t before = times > 1.0 ? -1 : 0;
+    memcpy(b->place, t->cfg.place, sizeof b->place);
+    bool ok = lift_fit(t, search, w, b, &outcome);
+    *doubted = ok ? doubt_window(t, s, w, b) : 0;
     for (int32_t fits = 0; ok && *doubted != before && fits < FITS; fits++) {
         before = *doubted;
         ok = lift_fit_again(t, search, w, b);
@@ -83,7 +75,7 @@ static bool fit(const lift_table *t, lift_search *search, lift_stream *s, const 
         return ok;
     double const usual = lift_evidence(t, b);
     ok = fit_from(t, search, s, w, b, ROUGH, doubted);
-    if (ok && lift_evidence(t, b) < usual)
+    if (ok && lift_evidence(t, b) < usual) /* there is no room to keep both */
         ok = fit_from(t, search, s, w, b, 1.0, doubted);
     return ok;
 }

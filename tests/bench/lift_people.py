@@ -134,7 +134,7 @@ def _lifted(walk: Walk) -> tuple[Outcome, Outcome]:
     frames = np.arange(len(walk.places))
     joints = Joints(frames, frames / RATE, dict(zip(EVAL15, walk.places.transpose(1, 0, 2), strict=True)))
     tracks = lift_tracks.tracked(joints, walk.camera, lift_tracks.NOISE, lift_tracks.GAPS)
-    at, places, sd = lift_stream.streamed(tracks, walk.camera, walk.model, LiftConfig.default())
+    at, places, sd, _ = lift_stream.streamed(tracks, walk.camera, walk.model, LiftConfig.default())
     live = _judged(walk, places, sd, None, walk.places[at])
     found = lift_tracks.lifted(walk.prior, tracks, walk.camera, lift_tracks.NOISE)
     order = [found.names.index(name) for name in EVAL15]

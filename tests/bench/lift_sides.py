@@ -31,7 +31,6 @@ Floats = npt.NDArray[np.float64]
 
 LEGS = ("hip", "knee", "ankle")
 PARTS = {"legs": LEGS, "legs and arms": (*LEGS, "shoulder", "elbow", "wrist"), "nothing": ()}
-WILD_PIXELS = 150.0  # deviation of wild points
 SEED = 11
 EACH, APART = 3, 4  # cases of a walk, and how far apart they are in the list
 
@@ -88,7 +87,7 @@ def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[
     frames = np.arange(len(places))
     true = Joints(frames, frames / case.rate, dict(zip(EVAL15, places.transpose(1, 0, 2), strict=True)))
     tracks = lift_tracks.tracked(true, walk.camera, lift_tracks.NOISE, lift_tracks.GAPS)
-    tracks = _wild(tracks, case.wild, rng)
+    tracks = lift_tracks.wild(tracks, case.wild, rng)
     begin = int(rng.integers(1, len(frames) - case.length))
     spoilt = exchanged(tracks, PARTS[case.part], begin, begin + case.length)
     clock = [time.perf_counter()]
@@ -133,15 +132,6 @@ def exchanged(tracks: Tracks, joints: tuple[str, ...], begin: int, end: int) -> 
     return replace(tracks, uv=uv)
 
 
-def _wild(tracks: Tracks, share: float, rng: np.random.Generator) -> Tracks:
-    """Tracks with a share of the points anywhere."""
-    wild = rng.random(tracks.uv.shape[:2]) < share
-    return replace(
-        tracks,
-        uv=tracks.uv + WILD_PIXELS * wild[..., None] * rng.normal(size=tracks.uv.shape),
-    )
-
-
 def _differ(one: Tracks, other: Tracks, among: npt.NDArray[np.bool_]) -> int:
     """Points among some that are not where the other tracks have them."""
     return int((among & one.seen & (one.uv != other.uv).any(axis=2)).sum())
@@ -160,7 +150,7 @@ def _publish(found: dict[Case, list[list[float]]]) -> None:
         )
     note = (
         "Other walks of the clips' people as in lift_people, 3 px of noise, 10 % missing, some of the rest "
-        f"wild ({WILD_PIXELS:g} px); in one stretch of frames left and right are exchanged. Root-aligned "
+        f"wild ({lift_tracks.OFF:g} px); in one stretch of frames left and right are exchanged. Root-aligned "
         "error in that stretch, median mm: as seen, exchanged (--keep-sides), put back (gait lift alone). "
         "Lifts: how long the putting back takes, over a lift of the tracks as seen, median. Points "
         "exchanged; of these those still wrong after putting back; those moved that were right. Refused: "

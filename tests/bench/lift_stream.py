@@ -25,9 +25,11 @@ from gait.motion.trackfile import read_truth
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 
 LEAST = 0.80  # coverage
-WRONG, OFF = 0.05, 150.0  # share of the points, pixels
+WRONG = 0.05  # share of the points
 MANY = 0.15  # of the points, where the status tells what to rely on
 EXCHANGED = 10  # frames
 STRICT = 4.0  # misfit, below the usual one
@@ -50,8 +52,8 @@ def main() -> int:
     note = (
         f"As for lift_dev, frame by frame with a lag of {LiftConfig.default().lag}: stature unknown; given "
         "(the true one); exact: coverage if the mean stature is taken for the person's (stature_sd 0). "
-        f"wrong: {WRONG:.0%} of the points, off by {OFF:g} px (a standard deviation); legs: left and right "
-        f"exchanged for {EXCHANGED} frames; worst: of any frame, mm. many: {MANY:.0%} of the points; "
+        f"wrong: {WRONG:.0%} of the points, off by {lift_tracks.OFF:g} px (a standard deviation); legs: left "
+        f"and right exchanged for {EXCHANGED} frames; worst: of any frame, mm. many: {MANY:.0%} of the points; "
         "tracked: share of the frames that come out as TRACKING, the only ones that count there. "
         f"Coverage of the 90 % intervals of places in the world. Wanted: at least {LEAST:g}, of unknown "
         "stature; "
@@ -72,11 +74,10 @@ def _odd() -> None:
         row: list[object] = [name]
         for misfit in (LiftConfig.default().misfit, STRICT):
             config = LiftConfig.default(misfit=misfit)
-            at, found, sd = streamed(tracks, camera, None, config)
-            tracked = streamed(tracks, camera, None, config, (TrackStatus.TRACKING,))[0]
+            at, found, sd, tracked = streamed(tracks, camera, None, config)
             apart = np.linalg.norm(found - true[at], axis=2).mean(axis=1)
             inside = np.mean(np.abs(found - true[at]) < lift_tracks.WITHIN * sd)
-            row += [1000 * float(np.median(apart)), float(inside), len(tracked) / len(at)]
+            row += [1000 * float(np.median(apart)), float(inside), float(tracked.mean())]
         rows.append(row)
     note = (
         "The balancing man by the shipped prior of walks, frame by frame, "
@@ -90,9 +91,7 @@ def _odd() -> None:
 
 def _wrong(tracks: Tracks, share: float = WRONG) -> Tracks:
     """Tracks of a detector that puts single points elsewhere."""
-    rng = np.random.default_rng(2)
-    off = OFF * rng.normal(size=tracks.uv.shape) * (rng.random(tracks.seen.shape) < share)[..., None]
-    return replace(tracks, uv=tracks.uv + off)
+    return lift_tracks.wild(tracks, share, np.random.default_rng(2))
 
 
 def _legs(tracks: Tracks) -> Tracks:
@@ -114,7 +113,7 @@ def _row(clip: Clip, model: Path) -> list[object]:
     usual, stature = LiftConfig.default(), eval_clips.meta_of(clip.folder)["stature_m"]
 
     def lifted(config: LiftConfig, seen: Tracks = tracks) -> list[float]:
-        return _judged(streamed(seen, camera, model, config), joints.eval15())
+        return _judged(*streamed(seen, camera, model, config)[:3], joints.eval15())
 
     root, apart, _, share = lifted(usual)
     given = lifted(LiftConfig.default(stature=stature))
@@ -128,15 +127,13 @@ def _row(clip: Clip, model: Path) -> list[object]:
 
 def _many(tracks: Tracks, camera: Camera, model: Path, true: Floats) -> list[float]:
     """Share of frames tracked among many wrong points; median and worst mm of those, and coverage."""
-    spoilt = _wrong(tracks, MANY)
-    count = len(streamed(spoilt, camera, model, LiftConfig.default())[0])
-    relied = streamed(spoilt, camera, model, LiftConfig.default(), (TrackStatus.TRACKING,))
-    return [len(relied[0]) / count, *_judged(relied, true)[1:]]
+    at, found, sd, tracked = streamed(_wrong(tracks, MANY), camera, model, LiftConfig.default())
+    relied = at[tracked], found[tracked], sd[tracked]
+    return [float(tracked.mean()), *_judged(*relied, true)[1:]]
 
 
-def _judged(streamed: tuple[list[int], Floats, Floats], true: Floats) -> list[float]:
+def _judged(at: Ints, found: Floats, sd: Floats, true: Floats) -> list[float]:
     """Root-aligned and absolute error, median mm, the worst frame's, and coverage."""
-    at, found, sd = streamed
     apart = 1000 * np.linalg.norm(found - true[at], axis=2).mean(axis=1)
     inside = np.mean(np.abs(found - true[at]) < lift_tracks.WITHIN * sd)
     root = lift_tracks.root_error(found, true[at], lift_tracks.HIPS)
@@ -144,27 +141,24 @@ def _judged(streamed: tuple[list[int], Floats, Floats], true: Floats) -> list[fl
 
 
 def streamed(
-    tracks: Tracks,
-    camera: Camera,
-    model: Path | None,
-    config: LiftConfig,
-    statuses: tuple[TrackStatus, ...] = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS),
-) -> tuple[list[int], Floats, Floats]:
-    """Frames (n) of these statuses from the live lifter, and their joints and deviations (n, 15, 3)."""
+    tracks: Tracks, camera: Camera, model: Path | None, config: LiftConfig
+) -> tuple[Ints, Floats, Floats, Flags]:
+    """Frames (n) that come out of the live lifter, joints and deviations (n, P, 3), whether TRACKING (n)."""
     lifter = Lifter(model, camera, config)
     index = [lifter.names.index(name) for name in tracks.names]
     utimes = np.round(1e6 * tracks.time).astype(int)
-    at, places, spread = [], [], []
+    at, places, spread, tracked = [], [], [], []
     uv = np.full((len(lifter.names), 2), np.nan)
     for utime, seen in zip(utimes.tolist(), tracks.uv, strict=True):
         uv[index] = seen
         lifter.push(utime, uv)
         frame = lifter.estimate()
-        if frame is not None and frame.status in statuses:
+        if frame is not None and frame.status != TrackStatus.INIT:
             at.append(int(np.searchsorted(utimes, frame.utime)))
             places.append(frame.markers[index])
             spread.append(frame.sd[index])
-    return at, np.array(places), np.array(spread)
+            tracked.append(frame.status == TrackStatus.TRACKING)
+    return np.array(at), np.array(places), np.array(spread), np.array(tracked)
 
 
 if __name__ == "__main__":

@@ -69,6 +69,12 @@ def tracked(joints: Joints, camera: Camera, noise: float, gaps: float) -> Tracks
     return Tracks(joints.frame, joints.time, names, uv, np.ones(uv.shape[:2]))
 
 
+def wild(tracks: Tracks, share: float, rng: np.random.Generator) -> Tracks:
+    """Tracks of a detector that puts a share of the points anywhere."""
+    off = rng.random(tracks.seen.shape) < share
+    return replace(tracks, uv=tracks.uv + off[..., None] * rng.normal(0, OFF, tracks.uv.shape))
+
+
 def rooted(places: Floats, hips: list[int]) -> Floats:
     """Places (T, J, 3) about the middle of the hips."""
     return places - places[:, hips].mean(axis=1, keepdims=True)
@@ -132,8 +138,8 @@ def _clips() -> list[list[object]]:
             blend = lifted(prior, tracks, camera, NOISE, "blend")
             stature = float(eval_clips.meta_of(clip.folder)["stature_m"])
             known = lifted(prior, tracks, camera, NOISE, floor_sd=FLOOR_KNOWN, stature=stature)
-            steady, _ = outliers.without_jumps(_wild(tracks), NOISE)
-            wild = lifted(prior, steady, camera, NOISE)
+            steady, _ = outliers.without_jumps(wild(tracks, WILD, np.random.default_rng(2)), NOISE)
+            spoilt = lifted(prior, steady, camera, NOISE)
             order = [found.names.index(name) for name in EVAL15]
             error = root_error(found.places[:, order], truth, HIPS)
             share, rooted_share = _coverage(found, truth, order)
@@ -143,7 +149,7 @@ def _clips() -> list[list[object]]:
                     *(_blind(prior, tracks, camera, truth), _static(prior, tuple(EVAL15), truth, HIPS)),
                     *(_absolute(found, truth, order), share, rooted_share),
                     *(_absolute(known, truth, order), _coverage(known, truth, order)[0]),
-                    *judged(wild, truth),
+                    *judged(spoilt, truth),
                     "yes" if error < TARGET else "NO",
                 ]
             )
@@ -178,13 +184,6 @@ def _clips() -> list[list[object]]:
     ]
     table.publish("lift_dev", "Tracks of the development clips", [*head, "met"], rows, note)
     return rows
-
-
-def _wild(tracks: Tracks) -> Tracks:
-    """Tracks of a detector that puts many points elsewhere."""
-    rng = np.random.default_rng(2)
-    wild = rng.random(tracks.seen.shape) < WILD
-    return replace(tracks, uv=tracks.uv + wild[..., None] * rng.normal(0, OFF, tracks.uv.shape))
 
 
 def _blind(prior: SegmentPrior, tracks: Tracks, camera: Camera, truth: Floats) -> float:

@@ -191,6 +191,10 @@ def test_what_else_a_log_holds_is_remarked(estimates, tmp_path):
     assert read_run(str(rig.write_log(tmp_path / "whole.log", events))).remark is None
     twice = read_run(str(rig.write_log(tmp_path / "twice.log", events * 2)))
     assert len(twice.frame) == COUNT and twice.remark.startswith("another stream begins with frame 0;")
+    cut = tmp_path / "cut.log"
+    cut.write_bytes((tmp_path / "whole.log").read_bytes()[:-100])
+    assert len(read_run(str(cut)).frame) == COUNT - 1
+    assert f"messages before: {COUNT - 1}" in break_of(cut)
 
 
 def test_logs_break_off_where_lcm_stops(tmp_path):

@@ -5,6 +5,7 @@ import subprocess
 import urllib.error
 import urllib.request
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import lcm_rig as rig
@@ -46,6 +47,20 @@ def test_each_estimate_is_drawn_into_its_own_frame(log):
     for picture, i in zip(shown, (0, 1, 2, 4, 5), strict=True):
         estimate = replace(estimate_of(estimates[i]), utime=rig.utime(i) - rig.utime(0))
         np.testing.assert_array_equal(picture, overlay.draw(rig.picture(i), estimate, i))
+
+
+def test_damaged_messages_are_passed_over(log, tmp_path):
+    frames, estimates = rig.frames(0, 3), log[1]
+    cut = SimpleNamespace(encode=lambda: bytes(30))
+    events = [*rig.opening()]
+    for frame, estimate in zip(frames, estimates, strict=False):
+        events += [(frame[0], cut), frame, ("GAIT_ESTIMATE", cut), ("GAIT_ESTIMATE", estimate)]
+    path = rig.write_log(tmp_path / "spoilt.log", events)
+    assert len(view(path)) == 3
+    viewer = Viewer(f"file://{path}?speed=0", 0, rig.model(), None, lambda picture: None)
+    while viewer.handle(1.0):
+        pass
+    assert "GAIT_IMAGE_0: not a gaitmsg.image_t" in viewer.damage
 
 
 def test_without_a_camera_nothing_is_drawn(log, tmp_path):

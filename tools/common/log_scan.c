@@ -5,10 +5,10 @@
 #include <sys/stat.h>
 
 enum {
-    HEAD = 28,
-    SYNC = 0xEDA1DA01 - (1LL << 32),
-    LONGEST = 1000
-}; /* bytes before the channel's name, the first four of them, bytes of a name at which LCM stops */
+    HEAD = 28,                       /* bytes before the channel's name, */
+    SYNC = 0xEDA1DA01 - (1LL << 32), /* the first four of them */
+    LONGEST = 1000                   /* bytes of a name at which LCM stops */
+};
 
 static int64_t big_endian(const unsigned char *at)
 {

@@ -57,6 +57,8 @@ def run(args: argparse.Namespace) -> int:
         while viewer.handle(_TURN):
             pass
     screen.close()
+    if viewer.damage and not args.quiet:
+        print(f"gait view: left out: {viewer.damage}", file=sys.stderr)
     return 0
 
 

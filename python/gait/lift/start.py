@@ -7,7 +7,8 @@ A segment seen from far away fits nearly as well when it is mirrored in depth; i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -53,45 +54,54 @@ def explanations(
         if part.seen.sum() < FEWEST:
             found.append([])
         else:
-            found.append(_trusted(prior, part, view, lengths[begin:end], person))
+            found.append(_Segment(prior, part, view, lengths[begin:end], person).trusted())
         update(s + 1)
     return found
 
 
-def _trusted(
-    prior: SegmentPrior, seen: Observations, view: View, lengths: Floats, person: Person
-) -> list[Explanation]:
-    """Explain a segment by all points, then without those far from where the rest has them (`doubt`).
+@dataclass(frozen=True)
+class _Segment:
+    """What is seen of a segment, and how."""
 
-    Where wild points may have led the search astray it is made again, first while all points say less; the
-    more probable explanation counts.
-    """
+    prior: SegmentPrior
+    seen: Observations
+    view: View
+    lengths: Floats
+    person: Person
 
-    def explained(points: Observations) -> tuple[list[Explanation], Floats]:
-        def measure(places: Floats) -> Rows:
-            rows = view.rows(points, places, lengths)
-            return rows if view.grounded else _centred(rows, places)
+    def trusted(self) -> list[Explanation]:
+        """Explain it by all points, then without those far from where the rest has them (`doubt`).
 
-        found = explain(prior, measure, person)
-        said = view.project(found[0].posterior.points, lengths)
-        if not view.grounded:
-            said = said + np.nanmedian(seen.uv - said, axis=(0, 1))
+        Where wild points may have led the search astray it is made again, first while all points say less;
+        the more probable explanation counts.
+        """
+        found, astray = self._doubting(self.seen)
+        if not astray:
+            return found
+        other, _ = self._doubting(replace(self.seen, sd=ROUGH * self.seen.sd))
+        return max(found, other, key=lambda each: each[0].posterior.log_evidence)
+
+    def _doubting(self, points: Observations) -> tuple[list[Explanation], bool]:
+        """Explain it by points, and again while that leaves others in doubt; and whether it went astray."""
+        found, said = self._explained(points)
+        for _ in range(DOUBTS):
+            before, points = points, doubt.doubted(self.seen, said)
+            if np.array_equal(points.sd > self.seen.sd, before.sd > self.seen.sd):
+                break
+            found, said = self._explained(points)
+        return found, _astray(self.seen, points, said)
+
+    def _explained(self, points: Observations) -> tuple[list[Explanation], Floats]:
+        """Explanations by points, and where the first has them in the picture."""
+        found = explain(self.prior, partial(self._rows, points), self.person)
+        said = self.view.project(found[0].posterior.points, self.lengths)
+        if not self.view.grounded:
+            said = said + np.nanmedian(self.seen.uv - said, axis=(0, 1))
         return found, said
 
-    def doubting(points: Observations) -> tuple[list[Explanation], bool]:
-        found, said = explained(points)
-        for _ in range(DOUBTS):
-            before, points = points, doubt.doubted(seen, said)
-            if np.array_equal(points.sd > seen.sd, before.sd > seen.sd):
-                break  # the same are doubted
-            found, said = explained(points)
-        return found, _astray(seen, points, said)
-
-    found, astray = doubting(seen)
-    if not astray:
-        return found
-    other, _ = doubting(replace(seen, sd=ROUGH * seen.sd))
-    return max(found, other, key=lambda each: each[0].posterior.log_evidence)
+    def _rows(self, points: Observations, places: Floats) -> Rows:
+        rows = self.view.rows(points, places, self.lengths)
+        return rows if self.view.grounded else _centred(rows, places)
 
 
 def _astray(seen: Observations, trusted: Observations, said: Floats) -> bool:
