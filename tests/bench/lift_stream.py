@@ -53,7 +53,7 @@ def main() -> int:
         f"As for lift_dev, frame by frame with a lag of {LiftConfig.default().lag}: stature unknown; given "
         "(the true one); exact: coverage if the mean stature is taken for the person's (stature_sd 0). "
         f"wrong: {WRONG:.0%} of the points, off by {lift_tracks.OFF:g} px (a standard deviation); legs: left "
-        f"and right exchanged for {EXCHANGED} frames; worst: of any frame, mm. many: {MANY:.0%} of the points; "
+        f"and right exchanged for {EXCHANGED} frames; worst: of any frame, mm. many: {MANY:.0%} of them; "
         "tracked: share of the frames that come out as TRACKING, the only ones that count there. "
         f"Coverage of the 90 % intervals of places in the world. Wanted: at least {LEAST:g}, of unknown "
         "stature; "
