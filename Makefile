@@ -47,9 +47,9 @@ EIGEN := $(firstword $(wildcard $(VENV_EIGEN)) $(patsubst -I%,%,$(shell pkg-conf
 endif
 
 # ---- flags ---------------------------------------------------------------------------------------------------
-# Same bits everywhere: baseline instruction set, no fused multiply-add, no -ffast-math, Eigen not vectorised.
-# Ignoring errno and traps changes no value (make golden-check) and lets loops over lanes become vector code.
-OPT_release  := -O3 -DNDEBUG -fno-math-errno -fno-trapping-math
+include libgait/flags.mk
+
+OPT_release  := $(RELEASE_FLAGS)
 OPT_debug    := -O0
 OPT_sanitize := -O1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
 OPT_thread   := -O1 -fsanitize=thread -fno-omit-frame-pointer
@@ -57,39 +57,25 @@ OPT ?= $(OPT_$(config))
 ifeq ($(OPT),)
 $(error unknown config=$(config): use release, debug, sanitize or thread)
 endif
-# At -O3 only what a step or a live lift spends its time in, at -O2 what else runs for every particle or row of
-# numbers (a third smaller, 2 % of a step), with vector code where that has loops over lanes, at -Os the rest (a fifth
-# smaller again, no slower).
 GCC   := $(if $(findstring clang,$(shell $(CC) --version 2>/dev/null)),,gcc)
-TIGHT := $(if $(GCC),$(patsubst %,-fno-align-%,functions loops jumps labels))
+TIGHT := $(if $(GCC),$(GCC_TIGHT))
 SMALL := $(if $(filter -O3,$(OPT)),-O2 $(TIGHT))
 LEAST := $(if $(filter -O3,$(OPT)),-Os $(TIGHT))
-FAST  := lift_read.c $(patsubst %,%_kernel.c,outline like_edges like_pose like_silhouette like_surface)
-MANY  := $(patsubst %,%.c,kinematics lift mingle pf population weigh)
-LANED := fmath.c
-C_FLAGS = $(if $(filter $(FAST),$(1)),,$(if $(filter $(LANED),$(1)),$(SMALL_FLAGS),$(if $(filter $(MANY),$(1)),$(SMALL),$(LEAST))))
-WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(werror),-Werror)
+SMALL_VECTOR := $(if $(SMALL),$(SMALL) $(if $(GCC),$(GCC_VECTOR),$(CLANG_VECTOR)))
+# Flags of a source by its file name; kernels and other sources differ where no list names them.
+listed = $(if $(filter $(1),$(VECTOR_SOURCES)),$(SMALL_VECTOR),$(if $(filter $(1),$(O2_SOURCES)),$(SMALL),$(2)))
+C_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),,$(call listed,$(1),$(LEAST)))
+KERNEL_FLAGS = $(if $(filter $(1),$(O3_SOURCES)),$(FAST_FLAGS),$(call listed,$(1),$(SMALL_VECTOR)))
+FAST_FLAGS := $(if $(GCC),$(GCC_KERNEL))
+WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla $(if $(GCC),,-Wno-pass-failed) $(if $(werror),-Werror)
 CWARN  := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 COMMON := $(OPT) -g -MMD -MP -ffp-contract=off
 CALLS := $(shell $(CC) -fcallgraph-info=su -E -x c /dev/null >/dev/null 2>&1 && echo -fcallgraph-info=su)
 # Atomics of aarch64 in line: libgcc's would bring a constructor and a writable global.
 ATOMICS := $(shell $(CC) -Werror -mno-outline-atomics -E -x c /dev/null >/dev/null 2>&1 && echo -mno-outline-atomics)
-LIBGAIT := $(COMMON) $(ATOMICS) -fPIC -fvisibility=hidden -fno-asynchronous-unwind-tables -fstack-usage $(CALLS) -Wframe-larger-than=16384 \
+LIBGAIT := $(COMMON) $(CODE_FLAGS) $(ATOMICS) -fstack-usage $(CALLS) -Wframe-larger-than=16384 \
            -Ilibgait/include
-EIGEN_FLAGS := -isystem $(EIGEN) -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_NO_IO
-NO_RUNTIME := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden
-
-# Kernels (libgait/src/kernels.h) are compiled once per instruction set; `scalar` defines their results.
-# gcc at -O3 would unroll every loop over 16 lanes besides making vector code of it: half as large again, no faster.
-FAST_FLAGS := $(if $(GCC),--param=max-completely-peel-times=8,-Wno-pass-failed)
-SMALL_FLAGS := $(if $(SMALL),$(SMALL) -ftree-vectorize $(if $(GCC),-fvect-cost-model=dynamic)) $(if $(GCC),,-Wno-pass-failed)
-KERNEL_FLAGS = $(if $(filter $(FAST),$(notdir $(1))),$(FAST_FLAGS),$(SMALL_FLAGS))
-FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
-FLAGS_base   :=
-FLAGS_avx2   := -mavx2 -mpopcnt -mbmi -mbmi2
-FLAGS_avx512 := $(FLAGS_avx2) -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vpopcntdq \
-                -mavx512bitalg -mprefer-vector-width=512
-KERNEL_ISAS := scalar base $(if $(findstring x86_64,$(MACHINE)),avx2 avx512)
+KERNEL_ISAS := scalar base $(if $(findstring x86_64,$(MACHINE)),$(X86_ISAS))
 KERNEL_SRC := $(sort $(wildcard libgait/src/*_kernel.c))
 KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(KERNEL_SRC:libgait/src/%.c=$(B)/src/%.$(isa).o))
 SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*.c libgait/src/*.cpp)))
@@ -115,7 +101,7 @@ MADE := $(B)/.made_with
 ifneq ($(strip $(shell cat $(MADE) 2>/dev/null)),$(strip $(MADE_WITH)))
 .PHONY: $(MADE)
 endif
-$(MADE): | $(B)/
+$(MADE): libgait/flags.mk | $(B)/
 	@printf '%s\n' '$(subst ','\'',$(MADE_WITH))' > $@.$$$$ && mv $@.$$$$ $@
 
 # Said before anything is built or fetched.
@@ -177,11 +163,11 @@ $(B)/src/%.c.o: libgait/src/%.c Makefile $(MADE) | $(B)/src/
 $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
 	@test -f $(EIGEN)/Eigen/Core || { echo 'lib: no Eigen/Core in EIGEN=$(EIGEN): give the folder that has it, or install' \
 	    'libeigen3-dev' >&2; exit 1; }
-	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) $(NO_RUNTIME) $(EIGEN_FLAGS) $(WARN) $(SMALL) $(CXXFLAGS) -c $< -o $@
+	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) -isystem $(EIGEN) $(CXX_FLAGS) $(WARN) $(call C_FLAGS,$(notdir $<)) $(CXXFLAGS) -c $< -o $@
 
 define kernel_rule
 $(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(B)/src/
-	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$<) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
+	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<)) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 

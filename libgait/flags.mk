@@ -1,0 +1,27 @@
+# Compiler flags of the library.  The Makefile includes this file and CMakeLists.txt reads it line by line, so it has
+# only comments and lines `NAME := WORDS`.
+
+# Same bits everywhere: baseline instruction set, no fused multiply-add, no -ffast-math, Eigen not vectorised.
+# Ignoring errno and traps changes no value (make golden-check) and lets loops over lanes become vector code.
+RELEASE_FLAGS := -O3 -DNDEBUG -fno-math-errno -fno-trapping-math
+CODE_FLAGS    := -ffp-contract=off -fPIC -fvisibility=hidden -fno-asynchronous-unwind-tables
+CXX_FLAGS     := -fno-exceptions -fno-rtti -fno-threadsafe-statics -fvisibility-inlines-hidden -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_NO_IO
+
+# Release builds use -O3 only for the sources a step or a live lift spends its time in.  What else runs for every
+# particle or row of numbers is compiled at -O2 (a third smaller, 2 % of a step), with vector code where it has loops
+# over lanes, and the rest at -Os (a fifth smaller again, no slower).  Kernels not listed here have loops over lanes.
+O3_SOURCES     := lift_read.c outline_kernel.c like_edges_kernel.c like_pose_kernel.c like_silhouette_kernel.c like_surface_kernel.c
+VECTOR_SOURCES := fmath.c
+O2_SOURCES     := kinematics.c lift.c mingle.c pf.c population.c weigh.c linalg.cpp
+GCC_TIGHT      := -fno-align-functions -fno-align-loops -fno-align-jumps -fno-align-labels
+GCC_VECTOR     := -ftree-vectorize -fvect-cost-model=dynamic
+CLANG_VECTOR   := -ftree-vectorize
+# At -O3 gcc would unroll every loop over 16 lanes besides vectorising it: half as large again, no faster.
+GCC_KERNEL     := --param=max-completely-peel-times=8
+
+# Kernels are compiled once per instruction set; the results of `scalar` define those of the others.
+X86_ISAS     := avx2 avx512
+FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
+FLAGS_base   :=
+FLAGS_avx2   := -mavx2 -mpopcnt -mbmi -mbmi2
+FLAGS_avx512 := -mavx2 -mpopcnt -mbmi -mbmi2 -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vpopcntdq -mavx512bitalg -mprefer-vector-width=512
