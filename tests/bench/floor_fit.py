@@ -11,9 +11,9 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from gait.body.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, curves, points
-from gait.learn import readers, retarget
-from gait.learn.fit import channel_scale
-from gait.learn.sequence import Sequence, levelled
+from gait.learn.cycles.sequence import Sequence, levelled
+from gait.learn.prior.fit import channel_scale
+from gait.learn.solve import readers, retarget
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

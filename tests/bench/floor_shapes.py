@@ -10,8 +10,8 @@ import numpy as np
 from floor_fit import OFFSETS
 
 from gait.body.skeleton import ANGLES
-from gait.learn.fit import Learned
 from gait.learn.model_options import DEFAULT_COMPONENTS
+from gait.learn.prior.fit import Learned
 from gait.track.trackerconfig import TrackerConfig
 
 MOST = 12  # dimensions of a particle for its shape

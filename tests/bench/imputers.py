@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from gait.learn import fpca
-from gait.learn.impute import by_svd, column_mean
+from gait.learn.prior import fpca
+from gait.learn.prior.impute import by_svd, column_mean
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

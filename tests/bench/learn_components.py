@@ -19,10 +19,10 @@ import gait_generator as g
 import learn_cases as cases
 
 from gait.body.skeleton import CHANNELS, default_skeleton, points
-from gait.learn import fit, fpca, impute, rank
-from gait.learn.model import anova
-from gait.learn.sequence import load
-from gait.learn.stage import one_thread_for_good
+from gait.learn.corpus.stage import one_thread_for_good
+from gait.learn.cycles.sequence import load
+from gait.learn.prior import fit, fpca, impute, rank
+from gait.learn.prior.model import anova
 from gait.progress import progress
 
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")

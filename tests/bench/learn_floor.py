@@ -30,9 +30,12 @@ from floor_shapes import ALL_OFFSETS, BARE, DIVIDED, MOST, OURS, SHAPES, TRACKED
 from gait.body.pace import series
 from gait.body.skeleton import CHANNELS, Proportions, default_skeleton
 from gait.errors import UserError
-from gait.learn import cycles, fit, fpca, model, pace, prior, readers, retarget, subjects
-from gait.learn.sequence import Sequence, load, measured
-from gait.learn.stage import one_thread, one_thread_for_good
+from gait.learn.corpus import subjects
+from gait.learn.corpus.stage import one_thread, one_thread_for_good
+from gait.learn.cycles import cycles
+from gait.learn.cycles.sequence import Sequence, load, measured
+from gait.learn.prior import fit, fpca, model, pace, prior
+from gait.learn.solve import readers, retarget
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

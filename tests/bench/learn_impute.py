@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import learn_cases as cases
 from learn_components import components
 
-from gait.learn.stage import one_thread_for_good
+from gait.learn.corpus.stage import one_thread_for_good
 from gait.progress import progress
 
 ROOT = Path(__file__).resolve().parents[2]

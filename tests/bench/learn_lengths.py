@@ -17,11 +17,12 @@ import numpy as np
 import table
 
 from gait.errors import UserError
-from gait.learn import readers, sources
-from gait.learn.body import Body
+from gait.learn.corpus import sources
+from gait.learn.corpus.stage import one_thread
 from gait.learn.reading import DEFAULT
-from gait.learn.retarget import Measures, measure
-from gait.learn.stage import one_thread
+from gait.learn.solve import readers
+from gait.learn.solve.body import Body
+from gait.learn.solve.retarget import Measures, measure
 
 MARKERS = "trc"  # folder beside the walks: a walk and a run of one person, markers of OpenSim
 LIMBS = ("upper_arm", "forearm", "thigh", "shank", "foot")

@@ -25,9 +25,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import gait_generator as g
 from learn_measures import cramer_rao, falls, gauge_free, walkers
 
-from gait.learn import align, period
-from gait.learn.sequence import load
-from gait.learn.stage import one_thread_for_good
+from gait.learn.corpus.stage import one_thread_for_good
+from gait.learn.cycles import align, period
+from gait.learn.cycles.sequence import load
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

@@ -18,10 +18,10 @@ from gait.body.pace import series, waves
 from gait.body.skeleton import default_skeleton, points
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn import between, fit, model, pace
-from gait.learn.fourier import HARMONICS
-from gait.learn.sequence import load
-from gait.learn.stage import one_thread
+from gait.learn.corpus.stage import one_thread
+from gait.learn.cycles.fourier import HARMONICS
+from gait.learn.cycles.sequence import load
+from gait.learn.prior import between, fit, model, pace
 
 Floats = npt.NDArray[np.float64]
 

@@ -30,8 +30,9 @@ from gait.core.model import read_cyclic
 from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
 from gait.image.video import Video, read_plate
-from gait.learn import readers, segment_motion
 from gait.learn.segment_options import Segments
+from gait.learn.segments import segment_motion
+from gait.learn.solve import readers
 from gait.lift.beginning import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.fit_clip import fit_clip

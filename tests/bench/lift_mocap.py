@@ -25,9 +25,10 @@ from eval_clips import DATA
 from gait.body.skeleton import axis_rotation
 from gait.core.lifter import Lifter
 from gait.core.segment_prior import SegmentPrior
-from gait.learn import readers, segment_corpus, segment_motion
-from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments
+from gait.learn.segments import segment_corpus, segment_motion
+from gait.learn.segments.segment_corpus import Corpus
+from gait.learn.solve import readers
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.posterior import place
 from gait.progress import progress

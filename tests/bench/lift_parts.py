@@ -17,7 +17,7 @@ import table
 from gait.body.skeleton import EVAL15
 from gait.core.segment_prior import SegmentPrior
 from gait.image.camera import Camera
-from gait.learn.stage import one_thread
+from gait.learn.corpus.stage import one_thread
 from gait.lift.size import tells_distance
 from gait.lift.tracks_file import Tracks
 from gait.motion.trackfile import read_truth

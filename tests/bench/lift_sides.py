@@ -19,7 +19,7 @@ import table
 
 from gait.body.skeleton import EVAL15
 from gait.errors import UserError
-from gait.learn.stage import one_thread
+from gait.learn.corpus.stage import one_thread
 from gait.lift import motion, outliers, sides
 from gait.lift.equations import Perspective
 from gait.lift.result import Options

@@ -24,7 +24,7 @@ from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.image.camera import Camera
 from gait.io.trc import read_trc
-from gait.learn.stage import one_thread
+from gait.learn.corpus.stage import one_thread
 from gait.lift import motion, outliers, result
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.tracks_file import Tracks

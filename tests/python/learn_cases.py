@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import gait_generator as g
 import numpy as np
 
-from gait.learn import cycles
+from gait.learn.cycles import cycles
 
 SUBJECT_SD, CYCLE_SD = 1.0, 0.44  # of the scores, shares of SCORE_SD
 REFERENCE = {"rows": 80, "samples": 64, "sd": (2.0, 1.2, 0.7), "noise": 0.45, "missing": 0.13}

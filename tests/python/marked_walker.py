@@ -3,9 +3,10 @@
 import numpy as np
 
 from gait.body.skeleton import ANGLES, SIDES, Proportions
-from gait.learn import articulated, retarget, rotations
-from gait.learn.articulated import SEGMENTS
-from gait.learn.marker_sets import LANDMARKS, SETS
+from gait.learn import rotations
+from gait.learn.mocap.marker_sets import LANDMARKS, SETS
+from gait.learn.solve import articulated, retarget
+from gait.learn.solve.articulated import SEGMENTS
 
 #: Labels of Plug-in-Gait's full body, as in Vicon's files.
 CENTRAL = ["SACR", "C7", "T10", "CLAV", "STRN"]

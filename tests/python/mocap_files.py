@@ -6,8 +6,8 @@ import gait_generator as g
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gait.learn import mocap_asf
-from gait.learn.recording import Y_UP
+from gait.learn.mocap import mocap_asf
+from gait.learn.mocap.recording import Y_UP
 
 # name, parent, direction, length (units of inch / 0.45), axis (degrees), dof
 BONES = [

@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from gait.body.skeleton import ANGLES, JOINTS, ROOTS, default_skeleton
 from gait.errors import UserError
-from gait.learn import angle_file, readers, retarget
-from gait.learn.angle_file import AngleTable
-from gait.learn.articulated import posed
-from gait.learn.body import Body
+from gait.learn.mocap import angle_file
+from gait.learn.mocap.angle_file import AngleTable
 from gait.learn.reading import Reading
+from gait.learn.solve import readers, retarget
+from gait.learn.solve.articulated import posed
+from gait.learn.solve.body import Body
 from gait.motion.trackfile import header
 
 TABLE = mw.walk_angles(240, 100.0)

@@ -16,7 +16,7 @@ from gait.body.skeleton import EVAL15, JOINTS
 from gait.cli import main
 from gait.core.model import read_blob, read_cyclic
 from gait.io import blob
-from gait.learn import segment_sections
+from gait.learn.segments import segment_sections
 from gait.lift import lifted_file
 from gait.motion.baselines import free_run, root_path, static_pose, stature
 from gait.motion.calibration import calibration, coverage, crps

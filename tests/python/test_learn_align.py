@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from learn_measures import falls, gauge_free, walkers
 
-from gait.learn import align, periodic, shift
+from gait.learn.cycles import align, periodic, shift
 
 
 @pytest.mark.parametrize("start", ["xcorr", "zeros"])

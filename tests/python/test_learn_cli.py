@@ -15,7 +15,8 @@ from gait.body.skeleton import ANGLES, CHANNELS, JOINTS
 from gait.cli import info
 from gait.core.segment_prior import TAGS
 from gait.io import blob
-from gait.learn import fit, model, sources
+from gait.learn.corpus import sources
+from gait.learn.prior import fit, model
 
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"

@@ -7,8 +7,8 @@ import pytest
 
 from gait.body.skeleton import ANGLES, CHANNELS
 from gait.errors import UserError
+from gait.learn.cycles.sequence import load
 from gait.learn.reading import Reading
-from gait.learn.sequence import load
 
 FPS = 120.0
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"

@@ -15,7 +15,7 @@ from test_marker_files import write_c3d
 
 import gait.cli
 from gait.errors import UserError
-from gait.learn import cluster, sources
+from gait.learn.corpus import cluster, sources
 
 distributed = pytest.importorskip(
     "distributed", reason="dask is not installed: pip install -e 'python[dask]'"

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from learn_measures import falls
 
-from gait.learn import bayes, cycles, fpca, impute
-from gait.learn.fourier import HARMONICS
-from gait.learn.model import anova
-from gait.learn.rank import LARGEST, choose
+from gait.learn.cycles import cycles
+from gait.learn.cycles.fourier import HARMONICS
+from gait.learn.prior import bayes, fpca, impute
+from gait.learn.prior.model import anova
+from gait.learn.prior.rank import LARGEST, choose
 
 METHODS = sorted(fpca.METHODS)
 

@@ -10,9 +10,11 @@ import pytest
 import gait.cli
 from gait.body.skeleton import ANGLES
 from gait.errors import UserError
-from gait.learn import body, cycles, gaps, joint_file, marker_map, mocap_asf, retarget, sequence
-from gait.learn.fit import SAMPLES
+from gait.learn.cycles import cycles, sequence
+from gait.learn.mocap import marker_map, mocap_asf
+from gait.learn.prior.fit import SAMPLES
 from gait.learn.reading import Reading
+from gait.learn.solve import body, gaps, joint_file, retarget
 
 RATE = 120
 

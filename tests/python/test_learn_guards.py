@@ -13,7 +13,9 @@ import gait.cli
 from gait import Model
 from gait.body.skeleton import CHANNELS, Proportions
 from gait.io import blob
-from gait.learn import between, ground, report, sources
+from gait.learn.corpus import sources
+from gait.learn.prior import between, ground
+from gait.learn.report import report
 
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"
 

@@ -9,8 +9,9 @@ import pytest
 from test_marker_files import write_c3d
 
 import gait.cli
-from gait.learn import body, mocap_asf, readers, remarks
+from gait.learn.mocap import mocap_asf, remarks
 from gait.learn.reading import Reading
+from gait.learn.solve import body, readers
 
 MAP = {"set": "plug-in-gait", "markers": {"Wand_L": "l_knee_lateral", "LKN": None, "l kne": "l_knee_lateral"}}
 

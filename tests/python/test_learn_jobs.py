@@ -21,9 +21,9 @@ import pytest
 
 from gait import cli
 from gait.errors import UserError
-from gait.learn import fork_server, pool, sources
+from gait.learn.corpus import fork_server, pool, sources
+from gait.learn.corpus.stage import Task
 from gait.learn.spool import Spool
-from gait.learn.stage import Task
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +130,7 @@ def test_workers_are_expected_where_much_is_to_be_read_beside_the_first_file(tmp
 def test_the_fork_server_starts_before_what_is_slow_to_import(jobs, large, starts, tmp_path):
     """A run that ends at once: the skeleton beside a recording is none."""
     script = (
-        "import sys, gait.cli; from gait.learn import fork_server\n"
+        "import sys, gait.cli; from gait.learn.corpus import fork_server\n"
         f"fork_server.worth = lambda sources: {large}\n"
         "fork_server.start = lambda: print('scipy' in sys.modules)\n"
         f"gait.cli.main(['learn', 'x.asf', '-o', {str(tmp_path / 'm.gait')!r}, '--jobs', {jobs!r}])"
@@ -144,7 +144,8 @@ def test_the_server_that_imports_does_not_hear_an_interruption():
     """From a terminal it reaches the whole group; the command ends its server itself."""
     tell = "print(open(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read())"
     program = (
-        f"from multiprocessing import forkserver; from gait.learn import fork_server as f; f.start(); {tell}"
+        "from multiprocessing import forkserver; from gait.learn.corpus import fork_server as f; "
+        f"f.start(); {tell}"
     )
     told = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True
@@ -156,13 +157,13 @@ def test_the_server_that_imports_does_not_hear_an_interruption():
 def test_workers_have_the_stage_from_the_server_that_was_started():
     script = """
 import sys
-from gait.learn import fork_server
+from gait.learn.corpus import fork_server
 
 if __name__ == "__main__":
     fork_server.start()
     with fork_server.context().Pool(1) as pool:
-        print(pool.apply(eval, ("'gait.learn.stage' in __import__('sys').modules",)))
-    print("gait.learn.stage" in sys.modules)
+        print(pool.apply(eval, ("'gait.learn.corpus.stage' in __import__('sys').modules",)))
+    print("gait.learn.corpus.stage" in sys.modules)
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["True", "False"]
@@ -203,7 +204,7 @@ def test_a_file_that_kills_its_process_is_named_and_the_rest_is_read(walks, stuc
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_stopped_command_leaves_no_processes(walks, stuck, tmp_path, number):
     script = (
-        "import sys, gait.cli; from pathlib import Path; from gait.learn import pool, sources\n"
+        "import sys, gait.cli; from pathlib import Path; from gait.learn.corpus import pool, sources\n"
         "pool.START = -1.0\n"
         f"sources.find = lambda *_: [(p, True) for p in sorted(Path({str(walks)!r}).glob('*.amc'))]\n"
         f"sys.exit(gait.cli.main(['learn', 'x', '-o', {str(tmp_path / 'm.gait')!r}, '--jobs', '2']))"

@@ -9,10 +9,11 @@ from test_marker_files import write_c3d
 
 from gait.body.skeleton import ANGLES
 from gait.errors import UserError
-from gait.learn import body, joint_file, mocap_asf, readers, retarget, torn_joint
+from gait.learn.cycles.sequence import load
+from gait.learn.mocap import mocap_asf
+from gait.learn.mocap.recording import Y_UP
 from gait.learn.reading import Reading
-from gait.learn.recording import Y_UP
-from gait.learn.sequence import load
+from gait.learn.solve import body, joint_file, readers, retarget, torn_joint
 
 TRC_NAMES = {"neck": "Neck", "head": "Head", "l_toe": "LBigToe", "r_toe": "RBigToe"}
 

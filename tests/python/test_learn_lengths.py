@@ -10,8 +10,9 @@ from gait.body import skeleton
 from gait.body.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
 from gait.core.model import read_blob
 from gait.io import blob
-from gait.learn import lengths, retarget
-from gait.learn.retarget import Measures
+from gait.learn.prior import lengths
+from gait.learn.solve import retarget
+from gait.learn.solve.retarget import Measures
 
 MEAN = Proportions()
 FRAMES = default_skeleton(MEAN).frames

@@ -10,7 +10,8 @@ import mocap_files as files
 import numpy as np
 import pytest
 
-from gait.learn import rank, spool
+from gait.learn import spool
+from gait.learn.prior import rank
 
 STATUS = Path("/proc/self/status")
 MOST = 0.05  # MB per cycle; a cycle's values alone are 0.03 MB, and they are used in a dozen ways
@@ -21,7 +22,9 @@ import json, sys
 from dataclasses import replace
 from pathlib import Path
 import numpy as np
-from gait.learn import fit, model, sources, spool, stage
+from gait.learn.prior import fit, model
+from gait.learn.corpus import sources, stage
+from gait.learn import spool
 
 def copy(s, k):
     noise = 0.02 * np.random.default_rng(k).normal(size=s.channels.shape)

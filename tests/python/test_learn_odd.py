@@ -14,7 +14,9 @@ from gait import Model
 from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn import fit, fpca, model, model_options, sources
+from gait.learn import model_options
+from gait.learn.corpus import sources
+from gait.learn.prior import fit, fpca, model
 
 LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for name in ANGLES])
 

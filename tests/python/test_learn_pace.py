@@ -14,8 +14,8 @@ from gait.cli import main
 from gait.core.model import read_blob, read_cyclic
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn import pace as learnt
-from gait.learn.prior import mirrored
+from gait.learn.prior import pace as learnt
+from gait.learn.prior.prior import mirrored
 
 SAMPLES = 64
 GAIT = np.array([0.9, 0.07])

@@ -6,8 +6,8 @@ import pytest
 from learn_measures import cramer_rao
 from scipy import stats
 
-from gait.learn import period, verdict
-from gait.learn.stage import one_thread
+from gait.learn.corpus.stage import one_thread
+from gait.learn.cycles import period, verdict
 
 FPS = 120.0
 

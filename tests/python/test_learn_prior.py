@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import subspace_angles
 
 from gait.body.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
-from gait.learn import prior, singular
-from gait.learn.fourier import decode, encode, fourier_basis
+from gait.learn.cycles.fourier import decode, encode, fourier_basis
+from gait.learn.prior import prior, singular
 
 SAMPLES, HARMONICS = 64, 5
 BODY = Proportions()

@@ -4,7 +4,7 @@ import mocap_files as files
 import pytest
 
 from gait.errors import UserError
-from gait.learn import readers
+from gait.learn.solve import readers
 
 
 def damaged(path, change):

@@ -11,19 +11,19 @@ import pytest
 
 import gait.cli
 from gait.body.skeleton import ANGLES, CHANNELS
-from gait.learn import (
+from gait.learn.corpus import sources
+from gait.learn.corpus.stage import one_thread
+from gait.learn.prior import fit
+from gait.learn.prior.subject_residuals import subject_residuals
+from gait.learn.report import (
     figures_cycle,
     figures_model,
     figures_period,
     figures_subject,
-    fit,
     report,
     report_place,
-    sources,
 )
-from gait.learn.figures_base import SHOWN, column
-from gait.learn.stage import one_thread
-from gait.learn.subject_residuals import subject_residuals
+from gait.learn.report.figures_base import SHOWN, column
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -219,7 +219,7 @@ def many_subjects(sequences):
     return fit.fit(many, 4)
 
 
-@pytest.mark.filterwarnings("error::RuntimeWarning:gait.learn.model")
+@pytest.mark.filterwarnings("error::RuntimeWarning:gait.learn.prior.model")
 @pytest.mark.parametrize("make", [one_file, lower_body, many_subjects])
 def test_odd_input_gives_a_report_too(sequences, tmp_path, make):
     odd = make(sequences)

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from gait.body import skeleton
 from gait.body.skeleton import ANGLES, CHANNELS, SIDES
-from gait.learn import readers, retarget, root, rotations
-from gait.learn.body import Body
+from gait.learn import rotations
+from gait.learn.solve import readers, retarget, root
+from gait.learn.solve.body import Body
 
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
 MODEL = skeleton.default_skeleton().sections() | {"CHNM": None}
@@ -172,7 +173,7 @@ def test_real_walks_are_reproduced_to_8_mm():
     """The 24 angles with own lengths and a rigid shoulder girdle reach 8 mm on average (root-aligned)."""
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
-    from gait.learn.sequence import levelled, load
+    from gait.learn.cycles.sequence import levelled, load
 
     errors = []
     for name in ("02/02_01", "07/07_01", "16/16_16", "35/35_01", "38/38_01"):

@@ -10,10 +10,11 @@ from test_marker_files import write_c3d, write_trc
 
 import gait.cli
 from gait.errors import UserError
-from gait.learn import cycles, mocap_asf
-from gait.learn.body import body
+from gait.learn.cycles import cycles
+from gait.learn.cycles.sequence import load
+from gait.learn.mocap import mocap_asf
 from gait.learn.reading import Reading
-from gait.learn.sequence import load
+from gait.learn.solve.body import body
 
 FEW = "too few frames ({}); a recording of a few seconds is needed"
 LEGS = [f"{s}_{joint}_flexion" for s in "lr" for joint in ("hip", "knee")]

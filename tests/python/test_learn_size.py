@@ -8,7 +8,7 @@ import pytest
 
 import gait.cli
 from gait.io import blob
-from gait.learn import lengths, model, pace
+from gait.learn.prior import lengths, model, pace
 
 PEOPLE = 14  # more than META has rows
 LIMIT = 100_000  # bytes of a cyclic model of five components

@@ -8,8 +8,8 @@ import mocap_files as files
 import pytest
 
 import gait.cli
-from gait.learn import sources
-from gait.learn.subjects import names, subjects
+from gait.learn.corpus import sources
+from gait.learn.corpus.subjects import names, subjects
 
 
 def paths(*words):

@@ -4,7 +4,7 @@ import gait_generator as g
 import numpy as np
 import pytest
 
-from gait.learn import trim
+from gait.learn.cycles import trim
 
 FPS, PERIOD = 100, 110
 

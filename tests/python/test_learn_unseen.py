@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gait.learn.unseen import bounded, never_shown
+from gait.learn.prior.unseen import bounded, never_shown
 
 
 def people(rng, odd):

@@ -10,7 +10,7 @@ import gait
 from gait.body import skeleton
 from gait.body.skeleton import ANGLES
 from gait.io import blob
-from gait.learn import activity, period, verdict
+from gait.learn.cycles import activity, period, verdict
 
 FPS, PERIOD = 100, 110.0
 SHIPPED = Path(gait.__file__).parent / "data/walk.gait"

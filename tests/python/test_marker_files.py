@@ -12,11 +12,12 @@ import pytest
 from gait.body.skeleton import ANGLES
 from gait.errors import UserError
 from gait.io.trc import read_trc
-from gait.learn import c3d_file, marker_map, marker_sets, readers, retarget, root
-from gait.learn.articulated import SEGMENTS
-from gait.learn.period import find
+from gait.learn.cycles.period import find
+from gait.learn.mocap import c3d_file, marker_map, marker_sets
+from gait.learn.mocap.recording import Y_UP
 from gait.learn.reading import Reading
-from gait.learn.recording import Y_UP
+from gait.learn.solve import readers, retarget, root
+from gait.learn.solve.articulated import SEGMENTS
 
 DATA = Path(__file__).parents[2] / "../shared/data/mocap"
 

@@ -8,9 +8,9 @@ import pytest
 
 from gait.body.skeleton import ANGLES, Proportions
 from gait.errors import UserError
-from gait.learn import articulated, marker_body, readers, retarget, root, skeleton_fit
-from gait.learn.articulated import SEGMENTS
-from gait.learn.recording import Y_UP
+from gait.learn.mocap.recording import Y_UP
+from gait.learn.solve import articulated, marker_body, readers, retarget, root, skeleton_fit
+from gait.learn.solve.articulated import SEGMENTS
 
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
 FILE = Path("walk.c3d")

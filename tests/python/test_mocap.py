@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gait.errors import UserError
-from gait.learn import body, mocap_asf, mocap_bvh, recording, retarget, root
+from gait.learn.mocap import mocap_asf, mocap_bvh, recording
+from gait.learn.solve import body, retarget, root
 
 DATA = Path(__file__).parents[2] / "../shared/data/mocap"
 CGSPEED = {

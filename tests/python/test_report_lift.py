@@ -13,7 +13,7 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.cli import main, report_lift
 from gait.image.camera import Camera
-from gait.learn import segment_motion
+from gait.learn.segments import segment_motion
 from gait.lift import figures_base, figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.tracks_file import Tracks, read, write

@@ -8,8 +8,9 @@ from mocap_files import write_toy
 
 from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, Proportions, default_skeleton, points
 from gait.errors import UserError
-from gait.learn import (
-    readers,
+from gait.learn.mocap.angle_file import AngleTable
+from gait.learn.segment_options import Segments
+from gait.learn.segments import (
     segment_angles,
     segment_basis,
     segment_corpus,
@@ -19,10 +20,9 @@ from gait.learn import (
     segment_motion,
     segment_people,
 )
-from gait.learn.angle_file import AngleTable
-from gait.learn.segment_corpus import Corpus, Recorded
-from gait.learn.segment_options import Segments
-from gait.learn.virtual_markers import MARKERS, SKIN, marked_skeleton
+from gait.learn.segments.segment_corpus import Corpus, Recorded
+from gait.learn.segments.virtual_markers import MARKERS, SKIN, marked_skeleton
+from gait.learn.solve import readers
 
 PLAIN = Segments(people=False)
 

@@ -7,7 +7,7 @@ from toy_segments import toy_blob, toy_prior
 from gait.core.segment_prior import TAGS, SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn.segment_sections import sections
+from gait.learn.segments.segment_sections import sections
 
 
 @pytest.mark.parametrize("components", [1, 3])

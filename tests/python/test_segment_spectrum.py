@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gait.learn import readers, segment_corpus, segment_fit, segment_motion
-from gait.learn.segment_corpus import Corpus
 from gait.learn.segment_options import Segments
+from gait.learn.segments import segment_corpus, segment_fit, segment_motion
+from gait.learn.segments.segment_corpus import Corpus
+from gait.learn.solve import readers
 
 MOCAP = Path(__file__).parents[3] / "shared" / "data" / "mocap" / "cmu_misc"
 FOUR = ("01/01_14.amc", "02/02_04.amc", "02/02_05.amc", "02/02_07.amc")

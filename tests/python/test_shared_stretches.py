@@ -9,20 +9,13 @@ import pytest
 from test_marker_files import real, write_c3d, write_trc
 
 from gait import cli
-from gait.learn import (
-    articulated,
-    fit,
-    marker_body,
-    retarget,
-    shared_stretches,
-    skeleton_fit,
-    sources,
-    subject_fit,
-)
-from gait.learn.articulated import SEGMENTS, STRETCHES
+from gait.learn.corpus import shared_stretches, sources
+from gait.learn.corpus.stage import Prepared, one_thread
+from gait.learn.prior import fit
 from gait.learn.reading import DEFAULT, Reading
-from gait.learn.stage import Prepared, one_thread
-from gait.learn.stretch_information import NOTHING, PEOPLE, Information, odds
+from gait.learn.solve import articulated, marker_body, retarget, skeleton_fit, subject_fit
+from gait.learn.solve.articulated import SEGMENTS, STRETCHES
+from gait.learn.solve.stretch_information import NOTHING, PEOPLE, Information, odds
 
 FILE = Path("walk.c3d")
 LIMBS = [k for k, name in enumerate(STRETCHES) if name in ("upper_arm", "forearm", "thigh", "shank", "foot")]

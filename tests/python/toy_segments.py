@@ -7,7 +7,7 @@ import numpy as np
 from gait.body.skeleton import JOINTS
 from gait.core.segment_prior import SegmentPrior
 from gait.io import blob
-from gait.learn.segment_sections import sections
+from gait.learn.segments.segment_sections import sections
 
 #: Axes of a picture taken along +y: to the right and up.
 FRONT = np.array([[1.0, 0, 0], [0, 0, 1]])

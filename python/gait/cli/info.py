@@ -97,7 +97,7 @@ def text(name: str, s: Mapping[str, Any]) -> str:
 
 
 def sequence_lines(rows: list[list[Any]]) -> list[str]:
-    """Table of sequences: rows of gait.learn.model.SEQUENCE_COLUMNS."""
+    """Table of sequences: rows of gait.learn.prior.model.SEQUENCE_COLUMNS."""
     wide = max([11, *(len(row[0]) for row in rows)]) + 1
     lines = [f"{'sequence':{wide}}{'period':>9}{'cycles':>8}{'sharpness':>11}{'residual':>10}"]
     for name, period, cycles, sharpness, residual in rows:

@@ -23,7 +23,7 @@ import argparse
 from pathlib import Path
 
 from gait.cli import learn_segments, values
-from gait.learn import fork_server, subjects
+from gait.learn.corpus import fork_server, subjects
 from gait.learn.model_options import DEFAULT_COMPONENTS, MOST_COMPONENTS, PRIORS
 
 NAME = "learn"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from gait.learn import marker_map
-from gait.learn.marker_sets import plain
-from gait.learn.readers import MARKED
-from gait.learn.remarks import Noticed
+from gait.learn.mocap import marker_map
+from gait.learn.mocap.marker_sets import plain
+from gait.learn.mocap.remarks import Noticed
+from gait.learn.solve.readers import MARKED
 
 MOST_NAMES = 6  # of labels
 

@@ -10,9 +10,10 @@ from gait.cli import segment_text
 from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn import model, segment_fit, segment_sections
-from gait.learn.segment_corpus import Corpus
+from gait.learn.prior import model
 from gait.learn.segment_options import Segments
+from gait.learn.segments import segment_fit, segment_sections
+from gait.learn.segments.segment_corpus import Corpus
 
 
 def learn(corpus: Corpus, wanted: Segments, quiet: bool) -> SegmentPrior | None:

@@ -13,15 +13,20 @@ from gait.cli import learn_hints, learn_prior, learn_segments, learn_text
 from gait.errors import UsageError, UserError
 from gait.io import blob
 from gait.io.files import require_folder, require_writable
-from gait.learn import activity, fit, fork_server, marker_map, model, report_place, segment_sections, sources
-from gait.learn.readers import KINDS
+from gait.learn.corpus import fork_server, sources
+from gait.learn.corpus.shared_stretches import Shared
+from gait.learn.corpus.stage import one_thread
+from gait.learn.cycles import activity
+from gait.learn.cycles.sequence import Sequence
+from gait.learn.mocap import marker_map
+from gait.learn.mocap.remarks import Noticed
+from gait.learn.prior import fit, model
 from gait.learn.reading import Reading
-from gait.learn.remarks import Noticed
-from gait.learn.retarget import Measures
-from gait.learn.segment_corpus import Corpus
-from gait.learn.sequence import Sequence
-from gait.learn.shared_stretches import Shared
-from gait.learn.stage import one_thread
+from gait.learn.report import report_place
+from gait.learn.segments import segment_sections
+from gait.learn.segments.segment_corpus import Corpus
+from gait.learn.solve.readers import KINDS
+from gait.learn.solve.retarget import Measures
 from gait.progress import progress
 
 MOST_LINES = 20  # about files left out
@@ -41,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         sections = model.sections(learned, args.activity, args.seed)
         data = blob.write(args.output, sections | (segment_sections.sections(prior) if prior else {}))
         if args.report:
-            from gait.learn import report  # matplotlib is slow to import
+            from gait.learn.report import report
 
             try:
                 report.write(Path(args.report), learned, args.activity, refused, args.quiet)

@@ -12,9 +12,9 @@ from gait.body.skeleton import ANGLES
 from gait.cli import segment_text
 from gait.core.segment_prior import SegmentPrior
 from gait.io import blob
-from gait.learn import fit, ground, model, unseen
+from gait.learn.cycles.sequence import Sequence
 from gait.learn.model_options import DEFAULT_COMPONENTS
-from gait.learn.sequence import Sequence
+from gait.learn.prior import fit, ground, model, unseen
 
 Floats = npt.NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from gait.core.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.image.camera import Camera
-from gait.learn.stage import one_thread
+from gait.learn.corpus.stage import one_thread
 from gait.lift import motion, outliers, sentinels, sides, switches, tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.result import Motion, Options

@@ -20,7 +20,7 @@ from gait.errors import UsageError, UserError
 from gait.image.camera import Camera
 from gait.image.video import Video, VideoWriter, background, require_video_name
 from gait.io.blob import decode
-from gait.learn.stage import one_thread
+from gait.learn.corpus.stage import one_thread
 from gait.lift import lifted_file, suggest
 from gait.lift.beginning import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings

@@ -27,10 +27,11 @@ from gait.core.segment_prior import SegmentPrior
 from gait.draw.page import Page
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
-from gait.learn import readers, segment_corpus, segment_motion
-from gait.learn.figures_base import Drawing
-from gait.learn.segment_corpus import Corpus
+from gait.learn.report.figures_base import Drawing
 from gait.learn.segment_options import Segments
+from gait.learn.segments import segment_corpus, segment_motion
+from gait.learn.segments.segment_corpus import Corpus
+from gait.learn.solve import readers
 from gait.lift import figures_clip
 from gait.lift.equations import View
 from gait.lift.figures_segment import Case, case, drawings

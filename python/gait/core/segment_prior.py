@@ -1,8 +1,9 @@
 """The prior over segments of motion: x = mean + sum_i alpha_i mode_i + residual, alpha ~ N(0, I).
 
 A segment is F frames of J markers, in statures; the pelvis of its first frame is over the origin and the
-floor is z = 0.  With `headings` 0 its body looks along +x in the first frame.  `gait.learn.segment_sections`
-writes what is read here; libgait/doc/model-format.md names the sections.
+floor is z = 0.  With `headings` 0 its body looks along +x in the first frame.
+`gait.learn.segments.segment_sections` writes what is read here; the sections are in
+libgait/doc/model-format.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The cylinder figure: one body of constant bone lengths laid on markers by least squares, frame by frame.
 
-The last step of Leventon & Freeman 1998; the fit is that of `gait.learn.skeleton_fit`, which motion capture
-goes through as well.
+The last step of Leventon & Freeman 1998; the fit is that of `gait.learn.solve.skeleton_fit`, which motion
+capture goes through as well.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from gait.body.skeleton import ELLIPSOID, JOINTS, default_skeleton
 from gait.errors import UserError
-from gait.learn import articulated, skeleton_fit
-from gait.learn.articulated import Pose
-from gait.learn.virtual_markers import MARKERS, SKIN, marked_skeleton
+from gait.learn.segments.virtual_markers import MARKERS, SKIN, marked_skeleton
+from gait.learn.solve import articulated, skeleton_fit
+from gait.learn.solve.articulated import Pose
 
 Floats = npt.NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Figure:
     Attributes
     ----------
     stretch : (S,)
-        Logarithms of the body's stretches (`gait.learn.articulated.STRETCHES`).
+        Logarithms of the body's stretches (`gait.learn.solve.articulated.STRETCHES`).
     pose : Pose
     residual : (T, M)
         Distance from the markers used, metres.
@@ -50,7 +50,7 @@ class Figure:
         Raises
         ------
         UserError
-            If hardly any marker is one of `gait.learn.virtual_markers.MARKERS`.
+            If hardly any marker is one of `gait.learn.segments.virtual_markers.MARKERS`.
         """
         used = [name for name in names if name in MARKERS]
         if len(used) < FEWEST:

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gait.draw.colours import DARK, GREY
-from gait.learn.figures_base import plain
-from gait.learn.figures_model import STICKS
+from gait.learn.report.figures_base import plain
+from gait.learn.report.figures_model import STICKS
 
 Floats = npt.NDArray[np.float64]
 

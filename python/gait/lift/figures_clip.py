@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gait.draw.colours import DARK, GREY, ON_PAPER, side_of
-from gait.learn.figures_base import Drawing
-from gait.learn.figures_model import STICKS
+from gait.learn.report.figures_base import Drawing
+from gait.learn.report.figures_model import STICKS
 from gait.lift.equations import Perspective, View
 from gait.lift.figures_base import BELOW, SHOWN, bare, scale_bar
 from gait.lift.result import Motion

@@ -1,0 +1,197 @@
+"""The per-file stage on a Dask cluster, in the order of the files.
+
+The workers read the files themselves, so they need the same paths as this machine: a shared file system.
+They also need this package, the same versions of it, numpy, scipy and ezc3d, and the same kernels
+(`gait.kernels`), or the results would differ.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gait import kernels
+from gait.errors import UsageError, UserError
+from gait.learn.corpus.stage import Prepared, Task, one_thread_for_good
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+ADDRESS = re.compile(r"(tcp://|tls://)?[^/\s]+:\d{1,5}")
+CONNECT = 5.0  # seconds that a scheduler gets to answer and to have a worker
+PATIENCE = 10.0  # seconds between looks at whether there still are workers
+AHEAD = 4  # files in flight per thread of the workers
+SAME = ("gait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
+
+
+@dataclass(frozen=True)
+class Unlike:
+    """A worker that would give other results: its version of a package, or other kernels (no package)."""
+
+    worker: str
+    package: str = ""
+    found: str = ""
+
+    def refusal(self, address: str) -> UserError:
+        """Tell what to do about it."""
+        if self.package:
+            return UserError(
+                f"--dask {address}: worker {self.worker} has {self.found} of {self.package}, "
+                f"this machine {metadata.version(self.package)}; install the same versions on both"
+            )
+        return UserError(
+            f"--dask {address}: last digits would depend on the CPU of worker {self.worker}; "
+            f"start it with 'dask worker --preload-nanny {kernels.__name__} {address}'"
+        )
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What results depend on besides the task: versions of packages, and the kernels."""
+
+    versions: dict[str, str]
+    kernels: dict[str, str]
+
+
+def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, None]:
+    """Outcomes of files in their order, from the workers of the scheduler at `address`.
+
+    Raises
+    ------
+    UserError
+        If dask is not installed, nothing answers, the workers have other versions or do not see the files.
+    """
+    with _connected(address) as client:
+        _require_packages(client, address)
+        wanted = _surroundings()
+        ahead = AHEAD * max(1, sum(client.nthreads().values()))
+        waiting, flying = deque(tasks), deque[tuple[Path, "Future"]]()
+        while waiting or flying:
+            while waiting and len(flying) < ahead:
+                task = waiting.popleft()
+                flying.append((task.path, client.submit(_done, _absolute(task), wanted, pure=False)))
+            path, future = flying.popleft()
+            outcome = _result(client, address, path, future)
+            if isinstance(outcome, Unlike):
+                raise outcome.refusal(address)
+            yield _as_named(outcome, path)
+
+
+def _absolute(task: Task) -> Task:
+    """Task for whoever works in another folder."""
+    reading = task.reading
+    if reading.markers:
+        reading = replace(reading, markers=reading.markers.absolute())
+    return replace(task, path=task.path.absolute(), reading=reading)
+
+
+def _surroundings() -> Surroundings:
+    """Surroundings of this process."""
+    return Surroundings({package: metadata.version(package) for package in SAME}, kernels.chosen())
+
+
+def _done(task: Task, wanted: Surroundings) -> Prepared | Unlike | None:
+    """Do a task on a worker that is like the client; None if it does not see the file.
+
+    Every task looks: a worker may come while others are at work.
+    """
+    if (here := _surroundings()) != wanted:
+        return _difference(here, wanted)
+    one_thread_for_good()
+    return task.done() if task.path.is_file() else None
+
+
+def _difference(here: Surroundings, wanted: Surroundings) -> Unlike:
+    """Name what makes this worker unlike the client."""
+    from distributed import get_worker
+
+    worker: str = get_worker().address
+    for package, version in wanted.versions.items():
+        if here.versions[package] != version:
+            return Unlike(worker, package, here.versions[package])
+    return Unlike(worker)
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Client]:
+    """Client of a scheduler that answers and has a worker."""
+    if not ADDRESS.fullmatch(address):
+        raise UsageError(f"--dask {address}: is not an address; give one such as tcp://192.168.0.7:8786")
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise UserError(
+            "--dask: dask is not installed; pip install -e 'python[dask]' in the repository"
+        ) from error
+    log = logging.getLogger("distributed")
+    before = log.level
+    log.setLevel(logging.CRITICAL)  # a lost connection is one line of ours, not its tracebacks
+    try:
+        with ExitStack() as stack:
+            try:
+                client = stack.enter_context(Client(address, timeout=CONNECT, set_as_default=False))
+                client.wait_for_workers(1, timeout=CONNECT)
+            except (TimeoutError, OSError) as error:
+                raise UserError(
+                    f"--dask {address}: no scheduler with a worker answered within {CONNECT:.0f} s; "
+                    "start them with 'dask scheduler' and "
+                    f"'dask worker --preload-nanny {kernels.__name__} {address}'"
+                ) from error
+            yield client
+    finally:
+        log.setLevel(before)
+
+
+def _require_packages(client: Client, address: str) -> None:
+    """Refuse workers on which a package is absent or another: they might not even read a task."""
+    for package in SAME:
+        for worker, there in client.run(metadata.version, package, on_error="return").items():
+            if isinstance(there, metadata.PackageNotFoundError):
+                raise Unlike(worker, package, "none").refusal(address)
+            if isinstance(there, str) and there != metadata.version(package):
+                raise Unlike(worker, package, there).refusal(address)
+
+
+def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | Unlike | None:
+    """Wait for a result while there are workers."""
+    from distributed import CancelledError, KilledWorker
+    from distributed.comm import CommClosedError
+
+    lost = UserError(f"--dask {address}: the connection was lost at {path}; start again")
+    while True:
+        try:
+            outcome: Prepared | Unlike | None = future.result(timeout=PATIENCE)
+            return outcome
+        except KilledWorker:
+            killed = UserError(
+                f"{path}: the workers that read it were killed (out of memory?); "
+                "leave it out with --exclude or cut the recording"
+            )
+            return Prepared(refused=killed)
+        except TimeoutError as error:
+            if client.status != "running" or not client.nthreads():
+                raise lost from error
+        except (CancelledError, CommClosedError) as error:
+            raise lost from error
+
+
+def _as_named(outcome: Prepared | None, path: Path) -> Prepared:
+    """Outcome as if the file had been read by the name it has here."""
+    if outcome is None:
+        raise UserError(
+            f"{path}: a worker does not see {path.absolute()}; put the files where all workers find them "
+            "under the same path"
+        )
+    if outcome.refused:
+        words = str(outcome.refused).replace(str(path.absolute()), str(path))
+        outcome = replace(outcome, refused=type(outcome.refused)(words))
+    if outcome.sequence:
+        outcome = replace(outcome, sequence=replace(outcome.sequence, source=path))
+    return outcome

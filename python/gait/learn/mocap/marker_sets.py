@@ -1,0 +1,176 @@
+"""Marker sets known by name: labels to landmarks, and where landmarks lie on the default skeleton.
+
+Places are approximate, of the middle of a 14 mm marker on an adult; the fit moves each by about its sd.
+Sources: marker placement guides of Plug-in-Gait and Helen Hayes; hip joints after Bell and others (1990); the
+joint between neck and trunk after Reed and others (1999); heights after Drillis and Contini (1966).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gait.body.skeleton import SIDES, Proportions
+from gait.learn.solve.articulated import SEGMENTS
+
+_P = Proportions()
+
+
+class Landmark(NamedTuple):
+    """A place on the body: segment, position in its axes and how far markers lie from there, statures."""
+
+    segment: str
+    at: tuple[float, float, float]
+    sd: float
+
+
+BONE = 0.008  # felt under the skin
+SOFT = 0.012  # on the joint's side, but not at one bony point
+LOOSE = 0.045  # somewhere about there
+
+#: Left landmarks, named without their side; the right ones mirror them.
+_PAIRED: dict[str, Landmark] = {
+    "asis": Landmark("pelvis", (0.045, 0.070, 0.045), SOFT),
+    "psis": Landmark("pelvis", (-0.055, 0.027, 0.058), SOFT),
+    "iliac_crest": Landmark("pelvis", (0.005, 0.085, 0.075), SOFT),
+    "pelvis_wand": Landmark("pelvis", (-0.150, 0.010, 0.060), 2 * LOOSE),
+    "trochanter": Landmark("thigh", (0.0, 0.048, 0.0), SOFT),
+    "thigh_side": Landmark("thigh", (0.0, 0.055, -0.140), LOOSE),
+    "thigh_front": Landmark("thigh", (0.045, 0.0, -0.140), LOOSE),
+    "knee_lateral": Landmark("thigh", (0.0, 0.033, -_P.thigh), BONE),
+    "knee_medial": Landmark("thigh", (0.0, -0.033, -_P.thigh), BONE),
+    "shank_side": Landmark("shank", (0.0, 0.040, -0.120), LOOSE),
+    "shank_front": Landmark("shank", (0.025, 0.0, -0.120), LOOSE),
+    "ankle_lateral": Landmark("shank", (0.0, 0.024, -_P.shank), BONE),
+    "ankle_medial": Landmark("shank", (0.0, -0.024, -_P.shank + 0.005), BONE),
+    "heel": Landmark("foot", (-0.042, 0.0, -0.028), BONE),
+    "mt1": Landmark("foot", (0.072, -0.020, -0.020), BONE),
+    "mt2": Landmark("foot", (0.072, 0.0, -0.014), BONE),
+    "mt5": Landmark("foot", (0.052, 0.030, -0.026), BONE),
+    "toe_tip": Landmark("foot", (0.105, -0.010, -0.026), SOFT),
+    "acromion": Landmark("torso", (0.0, 0.100, 0.300), SOFT),
+    "clavicle": Landmark("torso", (0.040, 0.050, 0.290), SOFT),
+    "back": Landmark("torso", (-0.065, 0.050, 0.240), LOOSE),
+    "upper_arm_side": Landmark("upper_arm", (0.0, 0.030, -0.090), LOOSE),
+    "elbow_lateral": Landmark("upper_arm", (0.0, 0.024, -_P.upper_arm), BONE),
+    "elbow_medial": Landmark("upper_arm", (0.0, -0.024, -_P.upper_arm), BONE),
+    "forearm_side": Landmark("forearm", (0.0, 0.025, -0.080), LOOSE),
+    "wrist": Landmark("forearm", (0.0, 0.015, -_P.forearm), SOFT),
+    "wrist_radial": Landmark("forearm", (0.020, 0.010, -_P.forearm), SOFT),
+    "wrist_ulnar": Landmark("forearm", (-0.020, 0.010, -_P.forearm), SOFT),
+    "head_front": Landmark("head", (0.070, 0.042, 0.100), SOFT),
+    "head_back": Landmark("head", (-0.040, 0.042, 0.105), SOFT),
+    "head_side": Landmark("head", (0.015, 0.047, 0.085), SOFT),
+    # Centres of joints, for files that hold them beside markers.
+    "shoulder": Landmark("torso", _P.shoulder, BONE),
+    "elbow": Landmark("upper_arm", (0.0, 0.0, -_P.upper_arm), BONE),
+    "wrist_centre": Landmark("forearm", (0.0, 0.0, -_P.forearm), BONE),
+    "hip": Landmark("pelvis", _P.hip, BONE),
+    "knee": Landmark("thigh", (0.0, 0.0, -_P.thigh), BONE),
+    "ankle": Landmark("shank", (0.0, 0.0, -_P.shank), BONE),
+    "toe": Landmark("foot", _P.toe, BONE),
+}
+_SINGLE: dict[str, Landmark] = {
+    "sacrum": Landmark("pelvis", (-0.060, 0.0, 0.050), SOFT),
+    "c7": Landmark("torso", (-0.038, 0.0, 0.325), SOFT),
+    "t10": Landmark("torso", (-0.065, 0.0, 0.200), SOFT),
+    "suprasternale": Landmark("torso", (0.040, 0.0, 0.285), SOFT),
+    "xiphoid": Landmark("torso", (0.070, 0.0, 0.190), SOFT),
+    "neck": Landmark("torso", (0.0, 0.0, _P.neck), BONE),
+    "head_top": Landmark("head", (0.015, 0.0, 0.145), SOFT),
+    "forehead": Landmark("head", (0.075, 0.0, 0.100), SOFT),
+    "occiput": Landmark("head", (-0.045, 0.0, 0.095), SOFT),
+}
+
+
+def _mirrored(mark: Landmark, side: str) -> Landmark:
+    x, y, z = mark.at
+    segment = mark.segment if mark.segment in SEGMENTS else f"{side}_{mark.segment}"
+    return Landmark(segment, (x, y if side == "l" else -y, z), mark.sd)
+
+
+#: All landmarks: l_asis, r_asis ..., sacrum ...
+LANDMARKS = {f"{s}_{name}": _mirrored(mark, s) for name, mark in _PAIRED.items() for s in SIDES} | _SINGLE
+
+#: Sets: labels, as `plain` gives them, to landmarks; {s} is the side, l or r, or the words left, right.
+_PLUG_IN_GAIT = {
+    "{s}asi": "asis", "{s}psi": "psis", "sacr": "sacrum", "{s}thi": "thigh_side", "{s}kne": "knee_lateral",
+    "{s}knee": "knee_lateral", "{s}knm": "knee_medial", "{s}knein": "knee_medial", "{s}mkne": "knee_medial",
+    "{s}medkne": "knee_medial", "{s}tib": "shank_side", "{s}ank": "ankle_lateral", "{s}ankin": "ankle_medial",
+    "{s}med": "ankle_medial", "{s}mank": "ankle_medial", "{s}mma": "ankle_medial", "{s}hee": "heel",
+    "{s}toe": "mt2", "{s}mt1": "mt1", "{s}mt5": "mt5", "{s}fhd": "head_front", "{s}bhd": "head_back",
+    "c7": "c7", "t10": "t10", "clav": "suprasternale", "strn": "xiphoid", "{s}bak": "back",
+    "{s}cla": "clavicle", "{s}sho": "acromion", "{s}upa": "upper_arm_side", "{s}elb": "elbow_lateral",
+    "{s}elbm": "elbow_medial",
+    "{s}fra": "forearm_side", "{s}frm": "forearm_side", "{s}wra": "wrist_radial", "{s}wrb": "wrist_ulnar",
+    "{s}trn": "trochanter", "{s}gtr": "trochanter", "{s}ili": "iliac_crest",
+    **{f"{{s}}f0{i}": "thigh_front" for i in range(1, 6)},
+    **{f"{{s}}t0{i}": "shank_front" for i in range(1, 6)},
+}  # fmt: skip
+_HELEN_HAYES = {
+    "{s}asis": "asis", "{s}psis": "psis", "vsacral": "sacrum", "sacral": "sacrum", "sacrum": "sacrum",
+    "s2": "sacrum", "{s}iliaccrest": "iliac_crest", "{s}sacwand": "pelvis_wand", "{s}hip": "trochanter",
+    "{s}gtroch": "trochanter", "{s}trochanter": "trochanter", "{s}thigh": "thigh_side",
+    "{s}postfem": "thigh_side", "{s}antfem": "thigh_side", "{s}knee": "knee_lateral",
+    "{s}kneelat": "knee_lateral",
+    "{s}kneelateral": "knee_lateral", "{s}kneemed": "knee_medial", "{s}kneemedial": "knee_medial",
+    "{s}shank": "shank_side", "{s}tibia": "shank_side", "{s}posttib": "shank_side", "{s}anttib": "shank_side",
+    "{s}ankle": "ankle_lateral", "{s}anklelat": "ankle_lateral", "{s}anklelateral": "ankle_lateral",
+    "{s}anklemed": "ankle_medial", "{s}anklemedial": "ankle_medial", "{s}heel": "heel", "{s}toe": "mt2",
+    "{s}mt1": "mt1", "{s}mt5": "mt5", "{s}shoulder": "acromion", "{s}clavicle": "clavicle",
+    "{s}upperarm": "upper_arm_side", "{s}elbow": "elbow_lateral", "{s}elbowlat": "elbow_lateral",
+    "{s}elbowmed": "elbow_medial", "{s}elbowmedial": "elbow_medial", "{s}forearm": "forearm_side",
+    "{s}wrist": "wrist", "{s}radius": "wrist_radial", "{s}ulna": "wrist_ulnar", "tophead": "head_top",
+    "fronthead": "forehead", "rearhead": "occiput", "backhead": "occiput", "sternum": "xiphoid",
+    "c7": "c7", "t10": "t10",
+}  # fmt: skip
+_OPENSIM = {
+    **_HELEN_HAYES, "{s}toe": "toe_tip", "{s}biceps": "upper_arm_side",
+    **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
+    **{f"{{s}}sh{i}": "shank_side" for i in range(1, 5)},
+}  # fmt: skip
+_OPENSIM_SHORT = {
+    **_PLUG_IN_GAIT, "{s}toe": "toe_tip", "{s}cal": "heel", "{s}acr": "acromion", "{s}lel": "elbow_lateral",
+    "{s}mel": "elbow_medial", "{s}faradius": "wrist_radial", "{s}faulna": "wrist_ulnar",
+    "{s}fasuperior": "forearm_side", "{s}lfc": "knee_lateral", "{s}mfc": "knee_medial",
+    "{s}lmal": "ankle_lateral", "{s}mmal": "ankle_medial", "{s}mt2": "mt2", "{s}ash": "upper_arm_side",
+    **{f"{{s}}ua{i}": "upper_arm_side" for i in range(1, 5)},
+    **{f"{{s}}th{i}": "thigh_side" for i in range(1, 5)},
+    **{f"{{s}}tb{i}": "shank_side" for i in range(1, 5)},
+}  # fmt: skip
+_PATTERNS = {
+    "plug-in-gait": _PLUG_IN_GAIT,
+    "helen-hayes": _HELEN_HAYES,
+    "opensim": _OPENSIM,
+    "opensim-short": _OPENSIM_SHORT,
+}
+
+
+def _expanded(patterns: dict[str, str]) -> dict[str, str]:
+    """Labels of both sides, with the side as a letter or a word, before or behind."""
+    table: dict[str, str] = {}
+    for pattern, landmark in patterns.items():
+        if "{s}" not in pattern:
+            table[pattern] = landmark
+            continue
+        for s, word in zip(SIDES, ("left", "right"), strict=True):
+            stem = pattern.format(s="")
+            table |= dict.fromkeys((s + stem, word + stem, stem + word), f"{s}_{landmark}")
+    return table
+
+
+#: Set to its labels (as `plain` gives them) and their landmarks.
+SETS = {name: _expanded(patterns) for name, patterns in _PATTERNS.items()}
+
+
+def plain(label: str) -> str:
+    """Give a label without the subject before ':', case, blanks and punctuation."""
+    return "".join(c for c in label.rsplit(":", 1)[-1].lower() if c.isalnum())
+
+
+def find(labels: list[str]) -> tuple[str, dict[str, str]]:
+    """Find the set that knows most of a file's labels: its name, and label to landmark."""
+    matches = {
+        name: {k: table[plain(k)] for k in labels if plain(k) in table} for name, table in SETS.items()
+    }
+    name = max(matches, key=lambda n: len(matches[n]))
+    return name, matches[name]

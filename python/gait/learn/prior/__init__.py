@@ -1,0 +1,1 @@
+"""The cyclic model: missing entries, principal components, stride rate, body lengths, blob sections."""

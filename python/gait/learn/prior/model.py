@@ -1,0 +1,205 @@
+"""A learned model as the sections of a blob (libgait/doc/model-format.md)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait._version import __version__
+from gait.body.pace import series
+from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
+from gait.io import blob
+from gait.learn.prior.between import ADULT_STATURE, LENGTH_SD, RATE_SD, by_subject
+from gait.learn.prior.fit import Learned
+from gait.learn.prior.pace import TERMS
+from gait.learn.prior.rounded import rounded
+from gait.learn.spool import by_rows, release
+
+Floats = npt.NDArray[np.float64]
+
+#: What META tells of a large corpus: so many rows of a table, and so many characters of a name, as JSON.
+MOST_ROWS, MOST_NAME = 12, 32
+GENERATOR = f"gait {__version__}"
+CMU = (
+    "The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "The database was created with funding from NSF EIA-0196217."
+)
+
+
+def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array]:
+    """All sections of the blob, META first."""
+    return {
+        "META": meta_section(meta(learned, activity, seed)),
+        "CHNM": blob.pack_names(CHANNELS),
+        "CURV": rounded(learned.curves),
+        "CHST": rounded(channel_statistics(learned)),
+        "SCST": rounded(score_statistics(learned)),
+        "GAIT": rounded(gait_statistics(learned)),
+        **({"PACE": rounded(series(learned.pace_curve, TERMS))} if learned.pace_curve.any() else {}),
+        **default_skeleton(learned.proportions).sections(),
+        **_proportions(learned),
+    }
+
+
+def _proportions(learned: Learned) -> dict[str, blob.Array]:
+    """PROP and SHFT, if proportions were learnt."""
+    if not len(learned.lengths):
+        return {}
+    return {"PROP": rounded(learned.lengths), "SHFT": rounded(learned.shifts)}
+
+
+def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
+    """META as it is stored."""
+    return np.frombuffer(json.dumps(meta, separators=(",", ":")).encode(), np.uint8)
+
+
+def origin(activity: str, seed: int, sources: Iterable[Path]) -> dict[str, Any]:
+    """Entries of META that say what a blob is and where it comes from."""
+    made = {"activity": shortened(activity), "generator": GENERATOR, "seed": seed}
+    return made | ({"acknowledgement": CMU} if from_cmu(sources) else {})
+
+
+def shortened(name: str) -> str:
+    """Keep the name, or as much of its beginning as MOST_NAME characters of JSON hold."""
+    if len(json.dumps(name)) <= MOST_NAME:
+        return name
+    end = len(name)
+    while len(json.dumps(f"{name[:end]}...")) > MOST_NAME:
+        end -= 1
+    return f"{name[:end]}..."
+
+
+def from_cmu(sources: Iterable[Path]) -> bool:
+    """Whether any recording is in the CMU database's form, whose terms ask for an acknowledgement."""
+    return any(source.suffix.lower() == ".amc" for source in sources)
+
+
+def channel_statistics(learned: Learned) -> Floats:
+    """CHST (M, 4): residual sd, least and largest value, sd of a held-out subject's static offset.
+
+    Zeros for channels that no recording has.
+    """
+    mask, values = learned.cycles.mask, learned.cycles.values
+    count = mask.sum(axis=(0, 1))
+    sd = np.sqrt(learned.residuals.squares.sum(axis=0) / np.maximum(count, 1))
+    least, largest = np.full(len(count), np.inf), np.full(len(count), -np.inf)
+    for part in by_rows(values):
+        np.minimum(least, np.where(mask[part], values[part], np.inf).min(axis=(0, 1)), out=least)
+        np.maximum(largest, np.where(mask[part], values[part], -np.inf).max(axis=(0, 1)), out=largest)
+    return np.where(count[:, None] > 0, np.stack([sd, least, largest, learned.static], axis=1), 0.0)
+
+
+def score_statistics(learned: Learned) -> Floats:
+    """SCST (q, 3): sd of the score, then between- and within-subject sd relative to it (one-way ANOVA)."""
+    c = learned.components
+    between, within = anova(c.scores / np.maximum(c.sd, 1e-12), learned.row_subject)
+    return np.stack([c.sd, between, within], axis=1)
+
+
+def anova(values: Floats, group: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Between- and within-group standard deviations of columns (n, k), unequal group sizes allowed.
+
+    With one group the between part is 0; with one member each, the within part.
+    """
+    labels, counts = np.unique(group, return_counts=True)
+    n, k = len(values), len(labels)
+    means = np.array([values[group == g].mean(axis=0) for g in labels])
+    grand = values.mean(axis=0)
+    inside = sum(((values[group == g] - m) ** 2).sum(axis=0) for g, m in zip(labels, means, strict=True))
+    within = inside / max(n - k, 1)
+    if k < 2:
+        return np.zeros(values.shape[1]), np.sqrt(within)
+    mean_square = (counts[:, None] * (means - grand) ** 2).sum(axis=0) / (k - 1)
+    size = (n - (counts**2).sum() / n) / (k - 1)
+    return np.sqrt(np.maximum(mean_square - within, 0) / size), np.sqrt(within)
+
+
+def gait_statistics(learned: Learned) -> Floats:
+    """GAIT (8,): stride rate, stride length, sample rate and stature of the training set.
+
+    Where no recording shows the pelvis's path the stride is that of the mean curves (`ground`).
+    """
+    rates = np.array([s.fps / s.period.frames for s in learned.sequences])
+    column = CHANNELS.index("root_forward")
+    speeds = [_observed(s.channels, column) for s in learned.sequences]
+    lengths = np.array([speed.mean() if len(speed) else np.nan for speed in speeds])
+    fps = float(np.median([s.fps for s in learned.sequences]))
+    rate = by_subject(rates, learned.subject_index, RATE_SD)
+    length = by_subject(lengths, learned.subject_index, LENGTH_SD)
+    if not np.isfinite(lengths).any():
+        made_up = float(learned.components.mean[:, column].mean())
+        length = made_up, 2 * LENGTH_SD * made_up
+    return np.array([*rate, stride_variation(learned), *length, fps, *ADULT_STATURE])
+
+
+def _observed(channels: Floats, column: int) -> Floats:
+    """Observed values of one of the channels (T, M) of a sequence, which lies on disk."""
+    values = channels[np.isfinite(channels[:, column]), column]
+    release(channels)
+    return values
+
+
+def stride_variation(learned: Learned) -> float:
+    """Coefficient of variation of the stride time within a sequence, pooled."""
+    parts = [s.strides / s.strides.mean() for s in learned.sequences if len(s.strides) > 1]
+    squares = sum(float(np.sum((p - 1) ** 2)) for p in parts)
+    return float(np.sqrt(squares / max(sum(len(p) - 1 for p in parts), 1)))
+
+
+def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
+    """META: what people and tools may want to know; degrees, metres, seconds."""
+    c = learned.components
+    statures = [_stature(learned, name) for name in learned.subjects[:MOST_ROWS]]
+    return {
+        **origin(activity, seed, [s.source for s in learned.sequences]),
+        "subject_count": len(learned.subjects),
+        "subjects": [shortened(name) for name in learned.subjects[:MOST_ROWS]],
+        "statures_m": [None if h is None else round(h, 3) for h in statures],
+        "sequences": {
+            "count": len(learned.sequences),
+            "columns": list(SEQUENCE_COLUMNS),
+            "rows": [[shortened(name), *row] for name, *row in sequence_table(learned)[:MOST_ROWS]],
+        },
+        **({"unobserved": missing} if (missing := unobserved(learned)) else {}),
+        "cycles": len(c.scores),
+        "missing": round(float(1 - learned.cycles.mask.mean()), 3),
+        "variance_explained": [round(float(v), 3) for v in np.cumsum(c.spectrum)[: len(c.sd)]],
+        "iterations": {"alignment": len(learned.alignment.objective), "imputation": len(c.rmse)},
+    }
+
+
+def unobserved(learned: Learned) -> list[str]:
+    """Parts of the body, such as 'l_shoulder', of which no recording has any angle."""
+    seen = parts(np.asarray(learned.cycles.mask.any(axis=(0, 1))))
+    return [part for part in parts(np.ones(len(ANGLES), bool)) if part not in seen]
+
+
+def parts(which: npt.NDArray[np.bool_]) -> list[str]:
+    """Parts of the body that have any of some channels (>= A,), the angles first."""
+    return list(
+        dict.fromkeys(name.rsplit("_", 1)[0] for name, one in zip(ANGLES, which, strict=False) if one)
+    )
+
+
+def _stature(learned: Learned, subject: str) -> float | None:
+    """Mean stature of a subject, metres; None if no recording shows it."""
+    bodies = [s.measures for s in learned.sequences if s.subject == subject and s.measures is not None]
+    return float(np.mean([b.stature for b in bodies])) if bodies else None
+
+
+SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")
+
+
+def sequence_table(learned: Learned) -> list[list[Any]]:
+    """Rows of SEQUENCE_COLUMNS; sharpness: peak over median SNR; residual: rms of all angles."""
+    table = []
+    for i, s in enumerate(learned.sequences):
+        rms = learned.residuals.rms(learned.cycles.sequence == i, slice(len(ANGLES)))
+        row = [round(1000 * s.period.frames / s.fps), round(s.cycles, 1), round(s.period.sharpness)]
+        table.append([s.name, *row, round(float(np.degrees(rms)), 1) if np.isfinite(rms) else None])
+    return table

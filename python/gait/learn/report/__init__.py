@@ -1,0 +1,1 @@
+"""The report of a learned model: figures and one page."""

@@ -1,0 +1,182 @@
+"""Figures of the model: mean and components as curves and stick figures (Ormoneit 2000, Fig. 6), errors."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from gait.body.skeleton import ANGLES, JOINTS, default_skeleton, points
+from gait.draw.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
+from gait.learn.prior.fit import Learned
+from gait.learn.report.figures_base import (
+    PHASE,
+    PHASE_LABEL,
+    SHOWN,
+    Floats,
+    column,
+    grid,
+    line_legend,
+    observed,
+    plain,
+    say_unobserved,
+    whole_numbers,
+    words,
+)
+
+PHASES = 8  # of a strip
+TURNS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}
+STEP = 0.75  # statures from one figure of a strip to the next
+MOST_COMPONENTS = 8  # drawn as curves
+MOST_SPECTRUM = 20
+JOINT_ORDER = ("hip", "knee", "ankle", "shoulder", "elbow", "torso", "neck")
+_ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "toe")
+STICKS = {
+    "c": [["head_top", "neck", "pelvis"], ["l_shoulder", "neck", "r_shoulder"], ["l_hip", "pelvis", "r_hip"]],
+    **{
+        s: [[f"{s}_{j}" for j in _ARM], [f"{s}_{j}" for j in _LEG], [f"{s}_ankle", f"{s}_heel", f"{s}_toe"]]
+        for s in "lr"
+    },
+}
+
+
+def curves(learned: Learned) -> Figure:
+    """Mean and two standard deviations of the stride rate and along each component, angle by angle."""
+    mean_curve, *turns = np.degrees(learned.curves[: 1 + MOST_COMPONENTS])
+    names, seen = [f"component {k + 1}" for k in range(len(turns))], observed(learned)
+    if learned.pace_curve.any():
+        names, turns = ["stride rate", *names], [np.degrees(learned.pace_curve), *turns]
+    figure = Figure(figsize=(11, 1.6 * len(names) + 0.7), layout="constrained")
+    panels = figure.subplots(len(names), len(SHOWN), sharex=True, sharey="col", squeeze=False)
+    for k, row in enumerate(panels):
+        for axes, name in zip(row, SHOWN, strict=True):
+            plain(axes)
+            c = column(name)
+            if not seen[c]:
+                say_unobserved(axes)
+            else:
+                mean, turn = mean_curve[:, c], 2 * turns[k][:, c]
+                axes.fill_between(PHASE, mean - turn, mean + turn, color=GREY, alpha=0.2, lw=0)
+                axes.plot(PHASE, mean + turn, color=ORANGE, lw=1)
+                axes.plot(PHASE, mean, color=DARK, lw=1)
+                axes.plot(PHASE, mean - turn, color=BLUE, lw=1)
+            axes.set(xlim=(0, 1))
+            if k == 0:
+                axes.set_title(words(name), fontsize=9)
+        row[0].set_ylabel(f"{names[k]}\ndegrees", fontsize=8)
+    line_legend(figure, {**TURNS, "mean": DARK})
+    figure.supxlabel(PHASE_LABEL, fontsize=9)
+    return figure
+
+
+def strip(learned: Learned, moved: Floats | None) -> Figure:
+    """Walker over one cycle from the side and from the front.
+
+    Parameters
+    ----------
+    moved : (T, M), optional
+        Draw the mean plus and minus two of these changes over the mean; None: the mean alone.
+    """
+    figure, panels = grid(2, 1, 10, 4.6)
+    turns = [0.0] if moved is None else [0.0, -2.0, 2.0]
+    top = 1.05
+    for turn in turns:
+        bodies = _bodies(learned, learned.curves[0] if moved is None else learned.curves[0] + turn * moved)
+        top = max(top, float(bodies[..., 2].max()))
+        colour = {0.0: DARK if moved is None else GREY, -2.0: BLUE, 2.0: ORANGE}[turn]
+        for axes, across in zip(panels, (0, 1), strict=True):
+            _draw(axes, bodies, across, colour)
+    for axes, name in zip(panels, ("seen from the right", "seen from ahead"), strict=True):
+        axes.set_aspect("equal")
+        axes.grid(visible=False)
+        axes.axhline(0, color="#cccccc", lw=0.8, zorder=0)
+        axes.set(xlim=(-0.6 * STEP, (PHASES - 0.4) * STEP), ylim=(-0.04, top + 0.03), yticks=[], ylabel=name)
+        axes.spines[["left", "bottom"]].set_visible(False)
+        axes.set_xticks(STEP * np.arange(PHASES), [f"{i / PHASES:g}" for i in range(PHASES)])
+    panels[1].set_xlabel(PHASE_LABEL)
+    if moved is not None:
+        line_legend(figure, TURNS)
+    return figure
+
+
+def _bodies(learned: Learned, cycle: Floats) -> Floats:
+    """Joints (PHASES, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
+    at = np.arange(PHASES) * len(PHASE) // PHASES
+    joints = points(default_skeleton(learned.proportions).sections(), cycle[at])
+    joints[:, :, 2] -= joints[:, :, 2].min(axis=1, keepdims=True)
+    return joints
+
+
+def _draw(axes: Axes, bodies: Floats, across: int, colour: str) -> None:
+    """Stick figures side by side; what is nearer to the viewer (the right side) is bolder.
+
+    Parameters
+    ----------
+    across : int
+        Coordinate along the paper: 0 forward to the right, 1 seen from ahead (its left to the right).
+    """
+    for i, body in enumerate(bodies):
+        for side, chains in STICKS.items():
+            for chain in chains:
+                joints = body[[JOINTS.index(name) for name in chain]]
+                axes.plot(
+                    joints[:, across] + i * STEP, joints[:, 2], color=colour,
+                    lw=0.9 if side == "l" else 1.8, alpha=0.7 if side == "l" else 1,
+                    solid_capstyle="round",
+                )  # fmt: skip
+
+
+def spectrum(learned: Learned) -> Figure:
+    """Share of the variance that components explain; error on held-out data if it was asked for."""
+    held = np.degrees(learned.held_out)
+    figure, panels = grid(1, 2 if len(held) else 1, 8 if len(held) else 5, 3.4)
+    single, kept = 100 * learned.components.spectrum[:MOST_SPECTRUM], len(learned.components.sd)
+    numbers = np.arange(1, len(single) + 1)
+    panels[0].bar(numbers, single, color=BLUE, alpha=0.6, label="each")
+    panels[0].plot(numbers, np.cumsum(single), "o-", ms=3, color=DARK, label="together")
+    panels[0].axvline(kept + 0.5, color=ORANGE, lw=1, ls="--", label=f"kept: {kept}")
+    panels[0].set(xlabel="component", ylabel="variance explained, %", ylim=(0, 103))
+    panels[0].set_xlim(0.3, len(single) + 0.7)
+    panels[0].legend(fontsize=8, frameon=False, loc="center right")
+    if len(held):
+        panels[1].plot(np.arange(len(held)), held, "o-", ms=4, color=BLUE)
+        panels[1].plot(kept, held[min(kept, len(held) - 1)], "o", ms=7, color=ORANGE, label=f"chosen: {kept}")
+        panels[1].set(xlabel="components", ylabel="error on held-out data, degrees")
+        panels[1].legend(fontsize=8, frameon=False)
+    for axes in panels:
+        whole_numbers(axes)
+    return figure
+
+
+def residuals(learned: Learned) -> Figure:
+    """Root mean square of what the components leave of each angle."""
+    figure, (axes,) = grid(1, 1, 8, 3.8)
+    squares, count = learned.residuals.squares.sum(axis=0), learned.residuals.count.sum(axis=0)
+    rest = np.degrees(np.sqrt(squares / np.maximum(count, 1)))[: len(ANGLES)]
+    order = sorted(range(len(ANGLES)), key=lambda i: [j in ANGLES[i] for j in JOINT_ORDER].index(True))
+    shades = [ON_PAPER[side_of(ANGLES[i])] for i in order]
+    axes.bar(np.arange(len(order)), rest[order], color=shades)
+    for place in np.flatnonzero(count[order] == 0).tolist():
+        axes.text(place, 0, " not observed", rotation=90, ha="center", va="bottom", fontsize=7, color=GREY)
+    axes.set_xticks(np.arange(len(order)), [words(ANGLES[i]) for i in order], rotation=90, fontsize=8)
+    axes.set(ylabel="residual, degrees (rms)", xlim=(-0.7, len(order) - 0.3))
+    axes.grid(visible=False, axis="x")
+    return figure
+
+
+def convergence(learned: Learned) -> Figure:
+    """Objectives of the alignment and of the filling of gaps, and its error, against their passes."""
+    figure, panels = grid(1, 3, 10, 3.2)
+    filling = learned.components
+    courses: list[tuple[str, str, list[float] | Floats]] = [
+        ("alignment", "weighted sum of squares, rad²", learned.alignment.objective),
+        ("filling of gaps: objective", "- log-likelihood per entry", filling.objective),
+        ("filling of gaps: error", "on observed entries, degrees (rms)", np.degrees(filling.rmse)),
+    ]
+    for axes, (title, unit, values) in zip(panels, courses, strict=True):
+        axes.plot(np.arange(1, len(values) + 1), values, "o-", ms=3, color=BLUE)
+        axes.set(xlabel="pass", ylabel=unit)
+        axes.set_title(title, fontsize=10)
+        axes.ticklabel_format(axis="y", useOffset=False)
+        whole_numbers(axes)
+    return figure

@@ -1,0 +1,1 @@
+"""The segment prior: virtual markers, segments of a corpus, their Gaussian, sections of the blob."""
