@@ -12,6 +12,12 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#ifdef OLDEST_GLIBC /* for wheels: these moved from libpthread to libc in 2.32 and 2.34 and got new versions there */
+__asm__(".symver pthread_create, pthread_create@" OLDEST_GLIBC);
+__asm__(".symver pthread_join, pthread_join@" OLDEST_GLIBC);
+__asm__(".symver pthread_sigmask, pthread_sigmask@" OLDEST_GLIBC);
+#endif
+
 typedef struct job {
     gait_task_fn *fn; /* NULL: none */
     void *ctx;

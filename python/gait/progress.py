@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
-from rich.progress import Progress
-
 _PATIENCE = 2.0  # seconds of work before a bar appears
+_PERIOD = 0.1  # seconds between two drawings of the bar
+_WIDTH = 40  # characters
 
 
 @contextmanager
@@ -25,21 +25,31 @@ def progress(words: str, total: int | None, quiet: bool = False) -> Iterator[Cal
     quiet : bool
         Show nothing.
     """
-    console = Console(stderr=True)
-    bar = Progress(console=console, transient=True, disable=quiet or not console.is_terminal)
-    begun = time.monotonic()
-    task = None
+    shown = not quiet and sys.stderr.isatty()
+    start = time.monotonic()
+    due = start + _PATIENCE
+    drawn = False
 
     def update(done: int) -> None:
-        nonlocal task
-        if task is None and time.monotonic() - begun > _PATIENCE:
-            bar.start()
-            task = bar.add_task(words, total=total)
-        if task is not None:
-            bar.update(task, completed=done)
+        nonlocal due, drawn
+        now = time.monotonic()
+        if shown and now >= due:
+            due, drawn = now + _PERIOD, True
+            sys.stderr.write(f"\r{words} {_bar(done, total, now - start)}\x1b[K")
+            sys.stderr.flush()
 
     try:
         yield update
     finally:
-        if task is not None:
-            bar.stop()
+        if drawn:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
+
+
+def _bar(done: int, total: int | None, elapsed: float) -> str:
+    """Bar, percentage and remaining time, or only the count if the total is unknown."""
+    if not total:
+        return str(done)
+    share = min(done / total, 1.0)
+    left = round(elapsed * (1.0 / share - 1.0)) if share else 0
+    return f"[{'#' * round(share * _WIDTH):<{_WIDTH}}] {share:4.0%} {left // 60}:{left % 60:02d}"

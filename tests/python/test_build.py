@@ -15,11 +15,10 @@ TOOLS = "sh sed tr cat mkdir dirname uname printf test awk expr ls head cut real
 @pytest.fixture
 def bare(tmp_path):
     """Copy of what the library is built from, and a folder of programs without Python and compilers."""
-    for name in ("Makefile", "libgait", "python/requirements.txt", "python/requirements-dev.txt"):
+    for name in ("Makefile", "libgait", "python/constraints.txt", "python/pyproject.toml"):
         target = tmp_path / "gait" / name
         target.parent.mkdir(parents=True, exist_ok=True)
         (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, target)
-    shutil.copy(ROOT / "python/pyproject.toml", tmp_path / "gait/python/pyproject.toml")
     programs = tmp_path / "bin"
     programs.mkdir()
     for name in TOOLS.split():

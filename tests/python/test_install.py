@@ -34,7 +34,8 @@ def installed(tmp_path):
 def test_install_puts_everything_and_uninstall_removes_it(installed):
     names = {str(p.relative_to(installed / "opt/gait")) for p in installed.rglob("*") if not p.is_dir()}
     libraries = {"lib/libgait.so", f"lib/libgait.so.{ABI}", "lib/libgait.a"}
-    assert names == libraries | {"lib/pkgconfig/gait.pc", "include/gait.h", "include/gait_pool.h"}
+    described = {"lib/pkgconfig/gait.pc", *(f"lib/cmake/gait/gaitConfig{kind}.cmake" for kind in ("", "Version"))}
+    assert names == libraries | described | {"include/gait.h", "include/gait_pool.h"}
     assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0
     assert not [p for p in installed.rglob("*") if not p.is_dir()]
 
@@ -57,6 +58,23 @@ def test_a_program_builds_and_runs_against_the_installed_library(installed, tmp_
         flags = [f for f in flags if f != "-lgait"] + linked
     subprocess.run(["cc", tmp_path / "a.c", "-o", tmp_path / "a", *flags], check=True)
     assert subprocess.run([tmp_path / "a"], env=env).returncode == 0
+
+
+@pytest.mark.parametrize("shared", ["ON", "OFF"])
+def test_find_package_of_cmake_finds_the_installed_library(installed, tmp_path, shared):
+    if not shutil.which("cmake"):
+        pytest.skip("cmake is not installed")
+    (tmp_path / "a.c").write_text(PROGRAM)
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.18)\nproject(a C)\nfind_package(gait 0.1 REQUIRED)\n"
+        "add_executable(a a.c)\ntarget_link_libraries(a gait::gait)\n"
+    )
+    options = [f"-DCMAKE_PREFIX_PATH={installed}/opt/gait", f"-DBUILD_SHARED_LIBS={shared}"]
+    for command in (["cmake", "-S", ".", "-B", "build", *options], ["cmake", "--build", "build"]):
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=120)
+    assert subprocess.run([tmp_path / "build/a"]).returncode == 0
+    needed = subprocess.run(["readelf", "-d", tmp_path / "build/a"], capture_output=True, text=True).stdout
+    assert (f"libgait.so.{ABI}" in needed) == (shared == "ON")
 
 
 def test_a_prefix_with_a_space(tmp_path):
