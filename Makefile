@@ -76,14 +76,15 @@ CALLS := $(shell $(CC) -fcallgraph-info=su -E -x c /dev/null >/dev/null 2>&1 && 
 # Atomics of aarch64 in line: libgcc's would bring a constructor and a writable global.
 ATOMICS := $(shell $(CC) -Werror -mno-outline-atomics -E -x c /dev/null >/dev/null 2>&1 && echo -mno-outline-atomics)
 LIBGAIT := $(COMMON) $(CODE_FLAGS) $(ATOMICS) -fstack-usage $(CALLS) -Wframe-larger-than=16384 \
-           -Ilibgait/include
+           -Ilibgait/include -iquote libgait/src
 KERNEL_ISAS := scalar base $(if $(findstring x86_64,$(MACHINE)),$(X86_ISAS))
-KERNEL_SRC := $(sort $(wildcard libgait/src/*_kernel.c))
+KERNEL_SRC := $(sort $(wildcard libgait/src/*/*_kernel.c))
 KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(KERNEL_SRC:libgait/src/%.c=$(B)/src/%.$(isa).o))
-SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*.c libgait/src/*.cpp)))
+SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*/*.c libgait/src/*/*.cpp)))
 OBJ := $(SRC:libgait/src/%=$(B)/src/%.o) $(KERNEL_OBJ)
+SRC_DIRS := $(sort $(dir $(OBJ)))
 UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_*.c)))
-TOOLS := $(patsubst tools/%.c,$(BIN)/%,$(sort $(wildcard tools/gait-*.c)))
+TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
 .PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan tsan unit-threads fuzz fuzz-run golden-check \
@@ -159,16 +160,16 @@ $(B)/libgait.a: $(OBJ)
 	@rm -f $@
 	@$(AR) rcs $@ $(B)/libgait.o
 
-$(B)/src/%.c.o: libgait/src/%.c Makefile $(MADE) | $(B)/src/
+$(B)/src/%.c.o: libgait/src/%.c Makefile $(MADE) | $(SRC_DIRS)
 	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(call C_FLAGS,$(notdir $<)) $(CFLAGS) -c $< -o $@
 
-$(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(B)/src/ $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
+$(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(SRC_DIRS) $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
 	@test -f $(EIGEN)/Eigen/Core || { echo 'lib: no Eigen/Core in EIGEN=$(EIGEN): give the folder that has it, or install' \
 	    'libeigen3-dev' >&2; exit 1; }
 	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) -isystem $(EIGEN) $(CXX_FLAGS) $(WARN) $(call C_FLAGS,$(notdir $<)) $(CXXFLAGS) -c $< -o $@
 
 define kernel_rule
-$(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(B)/src/
+$(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(SRC_DIRS)
 	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<)) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
@@ -196,11 +197,11 @@ $(B)/libgaitmsg.a: build/lcm/.stamp $(MADE) | $(B)/lcm/
 	@rm -f $@
 	@$(AR) rcs $@ $(LCM_TYPES:lcm_types/%.lcm=$(B)/lcm/%.o)
 
-TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/common/*.c)))
-$(BIN)/%: $(B)/tools/%.c.o $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
+TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/trackd/*.c)))
+$(BIN)/gait-trackd: $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
 	$(call say,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) $(JPEG_LIBS) -lm
 
-$(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/common/
+$(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/trackd/
 	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
 	    $(JPEG_CFLAGS) $(CFLAGS) -c $< -o $@
 
@@ -268,7 +269,7 @@ model: setup lib ## learn the default model from MOCAP= *
 BENCH_ISA := $(foreach isa,$(KERNEL_ISAS),$(B)/bench/bench_limit_kernel.$(isa).o)
 BENCH_SRC := tests/bench/step.c $(filter-out %_kernel.c,$(sort $(wildcard tests/bench/bench_*.c)))
 BENCH_OBJ := $(BENCH_SRC:tests/bench/%.c=$(B)/bench/%.o) $(BENCH_ISA)
-BENCH_PARTS := $(patsubst %,$(B)/tools/common/%.c.o,file message options workers)
+BENCH_PARTS := $(patsubst %,$(B)/tools/trackd/%.c.o,file message options workers)
 BENCH_WRAP := $(shell sed -n 's/^WRAP.[^,]*, \([a-z_]*\),.*/-Wl,--wrap=\1/p' tests/bench/bench_stages.c)
 BENCH_CC = $(CC) -std=c11 -D_DEFAULT_SOURCE -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -Ilibgait/include -iquote libgait/src -Itools $(CFLAGS)
 define bench_isa_rule
@@ -327,8 +328,8 @@ sdist: $(READY) ## source package that builds without a network, in build/wheel
 	@cd python && ../$(PY) -c 'from scikit_build_core.build import build_sdist; print(build_sdist("../build/wheel"))'
 
 # ---- style ---------------------------------------------------------------------------------------------------
-C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*.[ch] libgait/src/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] tools/*.[ch] \
-           tools/common/*.[ch]))
+C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] \
+           tools/trackd/*.[ch]))
 lint: export PATH := $(abspath $(VENV)/bin):$(PATH)
 lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed
 	@clang-format --dry-run -Werror $(C_FILES)
@@ -336,7 +337,7 @@ lint: setup ## clang-format, ruff, mypy; clang-tidy where it is installed
 	@ruff format --quiet --check --config python/pyproject.toml python tests
 	@mypy --no-error-summary --config-file python/pyproject.toml python/gait
 	@if command -v clang-tidy >/dev/null; then \
-	    clang-tidy --quiet $(filter libgait/src/%.c,$(C_FILES)) -- -std=c11 -Ilibgait/include; \
+	    clang-tidy --quiet $(filter libgait/src/%.c,$(C_FILES)) -- -std=c11 -Ilibgait/include -iquote libgait/src; \
 	else echo 'lint: no clang-tidy, skipped' >&2; fi
 
 format: setup ## rewrite in the house style
@@ -364,4 +365,4 @@ uninstall: ## remove what install put there
 clean: ## remove build/ (not .venv)
 	rm -rf build
 
--include $(wildcard $(B)/src/*.d $(B)/unit/*.d $(B)/bench/*.d $(B)/tools/*.d $(B)/tools/common/*.d)
+-include $(wildcard $(B)/src/*/*.d $(B)/unit/*.d $(B)/bench/*.d $(B)/tools/trackd/*.d)

@@ -6,7 +6,7 @@
  * GAIT_ALIGN; they must outlive the object and not move.  There is nothing to free.
  * Threads: a gait_model is immutable and may be shared; any other object takes one call at a time.
  * Results depend on input, configuration and seed - not on threads, addresses, time or CPU features.
- * Every function returning gait_status gives GAIT_OK or a negative error and then leaves its outputs alone. */
+ * Every function returning gait_result gives GAIT_OK or a negative error and then leaves its outputs alone. */
 #ifndef GAIT_H
 #define GAIT_H
 #include <stddef.h>
@@ -16,7 +16,7 @@
 #define GAIT_VERSION_MINOR 1
 #define GAIT_VERSION_PATCH 0
 #define GAIT_VERSION (GAIT_VERSION_MAJOR * 10000 + GAIT_VERSION_MINOR * 100 + GAIT_VERSION_PATCH)
-#define GAIT_ABI 6          /* SONAME; bumped by any incompatible change below, struct layout included */
+#define GAIT_ABI 7          /* SONAME; bumped by any incompatible change below, struct layout included */
 #define GAIT_FORMAT_MAJOR 1 /* model blob: another major is refused, */
 #define GAIT_FORMAT_MINOR 0 /* sections added by a newer minor are skipped */
 
@@ -37,7 +37,7 @@ extern "C" {
 #endif
 
 /* ---- status: 0 success, negative error.  Values never change meaning. -------------------------------- */
-typedef enum gait_status {
+typedef enum gait_result {
     GAIT_OK          = 0,
     GAIT_ERR_ARG     = -1, /* null pointer, non-finite number, value outside its documented range */
     GAIT_ERR_STRUCT  = -2, /* struct_size unset or unknown: call gait_*_default() first */
@@ -48,20 +48,20 @@ typedef enum gait_status {
     GAIT_ERR_CORRUPT = -7, /* checksum, bounds or cross-reference check failed */
     GAIT_ERR_STATE   = -8, /* call out of order: step before start, time running backwards */
     GAIT_ERR_NUMERIC = -9  /* lifting ran out of the range of numbers; the tracker flags GAIT_EST_DEGENERATE instead */
-} gait_status;
+} gait_result;
 
 typedef struct gait_error { /* optional detail, written on failure only; there is no global "last error" */
-    int32_t status;         /* the gait_status returned */
+    int32_t status;         /* the gait_result returned */
     int32_t index;          /* camera, section or parameter concerned; -1 if none */
     char    text[120];      /* one line, NUL-terminated */
 } gait_error;
 
 typedef struct gait_abi_field { /* one row per struct (field "") and per field */
-    char     type[20], field[20];
+    char     type[20], field[24];
     uint32_t offset, size;      /* bytes */
 } gait_abi_field;
 
-GAIT_API const char           *gait_status_name(gait_status s);  /* "GAIT_ERR_CORRUPT"; never NULL */
+GAIT_API const char           *gait_result_name(gait_result s);  /* "GAIT_ERR_CORRUPT"; never NULL */
 GAIT_API uint32_t              gait_version(void);               /* of the library that is loaded */
 GAIT_API uint32_t              gait_abi(void);
 GAIT_API const gait_abi_field *gait_abi_fields(uint32_t *count); /* bindings check themselves on import */
@@ -132,22 +132,22 @@ typedef struct gait_model_info {
 } gait_model_info;
 
 /* The blob must be aligned to GAIT_ALIGN and outlive the model. */
-GAIT_API gait_status gait_model_bytes(const void *blob, size_t blob_bytes, size_t *bytes, gait_error *err);
-GAIT_API gait_status gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
+GAIT_API gait_result gait_model_bytes(const void *blob, size_t blob_bytes, size_t *bytes, gait_error *err);
+GAIT_API gait_result gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
                                      gait_model **out, gait_error *err);
-GAIT_API gait_status gait_model_get_info(const gait_model *m, gait_model_info *out);
+GAIT_API gait_result gait_model_get_info(const gait_model *m, gait_model_info *out);
 GAIT_API const char *gait_model_joint_name(const gait_model *m, int32_t joint); /* NULL out of range */
 GAIT_API const char *gait_model_angle_name(const gait_model *m, int32_t angle); /* NULL out of range */
 GAIT_API const char *gait_model_limb_name(const gait_model *m, int32_t limb);   /* NULL out of range */
 /* Pose of one hypothesis: curves (Ormoneit 2000, eq. 3), then forward kinematics. */
-GAIT_API gait_status gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out);
+GAIT_API gait_result gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out);
 /* Height of the pelvis over the ground that the model predicts for s (s->pelvis is not read), metres. */
-GAIT_API gait_status gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out);
+GAIT_API gait_result gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out);
 
 /* ---- render: limbs with depth order ------------------------------------------------------------------- */
 /* Draw a hypothesis with the model's own radii: every pixel of ids (width x height of the camera, ids_stride
  * bytes per row) becomes 0 or limb index + 1, nearest limb in front (ideal pinhole image, no distortion). */
-GAIT_API gait_status gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
+GAIT_API gait_result gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
                                  int32_t ids_stride);
 
 /* ---- tracker (Ormoneit et al. 2000) ------------------------------------------------------------------- */
@@ -159,14 +159,14 @@ enum { GAIT_MODE_DEFAULT = 0, GAIT_MODE_PAPER = 1 };
 #define GAIT_TERM_SILHOUETTE 0x2u /* foreground both ways; needs a background plate */
 #define GAIT_TERM_EDGES      0x4u /* image gradient along the limbs' outlines */
 #define GAIT_TERM_TEMPLATE   0x8u /* running appearance of each limb */
-#define GAIT_TERM_TRACKS     0x10u /* joints found in the images by somebody else, gait_frame tracks; default off */
+#define GAIT_TERM_KEYPOINTS     0x10u /* joints found in the images by somebody else, gait_frame keypoints; default off */
 
 typedef struct gait_tracker_config {
     uint32_t struct_size;      /* set by gait_tracker_default() */
     int32_t  mode;             /* GAIT_MODE_*; set by gait_tracker_default() */
     uint64_t seed;             /* default 1 */
     int32_t  particles;        /* [16, 1 << 20]; default 2000 (paper mode 10000) */
-    int32_t  search_particles; /* twice as many in a search, up to these [0, 1 << 20]; default 4000 (paper mode 0) */
+    int32_t  acquisition_particles; /* twice as many in a search, up to these [0, 1 << 20]; default 4000 (paper mode 0) */
     int32_t  components;       /* [0, the model's]; default -1: the first 5, in paper mode all */
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
@@ -183,7 +183,7 @@ typedef struct gait_tracker_config {
     float    evidence_time;    /* seconds for which errors of the image terms last; a frame's log-likelihood counts at
                                 * the time since images last supported the walker / this, at most whole; 0: frames are
                                 * independent [0, 1e6]; default 0.1 (paper mode 0) */
-    float    mingle_time;      /* seconds in which particles forget whom they descend from; 0: never [0, 1e6]; default
+    float    rejuvenation_time;      /* seconds in which particles forget whom they descend from; 0: never [0, 1e6]; default
                                 * 1.5 (paper mode 0) */
     float    max_dt;           /* longest accepted interval, seconds [0.001, 10]; default 0.5 */
     /* Dynamics (eqs. 5-9): standard deviations of random walks, per sqrt(second). */
@@ -214,19 +214,19 @@ typedef struct gait_tracker_config {
     gait_tasks exec;           /* default { NULL, NULL } */
 } gait_tracker_config;
 
-typedef struct gait_track { /* one joint located in an image */
+typedef struct gait_keypoint { /* one joint located in an image */
     float u, v; /* pixels, as captured (distorted) */
     float sd;   /* standard deviation, pixels, with what the model's joints miss the detector's by; not positive: not seen */
-} gait_track;
+} gait_keypoint;
 
 typedef struct gait_frame {
     int64_t    utime;                   /* capture time; must increase */
     gait_image image[GAIT_MAX_CAMERAS]; /* data NULL: that camera missed this frame */
-    const gait_track *tracks[GAIT_MAX_CAMERAS]; /* the model's joints in order, for GAIT_TERM_TRACKS; NULL: none.  They
+    const gait_keypoint *keypoints[GAIT_MAX_CAMERAS]; /* the model's joints in order, for GAIT_TERM_KEYPOINTS; NULL: none.  They
                                                  * count where the camera has an image */
 } gait_frame;
 
-enum { GAIT_STATUS_INIT = 0, GAIT_STATUS_TRACKING = 1, GAIT_STATUS_AMBIGUOUS = 2, GAIT_STATUS_LOST = 3 };
+enum { GAIT_TRACK_INIT = 0, GAIT_TRACK_TRACKING = 1, GAIT_TRACK_AMBIGUOUS = 2, GAIT_TRACK_LOST = 3 };
 #define GAIT_EST_RESAMPLED  0x1u
 #define GAIT_EST_NO_IMAGE   0x2u /* prediction only */
 #define GAIT_EST_DEGENERATE 0x4u /* effective sample size below 2 */
@@ -249,33 +249,33 @@ typedef struct gait_estimate {
 } gait_estimate;
 
 GAIT_API void        gait_tracker_default(gait_tracker_config *cfg, int32_t mode);
-GAIT_API gait_status gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
+GAIT_API gait_result gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
                                         gait_error *err);
-GAIT_API gait_status gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
+GAIT_API gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
                                        const gait_tracker_config *cfg, gait_tracker **out, gait_error *err);
 /* Empty scene of one camera, as captured (distorted), borrowed: its pixels must stay until replaced or the tracker is
  * done; snapshots lack it, restore keeps this tracker's.  plate NULL: none; the silhouette term is then silent. */
-GAIT_API gait_status gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate);
+GAIT_API gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate);
 /* Broad prior: phase uniform, stride rate and stature of the population, heading unknown, pelvis at the origin. */
-GAIT_API gait_status gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd);
+GAIT_API gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd);
 /* Draw the particles from independent normals; a phase or heading whose sd is >= a half turn is uniform.  GAIT_ERR_ARG:
  * a number is out of range: deviations [0, 10]; means as said at gait_state, phase [0, 1], the others [-10, 10]. */
-GAIT_API gait_status gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
+GAIT_API gait_result gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
                                         gait_error *err);
 /* One frame: resample, predict, weigh, estimate.  The first frame after start at the same utime is not moved. */
-GAIT_API gait_status gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out, gait_error *err);
+GAIT_API gait_result gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out, gait_error *err);
 /* The frame `back` steps ago given every frame since: today's weights on the ancestors of then.  back 0 is the
  * present.  GAIT_ERR_ARG: back is not in [0, config lag]; GAIT_ERR_STATE: not so many steps since start.  ess counts
  * the ancestors that are left; status is LOST if it was, else the mode's mass as known now decides. */
-GAIT_API gait_status gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err);
+GAIT_API gait_result gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err);
 /* Go on with so many particles [16, config particles], drawn in the next step from those there are by their weights;
  * while the two readings of left and right are weighed against each other the change waits.  A start keeps it. */
-GAIT_API gait_status gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_error *err);
+GAIT_API gait_result gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_error *err);
 /* Copy up to cap particles with normalised weights; returns how many there are, or a negative status. */
 GAIT_API int32_t     gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap);
 GAIT_API uint64_t    gait_tracker_digest(const gait_tracker *t); /* hash of the whole state, for replay */
-GAIT_API gait_status gait_tracker_save(const gait_tracker *t, void *mem, size_t cap, size_t *bytes); /* mem NULL: size */
-GAIT_API gait_status gait_tracker_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err);
+GAIT_API gait_result gait_tracker_save(const gait_tracker *t, void *mem, size_t cap, size_t *bytes); /* mem NULL: size */
+GAIT_API gait_result gait_tracker_restore(gait_tracker *t, const void *mem, size_t bytes, gait_error *err);
 
 /* ---- lift: 3-D motion from 2-D tracks (Leventon and Freeman 1998) -------------------------------------- */
 /* A segment is F frames of J markers: stature x (mean + sum_i alpha_i mode_i), turned by a heading about z and
@@ -343,55 +343,55 @@ typedef struct gait_lift_frame { /* one frame of a stream, `lag` frames ago */
     uint64_t frame;              /* frames pushed before it since the start */
     double   heading;            /* of the body, radians */
     double   misfit;             /* squared deviations per number observed of the segments behind it */
-    int32_t  status;             /* GAIT_STATUS_TRACKING; AMBIGUOUS: as GAIT_LIFT_MISFIT; INIT: none yet, all below is 0 */
+    int32_t  status;             /* GAIT_TRACK_TRACKING; AMBIGUOUS: as GAIT_LIFT_MISFIT; INIT: none yet, all below is 0 */
     uint32_t flags;              /* GAIT_LIFT_* */
     double   marker[GAIT_MAX_MARKERS][3]; /* posterior mean, metres, world; 0 for those not in config report */
     double   sd[GAIT_MAX_MARKERS][3];     /* standard deviation; wider by the root of a misfit above 1 */
 } gait_lift_frame;
 
 /* A blob may hold a cyclic model, a segment prior or both. */
-GAIT_API gait_status gait_lift_get_info(const void *blob, size_t blob_bytes, gait_lift_info *out, gait_error *err);
+GAIT_API gait_result gait_lift_get_info(const void *blob, size_t blob_bytes, gait_lift_info *out, gait_error *err);
 GAIT_API void        gait_lift_default(gait_lift_config *cfg);
 /* The blob must be aligned to GAIT_ALIGN and outlive the object. */
-GAIT_API gait_status gait_lift_bytes(const void *blob, size_t blob_bytes, const gait_lift_config *cfg, size_t *bytes,
+GAIT_API gait_result gait_lift_bytes(const void *blob, size_t blob_bytes, const gait_lift_config *cfg, size_t *bytes,
                                      gait_error *err);
-GAIT_API gait_status gait_lift_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
+GAIT_API gait_result gait_lift_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
                                     const gait_lift_config *cfg, gait_lift **out, gait_error *err);
 GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL out of range */
 
 /* One segment.  uv [F][J][2]; sd [F][J] or NULL (config sd): infinite, NaN or <= 0 is not seen, as is a uv
  * that is NaN, beyond 1e6 or, in perspective, exactly 0, 0 or -1, -1, where detectors put what they do not see. */
-GAIT_API gait_status gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
+GAIT_API gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
 /* Of the last gait_lift_segment() (GAIT_ERR_STATE without one): posterior mean [F][J][3] and standard deviation (may
  * be NULL), metres, world; */
-GAIT_API gait_status gait_lift_positions(gait_lift *l, double *mean, double *sd);
+GAIT_API gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd);
 /* the unknowns [n], n = gait_lift_unknowns(), prior N(0, 1) each: modes, place x y z, stature and heading if they are
  * unknown; and their covariance [n][n] (may be NULL); */
 GAIT_API int32_t     gait_lift_unknowns(const gait_lift *l);
-GAIT_API gait_status gait_lift_posterior(gait_lift *l, double *mean, double *covariance);
+GAIT_API gait_result gait_lift_posterior(gait_lift *l, double *mean, double *covariance);
 /* by what deviations are to be multiplied for a motion as far from the prior's mean as this one: above 1 where its
  * modes are larger than the prior expects, below 1 where they are smaller; 0: no segment. Of a parallel view, heading
  * and size known, errors are then about Student's t of ten degrees: 90 % within 1.81. Takes milliseconds; */
 GAIT_API double      gait_lift_scale(gait_lift *l);
 /* what the observations alone say, the least-squares fit of minimum norm [F][J][3] (fig. 5c); */
-GAIT_API gait_status gait_lift_least_squares(gait_lift *l, double *mean);
+GAIT_API gait_result gait_lift_least_squares(gait_lift *l, double *mean);
 /* the `count` most uncertain displacements [count][F][J][3], one deviation long, metres, and their deviations
  * [count] over all markers (fig. 6). */
-GAIT_API gait_status gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, double *sd);
+GAIT_API gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, double *sd);
 
 /* Many segments with the same visibility: orthographic, heading known, component 0.  gait_lift_fix() computes the gain
  * for sd [F][J]; gait_lift_batch() then takes uv [count][F][J][2] to mean [count][F][J][3]; deviations are those of
  * gait_lift_positions() after gait_lift_fix(). */
-GAIT_API gait_status gait_lift_fix(gait_lift *l, const double *sd, gait_error *err);
-GAIT_API gait_status gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean);
+GAIT_API gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err);
+GAIT_API gait_result gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean);
 
 /* A stream: one frame uv [J][2], sd [J] or NULL; utime must increase.  Segments begin every hop / fps seconds from the
  * first frame on; each frame is added to those that it falls into, at its own time (linear between their frames).
  * Points far from where the segments have them, as wrong detections are, have little or nothing to say. */
-GAIT_API gait_status gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
+GAIT_API gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
 /* The frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: not so many frames since the start. */
-GAIT_API gait_status gait_lift_estimate(gait_lift *l, gait_lift_frame *out);
+GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out);
 GAIT_API void        gait_lift_reset(gait_lift *l); /* forget the stream */
 
 #ifdef __cplusplus

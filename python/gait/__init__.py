@@ -13,39 +13,39 @@ from gait._version import __version__
 from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryError, UserError
 
 if TYPE_CHECKING:
-    from gait._abi import Flag, Mode, Term, TrackStatus
-    from gait.core.estimate import Estimate
-    from gait.core.frame import Joints
-    from gait.core.initial import Start
-    from gait.core.lifter import LiftConfig, LiftedFrame, Lifter
-    from gait.core.model import Model, ModelInfo
-    from gait.core.state import State
-    from gait.image.camera import Camera
-    from gait.image.video import Frame, Video, VideoWriter, background
+    from gait.bindings.abi import Flag, Mode, Term, TrackStatus
+    from gait.bindings.estimate import Estimate
+    from gait.bindings.frame import Joints
+    from gait.bindings.initial import Start
+    from gait.bindings.lifter import LiftConfig, LiftedFrame, Lifter
+    from gait.bindings.model import Model, ModelInfo
+    from gait.bindings.state import State
+    from gait.camera.camera import Camera
+    from gait.io.video import Frame, Video, VideoWriter, background
     from gait.track.tracker import Tracker
-    from gait.track.trackerconfig import TrackerConfig
+    from gait.track.config import TrackerConfig
 
 _HOME = {
-    "Camera": "image.camera",
-    "Estimate": "core.estimate",
-    "Flag": "_abi",
-    "Frame": "image.video",
-    "Joints": "core.frame",
-    "LiftConfig": "core.lifter",
-    "LiftedFrame": "core.lifter",
-    "Lifter": "core.lifter",
-    "Mode": "_abi",
-    "Model": "core.model",
-    "ModelInfo": "core.model",
-    "Start": "core.initial",
-    "State": "core.state",
-    "Term": "_abi",
-    "TrackStatus": "_abi",
+    "Camera": "camera.camera",
+    "Estimate": "bindings.estimate",
+    "Flag": "bindings.abi",
+    "Frame": "io.video",
+    "Joints": "bindings.frame",
+    "LiftConfig": "bindings.lifter",
+    "LiftedFrame": "bindings.lifter",
+    "Lifter": "bindings.lifter",
+    "Mode": "bindings.abi",
+    "Model": "bindings.model",
+    "ModelInfo": "bindings.model",
+    "Start": "bindings.initial",
+    "State": "bindings.state",
+    "Term": "bindings.abi",
+    "TrackStatus": "bindings.abi",
     "Tracker": "track.tracker",
-    "TrackerConfig": "track.trackerconfig",
-    "Video": "image.video",
-    "VideoWriter": "image.video",
-    "background": "image.video",
+    "TrackerConfig": "track.config",
+    "Video": "io.video",
+    "VideoWriter": "io.video",
+    "background": "io.video",
 }
 
 __all__ = [

@@ -1,7 +1,7 @@
 #include "bench_measure.h"
 #include "bench_clock.h"
 #include "bench_limit.h"
-#include "common/workers.h"
+#include "trackd/workers.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -33,7 +33,7 @@ static int32_t trackers(const runner *r)
 typedef struct job {
     const runner *r;
     gait_frame frame;
-    gait_status status[2];
+    gait_result status[2];
     gait_error err[2];
 } job;
 
@@ -75,7 +75,7 @@ static bool step(runner *r, message *why)
     r->count += r->frame > 0; /* the first frame has no ancestors */
     for (int k = 0; k < trackers(r); k++)
         if (j.status[k] != GAIT_OK)
-            return message_set(why, "%s: %s", gait_status_name(j.status[k]), j.err[k].text);
+            return message_set(why, "%s: %s", gait_result_name(j.status[k]), j.err[k].text);
     return true;
 }
 

@@ -42,7 +42,7 @@ bool bench_scene_make(bench_scene *s, const gait_model *model, int32_t width, in
                       message *why)
 {
     gait_model_info info;
-    gait_state walker = {.stature = 1.75f};
+    gait_state particle_state = {.stature = 1.75f};
     /* 8 m to the side of the path, 1.4 m up. */
     *s = (bench_scene){.frames = frames,
                        .camera = {.width = width,
@@ -64,17 +64,17 @@ bool bench_scene_make(bench_scene *s, const gait_model *model, int32_t width, in
         draw_plate(s);
     for (int32_t f = 0; ok && f < frames; f++) {
         if (f == 0) {
-            walker.stride_hz = info.stride_hz;
-            walker.pelvis[0] =
-                -0.5f * (float)frames / FPS * walker.stature * info.stride_hz * info.stride_length;
+            particle_state.stride_hz = info.stride_hz;
+            particle_state.pelvis[0] =
+                -0.5f * (float)frames / FPS * particle_state.stature * info.stride_hz * info.stride_length;
         }
-        ok = gait_model_pelvis_height(model, &walker, &walker.pelvis[2]) == GAIT_OK &&
-             gait_render(model, &s->camera, &walker, ids, width) == GAIT_OK;
+        ok = gait_model_pelvis_height(model, &particle_state, &particle_state.pelvis[2]) == GAIT_OK &&
+             gait_render(model, &s->camera, &particle_state, ids, width) == GAIT_OK;
         if (f == 0)
-            s->start = walker;
+            s->start = particle_state;
         draw_frame(s, ids, s->pixels + (size_t)f * bytes);
-        walker.phase = fmodf(walker.phase + info.stride_hz / FPS, 1);
-        walker.pelvis[0] += walker.stature * info.stride_hz * info.stride_length / FPS;
+        particle_state.phase = fmodf(particle_state.phase + info.stride_hz / FPS, 1);
+        particle_state.pelvis[0] += particle_state.stature * info.stride_hz * info.stride_length / FPS;
     }
     free(ids);
     return ok || message_set(why, "the walker cannot be drawn");

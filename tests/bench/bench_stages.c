@@ -1,10 +1,10 @@
 #include "bench_stages.h"
 #include "bench_clock.h"
-#include "estimate.h"
-#include "look.h"
-#include "loss.h"
-#include "modes.h"
-#include "weigh.h"
+#include "tracker/estimate.h"
+#include "tracker/features_step.h"
+#include "tracker/track_loss.h"
+#include "tracker/hypotheses.h"
+#include "tracker/likelihood_step.h"
 
 const char *const bench_stage_name[BENCH_STAGES] = {
     [STAGE_FEATURES] = "features",     [STAGE_RESAMPLE] = "resample",     [STAGE_PROPAGATE] = "propagate",
@@ -95,7 +95,7 @@ static void layers_draw(const struct layers_block *block, int32_t lane, struct l
     PART(STAGE_RASTER, b.plain->layers_draw(block, lane, out));
 }
 
-static void silhouette_count(const struct features *f, const struct rast_mask *whole, int32_t *area,
+static void silhouette_count(const struct features *f, const struct grid_mask *whole, int32_t *area,
                              int32_t *covered)
 {
     PART(STAGE_SILHOUETTE, b.plain->silhouette_count(f, whole, area, covered));
@@ -229,7 +229,7 @@ static void stage_end(int stage, double outer_ns, int64_t since)
     result __wrap_##name parameters;                                                                         \
     result __wrap_##name parameters
 
-WRAP(int32_t, look_frame, (gait_tracker * t, const gait_frame *frame, const walker *predicted))
+WRAP(int32_t, features_step, (gait_tracker * t, const gait_frame *frame, const particle_state *predicted))
 {
     int32_t cameras;
     WHOLE(STAGE_FEATURES, cameras = __real_look_frame(t, frame, predicted));
@@ -241,14 +241,14 @@ WRAP(void, pf_inherit, (pf * p, int32_t before, void *array, size_t bytes))
     WHOLE(STAGE_RESAMPLE, __real_pf_inherit(p, before, array, bytes));
 }
 
-WRAP(bool, modes_resample, (gait_tracker * t, uint32_t frame))
+WRAP(bool, hypotheses_resample, (gait_tracker * t, uint32_t frame))
 {
     bool done;
     WHOLE(STAGE_RESAMPLE, done = __real_modes_resample(t, frame));
     return done;
 }
 
-WRAP(void, weigh_particles, (gait_tracker * t))
+WRAP(void, likelihood_step, (gait_tracker * t))
 {
     b.weighing = b.on;
     WHOLE(STAGE_LIKELIHOOD, __real_weigh_particles(t));
@@ -265,44 +265,44 @@ WRAP(void, task_run,
         WHOLE(STAGE_PROPAGATE, __real_task_run(exec, tasks, items, block, fn, ctx));
 }
 
-WRAP(pf_summary, modes_reweigh, (gait_tracker * t, float dt))
+WRAP(pf_summary, hypotheses_update, (gait_tracker * t, float dt))
 {
     pf_summary s;
     WHOLE(STAGE_WEIGHTS, s = __real_modes_reweigh(t, dt));
     return s;
 }
 
-WRAP(void, loss_allow_hidden, (gait_tracker * t))
+WRAP(void, track_loss_allow_hidden, (gait_tracker * t))
 {
     WHOLE(STAGE_WEIGHTS, __real_loss_allow_hidden(t));
 }
 
-WRAP(walker, population_place, (const population *people, const double *weight))
+WRAP(particle_state, particle_set_place, (const particle_set *particles, const double *weight))
 {
-    walker w;
-    WHOLE(STAGE_ESTIMATE, w = __real_population_place(people, weight));
+    particle_state w;
+    WHOLE(STAGE_ESTIMATE, w = __real_population_place(particles, weight));
     return w;
 }
 
-WRAP(walker, estimate_fill, (gait_tracker * t, int32_t best, gait_estimate *out))
+WRAP(particle_state, estimate_fill, (gait_tracker * t, int32_t best, gait_estimate *out))
 {
-    walker w;
+    particle_state w;
     WHOLE(STAGE_ESTIMATE, w = __real_estimate_fill(t, best, out));
     return w;
 }
 
-WRAP(void, loss_watch, (gait_tracker * t, const walker *mean))
+WRAP(void, track_loss_update, (gait_tracker * t, const particle_state *mean))
 {
     WHOLE(STAGE_ESTIMATE, __real_loss_watch(t, mean));
 }
 
-WRAP(void, lag_keep, (gait_tracker * t, const gait_estimate *e))
+WRAP(void, fixed_lag_keep, (gait_tracker * t, const gait_estimate *e))
 {
     WHOLE(STAGE_LAG, __real_lag_keep(t, e));
 }
 
 /* Parts of the likelihood that are no kernels. */
-WRAP(void, population_bodies, (const body_rule *r, const population *p, int32_t begin, kin_body *out))
+WRAP(void, particle_set_bodies, (const state_layout *r, const particle_set *p, int32_t begin, kin_body *out))
 {
     PART(STAGE_KINEMATICS, __real_population_bodies(r, p, begin, out));
 }

@@ -1,7 +1,7 @@
 /* bench_stages.h - where the time of a step goes.
  *
  * The linker puts functions of bench_stages.c round those of the library (-Wl,--wrap), and the tracker's table of
- * kernels is exchanged for one that keeps time: the library itself has no hooks.  For one thread. */
+ * kernels is mirrored for one that keeps time: the library itself has no hooks.  For one thread. */
 #ifndef BENCH_STAGES_H
 #define BENCH_STAGES_H
 #include "gait.h"

@@ -1,7 +1,7 @@
 #include "bench_verdict.h"
 #include "bench_limit.h"
-#include "like.h"
-#include "model.h"
+#include "likelihood/likelihood.h"
+#include "model/model.h"
 
 #include <stdio.h>
 #include <stdlib.h>

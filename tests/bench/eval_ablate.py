@@ -23,7 +23,7 @@ _FEATURES: dict[str, dict[str, Any]] = {
     "turning": {"turn_time": 0.0},
     "tilt": {"tilt_noise": 0.0},
     "frames alike": {"evidence_time": 0.0},
-    "mingling": {"mingle_time": 0.0},
+    "mingling": {"rejuvenation_time": 0.0},
     "rate return": {"rate_time": 0.0},
     "missed foreground": {"missed_weight": 0.0},
 }

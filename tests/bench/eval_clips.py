@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from eval_plan import Clip
 
-from gait.core.initial import DEFAULT_SD
+from gait.bindings.initial import DEFAULT_SD
 from gait.errors import UserError
 from gait.motion.events import strikes_of
-from gait.motion.trackfile import Joints, read_truth
+from gait.io.track_file import Joints, read_truth
 from gait.progress import progress
 
 ROOT = Path(__file__).resolve().parents[2]

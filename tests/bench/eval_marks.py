@@ -13,7 +13,7 @@ from eval_measures import shares
 from gait import Camera
 from gait.motion.evaluate import phase_errors
 from gait.motion.events import Strikes
-from gait.motion.trackfile import Track
+from gait.io.track_file import Track
 
 LEG = ("hip", "knee", "ankle")
 LOST_SHARE = 0.15  # of the person's height in the picture: marks further off, on average, are of a lost frame

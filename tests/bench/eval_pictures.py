@@ -11,10 +11,10 @@ from eval_marks import Marks
 
 from gait import Camera, Model, Video
 from gait.body.skeleton import BONES
-from gait.core.estimate import Estimate
-from gait.draw.overlay import Overlay
-from gait.image.video import Image
-from gait.motion.trackfile import read_truth
+from gait.bindings.estimate import Estimate
+from gait.report.overlay import Overlay
+from gait.io.video import Image
+from gait.io.track_file import read_truth
 
 if TYPE_CHECKING:
     from eval_run import Result

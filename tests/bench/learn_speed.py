@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import machines
 
 from gait.body import skeleton
-from gait.core.model import Model
-from gait.core.state import State
+from gait.bindings.model import Model
+from gait.bindings.state import State
 from gait.errors import UserError
 from gait.io import blob
 from gait.progress import progress

@@ -1,7 +1,7 @@
 /* lift.c - speed of lifting: microseconds of CPU per frame of a stream of 15 points, estimate included, by instruction
  * set; segments per second by the gain and one by one; what is wanted of the best set, and whether it was reached. */
-#include "common/file.h"
-#include "common/options.h"
+#include "trackd/file.h"
+#include "trackd/options.h"
 #include "gait.h"
 
 #include <math.h>
@@ -115,7 +115,7 @@ static bool stream(bench *b, uint32_t mask)
         see((double)i / RATE, b->uv);
         double const before = now();
         ok = gait_lift_push(b->lift, 1000 + (int64_t)i * 1000000 / RATE, b->uv, b->sd, NULL) == GAIT_OK;
-        bool const there = gait_lift_estimate(b->lift, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING;
+        bool const there = gait_lift_estimate(b->lift, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING;
         double const us = now() - before;
         if (there && start_us == 0.0) {
             start_us = us; /* the heading was searched for */

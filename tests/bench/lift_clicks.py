@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gait.body.skeleton import EVAL15
 from gait.lift.clip_segments import ClipSegments
 from gait.lift.fit_clip import ClipFit, fit_clip
-from gait.lift.springs import Correction
+from gait.lift.corrections import Correction
 from gait.motion.evaluate import root_errors
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import table
 from lift_mocap import MOCAP, HeldOut, one_of_each
 
-from gait.core.lifter import LiftConfig, Lifter
+from gait.bindings.lifter import LiftConfig, Lifter
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.uncertain import share_along, share_rigid
 

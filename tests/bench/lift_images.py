@@ -26,20 +26,20 @@ from lift_sticks import Walk, bends, depth_gaps, jump, stick_clip
 from scipy import stats
 
 from gait.body.skeleton import EVAL15, JOINTS
-from gait.core.model import read_cyclic
-from gait.core.segment_prior import SegmentPrior
-from gait.image.camera import Camera
-from gait.image.video import Video, read_plate
+from gait.bindings.model import read_cyclic
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
+from gait.io.video import Video, read_plate
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_motion
 from gait.learn.solve import readers
-from gait.lift.beginning import Beginning
+from gait.lift.phase_prior import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.fit_clip import fit_clip
 from gait.lift.sensors import Film
-from gait.lift.springs import Correction, Placement, read_placement
+from gait.lift.corrections import Correction, Placement, read_placement
 from gait.lift.views import CameraView
-from gait.motion.trackfile import read_truth
+from gait.io.track_file import read_truth
 from gait.progress import progress
 
 PARTS = ("sticks", "clips", "outdoor")

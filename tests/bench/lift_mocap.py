@@ -23,8 +23,8 @@ import table
 from eval_clips import DATA
 
 from gait.body.skeleton import axis_rotation
-from gait.core.lifter import Lifter
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.lifter import Lifter
+from gait.bindings.segment_prior import SegmentPrior
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_corpus, segment_motion
 from gait.learn.segments.segment_corpus import Corpus

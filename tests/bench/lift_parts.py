@@ -15,12 +15,12 @@ import numpy as np
 import table
 
 from gait.body.skeleton import EVAL15
-from gait.core.segment_prior import SegmentPrior
-from gait.image.camera import Camera
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
 from gait.learn.corpus.stage import one_thread
 from gait.lift.size import tells_distance
-from gait.lift.tracks_file import Tracks
-from gait.motion.trackfile import read_truth
+from gait.io.keypoints_file import Tracks
+from gait.io.track_file import read_truth
 from gait.progress import progress
 
 PARTS = {

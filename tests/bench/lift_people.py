@@ -25,15 +25,15 @@ import table
 from eval_plan import Clip
 
 from gait.body.skeleton import EVAL15, axis_rotation
-from gait.core.lifter import LiftConfig
-from gait.core.segment_prior import SegmentPrior
-from gait.image.camera import Camera
+from gait.bindings.lifter import LiftConfig
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
 from gait.learn.corpus.stage import one_thread
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_motion
 from gait.learn.solve import readers
 from gait.lift import motion
-from gait.motion.trackfile import Joints, read_truth
+from gait.io.track_file import Joints, read_truth
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

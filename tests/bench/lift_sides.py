@@ -23,8 +23,8 @@ from gait.learn.corpus.stage import one_thread
 from gait.lift import motion, outliers, sides
 from gait.lift.equations import Perspective
 from gait.lift.result import Options
-from gait.lift.tracks_file import Tracks
-from gait.motion.trackfile import Joints
+from gait.io.keypoints_file import Tracks
+from gait.io.track_file import Joints
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

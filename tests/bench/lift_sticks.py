@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.skeleton import BONES
-from gait.core.segment_prior import SegmentPrior
-from gait.image.camera import Camera
-from gait.image.video import Frame, Image
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
+from gait.io.video import Frame, Image
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.energy import PLACE
 from gait.lift.fit_clip import ClipFit, Sequence
 from gait.lift.sensors import Film
-from gait.lift.springs import Placement
+from gait.lift.corrections import Placement
 from gait.lift.views import CameraView
 
 Array = NDArray[np.float64]

@@ -18,10 +18,10 @@ import table
 from eval_plan import Clip
 
 from gait import TrackStatus
-from gait.core.lifter import LiftConfig, Lifter
-from gait.image.camera import Camera
-from gait.lift.tracks_file import Tracks
-from gait.motion.trackfile import read_truth
+from gait.bindings.lifter import LiftConfig, Lifter
+from gait.camera.camera import Camera
+from gait.io.keypoints_file import Tracks
+from gait.io.track_file import read_truth
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

@@ -20,15 +20,15 @@ import numpy.typing as npt
 import table
 
 from gait.body.skeleton import EVAL15, axis_rotation
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.io.trc import read_trc
 from gait.learn.corpus.stage import one_thread
 from gait.lift import motion, outliers, result
 from gait.lift.equations import Parallel, Perspective, View, looking_along
-from gait.lift.tracks_file import Tracks
-from gait.motion.trackfile import Joints, read_truth
+from gait.io.keypoints_file import Tracks
+from gait.io.track_file import Joints, read_truth
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

@@ -17,7 +17,7 @@ import table
 from lift_mocap import AXES, MOCAP, ONE_OF_EACH, HeldOut, one_of_each
 from scipy.optimize import brentq
 
-from gait.core.lifter import Lifter
+from gait.bindings.lifter import Lifter
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.observe import Observations, orthographic
 from gait.lift.posterior import Gaussian, Posterior, infer, place

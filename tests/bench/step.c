@@ -3,8 +3,8 @@
 #include "bench_limit.h"
 #include "bench_report.h"
 #include "bench_verdict.h"
-#include "common/file.h"
-#include "common/options.h"
+#include "trackd/file.h"
+#include "trackd/options.h"
 #include "gait_pool.h"
 
 #include <stdio.h>

@@ -25,9 +25,9 @@ import table
 from eval_plan import Clip
 
 from gait.cli import main as gait
-from gait.image.camera import Camera
-from gait.lift import tracks_file
-from gait.motion.trackfile import read_truth
+from gait.camera.camera import Camera
+from gait.io import keypoints_file as tracks_file
+from gait.io.track_file import read_truth
 from gait.progress import progress
 
 SEEDS = (1, 2, 3)

@@ -22,8 +22,8 @@ POINTERS = {  # file and name of a pointer: functions it may point to
     "task.c:run": "run",
     "pool.c:fn": "run_one",
     "task.c:fn": r"\w+_range",
-    "like.c:log_likelihood": "log_likelihood",
-    "like.c:support": "support",
+    "likelihood.c:log_likelihood": "log_likelihood",
+    "likelihood.c:support": "support",
 }
 THREADS = {"pool.c:helper"}  # on a stack of their own
 

@@ -12,18 +12,18 @@ check() { # NAME WHAT_HOLDS COMMAND...
 }
 cd "$(dirname "$0")/../.." || exit 1
 here=tests/check
-check no_heap 'no heap' $here/no_heap.sh "$B"/src/*.o "$B/libgait.so"
+check no_heap 'no heap' $here/no_heap.sh "$B"/src/*/*.o "$B/libgait.so"
 check deps 'needs exact functions of libc and libm alone' $here/deps.sh "$B/libgait.so"
 check size '400000 bytes at most' $here/size.sh "$B/libgait.so" 400000
 check symbols 'exports what the headers say' python3 $here/symbols.py libgait/include/*.h "$B/libgait.so" "$B/libgait.a"
-check threads 'threads in the pool alone' $here/threads.sh "$B"/src/*.o
-check static_init 'no writable data, no constructors' $here/static_init.sh "$B/libgait.so" "$B"/src/*.o
+check threads 'threads in the pool alone' $here/threads.sh "$B"/src/*/*.o
+check static_init 'no writable data, no constructors' $here/static_init.sh "$B/libgait.so" "$B"/src/*/*.o
 check headers 'headers compile alone' $here/headers.sh libgait/include/*.h
 check layers 'includes go down' python3 $here/layers.py libgait/LAYERS libgait/src
 check py_layers 'imports go down' python3 $here/py_layers.py python/LAYERS python/gait
-check stack 'frames of 16384 bytes at most' python3 $here/stack.py 16384 "$B"/src/*.su
-if ls "$B"/src/*.ci >/dev/null 2>&1; then
-    check calls "no recursion, paths of 49152 bytes at most without libc's" python3 $here/calls.py 49152 "$B"/src/*.ci
+check stack 'frames of 16384 bytes at most' python3 $here/stack.py 16384 "$B"/src/*/*.su
+if ls "$B"/src/*/*.ci >/dev/null 2>&1; then
+    check calls "no recursion, paths of 49152 bytes at most without libc's" python3 $here/calls.py 49152 "$B"/src/*/*.ci
 else
     echo 'check calls: needs the call graphs of gcc, skipped'
 fi

@@ -3,7 +3,7 @@
 #ifndef FUZZ_H
 #define FUZZ_H
 #include "gait.h"
-#include "hash.h"
+#include "base/hash.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* fuzz_snapshot.c - a damaged snapshot is refused, or else the tracker goes on from it. */
 #include "fuzz.h"
-#include "hash.h"
+#include "base/hash.h"
 
 #include <stdlib.h>
 #include <string.h>

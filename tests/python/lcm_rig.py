@@ -20,11 +20,11 @@ import lcm
 import numpy as np
 import pytest
 
-from gait.core.model import Model
-from gait.core.state import State
+from gait.bindings.model import Model
+from gait.bindings.state import State
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import VideoWriter
+from gait.camera.camera import Camera
+from gait.io.video import VideoWriter
 from gait.lcm.link import open_lcm, private_url
 from gait.lcm.messages import camera_message, command_message, image_message
 from gait.lcm.types import gaitmsg

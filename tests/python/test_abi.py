@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import pytest
 from drawn_walker import camera
 
-from gait import GaitError, LibraryError, Model, Tracker, _abi
-from gait._abi import library as loader
-from gait.track.trackerconfig import TrackerConfig
+from gait import GaitError, LibraryError, Model, Tracker
+from gait.bindings import abi
+from gait.bindings import library as loader
+from gait.track.config import TrackerConfig
 
 INCLUDE = Path(__file__).resolve().parents[2] / "libgait/include"
 HEADER = (INCLUDE / "gait.h").read_text()
@@ -26,17 +27,17 @@ def rows():
 
 def library_saying(table):
     """Stand-in for a library whose table is `table`."""
-    array = (_abi.AbiField * len(table))(*table)
+    array = (abi.AbiField * len(table))(*table)
 
     def fields(count):
         count._obj.value = len(table)
-        return ctypes.cast(array, ctypes.POINTER(_abi.AbiField))
+        return ctypes.cast(array, ctypes.POINTER(abi.AbiField))
 
     return SimpleNamespace(gait_abi_fields=fields)
 
 
 def test_layout_of_the_real_library_matches():
-    assert _abi.verify(REAL) == []
+    assert abi.verify(REAL) == []
     assert len(rows()) > 80
 
 
@@ -47,35 +48,35 @@ def test_a_wrong_offset_or_size_is_caught_in_every_row(column, name):
         wrong[column] += 4
         table = rows()
         table[i] = tuple(wrong)
-        faults = _abi.verify(library_saying(table))
+        faults = abi.verify(library_saying(table))
         assert len(faults) == 1, name
         assert row[0].decode() in faults[0] and row[1].decode() in faults[0]
 
 
 def test_a_missing_or_additional_field_is_caught():
     table = rows()
-    assert len(_abi.verify(library_saying(table[:-1]))) == 1
-    assert "news" in _abi.verify(library_saying([*table, (b"gait_state", b"news", 0, 4)]))[0]
+    assert len(abi.verify(library_saying(table[:-1]))) == 1
+    assert "news" in abi.verify(library_saying([*table, (b"gait_state", b"news", 0, 4)]))[0]
 
 
 def test_every_public_function_is_declared():
     headers = "".join(path.read_text(encoding="utf-8") for path in INCLUDE.glob("*.h"))
     public = set(re.findall(r"GAIT_API[^;(]*?\b(gait_\w+)\(", headers))
-    assert public == {name for name, _, _ in _abi.FUNCTIONS}
+    assert public == {name for name, _, _ in abi.FUNCTIONS}
 
 
 def test_enumerations_and_limits_equal_the_header():
     pairs = re.findall(r"\b(GAIT_\w+)\s*=?\s+(-?(?:0x[0-9a-fA-F]+|\d+))u?\b", HEADER)
     values = {name: int(value, 0) for name, value in pairs}
-    ours = {f"GAIT_ERR_{s.name}": s for s in _abi.Status if s} | {"GAIT_OK": _abi.Status.OK}
-    ours |= {f"GAIT_{p.name}": p for p in _abi.PixelFormat}
-    ours |= {f"GAIT_MODE_{m.name}": m for m in _abi.Mode}
-    ours |= {f"GAIT_TERM_{t.name}": t for t in _abi.Term}
-    ours |= {f"GAIT_STATUS_{s.name}": s for s in _abi.TrackStatus}
-    ours |= {f"GAIT_EST_{f.name}": f for f in _abi.Flag}
-    ours |= {"GAIT_ABI": _abi.ABI, "GAIT_ALIGN": _abi.ALIGN, "GAIT_MAX_JOINTS": _abi.MAX_JOINTS}
-    ours |= {"GAIT_MAX_ANGLES": _abi.MAX_ANGLES, "GAIT_MAX_CAMERAS": _abi.MAX_CAMERAS}
-    ours |= {"GAIT_MAX_COMPONENTS": _abi.MAX_COMPONENTS}
+    ours = {f"GAIT_ERR_{s.name}": s for s in abi.Status if s} | {"GAIT_OK": abi.Status.OK}
+    ours |= {f"GAIT_{p.name}": p for p in abi.PixelFormat}
+    ours |= {f"GAIT_MODE_{m.name}": m for m in abi.Mode}
+    ours |= {f"GAIT_TERM_{t.name}": t for t in abi.Term}
+    ours |= {f"GAIT_STATUS_{s.name}": s for s in abi.TrackStatus}
+    ours |= {f"GAIT_EST_{f.name}": f for f in abi.Flag}
+    ours |= {"GAIT_ABI": abi.ABI, "GAIT_ALIGN": abi.ALIGN, "GAIT_MAX_JOINTS": abi.MAX_JOINTS}
+    ours |= {"GAIT_MAX_ANGLES": abi.MAX_ANGLES, "GAIT_MAX_CAMERAS": abi.MAX_CAMERAS}
+    ours |= {"GAIT_MAX_COMPONENTS": abi.MAX_COMPONENTS}
     assert {name: values.get(name) for name in ours} == ours
     families = r"GAIT_(ERR|MODE|TERM|STATUS|EST)_\w+"
     assert {name for name in values if re.fullmatch(families, name)} <= ours.keys()
@@ -119,7 +120,7 @@ def test_version_and_abi_mismatch_name_the_file(monkeypatch, where, name, value,
 
 
 def test_statuses_become_exceptions_with_name_and_index():
-    error = _abi.Error(status=-1, index=3, text=b"fx is not positive")
+    error = abi.Error(status=-1, index=3, text=b"fx is not positive")
     with pytest.raises(ValueError, match="GAIT_ERR_ARG: fx is not positive") as caught:
         loader.check(-1, error)
     assert (caught.value.status, caught.value.name, caught.value.index) == (-1, "GAIT_ERR_ARG", 3)
@@ -129,7 +130,7 @@ def test_statuses_become_exceptions_with_name_and_index():
 @pytest.mark.parametrize("size", [1, 64, 1000])
 def test_memory_is_aligned(size):
     memory = loader.aligned(size)
-    assert memory.ctypes.data % _abi.ALIGN == 0 and memory.nbytes == size
+    assert memory.ctypes.data % abi.ALIGN == 0 and memory.nbytes == size
 
 
 def told(text):
@@ -148,7 +149,7 @@ def test_the_header_tells_range_and_default_of_every_setting(name, words):
         r"\[([\d.]+), ([\de.]+)\]; default ([\d.]+)(?: \(paper mode ([\d.]+)(?::.*)?\))?$", words
     ).groups()
     assert getattr(TrackerConfig.default(), name) == told(usual)
-    assert getattr(TrackerConfig.default(_abi.Mode.PAPER), name) == told(paper or usual)
+    assert getattr(TrackerConfig.default(abi.Mode.PAPER), name) == told(paper or usual)
     for past in (float(low) - 1, 1.01 * float(high)):
         with pytest.raises(GaitError, match="is outside") as refused:
             Tracker(Model(), camera(), TrackerConfig.default(**{name: past}))
@@ -160,5 +161,5 @@ def test_the_header_tells_the_weights_of_the_terms():
     name, words = SETTINGS[0]
     assert name == "term_weight" and words.endswith("each [0, 1e6]; default 0.2 (paper mode 1), 25, 40, 4, 8")
     assert list(TrackerConfig.default().term_weight) == [told(w) for w in (0.2, 25, 40, 4, 8)]
-    assert list(TrackerConfig.default(_abi.Mode.PAPER).term_weight) == [told(w) for w in (1, 25, 40, 4, 8)]
-    assert len(SETTINGS) == len([f for f, kind in _abi.TrackerConfigC._fields_ if kind is ctypes.c_float]) + 1
+    assert list(TrackerConfig.default(abi.Mode.PAPER).term_weight) == [told(w) for w in (1, 25, 40, 4, 8)]
+    assert len(SETTINGS) == len([f for f, kind in abi.TrackerConfigC._fields_ if kind is ctypes.c_float]) + 1

@@ -16,7 +16,7 @@ from gait.learn.reading import Reading
 from gait.learn.solve import readers, retarget
 from gait.learn.solve.articulated import posed
 from gait.learn.solve.body import Body
-from gait.motion.trackfile import header
+from gait.io.track_file import header
 
 TABLE = mw.walk_angles(240, 100.0)
 DEGREES = np.degrees(1)

@@ -12,11 +12,11 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.body.skeleton import JOINTS
 from gait.cli import lift, main
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.io.trc import read_trc
 from gait.lift import motion, outliers, size
 from gait.lift.result import METHODS
-from gait.lift.tracks_file import Tracks, read, write
+from gait.io.keypoints_file import Tracks, read, write
 from gait.lift.uncertain import Uncertain
 
 FRAMES, MARKERS = 6, 12

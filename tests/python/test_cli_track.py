@@ -11,9 +11,9 @@ from drawn_walker import DATA, camera, clip, state_at, wall, write
 
 from gait import Model, Video
 from gait.cli import main
-from gait.core.model import read_blob
+from gait.bindings.model import read_blob
 from gait.io import blob
-from gait.lift import tracks_file
+from gait.io import keypoints_file as tracks_file
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))

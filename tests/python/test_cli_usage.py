@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import gait
-from gait import _abi
+from gait.bindings import abi
 from gait.cli import COMMANDS, main, values
-from gait.track.trackerconfig import TrackerConfig
+from gait.track.config import TrackerConfig
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_the_version_is_that_of_package_and_library(capsys):
     with pytest.raises(SystemExit) as caught:
         main(["--version"])
     assert caught.value.code == 0
-    assert capsys.readouterr().out == f"gait {gait.__version__} libgait {gait.__version__} abi {_abi.ABI}\n"
+    assert capsys.readouterr().out == f"gait {gait.__version__} libgait {gait.__version__} abi {abi.ABI}\n"
 
 
 def test_threads_end_where_the_pool_does():

@@ -10,7 +10,7 @@ import pytest
 from test_evaluate import FIRST_PHASE, RATE, STRIKES, TRUTH, track
 
 from gait import Camera, TrackerConfig
-from gait.motion.trackfile import Joints
+from gait.io.track_file import Joints
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import eval_ablate

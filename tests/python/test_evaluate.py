@@ -14,12 +14,12 @@ from gait import Camera, UserError
 from gait.body import skeleton
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.cli import main
-from gait.core.model import read_blob, read_cyclic
+from gait.bindings.model import read_blob, read_cyclic
 from gait.io import blob
 from gait.learn.segments import segment_sections
-from gait.lift import lifted_file
+from gait.io import lifted_file
 from gait.motion.baselines import free_run, root_path, static_pose, stature
-from gait.motion.calibration import calibration, coverage, crps
+from gait.motion.interval_coverage import calibration, coverage, crps
 from gait.motion.evaluate import (
     LIMBS,
     evaluate,
@@ -31,7 +31,7 @@ from gait.motion.evaluate import (
     trust,
 )
 from gait.motion.events import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
-from gait.motion.trackfile import Joints, Track, read_estimates, read_truth
+from gait.io.track_file import Joints, Track, read_estimates, read_truth
 
 SECTIONS = blob.decode(read_blob(None))
 RATE, FIRST_PHASE, HEIGHT = 0.9, 0.3, 1.7

@@ -8,13 +8,13 @@ import pytest
 from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
 
 from gait import Camera, Model, Start, UserError, Video
-from gait.core.initial import DEFAULT_SD
-from gait.core.model import read_blob
-from gait.image.sighting import another_scene, one_is_grey, sightings, standing
-from gait.image.video import Frame
+from gait.bindings.initial import DEFAULT_SD
+from gait.bindings.model import read_blob
+from gait.track.person_detection import another_scene, one_is_grey, sightings, standing
+from gait.io.video import Frame
 from gait.io import blob
-from gait.motion.trackfile import read_truth
-from gait.track.autostart import Spotter, find_start
+from gait.io.track_file import read_truth
+from gait.track.auto_start import Spotter, find_start
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -293,7 +293,7 @@ def test_looks_alone_do_at_any_frame_rate(monkeypatch, rate):
         seen.append(standing(foot, head, view, 1.0, 0.04))
         return seen[-1:]
 
-    monkeypatch.setattr("gait.track.autostart.people", one)
+    monkeypatch.setattr("gait.track.auto_start.people", one)
     spotter = Spotter(view, None, MODEL)
     for n in range(2 * rate):
         frame = Frame(n, n / rate, wall())

@@ -7,8 +7,8 @@ import pytest
 from drawn_walker import FPS, camera, clip
 
 from gait import Model, State, Term, Tracker, TrackerConfig
-from gait.core.frame import Joints
-from gait.core.model import read_blob
+from gait.bindings.frame import Joints
+from gait.bindings.model import read_blob
 from gait.io import blob
 
 MODEL = Model()

@@ -3,7 +3,7 @@
 import lcm_rig as rig
 import numpy as np
 
-from gait.core.state import State
+from gait.bindings.state import State
 from gait.lcm.messages import command_message, image_message
 from gait.lcm.types import gaitmsg
 

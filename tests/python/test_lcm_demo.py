@@ -9,7 +9,7 @@ import lcm_rig as rig
 import pytest
 
 from gait.cli import main
-from gait.motion.trackfile import read_track
+from gait.io.track_file import read_track
 
 COUNT = 20
 

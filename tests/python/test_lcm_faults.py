@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import gait
-from gait._abi import Mode
-from gait.core.model import Model
+from gait.bindings.abi import Mode
+from gait.bindings.model import Model
 from gait.errors import GaitError
 from gait.track.tracker import Tracker
-from gait.track.trackerconfig import TrackerConfig
+from gait.track.config import TrackerConfig
 
 CAMERA = rig.CAMERA.to_dict()
 INIT = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": 0.1}}
@@ -256,7 +256,7 @@ def test_help_names_the_defaults_of_the_library():
     usual, paper = (TrackerConfig.default(mode) for mode in Mode)
     printed = rig.run("--help").printed
     assert f"default {usual.particles}, paper mode {paper.particles}\n" in printed
-    assert f"up to N; default {usual.search_particles},\n" in printed
+    assert f"up to N; default {usual.acquisition_particles},\n" in printed
 
 
 TERMS = [f"{term}-weight" for term in ("texture", "silhouette", "edges", "template", "tracks")]

@@ -2,7 +2,7 @@
 
 import lcm_rig as rig
 
-from gait.core.state import State
+from gait.bindings.state import State
 from gait.lcm.link import private_url
 from gait.lcm.messages import command_message
 from gait.lcm.types import gaitmsg

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait._abi import LiftFlag, TrackStatus
-from gait.core.lifter import LiftConfig, Lifter
-from gait.image.camera import Camera
+from gait.bindings.abi import LiftFlag, TrackStatus
+from gait.bindings.lifter import LiftConfig, Lifter
+from gait.camera.camera import Camera
 from gait.lcm.link import private_url
 from gait.lcm.messages import camera_message, tracks_message
 from gait.lcm.types import gaitmsg

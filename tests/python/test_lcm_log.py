@@ -305,7 +305,7 @@ def test_a_long_pause_stops_the_tracker_which_says_so(tmp_path):
 def test_a_shorter_pause_is_bridged_by_prediction(tmp_path):
     """As the library does when it is stepped without an image in between."""
     from gait.track.tracker import Tracker
-    from gait.track.trackerconfig import TrackerConfig
+    from gait.track.config import TrackerConfig
 
     late = [rig.frame_message(i, utime=rig.utime(i) + 1_200_000) for i in range(3, 5)]
     events = [*rig.opening(), *rig.frames(0, 3), *(("GAIT_IMAGE_0", m) for m in late)]

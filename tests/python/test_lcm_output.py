@@ -8,7 +8,7 @@ from dataclasses import replace
 import lcm_rig as rig
 import pytest
 
-from gait.core.state import State
+from gait.bindings.state import State
 from gait.lcm.messages import command_message
 from gait.lcm.types import gaitmsg
 

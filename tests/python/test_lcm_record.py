@@ -15,7 +15,7 @@ from gait.lcm.link import open_lcm, private_url
 from gait.lcm.log import LogWriter, break_of
 from gait.lcm.results import read_run
 from gait.lcm.types import gaitmsg
-from gait.motion.trackfile import read_track
+from gait.io.track_file import read_track
 
 COUNT = 20
 SECOND = 1_000_000  # microseconds

@@ -6,7 +6,7 @@ import cv2
 import lcm_rig as rig
 import pytest
 
-from gait.core.initial import Start
+from gait.bindings.initial import Start
 from gait.lcm.messages import command_message, state_message
 from gait.lcm.types import gaitmsg
 

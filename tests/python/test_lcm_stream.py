@@ -16,7 +16,7 @@ from gait.lcm.record import Recorder
 from gait.lcm.results import read_run
 from gait.lcm.source import FileSource
 from gait.lcm.types import gaitmsg
-from gait.motion.trackfile import read_track
+from gait.io.track_file import read_track
 
 COUNT = 20
 

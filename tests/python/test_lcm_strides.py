@@ -6,7 +6,7 @@ import pytest
 
 from gait.lcm.messages import estimate_of
 from gait.lcm.types import gaitmsg
-from gait.motion.trackfile import read_track
+from gait.io.track_file import read_track
 
 FRAMES = 76
 

@@ -11,12 +11,12 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait._abi import Term
-from gait.core.frame import Joints
+from gait.bindings.abi import Term
+from gait.bindings.frame import Joints
 from gait.lcm.messages import image_message, tracks_message
 from gait.lcm.types import gaitmsg
 from gait.track.tracker import Tracker
-from gait.track.trackerconfig import TrackerConfig
+from gait.track.config import TrackerConfig
 
 FRAMES, SD = 16, 1.0
 SAID = re.compile(r"tracks (\d+) tracks_used (\d+) tracks_late (\d+)")

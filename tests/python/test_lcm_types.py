@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gait.core.state import State
+from gait.bindings.state import State
 from gait.errors import UserError
 from gait.lcm.messages import (
     camera_message,
@@ -167,7 +167,7 @@ def test_commands_have_ids_of_their_own():
 def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
     """Encoded by C, decoded by Python, beside the binding's own estimate of the same frames."""
     from gait.track.tracker import Tracker
-    from gait.track.trackerconfig import TrackerConfig
+    from gait.track.config import TrackerConfig
 
     outcome = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 6)]))
     config = TrackerConfig.default(particles=rig.PARTICLES)

@@ -12,7 +12,7 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.draw.overlay import Overlay
+from gait.report.overlay import Overlay
 from gait.errors import UserError
 from gait.lcm.link import private_url
 from gait.lcm.messages import estimate_of

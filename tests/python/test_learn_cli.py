@@ -13,7 +13,7 @@ import gait.cli
 from gait.body import skeleton
 from gait.body.skeleton import ANGLES, CHANNELS, JOINTS
 from gait.cli import info
-from gait.core.segment_prior import TAGS
+from gait.bindings.segment_prior import TAGS
 from gait.io import blob
 from gait.learn.corpus import sources
 from gait.learn.prior import fit, model

@@ -133,7 +133,7 @@ def test_a_worker_with_other_kernels_is_refused_with_the_remedy(walks, scheduler
 
 
 def test_the_remedy_gives_the_model_of_the_command_line(walks, tmp_path):
-    dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--preload-nanny", "gait.kernels"]
+    dask = [sys.executable, "-m", "distributed.cli.dask_worker", "--preload-nanny", "gait.reproducible"]
     learn = [sys.executable, "-m", "gait", "learn", walks, "--components", "2", "--quiet", "-o"]
     with distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as local:
         worker = subprocess.Popen([*dask, local.scheduler_address], stderr=subprocess.DEVNULL)

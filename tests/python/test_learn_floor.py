@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gait.body.skeleton import CHANNELS, curves
-from gait.core.model import read_blob
+from gait.bindings.model import read_blob
 from gait.io.blob import decode
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))

@@ -7,11 +7,11 @@ import pytest
 
 from gait import GaitError, Model, State
 from gait.body import skeleton
-from gait.body.modelcurves import ModelCurves
+from gait.body.model_curves import ModelCurves
 from gait.body.pace import MOST, pace, series, slope_of
 from gait.body.skeleton import CHANNELS
 from gait.cli import main
-from gait.core.model import read_blob, read_cyclic
+from gait.bindings.model import read_blob, read_cyclic
 from gait.errors import UserError
 from gait.io import blob
 from gait.learn.prior import pace as learnt

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from gait.body.skeleton import EVAL15, JOINTS
-from gait.core.segment_prior import SegmentPrior
-from gait.lift import common, likeness
+from gait.bindings.segment_prior import SegmentPrior
+from gait.lift import common
+from gait.lift import fit_correlation as likeness
 from gait.lift.descent import Link, information, normal
 from gait.lift.fit_clip import fit_clip
 from gait.lift.tridiagonal import factor

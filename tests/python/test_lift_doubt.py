@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from gait.body.skeleton import EVAL15
-from gait.core.estimate import TrackStatus
-from gait.core.lifter import Lifter
-from gait.core.segment_prior import SegmentPrior
-from gait.image.camera import Camera
+from gait.bindings.estimate import TrackStatus
+from gait.bindings.lifter import Lifter
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
 from gait.lift import motion, outliers, result
-from gait.lift.doubt import FAR, doubted, price
+from gait.lift.robust_weights import FAR, doubted, price
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 SD = 3.0
 CAMERA = Camera.looking((1.5, -6.0, 1.4), (1.0, 0, 0.9), (960, 720), 900)

@@ -5,7 +5,7 @@ import pytest
 from lift_reference import dual
 from toy_segments import FRONT, toy_prior
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.lift.heading import Person, explain
 from gait.lift.observe import Observations, orthographic, perspective
 from gait.lift.posterior import infer, place

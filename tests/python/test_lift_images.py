@@ -8,16 +8,16 @@ import pytest
 from toy_segments import toy_prior
 
 from gait.body.skeleton import JOINTS
-from gait.core.model import read_cyclic
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.model import read_cyclic
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Frame
+from gait.camera.camera import Camera
+from gait.io.video import Frame
 from gait.lift import sensors
-from gait.lift.beginning import Beginning
+from gait.lift.phase_prior import Beginning
 from gait.lift.descent import Link, normal
 from gait.lift.energy import GAIN, HEADING, PLACE, Anchor, Energy, Reading, Shape, Springs
-from gait.lift.springs import CLICK_SD, as_json, read_corrections, read_placement
+from gait.lift.corrections import CLICK_SD, as_json, read_corrections, read_placement
 from gait.lift.stick import Sticks, stick_responses
 from gait.lift.views import CameraView, FlatView
 

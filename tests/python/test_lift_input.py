@@ -11,9 +11,10 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.cli import lift_tracks, main
 from gait.cli.lift import PIXEL_SD
-from gait.image.camera import Camera
-from gait.lift import motion, outliers, sentinels, switches
-from gait.lift.tracks_file import Tracks, read, write
+from gait.camera.camera import Camera
+from gait.lift import motion, outliers, switches
+from gait.io import sentinels
+from gait.io.keypoints_file import Tracks, read, write
 
 FRAMES, MARKERS = 6, 12
 FRONT = (640, 480)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gait.lift.outliers import shake, without_jumps
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 
 def swinging(rate: float, frames: int = 60, seed: int = 4) -> Tracks:

@@ -10,8 +10,10 @@ from toy_segments import toy_prior
 
 from gait.body.skeleton import axis_rotation
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.lift import bordered, motion, result, sequence, soft, tridiagonal
+from gait.camera.camera import Camera
+from gait.lift import motion, result, sequence, tridiagonal
+from gait.lift import block_arrowhead as bordered
+from gait.lift import soft_constraints as soft
 from gait.lift import chain as chains
 from gait.lift.chain import Around, Freedom, Segment, overlapping, restricted
 from gait.lift.equations import Parallel, Perspective, looking_along
@@ -19,7 +21,7 @@ from gait.lift.grid import Grid
 from gait.lift.observe import Observations
 from gait.lift.refuse import Unlike
 from gait.lift.sequence import Seen, Start, smooth
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 from gait.lift.uncertain import Uncertain
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4

@@ -7,7 +7,7 @@ import pytest
 
 from gait.lift import flips
 from gait.lift.sides import CLEAR, put_back
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 NAMES = ("pelvis", "l_knee", "r_knee", "l_ankle", "r_ankle")
 LEFT, RIGHT = [1, 3], [2, 4]

@@ -7,8 +7,8 @@ import pytest
 from toy_segments import toy_prior
 
 from gait.body.skeleton import EVAL15, JOINTS
-from gait.core.segment_prior import SegmentPrior
-from gait.image.camera import Camera
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
 from gait.lift import chain as chains
 from gait.lift import motion, size
 from gait.lift.chain import Around, Freedom, overlapping, restricted
@@ -16,7 +16,7 @@ from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
 from gait.lift.result import Options
 from gait.lift.sequence import Seen, Start, smooth
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 STATURE, SECONDS, EXACT = 1.7, 2, 0.3  # metres, s, pixels
 SHAKY, FARTHEST_OFF = 40.0, 0.03  # pixels; share of the distance

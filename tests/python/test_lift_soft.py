@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from gait.body.skeleton import EVAL15, JOINTS
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.lift import motion, result
 from gait.lift.equations import Perspective
-from gait.lift.soft import BONES, FEET
-from gait.lift.tracks_file import Tracks
+from gait.lift.soft_constraints import BONES, FEET
+from gait.io.keypoints_file import Tracks
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
 

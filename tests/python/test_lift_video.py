@@ -11,16 +11,16 @@ import pytest
 
 from gait.body.skeleton import EVAL15, JOINTS, pose
 from gait.cli import lift_video, main
-from gait.core.model import read_blob
-from gait.core.segment_prior import TAGS, SegmentPrior
+from gait.bindings.model import read_blob
+from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.errors import UserError
-from gait.image.video import Video, VideoWriter
+from gait.io.video import Video, VideoWriter
 from gait.io import blob
 from gait.lift.clip_segments import Settings
 from gait.lift.cylinder import LIMBS, Figure
 from gait.lift.cylinder_picture import draw_figure
 from gait.lift.fit_clip import _share, fit_clip
-from gait.lift.springs import (
+from gait.lift.corrections import (
     CLICK_SD,
     HEADING_SD,
     PHASE_SD,

@@ -13,10 +13,10 @@ from toy_segments import FRONT as AXES
 from toy_segments import toy_blob, toy_prior
 
 from gait.body.skeleton import axis_rotation
-from gait.core.lifter import LiftConfig, Lifter, LiftFlag
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.lifter import LiftConfig, Lifter, LiftFlag
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import GaitError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.io import blob
 from gait.lift import heading, observe, posterior
 from gait.lift.uncertain import share_along, share_rigid, uncertain_modes

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gait import GaitArgumentError, GaitError, Model, State, UserError
 from gait.body import skeleton
-from gait.core.model import read_blob
+from gait.bindings.model import read_blob
 from gait.io import blob
 
 MODEL = Model()

@@ -12,11 +12,11 @@ import threadpoolctl
 from toy_segments import toy_blob, toy_prior
 
 from gait.cli import main, report_lift
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.learn.segments import segment_motion
 from gait.lift import figures_base, figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
-from gait.lift.tracks_file import Tracks, read, write
+from gait.io.keypoints_file import Tracks, read, write
 from gait.lift.uncertain import Uncertain
 
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"

@@ -11,9 +11,9 @@ from test_parameters import drawn
 from walking_track import walking_track, write_track
 
 from gait.cli import main
-from gait.draw.colours import BLUE, ORANGE
-from gait.draw.overlay import side_colour
-from gait.draw.parameter_plots import path_plot
+from gait.report.colours import BLUE, ORANGE
+from gait.report.overlay import side_colour
+from gait.report.parameter_plots import path_plot
 from gait.motion.parameters import QUANTITIES, measure
 
 

@@ -11,8 +11,8 @@ from toy_segments import FRONT
 
 import gait.cli
 from gait.body.skeleton import EVAL15, JOINTS
-from gait.core.model import Model
-from gait.core.segment_prior import TAGS, SegmentPrior
+from gait.bindings.model import Model
+from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
 from gait.lift.observe import Observations, orthographic

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
-from gait.core.segment_prior import TAGS, SegmentPrior
+from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
 from gait.learn.segments.segment_sections import sections

@@ -11,8 +11,8 @@ import pytest
 
 from gait.cli import main
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Video
+from gait.camera.camera import Camera
+from gait.io.video import Video
 from gait.io import blob
 from gait.simulate import FILES, PRESETS, Scenario
 from gait.simulate.anatomy import PARENTS, POINT_BONE, POINTS

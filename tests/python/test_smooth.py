@@ -9,14 +9,14 @@ import pytest
 from drawn_walker import camera, clip, state_at, wall, write
 
 from gait import Model, State, Tracker, TrackerConfig, UserError
-from gait._abi import Mode, TrackStatus
-from gait.body.modelcurves import ModelCurves
+from gait.bindings.abi import Mode, TrackStatus
+from gait.body.model_curves import ModelCurves
 from gait.cli import main
-from gait.core.model import read_blob
-from gait.image.video import Frame
+from gait.bindings.model import read_blob
+from gait.io.video import Frame
 from gait.io import blob
 from gait.motion.footfall_draws import Draws
-from gait.motion.trackfile import read_track
+from gait.io.track_file import read_track
 from gait.track.smooth import Spool, draw_motions
 from gait.track.smoothed import Smoother, pose_all, smoothed
 from gait.track.transitions import Step, Transitions

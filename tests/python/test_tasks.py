@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from gait import GaitLimitError, _abi
+from gait import GaitLimitError
+from gait.bindings import abi
 from gait.track.tasks import threads
 
 LISTING = Path("/proc/self/task")
@@ -30,7 +31,7 @@ def test_threads_end_with_their_object():
 def test_every_task_is_called_once():
     pool = threads(3)
     called = []
-    function = _abi.TaskFn(lambda context, i: called.append(i))
+    function = abi.TaskFn(lambda context, i: called.append(i))
     for count in (0, 1, 100):
         called.clear()
         pool.struct.run(pool.struct.user, function, None, count)
@@ -48,7 +49,7 @@ def test_a_forked_process_works_and_ends():
     child = os.fork()
     if child == 0:
         done = []
-        function = _abi.TaskFn(lambda context, i: done.append(i))
+        function = abi.TaskFn(lambda context, i: done.append(i))
         pool.struct.run(pool.struct.user, function, None, 5)
         del pool
         gc.collect()

@@ -23,7 +23,7 @@ from gait import (
     Video,
     _abi,
 )
-from gait.core.model import read_blob
+from gait.bindings.model import read_blob
 from gait.io import blob
 
 MODEL = Model()
@@ -56,13 +56,13 @@ def run(tracker, first=0, last=None):
 
 def test_the_dataclass_has_the_settings_of_the_c_struct():
     ours = [item.name for item in fields(TrackerConfig)]
-    theirs = [name for name, *_ in _abi.TrackerConfigC._fields_]
+    theirs = [name for name, *_ in abi.TrackerConfigC._fields_]
     assert ours == [n for n in theirs if n not in ("struct_size", "cameras", "camera", "exec")]
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_defaults_come_from_the_library_and_survive_the_way_there(mode):
-    c = _abi.TrackerConfigC()
+    c = abi.TrackerConfigC()
     _abi_library().gait_tracker_default(ctypes.byref(c), mode)
     back = TrackerConfig.default(mode).to_c()
     for name, *_ in c._fields_[:-2]:
@@ -70,7 +70,7 @@ def test_defaults_come_from_the_library_and_survive_the_way_there(mode):
 
 
 def _abi_library():
-    from gait._abi.library import library
+    from gait.bindings.library import library
 
     return library()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gait.errors import UserError
-from gait.lift.tracks_file import Tracks, read, write
+from gait.io.keypoints_file import Tracks, read, write
 
 KNOWN = ("pelvis", "l_knee", "r_knee")
 

@@ -8,8 +8,8 @@ import pytest
 from drawn_walker import clip, wall, write
 
 from gait import Model, UserError, Video, VideoWriter, background
-from gait.core.model import read_blob
-from gait.image.video import median_plate
+from gait.bindings.model import read_blob
+from gait.io.video import median_plate
 from gait.io import blob
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gait.body.skeleton import JOINTS
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.io import blob
 from gait.learn.segments.segment_sections import sections
 

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 
 from gait.body.skeleton import JOINTS
-from gait.motion.trackfile import Track, header
+from gait.io.track_file import Track, header
 
 FPS = 30.0
 STEP = {"right": 0.0, "left": 0.52}  # phase at which each foot strikes
@@ -29,7 +29,7 @@ def foot(time, side, hz, length, width, heading):
 
 
 def walking_track(seconds=5.0, hz=0.9, length=1.3, width=0.12, heading=0.4, sd=0.01, phase_sd=0.004):
-    """Track of a steady walk; `numbers` as those of `gait.motion.trackfile.read_track`."""
+    """Track of a steady walk; `numbers` as those of `gait.io.track_file.read_track`."""
     time = np.arange(round(seconds * FPS)) / FPS
     ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
     pelvis = (length * hz * time)[:, None] * ahead + [0, 0, 0.9]

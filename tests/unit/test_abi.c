@@ -27,7 +27,7 @@ int main(void)
         {"gait_tasks", sizeof(gait_tasks)},
         {"gait_model_info", sizeof(gait_model_info)},
         {"gait_tracker_config", sizeof(gait_tracker_config)},
-        {"gait_track", sizeof(gait_track)},
+        {"gait_keypoint", sizeof(gait_keypoint)},
         {"gait_frame", sizeof(gait_frame)},
         {"gait_estimate", sizeof(gait_estimate)},
         {"gait_lift_info", sizeof(gait_lift_info)},

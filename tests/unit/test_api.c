@@ -6,14 +6,14 @@
 static void test_library(void)
 {
     CHECK(gait_version() == GAIT_VERSION && gait_abi() == GAIT_ABI);
-    CHECK(strcmp(gait_status_name(GAIT_OK), "GAIT_OK") == 0);
-    CHECK(strcmp(gait_status_name(GAIT_ERR_CORRUPT), "GAIT_ERR_CORRUPT") == 0);
+    CHECK(strcmp(gait_result_name(GAIT_OK), "GAIT_OK") == 0);
+    CHECK(strcmp(gait_result_name(GAIT_ERR_CORRUPT), "GAIT_ERR_CORRUPT") == 0);
     for (int s = GAIT_ERR_NUMERIC; s < GAIT_OK; s++) {
-        CHECK(strncmp(gait_status_name((gait_status)s), "GAIT_ERR_", 9) == 0);
+        CHECK(strncmp(gait_result_name((gait_result)s), "GAIT_ERR_", 9) == 0);
         for (int t = s + 1; t < GAIT_OK; t++)
-            CHECK(strcmp(gait_status_name((gait_status)s), gait_status_name((gait_status)t)) != 0);
+            CHECK(strcmp(gait_result_name((gait_result)s), gait_result_name((gait_result)t)) != 0);
     }
-    CHECK(strcmp(gait_status_name((gait_status)-77), "unknown gait_status") == 0);
+    CHECK(strcmp(gait_result_name((gait_result)-77), "unknown gait_result") == 0);
 }
 
 static void test_memory(void)

@@ -3,7 +3,7 @@
 
 #include "check.h"
 
-static void refuse(const gait_tracker_config *cfg, gait_status want, int32_t index, const char *word)
+static void refuse(const gait_tracker_config *cfg, gait_result want, int32_t index, const char *word)
 {
     size_t bytes = 5;
     gait_error err = {.index = -7};
@@ -22,7 +22,7 @@ static void test_integers(void)
     static const struct {
         size_t offset;
         int32_t value;
-        gait_status want;
+        gait_result want;
         const char *word;
     } bad[] = {
         {offsetof(gait_tracker_config, struct_size), 0, GAIT_ERR_STRUCT, "gait_tracker_default"},
@@ -33,8 +33,8 @@ static void test_integers(void)
         {offsetof(gait_tracker_config, particles), 15, GAIT_ERR_LIMIT, "particles"},
         {offsetof(gait_tracker_config, particles), (1 << 20) + 1, GAIT_ERR_LIMIT, "particles"},
         {offsetof(gait_tracker_config, particles), INT32_MIN, GAIT_ERR_LIMIT, "particles"},
-        {offsetof(gait_tracker_config, search_particles), -1, GAIT_ERR_LIMIT, "search_particles"},
-        {offsetof(gait_tracker_config, search_particles), (1 << 20) + 1, GAIT_ERR_LIMIT, "search_particles"},
+        {offsetof(gait_tracker_config, acquisition_particles), -1, GAIT_ERR_LIMIT, "acquisition_particles"},
+        {offsetof(gait_tracker_config, acquisition_particles), (1 << 20) + 1, GAIT_ERR_LIMIT, "acquisition_particles"},
         {offsetof(gait_tracker_config, components), -2, GAIT_ERR_LIMIT, "components"},
         {offsetof(gait_tracker_config, components), TOY_COMPONENTS + 1, GAIT_ERR_LIMIT, "components"},
         {offsetof(gait_tracker_config, tasks), 0, GAIT_ERR_LIMIT, "tasks"},
@@ -95,7 +95,7 @@ static void test_floats(void)
         FLOAT(offset_noise, -1e-3f, 1e9f),
         FLOAT(proportion_noise, -1e-3f, 1e9f),
         FLOAT(evidence_time, -1e-3f, 1e9f),
-        FLOAT(mingle_time, -1e-3f, 1e9f),
+        FLOAT(rejuvenation_time, -1e-3f, 1e9f),
         FLOAT(joint_sd_model, -1e-3f, 1.1f),
     };
 #undef FLOAT

@@ -1,8 +1,8 @@
 /* The container against damage: whatever the bytes, nothing outside the blob is read. */
-#include "blob.h"
+#include "model/blob.h"
 
-#include "hash.h"
-#include "kinematics.h"
+#include "base/hash.h"
+#include "model/kinematics.h"
 #include "toy_model.h"
 
 #include "check.h"
@@ -25,10 +25,10 @@ static uint32_t get32(const unsigned char *p)
 }
 
 /* Open a model; one that is accepted must also be usable. */
-static gait_status open_and_use(const unsigned char *b, size_t bytes)
+static gait_result open_and_use(const unsigned char *b, size_t bytes)
 {
     gait_model m;
-    gait_status const s = model_open(b, bytes, &m, NULL);
+    gait_result const s = model_open(b, bytes, &m, NULL);
     if (s == GAIT_OK) {
         gait_state const state = {.phase = 0.3f, .stature = 1.7f, .coef = {3.0f, -3.0f}};
         gait_pose pose;
@@ -86,7 +86,7 @@ static void test_flipped(void)
         b[i] ^= mask[i % 3];
         silent += open_and_use(b, good_bytes) == GAIT_OK;
         seal(b, good_bytes);
-        gait_status const s = open_and_use(b, good_bytes);
+        gait_result const s = open_and_use(b, good_bytes);
         tolerated += s == GAIT_OK && i < table_end && !free_byte(i);
         b[i] = good[i];
         memcpy(b + 20, good + 20, 4);
@@ -123,7 +123,7 @@ typedef struct patch {
     size_t at;
     int bytes;
     uint64_t value;
-    gait_status want;
+    gait_result want;
 } patch;
 
 static void test_fields(void)
@@ -166,9 +166,9 @@ static void test_fields(void)
         memcpy(b, good, sizeof b);
         toy_put(b + p->at, p->value, p->bytes);
         seal(b, good_bytes);
-        gait_status const s = open_and_use(b, good_bytes);
+        gait_result const s = open_and_use(b, good_bytes);
         if (s != p->want)
-            fprintf(stderr, "%s: %s\n", p->what, gait_status_name(s));
+            fprintf(stderr, "%s: %s\n", p->what, gait_result_name(s));
         CHECK(s == p->want);
     }
     CHECK(open_and_use(good + 1, good_bytes) == GAIT_ERR_MEMORY);

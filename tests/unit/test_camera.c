@@ -1,4 +1,4 @@
-#include "camera.h"
+#include "image/camera.h"
 
 #include "check.h"
 

@@ -6,7 +6,7 @@
 #include "golden.h"
 #include "sanitized.h"
 #include "toy_films.h"
-#include "tracker.h"
+#include "tracker/tracker.h"
 
 #include "check.h"
 
@@ -31,10 +31,10 @@ static void run_backwards(void *user, gait_task_fn *fn, void *ctx, int32_t count
         fn(ctx, count);
 }
 
-static gait_tracker *start(const gait_tracker_config *cfg, int n, float wide)
+static gait_tracker *start(const gait_tracker_config *cfg, int n, float simd_f64)
 {
     gait_tracker *const t = toy_tracker_new(cfg);
-    films_start(t, cfg, n, wide);
+    films_start(t, cfg, n, simd_f64);
     return t;
 }
 
@@ -128,9 +128,9 @@ static void test_search_is_decided(void)
     gait_tracker_config const cfg = films_config(FILMS_SEARCH);
     gait_tracker *const t = start(&cfg, 0, 1.0f);
     advance(&cfg, t, 0, SAVE_AT, 0);
-    CHECK(t->core->modes.stage == MODES_FORKED && t->cfg.particles == cfg.search_particles);
+    CHECK(t->core->hypotheses.stage == HYPOTHESES_TWO && t->cfg.particles == cfg.acquisition_particles);
     advance(&cfg, t, SAVE_AT, SHOTS, 0);
-    CHECK(t->core->modes.stage == MODES_SINGLE && t->cfg.particles == cfg.particles);
+    CHECK(t->core->hypotheses.stage == HYPOTHESES_ONE && t->cfg.particles == cfg.particles);
     toy_tracker_free(t);
 }
 
@@ -146,7 +146,7 @@ static void test_pieces_and_threads(void)
         cfg.exec = gait_pool_tasks(pool);
         cfg.cpu_mask = (uint32_t)(tasks / 16 + tasks) % MASKS;
         CHECK(run(&cfg, tasks % 5 ? 0 : SAVE_AT) == GOLDEN);
-        cfg.search_particles = 2 * cfg.particles;
+        cfg.acquisition_particles = 2 * cfg.particles;
         CHECK(tasks % 4 || run(&cfg, tasks % 8 ? 0 : SAVE_AT) == GOLDEN_SEARCH);
         gait_pool_stop(pool);
     }

@@ -3,8 +3,8 @@
 #include "toy_prior.h"
 #include "toy_shifted.h"
 
-#include "fmath.h"
-#include "rng.h"
+#include "base/fmath.h"
+#include "base/rng.h"
 
 enum { FIELDS = F_COEF + 4 };
 
@@ -35,13 +35,13 @@ static void test_pace(void)
             dynamics d = quiet(mode, 1);
             d.rule.model = m;
             cfg.rate_time = 0.0f; /* the rate stays */
-            walker w = {{[F_RATE] = m->stride_hz + (float)deviations * m->stride_hz_sd, [F_STATURE] = 2.0f}};
+            particle_state w = {{[F_RATE] = m->stride_hz + (float)deviations * m->stride_hz_sd, [F_STATURE] = 2.0f}};
             float const rate = w.f[F_RATE], clipped = f_clamp((float)deviations, -2.0f, 2.0f);
             for (int32_t k = 0; k < 200; k++)
                 w = move_one(&d, &w, 1.0f / (200.0f * rate), 1.0f, (uint32_t)k, 3);
             float const own = mode == GAIT_MODE_PAPER ? m->stride_length : 0.80f + 0.05f * clipped;
             CHECK_NEAR(w.f[F_X], 2.0f * own, 1e-3);
-            CHECK_NEAR(body_rule_pace(&d.rule, rate), mode == GAIT_MODE_PAPER ? 0.0f : clipped, 1e-4);
+            CHECK_NEAR(state_layout_pace(&d.rule, rate), mode == GAIT_MODE_PAPER ? 0.0f : clipped, 1e-4);
         }
 }
 
@@ -53,7 +53,7 @@ static void test_drift(void)
         for (int32_t steps = 12; steps <= 48; steps *= 2) {
             dynamics const d = quiet(mode, 1);
             float const dt = 1.2f / (float)steps, rate = m->stride_hz;
-            walker w = {{0}};
+            particle_state w = {{0}};
             w.f[F_PHASE] = 0.9f;
             w.f[F_RATE] = rate;
             w.f[F_STATURE] = 1.8f;
@@ -92,7 +92,7 @@ static void test_rate(void)
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 1);
     double const own = (double)toy_model()->stride_hz;
     for (int never = 0; never < 2; never++) {
-        walker w = {.f = {[F_RATE] = 1.3f, [F_STATURE] = 1.7f}};
+        particle_state w = {.f = {[F_RATE] = 1.3f, [F_STATURE] = 1.7f}};
         cfg.rate_time = never ? 0.0f : 5.0f;
         for (uint32_t k = 0; k < 60; k++)
             w = move_one(&d, &w, 0.05f, 2.0f, k, 0);
@@ -104,7 +104,7 @@ static void test_rate(void)
 static void test_paper_way(void)
 {
     dynamics const d = quiet(GAIT_MODE_PAPER, 1);
-    walker const from = {.f = {[F_RATE] = 1.0f, [F_STATURE] = 1.7f}};
+    particle_state const from = {.f = {[F_RATE] = 1.0f, [F_STATURE] = 1.7f}};
     cfg.phase_noise = 0.05f;
     for (int32_t i = 0; i < 5; i++)
         CHECK_NEAR(move_one(&d, &from, 0.1f, 0.0f, 0, i).f[F_X], 1.7f * 0.80f * 0.1f, 1e-6);
@@ -113,12 +113,12 @@ static void test_paper_way(void)
 /* ---- motion with noise ---- */
 
 /* Fields of many particles after `seconds` in steps of dt; everyone starts alike. */
-static void spread_after(const dynamics *d, const walker *from, float dt, float seconds, float age,
+static void spread_after(const dynamics *d, const particle_state *from, float dt, float seconds, float age,
                          double v[FIELDS][DRAWS])
 {
     int32_t const steps = (int32_t)(seconds / dt + 0.5f);
     for (int32_t i = 0; i < DRAWS; i += BLOCK) {
-        walker w[BLOCK];
+        particle_state w[BLOCK];
         double cycles[BLOCK] = {0.0}; /* unwrapped phase */
         for (int32_t lane = 0; lane < BLOCK; lane++)
             w[lane] = *from;
@@ -140,9 +140,9 @@ static void spread_after(const dynamics *d, const walker *from, float dt, float 
     }
 }
 
-static walker standing(void)
+static particle_state standing(void)
 {
-    return (walker){.f = {[F_PHASE] = 0.2f, [F_RATE] = toy_model()->stride_hz, [F_STATURE] = 1.75f}};
+    return (particle_state){.f = {[F_PHASE] = 0.2f, [F_RATE] = toy_model()->stride_hz, [F_STATURE] = 1.75f}};
 }
 
 static double sampled[2][FIELDS][DRAWS];
@@ -151,7 +151,7 @@ static double sampled[2][FIELDS][DRAWS];
 static void test_spread(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 9);
-    walker const from = standing();
+    particle_state const from = standing();
     double const T = 1.0, dt = 1.0 / 30.0, own = (double)toy_model()->stride_hz;
     noisy();
     cfg.settle_time = 0.0f;
@@ -185,7 +185,7 @@ static void test_stationary(void)
     static const float steps[] = {0.05f, 0.5f};
     for (size_t k = 0; k < 2; k++) {
         dynamics const d = quiet(GAIT_MODE_DEFAULT, 10 + k);
-        walker const from = standing();
+        particle_state const from = standing();
         noisy();
         cfg.tilt_time = 0.5f;
         cfg.coef_time = 0.6f;
@@ -208,7 +208,7 @@ static void test_slow(void)
 {
     static const float times[] = {0.0f, 1e6f, 1e4f, 100.0f};
     double var[4];
-    walker const from = standing();
+    particle_state const from = standing();
     for (size_t k = 0; k < 4; k++) {
         dynamics const d = quiet(GAIT_MODE_DEFAULT, 60);
         cfg.tilt_noise = 0.033f;
@@ -224,7 +224,7 @@ static void test_slow(void)
 static void test_frame_rate(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 20);
-    walker from = standing();
+    particle_state from = standing();
     noisy();
     cfg.settle_time = 9.0f;
     from.f[F_HEADING] = 0.5f;
@@ -252,7 +252,7 @@ static void test_reflect(void)
     cfg.rate_time = 0.0f;
     cfg.rate_noise = 0.3f;
     for (int32_t i = 0; i < 500; i++) {
-        walker w = {.f = {[F_RATE] = i % 2 ? 2.45f : 0.5f, [F_STATURE] = 1.7f}};
+        particle_state w = {.f = {[F_RATE] = i % 2 ? 2.45f : 0.5f, [F_STATURE] = 1.7f}};
         for (uint32_t k = 0; k < 20; k++) {
             w = move_one(&d, &w, 0.1f, 2.0f, k, i);
             wrong += !(w.f[F_RATE] >= 1.0f / 2.1f && w.f[F_RATE] <= 2.5f);
@@ -269,7 +269,7 @@ static void test_reflect(void)
 static void test_settling(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 40);
-    walker const from = standing();
+    particle_state const from = standing();
     double const own = (double)toy_model()->stride_hz;
     noisy();
     cfg.rate_time = 0.0f;
@@ -288,7 +288,7 @@ static void test_turn_rates(void)
     double const kept = exp(-0.5), other = 0.5 * (1.0 - kept);
     for (size_t k = 0; k < 2; k++) {
         dynamics const d = quiet(GAIT_MODE_DEFAULT, 70 + k);
-        walker from = standing();
+        particle_state from = standing();
         from.f[F_TURN] = cfg.turn_sd = 0.25f;
         cfg.turn_time = 2.0f;
         spread_after(&d, &from, steps[k], 1.0f, 0.1f, sampled[0]);
@@ -313,7 +313,7 @@ static void test_circle(void)
     dynamics d = quiet(GAIT_MODE_DEFAULT, 1);
     double const quarter = 1.57079632679490, rate = 0.5;
     for (int32_t steps = 20; steps <= 80; steps *= 2) {
-        walker w = standing();
+        particle_state w = standing();
         w.f[F_TURN] = (float)rate;
         for (int32_t k = 0; k < steps; k++)
             w = move_one(&d, &w, (float)(quarter / rate) / (float)steps, 1.0f, (uint32_t)k, 3);
@@ -327,7 +327,7 @@ static void test_circle(void)
 static void test_independent(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 50), other = quiet(GAIT_MODE_DEFAULT, 51);
-    walker const from = standing();
+    particle_state const from = standing();
     noisy();
     spread_after(&d, &from, 0.04f, 0.04f, 0.0f, sampled[0]);
     for (int a = 0; a < FIELDS; a++)
@@ -340,11 +340,11 @@ static void test_independent(void)
                 cov += (sampled[0][a][i] - x.mean) * (sampled[0][b][i] - y.mean) / DRAWS;
             CHECK_NEAR(cov / sqrt(x.var * y.var), 0.0, 4.5 / sqrt(DRAWS));
         }
-    walker const w = move_one(&d, &from, 0.04f, 0.0f, 3, 7);
-    walker const same = move_one(&d, &from, 0.04f, 0.0f, 3, 7);
-    walker const frame = move_one(&d, &from, 0.04f, 0.0f, 4, 7);
-    walker const index = move_one(&d, &from, 0.04f, 0.0f, 3, 8);
-    walker const seed = move_one(&other, &from, 0.04f, 0.0f, 3, 7);
+    particle_state const w = move_one(&d, &from, 0.04f, 0.0f, 3, 7);
+    particle_state const same = move_one(&d, &from, 0.04f, 0.0f, 3, 7);
+    particle_state const frame = move_one(&d, &from, 0.04f, 0.0f, 4, 7);
+    particle_state const index = move_one(&d, &from, 0.04f, 0.0f, 3, 8);
+    particle_state const seed = move_one(&other, &from, 0.04f, 0.0f, 3, 7);
     CHECK(memcmp(&w, &same, sizeof w) == 0);
     for (int f = 0; f < FIELDS; f++)
         CHECK(f == F_TURN || (w.f[f] != frame.f[f] && w.f[f] != index.f[f] && w.f[f] != seed.f[f]));
@@ -353,8 +353,8 @@ static void test_independent(void)
 /* Every instruction set moves every lane to the same bits, and writes only the fields there are. */
 static void test_instruction_sets(void)
 {
-    static _Alignas(GAIT_ALIGN) unsigned char memory[2][sizeof(walker_block) + 2 * GUARD];
-    static walker_block from;
+    static _Alignas(GAIT_ALIGN) unsigned char memory[2][sizeof(particle_block) + 2 * GUARD];
+    static particle_block from;
     static const float extreme[] = {0.0f, -0.0f, 1e-30f, 0.999999f, -3.2f, 3.1415927f, 40.0f, -1e6f};
     for (uint32_t round = 0; round < 60; round++) {
         dynamics const d = quiet(round % 2 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT, round);
@@ -370,9 +370,9 @@ static void test_instruction_sets(void)
                         (round + 3 * f + lane + k) % 9 == 0 ? extreme[(f + round) % 8] : n[k];
             }
         for (int k = -1; k < isa_count(); k++) {
-            guarded const g = guard_fill(memory[k >= 0], sizeof(walker_block));
+            guarded const g = guard_fill(memory[k >= 0], sizeof(particle_block));
             const kernels *const run = k < 0 ? isa_scalar() : isa_at(k);
-            run->dynamics_move(&s, (int32_t)(round * BLOCK), &from, (walker_block *)(void *)g.begin);
+            run->dynamics_move(&s, (int32_t)(round * BLOCK), &from, (particle_block *)(void *)g.begin);
             CHECK(guard_whole(&g));
             CHECK(k < 0 || memcmp(memory[0], memory[1], sizeof memory[0]) == 0);
         }

@@ -1,8 +1,8 @@
 /* What is reported of weighted particles, against direct sums in double precision. */
-#include "estimate.h"
+#include "tracker/estimate.h"
 
 #include "kernel_check.h"
-#include "rng.h"
+#include "base/rng.h"
 #include "toy_tracker.h"
 
 #include "check.h"
@@ -10,16 +10,16 @@
 enum { N = 40 };
 
 static gait_tracker *t;
-static population *people;
+static particle_set *particles;
 
 /* Every particle the same plausible walker of weight 1/N, its joints zero. */
 static void reset(void)
 {
-    people = &t->people;
+    particles = &t->particles;
     pf_uniform(&t->filter);
     for (int32_t i = 0; i < N; i++) {
-        walker const w = {.f = {[F_PHASE] = 0.5f, [F_RATE] = 0.9f, [F_STATURE] = 1.75f}};
-        walker_put(people, i, &w);
+        particle_state const w = {.f = {[F_PHASE] = 0.5f, [F_RATE] = 0.9f, [F_STATURE] = 1.75f}};
+        particle_put(particles, i, &w);
     }
     memset(t->joint, 0, (size_t)(3 * TOY_POINTS * N) * sizeof *t->joint);
 }
@@ -73,10 +73,10 @@ static void test_phase(void)
         double mean, length;
         reset();
         for (int32_t i = 0; i < N; i++)
-            field(people, F_PHASE)[i] = m_wrap1(centre[k] + 0.03f * normal((uint32_t)i, 1));
+            field(particles, F_PHASE)[i] = m_wrap1(centre[k] + 0.03f * normal((uint32_t)i, 1));
         weigh(4);
-        field(people, F_PHASE)[4] = centre[k];
-        resultant(field(people, F_PHASE), 1.0, &mean, &length);
+        field(particles, F_PHASE)[4] = centre[k];
+        resultant(field(particles, F_PHASE), 1.0, &mean, &length);
         gait_estimate const e = estimate(4);
         CHECK_NEAR(circle((double)e.mean.phase - mean), 0.0, 1e-5);
         CHECK(e.mean.phase >= 0.0f && e.mean.phase < 1.0f);
@@ -93,10 +93,10 @@ static void test_heading(void)
         double mean, length;
         reset();
         for (int32_t i = 0; i < N; i++)
-            field(people, F_HEADING)[i] = m_wrap_pi(centre[k] + 0.1f * normal((uint32_t)i, 2));
+            field(particles, F_HEADING)[i] = m_wrap_pi(centre[k] + 0.1f * normal((uint32_t)i, 2));
         weigh(7);
-        field(people, F_HEADING)[7] = centre[k];
-        resultant(field(people, F_HEADING), 1.0 / 6.283185307179586, &mean, &length);
+        field(particles, F_HEADING)[7] = centre[k];
+        resultant(field(particles, F_HEADING), 1.0 / 6.283185307179586, &mean, &length);
         gait_estimate const e = estimate(7);
         CHECK_NEAR(circle((double)e.mean.heading / 6.283185307 - mean), 0.0, 1e-4);
         CHECK(fabsf(e.mean.heading) <= PI_F);
@@ -109,7 +109,7 @@ static void test_no_phase(void)
 {
     reset();
     for (int32_t i = 0; i < N; i++)
-        field(people, F_PHASE)[i] = (float)i / N;
+        field(particles, F_PHASE)[i] = (float)i / N;
     gait_estimate const e = estimate(0);
     CHECK_NEAR(e.phase_r, 0.0, 1e-5);
     CHECK(e.sd.phase > 0.5f && isfinite(e.sd.phase));
@@ -128,17 +128,17 @@ static void test_modes(void)
             reset();
             weigh(best);
             for (int32_t i = 0; i < N; i++) { /* even ones: group 0 */
-                field(people, by_heading ? F_HEADING : F_PHASE)[i] =
+                field(particles, by_heading ? F_HEADING : F_PHASE)[i] =
                     i % 2 ? 0.2f + (by_heading ? 2.0f : 0.5f) : 0.2f + 0.001f * (float)i;
-                field(people, F_STATURE)[i] = i % 2 ? 1.6f : 1.9f;
-                field(people, F_RATE)[i] = i % 2 ? 0.8f : 1.0f;
+                field(particles, F_STATURE)[i] = i % 2 ? 1.6f : 1.9f;
+                field(particles, F_RATE)[i] = i % 2 ? 0.8f : 1.0f;
                 double const w = t->filter.weight[i];
                 mass += i % 2 == best ? w : 0.0;
-                stature += i % 2 == best ? w * (double)field(people, F_STATURE)[i] : 0.0;
-                all += w * (double)field(people, F_STATURE)[i];
+                stature += i % 2 == best ? w * (double)field(particles, F_STATURE)[i] : 0.0;
+                all += w * (double)field(particles, F_STATURE)[i];
             }
             for (int32_t i = 0; i < N; i++) {
-                double const d = (double)field(people, F_STATURE)[i] - all;
+                double const d = (double)field(particles, F_STATURE)[i] - all;
                 square += t->filter.weight[i] * d * d;
             }
             gait_estimate const e = estimate(best);
@@ -146,7 +146,7 @@ static void test_modes(void)
             CHECK_NEAR(e.mean.stature, stature / mass, 1e-6);
             CHECK_NEAR(e.mean.stride_hz, best ? 0.8 : 1.0, 1e-6);
             CHECK_NEAR(e.sd.stature, sqrt(square), 1e-6); /* over all particles */
-            CHECK(e.best.stature == field(people, F_STATURE)[best]);
+            CHECK(e.best.stature == field(particles, F_STATURE)[best]);
             if (by_heading)
                 CHECK_NEAR(e.mean.heading, best ? 2.2 : 0.22, 0.03);
             else
@@ -179,8 +179,8 @@ static void test_rotation(void)
         reset();
         weigh(3);
         for (uint32_t i = 0; i < N; i++) {
-            float *const angle[] = {&field(people, F_HEADING)[i], &field(people, F_PITCH)[i],
-                                    &field(people, F_ROLL)[i]};
+            float *const angle[] = {&field(particles, F_HEADING)[i], &field(particles, F_PITCH)[i],
+                                    &field(particles, F_ROLL)[i]};
             for (uint32_t k = 0; k < 3; k++)
                 *angle[k] =
                     (k ? 0.3f : 2.9f) * normal(round, 60 + k) + (i == 3 ? 0.0f : 0.12f) * normal(i, 10 + k);
@@ -268,8 +268,8 @@ static void test_fields(void)
     reset();
     weigh(2);
     for (uint32_t i = 0; i < N; i++)
-        for (int f = 0; f < people->fields; f++) {
-            float *const v = &field(people, f)[i];
+        for (int f = 0; f < particles->fields; f++) {
+            float *const v = &field(particles, f)[i];
             *v = (f == F_STATURE ? 1.7f
                   : f == F_RATE  ? 0.9f
                   : f == F_PHASE ? 0.4f
@@ -286,19 +286,19 @@ static void test_fields(void)
     CHECK_NEAR(e.mean.offset[TOY_TORSO], mean[F_COEF + 3], 1e-6);
     CHECK(e.sd.coef[0] > 0.01f && e.sd.offset[TOY_TORSO] > 0.01f && e.sd.proportion[0] > 0.01f &&
           e.sd.stride_hz > 0.01f && e.sd.coef[2] == 0.0f);
-    walker w = {{0}};
-    for (int f = 0; f < people->fields; f++)
+    particle_state w = {{0}};
+    for (int f = 0; f < particles->fields; f++)
         w.f[f] = (float)mean[f];
     w.f[F_PHASE] = e.mean.phase;
     w.f[F_HEADING] = e.mean.heading;
-    gait_state const s = walker_state(&t->rule, &w);
+    gait_state const s = particle_to_state(&t->rule, &w);
     for (int k = 0; k < 3; k++)
         CHECK_NEAR(e.mean.pelvis[k], s.pelvis[k], 1e-5);
     gait_pose pose;
     CHECK(gait_model_pose(toy_model(), &e.mean, &pose) == GAIT_OK);
     CHECK(memcmp(pose.angle, e.pose.angle, sizeof pose.angle) == 0);
-    walker const heaviest = walker_get(people, 2);
-    gait_state const best = walker_state(&t->rule, &heaviest);
+    particle_state const heaviest = particle_get(particles, 2);
+    gait_state const best = particle_to_state(&t->rule, &heaviest);
     CHECK(memcmp(&best, &e.best, sizeof best) == 0);
     double forward = 0.0;
     for (int j = 0; j < TOY_PHASES; j++)
@@ -307,7 +307,7 @@ static void test_fields(void)
                 (k ? mean[F_COEF + k - 1] : 1.0) / TOY_PHASES *
                 (double)toy_model()->curves[(k * TOY_PHASES + j) * TOY_CHANNELS + TOY_ROOT + ROOT_FORWARD];
     CHECK_NEAR(e.speed, mean[F_STATURE] * mean[F_RATE] * forward, 1e-4);
-    walker const place = population_place(people, t->filter.weight);
+    particle_state const place = particle_set_place(particles, t->filter.weight);
     CHECK_NEAR(place.f[F_X], mean[F_X], 1e-6);
     CHECK_NEAR(place.f[F_Y], mean[F_Y], 1e-6);
     CHECK_NEAR(place.f[F_Z], mean[F_Z], 1e-6);

@@ -1,9 +1,9 @@
 /* Maps of one frame: foreground, edges and local contrast of pictures whose answer is known. */
-#include "features.h"
+#include "image/features.h"
 
-#include "arena.h"
-#include "base.h"
-#include "rng.h"
+#include "base/arena.h"
+#include "base/base.h"
+#include "base/rng.h"
 #include "toy_features.h"
 
 #include "check.h"
@@ -44,7 +44,7 @@ static void make_scene(int32_t channels)
                 (uint8_t)(60 + 20 * c + (int32_t)(noise((uint32_t)(i / 4 + c * VIEW_PIXELS)) % 90));
         memcpy(frame.channel[c], plate.channel[c], VIEW_PIXELS);
     }
-    memset(f.inside, 0xff, RAST_SIZE * sizeof *f.inside);
+    memset(f.inside, 0xff, GRID_SIZE * sizeof *f.inside);
 }
 
 /* Foreground of a cell from its bit planes, [0, FG_ONE]. */
@@ -65,7 +65,7 @@ static void test_no_change(void)
         run->features_foreground(&f, &frame, &plate);
         int32_t set = 0;
         for (int32_t k = 0; k < FG_PLANES; k++)
-            for (int32_t y = 0; y < RAST_SIZE; y++)
+            for (int32_t y = 0; y < GRID_SIZE; y++)
                 set += f.fg[k][y][0] != 0 || f.fg[k][y][1] != 0;
         CHECK(f.fg_total == 0 && set == 0);
     }
@@ -81,7 +81,7 @@ static void test_exposure(void)
                 for (int32_t i = 0; i < VIEW_PIXELS; i++)
                     frame.channel[c][i] = (uint8_t)(plate.channel[c][i] * gain / 16);
             run->features_foreground(&f, &frame, &plate);
-            CHECK(f.fg_total < RAST_SIZE * RAST_SIZE * FG_ONE / 200);
+            CHECK(f.fg_total < GRID_SIZE * GRID_SIZE * FG_ONE / 200);
         }
 }
 
@@ -102,8 +102,8 @@ static void test_square(void)
             for (int32_t i = 0; i < VIEW_PIXELS; i++)
                 frame.channel[c][i] = (uint8_t)(frame.channel[c][i] * 31 / 32);
         run->features_foreground(&f, &frame, &plate);
-        for (int32_t y = 0; y < RAST_SIZE; y++)
-            for (int32_t x = 0; x < RAST_SIZE; x++) {
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t x = 0; x < GRID_SIZE; x++) {
                 bool const in = x >= 40 && x < 70 && y >= 50 && y < 90;
                 *(in ? &inside : &outside) += fg_at(x, y);
                 total += fg_at(x, y);
@@ -130,7 +130,7 @@ static void test_channels(void)
         run->features_foreground(&f, &frame, &plate);
         total[k] = f.fg_total;
     }
-    CHECK(total[0] == total[1] && total[0] > 15 * RAST_SIZE * FG_ONE / 2);
+    CHECK(total[0] == total[1] && total[0] > 15 * GRID_SIZE * FG_ONE / 2);
 }
 
 /* A shadow keeps the colour of what it falls on: it counts less than paint of the same distance. */
@@ -148,7 +148,7 @@ static void test_shadow(void)
         run->features_foreground(&f, &frame, &plate);
         total[painted] = 0;
         for (int32_t y = 0; y < 8; y++)
-            for (int32_t x = 0; x < RAST_SIZE; x++)
+            for (int32_t x = 0; x < GRID_SIZE; x++)
                 total[painted] += fg_at(x, y);
     }
     CHECK(total[0] > 0 && 4 * total[0] < 3 * total[1]);
@@ -160,13 +160,13 @@ static void test_unseen(void)
     int32_t outside = 0;
     make_scene(1);
     memset(frame.channel[0], 255, VIEW_PIXELS);
-    for (int32_t y = 0; y < RAST_SIZE; y++) {
+    for (int32_t y = 0; y < GRID_SIZE; y++) {
         f.inside[y][0] = y < 100 ? ~UINT64_C(0) << 20 : 0;
         f.inside[y][1] = 0;
     }
     run->features_foreground(&f, &frame, &plate);
-    for (int32_t y = 0; y < RAST_SIZE; y++)
-        for (int32_t x = 0; x < RAST_SIZE; x++)
+    for (int32_t y = 0; y < GRID_SIZE; y++)
+        for (int32_t x = 0; x < GRID_SIZE; x++)
             outside += fg_at(x, y) > 0 && !(x >= 20 && x < 64 && y < 100);
     CHECK(outside == 0 && f.fg_total > 100 * 44 * FG_ONE / 2);
 }
@@ -338,16 +338,16 @@ static void test_compute(void)
     f.map = (view_map){.scale = 1.0f, .u0 = -100.0f, .v0 = -50.0f};
     view_sample(run, &f.map, &cam, &im, &plate);
     toy_features(run, &f, &cam, &im, &plate, false, &scratch);
-    CHECK(f.seen && f.has_fg && f.fg_total == 0);
+    CHECK(f.has_image && f.has_fg && f.fg_total == 0);
     CHECK(memcmp(scratch.planes.channel[0], plate.channel[0], VIEW_PIXELS) ==
           0); /* in bands as in one piece */
     int32_t cells = 0;
-    for (int32_t y = 0; y < RAST_SIZE; y++)
-        cells += rast_popcount(f.inside[y][0]) + rast_popcount(f.inside[y][1]);
+    for (int32_t y = 0; y < GRID_SIZE; y++)
+        cells += grid_popcount(f.inside[y][0]) + grid_popcount(f.inside[y][1]);
     CHECK(cells == W / 2 * (H / 2));
     CHECK(f.edge[20 * VIEW_SIZE + 20].trace == 0 && f.edge[120 * VIEW_SIZE + 180].trace > 5);
     toy_features(run, &f, &cam, &im, NULL, true, &scratch); /* no plate; grey levels in paper mode */
-    CHECK(f.seen && !f.has_fg);
+    CHECK(f.has_image && !f.has_fg);
     int32_t wrong = 0;
     for (int32_t y = 0; y < H; y++)
         for (int32_t x = 0; x < W; x++)
@@ -356,16 +356,16 @@ static void test_compute(void)
     im.format = GAIT_RGB8;
     im.stride = 3 * W;
     toy_features(run, &f, &cam, &im, &plate, false, &scratch); /* a grey plate: its luma is compared */
-    CHECK(f.seen && f.has_fg && f.fg_total > 0);
+    CHECK(f.has_image && f.has_fg && f.fg_total > 0);
     im.data = NULL;
     f.has_fg = true;
     toy_features(run, &f, &cam, &im, &plate, false, &scratch);
-    CHECK(!f.seen && !f.has_fg);
+    CHECK(!f.has_image && !f.has_fg);
 }
 
 int main(void)
 {
-    run = kernels_choose(~0u); /* the others give the same: test_image_kernels.c */
+    run = dispatch_choose(~0u); /* the others give the same: test_image_kernels.c */
     make_maps();
     test_no_change();
     test_exposure();

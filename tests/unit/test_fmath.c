@@ -1,5 +1,5 @@
 /* Sweeps against double libm; the bounds are the ones that fmath.h states. */
-#include "fmath.h"
+#include "base/fmath.h"
 
 #include "check.h"
 

@@ -14,7 +14,7 @@ int main(void)
 #include "gait_pool.h"
 #include "toy_films.h"
 #include "toy_passer.h"
-#include "tracker.h"
+#include "tracker/tracker.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -117,7 +117,7 @@ static uint32_t work(gait_tracker *t, const gait_tracker_config *cfg)
         gait_frame const f = frame_of(cfg, n);
         gait_estimate e;
         ok &= gait_tracker_step(t, &f, &e, NULL) == GAIT_OK;
-        stages |= 1u << t->core->modes.stage;
+        stages |= 1u << t->core->hypotheses.stage;
         ok &= gait_tracker_lagged(t, n < 5 ? n : 5, &e, NULL) == GAIT_OK;
         ok &= gait_tracker_particles(t, state, weight, 400) == t->cfg.particles;
         ok &= gait_model_pose(toy_model(), &e.mean, &pose) == GAIT_OK;
@@ -143,8 +143,8 @@ static void test_no_allocation(int film_kind)
     bool const made = gait_tracker_init(memory, sizeof memory, toy_model(), &cfg, &t, NULL) == GAIT_OK;
     uint32_t const stages = made ? work(t, &cfg) : 0;
     armed = false;
-    CHECK(stages >> MODES_SINGLE & 1u);
-    CHECK((stages >> MODES_FORKED & 1u) == (film_kind == FILMS_SEARCH));
+    CHECK(stages >> HYPOTHESES_ONE & 1u);
+    CHECK((stages >> HYPOTHESES_TWO & 1u) == (film_kind == FILMS_SEARCH));
     gait_pool_stop(pool);
 }
 

@@ -2,9 +2,9 @@
  * nothing else. */
 #include "kernel_check.h"
 
-#include "camera.h"
-#include "features.h"
-#include "rng.h"
+#include "image/camera.h"
+#include "image/features.h"
+#include "base/rng.h"
 
 #include "check.h"
 
@@ -66,12 +66,12 @@ static void sample_case(uint32_t n)
     map.u0 = (float)(noise(9 * n + 2) % 1000) * 1e-3f * (float)w - 127.5f / map.scale;
     map.v0 = (float)(noise(9 * n + 3) % 1000) * 1e-3f * (float)h - 127.5f / map.scale;
     view_planes out[2];
-    static _Alignas(8) unsigned char inside[2][RAST_SIZE * RAST_WORDS * 8 + 2 * GUARD];
+    static _Alignas(8) unsigned char inside[2][GRID_SIZE * GRID_WORDS * 8 + 2 * GUARD];
     for (int k = -1; k < isa_count(); k++) {
         const kernels *const run = k < 0 ? isa_scalar() : isa_at(k);
         int const to = k >= 0;
         guarded const g = guard_fill(memory[to], PLANES * VIEW_PIXELS),
-                      in = guard_fill(inside[to], RAST_SIZE * RAST_WORDS * 8);
+                      in = guard_fill(inside[to], GRID_SIZE * GRID_WORDS * 8);
         for (int32_t c = 0; c < PLANES; c++)
             out[to].channel[c] = g.begin + c * VIEW_PIXELS;
         view_sample(run, &map, &cam, &im, &out[to]);
@@ -86,20 +86,20 @@ static void sample_case(uint32_t n)
 /* ---- maps ---- */
 typedef struct maps {
     unsigned char grey[VIEW_PIXELS + 2 * GUARD], edge[VIEW_PIXELS * sizeof(edge_cell) + 2 * GUARD];
-    unsigned char surface[VIEW_PIXELS + 2 * GUARD], fg[FG_PLANES * RAST_SIZE * RAST_WORDS * 8 + 2 * GUARD];
+    unsigned char surface[VIEW_PIXELS + 2 * GUARD], fg[FG_PLANES * GRID_SIZE * GRID_WORDS * 8 + 2 * GUARD];
     unsigned char pairs[PAIRS * sizeof(uint16_t) + 2 * GUARD];
     int32_t fg_total;
 } maps;
 
 static void compute(const kernels *run, const view_planes *im, const view_planes *plate,
-                    uint64_t (*inside)[RAST_WORDS], maps *out)
+                    uint64_t (*inside)[GRID_WORDS], maps *out)
 {
     static edge_rows rows;
     guarded const g[] = {
         guard_fill(out->grey, VIEW_PIXELS), guard_fill(out->edge, VIEW_PIXELS * sizeof(edge_cell)),
-        guard_fill(out->surface, VIEW_PIXELS), guard_fill(out->fg, FG_PLANES * RAST_SIZE * RAST_WORDS * 8),
+        guard_fill(out->surface, VIEW_PIXELS), guard_fill(out->fg, FG_PLANES * GRID_SIZE * GRID_WORDS * 8),
         guard_fill(out->pairs, PAIRS * sizeof(uint16_t))};
-    features f = {.inside = inside, .fg = (uint64_t (*)[RAST_SIZE][RAST_WORDS])(void *)g[3].begin};
+    features f = {.inside = inside, .fg = (uint64_t (*)[GRID_SIZE][GRID_WORDS])(void *)g[3].begin};
     run->view_grey(im, 0, VIEW_SIZE, g[0].begin);
     run->features_edges(g[0].begin, (edge_cell *)(void *)g[1].begin, &rows);
     run->features_contrast(g[0].begin, (int8_t *)g[2].begin);
@@ -117,7 +117,7 @@ static void maps_case(uint32_t n)
     static _Alignas(GAIT_ALIGN) maps want, have;
     static const int32_t gain[] = {16, 13, 19, 7, 34};
     view_planes im = {.channels = n % 3 ? 3 : 1}, plate = im;
-    uint64_t inside[RAST_SIZE][RAST_WORDS];
+    uint64_t inside[GRID_SIZE][GRID_WORDS];
     for (int32_t c = 0; c < PLANES; c++) {
         im.channel[c] = pixels[c];
         plate.channel[c] = pixels[PLANES + c];
@@ -128,8 +128,8 @@ static void maps_case(uint32_t n)
                 (uint8_t)i_clamp(plate.channel[c][i] * gain[n / 5 % 5] / 16 + r + block, 0, 255);
         }
     }
-    for (uint32_t i = 0; i < RAST_SIZE * RAST_WORDS; i++)
-        inside[i / RAST_WORDS][i % RAST_WORDS] =
+    for (uint32_t i = 0; i < GRID_SIZE * GRID_WORDS; i++)
+        inside[i / GRID_WORDS][i % GRID_WORDS] =
             n % 4 ? ~UINT64_C(0) : (uint64_t)noise(i) << 32 | noise(i + 1000);
     compute(isa_scalar(), &im, &plate, inside, &want);
     for (int k = 0; k < isa_count(); k++) {

@@ -1,8 +1,8 @@
 /* The choice of an instruction set, and the counting kernel in each of them. */
 #include "kernel_check.h"
 
-#include "features.h"
-#include "rng.h"
+#include "image/features.h"
+#include "base/rng.h"
 #include "toy_visible.h"
 
 #include "check.h"
@@ -17,12 +17,12 @@ static void test_choice(void)
     CHECK(strcmp(gait_cpu_name(GAIT_CPU_AVX2), have & GAIT_CPU_AVX2 ? "avx2" : "scalar") == 0);
     CHECK(strcmp(gait_cpu_name(GAIT_CPU_AVX512), have & GAIT_CPU_AVX512 ? "avx512" : "scalar") == 0);
     CHECK(gait_cpu_name(~0u) == gait_cpu_name(have));
-    CHECK(kernels_choose(~have) == isa_scalar());
+    CHECK(dispatch_choose(~have) == isa_scalar());
     for (int k = 0; k < isa_count(); k++) {
         CHECK(isa_at(k) != isa_scalar());
         CHECK(k == 0 || isa_at(k) != isa_at(k - 1));
     }
-    CHECK(isa_at(isa_count() - 1) == kernels_choose(~0u));
+    CHECK(isa_at(isa_count() - 1) == dispatch_choose(~0u));
 #if defined(__x86_64__) && defined(__GNUC__)
     /* The compiler's own support code asks the same questions. */
     __builtin_cpu_init();
@@ -46,29 +46,29 @@ static uint64_t word(uint32_t index, uint32_t draw, uint32_t kind)
 
 static void test_silhouette_count(void)
 {
-    static uint64_t fg[FG_PLANES][RAST_SIZE][RAST_WORDS], inside[RAST_SIZE][RAST_WORDS];
-    static uint64_t words[RAST_STARTS][FG_PLANES + 1][RAST_SIZE];
-    static rast_mask body;
+    static uint64_t fg[FG_PLANES][GRID_SIZE][GRID_WORDS], inside[GRID_SIZE][GRID_WORDS];
+    static uint64_t words[GRID_STARTS][FG_PLANES + 1][GRID_SIZE];
+    static grid_mask body;
     features f = {.fg = fg, .inside = inside, .words = words};
     for (uint32_t round = 0; round < 400; round++) {
         int32_t const first = (int32_t)(round * 37 % 128),
                       last = first + (int32_t)(round * 11 % 129) % (129 - first);
         int32_t area, covered, cells = 0, under = 0;
-        for (uint32_t y = 0; y < RAST_SIZE; y++)
-            for (uint32_t w = 0; w < RAST_WORDS; w++) {
-                uint32_t const at = y * RAST_WORDS + w;
+        for (uint32_t y = 0; y < GRID_SIZE; y++)
+            for (uint32_t w = 0; w < GRID_WORDS; w++) {
+                uint32_t const at = y * GRID_WORDS + w;
                 body.word[w][y] = word(at, 10 * round, round % 3);
                 inside[y][w] = word(at, 10 * round + 1, round / 3 % 4);
                 for (uint32_t k = 0; k < FG_PLANES; k++)
                     fg[k][y][w] = word(at, 10 * round + 2 + k, round / 12 % 4);
             }
         body.first = round % 5 ? first : 0;
-        body.last = round % 5 ? last : RAST_SIZE;
-        body.width = round % 2 ? 64 : RAST_SIZE;
-        body.column = round % 2 ? (int32_t)(round / 2 % 8 * RAST_STEP) : 0;
+        body.last = round % 5 ? last : GRID_SIZE;
+        body.width = round % 2 ? 64 : GRID_SIZE;
+        body.column = round % 2 ? (int32_t)(round / 2 % 8 * GRID_STEP) : 0;
         features_words(&f);
-        for (int32_t y = 0; y < RAST_SIZE; y++)
-            for (int32_t x = 0; x < RAST_SIZE; x++) {
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t x = 0; x < GRID_SIZE; x++) {
                 uint64_t const bit = UINT64_C(1) << (x & 63);
                 if (!toy_cell(&body, x, y) || !(inside[y][x >> 6] & bit))
                     continue;

@@ -1,8 +1,8 @@
 /* Curves and kinematics of every instruction set against the scalar ones. */
 #include "kernel_check.h"
-#include "kinematics.h"
+#include "model/kinematics.h"
 
-#include "rng.h"
+#include "base/rng.h"
 #include "toy_shifted.h"
 
 #include "check.h"

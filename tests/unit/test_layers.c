@@ -1,7 +1,7 @@
 /* Depth order: by hand on rectangles, by brute force on the toy walker. */
-#include "layers.h"
+#include "raster/layers.h"
 
-#include "population.h"
+#include "filter/particles.h"
 #include "toy_draw.h"
 #include "toy_scene.h"
 #include "toy_visible.h"
@@ -27,12 +27,12 @@ static bool covers(const rast_spans *s, int32_t x, int32_t y)
     return y >= s->first && y < s->last && x >= s->begin[y] && x < s->end[y];
 }
 
-static int32_t count(const rast_mask *m)
+static int32_t count(const grid_mask *m)
 {
     int32_t n = 0;
     for (int32_t w = 0; 64 * w < m->width; w++)
         for (int32_t y = m->first; y < m->last; y++)
-            n += rast_popcount(m->word[w][y]);
+            n += grid_popcount(m->word[w][y]);
     return n;
 }
 
@@ -58,15 +58,15 @@ static void test_cells(void)
     memset(&drawn, 0xff, sizeof drawn);
     rectangle(0, 3, 20, 40, 60, 100, 2.0f);
     toy_draw(&outline, flat, 1, 3, &drawn);
-    for (int32_t y = 0; y < RAST_SIZE; y++)
-        for (int32_t x = 0; x < RAST_SIZE; x++) {
+    for (int32_t y = 0; y < GRID_SIZE; y++)
+        for (int32_t x = 0; x < GRID_SIZE; x++) {
             bool const in = x >= 10 && x < 30 && y >= 20 && y < 50;
             wrong += toy_cell(&drawn.visible[0], x, y) != in;
             wrong += toy_cell(&drawn.whole, x, y) != in;
         }
     CHECK(wrong == 0);
     CHECK(drawn.whole.first <= 20 && drawn.whole.last >= 50);
-    const rast_mask *const m = &drawn.visible[0];
+    const grid_mask *const m = &drawn.visible[0];
     CHECK(toy_visible(m, 20.0f, 40.0f) && toy_visible(m, 59.9f, 99.9f));
     CHECK(!toy_visible(m, 19.9f, 40.0f) && !toy_visible(m, 60.0f, 50.0f));
     CHECK(!toy_visible(m, 30.0f, 39.9f) && !toy_visible(m, 30.0f, 100.0f));
@@ -74,7 +74,7 @@ static void test_cells(void)
     CHECK(!toy_visible(m, 1e30f, 50.0f) && !toy_visible(m, -1e30f, 50.0f));
     rectangle(0, 3, -100, -100, 400, 400, 2.0f); /* the whole grid, and not a cell more */
     toy_draw(&outline, flat, 1, 3, &drawn);
-    CHECK(count(m) == RAST_SIZE * RAST_SIZE);
+    CHECK(count(m) == GRID_SIZE * GRID_SIZE);
     CHECK(toy_visible(m, 0.0f, 0.0f) && toy_visible(m, 255.9f, 255.9f));
     CHECK(!toy_visible(m, -0.1f, 5.0f) && !toy_visible(m, 5.0f, -0.1f));
     CHECK(!toy_visible(m, 256.0f, 5.0f) && !toy_visible(m, 5.0f, 256.0f));
@@ -83,24 +83,24 @@ static void test_cells(void)
 /* Bodies of any width anywhere across the grid and beyond it, two limbs each. */
 static void test_columns(void)
 {
-    int32_t wrong = 0, narrow = 0, wide = 0;
+    int32_t wrong = 0, narrow = 0, simd_f64 = 0;
     for (int32_t apart = 0; apart < 130; apart += 9)
         for (int32_t x = -40; x < 140; x++) { /* cells */
             float const a = 2.0f * (float)x, b = a + 2.0f * (float)apart;
             rectangle(0, 1, a, 20, a + 20, 60, 2.0f);
             rectangle(1, 1, b, 100, b + 20, 120, 3.0f);
             toy_draw(&outline, flat, 2, 1, &drawn);
-            for (int32_t c = 0; c < RAST_SIZE; c++) {
+            for (int32_t c = 0; c < GRID_SIZE; c++) {
                 wrong += toy_cell(&drawn.visible[0], c, 20) != (c >= x && c < x + 10);
                 wrong += toy_cell(&drawn.visible[1], c, 55) != (c >= x + apart && c < x + apart + 10);
                 wrong += toy_cell(&drawn.whole, c, 55) != (c >= x + apart && c < x + apart + 10);
             }
-            wrong += drawn.whole.column % RAST_STEP;
+            wrong += drawn.whole.column % GRID_STEP;
             narrow += drawn.whole.width == 64;
-            wide += drawn.whole.width == RAST_SIZE;
+            simd_f64 += drawn.whole.width == GRID_SIZE;
         }
     CHECK(wrong == 0);
-    CHECK(narrow > 500 && wide > 500);
+    CHECK(narrow > 500 && simd_f64 > 500);
 }
 
 /* The nearer one hides the farther one, whatever their indices. */
@@ -109,7 +109,7 @@ static void test_hiding(void)
     memset(&drawn, 0xff, sizeof drawn);
     for (int32_t l = 0; l < 6; l++) { /* of a body before */
         drawn.visible[l].first = 0;
-        drawn.visible[l].last = RAST_SIZE;
+        drawn.visible[l].last = GRID_SIZE;
     }
     for (int swap = 0; swap < 2; swap++) {
         int32_t const near = swap, far = 1 - swap;
@@ -141,7 +141,7 @@ static void test_walker(void)
     gait_tracker_config cfg;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
     cfg.components = 0;
-    body_rule const rule = body_rule_init(m, &cfg);
+    state_layout const rule = state_layout_init(m, &cfg);
     static kin_body body;
     limb_geometry limbs[MODEL_MAX_LIMBS];
     limb_geometry_init(m, 1.0f, limbs);
@@ -150,8 +150,8 @@ static void test_walker(void)
         gait_camera const cam = toy_camera(n % 2);
         view_map const map = {.scale = 1.4f, .u0 = 85.0f + 2.0f * (float)n, .v0 = 60.0f};
         gait_state const s = toy_walk(0.05f * (float)n);
-        walker const w = walker_from_state(&rule, &s);
-        walker_body(&rule, &w, &body);
+        particle_state const w = particle_from_state(&rule, &s);
+        particle_body(&rule, &w, &body);
         toy_project(limbs, m->limbs, &body, &cam, &map, &outline);
         int32_t const lane = n % BLOCK;
         toy_draw(&outline, limbs, m->limbs, lane, &drawn);
@@ -162,10 +162,10 @@ static void test_walker(void)
                 x[k] = (outline.limb[l].x[k][lane] - 0.5f) / 2.0f;
                 y[k] = (outline.limb[l].y[k][lane] - 0.5f) / 2.0f;
             }
-            rast_convex(x, y, outline_vertices(&limbs[l]), 0, RAST_SIZE, &alone[l]);
+            rast_convex(x, y, outline_vertices(&limbs[l]), 0, GRID_SIZE, &alone[l]);
         }
-        for (int32_t y = 0; y < RAST_SIZE; y++)
-            for (int32_t x = 0; x < RAST_SIZE; x++) {
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t x = 0; x < GRID_SIZE; x++) {
                 int32_t top = -1, covering = 0;
                 for (int32_t l = 0; l < m->limbs; l++)
                     if (covers(&alone[l], x, y)) {

@@ -1,9 +1,9 @@
 /* Outlines, edges and masks of every instruction set against the scalar ones: walkers, and any bits as coordinates. */
 #include "kernel_check.h"
-#include "layers.h"
+#include "raster/layers.h"
 
-#include "population.h"
-#include "rng.h"
+#include "filter/particles.h"
+#include "base/rng.h"
 #include "toy_scene.h"
 
 #include "check.h"
@@ -15,7 +15,7 @@ static _Alignas(GAIT_ALIGN) unsigned char memory[sizeof(layers_block) + sizeof(o
                                                  sizeof(layers) + 2 * GUARD];
 
 /* Rows beyond a mask's are nobody's: each set may have drawn others in vain. */
-static bool same_mask(const rast_mask *a, const rast_mask *b)
+static bool same_mask(const grid_mask *a, const grid_mask *b)
 {
     bool same = a->first == b->first && a->last == b->last && a->column == b->column && a->width == b->width;
     for (int32_t w = 0; same && 64 * w < a->width; w++)
@@ -55,7 +55,7 @@ static void compare_layers(const limb_geometry *limbs, int32_t count)
 }
 
 /* Bodies of a block, each lane another, some of them at or behind the camera. */
-static void walkers(int round, const body_rule *rule, population *p)
+static void walkers(int round, const state_layout *rule, particle_set *p)
 {
     for (int32_t i = 0; i < BLOCK; i++) {
         gait_state s = toy_walk(0.13f * (float)round + 0.21f * (float)i);
@@ -63,8 +63,8 @@ static void walkers(int round, const body_rule *rule, population *p)
         s.stature *= 1.0f + 0.02f * (float)i;
         s.pelvis[0] += round % 3 ? 0.05f * (float)i : 0.9f * (float)(i - 8);
         s.pelvis[1] += round % 3 ? 0.0f : 0.7f * (float)(i - 8);
-        walker const w = walker_from_state(rule, &s);
-        walker_put(p, i, &w);
+        particle_state const w = particle_from_state(rule, &s);
+        particle_put(p, i, &w);
     }
 }
 
@@ -73,9 +73,9 @@ static void test_walkers(void)
     const gait_model *const m = toy_model();
     gait_tracker_config cfg;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
-    body_rule const rule = body_rule_init(m, &cfg);
+    state_layout const rule = state_layout_init(m, &cfg);
     static float value[F_MAX * BLOCK];
-    population p = {.n = BLOCK, .fields = body_rule_fields(&rule), .value = value};
+    particle_set p = {.n = BLOCK, .fields = state_layout_fields(&rule), .value = value};
     static kin_body body;
     limb_geometry limbs[MODEL_MAX_LIMBS];
     limb_geometry_init(m, 1.05f, limbs);
@@ -83,7 +83,7 @@ static void test_walkers(void)
         gait_camera const cam = toy_camera(round % 2);
         view_map const map = {.scale = 1.4f, .u0 = 85.0f + (float)round, .v0 = 60.0f};
         walkers(round, &rule, &p);
-        population_bodies(&rule, &p, 0, &body);
+        particle_set_bodies(&rule, &p, 0, &body);
         memset(&outline, 0xa5, sizeof outline);
         isa_scalar()->outline_project(limbs, m->limbs, &body, &cam, &map, &outline);
         for (int k = 0; k < isa_count(); k++) {

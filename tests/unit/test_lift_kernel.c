@@ -1,6 +1,6 @@
 /* Positions by modes: every instruction set against the scalar definition, and that against the sum in order. */
-#include "dense.h"
-#include "rng.h"
+#include "base/cholesky.h"
+#include "base/rng.h"
 
 #include "check.h"
 #include "kernel_check.h"
@@ -64,7 +64,7 @@ static void compare(int32_t width, int32_t modes, int32_t off)
 enum {
     MOST_MODES = GAIT_MAX_MODES,
     MOST_LANES = MOST_MODES,
-    EIGHT = DENSE_LANES,
+    EIGHT = CHOLESKY_LANES,
     APART = 16,
     WIDTH = 3 * APART,
     OFFSETS = 8
@@ -81,7 +81,7 @@ typedef struct shapes { /* what they make, each between canaries */
 
 static void clear(shapes *s, int32_t modes, size_t off)
 {
-    int32_t const lanes = dense_padded(modes);
+    int32_t const lanes = cholesky_padded(modes);
     const int32_t numbers[PARTS] = {3 * lanes, 3, lanes, 3 * modes * EIGHT, 3 * EIGHT, WIDTH};
     for (int k = 0; k < PARTS; k++) {
         s->in[k] = guard_fill(s->memory[k] + off * sizeof(double), (size_t)numbers[k] * sizeof(double));
@@ -114,7 +114,7 @@ static void run(const kernels *k, int32_t modes, size_t off, shapes *s)
 {
     static _Alignas(64) float row[2][3 * MOST_LANES + OFFSETS], column[2][MOST_MODES * EIGHT + OFFSETS];
     static _Alignas(64) double theta[MOST_MODES + OFFSETS];
-    int32_t const lanes = dense_padded(modes);
+    int32_t const lanes = cholesky_padded(modes);
     double M[9][EIGHT], g[3];
     clear(s, modes, off);
     for (int32_t i = 0; i < modes; i++)
@@ -142,7 +142,7 @@ static void run(const kernels *k, int32_t modes, size_t off, shapes *s)
 /* One marker as eight, and plain sums. */
 static void check_sums(const shapes *s, int32_t modes)
 {
-    int32_t const lanes = dense_padded(modes), squared = EIGHT * (1 + modes % (WIDTH / EIGHT));
+    int32_t const lanes = cholesky_padded(modes), squared = EIGHT * (1 + modes % (WIDTH / EIGHT));
     for (int32_t a = 0; a < 3; a++)
         for (int32_t r = 0; r < EIGHT; r++) {
             int32_t const c = APART * a + EIGHT + r;

@@ -3,7 +3,7 @@
 
 #include <stdbool.h>
 
-#include "hash.h"
+#include "base/hash.h"
 #include "toy_passer.h"
 
 enum { CANARY = 4 * GAIT_ALIGN, PUSHES = 1000 };

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 #include "golden.h"
-#include "hash.h"
+#include "base/hash.h"
 #include "toy_lift.h"
 
 enum { STREAM = 120, RATE = 30 };
@@ -59,7 +59,7 @@ static void see(const gait_lift_config *c, int frame, double noise)
 }
 
 /* Push a frame; returns what the call did. */
-static gait_status push(gait_lift *l, const gait_lift_config *c, int frame, double noise)
+static gait_result push(gait_lift *l, const gait_lift_config *c, int frame, double noise)
 {
     see(c, frame, noise);
     return gait_lift_push(l, utime_of(frame), uv, seen, NULL);
@@ -88,13 +88,13 @@ static void test_follows(int32_t lag)
     int count = 0;
     for (int i = 0; i < STREAM; i++) {
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-        gait_status const s = gait_lift_estimate(l, &out);
+        gait_result const s = gait_lift_estimate(l, &out);
         CHECK((s == GAIT_OK) == (i >= lag));
         if (s != GAIT_OK)
             continue;
         CHECK(out.utime == utime_of(i - lag) && out.frame == (uint64_t)(i - lag));
-        CHECK((out.status == GAIT_STATUS_TRACKING) == (i >= span));
-        if (out.status != GAIT_STATUS_TRACKING)
+        CHECK((out.status == GAIT_TRACK_TRACKING) == (i >= span));
+        if (out.status != GAIT_TRACK_TRACKING)
             continue;
         error += error_of(&out, &worst);
         count++;
@@ -118,23 +118,23 @@ static void test_pauses(void)
     CHECK(gait_lift_estimate(l, &out) == GAIT_ERR_STATE); /* nobody yet */
     for (int i = 0; i < 40; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
     before = out.sd[3][1];
     for (int j = 0; j < TOY_MARKERS; j++)
         seen[j] = INFINITY;
     for (int i = 40; i < 46; i++)
         CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
     CHECK(out.sd[3][1] > 1.2 * before);
     for (int i = 46; i < 70; i++)
         CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) != GAIT_OK || out.status == GAIT_STATUS_INIT);
+    CHECK(gait_lift_estimate(l, &out) != GAIT_OK || out.status == GAIT_TRACK_INIT);
     for (int i = 90; i < STREAM; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING && out.frame < 30);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING && out.frame < 30);
     CHECK(error_of(&out, &worst) < 0.06);
     CHECK(push(l, &c, STREAM + 60, 1.0) == GAIT_OK); /* two seconds later */
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_INIT && out.frame == 0);
+    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_INIT && out.frame == 0);
 }
 
 static void test_order(void)
@@ -192,7 +192,7 @@ static void test_wrong_points(double off)
             for (int a = 0; a < 2; a++)
                 uv[2 * (i % TOY_MARKERS) + a] += i % 2 ? off : -off;
         CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-        if (gait_lift_estimate(l, &out) != GAIT_OK || out.status != GAIT_STATUS_TRACKING)
+        if (gait_lift_estimate(l, &out) != GAIT_OK || out.status != GAIT_TRACK_TRACKING)
             continue;
         most = fmax(most, error_of(&out, &worst));
         count++;
@@ -231,7 +231,7 @@ static void test_noise(void)
             for (int j = 0; j < TOY_MARKERS; j++)
                 seen[j] = isfinite(seen[j]) ? 1.0 : seen[j];
             CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-            if (gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_STATUS_TRACKING)
+            if (gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING)
                 sd[loud] += out.sd[3][1] / STREAM;
         }
         CHECK(loud ? out.misfit > 4.0 : out.misfit < 2.0);
@@ -258,9 +258,9 @@ static void test_misfit(void)
         CHECK(gait_lift_push(l, utime_of(i), uv, NULL, NULL) == GAIT_OK);
         CHECK(i < 20 || gait_lift_estimate(l, &out) == GAIT_OK);
         flagged += (out.flags & GAIT_LIFT_MISFIT) != 0;
-        CHECK(i < 20 || (out.status == GAIT_STATUS_AMBIGUOUS) == ((out.flags & GAIT_LIFT_MISFIT) != 0));
+        CHECK(i < 20 || (out.status == GAIT_TRACK_AMBIGUOUS) == ((out.flags & GAIT_LIFT_MISFIT) != 0));
     }
-    CHECK(flagged > 0 && out.status == GAIT_STATUS_TRACKING);
+    CHECK(flagged > 0 && out.status == GAIT_TRACK_TRACKING);
     for (int j = 0; j < TOY_MARKERS; j++)
         CHECK(toy_distance(out.marker[j], X[j]) < 0.1);
 }

@@ -1,9 +1,9 @@
 /* The edge term on made-up fields of edges, where the answer follows from the outline's direction alone. */
-#include "toy_look.h"
+#include "toy_body.h"
 
 #include "check.h"
 
-static toy_look *v;
+static toy_body *v;
 static layers drawn;
 
 /* The limbs' outlines as masks and sides. */
@@ -200,7 +200,7 @@ static void test_beyond(void)
 
 int main(void)
 {
-    v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    v = toy_body_new(0, GAIT_MODE_DEFAULT);
     CHECK(like_edges.flag == GAIT_TERM_EDGES);
     test_direction();
     test_round();

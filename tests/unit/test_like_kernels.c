@@ -1,15 +1,15 @@
 /* Kernels of surface and edges: every instruction set against the scalar one, and that one against points
  * looked at one by one. */
 #include "kernel_check.h"
-#include "rng.h"
-#include "toy_look.h"
+#include "base/rng.h"
+#include "toy_body.h"
 #include "toy_visible.h"
 
 #include "check.h"
 
 enum { LIMBS = MODEL_MAX_LIMBS };
 
-static toy_look *v;
+static toy_body *v;
 
 static uint32_t draw(uint32_t index, uint32_t what)
 {
@@ -30,7 +30,7 @@ static float uniform(uint32_t index, uint32_t what)
 static void bodies(uint32_t round)
 {
     gait_state s = toy_walk(0.5f);
-    toy_look_aim(v, &s);
+    toy_body_aim(v, &s);
     for (int32_t lane = 0; lane < BLOCK; lane++) {
         static kin_body one;
         uint32_t const at = round * BLOCK + (uint32_t)lane;
@@ -43,8 +43,8 @@ static void bodies(uint32_t round)
         s.roll = 0.5f * uniform(at, 3);
         s.pelvis[0] += (at % 5 ? 0.1f : 1.5f) * uniform(at, 4);
         s.pelvis[1] += near;
-        walker const w = walker_from_state(&v->rule, &s);
-        walker_body(&v->rule, &w, &one);
+        particle_state const w = particle_from_state(&v->rule, &s);
+        particle_body(&v->rule, &w, &one);
         for (int32_t f = 0; f < KIN_MAX_FRAMES; f++) {
             for (int32_t k = 0; k < 9; k++)
                 v->body.R[f][k][lane] = one.R[f][k][0];
@@ -112,7 +112,7 @@ static void test_sample(void)
     for (uint32_t round = 0; round < 24; round++) {
         bodies(round);
         shift_region(round);
-        toy_look_at(v, frame, NULL);
+        toy_body_at(v, frame, NULL);
         for (int32_t i = 0; i < VIEW_PIXELS && round % 6 == 5; i++) { /* the extremes */
             v->f.surface[i] = (int8_t)(draw((uint32_t)i, round) & 1 ? 127 : -127);
             v->f.pairs[i] = 0;
@@ -194,7 +194,7 @@ static void test_compare(void)
         like_body const b = {.setup = &v->setup,
                              .outline = &v->outline,
                              .lane = (int32_t)(round % BLOCK),
-                             .seen = now,
+                             .samples = now,
                              .ancestor = then,
                              .known = known};
         static int32_t want[LIMBS][BLOCK];
@@ -238,7 +238,7 @@ static void test_compare(void)
 /* ---- edges ---- */
 
 /* The points of one side. */
-static void walk(const rast_mask *mask, const float from[2], const float to[2], const float mid[2], int32_t n,
+static void walk(const grid_mask *mask, const float from[2], const float to[2], const float mid[2], int32_t n,
                  like_edge_tally *t)
 {
     float const dx = to[0] - from[0], dy = to[1] - from[1], len2 = dx * dx + dy * dy, turn = 64.0f / len2;
@@ -273,7 +273,7 @@ static like_edge_tally walk_limbs(int32_t lane)
             int32_t const step = round ? 2 : 1;
             mid[a] = 0.0375f * ((at[0][a] + at[step][a]) + (at[2 * step][a] + at[3 * step][a]));
         }
-        const rast_mask *const mask = &v->drawn.visible[l];
+        const grid_mask *const mask = &v->drawn.visible[l];
         if (!(v->outline.limb[l].depth[lane] > 0.0f))
             continue;
         for (int32_t k = 0; k < 8 && round; k++)
@@ -289,11 +289,11 @@ static like_edge_tally walk_limbs(int32_t lane)
 /* Corners in the image, about it, far off, all in one place, or no numbers at all. */
 static float corner(uint32_t round, uint32_t at)
 {
-    static const float wide[] = {128.0f, 300.0f, 1e5f, 1e7f, 0.2f, 128.0f};
+    static const float simd_f64[] = {128.0f, 300.0f, 1e5f, 1e7f, 0.2f, 128.0f};
     static const float odd[] = {NAN, INFINITY, -INFINITY, 256.0f, 0.0f, -0.0f};
     uint32_t const pick = draw(at, round + 9000);
     return round % 8 == 7 && pick % 5 == 0 ? odd[pick / 5 % 6]
-                                           : 128.0f + wide[round % 6] * uniform(at, round + 5000);
+                                           : 128.0f + simd_f64[round % 6] * uniform(at, round + 5000);
 }
 
 static void test_edges(void)
@@ -316,15 +316,15 @@ static void test_edges(void)
                     .trace = r & 1 ? 127 : 0, .xx_yy = r & 2 ? 127 : -128, .xy2 = r & 4 ? 127 : -128};
         }
         for (uint32_t l = 0; l < LIMBS; l++) {
-            rast_mask *const mask = &v->drawn.visible[l];
+            grid_mask *const mask = &v->drawn.visible[l];
             v->setup.geometry[l].shape = draw(l, round + 100) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
             v->outline.limb[l].depth[lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
             int32_t const first = (int32_t)(draw(l, round + 300) % 9 * LAYERS_BAND);
-            rast_frame(mask, first, first + (int32_t)(draw(l, round + 400) % 64),
-                       round % 4 ? (int32_t)(draw(l, round + 500) % 8 * RAST_STEP) : 0,
-                       round % 4 ? 64 : RAST_SIZE);
-            for (uint32_t y = 0; y < RAST_SIZE; y++)
-                for (uint32_t w = 0; w < RAST_WORDS; w++)
+            grid_mask_frame(mask, first, first + (int32_t)(draw(l, round + 400) % 64),
+                       round % 4 ? (int32_t)(draw(l, round + 500) % 8 * GRID_STEP) : 0,
+                       round % 4 ? 64 : GRID_SIZE);
+            for (uint32_t y = 0; y < GRID_SIZE; y++)
+                for (uint32_t w = 0; w < GRID_WORDS; w++)
                     mask->word[w][y] = round % 3
                                            ? ~UINT64_C(0)
                                            : (uint64_t)draw(4 * y + w, l) << 32 | draw(4 * y + w + 2, l);
@@ -361,7 +361,7 @@ static void test_edges(void)
 
 int main(void)
 {
-    v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    v = toy_body_new(0, GAIT_MODE_DEFAULT);
     test_sample();
     test_compare();
     test_edges();

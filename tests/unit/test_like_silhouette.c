@@ -1,15 +1,15 @@
 /* Foreground against the body, by counting cells one by one. */
-#include "toy_look.h"
+#include "toy_body.h"
 
-#include "rng.h"
+#include "base/rng.h"
 
 #include "check.h"
 
 static layers body;
 
-static void random_words(uint32_t draw, uint64_t (*out)[RAST_WORDS])
+static void random_words(uint32_t draw, uint64_t (*out)[GRID_WORDS])
 {
-    for (uint32_t y = 0; y < RAST_SIZE; y++) {
+    for (uint32_t y = 0; y < GRID_SIZE; y++) {
         uint32_t r[4];
         rng_bits(8, 0, 0, y, draw, r);
         out[y][0] = (uint64_t)r[0] << 32 | r[1];
@@ -17,7 +17,7 @@ static void random_words(uint32_t draw, uint64_t (*out)[RAST_WORDS])
     }
 }
 
-static int32_t bit(const uint64_t (*m)[RAST_WORDS], int32_t x, int32_t y)
+static int32_t bit(const uint64_t (*m)[GRID_WORDS], int32_t x, int32_t y)
 {
     return (int32_t)(m[y][x >> 6] >> (x & 63) & 1);
 }
@@ -26,33 +26,33 @@ static int32_t bit(const uint64_t (*m)[RAST_WORDS], int32_t x, int32_t y)
  * a typical person (0.16 x 96 x 96 cells). */
 static void test_counts(void)
 {
-    toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
     double const typical = 0.16 * 96.0 * 96.0;
-    uint64_t drawn[RAST_SIZE][RAST_WORDS];
+    uint64_t drawn[GRID_SIZE][GRID_WORDS];
     for (uint32_t round = 0; round < 20; round++) {
         double inside = 0.0, outside = 0.0, under = 0.0;
-        int32_t const first = (int32_t)(6 * round), last = i_min(first + 40, RAST_SIZE);
+        int32_t const first = (int32_t)(6 * round), last = i_min(first + 40, GRID_SIZE);
         random_words(8 * round, v->f.inside);
         random_words(8 * round + 1, drawn);
-        for (uint32_t y = 0; y < RAST_SIZE; y++) /* rows outside [first, last) hold leftovers */
-            for (int32_t w = 0; w < RAST_WORDS; w++)
+        for (uint32_t y = 0; y < GRID_SIZE; y++) /* rows outside [first, last) hold leftovers */
+            for (int32_t w = 0; w < GRID_WORDS; w++)
                 body.whole.word[w][y] = drawn[y][w];
-        body.whole.width = RAST_SIZE;
+        body.whole.width = GRID_SIZE;
         for (uint32_t k = 0; k < FG_PLANES; k++)
             random_words(8 * round + 2 + k, v->f.fg[k]);
         body.whole.first = first;
         body.whole.last = last;
         v->f.has_fg = true;
         v->f.fg_total = 0;
-        for (int32_t y = 0; y < RAST_SIZE; y++)
-            for (int32_t x = 0; x < RAST_SIZE; x++) {
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t x = 0; x < GRID_SIZE; x++) {
                 int32_t p = 0;
                 for (int32_t k = 0; k < FG_PLANES; k++) {
                     v->f.fg[k][y][x >> 6] &= v->f.inside[y][x >> 6];
-                    p |= bit((const uint64_t (*)[RAST_WORDS])v->f.fg[k], x, y) << k;
+                    p |= bit((const uint64_t (*)[GRID_WORDS])v->f.fg[k], x, y) << k;
                 }
-                bool const see = bit((const uint64_t (*)[RAST_WORDS])v->f.inside, x, y);
-                bool const in = y >= first && y < last && bit((const uint64_t (*)[RAST_WORDS])drawn, x, y);
+                bool const see = bit((const uint64_t (*)[GRID_WORDS])v->f.inside, x, y);
+                bool const in = y >= first && y < last && bit((const uint64_t (*)[GRID_WORDS])drawn, x, y);
                 v->f.fg_total += p;
                 inside += see && in ? 1.0 - p / 15.0 : 0.0;
                 under += see && in ? p / 15.0 : 0.0;
@@ -63,7 +63,7 @@ static void test_counts(void)
         double const missed = (double)v->setup.missed_weight,
                      nats = (double)v->setup.weight[1] * missed / typical;
         features_words(&v->f);
-        like_silhouette_look(&b);
+        like_silhouette_count(&b);
         like_parts const parts = like_silhouette_parts(&b);
         CHECK_NEAR(parts.explained, nats * under, 1e-3);
         CHECK_NEAR(parts.missed, nats * outside, 1e-3);
@@ -75,10 +75,10 @@ static void test_counts(void)
 /* Without a plate the term is silent. */
 static void test_silent(void)
 {
-    toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
     like_body b = {.setup = &v->setup, .features = &v->f, .layers = &body};
     v->f.has_fg = false;
-    like_silhouette_look(&b);
+    like_silhouette_count(&b);
     CHECK(like_silhouette_parts(&b).explained == 0.0f && like_silhouette_parts(&b).missed == 0.0f);
     CHECK(like_silhouette.log_likelihood(&b) == 0.0f && like_silhouette.support(&b) == 0.0f);
     CHECK(like_silhouette.flag == GAIT_TERM_SILHOUETTE);
@@ -89,19 +89,19 @@ static void test_scene(void)
 {
     static uint8_t wall[SCENE_PIXELS], shot[SCENE_PIXELS];
     for (int camera = 0; camera < SCENE_CAMERAS; camera++) {
-        toy_look *const v = toy_look_new(camera, GAIT_MODE_DEFAULT);
+        toy_body *const v = toy_body_new(camera, GAIT_MODE_DEFAULT);
         gait_state const s = toy_walk(1.0f);
         toy_wall(camera, wall);
         toy_shot(camera, 30, shot);
-        toy_look_aim(v, &s);
-        toy_look_at(v, shot, wall);
-        like_body const b = toy_look_body(v, &s);
+        toy_body_aim(v, &s);
+        toy_body_at(v, shot, wall);
+        like_body const b = toy_body_body(v, &s);
         CHECK(like_silhouette.log_likelihood(&b) > -0.3f);
         CHECK(like_silhouette.support(&b) > 0.1f);
         gait_state away = s;
         away.pelvis[0] += 0.6f; /* both wrong: the body on the wall, the walker unexplained */
         away.pelvis[1] += 0.4f;
-        like_body const c = toy_look_body(v, &away);
+        like_body const c = toy_body_body(v, &away);
         CHECK(like_silhouette.log_likelihood(&c) < -0.7f);
         CHECK(like_silhouette.support(&c) < -0.3f);
     }

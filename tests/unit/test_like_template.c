@@ -1,6 +1,6 @@
 /* Running appearance: how fast it learns, what it leaves alone, and what it says of a body. */
-#include "like_template.h"
-#include "toy_look.h"
+#include "likelihood/template.h"
+#include "toy_body.h"
 
 #include "check.h"
 
@@ -52,7 +52,7 @@ static void test_update(void)
 /* Every half of a limb teaches the points it shows, and finds what it taught. */
 static void test_turns(void)
 {
-    toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
+    toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
     v->setup.limbs = LIMBS;
     for (int turn = 0; turn < LIKE_DIRECTIONS; turn++) {
         template_clear(template, LIMBS);
@@ -69,7 +69,7 @@ static void test_turns(void)
                 CHECK(template[l * LIKE_SAMPLES + i] == want);
             }
         template_ring(template, LIMBS, ring);
-        like_body const b = {.setup = &v->setup, .seen = seen, .known = ring};
+        like_body const b = {.setup = &v->setup, .samples = seen, .known = ring};
         CHECK(like_template.log_likelihood(&b) == 0.0f);
         seen[0].turn = (uint8_t)((seen[0].turn + 1) % LIKE_DIRECTIONS);
         CHECK(like_template.log_likelihood(&b) == -1.5f); /* two points less */
@@ -79,8 +79,8 @@ static void test_turns(void)
 /* Mean Student-t cost over all samples known and seen, at least 32 of them; else as bad as a typical mismatch. */
 static void test_term(void)
 {
-    toy_look *const v = toy_look_new(0, GAIT_MODE_DEFAULT);
-    like_body b = {.setup = &v->setup, .seen = seen};
+    toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
+    like_body b = {.setup = &v->setup, .samples = seen};
     v->setup.limbs = LIMBS;
     CHECK(like_template.log_likelihood(&b) == 0.0f); /* no template at all */
     b.known = ring;

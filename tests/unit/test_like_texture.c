@@ -1,17 +1,17 @@
 /* Brightness constancy of one limb against values worked out by hand, and the bounds of the occlusion mixture. */
-#include "toy_look.h"
+#include "toy_body.h"
 
 #include "check.h"
 
 enum { LANE = 5 };
 
-static toy_look *v;
+static toy_body *v;
 static like_patch now[TOY_LIMBS], then[TOY_LIMBS];
 
 /* One limb with this cosine to the image plane; n samples seen in both frames, differing by d; the rest in one. */
 static float limb(int32_t mode, double facing, int n, int d)
 {
-    v = toy_look_new(0, mode);
+    v = toy_body_new(0, mode);
     v->setup.limbs = 1;
     v->outline.limb[0].facing[LANE] = (float)facing;
     now[0].turn = then[0].turn = 0;
@@ -23,7 +23,7 @@ static float limb(int32_t mode, double facing, int n, int d)
                          .features = &v->f,
                          .outline = &v->outline,
                          .lane = LANE,
-                         .seen = now,
+                         .samples = now,
                          .terms = &v->terms,
                          .ancestor = then};
     return like_texture.log_likelihood(&b);
@@ -99,7 +99,7 @@ static void test_turned(void)
                                  .features = &v->f,
                                  .outline = &v->outline,
                                  .lane = LANE,
-                                 .seen = now,
+                                 .samples = now,
                                  .terms = &v->terms,
                                  .ancestor = then};
             double const share = fmin(both / 12.8, 1.0);
@@ -121,7 +121,7 @@ static void test_limbs(void)
                    .features = &v->f,
                    .outline = &v->outline,
                    .lane = LANE,
-                   .seen = now,
+                   .samples = now,
                    .terms = &v->terms,
                    .ancestor = then};
     CHECK_NEAR(like_texture.log_likelihood(&b), 2.0f * one - 1.6f, 1e-4);

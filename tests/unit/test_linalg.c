@@ -1,6 +1,6 @@
-#include "linalg.h"
+#include "base/linalg.h"
 
-#include "rng.h"
+#include "base/rng.h"
 
 #include "check.h"
 

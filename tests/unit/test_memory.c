@@ -1,7 +1,7 @@
 /* The tracker's memory: exactly what it asks for, aligned, and nothing beside it. */
 #include "sanitized.h"
 #include "toy_films.h"
-#include "tracker.h"
+#include "tracker/tracker.h"
 
 #include "check.h"
 
@@ -72,7 +72,7 @@ static uint32_t walk(gait_tracker *t, const gait_tracker_config *cfg)
         gait_estimate e;
         f.utime = toy_frame(at).utime;
         CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
-        stages |= 1u << t->core->modes.stage;
+        stages |= 1u << t->core->hypotheses.stage;
     }
     return stages;
 }
@@ -88,7 +88,7 @@ static uint64_t walk_between_canaries(const gait_tracker_config *cfg, int fill)
     memset(memory, fill, need + 2 * CANARY);
     CHECK(gait_tracker_init(memory + CANARY, need, toy_model(), cfg, &t, NULL) == GAIT_OK);
     uint32_t const stages = walk(t, cfg);
-    CHECK((stages >> MODES_FORKED & 1u) == (cfg->search_particles > 0) && stages >> MODES_SINGLE & 1u);
+    CHECK((stages >> HYPOTHESES_TWO & 1u) == (cfg->acquisition_particles > 0) && stages >> HYPOTHESES_ONE & 1u);
     CHECK(intact(memory, fill) && intact(memory + CANARY + need, fill));
     uint64_t const digest = gait_tracker_digest(t);
     free(memory);
@@ -102,7 +102,7 @@ static void test_canaries(void)
     for (int film_kind = 0; film_kind < FILMS; film_kind++) {
         gait_tracker_config cfg = films_config(film_kind);
         cfg.particles = 33; /* not a multiple of a block */
-        cfg.search_particles = film_kind == FILMS_SEARCH ? 75 : 0;
+        cfg.acquisition_particles = film_kind == FILMS_SEARCH ? 75 : 0;
         cfg.tasks = 5;
         cfg.exec.run = run_backwards;
         CHECK(walk_between_canaries(&cfg, 0x5a) == walk_between_canaries(&cfg, 0xff));

@@ -1,5 +1,5 @@
 /* What the sections mean: a sound blob gives the views, each broken one an error that names its section. */
-#include "model.h"
+#include "model/model.h"
 
 #include "toy_model.h"
 
@@ -124,9 +124,9 @@ static void test_refused(void)
         toy_seal(buf, bytes);
         gait_model m = {.frames = -7};
         gait_error err = {0};
-        gait_status const s = model_open(buf, bytes, &m, &err);
+        gait_result const s = model_open(buf, bytes, &m, &err);
         if (s != GAIT_ERR_CORRUPT || !strstr(err.text, p->tag))
-            fprintf(stderr, "patch %zu of %s: %s, %s\n", i, p->tag, gait_status_name(s), err.text);
+            fprintf(stderr, "patch %zu of %s: %s, %s\n", i, p->tag, gait_result_name(s), err.text);
         CHECK(s == GAIT_ERR_CORRUPT && strstr(err.text, p->tag) && err.status == s);
         CHECK(m.frames == -7); /* outputs left alone */
     }
@@ -197,7 +197,7 @@ static void test_limits(void)
 }
 
 /* PROP of `rows` by `columns` zeros, and SHFT of `shifts` rows if it is given, in an otherwise sound model. */
-static gait_status open_shifted(uint32_t rows, uint32_t columns, uint32_t shifts,
+static gait_result open_shifted(uint32_t rows, uint32_t columns, uint32_t shifts,
                                 float (*shift)[TOY_FRAMES][3], gait_model *m, gait_error *err)
 {
     static unsigned char name[TOY_FRAMES][32], info[TOY_FRAMES][32], origin[TOY_FRAMES][12];
@@ -221,7 +221,7 @@ static gait_status open_shifted(uint32_t rows, uint32_t columns, uint32_t shifts
 }
 
 /* PACE of `terms` by `channels` numbers and so much deviation of the stride rate in an otherwise sound model. */
-static gait_status open_paced(uint32_t terms, uint32_t channels, const float *series, float rate_sd,
+static gait_result open_paced(uint32_t terms, uint32_t channels, const float *series, float rate_sd,
                               gait_model *m, gait_error *err)
 {
     toy_file f = toy_begin(buf, TOY_SECTIONS); /* PACE in place of META */
@@ -290,7 +290,7 @@ static void test_pace_unfolds(void)
     }
 }
 
-static gait_status open_proportions(uint32_t rows, uint32_t columns, gait_model *m, gait_error *err)
+static gait_result open_proportions(uint32_t rows, uint32_t columns, gait_model *m, gait_error *err)
 {
     return open_shifted(rows, columns, 0, NULL, m, err);
 }

@@ -1,5 +1,5 @@
 /* Limbs in the image: against the projection of their ends, of their surface, and against sizes known beforehand. */
-#include "outline.h"
+#include "raster/outline.h"
 
 #include "toy_draw.h"
 #include "toy_scene.h"
@@ -231,7 +231,7 @@ static double outside(const limb_polygon *p, int n, const float at[2])
 }
 
 typedef struct fit { /* how well polygons hold their limbs */
-    double out, wide, off_axis;
+    double out, simd_f64, off_axis;
     int points;
 } fit;
 
@@ -268,7 +268,7 @@ static void check_limb(const limb_geometry *g, const view_of_limb *v, const limb
             f->points++;
         }
     f->out = fmax(f->out, touch / size);
-    f->wide = fmax(f->wide, -touch / size);
+    f->simd_f64 = fmax(f->simd_f64, -touch / size);
 }
 
 static void test_walker(void)
@@ -301,11 +301,11 @@ static void test_walker(void)
             }
             float const depth = (float)dot3(R9 + 6, c) + cam.t[2];
             CHECK_NEAR(p.depth, depth, 1e-4);
-            float eye[3] = {0}; /* from the camera to the limb, world axes */
+            float projection[3] = {0}; /* from the camera to the limb, world axes */
             for (int k = 0; k < 3; k++)
                 for (int i = 0; i < 3; i++)
-                    eye[k] += R9[3 * i + k] * ((float)dot3(R9 + 3 * i, c) + cam.t[i]);
-            double const sine = dot3(eye, d) / sqrt(dot3(eye, eye) * dot3(d, d));
+                    projection[k] += R9[3 * i + k] * ((float)dot3(R9 + 3 * i, c) + cam.t[i]);
+            double const sine = dot3(projection, d) / sqrt(dot3(projection, projection) * dot3(d, d));
             if (limbs[l].shape == LIMB_CONE)
                 CHECK_NEAR(p.facing, sqrt(1.0 - sine * sine), 1e-3);
         }
@@ -313,7 +313,7 @@ static void test_walker(void)
     CHECK(f.points > 70000);
     CHECK(f.off_axis < 0.05); /* pixels */
     CHECK(f.out < 0.2);       /* of the size: a foreshortened end's ellipse is cut */
-    CHECK(f.wide < 0.01);     /* the surface touches the outline */
+    CHECK(f.simd_f64 < 0.01);     /* the surface touches the outline */
 }
 
 /* Every lane of a block has the polygon of its own body. */

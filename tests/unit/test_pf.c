@@ -29,7 +29,7 @@ static void test_reweigh(void)
                 best = w[i] > w[best] ? i : best;
             }
             log_total = log(total) + (double)base[k];
-            pf_summary const s = pf_reweigh(&p, ll);
+            pf_summary const s = pf_update(&p, ll);
             CHECK_NEAR(s.log_evidence, log_total, 1e-6 * fabs(log_total) + 1e-12);
             CHECK(s.best == best && !s.degenerate);
             for (int i = 0; i < N; i++) {
@@ -53,7 +53,7 @@ static void test_equal(void)
     float ll[N];
     for (int i = 0; i < N; i++)
         ll[i] = -12.5f;
-    pf_summary const s = pf_reweigh(&p, ll);
+    pf_summary const s = pf_update(&p, ll);
     CHECK_NEAR(s.log_evidence, -12.5, 1e-12);
     CHECK_NEAR(s.ess, N, 1e-9);
     CHECK(s.best == 0);
@@ -72,14 +72,14 @@ static void test_broken(void)
         float ll[N] = {0};
         ll[2] = bad[k];
         ll[5] = bad[(k + 1) % 3];
-        pf_summary s = pf_reweigh(&p, ll);
+        pf_summary s = pf_update(&p, ll);
         CHECK(!s.degenerate && p.weight[2] == 0.0 && p.weight[5] == 0.0);
         CHECK_NEAR(p.weight[0], 1.0 / 6.0, 1e-12);
         CHECK_NEAR(s.log_evidence, log(6.0 / 8.0), 1e-12);
         CHECK_NEAR(s.ess, 6.0, 1e-9);
         for (int i = 0; i < N; i++)
             ll[i] = 5.0f;
-        s = pf_reweigh(&p, ll); /* once impossible, it stays so until it is resampled */
+        s = pf_update(&p, ll); /* once impossible, it stays so until it is resampled */
         CHECK(p.weight[2] == 0.0 && fabs(s.log_evidence - 5.0) < 1e-12);
         pf_resample_systematic(&p, 123456789u);
         for (int i = 0; i < N; i++)
@@ -88,13 +88,13 @@ static void test_broken(void)
         pf_uniform(&p);
         for (uint32_t i = 0; i < N; i++)
             ll[i] = 3.0f * uniform(i, 1);
-        CHECK(!pf_reweigh(&p, ll).degenerate);
+        CHECK(!pf_update(&p, ll).degenerate);
         double kept[N], kept_log[N];
         memcpy(kept, p.weight, sizeof kept);
         memcpy(kept_log, p.log_weight, sizeof kept_log);
         for (int i = 0; i < N; i++)
             ll[i] = bad[k];
-        s = pf_reweigh(&p, ll);
+        s = pf_update(&p, ll);
         CHECK(s.degenerate && s.log_evidence == 0.0 && s.best >= 0 && s.best < N);
         CHECK(memcmp(kept, p.weight, sizeof kept) == 0 &&
               memcmp(kept_log, p.log_weight, sizeof kept_log) == 0);
@@ -112,7 +112,7 @@ static void test_single(void)
             float ll[N];
             for (int i = 0; i < N; i++)
                 ll[i] = i == at ? 0.0f : -2000.0f; /* below what exp() can tell from 0 */
-            pf_summary const s = pf_reweigh(&p, ll);
+            pf_summary const s = pf_update(&p, ll);
             CHECK(s.best == at && p.weight[at] == 1.0 && s.ess == 1.0);
             if (multinomial)
                 pf_resample_multinomial(&p, 3, 1, (uint32_t)at);
@@ -132,7 +132,7 @@ static void test_zero_ends(void)
         pf p = toy_filter(N);
         float ll[N] = {0};
         ll[0] = ll[1] = ll[N - 1] = -INFINITY;
-        pf_reweigh(&p, ll);
+        pf_update(&p, ll);
         pf_resample_systematic(&p, k ? 0xffffffffu : 0u);
         CHECK(p.parent[0] == 2 && p.parent[N - 1] == N - 2);
     }

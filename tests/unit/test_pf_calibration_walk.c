@@ -54,7 +54,7 @@ static double relaxed(double x, double tau, double noise, double n)
 
 /* Independent normals about the state of a pelvis; its height over the ground and the floor's own level (0
  * +- 0.03 m) are two measurements of one thing. */
-static void truth_start(const body_rule *rule, const gait_state *mean, const double n[NORMALS], double *x)
+static void truth_start(const state_layout *rule, const gait_state *mean, const double n[NORMALS], double *x)
 {
     double const floor = 0.03, doubt = start_sd[F_Z], trust = floor * floor / (floor * floor + doubt * doubt);
     double s[FIELDS];
@@ -72,7 +72,7 @@ static void truth_start(const body_rule *rule, const gait_state *mean, const dou
         .coef = {(float)s[F_COEF], (float)s[F_COEF + 1]},
         .proportion = {(float)s[F_COEF + 2]},
         .offset = {[OFFSET_ANGLE] = (float)s[F_COEF + 3]}};
-    walker const w = walker_from_state(rule, &drawn);
+    particle_state const w = particle_from_state(rule, &drawn);
     for (int f = 0; f < FIELDS; f++)
         x[f] = (double)w.f[f];
     x[F_Z] = trust * x[F_Z] + sqrt(trust) * s[F_Z];
@@ -116,7 +116,7 @@ static double apart(int field, double a, double b)
     return turn > 0.0 ? a - b - turn * floor((a - b) / turn + 0.5) : a - b;
 }
 
-static float log_likelihood(const walker *w, const double seen[FIELDS], double noise)
+static float log_likelihood(const particle_state *w, const double seen[FIELDS], double noise)
 {
     double cost = 0.0;
     for (int f = 0; f < FIELDS; f++) {

@@ -9,10 +9,10 @@ static double start[WALKERS], turned[WALKERS]; /* rate at the start; strides sin
 static double value[FIELDS][WALKERS];          /* at the end */
 
 /* Move everyone from `from`, the rate's deviation at the start aside, `steps` times. */
-static void move_all(const dynamics *d, const walker *from, float rate_sd, int32_t steps, float dt)
+static void move_all(const dynamics *d, const particle_state *from, float rate_sd, int32_t steps, float dt)
 {
     for (int32_t i = 0; i < WALKERS; i += BLOCK) {
-        walker w[BLOCK];
+        particle_state w[BLOCK];
         double turns[BLOCK] = {0.0};
         for (int32_t lane = 0; lane < BLOCK; lane++) {
             float n[4];
@@ -59,9 +59,9 @@ static void check_law(const double *v, double mean, double var)
     CHECK_NEAR(m.var / var, 1.0, 0.02);
 }
 
-static walker middle(void)
+static particle_state middle(void)
 {
-    return (walker){.f = {[F_PHASE] = 0.2f, [F_RATE] = toy_model()->stride_hz, [F_STATURE] = 1.75f}};
+    return (particle_state){.f = {[F_PHASE] = 0.2f, [F_RATE] = toy_model()->stride_hz, [F_STATURE] = 1.75f}};
 }
 
 /* A rate that walks at random: the phase's variance is that of the integral, s^2 t^3 / 3 in the limit; a
@@ -70,7 +70,7 @@ static void test_integrated(void)
 {
     enum { STEPS = 60 };
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 71);
-    walker const from = middle();
+    particle_state const from = middle();
     double const dt = 1.0 / 30.0, n = STEPS, own = (double)toy_model()->stride_hz, s = 0.02 * own;
     cfg.rate_time = 0.0f;
     cfg.rate_noise = 0.02f;
@@ -96,7 +96,7 @@ static void test_returning(void)
     static const float intervals[] = {1.0f / 30.0f, 1.0f / 6.0f};
     for (size_t k = 0; k < 2; k++) {
         dynamics const d = quiet(GAIT_MODE_DEFAULT, 72 + k);
-        walker const from = middle();
+        particle_state const from = middle();
         double const dt = (double)intervals[k], tau = 2.0, own = (double)toy_model()->stride_hz;
         double const var = 0.05 * 0.05 * own * own * tau / 2.0, keep = exp(-dt / tau);
         double sums = STEPS; /* sum over pairs of steps of keep^|i - j| */
@@ -118,7 +118,7 @@ static void test_stationary(void)
     static const float intervals[] = {0.25f, 1.0f};
     for (size_t k = 0; k < 2; k++) {
         dynamics const d = quiet(GAIT_MODE_DEFAULT, 74 + k);
-        walker from = middle();
+        particle_state from = middle();
         double const own = (double)toy_model()->stride_hz;
         cfg.tilt_time = 0.8f;
         cfg.tilt_noise = 0.033f;

@@ -7,7 +7,7 @@ static const double DT = 1.0 / 30.0, NOISE = 0.03,
                     RATE = 0.95; /* strides per sqrt(second), strides per second */
 static const double FULL = 6.28318530717958648;
 
-/* Nearly as likely with the legs exchanged. */
+/* Nearly as likely with the legs mirrored. */
 static double log_likelihood(double phase, double seen)
 {
     double const a = FULL * (phase - seen);
@@ -115,7 +115,7 @@ static double particles_off(int32_t n, uint64_t seed, double exact[FRAMES][BINS]
     cfg.phase_noise = (float)NOISE;
     cfg.rate_time = 0.0f;
     for (int32_t i = 0; i < n; i++)
-        c.now[i] = (walker){
+        c.now[i] = (particle_state){
             .f = {[F_PHASE] = ((float)i + 0.5f) / (float)n, [F_RATE] = (float)RATE, [F_STATURE] = 1.7f}};
     for (int t = 0; t < FRAMES; t++) {
         crowd_predict(&c, (float)DT, 1.0f, (uint32_t)t);
@@ -142,7 +142,7 @@ static void test_grid(void)
 }
 
 /* Probability of the half turn that does not lie about the phase seen last. */
-static double other_side(const double bin[BINS], double seen)
+static double other_hypothesis(const double bin[BINS], double seen)
 {
     double sum = 0.0;
     for (int k = 0; k < BINS / 2; k++)
@@ -158,7 +158,7 @@ static void test_particles(void)
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         grid_run(CELLS, seed, exact);
         double const off = particles_off(TOY_MOST, seed, exact);
-        double const other = other_side(exact[FRAMES - 1], seen_phase(seed, FRAMES - 1));
+        double const other = other_hypothesis(exact[FRAMES - 1], seen_phase(seed, FRAMES - 1));
         CHECK(other > 0.05 && other < 0.95);
         CHECK(off <= 0.03);
         FIGURE("K5: total variation %.4f, other side %.3f\n", off, other);

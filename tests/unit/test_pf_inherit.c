@@ -1,7 +1,7 @@
 /* What belongs to particles follows them in place: ancestors as resampling gives them, any at all, rings of them, and
  * another number of particles before. */
-#include "pf.h"
-#include "rng.h"
+#include "filter/pf.h"
+#include "base/rng.h"
 
 #include "check.h"
 
@@ -23,7 +23,7 @@ static void draw(pf *p, int32_t before, uint32_t round)
     pf_uniform(p);
     for (int32_t i = 0; i < before; i++)
         ll[i] = -14.0f * (float)(word(round * 1000 + (uint32_t)i) >> 8) * 0x1p-24f;
-    pf_reweigh(p, ll);
+    pf_update(p, ll);
     pf_resize(p, N, word(round));
 }
 

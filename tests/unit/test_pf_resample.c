@@ -15,7 +15,7 @@ static pf weighted(int32_t n, int kind)
                 : kind == ROUGH ? logf(u + 0.01f)
                                 : -14.0f * u;
     }
-    CHECK(!pf_reweigh(&p, ll).degenerate);
+    CHECK(!pf_update(&p, ll).degenerate);
     return p;
 }
 
@@ -168,7 +168,7 @@ static void test_order(void)
             f[i] = sorted ? i < PAIRS : i % 2 == 0;
             ll[i] = f[i] > 0.5 ? logf(3.0f) : 0.0f;
         }
-        pf_reweigh(&p, ll);
+        pf_update(&p, ll);
         mean_variance(&p, f, var[sorted]);
         FIGURE("S3: %s: %.1e, %.1e, %.3f\n", sorted ? "sorted" : "in turn", var[sorted][SYSTEMATIC],
                var[sorted][STRATIFIED], var[sorted][MULTINOMIAL]);

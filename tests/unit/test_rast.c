@@ -1,11 +1,11 @@
 /* Scan conversion against a point-in-polygon twin in 64-bit integers, and tilings that cover every pixel once. */
-#include "rast.h"
+#include "raster/rast.h"
 
-#include "rng.h"
+#include "base/rng.h"
 
 #include "check.h"
 
-enum { N = RAST_MAX_VERTICES, WIDE = 300, SUB = 256 };
+enum { N = RAST_MAX_VERTICES, SIMD_F64 = 300, SUB = 256 };
 
 typedef struct polygon {
     float x[N], y[N];
@@ -67,9 +67,9 @@ static void test_against_twin(void)
     for (uint32_t i = 0; i < 400; i++) {
         polygon const p = random_polygon(i);
         rast_spans s;
-        rast_convex(p.x, p.y, p.n, 0, WIDE, &s);
-        for (int32_t y = 0; y < RAST_SIZE; y++)
-            for (int32_t x = 0; x < WIDE; x++) {
+        rast_convex(p.x, p.y, p.n, 0, SIMD_F64, &s);
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t x = 0; x < SIMD_F64; x++) {
                 bool close;
                 bool const in = twin_covers(&p, x, y, &close), have = covers(&s, 0, x, y);
                 covered += in;
@@ -97,11 +97,11 @@ static void test_cut(void)
             rest.x[k] = p.x[(cut + k) % p.n];
             rest.y[k] = p.y[(cut + k) % p.n];
         }
-        rast_convex(p.x, p.y, p.n, 0, RAST_SIZE, &whole);
-        rast_convex(p.x, p.y, cut + 1, 0, RAST_SIZE, &first);
-        rast_convex(rest.x, rest.y, rest.n, 0, RAST_SIZE, &second);
-        for (int32_t y = 0; y < RAST_SIZE; y++)
-            for (int32_t x = 0; x < RAST_SIZE; x++) {
+        rast_convex(p.x, p.y, p.n, 0, GRID_SIZE, &whole);
+        rast_convex(p.x, p.y, cut + 1, 0, GRID_SIZE, &first);
+        rast_convex(rest.x, rest.y, rest.n, 0, GRID_SIZE, &second);
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t x = 0; x < GRID_SIZE; x++) {
                 int32_t const have = covers(&first, 0, x, y) + covers(&second, 0, x, y);
                 twice += have == 2;
                 differ += have != covers(&whole, 0, x, y);
@@ -115,7 +115,7 @@ static void test_cut(void)
 static void test_tiling(void)
 {
     enum { CELLS = 13, STEP = 12 };
-    static uint8_t count[RAST_SIZE][RAST_SIZE];
+    static uint8_t count[GRID_SIZE][GRID_SIZE];
     float gx[CELLS + 1][CELLS + 1], gy[CELLS + 1][CELLS + 1];
     for (uint32_t round = 0; round < 10; round++) {
         memset(count, 0, sizeof count);
@@ -132,14 +132,14 @@ static void test_tiling(void)
                     const float x[3] = {gx[r][c], gx[r + half][c + k], gx[r + 1][c + 1]};
                     const float y[3] = {gy[r][c], gy[r + half][c + k], gy[r + 1][c + 1]};
                     rast_spans s;
-                    rast_convex(x, y, 3, 0, RAST_SIZE, &s);
+                    rast_convex(x, y, 3, 0, GRID_SIZE, &s);
                     for (int32_t row = s.first; row < s.last; row++)
                         for (int32_t col = s.begin[row]; col < s.end[row]; col++)
                             count[row][col]++;
                 }
         int32_t wrong = 0;
-        for (int32_t row = 0; row < RAST_SIZE; row++)
-            for (int32_t col = 0; col < RAST_SIZE; col++)
+        for (int32_t row = 0; row < GRID_SIZE; row++)
+            for (int32_t col = 0; col < GRID_SIZE; col++)
                 wrong += count[row][col] != 1;
         CHECK(wrong == 0);
     }
@@ -160,19 +160,19 @@ static void test_edges(void)
     const float back[4] = {9, 9, 5, 5};
     for (int way = 0; way < 2; way++) {
         rast_spans s;
-        rast_convex(x, way ? back : y, 4, 0, RAST_SIZE, &s);
+        rast_convex(x, way ? back : y, 4, 0, GRID_SIZE, &s);
         CHECK(s.first == 5 && s.last == 9);
         for (int32_t row = 5; row < 9; row++)
             CHECK(s.begin[row] == 10 && s.end[row] == 20);
     }
     const float half[4] = {10.5f, 20.5f, 20.5f, 10.5f};
     rast_spans s;
-    rast_convex(half, half, 4, 0, RAST_SIZE, &s); /* degenerate: all on one line */
+    rast_convex(half, half, 4, 0, GRID_SIZE, &s); /* degenerate: all on one line */
     CHECK(empty(&s));
-    rast_convex(half, y, 4, 0, RAST_SIZE, &s);
+    rast_convex(half, y, 4, 0, GRID_SIZE, &s);
     CHECK(s.begin[5] == 11 && s.end[5] == 21);
     const float near[4] = {10.003f, 20.001f, 20.001f, 10.003f}; /* nearest 1/256: 10 + 1/256 and 20 */
-    rast_convex(near, y, 4, 0, RAST_SIZE, &s);
+    rast_convex(near, y, 4, 0, GRID_SIZE, &s);
     CHECK(s.begin[5] == 11 && s.end[5] == 20);
 }
 
@@ -197,12 +197,12 @@ static void test_windows(void)
             int32_t const top = tops[k / 5], width = widths[k % 5];
             rast_spans s, page = {.first = -1};
             rast_convex(p.x, p.y, p.n, top, width, &s);
-            for (int32_t y = top; y < top + RAST_SIZE; y++) {
+            for (int32_t y = top; y < top + GRID_SIZE; y++) {
                 int32_t have[2], want[2];
-                if (page.first < 0 || y % RAST_SIZE == 0)
-                    rast_convex(p.x, p.y, p.n, y / RAST_SIZE * RAST_SIZE, RAST_LIMIT, &page);
+                if (page.first < 0 || y % GRID_SIZE == 0)
+                    rast_convex(p.x, p.y, p.n, y / GRID_SIZE * GRID_SIZE, RAST_LIMIT, &page);
                 row_of(&s, top, width, y, have);
-                row_of(&page, y / RAST_SIZE * RAST_SIZE, width, y, want);
+                row_of(&page, y / GRID_SIZE * GRID_SIZE, width, y, want);
                 wrong += have[0] != want[0] || have[1] != want[1];
                 filled += want[1] > want[0];
             }
@@ -224,10 +224,10 @@ static void test_outside(void)
             x[v] = k < 4 ? far[k][0] + dx[v] : 100.0f * dx[v];
             y[v] = k < 4 ? far[k][1] + dy[v] : 100.0f * dy[v];
         }
-        rast_convex(x, y, 4, 0, RAST_SIZE, &s);
+        rast_convex(x, y, 4, 0, GRID_SIZE, &s);
         for (int32_t row = s.first; row < s.last; row++)
             area += s.end[row] - s.begin[row];
-        CHECK(area == (k < 4 ? 0 : RAST_SIZE * RAST_SIZE));
+        CHECK(area == (k < 4 ? 0 : GRID_SIZE * GRID_SIZE));
     }
 }
 
@@ -240,7 +240,7 @@ static void test_garbage(void)
     for (uint32_t i = 0; i < 20000; i++) {
         float x[N], y[N];
         int32_t const n = 3 + (int32_t)(i % 6), top = i % 5 ? 0 : 15000,
-                      width = i % 3 ? RAST_SIZE : RAST_LIMIT;
+                      width = i % 3 ? GRID_SIZE : RAST_LIMIT;
         rast_spans s;
         for (int32_t k = 0; k < n; k++) {
             uint32_t r[4];
@@ -250,7 +250,7 @@ static void test_garbage(void)
             y[k] = r[3] % 4 ? odd[r[3] / 4 % (sizeof odd / sizeof *odd)] : (float)(r[1] % 200);
         }
         rast_convex(x, y, n, top, width, &s);
-        wrong += s.first < top || s.last > top + RAST_SIZE || s.first > s.last;
+        wrong += s.first < top || s.last > top + GRID_SIZE || s.first > s.last;
         for (int32_t row = s.first; row < s.last; row++) {
             int32_t const b = s.begin[row - top], e = s.end[row - top];
             wrong += b < 0 || b > width || e < 0 || e > width;
@@ -261,8 +261,8 @@ static void test_garbage(void)
     /* A huge triangle about the window still covers it. */
     const float x[3] = {-1e30f, 1e30f, 0.0f}, y[3] = {-1e30f, -1e30f, 1e30f};
     rast_spans s;
-    rast_convex(x, y, 3, 0, RAST_SIZE, &s);
-    CHECK(s.first == 0 && s.last == RAST_SIZE && s.begin[64] == 0 && s.end[64] == RAST_SIZE);
+    rast_convex(x, y, 3, 0, GRID_SIZE, &s);
+    CHECK(s.first == 0 && s.last == GRID_SIZE && s.begin[64] == 0 && s.end[64] == GRID_SIZE);
 }
 
 static void test_slivers(void)
@@ -270,14 +270,14 @@ static void test_slivers(void)
     const float x[4] = {3.2f, 120.7f, 120.7f, 3.2f}, thin[4] = {50.4f, 50.4f, 50.6f, 50.6f};
     const float y[4] = {3.2f, 120.7f, 120.7f, 3.2f}, on[4] = {49.9f, 49.9f, 50.1f, 50.1f};
     rast_spans s;
-    rast_convex(x, thin, 4, 0, RAST_SIZE, &s); /* between two rows of centres */
+    rast_convex(x, thin, 4, 0, GRID_SIZE, &s); /* between two rows of centres */
     CHECK(s.first == s.last);
-    rast_convex(x, on, 4, 0, RAST_SIZE, &s); /* about one row */
+    rast_convex(x, on, 4, 0, GRID_SIZE, &s); /* about one row */
     CHECK(s.first == 50 && s.last == 51 && s.begin[50] == 4 && s.end[50] == 121);
-    rast_convex(x, y, 4, 0, RAST_SIZE, &s); /* a line has no inside */
+    rast_convex(x, y, 4, 0, GRID_SIZE, &s); /* a line has no inside */
     CHECK(empty(&s));
     const float dot[3] = {7.0f, 7.0f, 7.0f};
-    rast_convex(dot, dot, 3, 0, RAST_SIZE, &s);
+    rast_convex(dot, dot, 3, 0, GRID_SIZE, &s);
     CHECK(s.first == s.last);
 }
 
@@ -287,7 +287,7 @@ static void test_bits(void)
     int32_t wrong = 0;
     for (int32_t begin = 0; begin <= 200; begin++)
         for (int32_t end = -200; end <= 64; end++) {
-            uint64_t const have = rast_bits(begin, end);
+            uint64_t const have = grid_bits(begin, end);
             for (int32_t x = 0; x < 64; x++)
                 wrong += (have >> x & 1) != (uint64_t)(x >= begin && x < end);
         }
@@ -296,9 +296,9 @@ static void test_bits(void)
 
 static void test_popcount(void)
 {
-    CHECK(rast_popcount(0) == 0 && rast_popcount(~UINT64_C(0)) == 64);
+    CHECK(grid_popcount(0) == 0 && grid_popcount(~UINT64_C(0)) == 64);
     for (int32_t k = 0; k < 64; k++)
-        CHECK(rast_popcount(UINT64_C(1) << k) == 1);
+        CHECK(grid_popcount(UINT64_C(1) << k) == 1);
     int32_t wrong = 0;
     for (uint32_t i = 0; i < 10000; i++) {
         uint32_t r[4];
@@ -307,7 +307,7 @@ static void test_popcount(void)
         int32_t bits = 0;
         for (int32_t k = 0; k < 64; k++)
             bits += (int32_t)(v >> k & 1);
-        wrong += rast_popcount(v) != bits;
+        wrong += grid_popcount(v) != bits;
     }
     CHECK(wrong == 0);
 }

@@ -1,5 +1,5 @@
 /* gait_render: the picture that the layers draw, in bands of any image. */
-#include "layers.h"
+#include "raster/layers.h"
 #include "toy_draw.h"
 #include "toy_scene.h"
 #include "toy_visible.h"
@@ -25,7 +25,7 @@ static void test_against_layers(void)
     gait_tracker_config cfg;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
     cfg.components = 0;
-    body_rule const rule = body_rule_init(m, &cfg);
+    state_layout const rule = state_layout_init(m, &cfg);
     static kin_body body;
     static outline_block outline;
     static layers drawn;
@@ -34,19 +34,19 @@ static void test_against_layers(void)
     view_map const map = {.scale = 2.0f, .u0 = -0.25f, .v0 = -0.25f}; /* cell = pixel */
     int32_t wrong = 0, seen = 0;
     for (int n = 0; n < 10; n++) {
-        gait_camera cam = camera(RAST_SIZE, RAST_SIZE);
+        gait_camera cam = camera(GRID_SIZE, GRID_SIZE);
         cam.fx = cam.fy = 320.0f;
         cam.cx = 64.0f;
         cam.cy = 72.0f;
         gait_state s = toy_walk(0.1f * (float)n);
         s.pelvis[0] = 0.0f;
-        walker const w = walker_from_state(&rule, &s);
-        walker_body(&rule, &w, &body);
+        particle_state const w = particle_from_state(&rule, &s);
+        particle_body(&rule, &w, &body);
         toy_project(limbs, m->limbs, &body, &cam, &map, &outline);
         toy_draw(&outline, limbs, m->limbs, 0, &drawn);
         CHECK(gait_render(m, &cam, &s, ids, SIDE) == GAIT_OK);
-        for (int32_t y = 0; y < RAST_SIZE; y++)
-            for (int32_t x = 0; x < RAST_SIZE; x++) {
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t x = 0; x < GRID_SIZE; x++) {
                 int32_t id = 0;
                 for (int32_t l = 0; l < m->limbs; l++)
                     if (toy_visible(&drawn.visible[l], 2.0f * (float)x + 0.5f, 2.0f * (float)y + 0.5f))

@@ -153,7 +153,7 @@ static void test_waits_while_forked(void)
 static uint64_t search(int32_t store_at)
 {
     gait_tracker_config cfg = config(ROOM);
-    cfg.search_particles = 2 * ROOM;
+    cfg.acquisition_particles = 2 * ROOM;
     gait_tracker *t = film_tracker(&cfg, 0, 1.0f);
     CHECK(gait_tracker_set_particles(t, FEW, NULL) == GAIT_OK);
     gait_state const mean = toy_walk(0.0f);

@@ -1,5 +1,5 @@
 /* Saving and restoring: the same continuation, and nothing but an exact snapshot is taken. */
-#include "tracker.h"
+#include "tracker/tracker.h"
 
 #include "toy_film.h"
 
@@ -96,10 +96,10 @@ static gait_tracker *target;
 static uint64_t target_digest;
 
 /* Refused with a reason, and the tracker goes on as if nothing had been. */
-static void refuse(const unsigned char *mem, size_t bytes, gait_status want)
+static void refuse(const unsigned char *mem, size_t bytes, gait_result want)
 {
     gait_error err = {0};
-    gait_status const s = gait_tracker_restore(target, mem, bytes, &err);
+    gait_result const s = gait_tracker_restore(target, mem, bytes, &err);
     CHECK((want == GAIT_OK ? s < 0 : s == want) && err.status == s && err.text[0]);
     CHECK(gait_tracker_digest(target) == target_digest);
 }

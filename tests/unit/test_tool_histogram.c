@@ -1,5 +1,5 @@
 /* Quantiles against sorting, over the whole range of times. */
-#include "../../tools/common/histogram.c"
+#include "../../tools/trackd/histogram.c"
 #include "check.h"
 
 #include <stdlib.h>

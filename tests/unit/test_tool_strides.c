@@ -1,5 +1,5 @@
 /* Strides from estimates: times and lengths of a known walk, trembling, missed strikes, doubt, new starts. */
-#include "../../tools/common/strides.c"
+#include "../../tools/trackd/strides.c"
 #include "check.h"
 
 enum { FRAMES = 200, MOST = 20 };
@@ -8,7 +8,7 @@ enum { FRAMES = 200, MOST = 20 };
 static gait_estimate walk(int n)
 {
     double const t = 0.04 * n;
-    gait_estimate e = {.utime = 1000000000 + 40000 * (int64_t)n, .status = GAIT_STATUS_TRACKING};
+    gait_estimate e = {.utime = 1000000000 + 40000 * (int64_t)n, .status = GAIT_TRACK_TRACKING};
     e.mean.phase = (float)fmod(0.3 + 0.8 * t, 1.0);
     e.mean.stride_hz = 0.8f;
     e.sd.phase = 0.008f;
@@ -79,9 +79,9 @@ static void test_trembling(void)
 static void lose(int n, gait_estimate *e)
 {
     if (n == 60)
-        e->status = GAIT_STATUS_LOST;
+        e->status = GAIT_TRACK_LOST;
     if (n == 130)
-        e->status = GAIT_STATUS_AMBIGUOUS;
+        e->status = GAIT_TRACK_AMBIGUOUS;
 }
 
 static void test_doubt(void)

@@ -1,5 +1,5 @@
 /* The tracker follows the synthetic walker: seeds, cameras, colours, frame rates and modes. */
-#include "tracker.h"
+#include "tracker/tracker.h"
 
 #include "toy_error.h"
 
@@ -35,7 +35,7 @@ static void check_error(error have, double across, double depth, double phase, d
         fprintf(stderr, "across %.3f m, depth %.3f m, phase %.4f, joints %.3f m\n", have.across, have.depth,
                 have.phase, have.joint);
     CHECK(have.across < across && have.depth < depth && have.phase < phase && have.joint < joint);
-    CHECK(have.status[GAIT_STATUS_LOST] == 0 && have.status[GAIT_STATUS_AMBIGUOUS] == 0);
+    CHECK(have.status[GAIT_TRACK_LOST] == 0 && have.status[GAIT_TRACK_AMBIGUOUS] == 0);
 }
 
 static void test_follow(void)

@@ -1,5 +1,5 @@
 /* Where tracking begins and ends: first frames, refusals, loss, ambiguity, what is learned on the way. */
-#include "tracker.h"
+#include "tracker/tracker.h"
 
 #include "toy_error.h"
 
@@ -26,7 +26,7 @@ static void test_first_frame(void)
 }
 
 /* Status of a frame at a time, and that a refusal changes nothing. */
-static void refuse(gait_tracker *t, gait_frame f, gait_status want, const char *word)
+static void refuse(gait_tracker *t, gait_frame f, gait_result want, const char *word)
 {
     uint64_t const digest = gait_tracker_digest(t);
     gait_estimate e, kept;
@@ -81,7 +81,7 @@ static void test_refusals(void)
     CHECK(gait_tracker_step(t, NULL, &e, NULL) == GAIT_ERR_ARG);
     CHECK(gait_tracker_step(t, &f, NULL, NULL) == GAIT_ERR_ARG);
     film_step(t, 2, 11, 0, &e); /* and it goes on */
-    CHECK(e.frame == 1 && e.status == GAIT_STATUS_TRACKING);
+    CHECK(e.frame == 1 && e.status == GAIT_TRACK_TRACKING);
     gait_state const mean = toy_walk(0.0f), sd = toy_doubt(1.0f);
     CHECK(gait_tracker_start(t, &mean, &sd, INT64_MIN, NULL) == GAIT_OK);
     f.utime = INT64_MAX;
@@ -106,12 +106,12 @@ static void test_occluded(void)
         memset(blank, 128, sizeof blank);
         for (int n = 0; n < 20; n++)
             film_step(t, 1, n, 0, &e);
-        CHECK(e.status == GAIT_STATUS_TRACKING);
+        CHECK(e.status == GAIT_TRACK_TRACKING);
         float const sd = e.sd.pelvis[0];
         for (int n = 20; n < 60; n++) {
             toy_tracker_step(t, n, shots, &e);
-            lost_at = !lost_at && e.status == GAIT_STATUS_LOST ? n : lost_at;
-            CHECK(!lost_at || e.status == GAIT_STATUS_LOST);
+            lost_at = !lost_at && e.status == GAIT_TRACK_LOST ? n : lost_at;
+            CHECK(!lost_at || e.status == GAIT_TRACK_LOST);
         }
         CHECK(lost_at >= 28 && lost_at <= 34);
         CHECK(plate || e.sd.pelvis[0] > 2.0f * sd); /* with a plate the absence says where nobody is */
@@ -133,14 +133,14 @@ static void test_no_image(void)
         film_step(t, 2, n, 3, &e);
         check_sane(t, &e, &cfg, n);
         CHECK((e.flags & GAIT_EST_NO_IMAGE) && e.log_evidence == 0.0);
-        CHECK((e.status == GAIT_STATUS_LOST) == (n >= 29)); /* 0.33 s after frame 19 */
+        CHECK((e.status == GAIT_TRACK_LOST) == (n >= 29)); /* 0.33 s after frame 19 */
     }
     CHECK(e.sd.pelvis[0] > 1.5f * sd && e.sd.phase > 0.0f);
     look(&e, 35, &have);
     CHECK(have.across < 0.15 && have.phase < 0.04); /* half a second on its own */
     for (int n = 36; n < 46; n++)
         film_step(t, 2, n, 0, &e);
-    CHECK(!(e.flags & GAIT_EST_NO_IMAGE) && e.status == GAIT_STATUS_TRACKING);
+    CHECK(!(e.flags & GAIT_EST_NO_IMAGE) && e.status == GAIT_TRACK_TRACKING);
     have = (error){0};
     look(&e, 45, &have);
     CHECK(have.across < 0.03 && have.phase < 0.015);
@@ -161,10 +161,10 @@ static void test_unknown_phase(void)
     CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
     for (int n = 0; n < 45; n++) {
         film_step(t, 2, n, 0, &e);
-        CHECK(e.status != GAIT_STATUS_LOST && (e.status == GAIT_STATUS_INIT || n > 24));
+        CHECK(e.status != GAIT_TRACK_LOST && (e.status == GAIT_TRACK_INIT || n > 24));
     }
     look(&e, 44, &have);
-    CHECK(e.status == GAIT_STATUS_TRACKING &&
+    CHECK(e.status == GAIT_TRACK_TRACKING &&
           have.phase < 0.02); /* legs and arms tell left from right here */
     toy_tracker_free(t);
 }
@@ -174,16 +174,16 @@ static void test_ambiguous(void)
 {
     static const struct {
         int32_t apart, seconds, status;
-    } cases[] = {{25, 0, GAIT_STATUS_TRACKING},
-                 {35, 0, GAIT_STATUS_INIT},
-                 {35, 2, GAIT_STATUS_AMBIGUOUS},
-                 {25, 2, GAIT_STATUS_TRACKING}};
+    } cases[] = {{25, 0, GAIT_TRACK_TRACKING},
+                 {35, 0, GAIT_TRACK_INIT},
+                 {35, 2, GAIT_TRACK_AMBIGUOUS},
+                 {25, 2, GAIT_TRACK_TRACKING}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         gait_tracker_config cfg = toy_config(1);
         cfg.particles = 100;
         cfg.terms = GAIT_TERM_TEXTURE; /* nothing to compare with in the first frame: all weights equal */
         gait_tracker *const t = film_tracker(&cfg, 10, 0.1f);
-        float *const phase = field(&t->people, F_PHASE);
+        float *const phase = field(&t->particles, F_PHASE);
         for (int32_t i = 0; i < cases[k].apart; i++)
             phase[99 - i] = m_wrap1(phase[99 - i] + 0.5f);
         t->core->start_utime -= 1000000 * cases[k].seconds;
@@ -213,7 +213,7 @@ static void test_appearance(void)
     for (int c = 0; c < 2; c++) { /* each its own */
         int32_t near = 0, both = 0;
         for (int i = 0; i < TOY_LIMBS * LIKE_FACING; i++) {
-            const like_patch *const p = &t->seen[c * TOY_LIMBS + i / LIKE_FACING];
+            const like_patch *const p = &t->estimate_patch[c * TOY_LIMBS + i / LIKE_FACING];
             int32_t const now = p->value[i % LIKE_FACING],
                           point = (2 * p->turn + i % LIKE_FACING) % LIKE_SAMPLES;
             int32_t const mean = t->template[0][c][i / LIKE_FACING * LIKE_SAMPLES + point] / TEMPLATE_ONE;

@@ -1,10 +1,10 @@
 /* The region of interest: where it goes, and what its pixels are taken from. */
-#include "view.h"
+#include "image/view.h"
 
-#include "camera.h"
-#include "kernels.h"
-#include "rast.h"
-#include "rng.h"
+#include "image/camera.h"
+#include "base/dispatch.h"
+#include "raster/rast.h"
+#include "base/rng.h"
 
 #include "check.h"
 
@@ -284,12 +284,12 @@ static void test_inside(void)
         {1.0f, 0, 0}, {0.5f, -100, -60}, {2.0f, 150.3f, 80.6f}, {1.0f, -300, 0}, {0.8f, -31.7f, 70.2f}};
     for (int bent = 0; bent < 2; bent++)
         for (size_t k = 0; k < sizeof maps / sizeof *maps; k++) {
-            uint64_t inside[RAST_SIZE][2];
+            uint64_t inside[GRID_SIZE][2];
             int32_t wrong = 0, count = 0;
             cam.distortion[0] = bent ? 0.15f : 0.0f;
             run->view_inside(&maps[k], &cam, inside);
-            for (int32_t y = 0; y < RAST_SIZE; y++)
-                for (int32_t x = 0; x < RAST_SIZE; x++) {
+            for (int32_t y = 0; y < GRID_SIZE; y++)
+                for (int32_t x = 0; x < GRID_SIZE; x++) {
                     float u = maps[k].u0 + 2.0f * (float)x / maps[k].scale;
                     float v = maps[k].v0 + 2.0f * (float)y / maps[k].scale;
                     camera_distort(&cam, u, v, &u, &v);
@@ -324,7 +324,7 @@ static void test_grey(void)
 
 int main(void)
 {
-    run = kernels_choose(~0u); /* the others give the same: test_image_kernels.c */
+    run = dispatch_choose(~0u); /* the others give the same: test_image_kernels.c */
     test_follow();
     test_copy();
     test_colour();

@@ -14,18 +14,18 @@ typedef struct crowd {
     dynamics d;
     pf p;
     double ess;
-    walker *now, *next;
+    particle_state *now, *next;
 } crowd;
 
 static inline crowd crowd_new(const dynamics *d, int32_t n)
 {
-    static walker people[2][TOY_MOST];
-    return (crowd){.d = *d, .p = toy_filter(n), .ess = n, .now = people[0], .next = people[1]};
+    static particle_state particles[2][TOY_MOST];
+    return (crowd){.d = *d, .p = toy_filter(n), .ess = n, .now = particles[0], .next = particles[1]};
 }
 
 static inline void crowd_predict(crowd *c, float dt, float age, uint32_t frame)
 {
-    walker *const old = c->now;
+    particle_state *const old = c->now;
     pf_keep(&c->p);
     if (c->ess < 0.5 * c->p.n)
         pf_resample_systematic(&c->p, toy_bits(c->d.seed, frame));
@@ -40,6 +40,6 @@ static inline void crowd_predict(crowd *c, float dt, float age, uint32_t frame)
 
 static inline void crowd_weigh(crowd *c, const float *ll)
 {
-    c->ess = pf_reweigh(&c->p, ll).ess;
+    c->ess = pf_update(&c->p, ll).ess;
 }
 #endif

@@ -22,14 +22,14 @@ static inline void films_paper(gait_tracker_config *cfg)
     cfg->mode = GAIT_MODE_PAPER;
     cfg->terms = GAIT_TERM_TEXTURE;
     cfg->resample_ess = 1.0f;
-    cfg->evidence_time = cfg->mingle_time = cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
+    cfg->evidence_time = cfg->rejuvenation_time = cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
     cfg->offset_angles = 0;
 }
 
 static inline void films_given(gait_tracker_config *cfg)
 {
     static const float lens[5] = {-0.11f, 0.03f, 0.002f, -0.001f, 0.004f};
-    cfg->terms |= GAIT_TERM_TRACKS;
+    cfg->terms |= GAIT_TERM_KEYPOINTS;
     for (int k = 0; k < cfg->cameras; k++)
         memcpy(cfg->camera[k].distortion, lens, sizeof lens);
 }
@@ -44,14 +44,14 @@ static inline gait_tracker_config films_config(int film_kind)
     else if (film_kind == FILMS_GIVEN)
         films_given(&cfg);
     else if (film_kind == FILMS_SEARCH)
-        cfg.search_particles = 2 * cfg.particles;
+        cfg.acquisition_particles = 2 * cfg.particles;
     return cfg;
 }
 
 /* What the film is of is told by the settings, so that tests can change the others. */
 static inline bool films_is_given(const gait_tracker_config *cfg)
 {
-    return cfg->terms & GAIT_TERM_TRACKS;
+    return cfg->terms & GAIT_TERM_KEYPOINTS;
 }
 
 static inline gait_image films_coloured(const uint8_t *grey, int k, uint8_t *pixels)
@@ -77,7 +77,7 @@ static inline gait_image films_wall(const gait_tracker_config *cfg, int k)
 }
 
 /* Joints of frame n, off by up to 2 pixels, some of them not seen. */
-static inline void films_detect(const gait_camera *cam, int n, gait_track *out)
+static inline void films_detect(const gait_camera *cam, int n, gait_keypoint *out)
 {
     gait_state const truth = toy_walk((float)n / 30.0f);
     gait_pose pose;
@@ -90,7 +90,7 @@ static inline void films_detect(const gait_camera *cam, int n, gait_track *out)
         float uv[2] = {0}, u, v;
         camera_project(cam, pose.joint[j], uv);
         camera_distort(cam, uv[0], uv[1], &u, &v);
-        out[j] = (gait_track){.u = u + (float)(chance % 5) - 2.0f,
+        out[j] = (gait_keypoint){.u = u + (float)(chance % 5) - 2.0f,
                               .v = v + (float)(chance / 5 % 5) - 2.0f,
                               .sd = chance % 11 ? 2.0f : 0.0f};
     }
@@ -99,12 +99,12 @@ static inline void films_detect(const gait_camera *cam, int n, gait_track *out)
 static inline gait_frame films_frame(const gait_tracker_config *cfg, int n, uint32_t missing)
 {
     static uint8_t shot[SCENE_CAMERAS][3 * SCENE_PIXELS];
-    static gait_track track[SCENE_CAMERAS][GAIT_MAX_JOINTS];
+    static gait_keypoint track[SCENE_CAMERAS][GAIT_MAX_JOINTS];
     gait_frame f = toy_frame(n);
     for (int k = 0; k < cfg->cameras; k++) {
         if (films_is_given(cfg) && n % 5 != 2) {
             films_detect(&cfg->camera[k], n, track[k]);
-            f.tracks[k] = track[k];
+            f.keypoints[k] = track[k];
         }
         if (!(missing >> k & 1u))
             f.image[k] = films_is_given(cfg) ? films_coloured(film[k][n], k, shot[k]) : toy_image(film[k][n]);
@@ -112,16 +112,16 @@ static inline gait_frame films_frame(const gait_tracker_config *cfg, int n, uint
     return f;
 }
 
-static inline void films_start(gait_tracker *t, const gait_tracker_config *cfg, int n, float wide)
+static inline void films_start(gait_tracker *t, const gait_tracker_config *cfg, int n, float simd_f64)
 {
     for (int k = 0; k < cfg->cameras; k++) {
         gait_image const plate = films_wall(cfg, k);
         if (gait_tracker_set_background(t, k, &plate) != GAIT_OK)
             abort();
     }
-    if (cfg->search_particles > 0)
+    if (cfg->acquisition_particles > 0)
         toy_tracker_doubt(t, 0.5f);
     else
-        toy_tracker_start(t, n, wide);
+        toy_tracker_start(t, n, simd_f64);
 }
 #endif

@@ -2,9 +2,9 @@
  * FIGURE() for what a check measured: shown by FIGURES=1 build/release/unit/test_pf_... */
 #ifndef TOY_FILTER_H
 #define TOY_FILTER_H
-#include "pf.h"
+#include "filter/pf.h"
 
-#include "rng.h"
+#include "base/rng.h"
 
 #include "check.h"
 

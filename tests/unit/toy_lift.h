@@ -39,7 +39,7 @@ static inline gait_lift *toy_lift_open(const gait_lift_config *c)
 {
     gait_lift *l = NULL;
     gait_error err = {0};
-    gait_status const s = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_blob,
+    gait_result const s = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_blob,
                                          toy_lift_blob_bytes, c, &l, &err);
     if (s != GAIT_OK)
         fprintf(stderr, "gait_lift_init: %s\n", err.text);

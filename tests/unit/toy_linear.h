@@ -184,7 +184,7 @@ static inline pf_summary linear_filter_step(linear_filter *f, const linear_world
     }
     f->x = f->next;
     f->next = old;
-    pf_summary const sum = pf_reweigh(&f->p, ll);
+    pf_summary const sum = pf_update(&f->p, ll);
     f->ess = sum.ess;
     return sum;
 }

@@ -10,7 +10,7 @@ enum {
 }; /* frames a second, of a way, of its end unseen */
 
 /* Push frame `i`: a stiff body along x; each way starts where the first one did, a jump that does not fit. */
-static inline gait_status passer_push(gait_lift *l, const gait_lift_config *c, int i)
+static inline gait_result passer_push(gait_lift *l, const gait_lift_config *c, int i)
 {
     double X[TOY_MARKERS][3], uv[TOY_MARKERS * 2], sd[TOY_MARKERS];
     double const seconds = (double)(i % PASSER_WAY) / PASSER_RATE, step = 0.03 * (double)TOY_FPS * seconds;
@@ -51,9 +51,9 @@ static inline bool passer_stream(gait_lift *l, const gait_lift_config *c, int fr
     for (int i = 0; i < frames; i++) {
         gait_lift_frame f;
         ok &= passer_push(l, c, i) == GAIT_OK;
-        if (gait_lift_estimate(l, &f) == GAIT_OK && f.status != GAIT_STATUS_INIT) {
+        if (gait_lift_estimate(l, &f) == GAIT_OK && f.status != GAIT_TRACK_INIT) {
             followed++;
-            fits += f.status == GAIT_STATUS_TRACKING;
+            fits += f.status == GAIT_TRACK_TRACKING;
         }
     }
     return ok && followed > frames / 3 && fits > 0 && fits < followed;

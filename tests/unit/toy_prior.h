@@ -1,8 +1,8 @@
 /* toy_prior.h - a dynamics without noise for tests to add theirs to, and sample moments against true ones. */
 #ifndef TOY_PRIOR_H
 #define TOY_PRIOR_H
-#include "dynamics.h"
-#include "kernels.h"
+#include "filter/dynamics.h"
+#include "base/dispatch.h"
 #include "toy_model.h"
 
 #include "check.h"
@@ -28,14 +28,14 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.tilt_time = 1.1f;
     cfg.coef_time = 4.5f;
     return (dynamics){
-        .cfg = &cfg, .rule = body_rule_init(toy_model(), &cfg), .seed = seed, .stature_doubt = 0.05f};
+        .cfg = &cfg, .rule = state_layout_init(toy_model(), &cfg), .seed = seed, .stature_doubt = 0.05f};
 }
 
 /* Particles first .. first + BLOCK - 1 over one interval of dt seconds at an age. */
-static inline void move_block(const dynamics *d, walker w[BLOCK], float dt, float age, uint32_t frame,
+static inline void move_block(const dynamics *d, particle_state w[BLOCK], float dt, float age, uint32_t frame,
                               int32_t first)
 {
-    static walker_block from, to;
+    static particle_block from, to;
     dynamics_step const s = dynamics_step_init(d, dt, age, frame);
     for (int32_t f = 0; f < s.fields; f++)
         for (int32_t lane = 0; lane < BLOCK; lane++)
@@ -47,10 +47,10 @@ static inline void move_block(const dynamics *d, walker w[BLOCK], float dt, floa
 }
 
 /* Particle i alone. */
-static inline walker move_one(const dynamics *d, const walker *from, float dt, float age, uint32_t frame,
+static inline particle_state move_one(const dynamics *d, const particle_state *from, float dt, float age, uint32_t frame,
                               int32_t i)
 {
-    walker block[BLOCK] = {{{0}}};
+    particle_state block[BLOCK] = {{{0}}};
     block[i % BLOCK] = *from;
     move_block(d, block, dt, age, frame, i - i % BLOCK);
     return block[i % BLOCK];

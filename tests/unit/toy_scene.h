@@ -9,10 +9,10 @@
  * Pictures are made of integers and of + - * / on floats: the same bits wherever the library has the same. */
 #ifndef TOY_SCENE_H
 #define TOY_SCENE_H
-#include "camera.h"
-#include "fmath.h"
-#include "kinematics.h"
-#include "population.h"
+#include "image/camera.h"
+#include "base/fmath.h"
+#include "model/kinematics.h"
+#include "filter/particles.h"
 #include "toy_model.h"
 
 enum { SCENE_W = 384, SCENE_H = 288, SCENE_PIXELS = SCENE_W * SCENE_H, SCENE_CAMERAS = 2 };

@@ -1,7 +1,7 @@
 #ifndef TOY_SHIFTED_H
 #define TOY_SHIFTED_H
 
-#include "model.h"
+#include "model/model.h"
 #include "toy_model.h"
 
 /* The toy model whose proportions also move the shoulders, section SHFT, and whose strides are the longer the

@@ -16,7 +16,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     gait_tracker_default(&c, GAIT_MODE_DEFAULT);
     c.seed = 7;
     c.particles = 300;
-    c.search_particles = 0;
+    c.acquisition_particles = 0;
     c.components = TOY_COMPONENTS;
     c.tasks = 4;
     c.cameras = cameras;
@@ -30,7 +30,7 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.girth = 1.0f;
     c.resample_ess = 0.5f;
     c.evidence_time = 0.13f;
-    c.mingle_time = 0.7f;
+    c.rejuvenation_time = 0.7f;
     c.max_dt = 0.5f;
     c.phase_noise = 0.0164f;
     c.rate_noise = 0.02f;
@@ -82,17 +82,17 @@ static inline void toy_tracker_free(gait_tracker *t)
 }
 
 /* Deviations of a start by hand, times `wide`. */
-static inline gait_state toy_doubt(float wide)
+static inline gait_state toy_doubt(float simd_f64)
 {
-    gait_state sd = {.phase = 0.04f * wide,
-                     .stride_hz = 0.05f * wide,
-                     .stature = 0.02f * wide,
-                     .heading = 0.08f * wide,
-                     .pitch = 0.02f * wide,
-                     .roll = 0.02f * wide,
-                     .pelvis = {0.05f * wide, 0.05f * wide, 0.03f * wide}};
+    gait_state sd = {.phase = 0.04f * simd_f64,
+                     .stride_hz = 0.05f * simd_f64,
+                     .stature = 0.02f * simd_f64,
+                     .heading = 0.08f * simd_f64,
+                     .pitch = 0.02f * simd_f64,
+                     .roll = 0.02f * simd_f64,
+                     .pelvis = {0.05f * simd_f64, 0.05f * simd_f64, 0.03f * simd_f64}};
     for (int k = 0; k < TOY_COMPONENTS; k++)
-        sd.coef[k] = 0.5f * wide;
+        sd.coef[k] = 0.5f * simd_f64;
     return sd;
 }
 
@@ -104,9 +104,9 @@ static inline void toy_tracker_begin(gait_tracker *t, int n, const gait_state *s
         toy_stop("start", &err);
 }
 
-static inline void toy_tracker_start(gait_tracker *t, int n, float wide)
+static inline void toy_tracker_start(gait_tracker *t, int n, float simd_f64)
 {
-    gait_state const sd = toy_doubt(wide);
+    gait_state const sd = toy_doubt(simd_f64);
     toy_tracker_begin(t, n, &sd);
 }
 

@@ -6,7 +6,7 @@
 #ifndef TOY_TWIN_H
 #define TOY_TWIN_H
 
-#include "kinematics.h"
+#include "model/kinematics.h"
 
 #include <math.h>
 

@@ -1,17 +1,17 @@
 /* toy_visible.h - one point of a drawn body looked at by itself, as kernels must for many. */
 #ifndef TOY_VISIBLE_H
 #define TOY_VISIBLE_H
-#include "layers.h"
+#include "raster/layers.h"
 
 /* Has the mask this cell? */
-static inline bool toy_cell(const rast_mask *m, int32_t x, int32_t y)
+static inline bool toy_cell(const grid_mask *m, int32_t x, int32_t y)
 {
     int32_t const c = x - m->column;
     return y >= m->first && y < m->last && c >= 0 && c < m->width && (m->word[c >> 6][y] >> (c & 63) & 1);
 }
 
 /* Is the limb visible at this working pixel? */
-static inline bool toy_visible(const rast_mask *mask, float wx, float wy)
+static inline bool toy_visible(const grid_mask *mask, float wx, float wy)
 {
     /* Truncation is fine: cells left of or above the grid are refused first. */
     if (!(wx >= 0.0f && wy >= 0.0f && wx < (float)VIEW_SIZE && wy < (float)VIEW_SIZE))

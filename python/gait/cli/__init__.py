@@ -19,7 +19,7 @@ from importlib import import_module
 from types import FrameType
 from typing import NoReturn
 
-from gait import kernels
+from gait import reproducible
 from gait._version import __version__
 from gait.errors import GaitError, UsageError, UserError
 
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     if argv is None and words[:1] == ["learn"]:  # the process is ours, and numpy not yet loaded
-        kernels.settle()
+        reproducible.settle()
     if " ".join(words[:2]) in COMMANDS:  # a command of two words
         words[:2] = [" ".join(words[:2])]
     command = f" {words[0]}" if words and words[0] in COMMANDS else ""
@@ -109,7 +109,7 @@ class _Version(argparse.Action):
     """Say the versions, for which the library is loaded, and end."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from gait._abi.library import library, version_text  # here, as it loads numpy
+        from gait.bindings.library import library, version_text  # here, as it loads numpy
 
         loaded = library()
         print(f"gait {__version__} libgait {version_text(loaded.gait_version())} abi {loaded.gait_abi()}")

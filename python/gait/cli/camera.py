@@ -13,9 +13,9 @@ import sys
 
 import numpy as np
 
-from gait.image.camera import Camera
-from gait.image.camerafile import read_camera
-from gait.image.placing import place, read_points
+from gait.camera.camera import Camera
+from gait.camera.camera_file import read_camera
+from gait.camera.placing import place, read_points
 from gait.io.files import replacing, require_outputs
 
 NAME = "camera"

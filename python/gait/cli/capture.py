@@ -26,11 +26,11 @@ import numpy as np
 
 from gait.cli import values
 from gait.cli.ending import Ending
-from gait.core.initial import OUTSIDE, Start
-from gait.core.model import Model
+from gait.bindings.initial import OUTSIDE, Start
+from gait.bindings.model import Model
 from gait.errors import UsageError, UserError
-from gait.image.camera import Camera
-from gait.image.video import Frame, background, read_plate
+from gait.camera.camera import Camera
+from gait.io.video import Frame, background, read_plate
 from gait.io.files import require_unread
 from gait.lcm.capture import Publisher, Setup
 from gait.lcm.link import buffer_warning, is_log, lcm_url
@@ -180,7 +180,7 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
         return start
     if isinstance(source, DeviceSource) or setup.camera is None:
         raise UsageError("--init auto: needs a video file and --camera; give an init file")
-    from gait.track.autostart import find_start  # slow to load, and only needed here
+    from gait.track.auto_start import find_start  # slow to load, and only needed here
 
     return find_start(
         source.video,

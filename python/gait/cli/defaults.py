@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gait._abi import Mode
+from gait.bindings.abi import Mode
 from gait.errors import LibraryError
-from gait.track.trackerconfig import TrackerConfig
+from gait.track.config import TrackerConfig
 
 
 def particles(mode: Mode = Mode.DEFAULT) -> str:

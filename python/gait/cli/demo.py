@@ -27,16 +27,16 @@ from gait.cli.evaluate import text as evaluation_text
 from gait.cli.record import LISTENING
 from gait.cli.record import text as recording_text
 from gait.cli.report import make_report
-from gait.core.initial import Start
-from gait.core.model import Model
+from gait.bindings.initial import Start
+from gait.bindings.model import Model
 from gait.errors import UsageError, UserError
-from gait.image.camera import Camera
-from gait.image.video import Video, read_plate
+from gait.camera.camera import Camera
+from gait.io.video import Video, read_plate
 from gait.io.fields import read_json
 from gait.io.files import require_folder
 from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_buffer
 from gait.lcm.session import Session
-from gait.motion.trackfile import read_truth
+from gait.io.track_file import read_truth
 
 NAME = "demo"
 HELP = "run capture, tracker and recorder on a clip and report"

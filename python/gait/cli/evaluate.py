@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from gait.core.model import read_cyclic
+from gait.bindings.model import read_cyclic
 from gait.errors import UserError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.motion.evaluate import LOST_MM, Measures, evaluate
 from gait.motion.events import strikes_of
-from gait.motion.trackfile import Joints, read_estimates, read_truth
+from gait.io.track_file import Joints, read_estimates, read_truth
 
 NAME = "eval"
 HELP = "errors of a track against the truth"

@@ -12,7 +12,7 @@ import numpy as np
 
 from gait.body.pace import slope_of
 from gait.cli import segment_text
-from gait.core.segment_prior import TAGS, SegmentPrior
+from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.io import blob
 from gait.io.fields import json_of
 

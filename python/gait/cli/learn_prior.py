@@ -7,7 +7,7 @@ import json
 import sys
 
 from gait.cli import segment_text
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
 from gait.learn.prior import model

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from gait.body.skeleton import ANGLES
 from gait.cli import segment_text
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.io import blob
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.model_options import DEFAULT_COMPONENTS

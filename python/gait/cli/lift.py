@@ -26,12 +26,13 @@ from typing import Any
 import numpy as np
 
 from gait.cli import lift_doubts, lift_prior, lift_tracks, lift_video, values
-from gait.core.initial import STATURE
+from gait.bindings.initial import STATURE
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
 from gait.io.trc import write_trc
-from gait.lift import lifted_file, motion, result
-from gait.lift.tracks_file import FURTHEST, Tracks
+from gait.lift import motion, result
+from gait.io import lifted_file
+from gait.io.keypoints_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
 
 NAME = "lift"

@@ -7,7 +7,7 @@ import numpy as np
 from gait.cli import lift_tracks
 from gait.lift import motion, outliers, size
 from gait.lift.result import Motion, Options
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 FAR = 4.0  # noise alone gives a median of 1.2
 UNTOLD = (

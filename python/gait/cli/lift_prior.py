@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 
 FEW = 4  # recordings; by two of one person, intervals of other people's walks held as little as 70 %
 

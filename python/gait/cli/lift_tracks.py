@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.learn.corpus.stage import one_thread
-from gait.lift import motion, outliers, sentinels, sides, switches, tracks_file
+from gait.lift import motion, outliers, sides, switches
+from gait.io import sentinels
+from gait.io import keypoints_file as tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.result import Motion, Options
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 from gait.progress import progress
 
 MOST_JUMPS, MOST_SPANS = 5, 4  # named

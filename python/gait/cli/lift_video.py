@@ -14,22 +14,23 @@ import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
 from gait.cli import lift_prior, values
-from gait.core.model import read_blob, read_cyclic
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.model import read_blob, read_cyclic
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UsageError, UserError
-from gait.image.camera import Camera
-from gait.image.video import Video, VideoWriter, background, require_video_name
+from gait.camera.camera import Camera
+from gait.io.video import Video, VideoWriter, background, require_video_name
 from gait.io.blob import decode
 from gait.learn.corpus.stage import one_thread
-from gait.lift import lifted_file, suggest
-from gait.lift.beginning import Beginning
+from gait.lift import suggest
+from gait.io import lifted_file
+from gait.lift.phase_prior import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.cylinder import Figure
 from gait.lift.cylinder_picture import draw_figure
 from gait.lift.fit_clip import ClipFit, fit_clip, work
-from gait.lift.likeness import DOUBTFUL, HELD
+from gait.lift.fit_correlation import DOUBTFUL, HELD
 from gait.lift.sensors import Film
-from gait.lift.springs import Correction, Placement, read_corrections, read_placement
+from gait.lift.corrections import Correction, Placement, read_corrections, read_placement
 from gait.lift.views import CameraView, FlatView, View
 from gait.progress import progress
 

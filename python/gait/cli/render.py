@@ -15,11 +15,11 @@ import argparse
 import cv2
 
 from gait.cli.values import between
-from gait.core.model import Model
-from gait.core.state import POSE_SCALARS, State
-from gait.draw.strip import draw_room, draw_strip, room_camera
+from gait.bindings.model import Model
+from gait.bindings.state import POSE_SCALARS, State
+from gait.report.strip import draw_room, draw_strip, room_camera
 from gait.errors import UserError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.io.fields import Fields, read_json
 from gait.io.files import replacing, require_outputs
 

@@ -18,20 +18,20 @@ from typing import Any
 import numpy as np
 
 from gait.cli.evaluate import text as evaluation_text
-from gait.core.model import Model, read_cyclic
-from gait.draw.overlay import Overlay
-from gait.draw.page import Page
+from gait.bindings.model import Model, read_cyclic
+from gait.report.overlay import Overlay
+from gait.report.page import Page
 from gait.durations import spread
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Image, Video, VideoWriter
+from gait.camera.camera import Camera
+from gait.io.video import Image, Video, VideoWriter
 from gait.io.files import replacing, require_outputs
 from gait.lcm.log import break_of
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
 from gait.lcm.results import Run, read_run
 from gait.motion.evaluate import Measures, evaluate
 from gait.motion.events import Strikes, strikes_of
-from gait.motion.trackfile import Joints, Track, read_track, read_truth
+from gait.io.track_file import Joints, Track, read_track, read_truth
 from gait.progress import progress
 
 NAME = "report"

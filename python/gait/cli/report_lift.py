@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.cli import lift_tracks, values
-from gait.core.segment_prior import SegmentPrior
-from gait.draw.page import Page
+from gait.bindings.segment_prior import SegmentPrior
+from gait.report.page import Page
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
 from gait.learn.report.figures_base import Drawing
@@ -37,7 +37,7 @@ from gait.lift.equations import View
 from gait.lift.figures_segment import Case, case, drawings
 from gait.lift.motion import output_names
 from gait.lift.result import METHODS, Motion, Options
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

@@ -34,28 +34,28 @@ from typing import Any
 
 import numpy as np
 
-from gait._abi import Mode, Term, TrackStatus
-from gait.body.modelcurves import ModelCurves
+from gait.bindings.abi import Mode, Term, TrackStatus
+from gait.body.model_curves import ModelCurves
 from gait.cli import defaults, values
-from gait.core.estimate import Estimate
-from gait.core.frame import Joints
-from gait.core.initial import OUTSIDE, Start
-from gait.core.model import Model, read_cyclic
-from gait.draw.overlay import Overlay
+from gait.bindings.estimate import Estimate
+from gait.bindings.frame import Joints
+from gait.bindings.initial import OUTSIDE, Start
+from gait.bindings.model import Model, read_cyclic
+from gait.report.overlay import Overlay
 from gait.durations import spread
 from gait.errors import UsageError, UserError
-from gait.image.camera import Camera
-from gait.image.sighting import another_scene, one_is_grey
-from gait.image.video import Frame, Image, Video, VideoWriter, background
+from gait.camera.camera import Camera
+from gait.track.person_detection import another_scene, one_is_grey
+from gait.io.video import Frame, Image, Video, VideoWriter, background
 from gait.io.files import require_outputs
 from gait.io.trc import write_trc
-from gait.lift import tracks_file
-from gait.motion.trackfile import TrackWriter
+from gait.io import keypoints_file as tracks_file
+from gait.io.track_file import TrackWriter
 from gait.progress import progress
-from gait.track.autostart import Spotter, find_start
+from gait.track.auto_start import Spotter, find_start
 from gait.track.smoothed import Smoother
 from gait.track.tracker import Tracker
-from gait.track.trackerconfig import TrackerConfig
+from gait.track.config import TrackerConfig
 
 TRACKS_SD = 4.0  # pixels
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentTypeError
 from collections.abc import Callable
 
-from gait.core.initial import STATURE
+from gait.bindings.initial import STATURE
 from gait.errors import UsageError
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below

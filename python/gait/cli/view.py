@@ -15,10 +15,10 @@ import cv2
 
 from gait.cli import values
 from gait.cli.ending import Ending
-from gait.core.model import Model
+from gait.bindings.model import Model
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Image
+from gait.camera.camera import Camera
+from gait.io.video import Image
 from gait.io.files import replacing
 from gait.lcm.link import lcm_url
 from gait.lcm.viewer import Screen, Viewer

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gait.core.initial import Start
+from gait.bindings.initial import Start
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Frame, Image
+from gait.camera.camera import Camera
+from gait.io.video import Frame, Image
 from gait.lcm.ahead import ahead
 from gait.lcm.link import handle, publisher
 from gait.lcm.log import LogWriter

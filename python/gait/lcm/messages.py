@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gait._abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
-from gait.core.estimate import Estimate
-from gait.core.state import POSE_SCALARS, State
+from gait.bindings.abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
+from gait.bindings.estimate import Estimate
+from gait.bindings.state import POSE_SCALARS, State
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Image
+from gait.camera.camera import Camera
+from gait.io.video import Image
 from gait.lcm.types import gaitmsg
 
 _FRAME_KEY = "frame"

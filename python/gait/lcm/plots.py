@@ -12,12 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gait._abi import TrackStatus
-from gait.draw.colours import BLUE, GREY, ORANGE
+from gait.bindings.abi import TrackStatus
+from gait.report.colours import BLUE, GREY, ORANGE
 from gait.lcm.results import Run
 from gait.motion.evaluate import root_errors
 from gait.motion.events import Strikes
-from gait.motion.trackfile import Joints, Track
+from gait.io.track_file import Joints, Track
 
 Array = NDArray[np.float64]
 Painter = Callable[[Axes], None]

@@ -10,7 +10,7 @@ import lcm
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.core.estimate import Estimate
+from gait.bindings.estimate import Estimate
 from gait.errors import UserError
 from gait.lcm.log import break_of
 from gait.lcm.messages import estimate_after, estimate_of

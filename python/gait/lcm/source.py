@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from gait.errors import UserError
-from gait.image.video import Frame, Video
+from gait.io.video import Frame, Video
 
 
 class FileSource:

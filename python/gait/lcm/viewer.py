@@ -11,11 +11,11 @@ from typing import Any
 
 import cv2
 
-from gait.core.model import Model
-from gait.draw.overlay import Overlay
+from gait.bindings.model import Model
+from gait.report.overlay import Overlay
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Image
+from gait.camera.camera import Camera
+from gait.io.video import Image
 from gait.lcm.link import handle, is_log, listener
 from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.lcm.types import gaitmsg

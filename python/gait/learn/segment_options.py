@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gait.core.segment_prior import HEADINGS
+from gait.bindings.segment_prior import HEADINGS
 
 SOURCES = ("learnt", "all", "none", "only")
 MARKERS = ("virtual", "recorded")
@@ -29,7 +29,7 @@ class Segments:
     modes : int
         At most so many; a quarter of the segments if that is fewer.
     headings : 0, 2 or 8
-        See `gait.core.segment_prior.SegmentPrior`.
+        See `gait.bindings.segment_prior.SegmentPrior`.
     mixture : int or None
         Components; None: as many as describe held-out recordings best.
     markers : one of MARKERS

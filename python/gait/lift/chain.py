@@ -20,8 +20,8 @@ import numpy.typing as npt
 from scipy import linalg
 
 from gait.body.skeleton import axis_rotation
-from gait.core.segment_prior import SegmentPrior
-from gait.lift.bordered import Information
+from gait.bindings.segment_prior import SegmentPrior
+from gait.lift.block_arrowhead import Information
 
 Floats = npt.NDArray[np.float64]
 

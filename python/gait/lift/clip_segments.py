@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import make_interp_spline
 
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.lift import sensors
-from gait.lift.beginning import Beginning
+from gait.lift.phase_prior import Beginning
 from gait.lift.energy import EXTRA, GAIN, HEADING, LEVEL, PLACE, Anchor, Energy, Reading, Shape, Springs
 from gait.lift.sensors import Film
-from gait.lift.springs import HEIGHT_SD, Correction, Placement
+from gait.lift.corrections import HEIGHT_SD, Correction, Placement
 from gait.lift.stick import Sticks
 from gait.lift.views import View
 

@@ -32,7 +32,7 @@ def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floa
     factor : Factor
         Of the chain's information matrix at the states.
     drifted : (B,)
-        How far the figure may have drifted in each segment, metres, in one sense: `gait.lift.likeness`.
+        How far the figure may have drifted in each segment, metres, in one sense: `gait.lift.fit_correlation`.
     """
     pulls = np.stack([_pull(energy, state) for energy, state in zip(chain, states, strict=True)])
     drifts = pulls[..., :2] * drifted[:, None, None] / SHIFT_SD

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
-from gait.draw.overlay import draw_bones, tinted
-from gait.image.video import Image
+from gait.report.overlay import draw_bones, tinted
+from gait.io.video import Image
 from gait.lift.cylinder import LIMBS
-from gait.lift.springs import Correction
+from gait.lift.corrections import Correction
 from gait.lift.views import View
 
 Floats = npt.NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.errors import UsageError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.lift.observe import Observations, Rows, orthographic, perspective
 
 Floats = npt.NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gait.draw.colours import DARK, GREY
+from gait.report.colours import DARK, GREY
 from gait.learn.report.figures_base import plain
 from gait.learn.report.figures_model import STICKS
 

@@ -9,13 +9,13 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gait.draw.colours import DARK, GREY, ON_PAPER, side_of
+from gait.report.colours import DARK, GREY, ON_PAPER, side_of
 from gait.learn.report.figures_base import Drawing
 from gait.learn.report.figures_model import STICKS
 from gait.lift.equations import Perspective, View
 from gait.lift.figures_base import BELOW, SHOWN, bare, scale_bar
 from gait.lift.result import Motion
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 Floats = npt.NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.lifter import LiftConfig, Lifter
-from gait.core.segment_prior import SegmentPrior
-from gait.draw.colours import BLUE, DARK, GREY, ORANGE
+from gait.bindings.lifter import LiftConfig, Lifter
+from gait.bindings.segment_prior import SegmentPrior
+from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn.report.figures_base import Drawing, grid, line_legend
 from gait.lift.figures_base import AHEAD, SIDE, Strips
 from gait.lift.posterior import Gaussian, place

@@ -18,7 +18,7 @@ from gait.lift import common
 from gait.lift.clip_segments import CORRELATED, ClipSegments
 from gait.lift.descent import Link, descend, information
 from gait.lift.energy import HEADING, PLACE, Anchor, Energy
-from gait.lift.likeness import drift, likeness
+from gait.lift.fit_correlation import drift, likeness
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

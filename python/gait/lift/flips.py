@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]

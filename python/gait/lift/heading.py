@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.lift.chain import LEADING
 from gait.lift.observe import Rows
 from gait.lift.posterior import GROUND_SD, Gaussian, Posterior, infer, place

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.lift import sequence, size, start, uncertain
 from gait.lift.chain import Freedom, blended, in_turn, restricted
@@ -27,7 +27,7 @@ from gait.lift.posterior import Posterior, by_likelihood
 from gait.lift.refuse import Unlike, require_metres, require_seen, require_size
 from gait.lift.result import Motion, Options
 from gait.lift.sequence import Lifted, Seen, Start
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 Floats = npt.NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import axis_rotation
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.lift.observe import Rows
 

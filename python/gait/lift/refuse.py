@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UsageError, UserError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.lift.equations import Parallel
 from gait.lift.grid import Grid
 from gait.lift.heading import Explanation
 from gait.lift.observe import LONGEST_GAP, Observations
 from gait.lift.result import Options
 from gait.lift.start import FEWEST
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 Floats = npt.NDArray[np.float64]
 

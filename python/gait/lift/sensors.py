@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gait.image.video import Frame, Image
+from gait.io.video import Frame, Image
 
 Floats = npt.NDArray[np.float64]
 Field = npt.NDArray[np.float32]

@@ -1,6 +1,6 @@
 """Motion of a whole sequence from 2-D tracks: the exact Gaussian smoother over overlapping segments.
 
-The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints (`gait.lift.soft`), all
+The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints (`gait.lift.soft_constraints`), all
 linear in the places of the markers on a time grid of the prior's rate; places between its frames are
 interpolated.  What is not linear (perspective, headings, stature, lengths of bones) is linearised again
 around each estimate until it stays (Gauss-Newton).  Standard deviations are those of the last linear problem.
@@ -13,14 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.segment_prior import SegmentPrior
-from gait.lift import bordered, doubt, soft
-from gait.lift.bordered import Information
+from gait.bindings.segment_prior import SegmentPrior
+from gait.lift import block_arrowhead as bordered
+from gait.lift import robust_weights as doubt
+from gait.lift import soft_constraints as soft
+from gait.lift.block_arrowhead import Information
 from gait.lift.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
 from gait.lift.equations import Parallel, View, scale_free
 from gait.lift.grid import Grid, interpolated
 from gait.lift.observe import Observations
-from gait.lift.soft import Layout, Rows
+from gait.lift.soft_constraints import Layout, Rows
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
@@ -90,7 +92,7 @@ class Lifted:
     evidence : float
         Logarithm of the density of what is seen, without the soft constraints, but for a constant.
     doubted : (T, P)
-        Points that lost their say (`gait.lift.doubt`).
+        Points that lost their say (`gait.lift.robust_weights`).
     misfit : float
         Squared deviations per number seen; about 1 if the motion is of the prior's kind, more if it is not.
     """
@@ -206,7 +208,7 @@ class _Problem:
         return Around(heading, component, stature, around, around)
 
     def doubt(self, state: _State) -> None:
-        """Leave points that are far from an estimate less to say (`gait.lift.doubt`)."""
+        """Leave points that are far from an estimate less to say (`gait.lift.robust_weights`)."""
         places = self._at_video(state.places)[:, self.seen.markers]
         said = self.view.project(places, self._at_video(state.lengths))
         self.points = doubt.doubted(self.seen.points, said)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from gait.lift import flips, outliers
 from gait.lift.flips import Flags, Floats, Ints
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 SLOWEST = 0.11  # seconds from frame to frame: with longer steps strides are steps of the other leg
 MOST = 1 / 3  # of a pair's frames: of more it is open which are right

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.segment_prior import SegmentPrior
-from gait.image.camera import Camera
-from gait.lift.soft import BONES
-from gait.lift.tracks_file import Tracks
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
+from gait.lift.soft_constraints import BONES
+from gait.io.keypoints_file import Tracks
 
 Floats = npt.NDArray[np.float64]
 

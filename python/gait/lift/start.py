@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.segment_prior import SegmentPrior
-from gait.lift import doubt
+from gait.bindings.segment_prior import SegmentPrior
+from gait.lift import robust_weights as doubt
 from gait.lift.equations import View
 from gait.lift.heading import Explanation, Person, explain
 from gait.lift.observe import Observations, Rows

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from gait.body.skeleton import JOINTS
 from gait.lift.clip_segments import ClipSegments
 from gait.lift.fit_clip import ClipFit
-from gait.lift.springs import CLICK_SD
+from gait.lift.corrections import CLICK_SD
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

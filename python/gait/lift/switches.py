@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.lift.tracks_file import Tracks
+from gait.io.keypoints_file import Tracks
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 
 Floats = npt.NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from gait.body import skeleton
 from gait.body.skeleton import EVAL15
 from gait.io.blob import unpack_names
 from gait.motion.events import STRIDE, Strikes, walking_direction
-from gait.motion.trackfile import Joints
+from gait.io.track_file import Joints
 
 Array = NDArray[np.float64]
 

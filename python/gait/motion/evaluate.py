@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from gait.body.skeleton import EVAL15
 from gait.errors import UserError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.motion.baselines import free_run, static_pose
-from gait.motion.calibration import calibration, coverage
+from gait.motion.interval_coverage import calibration, coverage
 from gait.motion.events import Strikes
-from gait.motion.trackfile import STATUSES, Joints, Track
+from gait.io.track_file import STATUSES, Joints, Track
 
 Array = NDArray[np.float64]
 Measures = dict[str, Any]
@@ -53,7 +53,7 @@ def evaluate(
         ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D
         pose networks have; ``proc``: after the best rotation, scale and shift of every frame, to compare
         with literature only; ``status``, ``trust`` (see `trust`); ``calibration`` (see
-        `gait.motion.calibration`).
+        `gait.motion.interval_coverage`).
 
     Raises
     ------

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks
 
 from gait.io.fields import Fields, read_json
-from gait.motion.trackfile import Joints
+from gait.io.track_file import Joints
 
 Array = NDArray[np.float64]
 

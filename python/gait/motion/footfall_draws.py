@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gait.errors import UserError
 from gait.io.files import replacing
 from gait.motion.footfalls import SIDES, Contacts, Events, at, contacts, find_events, same_events, stack
-from gait.motion.trackfile import Joints, Track
+from gait.io.track_file import Joints, Track
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.motion.events import furthest, walking_direction
-from gait.motion.trackfile import Joints
+from gait.io.track_file import Joints
 
 Array = NDArray[np.float64]
 SIDES = ("right", "left")

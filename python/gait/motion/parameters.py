@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gait.errors import UserError
 from gait.motion.footfall_draws import Draws, draw_contacts
 from gait.motion.footfalls import SIDES, Contacts, Events, contacts, find_events, stride_time
-from gait.motion.trackfile import Track
+from gait.io.track_file import Track
 
 Array = NDArray[np.float64]
 

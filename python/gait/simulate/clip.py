@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from gait.errors import UserError
-from gait.image.video import VideoWriter
+from gait.io.video import VideoWriter
 from gait.io.files import replacing, require_writable
 from gait.simulate.arrays import Picture
 from gait.simulate.render import Renderer, develop

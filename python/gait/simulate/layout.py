@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.simulate import paint
 from gait.simulate.arrays import Array, Floats
 from gait.simulate.wardrobe import linear

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.simulate.arrays import Array, Floats
 from gait.simulate.layout import Bush
 from gait.simulate.paint import AMBIENT, SUN

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.simulate.arrays import Floats, Ints, Picture
 from gait.simulate.mesh import Mesh
 from gait.simulate.paint import AMBIENT, SUN

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.simulate import paint
 from gait.simulate.arrays import Array, Floats
 from gait.simulate.layout import Block, Layout

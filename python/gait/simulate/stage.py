@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.simulate.anatomy import Anatomy, draw_anatomy
 from gait.simulate.arrays import Array, Ints
-from gait.simulate.blobcurves import curves_of_model
+from gait.simulate.model_curves import curves_of_model
 from gait.simulate.curves import normative
 from gait.simulate.figure import build_figure
 from gait.simulate.layout import Layout, draw_layout

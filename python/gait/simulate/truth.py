@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gait._version import __version__
-from gait.core.initial import DEFAULT_SD
+from gait.bindings.initial import DEFAULT_SD
 from gait.io.files import replacing
 from gait.simulate.anatomy import BONE_INDEX, SIDES
 from gait.simulate.arrays import Array, Ints

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gait.errors import UsageError
-from gait.image.camera import Camera
+from gait.camera.camera import Camera
 from gait.simulate.arrays import Array
 from gait.simulate.path import Path
 

@@ -19,8 +19,8 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from gait._abi import Mode, TrackStatus
-from gait.core.estimate import Estimate
+from gait.bindings.abi import Mode, TrackStatus
+from gait.bindings.estimate import Estimate
 from gait.track.tracker import Tracker
 from gait.track.transitions import HEADING, PHASE, Step, Transitions, wrap
 

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gait import _abi
-from gait._abi import TrackStatus
-from gait._abi.library import check, library
-from gait.body.modelcurves import ModelCurves
-from gait.core.estimate import Estimate
-from gait.core.model import Model
-from gait.core.state import Array, State
-from gait.image.video import Frame
+from gait.bindings import abi
+from gait.bindings.abi import TrackStatus
+from gait.bindings.library import check, library
+from gait.body.model_curves import ModelCurves
+from gait.bindings.estimate import Estimate
+from gait.bindings.model import Model
+from gait.bindings.state import Array, State
+from gait.io.video import Frame
 from gait.motion.footfall_draws import Draws
 from gait.track.smooth import Spool, draw_motions
 from gait.track.tracker import Tracker
@@ -104,7 +104,7 @@ class Smoother:
 def pose_all(model: Model, states: NDArray[np.void]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Joints (..., P, 3), metres, and angles (..., A), radians, of an array (...) of ``gait_state``."""
     flat = np.ascontiguousarray(states).reshape(-1)
-    pose, pointer = _abi.PoseC(), ctypes.POINTER(_abi.StateC)
+    pose, pointer = abi.PoseC(), ctypes.POINTER(abi.StateC)
     joint, angle = np.ctypeslib.as_array(pose.joint), np.ctypeslib.as_array(pose.angle)
     joints = np.empty((len(flat), model.info.joints, 3), np.float32)
     angles = np.empty((len(flat), model.info.angles), np.float32)

@@ -8,8 +8,8 @@ import weakref
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from gait import _abi
-from gait._abi.library import aligned, check, library
+from gait.bindings import abi
+from gait.bindings.library import aligned, check, library
 
 Runner = Callable[[Callable[[int], None], int], None]
 """Called with (task, count): must call ``task(i)`` once for each i in range(count) and then return."""
@@ -19,7 +19,7 @@ class TaskSource(Protocol):
     """What a tracker needs; a pool written in C fits as well."""
 
     @property
-    def struct(self) -> _abi.Tasks:
+    def struct(self) -> abi.Tasks:
         """The structure given to the library; whatever it points to lives as long as this object."""
 
     def reraise(self) -> None:
@@ -36,8 +36,8 @@ class PythonTasks:
     def __init__(self, runner: Runner) -> None:
         self._runner = runner
         self._failure: BaseException | None = None
-        self._callback = _abi.RunFn(self._run)
-        self.struct = _abi.Tasks(self._callback, None)
+        self._callback = abi.RunFn(self._run)
+        self.struct = abi.Tasks(self._callback, None)
 
     def reraise(self) -> None:
         """Raise what the callable raised, once."""
@@ -67,12 +67,12 @@ class PoolTasks:
 
     def __init__(self, count: int) -> None:
         lib = library()
-        size, handle, err = ctypes.c_size_t(), ctypes.c_void_p(), _abi.Error()
+        size, handle, err = ctypes.c_size_t(), ctypes.c_void_p(), abi.Error()
         check(lib.gait_pool_bytes(count, ctypes.byref(size), ctypes.byref(err)), err)
         self._memory = aligned(size.value)
         where = (self._memory.ctypes.data, size.value)
         check(lib.gait_pool_init(*where, count, ctypes.byref(handle), ctypes.byref(err)), err)
-        self.struct: _abi.Tasks = lib.gait_pool_tasks(handle)
+        self.struct: abi.Tasks = lib.gait_pool_tasks(handle)
         # The memory must outlive the threads: the finaliser holds it as well.
         weakref.finalize(self, _stop, lib, handle, self._memory, os.getpid())
 

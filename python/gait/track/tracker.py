@@ -10,20 +10,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gait import _abi
-from gait._abi import TrackStatus
-from gait._abi.library import aligned, check, library
-from gait.core.estimate import Estimate
-from gait.core.frame import Joints, capture_time, image_view, per_camera, track_array
-from gait.core.initial import Start
-from gait.core.model import Model, camera_c
-from gait.core.state import LEAST_STATURE, State
+from gait.bindings import abi
+from gait.bindings.abi import TrackStatus
+from gait.bindings.library import aligned, check, library
+from gait.bindings.estimate import Estimate
+from gait.bindings.frame import Joints, capture_time, image_view, per_camera, track_array
+from gait.bindings.initial import Start
+from gait.bindings.model import Model, camera_c
+from gait.bindings.state import LEAST_STATURE, State
 from gait.errors import UserError
-from gait.image.camera import Camera
-from gait.image.video import Frame, Image, Video
-from gait.track.autostart import Spotter
+from gait.camera.camera import Camera
+from gait.io.video import Frame, Image, Video
+from gait.track.auto_start import Spotter
 from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
-from gait.track.trackerconfig import TrackerConfig
+from gait.track.config import TrackerConfig
 
 
 class Tracker:
@@ -70,7 +70,7 @@ class Tracker:
         self.cameras = _camera_list(cameras)
         self._tasks, config = _task_source(tasks), config or TrackerConfig.default()
         self.config = replace(config, tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
-        self._error = _abi.Error()
+        self._error = abi.Error()
         c = self._c_config()
         size, handle = ctypes.c_size_t(), ctypes.c_void_p()
         settings, err = ctypes.byref(c), ctypes.byref(self._error)
@@ -134,7 +134,7 @@ class Tracker:
         images = [None if image is None else np.ascontiguousarray(image) for image in per_camera(frames)]
         if len(images) > len(self.cameras):
             raise ValueError(f"{len(images)} images for {len(self.cameras)} cameras")
-        frame = _abi.FrameC(utime=capture_time(utime))
+        frame = abi.FrameC(utime=capture_time(utime))
         for i, image in enumerate(images):
             if image is not None:
                 frame.image[i] = image_view(image, self.cameras[i], "frame")
@@ -142,7 +142,7 @@ class Tracker:
         for i, array in enumerate(found[: len(self.cameras)]):
             if array is not None:
                 frame.tracks[i] = array
-        out = _abi.EstimateC()
+        out = abi.EstimateC()
         arguments = (ctypes.byref(frame), ctypes.byref(out), ctypes.byref(self._error))
         begun = time.perf_counter()
         status = self._lib.gait_tracker_step(self._handle, *arguments)
@@ -163,11 +163,11 @@ class Tracker:
         Estimate or None
             None if there were not so many steps since the start.
         """
-        out = _abi.EstimateC()
+        out = abi.EstimateC()
         steps = self.config.lag if back is None else back
         arguments = (ctypes.byref(out), ctypes.byref(self._error))
         status = self._lib.gait_tracker_lagged(self._handle, steps, *arguments)
-        if status == _abi.Status.STATE:
+        if status == abi.Status.STATE:
             return None
         self._check(status)
         return Estimate.from_c(out, self.model)
@@ -211,7 +211,7 @@ class Tracker:
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
         count = check(self._lib.gait_tracker_particles(self._handle, None, None, 0))
-        states = (_abi.StateC * count)()
+        states = (abi.StateC * count)()
         weights = np.zeros(count, np.float32)
         pointer = weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float))
         check(self._lib.gait_tracker_particles(self._handle, states, pointer, count))
@@ -245,10 +245,10 @@ class Tracker:
             self._tasks.reraise()
         check(status, self._error)
 
-    def _c_config(self) -> _abi.TrackerConfigC:
+    def _c_config(self) -> abi.TrackerConfigC:
         c = self.config.to_c()
-        if not 1 <= len(self.cameras) <= _abi.MAX_CAMERAS:
-            raise UserError(f"cameras: {len(self.cameras)} given; use 1 to {_abi.MAX_CAMERAS}")
+        if not 1 <= len(self.cameras) <= abi.MAX_CAMERAS:
+            raise UserError(f"cameras: {len(self.cameras)} given; use 1 to {abi.MAX_CAMERAS}")
         c.cameras = len(self.cameras)
         for i, camera in enumerate(self.cameras):
             c.camera[i] = camera_c(camera)

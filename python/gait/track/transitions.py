@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gait import _abi
-from gait._abi import Mode
-from gait.body.modelcurves import ModelCurves
-from gait.core.state import LEAST_STATURE
-from gait.track.trackerconfig import TrackerConfig
+from gait.bindings import abi
+from gait.bindings.abi import Mode
+from gait.body.model_curves import ModelCurves
+from gait.bindings.state import LEAST_STATURE
+from gait.track.config import TrackerConfig
 
 Array = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ class Transitions:
 
     def states(self, table: Array) -> NDArray[np.void]:
         """Give the inverse of `table`."""
-        out = np.ctypeslib.as_array((_abi.StateC * len(table))())
+        out = np.ctypeslib.as_array((abi.StateC * len(table))())
         coef, build = self._coef(table), table[:, self._build : self._posture]
         for k, name in enumerate(SCALARS):
             out[name] = table[:, k]

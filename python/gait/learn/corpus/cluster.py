@@ -2,7 +2,7 @@
 
 The workers read the files themselves, so they need the same paths as this machine: a shared file system.
 They also need this package, the same versions of it, numpy, scipy and ezc3d, and the same kernels
-(`gait.kernels`), or the results would differ.
+(`gait.reproducible`), or the results would differ.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gait import kernels
+from gait import reproducible
 from gait.errors import UsageError, UserError
 from gait.learn.corpus.stage import Prepared, Task, one_thread_for_good
 
@@ -94,7 +94,7 @@ def _absolute(task: Task) -> Task:
 
 def _surroundings() -> Surroundings:
     """Surroundings of this process."""
-    return Surroundings({package: metadata.version(package) for package in SAME}, kernels.chosen())
+    return Surroundings({package: metadata.version(package) for package in SAME}, reproducible.chosen())
 
 
 def _done(task: Task, wanted: Surroundings) -> Prepared | Unlike | None:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from gait.body.skeleton import CHANNELS
-from gait.draw.colours import GREY
+from gait.report.colours import GREY
 from gait.learn.prior.fit import SAMPLES, Learned
 
 Floats = npt.NDArray[np.float64]

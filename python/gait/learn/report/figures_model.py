@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gait.body.skeleton import ANGLES, JOINTS, default_skeleton, points
-from gait.draw.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
+from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
 from gait.learn.prior.fit import Learned
 from gait.learn.report.figures_base import (
     PHASE,

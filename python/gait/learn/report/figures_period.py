@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gait.body.skeleton import ANGLES
-from gait.draw.colours import BLUE, DARK, GREY, ORANGE
+from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn.cycles import period
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.prior.fit import Learned

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from gait.draw.colours import BLUE, ORANGE
+from gait.report.colours import BLUE, ORANGE
 from gait.learn.prior.between import ADULT_STATURE
 from gait.learn.prior.fit import Learned
 from gait.learn.report.figures_base import grid

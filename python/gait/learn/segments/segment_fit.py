@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import UserError
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_heldout, segment_mixture

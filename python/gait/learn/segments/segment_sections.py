@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gait.core.segment_prior import SegmentPrior
+from gait.bindings.segment_prior import SegmentPrior
 from gait.io import blob
 from gait.learn.prior.rounded import rounded
 

@@ -1,0 +1,266 @@
+/* lift_api.c - public functions of the lifter: check the arguments, then call down. */
+#include "lift/continue.h"
+#include "lift/read.h"
+#include "lift/uncertainty.h"
+#include "lift/lifter.h"
+
+#include <string.h>
+
+void gait_lift_default(gait_lift_config *cfg)
+{
+    if (!cfg)
+        return;
+    *cfg = (gait_lift_config){
+        .struct_size = sizeof *cfg,
+        .projection = GAIT_LIFT_PERSPECTIVE,
+        .stature_sd = -1.0,
+        .sd = 3.0,
+        .residual = -1.0,
+        .place_sd = {10.0, 10.0, 0.03},
+        .heading_sd = -1.0,
+        .turn_sd = 0.3,
+        .tolerance = 1e-9,
+        .max_iterations = 30,
+        .lag = 5,
+        .max_rate = 60.0,
+        .max_gap = 0.5,
+        .misfit = 9.0,
+        .report = ~UINT64_C(0),
+        .axis = {{1.0, 0.0, 0.0}, {0.0, 0.0, 1.0}},
+        .cpu_mask = ~0u,
+    };
+}
+
+gait_result gait_lift_bytes(const void *blob, size_t blob_bytes, const gait_lift_config *cfg, size_t *bytes,
+                            gait_error *err)
+{
+    if (!blob || !cfg || !bytes)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_bytes: null pointer");
+    segment_prior prior;
+    gait_result const s = lifter_open(blob, blob_bytes, cfg, &prior, err);
+    if (s != GAIT_OK)
+        return s;
+    arena a = {.base = NULL};
+    (void)lifter_layout(&a, &prior, cfg);
+    *bytes = a.used;
+    return GAIT_OK;
+}
+
+gait_result gait_lift_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
+                           const gait_lift_config *cfg, gait_lift **out, gait_error *err)
+{
+    if (!mem || !blob || !cfg || !out)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_init: null pointer");
+    segment_prior prior;
+    gait_result s = lifter_open(blob, blob_bytes, cfg, &prior, err);
+    if (s != GAIT_OK)
+        return s;
+    arena a = {.base = NULL};
+    (void)lifter_layout(&a, &prior, cfg);
+    s = arena_place(&a, mem, mem_bytes, err);
+    if (s != GAIT_OK)
+        return s;
+    gait_lift *const self = lifter_layout(&a, &prior, cfg);
+    lift_stream_reset(&self->stream);
+    for (int32_t f = 0; f < prior.frames; f++)
+        self->at[f] = f;
+    self->window = (lift_window){.frames = prior.frames, .at = self->at, .uv = self->uv, .sd = self->sd};
+    *out = self;
+    return GAIT_OK;
+}
+
+gait_result gait_lift_get_info(const void *blob, size_t blob_bytes, gait_lift_info *out, gait_error *err)
+{
+    if (!blob || !out)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_get_info: null pointer");
+    segment_prior p;
+    gait_result const s = segment_open(blob, blob_bytes, &p, err);
+    if (s == GAIT_OK)
+        *out = (gait_lift_info){.markers = p.markers,
+                                .frames = p.frames,
+                                .hop = p.hop,
+                                .headings = p.headings,
+                                .components = p.components,
+                                .modes = p.modes,
+                                .fps = p.fps,
+                                .stature = p.stature,
+                                .digest = p.digest};
+    return s;
+}
+
+const char *gait_lift_marker_name(const gait_lift *l, int32_t marker)
+{
+    return l && marker >= 0 && marker < l->table.prior.markers ? l->table.prior.name[marker] : NULL;
+}
+
+static size_t points_of(const lift_table *t)
+{
+    return (size_t)t->prior.frames * (size_t)t->prior.markers;
+}
+
+gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
+                              gait_error *err)
+{
+    if (!l || !uv || !out)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_segment: null pointer");
+    const lift_table *const t = &l->table;
+    segment_posterior *const b = &l->belief;
+    lift_outcome found;
+    lifter_take(l, points_of(t), uv, sd, l->uv, l->sd);
+    memcpy(b->place, t->cfg.place, sizeof b->place);
+    l->fitted = l->windowed = lift_fit(t, &l->search, &l->window, b, &found);
+    if (!l->fitted)
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: observations out of any range");
+    double const log_10 = 2.30258509299404568402;
+    *out = (gait_lift_fit){.log_evidence = lift_evidence(t, b),
+                           .log10_volume = -cholesky_log_det(b->U, t->n, t->ld) / log_10,
+                           .misfit = lift_misfit(t, b),
+                           .heading = lift_heading(t, b),
+                           .share = found.share,
+                           .component = b->component,
+                           .observed = b->observed,
+                           .iterations = found.iterations,
+                           .converged = found.converged};
+    if (t->turn >= 0) /* the last unknown: its variance is that of the last pivot */
+        out->heading_sd = b->turn_sd / b->U[t->turn * (t->ld + 1)];
+    for (int32_t i = 0; i < 3; i++)
+        out->place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
+    return GAIT_OK;
+}
+
+/* Every marker of frame f of the last segment. */
+static void read_frame(const gait_lift *l, const segment_posterior *b, int32_t f, bool residual, double *mean,
+                       double *sd)
+{
+    const lift_table *const t = &l->table;
+    size_t const J = (size_t)t->prior.markers, first = (size_t)f * J;
+    double x[3 * GAIT_MAX_MARKERS], each[3 * GAIT_MAX_MARKERS];
+    lift_seen const seen = {.uv = l->uv + first * 2, .sd = l->sd + first};
+    lift_query const q = {.at = f, .count = t->prior.markers, .seen = residual ? &seen : NULL};
+    lift_read(t, b, &q, x, sd ? each : NULL);
+    for (int32_t r = 0; r < q.count; r++) {
+        size_t const to = 3 * (first + (size_t)t->order[r]);
+        memcpy(mean + to, x + 3 * r, 3 * sizeof *x);
+        if (sd)
+            memcpy(sd + to, each + 3 * r, 3 * sizeof *each);
+    }
+}
+
+gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd)
+{
+    if (!l || !mean)
+        return GAIT_ERR_ARG;
+    if (!l->fitted)
+        return GAIT_ERR_STATE;
+    for (int32_t f = 0; f < l->table.prior.frames; f++)
+        read_frame(l, &l->belief, f, true, mean, sd);
+    return GAIT_OK;
+}
+
+int32_t gait_lift_unknowns(const gait_lift *l)
+{
+    return l ? l->table.n : GAIT_ERR_ARG;
+}
+
+gait_result gait_lift_posterior(gait_lift *l, double *mean, double *covariance)
+{
+    if (!l || !mean)
+        return GAIT_ERR_ARG;
+    if (!l->fitted)
+        return GAIT_ERR_STATE;
+    memcpy(mean, l->belief.theta, (size_t)l->table.n * sizeof *mean);
+    if (covariance)
+        lift_covariance(&l->table, &l->belief, &l->spare, covariance);
+    return GAIT_OK;
+}
+
+double gait_lift_scale(gait_lift *l)
+{
+    return l && l->windowed ? sqrt(lift_scale(&l->table, &l->belief, &l->spare)) : 0.0;
+}
+
+gait_result gait_lift_least_squares(gait_lift *l, double *mean)
+{
+    if (!l || !mean)
+        return GAIT_ERR_ARG;
+    if (!l->windowed)
+        return GAIT_ERR_STATE;
+    lift_likelihood_only(&l->table, &l->window, &l->belief, &l->spare);
+    segment_posterior alone = l->belief;
+    alone.theta = l->spare.theta;
+    for (int32_t f = 0; f < l->table.prior.frames; f++)
+        read_frame(l, &alone, f, false, mean, NULL);
+    return GAIT_OK;
+}
+
+gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, double *sd)
+{
+    if (!l || !mode || !sd || count < 1 || count > l->table.n)
+        return GAIT_ERR_ARG;
+    if (!l->fitted)
+        return GAIT_ERR_STATE;
+    lift_uncertain(&l->table, &l->belief, &l->spare, count, mode, sd);
+    return GAIT_OK;
+}
+
+gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err)
+{
+    if (!l || !sd)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_fix: null pointer");
+    lift_table *const t = &l->table;
+    if (t->projection.perspective || t->turn >= 0)
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "gait_lift_fix: needs an orthographic view and a known heading (heading_sd 0)");
+    memcpy(l->belief.place, t->cfg.place, sizeof l->belief.place);
+    l->windowed = false;
+    l->fitted = lift_gain_fix(t, &l->gain, &l->belief, sd);
+    if (!l->fitted)
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_fix: deviations out of any range");
+    memcpy(l->uv, l->gain.base, points_of(t) * 2 * sizeof *l->uv);
+    memcpy(l->sd, sd, points_of(t) * sizeof *l->sd);
+    return GAIT_OK;
+}
+
+gait_result gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean)
+{
+    if (!l || !uv || !mean || count < 0)
+        return GAIT_ERR_ARG;
+    if (!l->gain.ready)
+        return GAIT_ERR_STATE;
+    size_t const points = points_of(&l->table);
+    for (size_t i = 0; i < (size_t)count; i++)
+        lift_gain_apply(&l->table, &l->gain, uv + i * points * 2, mean + i * points * 3);
+    return GAIT_OK;
+}
+
+gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err)
+{
+    if (!l || !uv)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_push: null pointer");
+    const lift_table *const t = &l->table;
+    if (t->cfg.lag < 0)
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "gait_lift_push: config lag is -1: there is no room for a stream");
+    if (utime < 0 || (l->stream.last >= 0 && utime <= l->stream.last))
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "gait_lift_push: utime %lld does not follow %lld; gait_lift_reset() begins anew",
+                         (long long)utime, (long long)l->stream.last);
+    lift_seen const seen = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
+    lifter_take(l, (size_t)t->prior.markers, uv, sd, l->stream.new_uv, l->stream.new_sd);
+    if (!lift_stream_push(t, &l->search, &l->stream, utime, &seen))
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_push: observations out of any range");
+    return GAIT_OK;
+}
+
+gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out)
+{
+    if (!l || !out)
+        return GAIT_ERR_ARG;
+    return l->table.cfg.lag >= 0 && lift_estimate(&l->table, &l->stream, out) ? GAIT_OK : GAIT_ERR_STATE;
+}
+
+void gait_lift_reset(gait_lift *l)
+{
+    if (l)
+        lift_stream_reset(&l->stream);
+}

@@ -1,0 +1,129 @@
+/* model_api.c - public functions of the library and of models: check the arguments, then one call down. */
+#include "base/cpu.h"
+#include "base/dispatch.h"
+#include "model/kinematics.h"
+
+uint32_t gait_version(void)
+{
+    return GAIT_VERSION;
+}
+
+uint32_t gait_abi(void)
+{
+    return GAIT_ABI;
+}
+
+uint32_t gait_cpu_features(void)
+{
+    return cpu_features();
+}
+
+const char *gait_cpu_name(uint32_t mask)
+{
+    return dispatch_choose(mask)->isa;
+}
+
+const char *gait_result_name(gait_result s)
+{
+    switch (s) {
+    case GAIT_OK:
+        return "GAIT_OK";
+    case GAIT_ERR_ARG:
+        return "GAIT_ERR_ARG";
+    case GAIT_ERR_STRUCT:
+        return "GAIT_ERR_STRUCT";
+    case GAIT_ERR_MEMORY:
+        return "GAIT_ERR_MEMORY";
+    case GAIT_ERR_LIMIT:
+        return "GAIT_ERR_LIMIT";
+    case GAIT_ERR_MAGIC:
+        return "GAIT_ERR_MAGIC";
+    case GAIT_ERR_VERSION:
+        return "GAIT_ERR_VERSION";
+    case GAIT_ERR_CORRUPT:
+        return "GAIT_ERR_CORRUPT";
+    case GAIT_ERR_STATE:
+        return "GAIT_ERR_STATE";
+    case GAIT_ERR_NUMERIC:
+        return "GAIT_ERR_NUMERIC";
+    }
+    return "unknown gait_result";
+}
+
+gait_result gait_model_bytes(const void *blob, size_t blob_bytes, size_t *bytes, gait_error *err)
+{
+    if (!blob || !bytes)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_model_bytes: null pointer");
+    gait_model m;
+    gait_result const s = model_open(blob, blob_bytes, &m, err);
+    if (s != GAIT_OK)
+        return s;
+    arena a = {.base = NULL};
+    (void)model_layout(&a, &m);
+    *bytes = a.used;
+    return GAIT_OK;
+}
+
+gait_result gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
+                            gait_model **out, gait_error *err)
+{
+    if (!mem || !blob || !out)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_model_init: null pointer");
+    gait_model m;
+    gait_result s = model_open(blob, blob_bytes, &m, err);
+    if (s != GAIT_OK)
+        return s;
+    arena a = {.base = NULL};
+    (void)model_layout(&a, &m);
+    s = arena_place(&a, mem, mem_bytes, err);
+    if (s == GAIT_OK)
+        *out = model_layout(&a, &m);
+    return s;
+}
+
+gait_result gait_model_get_info(const gait_model *m, gait_model_info *out)
+{
+    if (!m || !out)
+        return GAIT_ERR_ARG;
+    *out = (gait_model_info){.joints = m->points,
+                             .angles = m->angles,
+                             .components = m->components,
+                             .proportions = m->proportions,
+                             .phases = m->phases,
+                             .limbs = m->limbs,
+                             .stride_hz = m->stride_hz,
+                             .stride_hz_sd = m->stride_hz_sd,
+                             .stride_length = m->stride_length,
+                             .stride_length_sd = m->stride_length_sd,
+                             .digest = m->digest};
+    return GAIT_OK;
+}
+
+const char *gait_model_joint_name(const gait_model *m, int32_t joint)
+{
+    return m && joint >= 0 && joint < m->points ? m->point_name[joint] : NULL;
+}
+
+const char *gait_model_angle_name(const gait_model *m, int32_t angle)
+{
+    return m && angle >= 0 && angle < m->angles ? m->channel_name[angle] : NULL;
+}
+
+const char *gait_model_limb_name(const gait_model *m, int32_t limb)
+{
+    return m && limb >= 0 && limb < m->limbs ? m->limb_name[limb] : NULL;
+}
+
+gait_result gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out)
+{
+    if (!m || !s || !out)
+        return GAIT_ERR_ARG;
+    return model_pose_state(m, s, out);
+}
+
+gait_result gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out)
+{
+    if (!m || !s || !out)
+        return GAIT_ERR_ARG;
+    return model_pelvis_height(m, s, out);
+}

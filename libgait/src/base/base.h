@@ -1,0 +1,72 @@
+/* base.h - what every module may use: assertions, min/max, constants, error reporting. */
+#ifndef GAIT_BASE_BASE_H
+#define GAIT_BASE_BASE_H
+#include "gait.h"
+
+#include <assert.h>
+#include <float.h>
+#include <limits.h>
+#include <math.h>
+#include <stdbool.h>
+
+/* Checks that cost nothing in a release: callers above api.c are trusted. */
+#ifdef NDEBUG
+#define GAIT_ASSERT(x) ((void)0)
+#else
+#define GAIT_ASSERT(x) assert(x)
+#endif
+
+#define PI_F     3.14159265358979323846f
+#define TWO_PI_F 6.28318530717958647692f
+
+_Static_assert(CHAR_BIT == 8 && sizeof(float) == 4 && sizeof(double) == 8, "IEEE 754 binary32 and binary64");
+_Static_assert(FLT_RADIX == 2 && FLT_MANT_DIG == 24 && DBL_MANT_DIG == 53, "IEEE 754 binary32 and binary64");
+_Static_assert(FLT_EVAL_METHOD == 0, "excess precision breaks determinism");
+
+/* Branch-free in a loop over lanes.  A NaN in the first argument gives the second. */
+static inline float f_min(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float f_max(float a, float b)
+{
+    return a > b ? a : b;
+}
+
+/* NaN gives lo, so a clamped value is always safe to convert to an integer. */
+static inline float f_clamp(float x, float lo, float hi)
+{
+    return f_min(f_max(x, lo), hi);
+}
+
+static inline int32_t i_min(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+static inline int32_t i_max(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+static inline int32_t i_clamp(int32_t x, int32_t lo, int32_t hi)
+{
+    return i_min(i_max(x, lo), hi);
+}
+
+/* Every one of n floats is finite. */
+static inline bool f_finite(const float *x, size_t n)
+{
+    bool ok = true;
+    for (size_t i = 0; i < n; i++)
+        ok &= fabsf(x[i]) <= FLT_MAX;
+    return ok;
+}
+
+/* Fill err (may be NULL) with status, index and one formatted line; returns s. */
+#if defined(__GNUC__)
+__attribute__((format(printf, 4, 5)))
+#endif
+gait_result base_fail(gait_error *err, gait_result s, int index, const char *fmt, ...);
+#endif

@@ -1,0 +1,25 @@
+#include "base/dispatch.h"
+#include "base/cpu.h"
+
+/* The functions of every ISA, and one constant table of each. */
+#define DECLARE_scalar(result, name, parameters) result name##_scalar parameters;
+#define DECLARE_base(result, name, parameters)   result name##_base parameters;
+#define DECLARE_avx2(result, name, parameters)   result name##_avx2 parameters;
+#define DECLARE_avx512(result, name, parameters) result name##_avx512 parameters;
+#define MEMBER_scalar(result, name, parameters)  .name = name##_scalar,
+#define MEMBER_base(result, name, parameters)    .name = name##_base,
+#define MEMBER_avx2(result, name, parameters)    .name = name##_avx2,
+#define MEMBER_avx512(result, name, parameters)  .name = name##_avx512,
+#define TABLE(which, bit)                                                                                    \
+    KERNELS(DECLARE_##which) static const kernels which = {.isa = #which, KERNELS(MEMBER_##which)};
+KERNEL_ISAS(TABLE)
+
+const kernels *dispatch_choose(uint32_t mask)
+{
+    uint32_t const usable = mask & cpu_features();
+    const kernels *best = &scalar;
+#define CONSIDER(which, bit) best = (usable & (bit)) ? &which : best;
+    KERNEL_ISAS(CONSIDER)
+#undef CONSIDER
+    return best;
+}

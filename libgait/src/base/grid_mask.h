@@ -1,0 +1,60 @@
+/* grid_mask.h - bit masks of the small grid on which bodies are drawn and foreground is counted. */
+#ifndef GAIT_BASE_GRID_MASK_H
+#define GAIT_BASE_GRID_MASK_H
+#include "base/base.h"
+
+enum {
+    GRID_SIZE = 128, /* the grid is GRID_SIZE x GRID_SIZE cells */
+    GRID_WORDS = 2,  /* 64-bit words per row of the grid */
+    GRID_SPARE = 16, /* rows of a mask beyond the grid: written in passing, never read */
+    GRID_SMALL = 32, /* rows of 64 columns that are looked up in registers */
+    GRID_STEP = 8,   /* a word can begin at any multiple of this many columns */
+    GRID_STARTS = 64 / GRID_STEP + 1
+};
+
+/* Rows [first, last) and columns from `column` on, a multiple of GRID_STEP; the rest is empty and not written. */
+typedef struct grid_mask {
+    _Alignas(
+        GAIT_ALIGN) uint64_t word[GRID_WORDS][GRID_SIZE + GRID_SPARE]; /* from column, and from column + 64 */
+    int32_t first, last, column, width; /* width: 64, or 128 from column 0 on */
+    /* For look-ups: the last of 64 columns, twice `first` less one, twice the rows; small: 64 columns and at most
+     * GRID_SMALL rows, of which the first begins a line of the cache. */
+    int32_t edge, half, halves;
+    bool small;
+} grid_mask;
+
+/* What a mask holds, and what follows from it. */
+static inline void grid_mask_frame(grid_mask *m, int32_t first, int32_t last, int32_t column, int32_t width)
+{
+    m->first = first;
+    m->last = last;
+    m->column = column;
+    m->width = width;
+    m->edge = column + 63;
+    m->half = 2 * first - 1;
+    m->halves = 2 * (last - first);
+    m->small = (width == 64) & (last - first <= GRID_SMALL) & (first % 8 == 0);
+}
+
+/* Bits [begin, end) of a word, begin >= 0, end <= 64; begin >= end: none.  No branch: a loop becomes vector code. */
+static inline uint64_t grid_bits(int32_t begin, int32_t end)
+{
+    uint64_t const ones = (uint64_t)(int64_t)-(int32_t)(begin < end);
+    return (ones >> ((uint32_t)(begin - end) & 63u)) << ((uint32_t)begin & 63u);
+}
+
+/* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y. */
+static inline int32_t grid_half(int32_t x, int32_t y)
+{
+    return 2 * y + (x >> 5) + (x < 64 ? 0 : 2 * (GRID_SIZE + GRID_SPARE) - 2);
+}
+
+/* Number of set bits, without a table or an ISA extension. */
+static inline int32_t grid_popcount(uint64_t v)
+{
+    v = v - ((v >> 1) & UINT64_C(0x5555555555555555));
+    v = (v & UINT64_C(0x3333333333333333)) + ((v >> 2) & UINT64_C(0x3333333333333333));
+    v = (v + (v >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+    return (int32_t)((v * UINT64_C(0x0101010101010101)) >> 56);
+}
+#endif

@@ -1,0 +1,359 @@
+/* simd16.h - for kernels, what compilers do not find out in loops over sixteen elements. */
+#ifndef GAIT_BASE_SIMD16_H
+#define GAIT_BASE_SIMD16_H
+#include "base/grid_mask.h"
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+enum { SIMD16 = 16 };
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+
+/* An unconditional gather would wait for what its register held before.  The distance is part of the instruction. */
+static inline __m256i simd16_lookup8(const void *table, int32_t bytes, __m256i index, __m256i take)
+{
+    __m256i const none = _mm256_setzero_si256();
+    return bytes == 2 ? _mm256_mask_i32gather_epi32(none, table, index, take, 2)
+                      : _mm256_mask_i32gather_epi32(none, table, index, take, 4);
+}
+#endif
+
+#if defined(__AVX512F__)
+#pragma GCC diagnostic push /* unoptimised, gcc's gather is a macro that changes the sign of a mask */
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+static inline __m512i simd16_lookup16(const void *table, int32_t bytes, __m512i index, __mmask16 take)
+{
+    __m512i const none = _mm512_setzero_si512();
+    return bytes == 2 ? _mm512_mask_i32gather_epi32(none, take, index, table, 2)
+                      : _mm512_mask_i32gather_epi32(none, take, index, table, 4);
+}
+#pragma GCC diagnostic pop
+#endif
+
+/* out[i] = the word `bytes` (2 or 4) times index[i] into the table where take[i] is negative, elsewhere 0. */
+static inline void simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index,
+                                      const int32_t *take, int32_t *out)
+{
+#if defined(__AVX512F__)
+    __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take));
+    _mm512_storeu_si512(out, simd16_lookup16(table, bytes, _mm512_loadu_si512(index), on));
+#elif defined(__AVX2__)
+    for (int32_t i = 0; i < SIMD16; i += 8)
+        _mm256_storeu_si256((__m256i_u *)(out + i),
+                            simd16_lookup8(table, bytes, _mm256_loadu_si256((const __m256i_u *)(index + i)),
+                                          _mm256_loadu_si256((const __m256i_u *)(take + i))));
+#else
+    for (int32_t i = 0; i < SIMD16; i++) {
+        int32_t found = 0;
+        if (take[i] < 0)
+            memcpy(&found, (const char *)table + (ptrdiff_t)bytes * index[i], sizeof found);
+        out[i] = found; /* which can be the indices' place */
+    }
+#endif
+}
+
+/* out[i] = table[index[i]] where take[i] is negative, elsewhere 0. */
+static inline void simd16_lookup(const void *table, const int32_t *index, const int32_t *take, int32_t *out)
+{
+    simd16_lookup_every(4, table, index, take, out);
+}
+
+#if defined(__AVX512BW__)
+#define SIMD16_WORDS 16 /* words in a register */
+typedef __m512i simd16_words;
+static inline simd16_words words_load(const int32_t *v)
+{
+    return _mm512_loadu_si512(v);
+}
+
+static inline void words_store(int32_t *v, simd16_words w)
+{
+    _mm512_storeu_si512(v, w);
+}
+#define WORDS_OP(op) _mm512_##op
+#define WORDS_AND    _mm512_and_si512
+#elif defined(__AVX2__)
+#define SIMD16_WORDS  8
+typedef __m256i simd16_words;
+static inline simd16_words words_load(const int32_t *v)
+{
+    return _mm256_loadu_si256((const __m256i_u *)v);
+}
+
+static inline void words_store(int32_t *v, simd16_words w)
+{
+    _mm256_storeu_si256((__m256i_u *)v, w);
+}
+#define WORDS_OP(op) _mm256_##op
+#define WORDS_AND    _mm256_and_si256
+#endif
+
+#if defined(SIMD16_WORDS)
+/* What is left of a fraction of 256 in the low half of each word, the fraction in the high one. */
+static inline simd16_words words_shares(simd16_words v)
+{
+    simd16_words const f = WORDS_AND(v, WORDS_OP(set1_epi32)(255));
+    return WORDS_OP(add_epi32)(WORDS_OP(slli_epi32)(f, 16),
+                               WORDS_OP(sub_epi32)(WORDS_OP(set1_epi32)(256), f));
+}
+#endif
+
+/* Between four neighbours, the bytes left, left below, right, right below of a word, at 1/256 of their distance, in the
+ * low bytes of u and v; rounded towards 0. */
+static inline void simd16_bilinear(const int32_t *four, const int32_t *u, const int32_t *v, int32_t *out)
+{
+#if defined(SIMD16_WORDS)
+    for (int32_t i = 0; i < SIMD16; i += SIMD16_WORDS) {
+        simd16_words const w = words_load(four + i), across = words_shares(words_load(u + i));
+        simd16_words const even = WORDS_OP(srai_epi16)(WORDS_OP(slli_epi16)(w, 8), 8);
+        simd16_words const top = WORDS_OP(madd_epi16)(even, across);
+        simd16_words const low = WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(w, 8), across);
+        simd16_words const both =
+            WORDS_OP(add_epi32)(WORDS_OP(slli_epi32)(low, 16), WORDS_AND(top, WORDS_OP(set1_epi32)(65535)));
+        simd16_words const sum = WORDS_OP(madd_epi16)(both, words_shares(words_load(v + i)));
+        simd16_words const up = WORDS_OP(srli_epi32)(WORDS_OP(srai_epi32)(sum, 31), 16);
+        words_store(out + i, WORDS_OP(srai_epi32)(WORDS_OP(add_epi32)(sum, up), 16));
+    }
+#else
+    for (int32_t i = 0; i < SIMD16; i++) {
+        int32_t const fx = u[i] & 255, fy = v[i] & 255;
+        uint32_t const w = (uint32_t)four[i];
+        int32_t const left = (int32_t)(w << 24) >> 24, left_low = (int32_t)(w << 16) >> 24;
+        int32_t const right = (int32_t)(w << 8) >> 24, right_low = (int32_t)w >> 24;
+        int32_t const top = left * 256 + (right - left) * fx;
+        int32_t const low = left_low * 256 + (right_low - left_low) * fx;
+        out[i] = (top * 256 + (low - top) * fy) / 65536;
+    }
+#endif
+}
+
+#if defined(__AVX512VBMI__)
+#define SIMD16_BETWEEN
+/* Bilinear look-up of bytes: pairs of one with that below it, 256 in a row; at u, v, 1/256 of their distance, rounded
+ * towards 0, where shown (negative), elsewhere `hidden`. */
+static inline void simd16_between(const uint16_t *pairs, const int32_t *u, const int32_t *v,
+                                 const int32_t *shown, int8_t hidden, int8_t *out)
+{
+    __m512i const x = _mm512_loadu_si512(u), y = _mm512_loadu_si512(v), low = _mm512_set1_epi32(255);
+    __m512i const at = _mm512_ternarylogic_epi32(_mm512_srai_epi32(x, 8), y, low, 0xf4);
+    __mmask16 const take = _mm512_movepi32_mask(_mm512_loadu_si512(shown));
+    __m512i const four = simd16_lookup16(pairs, 2, at, take);
+    __m512i const bytes = _mm512_set4_epi32(0x0c0c0c0c, 0x08080808, 0x04040404, 0);
+    __m512i const words = _mm512_or_si512(bytes, _mm512_set1_epi16((short)0x8000));
+    __m512i const down = _mm512_xor_si512(_mm512_shuffle_epi8(y, bytes), _mm512_set1_epi32(0x00ff00ff));
+    __m512i const left = _mm512_srai_epi16(_mm512_slli_epi16(four, 8), 8);
+    __m512i const both = _mm512_add_epi16(_mm512_maddubs_epi16(down, four), left);
+    __m512i const fx = _mm512_shuffle_epi8(x, words);
+    __m512i const across = _mm512_mask_sub_epi16(fx, 0x55555555, _mm512_set1_epi16(256), fx);
+    __m512i const sum = _mm512_madd_epi16(both, across);
+    __m512i const whole =
+        _mm512_mask_add_epi32(sum, _mm512_movepi32_mask(sum), sum, _mm512_set1_epi32(65535));
+    __m512i const third = _mm512_set_epi64(0, 0, 0, 0, 0, 0, 0x3e3a36322e2a2622, 0x1e1a16120e0a0602);
+    __m512i const value = _mm512_mask_permutexvar_epi8(_mm512_set1_epi8(hidden), take, third, whole);
+    _mm_storeu_si128((__m128i_u *)out, _mm512_castsi512_si128(value));
+}
+#endif
+
+/* The sum over `count` words, a multiple of LANES, of byte 1 times the low half of the pair and byte 3 times the high
+ * one. */
+static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, int32_t count)
+{
+    int32_t sum = 0;
+#if defined(SIMD16_WORDS)
+    int32_t part[SIMD16_WORDS];
+    simd16_words all = WORDS_OP(set1_epi32)(0);
+    for (int32_t i = 0; i < count; i += SIMD16_WORDS)
+        all = WORDS_OP(add_epi32)(
+            all, WORDS_OP(madd_epi16)(WORDS_OP(srai_epi16)(words_load(bytes + i), 8), words_load(pair + i)));
+    words_store(part, all);
+    for (int32_t i = 0; i < SIMD16_WORDS; i++)
+        sum += part[i];
+#else
+    for (int32_t i = 0; i < count; i++) {
+        uint32_t const v = (uint32_t)bytes[i], p = (uint32_t)pair[i];
+        sum +=
+            ((int32_t)(v << 16) >> 24) * ((int32_t)(p << 16) >> 16) + ((int32_t)v >> 24) * ((int32_t)p >> 16);
+    }
+#endif
+    return sum;
+}
+
+/* Sixteen numbers to be read again and again: in registers. */
+static inline void simd16_once(const float *in, float *restrict out)
+{
+#if defined(__AVX512F__)
+    _mm512_storeu_ps(out, _mm512_loadu_ps(in));
+#else
+    memcpy(out, in, SIMD16 * sizeof *out);
+#endif
+}
+
+/* Bytes to words: in pieces, what follows would wait for them. */
+static inline void simd16_widen(const int8_t *in, int32_t *out)
+{
+#if defined(__AVX512F__)
+    _mm512_storeu_si512(out, _mm512_cvtepi8_epi32(_mm_loadu_si128((const __m128i_u *)in)));
+#elif defined(__AVX2__)
+    for (int32_t i = 0; i < SIMD16; i += 8)
+        _mm256_storeu_si256((__m256i_u *)(out + i), _mm256_cvtepi8_epi32(_mm_loadu_si64(in + i)));
+#else
+    for (int32_t i = 0; i < SIMD16; i++)
+        out[i] = in[i];
+#endif
+}
+
+/* Words to bytes, which they fit. */
+static inline void simd16_narrow(const int32_t *in, int8_t *out)
+{
+#if defined(__AVX2__)
+    __m256i const low = _mm256_loadu_si256((const __m256i_u *)in);
+    __m256i const high = _mm256_loadu_si256((const __m256i_u *)(in + 8));
+    __m256i const half = _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0xd8);
+    _mm_storeu_si128((__m128i_u *)out,
+                     _mm_packs_epi16(_mm256_castsi256_si128(half), _mm256_extracti128_si256(half, 1)));
+#else
+    for (int32_t i = 0; i < SIMD16; i++)
+        out[i] = (int8_t)in[i];
+#endif
+}
+
+#if defined(__AVX512VBMI__)
+#define SIMD16_BYTES 4 /* rows of LANES bytes in a register */
+
+static inline __m512i bytes_load(const int8_t *const *row)
+{
+    __m512i v = _mm512_castsi128_si512(_mm_loadu_si128((const __m128i_u *)row[0]));
+    v = _mm512_inserti32x4(v, _mm_loadu_si128((const __m128i_u *)row[1]), 1);
+    v = _mm512_inserti32x4(v, _mm_loadu_si128((const __m128i_u *)row[2]), 2);
+    return _mm512_inserti32x4(v, _mm_loadu_si128((const __m128i_u *)row[3]), 3);
+}
+
+/* table[index], 0 .. 255 */
+static inline __m512i bytes_lookup(const uint8_t *table, __m512i index)
+{
+    __m512i const low =
+        _mm512_permutex2var_epi8(_mm512_loadu_si512(table), index, _mm512_loadu_si512(table + 64));
+    __m512i const high =
+        _mm512_permutex2var_epi8(_mm512_loadu_si512(table + 128), index, _mm512_loadu_si512(table + 192));
+    return _mm512_mask_blend_epi8(_mm512_movepi8_mask(index), low, high);
+}
+
+/* For each pair of rows the sum over differences d, where neither byte is `none`, of low[d] + 2^8 high[d] + 2^24. */
+static inline void bytes_costs(const int8_t *const *a, const int8_t *const *b, int8_t none,
+                               const uint8_t *low, const uint8_t *high, int32_t *sum)
+{
+    __m512i const x = bytes_load(a), y = bytes_load(b), no = _mm512_set1_epi8(none),
+                  zero = _mm512_setzero_si512();
+    __m512i const d = _mm512_sub_epi8(_mm512_max_epi8(x, y), _mm512_min_epi8(x, y));
+    __mmask64 const both = _mm512_mask_cmpneq_epi8_mask(_mm512_cmpneq_epi8_mask(x, no), y, no);
+    __m512i const l = _mm512_sad_epu8(_mm512_maskz_mov_epi8(both, bytes_lookup(low, d)), zero);
+    __m512i const h = _mm512_sad_epu8(_mm512_maskz_mov_epi8(both, bytes_lookup(high, d)), zero);
+    __m512i const n = _mm512_sad_epu8(_mm512_maskz_set1_epi8(both, 1), zero);
+    __m512i const half = l + (h << 8) + (n << 24); /* of a row, twice in each */
+    __m512i const all = half + _mm512_shuffle_epi32(half, _MM_PERM_BADC);
+    __m512i const first = _mm512_permutexvar_epi64(_mm512_setr_epi64(0, 2, 4, 6, 0, 0, 0, 0), all);
+    _mm_storeu_si128((__m128i_u *)sum, _mm256_cvtepi64_epi32(_mm512_castsi512_si256(first)));
+}
+#endif
+
+/* Two numbers in turn, `count` in all, a multiple of eight. */
+static inline void simd16_repeat(const float *two, int32_t count, float *restrict out)
+{
+#if defined(__AVX512F__)
+    double both;
+    memcpy(&both, two, sizeof both);
+    for (int32_t i = 0; i < count; i += 16)
+        _mm512_storeu_pd((double *)(void *)(out + i), _mm512_set1_pd(both));
+#elif defined(__AVX2__)
+    double both;
+    memcpy(&both, two, sizeof both);
+    for (int32_t i = 0; i < count; i += 8)
+        _mm256_storeu_pd((double *)(void *)(out + i), _mm256_set1_pd(both));
+#else
+    for (int32_t i = 0; i < count; i += 2)
+        memcpy(out + i, two, 2 * sizeof *out);
+#endif
+}
+
+/* Eight numbers, and again. */
+static inline void simd16_twice(const float *eight, float *restrict out)
+{
+#if defined(__AVX512DQ__) /* in pieces, what follows would wait for them */
+    _mm512_storeu_ps(out, _mm512_broadcast_f32x8(_mm256_loadu_ps(eight)));
+#else
+    memcpy(out, eight, 8 * sizeof *out);
+    memcpy(out + 8, eight, 8 * sizeof *out);
+#endif
+}
+
+/* Rows of masks at once, as many as the two ends of fill a register. */
+#if defined(__AVX2__) && !defined(__AVX512F__)
+enum { SIMD16_ROWS = 4 };
+#else
+enum { SIMD16_ROWS = 8 };
+#endif
+
+/* Of each word the bits from the first to the second number of a pair, 0 to 64, go behind those of `whole`: what is seen
+ * of them, and all. */
+static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, uint64_t *restrict seen)
+{
+#if defined(__AVX512F__)
+    __m512i const ones = _mm512_set1_epi64(-1), both = _mm512_loadu_si512(span);
+    __m512i const from = _mm512_sllv_epi64(ones, _mm512_maskz_mov_epi32(0x5555, both));
+    __m512i const to = _mm512_sllv_epi64(ones, _mm512_srli_epi64(both, 32));
+    __m512i const nearer = _mm512_loadu_si512(whole);
+    _mm512_storeu_si512(whole, _mm512_ternarylogic_epi64(nearer, from, to, 0xf4));
+    _mm512_storeu_si512(seen, _mm512_ternarylogic_epi64(nearer, from, to, 0x04));
+#elif defined(__AVX2__)
+    __m256i const ones = _mm256_set1_epi64x(-1), both = _mm256_loadu_si256((const __m256i_u *)span);
+    __m256i const from = _mm256_sllv_epi64(ones, _mm256_and_si256(both, _mm256_set1_epi64x(0xffffffff)));
+    __m256i const mine = _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_srli_epi64(both, 32)), from);
+    __m256i const nearer = _mm256_loadu_si256((const __m256i_u *)whole);
+    _mm256_storeu_si256((__m256i_u *)whole, _mm256_or_si256(nearer, mine));
+    _mm256_storeu_si256((__m256i_u *)seen, _mm256_andnot_si256(nearer, mine));
+#else
+    for (int32_t i = 0; i < SIMD16_ROWS; i++) {
+        uint64_t const mine = grid_bits(span[2 * i], span[2 * i + 1]), nearer = whole[i];
+        whole[i] = nearer | mine;
+        seen[i] = mine & ~nearer;
+    }
+#endif
+}
+
+/* Sixteen numbers of sixteen bodies: from in[number][body] to out[body][number], a cache line each. */
+static inline void simd16_deal(const float (*restrict in)[SIMD16], float (*restrict out)[SIMD16])
+{
+#if defined(__AVX2__)
+    for (int32_t a = 0; a < SIMD16; a += 8)
+        for (int32_t b = 0; b < SIMD16; b += 8) {
+            __m256 r[8], s[8];
+#pragma GCC unroll 8
+            for (int32_t i = 0; i < 8; i++) /* four numbers of two halves of the bodies in each */
+                r[i] =
+                    _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(in[a + (i & 3)] + b + (i & 4))),
+                                         _mm_loadu_ps(in[a + 4 + (i & 3)] + b + (i & 4)), 1);
+#pragma GCC unroll 4
+            for (int32_t i = 0; i < 8; i += 2) {
+                s[i] = _mm256_unpacklo_ps(r[i], r[i + 1]);
+                s[i + 1] = _mm256_unpackhi_ps(r[i], r[i + 1]);
+            }
+#pragma GCC unroll 2
+            for (int32_t i = 0; i < 8; i += 4)
+#pragma GCC unroll 2
+                for (int32_t k = 0; k < 2; k++) {
+                    __m256d const low = _mm256_castps_pd(s[i + k]), high = _mm256_castps_pd(s[i + 2 + k]);
+                    _mm256_storeu_pd((double *)(void *)(out[b + i + 2 * k] + a),
+                                     _mm256_unpacklo_pd(low, high));
+                    _mm256_storeu_pd((double *)(void *)(out[b + i + 2 * k + 1] + a),
+                                     _mm256_unpackhi_pd(low, high));
+                }
+        }
+#else
+    for (int32_t b = 0; b < SIMD16; b++)
+        for (int32_t a = 0; a < SIMD16; a++)
+            out[b][a] = in[a][b];
+#endif
+}
+#endif

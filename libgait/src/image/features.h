@@ -1,0 +1,80 @@
+/* features.h - what the likelihood terms look up: maps computed once per frame inside one camera's region. */
+#ifndef GAIT_IMAGE_FEATURES_H
+#define GAIT_IMAGE_FEATURES_H
+#include "base/dispatch.h"
+#include "base/grid_mask.h"
+#include "image/view.h"
+
+enum {
+    FG_PLANES = 4,        /* bits of a cell's foreground probability */
+    FG_ONE = 15,          /* probability 1 */
+    EDGE_ONE = 120,       /* edge tensor of trace 1 */
+    CONTRAST_UNIT = 32,   /* one local standard deviation */
+    TEXTURE_HIDDEN = -128 /* marks a surface sample that was not seen */
+};
+
+typedef struct edge_cell { /* smoothed, contrast-normalised edge tensor: n'Tn is the response to a normal n */
+    int8_t trace, xx_yy, zero, xy2;
+} edge_cell;
+
+typedef struct features_keypoints {                  /* joints located in the frame by somebody else */
+    int32_t count;                                /* how many are; 0: the term is silent */
+    float u[GAIT_MAX_JOINTS], v[GAIT_MAX_JOINTS]; /* pixels without the lens's distortion */
+    float inverse_sd[GAIT_MAX_JOINTS];            /* 0: not seen */
+} features_keypoints;
+
+typedef struct features {
+    view_map map;
+    bool has_image;   /* this frame had an image */
+    bool has_fg;      /* and a background plate */
+    edge_cell *edge;  /* VIEW_PIXELS */
+    int8_t *surface;  /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
+    uint16_t *pairs;  /* VIEW_PIXELS: each with its lower neighbour in the byte above it */
+    int32_t fg_total; /* sum of foreground over the grid, FG_ONE = 1 */
+    uint64_t (*fg)[GRID_SIZE][GRID_WORDS]; /* FG_PLANES bit planes of the foreground probability */
+    uint64_t (*inside)[GRID_WORDS];        /* cells that the camera sees, */
+    view_map inside_map;                   /* found for this place of the region */
+    /* The planes of fg, then inside, in words that begin at each multiple of GRID_STEP columns: grid_mask's. */
+    uint64_t (*words)[FG_PLANES + 1][GRID_SIZE]; /* GRID_STARTS */
+    features_keypoints keypoints;
+} features;
+
+enum { EDGE_SIZES = 32, EDGE_SOFT = 4 }; /* rows kept, by row number modulo this */
+
+typedef struct edge_rows { /* of the edge tensor on its way: rings of rows */
+    uint16_t size[EDGE_SIZES][VIEW_SIZE];
+    int16_t once[3][EDGE_SOFT][VIEW_SIZE], twice[3][EDGE_SOFT][VIEW_SIZE];
+} edge_rows;
+
+typedef struct features_scratch { /* shared by the cameras */
+    view_planes planes;
+    uint8_t *grey; /* VIEW_PIXELS */
+    edge_rows *rows;
+} features_scratch;
+
+features features_layout(arena *a);
+features_scratch features_scratch_layout(arena *a);
+
+/* A new frame, or none (im->data NULL), in the region f->map: f->has_image tells which. */
+void features_begin(features *f, const gait_image *im, features_scratch *s);
+
+/* One of FEATURES_BANDS parts of the frame's planes and of their grey levels, each apart from the others. */
+enum { FEATURES_BANDS = 4 };
+void features_sample(const kernels *run, const features *f, int32_t band, const gait_camera *cam,
+                     const gait_image *im, features_scratch *s);
+
+/* Make `words` of fg and inside. */
+void features_words(features *f);
+
+/* The maps of what was sampled, each apart from the others, in the order of the time that they take. */
+enum { FEATURES_EDGES, FEATURES_SURFACE, FEATURES_FOREGROUND, FEATURES_MAPS };
+
+/* One of them.  plate: resampled empty scene, with colour only if the frame has, or NULL; raw: surface keeps grey
+ * levels (paper mode).  Kernels (kernels.h):
+ *   features_foreground  fg and fg_total where inside
+ *   features_edges       edge tensors of a grey plane
+ *   features_contrast    local contrast of a grey plane
+ *   features_pairs       each value of the surface with that below it */
+void features_map(const kernels *run, features *f, int32_t map, const gait_camera *cam,
+                  const view_planes *plate, bool raw, features_scratch *s);
+#endif

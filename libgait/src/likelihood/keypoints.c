@@ -1,0 +1,44 @@
+/* Joints that somebody else has found in the image: robust distance to where the body would show them. */
+#include "likelihood/likelihood.h"
+
+#include "image/camera.h"
+#include "base/fmath.h"
+
+#define STRANGE 8.0f /* deviations at which a joint says as much as nobody would */
+#define BEHIND  1e6f /* squared deviations of a joint behind the camera */
+
+/* Student-t with 4 degrees of freedom in two dimensions: squared deviations to nats. */
+static float cost(float square)
+{
+    return 3.0f * m_log(1.0f + 0.25f * square);
+}
+
+/* Mean cost of the joints seen. */
+static float mean_cost(const like_body *b)
+{
+    const features_keypoints *const found = &b->features->keypoints;
+    float sum = 0.0f;
+    for (int32_t p = 0; p < GAIT_MAX_JOINTS; p++) {
+        float const weight = found->inverse_sd[p];
+        if (weight == 0.0f)
+            continue;
+        const float X[3] = {b->points[p][0][b->lane], b->points[p][1][b->lane], b->points[p][2][b->lane]};
+        float uv[2] = {0.0f};
+        float const depth = camera_project(b->camera, X, uv);
+        float const du = weight * (uv[0] - found->u[p]), dv = weight * (uv[1] - found->v[p]);
+        sum += cost(depth > CAMERA_NEAR ? f_min(du * du + dv * dv, BEHIND) : BEHIND);
+    }
+    return sum / (float)found->count;
+}
+
+static float log_likelihood(const like_body *b)
+{
+    return b->features->keypoints.count ? -mean_cost(b) : 0.0f;
+}
+
+static float support(const like_body *b)
+{
+    return b->features->keypoints.count ? cost(STRANGE * STRANGE) - mean_cost(b) : 0.0f;
+}
+
+const like_term like_keypoints = {"keypoints", GAIT_TERM_KEYPOINTS, log_likelihood, support};

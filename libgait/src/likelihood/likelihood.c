@@ -1,0 +1,114 @@
+#include "likelihood/likelihood.h"
+#include "base/fmath.h"
+
+static const like_term *const TERMS[LIKE_TERMS] = {
+    [LIKE_TEXTURE] = &like_texture,   [LIKE_SILHOUETTE] = &like_silhouette, [LIKE_EDGES] = &like_edges,
+    [LIKE_TEMPLATE] = &like_template, [LIKE_KEYPOINTS] = &like_keypoints,
+};
+
+/* Point and outward normal on one ring, at this angle from the lateral axis; z from 0 at the start to 1. */
+static void surface_point(const limb_geometry *g, float z, float angle, float point[3], float normal[3])
+{
+    float s, c, ra = g->a0 + (g->a1 - g->a0) * z, rb = g->b0 + (g->b1 - g->b0) * z, norm = 0.0f;
+    m_sincos_one(angle, &s, &c);
+    if (g->shape == LIMB_ELLIPSOID) {
+        float const bulge = 2.0f * z - 1.0f, shrink = __builtin_sqrtf(1.0f - bulge * bulge);
+        ra = g->a0 * shrink;
+        rb = g->b0 * shrink;
+    }
+    for (int32_t k = 0; k < 3; k++) {
+        point[k] =
+            g->start[k] + z * (g->end[k] - g->start[k]) + ra * c * g->lateral[k] + rb * s * g->sagittal[k];
+        normal[k] = c / ra * g->lateral[k] + s / rb * g->sagittal[k];
+        norm += normal[k] * normal[k];
+    }
+    for (int32_t k = 0; k < 3; k++)
+        normal[k] /= __builtin_sqrtf(norm);
+}
+
+/* Points on rings at the middles of equal parts of the limb. */
+static void surface_init(const limb_geometry *g, like_surface *out)
+{
+    for (int32_t i = 0; i < LIKE_RING; i++) {
+        int32_t const direction = i / 2 % LIKE_DIRECTIONS, row = (direction & 1) + 2 * (i & 1);
+        float const z = ((float)row + 0.5f) / (float)LIKE_ROWS;
+        float p[3], n[3];
+        surface_point(g, z, TWO_PI_F * (0.5f * (float)direction) / (float)LIKE_AZIMUTHS, p, n);
+        for (int32_t k = 0; k < 3; k++) {
+            out->point[k][i] = p[k];
+            out->normal[k][i] = n[k];
+        }
+        out->outward[i] = p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
+    }
+    for (int32_t k = 0; k < 3; k++) {
+        out->middle[k] = 0.5f * (g->start[k] + g->end[k]);
+        for (int32_t d = 0; d < LIKE_AZIMUTHS; d++)
+            out->side[k][d] = out->normal[k][2 * d] + out->normal[k][2 * d + 1];
+    }
+}
+
+static void cost_set(like_costs *c, int32_t difference, int32_t cost)
+{
+    c->one[difference] = LIKE_COUNT_ONE + cost;
+    c->low[difference] = (uint8_t)(cost & 255);
+    c->high[difference] = (uint8_t)(cost >> 8);
+}
+
+/* Student-t with 4 degrees of freedom, scale half a local standard deviation: a square loses real clips. */
+static void costs_init(like_setup *s)
+{
+    float const scale = 0.5f * (float)CONTRAST_UNIT;
+    for (int32_t d = 0; d < LIKE_COSTS; d++) {
+        float const r = (float)d / scale;
+        cost_set(&s->robust, d, (int32_t)(2.5f * m_log(1.0f + r * r / 4.0f) * (float)LIKE_COST_ONE + 0.5f));
+        cost_set(&s->square, d, d * d);
+    }
+}
+
+void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg)
+{
+    s->run = dispatch_choose(cfg->cpu_mask);
+    s->limbs = m->limbs;
+    s->paper = cfg->mode == GAIT_MODE_PAPER;
+    s->terms = cfg->terms;
+    s->missed_weight = cfg->missed_weight;
+    for (int32_t k = 0; k < LIKE_TERMS; k++)
+        s->weight[k] = cfg->term_weight[k];
+    limb_geometry_init(m, cfg->girth, s->geometry);
+    for (int32_t l = 0; l < m->limbs; l++)
+        surface_init(&s->geometry[l], &s->surface[l]);
+    costs_init(s);
+}
+
+void like_evaluate(const like_body *b)
+{
+    const like_setup *const s = b->setup;
+    if ((s->terms & GAIT_TERM_TEXTURE) && b->ancestor)
+        s->run->texture_costs(b, b->terms->cost);
+    for (int32_t k = LIKE_TEXTURE + 1; k < LIKE_TERMS; k++) /* like_sum() has the texture's */
+        b->terms->nats[k][b->lane] =
+            s->terms & TERMS[k]->flag ? s->weight[k] * TERMS[k]->log_likelihood(b) : 0.0f;
+}
+
+void like_sum(const like_setup *s, const outline_block *outline, bool ancestors, like_block *terms,
+              float sum[BLOCK])
+{
+    float log[BLOCK] = {0.0f};
+    if ((s->terms & GAIT_TERM_TEXTURE) && ancestors)
+        s->run->texture_logs(s, outline, (const int32_t (*)[BLOCK])terms->cost, log);
+    for (int32_t i = 0; i < BLOCK; i++) {
+        terms->nats[LIKE_TEXTURE][i] = s->weight[LIKE_TEXTURE] * log[i];
+        sum[i] = 0.0f;
+        for (int32_t k = 0; k < LIKE_TERMS; k++)
+            sum[i] += terms->nats[k][i];
+    }
+}
+
+float like_support(const like_body *b)
+{
+    float sum = 0.0f;
+    for (int32_t k = 0; k < LIKE_TERMS; k++)
+        if ((b->setup->terms & TERMS[k]->flag) && TERMS[k]->support)
+            sum += b->setup->weight[k] * TERMS[k]->support(b);
+    return sum;
+}

@@ -1,0 +1,144 @@
+/* What limbs look like and looked like (Ormoneit et al. 2000, eqs. 10-13). */
+#include "base/fmath.h"
+#include "base/dispatch.h"
+#include "likelihood/likelihood.h"
+#include "base/simd16.h"
+#include <string.h>
+
+enum { PLACES = (MODEL_MAX_LIMBS + 3) / 4 * 4 }; /* for limbs, four at a time */
+
+typedef struct rows { /* points of each limb */
+    const int8_t *now[PLACES], *then[PLACES];
+} rows;
+
+/* Sums of costs over the points of each limb, with LIKE_COUNT_ONE for each point that is seen in both. */
+#ifdef SIMD16_BYTES
+static void compare_all(rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
+{
+    for (int32_t l = limbs; l % SIMD16_BYTES != 0; l++) { /* nobody reads their sums */
+        r->now[l] = r->now[0];
+        r->then[l] = r->then[0];
+    }
+    for (int32_t l = 0; l < limbs; l += SIMD16_BYTES)
+        bytes_costs(r->now + l, r->then + l, TEXTURE_HIDDEN, cost->low, cost->high, sum + l);
+}
+#else
+static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b, const int32_t *cost)
+{
+    int32_t x[LIKE_FACING], y[LIKE_FACING], difference[LIKE_FACING], both[LIKE_FACING], one[LIKE_FACING],
+        sum = 0;
+    simd16_widen(a, x);
+    simd16_widen(b, y);
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LIKE_FACING; i++) {
+        difference[i] = i_max(x[i] - y[i], y[i] - x[i]);
+        both[i] = -((x[i] != TEXTURE_HIDDEN) & (y[i] != TEXTURE_HIDDEN));
+    }
+    simd16_lookup(cost, difference, both, one);
+#pragma GCC unroll 1
+    for (int32_t i = 0; i < LIKE_FACING; i++)
+        sum += one[i];
+    return sum;
+}
+
+static void compare_all(const rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
+{
+    for (int32_t l = 0; l < limbs; l++)
+        sum[l] = compare(r->now[l], r->then[l], cost->one);
+}
+#endif
+
+/* The ancestor's half may begin elsewhere: its values are laid among hidden ones and read from where `now`
+ * begins. */
+static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs,
+                          const like_costs *cost, int32_t *sum)
+{
+    int8_t simd_f64[MODEL_MAX_LIMBS][3 * LIKE_FACING];
+    rows r;
+    for (int32_t l = 0; l < limbs; l++) {
+        memset(simd_f64[l], TEXTURE_HIDDEN, sizeof simd_f64[l]);
+        memcpy(simd_f64[l] + LIKE_FACING, then[l].value, LIKE_FACING);
+    }
+    for (int32_t l = 0; l < limbs; l++) {
+        int32_t const ahead = (now[l].turn - then[l].turn + LIKE_AZIMUTHS) & (LIKE_DIRECTIONS - 1);
+        r.now[l] = now[l].value;
+        r.then[l] = simd_f64[l] + 2 * ahead;
+    }
+    compare_all(&r, limbs, cost, sum);
+}
+
+/* Share of the about LIKE_SAMPLES / 2 points facing the camera that both frames show. */
+static inline float visible_share(int32_t both)
+{
+    return f_min((float)both / (0.4f * (float)LIKE_SAMPLES), 1.0f);
+}
+
+/* Mixture of "visible and constant" and "occluded" for one limb (eq. 12), as a log. */
+static inline float mixture(float q, float log_visible, float log_occluded)
+{
+    float const d = log_visible - log_occluded;
+    /* log(q e^v + (1 - q) e^o) with e^o taken out; beyond 30 nats more does not matter. */
+    return log_occluded + m_log(q * m_exp(f_clamp(d, -30.0f, 30.0f)) + (1.0f - q));
+}
+
+/* Robust, contrast-normalised form: mean Student-t cost. */
+static inline float robust(int32_t both, int32_t cost, float facing)
+{
+    float const log_occluded = -1.6f; /* as bad as a typical mismatch */
+    float const mean = (float)cost / (float)(i_max(both, 1) * LIKE_COST_ONE);
+    float const seen = mixture(facing * visible_share(both), -mean, log_occluded);
+    return both < LIKE_FEW ? log_occluded : seen;
+}
+
+/* Literal form: mean squared grey-level difference, normal density, sigma growing with the viewing angle. */
+static inline float literal(int32_t both, int32_t squares, float facing)
+{
+    float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared */
+    float const tan2 = f_min((1.0f - facing * facing) / f_max(facing * facing, 1e-3f), 9.0f);
+    float const var = 2.0f * image_var + model_var * (1.0f + tan2);
+    float const log_visible =
+        -0.5f * m_log(TWO_PI_F * var) - (float)squares / (2.0f * var * (float)i_max(both, 1));
+    float const seen = mixture(facing * visible_share(both), log_visible, LIKE_PAPER_OCCLUDED);
+    return both < LIKE_FEW ? LIKE_PAPER_OCCLUDED : seen;
+}
+
+void KERNEL(texture_costs)(const like_body *b, int32_t (*cost)[BLOCK])
+{
+    int32_t const limbs = b->setup->limbs;
+    int32_t sum[PLACES];
+    compare_limbs(b->samples, b->ancestor, limbs, b->setup->paper ? &b->setup->square : &b->setup->robust, sum);
+    for (int32_t l = 0; l < limbs; l++)
+        cost[l][b->lane] = sum[l];
+}
+
+void KERNEL(texture_logs)(const like_setup *s, const outline_block *outline, const int32_t (*cost)[BLOCK],
+                          float *restrict log)
+{
+    for (int32_t i = 0; i < BLOCK; i++)
+        log[i] = 0.0f;
+    for (int32_t l = 0; l < s->limbs; l++) {
+        const float *const facing = outline->limb[l].facing;
+        if (s->paper)
+            for (int32_t i = 0; i < BLOCK; i++)
+                log[i] += literal(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, facing[i]);
+        else
+            for (int32_t i = 0; i < BLOCK; i++)
+                log[i] += robust(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, facing[i]);
+    }
+}
+
+int64_t KERNEL(template_cost)(const like_body *b)
+{
+    int32_t const limbs = b->setup->limbs;
+    int32_t sum[PLACES];
+    int64_t all = 0;
+    rows r;
+    for (int32_t l = 0; l < limbs; l++) {
+        r.now[l] = b->samples[l].value;
+        r.then[l] = b->known + l * LIKE_RING + 2 * (b->samples[l].turn & (LIKE_DIRECTIONS - 1));
+    }
+    compare_all(&r, limbs, &b->setup->robust, sum);
+    for (int32_t l = 0; l < limbs; l++)
+        all += sum[l];
+    return all;
+}

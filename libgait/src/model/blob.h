@@ -1,0 +1,24 @@
+/* blob.h - container of a model file (doc/model-format.md): header, section table, checksum.
+ * Everything is checked by blob_open before anything is read; what a section means is model.c's business. */
+#ifndef GAIT_MODEL_BLOB_H
+#define GAIT_MODEL_BLOB_H
+#include "base/base.h"
+
+enum { BLOB_U8 = 1, BLOB_I32 = 2, BLOB_F32 = 3 };
+enum { BLOB_MAX_SECTIONS = 64 };
+
+typedef struct blob {
+    const unsigned char *data; /* the file, where it lies */
+    size_t bytes;
+    uint32_t sections;
+} blob;
+
+/* Check the whole container: magic, version, alignment, CRC, bounds, overlaps, unique tags. */
+gait_result blob_open(const void *data, size_t bytes, blob *out, gait_error *err);
+
+bool blob_has(const blob *b, const char tag[4]);
+
+/* Elements of the section with this tag, type and rank, and its dimensions (unused ones 1).
+ * NULL if there is none.  An empty section gives a pointer that must not be read. */
+const void *blob_section(const blob *b, const char tag[4], uint32_t dtype, uint32_t rank, uint32_t dims[4]);
+#endif

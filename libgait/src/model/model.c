@@ -1,0 +1,247 @@
+#include "model/model.h"
+
+#include "base/fmath.h"
+#include "base/hash.h"
+#include "model/sections.h"
+
+#include <string.h>
+
+#define LARGEST_PACE       1.0f /* a channel's coefficients: radians or statures per unit of kin_pace */
+#define LARGEST_PROPORTION 0.1f /* per standard deviation; a shift: statures */
+
+static const float *take_table(sections *r, const char *tag, int32_t rows, uint32_t columns)
+{
+    return sections_floats(r, tag, 2, (uint32_t[4]){(uint32_t)rows, columns});
+}
+
+static const int32_t *take_ints(sections *r, const char *tag, int32_t rows, uint32_t columns)
+{
+    return sections_take(r, tag, BLOB_I32, columns ? 2 : 1, (uint32_t[4]){(uint32_t)rows, columns});
+}
+
+static void read_channels(sections *r, gait_model *m)
+{
+    static const char *const root[MODEL_ROOT_CHANNELS] = {"root_forward", "root_sway",  "root_height",
+                                                          "root_roll",    "root_pitch", "root_yaw"};
+    m->channel_name = sections_names(r, "CHNM", MODEL_MAX_CHANNELS, &m->channels);
+    m->root_channel = m->angles = m->channels - MODEL_ROOT_CHANNELS;
+    sections_require(r, m->angles >= 0, "CHNM", "does not end with the six root channels");
+    for (int32_t i = 0; r->status == GAIT_OK && i < MODEL_ROOT_CHANNELS; i++)
+        sections_require(r, strcmp(m->channel_name[m->root_channel + i], root[i]) == 0, "CHNM",
+                         "does not end with the six root channels");
+}
+
+static void read_curves(sections *r, gait_model *m)
+{
+    uint32_t dims[4] = {SECTION_ANY, SECTION_ANY, (uint32_t)m->channels};
+    m->curves = sections_floats(r, "CURV", 3, dims);
+    if (!m->curves)
+        return;
+    sections_require(r, dims[0] > 0 && dims[1] >= MODEL_MIN_PHASES, "CURV",
+                     "needs a mean and at least 8 phases");
+    if (dims[0] > 1 + GAIT_MAX_COMPONENTS || dims[1] > MODEL_MAX_PHASES)
+        sections_refuse(r, GAIT_ERR_LIMIT, "CURV", "has more components or phases than this build can hold");
+    m->components = (int32_t)dims[0] - 1;
+    m->phases = (int32_t)dims[1];
+}
+
+static void read_statistics(sections *r, gait_model *m)
+{
+    m->channel_stat = take_table(r, "CHST", m->channels, 4);
+    m->score_stat = take_table(r, "SCST", m->components, 3);
+    const float *const g = sections_floats(r, "GAIT", 1, (uint32_t[4]){8});
+    for (int32_t i = 0; r->status == GAIT_OK && i < m->channels; i++) {
+        const float *const s = m->channel_stat + 4 * i;
+        sections_require(r, s[0] >= 0.0f && s[1] <= s[2] && s[3] >= 0.0f, "CHST",
+                         "negative sd or empty range");
+    }
+    for (int32_t i = 0; r->status == GAIT_OK && i < 3 * m->components; i++)
+        sections_require(r, m->score_stat[i] >= 0.0f, "SCST", "has a negative sd");
+    if (r->status != GAIT_OK)
+        return;
+    m->stride_hz = g[0];
+    m->stride_hz_sd = g[1];
+    m->stride_cv = g[2];
+    m->stride_length = g[3];
+    m->stride_length_sd = g[4];
+    m->stature_mean = g[6];
+    m->stature_sd = g[7];
+    sections_require(r, g[0] > 0.0f && g[3] >= 0.0f && g[6] > 0.0f, "GAIT",
+                     "stride rate or stature not positive");
+    sections_require(r, g[1] >= 0.0f && g[2] >= 0.0f && g[4] >= 0.0f && g[7] >= 0.0f, "GAIT",
+                     "has a negative sd");
+}
+
+/* Optional: models without it walk alike at every stride rate. */
+static void read_pace(sections *r, gait_model *m)
+{
+    if (r->status != GAIT_OK || !blob_has(&r->b, "PACE"))
+        return;
+    uint32_t dims[4] = {SECTION_ANY, (uint32_t)m->channels};
+    m->pace_series = sections_floats(r, "PACE", 2, dims);
+    sections_require(r, m->stride_hz_sd > 0.0f, "PACE", "needs an sd of the stride rate in GAIT");
+    sections_require(r, dims[0] % 2 == 1 && dims[0] < (uint32_t)m->phases, "PACE",
+                     "its rows are no Fourier series");
+    for (int32_t c = 0; r->status == GAIT_OK && c < m->channels; c++) {
+        float sum = 0.0f;
+        for (uint32_t i = 0; i < dims[0]; i++)
+            sum += fabsf(m->pace_series[i * dims[1] + (uint32_t)c]);
+        sections_require(r, sum <= LARGEST_PACE, "PACE", "changes a channel by more than 1");
+    }
+    m->pace_terms = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
+}
+
+/* The pairs (axis, channel) of a frame: n of them valid, the others 0. */
+static bool rotations_valid(const gait_model *m, const int32_t info[FRAME_INFO])
+{
+    bool ok = info[1] >= 0 && info[1] <= FRAME_ROTATIONS;
+    for (int32_t i = 0; i < FRAME_ROTATIONS; i++) {
+        int32_t const axis = info[2 + 2 * i], channel = info[3 + 2 * i];
+        if (i < info[1])
+            ok = ok && axis && axis >= -3 && axis <= 3 && channel >= 0 && channel < m->channels;
+        else
+            ok = ok && axis == 0 && channel == 0;
+    }
+    return ok;
+}
+
+static void read_frames(sections *r, gait_model *m)
+{
+    int32_t const root = m->root_channel;
+    const int32_t first[FRAME_INFO] = {-1, 3, 3, root + ROOT_YAW, 2, root + ROOT_PITCH, 1, root + ROOT_ROLL};
+    m->frame_name = sections_names(r, "FRNM", MODEL_MAX_FRAMES, &m->frames);
+    m->frame_info = take_ints(r, "FRMI", m->frames, FRAME_INFO);
+    m->frame_origin = take_table(r, "FRMF", m->frames, 3);
+    if (r->status != GAIT_OK)
+        return;
+    sections_require(r, memcmp(m->frame_info, first, sizeof first) == 0, "FRMI",
+                     "frame 0 must be the root: +3 root_yaw, +2 root_pitch, +1 root_roll");
+    for (int32_t k = 0; k < 3; k++)
+        sections_require(r, m->frame_origin[k] == 0.0f, "FRMF", "frame 0 must lie at 0");
+    for (int32_t f = 1; r->status == GAIT_OK && f < m->frames; f++) {
+        const int32_t *const info = m->frame_info + FRAME_INFO * f;
+        sections_require(r, info[0] >= 0 && info[0] < f, "FRMI", "a parent does not come before its child");
+        sections_require(r, rotations_valid(m, info), "FRMI",
+                         "has a rotation with a bad axis, channel or count");
+    }
+}
+
+/* Optional: models without it have one body for everybody. */
+static void read_proportions(sections *r, gait_model *m)
+{
+    uint32_t dims[4] = {SECTION_ANY, (uint32_t)m->frames + 1};
+    if (r->status != GAIT_OK || !blob_has(&r->b, "PROP"))
+        return;
+    m->proportion = sections_floats(r, "PROP", 2, dims);
+    if (dims[0] > GAIT_MAX_PROPORTIONS)
+        sections_refuse(r, GAIT_ERR_LIMIT, "PROP", "has more rows than this build can hold");
+    for (uint32_t i = 0; r->status == GAIT_OK && i < dims[0] * dims[1]; i++)
+        sections_require(r, fabsf(m->proportion[i]) <= LARGEST_PROPORTION, "PROP",
+                         "changes a length by more than 10 %");
+    m->proportions = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
+}
+
+/* Optional: models without it change lengths in proportion alone. */
+static void read_shifts(sections *r, gait_model *m)
+{
+    uint32_t dims[4] = {(uint32_t)m->proportions, (uint32_t)m->frames, 3};
+    if (r->status != GAIT_OK || !blob_has(&r->b, "SHFT"))
+        return;
+    sections_require(r, m->proportions > 0, "SHFT", "needs PROP");
+    m->shift = sections_floats(r, "SHFT", 3, dims);
+    for (uint32_t k = 0; r->status == GAIT_OK && k < dims[0]; k++)
+        for (uint32_t i = 0; i < 3 * dims[1]; i++) {
+            float const by = fabsf(m->shift[3 * dims[1] * k + i]);
+            sections_require(r, by <= LARGEST_PROPORTION, "SHFT", "moves an origin by more than a tenth");
+            sections_require(r, i >= 3 || by == 0.0f, "SHFT", "frame 0 must lie at 0");
+        }
+}
+
+static void read_points(sections *r, gait_model *m)
+{
+    m->point_name = sections_names(r, "PTNM", GAIT_MAX_JOINTS, &m->points);
+    m->point_frame = take_ints(r, "PTNI", m->points, 0);
+    m->point_offset = take_table(r, "PTNF", m->points, 3);
+    if (r->status == GAIT_OK)
+        sections_require(r, strcmp(m->point_name[0], "pelvis") == 0, "PTNM",
+                         "does not begin with the pelvis");
+    for (int32_t i = 0; r->status == GAIT_OK && i < m->points; i++)
+        sections_require(r, m->point_frame[i] >= 0 && m->point_frame[i] < m->frames, "PTNI", "no such frame");
+}
+
+/* Radii positive; an axis of some length that is not along y, from which the first radius is measured. */
+static bool limb_valid(const float s[LIMB_SHAPE])
+{
+    float const dx = s[3] - s[0], dy = s[4] - s[1], dz = s[5] - s[2];
+    float const across = dx * dx + dz * dz, length = across + dy * dy;
+    bool const axis = length > 1e-8f && across > 1e-4f * length;
+    return axis && s[6] > 0.0f && s[7] > 0.0f && s[8] > 0.0f && s[9] > 0.0f;
+}
+
+static void read_limbs(sections *r, gait_model *m)
+{
+    m->limb_name = sections_names(r, "LBNM", MODEL_MAX_LIMBS, &m->limbs);
+    m->limb_info = take_ints(r, "LIMI", m->limbs, LIMB_INFO);
+    m->limb_shape = take_table(r, "LIMF", m->limbs, LIMB_SHAPE);
+    for (int32_t i = 0; r->status == GAIT_OK && i < m->limbs; i++) {
+        int32_t const frame = m->limb_info[LIMB_INFO * i], shape = m->limb_info[LIMB_INFO * i + 1];
+        sections_require(r, frame >= 0 && frame < m->frames, "LIMI", "no such frame");
+        sections_require(r, shape == LIMB_CONE || shape == LIMB_ELLIPSOID, "LIMI", "has an unknown shape");
+        sections_require(r, limb_valid(m->limb_shape + LIMB_SHAPE * i), "LIMF",
+                         "has a radius that is not positive or an axis without length or along y");
+    }
+}
+
+gait_result model_open(const void *data, size_t bytes, gait_model *m, gait_error *err)
+{
+    sections r = {.what = "model", .err = err};
+    gait_model t = {0};
+    r.status = blob_open(data, bytes, &r.b, err);
+    if (r.status == GAIT_OK && !blob_has(&r.b, "CHNM") && blob_has(&r.b, "SGNM"))
+        sections_refuse(&r, GAIT_ERR_CORRUPT, "CHNM",
+                        "missing: only segments were learnt; learn without --segments only to track");
+    read_channels(&r, &t);
+    read_curves(&r, &t);
+    read_statistics(&r, &t);
+    read_pace(&r, &t);
+    read_frames(&r, &t);
+    read_proportions(&r, &t);
+    read_shifts(&r, &t);
+    read_points(&r, &t);
+    read_limbs(&r, &t);
+    if (r.status != GAIT_OK)
+        return r.status;
+    t.digest = hash_fnv1a(HASH_INIT, data, bytes);
+    *m = t;
+    return GAIT_OK;
+}
+
+/* The series at the phases of the mean curves, T x M, summed from the constant up. */
+static void unfold_pace(const gait_model *m, float *curve)
+{
+    int32_t const T = m->phases, M = m->channels;
+    for (int32_t j = 0; j < T; j++) {
+        float *const at = curve + j * M;
+        memcpy(at, m->pace_series, (size_t)M * sizeof(float));
+        for (int32_t h = 1; 2 * h < m->pace_terms; h++) {
+            const float *const a = m->pace_series + (2 * h - 1) * M;
+            float s, c;
+            m_sincos_one(TWO_PI_F * (float)(h * j % T) / (float)T, &s, &c);
+            for (int32_t i = 0; i < M; i++)
+                at[i] += c * a[i] + s * a[M + i];
+        }
+    }
+}
+
+gait_model *model_layout(arena *a, const gait_model *m)
+{
+    gait_model *const self = TAKE(a, gait_model, 1);
+    float *const curve = m->pace_terms ? TAKE(a, float, m->phases * m->channels) : NULL;
+    if (!self || a->overflow)
+        return NULL;
+    *self = *m;
+    self->pace_curve = curve;
+    if (curve)
+        unfold_pace(m, curve);
+    return self;
+}

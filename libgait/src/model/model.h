@@ -1,0 +1,72 @@
+/* model.h - a checked blob as typed views.  Lengths are fractions of stature, angles radians. */
+#ifndef GAIT_MODEL_MODEL_H
+#define GAIT_MODEL_MODEL_H
+#include "base/arena.h"
+
+enum {
+    MODEL_MAX_FRAMES = 24,
+    MODEL_MAX_LIMBS = 32,
+    MODEL_MIN_PHASES = 8,
+    MODEL_MAX_PHASES = 4096,
+    MODEL_ROOT_CHANNELS = 6,
+    MODEL_MAX_CHANNELS = GAIT_MAX_ANGLES + MODEL_ROOT_CHANNELS
+};
+/* Channels of the root, counted from root_channel. */
+enum { ROOT_FORWARD, ROOT_SWAY, ROOT_HEIGHT, ROOT_ROLL, ROOT_PITCH, ROOT_YAW };
+enum { LIMB_CONE = 0, LIMB_ELLIPSOID = 1 };
+enum { FRAME_INFO = 8, FRAME_ROTATIONS = 3, LIMB_INFO = 2, LIMB_SHAPE = 10, MODEL_NAME = 32 };
+
+struct gait_model {
+    int32_t frames, points, limbs, angles;
+    int32_t channels;     /* M = angles + MODEL_ROOT_CHANNELS */
+    int32_t phases;       /* T */
+    int32_t components;   /* q */
+    int32_t proportions;  /* p */
+    int32_t root_channel; /* index of root_forward; the other ROOT_* follow */
+
+    const float *curves;       /* (1 + q) x T x M: mean, then component k times its standard deviation */
+    const float *pace_series;  /* pace_terms x M: constant, then cosine and sine of each harmonic */
+    int32_t pace_terms;        /* odd; 0: the mean is the same at every rate */
+    const float *pace_curve;   /* T x M: change of the mean per unit of kin_pace; NULL: none */
+    const float *channel_stat; /* M x 4: residual sd, smallest, largest, sd of the static offset */
+    const float *score_stat;   /* q x 3: singular-value sd, between-subject sd, within-subject sd */
+
+    /* p x (F + 1): relative change of the lengths in each frame, then of the pelvis's height, per standard
+     * deviation; NULL if p is 0 */
+    const float *proportion;
+    const float
+        *shift; /* p x F x 3: how far each frame's origin is moved in its parent besides; may be NULL */
+
+    float stride_hz, stride_hz_sd;         /* strides per second: mean, sd between subjects */
+    float stride_cv;                       /* variation of the stride time within a subject */
+    float stride_length, stride_length_sd; /* statures: mean, sd between subjects */
+    float stature_mean, stature_sd;        /* metres, adults */
+
+    const int32_t *frame_info;  /* F x 8: parent, rotations n, then n x (signed axis, channel) */
+    const float *frame_origin;  /* F x 3, in the parent frame */
+    const int32_t *point_frame; /* P */
+    const float *point_offset;  /* P x 3, in its frame */
+    const int32_t *limb_info;   /* L x 2: frame, LIMB_* */
+    const float *limb_shape;    /* L x 10: start[3], end[3] in the frame, radii a0 b0 a1 b1 */
+
+    const char (*channel_name)[MODEL_NAME]; /* M */
+    const char (*frame_name)[MODEL_NAME];   /* F */
+    const char (*point_name)[MODEL_NAME];   /* P */
+    const char (*limb_name)[MODEL_NAME];    /* L */
+
+    uint64_t digest; /* FNV-1a of the blob */
+};
+
+/* Deviation among people of the posture of angle a, radians. */
+static inline float model_posture_sd(const gait_model *m, int32_t a)
+{
+    float const learnt = m->channel_stat[4 * a + 3];
+    return learnt > 0.0f ? learnt : 0.035f; /* 2 degrees, where too few people were seen to tell */
+}
+
+/* Check a blob and fill m with views into it (pace_curve is none); err names the section at fault. */
+gait_result model_open(const void *data, size_t bytes, gait_model *m, gait_error *err);
+
+/* Place a copy of m in the arena, and pace_curve, made of its series.  NULL when counting or on overflow. */
+gait_model *model_layout(arena *a, const gait_model *m);
+#endif

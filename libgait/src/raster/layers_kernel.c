@@ -1,0 +1,268 @@
+/* The limbs of a block of bodies as lines in the grid, one lane a body; then one body's lines as masks, one lane a
+ * row, each limb without what stands before it. */
+#include "base/dispatch.h"
+#include "base/simd16.h"
+#include "raster/layers.h"
+
+#include <string.h>
+
+/* ---- lines, lanes are bodies ---- */
+
+/* Corners are clamped to so many cells beyond the grid's first, and no line is less steep: one that crosses two rows
+ * cannot be, and one that crosses a single row is right there. */
+#define FAR     512.0f
+#define SHALLOW (2.0f * FAR) /* cells in a row */
+#define NOWHERE 1e6f         /* column of a line that bounds nothing */
+
+/* Working pixels to grid cells: the centre of cell c is working pixel 2 c + 1/2. */
+static float to_cell(float v)
+{
+    return f_clamp(0.5f * v - 0.25f, -FAR, FAR);
+}
+
+/* First row whose centre is at or below y. */
+static int32_t row_from(float y)
+{
+    enum { BELOW = 1024 }; /* makes the number positive, which is rounded down */
+    return BELOW - (int32_t)((float)BELOW - y);
+}
+
+typedef struct box { /* cells that the limbs in front of the camera can meet */
+    int32_t left[BLOCK], right[BLOCK], top[BLOCK], end[BLOCK];
+} box;
+
+static box box_empty(void)
+{
+    box b;
+    for (int32_t i = 0; i < BLOCK; i++) {
+        b.left[i] = b.top[i] = GRID_SIZE;
+        b.right[i] = b.end[i] = 0;
+    }
+    return b;
+}
+
+/* What a limb meets grows what the body does, by whole bands of rows. */
+static void box_join(box *restrict body, const box *limb, const float *depth, layers_limb *restrict out)
+{
+    for (int32_t i = 0; i < BLOCK; i++) {
+        int32_t const top = i_max(limb->top[i], 0), end = i_min(limb->end[i], GRID_SIZE);
+        bool const front = depth[i] > 0.0f, met = front & (top < end);
+        out->top[i] = met ? top : 0;
+        out->end[i] = met ? end : 0;
+        body->top[i] = i_min(body->top[i], met ? top / LAYERS_BAND * LAYERS_BAND : GRID_SIZE);
+        body->end[i] = i_max(body->end[i], met ? (end + LAYERS_BAND - 1) / LAYERS_BAND * LAYERS_BAND : 0);
+        body->left[i] = i_min(body->left[i], met ? limb->left[i] : GRID_SIZE);
+        body->right[i] = i_max(body->right[i], met ? limb->right[i] : 0);
+    }
+}
+
+typedef struct corners { /* cells */
+    float x[RAST_MAX_VERTICES][BLOCK], y[RAST_MAX_VERTICES][BLOCK];
+} corners;
+
+static void corners_of(const outline_lanes *limb, int32_t n, corners *restrict c, box *restrict own)
+{
+    for (int32_t k = 0; k < n; k++)
+        for (int32_t i = 0; i < BLOCK; i++) {
+            float const x = to_cell(limb->x[k][i]), y = to_cell(limb->y[k][i]);
+            c->x[k][i] = x;
+            c->y[k][i] = y;
+            /* a column more on either side, because lines are rounded */
+            own->left[i] = i_min(own->left[i], row_from(x) - 2);
+            own->right[i] = i_max(own->right[i], row_from(x) + 2);
+            own->top[i] = i_min(own->top[i], row_from(y));
+            own->end[i] = i_max(own->end[i], row_from(y));
+        }
+}
+
+/* Where a limb's lines go: at, slope; left, right; body. */
+typedef float line_lanes[2][2][BLOCK];
+
+/* The side from corner j to corner k, which goes down on the right if the corners go round clockwise. */
+static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwise, line_lanes *restrict out)
+{
+    KERNEL_LANES
+    for (int32_t i = 0; i < BLOCK; i++) {
+        bool const down = c->y[j][i] < c->y[k][i];
+        float const x0 = down ? c->x[j][i] : c->x[k][i], y0 = down ? c->y[j][i] : c->y[k][i];
+        float const x1 = down ? c->x[k][i] : c->x[j][i], y1 = down ? c->y[k][i] : c->y[j][i];
+        int32_t const first = row_from(y0), last = row_from(y1);
+        bool const crosses = first < last, right = down == clockwise[i];
+        float const slope = f_clamp((x1 - x0) / (crosses ? y1 - y0 : 1.0f), -NOWHERE, NOWHERE);
+        float const steep = f_clamp(slope, -SHALLOW, SHALLOW);
+        float const at = x0 + slope * ((float)first - y0) - steep * (float)first;
+        bool const to_left = crosses & !right, to_right = crosses & right;
+        (*out)[0][0][i] = to_left ? at : (*out)[0][0][i];
+        (*out)[0][1][i] = to_right ? -at : (*out)[0][1][i];
+        (*out)[1][0][i] = to_left ? steep : (*out)[1][0][i];
+        (*out)[1][1][i] = to_right ? -steep : (*out)[1][1][i];
+    }
+}
+
+/* Opposite sides of an octagon, and the ends of a cone, are parallel: one is on the left, the other on the right. */
+static void limb_lines(const outline_lanes *limb, int32_t n, box *restrict body, layers_limb *restrict out)
+{
+    corners c;
+    int32_t clockwise[BLOCK];
+    box own = box_empty();
+    line_lanes *const line = (line_lanes *)out->line; /* dealt out when the columns are known */
+    corners_of(limb, n, &c, &own);
+    for (int32_t i = 0; i < BLOCK; i++) {
+        int32_t const a = n / 4, b = n / 2, d = n / 4 + n / 2;
+        clockwise[i] = (c.x[b][i] - c.x[0][i]) * (c.y[d][i] - c.y[a][i]) >
+                       (c.y[b][i] - c.y[0][i]) * (c.x[d][i] - c.x[a][i]);
+    }
+    for (int32_t slot = 0; slot < LAYERS_LINES; slot++)
+        for (int32_t right = 0; right < 2; right++)
+            for (int32_t i = 0; i < BLOCK; i++) {
+                line[slot][0][right][i] = -NOWHERE;
+                line[slot][1][right][i] = 0.0f;
+            }
+    for (int32_t k = 0; k < n; k++)
+        side(&c, k, (k + 1) % n, clockwise, &line[n == 4 && k == 3 ? 1 : k % LAYERS_LINES]);
+    box_join(body, &own, limb->depth, out);
+}
+
+/* Columns from the body's first on, body by body. */
+static void deal_lines(const int32_t *column, layers_limb *restrict out)
+{
+    line_lanes line[LAYERS_LINES];
+    memcpy(line, out->line, sizeof line);
+    for (int32_t slot = 0; slot < LAYERS_LINES; slot++)
+        for (int32_t i = 0; i < BLOCK; i++) {
+            line[slot][0][0][i] -= (float)column[i];
+            line[slot][0][1][i] += (float)column[i];
+        }
+    simd16_deal((const float (*)[SIMD16])line, (float (*)[SIMD16])out->line);
+}
+
+/* Most bodies are no wider than a word; its first column is a multiple of GRID_STEP. */
+static void choose_columns(const box *body, layers_block *restrict out)
+{
+    for (int32_t i = 0; i < BLOCK; i++) {
+        int32_t const column = i_clamp(body->left[i], 0, 63) / GRID_STEP * GRID_STEP;
+        bool const fits = i_min(body->right[i], GRID_SIZE) - column <= 64;
+        out->first[i] = i_min(body->top[i], body->end[i]);
+        out->last[i] = body->end[i];
+        out->column[i] = fits ? column : 0;
+        out->width[i] = fits ? 64 : GRID_SIZE;
+    }
+}
+
+/* Each limb's place from near to far, by counting those before it. */
+static void depth_order(const outline_lanes *limb, int32_t count, layers_block *restrict out)
+{
+    float key[MODEL_MAX_LIMBS][BLOCK];
+    for (int32_t l = 0; l < count; l++)
+        for (int32_t i = 0; i < BLOCK; i++) {
+            int32_t const front = limb[l].depth[i] > 0.0f;
+            key[l][i] = front ? f_min(limb[l].depth[i], FLT_MAX) : INFINITY;
+        }
+    for (int32_t l = 0; l < count; l++) {
+        int32_t before[BLOCK] = {0};
+        for (int32_t m = 0; m < l; m++)
+            for (int32_t i = 0; i < BLOCK; i++)
+                before[i] += key[m][i] <= key[l][i];
+        for (int32_t m = l + 1; m < count; m++)
+            for (int32_t i = 0; i < BLOCK; i++)
+                before[i] += key[m][i] < key[l][i];
+        for (int32_t i = 0; i < BLOCK; i++)
+            out->order[i][before[i]] = (uint8_t)l;
+    }
+}
+
+void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *limbs, int32_t count,
+                            layers_block *restrict out)
+{
+    box body = box_empty();
+    out->count = count;
+    for (int32_t l = 0; l < count; l++) {
+        int32_t const n = outline_vertices(&limbs[l]);
+        out->lines[l] = n == 4 ? 3 : LAYERS_LINES;
+        limb_lines(&outline->limb[l], n, &body, &out->limb[l]);
+    }
+    choose_columns(&body, out);
+    for (int32_t l = 0; l < count; l++)
+        deal_lines(out->column, &out->limb[l]);
+    depth_order(outline->limb, count, out);
+}
+
+/* ---- masks, lanes are rows ---- */
+
+/* The first cell of a word whose centre is at or right of a column; so little left of it is rounding. */
+static inline int32_t cell_from(float x)
+{
+    float const slack = 1.0f / 1024.0f; /* cells */
+    return i_clamp((int32_t)(x + (1.0f - slack)), 0, 64);
+}
+
+/* The bits in a word, SIMD16_ROWS rows at once, each as its left and its right column; what was stored so is loaded so. */
+static inline __attribute__((always_inline)) void draw_limb(const float *line, int32_t lines, int32_t top,
+                                                            int32_t end, uint64_t *restrict whole,
+                                                            uint64_t *restrict seen)
+{
+    float at[LAYERS_LINES][2 * SIMD16_ROWS], slope[LAYERS_LINES][2 * SIMD16_ROWS], y[2 * SIMD16_ROWS];
+    int32_t const first = top / LAYERS_BAND * LAYERS_BAND;
+    int32_t row[2 * SIMD16_ROWS];
+    simd16_repeat(line, 2 * SIMD16_ROWS, at[0]);
+    simd16_repeat(line + 2, 2 * SIMD16_ROWS, slope[0]);
+    simd16_repeat(line + 4, 2 * SIMD16_ROWS, at[1]);
+    simd16_repeat(line + 6, 2 * SIMD16_ROWS, slope[1]);
+    simd16_repeat(line + 8, 2 * SIMD16_ROWS, at[2]);
+    simd16_repeat(line + 10, 2 * SIMD16_ROWS, slope[2]);
+    if (lines > 3) {
+        simd16_repeat(line + 12, 2 * SIMD16_ROWS, at[3]);
+        simd16_repeat(line + 14, 2 * SIMD16_ROWS, slope[3]);
+    }
+    for (int32_t i = 0; i < 2 * SIMD16_ROWS; i++) {
+        row[i] = first - top + (i >> 1);
+        y[i] = (float)(first + (i >> 1));
+    }
+    for (int32_t strip = first; strip < end; strip += SIMD16_ROWS) {
+        int32_t span[2 * SIMD16_ROWS];
+        for (int32_t i = 0; i < 2 * SIMD16_ROWS; i++) {
+            float const sign = (float)(1 - 2 * (i & 1));
+            float x = at[0][i] + slope[0][i] * y[i];
+            x = f_max(at[1][i] + slope[1][i] * y[i], x);
+            x = f_max(at[2][i] + slope[2][i] * y[i], x);
+            x = lines > 3 ? f_max(at[3][i] + slope[3][i] * y[i], x) : x;
+            span[i] = (uint32_t)row[i] < (uint32_t)(end - top) ? cell_from(sign * x) : 0;
+            row[i] += SIMD16_ROWS;
+            y[i] += (float)SIMD16_ROWS;
+        }
+        simd16_cover(span, whole + strip, seen + strip);
+    }
+}
+
+/* One word of every row. */
+static void draw_word(const layers_block *block, int32_t lane, int32_t word, layers *restrict out)
+{
+    uint64_t *const whole = out->whole.word[word];
+    memset(whole + out->whole.first, 0, (size_t)(out->whole.last - out->whole.first) * sizeof *whole);
+    for (int32_t k = 0; k < block->count; k++) {
+        int32_t const l = block->order[lane][k];
+        const layers_limb *const limb = &block->limb[l];
+        float const *line = limb->line[lane];
+        float moved[SIMD16];
+        if (word) {
+            for (int32_t i = 0; i < SIMD16; i++)
+                moved[i] = line[i] + (i & 2 ? 0.0f : (float)(i & 1 ? 64 : -64));
+            line = moved;
+        }
+        if (block->lines[l] == 3)
+            draw_limb(line, 3, limb->top[lane], limb->end[lane], whole, out->visible[l].word[word]);
+        else
+            draw_limb(line, 4, limb->top[lane], limb->end[lane], whole, out->visible[l].word[word]);
+    }
+}
+
+void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restrict out)
+{
+    int32_t const column = block->column[lane], width = block->width[lane];
+    grid_mask_frame(&out->whole, block->first[lane], block->last[lane], column, width);
+    for (int32_t l = 0; l < block->count; l++)
+        grid_mask_frame(&out->visible[l], block->limb[l].top[lane] / LAYERS_BAND * LAYERS_BAND,
+                   block->limb[l].end[lane], column, width);
+    for (int32_t word = 0; 64 * word < width; word++)
+        draw_word(block, lane, word, out);
+}

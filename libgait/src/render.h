@@ -1,9 +1,0 @@
-/* render.h - limbs of one body into an image of any size. */
-#ifndef GAIT_RENDER_H
-#define GAIT_RENDER_H
-#include "outline.h"
-
-/* Errors as model_pose_state. */
-gait_status render_limbs(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
-                         int32_t stride);
-#endif

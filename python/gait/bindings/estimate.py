@@ -1,0 +1,92 @@
+"""What a tracker believes after a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait.bindings import abi
+from gait.bindings.abi import Flag, TrackStatus
+from gait.bindings.model import Model, pose_arrays
+from gait.bindings.state import Array, State
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the tracker believes after a frame.
+
+    Attributes
+    ----------
+    utime : int
+        Capture time, microseconds.
+    frame : int
+        Steps since start.
+    status : TrackStatus
+    flags : Flag
+    log_evidence : float
+        log p(frame | past), up to a constant.
+    ess : float
+        Effective number of particles.
+    phase_r : float
+        How sure the phase is, [0, 1].
+    mode_mass : float
+        Weight of the dominant mode, [0, 1].
+    speed : float
+        Metres per second along the ground.
+    mean, sd, best : State
+        Of the dominant mode; standard deviation over all particles; heaviest particle.
+    joints : ndarray of shape (P, 3)
+        Posterior mean of the joints in the world, metres.
+    joint_sd : ndarray of shape (P, 3)
+        Posterior standard deviation, metres.
+    angles : ndarray of shape (A,)
+        Radians, of the dominant mode.
+    joint_names : tuple of str
+        Names of the P joints.
+    """
+
+    utime: int
+    frame: int
+    status: TrackStatus
+    flags: Flag
+    log_evidence: float
+    ess: float
+    phase_r: float
+    mode_mass: float
+    speed: float
+    mean: State
+    sd: State
+    best: State
+    joints: Array
+    joint_sd: Array
+    angles: Array
+    joint_names: tuple[str, ...]
+
+    def joint(self, name: str) -> Array:
+        """Place of one joint in the world, shape (3,), metres."""
+        return np.asarray(self.joints[self.joint_names.index(name)])
+
+    @staticmethod
+    def from_c(c: abi.EstimateC, model: Model) -> Estimate:
+        """Copy a ``gait_estimate``."""
+        info = model.info
+        joints, angles = pose_arrays(c.pose, info.joints, info.angles)
+        return Estimate(
+            utime=c.utime,
+            frame=c.frame,
+            status=TrackStatus(c.status),
+            flags=Flag(c.flags),
+            log_evidence=c.log_evidence,
+            ess=c.ess,
+            phase_r=c.phase_r,
+            mode_mass=c.mode_mass,
+            speed=c.speed,
+            mean=State.from_c(c.mean, info.components, info.angles),
+            sd=State.from_c(c.sd, info.components, info.angles),
+            best=State.from_c(c.best, info.components, info.angles),
+            joints=joints,
+            joint_sd=np.array(c.joint_sd, float)[: info.joints],
+            angles=angles,
+            joint_names=model.joint_names,
+        )

@@ -1,0 +1,75 @@
+"""What the tracker is given of one moment, as the C library takes it: pictures, and joints found in them."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gait.bindings import abi
+from gait.camera.camera import Camera
+from gait.io.video import Image
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joints that a detector has located in one picture, for the likelihood's term of tracks.
+
+    Attributes
+    ----------
+    names : sequence of str
+        Which, as the model names them; others are left out.
+    uv : array_like of shape (J, 2)
+        Pixels as captured; NaN where a joint was not seen.
+    sd : array_like that broadcasts to (J,)
+        Standard deviations, pixels, what the model's joints miss the detector's by included.
+    """
+
+    names: Sequence[str]
+    uv: ArrayLike
+    sd: ArrayLike = 4.0
+
+
+def per_camera(items: Any) -> list[Any]:
+    """One item for each camera: a list, or the only camera's own."""
+    if items is None or isinstance(items, np.ndarray | Joints):
+        return [items]
+    return list(items)
+
+
+def capture_time(utime: Any) -> int:
+    """Check a capture time: whole microseconds that fit 64 bits; ValueError if they do not."""
+    try:
+        whole = operator.index(utime)
+    except TypeError:
+        raise ValueError(f"utime = {utime!r}: give whole microseconds") from None
+    if not -(1 << 63) <= whole < 1 << 63:
+        raise ValueError(f"utime = {utime}: give microseconds in [-2^63, 2^63)")
+    return whole
+
+
+def image_view(image: Image, camera: Camera, what: str) -> abi.ImageView:
+    """View of a contiguous picture that must fit the camera."""
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
+        raise ValueError(f"{what}: {image.dtype} {image.shape}; give uint8 (h, w) grey or (h, w, 3) BGR")
+    height, width = image.shape[:2]
+    if (width, height) != camera.size:
+        raise ValueError(f"{what}: {width}x{height}, the camera is {camera.width}x{camera.height}")
+    form = abi.PixelFormat.GREY8 if image.ndim == 2 else abi.PixelFormat.BGR8
+    return abi.ImageView(image.ctypes.data, width, height, image.strides[0], form)
+
+
+def track_array(joints: Joints, names: Sequence[str]) -> Any:
+    """Array of ``gait_track`` in the order of the model's `names`."""
+    uv = np.asarray(joints.uv, float)
+    if uv.shape != (len(joints.names), 2):
+        raise ValueError(f"joints: uv has shape {uv.shape} instead of {(len(joints.names), 2)}")
+    found = dict(zip(joints.names, zip(uv, np.broadcast_to(joints.sd, len(uv)), strict=True), strict=True))
+    array = (abi.KeypointC * len(names))()
+    for track, name in zip(array, names, strict=True):
+        (track.u, track.v), track.sd = found.get(name, ((0.0, 0.0), -1.0))
+    return array

@@ -1,0 +1,139 @@
+"""Where a track starts: the first state of the walker and how sure it is."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait.bindings.model import Model
+from gait.bindings.state import State
+from gait.errors import UserError
+from gait.io.fields import Fields, read_json
+
+# Standard deviations of values that an init file gives without saying how sure they are.
+DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
+KEYS = ("frame", *DEFAULT_SD, "sd")
+FAR = 1e4  # metres from the origin; single precision places nothing to the millimetre further out
+OUTSIDE = "the start is outside of the picture; check pelvis and camera"
+STATURE = (0.5, 2.5)  # metres, accepted range
+
+SCALARS = {  # key in the file: attribute of State, accepted range, remedy
+    "heading_rad": ("heading", (-7.0, 7.0), "give the walking direction about z in radians, 0 = along +x"),
+    "phase": ("phase", (0.0, 1.0), "give the phase of the stride from 0 (right heel strike) to 1"),
+    "stride_hz": ("stride_hz", (0.1, 4.0), "give strides (two steps) per second, about 0.9"),
+    "stature_m": ("stature", STATURE, "give the person's height in metres"),
+}
+
+
+@dataclass(frozen=True)
+class Start:
+    """First state of a track.
+
+    Attributes
+    ----------
+    frame : int
+        Frame of the video that it describes.
+    mean, sd : State
+        Independent normals; a phase or heading whose sd is a half turn or more is uniform.
+    looks : float, optional
+        Stature that the pictures give, metres, where it is beyond doubt another than was believed.
+    """
+
+    frame: int
+    mean: State
+    sd: State
+    looks: float | None = None
+
+    @staticmethod
+    def read(
+        path: str | os.PathLike[str], model: Model, *, frame: int | None = None, height: float | None = None
+    ) -> Start:
+        """Read an init file; what it does not say comes from the model's broad prior.
+
+        Parameters
+        ----------
+        path : path
+            JSON with `KEYS`, each optional.  A pelvis of two numbers gets the model's height over ground.
+        model : Model
+        frame : int, optional
+            First frame, where the file does not say.
+        height : float, optional
+            Stature in metres, which then counts more than the file's.
+
+        Raises
+        ------
+        UserError
+            One line naming file, key and remedy.
+        """
+        fields, spread = read_start(path, "init", KEYS)
+        if "frame" in fields:
+            own = frame_number(fields)
+            if frame not in (None, own):
+                raise fields.fail("frame", f"is {own}, --start says {frame}", "leave one of them out")
+            frame = own
+        mean, sd = model.prior()
+        for key, (name, (low, high), remedy) in SCALARS.items():
+            if key in fields:
+                setattr(mean, name, fields.number(key, low, high, remedy))
+                setattr(sd, name, DEFAULT_SD[key])
+            if key in spread:
+                setattr(sd, name, spread.number(key, 0.0, 10.0, "give a standard deviation, not negative"))
+        if height is not None:
+            set_height(mean, sd, height)
+        _place(fields, spread, model, mean, sd)
+        mean.phase %= 1.0
+        return Start(frame or 0, mean, sd)
+
+
+def read_start(path: str | os.PathLike[str], what: str, keys: Sequence[str]) -> tuple[Fields, Fields]:
+    """Fields of a file that says where somebody is, which may have `keys`, and of its standard deviations.
+
+    Raises
+    ------
+    UserError
+        One line naming file, key and remedy.
+    """
+    fields = read_json(path, what)
+    fields.only(keys)
+    spread = fields.table("sd", "give standard deviations by key")
+    spread.only(tuple(DEFAULT_SD))
+    return fields, spread
+
+
+def frame_number(fields: Fields) -> int:
+    """Read the frame that a start describes."""
+    return fields.integer("frame", 0, 1 << 31, "give the frame number, from 0")
+
+
+def set_height(mean: State, sd: State, height: float) -> None:
+    """Put a known stature in metres into a first state; its sd is at most the usual one."""
+    if not STATURE[0] <= height <= STATURE[1]:
+        raise UserError(
+            f"--height: {height:g} m is not a stature; give metres from {STATURE[0]} to {STATURE[1]}"
+        )
+    mean.stature = height
+    sd.stature = min(sd.stature, DEFAULT_SD["stature_m"])
+
+
+def _place(fields: Fields, spread: Fields, model: Model, mean: State, sd: State) -> None:
+    """Set the pelvis; its height is the model's unless the file gives it."""
+    remedy = "give x and y (and z if known) of the pelvis in metres"
+    known = 2
+    if "pelvis" in fields:
+        known = 3 if fields.count("pelvis", remedy) == 3 else 2
+        mean.pelvis[:known] = fields.array("pelvis", (known,), remedy)
+        if (np.abs(mean.pelvis) > FAR).any():
+            what = f"is further than {FAR:g} m from the origin"
+            raise fields.fail("pelvis", what, "lay the world's origin near the scene")
+        sd.pelvis[:] = DEFAULT_SD["pelvis"]
+    if known == 2:
+        mean.pelvis[2] = model.pelvis_height(mean)
+    if "pelvis" in spread:
+        remedy = "give one number or three, metres"
+        values = spread.one_or_three("pelvis", remedy)
+        if (values < 0).any():
+            raise spread.fail("pelvis", "is negative", remedy)
+        sd.pelvis[:] = values

@@ -1,0 +1,98 @@
+"""Find and load libgait, check that it is this package's, and turn its status codes into exceptions."""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import functools
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings import abi
+from gait._version import __version__
+from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryError
+
+_HERE = Path(__file__).resolve().parents[1]
+_RAISES = {abi.Status.ARG: GaitArgumentError, abi.Status.LIMIT: GaitLimitError}
+
+
+def candidates() -> Iterator[str]:
+    """Yield the files to try, in order; ``$GAIT_LIBRARY`` alone if it is set."""
+    chosen = os.environ.get("GAIT_LIBRARY")
+    if chosen:
+        yield chosen
+        return
+    yield str(_HERE / "lib" / "libgait.so")
+    yield str(_HERE.parents[1] / "build" / "release" / "libgait.so")
+    installed = ctypes.util.find_library("gait")
+    if installed:
+        yield installed
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """Load libgait once.
+
+    Raises
+    ------
+    LibraryError
+        Listing every file tried and why it would not do.
+    """
+    failures = []
+    for path in candidates():
+        try:
+            return open_library(path)
+        except LibraryError as exc:
+            failures.append(str(exc))
+    raise LibraryError(
+        f"cannot load libgait: {'; '.join(failures)} - run make lib, or set GAIT_LIBRARY to the file"
+    )
+
+
+def open_library(path: str) -> ctypes.CDLL:
+    """Load one file and check version, functions and layout against this package."""
+    if os.sep in path and not Path(path).is_file():
+        raise LibraryError(f"{path}: no such file")
+    try:
+        loaded = ctypes.CDLL(path)
+    except OSError as exc:
+        raise LibraryError(f"{path}: {exc}") from None
+    try:
+        abi.declare(loaded)
+    except AttributeError as exc:
+        raise LibraryError(f"{path}: not this version of libgait ({exc})") from None
+    if loaded.gait_abi() != abi.ABI:
+        raise LibraryError(f"{path}: ABI {loaded.gait_abi()}, this package needs {abi.ABI}")
+    version = version_text(loaded.gait_version())
+    if version != __version__:
+        raise LibraryError(f"{path}: version {version}, this package is {__version__}")
+    faults = abi.verify(loaded)
+    if faults:
+        raise LibraryError(f"{path}: layout differs from gait.bindings.abi: {'; '.join(faults)}")
+    return loaded
+
+
+def version_text(number: int) -> str:
+    """Write ``gait_version()`` as MAJOR.MINOR.PATCH."""
+    return f"{number // 10000}.{number // 100 % 100}.{number % 100}"
+
+
+def check(status: int, error: abi.Error | None = None, words: str = "") -> int:
+    """Raise what a negative status means, in the library's words or these; return any other."""
+    if status >= 0:
+        return status
+    name = library().gait_result_name(status).decode()
+    kind = _RAISES.get(abi.Status(status), GaitError)
+    text, index = (error.text.decode(errors="replace"), error.index) if error else (words, -1)
+    raise kind(status, name, text, index)
+
+
+def aligned(size: int) -> NDArray[np.uint8]:
+    """Memory of `size` bytes at an address that is a multiple of GAIT_ALIGN."""
+    room = np.zeros(size + abi.ALIGN, np.uint8)
+    skip = -room.ctypes.data % abi.ALIGN
+    return room[skip : skip + size]

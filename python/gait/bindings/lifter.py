@@ -1,0 +1,336 @@
+"""3-D motion from 2-D tracks by the C library: one segment, many at once, or a stream.
+
+After Leventon and Freeman (1998).  The prior is that of `gait.bindings.segment_prior.SegmentPrior`; `gait.lift`
+holds the same inference in numpy, which is the reference in tests.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gait.bindings import abi
+from gait.bindings.abi import LiftFlag, TrackStatus
+from gait.bindings.library import aligned, check, library
+from gait.bindings.lift_config import LiftConfig as LiftConfig
+from gait.bindings.model import read_blob
+from gait.errors import GaitError
+from gait.camera.camera import Camera
+
+Array = NDArray[np.float64]
+
+FITTED = "there is no segment yet; call segment() first"
+GAIN = "there is no gain yet; call fix() first"
+
+
+@dataclass(frozen=True)
+class LiftInfo:
+    """What the segment prior of a blob holds; see ``gait_lift_info``."""
+
+    markers: int
+    frames: int
+    hop: int
+    headings: int
+    components: int
+    modes: int
+    fps: float
+    stature: float
+    digest: int
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What the observations of one segment say.
+
+    Attributes
+    ----------
+    log_evidence : float
+        log p(observations), nats, of the best heading and component.
+    log10_volume : float
+        log10 of posterior over prior volume of all unknowns.
+    misfit : float
+        Sum of squared residuals in deviations.
+    heading, heading_sd : float
+        Radians about z; 0 = along +x.
+    place : ndarray of shape (3,)
+        Of the pelvis in the first frame, z: of the floor, metres.
+    share : float
+        Posterior probability of the component.
+    component, observed, iterations : int
+        Gaussian of the mixture; numbers observed; passes taken.
+    converged : bool
+    """
+
+    log_evidence: float
+    log10_volume: float
+    misfit: float
+    heading: float
+    heading_sd: float
+    place: Array
+    share: float
+    component: int
+    observed: int
+    iterations: int
+    converged: bool
+
+
+@dataclass(frozen=True)
+class LiftedFrame:
+    """One frame of a stream.
+
+    Attributes
+    ----------
+    utime : int
+        Its capture time, microseconds.
+    frame : int
+        Frames pushed before it since the start.
+    status : TrackStatus
+        TRACKING, AMBIGUOUS where what is seen does not fit, INIT before a first whole segment.
+    flags : LiftFlag
+    heading : float
+        Radians.
+    misfit : float
+        Squared deviations per number observed.
+    markers, sd : ndarray of shape (J, 3)
+        Posterior mean and standard deviation, metres, world; 0 for those not in the config's `report`.
+    """
+
+    utime: int
+    frame: int
+    status: TrackStatus
+    flags: LiftFlag
+    heading: float
+    misfit: float
+    markers: Array
+    sd: Array
+
+
+class Lifter:
+    """Lifts 2-D tracks of markers in memory of fixed size.
+
+    Parameters
+    ----------
+    source : path or bytes, optional
+        Blob with a segment prior; the model of the package if left out or None.
+    view : Camera, or array_like of shape (2, 3)
+        Calibrated camera, tracks in pixels; or the directions of u and v in the world of an orthographic
+        view, tracks in metres.  It must be given: ``Lifter(view=camera)``.
+    config : LiftConfig, optional
+        The library's defaults if left out; stature and lag are in it.
+    **settings
+        None: they belong into the config.
+
+    Attributes
+    ----------
+    info : LiftInfo
+    names : tuple of str
+        The J markers.
+    memory_bytes : int
+        All the memory that lifting uses.
+
+    Raises
+    ------
+    TypeError
+        If there is no view or it is none, or settings are not in the config.
+    UserError
+        If the file cannot be read.
+    GaitError
+        If the blob holds no sound segment prior, or a setting is out of its range; later, if a method is
+        called before the one that it needs.
+
+    Notes
+    -----
+    Observations are arrays of doubles; a marker whose `sd` is not a positive number, or whose `uv` is NaN,
+    was not seen.  Same input and configuration give the same bits.
+    """
+
+    def __init__(
+        self,
+        source: str | os.PathLike[str] | bytes | None = None,
+        view: Camera | ArrayLike | None = None,
+        config: LiftConfig | None = None,
+        **settings: object,
+    ) -> None:
+        if settings:
+            name = next(iter(settings))
+            raise TypeError(
+                f"Lifter takes no {name!r}; settings, such as a person's stature, are in "
+                "config=LiftConfig.default(stature=1.8, stature_sd=0.04, lag=5)"
+            )
+        if isinstance(source, Camera) or view is None:
+            raise TypeError("a view is missing; write Lifter(view=camera), or Lifter(model, camera)")
+        contents = source if isinstance(source, bytes) else read_blob(source)
+        self._blob = aligned(len(contents))
+        self._blob[:] = np.frombuffer(contents, np.uint8)
+        self.config = config or LiftConfig.default()
+        c, error, size = self.config.to_c(view), abi.Error(), ctypes.c_size_t()
+        blob = (self._blob.ctypes.data, len(contents))
+        lib = library()
+        check(lib.gait_lift_bytes(*blob, ctypes.byref(c), ctypes.byref(size), ctypes.byref(error)), error)
+        self.memory_bytes = size.value
+        self._memory, self._handle = aligned(size.value), ctypes.c_void_p()
+        check(
+            lib.gait_lift_init(
+                self._memory.ctypes.data,
+                size.value,
+                *blob,
+                ctypes.byref(c),
+                ctypes.byref(self._handle),
+                ctypes.byref(error),
+            ),
+            error,
+        )
+        info = abi.LiftInfoC()
+        check(lib.gait_lift_get_info(*blob, ctypes.byref(info), ctypes.byref(error)), error)
+        self.info = LiftInfo(**{item.name: getattr(info, item.name) for item in fields(LiftInfo)})
+        markers = range(self.info.markers)
+        self.names = tuple(lib.gait_lift_marker_name(self._handle, j).decode() for j in markers)
+
+    def _observations(self, uv: ArrayLike, sd: ArrayLike | None, *shape: int) -> tuple[Array, Array | None]:
+        """Check shapes (..., J, 2) and (..., J)."""
+        seen = np.ascontiguousarray(uv, np.float64)
+        if seen.shape != (*shape, 2):
+            raise ValueError(f"uv has shape {seen.shape} instead of {(*shape, 2)}")
+        if sd is None:
+            return seen, None
+        return seen, np.ascontiguousarray(np.broadcast_to(np.asarray(sd, np.float64), shape))
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return self.info.frames, self.info.markers
+
+    def segment(self, uv: ArrayLike, sd: ArrayLike | None = None) -> Fit:
+        """Fit one segment.
+
+        Parameters
+        ----------
+        uv : array_like of shape (F, J, 2)
+            Pixels, or metres of an orthographic view.
+        sd : array_like that broadcasts to (F, J), optional
+            Standard deviations in the same unit; the config's if left out.
+        """
+        seen, deviations = self._observations(uv, sd, *self._shape)
+        c, error = abi.LiftFitC(), abi.Error()
+        check(
+            library().gait_lift_segment(
+                self._handle,
+                seen.ctypes.data,
+                deviations.ctypes.data if deviations is not None else None,
+                ctypes.byref(c),
+                ctypes.byref(error),
+            ),
+            error,
+        )
+        values = {item.name: getattr(c, item.name) for item in fields(Fit)}
+        return Fit(**(values | {"place": np.array(c.place), "converged": bool(c.converged)}))
+
+    def positions(self) -> tuple[Array, Array]:
+        """Give posterior mean and standard deviation (F, J, 3) of the last segment or of `fix`; metres."""
+        mean, sd = np.empty((*self._shape, 3)), np.empty((*self._shape, 3))
+        status = library().gait_lift_positions(self._handle, mean.ctypes.data, sd.ctypes.data)
+        check(status, words=FITTED)
+        return mean, sd
+
+    def posterior(self) -> tuple[Array, Array]:
+        """Mean (n,) and covariance (n, n) of modes, place, stature and heading; each N(0, 1) a priori."""
+        count = library().gait_lift_unknowns(self._handle)
+        mean, covariance = np.empty(count), np.empty((count, count))
+        status = library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data)
+        check(status, words=FITTED)
+        return mean, covariance
+
+    def scale(self) -> float:
+        """By what to multiply deviations for a motion as far from the prior's mean as the last segment.
+
+        Above 1 where its modes are larger than the prior expects, below 1 where they are smaller (the
+        likeliest scale of the modes' variances, with an inverse gamma prior).  Of a parallel view, heading
+        and size known, errors over deviations so multiplied are about Student's t of ten degrees: 90 % are
+        within 1.81.  With a camera the doubt about size and place is in the deviations as well and does not
+        shrink with the motion: do not multiply by less than 1.  Takes milliseconds; none after `fix`.
+        """
+        scale = float(library().gait_lift_scale(self._handle))
+        if not scale > 0:
+            check(abi.Status.STATE, words=FITTED)
+        return scale
+
+    def least_squares(self) -> Array:
+        """Fit the last segment's observations alone (F, J, 3): least squares of minimum norm."""
+        mean = np.empty((*self._shape, 3))
+        check(library().gait_lift_least_squares(self._handle, mean.ctypes.data), words=FITTED)
+        return mean
+
+    def uncertain(self, count: int = 3) -> tuple[Array, Array]:
+        """Find the least certain displacements of the last segment.
+
+        Returns
+        -------
+        sd : (count,)
+            Their deviations over all markers and frames, metres, largest first.
+        modes : (count, F, J, 3)
+            The displacements, one deviation long.
+        """
+        most = library().gait_lift_unknowns(self._handle)
+        if not 1 <= count <= most:
+            raise ValueError(f"count is {count}; give one from 1 to {most}")
+        sd, modes = np.empty(count), np.empty((count, *self._shape, 3))
+        status = library().gait_lift_uncertain(self._handle, count, modes.ctypes.data, sd.ctypes.data)
+        check(status, words=FITTED)
+        return sd, modes
+
+    def fix(self, sd: ArrayLike) -> None:
+        """Compute the gain for segments with deviations `sd` (F, J): orthographic, config `heading_sd` 0."""
+        deviations, error = np.ascontiguousarray(np.broadcast_to(sd, self._shape), np.float64), abi.Error()
+        check(library().gait_lift_fix(self._handle, deviations.ctypes.data, ctypes.byref(error)), error)
+
+    def batch(self, uv: ArrayLike) -> Array:
+        """Lift segments (n, F, J, 2) by the gain of `fix`; posterior means (n, F, J, 3)."""
+        count = len(np.asarray(uv))
+        seen, _ = self._observations(uv, None, count, *self._shape)
+        mean = np.empty((*seen.shape[:-1], 3))
+        status = library().gait_lift_batch(self._handle, count, seen.ctypes.data, mean.ctypes.data)
+        check(status, words=GAIN)
+        return mean
+
+    def push(self, utime: int, uv: ArrayLike, sd: ArrayLike | None = None) -> None:
+        """Add one frame to the stream: uv (J, 2), sd (J,); microseconds, increasing."""
+        seen, deviations = self._observations(uv, sd, self.info.markers)
+        error = abi.Error()
+        check(
+            library().gait_lift_push(
+                self._handle,
+                utime,
+                seen.ctypes.data,
+                deviations.ctypes.data if deviations is not None else None,
+                ctypes.byref(error),
+            ),
+            error,
+        )
+
+    def estimate(self) -> LiftedFrame | None:
+        """Estimate the frame `lag` frames before the last one pushed; None: not so many yet."""
+        c = abi.LiftFrameC()
+        try:
+            check(library().gait_lift_estimate(self._handle, ctypes.byref(c)))
+        except GaitError as exc:
+            if exc.status == abi.Status.STATE:
+                return None
+            raise
+        count = self.info.markers
+        return LiftedFrame(
+            utime=c.utime,
+            frame=c.frame,
+            status=TrackStatus(c.status),
+            flags=LiftFlag(c.flags),
+            heading=c.heading,
+            misfit=c.misfit,
+            markers=np.array(c.marker)[:count],
+            sd=np.array(c.sd)[:count],
+        )
+
+    def reset(self) -> None:
+        """Forget the stream."""
+        library().gait_lift_reset(self._handle)

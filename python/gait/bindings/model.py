@@ -1,0 +1,191 @@
+"""A learned walking model: poses of the body at any phase, and pictures of them."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings import abi
+from gait.bindings.library import aligned, check, library
+from gait.body.pace import slope_of
+from gait.bindings.state import State
+from gait.errors import GaitError, UserError
+from gait.camera.camera import Camera
+from gait.io.blob import decode
+
+Array = NDArray[np.float64]
+
+NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """What a model holds.
+
+    Attributes
+    ----------
+    joints, angles : int
+        Reported points and joint angles.
+    components : int
+        Principal components of the cyclic motion.
+    proportions : int
+        Ways in which limbs differ in length at the same stature.
+    phases : int
+        Samples per stride of its curves.
+    limbs : int
+        Drawn body parts.
+    stride_hz, stride_hz_sd : float
+        Strides per second: mean of the training set, and standard deviation between subjects.
+    stride_length, stride_length_sd : float
+        Fractions of stature, likewise.
+    digest : int
+        Hash of the blob.
+    """
+
+    joints: int
+    angles: int
+    components: int
+    proportions: int
+    phases: int
+    limbs: int
+    stride_hz: float
+    stride_hz_sd: float
+    stride_length: float
+    stride_length_sd: float
+    digest: int
+
+
+class Model:
+    """Cyclic model read from a ``.gait`` blob.
+
+    Parameters
+    ----------
+    source : path or bytes, optional
+        File or contents of a blob; the walking model of the package if left out.
+
+    Attributes
+    ----------
+    info : ModelInfo
+    joint_names, angle_names, limb_names : tuple of str
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or is no sound model: not one, damaged, of another version.
+    GaitError
+        If the library refuses a blob given as bytes.
+    """
+
+    def __init__(self, source: str | os.PathLike[str] | bytes | None = None) -> None:
+        self._lib = library()
+        if isinstance(source, bytes):
+            self._load(source)
+            return
+        contents = read_blob(source)
+        try:
+            self._load(contents)
+        except GaitError as exc:
+            if {"SGNM", "CURV"} & set(decode(contents)) == {"SGNM"}:
+                raise UserError(f"{source}: {NOT_CYCLIC}") from exc
+            raise UserError(f"{source or 'walk.gait'}: {exc.text}; copy or learn it again") from exc
+
+    def _load(self, blob: bytes) -> None:
+        """Check and take in a blob."""
+        self._blob = aligned(len(blob))
+        self._blob[:] = np.frombuffer(blob, np.uint8)
+        size, error, handle = ctypes.c_size_t(), abi.Error(), ctypes.c_void_p()
+        where = (self._blob.ctypes.data, len(blob))
+        check(self._lib.gait_model_bytes(*where, ctypes.byref(size), ctypes.byref(error)), error)
+        self._memory = aligned(size.value)
+        status = self._lib.gait_model_init(
+            self._memory.ctypes.data, size.value, *where, ctypes.byref(handle), ctypes.byref(error)
+        )
+        check(status, error)
+        self.handle = handle
+        self.info = self._read_info()
+        names, info = self._lib, self.info
+        self.joint_names = tuple(names.gait_model_joint_name(handle, i).decode() for i in range(info.joints))
+        self.angle_names = tuple(names.gait_model_angle_name(handle, i).decode() for i in range(info.angles))
+        self.limb_names = tuple(names.gait_model_limb_name(handle, i).decode() for i in range(info.limbs))
+
+    def __repr__(self) -> str:
+        return f"<gait.Model of {self.info.components} components, digest {self.info.digest:016x}>"
+
+    def pose(self, state: State) -> tuple[Array, Array]:
+        """Joint positions (P, 3) in the world, metres, and joint angles (A,), radians, of one hypothesis."""
+        c = abi.PoseC()
+        check(self._lib.gait_model_pose(self.handle, ctypes.byref(state.to_c()), ctypes.byref(c)))
+        return pose_arrays(c, self.info.joints, self.info.angles)
+
+    def pelvis_height(self, state: State) -> float:
+        """Height of the pelvis over the ground that the model predicts, metres (for any ``state.pelvis``)."""
+        height = ctypes.c_float()
+        check(
+            self._lib.gait_model_pelvis_height(self.handle, ctypes.byref(state.to_c()), ctypes.byref(height))
+        )
+        return height.value
+
+    def prior(self) -> tuple[State, State]:
+        """Mean and standard deviation of a walker of whom nothing is known, with the pelvis at the origin."""
+        mean, sd = abi.StateC(), abi.StateC()
+        check(self._lib.gait_tracker_prior(self.handle, ctypes.byref(mean), ctypes.byref(sd)))
+        sizes = (self.info.components, self.info.angles)
+        return State.from_c(mean, *sizes), State.from_c(sd, *sizes)
+
+    def render(self, camera: Camera, state: State) -> NDArray[np.uint8]:
+        """Draw a hypothesis through an ideal lens: (height, width) of limb index + 1, or 0 for none."""
+        ids = np.zeros((camera.height, camera.width), np.uint8)
+        pixels = ids.ctypes.data_as(ctypes.POINTER(ctypes.c_uint8))
+        view, walker = camera_c(camera), state.to_c()
+        check(
+            self._lib.gait_render(self.handle, ctypes.byref(view), ctypes.byref(walker), pixels, camera.width)
+        )
+        return ids
+
+    def _read_info(self) -> ModelInfo:
+        c = abi.ModelInfoC()
+        check(self._lib.gait_model_get_info(self.handle, ctypes.byref(c)))
+        return ModelInfo(**{name: getattr(c, name) for name, *_ in c._fields_ if name != "reserved"})
+
+
+def pose_arrays(c: abi.PoseC, joints: int, angles: int) -> tuple[Array, Array]:
+    """Copy a ``gait_pose`` to arrays (joints, 3) and (angles,)."""
+    return np.array(c.joint, float)[:joints], np.array(c.angle[:angles], float)
+
+
+def camera_c(camera: Camera) -> abi.CameraC:
+    """Make a ``gait_camera``."""
+    c = abi.CameraC(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
+    c.R[:], c.t[:] = camera.R.ravel().tolist(), camera.t.tolist()
+    c.distortion[:] = camera.distortion.tolist()
+    return c
+
+
+def read_blob(path: str | os.PathLike[str] | None) -> bytes:
+    """Bytes of a blob file, or of the package's own, whose container is sound."""
+    if path is None:
+        shipped = resources.files("gait") / "data" / "walk.gait"
+        if not shipped.is_file():
+            raise UserError("gait/data/walk.gait: the package was built without its model; run make model")
+        return shipped.read_bytes()
+    if not Path(path).is_file():
+        raise UserError(f"{path}: no such model file; make one with gait learn")
+    contents = Path(path).read_bytes()
+    decode(contents, str(path))
+    return contents
+
+
+def read_cyclic(path: str | os.PathLike[str] | None) -> dict[str, Any]:
+    """Sections of a blob file, or of the package's own, that has a cyclic model."""
+    sections = decode(read_blob(path), str(path))
+    if "CURV" not in sections:
+        raise UserError(f"{path}: {NOT_CYCLIC}")
+    slope_of(sections, str(path))
+    return sections

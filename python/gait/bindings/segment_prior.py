@@ -1,0 +1,180 @@
+"""The prior over segments of motion: x = mean + sum_i alpha_i mode_i + residual, alpha ~ N(0, I).
+
+A segment is F frames of J markers, in statures; the pelvis of its first frame is over the origin and the
+floor is z = 0.  With `headings` 0 its body looks along +x in the first frame.
+`gait.learn.segments.segment_sections` writes what is read here; the sections are in
+libgait/doc/model-format.md.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.errors import UserError
+from gait.io import blob
+
+Floats = npt.NDArray[np.float64]
+
+#: Sections of a blob that hold the prior: all of them, or none.
+TAGS = ("SGNM", "SGIN", "SGRT", "SGWT", "SGMN", "SGMD", "SGSD", "SGPS")
+HEADINGS = (0, 2, 8)  # turned copies of every training segment; 0: the heading is unknown when lifting
+
+
+@dataclass(frozen=True)
+class SegmentPrior:
+    """Mixture of K Gaussians with k modes each over segments of F frames and J markers; lengths in statures.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The J markers.
+    hop : int
+        Frames from one segment to the next.
+    fps : float
+        Frames per second of the segments.
+    headings : int
+        0: the heading is latent; 2 or 8: so many turned copies were learnt, in the axes of the world.
+    weights : (K,)
+        Shares of the mixture's components, sum 1.
+    mean : (K, F, J, 3)
+    modes : (K, k, F, J, 3)
+        Principal directions times their standard deviations, most variance first.
+    sd : (K, k)
+        These standard deviations; 0 where a component has fewer modes.
+    residual : (K, J)
+        Variance of each coordinate of a marker outside the modes, squared statures.
+    gamma : float
+        Factor of that variance which held-out recordings ask for.
+    stature : float
+        Mean of the people learnt from, metres.
+    segments, recordings : int
+        How many were learnt from.
+    """
+
+    names: tuple[str, ...]
+    hop: int
+    fps: float
+    headings: int
+    weights: Floats
+    mean: Floats
+    modes: Floats
+    sd: Floats
+    residual: Floats
+    gamma: float
+    stature: float
+    segments: int = 0
+    recordings: int = 0
+
+    @property
+    def frames(self) -> int:
+        """Frames F of a segment."""
+        return int(self.mean.shape[1])
+
+    @property
+    def components(self) -> int:
+        """Gaussians K of the mixture."""
+        return len(self.weights)
+
+    @property
+    def size(self) -> int:
+        """Modes k of a component."""
+        return int(self.sd.shape[1])
+
+    def index(self, names: Sequence[str]) -> npt.NDArray[np.intp]:
+        """Places of markers among `names`.
+
+        Raises
+        ------
+        UserError
+            If the prior does not know one.
+        """
+        for name in names:
+            if name not in self.names:
+                raise UserError(f"marker {name!r} is not in the prior; it knows {' '.join(self.names)}")
+        return np.array([self.names.index(name) for name in names], np.intp)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str] | None = None) -> SegmentPrior:
+        """Read the prior of a blob, or of the model shipped with the package.
+
+        Raises
+        ------
+        UserError
+            If the file is no sound blob, or holds no such prior.
+        """
+        from gait.bindings.model import read_blob  # the model's module loads the C library's bindings
+
+        name = os.fspath(path) if path is not None else "walk.gait"
+        return cls.from_sections(blob.decode(read_blob(path), name), name)
+
+    @classmethod
+    def from_sections(cls, sections: Mapping[str, Any], name: str = "blob") -> SegmentPrior:
+        """Take the prior out of the sections of a blob, called `name` in errors.
+
+        Raises
+        ------
+        UserError
+            If sections are missing or contradict each other.
+        """
+        missing = [tag for tag in TAGS if tag not in sections]
+        if missing:
+            what = "segment prior" if len(missing) == len(TAGS) else f"section {missing[0]} of the prior"
+            raise UserError(f"{name}: holds no {what}; learn it with gait learn ... --segments learnt")
+        problem = _problem(sections)
+        if problem:
+            raise UserError(f"{name}: {problem}; learn the model again")
+        frames, hop, headings, components, size, segments, recordings = sections["SGIN"][:7].tolist()
+        fps, gamma, stature = sections["SGRT"][:3].astype(float).tolist()
+        markers = len(sections["SGNM"])
+        return cls(
+            names=tuple(blob.unpack_names(sections["SGNM"])),
+            hop=hop,
+            fps=fps,
+            headings=headings,
+            weights=sections["SGWT"].astype(float),
+            mean=sections["SGMN"].astype(float),
+            modes=sections["SGMD"].astype(float).reshape(components, size, frames, markers, 3),
+            sd=sections["SGSD"].astype(float),
+            residual=sections["SGPS"].astype(float),
+            gamma=gamma,
+            stature=stature,
+            segments=segments,
+            recordings=recordings,
+        )
+
+
+def _problem(sections: Mapping[str, Any]) -> str:
+    """Say what is wrong with the sections of a prior; '' if nothing is."""
+    if sections["SGIN"].shape != (8,) or sections["SGRT"].shape != (8,):
+        return "section SGIN or SGRT has not 8 entries"
+    frames, hop, headings, components, size = sections["SGIN"][:5].tolist()
+    markers = len(sections["SGNM"])
+    if not (frames >= 1 and 1 <= hop <= frames and components >= 1 and size >= 1 and headings in HEADINGS):
+        return "section SGIN holds impossible counts"
+    shapes = {
+        "SGNM": (markers, blob.NAME_BYTES),
+        "SGWT": (components,),
+        "SGMN": (components, frames, markers, 3),
+        "SGMD": (components, size, frames, 3 * markers),
+        "SGSD": (components, size),
+        "SGPS": (components, markers),
+    }
+    for tag, shape in shapes.items():
+        if sections[tag].shape != shape:
+            return f"section {tag} has shape {sections[tag].shape} instead of {shape}"
+    if not all(np.isfinite(sections[tag]).all() for tag in TAGS[2:]):
+        return "the segment prior holds values that are not finite"
+    if not (sections["SGRT"][:3] > 0).all():
+        return "section SGRT holds a rate, factor or stature that is not positive"
+    weights = sections["SGWT"]
+    if (weights <= 0).any() or abs(float(weights.sum()) - 1) > 1e-3:
+        return "section SGWT holds weights that are not positive with sum 1"
+    if (sections["SGSD"] < 0).any() or (sections["SGPS"] <= 0).any():
+        return "section SGSD or SGPS holds a deviation or variance below its range"
+    return ""

@@ -1,0 +1,87 @@
+"""One hypothesis of a walker in numpy clothes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings import abi
+
+Array = NDArray[np.float64]
+LIMITS = {"coef": abi.MAX_COMPONENTS, "offset": abi.MAX_ANGLES, "proportion": abi.MAX_PROPORTIONS}
+LEAST_STATURE = 0.3  # metres, of a particle (population.h)
+POSE_SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")  # poses need no more
+SCALARS = (*POSE_SCALARS, "turn_rate")
+
+
+@dataclass
+class State:
+    """Everything that places and poses a walker; also used for the standard deviations of those values.
+
+    Attributes
+    ----------
+    phase : float
+        [0, 1) of the stride, 0 = right heel strike.
+    stride_hz : float
+        Strides (two steps) per second.
+    stature : float
+        Metres.
+    heading : float
+        Walking direction about world z, radians; 0 = along +x.
+    pitch, roll : float
+        Tilt of the pelvis beyond the model's own, radians.
+    pelvis : ndarray of shape (3,)
+        Pelvis joint in the world, metres.
+    coef : ndarray of shape (q,)
+        Principal-component scores in standard deviations; missing ones are 0.
+    offset : ndarray of shape (A,)
+        Posture: added to the model's joint angles, radians; missing ones are 0.
+    proportion : ndarray of shape (p,)
+        Scores of the limbs' proportions in standard deviations; missing ones are 0.
+    turn_rate : float
+        Of the heading, radians per second, positive to the left.
+    """
+
+    phase: float = 0.0
+    stride_hz: float = 0.9
+    stature: float = 1.75
+    heading: float = 0.0
+    pitch: float = 0.0
+    roll: float = 0.0
+    pelvis: Array = field(default_factory=lambda: np.zeros(3))
+    coef: Array = field(default_factory=lambda: np.zeros(0))
+    offset: Array = field(default_factory=lambda: np.zeros(0))
+    proportion: Array = field(default_factory=lambda: np.zeros(0))
+    turn_rate: float = 0.0
+
+    @staticmethod
+    def from_c(c: abi.StateC, components: int, angles: int) -> State:
+        """Copy a ``gait_state``, keeping `components` scores and `angles` offsets."""
+        arrays = {"pelvis": c.pelvis, "coef": c.coef[:components], "offset": c.offset[:angles]}
+        arrays["proportion"] = c.proportion[:]
+        values: dict[str, Any] = {name: float(getattr(c, name)) for name in SCALARS}
+        values |= {name: np.array(numbers, float) for name, numbers in arrays.items()}
+        return State(**values)
+
+    def to_c(self) -> abi.StateC:
+        """Make a ``gait_state``.
+
+        Raises
+        ------
+        ValueError
+            If `pelvis` is not of 3 numbers, or another array has more than the library can hold.
+        """
+        pelvis: Sequence[float] = np.asarray(self.pelvis, float).tolist()
+        if len(pelvis) != 3 or any(np.size(getattr(self, name)) > most for name, most in LIMITS.items()):
+            limits = ", ".join(f"{name} at most {most}" for name, most in LIMITS.items())
+            raise ValueError(f"state: pelvis has 3 numbers, {limits}")
+        c = abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
+        c.pelvis[:] = pelvis
+        for name in LIMITS:
+            numbers: Sequence[float] = np.asarray(getattr(self, name), float).tolist()
+            getattr(c, name)[: len(numbers)] = numbers
+        return c

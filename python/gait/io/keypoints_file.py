@@ -1,0 +1,238 @@
+"""Files of 2-D joint tracks: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``, empty cells = not seen.
+
+Columns may also be separated by tabs, or by semicolons with decimal commas.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.frame import Joints
+from gait.errors import UserError
+from gait.io import delimited
+from gait.io.fields import frame_numbers
+from gait.io.files import replacing
+from gait.io import sentinels
+
+Array = NDArray[np.float64]
+
+LEAST_CONFIDENCE = 0.1  # points below it count as not seen
+
+LONGEST_STEP = 1.0  # seconds between frames; so long a step is a cycle of walking
+SHORTEST_STEP = 1e-5  # no camera is as fast
+LONGEST_GAP = 10.0  # seconds without a row that lifting bridges; nothing is known in the middle of it
+FURTHEST = 1e6  # pixels, or units of an orthographic view
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Points followed in one view over T frames.
+
+    Attributes
+    ----------
+    frame : ndarray of int, shape (T,)
+        Increasing.
+    time : ndarray of shape (T,)
+        Seconds, increasing.
+    names : tuple of str
+        The J points.
+    uv : ndarray of shape (T, J, 2)
+        Pixels (or metres of an orthographic view), u to the right, v down; NaN where not seen.
+    confidence : ndarray of shape (T, J)
+        From 0 to 1; 1 where the file has none.
+    """
+
+    frame: NDArray[np.int64]
+    time: Array
+    names: tuple[str, ...]
+    uv: Array
+    confidence: Array
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which points are seen, shape (T, J)."""
+        return np.asarray(np.isfinite(self.uv).all(axis=2))
+
+    def outside(self, size: tuple[int, int]) -> float:
+        """Share of the points seen that lie outside of a picture of `size` (width, height)."""
+        seen = self.uv[self.seen]
+        return float(((seen < -0.5) | (seen > np.array(size) - 0.5)).any(axis=1).mean())
+
+    def require_spread(self, path: str | os.PathLike[str], sd: float) -> None:
+        """Raise UserError if several points all lie within `sd`: not in its unit, they tell nothing."""
+        seen = self.uv[self.seen]
+        spread = float(np.ptp(seen, axis=0).max())
+        if self.seen.any(axis=0).sum() > 1 and spread <= sd:
+            raise UserError(
+                f"{path}: all u and v lie within {spread:.3g}, less than their noise of {sd:g}; give pixels, "
+                "not shares of the picture, or the noise in their unit"
+            )
+
+    def require_motion(self, path: str | os.PathLike[str]) -> None:
+        """Raise UserError unless this is one stretch of two frames or more."""
+        if len(self.time) < 2:
+            raise UserError(f"{path}: has one frame; lifting is of motion, give two or more")
+        gap = np.diff(self.time)
+        if gap.max() > LONGEST_GAP:
+            line = int(gap.argmax()) + 3
+            raise UserError(
+                f"{path}: line {line}: {gap.max():.3g} s after the frame before; lift what is before and "
+                f"after a gap of more than {LONGEST_GAP:g} s by itself"
+            )
+
+    def deviations(self, sd: float) -> Array:
+        """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
+        return np.where(self.seen, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
+
+    def joints(self, sd: float) -> dict[int, Joints]:
+        """Joints by frame, as the tracker takes them; `sd` as in `deviations`."""
+        found = zip(self.frame.tolist(), self.uv, self.deviations(sd), strict=True)
+        return {frame: Joints(self.names, uv, deviation) for frame, uv, deviation in found}
+
+
+def read(
+    path: str | os.PathLike[str], known: Sequence[str], ignore_unknown: bool = False
+) -> tuple[Tracks, list[str]]:
+    """Read tracks of points named in `known`.
+
+    Returns
+    -------
+    tracks : Tracks
+    ignored : list of str
+        Points that are not in `known`.
+
+    Raises
+    ------
+    UserError
+        If the file is malformed, holds no point, or one that is not known unless `ignore_unknown`.
+    """
+    head, rows = _table(path)
+    columns = {name: i for i, name in enumerate(head)}
+    for name in ("frame", "time"):
+        if name not in columns:
+            raise UserError(f"{path}: column {name} is missing; tracks are frame,time,<joint>_u,<joint>_v")
+    points = list(dict.fromkeys(name[:-2] for name in head if name[-2:] in ("_u", "_v")))
+    if not points:
+        raise UserError(f"{path}: no columns <joint>_u,<joint>_v; name them by joint, such as l_knee_u")
+    for name in points:
+        for axis in "uv":
+            if f"{name}_{axis}" not in columns:
+                raise UserError(f"{path}: column {name}_{axis} is missing; every point needs _u and _v")
+    ignored = [name for name in points if name not in known]
+    if ignored and not ignore_unknown:
+        raise UserError(
+            f"{path}: point {ignored[0]!r} is unknown to the model; rename it to one of {' '.join(known)}, "
+            "or use --ignore-unknown"
+        )
+    names = [name for name in points if name in known]
+    if not names:
+        raise UserError(f"{path}: no point of the model; rename them to {' '.join(known)}")
+    numbers = _Numbers(path, columns, rows)
+    frame, time = frame_numbers(path, numbers.required("frame")), numbers.required("time")
+    if (np.diff(time) <= 0).any():
+        line = int(np.argmax(np.diff(time) <= 0)) + 3
+        raise UserError(f"{path}: line {line}: time does not increase; give seconds")
+    step = float(np.median(np.diff(time))) if len(time) > 1 else SHORTEST_STEP
+    if not SHORTEST_STEP <= step < LONGEST_STEP:
+        what = f"time goes on by {step:g} from frame to frame"
+        raise UserError(f"{path}: {what}; give seconds, not milliseconds or frames")
+    both = [[numbers.column(f"{name}_{axis}", FURTHEST) for axis in "uv"] for name in names]
+    uv = np.moveaxis(np.array(both), 2, 0).copy()
+    half = np.isfinite(uv[..., 0]) != np.isfinite(uv[..., 1])
+    if half.any():
+        t, j = np.argwhere(half)[0]
+        raise UserError(f"{path}: line {t + 2}: {names[j]} has only one of _u and _v; give both or none")
+    confidence = np.stack([numbers.confidence(f"{name}_c") for name in names], axis=1)
+    uv[confidence < LEAST_CONFIDENCE] = np.nan
+    if not np.isfinite(uv).any():
+        raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
+    sentinels.refuse(path, names, uv)
+    return Tracks(frame, time, tuple(names), uv, confidence), ignored
+
+
+def write(path: str | os.PathLike[str], tracks: Tracks) -> None:
+    """Write tracks so that `read` gets them back (hundredths of a pixel)."""
+    head = ["frame", "time", *(f"{name}_{axis}" for name in tracks.names for axis in "uvc")]
+    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(head)
+        for t, frame in enumerate(tracks.frame):
+            row = [str(frame), f"{tracks.time[t]:.6f}"]
+            for j, (u, v) in enumerate(tracks.uv[t]):
+                seen = np.isfinite(u)
+                row += [f"{u:.4f}", f"{v:.4f}", f"{tracks.confidence[t, j]:.3g}"] if seen else ["", "", ""]
+            table.writerow(row)
+
+
+class _Numbers:
+    """Columns of numbers with errors that name file, line and column."""
+
+    def __init__(self, path: str | os.PathLike[str], columns: dict[str, int], rows: list[list[str]]) -> None:
+        self._path, self._columns, self._rows = path, columns, rows
+
+    def column(self, name: str, most: float = sys.float_info.max) -> Array:
+        """Values of a column between -most and most, NaN where it is empty."""
+        values = np.full(len(self._rows), np.nan)
+        limit = f" of at most {most:g}" if most < sys.float_info.max else ""
+        for i, row in enumerate(self._rows):
+            cell = row[self._columns[name]].strip()
+            if not cell or cell.lower() == "nan":
+                continue
+            try:
+                values[i] = float(cell)
+            except ValueError:
+                values[i] = np.inf
+            if not abs(values[i]) <= most:
+                raise UserError(
+                    f"{self._path}: line {i + 2}: {name} is {cell!r}; give a number{limit} or leave it empty"
+                )
+        return values
+
+    def required(self, name: str) -> Array:
+        """Values of a column without gaps."""
+        values = self.column(name)
+        if np.isnan(values).any():
+            raise UserError(
+                f"{self._path}: line {int(np.argmax(np.isnan(values))) + 2}: {name} is empty; give a number"
+            )
+        return values
+
+    def confidence(self, name: str) -> Array:
+        """Confidences; 1 if there is no such column, 0 where it is empty."""
+        if name not in self._columns:
+            return np.ones(len(self._rows))
+        values = self.column(name)
+        wrong = (values < 0) | (values > 1)
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise UserError(f"{self._path}: line {i + 2}: {name} is {values[i]:g}; give it from 0 to 1")
+        return np.nan_to_num(values)
+
+
+def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a CSV, all of one width."""
+    if not Path(path).is_file():
+        raise UserError(f"{path}: no such file of tracks")
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+        lines = [row for _, row in delimited.rows(text) if row]
+    except (UnicodeDecodeError, csv.Error) as exc:
+        raise UserError(f"{path}: not a CSV file ({exc})") from None
+    if len(lines) < 2:
+        raise UserError(f"{path}: has no rows; tracks are a header and one row per frame")
+    head = [name.strip() for name in lines[0]]
+    twice = next((name for name in head if head.count(name) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path}: column {twice} is there twice; remove one")
+    for number, row in enumerate(lines[1:], 2):
+        if len(row) != len(head):
+            raise UserError(f"{path}: line {number} has {len(row)} cells, the header {len(head)}")
+    return head, lines[1:]

@@ -1,0 +1,261 @@
+"""Track and truth files: CSV with one row per frame and metric joint positions in the world."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.body.skeleton import EVAL15, JOINTS
+from gait.bindings.estimate import Estimate
+from gait.errors import UserError
+from gait.io.video import Frame
+from gait.io.fields import frame_numbers
+from gait.io.files import replacing
+
+Array = NDArray[np.float64]
+
+STATE_COLUMNS = (
+    *("frame", "time", "status", "phase", "stride_hz", "heading_rad", "stature_m", "speed_m_s"),
+    *("ess", "log_evidence"),
+)
+SPREAD_COLUMNS = ("phase_sd", "stride_hz_sd", "heading_sd_rad", "stature_sd_m")
+STATUSES = ("init", "tracking", "ambiguous", "lost")
+
+
+def header(components: int, angle_names: tuple[str, ...]) -> list[str]:
+    """Column names of a track file."""
+    scores = [f"c_{k + 1}" for k in range(components)]
+    joints = [f"{joint}_{axis}" for joint in JOINTS for axis in ("x", "y", "z", "sx", "sy", "sz")]
+    spreads = [*SPREAD_COLUMNS, *(f"{score}_sd" for score in scores)]
+    return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names), *spreads]
+
+
+class TrackWriter:
+    """Write a track file row by row; it appears under its name when the ``with`` block ends without error.
+
+    Parameters
+    ----------
+    path : path
+    components : int
+        Scores per row.
+    joint_names, angle_names : tuple of str
+        Of the model.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        components: int,
+        joint_names: tuple[str, ...],
+        angle_names: tuple[str, ...],
+    ) -> None:
+        self.path = path
+        missing = [name for name in JOINTS if name not in joint_names]
+        if missing:
+            raise UserError(f"model: has no joint {' '.join(missing)}; learn it with the default skeleton")
+        self._order = [joint_names.index(name) for name in JOINTS]
+        self._components = components
+        self._header = header(components, angle_names)
+        self._stack = ExitStack()
+
+    def __enter__(self) -> TrackWriter:
+        temporary = self._stack.enter_context(replacing(self.path))
+        file = self._stack.enter_context(open(temporary, "w", newline="", encoding="utf-8"))
+        self._csv = csv.writer(file, lineterminator="\n")
+        self._csv.writerow(self._header)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
+    ) -> bool | None:
+        return self._stack.__exit__(kind, exc, trace)
+
+    def write(self, frame: Frame, estimate: Estimate) -> None:
+        """Append the estimate of one frame."""
+        state, sd = estimate.mean, estimate.sd
+        joints = np.hstack([estimate.joints, estimate.joint_sd])[self._order]
+        values = [state.phase, state.stride_hz, state.heading, state.stature, estimate.speed]
+        self._csv.writerow(
+            [frame.number, f"{frame.time:.6f}", estimate.status.name.lower()]
+            + [f"{value:.6f}" for value in values]
+            + [f"{estimate.ess:.2f}", f"{estimate.log_evidence:.4f}"]
+            + [f"{value:.4f}" for value in self._scores(state.coef)]
+            + [f"{value:.5f}" for value in joints.ravel()]
+            + [f"{value:.3f}" for value in np.degrees(estimate.angles)]
+            + [f"{value:.6f}" for value in (sd.phase, sd.stride_hz, sd.heading, sd.stature)]
+            + [f"{value:.4f}" for value in self._scores(sd.coef)]
+        )
+
+    def _scores(self, coef: Array) -> Array:
+        """One value for each score column; a state may hold fewer, which are 0."""
+        return np.pad(np.asarray(coef, float)[: self._components], (0, max(0, self._components - len(coef))))
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joint positions over frames, the truth of a clip.
+
+    Attributes
+    ----------
+    frame : ndarray of int, shape (n,)
+        Increasing.
+    time : ndarray of shape (n,)
+        Seconds.
+    places : dict of str to ndarray of shape (n, 3)
+        Metres, world; at least EVAL15.
+    """
+
+    frame: NDArray[np.int64]
+    time: Array
+    places: dict[str, Array]
+
+    def eval15(self) -> Array:
+        """Return the positions of EVAL15, shape (n, 15, 3)."""
+        return np.stack([self.places[name] for name in EVAL15], axis=1)
+
+
+@dataclass(frozen=True)
+class Track(Joints):
+    """A track file.
+
+    Attributes
+    ----------
+    status : list of str
+        Of each frame: init, tracking, ambiguous or lost.
+    phase : ndarray of shape (n,)
+    sd : dict of str to ndarray of shape (n, 3)
+        Posterior standard deviations, metres.
+    numbers : dict of str to ndarray of shape (n,)
+        Every other column of numbers by its name: state, scores, angles and their standard deviations.
+    """
+
+    status: list[str]
+    phase: Array
+    sd: dict[str, Array]
+    numbers: dict[str, Array] = field(default_factory=dict)
+
+    def eval15_sd(self) -> Array:
+        """Return the standard deviations of EVAL15, shape (n, 15, 3)."""
+        return np.stack([self.sd[name] for name in EVAL15], axis=1)
+
+
+def read_truth(path: str | os.PathLike[str]) -> Joints:
+    """Read ``frame,time`` and ``<joint>_x,_y,_z`` columns; others are ignored."""
+    table = _Table(path, "truth")
+    names = [name for name in JOINTS if name in EVAL15 or f"{name}_x" in table.rows]
+    return Joints(table.frames(), table.numbers("time"), {name: table.vectors(name, "xyz") for name in names})
+
+
+def read_estimates(path: str | os.PathLike[str]) -> Track:
+    """Read what ``gait track`` or ``gait lift`` wrote.
+
+    Lifted motion has joints alone: every status is then ``tracking`` and the phase NaN.
+    """
+    table = _Table(path, "track")
+    if _has_no_state(table):
+        count = len(table.frames())
+        return _track(table, ["tracking"] * count, np.full(count, np.nan))
+    return read_track(path)
+
+
+def read_track(path: str | os.PathLike[str]) -> Track:
+    """Read what ``gait track`` wrote."""
+    table = _Table(path, "track")
+    if _has_no_state(table):
+        raise UserError(f"{path}: has joints alone, as gait lift writes; give a track of gait track")
+    status = table.column("status")
+    for line, word in enumerate(status, 2):
+        if word not in STATUSES:
+            raise UserError(f"{path}: line {line}: status {word!r} is not one of {' '.join(STATUSES)}")
+    return _track(table, status, table.numbers("phase"))
+
+
+def _has_no_state(table: _Table) -> bool:
+    """Whether it is lifted motion, or a truth: joints alone."""
+    return not {"status", "phase"} & table.rows.keys()
+
+
+def _track(table: _Table, status: list[str], phase: Array) -> Track:
+    return Track(
+        frame=table.frames(),
+        time=table.numbers("time"),
+        places={name: table.vectors(name, "xyz") for name in JOINTS},
+        status=status,
+        phase=phase,
+        sd={name: table.deviations(name) for name in JOINTS},
+        numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
+    )
+
+
+def _is_number(column: str) -> bool:
+    """Whether `read_track` takes a column into `Track.numbers`."""
+    known = column in STATE_COLUMNS[3:] or column in SPREAD_COLUMNS or column.endswith("_deg")
+    return known or re.fullmatch(r"c_\d+(_sd)?", column) is not None
+
+
+class _Table:
+    """CSV columns by name, with errors that name file, line and column."""
+
+    def __init__(self, path: str | os.PathLike[str], what: str) -> None:
+        self.path, self.what = path, what
+        if not Path(path).is_file():
+            raise UserError(f"{path}: no such {what} file")
+        try:
+            with open(path, newline="", encoding="utf-8-sig") as file:
+                lines = list(csv.reader(file))
+        except (UnicodeDecodeError, csv.Error) as exc:
+            raise UserError(f"{path}: not a CSV file ({exc})") from None
+        form = f"give a {what} CSV with a header and one row per frame"
+        if len(lines) < 2:
+            raise UserError(f"{path}: has no rows; {form}")
+        names, *rows = lines
+        if "frame" not in names:
+            raise UserError(f"{path}: not a {what} file, its header names no frame; {form}")
+        for number, row in enumerate(rows, 2):
+            if len(row) != len(names):
+                raise UserError(
+                    f"{path}: line {number} has {len(row)} cells, the header {len(names)}; "
+                    "cut off? write it anew"
+                )
+        self.rows = dict(zip(names, zip(*rows, strict=True), strict=True))
+
+    def column(self, name: str) -> list[str]:
+        if name not in self.rows:
+            raise UserError(f"{self.path}: column {name} is missing; a {self.what} file needs it")
+        return list(self.rows[name])
+
+    def numbers(self, name: str) -> Array:
+        cells = self.column(name)
+        values = np.empty(len(cells))
+        for i, cell in enumerate(cells):
+            try:
+                values[i] = float(cell)
+            except ValueError:
+                values[i] = np.nan
+            if not np.isfinite(values[i]):
+                raise UserError(f"{self.path}: line {i + 2}: {name} is {cell!r}; give a finite number")
+        return values
+
+    def deviations(self, joint: str) -> Array:
+        sd = self.vectors(joint, ("sx", "sy", "sz"))
+        if (sd < 0).any():
+            i, axis = np.argwhere(sd < 0)[0]
+            cell = f"{joint}_s{'xyz'[axis]} is {sd[i, axis]:g}"
+            raise UserError(
+                f"{self.path}: line {i + 2}: {cell}; a standard deviation is 0 or more, write the file anew"
+            )
+        return sd
+
+    def vectors(self, joint: str, axes: str | tuple[str, ...]) -> Array:
+        return np.stack([self.numbers(f"{joint}_{axis}") for axis in axes], axis=1)
+
+    def frames(self) -> NDArray[np.int64]:
+        return frame_numbers(self.path, self.numbers("frame"))

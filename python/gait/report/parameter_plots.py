@@ -1,0 +1,195 @@
+"""Plots of the page of ``gait report track``, as SVG text."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping, Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from gait.report.colours import DARK, GREY, ON_PAPER
+from gait.motion.angle_cycles import PERCENT, AngleCycle
+from gait.motion.footfalls import SIDES, contacts, stride_time
+from gait.motion.parameters import QUANTITIES, Parameters
+from gait.io.track_file import Track
+
+Array = NDArray[np.float64]
+Painter = Callable[[Axes], None]
+
+_TINT = {"lost": "#e07a7a", "ambiguous": "#f4d06f"}
+_WIDTH = 7.6  # inches
+_GROUPS = (
+    ("hip_flexion", "knee_flexion", "ankle_flexion"),
+    ("hip_abduction", "hip_rotation", "shoulder_flexion"),
+    ("shoulder_abduction", "shoulder_rotation", "elbow_flexion"),
+)
+_TRUNK = (("torso_x", "torso_y", "torso_z"), ("neck_x", "neck_y", "neck_z"))
+
+
+def footfall_plot(track: Track, parameters: Parameters) -> str:
+    """Draw the contacts of both feet over time; ticks are strikes with two deviations."""
+    stride = stride_time(parameters.events)
+
+    def paint(axes: Axes) -> None:
+        _tint(axes, track)
+        for row, side in enumerate(SIDES):
+            foot = contacts(track, parameters.events, side, stride)
+            begin, ends = foot.strike, np.where(np.isfinite(foot.off), foot.off, track.time[-1])
+            first = parameters.events.off[side][:1]
+            if len(first) and (not len(begin) or first[0] < begin[0]):  # on the ground from the start
+                begin, ends = np.append(track.time[0], begin), np.append(first, ends)
+            axes.barh(np.full(len(ends), row), ends - begin, left=begin, height=0.5, color=ON_PAPER[side])
+            for times, sds, bottom in (
+                (parameters.events.strike[side], parameters.event_sd.strike[side], 0.32),
+                (parameters.events.off[side], parameters.event_sd.off[side], -0.32),
+            ):
+                axes.errorbar(
+                    times,
+                    np.full(len(times), row + bottom),
+                    xerr=2 * sds,
+                    fmt="|",
+                    color=DARK,
+                    capsize=2,
+                    lw=1,
+                )
+        axes.set(yticks=[0, 1], yticklabels=SIDES, xlabel="time, s", ylim=(-0.6, 1.6))
+        axes.set_xlim(track.time[0], track.time[-1])
+        axes.grid(axis="y", visible=False)
+
+    return _figure([[paint]], 1.7)
+
+
+def stride_plot(track: Track, parameters: Parameters) -> str:
+    """Draw quantities stride by stride with two deviations; strides that are not sure are hollow."""
+
+    def painter(name: str, title: str) -> Painter:
+        def paint(axes: Axes) -> None:
+            for side in SIDES:
+                s = parameters.strides[side]
+                middle = (s.start + s.end) / 2
+                seen = np.isfinite(s.values[name])
+                for sure in (True, False):
+                    use = seen & (s.sure == sure)
+                    axes.errorbar(
+                        middle[use],
+                        s.values[name][use],
+                        yerr=2 * s.sd[name][use],
+                        fmt="o",
+                        ms=4,
+                        lw=1,
+                        color=ON_PAPER[side],
+                        mfc=ON_PAPER[side] if sure else "white",
+                        label=side if sure else None,
+                    )
+            axes.set(title=title, xlabel="time, s")
+            axes.set_xlim(track.time[0], track.time[-1])
+            axes.margins(y=0.25)
+
+        return paint
+
+    names = (
+        "stride_time_s",
+        "stride_length_m",
+        "speed_m_s",
+        "step_length_m",
+        "step_width_m",
+        "stance_percent",
+    )
+    painters = [painter(name, QUANTITIES[name]) for name in names]
+    return _figure([painters[:3], painters[3:]], 4.2, legend=True)
+
+
+def angle_plot(cycles: Mapping[str, AngleCycle], trunk: bool = False) -> str | None:
+    """Draw the angles of the limbs, right and left, or of the trunk, with bands, over the norm in grey.
+
+    None if there is no such angle.
+    """
+    rows = []
+    for group in _TRUNK if trunk else _GROUPS:
+        known = [n for n in group if n in cycles or f"r_{n}" in cycles or f"l_{n}" in cycles]
+        if known:
+            rows.append([_angle_painter(name, cycles) for name in known])
+    return _figure(rows, 2.1 * len(rows), legend=not trunk) if rows else None
+
+
+def _angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:
+    def paint(axes: Axes) -> None:
+        first = cycles.get(f"r_{name}") or cycles.get(f"l_{name}") or cycles[name]
+        low, high = first.norm_mean - 2 * first.norm_sd, first.norm_mean + 2 * first.norm_sd
+        axes.fill_between(PERCENT, low, high, color=GREY, alpha=0.25, lw=0, label="norm, 2 deviations")
+        for side, key in (("right", f"r_{name}"), ("left", f"l_{name}"), ("right", name)):
+            if key not in cycles:
+                continue
+            c, colour = cycles[key], ON_PAPER[side if key != name else "middle"]
+            axes.plot(PERCENT, c.strides.T, color=colour, lw=0.5, alpha=0.5)
+            axes.fill_between(PERCENT, c.mean - 2 * c.sd, c.mean + 2 * c.sd, color=colour, alpha=0.25, lw=0)
+            axes.plot(PERCENT, c.mean, color=colour, label=side if key != name else None)
+        axes.set(title=name.replace("_", " ") + ", °", xlabel="% of the stride", xlim=(0, 100))
+
+    return paint
+
+
+def deviation_plot(cycles: Mapping[str, AngleCycle]) -> str:
+    """Draw the deviation from the norm of every angle over the cycle."""
+    names = list(cycles)
+
+    def paint(axes: Axes) -> None:
+        values = np.array([cycles[name].z for name in names])
+        image = axes.imshow(
+            values, aspect="auto", cmap="RdBu_r", vmin=-3, vmax=3, extent=(0, 100, len(names) - 0.5, -0.5)
+        )
+        axes.set(yticks=range(len(names)), xlabel="% of the stride")
+        axes.set_yticklabels([name.replace("_", " ") for name in names], fontsize=7)
+        axes.grid(visible=False)
+        axes.figure.colorbar(image, ax=axes, label="deviations from the norm's mean", extend="both")
+
+    return _figure([[paint]], 0.6 + 0.17 * len(names))
+
+
+def path_plot(track: Track, parameters: Parameters) -> str:
+    """Draw the way of the pelvis and where the feet stood, seen from above."""
+    stride = stride_time(parameters.events)
+
+    def paint(axes: Axes) -> None:
+        axes.plot(*track.places["pelvis"][:, :2].T, color=GREY, lw=1, label="pelvis")
+        for side in SIDES:
+            places = contacts(track, parameters.events, side, stride).place
+            axes.plot(*places[:, :2].T, "o", ms=5, color=ON_PAPER[side], label=f"{side} heel")
+        axes.set(xlabel="x, m", ylabel="y, m")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.legend(fontsize=7)
+
+    return _figure([[paint]], 3.0)
+
+
+def _tint(axes: Axes, track: Track) -> None:
+    """Colour the ground of frames that are lost or ambiguous."""
+    half = 0.5 * float(np.median(np.diff(track.time)))
+    for time, status in zip(track.time, track.status, strict=True):
+        if status in _TINT:
+            axes.axvspan(time - half, time + half, color=_TINT[status], alpha=0.5, lw=0)
+
+
+def _figure(rows: Sequence[Sequence[Painter]], height: float, legend: bool = False) -> str:
+    """Draw rows of axes; `legend` above them all, from the first."""
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "gait", "font.size": 8}):
+        figure = Figure(figsize=(_WIDTH, height), layout="constrained")
+        columns = max(len(row) for row in rows)
+        grid = figure.add_gridspec(len(rows), columns)
+        for i, row in enumerate(rows):
+            for k, paint in enumerate(row):
+                axes = figure.add_subplot(grid[i, k])
+                axes.grid(alpha=0.25)
+                axes.spines[["top", "right"]].set_visible(False)
+                paint(axes)
+                axes.title.set_fontsize(8)
+        if legend:
+            handles, labels = figure.axes[0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
+        text = io.StringIO()
+        figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    return text.getvalue()[text.getvalue().index("<svg") :]

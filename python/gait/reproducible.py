@@ -1,0 +1,54 @@
+"""The same arithmetic on every x86-64 CPU, so that the same recordings give the same model to the last bit.
+
+OpenBLAS, numpy and libm choose their kernels by the CPU when they are loaded, and their last bits differ.
+The filling of gaps takes up to hundreds of steps, each by those before, and may carry that to the sixth
+decimal.  All three can be told to use what every CPU has that numpy runs on (SSE4.2); learning takes a
+little longer.
+
+`dask worker --preload-nanny gait.reproducible tcp://HOST:PORT` does so in a worker.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+
+COMMON = {
+    "OPENBLAS_CORETYPE": "Nehalem",
+    "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512_SKX X86_V3 X86_V4 AVX512_ICL AVX512_SPR",
+    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-FMA4",
+}
+"""Environment of a process that uses the common kernels."""
+
+_NO_WARNING = "ignore:During parsing environment variable:ImportWarning"  # numpy names features it lacks
+_RESTARTED = "GAIT_RESTARTED"  # which process was: never twice, whatever sets COMMON back at its start
+
+
+def chosen() -> dict[str, str]:
+    """Tell which of COMMON's names this process was given, and how."""
+    return {name: os.environ[name] for name in COMMON if name in os.environ}
+
+
+def settle() -> None:
+    """Start this program anew, its command line the same, unless it uses the common kernels already.
+
+    A program that cannot be had again, typed or read from stdin, goes on with the kernels of its CPU.
+    """
+    again = sys.executable and sys.argv[0] not in ("", "-") and os.environ.get(_RESTARTED) != str(os.getpid())
+    if again and _to_choose() and chosen() != COMMON:
+        os.environ.update({**COMMON, _RESTARTED: str(os.getpid())})
+        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), _NO_WARNING)))
+        with contextlib.suppress(OSError):
+            os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+
+
+def dask_setup(_: object) -> None:
+    """Let the workers that a nanny starts use the common kernels."""
+    if _to_choose():
+        os.environ.update(COMMON)
+
+
+def _to_choose() -> bool:
+    """Tell whether COMMON is for this machine."""
+    return os.name == "posix" and os.uname().machine == "x86_64"

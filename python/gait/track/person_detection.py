@@ -1,0 +1,144 @@
+"""See a person against the background: person-sized blobs, their place on the ground and their stature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.camera.camera import Camera
+from gait.io.video import Image
+
+Array = NDArray[np.float64]
+
+STATURE = (1.2, 2.4)  # metres by foot and head ray alone, so with room for shadows
+_GREY_STEP = 14.0  # least difference from the plate that counts, grey levels
+_NOISE_STEPS = 5.0  # and in robust standard deviations of the picture's noise
+_ANOTHER = 18.0  # grey levels by which half of a picture differs from the plate of another scene, at least
+_COLOUR = 4.0  # grey levels between the channels of half of a picture in colour, at least
+_FILL = 0.15  # a standing person covers at least this share of the box round it
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One blob that may be a person.
+
+    Attributes
+    ----------
+    foot, head : ndarray of shape (2,)
+        Lowest and highest point on the blob's middle line, pixels.
+    place : ndarray of shape (3,)
+        Where the ray of `foot` meets the ground, metres.
+    stature : float
+        Height of the head ray over `place`, metres.
+    strength : float
+        How much there is of it: pixels of a blob, votes of a detector.
+    spread : float
+        Standard deviation of `foot` and `head` beyond a pixel or two, as a share of the person's height.
+    """
+
+    foot: Array
+    head: Array
+    place: Array
+    stature: float
+    strength: float
+    spread: float = 0.0
+
+    @property
+    def tall(self) -> float:
+        """Height in the picture, pixels."""
+        return float(self.foot[1] - self.head[1])
+
+
+def _change(image: Image, plate: Image) -> Array:
+    """Largest difference (h, w) of the channels of two BGR pictures, without exposure, in grey levels."""
+    step = image.astype(np.float32) - plate
+    step -= np.median(step[::4, ::4], axis=(0, 1))  # exposure: most of the picture is background
+    return np.asarray(cv2.GaussianBlur(np.abs(step).max(axis=2), (0, 0), 1.2), np.float64)
+
+
+def another_scene(image: Image, plate: Image) -> bool:
+    """Whether half of a picture differs from the plate: it shows another scene, or the camera has moved."""
+    return bool(np.median(_change(image, plate)[::4, ::4]) > _ANOTHER)
+
+
+def one_is_grey(image: Image, plate: Image) -> bool:
+    """Whether one of two BGR pictures is grey throughout, the other in colour: one scene looks like two."""
+    spread = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
+    return min(spread) == 0 and max(spread) > _COLOUR
+
+
+def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
+    """Mask (h, w), 255 where a BGR picture differs from the plate by more than noise and exposure explain."""
+    change = _change(image, plate)
+    noise = 1.4826 * float(np.median(change[::4, ::4]))
+    mask = (change > max(_GREY_STEP, _NOISE_STEPS * noise)).astype(np.uint8) * 255
+    reach = max(3, image.shape[0] // 90) | 1  # joins what low contrast tears apart, mostly at neck and knees
+    opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return np.asarray(
+        cv2.morphologyEx(opened, cv2.MORPH_CLOSE, np.ones((3 * reach, reach), np.uint8)), np.uint8
+    )
+
+
+def sightings(
+    image: Image, plate: Image, camera: Camera, misplaced: list[float] | None = None
+) -> list[Sighting]:
+    """Find blobs of a person's size standing on the ground in full view, largest first.
+
+    Of blobs shaped like one, but not of one's size where they would stand, the largest's stature goes to
+    `misplaced`.
+    """
+    mask = foreground(image, plate)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    found, others = [], []
+    for i in range(1, count):
+        x, y, width, height, area = (int(value) for value in stats[i])
+        inside = x > 1 and y > 1 and x + width < camera.width - 1 and y + height < camera.height - 1
+        if inside and height > 30 and height > width and area > _FILL * width * height:
+            blob = labels[y : y + height, x : x + width] == i
+            foot, head = _ends(blob, x, y)
+            one = standing(foot, head, camera, area)
+            if one is not None:
+                found.append(one)
+            else:
+                others.append((area, _stature(foot, head, camera)))
+    if misplaced is not None and others:
+        misplaced.append(max(others)[1])
+    return sorted(found, key=lambda one: -one.strength)
+
+
+def _ends(blob: NDArray[np.bool_], x: int, y: int) -> tuple[Array, Array]:
+    """Pixels of foot and head of a blob whose box begins at (x, y)."""
+    height = len(blob)
+    columns = np.nonzero(blob)[1]
+    middle = x + float(np.median(columns))
+    crown = np.nonzero(blob[: max(1, height // 10)])[1]
+    foot = np.array([middle, y + height - 0.5])
+    head = np.array([x + float(np.median(crown)), y - 0.5])
+    return foot, head
+
+
+def standing(
+    foot: Array, head: Array, camera: Camera, strength: float, spread: float = 0.0
+) -> Sighting | None:
+    """Sighting of somebody between two pixels; None if a person on the ground is not there and that tall."""
+    stature = _stature(foot, head, camera)
+    if not STATURE[0] <= stature <= STATURE[1]:
+        return None
+    return Sighting(foot, head, camera.on_plane(foot), stature, strength, spread)
+
+
+def _stature(foot: Array, head: Array, camera: Camera) -> float:
+    """Stature of whoever stands between two pixels, metres; not a number without ground under the foot."""
+    place = camera.on_plane(foot)
+    if not np.isfinite(place).all():
+        return float("nan")
+    return height_over(camera, head, float(np.hypot(*(place - camera.centre)[:2])))
+
+
+def height_over(camera: Camera, pixel: Array, distance: float) -> float:
+    """Height over ground of a pixel's ray at a horizontal distance from the camera, metres."""
+    ray = camera.rays(pixel)
+    return float(camera.centre[2] + distance * ray[2] / np.hypot(ray[0], ray[1]))

@@ -1,0 +1,124 @@
+/* Joints found by somebody else: what the term says of one body, and that a tracker which is given them does better. */
+#include "toy_error.h"
+#include "toy_body.h"
+
+enum { FRAMES = 40 };
+
+/* Joints of a state in the scene's camera, as a detector would find them. */
+static void detect(const gait_camera *cam, const gait_state *s, float noise, uint32_t seed, gait_keypoint *out)
+{
+    gait_pose pose;
+    CHECK(gait_model_pose(toy_model(), s, &pose) == GAIT_OK);
+    for (int p = 0; p < TOY_POINTS; p++) {
+        float uv[2] = {0.0f}, ud, vd;
+        CHECK(camera_project(cam, pose.joint[p], uv) > 0.0f);
+        camera_distort(cam, uv[0], uv[1], &ud, &vd);
+        float const du = (float)(toy_hash(seed, (uint32_t)p, 1) % 2001) / 1000.0f - 1.0f;
+        float const dv = (float)(toy_hash(seed, (uint32_t)p, 2) % 2001) / 1000.0f - 1.0f;
+        out[p] =
+            (gait_keypoint){.u = ud + 1.7f * noise * du, .v = vd + 1.7f * noise * dv, .sd = f_max(noise, 1.0f)};
+    }
+}
+
+/* ---- the term ---- */
+static float points[GAIT_MAX_JOINTS][3][BLOCK];
+
+static like_body look_through(toy_body *v, int lane)
+{
+    return (like_body){.setup = &v->setup,
+                       .features = &v->f,
+                       .camera = &v->cam,
+                       .lane = lane,
+                       .points = (const float (*)[3][BLOCK])points};
+}
+
+static void test_cost(void)
+{
+    toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
+    gait_state const s = toy_walk(0.3f);
+    gait_pose pose;
+    like_body const b = look_through(v, 3);
+    CHECK(like_keypoints.flag == GAIT_TERM_KEYPOINTS && strcmp(like_keypoints.name, "tracks") == 0);
+    CHECK(gait_model_pose(toy_model(), &s, &pose) == GAIT_OK);
+    v->f.keypoints = (features_keypoints){0};
+    CHECK(like_keypoints.log_likelihood(&b) == 0.0f && like_keypoints.support(&b) == 0.0f);
+    for (int p = 0; p < 4; p++) {
+        float uv[2] = {0.0f};
+        camera_project(&v->cam, pose.joint[p], uv);
+        v->f.keypoints.u[p] = uv[0] + (p == 2 ? 3.0f : 0.0f);
+        v->f.keypoints.v[p] = uv[1] - (p == 2 ? 4.0f : 0.0f);
+        for (int k = 0; k < 3; k++)
+            points[p][k][3] = pose.joint[p][k];
+        v->f.keypoints.inverse_sd[p] = p == 1 ? 0.0f : 0.5f; /* 2 pixels; the second is not seen */
+    }
+    v->f.keypoints.v[1] = NAN; /* is not read */
+    v->f.keypoints.count = 3;
+    double const want = 3.0 * log(1.0 + 0.25 * 6.25) / 3.0; /* 5 pixels at one of three joints */
+    CHECK_NEAR(like_keypoints.log_likelihood(&b), -want, 1e-4);
+    CHECK_NEAR(like_keypoints.support(&b), 3.0 * log(17.0) - want, 1e-4);
+    points[0][1][3] -= 100.0f; /* behind the camera: as bad as can be, but finite */
+    float const behind = like_keypoints.log_likelihood(&b);
+    CHECK(behind < -10.0f && behind > -100.0f && like_keypoints.support(&b) < 0.0f);
+}
+
+/* ---- the tracker ---- */
+typedef struct given { /* what the detector does */
+    uint32_t terms;
+    float noise;
+    bool keypoints, strange; /* strange: one joint is always somewhere else */
+} given;
+
+static error follow(const given *g, uint64_t *digest)
+{
+    gait_tracker_config cfg = toy_config(1);
+    cfg.terms = g->terms;
+    cfg.term_weight[2] = 1.0f; /* an image that says little */
+    cfg.term_weight[4] = 8.0f;
+    gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
+    gait_keypoint track[GAIT_MAX_JOINTS];
+    error out = {0};
+    gait_estimate e;
+    for (int n = 0; n < FRAMES; n++) {
+        gait_state const truth = toy_walk((float)n / 30.0f);
+        gait_frame f = toy_frame(n);
+        f.image[0] = toy_image(film[0][n]);
+        detect(&cfg.camera[0], &truth, g->noise, (uint32_t)n, track);
+        if (g->strange)
+            track[7].u += 60.0f;
+        track[4].sd = n % 3 ? track[4].sd : INFINITY;
+        f.keypoints[0] = g->keypoints ? track : NULL;
+        CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
+        if (n >= 15)
+            look(&e, n, &out);
+    }
+    *digest = gait_tracker_digest(t);
+    toy_tracker_free(t);
+    return out;
+}
+
+static void test_tracker(void)
+{
+    uint64_t plain, ignored, alone, helped, odd;
+    given g = {.terms = GAIT_TERM_EDGES, .noise = 1.0f};
+    error const edges = follow(&g, &plain);
+    g.keypoints = true;
+    (void)follow(&g, &ignored);
+    CHECK(ignored == plain); /* the term is off: tracks are not read */
+    g.terms = GAIT_TERM_EDGES | GAIT_TERM_KEYPOINTS;
+    error const both = follow(&g, &helped);
+    g.strange = true;
+    error const strange = follow(&g, &odd);
+    g = (given){.terms = GAIT_TERM_KEYPOINTS, .noise = 1.0f, .keypoints = true};
+    error const tracks = follow(&g, &alone);
+    CHECK(helped != plain && odd != helped && alone != helped);
+    CHECK(both.joint < 0.8 * edges.joint && both.joint < 0.04);
+    CHECK(strange.joint < 1.5 * both.joint && tracks.joint < 0.05);
+}
+
+int main(void)
+{
+    film_make(1, FRAMES);
+    test_cost();
+    test_tracker();
+    return CHECK_DONE();
+}

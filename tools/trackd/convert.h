@@ -1,0 +1,27 @@
+/* convert.h - between the structs of gait.h and the messages of package gaitmsg. */
+#ifndef TRACKD_CONVERT_H
+#define TRACKD_CONVERT_H
+#include "gait.h"
+#include "gaitmsg_camera_t.h"
+#include "gaitmsg_estimate_t.h"
+#include "gaitmsg_state_t.h"
+#include "message.h"
+
+/* An estimate message with the arrays it points to; it must not move once filled. */
+typedef struct estimate_message {
+    gaitmsg_estimate_t msg;
+    gaitmsg_joint_t joint[GAIT_MAX_JOINTS];
+    gaitmsg_angle_t angle[GAIT_MAX_ANGLES];
+} estimate_message;
+
+void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_state_t *out);
+/* Fields that are not numbers become those of `unknown`; components and offsets beyond the message's are 0. */
+bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
+                           message *why);
+bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why);
+/* Numbers differ by no more than rounding: files and messages have their own, and readers may straighten R. */
+bool convert_same_camera(const gait_camera *a, const gait_camera *b);
+/* All but frame, step, dropped, receive_utime, step_us and tracker_digest, which are the caller's. */
+void convert_estimate(const gait_model *model, const gait_model_info *info, const gait_estimate *in,
+                      estimate_message *out);
+#endif

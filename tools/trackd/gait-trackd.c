@@ -1,0 +1,223 @@
+/* gait-trackd - frames in, estimates out, over LCM.  `gait-trackd --help` is the manual. */
+#include "trackd/camera_file.h"
+#include "trackd/jpeg.h"
+#include "trackd/link.h"
+#include "trackd/log_scan.h"
+#include "trackd/pnm.h"
+#include "trackd/receiver.h"
+#include "trackd/settings.h"
+#include "trackd/workers.h"
+
+#include <inttypes.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static volatile sig_atomic_t quit;
+
+static void on_signal(int number)
+{
+    (void)number;
+    quit = 1;
+}
+
+/* Block the signals that end us, in every thread LCM will start; `unblocked` is the mask to wait with. */
+static void set_signals(sigset_t *unblocked)
+{
+    struct sigaction const action = {.sa_handler = on_signal};
+    sigset_t block;
+    sigemptyset(&block);
+    sigaddset(&block, SIGINT);
+    sigaddset(&block, SIGTERM);
+    sigprocmask(SIG_BLOCK, &block, unblocked);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); /* a log that grows too large is an error of writing */
+}
+
+static bool read_background(service *s, const char *path, message *why)
+{
+    file_bytes bytes;
+    gait_image plate;
+    if (!path[0])
+        return true;
+    if (!pnm_read(path, &bytes, &plate, why))
+        return false;
+    message bad;
+    bool const ok = tracking_set_background(&s->track, &plate, &bad) ||
+                    message_set(why, "%.100s: %.140s", path, bad.text);
+    free(bytes.data);
+    return ok;
+}
+
+typedef struct parts { /* those that a service may lack */
+    lift_service lift;
+    keypoint_cue cue;
+} parts;
+
+/* The second service, if it is asked for. */
+static bool load_lift(service *s, const settings *want, lift_service *lift, sink *out, message *why)
+{
+    lift_settings const set = {.stature = want->lift_stature,
+                               .sd = want->lift_sd > 0 ? want->lift_sd : 3,
+                               .lag = want->lift_lag >= 0 ? want->lift_lag : 5,
+                               .cpu_mask = (uint32_t)want->cpu_mask};
+    const char *const model = want->lift_model[0] ? want->lift_model : want->model;
+    if (!want->lift)
+        return true;
+    if (!lift_service_open(lift, model, &set, out, why))
+        return false;
+    s->lift = lift;
+    s->track.memory_bytes += lift->blob.size + lift->memory_bytes;
+    return true;
+}
+
+/* Model, start, camera and empty scene, as far as the command line gives them. */
+static bool load(service *s, const settings *want, parts *p, workers *threads, sink *out, message *why)
+{
+    gait_tracker_config config;
+    gait_camera camera;
+    init_state init;
+    bool const has_init = strcmp(want->init, "auto") != 0;
+    settings_tracker(want, gait_pool_tasks(threads->pool), &config);
+    if (!tracking_open(&s->track, want->model, &config, why))
+        return false;
+    if ((has_init && !init_file_read(want->init, s->track.model, &init, why)) ||
+        !load_lift(s, want, &p->lift, out, why))
+        return false;
+    if (want->tracks_term) {
+        keypoint_cue_open(&p->cue, s->track.model, s->track.info.joints,
+                        want->tracks_sd > 0 ? want->tracks_sd : 4);
+        s->cue = &p->cue;
+    }
+    s->max_gap = (double)want->max_gap;
+    s->budget = (budget){.limit_us = (int64_t)(1e3f * want->budget_ms),
+                         .low = want->adapt_particles,
+                         .high = config.particles};
+    s->pool_bytes = threads->bytes;
+    s->track.memory_bytes += threads->bytes;
+    if (!service_open(s, out, want->stream, want->threads, has_init ? &init : NULL, want->particles_channel,
+                      why))
+        return false;
+    if (want->camera[0] &&
+        (!camera_file_read(want->camera, &camera, why) || !service_set_camera(s, &camera, why) ||
+         (s->lift && !lift_service_camera(s->lift, &camera, why))))
+        return false;
+    return read_background(s, want->background, why);
+}
+
+static void print_summary(const service *s, bool live)
+{
+    const service_counts *const c = &s->counts;
+    printf("frames %" PRId64 " dropped %" PRId64 " rejected %" PRId64, c->frames, c->dropped, c->rejected);
+    printf(" step_ms median %.2f p99 %.2f max %.2f", histogram_quantile(&c->step, 0.5) / 1e3,
+           histogram_quantile(&c->step, 0.99) / 1e3, c->step.largest / 1e3);
+    if (live)
+        printf(" latency_ms median %.2f p99 %.2f", histogram_quantile(&c->latency, 0.5) / 1e3,
+               histogram_quantile(&c->latency, 0.99) / 1e3);
+    if (s->budget.limit_us)
+        printf(" late %" PRId64 " over_budget %" PRId64 " particles %d slow_steps %" PRId64, s->budget.late,
+               s->budget.over, (int)(s->wanted ? s->wanted : s->track.config.particles),
+               s->budget.slow_steps);
+    if (s->cue)
+        printf(" tracks %" PRId64 " tracks_used %" PRId64 " tracks_late %" PRId64 " points_left_out %" PRId64,
+               s->cue->messages, s->cue->used, s->cue->late, s->cue->sieve.left_out);
+    if (s->lift)
+        printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
+               " lift_points_left_out %" PRId64 " lift_ms median %.3f p99 %.3f",
+               s->lift->frames, s->lift->lifted, s->lift->rejected, s->lift->sieve.left_out,
+               histogram_quantile(&s->lift->step, 0.5) / 1e3, histogram_quantile(&s->lift->step, 0.99) / 1e3);
+    printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
+}
+
+/* Did anything come of a log?  If not, what is lacking? */
+static bool check_yield(const char *path, const service *s, message *why)
+{
+    int64_t const tracks = s->lift ? s->lift->frames : 0;
+    message lack = s->complaint;
+    if (s->tracked > 0 || (s->lift && s->lift->lifted > 0))
+        return true;
+    if (s->came == 0 && tracks == 0)
+        return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream chooses another camera", path,
+                           s->stream, s->lift ? " and no tracks of a known camera" : "");
+    if (s->came == 0)
+        return message_set(why, "%.80s: none of its %" PRId64 " messages of tracks was lifted: %.110s", path,
+                           tracks, lack.text[0] ? lack.text : "too few");
+    service_lack(s, &lack);
+    return message_set(why, "%.80s: none of its %" PRId64 " frames was tracked: %.130s", path, s->came,
+                       lack.text);
+}
+
+/* Was a log that was played whole, and of use? */
+static bool check_log(const char *url, const service *s, message *why)
+{
+    char path[LINK_PATH];
+    link_log(url, path);
+    log_scan(path, why);
+    return !why->text[0] && check_yield(path, s, why);
+}
+
+/* Everything between the settings and the exit code. */
+static bool serve(service *s, const settings *want, parts *p, workers *threads, const sigset_t *unblocked,
+                  message *why)
+{
+    const char *const url = link_url(want->url);
+    bool const log = link_is_log(url);
+    const char *const to = want->out[0] ? want->out : log ? NULL : url;
+    receiver r = {0};
+    sink out = {0};
+    message lost;
+    bool const ready = (!to || sink_open(&out, to, why)) && load(s, want, p, threads, &out, why) &&
+                       receiver_open(&r, s, url, why);
+    if (ready && !log && !want->quiet)
+        fprintf(stderr, "gait-trackd: listening on %s\n", url);
+    bool ok = ready && receiver_run(&r, &quit, unblocked, why);
+    if (ok) {
+        service_send_status(s);
+        if (!want->quiet)
+            print_summary(s, !log);
+    }
+    if (ok && log)
+        ok = check_log(url, s, why);
+    receiver_close(&r);
+    if (!sink_close(&out, &lost) && ok)
+        ok = message_set(why, "%s", lost.text);
+    return ok;
+}
+
+int main(int argc, char **argv)
+{
+    static settings want;
+    static service s;
+    static parts extra;
+    static workers threads;
+    sigset_t unblocked;
+    message why;
+    option_result const result = settings_read(&want, argc, argv, &why);
+    if (result == OPTION_HELP)
+        settings_help();
+    if (result == OPTION_BAD)
+        fprintf(stderr, "gait-trackd: %s\n", why.text);
+    if (result != OPTION_OK)
+        return result == OPTION_HELP ? 0 : 2;
+    if (want.version) {
+        uint32_t const v = gait_version();
+        printf("gait-trackd %u.%u.%u jpeg %s\n", v / 10000, v / 100 % 100, v % 100,
+               jpeg_supported() ? "yes" : "no");
+        return 0;
+    }
+    set_signals(&unblocked);
+    bool ok = workers_start(&threads, want.threads, &why);
+    if (ok) {
+        ok = serve(&s, &want, &extra, &threads, &unblocked, &why);
+        workers_stop(&threads);
+        service_close(&s);
+        lift_service_close(&extra.lift);
+        keypoint_cue_close(&extra.cue);
+    }
+    if (!ok)
+        fprintf(stderr, "gait-trackd: %s\n", why.text);
+    return ok ? 0 : 1;
+}

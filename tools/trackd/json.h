@@ -1,0 +1,34 @@
+/* json.h - strict JSON (RFC 8259) into nodes of the caller; strings are checked but their escapes stay as they are.
+ * NaN and Infinity, which JSON does not have, come through as NAN so that the reader of a key can refuse them by name.
+ */
+#ifndef TRACKD_JSON_H
+#define TRACKD_JSON_H
+#include "message.h"
+
+#include <stddef.h>
+
+typedef enum json_type { JSON_NULL, JSON_BOOL, JSON_NUMBER, JSON_STRING, JSON_ARRAY, JSON_OBJECT } json_type;
+
+/* One value; its parts follow it.  An object's parts are key, value, key, value. */
+typedef struct json_node {
+    json_type type;
+    int next;         /* index of the node after this value and all its parts */
+    int line;         /* in the text, from 1 */
+    double number;    /* JSON_NUMBER, may be NAN; JSON_BOOL: 0 or 1 */
+    const char *text; /* JSON_STRING: between the quotes, not terminated */
+    size_t length;
+} json_node;
+
+typedef struct json_doc {
+    json_node *node; /* node[0] is the whole text */
+    int used, cap;
+} json_doc;
+
+/* Parse a NUL-terminated text.  On failure `why` is "line N: ...". */
+bool json_parse(json_doc *doc, json_node *nodes, int cap, const char *text, message *why);
+/* Value of a key of an object, or -1. */
+int json_find(const json_doc *doc, int object, const char *key);
+/* Copy the numbers of a value: one number, or an array of them, nested or not.  Returns how many there are (also
+ * beyond cap), or -1 if anything else is in it. */
+int json_numbers(const json_doc *doc, int value, double *out, int cap);
+#endif

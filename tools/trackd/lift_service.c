@@ -1,0 +1,194 @@
+#include "lift_service.h"
+
+#include "convert.h"
+#include "gaitmsg_estimate_t.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum {
+    MESSAGE_ROOM = 1 << 14, /* an estimate of all markers, with room to spare */
+    BACK_US = 1000000,      /* tracks that are older than the last by more are of another time */
+};
+
+static int64_t monotonic_us(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000;
+}
+
+bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why)
+{
+    gait_error err = {.text = ""};
+    gait_lift_config *const c = &s->config;
+    s->out = out;
+    s->last = -1;
+    gait_lift_default(c);
+    c->stature = (double)set->stature;
+    c->sd = (double)set->sd;
+    c->lag = set->lag;
+    c->cpu_mask = set->cpu_mask;
+    /* any camera asks for as much memory */
+    c->camera = (gait_camera){.width = 1, .height = 1, .fx = 1, .fy = 1, .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    if (!file_read(model, "model", &s->blob, why))
+        return false;
+    if (gait_lift_get_info(s->blob.data, s->blob.size, &s->info, &err) != GAIT_OK ||
+        gait_lift_bytes(s->blob.data, s->blob.size, c, &s->memory_bytes, &err) != GAIT_OK)
+        return message_set(why, "--lift: %.100s: %.120s", model, err.text);
+    size_t const padded = (s->memory_bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
+    s->memory = aligned_alloc(GAIT_ALIGN, padded);
+    return s->memory || message_set(why, "--lift: not enough memory for %zu bytes", padded);
+}
+
+void lift_service_close(lift_service *s)
+{
+    free(s->memory);
+    free(s->blob.data);
+    *s = (lift_service){0};
+}
+
+bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why)
+{
+    gait_error err = {.text = ""};
+    if (s->lift)
+        return convert_same_camera(camera, &s->config.camera) ||
+               message_set(why,
+                           "another camera than the one in use was announced and is ignored; restart for it");
+    gait_lift_config c = s->config;
+    c.camera = *camera;
+    if (gait_lift_init(s->memory, s->memory_bytes, s->blob.data, s->blob.size, &c, &s->lift, &err) != GAIT_OK)
+        return message_set(why, "--lift: %s", err.text);
+    s->config = c;
+    return true;
+}
+
+/* Index of a marker by name, -1: the prior does not know it. */
+static int32_t find(const lift_service *s, const char *name)
+{
+    for (int32_t j = 0; j < s->info.markers; j++)
+        if (strcmp(gait_lift_marker_name(s->lift, j), name) == 0)
+            return j;
+    return -1;
+}
+
+/* Observations by marker; tracks of others are left out.  Returns how many points were known. */
+static int32_t take(lift_service *s, keypoints_view *v)
+{
+    track_view track;
+    int32_t known = 0;
+    for (int32_t j = 0; j < s->info.markers; j++)
+        s->sd[j] = -1.0;
+    keypoints_sieve_begin(&s->sieve);
+    while (keypoints_view_next(v, &track)) {
+        int32_t const j = find(s, track.name);
+        known += j >= 0;
+        if (!keypoints_sieve_pass(&s->sieve, &track, j))
+            continue;
+        s->uv[2 * j] = (double)track.u;
+        s->uv[2 * j + 1] = (double)track.v;
+        s->sd[j] = keypoints_view_sd(&track, s->config.sd);
+    }
+    return known;
+}
+
+/* What the source said of the frame captured at `utime`, one of the last. */
+static const lift_past *past_of(const lift_service *s, int64_t utime)
+{
+    for (int32_t i = 0; i < LIFT_SERVICE_PAST; i++)
+        if (s->past[i].utime == utime)
+            return &s->past[i];
+    return &s->past[s->frames % LIFT_SERVICE_PAST];
+}
+
+static bool finite_joints(const gaitmsg_estimate_t *m)
+{
+    bool finite = isfinite(m->mean.heading);
+    for (int32_t j = 0; j < m->njoints; j++)
+        for (int32_t i = 0; i < 3; i++)
+            finite = finite && isfinite(m->joints[j].position[i]) && isfinite(m->joints[j].sd[i]);
+    return finite;
+}
+
+/* What is not finite is not published. */
+static bool send(lift_service *s, int64_t step_us, message *why)
+{
+    static uint8_t room[MESSAGE_ROOM];
+    const gait_lift_frame *const e = &s->estimate;
+    const lift_past *const past = past_of(s, e->utime);
+    bool const known = e->status != GAIT_TRACK_INIT; /* before that nobody knows where the joints are */
+    gaitmsg_estimate_t m = {.utime = e->utime,
+                            .frame = past->frame,
+                            .step = (int64_t)e->frame,
+                            .receive_utime = past->receive_utime,
+                            .step_us = (int32_t)step_us,
+                            .status = (int8_t)e->status,
+                            .model_digest = (int64_t)s->info.digest,
+                            .njoints = known ? s->info.markers : 0,
+                            .joints = s->joint};
+    m.flags = e->flags & GAIT_LIFT_UNSEEN ? GAITMSG_ESTIMATE_T_FLAG_NO_IMAGE : 0;
+    m.mean.heading = (float)e->heading;
+    m.mean.stature = (float)(s->config.stature > 0.0 ? s->config.stature : (double)s->info.stature);
+    for (int32_t j = 0; j < m.njoints; j++) {
+        s->joint[j].name =
+            (char *)gait_lift_marker_name(s->lift, j); /* LCM's strings lack const; read only */
+        for (int32_t i = 0; i < 3; i++) {
+            s->joint[j].position[i] = (float)e->marker[j][i];
+            s->joint[j].sd[i] = (float)e->sd[j][i];
+        }
+    }
+    if (!finite_joints(&m)) {
+        gait_lift_reset(s->lift);
+        s->rejected++;
+        return message_set(why, "tracks: joints that are not finite came of them; the lift begins anew");
+    }
+    sink_publish(s->out, "GAIT_LIFT", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &m));
+    s->lifted++;
+    return true;
+}
+
+/* May tracks of this time follow the last ones, perhaps in a new stream? */
+static bool in_time(lift_service *s, int64_t utime, message *why)
+{
+    if (utime < 0 || (utime <= s->last && utime >= s->last - BACK_US))
+        return message_set(why, "tracks: capture time did not advance; stamp them in order");
+    if (utime > s->last)
+        return true;
+    gait_lift_reset(s->lift);
+    if (!s->told_back)
+        fprintf(stderr, "gait-trackd: tracks: capture time went back by %.3f s: the lift begins anew\n",
+                1e-6 * (double)(s->last - utime));
+    s->told_back = true;
+    return true;
+}
+
+bool lift_service_keypoints(lift_service *s, keypoints_view *v, int64_t receive_utime, message *why)
+{
+    gait_error err = {.text = ""};
+    if (!s->lift)
+        return true; /* the camera is announced every few seconds */
+    s->frames++;
+    int32_t const announced = v->count;
+    if (take(s, v) == 0 && announced > 0) {
+        s->rejected++;
+        return keypoints_view_strangers(why);
+    }
+    if (!in_time(s, v->utime, why)) {
+        s->rejected++;
+        return false;
+    }
+    int64_t const before = monotonic_us();
+    s->last = v->utime;
+    if (gait_lift_push(s->lift, v->utime, s->uv, s->sd, &err) != GAIT_OK) {
+        s->rejected++;
+        return message_set(why, "tracks: %s", err.text);
+    }
+    s->past[s->frames % LIFT_SERVICE_PAST] = (lift_past){v->utime, v->frame, receive_utime};
+    bool const there = gait_lift_estimate(s->lift, &s->estimate) == GAIT_OK;
+    int64_t const step_us = monotonic_us() - before;
+    histogram_add(&s->step, step_us);
+    return !there || send(s, step_us, why);
+}

@@ -1,0 +1,51 @@
+/* lift_service.h - the lifter as a service: 2-D tracks of one camera in, 3-D joints out, whatever carries them. */
+#ifndef TRACKD_LIFT_SERVICE_H
+#define TRACKD_LIFT_SERVICE_H
+#include "file.h"
+#include "gait.h"
+#include "gaitmsg_joint_t.h"
+#include "histogram.h"
+#include "sink.h"
+#include "keypoints_view.h"
+
+enum { LIFT_SERVICE_PAST = 65 }; /* more than the longest lag */
+
+typedef struct lift_settings {
+    float stature; /* metres; 0: the learners' mean */
+    float sd;      /* pixels, of a point with full confidence */
+    int32_t lag;   /* frames */
+    uint32_t cpu_mask;
+} lift_settings;
+
+typedef struct lift_past { /* what the source said of a frame */
+    int64_t utime, frame, receive_utime;
+} lift_past;
+
+typedef struct lift_service {
+    sink *out;
+    file_bytes blob;
+    gait_lift_config config;
+    gait_lift_info info;
+    gait_lift *lift; /* NULL until the camera is known */
+    void *memory;    /* taken once */
+    size_t memory_bytes;
+    int64_t frames, lifted, rejected;
+    int64_t last;   /* capture time of the last frame lifted; -1: none */
+    bool told_back; /* that time went back, once on stderr */
+    histogram step; /* microseconds */
+    keypoints_sieve sieve;
+    double uv[2 * GAIT_MAX_MARKERS], sd[GAIT_MAX_MARKERS];
+    gait_lift_frame estimate;
+    gaitmsg_joint_t joint[GAIT_MAX_MARKERS];
+    lift_past past[LIFT_SERVICE_PAST]; /* a ring by the number of frames */
+} lift_service;
+
+/* Read the segment prior of a blob and take all memory; s is all zero before. */
+bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why);
+void lift_service_close(lift_service *s);
+/* The first camera starts the service; another one later is an error. */
+bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why);
+/* One frame's tracks, received at `receive_utime`: pushed, and what they tell published on GAIT_LIFT.
+ * Tracks from more than a second before the last ones begin anew: a clock was set, or one stamp was wrong. */
+bool lift_service_keypoints(lift_service *s, keypoints_view *v, int64_t receive_utime, message *why);
+#endif

@@ -1,0 +1,208 @@
+#define _GNU_SOURCE /* ppoll */
+#include "receiver.h"
+
+#include "link.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+
+enum {
+    FRAMES_WAITING = 64, /* two seconds of frames: the tracker skips to the last of them */
+    OTHERS_WAITING = 256,
+    STATUS_US = 1000000, /* between two messages of GAIT_STATUS */
+};
+
+static bool open_view(service *s, const lcm_recv_buf_t *buf, const char *channel, image_view *v)
+{
+    message why, line;
+    if (image_view_open(v, buf->data, buf->data_size, &why))
+        return true;
+    message_set(&line, "%.40s: %.180s", channel, why.text);
+    s->counts.rejected++;
+    service_complain(s, &line);
+    return false;
+}
+
+static bool newest(const receiver *r)
+{
+    return r->log || lcm_subscription_get_queue_size(r->frames) == 0;
+}
+
+/* Track the frame that was held, if there is one. */
+static void flush(receiver *r)
+{
+    keypoint_cue *const cue = r->service->cue;
+    image_view v;
+    message why;
+    if (cue && cue->held_bytes && image_view_open(&v, cue->held, cue->held_bytes, &why))
+        service_frame(r->service, &v, newest(r), cue->held_arrival);
+    if (cue)
+        cue->held_bytes = 0;
+}
+
+static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    image_view v;
+    keypoint_cue *const cue = r->service->cue;
+    flush(r);
+    r->service->came++;
+    if (!open_view(r->service, buf, channel, &v))
+        return;
+    bool const wait = cue && !keypoint_cue_at(cue, v.utime);
+    if (!wait || !keypoint_cue_hold(cue, v.utime, buf->data, buf->data_size, buf->recv_utime))
+        service_frame(r->service, &v, newest(r), buf->recv_utime);
+}
+
+static void on_background(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    image_view v;
+    if (open_view(r->service, buf, channel, &v))
+        service_background(r->service, &v);
+}
+
+static void damaged(receiver *r, const char *channel)
+{
+    message why;
+    message_set(&why, "%.40s: damaged message or another version of its type", channel);
+    service_complain(r->service, &why);
+}
+
+static void complain_of(receiver *r, const char *channel, const message *why)
+{
+    message line;
+    message_set(&line, "%.40s: %.180s", channel, why->text);
+    service_complain(r->service, &line);
+}
+
+static void on_tracks(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    keypoint_cue *const cue = r->service->cue;
+    keypoints_view v;
+    message why;
+    if (!keypoints_view_open(&v, buf->data, buf->data_size, &why)) {
+        complain_of(r, channel, &why);
+        return;
+    }
+    keypoints_view again = v; /* each goes through the tracks */
+    if (r->service->lift && !lift_service_keypoints(r->service->lift, &v, buf->recv_utime, &why))
+        complain_of(r, channel, &why);
+    if (cue && !keypoint_cue_take(cue, &again, &why))
+        complain_of(r, channel, &why);
+    if (cue && cue->held_bytes && keypoint_cue_at(cue, cue->held_utime))
+        flush(r);
+}
+
+/* The same camera for the lifter. */
+static void lift_camera(receiver *r, const gaitmsg_camera_t *msg)
+{
+    gait_camera camera;
+    message why;
+    if (convert_camera_message(msg, &camera, &why) && !lift_service_camera(r->service->lift, &camera, &why))
+        service_complain(r->service, &why);
+}
+
+static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    gaitmsg_camera_t msg;
+    if (gaitmsg_camera_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
+        damaged(r, channel);
+    else {
+        service_camera(r->service, &msg);
+        if (r->service->lift)
+            lift_camera(r, &msg);
+    }
+}
+
+static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    receiver *const r = user;
+    gaitmsg_command_t msg;
+    if (gaitmsg_command_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
+        damaged(r, channel);
+    else
+        service_command(r->service, &msg);
+}
+
+static bool subscribe(receiver *r, message *why)
+{
+    int const camera = r->service->stream;
+    char name[4][32];
+    snprintf(name[0], sizeof name[0], "GAIT_IMAGE_%d", camera);
+    snprintf(name[1], sizeof name[1], "GAIT_CAMERA_%d", camera);
+    snprintf(name[2], sizeof name[2], "GAIT_BACKGROUND_%d", camera);
+    snprintf(name[3], sizeof name[3], "GAIT_TRACKS_%d", camera);
+    r->frames = link_subscribe(r->images, name[0], on_frame, r, FRAMES_WAITING, why);
+    return r->frames &&
+           ((!r->service->lift && !r->service->cue) ||
+            link_subscribe(r->others, name[3], on_tracks, r, OTHERS_WAITING, why)) &&
+           link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
+           link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why) &&
+           link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why);
+}
+
+bool receiver_open(receiver *r, service *s, const char *url, message *why)
+{
+    *r = (receiver){.service = s, .log = link_is_log(url)};
+    r->images = link_open(url, why);
+    if (!r->images)
+        return false;
+    r->others = r->log ? r->images : link_open(url, why);
+    return r->others && subscribe(r, why);
+}
+
+void receiver_close(receiver *r)
+{
+    if (r->others && r->others != r->images)
+        lcm_destroy(r->others);
+    if (r->images)
+        lcm_destroy(r->images);
+    *r = (receiver){0};
+}
+
+/* Handle what is there: every other message before the next frame.  false: the connection has ended. */
+static bool serve(receiver *r)
+{
+    int more = 0;
+    while (r->others != r->images && (more = lcm_handle_timeout(r->others, 0)) > 0)
+        ;
+    return more >= 0 && lcm_handle_timeout(r->images, 0) >= 0;
+}
+
+/* Of a clock that nobody sets: the status comes whatever becomes of the date. */
+static struct timespec until(int64_t deadline)
+{
+    int64_t const left = deadline - service_ticks();
+    int64_t const us = left < 0 ? 0 : left > STATUS_US ? STATUS_US : left;
+    return (struct timespec){.tv_sec = (time_t)(us / 1000000), .tv_nsec = (long)(us % 1000000) * 1000};
+}
+
+bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t *unblocked, message *why)
+{
+    int64_t due = 0;
+    struct pollfd fd[2] = {{.fd = lcm_get_fileno(r->images), .events = POLLIN},
+                           {.fd = lcm_get_fileno(r->others), .events = POLLIN}};
+    while (!*quit) {
+        int64_t const now = service_ticks();
+        if (r->service->news || now >= due) {
+            service_send_status(r->service);
+            due = now + STATUS_US;
+        }
+        struct timespec const wait = until(due);
+        int const ready = ppoll(fd, r->log ? 1 : 2, &wait, unblocked);
+        if (ready < 0 && errno != EINTR)
+            return message_set(why, "cannot wait for messages: %s", strerror(errno));
+        if (sink_ended(r->service->out, why))
+            return false;
+        if (ready > 0 && !serve(r)) {
+            flush(r);
+            return r->log || message_set(why, "the LCM connection has failed");
+        }
+    }
+    return true;
+}
