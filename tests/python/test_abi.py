@@ -72,7 +72,7 @@ def test_enumerations_and_limits_equal_the_header():
     ours |= {f"GAIT_{p.name}": p for p in abi.PixelFormat}
     ours |= {f"GAIT_MODE_{m.name}": m for m in abi.Mode}
     ours |= {f"GAIT_TERM_{t.name}": t for t in abi.Term}
-    ours |= {f"GAIT_STATUS_{s.name}": s for s in abi.TrackStatus}
+    ours |= {f"GAIT_TRACK_{s.name}": s for s in abi.TrackStatus}
     ours |= {f"GAIT_EST_{f.name}": f for f in abi.Flag}
     ours |= {"GAIT_ABI": abi.ABI, "GAIT_ALIGN": abi.ALIGN, "GAIT_MAX_JOINTS": abi.MAX_JOINTS}
     ours |= {"GAIT_MAX_ANGLES": abi.MAX_ANGLES, "GAIT_MAX_CAMERAS": abi.MAX_CAMERAS}
@@ -108,7 +108,7 @@ def test_another_library_is_refused():
 @pytest.mark.parametrize(
     "where, name, value, words",
     [
-        (_abi, "ABI", 99, "ABI 6, this package needs 99"),
+        (abi, "ABI", 99, "ABI 7, this package needs 99"),
         (loader, "__version__", "9.9.9", "this package is 9.9.9"),
     ],
 )

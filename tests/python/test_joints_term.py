@@ -40,13 +40,13 @@ def follow(terms: Term, joints: bool) -> tuple[str, float]:
 
 def test_joints_help() -> None:
     _, without = follow(Term.TEXTURE, joints=False)
-    _, helped = follow(Term.TEXTURE | Term.TRACKS, joints=True)
+    _, helped = follow(Term.TEXTURE | Term.KEYPOINTS, joints=True)
     assert helped < 0.7 * without and helped < 2.0
 
 
 def test_joints_are_not_read_while_the_term_is_off() -> None:
     assert follow(Term.TEXTURE, joints=True) == follow(Term.TEXTURE, joints=False)
-    assert Term.TRACKS not in CONFIG.terms  # by default
+    assert Term.KEYPOINTS not in CONFIG.terms  # by default
 
 
 def test_wrong_shapes_are_refused() -> None:

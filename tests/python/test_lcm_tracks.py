@@ -69,7 +69,7 @@ def by_python() -> str:
     tracker = Tracker(
         rig.model(),
         as_in_messages(rig.CAMERA),
-        replace(usual, terms=usual.terms | Term.TRACKS),
+        replace(usual, terms=usual.terms | Term.KEYPOINTS),
         background=rig.plate(),
     )
     tracker.start(rig.walker(0), rig.SD, rig.utime(0))

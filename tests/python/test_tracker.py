@@ -21,8 +21,8 @@ from gait import (
     TrackerConfig,
     UserError,
     Video,
-    _abi,
 )
+from gait.bindings import abi
 from gait.bindings.model import read_blob
 from gait.io import blob
 

@@ -12,7 +12,7 @@ from ctypes import (
 )
 from enum import IntEnum, IntFlag
 
-ABI = 6
+ABI = 7
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_MARKERS = 64
@@ -55,7 +55,7 @@ class Term(IntFlag):
     SILHOUETTE = 2
     EDGES = 4
     TEMPLATE = 8
-    TRACKS = 16
+    KEYPOINTS = 16
 
 
 class TrackStatus(IntEnum):

@@ -148,7 +148,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"{args.init}: {OUTSIDE}", file=sys.stderr)
     config = TrackerConfig.default(Mode[args.mode.upper()], **_given(args))
     if args.tracks:
-        config = replace(config, terms=config.terms | Term.TRACKS)
+        config = replace(config, terms=config.terms | Term.KEYPOINTS)
     tracker = Tracker(model, camera, config, background=plate, tasks=args.threads)
     spotter = None if args.smooth else Spotter(camera, plate, model, args.height)
     results = _track(args, video, tracker, start, frames, spotter, joints)

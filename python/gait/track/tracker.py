@@ -129,7 +129,7 @@ class Tracker:
         utime : int
             Capture time, microseconds; must increase.
         joints : Joints, or sequence of Joints or None, optional
-            Joints found in each camera's picture; they count if ``config.terms`` has ``Term.TRACKS``.
+            Joints found in each camera's picture; they count if ``config.terms`` has ``Term.KEYPOINTS``.
         """
         images = [None if image is None else np.ascontiguousarray(image) for image in per_camera(frames)]
         if len(images) > len(self.cameras):
