@@ -9,6 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from gait import extras
 from gait._version import __version__
 from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryError, UserError
 
@@ -48,6 +49,8 @@ _HOME = {
     "background": "io.video",
 }
 
+_OF_VIDEO = ("Video", "VideoWriter", "background")
+
 __all__ = [
     "Camera",
     "Estimate",
@@ -82,6 +85,8 @@ def __getattr__(name: str) -> Any:
     """Import a public name from its module on first use."""
     if name not in _HOME:
         raise AttributeError(f"module 'gait' has no attribute {name!r}")
+    if name in _OF_VIDEO and (lacking := extras.remedy(f"gait.{name}", ["video"])):
+        raise ImportError(lacking)
     return getattr(import_module(f"gait.{_HOME[name]}"), name)
 
 

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-PACKAGES = ("gait", "numpy", "scipy")
+PACKAGES = ("libgait", "numpy", "scipy")
 
 
 def facts(command: str) -> str:

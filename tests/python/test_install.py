@@ -34,7 +34,10 @@ def installed(tmp_path):
 def test_install_puts_everything_and_uninstall_removes_it(installed):
     names = {str(p.relative_to(installed / "opt/gait")) for p in installed.rglob("*") if not p.is_dir()}
     libraries = {"lib/libgait.so", f"lib/libgait.so.{ABI}", "lib/libgait.a"}
-    described = {"lib/pkgconfig/gait.pc", *(f"lib/cmake/gait/gaitConfig{kind}.cmake" for kind in ("", "Version"))}
+    described = {
+        "lib/pkgconfig/gait.pc",
+        *(f"lib/cmake/gait/gaitConfig{kind}.cmake" for kind in ("", "Version")),
+    }
     assert names == libraries | described | {"include/gait.h", "include/gait_pool.h"}
     assert make("uninstall", f"DESTDIR={installed}", "PREFIX=/opt/gait").returncode == 0
     assert not [p for p in installed.rglob("*") if not p.is_dir()]

@@ -17,9 +17,7 @@ import gait.cli
 from gait.errors import UserError
 from gait.learn.corpus import cluster, sources
 
-distributed = pytest.importorskip(
-    "distributed", reason="dask is not installed: pip install -e 'python[dask]'"
-)
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: make setup")
 pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
 
 
@@ -80,7 +78,7 @@ def test_a_file_that_workers_do_not_see_is_named_with_the_remedy(walks, schedule
         sources.load_all([(tmp_path / "absent.amc", True)], dask=scheduler)
 
 
-@pytest.mark.parametrize("package", ["gait", "scipy"])
+@pytest.mark.parametrize("package", ["libgait", "scipy"])
 def test_a_worker_of_another_version_is_refused(package, walks, scheduler, monkeypatch):
     here = os.getpid()
     true = importlib.metadata.version
@@ -108,7 +106,7 @@ def test_an_address_without_a_scheduler_is_one_line(walks, tmp_path, monkeypatch
 
 def test_without_dask_the_remedy_is_named(walks, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(UserError, match="dask is not installed; pip install"):
+    with pytest.raises(UserError, match="needs Dask: pip install"):
         sources.load_all([(walks / "01_00.amc", True)], dask="127.0.0.1:9")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -95,6 +94,8 @@ class Camera:
 
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2) of world points (..., 3), lens distortion included; NaN behind the camera."""
+        import cv2  # here, so that a model is used without OpenCV
+
         world = np.asarray(points, np.float64)
         flat = np.ascontiguousarray(world.reshape(-1, 3))
         uv = np.full((len(flat), 2), np.nan)
@@ -111,6 +112,8 @@ class Camera:
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Look along pixels (..., 2): unit directions (..., 3) in the world from `centre`."""
+        import cv2  # as in project()
+
         uv = np.asarray(pixels, np.float64)
         flat = np.ascontiguousarray(uv.reshape(-1, 1, 2))
         if not flat.size:  # OpenCV answers None

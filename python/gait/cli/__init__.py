@@ -1,8 +1,9 @@
 """The ``gait`` command.
 
-Each sub-command is a module here with ``NAME``, ``HELP``, ``add_arguments(parser)`` and ``run(args) -> int``.
-Its docstring is the text of ``--help``.  Every command gets ``--quiet``, and ``--json`` unless it says
-``JSON = False``.  Figures go to stdout, words and progress to stderr; exit codes are 0 ok, 1 failed, 2 usage.
+Each command is a row of ``COMMANDS`` and a module here, whose docstring is the text of ``--help``, with
+``add_arguments(parser)`` and ``run(args) -> int``.  Every command gets ``--quiet``, and ``--json`` unless the
+module says ``JSON = False``.  Figures go to stdout, words and progress to stderr.
+Exit codes are 0 ok, 1 failed, 2 usage.
 """
 
 from __future__ import annotations
@@ -17,30 +18,43 @@ import threading
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 from types import FrameType
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
-from gait import reproducible
+from gait import extras, reproducible
 from gait._version import __version__
 from gait.errors import GaitError, UsageError, UserError
 
+
+class Command(NamedTuple):
+    """A command: its module here, its line in ``gait --help``, the extras of libgait that it needs."""
+
+    module: str
+    help: str
+    extras: tuple[str, ...] = ()
+
+
 COMMANDS = {
-    "learn": "learn",
-    "info": "info",
-    "track": "track",
-    "eval": "evaluate",
-    "lift": "lift",
-    "render": "render",
-    "camera": "camera",
-    "simulate": "simulate",
-    "capture": "capture",
-    "record": "record",
-    "demo": "demo",
-    "report": "report",
-    "report track": "report_track",
-    "report lift": "report_lift",
-    "view": "view",
+    "learn": Command("learn", "learn a cyclic model from motion capture", ("mocap",)),
+    "info": Command("info", "what a model holds"),
+    "track": Command("track", "track a walking person in a video file", ("video",)),
+    "eval": Command("evaluate", "errors of a track against the truth", ("video",)),
+    "lift": Command("lift", "2-D joint tracks, or a video, to 3-D", ("video", "mocap")),
+    "render": Command("render", "draw a pose or a model", ("video",)),
+    "camera": Command("camera", "where a camera stands, from points measured on the ground", ("video",)),
+    "simulate": Command("simulate", "make a test clip of a walker with its exact truth", ("video",)),
+    "capture": Command("capture", "send the frames of a video or a camera over LCM", ("video", "lcm")),
+    "record": Command("record", "record the estimates of gait-trackd into a track file", ("video", "lcm")),
+    "demo": Command(
+        "demo", "run capture, tracker and recorder on a clip and report", ("video", "lcm", "report")
+    ),
+    "report": Command("report", "overlay video and HTML page of a tracked clip", ("video", "lcm", "report")),
+    "report track": Command("report_track", "gait parameters of a track, with plots", ("video", "report")),
+    "report lift": Command(
+        "report_lift", "figures of the segment prior and of lifting", ("video", "report", "mocap")
+    ),
+    "view": Command("view", "watch the estimates of gait-trackd in a browser", ("video", "lcm")),
 }
-"""Command to its module, in the order of ``gait --help``."""
+"""Commands in the order of ``gait --help``."""
 
 
 _DIRECTION = re.compile(r"-[xyz]|-[\d.][^,]*,[^,]+,[^,]+")
@@ -65,6 +79,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except (UserError, GaitError) as exc:
         return _failed(command, str(exc))
+    except ModuleNotFoundError as exc:
+        needed = COMMANDS[words[0]].extras if command else ()
+        text = extras.remedy(f"gait{command}", needed, (exc.name or "").partition(".")[0])
+        if not text:
+            raise
+        print(text, file=sys.stderr)
+        return 1
     except BrokenPipeError:  # the reader of our output has left, which is its right
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -117,20 +138,21 @@ class _Version(argparse.Action):
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """Parser of the command named first in `words` (so that only its imports cost time), else of all."""
+    """Parser of the command named first in `words`, else one that imports no command and only lists them."""
     parser = _Parser(
         prog="gait",
         description="Learn how people walk from motion capture and track them in calibrated video.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="say the versions of package and library")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in words[:1] if words and words[0] in COMMANDS else COMMANDS:
-        module = import_module(f"gait.cli.{COMMANDS[name]}")
+    chosen = words[0] if words and words[0] in COMMANDS else None
+    for name, command in COMMANDS.items() if chosen is None else [(chosen, COMMANDS[chosen])]:
+        if chosen is None:
+            commands.add_parser(name, help=command.help)
+            continue
+        module = import_module(f"gait.cli.{command.module}")
         sub = commands.add_parser(
-            module.NAME,
-            help=module.HELP,
-            description=module.__doc__ or module.HELP,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            name, description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
         )
         module.add_arguments(sub)
         if getattr(module, "JSON", True):

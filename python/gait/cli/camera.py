@@ -18,9 +18,6 @@ from gait.camera.camera_file import read_camera
 from gait.camera.placing import place, read_points
 from gait.io.files import replacing, require_outputs
 
-NAME = "camera"
-HELP = "where a camera stands, from points measured on the ground"
-
 _DOUBTFUL = 3.0  # pixels, rms, from which the points are worth a second look
 
 

@@ -39,9 +39,6 @@ from gait.lcm.pacing import Pacer, parse_rate
 from gait.lcm.source import DeviceSource, FileSource, is_device
 from gait.progress import progress
 
-NAME = "capture"
-HELP = "send the frames of a video or a camera over LCM"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""

@@ -38,9 +38,6 @@ from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_bu
 from gait.lcm.session import Session
 from gait.io.track_file import read_truth
 
-NAME = "demo"
-HELP = "run capture, tracker and recorder on a clip and report"
-
 _ROOT = Path(__file__).resolve().parents[3]
 _TRACKD = _ROOT / "build" / "bin" / "gait-trackd"
 _MODEL = _ROOT / "python" / "gait" / "data" / "walk.gait"

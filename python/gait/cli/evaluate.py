@@ -28,9 +28,6 @@ from gait.motion.evaluate import LOST_MM, Measures, evaluate
 from gait.motion.events import strikes_of
 from gait.io.track_file import Joints, read_estimates, read_truth
 
-NAME = "eval"
-HELP = "errors of a track against the truth"
-
 DRIFT = 0.1  # seconds by which times of paired frames may run apart
 
 MEANING = (

@@ -16,8 +16,6 @@ from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.io import blob
 from gait.io.fields import json_of
 
-NAME = "info"
-HELP = "what a model holds"
 GAIT = (
     "stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps", "stature_m",
     "stature_sd_m",

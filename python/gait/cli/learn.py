@@ -9,7 +9,7 @@ everything.
 
 Recordings are read a few at a time and their signals wait on disk, in the folder that TMPDIR names; in memory
 are their cycles alone.  The model does not depend on --jobs or --dask, nor on the CPU if it is x86-64.
-The workers of a Dask cluster (.venv/bin/pip install -e 'python[dask]' in the repository) need this version of
+The workers of a Dask cluster (pip install 'libgait[dask]') need this version of
 the package and the files under the same paths; start them with dask worker --preload-nanny gait.reproducible.
 
 What the columns of .csv and the marker names of .c3d and .trc must be: libgait/doc/mocap-formats.md.
@@ -25,9 +25,6 @@ from pathlib import Path
 from gait.cli import learn_segments, values
 from gait.learn.corpus import fork_server, subjects
 from gait.learn.model_options import DEFAULT_COMPONENTS, MOST_COMPONENTS, PRIORS
-
-NAME = "learn"
-HELP = "learn a cyclic model from motion capture"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

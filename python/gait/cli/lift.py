@@ -35,9 +35,6 @@ from gait.io import lifted_file
 from gait.io.keypoints_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
 
-NAME = "lift"
-HELP = "2-D joint tracks, or a video, to 3-D"
-
 _ONLY_TRACKS = (
     *("orthographic", "metres_per_unit", "height", "pixel_sd", "floor_sd", "method", "no_contact"),
     *("no_bones", "ignore_unknown", "keep_sides", "keep_jumps", "trc"),

@@ -25,8 +25,6 @@ from gait.lcm.link import is_log, lcm_url
 from gait.lcm.log import log_of
 from gait.lcm.record import ESTIMATE, LAGGED, Recorder
 
-NAME = "record"
-HELP = "record the estimates of gait-trackd into a track file"
 LISTENING = "listening"
 """First word on stderr once every estimate from now on will be recorded."""
 

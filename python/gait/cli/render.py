@@ -23,8 +23,6 @@ from gait.camera.camera import Camera
 from gait.io.fields import Fields, read_json
 from gait.io.files import replacing, require_outputs
 
-NAME = "render"
-HELP = "draw a pose or a model"
 JSON = False
 
 _RANGES = {"phase": (0.0, 1.0), "stride_hz": (0.1, 4.0), "stature": (0.5, 2.5)}

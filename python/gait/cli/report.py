@@ -34,8 +34,6 @@ from gait.motion.events import Strikes, strikes_of
 from gait.io.track_file import Joints, Track, read_track, read_truth
 from gait.progress import progress
 
-NAME = "report"
-HELP = "overlay video and HTML page of a tracked clip"
 _PICTURES = 6
 
 

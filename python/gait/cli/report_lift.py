@@ -42,8 +42,6 @@ from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
 
-NAME = "report lift"
-HELP = "figures of the segment prior and of lifting"
 DPI = 110
 FIGURES = 5  # besides that of a clip
 

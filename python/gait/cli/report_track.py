@@ -26,9 +26,6 @@ from gait.motion.footfall_draws import Draws
 from gait.motion.parameters import QUANTITIES, Parameters, measure
 from gait.io.track_file import Track, read_track
 
-NAME = "report track"
-HELP = "gait parameters of a track, with plots"
-
 _SHRUNK = (
     "The tracker fills in what the image does not show from the same people, so that true deviations are "
     "larger than these, the more so for small or hidden limbs."

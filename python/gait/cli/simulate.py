@@ -25,9 +25,6 @@ from gait.simulate import FILES, PRESETS, Scenario, simulate
 from gait.simulate.scenario import GENERATOR
 from gait.simulate.views import DIRECTIONS, VIEWS
 
-NAME = "simulate"
-HELP = "make a test clip of a walker with its exact truth"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options; those not given come from the preset."""

@@ -61,9 +61,6 @@ TRACKS_SD = 4.0  # pixels
 
 Sink = Callable[[Frame, Estimate], None]
 
-NAME = "track"
-HELP = "track a walking person in a video file"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""

@@ -23,8 +23,6 @@ from gait.io.files import replacing
 from gait.lcm.link import lcm_url
 from gait.lcm.viewer import Screen, Viewer
 
-NAME = "view"
-HELP = "watch the estimates of gait-trackd in a browser"
 JSON = False
 _TURN = 0.1  # seconds
 

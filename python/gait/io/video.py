@@ -1,4 +1,7 @@
-"""Video files in and out (PyAV, so no system FFmpeg), and the plate of the empty scene."""
+"""Video files in and out (PyAV, so no system FFmpeg), and the plate of the empty scene.
+
+PyAV and OpenCV are imported where they are used, so that pictures can be tracked without them.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,16 @@ from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import av
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
 from gait.io.files import replacing
+
+if TYPE_CHECKING:
+    import av
 
 Image = NDArray[np.uint8]
 """A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
@@ -59,6 +63,8 @@ class Video:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
+        import av
+
         self.path = Path(path)
         if not self.path.is_file():
             raise UserError(f"{self.path}: no such video file")
@@ -81,6 +87,8 @@ class Video:
 
     def _probe(self) -> None:
         """Read the first frame for the size, the stream's header or its packets for count and rate."""
+        import av
+
         with av.open(str(self.path)) as container:
             if not container.streams.video:
                 raise UserError(f"{self.path}: holds no video stream; give a file with pictures")
@@ -94,6 +102,8 @@ class Video:
 
     def _decode(self, stop: int | None) -> Iterator[tuple[int, float, av.VideoFrame]]:
         """Yield index, time and raw frame; times missing or not increasing are set by the frame rate."""
+        import av
+
         last: float | None = None
         try:
             with av.open(str(self.path)) as container:
@@ -153,6 +163,8 @@ class VideoWriter:
         self._stream: av.VideoStream | None = None
 
     def __enter__(self) -> VideoWriter:
+        import av
+
         temporary = self._stack.enter_context(replacing(self.path))
         self._container = self._stack.enter_context(av.open(str(temporary), "w"))
         return self
@@ -166,6 +178,8 @@ class VideoWriter:
 
     def write(self, image: Image) -> None:
         """Append one picture, (h, w) grey or (h, w, 3) BGR."""
+        import av
+
         height, width = image.shape[:2]
         if self._stream is None:
             self._stream = self._open(width + width % 2, height + height % 2)
@@ -207,6 +221,8 @@ def median_plate(video: Video, samples: int = 40, progress: Callable[[int], None
 
 def read_plate(path: str | os.PathLike[str], size: tuple[int, int]) -> Image:
     """Read the empty scene from an image file, BGR, and check its (width, height)."""
+    import cv2
+
     if not Path(path).is_file():
         raise UserError(f"{path}: no such background image; give an image file, auto or none")
     plate = cv2.imread(str(path), cv2.IMREAD_COLOR_BGR)

@@ -17,6 +17,8 @@ from gait.lcm.types import generated
 try:
     import lcm
 except ImportError as exc:  # its own fallbacks hide the reason: liblcm needs the system's GLib
+    if exc.name == "lcm":
+        raise
     raise UserError(f"lcm: cannot be loaded ({exc}); install libglib2.0-0 and the lcm wheel") from None
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"

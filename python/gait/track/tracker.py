@@ -6,24 +6,27 @@ import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings import abi
 from gait.bindings.abi import TrackStatus
-from gait.bindings.library import aligned, check, library
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import Joints, capture_time, image_view, per_camera, track_array
 from gait.bindings.initial import Start
+from gait.bindings.library import aligned, check, library
 from gait.bindings.model import Model, camera_c
 from gait.bindings.state import LEAST_STATURE, State
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io.video import Frame, Image, Video
-from gait.track.auto_start import Spotter
-from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
 from gait.track.config import TrackerConfig
+from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
+
+if TYPE_CHECKING:
+    from gait.track.auto_start import Spotter  # needs OpenCV
 
 
 class Tracker:

@@ -17,7 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gait import reproducible
+from gait import extras, reproducible
 from gait.errors import UsageError, UserError
 from gait.learn.corpus.stage import Prepared, Task, one_thread_for_good
 
@@ -28,7 +28,7 @@ ADDRESS = re.compile(r"(tcp://|tls://)?[^/\s]+:\d{1,5}")
 CONNECT = 5.0  # seconds that a scheduler gets to answer and to have a worker
 PATIENCE = 10.0  # seconds between looks at whether there still are workers
 AHEAD = 4  # files in flight per thread of the workers
-SAME = ("gait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
+SAME = ("libgait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
 
 
 @dataclass(frozen=True)
@@ -124,12 +124,10 @@ def _connected(address: str) -> Iterator[Client]:
     """Client of a scheduler that answers and has a worker."""
     if not ADDRESS.fullmatch(address):
         raise UsageError(f"--dask {address}: is not an address; give one such as tcp://192.168.0.7:8786")
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise UserError(
-            "--dask: dask is not installed; pip install -e 'python[dask]' in the repository"
-        ) from error
+    if lacking := extras.remedy("--dask", ["dask"]):
+        raise UserError(lacking)
+    from distributed import Client
+
     log = logging.getLogger("distributed")
     before = log.level
     log.setLevel(logging.CRITICAL)  # a lost connection is one line of ours, not its tracebacks

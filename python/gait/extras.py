@@ -1,0 +1,36 @@
+"""Optional packages: which extra of libgait brings them, and what to say when they are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+
+EXTRAS = {
+    "video": {"cv2": "OpenCV", "av": "PyAV", "scipy": "SciPy"},
+    "lcm": {"lcm": "LCM"},
+    "report": {"matplotlib": "Matplotlib", "scipy": "SciPy"},
+    "mocap": {"scipy": "SciPy", "ezc3d": "ezc3d", "threadpoolctl": "threadpoolctl"},
+    "dask": {"distributed": "Dask"},
+}
+"""Extra of pyproject.toml to what it brings: module to name of the package."""
+
+
+def remedy(user: str, extras: Sequence[str], module: str | None = None) -> str:
+    """Say in one line what `user` needs of these extras and how to install it; empty if nothing is missing.
+
+    Parameters
+    ----------
+    user : str
+        Command or function that needs the extras.
+    extras : sequence of str
+    module : str, optional
+        A module that could not be imported; if none of `extras` brings it, an extra that does is added.
+    """
+    if module and not any(module in EXTRAS[extra] for extra in extras):
+        extras = [*extras, *[extra for extra in EXTRAS if module in EXTRAS[extra]][:1]]
+    lacking = {e: [label for m, label in EXTRAS[e].items() if find_spec(m) is None] for e in extras}
+    labels = list(dict.fromkeys(label for found in lacking.values() for label in found))
+    if not labels:
+        return ""
+    words = " and ".join(filter(None, [", ".join(labels[:-1]), labels[-1]]))
+    return f"{user} needs {words}: pip install 'libgait[{','.join(e for e in lacking if lacking[e])}]'"
