@@ -48,7 +48,7 @@ class Unlike:
             )
         return UserError(
             f"--dask {address}: last digits would depend on the CPU of worker {self.worker}; "
-            f"start it with 'dask worker --preload-nanny {kernels.__name__} {address}'"
+            f"start it with 'dask worker --preload-nanny {reproducible.__name__} {address}'"
         )
 
 
@@ -140,7 +140,7 @@ def _connected(address: str) -> Iterator[Client]:
                 raise UserError(
                     f"--dask {address}: no scheduler with a worker answered within {CONNECT:.0f} s; "
                     "start them with 'dask scheduler' and "
-                    f"'dask worker --preload-nanny {kernels.__name__} {address}'"
+                    f"'dask worker --preload-nanny {reproducible.__name__} {address}'"
                 ) from error
             yield client
     finally:
