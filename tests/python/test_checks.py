@@ -332,3 +332,26 @@ def test_unit_runner_counts_a_crash_and_a_silent_exit(tmp_path, script, want):
     test.chmod(0o755)
     done = subprocess.run([ROOT / "tests/unit/run.sh", test], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout.splitlines()[-1]) == (want[0], f"C tests: {want[1]}")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.c", "int add_mingle(void);\n", "a.c:1: 'mingle': write rejuvenate"),
+        ("a.py", "x = 1\n\n\nclass OldWalkers:\n    pass\n", "a.py:4: 'walkers'"),
+        ("a.md", "The points say that nobody is there.\n", "a.md:1: 'nobody'"),
+        ("a.md", "Its deviation is 2 m.\n", "standard deviation"),
+        ("a.h", "extern int seen_area;\n", "a.h:1: 'seen'"),
+        ("spotter.c", "int x;\n", "spotter.c:0: 'spotter'"),
+        ("a.md", "The search is given up.\n", "'given up'"),
+    ],
+)
+def test_words_sees_a_private_word(checkout, name, text, words):
+    clean = "/* as seen from a standard\n * deviation; np.eye(3), odd number */\nint track_loss;\n"
+    (checkout / "a.c").write_text(clean)
+    subprocess.run(["git", "-C", checkout, "add", "a.c"], check=True)
+    assert run("words.py", checkout).returncode == 0
+    (checkout / name).write_text(text)
+    subprocess.run(["git", "-C", checkout, "add", name], check=True)
+    assert fails(run("words.py", checkout, name), words)
+    assert run("words.py", checkout, "libgait").returncode == 0
