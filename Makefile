@@ -88,7 +88,7 @@ TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
 .PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan tsan unit-threads fuzz fuzz-run golden-check \
-        lint format wheel sdist install uninstall clean
+        lint format wheel sdist wheel-check install uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
@@ -325,7 +325,12 @@ wheel: $(READY) ## Python package with the library inside, in build/wheel (CC=aa
 
 sdist: $(READY) ## source package that builds without a network, in build/wheel
 	@rm -rf build/eigen3 && mkdir -p build/eigen3 && cp -r $(EIGEN)/Eigen build/eigen3
-	@cd python && ../$(PY) -c 'from scikit_build_core.build import build_sdist; print(build_sdist("../build/wheel"))'
+	@cd python && ../$(PY) -c 'from scikit_build_core.build import build_sdist; build_sdist("../build/wheel")' >/dev/null
+	@echo build/wheel/libgait-$(VERSION).tar.gz
+
+wheel-check: wheel sdist lib ## both packages in fresh environments without a compiler (fetches dependencies)
+	@GAIT_WHEEL=$(abspath build/wheel/$(WHEEL)) GAIT_SDIST=$(abspath build/wheel/libgait-$(VERSION).tar.gz) \
+	    $(PY) -m pytest -q -c python/pyproject.toml --rootdir . tests/python/test_wheel.py $(ARGS)
 
 # ---- style ---------------------------------------------------------------------------------------------------
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] \

@@ -6,9 +6,8 @@ import sys
 from codecs import BOM_UTF8
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from gait.errors import UserError
@@ -19,6 +18,8 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+if TYPE_CHECKING:
+    import cv2  # at run time where it is used: JSON files are read without OpenCV
 
 MAX_PIXELS = 1 << 14
 LONGEST_LENS = 1000  #: focal length over the width of the picture; the longest made have a few hundred
@@ -114,6 +115,8 @@ def _pose(fields: Fields, placed: bool) -> tuple[Array, Array]:
 
 def _file_storage(path: str) -> Fields:
     """Read the top-level nodes of an OpenCV FileStorage into a mapping under their documented names."""
+    import cv2
+
     broken = UserError(f"{path}: not an OpenCV FileStorage file; write it with cv2.FileStorage")
     text = Path(path).read_bytes().removeprefix(BOM_UTF8).decode("latin-1")  # only ASCII is looked at
     try:
@@ -183,6 +186,8 @@ def _rotation(fields: Fields, key: str) -> Array:
 
 
 def _rodrigues(fields: Fields, key: str) -> Array:
+    import cv2
+
     vector = fields.array(key, (3,), "give the rotation vector from world to camera, radians")
     return np.asarray(cv2.Rodrigues(vector)[0], np.float64)
 

@@ -1,0 +1,169 @@
+"""The wheel and the source package in fresh environments without a compiler: run by `make wheel-check`."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import time
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from gait.cli import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[2]
+if "GAIT_WHEEL" not in os.environ:
+    pytest.skip("needs the packages: run make wheel-check", allow_module_level=True)
+WHEEL, SDIST = Path(os.environ["GAIT_WHEEL"]), Path(os.environ["GAIT_SDIST"])
+PIP = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+
+WITH_NUMPY_ALONE = """
+import sys
+import numpy as np
+import gait
+
+model = gait.Model()
+mean, sd = model.prior()
+joints, angles = model.pose(mean)
+assert joints.shape == (19, 3) and angles.shape == (24,)
+view = gait.Camera.looking([0, -5, 1.2], [0, 0, 1], (320, 240), 300.0)
+picture = model.render(view, mean)
+assert picture.any()
+empty = np.zeros((240, 320), np.uint8)
+tracker = gait.Tracker(model, view, gait.TrackerConfig.default(particles=100), background=empty)
+tracker.start(mean, sd, 0)
+for i in range(5):
+    estimate = tracker.step(np.where(picture > 0, 200, empty).astype(np.uint8), i * 40_000)
+assert np.isfinite(estimate.joints).all()
+optional = {"cv2", "av", "scipy", "lcm", "matplotlib", "ezc3d", "threadpoolctl"}
+assert not optional & {name.partition(".")[0] for name in sys.modules}
+"""
+DIGEST = """
+import numpy as np
+import gait
+
+model = gait.Model()
+mean, sd = model.prior()
+view = gait.Camera.looking([0, -5, 1.2], [0, 0, 1], (320, 240), 300.0)
+empty = np.zeros((240, 320), np.uint8)
+tracker = gait.Tracker(model, view, gait.TrackerConfig.default(particles=500, seed=5), background=empty)
+tracker.start(mean, sd, 0)
+noise = np.random.default_rng(1)
+for i in range(10):
+    shade = noise.integers(100, 250, (240, 320))
+    tracker.step(np.where(model.render(view, mean) > 0, shade, empty).astype(np.uint8), i * 40_000)
+print(tracker.digest())
+"""
+
+
+def run(command, folder, **environment):
+    """Run a program that sees nothing of this environment but what is given here."""
+    return subprocess.run(
+        [str(word) for word in command],
+        cwd=folder,
+        env={"HOME": str(folder), "LC_ALL": "C.UTF-8"} | environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+def site_packages(environment):
+    return next(environment.glob("lib/python3*/site-packages"))
+
+
+@pytest.fixture(scope="module")
+def numpy_alone(tmp_path_factory):
+    """Environment with the wheel and NumPy."""
+    made = tmp_path_factory.mktemp("numpy") / "venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", made], check=True)
+    for found in site_packages(Path(sys.prefix)).glob("numpy*"):
+        (site_packages(made) / found.name).symlink_to(found)
+    subprocess.run(
+        [*PIP, "--python", made / "bin/python", "install", "--no-deps", "--no-index", WHEEL], check=True
+    )
+    return made
+
+
+def test_import_gait_needs_numpy_alone(numpy_alone, tmp_path):
+    done = run([numpy_alone / "bin/python", "-c", WITH_NUMPY_ALONE], tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_missing_extra_is_one_line(numpy_alone, tmp_path):
+    for name, command in COMMANDS.items():
+        words = "learn walks -o model.gait" if name == "learn" else name
+        done = run([numpy_alone / "bin/gait", *words.split()], tmp_path)
+        assert done.stderr.count("\n") == 1
+        if command.extras:
+            assert done.stderr.startswith(f"gait {name} needs ") and done.returncode == 1, done.stderr
+            assert f"pip install 'libgait[{','.join(command.extras)}]'" in done.stderr
+    done = run([numpy_alone / "bin/python", "-c", "import gait; gait.Video"], tmp_path)
+    remedy = "ImportError: gait.Video needs OpenCV, PyAV and SciPy: pip install 'libgait[video]'"
+    assert done.stderr.splitlines()[-1] == remedy
+
+
+def test_help_is_quick(numpy_alone, tmp_path):
+    times = []
+    for _ in range(3):
+        start = time.monotonic()
+        assert run([numpy_alone / "bin/gait", "--help"], tmp_path).returncode == 0
+        times.append(time.monotonic() - start)
+    assert min(times) < 0.3
+
+
+def test_the_wheel_makes_a_clip_and_tracks_it(tmp_path):
+    """As the README says, with nothing on the PATH but the environment: no compiler, no system FFmpeg."""
+    venv = tmp_path / "venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", venv], check=True)
+    pins = ["--no-compile", "--constraint", ROOT / "python/constraints.txt"]
+    subprocess.run([*PIP, "--python", venv / "bin/python", "install", *pins, f"{WHEEL}[all]"], check=True)
+    for command in (
+        "gait simulate -o walk",
+        "gait track walk/video.mp4 --camera walk/camera.json -o t.csv",
+    ):
+        name, *words = command.split()
+        done = run([venv / "bin" / name, *words], tmp_path, PATH=str(venv / "bin"))
+        assert done.returncode == 0, done.stderr
+    assert len((tmp_path / "t.csv").read_text().splitlines()) > 100
+
+
+def test_cmake_and_make_build_libraries_of_the_same_bits(tmp_path):
+    with zipfile.ZipFile(WHEEL) as wheel:
+        by_cmake = wheel.extract("gait/lib/libgait.so", tmp_path)
+    digests = [
+        run([sys.executable, "-c", DIGEST], tmp_path, GAIT_LIBRARY=str(library))
+        for library in (by_cmake, ROOT / "build/release/libgait.so")
+    ]
+    assert digests[0].stdout and digests[0].stdout == digests[1].stdout, digests
+
+
+def test_the_source_package_builds_the_same_wheel_without_a_network(tmp_path):
+    words = ["wheel", "--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", tmp_path, SDIST]
+    subprocess.run([*PIP, *words], check=True)
+    (built,) = tmp_path.glob("*.whl")
+    contents = [set(zipfile.ZipFile(file).namelist()) for file in (built, WHEEL)]
+    assert contents[0] == contents[1]
+
+
+def test_cmake_projects_build_with_the_library_as_a_folder(tmp_path):
+    """add_subdirectory of the source package; FetchContent does the same after a download."""
+    with tarfile.open(SDIST) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (source,) = tmp_path.glob("libgait-*/libgait")
+    (tmp_path / "CMakeLists.txt").write_text(
+        f"cmake_minimum_required(VERSION 3.18)\nproject(a C CXX)\nadd_subdirectory({source} gait)\n"
+        "add_executable(a a.c)\ntarget_link_libraries(a gait::gait)\n"
+    )
+    (tmp_path / "a.c").write_text("#include <gait.h>\nint main(void) { return gait_abi() != GAIT_ABI; }\n")
+    ninja = ["-G", "Ninja"] if shutil.which("ninja") else []
+    build = tmp_path / "build"
+    subprocess.run(
+        ["cmake", *ninja, "-S", tmp_path, "-B", build, "-DCMAKE_BUILD_TYPE=Debug"],
+        check=True,
+        capture_output=True,
+    )
+    subprocess.run(["cmake", "--build", build, "--parallel", "2"], check=True, capture_output=True)
+    assert subprocess.run([build / "a"]).returncode == 0
