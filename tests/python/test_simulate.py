@@ -9,20 +9,18 @@ import cv2
 import numpy as np
 import pytest
 
+from gait.camera.camera import Camera
 from gait.cli import main
 from gait.errors import UserError
-from gait.camera.camera import Camera
-from gait.io.video import Video
 from gait.io import blob
+from gait.io.video import Video
 from gait.simulate import FILES, PRESETS, Scenario
-from gait.simulate.anatomy import PARENTS, POINT_BONE, POINTS
-from gait.simulate.clip import background, pictures, simulate
+from gait.simulate.body import PARENTS, POINT_BONE, POINTS, Mesh
+from gait.simulate.clip import background, find_events, pictures, simulate
 from gait.simulate.curves import NAMES, fourier, normative
-from gait.simulate.mesh import Mesh
-from gait.simulate.raster import rasterise
+from gait.simulate.render import rasterise
+from gait.simulate.scenario import VIEWS
 from gait.simulate.stage import Stage, build_set, set_stage
-from gait.simulate.truth import find_events
-from gait.simulate.views import VIEWS
 
 TINY = Scenario(frames=5, size=(160, 120), seed=3)
 SEGMENTS = {

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gait.errors import UserError
 from gait.camera.camera import Array, Camera
+from gait.errors import UserError
 from gait.io.fields import Fields, parsing, read_json
 
 if sys.version_info >= (3, 11):

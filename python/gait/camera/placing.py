@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io import delimited
 
 Array = NDArray[np.float64]

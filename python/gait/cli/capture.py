@@ -24,14 +24,14 @@ from itertools import chain
 import cv2
 import numpy as np
 
-from gait.cli import values
-from gait.cli.ending import Ending
 from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model
-from gait.errors import UsageError, UserError
 from gait.camera.camera import Camera
-from gait.io.video import Frame, background, read_plate
+from gait.cli import values
+from gait.cli.ending import Ending
+from gait.errors import UsageError, UserError
 from gait.io.files import require_unread
+from gait.io.video import Frame, background, read_plate
 from gait.lcm.capture import Publisher, Setup
 from gait.lcm.link import buffer_warning, is_log, lcm_url
 from gait.lcm.log import log_of

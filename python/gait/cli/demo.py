@@ -22,21 +22,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gait.bindings.initial import Start
+from gait.bindings.model import Model
+from gait.camera.camera import Camera
 from gait.cli import defaults, values
 from gait.cli.evaluate import text as evaluation_text
 from gait.cli.record import LISTENING
 from gait.cli.record import text as recording_text
 from gait.cli.report import make_report
-from gait.bindings.initial import Start
-from gait.bindings.model import Model
 from gait.errors import UsageError, UserError
-from gait.camera.camera import Camera
-from gait.io.video import Video, read_plate
 from gait.io.fields import read_json
 from gait.io.files import require_folder
+from gait.io.track_file import read_truth
+from gait.io.video import Video, read_plate
 from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_buffer
 from gait.lcm.session import Session
-from gait.io.track_file import read_truth
 
 _ROOT = Path(__file__).resolve().parents[3]
 _TRACKD = _ROOT / "build" / "bin" / "gait-trackd"

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.body.pace import slope_of
 from gait.cli import segment_text
-from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.io import blob
 from gait.io.fields import json_of
 

@@ -14,14 +14,14 @@ import argparse
 
 import cv2
 
-from gait.cli.values import between
 from gait.bindings.model import Model
 from gait.bindings.state import POSE_SCALARS, State
-from gait.report.strip import draw_room, draw_strip, room_camera
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.cli.values import between
+from gait.errors import UserError
 from gait.io.fields import Fields, read_json
 from gait.io.files import replacing, require_outputs
+from gait.report.strip import draw_room, draw_strip, room_camera
 
 JSON = False
 

@@ -17,22 +17,22 @@ from typing import Any
 
 import numpy as np
 
-from gait.cli.evaluate import text as evaluation_text
 from gait.bindings.model import Model, read_cyclic
-from gait.report.overlay import Overlay
-from gait.report.page import Page
+from gait.camera.camera import Camera
+from gait.cli.evaluate import text as evaluation_text
 from gait.durations import spread
 from gait.errors import UserError
-from gait.camera.camera import Camera
-from gait.io.video import Image, Video, VideoWriter
 from gait.io.files import replacing, require_outputs
+from gait.io.track_file import Joints, Track, read_track, read_truth
+from gait.io.video import Image, Video, VideoWriter
 from gait.lcm.log import break_of
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
 from gait.lcm.results import Run, read_run
 from gait.motion.evaluate import Measures, evaluate
 from gait.motion.events import Strikes, strikes_of
-from gait.io.track_file import Joints, Track, read_track, read_truth
 from gait.progress import progress
+from gait.report.overlay import Overlay
+from gait.report.page import Page
 
 _PICTURES = 6
 

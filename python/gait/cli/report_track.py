@@ -14,17 +14,17 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gait.body.model_curves import ModelCurves
 from gait.bindings.model import read_cyclic
-from gait.report.page import Page
-from gait.report.parameter_plots import angle_plot, deviation_plot, footfall_plot, path_plot, stride_plot
+from gait.body.model_curves import ModelCurves
 from gait.errors import UserError
 from gait.io.files import filling, require_folder
+from gait.io.track_file import Track, read_track
 from gait.motion import parameter_files
 from gait.motion.angle_cycles import AngleCycle, angle_cycles
 from gait.motion.footfall_draws import Draws
 from gait.motion.parameters import QUANTITIES, Parameters, measure
-from gait.io.track_file import Track, read_track
+from gait.report.page import Page
+from gait.report.parameter_plots import angle_plot, deviation_plot, footfall_plot, path_plot, stride_plot
 
 _SHRUNK = (
     "The tracker fills in what the image does not show from the same people, so that true deviations are "

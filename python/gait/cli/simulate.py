@@ -22,8 +22,7 @@ from typing import Any
 
 from gait.progress import progress
 from gait.simulate import FILES, PRESETS, Scenario, simulate
-from gait.simulate.scenario import GENERATOR
-from gait.simulate.views import DIRECTIONS, VIEWS
+from gait.simulate.scenario import DIRECTIONS, GENERATOR, VIEWS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -35,27 +35,27 @@ from typing import Any
 import numpy as np
 
 from gait.bindings.abi import Mode, Term, TrackStatus
-from gait.body.model_curves import ModelCurves
-from gait.cli import defaults, values
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import Joints
 from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model, read_cyclic
-from gait.report.overlay import Overlay
+from gait.body.model_curves import ModelCurves
+from gait.camera.camera import Camera
+from gait.cli import defaults, values
 from gait.durations import spread
 from gait.errors import UsageError, UserError
-from gait.camera.camera import Camera
-from gait.track.person_detection import another_scene, one_is_grey
-from gait.io.video import Frame, Image, Video, VideoWriter, background
-from gait.io.files import require_outputs
-from gait.io.trc import write_trc
 from gait.io import keypoints_file as tracks_file
+from gait.io.files import require_outputs
 from gait.io.track_file import TrackWriter
+from gait.io.trc import write_trc
+from gait.io.video import Frame, Image, Video, VideoWriter, background
 from gait.progress import progress
+from gait.report.overlay import Overlay
 from gait.track.auto_start import Spotter, find_start
+from gait.track.config import TrackerConfig
+from gait.track.person_detection import another_scene, one_is_grey
 from gait.track.smoothed import Smoother
 from gait.track.tracker import Tracker
-from gait.track.config import TrackerConfig
 
 TRACKS_SD = 4.0  # pixels
 

@@ -13,13 +13,13 @@ import time
 
 import cv2
 
+from gait.bindings.model import Model
+from gait.camera.camera import Camera
 from gait.cli import values
 from gait.cli.ending import Ending
-from gait.bindings.model import Model
 from gait.errors import UserError
-from gait.camera.camera import Camera
-from gait.io.video import Image
 from gait.io.files import replacing
+from gait.io.video import Image
 from gait.lcm.link import lcm_url
 from gait.lcm.viewer import Screen, Viewer
 

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from gait.bindings.frame import Joints
 from gait.errors import UserError
-from gait.io import delimited
+from gait.io import delimited, sentinels
 from gait.io.fields import frame_numbers
 from gait.io.files import replacing
-from gait.io import sentinels
 
 Array = NDArray[np.float64]
 

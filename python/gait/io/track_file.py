@@ -13,12 +13,12 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.body.skeleton import EVAL15, JOINTS
 from gait.bindings.estimate import Estimate
+from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
-from gait.io.video import Frame
 from gait.io.fields import frame_numbers
 from gait.io.files import replacing
+from gait.io.video import Frame
 
 Array = NDArray[np.float64]
 

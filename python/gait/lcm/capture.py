@@ -10,8 +10,8 @@ from functools import partial
 from typing import Any
 
 from gait.bindings.initial import Start
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io.video import Frame, Image
 from gait.lcm.ahead import ahead
 from gait.lcm.link import handle, publisher

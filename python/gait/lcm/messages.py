@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from gait.bindings.abi import MAX_ANGLES, MAX_COMPONENTS, Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.state import POSE_SCALARS, State
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io.video import Image
 from gait.lcm.types import gaitmsg
 

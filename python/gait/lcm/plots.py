@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gait.bindings.abi import TrackStatus
-from gait.report.colours import BLUE, GREY, ORANGE
+from gait.io.track_file import Joints, Track
 from gait.lcm.results import Run
 from gait.motion.evaluate import root_errors
 from gait.motion.events import Strikes
-from gait.io.track_file import Joints, Track
+from gait.report.colours import BLUE, GREY, ORANGE
 
 Array = NDArray[np.float64]
 Painter = Callable[[Axes], None]

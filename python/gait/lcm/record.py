@@ -11,12 +11,12 @@ import numpy as np
 
 from gait.durations import spread
 from gait.errors import UserError
-from gait.io.video import Frame
 from gait.io.files import replacing
+from gait.io.track_file import TrackWriter
+from gait.io.video import Frame
 from gait.lcm.link import handle, is_log, listener
 from gait.lcm.log import LogWriter, break_of, log_of
 from gait.lcm.messages import estimate_after, estimate_of, now
-from gait.io.track_file import TrackWriter
 
 _NO_IMAGE = np.empty((0, 0), np.uint8)
 _TURN = 0.1  # seconds, longest wait before looking whether to stop

@@ -12,13 +12,13 @@ from typing import Any
 import cv2
 
 from gait.bindings.model import Model
-from gait.report.overlay import Overlay
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io.video import Image
 from gait.lcm.link import handle, is_log, listener
 from gait.lcm.messages import camera_of, decode, estimate_of, picture
 from gait.lcm.types import gaitmsg
+from gait.report.overlay import Overlay
 
 _KEPT = 64  # frames that wait for their estimate
 _PART = "gait-frame"

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.model_curves import ModelCurves
+from gait.io.track_file import Track
 from gait.motion.footfall_draws import Draws
 from gait.motion.parameters import Parameters
-from gait.io.track_file import Track
 
 Array = NDArray[np.float64]
 

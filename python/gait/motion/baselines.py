@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from gait.body import skeleton
 from gait.body.skeleton import EVAL15
 from gait.io.blob import unpack_names
-from gait.motion.events import STRIDE, Strikes, walking_direction
 from gait.io.track_file import Joints
+from gait.motion.events import STRIDE, Strikes, walking_direction
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.skeleton import EVAL15
-from gait.errors import UserError
 from gait.camera.camera import Camera
-from gait.motion.baselines import free_run, static_pose
-from gait.motion.interval_coverage import calibration, coverage
-from gait.motion.events import Strikes
+from gait.errors import UserError
 from gait.io.track_file import STATUSES, Joints, Track
+from gait.motion.baselines import free_run, static_pose
+from gait.motion.events import Strikes
+from gait.motion.interval_coverage import calibration, coverage
 
 Array = NDArray[np.float64]
 Measures = dict[str, Any]

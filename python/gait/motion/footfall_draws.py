@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from gait.errors import UserError
 from gait.io.files import replacing
-from gait.motion.footfalls import SIDES, Contacts, Events, at, contacts, find_events, same_events, stack
 from gait.io.track_file import Joints, Track
+from gait.motion.footfalls import SIDES, Contacts, Events, at, contacts, find_events, same_events, stack
 
 Array = NDArray[np.float64]
 

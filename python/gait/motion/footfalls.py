@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.motion.events import furthest, walking_direction
 from gait.io.track_file import Joints
+from gait.motion.events import furthest, walking_direction
 
 Array = NDArray[np.float64]
 SIDES = ("right", "left")

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from gait.io.files import replacing
+from gait.io.track_file import Track
 from gait.motion.angle_cycles import PERCENT, AngleCycle
 from gait.motion.footfalls import SIDES
 from gait.motion.parameters import QUANTITIES, Parameters
-from gait.io.track_file import Track
 
 
 def as_json(track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> dict[str, Any]:

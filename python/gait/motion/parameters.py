@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.errors import UserError
+from gait.io.track_file import Track
 from gait.motion.footfall_draws import Draws, draw_contacts
 from gait.motion.footfalls import SIDES, Contacts, Events, contacts, find_events, stride_time
-from gait.io.track_file import Track
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.body.skeleton import BONES
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.report.colours import OVER_PICTURES, side_of
-from gait.report.panel import draw_panel
+from gait.body.skeleton import BONES
 from gait.camera.camera import Camera
 from gait.io.video import Image
+from gait.report.colours import OVER_PICTURES, side_of
+from gait.report.panel import draw_panel
 
 Array = NDArray[np.float64]
 Colour = tuple[int, int, int]

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gait.report.colours import DARK, GREY, ON_PAPER
+from gait.io.track_file import Track
 from gait.motion.angle_cycles import PERCENT, AngleCycle
 from gait.motion.footfalls import SIDES, contacts, stride_time
 from gait.motion.parameters import QUANTITIES, Parameters
-from gait.io.track_file import Track
+from gait.report.colours import DARK, GREY, ON_PAPER
 
 Array = NDArray[np.float64]
 Painter = Callable[[Axes], None]

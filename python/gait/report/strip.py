@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.report.overlay import Overlay
 from gait.camera.camera import Camera
 from gait.io.video import Image
+from gait.report.overlay import Overlay
 
 Array = NDArray[np.float64]
 

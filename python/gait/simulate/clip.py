@@ -1,7 +1,8 @@
-"""Make a clip: pictures and truth, written to a folder."""
+"""Make a clip: pictures and exact truth, written to a folder."""
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 from collections.abc import Callable, Iterator
@@ -11,14 +12,200 @@ from typing import Any
 import cv2
 import numpy as np
 
+from gait._version import __version__
+from gait.bindings.initial import DEFAULT_SD
 from gait.errors import UserError
-from gait.io.video import VideoWriter
 from gait.io.files import replacing, require_writable
-from gait.simulate.arrays import Picture
-from gait.simulate.render import Renderer, develop
+from gait.io.video import VideoWriter
+from gait.simulate.body import BONE_INDEX, SIDES
+from gait.simulate.geometry import Array, Ints, Picture
+from gait.simulate.render import DEFOCUS_PX, SHUTTER, Renderer, develop
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import Set, Stage, build_set, set_stage
-from gait.simulate.truth import CRF, describe, find_events, first_state, write_truth
+from gait.simulate.walk import Walk
+
+EVENTS = ("l_heel_strike", "l_toe_off", "r_heel_strike", "r_toe_off")
+CRF = 14
+
+
+def find_events(stage: Stage) -> dict[str, Array]:
+    """Return heel strikes and toe-offs as fractional frames, those just outside the clip included.
+
+    A heel strikes where it is furthest ahead of the pelvis, the toes leave where they are furthest behind
+    (Zeni et al. 2008), found on the fine time grid.
+    """
+    walk = stage.walk
+    points = walk.points()
+    ahead = np.column_stack([np.cos(walk.heading), np.sin(walk.heading)])
+    per_frame, first = walk.timing.per_frame, stage.frames[0]
+    out = {}
+    for side in SIDES:
+        for joint, event, sign in (("heel", "heel_strike", 1), ("toe", "toe_off", -1)):
+            reach = sign * ((points[f"{side}_{joint}"] - points["pelvis"])[:, :2] * ahead).sum(1)
+            out[f"{side}_{event}"] = (_peaks(reach, walk) - first) / per_frame
+    return out
+
+
+def _peaks(value: Array, walk: Walk) -> Array:
+    """Return grid positions of the largest value of each stride, between samples by a parabola."""
+    half = int(0.35 / (walk.timing.step * np.gradient(walk.timing.phase, walk.timing.step).mean()))
+    inner = np.arange(half, len(value) - half)
+    windows = np.lib.stride_tricks.sliding_window_view(value, 2 * half + 1)
+    top = inner[windows[: len(inner)].argmax(1) == half]
+    a, b, c = value[top - 1], value[top], value[top + 1]
+    curve = a - 2 * b + c
+    return top + np.where(curve < 0, 0.5 * (a - c) / np.where(curve < 0, curve, -1), 0)
+
+
+def cycles_at(strikes: Array, frames: Array) -> Array:
+    """Return unwrapped phase at frames: whole at right heel strikes, linear between them."""
+    return np.interp(frames, strikes, np.arange(len(strikes), dtype=float))
+
+
+def write_truth(path: Path, stage: Stage, strikes: Array) -> None:
+    """Write joints (metres, world) and their pixels, heading, speed, phase and some angles of every frame."""
+    walk, frames = stage.walk, stage.frames
+    count = np.arange(len(frames), dtype=float)
+    heading = _wrapped(walk.heading[frames])
+    columns: dict[str, Array] = {
+        "phase": cycles_at(strikes, count) % 1.0,
+        "heading_rad": heading,
+        "pelvis_yaw_rad": _wrapped(heading + walk.pelvis_yaw[frames]),
+        "speed_m_s": walk.speed[frames],
+    }
+    for name, place in walk.points(frames).items():
+        uv = stage.camera.project(place)
+        for axis, values in zip("xyzuv", (*place.T, *uv.T), strict=True):
+            columns[f"{name}_{axis}"] = values
+    columns |= _angles(walk, frames)
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="ascii") as file:
+        writer = csv.writer(file)
+        writer.writerow(["frame", "time", *columns])
+        for i in range(len(frames)):
+            row = (f"{values[i]:.6f}" for values in columns.values())
+            writer.writerow([i, f"{i / stage.scenario.fps:.6f}", *row])
+
+
+def _wrapped(angle: Array) -> Array:
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def _angles(walk: Walk, frames: Ints) -> dict[str, Array]:
+    """Return hinge angles and pitches in degrees, flexion and forward positive."""
+    turns = walk.turns[frames]
+    out = {}
+    for side in SIDES:
+        for name, upper, lower in (("knee", "thigh", "shank"), ("elbow", "upper_arm", "forearm")):
+            a, b = (turns[:, BONE_INDEX[f"{side}_{bone}"], :, 2] for bone in (upper, lower))
+            out[f"{side}_{name}_flexion_deg"] = np.degrees(np.arccos(np.clip((a * b).sum(1), -1, 1)))
+        for name, bone in (("thigh", "thigh"), ("upperarm", "upper_arm")):
+            down = -turns[:, BONE_INDEX[f"{side}_{bone}"], :, 2]
+            heading = walk.heading[frames]
+            ahead = down[:, 0] * np.cos(heading) + down[:, 1] * np.sin(heading)
+            out[f"{side}_{name}_pitch_deg"] = np.degrees(np.arctan2(ahead, -down[:, 2]))
+    return out
+
+
+def first_state(stage: Stage, strikes: Array) -> dict[str, Any]:
+    """Return the init file: the truth at frame 0 with an error drawn from its own standard deviations."""
+    rng, walk, at = stage.scenario.stream("init"), stage.walk, stage.frames[0]
+    cycles = cycles_at(strikes, np.array([0.0, 1.0]))
+    truth = {
+        "heading_rad": float(_wrapped(walk.heading[at])),
+        "phase": float(cycles[0] % 1),
+        "stride_hz": float((cycles[1] - cycles[0]) * stage.scenario.fps),
+        "stature_m": stage.body.stature,
+    }
+    pelvis = walk.origins[at, 0] + DEFAULT_SD["pelvis"] * rng.standard_normal(3)
+    noisy = {key: value + DEFAULT_SD[key] * float(rng.standard_normal()) for key, value in truth.items()}
+    noisy["phase"] %= 1.0
+    rounded = {key: round(value, 5) for key, value in noisy.items()}
+    return {"frame": 0, "pelvis": pelvis.round(5).tolist(), **rounded, "sd": dict(DEFAULT_SD)}
+
+
+def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any]:
+    """Return meta.json: how the clip was made and what happens in it."""
+    scenario, walk, frames = stage.scenario, stage.walk, stage.frames
+    inside = {
+        name: [round(float(t), 3) for t in times if 0 <= t <= len(frames) - 1]
+        for name, times in events.items()
+    }
+    strides = np.diff(events["r_heel_strike"]) / scenario.fps
+    pelvis = walk.origins[frames, 0]
+    tall = _height_px(stage)
+    about = {
+        "clip": f"gait simulate, seed {scenario.seed}",
+        "fps": scenario.fps,
+        "frames": scenario.frames,
+        "width": stage.camera.width,
+        "height": stage.camera.height,
+        "motion": _source(scenario.gait),
+        "view": scenario.view,
+        "direction": "left to right" if scenario.direction == "lr" else "right to left",
+        "background": "procedural, clutter" if scenario.clutter else "procedural",
+        "calibration": "exact",
+        "body": "lofted and skinned mesh with its own skeleton",
+        "clothing": made.look.notes,
+        "difficulty": [word for word in ("pole", "clutter") if getattr(scenario, word)],
+        "poles": _pole(stage, made),
+        "mean_speed_m_s": round(float(walk.speed[frames].mean()), 4),
+        "stride_period_s": round(float(strides.mean()), 4),
+        "stride_period_sd_s": round(float(strides.std()), 4),
+        "net_displacement_m": (pelvis[-1] - pelvis[0]).round(3).tolist(),
+        "events_video_frames": inside,
+        "events_note": "fractional 0-based video frames; heel strike: heel furthest ahead of the pelvis "
+        "(Zeni); toe-off: toe (MTP) furthest behind",
+        "limb_lengths_m": {key: round(value, 4) for key, value in stage.body.lengths.items()},
+        "stature_m": round(stage.body.stature, 4),
+        "person_height_px": [round(float(q)) for q in np.percentile(tall, (0, 50, 100))],
+    }
+    return about | {
+        "noise_sigma": scenario.noise,
+        "defocus_sigma_px": DEFOCUS_PX,
+        "shutter_fraction_of_frame": SHUTTER,
+        "flicker": scenario.flicker,
+        "crf": CRF,
+        "seed": scenario.seed,
+        "generator": f"gait {__version__}",
+        "license": "BSD-3-Clause, as libgait: motion, body, clothes and scene are generated",
+    }
+
+
+def _source(gait: str) -> str:
+    return "normative gait cycle" if gait == "generator" else f"curves of {Path(gait).name}"
+
+
+def _height_px(stage: Stage) -> Array:
+    """Return the picture height of the walker from the lower heel to the head's top, per frame."""
+    points = {name: stage.camera.project(xyz)[:, 1] for name, xyz in stage.walk.points(stage.frames).items()}
+    low = np.max([points[name] for name in ("l_heel", "r_heel", "l_toe", "r_toe")], axis=0)
+    return low - points["head_top"]
+
+
+def _pole(stage: Stage, made: Set) -> list[dict[str, Any]]:
+    """Return place and effect of the pole: frames in which it hides joints, and the largest share hidden."""
+    pole = made.layout.pole
+    if pole is None:
+        return []
+    uv = stage.camera.project(np.stack(list(stage.walk.points(stage.frames).values()), axis=1))
+    column, row = np.moveaxis(np.rint(np.nan_to_num(uv)).astype(int), -1, 0)
+    inside = (column >= 0) & (row >= 0) & (column < stage.camera.width) & (row < stage.camera.height)
+    front = made.scene.front[
+        np.clip(row, 0, stage.camera.height - 1), np.clip(column, 0, stage.camera.width - 1)
+    ]
+    share = ((front > 0.5) & inside).mean(1)
+    hit = np.flatnonzero(share > 0)
+    centre = 0.5 * (pole.low + pole.high)
+    return [
+        {
+            "x": round(float(centre[0]), 3),
+            "y": round(float(centre[1]), 3),
+            "radius_m": round(float(0.5 * (pole.high[0] - pole.low[0])), 3),
+            "frames": [int(hit[0]), int(hit[-1])] if len(hit) else [],
+            "most_joints_hidden": round(float(share.max()), 2),
+        }
+    ]
+
 
 FILES = ("video.mp4", "background.png", "camera.json", "truth.csv", "init.json", "meta.json", "contact.jpg")
 _CONTACTS = (3, 2)  # pictures across and down in contact.jpg

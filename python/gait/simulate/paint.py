@@ -7,7 +7,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from gait.simulate.arrays import Array, Floats
+from gait.simulate.geometry import Array, Floats
 from gait.simulate.wardrobe import linear, tile_noise
 
 Paint = Callable[[Floats, Floats], Floats]

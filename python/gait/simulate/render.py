@@ -3,19 +3,175 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from gait.camera.camera import Camera
-from gait.simulate.arrays import Floats, Ints, Picture
-from gait.simulate.mesh import Mesh
+from gait.simulate.body import Mesh
+from gait.simulate.geometry import Floats, Ints, Picture
 from gait.simulate.paint import AMBIENT, SUN
-from gait.simulate.raster import rasterise
 from gait.simulate.scene import Scene
-from gait.simulate.shadow import Contact, SunView
 from gait.simulate.walk import Walk
 from gait.simulate.wardrobe import FACE, LEGS, SIZE, TOP, Look
+
+
+class Hits(NamedTuple):
+    """The nearest surface at every covered pixel.
+
+    Attributes
+    ----------
+    row, column : ndarray of shape (n,)
+        Pixels, each once.
+    face : ndarray of shape (n,)
+        Triangle seen there.
+    weights : ndarray of shape (n, 3)
+        Barycentric weights of its corners in the picture plane.
+    """
+
+    row: Ints
+    column: Ints
+    face: Ints
+    weights: Floats
+
+
+def rasterise(xy: Floats, nearness: Floats, faces: Ints, width: int, height: int) -> Hits:
+    """Find the visible triangle of every pixel.
+
+    Parameters
+    ----------
+    xy : ndarray of shape (n, 2)
+        Vertices in pixels, pixel centres at integers.
+    nearness : ndarray of shape (n,)
+        Larger is nearer, linear in the picture (1 / depth for a perspective camera).
+    faces : ndarray of shape (m, 3)
+        Triangles; those clockwise in a picture with v down (the back sides) are dropped.
+    width, height : int
+        Of the picture, pixels.
+    """
+    a, b, c = (xy[faces[:, k]] for k in range(3))
+    area = _cross(b - a, c - a)
+    front = np.flatnonzero(area < -1e-9)
+    a, b, c, area = a[front], b[front], c[front], area[front]
+    low = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0).astype(np.int32)
+    edge = np.array([width - 1, height - 1], np.float32)
+    high = np.floor(np.minimum(np.maximum(np.maximum(a, b), c), edge)).astype(np.int32)
+    size = high - low + 1
+    seen = np.flatnonzero((size[:, 0] > 0) & (size[:, 1] > 0))
+    x, y, which = _candidates(low[seen], size[seen])
+    which = seen[which]
+    weights = _weights(a, (b - a) / area[:, None], (c - a) / area[:, None], x, y, which)
+    inside = np.flatnonzero(weights.min(0) >= 0)
+    return _nearest(x[inside], y[inside], front[which[inside]], weights[:, inside], nearness, faces, width)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _candidates(low: Ints, size: Ints) -> tuple[Ints, Ints, Ints]:
+    """List the pixels of every bounding box: column, row and index of the box."""
+    count = size[:, 0] * size[:, 1]
+    which = np.repeat(np.arange(len(count), dtype=np.int32), count)
+    start = np.cumsum(count, dtype=np.int32) - count
+    local = np.arange(int(count.sum()), dtype=np.int32) - start[which]
+    wide = size[which, 0]
+    row = local // wide
+    return low[which, 0] + (local - row * wide), low[which, 1] + row, which
+
+
+def _weights(a: Floats, ab: Floats, ac: Floats, x: Ints, y: Ints, which: Ints) -> Floats:
+    """Return the barycentric weights (3, n) of pixels in triangles `which`; edges are given over the area."""
+    px, py = x - a[which, 0], y - a[which, 1]
+    second = px * ac[which, 1] - py * ac[which, 0]
+    third = py * ab[which, 0] - px * ab[which, 1]
+    return np.stack([1 - second - third, second, third])
+
+
+def _nearest(
+    x: Ints, y: Ints, face: Ints, weights: Floats, nearness: Floats, faces: Ints, width: int
+) -> Hits:
+    """Keep the nearest candidate of each pixel."""
+    depth = np.einsum("kn,nk->n", weights, nearness[faces[face]])
+    pixel = y * np.int32(width) + x
+    order = np.lexsort((depth, pixel))
+    last = order[np.flatnonzero(np.diff(pixel[order], append=-1))]
+    return Hits(y[last], x[last], face[last].astype(np.int32), np.ascontiguousarray(weights[:, last].T))
+
+
+_CELL = 0.0125  # metres per pixel of the sun's view
+_BIAS = 0.025  # metres
+_PENUMBRA = 1.6  # cells
+_FOOT_CELL, _FOOT_SIDE = 0.02, 96
+
+
+class SunView:
+    """Parallel projection along the sun's rays, renewed for each frame."""
+
+    def __init__(self, scene: Scene) -> None:
+        z = scene.to_sun
+        x = np.cross([0.0, 0.0, 1.0], z)
+        x /= np.linalg.norm(x)
+        self._axes = np.stack([x, np.cross(x, z), z]).astype(np.float32)  # right, down, towards the sun
+        self._plate = scene.position @ self._axes.T
+        self._nearest = np.zeros((1, 1), np.float32)
+        self._corner = np.zeros(2, np.float32)
+        self._centre = 0.0
+
+    def look(self, vertices: Floats, faces: Ints) -> None:
+        """Find what the sun sees of the figure."""
+        seen = vertices @ self._axes.T
+        self._corner = seen[:, :2].min(0) - np.float32(8 * _CELL)
+        extent = seen[:, :2].max(0) - self._corner + 8 * _CELL
+        width, height = (int(v) for v in np.ceil(extent / _CELL))
+        hits = rasterise((seen[:, :2] - self._corner) / np.float32(_CELL), seen[:, 2], faces, width, height)
+        self._nearest = np.full((height, width), -np.inf, np.float32)
+        self._nearest[hits.row, hits.column] = np.einsum(
+            "nk,nk->n", hits.weights, seen[:, 2][faces[hits.face]]
+        )
+        self._centre = float(seen[:, 2].mean())
+
+    def visible(self, places: Floats, normals: Floats, shift: Floats) -> Floats:
+        """Return 1 where places (n, 3) on the figure see the sun, 0 in its own shade; `shift` softens."""
+        seen = (places + np.float32(0.012) * normals) @ self._axes.T
+        at = np.rint((seen[:, :2] - self._corner) / np.float32(_CELL) + 2.5 * shift).astype(np.int32)
+        rows, columns = self._nearest.shape
+        inside = (at >= 0).all(1) & (at[:, 0] < columns) & (at[:, 1] < rows)
+        depth = self._nearest[np.clip(at[:, 1], 0, rows - 1), np.clip(at[:, 0], 0, columns - 1)]
+        return np.where(inside & (depth > seen[:, 2] + _BIAS), 0, 1).astype(np.float32)
+
+    def cast(self) -> Floats:
+        """Return how far the figure shades each pixel of the empty scene from the sun, 0..1, (h, w)."""
+        mask = cv2.GaussianBlur(np.isfinite(self._nearest).astype(np.float32), (0, 0), _PENUMBRA)
+        x = (self._plate[..., 0] - self._corner[0]) / np.float32(_CELL)
+        y = (self._plate[..., 1] - self._corner[1]) / np.float32(_CELL)
+        shade = cv2.remap(mask, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+        return shade * (self._plate[..., 2] < self._centre)
+
+
+class Contact:
+    """Loss of sky light on the ground close to the feet."""
+
+    def __init__(self, position: Floats) -> None:
+        self._x, self._y = position[..., 0].copy(), position[..., 1].copy()
+        self._ground = np.abs(position[..., 2]) < 0.01
+
+    def dark(self, vertices: Floats) -> Floats:
+        """Return the share of light lost at each pixel, (h, w), for figure vertices (n, 3)."""
+        low = vertices[vertices[:, 2] < 0.25]
+        if not len(low):
+            return np.zeros_like(self._x)
+        corner = 0.5 * (low[:, :2].min(0) + low[:, :2].max(0)) - np.float32(0.5 * _FOOT_SIDE * _FOOT_CELL)
+        cell = np.clip(((low[:, :2] - corner) / np.float32(_FOOT_CELL)).astype(int), 0, _FOOT_SIDE - 1)
+        near = np.exp(-np.maximum(low[:, 2], 0) / 0.07)
+        grid = np.zeros((_FOOT_SIDE, _FOOT_SIDE), np.float32)
+        np.maximum.at(grid, (cell[:, 1], cell[:, 0]), near)
+        grid = np.minimum(cv2.GaussianBlur(grid, (0, 0), 2.2) * 2.2, 1) * 0.6
+        x, y = (self._x - corner[0]) / np.float32(_FOOT_CELL), (self._y - corner[1]) / np.float32(_FOOT_CELL)
+        dark = cv2.remap(grid, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+        return np.asarray(dark * self._ground, np.float32)
+
 
 # sub-pixel shifts of the instants averaged over the open shutter: antialiasing and motion blur at once
 _SHIFTS = np.array([(-5, 1), (3, -3), (-1, -5), (5, 3), (-3, 5), (1, -1)], np.float32) / 12

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.errors import UsageError
-from gait.simulate.views import DIRECTIONS, VIEWS
 
 GENERATOR = "generator"
+VIEWS = ("side", "oblique", "toward", "away", "above", "circle")
+DIRECTIONS = ("lr", "rl")
 
 # option: smallest and largest value
 _LIMITS = {

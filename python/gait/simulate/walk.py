@@ -10,18 +10,241 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
-from scipy.ndimage import gaussian_filter1d
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.optimize import brentq
 
 from gait.errors import UsageError
-from gait.simulate import feet
-from gait.simulate.anatomy import BONE_INDEX, BONES, JOINT_OF, POINT_BONE, POINTS, SIDES, Anatomy
-from gait.simulate.arrays import Array, Ints
+from gait.simulate.body import BONE_INDEX, BONES, JOINT_OF, POINT_BONE, POINTS, SIDES, Anatomy
 from gait.simulate.curves import Curves
-from gait.simulate.path import Path
-from gait.simulate.rotations import about, apply, euler, limb, unit
-from gait.simulate.stride import Timing
+from gait.simulate.geometry import Array, Ints, about, apply, euler, limb, unit
+
+
+@dataclass(frozen=True)
+class Path:
+    """Curve on the ground by arc length; arc length 0 is the middle of the clip.
+
+    Attributes
+    ----------
+    heading : float
+        Direction of travel at arc length 0, radians from world x towards world y.
+    radius : float
+        Of the circle about the origin, metres, positive to the left (anticlockwise); 0 = straight.
+    """
+
+    heading: float
+    radius: float = 0.0
+
+    def direction(self, along: ArrayLike) -> Array:
+        """Return the heading at arc lengths (...), radians, unwrapped."""
+        along = np.asarray(along, np.float64)
+        return self.heading + (along / self.radius if self.radius else np.zeros_like(along))
+
+    def point(self, along: ArrayLike, left: ArrayLike = 0.0) -> Array:
+        """Return world x, y (..., 2) at arc lengths (...) and an offset to the left, metres."""
+        along, left = np.broadcast_arrays(np.asarray(along, np.float64), left)
+        h = self.direction(along)
+        ahead, aside = np.stack([np.cos(h), np.sin(h)], -1), np.stack([-np.sin(h), np.cos(h)], -1)
+        base = -self.radius * aside if self.radius else along[..., None] * ahead
+        return base + left[..., None] * aside
+
+
+STRIDE_TIME_CV = 0.02
+MARGIN_STRIDES = 2  # whole strides simulated before and after the clip, so that no foot is planned at an edge
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Fine time grid and the gait phase on it.
+
+    Attributes
+    ----------
+    time : ndarray of shape (T,)
+        Seconds, uniform, 0 = first frame of the clip; the frames lie on the grid.
+    phase : ndarray of shape (T,)
+        Unwrapped strides of the right foot; whole numbers are right heel strikes.
+    scores : ndarray of shape (T, modes)
+        Smooth stride-to-stride scores, unit variance.
+    per_frame : int
+        Grid steps per frame, a multiple of 4 so that a half shutter opens and closes on the grid.
+    """
+
+    time: Array
+    phase: Array
+    scores: Array
+    per_frame: int
+
+    @property
+    def step(self) -> float:
+        """Grid step, seconds."""
+        return float(self.time[1] - self.time[0])
+
+    def of_side(self, side: str) -> Array:
+        """Return the unwrapped phase of a foot, whole at its own heel strikes."""
+        return self.phase + (0.5 if side == "l" else 0.0)
+
+
+def draw_timing(stride_hz: float, fps: float, frames: int, modes: int, rng: np.random.Generator) -> Timing:
+    """Draw stride times with a coefficient of variation of 2 % and a random phase at the first frame."""
+    per_frame = 4 * int(np.ceil(60 / fps))
+    step = 1 / (fps * per_frame)
+    period = 1 / stride_hz
+    before = int(np.ceil(MARGIN_STRIDES * period / step))
+    count = before + (frames - 1) * per_frame + before + 1
+    time = (np.arange(count, dtype=np.float64) - before) * step
+    strides = int(np.ceil((time[-1] - time[0]) / period)) + 4
+    lengths = period * (1 + STRIDE_TIME_CV * np.clip(rng.standard_normal(strides), -2.5, 2.5))
+    strikes = time[0] - period * (1 + rng.uniform()) + np.concatenate([[0], np.cumsum(lengths)])
+    phase = PchipInterpolator(strikes, np.arange(strides + 1.0) - 2, extrapolate=True)(time)
+    knots: Array = rng.standard_normal((strides + 1, modes))
+    scores = PchipInterpolator(strikes, np.clip(knots, -2, 2), extrapolate=True)(time)
+    return Timing(time, np.asarray(phase, np.float64), np.asarray(scores, np.float64), per_frame)
+
+
+TOE_OFF = 0.625  # share of the cycle
+
+# pitch of the foot, degrees, toes up positive
+_PITCH_PHASE = (0, 0.03, 0.065, 0.10, 0.34, 0.43, 0.50, 0.56, 0.61, 0.66, 0.71, 0.77, 0.83, 0.88, 0.93, 0.97)
+_PITCH_DEG = (20, 13, 4, 0, 0, -5, -15, -34, -56, -67, -60, -38, -11, 8, 18, 20.5)
+# bend of the toes against the foot, as a share of its downward pitch: flat on the ground, then rolling off
+_BEND_PHASE = (0, 0.50, 0.56, 0.60, 0.625, 0.66, 0.70, 0.75, 0.85)
+_BEND_SHARE = (1, 1, 0.88, 0.67, 0.55, 0.38, 0.20, 0.05, 0)
+
+
+def _periodic(phase: tuple[float, ...], value: tuple[float, ...]) -> PchipInterpolator:
+    """Interpolate without overshoot over three cycles, so that the middle one is periodic."""
+    p = np.asarray(phase)
+    return PchipInterpolator(np.concatenate([p - 1, p, p + 1]), np.tile(value, 3))
+
+
+_PITCH = _periodic(_PITCH_PHASE, _PITCH_DEG)
+_BEND = _periodic(_BEND_PHASE, _BEND_SHARE)
+
+
+def foot_pitch(phase: Array, gain: float) -> Array:
+    """Return the pitch of the foot (toes up positive), radians, at phases of that foot (unwrapped)."""
+    return np.radians(gain * _PITCH(phase % 1.0))
+
+
+def toe_bend(phase: Array, pitch: Array) -> Array:
+    """Return how far the toes bend up against the foot, radians."""
+    return np.maximum(-pitch, 0) * _BEND(phase % 1.0)
+
+
+def smoothstep(x: Array, low: float, high: float) -> Array:
+    """Return 0 below `low`, 1 above `high`, a smooth cubic between."""
+    u = np.clip((np.asarray(x) - low) / (high - low), 0, 1)
+    return u * u * (3 - 2 * u)
+
+
+def rolling_ankle(pitch: Array, bend: Array, body: Anatomy) -> tuple[Array, Array]:
+    """Return the ankle of a planted foot, forward and up of the ground under the flat foot's ankle, metres.
+
+    The foot turns about its heel while the toes are up, then about its ball, last about the tip of the toes.
+    """
+    c, s = np.cos(pitch), np.sin(pitch)
+    toes = body["toe_forward"] - body["ball_forward"]
+    tilt = pitch + bend  # of the toes
+    ball_forward = np.where(pitch > 0, 0, toes * (1 - np.cos(tilt)))
+    ball_up = np.where(pitch > 0, 0, -toes * np.sin(tilt))
+    pivot = np.where(pitch > 0, -body["heel_back"], body["ball_forward"])
+    forward = pivot * (1 - c) - body["ankle_height"] * s + ball_forward
+    up = -pivot * s + body["ankle_height"] * c + ball_up
+    return forward, up
+
+
+@dataclass(frozen=True)
+class Footfall:
+    """One planted step.
+
+    Attributes
+    ----------
+    stride : int
+        The foot's stride number: it is on the ground from phase `stride` to `stride` + TOE_OFF.
+    place : ndarray of shape (2,)
+        Ground under the ankle of the flat foot, world, metres.
+    yaw : float
+        Direction of the foot, radians.
+    """
+
+    stride: int
+    place: Array
+    yaw: float
+
+
+def foot_track(
+    phase: Array, free: Array, step: float, falls: list[Footfall], rolled: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Return the ankle (T, 3) and the yaw (T,) of a foot that stays where it is planted.
+
+    Parameters
+    ----------
+    phase : ndarray of shape (T,)
+        Unwrapped phase of this foot.
+    free : ndarray of shape (T, 3)
+        Ankle as the joint angles alone would carry it; gives the swing its shape.
+    step : float
+        Grid step, seconds.
+    falls : list of Footfall
+        Consecutive steps.
+    rolled : two ndarrays of shape (T,)
+        The planted ankle, from `rolling_ankle`.
+    """
+    ankle, yaw = free.copy(), np.zeros(len(phase))
+    forward, up = rolled
+    stances = []
+    for fall in falls:
+        span = np.flatnonzero((phase >= fall.stride) & (phase <= fall.stride + TOE_OFF))
+        ahead = np.array([np.cos(fall.yaw), np.sin(fall.yaw)])
+        ankle[span, :2] = fall.place + forward[span, None] * ahead
+        ankle[span, 2] = up[span]
+        yaw[span] = fall.yaw
+        stances.append(span)
+    for this, after, a, b in zip(stances, stances[1:], falls, falls[1:], strict=False):
+        _swing(ankle, free, this[-1], after[0], step)
+        u = smoothstep(np.arange(this[-1], after[0] + 1), this[-1], after[0])
+        yaw[this[-1] : after[0] + 1] = a.yaw + u * (b.yaw - a.yaw)
+    return ankle, yaw
+
+
+def _swing(ankle: Array, free: Array, first: int, last: int, step: float) -> None:
+    """Bend the free swing so that it leaves and meets the planted foot with equal place and velocity."""
+    ends = np.array([first, last])
+    offset = ankle[ends] - free[ends]
+    before = (ankle[first] - ankle[first - 2] - free[first] + free[first - 2]) / (2 * step)
+    after = (ankle[last + 2] - ankle[last] - free[last + 2] + free[last]) / (2 * step)
+    inside = np.arange(first + 1, last)
+    bend = CubicHermiteSpline(ends * step, offset, np.array([before, after]))
+    ankle[inside] = free[inside] + bend(inside * step)
+
+
+def lift_swing(ankle: Array, pitch: Array, bend: Array, phase: Array, body: Anatomy) -> Array:
+    """Raise a swinging foot (T, 3) smoothly where its sole would come within 12 mm of the ground."""
+    sole = np.min(
+        [point_height(ankle[:, 2], pitch, bend, name, body) for name in ("heel", "ball", "tip")], axis=0
+    )
+    p = phase % 1.0
+    window = smoothstep(p, TOE_OFF, TOE_OFF + 0.10) * (1 - smoothstep(p, 0.92, 1.0))
+    lack = np.maximum(0.012 - sole, 0) * window
+    stride = len(phase) / (phase[-1] - phase[0])
+    broad = gaussian_filter1d(maximum_filter1d(lack, int(0.10 * stride)), 0.05 * stride)
+    raised = ankle.copy()
+    raised[:, 2] += broad * window
+    return raised
+
+
+def point_height(ankle_z: Array, pitch: Array, bend: Array, name: str, body: Anatomy) -> Array:
+    """Return the height of the sole under the heel, the ball or the tip of the toes, metres."""
+    c, s = np.cos(pitch), np.sin(pitch)
+    if name == "heel":
+        return ankle_z - body["heel_back"] * s - body["ankle_height"] * c
+    ball = ankle_z + body["ball_forward"] * s - body["ankle_height"] * c
+    if name == "ball":
+        return ball
+    return ball + (body["toe_forward"] - body["ball_forward"]) * np.sin(pitch + bend)
+
 
 _REACH = 0.9985  # a leg is never straighter than this share of its length
 _LANDING = 0.90  # from this share of the cycle the swinging foot already binds the pelvis's height
@@ -162,10 +385,10 @@ def _forward_speed(angles: dict[str, Array], timing: Timing, body: Anatomy, gain
     for side in SIDES:
         phase = timing.of_side(side)
         p = phase % 1.0
-        pitch = feet.foot_pitch(phase, _pitch_gain(gain))
-        rolled, _ = feet.rolling_ankle(pitch, feet.toe_bend(phase, pitch), body)
+        pitch = foot_pitch(phase, _pitch_gain(gain))
+        rolled, _ = rolling_ankle(pitch, toe_bend(phase, pitch), body)
         still = _free_ankle(side, angles, body)[:, 0] - rolled
-        share = feet.smoothstep(p, 0.0, 0.12) * (1 - feet.smoothstep(p, 0.48, feet.TOE_OFF))
+        share = smoothstep(p, 0.0, 0.12) * (1 - smoothstep(p, 0.48, TOE_OFF))
         total += share * -np.gradient(still, timing.step)
         weight += share
     speed = total / np.maximum(weight, 1e-3)
@@ -204,33 +427,33 @@ def _stride_gain(angles: dict[str, Array], timing: Timing, body: Anatomy, speed:
 def _plan_foot(side: str, course: _Course, rng: np.random.Generator) -> _FootPlan:
     """Plant every step of one foot and carry the foot from one to the next."""
     phase = course.timing.of_side(side)
-    pitch = feet.foot_pitch(phase, _pitch_gain(course.gain))
-    bend = feet.toe_bend(phase, pitch)
+    pitch = foot_pitch(phase, _pitch_gain(course.gain))
+    bend = toe_bend(phase, pitch)
     rel = _free_ankle(side, course.angles, course.body)
-    rolled = feet.rolling_ankle(pitch, bend, course.body)
+    rolled = rolling_ankle(pitch, bend, course.body)
     left = (1.0 if side == "l" else -1.0) * _HALF_WIDTH * course.body.stature * float(rng.uniform(0.7, 1.3))
     falls = _footfalls(side, course, course.along + rel[:, 0] - rolled[0], left, rng)
     ahead = np.column_stack([np.cos(course.heading), np.sin(course.heading)])
-    stance = phase % 1.0 < feet.TOE_OFF
+    stance = phase % 1.0 < TOE_OFF
     height = rel[:, 2] - (rel[:, 2] - rolled[1])[stance].mean()
     free = np.column_stack([course.path.point(course.along, left) + rel[:, :1] * ahead, height])
-    ankle, yaw = feet.foot_track(phase, free, course.timing.step, falls, rolled)
-    return _FootPlan(feet.lift_swing(ankle, pitch, bend, phase, course.body), yaw, pitch, bend, phase)
+    ankle, yaw = foot_track(phase, free, course.timing.step, falls, rolled)
+    return _FootPlan(lift_swing(ankle, pitch, bend, phase, course.body), yaw, pitch, bend, phase)
 
 
 def _footfalls(
     side: str, course: _Course, place: Array, left: float, rng: np.random.Generator
-) -> list[feet.Footfall]:
+) -> list[Footfall]:
     """Plant each step where the foot is on average while it stands: `place` (T,) along the path, metres."""
     phase, stature = course.timing.of_side(side), course.body.stature
     toe_out = (1.0 if side == "l" else -1.0) * np.radians(rng.uniform(3, 9))
     falls = []
-    for stride in range(int(np.ceil(phase[0])), int(np.floor(phase[-1] - feet.TOE_OFF)) + 1):
-        stance = (phase > stride) & (phase < stride + feet.TOE_OFF)
+    for stride in range(int(np.ceil(phase[0])), int(np.floor(phase[-1] - TOE_OFF)) + 1):
+        stance = (phase > stride) & (phase < stride + TOE_OFF)
         where = float(place[stance].mean()) - _LEAD * stature
         aside = left + 0.004 * stature * float(np.clip(rng.standard_normal(), -2, 2))
         yaw = float(course.path.direction(where) + toe_out + np.radians(1.5) * rng.standard_normal())
-        falls.append(feet.Footfall(stride, course.path.point(where, aside), yaw))
+        falls.append(Footfall(stride, course.path.point(where, aside), yaw))
     return falls
 
 
@@ -243,9 +466,9 @@ def _pelvis_height(
         hip = apply(turn, body.rest[f"{side}_hip"])
         aside = np.linalg.norm(plan.ankle[:, :2] - ground - hip[:, :2], axis=1)
         p = plan.phase % 1.0
-        reach = body.leg * np.where(p < feet.TOE_OFF, _bent(p), 1.0)
+        reach = body.leg * np.where(p < TOE_OFF, _bent(p), 1.0)
         highest = plan.ankle[:, 2] + np.sqrt(np.maximum(reach**2 - aside**2, 0)) - hip[:, 2]
-        limit = np.minimum(limit, np.where((p < feet.TOE_OFF) | (p > _LANDING), highest, np.inf))
+        limit = np.minimum(limit, np.where((p < TOE_OFF) | (p > _LANDING), highest, np.inf))
     height = _smoothed(limit, 0.045, timing)
     for _ in range(4):
         height -= _smoothed(np.maximum(height - limit, 0), 0.03, timing)
@@ -254,7 +477,7 @@ def _pelvis_height(
 
 def _bent(p: Array) -> Array:
     """Return the extension a stance leg aims for: yielding while it takes the load, then almost straight."""
-    load = feet.smoothstep(p, 0.02, 0.13) * (1 - feet.smoothstep(p, 0.18, 0.36))
+    load = smoothstep(p, 0.02, 0.13) * (1 - smoothstep(p, 0.18, 0.36))
     return _REACH - 0.0095 * load
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from gait.simulate.arrays import Array, Floats
+from gait.simulate.geometry import Array, Floats
 
 TOP, LEGS, SKIN, FACE, HAIR, SHOE, SOLE, SOCK = range(8)
 SIZE = 256  # texels of a texture, square

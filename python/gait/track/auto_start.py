@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from gait.bindings.initial import Start, set_height
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io.video import Frame, Image, Video
 from gait.track.hog_detector import people
 from gait.track.person_detection import Sighting, height_over, sightings
-from gait.io.video import Frame, Image, Video
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.camera.camera import Camera
-from gait.track.person_detection import Sighting, standing
 from gait.io.video import Image
+from gait.track.person_detection import Sighting, standing
 
 Array = NDArray[np.float64]
 

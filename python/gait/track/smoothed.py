@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from gait.bindings import abi
 from gait.bindings.abi import TrackStatus
-from gait.bindings.library import check, library
-from gait.body.model_curves import ModelCurves
 from gait.bindings.estimate import Estimate
+from gait.bindings.library import check, library
 from gait.bindings.model import Model
 from gait.bindings.state import Array, State
+from gait.body.model_curves import ModelCurves
 from gait.io.video import Frame
 from gait.motion.footfall_draws import Draws
 from gait.track.smooth import Spool, draw_motions

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gait.bindings import abi
 from gait.bindings.abi import Mode
-from gait.body.model_curves import ModelCurves
 from gait.bindings.state import LEAST_STATURE
+from gait.body.model_curves import ModelCurves
 from gait.track.config import TrackerConfig
 
 Array = NDArray[np.float64]

@@ -1,11 +1,18 @@
-"""Rotation matrices for arrays of angles, right-handed, acting on column vectors."""
+"""Array types of the simulator, and rotation matrices: right-handed, acting on column vectors."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
+from typing import Any
 
-from gait.simulate.arrays import Array
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
+"""Single precision in the renderer's inner loops, where it halves the time."""
+Ints = NDArray[np.integer[Any]]
+Picture = NDArray[np.uint8]
+"""(h, w, 3) BGR."""
 
 
 def about(axis: int, angle: ArrayLike) -> Array:
