@@ -19,7 +19,7 @@ check symbols 'exports what the headers say' python3 $here/symbols.py libgait/in
 check threads 'threads in the pool alone' $here/threads.sh "$B"/src/*/*.o
 check static_init 'no writable data, no constructors' $here/static_init.sh "$B/libgait.so" "$B"/src/*/*.o
 check headers 'headers compile alone' $here/headers.sh libgait/include/*.h
-check layers 'includes go down' python3 $here/layers.py libgait/LAYERS libgait/src
+check layers 'includes and calls go down, in no circle' python3 $here/layers.py libgait/LAYERS libgait/src "$B"/src/*/*.o
 check py_layers 'imports go down' python3 $here/py_layers.py python/LAYERS python/gait
 check stack 'frames of 16384 bytes at most' python3 $here/stack.py 16384 "$B"/src/*/*.su
 if ls "$B"/src/*/*.ci >/dev/null 2>&1; then

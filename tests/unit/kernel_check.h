@@ -6,14 +6,14 @@
  * Outputs lie between canaries: guard_fill(&g) before the call, CHECK(guard_whole(&g)) after it. */
 #ifndef KERNEL_CHECK_H
 #define KERNEL_CHECK_H
-#include "base/dispatch.h"
+#include "api/kernels.h"
 
 #include <stdint.h>
 #include <string.h>
 
 static inline const kernels *isa_scalar(void)
 {
-    return dispatch_choose(0);
+    return kernels_choose(0);
 }
 
 /* How many there are besides the scalar one. */
@@ -30,7 +30,7 @@ static inline const kernels *isa_at(int k)
     uint32_t bits = gait_cpu_features();
     for (; k > 0; k--)
         bits &= bits - 1;
-    return dispatch_choose(bits & -bits);
+    return kernels_choose(bits & -bits);
 }
 
 enum { GUARD = 64 }; /* bytes each side */

@@ -1,4 +1,5 @@
 /* Symmetric systems against the products they are made of, and the kernels against the scalar one. */
+#include "api/kernels.h"
 #include "base/cholesky.h"
 
 #include "check.h"
@@ -24,7 +25,7 @@ static void make(const kernels *k, int32_t n, int32_t ld)
 
 static void test_system(int32_t n)
 {
-    const kernels *const k = dispatch_choose(~0u);
+    const kernels *const k = kernels_choose(~0u);
     int32_t const ld = cholesky_padded(n + 1);
     double theta[WIDEST], left = 0.0, log_det = 0.0;
     make(k, n, ld);
@@ -52,7 +53,7 @@ static void test_system(int32_t n)
 /* Several right-hand sides at once are as each alone, with floats about so. */
 static void test_forward(int32_t n)
 {
-    const kernels *const k = dispatch_choose(~0u);
+    const kernels *const k = kernels_choose(~0u);
     int32_t const ld = cholesky_padded(n + 1);
     uint32_t seed = 11;
     static float about[2 * WIDEST * WIDEST];
@@ -79,7 +80,7 @@ static void test_forward(int32_t n)
 static void test_eigen(int32_t n)
 {
     int32_t const ld = cholesky_padded(n);
-    make(dispatch_choose(0), n - 1, ld);
+    make(kernels_choose(0), n - 1, ld);
     for (int32_t i = 0; i < n; i++)
         for (int32_t j = 0; j < i; j++)
             A[i * ld + j] = A[j * ld + i];
@@ -101,7 +102,7 @@ static void test_eigen(int32_t n)
 
 static void test_refused(void)
 {
-    const kernels *const k = dispatch_choose(~0u);
+    const kernels *const k = kernels_choose(~0u);
     make(k, 7, 8);
     A[3 * 9] = -1e6;
     CHECK(!k->cholesky_factor(A, A, 7, 8));
@@ -116,7 +117,7 @@ static void test_kernels(void)
     static double first[WIDEST * WIDEST], solved[WIDEST * WIDEST];
     static float about[2 * WIDEST * WIDEST], about_first[MOST * WIDEST];
     for (uint32_t mask = 0; mask <= 7; mask = 2 * mask + 1) {
-        const kernels *const k = dispatch_choose(mask);
+        const kernels *const k = kernels_choose(mask);
         uint32_t seed = 5;
         make(k, MOST, WIDEST);
         CHECK(k->cholesky_factor(A, A, MOST, WIDEST));

@@ -1,4 +1,5 @@
 /* Maps of one frame: foreground, edges and local contrast of pictures whose answer is known. */
+#include "api/kernels.h"
 #include "image/features.h"
 
 #include "base/arena.h"
@@ -365,7 +366,7 @@ static void test_compute(void)
 
 int main(void)
 {
-    run = dispatch_choose(~0u); /* the others give the same: test_image_kernels.c */
+    run = kernels_choose(~0u); /* the others give the same: test_image_kernels.c */
     make_maps();
     test_no_change();
     test_exposure();

@@ -17,12 +17,12 @@ static void test_choice(void)
     CHECK(strcmp(gait_cpu_name(GAIT_CPU_AVX2), have & GAIT_CPU_AVX2 ? "avx2" : "scalar") == 0);
     CHECK(strcmp(gait_cpu_name(GAIT_CPU_AVX512), have & GAIT_CPU_AVX512 ? "avx512" : "scalar") == 0);
     CHECK(gait_cpu_name(~0u) == gait_cpu_name(have));
-    CHECK(dispatch_choose(~have) == isa_scalar());
+    CHECK(kernels_choose(~have) == isa_scalar());
     for (int k = 0; k < isa_count(); k++) {
         CHECK(isa_at(k) != isa_scalar());
         CHECK(k == 0 || isa_at(k) != isa_at(k - 1));
     }
-    CHECK(isa_at(isa_count() - 1) == dispatch_choose(~0u));
+    CHECK(isa_at(isa_count() - 1) == kernels_choose(~0u));
 #if defined(__x86_64__) && defined(__GNUC__)
     /* The compiler's own support code asks the same questions. */
     __builtin_cpu_init();

@@ -1,6 +1,6 @@
 /* Curves and forward kinematics against a plain double-precision twin, and against what the words mean. */
 #include "model/kinematics.h"
-#include "base/dispatch.h"
+#include "api/kernels.h"
 
 #include "base/rng.h"
 #include "toy_model.h"
@@ -56,7 +56,7 @@ static void run_block(const gait_model *m, uint32_t first, block *b)
         gait_state const s = random_state(first + (uint32_t)lane);
         put_lane(m, &filled, lane, &s);
     }
-    const kernels *const run = dispatch_choose(~0u);
+    const kernels *const run = kernels_choose(~0u);
     run->kin_curves(m, &filled, m->components, &b->ch);
     run->kin_pose(m, &b->ch, &filled, m->proportions, &b->body);
     kin_points(m, &b->body, b->xyz);
@@ -124,7 +124,7 @@ static const float *mean_at(float phase, int32_t components, const float score[2
     filled.phase[3] = phase;
     filled.coef[0][3] = score[0];
     filled.coef[1][3] = score[1];
-    dispatch_choose(~0u)->kin_curves(toy_model(), &filled, components, &ch);
+    kernels_choose(~0u)->kin_curves(toy_model(), &filled, components, &ch);
     for (int i = 0; i < TOY_CHANNELS; i++)
         value[i] = ch.v[i][3];
     return value;
@@ -251,8 +251,8 @@ static void test_shoulder_rotation(void)
         filled.stature[0] = 1.7f;
         static kin_channels ch;
         static kin_body body;
-        dispatch_choose(~0u)->kin_curves(m, &filled, 1, &ch);
-        dispatch_choose(~0u)->kin_pose(m, &ch, &filled, m->proportions, &body);
+        kernels_choose(~0u)->kin_curves(m, &filled, 1, &ch);
+        kernels_choose(~0u)->kin_pose(m, &ch, &filled, m->proportions, &body);
         CHECK_NEAR(body.R[3 + 5 * side][3][0], side ? sin(0.2) : -sin(0.2), 1e-6); /* y of its x axis */
     }
 }

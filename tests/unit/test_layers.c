@@ -1,4 +1,5 @@
 /* Depth order: by hand on rectangles, by brute force on the toy walker. */
+#include "api/kernels.h"
 #include "raster/layers.h"
 
 #include "filter/particles.h"
@@ -141,7 +142,7 @@ static void test_walker(void)
     gait_tracker_config cfg;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
     cfg.components = 0;
-    state_layout const rule = state_layout_init(m, &cfg);
+    state_layout const rule = state_layout_init(m, &cfg, kernels_choose(~0u));
     static kin_body body;
     limb_geometry limbs[MODEL_MAX_LIMBS];
     limb_geometry_init(m, 1.0f, limbs);

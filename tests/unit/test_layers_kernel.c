@@ -73,7 +73,7 @@ static void test_walkers(void)
     const gait_model *const m = toy_model();
     gait_tracker_config cfg;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
-    state_layout const rule = state_layout_init(m, &cfg);
+    state_layout const rule = state_layout_init(m, &cfg, kernels_choose(~0u));
     static float value[F_MAX * BLOCK];
     particle_set p = {.n = BLOCK, .fields = state_layout_fields(&rule), .value = value};
     static kin_body body;

@@ -1,4 +1,5 @@
 /* The likelihood as a whole: surface points, their comparison, and the true body above displaced ones. */
+#include "api/kernels.h"
 #include "likelihood/template.h"
 #include "toy_body.h"
 
@@ -75,8 +76,8 @@ static void test_sample(void)
             for (int k = 0; k < 3; k++) {
                 const float *const r = frames.R + 9 * v->setup.geometry[l].frame + 3 * k;
                 const float *const projection = v->cam.R; /* camera centre: -R't */
-                float const centre =
-                    -(projection[k] * v->cam.t[0] + projection[3 + k] * v->cam.t[1] + projection[6 + k] * v->cam.t[2]);
+                float const centre = -(projection[k] * v->cam.t[0] + projection[3 + k] * v->cam.t[1] +
+                                       projection[6 + k] * v->cam.t[2]);
                 float const n = r[0] * f->normal[0][i] + r[1] * f->normal[1][i] + r[2] * f->normal[2][i];
                 p[k] = frames.o[3 * v->setup.geometry[l].frame + k] +
                        s.stature * (r[0] * f->point[0][i] + r[1] * f->point[1][i] + r[2] * f->point[2][i]);
@@ -121,12 +122,12 @@ static void test_setup(void)
     cfg.missed_weight = 0.3f;
     for (int k = 0; k < LIKE_TERMS; k++)
         cfg.term_weight[k] = 1.0f + (float)k;
-    like_setup_init(&s, toy_model(), &cfg);
+    like_setup_init(&s, toy_model(), &cfg, kernels_choose(~0u));
     CHECK(s.limbs == TOY_LIMBS && s.terms == 0x5 && s.missed_weight == 0.3f && !s.paper);
     CHECK(s.weight[0] == 1.0f && s.weight[1] == 2.0f && s.weight[2] == 3.0f && s.weight[3] == 4.0f);
     CHECK_NEAR(s.geometry[0].a0, 1.5f * 0.084f, 1e-6);
     cfg.mode = GAIT_MODE_PAPER;
-    like_setup_init(&s, toy_model(), &cfg);
+    like_setup_init(&s, toy_model(), &cfg, kernels_choose(~0u));
     CHECK(s.paper);
 }
 

@@ -1,4 +1,5 @@
 /* The exchange of left and right: the mirrored body half a stride on, at the same place. */
+#include "api/kernels.h"
 #include "filter/mirror.h"
 
 #include "base/rng.h"
@@ -10,7 +11,7 @@ static state_layout rule(uint32_t offsets)
 {
     gait_tracker_config cfg = toy_config(1);
     cfg.offset_angles = offsets;
-    return state_layout_init(toy_model(), &cfg);
+    return state_layout_init(toy_model(), &cfg, kernels_choose(~0u));
 }
 
 static particle_state some(const state_layout *r, uint32_t index)
@@ -79,7 +80,7 @@ static void test_twice_is_nothing(void)
     mirror_init(&x, &r);
     for (uint32_t i = 0; i < 12; i++) {
         particle_state const w = some(&r, i), once = mirror_apply(&x, &r, &w),
-                     twice = mirror_apply(&x, &r, &once);
+                             twice = mirror_apply(&x, &r, &once);
         for (int32_t f = 0; f < state_layout_fields(&r); f++)
             CHECK_NEAR(twice.f[f], w.f[f], 1e-3);
         static const int32_t SAME[] = {F_RATE, F_X, F_Y, F_Z, F_HEADING, F_PITCH, F_STATURE, F_TURN};

@@ -1,4 +1,5 @@
 /* Particles as fields: there and back to states, and their bodies against the kinematics of those states. */
+#include "api/kernels.h"
 #include "filter/particles.h"
 
 #include "base/rng.h"
@@ -13,7 +14,7 @@ static state_layout make_rule(int32_t mode, int32_t components, uint32_t offsets
     cfg.components = components;
     cfg.offset_angles = offsets;
     cfg.proportions = mode == GAIT_MODE_PAPER ? 0 : -1;
-    return state_layout_init(toy_model(), &cfg);
+    return state_layout_init(toy_model(), &cfg, kernels_choose(~0u));
 }
 
 static gait_state random_state(const state_layout *r, uint32_t i)
@@ -58,10 +59,10 @@ static void test_the_default_mode_uses_the_first_four_components_paper_mode_all(
         gait_tracker_config cfg;
         gait_tracker_default(&cfg, mode);
         for (m.components = 0; m.components <= 8; m.components++)
-            CHECK(state_layout_init(&m, &cfg).components ==
+            CHECK(state_layout_init(&m, &cfg, kernels_choose(~0u)).components ==
                   (mode == GAIT_MODE_PAPER || m.components < 5 ? m.components : 5));
         cfg.components = m.components = 8;
-        CHECK(state_layout_init(&m, &cfg).components == 8);
+        CHECK(state_layout_init(&m, &cfg, kernels_choose(~0u)).components == 8);
     }
 }
 

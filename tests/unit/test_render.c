@@ -1,4 +1,5 @@
 /* gait_render: the picture that the layers draw, in bands of any image. */
+#include "api/kernels.h"
 #include "raster/layers.h"
 #include "toy_draw.h"
 #include "toy_scene.h"
@@ -25,7 +26,7 @@ static void test_against_layers(void)
     gait_tracker_config cfg;
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
     cfg.components = 0;
-    state_layout const rule = state_layout_init(m, &cfg);
+    state_layout const rule = state_layout_init(m, &cfg, kernels_choose(~0u));
     static kin_body body;
     static outline_block outline;
     static layers drawn;

@@ -2,7 +2,7 @@
 #include "image/view.h"
 
 #include "image/camera.h"
-#include "base/dispatch.h"
+#include "api/kernels.h"
 #include "raster/rast.h"
 #include "base/rng.h"
 
@@ -324,7 +324,7 @@ static void test_grey(void)
 
 int main(void)
 {
-    run = dispatch_choose(~0u); /* the others give the same: test_image_kernels.c */
+    run = kernels_choose(~0u); /* the others give the same: test_image_kernels.c */
     test_follow();
     test_copy();
     test_colour();

@@ -6,6 +6,7 @@
  *   like_body b = toy_body_body(v, &state);            outline, layers and surface samples, until the next call */
 #ifndef TOY_LOOK_H
 #define TOY_LOOK_H
+#include "api/kernels.h"
 #include "likelihood/likelihood.h"
 #include "toy_draw.h"
 #include "toy_features.h"
@@ -39,7 +40,7 @@ static inline toy_body *toy_body_new(int camera, int32_t mode)
     v.cfg.terms = 0xf;
     v.cfg.girth = 1.0f;
     v.cfg.missed_weight = 0.4f;
-    v.rule = state_layout_init(toy_model(), &v.cfg);
+    v.rule = state_layout_init(toy_model(), &v.cfg, kernels_choose(~0u));
     v.rule.plain_root = false; /* the truth has its sway */
     v.cam = toy_camera(camera);
     v.f = features_layout(&a);
@@ -48,7 +49,7 @@ static inline toy_body *toy_body_new(int camera, int32_t mode)
     v.f.map = (view_map){.scale = 1.4f, .u0 = 100.0f, .v0 = 60.0f};
     if (a.overflow)
         abort();
-    like_setup_init(&v.setup, toy_model(), &v.cfg);
+    like_setup_init(&v.setup, toy_model(), &v.cfg, kernels_choose(~0u));
     return &v;
 }
 

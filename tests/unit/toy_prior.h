@@ -2,7 +2,7 @@
 #ifndef TOY_PRIOR_H
 #define TOY_PRIOR_H
 #include "filter/dynamics.h"
-#include "base/dispatch.h"
+#include "api/kernels.h"
 #include "toy_model.h"
 
 #include "check.h"
@@ -27,8 +27,10 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     cfg.rate_time = 5.0f;
     cfg.tilt_time = 1.1f;
     cfg.coef_time = 4.5f;
-    return (dynamics){
-        .cfg = &cfg, .rule = state_layout_init(toy_model(), &cfg), .seed = seed, .stature_doubt = 0.05f};
+    return (dynamics){.cfg = &cfg,
+                      .rule = state_layout_init(toy_model(), &cfg, kernels_choose(~0u)),
+                      .seed = seed,
+                      .stature_doubt = 0.05f};
 }
 
 /* Particles first .. first + BLOCK - 1 over one interval of dt seconds at an age. */
@@ -47,8 +49,8 @@ static inline void move_block(const dynamics *d, particle_state w[BLOCK], float 
 }
 
 /* Particle i alone. */
-static inline particle_state move_one(const dynamics *d, const particle_state *from, float dt, float age, uint32_t frame,
-                              int32_t i)
+static inline particle_state move_one(const dynamics *d, const particle_state *from, float dt, float age,
+                                      uint32_t frame, int32_t i)
 {
     particle_state block[BLOCK] = {{{0}}};
     block[i % BLOCK] = *from;

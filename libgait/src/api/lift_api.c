@@ -1,4 +1,5 @@
 /* lift_api.c - public functions of the lifter: check the arguments, then call down. */
+#include "api/kernels.h"
 #include "lift/continue.h"
 #include "lift/read.h"
 #include "lift/uncertainty.h"
@@ -41,7 +42,7 @@ gait_result gait_lift_bytes(const void *blob, size_t blob_bytes, const gait_lift
     if (s != GAIT_OK)
         return s;
     arena a = {.base = NULL};
-    (void)lifter_layout(&a, &prior, cfg);
+    (void)lifter_layout(&a, &prior, cfg, kernels_choose(cfg->cpu_mask));
     *bytes = a.used;
     return GAIT_OK;
 }
@@ -56,11 +57,11 @@ gait_result gait_lift_init(void *mem, size_t mem_bytes, const void *blob, size_t
     if (s != GAIT_OK)
         return s;
     arena a = {.base = NULL};
-    (void)lifter_layout(&a, &prior, cfg);
+    (void)lifter_layout(&a, &prior, cfg, kernels_choose(cfg->cpu_mask));
     s = arena_place(&a, mem, mem_bytes, err);
     if (s != GAIT_OK)
         return s;
-    gait_lift *const self = lifter_layout(&a, &prior, cfg);
+    gait_lift *const self = lifter_layout(&a, &prior, cfg, kernels_choose(cfg->cpu_mask));
     lift_stream_reset(&self->stream);
     for (int32_t f = 0; f < prior.frames; f++)
         self->at[f] = f;

@@ -1,6 +1,6 @@
 /* model_api.c - public functions of the library and of models: check the arguments, then one call down. */
+#include "api/kernels.h"
 #include "base/cpu.h"
-#include "base/dispatch.h"
 #include "model/kinematics.h"
 
 uint32_t gait_version(void)
@@ -20,7 +20,7 @@ uint32_t gait_cpu_features(void)
 
 const char *gait_cpu_name(uint32_t mask)
 {
-    return dispatch_choose(mask)->isa;
+    return kernels_choose(mask)->isa;
 }
 
 const char *gait_result_name(gait_result s)

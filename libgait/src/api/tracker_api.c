@@ -1,4 +1,5 @@
 /* tracker_api.c - the public tracker and render functions: argument checks, then one call down. */
+#include "api/kernels.h"
 #include "image/camera.h"
 #include "base/cpu.h"
 #include "image/image.h"
@@ -197,7 +198,7 @@ gait_result gait_tracker_bytes(const gait_model *m, const gait_tracker_config *c
         return s;
     if (!bytes)
         return base_fail(err, GAIT_ERR_ARG, -1, "bytes is NULL");
-    tracker_layout(&a, m, cfg);
+    tracker_layout(&a, m, cfg, kernels_choose(cfg->cpu_mask));
     if (a.overflow)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "the tracker would need more memory than can be addressed");
     *bytes = a.used;
@@ -215,7 +216,7 @@ gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
         s = arena_place(&a, mem, mem_bytes, err);
     if (s != GAIT_OK)
         return s;
-    gait_tracker *const t = tracker_layout(&a, m, cfg);
+    gait_tracker *const t = tracker_layout(&a, m, cfg, kernels_choose(cfg->cpu_mask));
     tracker_clear(t);
     *out = t;
     return GAIT_OK;

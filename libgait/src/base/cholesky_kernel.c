@@ -7,16 +7,16 @@ enum { ROWS = CHOLESKY_LANES };
 
 #define EACH_ROW(k) _Pragma("GCC unroll 8") for (int32_t k = 0; k < ROWS; k++)
 
-#define NUMBER double
-#define SIMD_F64S  simd_f64
-#define UPDATE update
+#define NUMBER    double
+#define SIMD_F64S simd_f64
+#define UPDATE    update
 #include "base/cholesky_update.h"
 #undef NUMBER
 #undef SIMD_F64S
 #undef UPDATE
-#define NUMBER float
-#define SIMD_F64S  simd_f64_float
-#define UPDATE update_float
+#define NUMBER    float
+#define SIMD_F64S simd_f64_float
+#define UPDATE    update_float
 #include "base/cholesky_update.h"
 
 void KERNEL(cholesky_rank)(double *A, int32_t ld, const double *W, int32_t count)
@@ -52,7 +52,8 @@ static bool factor_corner(double *A, int32_t ld, int32_t n)
         for (int32_t k = i + 1; k < ROWS; k++) {
             double const part = row[k] * inverse;
             double *const to = A + k * ld;
-            _Pragma("GCC unroll 8") for (int32_t j = 0; j < ROWS; j += SIMD_F64) /* left of k they mean nothing */
+            _Pragma("GCC unroll 8") for (int32_t j = 0; j < ROWS;
+                                         j += SIMD_F64) /* left of k they mean nothing */
                 simd_f64_store(to + j, simd_f64_load(to + j) - part * simd_f64_load(row + j));
         }
     }

@@ -34,13 +34,14 @@ struct particle_block;
 /* Result, name, parameters. */
 #define KERNELS(K)                                                                                           \
     /* Upper triangle of A += W'W, A and W of ld columns (dense.h) */                                        \
-    K(void, cholesky_rank, (double *A, int32_t ld, const double *W, int32_t rows))                              \
+    K(void, cholesky_rank, (double *A, int32_t ld, const double *W, int32_t rows))                           \
     /* A = U'U, n rows, U may be A; A[.][n]: b -> U^-T b, y'y -> what theta leaves; false: not definite */   \
-    K(bool, cholesky_factor, (const double *A, double *U, int32_t n, int32_t ld))                               \
-    /* Z = U^-T Z, `width` columns (a multiple of CHOLESKY_LANES), cholesky_padded(n) rows of ldz numbers */       \
-    K(void, cholesky_forward, (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))  \
-    /* V = U^-T V with floats, ld x width (of CHOLESKY_FLOATS); past V lies room for ld x ld more */            \
-    K(void, cholesky_forward_float, (const double *U, int32_t n, int32_t ld, float *V, int32_t width))          \
+    K(bool, cholesky_factor, (const double *A, double *U, int32_t n, int32_t ld))                            \
+    /* Z = U^-T Z, `width` columns (a multiple of CHOLESKY_LANES), cholesky_padded(n) rows of ldz numbers */ \
+    K(void, cholesky_forward,                                                                                \
+      (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))                       \
+    /* V = U^-T V with floats, ld x width (of CHOLESKY_FLOATS); past V lies room for ld x ld more */         \
+    K(void, cholesky_forward_float, (const double *U, int32_t n, int32_t ld, float *V, int32_t width))       \
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
     K(void, lift_sum,                                                                                        \
       (double *x, int32_t width, const float *mode, size_t stride, const double *theta, int32_t modes))      \
@@ -57,7 +58,7 @@ struct particle_block;
     /* v[i * stride + a * apart + r] = M[a][.][r] . shape[.][i][r], a < 3, i < modes, r < 8 */               \
     K(void, lift_turn,                                                                                       \
       (float *v, size_t stride, size_t apart, const double *shape, int32_t modes, double M[9][8]))           \
-    /* x[j] += sum_i Z[i * stride + j]^2, j < width, of CHOLESKY_LANES */                                       \
+    /* x[j] += sum_i Z[i * stride + j]^2, j < width, of CHOLESKY_LANES */                                    \
     K(void, lift_squares, (double *x, int32_t width, const float *Z, size_t stride, int32_t rows))           \
     /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. */    \
     K(void, kin_curves,                                                                                      \
@@ -80,8 +81,8 @@ struct particle_block;
     K(void, features_pairs, (const int8_t *surface, uint16_t *pairs))                                        \
     /* A block of particles over one interval, and their weights. */                                         \
     K(void, dynamics_move,                                                                                   \
-      (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                        \
-       struct particle_block *to))                                                                             \
+      (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                      \
+       struct particle_block *to))                                                                           \
     /* Sums over weighted particles, d = v - about: w d, w d^2 and, over those in use, w d; cosines and */   \
     /* sines over all and those in use; who is near the best, and their weight; products of quaternions. */  \
     K(void, estimate_moments,                                                                                \
@@ -95,7 +96,7 @@ struct particle_block;
       (const float *heading, const float *pitch, const float *roll, const double *weight,                    \
        const uint8_t *use, int32_t n, double out[16]))                                                       \
     /* log(exp(a[i]) + exp(b + part[i])) into part */                                                        \
-    K(void, track_loss_join, (const float *a, float b, int32_t n, float *part))                                    \
+    K(void, track_loss_join, (const float *a, float b, int32_t n, float *part))                              \
     /* The limbs of a block of bodies in one camera's working image. */                                      \
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \
@@ -137,9 +138,6 @@ typedef struct kernels {
     const char *isa; /* "scalar", "base", "avx2" or "avx512" */
     KERNELS(KERNEL_MEMBER)
 } kernels;
-
-/* The best of those in the mask (GAIT_CPU_*) that this CPU can run; mask 0: scalar. */
-const kernels *dispatch_choose(uint32_t mask);
 
 /* Before a loop whose passes do not depend on one another, where the compiler cannot see that. */
 #if defined(KERNEL_SCALAR)

@@ -34,7 +34,7 @@ static inline __m512i simd16_lookup16(const void *table, int32_t bytes, __m512i 
 
 /* out[i] = the word `bytes` (2 or 4) times index[i] into the table where take[i] is negative, elsewhere 0. */
 static inline void simd16_lookup_every(int32_t bytes, const void *table, const int32_t *index,
-                                      const int32_t *take, int32_t *out)
+                                       const int32_t *take, int32_t *out)
 {
 #if defined(__AVX512F__)
     __mmask16 const on = _mm512_movepi32_mask(_mm512_loadu_si512(take));
@@ -43,7 +43,7 @@ static inline void simd16_lookup_every(int32_t bytes, const void *table, const i
     for (int32_t i = 0; i < SIMD16; i += 8)
         _mm256_storeu_si256((__m256i_u *)(out + i),
                             simd16_lookup8(table, bytes, _mm256_loadu_si256((const __m256i_u *)(index + i)),
-                                          _mm256_loadu_si256((const __m256i_u *)(take + i))));
+                                           _mm256_loadu_si256((const __m256i_u *)(take + i))));
 #else
     for (int32_t i = 0; i < SIMD16; i++) {
         int32_t found = 0;
@@ -75,7 +75,7 @@ static inline void words_store(int32_t *v, simd16_words w)
 #define WORDS_OP(op) _mm512_##op
 #define WORDS_AND    _mm512_and_si512
 #elif defined(__AVX2__)
-#define SIMD16_WORDS  8
+#define SIMD16_WORDS 8
 typedef __m256i simd16_words;
 static inline simd16_words words_load(const int32_t *v)
 {
@@ -134,7 +134,7 @@ static inline void simd16_bilinear(const int32_t *four, const int32_t *u, const 
 /* Bilinear look-up of bytes: pairs of one with that below it, 256 in a row; at u, v, 1/256 of their distance, rounded
  * towards 0, where shown (negative), elsewhere `hidden`. */
 static inline void simd16_between(const uint16_t *pairs, const int32_t *u, const int32_t *v,
-                                 const int32_t *shown, int8_t hidden, int8_t *out)
+                                  const int32_t *shown, int8_t hidden, int8_t *out)
 {
     __m512i const x = _mm512_loadu_si512(u), y = _mm512_loadu_si512(v), low = _mm512_set1_epi32(255);
     __m512i const at = _mm512_ternarylogic_epi32(_mm512_srai_epi32(x, 8), y, low, 0xf4);

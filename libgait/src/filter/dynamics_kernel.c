@@ -53,8 +53,8 @@ KERNEL_ROW void advance(const dynamics_step *s, const particle_block *restrict f
 }
 
 /* Forward speed of the stride halfway through the interval, statures per stride: eq. 3 for one function. */
-KERNEL_ROW void speeds(const dynamics_step *s, const particle_block *restrict from, const float *restrict turn,
-                       float *restrict out)
+KERNEL_ROW void speeds(const dynamics_step *s, const particle_block *restrict from,
+                       const float *restrict turn, float *restrict out)
 {
     const gait_model *const m = s->model;
     int32_t const T = m->phases, M = m->channels;
@@ -121,7 +121,8 @@ KERNEL_ROW void grow(const dynamics_step *s, const float *restrict x, const floa
         out[lane] = f_max(x[lane] * (1.0f + s->stature_noise * n[lane]), LEAST_STATURE);
 }
 
-void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const particle_block *from, particle_block *to)
+void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const particle_block *from,
+                           particle_block *to)
 {
     float n[NORMALS][BLOCK], turn[BLOCK], speed[BLOCK];
     for (int32_t k = 0; k < s->fields + 2; k += 4)

@@ -23,13 +23,13 @@ static int32_t components_used(const gait_model *m, const gait_tracker_config *c
     return cfg->mode == GAIT_MODE_PAPER || m->components < TELLING ? m->components : TELLING;
 }
 
-state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg)
+state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run)
 {
     state_layout r = {.model = m,
-                   .run = dispatch_choose(cfg->cpu_mask),
-                   .components = components_used(m, cfg),
-                   .proportions = cfg->proportions < 0 ? m->proportions : cfg->proportions,
-                   .plain_root = cfg->mode == GAIT_MODE_PAPER};
+                      .run = run,
+                      .components = components_used(m, cfg),
+                      .proportions = cfg->proportions < 0 ? m->proportions : cfg->proportions,
+                      .plain_root = cfg->mode == GAIT_MODE_PAPER};
     for (int32_t j = 0; j < m->phases; j++)
         r.mean_height += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
     for (int32_t a = 0; a < m->angles; a++)
@@ -211,7 +211,7 @@ static float *block_field(const state_layout *r, block *b, int32_t f)
     default:
         return f < state_layout_proportion(r) ? in->coef[f - F_COEF]
                : f < state_layout_offset(r)   ? in->proportion[f - state_layout_proportion(r)]
-                                           : b->offset[f - state_layout_offset(r)];
+                                              : b->offset[f - state_layout_offset(r)];
     }
 }
 

@@ -45,7 +45,7 @@ typedef struct state_layout {
     float mean_height;              /* statures */
 } state_layout;
 
-state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg);
+state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run);
 
 /* First field of the limbs' proportions and of the posture offsets. */
 static inline int32_t state_layout_proportion(const state_layout *r)

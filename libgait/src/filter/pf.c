@@ -153,7 +153,8 @@ static void swap(unsigned char *a, unsigned char *b, size_t bytes)
 void pf_inherit(pf *p, int32_t before, void *array, size_t bytes)
 {
     unsigned char *const part = array;
-    uint64_t *const waiting = p->cumulative, done = UINT64_MAX; /* how many others still have to copy a part */
+    uint64_t *const waiting = p->cumulative,
+                    done = UINT64_MAX; /* how many others still have to copy a part */
     for (int32_t i = 0; i < i_max(p->n, before); i++)
         waiting[i] = 0;
     for (int32_t i = 0; i < p->n; i++)

@@ -5,10 +5,10 @@
 
 typedef struct pf {
     int32_t n;
-    double *log_weight; /* n, normalised: sum of exp is 1 */
-    double *weight;     /* n */
-    int32_t *parent;    /* n: ancestor indices of the last resampling, ascending if systematic */
-    uint64_t *cumulative;   /* n: running sum of integer weights */
+    double *log_weight;   /* n, normalised: sum of exp is 1 */
+    double *weight;       /* n */
+    int32_t *parent;      /* n: ancestor indices of the last resampling, ascending if systematic */
+    uint64_t *cumulative; /* n: running sum of integer weights */
 } pf;
 
 typedef struct pf_summary {

@@ -17,7 +17,7 @@ typedef struct edge_cell { /* smoothed, contrast-normalised edge tensor: n'Tn is
     int8_t trace, xx_yy, zero, xy2;
 } edge_cell;
 
-typedef struct features_keypoints {                  /* joints located in the frame by somebody else */
+typedef struct features_keypoints {               /* joints located in the frame by somebody else */
     int32_t count;                                /* how many are; 0: the term is silent */
     float u[GAIT_MAX_JOINTS], v[GAIT_MAX_JOINTS]; /* pixels without the lens's distortion */
     float inverse_sd[GAIT_MAX_JOINTS];            /* 0: not seen */

@@ -34,7 +34,8 @@ static double dot3(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-void projection_rows_near(const projection *e, const double ideal[2], const double about[3], projection_rows *out)
+void projection_rows_near(const projection *e, const double ideal[2], const double about[3],
+                          projection_rows *out)
 {
     double const depth = dot3(e->R + 6, about) + e->t[2], z = depth > NEAREST ? depth : NEAREST;
     for (int32_t a = 0; a < 2; a++) {
@@ -58,7 +59,8 @@ void projection_rows_ray(const projection *e, const double ideal[2], double dept
 }
 
 /* Lower triangle of the noise's Cholesky factor. */
-static void noise_root(const projection_rows *r, double sd, double residual, double *l11, double *l21, double *l22)
+static void noise_root(const projection_rows *r, double sd, double residual, double *l11, double *l21,
+                       double *l22)
 {
     double const variance = sd * sd;
     *l11 = sqrt(variance + residual * dot3(r->g[0], r->g[0]));

@@ -18,7 +18,8 @@ void projection_init(projection *e, const gait_lift_config *cfg);
 /* Take the lens distortion out: pixels of a pinhole camera. */
 void projection_ideal(const projection *e, const double uv[2], double ideal[2]);
 /* Rows of a point near `about`, by the first derivatives of the projection there (orthographic: exact). */
-void projection_rows_near(const projection *e, const double ideal[2], const double about[3], projection_rows *out);
+void projection_rows_near(const projection *e, const double ideal[2], const double about[3],
+                          projection_rows *out);
 /* Rows of a point of which only a rough depth is known: it lies on the ray through the pixel. */
 void projection_rows_ray(const projection *e, const double ideal[2], double depth, projection_rows *out);
 /* Make the noise white: sd^2 of the observation, `residual` variance of each coordinate of the point.

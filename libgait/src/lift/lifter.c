@@ -70,7 +70,8 @@ static gait_result check_config(const gait_lift_config *c, gait_error *err)
     return bad ? base_fail(err, GAIT_ERR_ARG, -1, "lift config: %s", bad) : GAIT_OK;
 }
 
-gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg)
+gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg,
+                         const kernels *run)
 {
     gait_lift l = {.table = {.prior = *prior, .cfg = *cfg}};
     lift_table *const t = &l.table;
@@ -94,7 +95,7 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
     if (!self || a->overflow)
         return NULL;
     projection_init(&t->projection, cfg);
-    t->run = dispatch_choose(cfg->cpu_mask);
+    t->run = run;
     lift_table_fill(t);
     *self = l;
     return self;
@@ -113,7 +114,8 @@ void lifter_take(const gait_lift *l, size_t points, const double *uv, const doub
     const lift_table *const t = &l->table;
     for (size_t i = 0; i < points; i++) {
         double const u = uv[2 * i], v = uv[2 * i + 1];
-        bool const none = t->projection.perspective && u == v && (u == 0.0 || u == -1.0); /* so say detectors */
+        bool const none =
+            t->projection.perspective && u == v && (u == 0.0 || u == -1.0); /* so say detectors */
         bool const there = fabs(u) <= FURTHEST && fabs(v) <= FURTHEST && !none;
         to_sd[i] = there ? (sd ? sd[i] : t->cfg.sd) : -1.0;
         to_uv[2 * i] = to_uv[2 * i + 1] = 0.0;

@@ -8,8 +8,8 @@ struct gait_lift {
     lift_table table;
     lift_search search;
     segment_posterior belief, spare; /* of the last segment; scratch */
-    lift_window window;        /* of the last segment */
-    double *at, *uv, *sd;      /* what the window points to: F; F x J x 2; F x J */
+    lift_window window;              /* of the last segment */
+    double *at, *uv, *sd;            /* what the window points to: F; F x J x 2; F x J */
     lift_gain gain;
     lift_stream stream;
     bool fitted, windowed; /* there is a belief; it is of observations, not of a gain */
@@ -19,7 +19,8 @@ struct gait_lift {
 gait_result lifter_open(const void *blob, size_t bytes, const gait_lift_config *cfg, segment_prior *prior,
                         gait_error *err);
 /* Place everything; NULL when counting or if the arena is too small. */
-gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg);
+gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg,
+                         const kernels *run);
 /* Observations of `points` markers as the core takes them: ideal pixels, a deviation each; sd NULL: the
  * config's. */
 void lifter_take(const gait_lift *l, size_t points, const double *uv, const double *sd, double *to_uv,

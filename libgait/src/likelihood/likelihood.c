@@ -65,9 +65,9 @@ static void costs_init(like_setup *s)
     }
 }
 
-void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg)
+void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg, const kernels *run)
 {
-    s->run = dispatch_choose(cfg->cpu_mask);
+    s->run = run;
     s->limbs = m->limbs;
     s->paper = cfg->mode == GAIT_MODE_PAPER;
     s->terms = cfg->terms;

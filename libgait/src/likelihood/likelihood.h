@@ -119,7 +119,7 @@ typedef struct like_body { /* one body in one camera, as the terms see it */
     const like_outline *sides; /* of the outline */
     int32_t lane;
     const layers *layers;
-    const like_patch *samples;     /* by limb: its surface in this frame */
+    const like_patch *samples;  /* by limb: its surface in this frame */
     const like_patch *ancestor; /* the same of its ancestor in the previous frame, or NULL */
     const gait_camera *camera;
     const float (*points)[3][BLOCK]; /* joints in the world, metres; read if the features have tracks */
@@ -144,7 +144,7 @@ typedef struct like_term {
 
 extern const like_term like_texture, like_silhouette, like_edges, like_template, like_keypoints;
 
-void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg);
+void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg, const kernels *run);
 
 /* Look up the surface of every limb of one lane in the frame. */
 static inline void like_sample(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,

@@ -37,10 +37,10 @@ static inline void ellipsoid(const like_sides *s, int32_t lane, sides *restrict 
         out->share[i] = i < 8 ? 0.25f : 0.75f;
 }
 
-typedef struct spots {                    /* points of the limbs' outlines */
+typedef struct spots {                     /* points of the limbs' outlines */
     int32_t cell[MODEL_MAX_LIMBS][SIMD16]; /* of the edge map: where, then what is there */
     int32_t x[MODEL_MAX_LIMBS][SIMD16], y[MODEL_MAX_LIMBS][SIMD16]; /* cell of the grid a little inside */
-    int32_t shown[MODEL_MAX_LIMBS][SIMD16];                        /* negative: in the image */
+    int32_t shown[MODEL_MAX_LIMBS][SIMD16];                         /* negative: in the image */
     int32_t normal[MODEL_MAX_LIMBS][SIMD16];
 } spots;
 

@@ -106,7 +106,8 @@ void KERNEL(texture_costs)(const like_body *b, int32_t (*cost)[BLOCK])
 {
     int32_t const limbs = b->setup->limbs;
     int32_t sum[PLACES];
-    compare_limbs(b->samples, b->ancestor, limbs, b->setup->paper ? &b->setup->square : &b->setup->robust, sum);
+    compare_limbs(b->samples, b->ancestor, limbs, b->setup->paper ? &b->setup->square : &b->setup->robust,
+                  sum);
     for (int32_t l = 0; l < limbs; l++)
         cost[l][b->lane] = sum[l];
 }

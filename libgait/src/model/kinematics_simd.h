@@ -28,7 +28,7 @@ typedef struct bodies {
 
 /* Channels first .. first + count - 1 of one body; component k's score is coef[k * stride]. */
 KIN_INLINE void curves_part(const gait_model *m, float phase, float pace, const float *coef, int32_t stride,
-                       int32_t components, int32_t first, int32_t count, float *acc)
+                            int32_t components, int32_t first, int32_t count, float *acc)
 {
     int32_t const T = m->phases, M = m->channels;
     float const at = m_wrap1(phase) * (float)T;
@@ -110,7 +110,7 @@ KIN_INLINE void scale_frames(const gait_model *m, const bodies *b, int n)
 
 /* World position (3 x n) of a point given in a frame, statures: o + scale R p. */
 KIN_INLINE void place_point(const float *R, const float *o, const float *scale, const float p[3],
-                       float *restrict out, int n)
+                            float *restrict out, int n)
 {
     for (int k = 0; k < 3; k++)
         for (int lane = 0; lane < n; lane++) {
@@ -120,8 +120,8 @@ KIN_INLINE void place_point(const float *R, const float *o, const float *scale, 
 }
 
 /* Move the origin o (3 x n) of frame f by what the proportions shift it in its parent's axes R. */
-KIN_INLINE void shift_origin(const gait_model *m, const bodies *b, int32_t f, const float *R, float *restrict o,
-                        int n)
+KIN_INLINE void shift_origin(const gait_model *m, const bodies *b, int32_t f, const float *R,
+                             float *restrict o, int n)
 {
     for (int32_t k = 0; k < b->proportions; k++) {
         const float *const by = m->shift + 3 * (k * m->frames + f);

@@ -262,7 +262,7 @@ void KERNEL(layers_draw)(const layers_block *block, int32_t lane, layers *restri
     grid_mask_frame(&out->whole, block->first[lane], block->last[lane], column, width);
     for (int32_t l = 0; l < block->count; l++)
         grid_mask_frame(&out->visible[l], block->limb[l].top[lane] / LAYERS_BAND * LAYERS_BAND,
-                   block->limb[l].end[lane], column, width);
+                        block->limb[l].end[lane], column, width);
     for (int32_t word = 0; 64 * word < width; word++)
         draw_word(block, lane, word, out);
 }

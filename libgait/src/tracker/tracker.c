@@ -96,12 +96,13 @@ int32_t tracker_count(const gait_tracker *t)
     return t->core->hypotheses.stage == HYPOTHESES_ACQUISITION ? acquisition_count(t) : t->wanted;
 }
 
-gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg)
+gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg,
+                             const kernels *run)
 {
     gait_tracker *const self = TAKE(a, gait_tracker, 1);
     gait_tracker t = {.model = m, .cfg = *cfg, .most = cfg->particles, .wanted = cfg->particles};
     t.cfg.particles = t.room = acquisition_count(&t);
-    t.rule = state_layout_init(m, &t.cfg);
+    t.rule = state_layout_init(m, &t.cfg, run);
     t.cfg.components = t.rule.components;
     t.cfg.proportions = t.rule.proportions;
     a->solid = true;
@@ -110,7 +111,7 @@ gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_c
     layout_work(a, &t);
     if (!self || a->overflow)
         return NULL;
-    like_setup_init(t.like, m, &t.cfg);
+    like_setup_init(t.like, m, &t.cfg, run);
     mirror_init(t.mirror, &t.rule);
     *self = t;
     return self;
@@ -241,12 +242,12 @@ static rejuvenation rejuvenation_after(gait_tracker *t, bool resampled, uint32_t
 {
     bool const known_mode = t->core->hypotheses.stage != HYPOTHESES_ACQUISITION && !track_loss_is_lost(t);
     rejuvenation m = {.fields = t->particles.fields,
-                  .row = t->joint,
-                  .parent = t->filter.parent,
-                  .n = t->filter.n,
-                  .split = hypotheses_boundary(t),
-                  .seed = t->cfg.seed,
-                  .frame = frame};
+                      .row = t->joint,
+                      .parent = t->filter.parent,
+                      .n = t->filter.n,
+                      .split = hypotheses_boundary(t),
+                      .seed = t->cfg.seed,
+                      .frame = frame};
     if (known_mode && resampled)
         rejuvenation_set(&m, seconds_since(t, t->core->rejuvenation_utime), t->cfg.rejuvenation_time);
     if (!known_mode || resampled)

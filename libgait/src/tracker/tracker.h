@@ -20,9 +20,9 @@ typedef struct hypotheses_state {
 
 typedef struct tracker_core { /* small mutable state; saved and hashed with the arrays that follow it */
     int64_t utime, start_utime;
-    int64_t support_utime; /* when the images last supported the estimate */
-    int64_t rejuvenation_utime;  /* when the particles last rejuvenated, or were of no one mode */
-    uint64_t frame;        /* steps since start */
+    int64_t support_utime;      /* when the images last supported the estimate */
+    int64_t rejuvenation_utime; /* when the particles last rejuvenated, or were of no one mode */
+    uint64_t frame;             /* steps since start */
     int32_t started;
     int32_t current;     /* which of the generations kept holds the particles */
     uint32_t textured;   /* bit c: there are surface samples of camera c's previous frame */
@@ -30,11 +30,11 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int32_t part;        /* this frame supports but a part of it */
     float stature_doubt; /* as in dynamics */
     float missed;        /* foreground that is usually left unexplained, nats */
-    float front_back;   /* front_back_score() lately */
+    float front_back;    /* front_back_score() lately */
     double ess;
     hypotheses_state hypotheses;
-    particle_state last;       /* when the images last supported it */
-    float phase, rate; /* reported last: strides, strides per second */
+    particle_state last; /* when the images last supported it */
+    float phase, rate;   /* reported last: strides, strides per second */
     view_map map[GAIT_MAX_CAMERAS];
     int32_t fewer, less; /* particles than there is room for; wanted, than of the caller's config */
 } tracker_core;
@@ -70,22 +70,22 @@ struct gait_tracker {
         *texture; /* n x cameras x limbs: what particles saw, while weighing their ancestors; or NULL */
     pf filter;
     int16_t *template[2][GAIT_MAX_CAMERAS]; /* of each side while forked; otherwise the first */
-    fixed_lag past;                               /* the particles of this step and those before */
+    fixed_lag past;                         /* the particles of this step and those before */
     unsigned char *state_end;
     particle_set particles; /* this step's */
     /* Recomputed in every step. */
     camera_state camera[GAIT_MAX_CAMERAS];
-    float *loglik; /* n: as much of loglik_raw as counts (loss.h, modes.h) */
-    float *loglik_raw; /* n */
+    float *loglik;                    /* n: as much of loglik_raw as counts (loss.h, modes.h) */
+    float *loglik_raw;                /* n */
     float *loglik_without_silhouette; /* n: loglik_raw without the silhouette */
-    float
-        *joint; /* P x 3 x n, metres: of the particles, or of those that fixed_lag_estimate() gathers; as scratch */
-    mirror *mirror;                 /* constant */
+    float *
+        joint; /* P x 3 x n, metres: of the particles, or of those that fixed_lag_estimate() gathers; as scratch */
+    mirror *mirror;                     /* constant */
     uint8_t *mode;                      /* n: particle belongs to the dominant mode */
-    like_patch *estimate_patch;                   /* cameras x limbs: surface of the estimate */
+    like_patch *estimate_patch;         /* cameras x limbs: surface of the estimate */
     int8_t *known[2][GAIT_MAX_CAMERAS]; /* template as compared in this frame: limbs x LIKE_RING */
     features_scratch scratch;           /* until the particles are weighed; as joint */
-    likelihood_scratch *work;                /* tasks, or 1 without threads; all but the first as past */
+    likelihood_scratch *work;           /* tasks, or 1 without threads; all but the first as past */
 };
 
 /* First particle of the second side; the number of particles where there is but one side. */
@@ -96,7 +96,8 @@ static inline int32_t hypothesis_of(const gait_tracker *t, int32_t particle)
     return particle >= hypotheses_boundary(t);
 }
 
-gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg);
+gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg,
+                             const kernels *run);
 void tracker_clear(gait_tracker *t);
 /* Since the images last supported the walker. */
 static inline float seconds_unseen(const gait_tracker *t)

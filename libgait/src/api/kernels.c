@@ -1,7 +1,8 @@
-#include "base/dispatch.h"
+/* kernels.c - the kernels of each instruction set: the only file that names them all. */
+#include "api/kernels.h"
 #include "base/cpu.h"
 
-/* The functions of every ISA, and one constant table of each. */
+/* Declarations of the kernels of every ISA, and one constant table of each. */
 #define DECLARE_scalar(result, name, parameters) result name##_scalar parameters;
 #define DECLARE_base(result, name, parameters)   result name##_base parameters;
 #define DECLARE_avx2(result, name, parameters)   result name##_avx2 parameters;
@@ -14,7 +15,7 @@
     KERNELS(DECLARE_##which) static const kernels which = {.isa = #which, KERNELS(MEMBER_##which)};
 KERNEL_ISAS(TABLE)
 
-const kernels *dispatch_choose(uint32_t mask)
+const kernels *kernels_choose(uint32_t mask)
 {
     uint32_t const usable = mask & cpu_features();
     const kernels *best = &scalar;
