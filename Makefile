@@ -88,7 +88,7 @@ TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
 .PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan tsan unit-threads fuzz fuzz-run golden-check \
-        lint format wheel sdist wheel-check install uninstall clean
+        docs lint format wheel sdist wheel-check install uninstall clean
 
 help: ## list the targets
 	@echo 'make demo     track a walking clip end to end, results in build/demo (VIDEO= CAMERA= for your own)'
@@ -331,6 +331,16 @@ sdist: $(READY) ## source package that builds without a network, in build/wheel
 wheel-check: wheel sdist lib ## both packages in fresh environments without a compiler (fetches dependencies)
 	@GAIT_WHEEL=$(abspath build/wheel/$(WHEEL)) GAIT_SDIST=$(abspath build/wheel/libgait-$(VERSION).tar.gz) \
 	    $(PY) -m pytest -q -c python/pyproject.toml --rootdir . tests/python/test_wheel.py $(ARGS)
+
+# ---- documentation -------------------------------------------------------------------------------------------
+DOCS_READY := $(VENV)/.docs
+$(DOCS_READY): python/constraints.txt | $(READY)
+	$(PIP_INSTALL) mkdocs-material mkdocstrings-python latex2mathml
+	@touch $@
+
+docs: setup lib tools $(DOCS_READY) ## these pages and the reference as a site, in build/docs
+	@NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build --strict --clean -f libgait/doc/site/mkdocs.yml
+	@echo build/docs/index.html
 
 # ---- style ---------------------------------------------------------------------------------------------------
 C_FILES := $(sort $(wildcard libgait/doc/*.c libgait/src/*/*.[ch] libgait/src/*/*.cpp tests/unit/*.[ch] tests/bench/*.[ch] tests/fuzz/*.[ch] \

@@ -171,7 +171,7 @@ typedef struct gait_tracker_config {
     int32_t  tasks;            /* [1, 256], as many as exec has threads; each takes 0.1 MB if exec is set; default 8 */
     int32_t  cameras;          /* [1, GAIT_MAX_CAMERAS]; default 1 */
     int32_t  lag;              /* frames that gait_tracker_lagged() can go back [0, 64]; default 5; 0: none */
-    int32_t  proportions;      /* [0, the model's]; -1: all; default 0 (doc/design.md says why) */
+    int32_t  proportions;      /* [0, the model's]; -1: all; default 0 (doc/decisions.md says why) */
     uint32_t terms;            /* GAIT_TERM_* in use; default all but tracks (paper mode texture alone) */
     float    term_weight[5];   /* nats per unit cost of texture, silhouette, edges, template, tracks, each [0, 1e6];
                                 * default 0.2 (paper mode 1), 25, 40, 4, 8 */

@@ -96,8 +96,9 @@ def test_what_no_recording_shows_is_said(tmp_path, capsys):
 
 
 def test_the_example_of_a_mapping_is_read(tmp_path):
-    page = Path(__file__).parents[2] / "libgait/doc/mocap-formats.md"
-    example = page.read_text(encoding="utf-8").split("```json")[1].split("```")[0]
+    page = Path(__file__).parents[2] / "libgait/doc/reference/files.md"
+    text = page.read_text(encoding="utf-8").split("### Marker maps")[1]
+    example = text.split("```json")[1].split("```")[0]
     (tmp_path / "map.json").write_text(example)
     table = marker_map.read(tmp_path / "map.json")
     assert table["clustera"].segment == "l_thigh" and "lwra" not in table

@@ -291,7 +291,8 @@ def test_a_model_without_a_cycle_takes_the_phase_of_the_shipped_one(prior, tmp_p
 
 
 def test_the_documented_files_are_read(prior, tmp_path):
-    page = (Path(__file__).parents[2] / "libgait/doc/lift-formats.md").read_text()
+    page = (Path(__file__).parents[2] / "libgait/doc/reference/files.md").read_text(encoding="utf-8")
+    page = page.split("## Placement")[1].split("## Motion capture")[0]
     calibrated, flat, corrections = (block.split("```")[0] for block in page.split("```json")[1:])
     path = tmp_path / "file.json"
     path.write_text(calibrated)

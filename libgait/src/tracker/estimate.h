@@ -1,4 +1,4 @@
-/* estimate.h - what to report of the weighted particles (doc/design.md, estimates). */
+/* estimate.h - what to report of the weighted particles (doc/method.md, filter). */
 #ifndef GAIT_TRACKER_ESTIMATE_H
 #define GAIT_TRACKER_ESTIMATE_H
 #include "tracker/tracker.h"

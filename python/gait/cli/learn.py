@@ -12,7 +12,7 @@ are their cycles alone.  The model does not depend on --jobs or --dask, nor on t
 The workers of a Dask cluster (pip install 'libgait[dask]') need this version of
 the package and the files under the same paths; start them with dask worker --preload-nanny gait.reproducible.
 
-What the columns of .csv and the marker names of .c3d and .trc must be: libgait/doc/mocap-formats.md.
+What the columns of .csv and the marker names of .c3d and .trc must be: libgait/doc/reference/files.md.
 
 The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
 """

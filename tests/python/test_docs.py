@@ -1,0 +1,305 @@
+"""What the README and the pages of libgait/doc tell people to type works, in the order in which they tell it.
+
+Every fenced block of a page runs in one folder: `sh` and `python` are executed, `c` is compiled, `json` parsed. A
+comment before a block changes that: `<!-- file: NAME -->` writes it to a file, `<!-- skip: REASON -->` only checks its commands,
+targets and options. `gait simulate -o walk` gives a clip that is shorter and smaller than the default.
+"""
+
+import contextlib
+import csv
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import mocap_files
+import numpy as np
+import pytest
+from example_scene import drawn_walk
+
+import gait
+import gait.cli
+from gait.cli import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[2]
+DOC = ROOT / "libgait/doc"
+BIN = ROOT / ".venv/bin"
+SHORT = ["--frames", "48", "--fps", "15", "--size", "480x360", "--quiet"]
+FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+PAGES = [ROOT / "README.md", *sorted(DOC.rglob("*.md"))]
+ENV = {k: v for k, v in os.environ.items() if not k.startswith("MAKE")}
+# The README's lines of C stand among declarations that their names speak for.
+AMONG = """#include <gait.h>
+#include <stdio.h>
+void lines(void *blob, size_t blob_bytes, const gait_tracker_config *from, int (*next_frame)(gait_frame *));
+void lines(void *blob, size_t blob_bytes, const gait_tracker_config *from, int (*next_frame)(gait_frame *))
+{
+    static _Alignas(GAIT_ALIGN) unsigned char model_memory[1 << 16], tracker_memory[8 << 20];
+    gait_tracker_config config = *from;
+    gait_model *model; gait_tracker *tracker; gait_error err;
+    gait_state mean = {0}, sd = {0}; gait_frame frame = {0}; gait_estimate estimate;
+%s}
+"""
+
+
+@dataclass(frozen=True)
+class Block:
+    """One fenced block of a page."""
+
+    page: str
+    line: int
+    language: str
+    text: str
+    file: str = ""
+    skip: str = ""
+
+    @property
+    def commands(self) -> list[str]:
+        """Commands of a shell block, one a line."""
+        lines = self.text.replace("\\\n", " ").splitlines()
+        return [re.sub(r"\s+#.*", "", line).strip() for line in lines if self.language == "sh" and line]
+
+
+def blocks(page: Path) -> list[Block]:
+    """Fenced blocks of a page with their directives."""
+    text = page.read_text(encoding="utf-8")
+    found = re.finditer(r"(?:^<!-- (\w+): ([^\n]*) -->\n)?^```(\w+)\n(.*?)^```$", text, re.M | re.S)
+    return [
+        Block(
+            page.relative_to(ROOT).as_posix(),
+            text.count("\n", 0, m.start(3)) + 1,
+            m[3],
+            m[4],
+            **({m[1]: m[2]} if m[1] else {}),
+        )
+        for m in found
+    ]
+
+
+ALL = {page: blocks(page) for page in PAGES}
+
+
+def run(*command, **options):
+    """Run, and show what it said if it fails."""
+    options = {"env": ENV, "timeout": 300} | options
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, **options)
+    assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+    return done
+
+
+@pytest.fixture(scope="session")
+def clip(tmp_path_factory):
+    """The clip of the pages."""
+    folder = tmp_path_factory.mktemp("clip") / "walk"
+    run(BIN / "gait", "simulate", "-o", folder, *SHORT)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory):
+    """Environment in which pkg-config finds the library, and a `gait` that copies the clip."""
+    folder = tmp_path_factory.mktemp("installed")
+    run("make", "-s", "install", f"DESTDIR={folder}", "PREFIX=/opt/gait", cwd=ROOT)
+    return ENV | {
+        "PKG_CONFIG_PATH": str(folder / "opt/gait/lib/pkgconfig"),
+        "PKG_CONFIG_SYSROOT_DIR": str(folder),
+        "LD_LIBRARY_PATH": str(folder / "opt/gait/lib"),
+    }
+
+
+@pytest.fixture
+def folder(tmp_path, clip, installed):
+    """Folder for the blocks of one page, in which the repository's folders can be named."""
+    for name in ("libgait", "python", "build", ".venv"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / "bin").mkdir()
+    shim = tmp_path / "bin/gait"
+    shim.write_text(
+        f'#!/bin/sh\n[ "$*" = "simulate -o walk" ] && exec cp -r {clip} walk\nexec {BIN}/gait "$@"\n'
+    )
+    shim.chmod(0o755)
+    return tmp_path
+
+
+def execute(block, folder, env):
+    """Do what a reader does with a block."""
+    if block.file:
+        (folder / block.file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / block.file).write_text(block.text, encoding="utf-8")
+    if block.language == "python" and block.skip:
+        compile(block.text, block.page, "exec")
+    elif block.language == "json":
+        json.loads(block.text)
+    elif block.skip:
+        pass
+    elif block.language == "c":
+        whole = "int main(" in block.text
+        (folder / "block.c").write_text(block.text if whole else AMONG % block.text, encoding="utf-8")
+        run("cc", *FLAGS, f"-I{ROOT}/libgait/include", "-fsyntax-only", "block.c", cwd=folder)
+    elif block.language == "python":
+        run(BIN / "python", "-c", block.text, cwd=folder)
+    elif block.language == "sh":
+        run("sh", "-ec", block.text, cwd=folder, env=env)
+
+
+def stand_in(clip, folder):
+    """The clip and its camera for the video, lens and tape marks of somebody who follows the tutorial."""
+    shutil.copy(clip / "video.mp4", folder / "phone.mp4")
+    camera = gait.Camera.read(clip / "camera.json")
+    lens = cv2.FileStorage(str(folder / "lens.yaml"), cv2.FILE_STORAGE_WRITE)
+    lens.write("image_width", camera.width)
+    lens.write("image_height", camera.height)
+    lens.write("camera_matrix", np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]))
+    lens.write("distortion_coefficients", np.zeros(5))
+    lens.release()
+    marks = np.array([[-1, -0.5, 0], [1, -0.5, 0], [-1.5, 1, 0], [1.5, 1, 0], [0, 0, 0]])
+    seen = (camera.R @ marks.T).T + camera.t
+    u, v = camera.fx * seen[:, 0] / seen[:, 2] + camera.cx, camera.fy * seen[:, 1] / seen[:, 2] + camera.cy
+    rows = [f"{a:.2f},{b:.2f},{x},{y}" for a, b, (x, y, _) in zip(u, v, marks, strict=True)]
+    (folder / "points.csv").write_text("\n".join(["u,v,x,y", *rows, ""]))
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if ALL[p]], ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_the_blocks_of_a_page_work(page, folder, clip, installed):
+    todo = ALL[page]
+    if any("pkg-config" in block.text for block in todo) and not shutil.which("pkg-config"):
+        pytest.skip("pkg-config is not installed")
+    if page.name == "README.md":
+        shutil.copytree(clip, folder / "walk")
+    if page.name == "learn.md":
+        mocap_files.write_people(folder / "my_mocap")
+    if page.name == "tutorial.md":
+        stand_in(clip, folder)
+    env = installed | {"PATH": f"{folder}/bin:{BIN}:{os.environ['PATH']}"}
+    for block in todo:
+        try:
+            execute(block, folder, env)
+        except (AssertionError, ValueError) as fault:
+            pytest.fail(f"{block.page}:{block.line}: {fault}")
+
+
+COMMANDS_SHOWN = sorted({c for page in PAGES for block in ALL[page] for c in block.commands})
+
+
+@pytest.mark.parametrize("command", [c for c in COMMANDS_SHOWN if c.startswith("make ")])
+def test_make_targets_exist(command):
+    told = run("make", "help", cwd=ROOT).stdout
+    targets = [word for word in command.split()[1:] if "=" not in word]
+    assert [t for t in targets if f" {t} " not in told] == []
+
+
+def helped(words, told={}):  # noqa: B006 - kept from call to call
+    """Help text of the program that the words begin with."""
+    if words[0] == "gait":
+        program = ["gait", *words[1 : 3 if " ".join(words[1:3]) in COMMANDS else 2]]
+    else:
+        program = words[:1]
+    key = " ".join(program)
+    if key not in told and words[0] == "gait":
+        text = io.StringIO()
+        with contextlib.redirect_stdout(text), pytest.raises(SystemExit):
+            gait.cli.main([*program[1:], "--help"])
+        told[key] = text.getvalue()
+    elif key not in told:
+        told[key] = run(ROOT / words[0], "--help").stdout
+    return told[key]
+
+
+def test_options_exist():
+    unknown = []
+    for command in COMMANDS_SHOWN:
+        words = command.split()
+        if words[0] not in ("gait", "build/bin/gait-trackd") or "--version" in words:
+            continue
+        options = [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]
+        text = helped(words)
+        unknown += [f"{command}: {o}" for o in options if not re.search(rf"(^|[\s,\[]){re.escape(o)}\b", text, re.M)]
+    assert unknown == []
+
+
+def test_options_named_in_the_text_exist():
+    """`--option` in prose is an option of some command."""
+    texts = [helped(["gait", *name.split()]) for name in COMMANDS] + [helped(["build/bin/gait-trackd"])]
+    known = set(re.findall(r"(?<![\w-])--[a-z][\w-]*", " ".join(texts)))
+    foreign = {"--preload-nanny", "--static", "--strict"}  # of dask worker, pkg-config, mkdocs
+    unknown = [
+        f"{page.relative_to(ROOT)}: {option}"
+        for page in PAGES
+        if page.name != "changelog.md"
+        for text in re.findall(r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S))
+        if not text.startswith(("make ", "tests/"))
+        for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text)
+        if option not in known | foreign
+    ]
+    assert unknown == []
+
+
+def test_every_command_has_a_place_in_the_docs():
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    assert [name for name in COMMANDS if f"`gait {name}" not in text and f"gait {name} " not in text] == []
+
+
+def output_of(page, start, folder, clip):
+    """What the first Python block of a page that begins so prints, beside a clip."""
+    shutil.copytree(clip, folder / "walk")
+    (block,) = (b for b in ALL[DOC / page] if b.language == "python" and start in b.text)
+    with (folder / "walk/truth.csv").open(encoding="utf-8", newline="") as f:
+        return run(BIN / "python", "-c", block.text, cwd=folder).stdout.splitlines(), list(csv.DictReader(f))
+
+
+def test_the_tracker_of_the_python_page_follows_the_person(tmp_path, clip):
+    (*rows, last), truth = output_of("howto/python.md", "tracker.start", tmp_path, clip)
+    found = {int(row.split()[0]): float(row.split()[1]) for row in rows}
+    assert sorted(found) == [int(row["frame"]) for row in truth]
+    assert np.median([abs(found[int(row["frame"])] - float(row["pelvis_x"])) for row in truth]) < 0.1
+    assert re.fullmatch(r"\d+ bytes, digest [0-9a-f]{16}", last)
+
+
+def test_the_lifter_of_the_python_page_follows_a_knee(tmp_path, clip):
+    rows, truth = output_of("howto/python.md", "lifter.push", tmp_path, clip)
+    knee = [[float(row[f"l_knee_{axis}"]) for axis in "xyz"] for row in truth]
+    off = [np.linalg.norm(np.array(row.split()[1:4], float) - knee[int(row.split()[0])]) for row in rows]
+    assert len(off) > len(truth) - 20
+    assert np.median(off) < 0.4  # the distance of a person of unknown stature
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory):
+    """The whole program of the C page."""
+    folder = tmp_path_factory.mktemp("example")
+    (block,) = (b for b in ALL[DOC / "howto/c.md"] if b.file == "example.c")
+    (folder / "example.c").write_text(block.text, encoding="utf-8")
+    library = ROOT / "build/release/libgait.a"
+    run("cc", *FLAGS, f"-I{ROOT}/libgait/include", folder / "example.c", library, "-lm", "-o", folder / "example")
+    return folder / "example"
+
+
+def test_the_c_program_follows_a_drawn_person(example):
+    _, pictures, places = drawn_walk(60)
+    shipped = ROOT / "python/gait/data/walk.gait"
+    frames = b"".join(p.tobytes() for p in pictures)
+    done = subprocess.run([example, shipped], input=frames, capture_output=True, timeout=300)
+    assert done.returncode == 0, done.stdout
+    found = [float(line.split()[0]) for line in done.stdout.decode().splitlines()]
+    assert len(found) == 60
+    assert np.abs(np.array(found) - places)[30:].max() < 0.15
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ([ROOT / "README.md"], ""),
+        (["/nonexistent"], "/nonexistent: cannot be read\n"),
+        (["/dev/null"], "/dev/null: is empty or too large for a model\n"),
+        ([], "usage: example MODEL.gait < 640x480 grey frames\n"),
+    ],
+)
+def test_the_c_program_reports_a_wrong_argument(example, words, says):
+    done = subprocess.run([example, *words], input=b"", capture_output=True, timeout=60)
+    assert done.returncode == 1 and done.stdout.strip()
+    assert not says or done.stdout.decode() == says
