@@ -218,7 +218,9 @@ def test_options_exist():
             continue
         options = [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]
         text = helped(words)
-        unknown += [f"{command}: {o}" for o in options if not re.search(rf"(^|[\s,\[]){re.escape(o)}\b", text, re.M)]
+        unknown += [
+            f"{command}: {o}" for o in options if not re.search(rf"(^|[\s,\[]){re.escape(o)}\b", text, re.M)
+        ]
     assert unknown == []
 
 
@@ -226,12 +228,19 @@ def test_options_named_in_the_text_exist():
     """`--option` in prose is an option of some command."""
     texts = [helped(["gait", *name.split()]) for name in COMMANDS] + [helped(["build/bin/gait-trackd"])]
     known = set(re.findall(r"(?<![\w-])--[a-z][\w-]*", " ".join(texts)))
-    foreign = {"--preload-nanny", "--static", "--strict"}  # of dask worker, pkg-config, mkdocs
+    foreign = {
+        "--record",
+        "--preload-nanny",
+        "--static",
+        "--strict",
+    }  # of make bench, dask worker, pkg-config, mkdocs
     unknown = [
         f"{page.relative_to(ROOT)}: {option}"
         for page in PAGES
         if page.name != "changelog.md"
-        for text in re.findall(r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S))
+        for text in re.findall(
+            r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
+        )
         if not text.startswith(("make ", "tests/"))
         for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text)
         if option not in known | foreign
@@ -275,7 +284,16 @@ def example(tmp_path_factory):
     (block,) = (b for b in ALL[DOC / "howto/c.md"] if b.file == "example.c")
     (folder / "example.c").write_text(block.text, encoding="utf-8")
     library = ROOT / "build/release/libgait.a"
-    run("cc", *FLAGS, f"-I{ROOT}/libgait/include", folder / "example.c", library, "-lm", "-o", folder / "example")
+    run(
+        "cc",
+        *FLAGS,
+        f"-I{ROOT}/libgait/include",
+        folder / "example.c",
+        library,
+        "-lm",
+        "-o",
+        folder / "example",
+    )
     return folder / "example"
 
 

@@ -144,7 +144,7 @@ class Tracker:
         found = [one and track_array(one, self.model.joint_names) for one in per_camera(joints)]
         for i, array in enumerate(found[: len(self.cameras)]):
             if array is not None:
-                frame.tracks[i] = array
+                frame.keypoints[i] = array
         out = abi.EstimateC()
         arguments = (ctypes.byref(frame), ctypes.byref(out), ctypes.byref(self._error))
         begun = time.perf_counter()
