@@ -1,8 +1,9 @@
 """What the README and the pages of libgait/doc tell people to type works, in the order in which they tell it.
 
-Every fenced block of a page runs in one folder: `sh` and `python` are executed, `c` is compiled, `json` parsed. A
-comment before a block changes that: `<!-- file: NAME -->` writes it to a file, `<!-- skip: REASON -->` only checks its commands,
-targets and options. `gait simulate -o walk` gives a clip that is shorter and smaller than the default.
+Every fenced block of a page runs in one folder: `sh` and `python` are executed, `c` is compiled, `json` parsed.
+A comment before a block changes that: `<!-- file: NAME -->` writes it to a file, `<!-- skip: REASON -->` only
+checks its commands, targets and options. `gait simulate -o walk` gives a clip that is shorter and smaller than
+the default.
 """
 
 import contextlib
@@ -210,41 +211,37 @@ def helped(words, told={}):  # noqa: B006 - kept from call to call
     return told[key]
 
 
+OPTION = r"(?<![\w-])--?[a-z][\w-]*"
+
+
 def test_options_exist():
     unknown = []
     for command in COMMANDS_SHOWN:
         words = command.split()
-        if words[0] not in ("gait", "build/bin/gait-trackd") or "--version" in words:
-            continue
-        options = [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]
-        text = helped(words)
-        unknown += [
-            f"{command}: {o}" for o in options if not re.search(rf"(^|[\s,\[]){re.escape(o)}\b", text, re.M)
-        ]
+        if words[0] in ("gait", "build/bin/gait-trackd"):
+            known = {*re.findall(OPTION, helped(words)), "--version"}
+            unknown += [(command, o) for o in re.findall(OPTION, command) if o not in known]
     assert unknown == []
 
 
 def test_options_named_in_the_text_exist():
     """`--option` in prose is an option of some command."""
     texts = [helped(["gait", *name.split()]) for name in COMMANDS] + [helped(["build/bin/gait-trackd"])]
-    known = set(re.findall(r"(?<![\w-])--[a-z][\w-]*", " ".join(texts)))
-    foreign = {
+    known = set(re.findall(OPTION, " ".join(texts)))
+    known |= {
+        "--version",
         "--record",
+        "--runs",
         "--preload-nanny",
         "--static",
         "--strict",
-    }  # of make bench, dask worker, pkg-config, mkdocs
-    unknown = [
-        f"{page.relative_to(ROOT)}: {option}"
-        for page in PAGES
-        if page.name != "changelog.md"
-        for text in re.findall(
-            r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
-        )
-        if not text.startswith(("make ", "tests/"))
-        for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text)
-        if option not in known | foreign
-    ]
+    }  # of other programs
+    unknown = []
+    for page in PAGES:
+        text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+        quoted = re.findall(r"`([^`\n]+)`", text)
+        options = [o for words in quoted for o in re.findall(r"(?<![\w-])--[a-z][\w-]*", words)]
+        unknown += [(page.name, o) for o in options if o not in known]
     assert unknown == []
 
 

@@ -1,8 +1,8 @@
 """What mkdocs needs to know of the repository.
 
 Pages in libgait/doc link to files outside of it as GitHub shows them. The site gets copies of these files
-(`files/...`; Markdown as pages), CONTRIBUTING.md as a page, equations as MathML, and the two pages that are made
-from the code: the commands from `--help`, the C API from the headers.
+(`files/...`; Markdown as pages), CONTRIBUTING.md as a page, equations as MathML, and the two pages that are
+made from the code: the commands from `--help`, the C API from the headers.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _prose(text: str, here: str) -> str:
 
 
 def _fence(text: str) -> str:
-    """A fenced block; one of mathematics as MathML."""
+    """Return a fenced block; one of mathematics as MathML."""
     first, *lines, _ = text.splitlines()
     if first.strip() != "```math":
         return text
@@ -106,7 +106,7 @@ def _fence(text: str) -> str:
 
 
 def _commands() -> str:
-    """The help of every command."""
+    """Return the help of every command."""
     from gait.cli import COMMANDS
 
     env = os.environ | {"COLUMNS": "100"}
@@ -123,10 +123,10 @@ def _commands() -> str:
 
 
 def _header(path: Path) -> str:
-    """A header by its sections, each under its title."""
+    """Return a header by its sections, each under its title."""
     text = path.read_text(encoding="utf-8")
     pieces = re.split(r"^/\* -{2,} (.+?)[. ]*-{2,} \*/\n", text, flags=re.M)
     out = [f"\n## {path.name}\n\n```c\n{pieces[0].strip()}\n```\n"]
-    for title, body in zip(pieces[1::2], pieces[2::2]):
+    for title, body in zip(pieces[1::2], pieces[2::2], strict=True):
         out.append(f"\n### {title[0].upper()}{title[1:]}\n\n```c\n{body.strip()}\n```\n")
     return "".join(out)
