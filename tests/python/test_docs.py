@@ -1,9 +1,9 @@
 """What the README and the pages of libgait/doc tell people to type works, in the order in which they tell it.
 
-Every fenced block of a page runs in one folder: `sh` and `python` are executed, `c` is compiled, `json` parsed.
-A comment before a block changes that: `<!-- file: NAME -->` writes it to a file, `<!-- skip: REASON -->` only
-checks its commands, targets and options. `gait simulate -o walk` gives a clip that is shorter and smaller than
-the default.
+Every fenced block of a page runs in one folder: `sh` and `python` are executed, `c` is compiled, `json`
+parsed. A comment before a block changes that: `<!-- file: NAME -->` writes it to a file, `<!-- skip: REASON
+-->` only checks its commands, targets and options. `gait simulate -o walk` gives a clip that is shorter and
+smaller than the default.
 """
 
 import contextlib
