@@ -1,14 +1,11 @@
-/* Points that jump are left out of a window; right ones stay, those that come back after a gap as well. */
-#include "lift/spikes.h"
+/* Spikes are left out of a window; correct points stay, also those that come back after a gap. */
+#include "lift/robust.h"
 
 #include "check.h"
 
 enum { FRAMES = 15, RUNS = 300 };
 
-static lift_table table;
-static double at[FRAMES], uv[2 * FRAMES], sd[FRAMES], apart[FRAMES];
-static int32_t frame[FRAMES];
-static lift_spikes_scratch room = {.frame = frame, .apart = apart};
+static double at[FRAMES], uv[2 * FRAMES], sd[FRAMES], scratch[2 * FRAMES];
 
 static double noise(uint32_t *seed)
 {
@@ -33,20 +30,20 @@ static void walk(uint32_t seed)
     }
 }
 
-/* Clear the window; how many points are left out besides those unseen before. */
+/* Clear the window; returns how many points are left out. */
 static int cleared(void)
 {
-    lift_window const w = {.frames = FRAMES, .at = at, .uv = uv, .sd = sd};
     int before = 0, after = 0;
     for (int f = 0; f < FRAMES; f++)
         before += sd[f] > 0.0;
-    lift_spikes_clear(&table, &w, sd, &room);
+    int32_t const spikes = lift_remove_spikes(FRAMES, 1, at, uv, sd, scratch);
     for (int f = 0; f < FRAMES; f++)
         after += sd[f] > 0.0;
+    CHECK(spikes == before - after);
     return before - after;
 }
 
-/* Unseen for `gap` frames before the last one, or before the middle. */
+/* Not observed for `gap` frames before the last one, or before the middle. */
 static void test_gaps(int gap, int last)
 {
     int lost = 0;
@@ -68,7 +65,6 @@ static void test_jump(int f, double by)
 
 int main(void)
 {
-    table.prior.markers = 1;
     for (int gap = 0; gap <= 9; gap += 3) {
         test_gaps(gap, FRAMES - 1);
         test_gaps(gap, FRAMES - 3);

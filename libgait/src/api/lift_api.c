@@ -1,7 +1,5 @@
 /* lift_api.c - public functions of the lifter: check the arguments, then call down. */
 #include "api/kernels.h"
-#include "lift/continue.h"
-#include "lift/read.h"
 #include "lift/uncertainty.h"
 #include "lift/lifter.h"
 
@@ -105,7 +103,7 @@ gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, 
     if (!l || !uv || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_segment: null pointer");
     const lift_table *const t = &l->table;
-    segment_posterior *const b = &l->belief;
+    segment_posterior *const b = &l->posterior;
     lift_outcome found;
     lifter_take(l, points_of(t), uv, sd, l->uv, l->sd);
     memcpy(b->place, t->cfg.place, sizeof b->place);
@@ -115,7 +113,7 @@ gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, 
     double const log_10 = 2.30258509299404568402;
     *out = (gait_lift_fit){.log_evidence = lift_evidence(t, b),
                            .log10_volume = -cholesky_log_det(b->U, t->n, t->ld) / log_10,
-                           .misfit = lift_misfit(t, b),
+                           .misfit = lift_chi2(t, b),
                            .heading = lift_heading(t, b),
                            .share = found.share,
                            .component = b->component,
@@ -136,7 +134,7 @@ static void read_frame(const gait_lift *l, const segment_posterior *b, int32_t f
     const lift_table *const t = &l->table;
     size_t const J = (size_t)t->prior.markers, first = (size_t)f * J;
     double x[3 * GAIT_MAX_MARKERS], each[3 * GAIT_MAX_MARKERS];
-    lift_seen const seen = {.uv = l->uv + first * 2, .sd = l->sd + first};
+    lift_observations const seen = {.uv = l->uv + first * 2, .sd = l->sd + first};
     lift_query const q = {.at = f, .count = t->prior.markers, .seen = residual ? &seen : NULL};
     lift_read(t, b, &q, x, sd ? each : NULL);
     for (int32_t r = 0; r < q.count; r++) {
@@ -154,7 +152,7 @@ gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd)
     if (!l->fitted)
         return GAIT_ERR_STATE;
     for (int32_t f = 0; f < l->table.prior.frames; f++)
-        read_frame(l, &l->belief, f, true, mean, sd);
+        read_frame(l, &l->posterior, f, true, mean, sd);
     return GAIT_OK;
 }
 
@@ -169,15 +167,15 @@ gait_result gait_lift_posterior(gait_lift *l, double *mean, double *covariance)
         return GAIT_ERR_ARG;
     if (!l->fitted)
         return GAIT_ERR_STATE;
-    memcpy(mean, l->belief.theta, (size_t)l->table.n * sizeof *mean);
+    memcpy(mean, l->posterior.theta, (size_t)l->table.n * sizeof *mean);
     if (covariance)
-        lift_covariance(&l->table, &l->belief, &l->spare, covariance);
+        lift_covariance(&l->table, &l->posterior, &l->spare, covariance);
     return GAIT_OK;
 }
 
 double gait_lift_scale(gait_lift *l)
 {
-    return l && l->windowed ? sqrt(lift_scale(&l->table, &l->belief, &l->spare)) : 0.0;
+    return l && l->windowed ? sqrt(lift_scale(&l->table, &l->posterior, &l->spare)) : 0.0;
 }
 
 gait_result gait_lift_least_squares(gait_lift *l, double *mean)
@@ -186,8 +184,8 @@ gait_result gait_lift_least_squares(gait_lift *l, double *mean)
         return GAIT_ERR_ARG;
     if (!l->windowed)
         return GAIT_ERR_STATE;
-    lift_likelihood_only(&l->table, &l->window, &l->belief, &l->spare);
-    segment_posterior alone = l->belief;
+    lift_least_squares(&l->table, &l->window, &l->posterior, &l->spare);
+    segment_posterior alone = l->posterior;
     alone.theta = l->spare.theta;
     for (int32_t f = 0; f < l->table.prior.frames; f++)
         read_frame(l, &alone, f, false, mean, NULL);
@@ -200,7 +198,7 @@ gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, doubl
         return GAIT_ERR_ARG;
     if (!l->fitted)
         return GAIT_ERR_STATE;
-    lift_uncertain(&l->table, &l->belief, &l->spare, count, mode, sd);
+    lift_uncertain(&l->table, &l->posterior, &l->spare, count, mode, sd);
     return GAIT_OK;
 }
 
@@ -212,9 +210,9 @@ gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err)
     if (t->projection.perspective || t->turn >= 0)
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "gait_lift_fix: needs an orthographic view and a known heading (heading_sd 0)");
-    memcpy(l->belief.place, t->cfg.place, sizeof l->belief.place);
+    memcpy(l->posterior.place, t->cfg.place, sizeof l->posterior.place);
     l->windowed = false;
-    l->fitted = lift_gain_fix(t, &l->gain, &l->belief, sd);
+    l->fitted = lift_gain_fix(t, &l->gain, &l->posterior, sd);
     if (!l->fitted)
         return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_fix: deviations out of any range");
     memcpy(l->uv, l->gain.base, points_of(t) * 2 * sizeof *l->uv);
@@ -246,7 +244,7 @@ gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const 
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "gait_lift_push: utime %lld does not follow %lld; gait_lift_reset() begins anew",
                          (long long)utime, (long long)l->stream.last);
-    lift_seen const seen = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
+    lift_observations const seen = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
     lifter_take(l, (size_t)t->prior.markers, uv, sd, l->stream.new_uv, l->stream.new_sd);
     if (!lift_stream_push(t, &l->search, &l->stream, utime, &seen))
         return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_push: observations out of any range");
@@ -257,7 +255,8 @@ gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out)
 {
     if (!l || !out)
         return GAIT_ERR_ARG;
-    return l->table.cfg.lag >= 0 && lift_estimate(&l->table, &l->stream, out) ? GAIT_OK : GAIT_ERR_STATE;
+    return l->table.cfg.lag >= 0 && lift_stream_estimate(&l->table, &l->stream, out) ? GAIT_OK
+                                                                                     : GAIT_ERR_STATE;
 }
 
 void gait_lift_reset(gait_lift *l)

@@ -21,7 +21,7 @@ static double dot3(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* What the prior's mean would show of each marker, and each marker's own share of what is left over. */
+/* Observations of the prior's mean, and each marker's own share of the residuals. */
 static void set_base(const lift_table *t, lift_gain *g, const segment_posterior *b, const double *sd)
 {
     g->axes = lift_axes_prior(t, b);
@@ -41,7 +41,8 @@ static void set_base(const lift_table *t, lift_gain *g, const segment_posterior 
 }
 
 /* Two rows of the gain: Q w over the noise's deviation, for the white rows w of one marker. */
-static void set_rows(const lift_table *t, const segment_posterior *b, const double *w, double noise_sd, double *row)
+static void set_rows(const lift_table *t, const segment_posterior *b, const double *w, double noise_sd,
+                     double *row)
 {
     for (int32_t i = 0; i < 2; i++, row += t->ld, w += t->ld) {
         memset(row, 0, (size_t)t->ld * sizeof *row);
@@ -63,13 +64,13 @@ bool lift_gain_fix(const lift_table *t, lift_gain *g, segment_posterior *b, cons
     g->ready = false;
     lift_clear(t, b);
     for (int32_t f = 0; f < t->prior.frames; f++) {
-        lift_seen const seen = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
+        lift_observations const seen = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
         lift_add(t, b, f, &seen, NULL, 0.0);
     }
     if (!lift_solve(t, b))
         return false;
     for (int32_t f = 0; f < t->prior.frames; f++) {
-        lift_seen const seen = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
+        lift_observations const seen = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
         const double *w = t->W;
         (void)lift_rows(t, b, f, &seen, NULL, 0.0, NULL);
         for (size_t p = (size_t)f * J; p < (size_t)(f + 1) * J; p++) {
@@ -84,14 +85,14 @@ bool lift_gain_fix(const lift_table *t, lift_gain *g, segment_posterior *b, cons
     return true;
 }
 
-/* theta += rows of one marker times what is left of its observation. */
+/* theta += rows of one marker times its observation less that of the mean. */
 static void add_point(const double *row, int32_t ld, double u, double v, double *theta)
 {
     for (int32_t k = 0; k < ld; k++)
         theta[k] = (theta[k] + u * row[k]) + v * row[ld + k];
 }
 
-/* Into the world, and towards the observation by the marker's own share. */
+/* Transform x to the world and move it towards the observation by the marker's own share. */
 static void place_point(const lift_table *t, const lift_axes *axes, const double *uv, double keep, double *x)
 {
     double world[3];

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-enum { SCOUT_PASSES = 5 }; /* of a trial, before the better ones are followed to the end */
+enum { SCOUT_PASSES = 5 }; /* of each trial, before the better ones are followed to the end */
 
 void lift_search_layout(arena *a, const lift_table *t, lift_search *s)
 {
@@ -15,21 +15,22 @@ void lift_search_layout(arena *a, const lift_table *t, lift_search *s)
         s->trial[i].theta = TAKE(a, double, (size_t)t->n);
 }
 
-/* Depth of a body that fills as much of the picture as these observations do: by the spread of the markers
- * seen. */
+/* Depth at which a body is as large in the picture as these observations: by the scatter of the markers observed. */
 static double rough_depth(const lift_table *t, const lift_window *w, const segment_posterior *b)
 {
     int32_t const J = t->prior.markers;
     double body = 0.0, picture = 0.0, centre[5] = {0.0}, count = 0.0;
     for (int32_t pass = 0; pass < 2; pass++) {
         for (int32_t f = 0; f < w->frames; f++) {
-            lift_seen const seen = {.uv = w->uv + (size_t)(f * J) * 2, .sd = w->sd + (size_t)f * (size_t)J};
+            lift_observations const seen = {.uv = w->uv + (size_t)(f * J) * 2,
+                                            .sd = w->sd + (size_t)f * (size_t)J};
             const float *const mean = segment_mean(&t->prior, b->component, lift_find_moment(t, w->at[f]).f);
             for (int32_t j = 0; j < J; j++) {
-                if (!lift_seen_at(&seen, j))
+                if (!lift_observed_at(&seen, j))
                     continue;
                 double const v[5] = {(double)mean[3 * j], (double)mean[3 * j + 1], (double)mean[3 * j + 2],
-                                     seen.uv[2 * j] / t->projection.focal[0], seen.uv[2 * j + 1] / t->projection.focal[1]};
+                                     seen.uv[2 * j] / t->projection.focal[0],
+                                     seen.uv[2 * j + 1] / t->projection.focal[1]};
                 count += pass == 0;
                 for (int32_t i = 0; i < 5; i++) {
                     double const off = v[i] - centre[i];
@@ -52,7 +53,7 @@ static void add_window(const lift_table *t, const lift_window *w, segment_poster
     size_t const J = (size_t)t->prior.markers;
     lift_clear(t, b);
     for (int32_t f = 0; f < w->frames; f++) {
-        lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
+        lift_observations const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
         lift_add(t, b, w->at[f], &seen, NULL, depth);
     }
 }
@@ -60,14 +61,13 @@ static void add_window(const lift_table *t, const lift_window *w, segment_poster
 /* Twice the negative log posterior at theta, up to a constant. */
 static double objective(const lift_table *t, const segment_posterior *b)
 {
-    double sum = b->miss + b->log_noise;
+    double sum = b->chi2 + b->log_noise;
     for (int32_t i = 0; i < t->n; i++)
         sum += b->theta[i] * b->theta[i];
     return sum;
 }
 
-/* The heading found becomes the one about which the next pass is linear; if nothing was known of it, the
- * centre too. */
+/* The next pass is linearised about the heading found; without a prior it is the centre too. */
 static void follow_heading(const lift_table *t, segment_posterior *b)
 {
     if (t->turn < 0)
@@ -79,7 +79,7 @@ static void follow_heading(const lift_table *t, segment_posterior *b)
     }
 }
 
-/* Largest change of an unknown, in deviations, from `before`; the heading's in radians by its deviation. */
+/* Largest change of an unknown from `before`, in standard deviations. */
 static double change(const lift_table *t, const segment_posterior *b, const double *before)
 {
     double largest = 0.0;
@@ -90,8 +90,9 @@ static double change(const lift_table *t, const segment_posterior *b, const doub
     return largest;
 }
 
-/* Back by a share of the way to the pass before, whose objective was lower. */
-static void retreat(const lift_table *t, segment_posterior *b, const double *before, double heading, double share)
+/* Go back by a share of the way to the pass before, whose objective was lower. */
+static void retreat(const lift_table *t, segment_posterior *b, const double *before, double heading,
+                    double share)
 {
     for (int32_t i = 0; i < t->n; i++)
         b->theta[i] += share * (before[i] - b->theta[i]);
@@ -100,11 +101,11 @@ static void retreat(const lift_table *t, segment_posterior *b, const double *bef
         b->centre = b->heading;
 }
 
-/* Gauss-Newton passes (perspective, unknown heading); one where all is linear. `first`: theta means nothing
- * yet.  Passes that end before they converge leave theta where its objective was lowest: what comes after has not been
- * looked at. */
-static bool refine(const lift_table *t, const lift_window *w, segment_posterior *b, double *before, bool first,
-                   int32_t passes, lift_outcome *out)
+/* Gauss-Newton passes (perspective, unknown heading); a single one if the problem is linear.  first: theta is not yet
+ * set.  Passes that end before they converge leave theta where the objective was lowest, because that of the last step
+ * has not been evaluated. */
+static bool refine(const lift_table *t, const lift_window *w, segment_posterior *b, double *before,
+                   bool first, int32_t passes, lift_outcome *out)
 {
     bool const linear = !t->projection.perspective && t->turn < 0;
     double lowest = DBL_MAX, noise = 0.0, heading = b->heading;
@@ -128,7 +129,7 @@ static bool refine(const lift_table *t, const lift_window *w, segment_posterior 
         out->converged = linear || (!rough && change(t, b, before) < t->cfg.tolerance);
         follow_heading(t, b);
     }
-    if (!out->converged) { /* squares are those at theta, not what the linear problem promised */
+    if (!out->converged) { /* squares at theta, not those predicted by the linear problem */
         retreat(t, b, before, heading, 1.0);
         b->log_noise = noise;
         b->U[t->n * (t->ld + 1)] = lowest - noise;
@@ -144,7 +145,7 @@ static void load_trial(const lift_table *t, const lift_trial *from, segment_post
     b->turn_sd = t->cfg.heading_sd < 0.0 ? (double)PI_F : t->cfg.heading_sd;
 }
 
-/* Follow a trial for some passes and keep where it came to. */
+/* Follow a trial for some passes and keep the result. */
 static bool follow(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b,
                    lift_trial *trial, bool first, lift_outcome *out)
 {
@@ -159,7 +160,7 @@ static bool follow(const lift_table *t, lift_search *s, const lift_window *w, se
     return true;
 }
 
-/* Index of the best trial, of `component` if that is not negative, but for `other`. */
+/* Index of the best trial (of `component`, unless negative) except `other`. */
 static int32_t best_trial(const lift_search *s, int32_t component, int32_t other)
 {
     int32_t best = -1;
@@ -170,7 +171,7 @@ static int32_t best_trial(const lift_search *s, int32_t component, int32_t other
     return best;
 }
 
-/* Probability of the component of the best trial: the best heading stands for each. */
+/* Probability of the component of the best trial; each component counts by its best heading. */
 static double share_of(const lift_table *t, const lift_search *s, int32_t best)
 {
     double sum = 1.0;
@@ -180,7 +181,8 @@ static double share_of(const lift_table *t, const lift_search *s, int32_t best)
     return 1.0 / sum;
 }
 
-bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b, lift_outcome *out)
+bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b,
+              lift_outcome *out)
 {
     int32_t const starts = s->trials / t->prior.components;
     bool const one = s->trials == 1;

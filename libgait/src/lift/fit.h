@@ -1,10 +1,10 @@
-/* fit.h - one whole segment: iterated linearisation, the heading all round, the components of the
+/* fit.h - fit one whole segment: iterated linearisation, from headings all round and every component of the
  * mixture. */
 #ifndef GAIT_LIFT_FIT_H
 #define GAIT_LIFT_FIT_H
 #include "lift/segment_posterior.h"
 
-enum { LIFT_HEADINGS = 8 }; /* from which an unknown heading is looked for */
+enum { LIFT_HEADINGS = 8 }; /* from which an unknown heading is searched for */
 
 typedef struct lift_trial { /* a component and a heading, as far as they were followed */
     int32_t component;
@@ -33,7 +33,8 @@ typedef struct lift_outcome {
 
 void lift_search_layout(arena *a, const lift_table *t, lift_search *s);
 /* Fit b to the window; b->place is the prior's.  false: numbers out of range. */
-bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b, lift_outcome *out);
-/* Fit b again to a window in which other deviations count, from where it is. */
+bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b,
+              lift_outcome *out);
+/* Fit b again from where it is, the deviations of the window having changed. */
 bool lift_fit_again(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b);
 #endif

@@ -1,4 +1,4 @@
-/* Positions by modes: sums in an order that the source fixes, so that lanes change nothing. */
+/* Positions by modes.  The source fixes the order of each sum, so that the number of lanes does not change a bit. */
 #include "base/cholesky.h"
 #include "base/simd_f64.h"
 
@@ -76,8 +76,9 @@ void KERNEL(lift_eight)(double *out, const float *s0, const float *s1, double w0
         int32_t i = 0, at = c;
         for (; i + 2 <= modes; i += 2, at += 2 * CHOLESKY_LANES) {
             even += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
-            odd += mixed(out + at + CHOLESKY_LANES, s0 + at + CHOLESKY_LANES, s1 + at + CHOLESKY_LANES, w0, w1) *
-                   theta[i + 1];
+            odd +=
+                mixed(out + at + CHOLESKY_LANES, s0 + at + CHOLESKY_LANES, s1 + at + CHOLESKY_LANES, w0, w1) *
+                theta[i + 1];
         }
         if (i < modes)
             even += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
@@ -95,7 +96,8 @@ void KERNEL(lift_turn)(float *v, size_t stride, size_t apart, const double *shap
         const double *s = shape + c;
         float *to = v + c;
         for (int32_t i = 0; i < modes; i++, s += CHOLESKY_LANES, to += stride) {
-            simd_f64 const x = simd_f64_load(s), y = simd_f64_load(s + plane), z = simd_f64_load(s + 2 * plane);
+            simd_f64 const x = simd_f64_load(s), y = simd_f64_load(s + plane),
+                           z = simd_f64_load(s + 2 * plane);
             simd_f64_store_float(to, (m[0] * x + m[1] * y) + m[2] * z);
             simd_f64_store_float(to + apart, (m[3] * x + m[4] * y) + m[5] * z);
             simd_f64_store_float(to + 2 * apart, (m[6] * x + m[7] * y) + m[8] * z);

@@ -3,9 +3,8 @@
 #include "image/camera.h"
 #include "base/cpu.h"
 
-#define KNOWN_STATURE_SD                                                                                     \
-    0.04 /* metres, of a stature that somebody gives: shoes, posture, where markers are */
-#define FURTHEST          1e6  /* pixels or metres; what is further off is not seen */
+#define KNOWN_STATURE_SD  0.04 /* metres, of a given stature: shoes, posture, marker positions */
+#define FURTHEST          1e6  /* pixels or metres; points further off count as not observed */
 #define PEOPLE_STATURE_SD 0.09 /* metres, among people */
 
 /* x is in [low, high]; NaN is not. */
@@ -26,7 +25,7 @@ static bool orthonormal(const double axis[2][3])
            within(product[2], -1e-9, 1e-9);
 }
 
-/* Along each axis: from further off single precision does not tell where a pixel looks. */
+/* Along each axis: further away, single precision cannot resolve the ray of a pixel. */
 static bool near(const float t[3])
 {
     return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) &&
@@ -83,7 +82,7 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
     gait_lift *const self = TAKE(a, gait_lift, 1);
     lift_table_layout(a, t);
     lift_search_layout(a, t, &l.search);
-    segment_posterior_layout(a, t, &l.belief);
+    segment_posterior_layout(a, t, &l.posterior);
     segment_posterior_layout(a, t, &l.spare);
     l.at = TAKE(a, double, (size_t)prior->frames);
     l.uv = TAKE(a, double, points * 2);
@@ -114,8 +113,8 @@ void lifter_take(const gait_lift *l, size_t points, const double *uv, const doub
     const lift_table *const t = &l->table;
     for (size_t i = 0; i < points; i++) {
         double const u = uv[2 * i], v = uv[2 * i + 1];
-        bool const none =
-            t->projection.perspective && u == v && (u == 0.0 || u == -1.0); /* so say detectors */
+        bool const none = t->projection.perspective && u == v &&
+                          (u == 0.0 || u == -1.0); /* detectors' sign of "not seen" */
         bool const there = fabs(u) <= FURTHEST && fabs(v) <= FURTHEST && !none;
         to_sd[i] = there ? (sd ? sd[i] : t->cfg.sd) : -1.0;
         to_uv[2 * i] = to_uv[2 * i + 1] = 0.0;

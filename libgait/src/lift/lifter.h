@@ -1,28 +1,27 @@
-/* lifter.h - the public object: all that lifting needs, in one block. */
+/* lifter.h - the public object: everything a lifter needs, in one block. */
 #ifndef GAIT_LIFT_LIFTER_H
 #define GAIT_LIFT_LIFTER_H
 #include "lift/batch.h"
-#include "lift/stream_estimate.h"
+#include "lift/stream.h"
 
 struct gait_lift {
     lift_table table;
     lift_search search;
-    segment_posterior belief, spare; /* of the last segment; scratch */
-    lift_window window;              /* of the last segment */
-    double *at, *uv, *sd;            /* what the window points to: F; F x J x 2; F x J */
+    segment_posterior posterior, spare; /* of the last segment; scratch */
+    lift_window window;                 /* of the last segment */
+    double *at, *uv, *sd;               /* of the window: F; F x J x 2; F x J */
     lift_gain gain;
     lift_stream stream;
-    bool fitted, windowed; /* there is a belief; it is of observations, not of a gain */
+    bool fitted, windowed; /* there is a posterior; it is of observations, not of a gain */
 };
 
-/* Is the configuration sound?  Then read the prior. */
+/* Check the configuration and read the prior. */
 gait_result lifter_open(const void *blob, size_t bytes, const gait_lift_config *cfg, segment_prior *prior,
                         gait_error *err);
 /* Place everything; NULL when counting or if the arena is too small. */
 gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg,
                          const kernels *run);
-/* Observations of `points` markers as the core takes them: ideal pixels, a deviation each; sd NULL: the
- * config's. */
+/* Convert observations of `points` markers: ideal pixels, a deviation each; sd NULL: the config's. */
 void lifter_take(const gait_lift *l, size_t points, const double *uv, const double *sd, double *to_uv,
                  double *to_sd);
 #endif

@@ -4,12 +4,101 @@
 
 #include <string.h>
 
-enum { ROWS_MOST = (2 * GAIT_MAX_MARKERS + CHOLESKY_FLOATS - 1) / CHOLESKY_FLOATS * CHOLESKY_FLOATS };
+enum {
+    FEWEST = 5, /* observations of a point from which spikes can be found */
+    REFITS = 4, /* at most, while the set of outliers changes */
+    ROWS_MOST = (2 * GAIT_MAX_MARKERS + CHOLESKY_FLOATS - 1) / CHOLESKY_FLOATS * CHOLESKY_FLOATS
+};
 
-static const double FAR = 4.0;    /* deviations; fewer than one right point in a thousand is as far */
-static const double BEYOND = 3.0; /* times the median of the frame's points */
+static const double SPIKE = 8.0;         /* standard deviations from the line */
+static const double MEDIAN_SD = 1.4826;  /* standard deviation over median distance */
+static const double LINE_VARIANCE = 1.5; /* of a point off the middle of its neighbours, over its own */
+static const double FAR = 4.0; /* standard deviations; fewer than one correct point in 1000 is as far */
+static const double FAR_MEDIAN = 3.0; /* times the median of the frame's points */
+static const double POOR_FIT = 4.0;   /* chi2 per observation from which outliers may have misled a search */
+static const double ROUGH = 8.0; /* times the points' deviations: the difference between people's motions */
 
-/* Variances of white rows t->W under a belief, over those of their noise. */
+/* Squared distance of a point in frame f from the line through its positions in frames a and b, as it would be half way
+ * between two neighbours `step` away: where the neighbours are further away, or on one side, noise and acceleration
+ * count for more. */
+static double off_line(const double *time, const double *uv, int32_t stride, int32_t a, int32_t f, int32_t b,
+                       double step)
+{
+    double const span = time[b] - time[a], share = (time[f] - time[a]) / span;
+    double const lever = share * (1.0 - share) * (span * span) / (step * step), motion = lever * lever,
+                 noise = (1.0 + share * share + (1.0 - share) * (1.0 - share)) / LINE_VARIANCE;
+    double sum = 0.0;
+    for (int32_t i = 0; i < 2; i++) {
+        double const at_a = uv[a * stride + i], at_b = uv[b * stride + i],
+                     off = uv[f * stride + i] - (at_a + share * (at_b - at_a));
+        sum += off * off;
+    }
+    return sum / (motion > noise ? motion : noise);
+}
+
+/* The observation that is the spike, where that of squared distance number k is the largest.  At an end either of the
+ * two outer points may be it: both are equally far off, but only the inner one puts the third off too, by half as
+ * far. */
+static int32_t spike_of(const double *square, int32_t count, int32_t k)
+{
+    double const off = square[k] / 16.0;
+    if (k < 2)
+        return square[2] > off;
+    if (k > count - 3)
+        return count - 1 - (square[count - 3] > off);
+    return k;
+}
+
+/* Frame of the largest spike of a point (uv and sd of every frame `stride` points apart), -1: there is none. */
+static int32_t find_spike(int32_t frames, int32_t points, const double *time, const double *uv,
+                          const double *sd, double *scratch)
+{
+    int32_t count = 0, far = 0;
+    double *const frame = scratch, *const square = scratch + frames; /* frames exactly, as doubles */
+    for (int32_t f = 0; f < frames; f++)
+        if (lift_observed(uv + 2 * f * points, sd[f * points]))
+            frame[count++] = f;
+    if (count < FEWEST)
+        return -1;
+    double const step = (time[(int32_t)frame[count - 1]] - time[(int32_t)frame[0]]) / (count - 1);
+    for (int32_t k = 0; k < count; k++) {
+        int32_t const before = k > 0 ? k - 1 : 2, after = k < count - 1 ? k + 1 : count - 3;
+        square[k] = off_line(time, uv, 2 * points, (int32_t)frame[before], (int32_t)frame[k],
+                             (int32_t)frame[after], step);
+        far = square[k] > square[far] ? k : far;
+    }
+    double const most = square[far];
+    far = (int32_t)frame[spike_of(square, count, far)];
+    double const own = sd[far * points], least = LINE_VARIANCE * own * own,
+                 usual = MEDIAN_SD * MEDIAN_SD * m_median(square, count);
+    return most > SPIKE * SPIKE * (usual > least ? usual : least) ? far : -1;
+}
+
+int32_t lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv, double *sd,
+                           double *scratch)
+{
+    int32_t spikes = 0;
+    for (int32_t j = 0; j < points; j++)
+        for (int32_t f; (f = find_spike(frames, points, time, uv + 2 * j, sd + j, scratch)) >= 0; spikes++)
+            sd[f * points + j] = -1.0;
+    return spikes;
+}
+
+int32_t lift_weight_points(int32_t points, const double *square, double *sd, double *scratch)
+{
+    memcpy(scratch, square, (size_t)points * sizeof *scratch);
+    double const usual = FAR_MEDIAN * FAR_MEDIAN * m_median(scratch, points),
+                 limit = usual > FAR * FAR ? usual : FAR * FAR;
+    int32_t outliers = 0;
+    for (int32_t j = 0; j < points; j++) {
+        double const far = square[j] / limit;
+        outliers += far > 1.0;
+        sd[j] *= far > 1.0 ? far : 1.0;
+    }
+    return outliers;
+}
+
+/* Variances of the white rows t->W as a posterior predicts them, over those of their noise. */
 static void predict(const lift_table *t, const segment_posterior *b, int32_t rows, double *variance)
 {
     int32_t const width = cholesky_padded_float(rows);
@@ -37,29 +126,71 @@ static void join(int32_t rows, const double *variance, double *square)
         square[r / 2] = square[r] / (1.0 + variance[r]) + square[r + 1] / (1.0 + variance[r + 1]);
 }
 
-int32_t lift_robust_weights(const lift_table *t, const segment_posterior *b, double at, const lift_seen *seen, bool known,
-                   double *place, double *sd)
+int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, double at,
+                          const lift_observations *seen, bool known, double *position, double *sd)
 {
-    double square[2 * GAIT_MAX_MARKERS], sorted[GAIT_MAX_MARKERS], variance[ROWS_MOST] = {0.0};
+    double square[2 * GAIT_MAX_MARKERS], own[GAIT_MAX_MARKERS], sorted[GAIT_MAX_MARKERS],
+        variance[ROWS_MOST] = {0.0};
     segment_posterior unchanged = *b;
-    lift_residuals const said = {.place = place, .square = square};
-    int32_t const rows = lift_rows(t, &unchanged, at, seen, NULL, 0.0, &said);
-    memcpy(sd, seen->sd, (size_t)t->prior.markers * sizeof *sd);
+    lift_residuals const residuals = {.position = position, .square = square};
+    int32_t const rows = lift_rows(t, &unchanged, at, seen, NULL, 0.0, &residuals), J = t->prior.markers;
+    int32_t count = 0, next = 0;
+    memcpy(sd, seen->sd, (size_t)J * sizeof *sd);
     if (largest(square, rows) <= FAR * FAR)
         return 0;
     if (!known)
         predict(t, b, rows, variance);
     join(rows, variance, square);
-    memcpy(sorted, square, (size_t)(rows / 2) * sizeof *sorted);
-    double const usual = BEYOND * BEYOND * m_median(sorted, rows / 2),
-                 limit = usual > FAR * FAR ? usual : FAR * FAR;
-    int32_t doubted = 0;
-    for (int32_t j = 0, k = 0; j < t->prior.markers; j++) {
-        if (!lift_seen_at(seen, j))
-            continue;
-        double const far = square[k++] / limit;
-        doubted += far > 1.0;
-        sd[j] *= far > 1.0 ? far : 1.0;
+    for (int32_t j = 0; j < J; j++)
+        if (lift_observed_at(seen, j))
+            own[count++] = sd[j];
+    int32_t const outliers = lift_weight_points(count, square, own, sorted);
+    for (int32_t j = 0; j < J; j++)
+        if (lift_observed_at(seen, j))
+            sd[j] = own[next++];
+    return outliers;
+}
+
+/* Weight the points of a window by a fit to them; returns how many are outliers. */
+static int32_t weight_window(const lift_table *t, const lift_window *w, const lift_robust *r,
+                             const segment_posterior *b)
+{
+    size_t const J = (size_t)t->prior.markers;
+    int32_t outliers = 0;
+    for (int32_t f = 0; f < w->frames; f++) {
+        lift_observations const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = r->inlier_sd + (size_t)f * J};
+        outliers += lift_weight_frame(t, b, w->at[f], &seen, true, r->position, r->sd + (size_t)f * J);
     }
-    return doubted;
+    return outliers;
+}
+
+/* Search by all points, of `times` their deviations, and refit while the outliers change. */
+static bool fit_from(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
+                     double times, segment_posterior *b, lift_outcome *out, int32_t *outliers)
+{
+    int32_t before = times > 1.0 ? -1 : 0; /* a rough fit is never the last */
+    for (size_t i = 0; i < (size_t)w->frames * (size_t)t->prior.markers; i++)
+        r->sd[i] = times * r->inlier_sd[i];
+    bool ok = lift_fit(t, s, w, b, out);
+    *outliers = ok ? weight_window(t, w, r, b) : 0;
+    for (int32_t fits = 0; ok && *outliers != before && fits < REFITS; fits++) {
+        before = *outliers;
+        ok = lift_fit_again(t, s, w, b);
+        *outliers = ok ? weight_window(t, w, r, b) : 0;
+    }
+    return ok;
+}
+
+bool lift_fit_robust(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
+                     segment_posterior *b, lift_outcome *out, int32_t *outliers)
+{
+    (void)lift_remove_spikes(w->frames, t->prior.markers, w->at, w->uv, r->inlier_sd, r->scratch);
+    bool ok = fit_from(t, s, w, r, 1.0, b, out, outliers);
+    if (!ok || (*outliers == 0 && lift_chi2(t, b) <= POOR_FIT * b->observed))
+        return ok;
+    double const usual = lift_evidence(t, b);
+    ok = fit_from(t, s, w, r, ROUGH, b, out, outliers);
+    if (ok && lift_evidence(t, b) < usual) /* there is no memory to keep both */
+        ok = fit_from(t, s, w, r, 1.0, b, out, outliers);
+    return ok;
 }

@@ -1,15 +1,39 @@
-/* lift_robust_weights.h - points that a detector put elsewhere: on the other leg, on somebody else.
+/* robust.h - fits that a detector's wrong points do not lead astray.
  *
- * A point far from where a belief has it loses its say: beyond `far` its deviation grows with the square of its
- * distance, so that its pull falls with the third power.  Nearer points keep theirs.  Where half of a frame's
- * points are off, as when somebody does what nobody expected, far means far beyond those. */
+ * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the motion.
+ * Points that are wrong for longer, on the other leg or on another person, are down-weighted by a fit: beyond four
+ * standard deviations a point's own deviation grows with the square of its distance from the prediction, so that its
+ * influence falls with the third power.  Nearer points keep theirs.  Where half of a frame's points are off, as in a
+ * motion that the prior does not know, the limit is three times their median distance. */
 #ifndef GAIT_LIFT_ROBUST_H
 #define GAIT_LIFT_ROBUST_H
-#include "lift/segment_posterior.h"
+#include "lift/fit.h"
 
-/* Deviations sd (J) for the points seen in a frame.  Distances count in the deviations of the points and, of those that
- * the belief does not know yet, of its prediction.  place (J x 3) receives where it has those seen.
- * Returns how many points are doubted. */
-int32_t lift_robust_weights(const lift_table *t, const segment_posterior *b, double at, const lift_seen *seen, bool known,
-                   double *place, double *sd);
+/* Set sd (frames x points) to -1 for spikes: points far off the line through the same point's neighbours in time, the
+ * furthest first.  "Far" is measured by the larger of the point's noise and the median of all its distances, which
+ * includes its acceleration.  time: frames, in any unit; uv: frames x points x 2; scratch: 2 x frames.
+ * Returns how many points were left out. */
+int32_t lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv, double *sd,
+                           double *scratch);
+/* Multiply the deviations sd of the points of a frame by what their squared distances from the prediction, in
+ * standard deviations, ask for.  scratch: points.  Returns how many points are outliers. */
+int32_t lift_weight_points(int32_t points, const double *square, double *sd, double *scratch);
+/* Deviations sd (J) for the points observed in a frame, by a posterior's prediction.  known: the posterior already
+ * includes the points; else their distances are divided by the deviation of the prediction too.
+ * position (J x 3) receives the predictions.  Returns how many points are outliers. */
+int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, double at,
+                          const lift_observations *seen, bool known, double *position, double *sd);
+
+typedef struct lift_robust {
+    double *sd;        /* frames x J: what the window's points point to; receives the weights */
+    double *inlier_sd; /* frames x J: as observed; spikes are removed in place */
+    double *scratch;   /* 2 x frames */
+    double *position;  /* J x 3, scratch */
+} lift_robust;
+
+/* Fit b to the points of a window, w->sd being r->sd: without spikes, and with outliers of the fit down-weighted.  If
+ * outliers may have misled the search it is repeated with all points at first weighted down; the more probable fit
+ * is kept.  false: numbers out of range. */
+bool lift_fit_robust(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
+                     segment_posterior *b, lift_outcome *out, int32_t *outliers);
 #endif

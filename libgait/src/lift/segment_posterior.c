@@ -4,21 +4,138 @@
 
 #include <string.h>
 
+void lift_table_layout(arena *a, lift_table *t)
+{
+    const segment_prior *const p = &t->prior;
+    size_t const frames = (size_t)p->components * (size_t)p->frames, points = frames * (size_t)p->markers;
+    t->n = p->modes + 3;
+    t->size = t->cfg.stature_sd > 0.0 ? t->n++ : -1;
+    t->turn = t->cfg.heading_sd == 0.0 ? -1 : t->n++;
+    t->ld = cholesky_padded(t->n + 1);
+    t->lanes = cholesky_padded(p->modes);
+    t->columns = cholesky_padded(p->markers);
+    t->width = cholesky_padded_float(3 * t->columns);
+    t->row = TAKE(a, float, points * 3 * (size_t)t->lanes);
+    t->column = TAKE(a, float, frames * 3 * (size_t)(p->modes * t->columns));
+    t->W = TAKE(a, double, 2 * (size_t)p->markers * (size_t)t->ld);
+    t->Z = TAKE(a, double, 3 * (size_t)p->markers * (size_t)t->ld);
+    t->shape = TAKE(a, double, 3 * CHOLESKY_LANES * (size_t)t->lanes);
+    t->V = TAKE(a, float, (size_t)t->ld *(size_t)(t->width + t->ld));
+}
+
+/* Index of a marker, -1: it is not in the prior. */
+static int32_t marker_named(const segment_prior *p, const char *name)
+{
+    for (int32_t j = 0; j < p->markers; j++)
+        if (strcmp(p->name[j], name) == 0)
+            return j;
+    return -1;
+}
+
+/* Markers that are reported come first. */
+static void set_order(lift_table *t)
+{
+    int32_t count = 0;
+    for (uint64_t report = t->cfg.report, pass = 0; pass < 2; pass++, report = ~report) {
+        for (int32_t j = 0; j < t->prior.markers; j++)
+            if (report >> j & 1)
+                t->order[count++] = j;
+        t->reported = pass == 0 ? count : t->reported;
+    }
+}
+
+/* Modes of a frame; numbers past the last mode and the last marker are 0. */
+static void set_frame(const lift_table *t, int32_t c, int32_t f, float *row, float *column)
+{
+    int32_t const J = t->prior.markers, k = t->prior.modes;
+    for (int32_t x = 0; x < 3 * J; x++, row += t->lanes)
+        for (int32_t i = 0; i < t->lanes; i++)
+            row[i] = i < k ? segment_mode(&t->prior, c, i, f)[x] : 0.0f;
+    for (int32_t first = 0; first < t->columns; first += CHOLESKY_LANES)
+        for (int32_t a = 0; a < 3; a++)
+            for (int32_t i = 0; i < k; i++)
+                for (int32_t r = first; r < first + CHOLESKY_LANES; r++)
+                    *column++ = r < J ? segment_mode(&t->prior, c, i, f)[3 * t->order[r] + a] : 0.0f;
+}
+
+void lift_table_fill(lift_table *t)
+{
+    static const char *const trunk[4] = {"r_hip", "l_hip", "r_shoulder", "l_shoulder"};
+    const segment_prior *const p = &t->prior;
+    int32_t const J3 = 3 * p->markers;
+    t->stature = t->cfg.stature > 0.0 ? t->cfg.stature : (double)p->stature;
+    t->growth = t->cfg.stature_sd / t->stature;
+    t->gamma = t->cfg.residual < 0.0 ? (double)p->gamma : t->cfg.residual;
+    for (int32_t i = 0; i < 4; i++)
+        t->trunk[i] = marker_named(p, trunk[i]);
+    memset(t->W, 0, 2 * (size_t)p->markers * (size_t)t->ld * sizeof *t->W);
+    memset(t->Z, 0, 3 * (size_t)p->markers * (size_t)t->ld * sizeof *t->Z);
+    set_order(t);
+    float *row = t->row, *column = t->column;
+    for (int32_t c = 0; c < p->components; c++)
+        for (int32_t f = 0; f < p->frames; f++, row += J3 * t->lanes, column += 3 * p->modes * t->columns)
+            set_frame(t, c, f, row, column);
+}
+
+void segment_posterior_layout(arena *a, const lift_table *t, segment_posterior *b)
+{
+    size_t const square = (size_t)t->ld * (size_t)t->ld;
+    b->theta = TAKE(a, double, (size_t)t->ld);
+    b->A = TAKE(a, double, square);
+    b->U = TAKE(a, double, square);
+}
+
+double lift_heading(const lift_table *t, const segment_posterior *b)
+{
+    return t->turn < 0 ? b->heading : b->centre + b->turn_sd * b->theta[t->turn];
+}
+
+lift_moment lift_find_moment(const lift_table *t, double at)
+{
+    int32_t const last = t->prior.frames - 1;
+    double const x = at > 0.0 ? (at < last ? at : last) : 0.0;
+    int32_t const f = (int32_t)x;
+    return (lift_moment){.f = f, .next = i_min(f + 1, last), .share = x - f};
+}
+
+static lift_axes axes_at(const lift_table *t, double heading, const double place[3])
+{
+    lift_axes f = {.z = t->stature, .place = {place[0], place[1], place[2]}};
+    m_sincos64(heading, &f.s, &f.c);
+    f.s *= t->stature;
+    f.c *= t->stature;
+    return f;
+}
+
+lift_axes lift_axes_prior(const lift_table *t, const segment_posterior *b)
+{
+    return axes_at(t, b->heading, b->place);
+}
+
+lift_axes lift_axes_now(const lift_table *t, const segment_posterior *b)
+{
+    double place[3];
+    for (int32_t i = 0; i < 3; i++)
+        place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
+    return axes_at(t, lift_heading(t, b), place);
+}
+
 void lift_clear(const lift_table *t, segment_posterior *b)
 {
     memset(b->A, 0, (size_t)t->ld * (size_t)t->ld * sizeof *b->A);
     for (int32_t i = 0; i < t->ld; i++)
         b->A[i * (t->ld + 1)] = i != t->n;
     b->observed = 0;
-    b->log_noise = b->miss = 0.0;
+    b->log_noise = b->chi2 = 0.0;
 }
 
-void lift_marker_moved(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
-                       const double moved[3], lift_marker *r, double x[3])
+/* Marker j displaced by `moved` by the modes: its parts, and in x its position in the body. */
+static void displaced_marker(const lift_table *t, const segment_posterior *b, const lift_moment *m, int32_t j,
+                             const double moved[3], lift_marker *r, double x[3])
 {
     const segment_prior *const p = &t->prior;
     bool const whole = t->projection.perspective;
-    double const growth = t->size < 0 ? 0.0 : t->growth * b->theta[t->size], w1 = m->part, w0 = 1.0 - w1;
+    double const growth = t->size < 0 ? 0.0 : t->growth * b->theta[t->size], w1 = m->share, w0 = 1.0 - w1;
     const float *const m0 = segment_mean(p, b->component, m->f) + 3 * j;
     const float *const m1 = segment_mean(p, b->component, m->next) + 3 * j;
     r->grown = whole ? 1.0 + growth : 1.0;
@@ -38,8 +155,8 @@ void lift_marker_at(const lift_table *t, const segment_posterior *b, const lift_
     const float *const s0 = t->row + ((first + (size_t)m->f) * J + (size_t)j) * 3 * (size_t)t->lanes;
     const float *const s1 = t->row + ((first + (size_t)m->next) * J + (size_t)j) * 3 * (size_t)t->lanes;
     double moved[3];
-    t->run->lift_shape(t->shape, s0, s1, 1.0 - m->part, m->part, t->lanes, b->theta, p->modes, moved);
-    lift_marker_moved(t, b, m, j, moved, r, x);
+    t->run->lift_shape(t->shape, s0, s1, 1.0 - m->share, m->share, t->lanes, b->theta, p->modes, moved);
+    displaced_marker(t, b, m, j, moved, r, x);
 }
 
 /* The white row g . X = y of a marker as a row of the unknowns, with y last. */
@@ -65,52 +182,53 @@ static void put_row(const lift_table *t, const segment_posterior *b, const lift_
     w[t->n] = rest;
 }
 
-typedef struct adding { /* what is the same for all markers of a frame */
+typedef struct adding { /* common to all markers of a frame */
     lift_axes prior, now;
     double depth;
 } adding;
 
 /* Two white rows of marker j and their squared residuals; returns the root of the determinant of their noise. */
-static double add_marker(const lift_table *t, segment_posterior *b, const adding *a, const double *ideal, double sd,
-                         int32_t j, const lift_marker *m, const double *about, double *w, double square[2])
+static double add_marker(const lift_table *t, segment_posterior *b, const adding *a, const double *ideal,
+                         double sd, int32_t j, const lift_marker *m, const double *about, double *w,
+                         double square[2])
 {
     projection_rows r;
     double spin[2] = {-(about[1] - a->now.place[1]), about[0] - a->now.place[0]};
     if (a->depth > 0.0) {
         projection_rows_ray(&t->projection, ideal, a->depth, &r);
-        spin[0] = spin[1] = 0.0; /* what is turned is not known yet */
+        spin[0] = spin[1] = 0.0; /* positions are not known yet */
     } else {
         projection_rows_near(&t->projection, ideal, about, &r);
     }
     double const det = projection_whiten(&r, sd, lift_residual(t, b, j));
     for (int32_t i = 0; i < 2; i++) {
-        double const miss = r.y[i] - ((r.g[i][0] * about[0] + r.g[i][1] * about[1]) + r.g[i][2] * about[2]);
-        square[i] = miss * miss;
-        b->miss += square[i];
+        double const off = r.y[i] - ((r.g[i][0] * about[0] + r.g[i][1] * about[1]) + r.g[i][2] * about[2]);
+        square[i] = off * off;
+        b->chi2 += square[i];
         put_row(t, b, &a->prior, m, spin, r.g[i], r.y[i], w + (size_t)i * (size_t)t->ld);
     }
     return det;
 }
 
-int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const lift_seen *seen, const double *guess,
-                  double depth, const lift_residuals *said)
+int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const lift_observations *seen,
+                  const double *guess, double depth, const lift_residuals *residuals)
 {
     lift_moment const m = lift_find_moment(t, at);
     adding const a = {.prior = lift_axes_prior(t, b), .now = lift_axes_now(t, b), .depth = depth};
-    double det = 1.0; /* a log for many is as good as one for each */
+    double det = 1.0; /* one logarithm for many factors */
     int32_t rows = 0;
     for (int32_t j = 0; j < t->prior.markers; j++) {
         lift_marker r;
         double x[3], own[3], square[2];
-        if (!lift_seen_at(seen, j))
+        if (!lift_observed_at(seen, j))
             continue;
         lift_marker_at(t, b, &m, j, &r, x);
         lift_to_world(&a.now, x, own);
         det *= add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, &r, guess ? guess + 3 * j : own,
                           t->W + (size_t)rows * (size_t)t->ld, square);
-        if (said) {
-            memcpy(said->place + 3 * j, own, sizeof own);
-            memcpy(said->square + rows, square, sizeof square);
+        if (residuals) {
+            memcpy(residuals->position + 3 * j, own, sizeof own);
+            memcpy(residuals->square + rows, square, sizeof square);
         }
         rows += 2;
         if (!(det > 1e-100 && det < 1e100)) {
@@ -123,8 +241,8 @@ int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const li
     return rows;
 }
 
-void lift_add(const lift_table *t, segment_posterior *b, double at, const lift_seen *seen, const double *guess,
-              double depth)
+void lift_add(const lift_table *t, segment_posterior *b, double at, const lift_observations *seen,
+              const double *guess, double depth)
 {
     int32_t const rows = lift_rows(t, b, at, seen, guess, depth, NULL);
     t->run->cholesky_rank(b->A, t->ld, t->W, rows);
@@ -145,4 +263,180 @@ double lift_evidence(const lift_table *t, const segment_posterior *b)
 {
     double const log_two_pi = 1.83787706640934548356, left = b->U[t->n * (t->ld + 1)];
     return -0.5 * (log_two_pi * b->observed + b->log_noise + left) - cholesky_log_det(b->U, t->n, t->ld);
+}
+
+double lift_chi2(const lift_table *t, const segment_posterior *b)
+{
+    double left = b->U[t->n * (t->ld + 1)];
+    for (int32_t i = 0; i < t->n; i++)
+        left -= b->theta[i] * b->theta[i];
+    return left > 0.0 ? left : 0.0;
+}
+
+enum { OTHERS = 5 }; /* unknowns other than modes, at most */
+
+typedef struct effects { /* displacement of a marker by one standard deviation of each unknown */
+    double M[3][3];      /* of the modes: M times the mode */
+    double other[OTHERS][3];
+} effects;
+
+/* Effects of the unknowns on a marker, times P (3 x 3). */
+static void find_effects(const lift_table *t, const segment_posterior *b, const lift_axes *axes,
+                         const lift_marker *m, const double own[3], double P[3][3], effects *out)
+{
+    int32_t const k = t->prior.modes;
+    double const away[2] = {own[0] - axes->place[0], own[1] - axes->place[1]};
+    for (int32_t a = 0; a < 3; a++) {
+        const double turned[3] = {P[a][0] * axes->c + P[a][1] * axes->s,
+                                  P[a][1] * axes->c - P[a][0] * axes->s, P[a][2] * axes->z};
+        for (int32_t i = 0; i < 3; i++) {
+            out->M[a][i] = m->grown * turned[i];
+            out->other[i][a] = P[a][i] * t->cfg.place_sd[i];
+        }
+        if (t->size >= 0)
+            out->other[t->size - k][a] =
+                t->growth * ((turned[0] * m->shape[0] + turned[1] * m->shape[1]) + turned[2] * m->shape[2]);
+        if (t->turn >= 0)
+            out->other[t->turn - k][a] = b->turn_sd * (P[a][1] * away[0] - P[a][0] * away[1]);
+    }
+}
+
+/* The part of marker j outside the modes: mean += K times the residual of its rows, P (3 x 3) = I - K G.  Nothing
+ * changes if it was not observed. */
+static void add_residual(const lift_table *t, const segment_posterior *b, const lift_observations *seen,
+                         int32_t j, double *mean, double P[3][3])
+{
+    if (!seen || !lift_observed_at(seen, j))
+        return;
+    projection_rows r;
+    double K[3][2], left[2];
+    projection_rows_near(&t->projection, seen->uv + 2 * j, mean, &r);
+    projection_gain(&r, seen->sd[j], lift_residual(t, b, j), K);
+    for (int32_t a = 0; a < 2; a++)
+        left[a] = r.y[a] - ((r.g[a][0] * mean[0] + r.g[a][1] * mean[1]) + r.g[a][2] * mean[2]);
+    for (int32_t i = 0; i < 3; i++) {
+        mean[i] += K[i][0] * left[0] + K[i][1] * left[1];
+        for (int32_t c = 0; c < 3; c++)
+            P[i][c] -= K[i][0] * r.g[0][c] + K[i][1] * r.g[1][c];
+    }
+}
+
+static void set_identity(double P[3][3])
+{
+    for (int32_t i = 0; i < 9; i++)
+        P[i / 3][i % 3] = i % 4 == 0;
+}
+
+void lift_positions(const lift_table *t, const segment_posterior *b, double at, const int32_t *marker,
+                    int32_t count, double *mean)
+{
+    lift_axes const axes = lift_axes_now(t, b);
+    lift_moment const moment = lift_find_moment(t, at);
+    for (int32_t r = 0; r < count; r++) {
+        lift_marker m;
+        double x[3];
+        lift_marker_at(t, b, &moment, marker[r], &m, x);
+        lift_to_world(&axes, x, mean + 3 * r);
+    }
+}
+
+void lift_modes(const lift_table *t, const segment_posterior *b, double at)
+{
+    lift_axes const axes = lift_axes_now(t, b);
+    lift_moment const moment = lift_find_moment(t, at);
+    int32_t const k = t->prior.modes;
+    double *z = t->Z;
+    for (int32_t j = 0; j < t->prior.markers; j++) {
+        lift_marker m;
+        effects by;
+        double x[3], own[3], P[3][3];
+        lift_marker_at(t, b, &moment, j, &m, x);
+        lift_to_world(&axes, x, own);
+        set_identity(P);
+        find_effects(t, b, &axes, &m, own, P, &by);
+        for (int32_t a = 0; a < 3; a++, z += t->ld) {
+            t->run->lift_row(z, t->shape, t->lanes, by.M[a]); /* the lanes past k are written again below */
+            for (int32_t i = 0; i < OTHERS; i++)
+                if (k + i < t->n)
+                    z[k + i] = by.other[i][a];
+        }
+    }
+}
+
+typedef struct reading { /* common to all markers of a query */
+    lift_axes axes;
+    lift_moment moment;
+    int32_t columns;   /* markers, padded */
+    int32_t width;     /* of a row of t->V: 3 columns, padded */
+    double *mean, *sd; /* sd: 3 x columns, variances, may be NULL */
+} reading;
+
+/* One marker, displaced by `moved` by the modes; the effects on it go to column r of each coordinate. */
+static void read_marker(const lift_table *t, const segment_posterior *b, const reading *to,
+                        const lift_observations *seen, int32_t r, const double moved[3],
+                        double M[9][CHOLESKY_LANES])
+{
+    int32_t const j = t->order[r];
+    lift_marker m;
+    effects by;
+    double x[3], own[3], P[3][3], *const mean = to->mean + 3 * r;
+    displaced_marker(t, b, &to->moment, j, moved, &m, x);
+    lift_to_world(&to->axes, x, own);
+    memcpy(mean, own, sizeof own);
+    set_identity(P);
+    add_residual(t, b, seen, j, mean, P);
+    if (!to->sd)
+        return;
+    find_effects(t, b, &to->axes, &m, own, P, &by);
+    for (int32_t a = 0; a < 3; a++) {
+        float *const v = t->V + t->prior.modes * to->width + a * to->columns + r;
+        to->sd[a * to->columns + r] = lift_residual(t, b, j) * P[a][a];
+        for (int32_t i = 0; i < 3; i++)
+            M[3 * a + i][r % CHOLESKY_LANES] = by.M[a][i];
+        for (int32_t i = 0; i < t->n - t->prior.modes; i++)
+            v[i * to->width] = (float)by.other[i][a];
+    }
+}
+
+/* Markers r to r + 7 of the order, as far as they are in the query. */
+static void read_eight(const lift_table *t, const segment_posterior *b, const reading *to,
+                       const lift_query *q, int32_t r)
+{
+    size_t const plane = (size_t)(t->prior.modes * CHOLESKY_LANES),
+                 frame = 3 * (size_t)(t->prior.modes * t->columns);
+    const float *const s = t->column + (size_t)(b->component * t->prior.frames) * frame +
+                           3 * plane * (size_t)(r / CHOLESKY_LANES);
+    double moved[3][CHOLESKY_LANES], M[9][CHOLESKY_LANES] = {{0.0}};
+    for (size_t a = 0; a < 3; a++)
+        t->run->lift_eight(t->shape + a * plane, s + (size_t)to->moment.f * frame + a * plane,
+                           s + (size_t)to->moment.next * frame + a * plane, 1.0 - to->moment.share,
+                           to->moment.share, b->theta, t->prior.modes, moved[a]);
+    for (int32_t i = r; i < r + CHOLESKY_LANES && i < q->count; i++) {
+        int32_t const c = i - r;
+        read_marker(t, b, to, q->seen, i, (const double[3]){moved[0][c], moved[1][c], moved[2][c]}, M);
+    }
+    if (to->sd)
+        t->run->lift_turn(t->V + r, (size_t)to->width, (size_t)to->columns, t->shape, t->prior.modes, M);
+}
+
+void lift_read(const lift_table *t, const segment_posterior *b, const lift_query *q, double *mean, double *sd)
+{
+    double variance[3 * GAIT_MAX_MARKERS] = {0.0};
+    reading to = {.axes = lift_axes_now(t, b),
+                  .moment = lift_find_moment(t, q->at),
+                  .columns = cholesky_padded(q->count),
+                  .mean = mean,
+                  .sd = sd ? variance : NULL};
+    to.width = cholesky_padded_float(3 * to.columns);
+    int32_t const clean = to.width > 3 * to.columns ? 0 : t->prior.modes; /* rows of which all is written */
+    memset(t->V + clean * to.width, 0, (size_t)((t->ld - clean) * to.width) * sizeof *t->V);
+    for (int32_t r = 0; r < q->count; r += CHOLESKY_LANES)
+        read_eight(t, b, &to, q, r);
+    if (!sd)
+        return;
+    t->run->cholesky_forward_float(b->U, t->n, t->ld, t->V, to.width);
+    t->run->lift_squares(variance, 3 * to.columns, t->V, (size_t)to.width, t->n);
+    for (int32_t r = 0; r < q->count; r++)
+        for (int32_t a = 0; a < 3; a++)
+            sd[3 * r + a] = sqrt(variance[a * to.columns + r]);
 }

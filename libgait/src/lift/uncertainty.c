@@ -1,11 +1,11 @@
 #include "lift/uncertainty.h"
 
-#include "lift/read.h"
+#include "lift/segment_posterior.h"
 
 #include <string.h>
 
-#define ROUNDS         100   /* of the scale; a fifth of them settle it to 1e-8 */
-#define NO_INFORMATION 1e-13 /* eigenvalues below this part of the largest are rounding */
+#define ROUNDS         100   /* of the scale; 20 are enough for 1e-8 */
+#define NO_INFORMATION 1e-13 /* eigenvalues below this share of the largest are rounding */
 
 /* Sum over all markers and frames of products of displacements: G (n x n, upper), square metres. */
 static void gram(const lift_table *t, const segment_posterior *b, double *G)
@@ -34,7 +34,8 @@ static void transpose(double *S, int32_t n, int32_t ld)
         }
 }
 
-void lift_likelihood_only(const lift_table *t, const lift_window *w, const segment_posterior *b, segment_posterior *spare)
+void lift_least_squares(const lift_table *t, const lift_window *w, const segment_posterior *b,
+                        segment_posterior *spare)
 {
     lift_table plain = *t;
     segment_posterior fit = *b;
@@ -49,7 +50,7 @@ void lift_likelihood_only(const lift_table *t, const lift_window *w, const segme
     fit.centre = fit.heading; /* the turn takes no part */
     memset(S, 0, (size_t)ld * (size_t)ld * sizeof *S);
     for (int32_t f = 0; f < w->frames; f++) {
-        lift_seen const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
+        lift_observations const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
         lift_add(&plain, &fit, w->at[f], &seen, NULL, 0.0);
     }
     double *const y = t->W; /* free again: n numbers */
@@ -88,8 +89,8 @@ static void set_sign(double *x, size_t n)
 }
 
 /* Displacements (count x F x J x 3) by rows of unknowns. */
-static void displacements(const lift_table *t, const segment_posterior *b, const double *unknowns, int32_t count,
-                          double *out)
+static void displacements(const lift_table *t, const segment_posterior *b, const double *unknowns,
+                          int32_t count, double *out)
 {
     size_t const J3 = 3 * (size_t)t->prior.markers, whole = J3 * (size_t)t->prior.frames;
     memset(out, 0, (size_t)count * whole * sizeof *out);
@@ -140,8 +141,8 @@ static double *inverse_root(const lift_table *t, const segment_posterior *b, seg
 }
 
 /* Q of the first k unknowns, rows of `stride`; spare->A is lost. */
-static void covariance(const lift_table *t, const segment_posterior *b, segment_posterior *spare, int32_t k, double *Q,
-                       int32_t stride)
+static void covariance(const lift_table *t, const segment_posterior *b, segment_posterior *spare, int32_t k,
+                       double *Q, int32_t stride)
 {
     const double *const Y = inverse_root(t, b, spare);
     for (int32_t i = 0; i < k; i++)
@@ -158,7 +159,7 @@ void lift_covariance(const lift_table *t, const segment_posterior *b, segment_po
     covariance(t, b, spare, t->n, Q, t->n);
 }
 
-/* MacKay's fixed point of the evidence, along the axes in which the observations tell the modes apart. */
+/* MacKay's fixed point of the evidence, along the axes in which the observations separate the modes. */
 double lift_scale(const lift_table *t, const segment_posterior *b, segment_posterior *spare)
 {
     int32_t const k = t->prior.modes, ld = t->ld;
@@ -172,13 +173,13 @@ double lift_scale(const lift_table *t, const segment_posterior *b, segment_poste
             x[i] += V[i * ld + j] * b->theta[j];
     }
     for (int32_t round = 0; round < ROUNDS; round++) {
-        double size = LIFT_FREEDOM, told = LIFT_FREEDOM;
+        double size = LIFT_FREEDOM, resolved = LIFT_FREEDOM;
         for (int32_t i = 0; i < k; i++) {
-            double const q = Q[i * (ld + 1)], part = scale / (q + scale * (1.0 - q));
-            size += part * part * x[i] * x[i];
-            told += part * (1.0 - q);
+            double const q = Q[i * (ld + 1)], gain = scale / (q + scale * (1.0 - q));
+            size += gain * gain * x[i] * x[i];
+            resolved += gain * (1.0 - q);
         }
-        scale = size / told;
+        scale = size / resolved;
     }
     return scale;
 }
