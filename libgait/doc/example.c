@@ -1,14 +1,14 @@
-/* example.c - follow somebody through PGM pictures, 640 x 480, 30 a second, in memory known when this is compiled.
+/* example.c - track a person through PGM pictures of 640 x 480 at 30 per second, in memory known at compile time.
  *   cc example.c $(pkg-config --cflags --libs gait) -o example
  *   ./example walk.gait scene.txt empty.pgm frame*.pgm
- * scene.txt: fx fy cx cy, R by rows and t of the camera (x_cam = R x_world + t), then where somebody is in the first
- * picture: x y (metres) and heading (radians, 0 along +x).  example_clip.py writes such files. */
+ * scene.txt: fx fy cx cy, R by rows and t of the camera (x_cam = R x_world + t), then where the person is in the
+ * first picture: x y (metres) and heading (radians, 0 = along +x).  example_clip.py writes such files. */
 #include <gait.h>
 #include <stdio.h>
 #include <string.h>
 
 enum { W = 640, H = 480 };
-static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 19], room[1 << 16], memory[6 << 20];
+static _Alignas(GAIT_ALIGN) unsigned char blob[1 << 19], model_memory[1 << 16], memory[6 << 20];
 static uint8_t empty[H][W], picture[H][W];
 
 static int fail(const char *name, const char *why)
@@ -16,7 +16,7 @@ static int fail(const char *name, const char *why)
     return fprintf(stderr, "%s: %s\n", name, why), 1;
 }
 
-/* Pixels of a PGM file without comments, or 19 numbers; 0 if they are not there. */
+/* Read the pixels of a PGM file without comments, or 19 numbers; 0 if the file does not hold them. */
 static int take(const char *name, uint8_t pixels[H][W], float number[19])
 {
     FILE *f = fopen(name, "rb");
@@ -43,7 +43,7 @@ int main(int argc, char **argv)
     size_t size = f ? fread(blob, 1, sizeof blob, f) : 0;
     if (argc < 5)
         return fail("usage", "example MODEL.gait SCENE.txt EMPTY.pgm FRAME.pgm..."), 2;
-    if (gait_model_init(room, sizeof room, blob, size, &model, &err) < 0)
+    if (gait_model_init(model_memory, sizeof model_memory, blob, size, &model, &err) < 0)
         return fail(argv[1], f ? err.text : "cannot be read");
     if (!take(argv[2], NULL, s) || !take(argv[3], empty, NULL))
         return 1;
@@ -51,7 +51,7 @@ int main(int argc, char **argv)
     cfg.camera[0] = (gait_camera){.width = W, .height = H, .fx = s[0], .fy = s[1], .cx = s[2], .cy = s[3]};
     memcpy(cfg.camera[0].R, s + 4, sizeof cfg.camera[0].R);
     memcpy(cfg.camera[0].t, s + 13, sizeof cfg.camera[0].t);
-    gait_tracker_prior(model, &mean, &sd); /* anybody, there, give or take 0.1 m and radians */
+    gait_tracker_prior(model, &mean, &sd); /* any person, within about 0.1 m and rad of the given start */
     mean.pelvis[0] = s[16], mean.pelvis[1] = s[17], mean.heading = s[18];
     sd.pelvis[0] = sd.pelvis[1] = sd.heading = 0.1f;
     if (gait_tracker_init(memory, sizeof memory, model, &cfg, &t, &err) < 0)

@@ -1,4 +1,4 @@
-"""Make of a clip of `gait simulate --size 640x480` what example.c reads: PGM pictures, and scene.txt."""
+"""Convert a clip of `gait simulate --size 640x480` to what example.c reads: PGM pictures and scene.txt."""
 
 import json
 import sys

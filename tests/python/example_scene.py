@@ -14,14 +14,14 @@ def drawn_walk(frames: int) -> tuple[np.ndarray, list[np.ndarray], list[float]]:
     rng = np.random.default_rng(1)
     plate = cv2.resize(rng.integers(40, 200, (96, 128)).astype(np.uint8), (640, 480))
     cloth = cv2.resize(rng.integers(0, 40, (160, 213)).astype(np.uint8), (640, 480))
-    walker, _ = model.prior()
-    walker.phase, walker.pelvis[0] = 0.3, -1.0
+    person, _ = model.prior()
+    person.phase, person.pelvis[0] = 0.3, -1.0
     pictures, places = [], []
     for _ in range(frames):
-        walker.pelvis[2] = model.pelvis_height(walker)
-        ids = model.render(camera, walker)
+        person.pelvis[2] = model.pelvis_height(person)
+        ids = model.render(camera, person)
         pictures.append(np.where(ids > 0, 30 + ids * 12 % 160 + cloth, plate).astype(np.uint8))
-        places.append(float(walker.pelvis[0]))
-        walker.phase = (walker.phase + walker.stride_hz / 30) % 1
-        walker.pelvis[0] += walker.stature * walker.stride_hz * model.info.stride_length / 30
+        places.append(float(person.pelvis[0]))
+        person.phase = (person.phase + person.stride_hz / 30) % 1
+        person.pelvis[0] += person.stature * person.stride_hz * model.info.stride_length / 30
     return plate, pictures, places

@@ -1,4 +1,4 @@
-"""What the README and the pages of libgait/doc tell people to type works, in the order in which they tell it.
+"""The commands and snippets of the README and the pages of libgait/doc work, in the order of each page.
 
 Every fenced block of a page runs in one folder: `sh` and `python` are executed, `c` is compiled, `json`
 parsed. A comment before a block changes that: `<!-- file: NAME -->` writes it to a file, `<!-- skip: REASON
@@ -86,7 +86,7 @@ ALL = {page: blocks(page) for page in PAGES}
 
 
 def run(*command, **options):
-    """Run, and show what it said if it fails."""
+    """Run, and show the output if it fails."""
     options = {"env": ENV, "timeout": 300} | options
     done = subprocess.run([*map(str, command)], capture_output=True, text=True, **options)
     assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
@@ -149,7 +149,7 @@ def execute(block, folder, env):
 
 
 def stand_in(clip, folder):
-    """The clip and its camera for the video, lens and tape marks of somebody who follows the tutorial."""
+    """The clip and its camera for the video, lens and tape marks of a reader of the tutorial."""
     shutil.copy(clip / "video.mp4", folder / "phone.mp4")
     camera = gait.Camera.read(clip / "camera.json")
     lens = cv2.FileStorage(str(folder / "lens.yaml"), cv2.FILE_STORAGE_WRITE)
@@ -159,8 +159,8 @@ def stand_in(clip, folder):
     lens.write("distortion_coefficients", np.zeros(5))
     lens.release()
     marks = np.array([[-1, -0.5, 0], [1, -0.5, 0], [-1.5, 1, 0], [1.5, 1, 0], [0, 0, 0]])
-    seen = (camera.R @ marks.T).T + camera.t
-    u, v = camera.fx * seen[:, 0] / seen[:, 2] + camera.cx, camera.fy * seen[:, 1] / seen[:, 2] + camera.cy
+    at = (camera.R @ marks.T).T + camera.t
+    u, v = camera.fx * at[:, 0] / at[:, 2] + camera.cx, camera.fy * at[:, 1] / at[:, 2] + camera.cy
     rows = [f"{a:.2f},{b:.2f},{x},{y}" for a, b, (x, y, _) in zip(u, v, marks, strict=True)]
     (folder / "points.csv").write_text("\n".join(["u,v,x,y", *rows, ""]))
 
@@ -189,26 +189,26 @@ COMMANDS_SHOWN = sorted({c for page in PAGES for block in ALL[page] for c in blo
 
 @pytest.mark.parametrize("command", [c for c in COMMANDS_SHOWN if c.startswith("make ")])
 def test_make_targets_exist(command):
-    told = run("make", "help", cwd=ROOT).stdout
+    shown = run("make", "help", cwd=ROOT).stdout
     targets = [word for word in command.split()[1:] if "=" not in word]
-    assert [t for t in targets if f" {t} " not in told] == []
+    assert [t for t in targets if f" {t} " not in shown] == []
 
 
-def helped(words, told={}):  # noqa: B006 - kept from call to call
+def helped(words, shown={}):  # noqa: B006 - kept from call to call
     """Help text of the program that the words begin with."""
     if words[0] == "gait":
         program = ["gait", *words[1 : 3 if " ".join(words[1:3]) in COMMANDS else 2]]
     else:
         program = words[:1]
     key = " ".join(program)
-    if key not in told and words[0] == "gait":
+    if key not in shown and words[0] == "gait":
         text = io.StringIO()
         with contextlib.redirect_stdout(text), pytest.raises(SystemExit):
             gait.cli.main([*program[1:], "--help"])
-        told[key] = text.getvalue()
-    elif key not in told:
-        told[key] = run(ROOT / words[0], "--help").stdout
-    return told[key]
+        shown[key] = text.getvalue()
+    elif key not in shown:
+        shown[key] = run(ROOT / words[0], "--help").stdout
+    return shown[key]
 
 
 OPTION = r"(?<![\w-])--?[a-z][\w-]*"
@@ -306,7 +306,7 @@ def test_the_c_program_follows_a_drawn_person(example):
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
+    ("words", "message"),
     [
         ([ROOT / "README.md"], ""),
         (["/nonexistent"], "/nonexistent: cannot be read\n"),
@@ -314,7 +314,7 @@ def test_the_c_program_follows_a_drawn_person(example):
         ([], "usage: example MODEL.gait < 640x480 grey frames\n"),
     ],
 )
-def test_the_c_program_reports_a_wrong_argument(example, words, says):
+def test_the_c_program_reports_a_wrong_argument(example, words, message):
     done = subprocess.run([example, *words], input=b"", capture_output=True, timeout=60)
     assert done.returncode == 1 and done.stdout.strip()
-    assert not says or done.stdout.decode() == says
+    assert not message or done.stdout.decode() == message

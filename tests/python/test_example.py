@@ -1,4 +1,4 @@
-"""The C example follows a drawn walker: built by pkg-config's flags, and for another CPU under emulation."""
+"""The C example tracks a drawn person, built with the flags of pkg-config, and for another CPU under emulation."""
 
 import csv
 import os
@@ -53,9 +53,9 @@ def program(tmp_path_factory):
         "PKG_CONFIG_SYSROOT_DIR": str(there),
     }
     command = ["pkg-config", "--cflags", "--libs", "gait"]
-    told = subprocess.run(command, env=env, check=True, capture_output=True, text=True).stdout.split()
+    flags = subprocess.run(command, env=env, check=True, capture_output=True, text=True).stdout.split()
     rpath = f"-Wl,-rpath,{there}/opt/gait/lib"
-    subprocess.run(["cc", *FLAGS, SOURCE, "-o", there / "example", *told, rpath], check=True)
+    subprocess.run(["cc", *FLAGS, SOURCE, "-o", there / "example", *flags, rpath], check=True)
     return [there / "example"]
 
 
@@ -72,7 +72,7 @@ def track(program, folder, frames=FRAMES) -> str:
     return done.stdout
 
 
-def test_the_example_follows_a_drawn_walker(program, walk):
+def test_the_example_follows_a_drawn_person(program, walk):
     folder, places = walk
     *rows, digest = track(program, folder).splitlines()
     found = np.array([float(row.split()[2]) for row in rows])
@@ -81,8 +81,8 @@ def test_the_example_follows_a_drawn_walker(program, walk):
     assert rows[-1].endswith("status 1")
 
 
-def test_the_example_follows_the_walker_of_a_clip(program, tmp_path):
-    """As README says: a clip of gait simulate, made into pictures and numbers by example_clip.py."""
+def test_the_example_follows_the_person_of_a_clip(program, tmp_path):
+    """As in the C how-to: a clip of gait simulate, made into pictures and numbers by example_clip.py."""
     clip = tmp_path / "walk"
     python = ROOT / ".venv/bin/python"
     make_clip = [
@@ -111,16 +111,16 @@ def test_the_example_follows_the_walker_of_a_clip(program, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         ([], 2, "usage: example MODEL.gait SCENE.txt EMPTY.pgm FRAME.pgm..."),
         (["/nonexistent", "a", "b", "c"], 1, "/nonexistent: cannot be read\n"),
         ([MODEL, "/dev/null", "b", "c"], 1, "/dev/null: not 19 numbers"),
     ],
 )
-def test_the_example_says_what_is_wrong(program, words, code, said):
+def test_the_example_reports_what_is_wrong(program, words, code, message):
     done = subprocess.run([*program, *words], capture_output=True, text=True, timeout=60)
-    assert done.returncode == code and done.stderr.startswith(said)
+    assert done.returncode == code and done.stderr.startswith(message)
 
 
 def test_another_cpu_gives_the_same_bits(program, walk, tmp_path):

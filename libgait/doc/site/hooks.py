@@ -114,11 +114,11 @@ def _commands() -> str:
     out = []
     for command in words:
         run = [sys.executable, "-m", *command, "--help"]
-        told = subprocess.run(run, check=True, capture_output=True, text=True, env=env).stdout
-        out.append(f"\n## {' '.join(command)}\n\n```text\n{told}```\n")
+        shown = subprocess.run(run, check=True, capture_output=True, text=True, env=env).stdout
+        out.append(f"\n## {' '.join(command)}\n\n```text\n{shown}```\n")
     daemon = ROOT / "build/bin/gait-trackd"
-    told = subprocess.run([daemon, "--help"], check=True, capture_output=True, text=True).stdout
-    out.append(f"\n## gait-trackd\n\n```text\n{told}```\n")
+    shown = subprocess.run([daemon, "--help"], check=True, capture_output=True, text=True).stdout
+    out.append(f"\n## gait-trackd\n\n```text\n{shown}```\n")
     return "".join(out)
 
 
