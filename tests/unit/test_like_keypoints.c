@@ -5,7 +5,8 @@
 enum { FRAMES = 40 };
 
 /* Joints of a state in the scene's camera, as a detector would find them. */
-static void detect(const gait_camera *cam, const gait_state *s, float noise, uint32_t seed, gait_keypoint *out)
+static void detect(const gait_camera *cam, const gait_state *s, float noise, uint32_t seed,
+                   gait_keypoint *out)
 {
     gait_pose pose;
     CHECK(gait_model_pose(toy_model(), s, &pose) == GAIT_OK);
@@ -15,8 +16,8 @@ static void detect(const gait_camera *cam, const gait_state *s, float noise, uin
         camera_distort(cam, uv[0], uv[1], &ud, &vd);
         float const du = (float)(toy_hash(seed, (uint32_t)p, 1) % 2001) / 1000.0f - 1.0f;
         float const dv = (float)(toy_hash(seed, (uint32_t)p, 2) % 2001) / 1000.0f - 1.0f;
-        out[p] =
-            (gait_keypoint){.u = ud + 1.7f * noise * du, .v = vd + 1.7f * noise * dv, .sd = f_max(noise, 1.0f)};
+        out[p] = (gait_keypoint){
+            .u = ud + 1.7f * noise * du, .v = vd + 1.7f * noise * dv, .sd = f_max(noise, 1.0f)};
     }
 }
 
@@ -38,7 +39,7 @@ static void test_cost(void)
     gait_state const s = toy_walk(0.3f);
     gait_pose pose;
     like_body const b = look_through(v, 3);
-    CHECK(like_keypoints.flag == GAIT_TERM_KEYPOINTS && strcmp(like_keypoints.name, "tracks") == 0);
+    CHECK(like_keypoints.flag == GAIT_TERM_KEYPOINTS && strcmp(like_keypoints.name, "keypoints") == 0);
     CHECK(gait_model_pose(toy_model(), &s, &pose) == GAIT_OK);
     v->f.keypoints = (features_keypoints){0};
     CHECK(like_keypoints.log_likelihood(&b) == 0.0f && like_keypoints.support(&b) == 0.0f);

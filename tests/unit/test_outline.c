@@ -1,5 +1,5 @@
 /* Limbs in the image: against the projection of their ends, of their surface, and against sizes known beforehand. */
-#include "raster/outline.h"
+#include "raster/limb_polygon.h"
 
 #include "toy_draw.h"
 #include "toy_scene.h"

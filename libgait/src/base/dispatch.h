@@ -8,6 +8,10 @@
 #define GAIT_BASE_DISPATCH_H
 #include "base/base.h"
 
+enum { BLOCK = 16 }; /* bodies that a kernel works on at once, one a lane */
+
+typedef float body_lanes[BLOCK];
+
 /* Types of higher layers, which a kernel's own file includes. */
 struct dynamics_step;
 struct edge_cell;

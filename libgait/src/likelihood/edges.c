@@ -1,5 +1,5 @@
 /* Image gradient along the visible outlines of the limbs, normal to them. */
-#include "likelihood/likelihood.h"
+#include "likelihood/term.h"
 
 enum { ENOUGH = 16 }; /* points below which the outline counts as unseen */
 

@@ -1,5 +1,5 @@
 /* Joints that somebody else has found in the image: robust distance to where the body would show them. */
-#include "likelihood/likelihood.h"
+#include "likelihood/term.h"
 
 #include "image/camera.h"
 #include "base/fmath.h"

@@ -1,7 +1,7 @@
-/* The sides of a block's limbs as the edge term reads them: worked out one lane a body, dealt out body by body. */
+/* Sides of the limbs of a block of bodies, for the edge term: computed one lane a body, stored body by body. */
 #include "base/dispatch.h"
 #include "base/simd16.h"
-#include "likelihood/likelihood.h"
+#include "likelihood/term.h"
 
 typedef struct side_words { /* where the words of one side go */
     float *x, *y, *dx, *dy, *normal;

@@ -1,5 +1,5 @@
 /* Silhouette both ways: background inside the body and foreground that the body leaves unexplained. */
-#include "likelihood/likelihood.h"
+#include "likelihood/term.h"
 
 /* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */
 static const float TYPICAL = 0.16f * 0.25f * (float)VIEW_PERSON * (float)VIEW_PERSON * (float)FG_ONE;

@@ -1,7 +1,7 @@
 /* template.h - running appearance of each limb: what its surface points have looked like. */
 #ifndef GAIT_LIKELIHOOD_TEMPLATE_H
 #define GAIT_LIKELIHOOD_TEMPLATE_H
-#include "likelihood/likelihood.h"
+#include "likelihood/term.h"
 
 enum { TEMPLATE_ONE = 64, TEMPLATE_EMPTY = INT16_MIN }; /* steps per unit of the surface map */
 

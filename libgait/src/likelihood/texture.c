@@ -1,5 +1,5 @@
 /* Brightness constancy along each particle's own history (Ormoneit et al. 2000, eqs. 10-13). */
-#include "likelihood/likelihood.h"
+#include "likelihood/term.h"
 
 #include <string.h>
 

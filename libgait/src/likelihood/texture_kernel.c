@@ -1,7 +1,7 @@
 /* What limbs look like and looked like (Ormoneit et al. 2000, eqs. 10-13). */
 #include "base/fmath.h"
 #include "base/dispatch.h"
-#include "likelihood/likelihood.h"
+#include "likelihood/term.h"
 #include "base/simd16.h"
 #include <string.h>
 
@@ -53,16 +53,16 @@ static void compare_all(const rows *r, int32_t limbs, const like_costs *cost, in
 static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs,
                           const like_costs *cost, int32_t *sum)
 {
-    int8_t simd_f64[MODEL_MAX_LIMBS][3 * LIKE_FACING];
+    int8_t padded[MODEL_MAX_LIMBS][3 * LIKE_FACING];
     rows r;
     for (int32_t l = 0; l < limbs; l++) {
-        memset(simd_f64[l], TEXTURE_HIDDEN, sizeof simd_f64[l]);
-        memcpy(simd_f64[l] + LIKE_FACING, then[l].value, LIKE_FACING);
+        memset(padded[l], TEXTURE_HIDDEN, sizeof padded[l]);
+        memcpy(padded[l] + LIKE_FACING, then[l].value, LIKE_FACING);
     }
     for (int32_t l = 0; l < limbs; l++) {
         int32_t const ahead = (now[l].turn - then[l].turn + LIKE_AZIMUTHS) & (LIKE_DIRECTIONS - 1);
         r.now[l] = now[l].value;
-        r.then[l] = simd_f64[l] + 2 * ahead;
+        r.then[l] = padded[l] + 2 * ahead;
     }
     compare_all(&r, limbs, cost, sum);
 }

@@ -2,12 +2,11 @@
  * Frames and signs: doc/model-format.md.  Lane results do not depend on the other lanes. */
 #ifndef GAIT_MODEL_KINEMATICS_H
 #define GAIT_MODEL_KINEMATICS_H
+#include "base/dispatch.h"
 #include "base/fmath.h"
 #include "model/model.h"
 
-enum { BLOCK = 16, KIN_MAX_FRAMES = MODEL_MAX_FRAMES };
-
-typedef float body_lanes[BLOCK];
+enum { KIN_MAX_FRAMES = MODEL_MAX_FRAMES };
 
 typedef struct kin_input {
     float phase[BLOCK];                            /* cycles; wrapped to [0, 1) */

@@ -1,5 +1,6 @@
 /* Curves and forward kinematics of BLOCK bodies. */
 #include "base/dispatch.h"
+#include "model/kinematics.h"
 #include "model/kinematics_simd.h"
 
 enum { PART = 16 }; /* channels at once */

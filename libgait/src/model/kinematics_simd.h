@@ -4,7 +4,7 @@
 #define GAIT_MODEL_KINEMATICS_SIMD_H
 #include "base/fmath.h"
 #include "base/dispatch.h"
-#include "model/kinematics.h"
+#include "model/model.h"
 
 #include <string.h>
 

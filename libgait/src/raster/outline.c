@@ -1,6 +1,4 @@
 #include "raster/outline.h"
-#include "raster/outline_one.h"
-#include <string.h>
 
 void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out)
 {
@@ -33,16 +31,4 @@ void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out)
         g.sagittal[2] = g.lateral[0] * d[1] - g.lateral[1] * d[0];
         out[l] = g;
     }
-}
-
-void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale,
-                  const gait_camera *cam, const view_map *map, limb_polygon *out)
-{
-    part p = {.g = g, .scale = scale, .cam = cam, .map = map};
-    memcpy(p.R, R, sizeof p.R);
-    memcpy(p.o, o, sizeof p.o);
-    if (g->shape == LIMB_ELLIPSOID)
-        part_ellipsoid(&p, out);
-    else
-        part_cone(&p, out);
 }

@@ -38,8 +38,4 @@ static inline int32_t outline_vertices(const limb_geometry *g)
 {
     return g->shape == LIMB_ELLIPSOID ? 8 : 4;
 }
-
-/* R, o, scale: the limb's frame in the world and metres per stature. */
-void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale,
-                  const gait_camera *cam, const view_map *map, limb_polygon *out);
 #endif

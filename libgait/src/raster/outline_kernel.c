@@ -1,6 +1,6 @@
 /* The limbs of BLOCK bodies as polygons: one lane a body. */
 #include "base/dispatch.h"
-#include "raster/outline_one.h"
+#include "raster/limb_polygon.h"
 
 static part part_of(const limb_geometry *g, const kin_body *body, int32_t lane, const gait_camera *cam,
                     const view_map *map)

@@ -1,5 +1,6 @@
 #include "raster/render.h"
 #include "raster/layers.h"
+#include "raster/limb_polygon.h"
 #include <string.h>
 
 /* Paint one polygon in bands of GRID_SIZE rows. */

@@ -1,4 +1,5 @@
 #include "tracker/likelihood_step.h"
+#include "likelihood/likelihood.h"
 #include <stddef.h>
 #include <string.h>
 

@@ -1,4 +1,5 @@
 #include "tracker/tracker.h"
+#include "likelihood/likelihood.h"
 #include "tracker/estimate.h"
 #include "base/fmath.h"
 #include "tracker/features_step.h"

@@ -1,18 +1,18 @@
-/* Points along the visible outlines of the limbs, and the image gradient there. */
+/* Points along the visible outlines of the limbs of one body, and the image gradient there. */
 #include "base/dispatch.h"
 #include "base/simd16.h"
-#include "likelihood/likelihood.h"
-#include "likelihood/hide.h"
+#include "likelihood/term.h"
+#include "likelihood/visible.h"
 
 #include <string.h>
 
 /* A limb has LANES points: eight along each side of a cone, two along each side of an ellipsoid's octagon. */
 
-typedef struct sides { /* of each point */
+typedef struct limb_points { /* of each point */
     float x[SIMD16], y[SIMD16], dx[SIMD16], dy[SIMD16], normal[SIMD16], share[SIMD16];
-} sides;
+} limb_points;
 
-static inline void cone(const float *w, sides *restrict out)
+static inline void cone(const float *w, limb_points *restrict out)
 {
     simd16_repeat(w + LIKE_SIDE_X, SIMD16, out->x);
     simd16_repeat(w + LIKE_SIDE_Y, SIMD16, out->y);
@@ -25,7 +25,7 @@ static inline void cone(const float *w, sides *restrict out)
 }
 
 /* The octagon's sides, twice round. */
-static inline void ellipsoid(const like_sides *s, int32_t lane, sides *restrict out)
+static inline void ellipsoid(const like_sides *s, int32_t lane, limb_points *restrict out)
 {
     simd16_twice(s->part[0][lane], out->x);
     simd16_twice(s->part[0][lane] + 8, out->y);
@@ -44,7 +44,7 @@ typedef struct spots {                     /* points of the limbs' outlines */
     int32_t normal[MODEL_MAX_LIMBS][SIMD16];
 } spots;
 
-static inline void place(const sides *s, const float inner[2], int32_t k, spots *restrict out)
+static inline void place(const limb_points *s, const float inner[2], int32_t k, spots *restrict out)
 {
     float const outer = 0.5f * (1.0f - LIKE_INWARD); /* cells */
     float const inner_x = inner[0], inner_y = inner[1];
@@ -81,7 +81,7 @@ void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
     spots p;
     for (int32_t l = 0; l < limbs; l++) {
         const like_sides *const o = &b->sides->limb[l];
-        sides s;
+        limb_points s;
         if (b->setup->geometry[l].shape == LIMB_ELLIPSOID) {
             ellipsoid(o, lane, &s);
             place(&s, o->part[2][lane] + 8, l, &p);

@@ -1,6 +1,6 @@
-/* hide.h - which points of a limb its own mask shows: what is nearer hides the others.  For kernels. */
-#ifndef GAIT_LIKELIHOOD_HIDE_H
-#define GAIT_LIKELIHOOD_HIDE_H
+/* visible.h - which points of a limb its own mask shows: what is nearer hides the others.  For kernels. */
+#ifndef GAIT_LIKELIHOOD_VISIBLE_H
+#define GAIT_LIKELIHOOD_VISIBLE_H
 #include "base/dispatch.h"
 #include "base/simd16.h"
 #include "base/grid_mask.h"

@@ -1,8 +1,10 @@
-/* outline_one.h - the polygon of one limb of one body; inlined, so that a loop over bodies becomes vector code. */
-#ifndef GAIT_RASTER_OUTLINE_ONE_H
-#define GAIT_RASTER_OUTLINE_ONE_H
+/* limb_polygon.h - the polygon of one limb of one body; inlined, so that a loop over bodies becomes vector code. */
+#ifndef GAIT_RASTER_LIMB_POLYGON_H
+#define GAIT_RASTER_LIMB_POLYGON_H
 #include "image/camera.h"
 #include "raster/outline.h"
+
+#include <string.h>
 
 typedef struct vec3 {
     float x, y, z;
@@ -135,5 +137,18 @@ static inline void part_ellipsoid(const part *p, limb_polygon *out)
         put(out, k, s.x + grow * l11 * COS[k], s.y + grow * (l21 * COS[k] + l22 * SIN[k]));
     out->depth = c.z > CAMERA_NEAR ? c.z : 0.0f;
     out->facing = 1.0f;
+}
+
+/* R, o, scale: the limb's frame in the world and metres per model length. */
+static inline void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale,
+                                const gait_camera *cam, const view_map *map, limb_polygon *out)
+{
+    part p = {.g = g, .scale = scale, .cam = cam, .map = map};
+    memcpy(p.R, R, sizeof p.R);
+    memcpy(p.o, o, sizeof p.o);
+    if (g->shape == LIMB_ELLIPSOID)
+        part_ellipsoid(&p, out);
+    else
+        part_cone(&p, out);
 }
 #endif
