@@ -17,7 +17,7 @@ VENV  := .venv
 READY := $(VENV)/.ready
 SITE  := $(VENV)/site
 PY    := $(VENV)/bin/python
-PIP_INSTALL := $(VENV)/bin/pip install --quiet --disable-pip-version-check --constraint python/constraints.txt
+PIP_INSTALL := $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compile --constraint python/constraints.txt
 HEADER := libgait/include/gait.h
 HEADERS := $(sort $(wildcard libgait/include/*.h))
 define_of = $(shell awk '$$2 == "$(1)" { print $$3 }' $(HEADER))
@@ -208,10 +208,10 @@ $(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/track
 # ---- tests ---------------------------------------------------------------------------------------------------
 test: built check unit python-test ## everything below that can fail
 
-PROCESSORS = $(shell getconf _NPROCESSORS_ONLN)
 # As many compilers at a time as there are processors, unless make was told how many.
+JOBS = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell getconf _NPROCESSORS_ONLN))
 built:
-	@$(if $(filter -j% --jobserver%,$(MAKEFLAGS)),:,$(MAKE) --no-print-directory -j$(PROCESSORS) setup lib tools $(UNIT))
+	@$(MAKE) --no-print-directory $(JOBS) setup lib tools $(UNIT)
 
 check: lib ## symbols, heap, threads, globals, size, layers, stack, recursion, headers, hygiene
 	@B=$(B) CC='$(CC)' CXX='$(CXX)' tests/check/run.sh
@@ -258,7 +258,8 @@ golden-check: ## tracker and lifter have their pinned digests at -O0, -O2 and -O
 # ---- work ----------------------------------------------------------------------------------------------------
 pass = $(foreach v,VIDEO CAMERA INIT BACKGROUND HEIGHT START STOP,$(if $($(v)),--$(shell echo $(v) | tr A-Z a-z) '$($(v))'))
 
-demo: setup lib tools ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIGHT START STOP)
+demo: ## clip -> LCM -> gait-trackd -> report (VIDEO CAMERA INIT BACKGROUND HEIGHT START STOP)
+	@$(MAKE) --no-print-directory $(JOBS) setup lib tools
 	@$(VENV)/bin/gait demo $(pass) $(ARGS)
 
 MOCAP ?= ../shared/data/mocap/cmu_walk
