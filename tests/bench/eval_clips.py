@@ -18,8 +18,8 @@ from eval_plan import Clip
 
 from gait.bindings.initial import DEFAULT_SD
 from gait.errors import UserError
-from gait.motion.events import strikes_of
 from gait.io.track_file import Joints, read_truth
+from gait.motion.footfalls import strikes_of
 from gait.progress import progress
 
 ROOT = Path(__file__).resolve().parents[2]

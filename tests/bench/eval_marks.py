@@ -11,9 +11,9 @@ import numpy as np
 from eval_measures import shares
 
 from gait import Camera
-from gait.motion.evaluate import phase_errors
-from gait.motion.events import Strikes
 from gait.io.track_file import Track
+from gait.motion.evaluate import phase_errors
+from gait.motion.footfalls import Strikes
 
 LEG = ("hip", "knee", "ankle")
 LOST_SHARE = 0.15  # of the person's height in the picture: marks further off, on average, are of a lost frame

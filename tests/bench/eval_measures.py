@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from gait import Camera, Model, State
-from gait.body.skeleton import EVAL15
 from gait.bindings.estimate import Estimate
-from gait.motion.interval_coverage import APART
-from gait.motion.evaluate import LOST_MM, root_errors
-from gait.motion.events import Strikes, strikes_by_zeni
+from gait.body.skeleton import EVAL15
 from gait.io.track_file import STATUSES, Joints, Track, read_truth
+from gait.motion.evaluate import APART, LOST_MM, root_errors
+from gait.motion.footfalls import Strikes, strikes_by_zeni
 
 LOCK_AFTER = (1.0, 1.5)  # seconds from the start: the phase must be right in this window
 LOCK = 0.05  # cycles, error that still counts as locked

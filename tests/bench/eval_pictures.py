@@ -10,11 +10,11 @@ import numpy as np
 from eval_marks import Marks
 
 from gait import Camera, Model, Video
-from gait.body.skeleton import BONES
 from gait.bindings.estimate import Estimate
-from gait.report.overlay import Overlay
-from gait.io.video import Image
+from gait.body.skeleton import BONES
 from gait.io.track_file import read_truth
+from gait.io.video import Image
+from gait.report.drawing import Overlay
 
 if TYPE_CHECKING:
     from eval_run import Result

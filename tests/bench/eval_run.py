@@ -18,15 +18,15 @@ from eval_plan import Clip, Job
 
 from gait import Camera, Model, Start, Tracker, TrackerConfig, UserError, Video
 from gait.bindings.abi import Mode
-from gait.bindings.library import library
 from gait.bindings.estimate import Estimate
+from gait.bindings.library import library
 from gait.bindings.model import read_blob
 from gait.errors import GaitError
-from gait.io.video import Frame, Image, median_plate, read_plate
 from gait.io import blob
-from gait.motion.evaluate import evaluate
-from gait.motion.events import Strikes, strikes_of
 from gait.io.track_file import Track, TrackWriter, read_track, read_truth
+from gait.io.video import Frame, Image, median_plate, read_plate
+from gait.motion.evaluate import evaluate
+from gait.motion.footfalls import Strikes, strikes_of
 from gait.track.auto_start import Spotter, find_start
 
 

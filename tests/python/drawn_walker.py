@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from gait import Camera, State, VideoWriter
-from gait.motion.baselines import root_path
+from gait.motion.evaluate import root_path
 
 DATA = Path(__file__).resolve().parents[2] / "../shared/data"
 FPS = 30

@@ -22,12 +22,11 @@ import pytest
 
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io.video import VideoWriter
-from gait.lcm.link import open_lcm, private_url
+from gait.lcm.link import gaitmsg, open_lcm, private_url
 from gait.lcm.messages import camera_message, command_message, image_message
-from gait.lcm.types import gaitmsg
 
 ROOT = Path(__file__).resolve().parents[2]
 TRACKD = Path(os.environ.get("GAIT_TRACKD", ROOT / "build" / "bin" / "gait-trackd"))

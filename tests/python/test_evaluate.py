@@ -11,27 +11,31 @@ from scipy.special import ndtr
 from toy_segments import toy_prior
 
 from gait import Camera, UserError
+from gait.bindings.model import read_blob, read_cyclic
 from gait.body import skeleton
 from gait.body.skeleton import EVAL15, JOINTS
 from gait.cli import main
-from gait.bindings.model import read_blob, read_cyclic
 from gait.io import blob
+from gait.io.track_file import Joints, Track, read_estimates, read_truth, write_lifted
 from gait.learn.segments import segment_sections
-from gait.io import lifted_file
-from gait.motion.baselines import free_run, root_path, static_pose, stature
-from gait.motion.interval_coverage import calibration, coverage, crps
 from gait.motion.evaluate import (
     LIMBS,
+    calibration,
+    coverage,
+    crps,
     evaluate,
+    free_run,
     phase_errors,
     picture_errors,
     pose_errors,
     procrustes_errors,
     root_errors,
+    root_path,
+    static_pose,
+    stature,
     trust,
 )
-from gait.motion.events import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
-from gait.io.track_file import Joints, Track, read_estimates, read_truth
+from gait.motion.footfalls import Strikes, strikes_by_zeni, strikes_from_meta, strikes_of, walking_direction
 
 SECTIONS = blob.decode(read_blob(None))
 RATE, FIRST_PHASE, HEIGHT = 0.9, 0.3, 1.7
@@ -288,7 +292,7 @@ def test_lifted_motion_is_compared_without_status_and_phase(tmp_path):
     names = [*EVAL15, *(name for name in JOINTS if name not in EVAL15)]
     places = np.random.default_rng(3).normal(size=(4, len(names), 3))
     path = tmp_path / "lifted.csv"
-    lifted_file.write(path, np.arange(4), np.arange(4) / 30, names, places, np.full_like(places, 0.1))
+    write_lifted(path, np.arange(4), np.arange(4) / 30, names, places, np.full_like(places, 0.1))
     read = read_estimates(path)
     assert read.status == ["tracking"] * 4 and np.isnan(read.phase).all()
     np.testing.assert_allclose(read.eval15(), places[:, :15], atol=1e-5)
@@ -306,7 +310,7 @@ def test_frames_of_other_times_are_told(tmp_path, capsys, rate, told):
     """Every third frame of a truth numbered by itself is paired with other moments."""
     places = np.stack([TRUTH.places[name] for name in JOINTS], axis=1)
     sd, frames = np.full_like(places, 0.1), np.arange(len(places))
-    lifted_file.write(tmp_path / "truth.csv", frames, frames / 30, JOINTS, places, sd)
-    lifted_file.write(tmp_path / "found.csv", frames, 7 + frames / rate, JOINTS, places, sd)
+    write_lifted(tmp_path / "truth.csv", frames, frames / 30, JOINTS, places, sd)
+    write_lifted(tmp_path / "found.csv", frames, 7 + frames / rate, JOINTS, places, sd)
     assert main(["eval", str(tmp_path / "found.csv"), "--truth", str(tmp_path / "truth.csv")]) == 0
     assert ("their times run apart by 6.60 s" in capsys.readouterr().err) == told

@@ -4,8 +4,8 @@ import lcm_rig as rig
 import numpy as np
 
 from gait.bindings.state import State
+from gait.lcm.link import gaitmsg
 from gait.lcm.messages import command_message, image_message
-from gait.lcm.types import gaitmsg
 
 LOST = gaitmsg.estimate_t.LOST
 SCENE = rig.opening()[:2]  # camera and empty scene, no START

@@ -5,9 +5,8 @@ import time
 import lcm_rig as rig
 import pytest
 
-from gait.lcm.link import private_url
-from gait.lcm.messages import command_message, image_message, now
-from gait.lcm.types import gaitmsg
+from gait.lcm.link import gaitmsg, now, private_url
+from gait.lcm.messages import command_message, image_message
 
 STATUS = gaitmsg.status_t
 

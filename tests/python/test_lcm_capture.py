@@ -8,7 +8,7 @@ import time
 import lcm_rig as rig
 import pytest
 
-from gait.lcm.types import gaitmsg
+from gait.lcm.link import gaitmsg
 
 COUNT = 12
 

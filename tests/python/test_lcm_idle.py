@@ -3,9 +3,8 @@
 import lcm_rig as rig
 
 from gait.bindings.state import State
-from gait.lcm.link import private_url
+from gait.lcm.link import gaitmsg, private_url
 from gait.lcm.messages import command_message
-from gait.lcm.types import gaitmsg
 
 CAMERA, SCENE, START = rig.opening()
 NO_CAMERA = "frames come, but no camera"

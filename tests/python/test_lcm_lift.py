@@ -17,9 +17,8 @@ from toy_segments import toy_blob, toy_prior
 from gait.bindings.abi import LiftFlag, TrackStatus
 from gait.bindings.lifter import LiftConfig, Lifter
 from gait.camera.camera import Camera
-from gait.lcm.link import private_url
+from gait.lcm.link import gaitmsg, private_url
 from gait.lcm.messages import camera_message, tracks_message
-from gait.lcm.types import gaitmsg
 
 CAMERA = Camera.looking([0.0, -6.0, 1.4], [0.0, 0.0, 1.0], (640, 480), 700.0)
 NAMES_SEEN, FRAMES, LAG, SD = 15, 45, 4, 2.0

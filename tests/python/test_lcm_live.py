@@ -11,14 +11,12 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.io.video import Frame
-from gait.lcm.capture import Publisher, Setup
-from gait.lcm.link import open_lcm, private_url
-from gait.lcm.messages import command_message, now
-from gait.lcm.pacing import Pacer
-from gait.lcm.record import Recorder
-from gait.lcm.types import gaitmsg
 from gait.io.track_file import read_track
+from gait.io.video import Frame
+from gait.lcm.capture import Pacer, Publisher, Setup
+from gait.lcm.link import gaitmsg, now, open_lcm, private_url
+from gait.lcm.messages import command_message
+from gait.lcm.record import Recorder
 
 STATUS = gaitmsg.status_t
 RUNNING = STATUS.RUNNING

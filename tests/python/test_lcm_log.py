@@ -7,8 +7,8 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
+from gait.lcm.link import gaitmsg
 from gait.lcm.messages import camera_message, command_message, image_message
-from gait.lcm.types import gaitmsg
 
 STOP, RESET = gaitmsg.command_t.STOP, gaitmsg.command_t.RESET
 
@@ -304,8 +304,8 @@ def test_a_long_pause_stops_the_tracker_which_says_so(tmp_path):
 
 def test_a_shorter_pause_is_bridged_by_prediction(tmp_path):
     """As the library does when it is stepped without an image in between."""
-    from gait.track.tracker import Tracker
     from gait.track.config import TrackerConfig
+    from gait.track.tracker import Tracker
 
     late = [rig.frame_message(i, utime=rig.utime(i) + 1_200_000) for i in range(3, 5)]
     events = [*rig.opening(), *rig.frames(0, 3), *(("GAIT_IMAGE_0", m) for m in late)]

@@ -9,8 +9,8 @@ import lcm_rig as rig
 import pytest
 
 from gait.bindings.state import State
+from gait.lcm.link import gaitmsg
 from gait.lcm.messages import command_message
-from gait.lcm.types import gaitmsg
 
 
 def log(tmp_path, count=3, name="in.log"):

@@ -11,11 +11,9 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.lcm.link import open_lcm, private_url
-from gait.lcm.log import LogWriter, break_of
-from gait.lcm.results import read_run
-from gait.lcm.types import gaitmsg
 from gait.io.track_file import read_track
+from gait.lcm.link import LogWriter, break_of, gaitmsg, open_lcm, private_url
+from gait.lcm.record import read_run
 
 COUNT = 20
 SECOND = 1_000_000  # microseconds

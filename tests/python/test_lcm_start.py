@@ -7,8 +7,8 @@ import lcm_rig as rig
 import pytest
 
 from gait.bindings.initial import Start
+from gait.lcm.link import gaitmsg
 from gait.lcm.messages import command_message, state_message
-from gait.lcm.types import gaitmsg
 
 
 def tracked(outcome):

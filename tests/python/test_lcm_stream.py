@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 from gait.errors import UserError
-from gait.lcm import link
-from gait.lcm.ahead import ahead
-from gait.lcm.pacing import Pacer, parse_rate
-from gait.lcm.record import Recorder
-from gait.lcm.results import read_run
-from gait.lcm.source import FileSource
-from gait.lcm.types import gaitmsg
 from gait.io.track_file import read_track
+from gait.lcm import link
+from gait.lcm.capture import FileSource, Pacer, ahead, parse_rate
+from gait.lcm.link import gaitmsg
+from gait.lcm.record import Recorder, read_run
 
 COUNT = 20
 

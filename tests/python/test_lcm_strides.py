@@ -4,9 +4,9 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.lcm.messages import estimate_of
-from gait.lcm.types import gaitmsg
 from gait.io.track_file import read_track
+from gait.lcm.link import gaitmsg
+from gait.lcm.messages import estimate_of
 
 FRAMES = 76
 

@@ -13,10 +13,10 @@ import pytest
 
 from gait.bindings.abi import Term
 from gait.bindings.frame import Joints
+from gait.lcm.link import gaitmsg
 from gait.lcm.messages import image_message, tracks_message
-from gait.lcm.types import gaitmsg
-from gait.track.tracker import Tracker
 from gait.track.config import TrackerConfig
+from gait.track.tracker import Tracker
 
 FRAMES, SD = 16, 1.0
 SAID = re.compile(r"tracks (\d+) tracks_used (\d+) tracks_late (\d+)")

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from gait.bindings.state import State
 from gait.errors import UserError
+from gait.lcm.link import gaitmsg
 from gait.lcm.messages import (
     camera_message,
     camera_of,
@@ -23,7 +24,6 @@ from gait.lcm.messages import (
     state_message,
     state_of,
 )
-from gait.lcm.types import gaitmsg
 
 # A published type is frozen: whoever must change one makes another (estimate2_t) and leaves this line alone.
 FINGERPRINTS = {
@@ -51,7 +51,7 @@ def test_published_types_are_frozen(name):
 def test_help_needs_no_generated_types():
     """In a fresh clone commands explain themselves, and say in one line what is missing when they are run."""
     code = """if True:
-        import contextlib, io, pathlib, gait.lcm.types as types
+        import contextlib, io, pathlib, gait.lcm.link as types
         from gait.cli import main
         types._PLACES = (pathlib.Path("nowhere"),)
         for name in ("capture", "record", "view", "report", "demo"):
@@ -166,8 +166,8 @@ def test_commands_have_ids_of_their_own():
 
 def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
     """Encoded by C, decoded by Python, beside the binding's own estimate of the same frames."""
-    from gait.track.tracker import Tracker
     from gait.track.config import TrackerConfig
+    from gait.track.tracker import Tracker
 
     outcome = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 6)]))
     config = TrackerConfig.default(particles=rig.PARTICLES)

@@ -12,11 +12,11 @@ import lcm_rig as rig
 import numpy as np
 import pytest
 
-from gait.report.overlay import Overlay
 from gait.errors import UserError
 from gait.lcm.link import private_url
 from gait.lcm.messages import estimate_of
 from gait.lcm.viewer import Screen, Viewer
+from gait.report.drawing import Overlay
 
 
 @pytest.fixture

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from toy_segments import toy_blob, toy_prior
 
+from gait.camera.camera import Camera
 from gait.cli import lift_tracks, main
 from gait.cli.lift import PIXEL_SD
-from gait.camera.camera import Camera
+from gait.io.keypoints_file import Tracks, read, shared_place, write
 from gait.lift import motion, outliers, switches
-from gait.io import sentinels
-from gait.io.keypoints_file import Tracks, read, write
 
 FRAMES, MARKERS = 6, 12
 FRONT = (640, 480)
@@ -88,7 +87,7 @@ def test_minus_one_is_refused_as_zero_is(folder, capsys):
 def test_points_at_one_place_are_told(folder, capsys, joints, place, told):
     uv = pixels()
     uv[5:20, :joints] = place, place
-    assert (sentinels.suspected(uv) is not None) == told
+    assert (shared_place(uv) is not None) == told
     save("u.csv", uv)
     words = f"{15 * joints} points are at exactly {place:g}, {place:g}: if a detector"
     assert (words in lift(capsys, "u.csv", "cam.json")[1]) == told
@@ -99,7 +98,7 @@ def test_joints_may_meet():
     uv = np.tile(
         np.array([[10.0, 0], [12, 40], [12, 40], [12, 40], [11, 65], [11, 90], [11, 90]]), (50, 1, 1)
     )
-    assert sentinels.suspected(uv) is None
+    assert shared_place(uv) is None
 
 
 def test_an_unusual_stature_is_told(folder, capsys, monkeypatch):

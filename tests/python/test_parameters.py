@@ -9,16 +9,13 @@ from drawn_walker import DATA
 from walking_track import STANCE, STEP, walking_track
 
 from gait import Model, UserError
-from gait.body.model_curves import ModelCurves
 from gait.bindings.model import read_blob
+from gait.body.model_curves import ModelCurves
 from gait.io import blob
 from gait.io.fields import read_json
-from gait.motion.angle_cycles import angle_cycles
-from gait.motion.events import strikes_from_meta
-from gait.motion.footfall_draws import Draws
-from gait.motion.footfalls import SIDES, find_events, stride_time
-from gait.motion.parameters import QUANTITIES, measure
 from gait.io.track_file import read_truth
+from gait.motion.footfalls import SIDES, Draws, find_events, stride_time, strikes_from_meta
+from gait.motion.parameters import QUANTITIES, angle_cycles, measure
 
 MODEL = Model()
 CURVES = ModelCurves(blob.decode(read_blob(None)))

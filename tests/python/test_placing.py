@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gait import Camera, UserError
-from gait.cli import main
-from gait.camera.camera_file import read_camera
+from gait.camera.camera import read_camera
 from gait.camera.placing import Points, place
+from gait.cli import main
 
 LENS = {"width": 640, "height": 480, "fx": 700.0, "fy": 710.0, "cx": 321.0, "cy": 238.5}
 BENT = [-0.1, 0.05, 0.001, -0.002, 0.01]

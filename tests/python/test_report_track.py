@@ -11,10 +11,10 @@ from test_parameters import drawn
 from walking_track import walking_track, write_track
 
 from gait.cli import main
-from gait.report.colours import BLUE, ORANGE
-from gait.report.overlay import side_colour
-from gait.report.parameter_plots import path_plot
 from gait.motion.parameters import QUANTITIES, measure
+from gait.report.colours import BLUE, ORANGE
+from gait.report.drawing import side_colour
+from gait.report.parameter_plots import path_plot
 
 
 @pytest.fixture(scope="module")

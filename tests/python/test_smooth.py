@@ -10,15 +10,14 @@ from drawn_walker import camera, clip, state_at, wall, write
 
 from gait import Model, State, Tracker, TrackerConfig, UserError
 from gait.bindings.abi import Mode, TrackStatus
+from gait.bindings.model import read_blob
 from gait.body.model_curves import ModelCurves
 from gait.cli import main
-from gait.bindings.model import read_blob
-from gait.io.video import Frame
 from gait.io import blob
-from gait.motion.footfall_draws import Draws
 from gait.io.track_file import read_track
-from gait.track.smooth import Spool, draw_motions
-from gait.track.smoothed import Smoother, pose_all, smoothed
+from gait.io.video import Frame
+from gait.motion.footfalls import Draws
+from gait.track.smooth import Smoother, Spool, draw_motions, pose_all, smoothed
 from gait.track.transitions import Step, Transitions
 
 SECTIONS = blob.decode(read_blob(None))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gait.camera.camera import Camera
 from gait.errors import UserError
-from gait.io import delimited
+from gait.io.fields import table_rows
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def read_points(path: str | os.PathLike[str]) -> Points:
         One line naming file, line and remedy.
     """
     try:
-        rows = [row for row in delimited.rows(Path(path).read_text(encoding="utf-8-sig")) if row[1]]
+        rows = [row for row in table_rows(Path(path).read_text(encoding="utf-8-sig")) if row[1]]
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}; give a file with the columns u,v,x,y[,z]") from None
     except (UnicodeDecodeError, csv.Error):

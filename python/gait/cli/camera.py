@@ -13,8 +13,7 @@ import sys
 
 import numpy as np
 
-from gait.camera.camera import Camera
-from gait.camera.camera_file import read_camera
+from gait.camera.camera import Camera, read_camera
 from gait.camera.placing import place, read_points
 from gait.io.files import replacing, require_outputs
 

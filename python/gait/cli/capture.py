@@ -32,11 +32,8 @@ from gait.cli.ending import Ending
 from gait.errors import UsageError, UserError
 from gait.io.files import require_unread
 from gait.io.video import Frame, background, read_plate
-from gait.lcm.capture import Publisher, Setup
-from gait.lcm.link import buffer_warning, is_log, lcm_url
-from gait.lcm.log import log_of
-from gait.lcm.pacing import Pacer, parse_rate
-from gait.lcm.source import DeviceSource, FileSource, is_device
+from gait.lcm.capture import DeviceSource, FileSource, Pacer, Publisher, Setup, is_device, parse_rate
+from gait.lcm.link import buffer_warning, is_log, lcm_url, log_of
 from gait.progress import progress
 
 

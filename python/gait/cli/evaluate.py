@@ -26,7 +26,7 @@ from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.track_file import Joints, read_estimates, read_truth
 from gait.motion.evaluate import LOST_MM, Measures, evaluate
-from gait.motion.events import strikes_of
+from gait.motion.footfalls import strikes_of
 
 DRIFT = 0.1  # seconds by which times of paired frames may run apart
 

@@ -31,7 +31,7 @@ from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
 from gait.io.trc import write_trc
 from gait.lift import motion, result
-from gait.io import lifted_file
+from gait.io.track_file import write_lifted
 from gait.io.keypoints_file import FURTHEST, Tracks
 from gait.lift.uncertain import Uncertain
 
@@ -152,7 +152,7 @@ def run(args: argparse.Namespace) -> int:
         camera, jumps = bool(args.camera), int(mended["jumps"])
         for words in lift_doubts.of(found, tracks, options, prior.stature, camera, jumps):
             print(words, file=sys.stderr)
-    lifted_file.write(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
+    write_lifted(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
     if args.trc:
         write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
     summary = _summary(args, tracks, found) | mended | {"pixel_sd": pixel_sd}

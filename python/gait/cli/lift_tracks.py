@@ -14,11 +14,10 @@ from gait.errors import UserError
 from gait.camera.camera import Camera
 from gait.learn.corpus.stage import one_thread
 from gait.lift import motion, outliers, sides, switches
-from gait.io import sentinels
 from gait.io import keypoints_file as tracks_file
 from gait.lift.equations import Parallel, Perspective, View, looking_along
 from gait.lift.result import Motion, Options
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Tracks, shared_place
 from gait.progress import progress
 
 MOST_JUMPS, MOST_SPANS = 5, 4  # named
@@ -41,7 +40,7 @@ def read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, quiet:
 
 def _remarks(tracks: Tracks) -> Iterator[str]:
     """Tell what in tracks is no motion of one person."""
-    if found := sentinels.suspected(tracks.uv):
+    if found := shared_place(tracks.uv):
         (u, v), count = found
         yield (
             f"{count} points are at exactly {u:g}, {v:g}: if a detector puts there what it does not see, "

@@ -22,7 +22,7 @@ from gait.io.video import Video, VideoWriter, background, require_video_name
 from gait.io.blob import decode
 from gait.learn.corpus.stage import one_thread
 from gait.lift import suggest
-from gait.io import lifted_file
+from gait.io.track_file import write_lifted
 from gait.lift.phase_prior import Beginning
 from gait.lift.clip_segments import ClipSegments, Settings
 from gait.lift.cylinder import Figure
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     figure = Figure.fit(fit.places, prior.names)
     shown = [i for i, name in enumerate(prior.names) if name in JOINTS or args.all_markers]
     names = [prior.names[i] for i in shown]
-    lifted_file.write(args.output, fit.frame, fit.time, names, fit.places[:, shown], fit.sd[:, shown])
+    write_lifted(args.output, fit.frame, fit.time, names, fit.places[:, shown], fit.sd[:, shown])
     if args.overlay:
         _draw(args, video, clip, fit, figure)
     summary = _summary(clip, free, fit, figure, args.suggest or 0)

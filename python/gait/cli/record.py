@@ -21,8 +21,7 @@ from typing import Any
 
 from gait.cli import values
 from gait.io.files import require_outputs
-from gait.lcm.link import is_log, lcm_url
-from gait.lcm.log import log_of
+from gait.lcm.link import is_log, lcm_url, log_of
 from gait.lcm.record import ESTIMATE, LAGGED, Recorder
 
 LISTENING = "listening"

@@ -21,7 +21,7 @@ from gait.cli.values import between
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
 from gait.io.files import replacing, require_outputs
-from gait.report.strip import draw_room, draw_strip, room_camera
+from gait.report.drawing import draw_room, draw_strip, room_camera
 
 JSON = False
 

@@ -25,13 +25,13 @@ from gait.errors import UserError
 from gait.io.files import replacing, require_outputs
 from gait.io.track_file import Joints, Track, read_track, read_truth
 from gait.io.video import Image, Video, VideoWriter
-from gait.lcm.log import break_of
+from gait.lcm.link import break_of
 from gait.lcm.plots import Comparison, compare, error_plot, gait_plot, path_plot, phase_plot, time_plot
-from gait.lcm.results import Run, read_run
+from gait.lcm.record import Run, read_run
 from gait.motion.evaluate import Measures, evaluate
-from gait.motion.events import Strikes, strikes_of
+from gait.motion.footfalls import Strikes, strikes_of
 from gait.progress import progress
-from gait.report.overlay import Overlay
+from gait.report.drawing import Overlay
 from gait.report.page import Page
 
 _PICTURES = 6

@@ -19,10 +19,19 @@ from gait.body.model_curves import ModelCurves
 from gait.errors import UserError
 from gait.io.files import filling, require_folder
 from gait.io.track_file import Track, read_track
-from gait.motion import parameter_files
-from gait.motion.angle_cycles import AngleCycle, angle_cycles
-from gait.motion.footfall_draws import Draws
-from gait.motion.parameters import QUANTITIES, Parameters, measure
+from gait.motion.footfalls import Draws
+from gait.motion.parameters import (
+    QUANTITIES,
+    AngleCycle,
+    Parameters,
+    angle_cycles,
+    as_json,
+    curve_rows,
+    measure,
+    stride_rows,
+    write_csv,
+    write_json,
+)
 from gait.report.page import Page
 from gait.report.parameter_plots import angle_plot, deviation_plot, footfall_plot, path_plot, stride_plot
 
@@ -53,12 +62,12 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f"{args.track}: {exc}") from None
     norm = ModelCurves(read_cyclic(args.model))
     cycles = angle_cycles(track, parameters, norm, draws)
-    found = parameter_files.as_json(track, parameters, cycles)
+    found = as_json(track, parameters, cycles)
     with filling(output) as folder:
-        parameter_files.write_json(folder / "parameters.json", found)
-        parameter_files.write_csv(folder / "events.csv", found["events"])
-        parameter_files.write_csv(folder / "strides.csv", list(parameter_files.strides(parameters)))
-        parameter_files.write_csv(folder / "curves.csv", list(parameter_files.curves(cycles)))
+        write_json(folder / "parameters.json", found)
+        write_csv(folder / "events.csv", found["events"])
+        write_csv(folder / "strides.csv", list(stride_rows(parameters)))
+        write_csv(folder / "curves.csv", list(curve_rows(cycles)))
         page = _page(source.name, track, parameters, cycles)
         (folder / "report.html").write_text(page, encoding="utf-8")
     print(json.dumps(found, allow_nan=False) if args.json else _text(parameters))

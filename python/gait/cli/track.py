@@ -50,11 +50,11 @@ from gait.io.track_file import TrackWriter
 from gait.io.trc import write_trc
 from gait.io.video import Frame, Image, Video, VideoWriter, background
 from gait.progress import progress
-from gait.report.overlay import Overlay
+from gait.report.drawing import Overlay
 from gait.track.auto_start import Spotter, find_start
 from gait.track.config import TrackerConfig
 from gait.track.person_detection import another_scene, one_is_grey
-from gait.track.smoothed import Smoother
+from gait.track.smooth import Smoother
 from gait.track.tracker import Tracker
 
 TRACKS_SD = 4.0  # pixels

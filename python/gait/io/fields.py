@@ -1,7 +1,8 @@
-"""Checked access to the keys of small input files: every fault is one line naming file, key and remedy."""
+"""Checked reading of JSON objects and delimited tables: a fault is one line naming file, key and remedy."""
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
@@ -211,3 +212,25 @@ def frame_numbers(path: str | os.PathLike[str], column: NDArray[np.float64]) -> 
             f"{_LAST_FRAME}"
         )
     return column.astype(np.int64)
+
+
+DELIMITERS = ",;\t"
+
+
+def table_rows(text: str) -> list[tuple[int, list[str]]]:
+    """Cells of each row, with its line number; what occurs most in the first line separates them.
+
+    Where that is a semicolon, commas below the header are decimal points.
+
+    Raises
+    ------
+    csv.Error
+        If it is no such text.
+    """
+    first = text.split("\n", 1)[0]
+    delimiter = max(DELIMITERS, key=first.count)
+    reader = csv.reader(text.splitlines(), delimiter=delimiter)
+    found = [(reader.line_num, row) for row in reader]
+    if delimiter == ";":
+        found[1:] = [(line, [cell.replace(",", ".") for cell in row]) for line, row in found[1:]]
+    return found

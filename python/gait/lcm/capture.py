@@ -1,25 +1,233 @@
-"""Send frames, calibration, empty scene and start to a tracker."""
+"""Send frames, calibration, empty scene and start to a tracker, at the rate the frames were taken."""
 
 from __future__ import annotations
 
+import queue
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
 
 from gait.bindings.initial import Start
 from gait.camera.camera import Camera
-from gait.errors import UserError
-from gait.io.video import Frame, Image
-from gait.lcm.ahead import ahead
-from gait.lcm.link import handle, publisher
-from gait.lcm.log import LogWriter
+from gait.errors import UsageError, UserError
+from gait.io.video import Frame, Image, Video
+from gait.lcm.link import LogWriter, gaitmsg, handle, now, publisher
 from gait.lcm.messages import camera_message, command_message, decode, image_message
-from gait.lcm.pacing import Pacer
-from gait.lcm.source import DeviceSource, FileSource
-from gait.lcm.types import gaitmsg
+
+
+class FileSource:
+    """Frames `start` <= index < `stop` of a video file, once or for ever.
+
+    Attributes
+    ----------
+    video : Video
+    size : (int, int)
+        Width and height, pixels.
+    first : float
+        Video time of frame `start`, seconds.
+    """
+
+    live = False
+
+    def __init__(
+        self, path: str, start: int = 0, stop: int | None = None, *, grey: bool = False, loop: bool = False
+    ) -> None:
+        self.video = Video(path)
+        self.size = self.video.size
+        self._start, self._stop, self._grey, self._loop = start, stop, grey, loop
+        self.first = self.time_of(start)
+
+    def time_of(self, index: int) -> float:
+        """Video time of one frame, seconds, exactly as `frames` gives it."""
+        for frame in self.video.frames(index, index + 1, grey=True):
+            return frame.time
+        raise UserError(f"{self.video.path}: has no frame {index}; it has {self.video.count}, counted from 0")
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield the frames; numbers and times go on through repetitions, one frame interval apart."""
+        shift_number, shift_time = 0, 0.0
+        while True:
+            number = time_ = None
+            for index, seconds, image in self.video.frames(self._start, self._stop, grey=self._grey):
+                number, time_ = index + shift_number, seconds + shift_time
+                yield Frame(number, time_, image)
+            if not self._loop or number is None or time_ is None:
+                return
+            shift_number = number + 1 - self._start
+            shift_time = time_ + 1 / self.video.fps - self.first
+
+
+class DeviceSource:
+    """A camera of this machine by number or path (/dev/video0).
+
+    A frame is stamped when it is grabbed; video time counts from when the device was opened.
+    """
+
+    live = True
+
+    def __init__(self, device: str, *, grey: bool = False) -> None:
+        self._name, self._grey = device, grey
+        self._capture = cv2.VideoCapture(int(device) if device.isdigit() else device)
+        if not self._capture.isOpened():
+            raise UserError(f"{device}: no such camera or it is in use; give a video file or a device")
+        self._opened = time.monotonic()
+        width, height = (
+            int(self._capture.get(k)) for k in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        )
+        self.size = width, height
+
+    @property
+    def first(self) -> float:
+        """Video time of a frame grabbed now, seconds."""
+        return time.monotonic() - self._opened
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield frames until the device ends."""
+        number = 0
+        while self._capture.grab():
+            seconds = time.monotonic() - self._opened
+            ok, image = self._capture.retrieve()
+            if not ok:
+                break
+            pixels = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if self._grey else image
+            yield Frame(number, seconds, np.asarray(pixels, np.uint8))
+            number += 1
+        raise UserError(f"{self._name}: gives no more frames; is it unplugged?")
+
+
+def is_device(name: str) -> bool:
+    """Tell a camera of this machine from a file."""
+    return name.isdigit() or Path(name).is_char_device()
+
+
+_MAX_HZ = 1000.0
+
+
+class Pacer:
+    """When to send each frame, and which capture time to write on it.
+
+    Capture times always follow the video's own clock; only the sending is faster or slower.
+
+    Parameters
+    ----------
+    rate : float or None
+        Frames per second; None: as the video was taken; infinity: no waiting.
+    first : float
+        Video time of the first frame, seconds.
+    lead : float
+        Seconds from now until the first frame is due.
+
+    Attributes
+    ----------
+    origin : int
+        Capture time of video time 0, microseconds since the Unix epoch.
+    late : float
+        Largest delay of a frame behind its deadline, seconds.
+    """
+
+    def __init__(
+        self,
+        rate: float | None = None,
+        first: float = 0.0,
+        lead: float = 0.0,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._rate, self._first = rate, first
+        self._clock, self._sleep = clock, sleep
+        self._begin = clock() + lead
+        self._sent = 0
+        self.origin = now() + round((lead - first) * 1e6)
+        self.late = 0.0
+
+    def utime(self, video_time: float) -> int:
+        """Capture time of a frame `video_time` seconds into the video."""
+        return self.origin + round(video_time * 1e6)
+
+    def wait(self, video_time: float) -> None:
+        """Return when the frame at `video_time` seconds is due; at once if it is late."""
+        after = video_time - self._first if self._rate is None else self._sent / self._rate
+        self._sent += 1
+        delay = self._begin + after - self._clock()
+        if delay > 0:
+            self._sleep(delay)
+        elif self._rate != float("inf"):
+            self.late = max(self.late, -delay)
+
+
+def parse_rate(text: str) -> float | None:
+    """Read ``true``, ``max`` or a number of frames per second, for `Pacer`."""
+    if text == "true":
+        return None
+    if text == "max":
+        return float("inf")
+    try:
+        hertz = float(text)
+    except ValueError:
+        hertz = 0.0
+    if not 0 < hertz <= _MAX_HZ:
+        raise UsageError(f"--rate {text}: give true, max or frames per second up to {_MAX_HZ:g}")
+    return hertz
+
+
+T = TypeVar("T")
+_TURN = 0.1  # seconds until a full queue is looked at again
+
+
+class _End:
+    """Last entry of the queue: how the source ended."""
+
+    def __init__(self, reason: BaseException | None) -> None:
+        self.reason = reason
+
+
+def ahead(source: Iterable[T], room: int) -> Iterator[T]:
+    """Yield the items of `source`, which another thread draws up to `room` items early.
+
+    An exception of the source is raised here, after the items before it.
+    """
+    waiting: queue.Queue[T | _End] = queue.Queue(room)
+    left = threading.Event()
+
+    def put(item: T | _End) -> bool:
+        while not left.is_set():
+            try:
+                waiting.put(item, timeout=_TURN)
+            except queue.Full:
+                continue
+            return True
+        return False
+
+    def work() -> None:
+        reason: BaseException | None = None
+        try:
+            for item in source:
+                if not put(item):
+                    return
+        except BaseException as exc:  # whatever it is belongs to the one who asked
+            reason = exc
+        put(_End(reason))
+
+    thread = threading.Thread(target=work, name="ahead", daemon=True)
+    thread.start()
+    try:
+        while not isinstance(item := waiting.get(), _End):
+            yield item
+        if item.reason is not None:
+            raise item.reason
+    finally:
+        left.set()
+        thread.join()
+
 
 ANNOUNCE = 2.0  # seconds of video between two announcements of camera and empty scene
 _AHEAD = 8  # frames decoded before they are due

@@ -1,18 +1,138 @@
-"""Connections to LCM: the URL in force, and one line instead of pages when there is no multicast route."""
+"""Connections to LCM and its logs, and the message classes that are generated from lcm_types/."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import select
 import socket
+import struct
 import sys
+import time
 from collections.abc import Iterator
+from importlib import import_module
+from io import BufferedWriter, FileIO
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from gait.errors import UsageError, UserError
-from gait.lcm.log import PREFIX, LogWriter, break_of, log_of
-from gait.lcm.types import generated
+
+_HERE = Path(__file__).resolve().parent
+_PLACES = (_HERE.parent / "lib", _HERE.parents[2] / "build" / "lcm" / "python")
+"""Folders that may hold ``gaitmsg``: of an installed package, of the source tree."""
+
+
+@functools.cache
+def generated() -> ModuleType:
+    """Import the package.
+
+    Raises
+    ------
+    UserError
+        If it has not been generated.
+    """
+    for place in (None, *_PLACES):
+        if place is not None:
+            if not (place / "gaitmsg" / "__init__.py").is_file():
+                continue
+            sys.path.append(str(place))
+        try:
+            return import_module("gaitmsg")
+        except ModuleNotFoundError:
+            continue
+    raise UserError(f"gaitmsg: no generated LCM types in {_PLACES[-1]}; run make tools")
+
+
+class _OnUse:
+    """The package, imported when a class is asked for: the words of ``--help`` need none."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(generated(), name)
+
+
+gaitmsg = _OnUse()
+
+PREFIX = "file://"
+_SYNC = 0xEDA1DA01
+_HEAD = struct.Struct(">Iqqii")  # sync, number, time, lengths of channel and data
+_LONGEST = 1000  # bytes of a channel's name at which LCM stops
+
+
+def log_of(url: str) -> tuple[str, str]:
+    """Path and mode (``r``, ``w``, ``a``, or empty if it is none of them) of a log's URL, as LCM reads it."""
+    path, _, options = url.removeprefix(PREFIX).partition("?")
+    modes = [word.removeprefix("mode=") for word in options.split("&") if word.startswith("mode=")]
+    mode = modes[-1] if modes else "r"
+    return path, mode if mode in ("r", "w", "a") else ""
+
+
+def break_of(path: str | os.PathLike[str]) -> str | None:
+    """Say where a log that is not whole breaks off, None of one that is."""
+    size, at, events = Path(path).stat().st_size, 0, 0
+    with open(path, "rb") as file:
+        while at < size:
+            head = file.read(_HEAD.size)
+            if len(head) < _HEAD.size:
+                break
+            sync, _, _, channel, data = _HEAD.unpack(head)
+            end = at + _HEAD.size + channel + data
+            if sync != _SYNC or not 0 < channel < _LONGEST or data < 0 or end > size:
+                break
+            file.seek(end)
+            at, events = end, events + 1
+    return None if at == size else f"the log is damaged or breaks off at byte {at}, messages before: {events}"
+
+
+class LogWriter:
+    """A log, event by event.
+
+    Parameters
+    ----------
+    path : path
+    mode : str
+        ``w``: new, ``a``: at its end.
+    name : str, optional
+        Of the file for messages, where it is written under another one.
+
+    Raises
+    ------
+    UserError
+        As all methods do, if the log cannot be written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], mode: str = "w", name: str | None = None) -> None:
+        self._name, self._events = name or path, 0
+        try:
+            self._file = BufferedWriter(FileIO(path, mode))
+        except OSError as error:
+            raise self._fault(error) from None
+
+    def write(self, utime: int, channel: str, data: bytes) -> None:
+        """Append an event of time `utime`, microseconds since the Unix epoch."""
+        name = channel.encode("utf-8")
+        try:
+            self._file.write(_HEAD.pack(_SYNC, self._events, utime, len(name), len(data)) + name)
+            self._file.write(data)
+        except OSError as error:
+            raise self._fault(error) from None
+        self._events += 1
+
+    def publish(self, channel: str, data: bytes) -> None:
+        """Append a message, dated now, as LCM publishes into a log."""
+        self.write(now(), channel, data)
+
+    def close(self) -> None:
+        """Write what waits, and close."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise self._fault(error) from None
+
+    def _fault(self, error: OSError) -> UserError:
+        return UserError(f"{self._name}: the log cannot be written: {error.strerror}")
+
 
 try:
     import lcm
@@ -27,6 +147,11 @@ DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
 ROUTE_REMEDY = "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
 _RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
 _RMEM_ENOUGH = 1 << 20
+
+
+def now() -> int:
+    """Wall clock, microseconds since the Unix epoch."""
+    return time.time_ns() // 1000
 
 
 def lcm_url(url: str | None = None) -> str:

@@ -17,15 +17,10 @@ from gait.bindings.state import POSE_SCALARS, State
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Image
-from gait.lcm.types import gaitmsg
+from gait.lcm.link import gaitmsg
 
 _FRAME_KEY = "frame"
 _UNKNOWN = math.nan
-
-
-def now() -> int:
-    """Wall clock, microseconds since the Unix epoch."""
-    return time.time_ns() // 1000
 
 
 def decode(kind: Any, data: bytes, channel: str) -> Any:

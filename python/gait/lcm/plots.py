@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gait.bindings.abi import TrackStatus
 from gait.io.track_file import Joints, Track
-from gait.lcm.results import Run
+from gait.lcm.record import Run
 from gait.motion.evaluate import root_errors
-from gait.motion.events import Strikes
+from gait.motion.footfalls import Strikes
 from gait.report.colours import BLUE, GREY, ORANGE
 
 Array = NDArray[np.float64]

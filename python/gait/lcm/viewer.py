@@ -15,10 +15,9 @@ from gait.bindings.model import Model
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Image
-from gait.lcm.link import handle, is_log, listener
+from gait.lcm.link import gaitmsg, handle, is_log, listener
 from gait.lcm.messages import camera_of, decode, estimate_of, picture
-from gait.lcm.types import gaitmsg
-from gait.report.overlay import Overlay
+from gait.report.drawing import Overlay
 
 _KEPT = 64  # frames that wait for their estimate
 _PART = "gait-frame"

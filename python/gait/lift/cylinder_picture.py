@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
-from gait.report.overlay import draw_bones, tinted
+from gait.report.drawing import draw_bones, tinted
 from gait.io.video import Image
 from gait.lift.cylinder import LIMBS
 from gait.lift.corrections import Correction

@@ -1,4 +1,7 @@
-"""Errors of a track against the truth."""
+"""Errors of a track against the truth: joints, phase, picture, intervals, and two baselines without images.
+
+The baselines are a standing mean pose and a mean cycle that runs on from the true start.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +9,158 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
+from scipy.stats import chisquare
 
+from gait.body import skeleton
 from gait.body.skeleton import EVAL15
 from gait.camera.camera import Camera
 from gait.errors import UserError
+from gait.io.blob import unpack_names
 from gait.io.track_file import STATUSES, Joints, Track
-from gait.motion.baselines import free_run, static_pose
-from gait.motion.events import Strikes
-from gait.motion.interval_coverage import calibration, coverage
+from gait.motion.footfalls import STRIDE, Strikes, walking_direction
 
 Array = NDArray[np.float64]
+
+HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
+_PHASES = np.arange(64) / 64
+_BONES = [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("hip", "knee"), ("knee", "ankle"))]
+_BONES += [(f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elbow"), ("elbow", "wrist"))]
+
+
+def static_pose(model: dict[str, Any], truth: Joints) -> Array:
+    """Mean pose of the model at the true hip midpoint and walking direction, EVAL15 (n, 15, 3).
+
+    Parameters
+    ----------
+    model : dict
+        Sections of the blob.
+    truth : Joints
+        Gives place, direction and the stature that fits its limbs.
+    """
+    joints = _poses(model, _PHASES, stature(model, truth)).mean(axis=0)
+    joints -= joints[HIPS].mean(axis=0)
+    turned = np.einsum("nij,pj->npi", _turns(truth), joints)
+    return np.asarray(turned + _hip_midpoint(truth)[:, None])
+
+
+def free_run(model: dict[str, Any], truth: Joints, strikes: Strikes, first: int) -> Array | None:
+    """Mean cycle running on from the true state at row `first` of the truth, EVAL15 (n, 15, 3).
+
+    Place, direction, phase and stride rate are the truth's at that row, then nothing is looked at.
+    None if the phase is unknown.
+    """
+    cycles = strikes.cycles(np.append(truth.frame[first], truth.frame[first] + 1))
+    if cycles is None:
+        return None
+    advance = (truth.frame - truth.frame[first]) * (cycles[1] - cycles[0])
+    size = stature(model, truth)
+    stride = (truth.time[-1] - truth.time[0]) / (advance[-1] - advance[0])
+    joints = _poses(model, cycles[0] + advance, size, 1 / stride)
+    joints += size * root_path(model, cycles[0] + advance, 1 / stride)[:, None]
+    joints = np.einsum("ij,npj->npi", _turns(truth, stride)[first], joints)
+    return np.asarray(joints - joints[first, HIPS].mean(axis=0) + _hip_midpoint(truth)[first])
+
+
+def stature(model: dict[str, Any], truth: Joints) -> float:
+    """Stature in metres at which the model's limbs are as long together as the truth's."""
+    joints = dict(zip(EVAL15, np.moveaxis(_poses(model, _PHASES[:1], 1.0), 1, 0), strict=True))
+    lengths = [
+        sum(float(np.median(np.linalg.norm(at[a] - at[b], axis=1))) for a, b in _BONES)
+        for at in (truth.places, joints)
+    ]
+    return lengths[0] / lengths[1]
+
+
+def _poses(model: dict[str, Any], phase: Array, size: float, rate: float = 0.0) -> Array:
+    """EVAL15 (n, 15, 3) of the mean cycle heading along x with the pelvis at the origin."""
+    joints, _ = skeleton.pose(model, phase, np.zeros(0), size, 0.0, 0.0, 0.0, np.zeros(3), stride_hz=rate)
+    names = unpack_names(model["PTNM"])
+    return joints[:, [names.index(name) for name in EVAL15]]
+
+
+def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:
+    """Pelvis (n, 3) of the mean cycle in statures against phase in strides, wherever it began.
+
+    rate : strides per second, which the mean cycle follows; 0: the mean rate.
+    """
+    names = unpack_names(model["CHNM"])
+    columns = [names.index(f"root_{name}") for name in ("forward", "sway", "height")]
+    fine = np.linspace(cycles.min(), cycles.max(), 64 * int(np.ptp(cycles) + 2))
+    speed, sway, height = skeleton.curves(model, fine, np.zeros((len(fine), 0)), rate)[:, columns].T
+    steps = np.diff(fine) * 0.5 * (speed[1:] + speed[:-1])
+    forward = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.stack([np.interp(cycles, fine, path) for path in (forward, sway, height)], axis=1)
+
+
+def _turns(truth: Joints, stride: float = STRIDE) -> Array:
+    """Rotations (n, 3, 3) from x forward, y left, z up to the world."""
+    forward = walking_direction(truth, stride)
+    up = np.broadcast_to([0.0, 0.0, 1.0], forward.shape)
+    return np.stack([forward, np.cross(up, forward), up], axis=2)
+
+
+def _hip_midpoint(truth: Joints) -> Array:
+    return 0.5 * (truth.places["l_hip"] + truth.places["r_hip"])
+
+
+APART = 15  # frames between two that count as independent
+_BINS = 10
+_HALF = {"50": 0.6744898, "90": 1.6448536}  # half-widths of normal intervals, standard deviations
+_TINY = 1e-9  # metres; a deviation of 0 is a claim to be exact
+
+
+def coverage(found: Array, sd: Array, true: Array) -> dict[str, float]:
+    """Share of the coordinates inside the normal 50 % and 90 % intervals.
+
+    Parameters
+    ----------
+    found, sd, true : ndarray of the same shape
+        Estimate, its standard deviation, truth.
+    """
+    off = np.abs(found - true)
+    return {level: float((off <= half * sd).mean()) for level, half in _HALF.items()}
+
+
+def calibration(found: Array, sd: Array, true: Array) -> dict[str, Any]:
+    """Measures of the intervals beyond their coverage.
+
+    Parameters
+    ----------
+    found, sd, true : ndarray of shape (n, 15, 3)
+        EVAL15 in metres, frame by frame.
+
+    Returns
+    -------
+    dict
+        ``pit``: shares of 10 equal bins of the probability integral transform over frames `APART` apart,
+        ``pit_chi2`` their chi-square statistic against flat and ``pit_p`` its p-value as if coordinates were
+        independent (they are not: read it as a ranking); ``z2``: mean squared error in variances, 1 where the
+        deviations are right; ``crps_mm``: continuous ranked probability score of a normal (Gneiting and
+        Raftery 2007), lower is better; ``width_mm``: mean width of the 90 % intervals.
+    """
+    z = (true - found) / np.maximum(sd, _TINY)
+    counts, _ = np.histogram(ndtr(z[::APART]), _BINS, (0.0, 1.0))
+    flat = chisquare(counts)
+    return {
+        "pit": (counts / counts.sum()).tolist(),
+        "pit_chi2": float(flat.statistic),
+        "pit_p": float(flat.pvalue),
+        "z2": float(np.mean(z**2)),
+        "crps_mm": 1000 * float(crps(z, sd).mean()),
+        "width_mm": 1000 * float(2 * _HALF["90"] * sd.mean()),
+    }
+
+
+def crps(z: Array, sd: Array) -> Array:
+    """Continuous ranked probability score of normals of deviation `sd`, missed by `z` deviations."""
+    density = np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
+    return np.asarray(sd * (z * (2 * ndtr(z) - 1) + 2 * density - 1 / np.sqrt(np.pi)))
+
+
 Measures = dict[str, Any]
 
 LOST_MM = 150.0
-HIPS = [EVAL15.index("l_hip"), EVAL15.index("r_hip")]
 BODY = [i for i, name in enumerate(EVAL15) if name != "pelvis"]
 LIMBS = [i for i, name in enumerate(EVAL15) if name not in ("pelvis", "neck", "head_top")]
 
@@ -53,7 +194,7 @@ def evaluate(
         ``root12``: as ``root`` over shoulders, elbows, wrists, hips, knees and ankles, the joints that 2-D
         pose networks have; ``proc``: after the best rotation, scale and shift of every frame, to compare
         with literature only; ``status``, ``trust`` (see `trust`); ``calibration`` (see
-        `gait.motion.interval_coverage`).
+        `gait.motion.evaluate`).
 
     Raises
     ------

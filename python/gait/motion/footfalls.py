@@ -1,20 +1,152 @@
-"""Where and when the feet of a tracked walker meet and leave the ground.
+"""Where and when the feet of a walking person meet and leave the ground, and how sure that is.
 
-Strikes are where the heel is furthest ahead of the pelvis along the walking direction, toe-offs where the
-toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).
+Heel strikes are where the heel is furthest ahead of the pelvis along the walking direction, toe-offs where
+the toe is furthest behind it (Zeni et al. 2008, Gait & Posture 27:710).
+
+Uncertainty is carried by draws.  With the motions of ``gait track --draws`` each draw is a whole motion, so
+errors that last are the same at both ends of a stride, as they should be.  A track alone has only the
+standard deviations of each frame: then strikes, toe-offs and places are drawn independently, which makes the
+parameters less certain where errors last.
 """
 
 from __future__ import annotations
 
+import os
+import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import find_peaks
 
-from gait.io.track_file import Joints
-from gait.motion.events import furthest, walking_direction
+from gait.errors import UserError
+from gait.io.fields import Fields, read_json
+from gait.io.files import replacing
+from gait.io.track_file import Joints, Track
 
 Array = NDArray[np.float64]
+
+STRIDE = 1.1  # seconds, where the true one is not known
+_APART = 0.5  # seconds between strikes of one foot, at least
+_REACH = 0.1  # metres that a foot swings past the pelvis, at least
+
+
+@dataclass(frozen=True)
+class Strikes:
+    """Heel strikes as fractional frame numbers, increasing."""
+
+    right: Array
+    left: Array
+
+    def phase(self, frames: ArrayLike) -> Array | None:
+        """Phase [0, 1) at frame numbers (n,): linear between strikes; None if fewer than two are known.
+
+        Right strikes are phase 0.  Left strikes, near but not at 0.5, serve only if right ones are too few.
+        """
+        cycles = self.cycles(frames)
+        return None if cycles is None else cycles % 1.0
+
+    def cycles(self, frames: ArrayLike) -> Array | None:
+        """Return phase without wrapping, in strides; beyond the first and last strike the rate goes on."""
+        at: Array = self.right
+        count: Array = np.arange(len(self.right), dtype=float)
+        if len(at) < 2:
+            at, count = self._both()
+        if len(at) < 2:
+            return None
+        frames = np.asarray(frames, float)
+        piece = np.clip(np.searchsorted(at, frames, side="right") - 1, 0, len(at) - 2)
+        share = (frames - at[piece]) / (at[piece + 1] - at[piece])
+        return np.asarray(count[piece] + share * (count[piece + 1] - count[piece]))
+
+    def _both(self) -> tuple[Array, Array]:
+        """Strikes of both feet, half a stride from one to the next."""
+        at = np.concatenate([self.right, self.left])
+        order = np.argsort(at)
+        is_left = np.concatenate([np.zeros(len(self.right), bool), np.ones(len(self.left), bool)])[order]
+        first = 0.5 if len(at) and is_left[0] else 0.0
+        return at[order], first + 0.5 * np.arange(len(at), dtype=float)
+
+
+def strikes_of(truth: Joints, meta: Path) -> Strikes:
+    """Strikes that the file `meta` lists, if it is there and lists any, else those found in the truth."""
+    known = strikes_from_meta(meta) if meta.is_file() else None
+    return known or strikes_by_zeni(truth)
+
+
+def strikes_from_meta(path: str | os.PathLike[str]) -> Strikes | None:
+    """Strikes from the ``events_video_frames`` of a clip's meta.json; None if it has none."""
+    events = read_json(path, "meta").table("events_video_frames", "give lists of heel strikes")
+    if "r_heel_strike" not in events or "l_heel_strike" not in events:
+        return None
+    return Strikes(_times(events, "r_heel_strike"), _times(events, "l_heel_strike"))
+
+
+def strikes_by_zeni(truth: Joints) -> Strikes:
+    """Strikes where a heel is furthest ahead of the pelvis along the walking direction (Zeni et al. 2008).
+
+    Where the truth has no heels the ankles serve.
+    """
+    ahead = walking_direction(truth)
+    pelvis = truth.places["pelvis"]
+    right, left = (
+        _strikes(truth, np.sum((_foot(truth, side) - pelvis) * ahead, axis=1)) for side in ("r", "l")
+    )
+    return Strikes(right, left)
+
+
+def walking_direction(truth: Joints, stride: float = STRIDE) -> Array:
+    """Return the unit direction of travel along the ground at each frame, shape (n, 3).
+
+    It is the way of the pelvis over one stride of `stride` seconds around the frame, over which the sway of
+    the pelvis cancels; near the ends, over the first and last stride.
+    """
+    time, pelvis = truth.time, truth.places["pelvis"][:, :2]
+    early = np.clip(time - stride / 2, time[0], max(time[0], time[-1] - stride))
+    late = np.minimum(early + stride, time[-1])
+    way = np.zeros((len(time), 3))
+    for axis in range(2):
+        way[:, axis] = np.interp(late, time, pelvis[:, axis]) - np.interp(early, time, pelvis[:, axis])
+    return np.asarray(way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12))
+
+
+def _foot(truth: Joints, side: str) -> Array:
+    return truth.places.get(f"{side}_heel", truth.places[f"{side}_ankle"])
+
+
+def furthest(time: Array, reach: Array) -> Array:
+    """Return the times of the maxima of `reach`, refined by the parabola through three frames.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n,)
+    reach : ndarray of shape (n,)
+        Metres that a foot is ahead of the pelvis (or behind it, to find toe-offs).
+    """
+    step = float(np.median(np.diff(time)))
+    peaks, _ = find_peaks(reach, height=_REACH, distance=max(1, round(_APART / step)))
+    before, top, after = reach[peaks - 1], reach[peaks], reach[peaks + 1]
+    bend = before - 2 * top + after
+    shift = np.where(bend < 0, 0.5 * (before - after) / np.where(bend < 0, bend, 1), 0.0)
+    return np.interp(peaks + shift, np.arange(len(reach)), time)
+
+
+def _strikes(truth: Joints, reach: Array) -> Array:
+    """Fractional frame numbers of the strikes of a foot that is `reach` (n,) metres ahead."""
+    return np.interp(furthest(truth.time, reach), truth.time, truth.frame.astype(float))
+
+
+def _times(events: Fields, key: str) -> Array:
+    """Increasing strike times of one foot."""
+    remedy = "give a list of increasing frame numbers"
+    times = events.array(key, (events.count(key, remedy),), remedy)
+    if (np.diff(times) <= 0).any():
+        raise events.fail(key, "does not increase", remedy)
+    return times
+
+
 SIDES = ("right", "left")
 
 _STANCE = np.linspace(0.10, 0.30, 5)  # of a stride after the strike: the foot is flat
@@ -143,3 +275,140 @@ def _flat(time: Array, heel: Array, strike: Array, stride: float) -> Array:
         if len(when):
             out[k] = at(time, heel, when).mean(axis=0)
     return out
+
+
+_COUNT = 500  # independent draws; deviations are then known to 3 %
+_FLAT = 0.2  # of a stride after the strike
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Motions drawn from the posterior of a whole clip.
+
+    Attributes
+    ----------
+    frame : ndarray of int, shape (n,)
+    time : ndarray of shape (n,)
+        Seconds.
+    joint_names, angle_names : tuple of str
+        Of P joints and A angles.
+    joints : ndarray of float32, shape (D, n, P, 3)
+        Metres, world.
+    angles : ndarray of float32, shape (D, n, A)
+        Radians.
+    phase : ndarray of float32, shape (D, n)
+        [0, 1) of the stride.
+    """
+
+    frame: NDArray[np.int64]
+    time: Array
+    joint_names: tuple[str, ...]
+    angle_names: tuple[str, ...]
+    joints: NDArray[np.float32]
+    angles: NDArray[np.float32]
+    phase: NDArray[np.float32]
+
+    def motion(self, draw: int) -> Joints:
+        """One of the motions."""
+        places = {name: self.joints[draw, :, i].astype(float) for i, name in enumerate(self.joint_names)}
+        return Joints(self.frame, self.time, places)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write a compressed .npz file."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        with replacing(path) as temporary, open(temporary, "wb") as file:
+            np.savez_compressed(file, **{k: np.asarray(v) for k, v in arrays.items()}, allow_pickle=False)
+
+    @staticmethod
+    def read(path: str | os.PathLike[str], track: Track) -> Draws:
+        """Read a file of `write` that must be of the same frames as `track`."""
+        if not Path(path).is_file():
+            raise UserError(f"{path}: no such file of draws; gait track --smooth --draws writes it")
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                arrays = {name: stored[name] for name in _ARRAYS}
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+            raise UserError(f"{path}: not a file of draws; gait track --smooth --draws writes it") from None
+        for name in ("joint_names", "angle_names"):
+            arrays[name] = tuple(str(word) for word in arrays[name])
+        draws = Draws(**arrays)
+        if not np.array_equal(draws.frame, track.frame):
+            raise UserError(f"{path}: its frames are not those of the track; give the draws made with it")
+        return draws
+
+
+_ARRAYS = ("frame", "time", "joint_names", "angle_names", "joints", "angles", "phase")
+
+
+def draw_contacts(
+    track: Track, events: Events, feet: Mapping[str, Contacts], stride: float, draws: Draws | None
+) -> tuple[dict[str, Contacts], Events, str]:
+    """Draws of the contacts by side, shape (D, ...); deviations of the events; and where they come from."""
+    if draws is not None:
+        return (*_of_motions(draws, events, stride), f"{len(draws.phase)} motions drawn from the posterior")
+    if "phase_sd" not in track.numbers:
+        nothing = {side: stack([_nan_like(feet[side])]) for side in SIDES}
+        return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
+    return (
+        *_of_deviations(track, events, feet, stride),
+        "the deviations of each frame, taken as independent",
+    )
+
+
+def _of_motions(draws: Draws, events: Events, stride: float) -> tuple[dict[str, Contacts], Events]:
+    motions = [draws.motion(d) for d in range(len(draws.phase))]
+    found = [same_events(find_events(motion), events) for motion in motions]
+    drawn = {
+        side: stack([contacts(m, e, side, stride) for m, e in zip(motions, found, strict=True)])
+        for side in SIDES
+    }
+    return drawn, _event_sd(found)
+
+
+def _of_deviations(
+    track: Track, events: Events, feet: Mapping[str, Contacts], stride: float
+) -> tuple[dict[str, Contacts], Events]:
+    """Draw each event as sure as the phase is then, its place as sure as the heel."""
+    random = np.random.default_rng(0)
+    time, rate = track.time, np.maximum(track.numbers["stride_hz"], 0.1)
+    late = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # no less sure than knowing nothing
+
+    def timing(when: Array) -> Array:
+        return np.interp(when, time, late)
+
+    def noisy(value: Array, sd: Array) -> Array:
+        return np.asarray(value + sd * random.standard_normal((_COUNT, *value.shape)))
+
+    drawn = {}
+    for side in SIDES:
+        foot = feet[side]
+        heel_sd, pelvis_sd = track.sd[f"{side[0]}_heel"], track.sd["pelvis"]
+        drawn[side] = Contacts(
+            noisy(foot.strike, timing(foot.strike)),
+            noisy(foot.off, timing(foot.off)),
+            noisy(foot.place, at(time, heel_sd, foot.strike + _FLAT * stride)),
+            noisy(foot.pelvis, at(time, pelvis_sd, foot.strike)),
+        )
+    sd = Events(
+        {side: timing(events.strike[side]) for side in SIDES},
+        {side: timing(events.off[side]) for side in SIDES},
+    )
+    return drawn, sd
+
+
+def _event_sd(found: list[Events], unknown: bool = False) -> Events:
+    """Deviation of each event over draws that were matched; NaN where fewer than half have it."""
+
+    def sd(times: list[Array]) -> Array:
+        stacked = np.stack(times)
+        enough = (np.isfinite(stacked).mean(axis=0) >= 0.5) & (not unknown)
+        return np.where(enough, np.nanstd(np.where(enough, stacked, 0.0), axis=0), np.nan)
+
+    return Events(
+        {side: sd([e.strike[side] for e in found]) for side in SIDES},
+        {side: sd([e.off[side] for e in found]) for side in SIDES},
+    )
+
+
+def _nan_like(c: Contacts) -> Contacts:
+    return Contacts(*(np.full_like(values, np.nan) for values in (c.strike, c.off, c.place, c.pelvis)))

@@ -1,22 +1,37 @@
-"""Gait parameters of a track, each with its uncertainty: strides, steps, stance, symmetry.
+"""Gait parameters and joint-angle cycles of a track, each with its uncertainty, and the files they go into.
 
-Uncertainty is carried by draws: contacts of the feet drawn from the posterior, from which every parameter is
-computed again; the standard deviation over the draws is reported.  See `gait.motion.footfall_draws`.
+Contacts of the feet are drawn from the posterior (`gait.motion.footfalls`) and every parameter is computed
+again from each draw; its standard deviation is that over the draws.
 """
 
 from __future__ import annotations
 
+import csv
+import json
+import os
 import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.body.model_curves import ModelCurves
 from gait.errors import UserError
+from gait.io.files import replacing
 from gait.io.track_file import Track
-from gait.motion.footfall_draws import Draws, draw_contacts
-from gait.motion.footfalls import SIDES, Contacts, Events, contacts, find_events, stride_time
+from gait.motion.footfalls import (
+    SIDES,
+    Contacts,
+    Draws,
+    Events,
+    contacts,
+    draw_contacts,
+    find_events,
+    stride_time,
+)
 
 Array = NDArray[np.float64]
 
@@ -235,3 +250,208 @@ def _sd(draws: Array) -> Array:
         warnings.simplefilter("ignore", RuntimeWarning)
         sd = np.nanstd(draws, axis=0)
     return np.where(np.isfinite(draws).mean(axis=0) >= 0.5, sd, np.nan)
+
+
+PERCENT = np.linspace(0, 100, 101)
+"""Of the stride: right strike to right strike, and left to left for the angles of the left side."""
+_SMALL = 0.005  # strides, for slopes
+
+
+@dataclass(frozen=True)
+class AngleCycle:
+    """One angle over the cycle, degrees, each array of shape (101,) unless said otherwise.
+
+    Attributes
+    ----------
+    strides : ndarray of shape (k, 101)
+        Of the sure strides.
+    mean, sd : ndarray
+        Mean of the strides, and its posterior standard deviation (NaN if the track does not tell).
+    norm_mean, norm_sd : ndarray
+        Of the people the model was learned from, at the stride rate of these strides.
+    """
+
+    strides: Array
+    mean: Array
+    sd: Array
+    norm_mean: Array
+    norm_sd: Array
+
+    @property
+    def z(self) -> Array:
+        """Deviation from the norm, in its standard deviations."""
+        return np.asarray((self.mean - self.norm_mean) / np.maximum(self.norm_sd, 1e-6))
+
+    def summary(self) -> dict[str, Any]:
+        """Range of the mean, root mean square of z, and where z is largest."""
+        worst = int(np.argmax(np.abs(self.z)))
+        return {
+            "least_deg": float(self.mean.min()),
+            "most_deg": float(self.mean.max()),
+            "strides": len(self.strides),
+            "rms_z": float(np.sqrt(np.mean(self.z**2))),
+            "worst_z": float(self.z[worst]),
+            "worst_at_percent": float(PERCENT[worst]),
+        }
+
+
+def angle_cycles(
+    track: Track, parameters: Parameters, curves: ModelCurves, draws: Draws | None = None
+) -> dict[str, AngleCycle]:
+    """Cycles of every angle that both track and model have.
+
+    Parameters
+    ----------
+    track : Track
+    parameters : Parameters
+        Of the track.
+    curves : ModelCurves
+        The norm; without draws also how scores and phase move the angles.
+    draws : Draws, optional
+        Motions drawn from the posterior.
+    """
+    angles = {name[: -len("_deg")]: v for name, v in track.numbers.items() if name.endswith("_deg")}
+    out = {}
+    for name in (n for n in curves.names if n in angles):
+        left = name.startswith("l_")
+        when = _times(parameters, "left" if left else "right")
+        if not len(when):
+            continue
+        strides = np.interp(when, track.time, angles[name])
+        rate = 1 / float(np.median(when[:, -1] - when[:, 0]))
+        norm_mean, norm_sd = curves.norm(name, PERCENT / 100 + (0.5 if left else 0.0), rate)
+        sd = (
+            _drawn_sd(draws, name, when)
+            if draws
+            else _linear_sd(track.numbers, track.time, name, curves, when)
+        )
+        out[name] = AngleCycle(strides, strides.mean(axis=0), sd, np.degrees(norm_mean), np.degrees(norm_sd))
+    return out
+
+
+def _times(parameters: Parameters, side: str) -> Array:
+    """Return the times (k, 101) of the sure strides of a foot."""
+    s = parameters.strides[side]
+    start, end = s.start[s.sure, None], s.end[s.sure, None]
+    return np.asarray(start + (end - start) * PERCENT / 100)
+
+
+def _drawn_sd(draws: Draws, name: str, when: Array) -> Array:
+    """Deviation of the mean curve over the draws; their timing is not taken out."""
+    values = np.degrees(draws.angles[:, :, draws.angle_names.index(name)].astype(float))
+    means = [np.interp(when, draws.time, motion).mean(axis=0) for motion in values]
+    return np.asarray(np.std(means, axis=0))
+
+
+def _linear_sd(
+    numbers: Mapping[str, Array], time: Array, name: str, curves: ModelCurves, when: Array
+) -> Array:
+    """Deviation by linear propagation of phase and scores, an error being the same in every stride."""
+    if "phase_sd" not in numbers:
+        return np.full(len(PERCENT), np.nan)
+    scores = sorted((n for n in numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)
+    scores = scores[: len(curves.samples) - 1]
+    phase, coef = numbers["phase"], np.stack([numbers[n] for n in scores], axis=1)
+    rate = numbers["stride_hz"]
+    here = curves.channel(name, phase, coef, rate)
+    late, early = (curves.channel(name, phase + move, coef, rate) for move in (_SMALL, -_SMALL))
+    slope = (late - early) / (2 * _SMALL)
+    variance = (slope * numbers["phase_sd"]) ** 2
+    for k, score in enumerate(scores):
+        one = np.eye(len(scores))[k]
+        variance += ((curves.channel(name, phase, coef + one, rate) - here) * numbers[f"{score}_sd"]) ** 2
+    return np.asarray(np.interp(when, time, np.degrees(np.sqrt(variance))).mean(axis=0))
+
+
+def _number(score: str) -> int:
+    return int(score[len("c_") :])
+
+
+def as_json(track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> dict[str, Any]:
+    """Everything but the curves, for JSON: what is not known is null."""
+    found = {
+        "frames": [int(track.frame[0]), int(track.frame[-1])],
+        "uncertainty": parameters.source,
+        "summary": parameters.summary(),
+        "events": list(event_rows(track, parameters)),
+        "strides": list(stride_rows(parameters)),
+        "angles": {name: cycle.summary() for name, cycle in cycles.items()},
+    }
+    clean: dict[str, Any] = _without_nan(found)
+    return clean
+
+
+def event_rows(track: Track, parameters: Parameters) -> Iterator[dict[str, Any]]:
+    """Strikes and toe-offs in the order of time."""
+    rows: list[dict[str, Any]] = []
+    for side in SIDES:
+        for kind in ("strike", "off"):
+            times = getattr(parameters.events, kind)[side]
+            for time, sd in zip(times, getattr(parameters.event_sd, kind)[side], strict=True):
+                frame = float(np.interp(time, track.time, track.frame))
+                rows.append(
+                    {
+                        "event": f"{side}_{_EVENT[kind]}",
+                        "time_s": float(time),
+                        "frame": frame,
+                        "sd_s": float(sd),
+                    }
+                )
+    yield from sorted(rows, key=lambda row: row["time_s"])
+
+
+_EVENT = {"strike": "heel_strike", "off": "toe_off"}
+
+
+def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
+    """Strides in the order of their start, each quantity with its deviation."""
+    rows = []
+    for side in SIDES:
+        s = parameters.strides[side]
+        for k in range(len(s.start)):
+            row: dict[str, Any] = {"side": side, "start_s": float(s.start[k]), "end_s": float(s.end[k])}
+            row["sure"] = bool(s.sure[k])
+            for name in QUANTITIES:
+                row[name], row[f"{name}_sd"] = float(s.values[name][k]), float(s.sd[name][k])
+            rows.append(row)
+    yield from sorted(rows, key=lambda row: row["start_s"])
+
+
+def curve_rows(cycles: Mapping[str, AngleCycle]) -> Iterator[dict[str, Any]]:
+    """Mean, deviation, norm and its deviation of every angle at each percent of the stride, degrees."""
+    for i, percent in enumerate(PERCENT):
+        row: dict[str, Any] = {"percent": int(percent)}
+        for name, c in cycles.items():
+            for part in ("mean", "sd", "norm_mean", "norm_sd"):
+                row[f"{name}_{part}_deg"] = float(getattr(c, part)[i])
+        yield row
+
+
+def write_json(path: str | os.PathLike[str], found: Mapping[str, Any]) -> None:
+    """Write a JSON file."""
+    with replacing(path) as temporary:
+        text = json.dumps(found, indent=1, allow_nan=False) + "\n"
+        Path(temporary).write_text(text, encoding="utf-8")
+
+
+def write_csv(path: str | os.PathLike[str], rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows of the same keys; what is not known is left empty."""
+    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(rows[0] if rows else ())
+        for row in rows:
+            table.writerow([_cell(value) for value in row.values()])
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, float):
+        return "" if np.isnan(value) else f"{value:.5f}"
+    return int(value) if isinstance(value, bool) else value
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and np.isnan(value) else value

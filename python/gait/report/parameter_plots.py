@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gait.io.track_file import Track
-from gait.motion.angle_cycles import PERCENT, AngleCycle
 from gait.motion.footfalls import SIDES, contacts, stride_time
-from gait.motion.parameters import QUANTITIES, Parameters
+from gait.motion.parameters import PERCENT, QUANTITIES, AngleCycle, Parameters
 from gait.report.colours import DARK, GREY, ON_PAPER
 
 Array = NDArray[np.float64]

@@ -1,8 +1,7 @@
-"""Test clips: a walker with a body, clothes and gait of its own in a generated scene, with exact truth.
+"""Test clips with exact truth: a walking person with their own body, clothes and gait in a generated scene.
 
-Nothing here uses the tracker's model, limbs or likelihood: what tracks these clips well has not merely
-inverted its own assumptions.  `simulate` writes a clip; the demo and the evaluation use
-those of `PRESETS`.
+Nothing here uses the tracker's model, limbs or likelihood, so a tracker that does well on these clips has not
+merely inverted its own assumptions.  `simulate` writes a clip; the demo and the evaluation use `PRESETS`.
 """
 
 from gait.simulate.clip import FILES, simulate

@@ -145,7 +145,7 @@ def describe(stage: Stage, made: Set, events: dict[str, Array]) -> dict[str, Any
         "background": "procedural, clutter" if scenario.clutter else "procedural",
         "calibration": "exact",
         "body": "lofted and skinned mesh with its own skeleton",
-        "clothing": made.look.notes,
+        "clothing": made.appearance.notes,
         "difficulty": [word for word in ("pole", "clutter") if getattr(scenario, word)],
         "poles": _pole(stage, made),
         "mean_speed_m_s": round(float(walk.speed[frames].mean()), 4),
@@ -176,7 +176,7 @@ def _source(gait: str) -> str:
 
 
 def _height_px(stage: Stage) -> Array:
-    """Return the picture height of the walker from the lower heel to the head's top, per frame."""
+    """Return the picture height of the person from the lower heel to the head's top, per frame."""
     points = {name: stage.camera.project(xyz)[:, 1] for name, xyz in stage.walk.points(stage.frames).items()}
     low = np.max([points[name] for name in ("l_heel", "r_heel", "l_toe", "r_toe")], axis=0)
     return low - points["head_top"]
@@ -214,7 +214,7 @@ _CONTACTS = (3, 2)  # pictures across and down in contact.jpg
 def pictures(stage: Stage, made: Set) -> Iterator[Picture]:
     """Yield the frames of the clip, (h, w, 3) BGR; each depends only on the scenario and its own number."""
     scenario = stage.scenario
-    renderer = Renderer(stage.camera, made.scene, made.mesh, made.look, stage.walk)
+    renderer = Renderer(stage.camera, made.scene, made.mesh, made.appearance, stage.walk)
     for frame in range(scenario.frames):
         rng = scenario.stream("sensor", frame)
         gain = 1 + 0.01 * scenario.flicker * float(np.clip(rng.standard_normal(), -2.5, 2.5))

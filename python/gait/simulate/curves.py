@@ -83,7 +83,7 @@ class Curves:
 
 
 def normative(rng: np.random.Generator) -> Curves:
-    """Return the table's gait in one person's style: offsets and smooth deviations of about 2 degrees."""
+    """Return the table's gait in one person's style: offsets and smooth departures of about 2 degrees."""
     middle = {name: _series(*row) for name, row in _MIDDLE.items()}
     limbs = {name: _interpolate(row) for name, row in _LIMBS.items()}
     arm_swing = float(rng.uniform(0.75, 1.25))
@@ -147,7 +147,7 @@ def _smooth(rng: np.random.Generator, sd: tuple[float, ...]) -> Array:
 
 
 def _calm(name: str) -> float:
-    """Return how much of the common spread a channel has: legs and pelvis vary less than arms."""
+    """Return how much of the common variation a channel has: legs and pelvis vary less than arms."""
     return _CALM.get(name, 1.0)
 
 
@@ -156,7 +156,7 @@ _NEEDED = tuple(f"{side}_{name}" for side in "lr" for name in ("hip_flexion", "k
 
 
 def curves_of_model(path: str, rng: np.random.Generator, cadence: float) -> Curves:
-    """Return the curves of a person drawn from the model at `path`; strides differ as the model says.
+    """Return the curves of a person drawn from the model at `path`; strides differ as in the model.
 
     cadence : strides per second, which the mean cycle follows.
 
@@ -176,14 +176,14 @@ def curves_of_model(path: str, rng: np.random.Generator, cadence: float) -> Curv
     if lacking:
         raise UserError(f"{path}: has no channel {lacking[0]}; give a model of walking")
     curves = np.asarray(sections["CURV"], np.float64)
-    spread = np.asarray(sections["SCST"], np.float64)
-    scores = spread[:, 1] * np.clip(rng.standard_normal(len(spread)), -1.5, 1.5)
+    sd = np.asarray(sections["SCST"], np.float64)
+    scores = sd[:, 1] * np.clip(rng.standard_normal(len(sd)), -1.5, 1.5)
     mean = curves[0] + np.einsum("q,qtm->tm", scores, curves[1:])
     if (slope := slope_of(sections)) is not None:
         mean += pace(sections["GAIT"], cadence) * slope
     modes = stride_modes(rng)
-    for k in range(min(len(modes), len(spread))):
-        modes[k] = spread[k, 2] * _rows(names, curves[1 + k])
+    for k in range(min(len(modes), len(sd))):
+        modes[k] = sd[k, 2] * _rows(names, curves[1 + k])
     return Curves(_rows(names, mean), modes)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from gait.simulate.body import SIDES, Anatomy, Mesh, Part, loft, merge, vertex_normals
-from gait.simulate.wardrobe import FACE, HAIR, LEGS, SHOE, SKIN, SOCK, SOLE, TOP, Look
+from gait.simulate.wardrobe import FACE, HAIR, LEGS, SHOE, SKIN, SOCK, SOLE, TOP, Appearance
 
 X, Y, Z = np.eye(3)
 
@@ -57,39 +57,44 @@ _LINE_AT = (0, 35, 60, 80, 100, 130, 180)
 _SHORT, _LONG = (22.5, 22.0, 19.5, 16.0, 12.0, 8.5, 7.0), (22.5, 21.5, 16.0, 5.0, 1.0, -2.0, -3.0)
 
 
-def trunk_parts(body: Anatomy, look: Look) -> list[Part]:
+def trunk_parts(body: Anatomy, appearance: Appearance) -> list[Part]:
     """Return the top, the seat of the trousers, neck, head, nose, ears and hair."""
     cm = 0.01 * body.stature / 1.75
-    return [_top(body, look, cm), _seat(body, look, cm), *_head(body, look, cm), _hair(body, look, cm)]
+    return [
+        _top(body, appearance, cm),
+        _seat(body, appearance, cm),
+        *_head(body, appearance, cm),
+        _hair(body, appearance, cm),
+    ]
 
 
-def _top(body: Anatomy, look: Look, cm: float) -> Part:
+def _top(body: Anatomy, appearance: Appearance, cm: float) -> Part:
     """Return the shirt or jacket from its hem to the collar, stretched to this person's trunk."""
     tall = body["neck_up"] / (52.9 * cm)
-    hem = 100 * look.hem
+    hem = 100 * appearance.hem
     rows = [(-hem, -0.2, 14.0, 18.9, 2.3, 1, 0), (-hem / 2, -0.4, 13.4, 18.3, 2.3, 1, 0), *_TOP]
     broad = body["shoulder_half"] / (17.7 * cm)
-    thigh = 9.2 * look.limbs + look.loose
-    wide = body["hip_half"] / cm + 0.9 * thigh
+    thigh = 9.2 * appearance.limbs + appearance.loose
+    breadth = body["hip_half"] / cm + 0.9 * thigh
     stations = []
     for z, x, d, w, n, low, high in rows:
-        girth = look.trunk * (1 + low * (look.hips - 1))
+        girth = appearance.trunk * (1 + low * (appearance.hips - 1))
         d, w = d * girth, w * (girth + high * (broad - girth))
         if z < 5:  # the hem hangs outside the moving thighs
-            room = np.interp(z, (0, 5), (1, 0.4))
-            d, w = max(d, thigh + 4.5 * room), max(w, wide + 1.5 * room)
+            slack = np.interp(z, (0, 5), (1, 0.4))
+            d, w = max(d, thigh + 4.5 * slack), max(w, breadth + 1.5 * slack)
         stations.append((x * cm, 0, z * cm * (tall if z > 0 else 1), d * cm, w * cm, n))
     part = loft(stations, 44, 36, TOP, -X, -Y)
     return part.bind_chain(["pelvis", "torso"], body, Z, 16 * cm)
 
 
-def _seat(body: Anatomy, look: Look, cm: float) -> Part:
-    girth = 0.94 * look.trunk * look.hips
+def _seat(body: Anatomy, appearance: Appearance, cm: float) -> Part:
+    girth = 0.94 * appearance.trunk * appearance.hips
     stations = [(x * cm, 0, z * cm, d * cm * girth, w * cm * girth, 2.3) for z, x, d, w in _SEAT]
     return loft(stations, 16, 30, LEGS, -X, -Y).bind_chain(["pelvis", "torso"], body, Z, 16 * cm)
 
 
-def _head(body: Anatomy, look: Look, cm: float) -> list[Part]:
+def _head(body: Anatomy, appearance: Appearance, cm: float) -> list[Part]:
     neck = body.rest["neck"]
     cm = cm * body["head_up"] / (27.6 * cm)
 
@@ -104,17 +109,17 @@ def _head(body: Anatomy, look: Look, cm: float) -> list[Part]:
     skull.uv[:, 1] = (skull.vertices[:, 2] - neck[2]) / (27.2 * cm) * 1.18 - 0.18
     nose = loft([ring(x, 0, z, d, w) for x, z, d, w in _NOSE], 8, 8, SKIN, X, -Y)
     parts = [skull, nose]
-    for sign in () if look.long_hair else (1.0, -1.0):  # long hair covers the ears
+    for sign in () if appearance.long_hair else (1.0, -1.0):  # long hair covers the ears
         parts.append(loft([ring(0.6, sign * 7.4, z, d, w) for z, d, w in _EAR], 8, 8, SKIN, X, Y))
     return [throat, *(part.bind("head") for part in parts)]
 
 
-def _hair(body: Anatomy, look: Look, cm: float) -> Part:
+def _hair(body: Anatomy, appearance: Appearance, cm: float) -> Part:
     """Return a cap a little larger than the skull that dives under the skin below the hairline."""
     neck = body.rest["neck"]
     cm = cm * body["head_up"] / (27.6 * cm)
     rows = [(z, x, d, w) for z, x, d, w in _HEAD if z > 9]
-    low = ((-3.5, -1.8, 6.5, 7.2), (2, -0.8, 7.2, 7.4)) if look.long_hair else ((6.5, 0.5, 7.2, 6.4),)
+    low = ((-3.5, -1.8, 6.5, 7.2), (2, -0.8, 7.2, 7.4)) if appearance.long_hair else ((6.5, 0.5, 7.2, 6.4),)
     stations = [
         (neck[0] + (x - 0.25) * cm, 0, neck[2] + z * cm, d * cm, w * cm, 2.1) for z, x, d, w in (*low, *rows)
     ]
@@ -122,10 +127,10 @@ def _hair(body: Anatomy, look: Look, cm: float) -> Part:
     centre = np.array([neck[0] + 0.6 * cm, 0, 0])
     flat = part.vertices - centre
     azimuth = np.degrees(np.abs(np.arctan2(flat[:, 1], flat[:, 0])))
-    line = PchipInterpolator(_LINE_AT, _LONG if look.long_hair else _SHORT)(azimuth)
+    line = PchipInterpolator(_LINE_AT, _LONG if appearance.long_hair else _SHORT)(azimuth)
     above = (part.vertices[:, 2] - neck[2]) / cm - line
     cover = np.clip(above / 1.2, 0, 1)
-    thick = (0.9 if not look.long_hair else 1.3) * cm
+    thick = (0.9 if not appearance.long_hair else 1.3) * cm
     outward = flat * [1, 1, 0]
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
     crown = np.clip(((part.vertices[:, 2] - neck[2]) / cm - 22) / 5, 0, 1)[:, None]
@@ -134,11 +139,13 @@ def _hair(body: Anatomy, look: Look, cm: float) -> Part:
     return part.bind("head")
 
 
-def limb_parts(body: Anatomy, look: Look) -> list[Part]:
+def limb_parts(body: Anatomy, appearance: Appearance) -> list[Part]:
     """Return both arms and both legs."""
     parts = []
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        parts += _arm(side, sign, body, look) + _leg(side, sign, body, look) + _shoe(side, sign, body)
+        parts += (
+            _arm(side, sign, body, appearance) + _leg(side, sign, body, appearance) + _shoe(side, sign, body)
+        )
     return parts
 
 
@@ -158,7 +165,7 @@ def _down(
     return np.array(out)
 
 
-def _arm(side: str, sign: float, body: Anatomy, look: Look) -> list[Part]:
+def _arm(side: str, sign: float, body: Anatomy, appearance: Appearance) -> list[Part]:
     cm, rest = _scale(body), body.rest
     shoulder = rest[f"{side}_shoulder"]
     s, e, w = (rest[f"{side}_{name}"][2] for name in ("shoulder", "elbow", "wrist"))
@@ -170,16 +177,28 @@ def _arm(side: str, sign: float, body: Anatomy, look: Look) -> list[Part]:
         (e - 15 * cm, 0, 4.0, 3.7), (w + 4 * cm, 0, 3.6, 3.3), (w + 0.5 * cm, 0, 3.6, 3.3),
     ]  # fmt: skip
     short = [(s - 19 * cm, 0, 5.3, 5.2)]
-    sleeve = cap + upper + (lower if look.long_sleeves else short)
+    sleeve = cap + upper + (lower if appearance.long_sleeves else short)
     skin = [
         (s - 12 * cm, 0, 4.1, 3.8), (e + 4 * cm, 0, 3.8, 3.6), (e, -0.2, 3.8, 3.6),
         (e - 6 * cm, 0.1, 4.2, 3.7),
         (e - 15 * cm, 0, 3.4, 3.0), (w + 3 * cm, 0, 2.8, 2.2), (w - 1 * cm, 0, 2.8, 2.0),
     ]  # fmt: skip
     parts = [
-        loft(_down(shoulder, sleeve, cm, look.limbs, 2.1), 34 if look.long_sleeves else 18, 16, TOP, -X, Y),
         loft(
-            _down(shoulder, skin[5:] if look.long_sleeves else skin, cm, look.limbs, 2), 26, 14, SKIN, -X, Y
+            _down(shoulder, sleeve, cm, appearance.limbs, 2.1),
+            34 if appearance.long_sleeves else 18,
+            16,
+            TOP,
+            -X,
+            Y,
+        ),
+        loft(
+            _down(shoulder, skin[5:] if appearance.long_sleeves else skin, cm, appearance.limbs, 2),
+            26,
+            14,
+            SKIN,
+            -X,
+            Y,
         ),
     ]
     for part in parts:
@@ -209,8 +228,8 @@ def _hand(side: str, sign: float, body: Anatomy) -> list[Part]:
     return parts
 
 
-def _leg(side: str, sign: float, body: Anatomy, look: Look) -> list[Part]:
-    cm, rest, loose = _scale(body), body.rest, look.loose
+def _leg(side: str, sign: float, body: Anatomy, appearance: Appearance) -> list[Part]:
+    cm, rest, loose = _scale(body), body.rest, appearance.loose
     hip = rest[f"{side}_hip"]
     h, k, a = (rest[f"{side}_{name}"][2] for name in ("hip", "knee", "ankle"))
     rows = [
@@ -224,7 +243,7 @@ def _leg(side: str, sign: float, body: Anatomy, look: Look) -> list[Part]:
         [z for z, *_ in rows], [a, k, h], [0.7 + 1.4 * loose, 0.3 + 0.8 * loose, 0.2 + 0.3 * loose]
     )
     rows = [(z, x, d + more, w + more) for (z, x, d, w), more in zip(rows, widen, strict=True)]
-    trouser = loft(_down(hip, rows, cm, look.limbs, 2.15), 46, 22, LEGS, -X, Y)
+    trouser = loft(_down(hip, rows, cm, appearance.limbs, 2.15), 46, 22, LEGS, -X, Y)
     trouser.bind_chain(["pelvis", f"{side}_thigh", f"{side}_shank"], body, -Z, 12 * cm)
     sock = [(a + 7 * cm, -0.3, 4.2, 3.8), (a, -0.2, 4.2, 3.7), (a - 3 * cm, -0.2, 4.0, 3.6)]
     ankle = loft(_down(hip, sock, cm, 1.0, 2), 8, 14, SOCK, X, -Y)
@@ -262,12 +281,12 @@ def _shoe(side: str, sign: float, body: Anatomy) -> list[Part]:
     return parts
 
 
-def build_figure(body: Anatomy, look: Look, rng: np.random.Generator) -> Mesh:
+def build_figure(body: Anatomy, appearance: Appearance, rng: np.random.Generator) -> Mesh:
     """Return the mesh of a person in clothes."""
-    parts = trunk_parts(body, look) + limb_parts(body, look)
+    parts = trunk_parts(body, appearance) + limb_parts(body, appearance)
     for part in parts:
         if part.material in (TOP, LEGS):
-            _crease(part, 0.0016 * (1 + look.loose), rng)
+            _crease(part, 0.0016 * (1 + appearance.loose), rng)
     return merge(parts, body)
 
 

@@ -19,7 +19,7 @@ _NOISE_SIZE = 512
 
 
 class Noise:
-    """Noise on the plane, zero mean, about unit deviation: fractal, or only as fine as the grain of stone."""
+    """Noise on the plane, mean 0, standard deviation about 1: fractal, or as fine as the grain of stone."""
 
     def __init__(self, rng: np.random.Generator, fine: bool = False) -> None:
         weights = ((256, 1.0), (128, 0.6)) if fine else ((8, 1.0), (24, 0.6), (72, 0.4), (200, 0.3))

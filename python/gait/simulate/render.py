@@ -14,7 +14,7 @@ from gait.simulate.geometry import Floats, Ints, Picture
 from gait.simulate.paint import AMBIENT, SUN
 from gait.simulate.scene import Scene
 from gait.simulate.walk import Walk
-from gait.simulate.wardrobe import FACE, LEGS, SIZE, TOP, Look
+from gait.simulate.wardrobe import FACE, LEGS, SIZE, TOP, Appearance
 
 
 class Hits(NamedTuple):
@@ -58,9 +58,9 @@ def rasterise(xy: Floats, nearness: Floats, faces: Ints, width: int, height: int
     edge = np.array([width - 1, height - 1], np.float32)
     high = np.floor(np.minimum(np.maximum(np.maximum(a, b), c), edge)).astype(np.int32)
     size = high - low + 1
-    seen = np.flatnonzero((size[:, 0] > 0) & (size[:, 1] > 0))
-    x, y, which = _candidates(low[seen], size[seen])
-    which = seen[which]
+    visible = np.flatnonzero((size[:, 0] > 0) & (size[:, 1] > 0))
+    x, y, which = _candidates(low[visible], size[visible])
+    which = visible[which]
     weights = _weights(a, (b - a) / area[:, None], (c - a) / area[:, None], x, y, which)
     inside = np.flatnonzero(weights.min(0) >= 0)
     return _nearest(x[inside], y[inside], front[which[inside]], weights[:, inside], nearness, faces, width)
@@ -76,9 +76,9 @@ def _candidates(low: Ints, size: Ints) -> tuple[Ints, Ints, Ints]:
     which = np.repeat(np.arange(len(count), dtype=np.int32), count)
     start = np.cumsum(count, dtype=np.int32) - count
     local = np.arange(int(count.sum()), dtype=np.int32) - start[which]
-    wide = size[which, 0]
-    row = local // wide
-    return low[which, 0] + (local - row * wide), low[which, 1] + row, which
+    columns = size[which, 0]
+    row = local // columns
+    return low[which, 0] + (local - row * columns), low[which, 1] + row, which
 
 
 def _weights(a: Floats, ab: Floats, ac: Floats, x: Ints, y: Ints, which: Ints) -> Floats:
@@ -119,27 +119,29 @@ class SunView:
         self._corner = np.zeros(2, np.float32)
         self._centre = 0.0
 
-    def look(self, vertices: Floats, faces: Ints) -> None:
+    def update(self, vertices: Floats, faces: Ints) -> None:
         """Find what the sun sees of the figure."""
-        seen = vertices @ self._axes.T
-        self._corner = seen[:, :2].min(0) - np.float32(8 * _CELL)
-        extent = seen[:, :2].max(0) - self._corner + 8 * _CELL
+        turned = vertices @ self._axes.T
+        self._corner = turned[:, :2].min(0) - np.float32(8 * _CELL)
+        extent = turned[:, :2].max(0) - self._corner + 8 * _CELL
         width, height = (int(v) for v in np.ceil(extent / _CELL))
-        hits = rasterise((seen[:, :2] - self._corner) / np.float32(_CELL), seen[:, 2], faces, width, height)
+        hits = rasterise(
+            (turned[:, :2] - self._corner) / np.float32(_CELL), turned[:, 2], faces, width, height
+        )
         self._nearest = np.full((height, width), -np.inf, np.float32)
         self._nearest[hits.row, hits.column] = np.einsum(
-            "nk,nk->n", hits.weights, seen[:, 2][faces[hits.face]]
+            "nk,nk->n", hits.weights, turned[:, 2][faces[hits.face]]
         )
-        self._centre = float(seen[:, 2].mean())
+        self._centre = float(turned[:, 2].mean())
 
     def visible(self, places: Floats, normals: Floats, shift: Floats) -> Floats:
         """Return 1 where places (n, 3) on the figure see the sun, 0 in its own shade; `shift` softens."""
-        seen = (places + np.float32(0.012) * normals) @ self._axes.T
-        at = np.rint((seen[:, :2] - self._corner) / np.float32(_CELL) + 2.5 * shift).astype(np.int32)
+        turned = (places + np.float32(0.012) * normals) @ self._axes.T
+        at = np.rint((turned[:, :2] - self._corner) / np.float32(_CELL) + 2.5 * shift).astype(np.int32)
         rows, columns = self._nearest.shape
         inside = (at >= 0).all(1) & (at[:, 0] < columns) & (at[:, 1] < rows)
         depth = self._nearest[np.clip(at[:, 1], 0, rows - 1), np.clip(at[:, 0], 0, columns - 1)]
-        return np.where(inside & (depth > seen[:, 2] + _BIAS), 0, 1).astype(np.float32)
+        return np.where(inside & (depth > turned[:, 2] + _BIAS), 0, 1).astype(np.float32)
 
     def cast(self) -> Floats:
         """Return how far the figure shades each pixel of the empty scene from the sun, 0..1, (h, w)."""
@@ -193,25 +195,25 @@ class Renderer:
 
     Parameters
     ----------
-    camera, scene, mesh, look, walk
+    camera, scene, mesh, appearance, walk
         What is seen.
     """
 
-    def __init__(self, camera: Camera, scene: Scene, mesh: Mesh, look: Look, walk: Walk) -> None:
-        self.camera, self.scene, self.mesh, self.look, self.walk = camera, scene, mesh, look, walk
+    def __init__(self, camera: Camera, scene: Scene, mesh: Mesh, appearance: Appearance, walk: Walk) -> None:
+        self.camera, self.scene, self.mesh, self.appearance, self.walk = camera, scene, mesh, appearance, walk
         self._sun = SunView(scene)
         self._contact = Contact(scene.position)
         self._zero = int(np.argmin(np.abs(walk.timing.time)))
         self._cloth = np.zeros(len(mesh.rest), np.float32)
         for material in (TOP, LEGS):
             self._cloth[mesh.faces[mesh.material == material]] = _SLIP
-        self._tile = (SIZE / look.spans).astype(np.float32)
+        self._tile = (SIZE / appearance.spans).astype(np.float32)
 
     def light(self, frame: int) -> Floats:
         """Return linear light (h, w, 3), RGB, before the lens and the sensor."""
         opened, closed = self._shutter(frame)
         middle = _between(opened, closed, 0.5)
-        self._sun.look(middle.vertices, self.mesh.faces)
+        self._sun.update(middle.vertices, self.mesh.faces)
         behind = 1 - self.scene.front  # what stands in front takes no shadow of the figure
         sunny = (1 - self._sun.cast() * behind)[..., None]
         touch = (1 - self._contact.dark(middle.vertices) * behind)[..., None]
@@ -257,10 +259,10 @@ class Renderer:
     def _project(self, vertices: Floats) -> tuple[Floats, Floats]:
         """Return pixels (n, 2) and 1 / depth (n,)."""
         camera = self.camera
-        seen = vertices @ camera.R.T.astype(np.float32) + camera.t.astype(np.float32)
-        near = 1 / seen[:, 2]
+        in_camera = vertices @ camera.R.T.astype(np.float32) + camera.t.astype(np.float32)
+        near = 1 / in_camera[:, 2]
         focal, centre = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
-        uv = seen[:, :2] * near[:, None] * focal + centre
+        uv = in_camera[:, :2] * near[:, None] * focal + centre
         return uv.astype(np.float32), near.astype(np.float32)
 
     def _splat(
@@ -284,16 +286,16 @@ class Renderer:
         normal = mix(now.normals)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-9
         lit = self._sun.visible(mix(now.vertices), normal, shift)
-        facing = np.maximum(normal @ self.scene.to_sun.astype(np.float32), 0)
+        cosine = np.maximum(normal @ self.scene.to_sun.astype(np.float32), 0)
         sky = AMBIENT * (0.72 + 0.34 * normal[:, 2])
         albedo = self._albedo(mix(uv), self.mesh.material[hits.face])
-        colour[hits.row, hits.column] += albedo * (sky + SUN * facing * lit)[:, None]
+        colour[hits.row, hits.column] += albedo * (sky + SUN * cosine * lit)[:, None]
         cover[hits.row, hits.column] += 1
 
     def _albedo(self, uv: Floats, material: Ints) -> Floats:
         texel = np.floor(uv * self._tile[material][:, None]).astype(np.int32)
         row = np.where(material == FACE, np.clip(texel[:, 1], 0, SIZE - 1), texel[:, 1] % SIZE)
-        return self.look.tiles[material, row, texel[:, 0] % SIZE]
+        return self.appearance.tiles[material, row, texel[:, 0] % SIZE]
 
 
 def _between(a: _Instant, b: _Instant, share: float) -> _Instant:
@@ -303,8 +305,8 @@ def _between(a: _Instant, b: _Instant, share: float) -> _Instant:
 
 def develop(light: Floats, gain: float, noise: float, rng: np.random.Generator | None) -> Picture:
     """Turn linear light (h, w, 3) RGB into an 8-bit BGR picture: lens blur, exposure, sensor noise."""
-    soft = cv2.GaussianBlur(light, (0, 0), DEFOCUS_PX)
-    shown = np.sqrt(np.maximum(soft, 0)) * np.float32(255 * gain)
+    defocused = cv2.GaussianBlur(light, (0, 0), DEFOCUS_PX)
+    shown = np.sqrt(np.maximum(defocused, 0)) * np.float32(255 * gain)
     if noise > 0 and rng is not None:
         shown += np.float32(noise) * rng.standard_normal(shown.shape, np.float32)
     return np.ascontiguousarray(np.clip(np.rint(shown), 0, 255).astype(np.uint8)[..., ::-1])

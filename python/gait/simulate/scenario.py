@@ -106,6 +106,6 @@ demo      side view, left to right: what ``make demo`` shows
 side      side view, right to left, the exposure flickers by 1 %
 oblique   45 degrees, coming nearer
 toward    5 s straight towards the camera
-pole      45 degrees, a pole hides the walker, strong background
+pole      45 degrees, a pole hides the person, strong background
 ========  =============================================================
 """

@@ -83,7 +83,7 @@ def draw_layout(camera: Camera, ground: Array, clutter: bool, pole: bool, rng: n
     ground : ndarray of shape (n, 2)
         The path on the ground, metres.
     clutter : bool
-        More and stronger things behind the walker.
+        More and stronger things behind the person.
     pole : bool
         Stand a pole between camera and path.
     """
@@ -97,7 +97,7 @@ def draw_layout(camera: Camera, ground: Array, clutter: bool, pole: bool, rng: n
         str(rng.choice(["tiles", "asphalt", "tiles"])), float(rng.choice([0.0, np.pi / 4, 0.3])),
         str(rng.choice(["grass", "tiles", "asphalt"])), float(rng.uniform(0.7, 1.3)),
     )  # fmt: skip
-    left, right = _seen(camera, wall_y)
+    left, right = _visible_range(camera, wall_y)
     if tall:
         layout.panels = _panels(left, right, clutter, rng)
     else:
@@ -108,7 +108,7 @@ def draw_layout(camera: Camera, ground: Array, clutter: bool, pole: bool, rng: n
     return layout
 
 
-def _seen(camera: Camera, y: float) -> tuple[float, float]:
+def _visible_range(camera: Camera, y: float) -> tuple[float, float]:
     """Return the x range of the picture at the wall."""
     edge = camera.centre
     reach = (y - edge[1]) * 0.5 * camera.width / camera.fx
@@ -117,7 +117,7 @@ def _seen(camera: Camera, y: float) -> tuple[float, float]:
 
 def _panels(left: float, right: float, clutter: bool, rng: np.random.Generator) -> list[Panel]:
     """Place windows, with louvred shutters in clutter, a door, and boards."""
-    pitch, wide = float(rng.uniform(2.0, 3.0)), float(rng.uniform(0.9, 1.3))
+    pitch, breadth = float(rng.uniform(2.0, 3.0)), float(rng.uniform(0.9, 1.3))
     sill, tall = float(rng.uniform(0.85, 1.05)), float(rng.uniform(1.2, 1.6))
     panels, at = [], left + float(rng.uniform(0, pitch)) - pitch
     door = int(rng.integers(1, 4))
@@ -128,18 +128,20 @@ def _panels(left: float, right: float, clutter: bool, rng: np.random.Generator) 
             panels.append(Panel(at, at + 1.05, 0.0, 2.15, paint.planks))
         else:
             shutters = clutter or rng.uniform() < 0.3
-            panels += _window(at, wide, sill, tall, shutters) + _window(at, wide, sill + 3.1, tall, shutters)
-        if clutter and rng.uniform() < 0.5 and pitch - wide > 1.3:
-            middle = at + wide + 0.5 * (pitch - wide)
+            panels += _window(at, breadth, sill, tall, shutters) + _window(
+                at, breadth, sill + 3.1, tall, shutters
+            )
+        if clutter and rng.uniform() < 0.5 and pitch - breadth > 1.3:
+            middle = at + breadth + 0.5 * (pitch - breadth)
             panels.append(Panel(middle - 0.28, middle + 0.28, 1.2, 2.0, _poster))
         at += pitch
         number += 1
     return panels
 
 
-def _window(left: float, wide: float, sill: float, tall: float, shutters: bool) -> list[Panel]:
-    out = [Panel(left - 0.08, left + wide + 0.08, sill - 0.1, sill + tall + 0.08, _frame)]
-    half, gap = 0.5 * wide, 0.035
+def _window(left: float, breadth: float, sill: float, tall: float, shutters: bool) -> list[Panel]:
+    out = [Panel(left - 0.08, left + breadth + 0.08, sill - 0.1, sill + tall + 0.08, _frame)]
+    half, gap = 0.5 * breadth, 0.035
     for k in (0, 1):
         for level in (0.0, 0.62):
             x, z = left + k * half, sill + level * tall
@@ -147,10 +149,16 @@ def _window(left: float, wide: float, sill: float, tall: float, shutters: bool) 
             out.append(Panel(x + gap, x + half - gap, z + gap, top - gap, _glass))
     if shutters:
         out.append(
-            Panel(left - 0.1 - 0.45 * wide, left - 0.1, sill - 0.05, sill + tall + 0.05, paint.louvres)
+            Panel(left - 0.1 - 0.45 * breadth, left - 0.1, sill - 0.05, sill + tall + 0.05, paint.louvres)
         )
         out.append(
-            Panel(left + wide + 0.1, left + 0.1 + 1.45 * wide, sill - 0.05, sill + tall + 0.05, paint.louvres)
+            Panel(
+                left + breadth + 0.1,
+                left + 0.1 + 1.45 * breadth,
+                sill - 0.05,
+                sill + tall + 0.05,
+                paint.louvres,
+            )
         )
     return out
 
@@ -204,24 +212,24 @@ def _furnish(
     layout: Layout, left: float, right: float, far: float, clutter: bool, rng: np.random.Generator
 ) -> None:
     """Put boxes and bushes between path and wall."""
-    room = layout.wall_y - far
+    free = layout.wall_y - far
     slots = np.linspace(left, right, 11 if clutter else 6)
     for x in slots:
         if rng.uniform() < (0.2 if clutter else 0.4):
             continue
         x = float(x + rng.uniform(-0.3, 0.3))
-        y = float(layout.wall_y - rng.uniform(0.25, 0.4 * room))
+        y = float(layout.wall_y - rng.uniform(0.25, 0.4 * free))
         kind = rng.choice(["bush", "box", "planter"])
-        wide, high = rng.uniform(0.25, 0.55), rng.uniform(0.3, 0.9)
+        breadth, high = rng.uniform(0.25, 0.55), rng.uniform(0.3, 0.9)
         if kind != "bush":
             tint = np.clip(1 + 0.3 * rng.uniform(-1, 1) + 0.08 * rng.standard_normal(3), 0.4, 1.5)
             finish = str(rng.choice(["planks", "plaster", "louvres"]))
             high = min(high, 0.45) if kind == "planter" else high
-            low, top = np.array([x - wide, y - 0.22, 0]), np.array([x + wide, y + 0.22, high])
+            low, top = np.array([x - breadth, y - 0.22, 0]), np.array([x + breadth, y + 0.22, high])
             layout.blocks.append(Block(low, top, finish, tint))
         if kind != "box":
             base = high if kind == "planter" else 0.0
-            radii = np.array([wide * rng.uniform(0.8, 1.2), 0.3, rng.uniform(0.3, 0.75)])
+            radii = np.array([breadth * rng.uniform(0.8, 1.2), 0.3, rng.uniform(0.3, 0.75)])
             colour = linear((rng.uniform(66, 108), rng.uniform(96, 130), rng.uniform(46, 74)))
             layout.bushes.append(Bush(np.array([x, y, base + 0.8 * radii[2]]), radii, colour))
 
@@ -287,7 +295,7 @@ class Scene:
     position : ndarray of shape (h, w, 3)
         World place of each pixel's surface, metres; far away for the sky.
     front : ndarray of shape (h, w)
-        Share of the pixel covered by something in front of the walker.
+        Share of the pixel covered by something in front of the person.
     to_sun : ndarray of shape (3,)
         Unit vector.
     """
@@ -315,7 +323,7 @@ class _Caster:
         self.ray = (plane @ fine.R).astype(np.float32)  # depth 1 along the optical axis
         self.depth = np.full(u.shape, np.inf, np.float32)
         self.albedo = np.zeros((*u.shape, 3), np.float32)
-        self.facing = np.zeros(u.shape, np.float32)  # cosine to the sun
+        self.sun_cosine = np.zeros(u.shape, np.float32)  # cosine to the sun
         self.open = np.ones(u.shape, np.float32)  # share of the sky that lights it
 
     def position(self) -> Floats:
@@ -331,12 +339,16 @@ class _Caster:
         return depth, self.ray * np.minimum(depth, 1e4)[..., None] + self.origin.astype(np.float32)
 
     def put(
-        self, hit: NDArray[np.bool_], depth: Floats, albedo: Floats, facing: float, sky: Floats | float = 1.0,
+        self, hit: NDArray[np.bool_], depth: Floats, albedo: Floats, cosine: float, sky: Floats | float = 1.0,
         box: tuple[slice, slice] = (slice(None), slice(None)),
     ) -> None:  # fmt: skip
         """Keep a surface, given in the window `box`, where it is nearer than what is there."""
         hit = hit & (depth < self.depth[box])
-        self.depth[box][hit], self.albedo[box][hit], self.facing[box][hit] = depth[hit], albedo[hit], facing
+        self.depth[box][hit], self.albedo[box][hit], self.sun_cosine[box][hit] = (
+            depth[hit],
+            albedo[hit],
+            cosine,
+        )
         self.open[box][hit] = sky[hit] if isinstance(sky, np.ndarray) else sky
 
 
@@ -352,9 +364,9 @@ def build_scene(camera: Camera, layout: Layout, rng: np.random.Generator) -> Sce
     position = cast.position()
     lit = _sunlit(position, layout)
     ambient = cast.albedo * (AMBIENT * cast.open)[..., None]
-    direct = cast.albedo * (SUN * np.maximum(cast.facing, 0) * lit)[..., None]
-    bare = ~np.isfinite(cast.depth)
-    ambient[bare], direct[bare] = cast.albedo[bare], 0
+    direct = cast.albedo * (SUN * np.maximum(cast.sun_cosine, 0) * lit)[..., None]
+    no_surface = ~np.isfinite(cast.depth)
+    ambient[no_surface], direct[no_surface] = cast.albedo[no_surface], 0
     for bush in layout.bushes:
         draw_bush(ambient, direct, cast.depth, cast.camera, bush, sun, rng)
     front = np.zeros(cast.depth.shape, np.float32)
@@ -422,8 +434,8 @@ def _paint_block(cast: _Caster, block: Block, sun: Array, rng: np.random.Generat
             continue
         rise, box = 1 if axis == 2 else 2, _bounds(inside)
         colour = finish(at[..., other][box], at[..., rise][box])
-        facing = float(sun[axis] * (1 if upper else -1))
-        cast.put(inside[box], depth[box], (colour * block.tint).astype(np.float32), facing, 1.0, box)
+        cosine = float(sun[axis] * (1 if upper else -1))
+        cast.put(inside[box], depth[box], (colour * block.tint).astype(np.float32), cosine, 1.0, box)
 
 
 def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:

@@ -15,7 +15,7 @@ from gait.simulate.geometry import Array, Ints
 from gait.simulate.scenario import GENERATOR, Scenario
 from gait.simulate.scene import Layout, Scene, build_scene, draw_layout
 from gait.simulate.walk import Path, Walk, draw_timing, make_walk
-from gait.simulate.wardrobe import Look, draw_look
+from gait.simulate.wardrobe import Appearance, draw_appearance
 
 CIRCLE_RADIUS = 2.5
 _CLOSEST = 2.2  # metres between lens and path
@@ -45,32 +45,32 @@ def make_camera(
     size : (int, int)
         Width and height, pixels.
     points : ndarray of shape (n, 3)
-        Everything the walker reaches, world, metres.
+        Everything the person reaches, world, metres.
     distance : float, optional
-        From the origin, horizontally, metres; by default such that the walker keeps well away.
+        From the origin, horizontally, metres; by default such that the person keeps well away.
     height : float, optional
         Metres.
 
     Raises
     ------
     UsageError
-        If the walker would come too close to the lens.
+        If the person would come too close to the lens.
     """
     near = -float(points[:, 1].min())
     if distance is None:
         distance = max(_AWAY[view], near + (4.0 if view in ("toward", "oblique", "away") else 3.0))
     if distance - near < _CLOSEST:
         raise UsageError(
-            f"--distance {distance:g}: the walker comes within {distance - near:.1f} m of the camera; "
+            f"--distance {distance:g}: the person comes within {distance - near:.1f} m of the camera; "
             f"give at least {near + _CLOSEST:.1f}"
         )
     place = np.array([0.0, -distance, _HEIGHT[view] if height is None else height])
     middle = 0.5 * (points.min(0) + points.max(0))
-    rotation = _look_at(place, middle)
-    for _ in range(4):  # turn until the walker's extent is centred
+    rotation = _aim_at(place, middle)
+    for _ in range(4):  # turn until the person's extent is centred
         low, high = _extent(points, place, rotation)
         ray = np.array([*(low + high) / 2, 1.0]) @ rotation
-        rotation = _look_at(place, place + ray)
+        rotation = _aim_at(place, place + ray)
     low, high = _extent(points, place, rotation)
     width, tall = size
     across = max(high[0], -low[0])
@@ -80,7 +80,7 @@ def make_camera(
     )
 
 
-def _look_at(place: Array, target: Array) -> Array:
+def _aim_at(place: Array, target: Array) -> Array:
     """Return world-to-camera rotation with a level horizon."""
     ahead = (target - place) / np.linalg.norm(target - place)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
@@ -90,8 +90,8 @@ def _look_at(place: Array, target: Array) -> Array:
 
 def _extent(points: Array, place: Array, rotation: Array) -> tuple[Array, Array]:
     """Return the smallest and largest (x / z, y / z) of the points."""
-    seen = (points - place) @ rotation.T
-    flat = seen[:, :2] / seen[:, 2:]
+    in_camera = (points - place) @ rotation.T
+    flat = in_camera[:, :2] / in_camera[:, 2:]
     return flat.min(0), flat.max(0)
 
 
@@ -122,7 +122,7 @@ class Set:
     """What is needed to draw: the figure and the empty scene."""
 
     mesh: Mesh
-    look: Look
+    appearance: Appearance
     layout: Layout
     scene: Scene
 
@@ -156,12 +156,12 @@ def set_stage(scenario: Scenario) -> Stage:
 def build_set(stage: Stage) -> Set:
     """Make the figure and paint the scene."""
     scenario, walk = stage.scenario, stage.walk
-    look = draw_look(scenario.stream("look"))
-    mesh = build_figure(stage.body, look, scenario.stream("cloth"))
+    appearance = draw_appearance(scenario.stream("look"))
+    mesh = build_figure(stage.body, appearance, scenario.stream("cloth"))
     ground = walk.origins[stage.frames, 0, :2]
     rng = scenario.stream("scene")
     layout = draw_layout(stage.camera, ground, scenario.clutter, scenario.pole, rng)
-    return Set(mesh, look, layout, build_scene(stage.camera, layout, rng))
+    return Set(mesh, appearance, layout, build_scene(stage.camera, layout, rng))
 
 
 def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
@@ -178,7 +178,7 @@ def pace(scenario: Scenario, stature: float) -> tuple[float, float]:
 
 
 def _envelope(walk: Walk, frames: Ints) -> Array:
-    """Return points (n, 3) around all that the walker's surface reaches."""
+    """Return points (n, 3) around all that the person's surface reaches."""
     joints = np.concatenate(list(walk.points(frames).values()))
     offsets = _SURFACE * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-0.3, 0.5)])
     return (joints[:, None] + offsets).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""What a walker looks like: the cut, colours and patterns of the clothes, skin, hair, face."""
+"""What a walking person looks like: the cut, colours and patterns of the clothes, skin, hair, face."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _SHOES = ((44, 38, 36), (206, 204, 198), (96, 66, 44), (60, 64, 74))
 
 
 @dataclass(frozen=True)
-class Look:
-    """Cut and colours of one walker.
+class Appearance:
+    """Cut and colours of one person.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Look:
     notes: dict[str, str]
 
 
-def draw_look(rng: np.random.Generator) -> Look:
+def draw_appearance(rng: np.random.Generator) -> Appearance:
     """Draw girths within 15 %, a cut, colours and patterns."""
     top_pattern = str(rng.choice(["plain", "stripes", "checks", "weave"]))
     legs_pattern = str(rng.choice(["plain", "denim", "plain", "weave"]))
@@ -80,7 +80,7 @@ def draw_look(rng: np.random.Generator) -> Look:
     spans[FACE] = 1.0
     bounds = {"trunk": 0.11, "limbs": 0.12, "hips": 0.06}
     girths = {name: float(1 + rng.uniform(-half, half)) for name, half in bounds.items()}
-    return Look(
+    return Appearance(
         **girths, long_sleeves=bool(rng.uniform() < 0.65), long_hair=bool(rng.uniform() < 0.4),
         hem=float(rng.uniform(0.05, 0.11)), loose=float(rng.uniform()), tiles=tiles, spans=spans,
         notes={"top": top_pattern, "trousers": legs_pattern},
@@ -93,7 +93,7 @@ def linear(rgb: object) -> Array:
 
 
 def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = SIZE) -> Floats:
-    """Return smooth noise (size, size) that tiles: `cells` bumps down and across, mean 0, deviation 1."""
+    """Return smooth tiling noise (size, size): `cells` bumps down and across, mean 0, standard deviation 1."""
     coarse = rng.standard_normal(cells).astype(np.float32)
     wrapped = np.pad(coarse, 2, mode="wrap")
     step_y, step_x = size / cells[0], size / cells[1]
@@ -153,7 +153,7 @@ def _band(x: Array, width: float) -> Array:
 
 
 def _face(skin: Array, hair: Array, rng: np.random.Generator) -> Floats:
-    """Paint eyes, brows, mouth and cheeks; u = 0.5 is the front, v runs from the chin up."""
+    """Paint a face: lids, brows, mouth and cheeks; u = 0.5 is the front, v runs from the chin up."""
     face = np.tile(skin.astype(np.float32), (SIZE, SIZE, 1)) * _grain(rng, 0.03)
     picture = np.ascontiguousarray(face)
 

@@ -20,8 +20,7 @@ from gait.bindings.state import State
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Frame, Image, Video
-from gait.track.hog_detector import people
-from gait.track.person_detection import Sighting, height_over, sightings
+from gait.track.person_detection import Sighting, height_over, people, sightings
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gait.body.skeleton import ANGLES, ROOTS
 from gait.errors import UserError, quoted, unreadable
-from gait.io import delimited
+from gait.io.fields import table_rows
 from gait.learn.mocap.recording import DEGREES, FARTHEST, require_frames
 
 Floats = npt.NDArray[np.float64]
@@ -136,7 +136,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
     try:
-        lines = delimited.rows(text)
+        lines = table_rows(text)
     except csv.Error as error:
         raise UserError(f"{path}: not a .csv ({error}); export it again") from None
     if not lines or not any(lines[0][1]):

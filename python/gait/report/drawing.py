@@ -1,13 +1,15 @@
-"""Draw an estimate into its frame: body, skeleton, how sure it is, and a small instrument panel."""
+"""Draw bodies: an estimate over its frame with a panel of figures, or a model as a sheet of poses."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import Model
 from gait.bindings.state import State
@@ -15,7 +17,57 @@ from gait.body.skeleton import BONES
 from gait.camera.camera import Camera
 from gait.io.video import Image
 from gait.report.colours import OVER_PICTURES, side_of
-from gait.report.panel import draw_panel
+
+_PANEL_SIZE = (236, 92)  # of the panel, pixels at scale 1
+_INK = (240, 240, 240)
+_DIM = (170, 170, 170)
+_STATUS = {
+    TrackStatus.INIT: (200, 200, 200),
+    TrackStatus.TRACKING: (120, 210, 110),
+    TrackStatus.AMBIGUOUS: (60, 200, 250),
+    TrackStatus.LOST: (70, 70, 240),
+}
+_FONT = cv2.FONT_HERSHEY_DUPLEX
+
+
+def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> None:
+    """Draw into the top left corner of a BGR picture, in place; `scale` 1 suits 540 lines."""
+    width, height = (round(side * scale) for side in _PANEL_SIZE)
+    edge = round(8 * scale)
+    region = canvas[edge : edge + height, edge : edge + width]
+    region[:] = np.rint(0.35 * region + 0.65 * np.array([32, 28, 26])).astype(np.uint8)
+    _dial(region, estimate, (round(46 * scale), round(46 * scale)), 32 * scale, scale)
+    colour = _STATUS[estimate.status]
+    left = round(96 * scale)
+    strides = estimate.mean.stride_hz
+    _write(region, estimate.status.name.lower(), (left, round(22 * scale)), 0.52 * scale, colour)
+    _write(region, f"{120 * strides:5.1f} steps/min", (left, round(43 * scale)), 0.4 * scale, _INK)
+    _write(region, f"{estimate.speed:5.2f} m/s", (left, round(61 * scale)), 0.4 * scale, _INK)
+    words = f"frame {frame}   {estimate.utime / 1e6:.2f} s"
+    _write(region, words, (left, round(80 * scale)), 0.34 * scale, _DIM)
+
+
+def _dial(region: Image, estimate: Estimate, at: tuple[int, int], radius: float, scale: float) -> None:
+    """Clock face of one stride: right heel strike at the top, the hand with an arc of two deviations."""
+    turn, spread = 360 * estimate.mean.phase, min(2 * 360 * estimate.sd.phase, 180.0)
+    thin, r = max(1, round(scale)), round(radius)
+    cv2.circle(region, at, r, _DIM, thin, cv2.LINE_AA)
+    colour = _STATUS[estimate.status]
+    start, end = turn - 90 - spread, turn - 90 + spread
+    cv2.ellipse(region, at, (r, r), 0, start, end, colour, round(4 * scale), cv2.LINE_AA)
+    angle = np.radians(turn)
+    tip = (round(at[0] + 0.78 * radius * np.sin(angle)), round(at[1] - 0.78 * radius * np.cos(angle)))
+    cv2.line(region, at, tip, _INK, max(1, round(2 * scale)), cv2.LINE_AA)
+    cv2.circle(region, at, max(2, round(3 * scale)), _INK, -1, cv2.LINE_AA)
+    for letter, way in (("R", -1), ("L", 1)):
+        size, _ = cv2.getTextSize(letter, _FONT, 0.34 * scale, 1)
+        place = (at[0] - size[0] // 2, round(at[1] + way * 0.6 * radius + size[1] / 2))
+        _write(region, letter, place, 0.34 * scale, _DIM)
+
+
+def _write(region: Image, words: str, at: tuple[int, int], size: float, colour: tuple[int, int, int]) -> None:
+    cv2.putText(region, words, at, _FONT, size, colour, max(1, round(1.4 * size)), cv2.LINE_AA)
+
 
 Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
@@ -161,3 +213,99 @@ def _ellipse(canvas: Image, at: Array, radii: Array, angle: float, colour: Colou
     axes = _fixed(np.maximum(radii, 1.0))
     cv2.ellipse(canvas, _fixed(at), axes, angle, 0, 360, _DARK, thick + 2, cv2.LINE_AA, _SUBPIXEL)
     cv2.ellipse(canvas, _fixed(at), axes, angle, 0, 360, colour, thick, cv2.LINE_AA, _SUBPIXEL)
+
+
+_PAPER = (246, 247, 248)
+_RULE = (214, 216, 218)
+_TEXT = (70, 70, 70)
+_LESS, _MEAN, _MORE = (190, 110, 40), (205, 205, 205), (40, 90, 230)
+_CELL = (176, 300)  # of the sheet, pixels
+_PHASES = 8
+_MARGIN = (120, 44)  # left and top of the sheet, pixels
+_SHEET_FONT = cv2.FONT_HERSHEY_DUPLEX
+
+
+def room_camera(state: State) -> Camera:
+    """Camera that shows a walker from in front and the left, slightly from above."""
+    target = np.array([*state.pelvis[:2], 0.5 * state.stature])
+    angle = state.heading + np.radians(50)
+    away = np.array([np.cos(angle), np.sin(angle), 0.22]) * 3 * state.stature
+    return Camera.looking(target + away, target, (720, 900), 2280.0)
+
+
+def draw_room(model: Model, state: State, camera: Camera) -> Image:
+    """Draw a walker on a ground of half-metre squares, (h, w, 3) BGR."""
+    canvas = np.full((camera.height, camera.width, 3), _PAPER, np.uint8)
+    middle = np.round(2 * np.asarray(state.pelvis[:2])) / 2
+    reach = np.arange(-3, 3.5, 0.5)
+    for step in reach:
+        for ends in ([(step, -3), (step, 3)], [(-3, step), (3, step)]):
+            along = np.linspace(ends[0], ends[1], 61) + middle  # short pieces: the lens may bend them
+            uv = camera.project(np.column_stack([along, np.zeros(61)]))
+            pieces = uv[np.isfinite(uv).all(axis=1)]
+            line = np.clip(np.rint(16 * pieces), -(1 << 28), 1 << 28).astype(np.int32)
+            cv2.polylines(canvas, [line], False, _RULE, 1, cv2.LINE_AA, 4)
+    return Overlay(model, camera).figure(canvas, state)
+
+
+def draw_strip(model: Model) -> Image:
+    """Draw the sheet, columns phases.
+
+    Rows are the mean, then at -2, 0 and +2 deviations the stride rate (where the mean follows it) and scores.
+    """
+    rows = _rows(model)
+    left, top = _MARGIN
+    width, height = _CELL
+    sheet = np.full((top + height * len(rows), left + width * _PHASES, 3), _PAPER, np.uint8)
+    camera = Camera.looking((0.0, -20.0, 0.9), (0.0, 0.0, 0.9), _CELL, 20 * 0.84 * height / 2.0)
+    overlay = Overlay(model, camera)
+    for row, (name, states) in enumerate(rows.items()):
+        y = top + row * height
+        cv2.putText(sheet, name, (10, y + height // 2), _SHEET_FONT, 0.45, _TEXT, 1, cv2.LINE_AA)
+        for column in range(_PHASES):
+            there = [_standing(model, state, column / _PHASES) for state in states]
+            x = left + column * width
+            sheet[y : y + height, x : x + width] = _cell(overlay, there)
+    for column in range(_PHASES):
+        place = (left + column * width + width // 2 - 34, 24)
+        cv2.putText(sheet, f"phase {column / _PHASES:.3g}", place, _SHEET_FONT, 0.42, _TEXT, 1, cv2.LINE_AA)
+    _legend(sheet)
+    return sheet
+
+
+def _rows(model: Model) -> dict[str, list[State]]:
+    """Name of each row: walkers at 0, -2 and +2 deviations, for the mean at 0 alone."""
+    info, turns = model.info, (0.0, -2.0, 2.0)
+    mean = State(stride_hz=info.stride_hz, coef=np.zeros(info.components))
+    rows = {"mean": [mean]}
+    rates = [replace(mean, stride_hz=info.stride_hz + turn * info.stride_hz_sd) for turn in turns]
+    if not np.array_equal(model.pose(rates[1])[1], model.pose(mean)[1]):
+        rows["stride rate"] = rates
+    for k, component in enumerate(np.eye(info.components)):
+        rows[f"component {k + 1}"] = [replace(mean, coef=turn * component) for turn in turns]
+    return rows
+
+
+def _standing(model: Model, state: State, phase: float) -> State:
+    """Walker of average size at a phase over the origin, heading along x."""
+    state = replace(state, phase=phase, pelvis=np.zeros(3))
+    state.pelvis[2] = model.pelvis_height(state)
+    return state
+
+
+def _cell(overlay: Overlay, states: list[State]) -> Image:
+    """Body of a single walker, else sticks of three."""
+    camera, model = overlay.camera, overlay.model
+    cell = np.full((camera.height, camera.width, 3), _PAPER, np.uint8)
+    ground = round(float(camera.project([0.0, 0.0, 0.0])[1]))
+    cv2.line(cell, (0, ground), (camera.width, ground), _RULE, 1, cv2.LINE_AA)
+    if len(states) == 1:
+        return overlay.figure(cell, states[0])
+    for state, colour, width in zip(states, (_MEAN, _LESS, _MORE), (6, 3, 3), strict=True):
+        overlay.sticks(cell, model.pose(state)[0], width, colour)
+    return cell
+
+
+def _legend(sheet: Image) -> None:
+    for line, (words, colour) in enumerate((("-2 sd", _LESS), ("mean", _TEXT), ("+2 sd", _MORE))):
+        cv2.putText(sheet, words, (10, 16 + 13 * line), _SHEET_FONT, 0.38, colour, 1, cv2.LINE_AA)
