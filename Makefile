@@ -82,6 +82,8 @@ KERNEL_SRC := $(sort $(wildcard libgait/src/*/*_kernel.c))
 KERNEL_OBJ := $(foreach isa,$(KERNEL_ISAS),$(KERNEL_SRC:libgait/src/%.c=$(B)/src/%.$(isa).o))
 SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard libgait/src/*/*.c libgait/src/*/*.cpp)))
 OBJ := $(SRC:libgait/src/%=$(B)/src/%.o) $(KERNEL_OBJ)
+GONE := $(filter-out $(notdir $(SRC) $(KERNEL_SRC)),$(O3_SOURCES) $(VECTOR_SOURCES) $(O2_SOURCES))
+$(if $(GONE),$(error libgait/flags.mk lists $(GONE), which libgait/src does not have))
 SRC_DIRS := $(sort $(dir $(OBJ)))
 UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_*.c)))
 TOOLS := $(BIN)/gait-trackd

@@ -80,8 +80,9 @@ def test_a_cross_compiler_brings_its_tools_and_has_its_own_folder(bare):
 
 def test_a_library_without_threads_needs_none(tmp_path):
     """GAIT_NO_THREADS leaves the pool out: nothing of it, and no threads of the system, in the object."""
-    source = ROOT / "libgait/src/pool.c"
-    options = ["-std=c11", "-Wpedantic", "-Werror", "-DGAIT_NO_THREADS", f"-I{ROOT}/libgait/include", "-c"]
+    source = ROOT / "libgait/src/base/pool.c"
+    options = ["-std=c11", "-Wpedantic", "-Werror", "-DGAIT_NO_THREADS", f"-I{ROOT}/libgait/include"]
+    options += ["-iquote", f"{ROOT}/libgait/src", "-c"]
     subprocess.run(["cc", *options, source, "-o", tmp_path / "pool.o"], check=True)
     said = subprocess.run(["nm", tmp_path / "pool.o"], capture_output=True, text=True, check=True).stdout
     assert "pthread" not in said and "gait_pool" not in said
@@ -105,7 +106,7 @@ def compile_one(bare, *words: str) -> str:
         k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k not in ("CC", "CFLAGS", "OPT")
     }
     done = subprocess.run(
-        ["make", "build/release/src/base.c.o", *words],
+        ["make", "build/release/src/base/base.c.o", *words],
         cwd=bare / "gait",
         env=env,
         capture_output=True,
@@ -117,11 +118,19 @@ def compile_one(bare, *words: str) -> str:
 
 
 def test_objects_are_made_anew_for_other_options_only(bare):
-    made, kept = "CC   libgait/src/base.c", "is up to date"
+    made, kept = "CC   libgait/src/base/base.c", "is up to date"
     for options in ((), ("CFLAGS=-DX='\"it'\\''s\"'",), ("OPT=-O1",), ("CC=gcc", "CXX=g++"), ()):
         assert made in compile_one(bare, *options), options
         assert kept in compile_one(bare, *options), options
     assert "-DX" in compile_one(bare, "-n", "CFLAGS=-DX") and kept in compile_one(bare)
+
+
+def test_a_source_with_flags_of_its_own_that_is_gone_is_named(bare):
+    for name in ("gcc", "g++", "cc"):
+        program(bare, name, "x86_64-linux-gnu")
+    (bare / "gait/libgait/src/base/fmath.c").unlink()
+    done = make(bare, "-n", "lib", "CC=gcc", "EIGEN=/opt/eigen")
+    assert done.returncode != 0 and "flags.mk lists fmath.c, which libgait/src does not have" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -142,7 +151,7 @@ def test_a_missing_compiler_is_told_before_anything_is_done(bare, words, said):
 def test_a_folder_without_eigen_is_named(bare):
     for name in ("gcc", "g++", "cc"):
         program(bare, name, "x86_64-linux-gnu")
-    done = make(bare, "build/release/src/linalg.cpp.o", "CC=gcc", "EIGEN=/nonexistent")
+    done = make(bare, "build/release/src/base/linalg.cpp.o", "CC=gcc", "EIGEN=/nonexistent")
     assert done.returncode != 0 and "no Eigen/Core in EIGEN=/nonexistent" in done.stderr
 
 
