@@ -87,7 +87,11 @@ SUFFIXES = {
     ".cmake",
 }
 BARE_NAMES = {"Makefile", "LAYERS", "README", "CMakeLists.txt"}
-OWN = {"tests/check/words.py", "tests/python/test_checks.py", "libgait/doc/changelog.md"}  # they list old names
+OWN = {
+    "tests/check/words.py",
+    "tests/python/test_checks.py",
+    "libgait/doc/changelog.md",
+}  # they list old names
 PIECE = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 TOKEN = re.compile(r"[A-Za-z_][A-Za-z_0-9]*")
 

@@ -140,43 +140,68 @@ def test_headers_sees_padding_old_declarations_and_missing_includes(tmp_path, co
     assert run("headers.sh", header).returncode == 1
 
 
+def objects(src: Path) -> list[Path]:
+    """Compile every source below a folder to build/FOLDER/NAME.c.o beside it."""
+    made = []
+    for source in sorted(src.rglob("*.c")):
+        made.append(src.parent / "build" / source.parent.name / f"{source.name}.o")
+        made[-1].parent.mkdir(parents=True, exist_ok=True)
+        subprocess.run([CC, "-O0", "-w", "-c", "-iquote", src, source, "-o", made[-1]], check=True)
+    return made
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """Two folders of C, low and high, that pass; LAYERS beside them."""
+    layers, src = tmp_path / "LAYERS", tmp_path / "src"
+    layers.write_text("# comment\nlow\nhigh\n")
+    for name, text in {
+        "low/low.h": "#include <stdint.h>\nint low(int x);\n",
+        "low/low.c": '#include "low/low.h"\nint low(int x) { return x; }\n',
+        "low/other.c": '#include "low/low.h"\nint other(int x) { return low(x); }\n',
+        "high/high.h": "int high(int x);\n",
+        "high/high.c": '#include "high/high.h"\n#include "low/low.h"\nint high(int x) { return low(x); }\n',
+    }.items():
+        (src / name).parent.mkdir(parents=True, exist_ok=True)
+        (src / name).write_text(text)
+    assert run("layers.py", layers, src, *objects(src)).returncode == 0
+    return layers, src
+
+
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("low.c", '#include "high.h"\n', '"high.h" is not below low.c'),
-        ("high.c", '#include "nothing.h"\n', '"nothing.h" is not below high.c'),
-        ("high.c", "#include <stdlib.h>\n", "<stdlib.h> is not for the library"),
-        ("other.c", '#include "low.h"\n', "other is not in LAYERS"),
+        ("low/low.h", '#include "high/high.h"\n', '"high/high.h" is not in its folder or one below it'),
+        ("high/high.h", '#include "high.h"\n', '"high.h" is not in its folder or one below it'),
+        ("high/high.h", "#include <stdlib.h>\n", "<stdlib.h> is not for the library"),
+        ("new/new.h", "", "folder new is not in LAYERS"),
+        (
+            "low/up.c",
+            "int high(int x); int up(int x) { return high(x); }\n",
+            "low/up: calls high of high/high",
+        ),
+        (
+            "low/low.c",
+            "int other(int x); int low(int x) { return other(x); }\n",
+            "circle of files: low/low low/other",
+        ),
+        ("low/low.h", '#include "low/b.h"\nint low(int x);\n', "circle of files: low/b low/low"),
     ],
 )
-def test_layers_sees_an_upward_include(tmp_path, name, text, words):
-    layers, src = tmp_path / "LAYERS", tmp_path / "src"
-    src.mkdir()
-    layers.write_text("# comment\nlow\nhigh\n")
-    (src / "low.h").write_text("#include <stdint.h>\n")
-    (src / "high.c").write_text('#include "high.h"\n#include "low.h"\n#include "gait.h"\n')
-    (src / "high.h").write_text("")
-    assert run("layers.py", layers, src).returncode == 0
-    (src / name).write_text(text)
-    assert fails(run("layers.py", layers, src), words)
+def test_layers_sees_an_upward_include_or_call_and_a_circle(folders, name, text, words):
+    layers, src = folders
+    (src / "low" / "b.h").write_text('#ifndef B_H\n#define B_H\n#include "low/low.h"\n#endif\n')
+    (src / name).parent.mkdir(exist_ok=True)
+    (src / name).write_text(f"#ifndef A_H\n#define A_H\n{text}#endif\n" if name.endswith(".h") else text)
+    made = [] if "not" in words else objects(src)
+    assert fails(run("layers.py", layers, src, *made), words)
 
 
-def test_layers_lets_a_header_lie_lower_than_its_source(tmp_path):
-    layers, src = tmp_path / "LAYERS", tmp_path / "src"
-    src.mkdir()
-    layers.write_text("top.h\nlow\ntop\n")
-    (src / "top.h").write_text("")
-    (src / "low.h").write_text('#include "top.h"\n')
-    (src / "top.c").write_text('#include "low.h"\n')
-    assert run("layers.py", layers, src).returncode == 0
-    (src / "top.h").write_text('#include "low.h"\n')
-    assert fails(run("layers.py", layers, src), '"low.h" is not below top.h')
-
-
-def test_layers_sees_a_module_without_source(tmp_path):
-    (tmp_path / "LAYERS").write_text("ghost\n")
-    (tmp_path / "src").mkdir()
-    assert fails(run("layers.py", tmp_path / "LAYERS", tmp_path / "src"), "no source of ghost")
+def test_layers_sees_a_folder_that_is_not_there_and_no_objects(folders):
+    layers, src = folders
+    assert fails(run("layers.py", layers, src), "was the library built")
+    layers.write_text("low\nghost\nhigh\n")
+    assert fails(run("layers.py", layers, src, *objects(src)), "no folder ghost")
 
 
 @pytest.mark.parametrize(
@@ -188,16 +213,20 @@ def test_layers_sees_a_module_without_source(tmp_path):
         ("low.py", "from walk import Name", "__init__ is not below low"),
         ("high/b.py", "from . import a", "__init__ is not below high"),
         ("new.py", "import os", "new is not in LAYERS"),
+        ("high/sub/c.py", "from walk.high.a import x", "high is not below high/sub"),
+        ("high/b.py", "import walk.high.a", "circle of modules: high/a high/b"),
+        ("high/b.py", "def f():\n    from walk.high import a", "circle of modules: high/a high/b"),
     ],
 )
-def test_py_layers_sees_an_upward_import(tmp_path, name, text, words):
+def test_py_layers_sees_an_upward_import_and_a_circle(tmp_path, name, text, words):
     layers, package = tmp_path / "LAYERS", tmp_path / "walk"
-    (package / "high").mkdir(parents=True)
-    layers.write_text("# comment\nlow\nhigh\n__init__\n")
+    (package / "high" / "sub").mkdir(parents=True)
+    layers.write_text("# comment\nlow\nhigh/sub\nhigh\n__init__\n")
     (package / "__init__.py").write_text("from walk.high.a import x")
     (package / "low.py").write_text("import numpy as np")
     (package / "high" / "a.py").write_text("from walk.high import b\nfrom walk.low import y")
     (package / "high" / "b.py").write_text("import walk.low")
+    (package / "high" / "sub" / "c.py").write_text("import walk.low")
     assert run("py_layers.py", layers, package).returncode == 0
     (package / name).write_text(text)
     assert fails(run("py_layers.py", layers, package), words)
@@ -296,7 +325,6 @@ def checkout(tmp_path):
         ("tests/truth.csv", b"frame,time\n", "data"),
         ("a.bin", b"a\0b", "binary"),
         ("large.txt", b"x\n" * 200_000, "over 300000"),
-        ("long.c", b"int x;\n" * 401, "401 lines"),
         ("lcm_types/a.h", b"/* THIS IS AN AUTOMATICALLY" + b" GENERATED FILE */\n", "generated"),
         ("a.md", b"look into /ho" + b"me/alice/gait\n", "a.md:1: path"),
         ("a.h", b"/* as in spe" + b"c 1.6 */\n", "a.h:1: refers to"),
@@ -314,6 +342,15 @@ def test_hygiene_sees_what_does_not_belong(checkout, name, content, words):
     (checkout / name).write_bytes(content)
     subprocess.run(["git", "-C", checkout, "add", "-f", name], check=True)
     assert fails(run("hygiene.py", checkout), words)
+
+
+def test_hygiene_warns_of_a_long_source(checkout):
+    for name in "libgait/src/long.c", "libgait/include/long.h":
+        (checkout / name).write_text("int x;\n" * 701)
+        subprocess.run(["git", "-C", checkout, "add", name], check=True)
+    done = run("hygiene.py", checkout)
+    assert done.returncode == 0
+    assert done.stdout == "\nwarning: libgait/src/long.c has 701 lines, more than 700\n".lstrip()
 
 
 @pytest.mark.parametrize(
