@@ -363,6 +363,15 @@ GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); 
  * that is NaN, beyond 1e6 or, in perspective, exactly 0, 0 or -1, -1, where detectors put what they do not see. */
 GAIT_API gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
+/* The same with outliers down-weighted: a point beyond four standard deviations of the fit keeps little influence.
+ * weighted [F][J] receives the deviations that count, above `sd` for outliers.  If outliers may have misled the search
+ * it is repeated with all points down-weighted at first. */
+GAIT_API gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const double *sd, double *weighted,
+                                              gait_lift_fit *out, gait_error *err);
+/* Expect the person of the following segments at another place and heading than the config's; heading_sd as there.
+ * GAIT_ERR_STATE: the lifter was not made for an unknown heading. */
+GAIT_API gait_result gait_lift_expect(gait_lift *l, const double place[3], double heading, double heading_sd,
+                                      gait_error *err);
 /* Of the last gait_lift_segment() (GAIT_ERR_STATE without one): posterior mean [F][J][3] and standard deviation (may
  * be NULL), metres, world; */
 GAIT_API gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd);
@@ -393,6 +402,16 @@ GAIT_API gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *u
 /* The frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: not so many frames since the start. */
 GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out);
 GAIT_API void        gait_lift_reset(gait_lift *l); /* forget the stream */
+
+/* Tools for sequences of 2-D points, without a lifter.  Both return how many points they found.
+ * Spikes: points far off the line through the same point's neighbours in time, by its own noise and acceleration; their
+ * sd [frames][points] becomes -1.  time [frames] increases; uv [frames][points][2]; scratch [2 frames]. */
+GAIT_API int32_t gait_lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv, double *sd,
+                                         double *scratch);
+/* Outliers: points of one frame whose distance from their prediction, squared, in standard deviations, is above 16 and
+ * above 9 times the frame's median; sd [points] grows with it, so that their pull falls with its third power.
+ * scratch [points]. */
+GAIT_API int32_t gait_lift_weight_outliers(int32_t points, const double *square, double *sd, double *scratch);
 
 #ifdef __cplusplus
 }

@@ -97,34 +97,83 @@ static size_t points_of(const lift_table *t)
     return (size_t)t->prior.frames * (size_t)t->prior.markers;
 }
 
+/* Public figures of the last fit. */
+static void describe_fit(const gait_lift *l, const lift_outcome *found, gait_lift_fit *out)
+{
+    const lift_table *const t = &l->table;
+    const segment_posterior *const b = &l->posterior;
+    double const log_10 = 2.30258509299404568402;
+    *out = (gait_lift_fit){.log_evidence = lift_evidence(t, b),
+                           .log10_volume = -cholesky_log_det(b->U, t->n, t->ld) / log_10,
+                           .misfit = lift_chi2(t, b),
+                           .heading = lift_heading(t, b),
+                           .share = found->share,
+                           .component = b->component,
+                           .observed = b->observed,
+                           .iterations = found->iterations,
+                           .converged = found->converged};
+    if (t->turn >= 0) /* the last unknown: its variance is that of the last pivot */
+        out->heading_sd = b->turn_sd / b->U[t->turn * (t->ld + 1)];
+    for (int32_t i = 0; i < 3; i++)
+        out->place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
+}
+
 gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                               gait_error *err)
 {
     if (!l || !uv || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_segment: null pointer");
     const lift_table *const t = &l->table;
-    segment_posterior *const b = &l->posterior;
     lift_outcome found;
     lifter_take(l, points_of(t), uv, sd, l->uv, l->sd);
-    memcpy(b->place, t->cfg.place, sizeof b->place);
-    l->fitted = l->windowed = lift_fit(t, &l->search, &l->window, b, &found);
+    memcpy(l->posterior.place, t->cfg.place, sizeof t->cfg.place);
+    l->fitted = l->windowed = lift_fit(t, &l->search, &l->window, &l->posterior, &found);
     if (!l->fitted)
         return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: observations out of any range");
-    double const log_10 = 2.30258509299404568402;
-    *out = (gait_lift_fit){.log_evidence = lift_evidence(t, b),
-                           .log10_volume = -cholesky_log_det(b->U, t->n, t->ld) / log_10,
-                           .misfit = lift_chi2(t, b),
-                           .heading = lift_heading(t, b),
-                           .share = found.share,
-                           .component = b->component,
-                           .observed = b->observed,
-                           .iterations = found.iterations,
-                           .converged = found.converged};
-    if (t->turn >= 0) /* the last unknown: its variance is that of the last pivot */
-        out->heading_sd = b->turn_sd / b->U[t->turn * (t->ld + 1)];
-    for (int32_t i = 0; i < 3; i++)
-        out->place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
+    describe_fit(l, &found, out);
     return GAIT_OK;
+}
+
+gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const double *sd, double *weighted,
+                                     gait_lift_fit *out, gait_error *err)
+{
+    if (!l || !uv || !weighted || !out)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_segment_robust: null pointer");
+    const lift_table *const t = &l->table;
+    lift_outcome found;
+    int32_t outliers;
+    lifter_take(l, points_of(t), uv, sd, l->uv, l->robust.inlier_sd);
+    memcpy(l->posterior.place, t->cfg.place, sizeof t->cfg.place);
+    l->fitted = l->windowed =
+        lift_fit_robust(t, &l->search, &l->window, &l->robust, &l->posterior, &found, &outliers);
+    if (!l->fitted)
+        return base_fail(err, GAIT_ERR_NUMERIC, -1,
+                         "gait_lift_segment_robust: observations out of any range");
+    memcpy(weighted, l->sd, points_of(t) * sizeof *weighted);
+    describe_fit(l, &found, out);
+    return GAIT_OK;
+}
+
+gait_result gait_lift_expect(gait_lift *l, const double place[3], double heading, double heading_sd,
+                             gait_error *err)
+{
+    if (!l || !place)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_expect: null pointer");
+    gait_lift_config cfg = l->table.cfg;
+    if (!l->any_heading)
+        return base_fail(
+            err, GAIT_ERR_STATE, -1,
+            "gait_lift_expect: the lifter was made for a known heading; make it with heading_sd -1");
+    memcpy(cfg.place, place, sizeof cfg.place);
+    cfg.heading = heading;
+    cfg.heading_sd = heading_sd;
+    gait_result const s = lifter_check_config(&cfg, err);
+    if (s == GAIT_OK && heading_sd == 0.0)
+        return base_fail(err, GAIT_ERR_ARG, -1,
+                         "gait_lift_expect: heading_sd is 0; give -1 or a positive one");
+    if (s == GAIT_OK)
+        l->table.cfg = cfg;
+    return s;
 }
 
 /* Every marker of frame f of the last segment. */
@@ -263,4 +312,15 @@ void gait_lift_reset(gait_lift *l)
 {
     if (l)
         lift_stream_reset(&l->stream);
+}
+
+int32_t gait_lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv,
+                                double *sd, double *scratch)
+{
+    return time && uv && sd && scratch ? lift_remove_spikes(frames, points, time, uv, sd, scratch) : 0;
+}
+
+int32_t gait_lift_weight_outliers(int32_t points, const double *square, double *sd, double *scratch)
+{
+    return square && sd && scratch && points > 0 ? lift_weight_points(points, square, sd, scratch) : 0;
 }

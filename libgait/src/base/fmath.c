@@ -110,11 +110,27 @@ float m_atan2(float y, float x)
 
 double m_median(double *x, int32_t count)
 {
-    for (int32_t i = 1; i < count; i++)
-        for (int32_t k = i; k > 0 && x[k] < x[k - 1]; k--) {
-            double const larger = x[k - 1];
-            x[k - 1] = x[k];
-            x[k] = larger;
+    int32_t const middle = count / 2;
+    for (int32_t low = 0, high = count - 1; low < high;) { /* quickselect */
+        double const pivot = x[low + (high - low) / 2];
+        int32_t i = low, k = high;
+        while (i <= k) {
+            for (; x[i] < pivot; i++)
+                ;
+            for (; pivot < x[k]; k--)
+                ;
+            if (i > k)
+                break;
+            double const other = x[i];
+            x[i++] = x[k];
+            x[k--] = other;
         }
-    return x[count / 2];
+        if (middle <= k)
+            high = k;
+        else if (middle >= i)
+            low = i;
+        else
+            break;
+    }
+    return x[middle];
 }

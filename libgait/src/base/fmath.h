@@ -148,7 +148,7 @@ double m_log64(double x);
 
 /* Absolute error < 3e-16 for |x| < 1000; NaN for numbers that are not finite. */
 void m_sincos64(double x, double *s, double *c);
-/* The middle one of count > 0 numbers, the upper of two; they are sorted on the way. */
+/* The median of count > 0 numbers, the upper one of two; their order changes. */
 double m_median(double *x, int32_t count);
 
 #endif

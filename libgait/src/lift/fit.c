@@ -6,12 +6,16 @@
 
 enum { SCOUT_PASSES = 5 }; /* of each trial, before the better ones are followed to the end */
 
+static int32_t starts_of(const lift_table *t)
+{
+    return t->cfg.heading_sd < 0.0 ? LIFT_HEADINGS : 1;
+}
+
 void lift_search_layout(arena *a, const lift_table *t, lift_search *s)
 {
-    int32_t const starts = t->cfg.heading_sd < 0.0 ? LIFT_HEADINGS : 1;
-    s->trials = t->prior.components * starts;
+    int32_t const starts = starts_of(t);
     s->before = TAKE(a, double, (size_t)t->n);
-    for (int32_t i = 0; i < s->trials; i++)
+    for (int32_t i = 0; i < t->prior.components * starts; i++)
         s->trial[i].theta = TAKE(a, double, (size_t)t->n);
 }
 
@@ -184,7 +188,8 @@ static double share_of(const lift_table *t, const lift_search *s, int32_t best)
 bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b,
               lift_outcome *out)
 {
-    int32_t const starts = s->trials / t->prior.components;
+    int32_t const starts = starts_of(t);
+    s->trials = t->prior.components * starts;
     bool const one = s->trials == 1;
     for (int32_t i = 0; i < s->trials; i++) {
         lift_trial *const trial = &s->trial[i];

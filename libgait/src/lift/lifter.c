@@ -32,7 +32,7 @@ static bool near(const float t[3])
            within((double)t[2], -1e4, 1e4);
 }
 
-static gait_result check_config(const gait_lift_config *c, gait_error *err)
+gait_result lifter_check_config(const gait_lift_config *c, gait_error *err)
 {
     bool place = true;
     if (c->struct_size != sizeof *c)
@@ -79,6 +79,7 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
         t->cfg.heading_sd = 0.0; /* the turned copies are the prior's own headings */
     if (cfg->stature_sd < 0.0)
         t->cfg.stature_sd = cfg->stature > 0.0 ? KNOWN_STATURE_SD : PEOPLE_STATURE_SD;
+    l.any_heading = t->cfg.heading_sd < 0.0;
     gait_lift *const self = TAKE(a, gait_lift, 1);
     lift_table_layout(a, t);
     lift_search_layout(a, t, &l.search);
@@ -87,6 +88,9 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
     l.at = TAKE(a, double, (size_t)prior->frames);
     l.uv = TAKE(a, double, points * 2);
     l.sd = TAKE(a, double, points);
+    l.robust = (lift_robust){.sd = l.sd,
+                             .inlier_sd = TAKE(a, double, points),
+                             .position = TAKE(a, double, (size_t)prior->markers * 3)};
     if (cfg->projection == GAIT_LIFT_ORTHOGRAPHIC && t->turn < 0)
         lift_gain_layout(a, t, &l.gain);
     if (cfg->lag >= 0)
@@ -103,7 +107,7 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
 gait_result lifter_open(const void *blob, size_t bytes, const gait_lift_config *cfg, segment_prior *prior,
                         gait_error *err)
 {
-    gait_result const s = check_config(cfg, err);
+    gait_result const s = lifter_check_config(cfg, err);
     return s == GAIT_OK ? segment_open(blob, bytes, prior, err) : s;
 }
 

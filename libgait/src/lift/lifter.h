@@ -10,11 +10,14 @@ struct gait_lift {
     segment_posterior posterior, spare; /* of the last segment; scratch */
     lift_window window;                 /* of the last segment */
     double *at, *uv, *sd;               /* of the window: F; F x J x 2; F x J */
+    lift_robust robust;
     lift_gain gain;
     lift_stream stream;
+    bool any_heading;      /* made for an unknown heading */
     bool fitted, windowed; /* there is a posterior; it is of observations, not of a gain */
 };
 
+gait_result lifter_check_config(const gait_lift_config *cfg, gait_error *err);
 /* Check the configuration and read the prior. */
 gait_result lifter_open(const void *blob, size_t bytes, const gait_lift_config *cfg, segment_prior *prior,
                         gait_error *err);

@@ -184,7 +184,6 @@ static bool fit_from(const lift_table *t, lift_search *s, const lift_window *w, 
 bool lift_fit_robust(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
                      segment_posterior *b, lift_outcome *out, int32_t *outliers)
 {
-    (void)lift_remove_spikes(w->frames, t->prior.markers, w->at, w->uv, r->inlier_sd, r->scratch);
     bool ok = fit_from(t, s, w, r, 1.0, b, out, outliers);
     if (!ok || (*outliers == 0 && lift_chi2(t, b) <= POOR_FIT * b->observed))
         return ok;

@@ -25,14 +25,12 @@ int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, doubl
                           const lift_observations *seen, bool known, double *position, double *sd);
 
 typedef struct lift_robust {
-    double *sd;        /* frames x J: what the window's points point to; receives the weights */
-    double *inlier_sd; /* frames x J: as observed; spikes are removed in place */
-    double *scratch;   /* 2 x frames */
+    double *sd;        /* frames x J: w->sd; receives the deviations that count */
+    double *inlier_sd; /* frames x J: as observed */
     double *position;  /* J x 3, scratch */
 } lift_robust;
 
-/* Fit b to the points of a window, w->sd being r->sd: without spikes, and with outliers of the fit down-weighted.  If
- * outliers may have misled the search it is repeated with all points at first weighted down; the more probable fit
+/* Fit b to the points of a window, w->sd being r->sd, with outliers of the fit down-weighted.  If outliers may have misled the search it is repeated with all points at first weighted down; the more probable fit
  * is kept.  false: numbers out of range. */
 bool lift_fit_robust(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
                      segment_posterior *b, lift_outcome *out, int32_t *outliers);

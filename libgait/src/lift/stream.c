@@ -148,10 +148,9 @@ void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s)
     s->at = TAKE(a, double, capacity);
     s->uv = TAKE(a, double, capacity * J * 2);
     s->guess = TAKE(a, double, J * 3);
-    s->robust = (lift_robust){.sd = TAKE(a, double, capacity *J),
-                              .inlier_sd = TAKE(a, double, capacity *J),
-                              .scratch = TAKE(a, double, capacity * 2),
-                              .position = s->guess};
+    s->robust = (lift_robust){
+        .sd = TAKE(a, double, capacity *J), .inlier_sd = TAKE(a, double, capacity *J), .position = s->guess};
+    s->scratch = TAKE(a, double, capacity * 2);
     s->mean = TAKE(a, double, J * 3);
     s->sd = TAKE(a, double, J * 3);
     s->new_uv = TAKE(a, double, J * 2);
@@ -300,6 +299,7 @@ static bool refit_segment(const lift_table *t, lift_search *search, lift_stream 
         memcpy(s->robust.inlier_sd + (size_t)w.frames * J, seen.sd, J * sizeof(double));
         w.frames++;
     }
+    (void)lift_remove_spikes(w.frames, t->prior.markers, w.at, w.uv, s->robust.inlier_sd, s->scratch);
     memcpy(b->place, t->cfg.place, sizeof b->place);
     if (!lift_fit_robust(t, search, &w, &s->robust, b, &outcome, &outliers))
         return false;

@@ -27,6 +27,7 @@ typedef struct lift_stream {
     int32_t segments;
     double *at, *uv;           /* window for a fit: past.capacity moments and observations */
     lift_robust robust;        /* its deviations */
+    double *scratch;           /* 2 x past.capacity */
     double *guess, *mean, *sd; /* J x 3 */
     double *new_uv, *new_sd;   /* the frame that comes in */
     double span, step; /* seconds: from a segment's first frame to its last; to the next segment's first */

@@ -117,6 +117,8 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ),
     ("gait_lift_marker_name", [_HANDLE, c_int32], c_char_p),
     ("gait_lift_segment", [_HANDLE, c_void_p, c_void_p, POINTER(LiftFitC), _ERR], _STATUS),
+    ("gait_lift_segment_robust", [_HANDLE, c_void_p, c_void_p, c_void_p, POINTER(LiftFitC), _ERR], _STATUS),
+    ("gait_lift_expect", [_HANDLE, c_void_p, c_double, c_double, _ERR], _STATUS),
     ("gait_lift_positions", [_HANDLE, c_void_p, c_void_p], _STATUS),
     ("gait_lift_unknowns", [_HANDLE], c_int32),
     ("gait_lift_posterior", [_HANDLE, c_void_p, c_void_p], _STATUS),
@@ -128,4 +130,6 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_lift_push", [_HANDLE, c_int64, c_void_p, c_void_p, _ERR], _STATUS),
     ("gait_lift_estimate", [_HANDLE, POINTER(LiftFrameC)], _STATUS),
     ("gait_lift_reset", [_HANDLE], None),
+    ("gait_lift_remove_spikes", [c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p], c_int32),
+    ("gait_lift_weight_outliers", [c_int32, c_void_p, c_void_p, c_void_p], c_int32),
 )

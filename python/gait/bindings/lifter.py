@@ -225,8 +225,44 @@ class Lifter:
             ),
             error,
         )
-        values = {item.name: getattr(c, item.name) for item in fields(Fit)}
-        return Fit(**(values | {"place": np.array(c.place), "converged": bool(c.converged)}))
+        return _fit(c)
+
+    def segment_robust(self, uv: ArrayLike, sd: ArrayLike | None = None) -> tuple[Fit, Array]:
+        """Fit one segment as `segment` does, with outliers of the fit down-weighted.
+
+        Returns
+        -------
+        fit : Fit
+        weighted : (F, J)
+            Standard deviations that count: larger than `sd` for outliers.
+        """
+        seen, deviations = self._observations(uv, sd, *self._shape)
+        c, error, weighted = abi.LiftFitC(), abi.Error(), np.empty(self._shape)
+        check(
+            library().gait_lift_segment_robust(
+                self._handle,
+                seen.ctypes.data,
+                deviations.ctypes.data if deviations is not None else None,
+                weighted.ctypes.data,
+                ctypes.byref(c),
+                ctypes.byref(error),
+            ),
+            error,
+        )
+        return _fit(c), weighted
+
+    def expect(self, place: ArrayLike, heading: float = 0.0, heading_sd: float = -1.0) -> None:
+        """Expect the person of the following segments at another place (3,) and heading than the config's.
+
+        A `heading_sd` of -1 leaves the heading unknown.  The lifter must have been made so.
+        """
+        where, error = np.ascontiguousarray(place, np.float64).reshape(3), abi.Error()
+        check(
+            library().gait_lift_expect(
+                self._handle, where.ctypes.data, heading, heading_sd, ctypes.byref(error)
+            ),
+            error,
+        )
 
     def positions(self) -> tuple[Array, Array]:
         """Give posterior mean and standard deviation (F, J, 3) of the last segment or of `fix`; metres."""
@@ -334,3 +370,47 @@ class Lifter:
     def reset(self) -> None:
         """Forget the stream."""
         library().gait_lift_reset(self._handle)
+
+
+def _fit(c: abi.LiftFitC) -> Fit:
+    values = {item.name: getattr(c, item.name) for item in fields(Fit)}
+    return Fit(**(values | {"place": np.array(c.place), "converged": bool(c.converged)}))
+
+
+def remove_spikes(time: ArrayLike, uv: ArrayLike, sd: ArrayLike) -> Array:
+    """Find points that are far off the line through the same point's neighbours in time.
+
+    Parameters
+    ----------
+    time : (T,)
+    uv : (T, P, 2)
+        NaN where a point was not seen.
+    sd : (T, P)
+
+    Returns
+    -------
+    (T, P)
+        `sd` with -1 for spikes.
+    """
+    at, points = np.ascontiguousarray(time, np.float64), np.ascontiguousarray(uv, np.float64)
+    kept, scratch = np.array(np.broadcast_to(sd, points.shape[:2]), np.float64), np.empty(2 * len(at))
+    library().gait_lift_remove_spikes(
+        *points.shape[:2], at.ctypes.data, points.ctypes.data, kept.ctypes.data, scratch.ctypes.data
+    )
+    return kept
+
+
+def weight_outliers(square: ArrayLike, sd: ArrayLike) -> Array:
+    """Enlarge the standard deviations (P,) of points far from their prediction, so that they hardly count.
+
+    Parameters
+    ----------
+    square : (P,)
+        Squared distances of the points of one frame from their prediction, in standard deviations.
+    """
+    distances, weighted = np.ascontiguousarray(square, np.float64), np.array(sd, np.float64)
+    scratch = np.empty(len(distances))
+    library().gait_lift_weight_outliers(
+        len(distances), distances.ctypes.data, weighted.ctypes.data, scratch.ctypes.data
+    )
+    return weighted
