@@ -8,6 +8,7 @@ from importlib.util import find_spec
 EXTRAS = {
     "video": {"cv2": "OpenCV", "av": "PyAV", "scipy": "SciPy"},
     "lcm": {"lcm": "LCM"},
+    "detect": {"ai_edge_litert": "LiteRT"},
     "report": {"matplotlib": "Matplotlib", "scipy": "SciPy"},
     "mocap": {"scipy": "SciPy", "ezc3d": "ezc3d", "threadpoolctl": "threadpoolctl"},
     "dask": {"distributed": "Dask"},

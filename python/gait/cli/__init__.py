@@ -38,6 +38,7 @@ COMMANDS = {
     "info": Command("info", "what a model holds"),
     "track": Command("track", "track a walking person in a video file", ("video",)),
     "eval": Command("evaluate", "errors of a track against the truth", ("video",)),
+    "detect": Command("detect", "2-D joints of the people in a video", ("video",)),
     "lift": Command("lift", "2-D joint tracks, or a video, to 3-D", ("video", "mocap")),
     "render": Command("render", "draw a pose or a model", ("video",)),
     "camera": Command("camera", "where a camera stands, from points measured on the ground", ("video",)),

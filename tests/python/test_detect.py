@@ -1,0 +1,174 @@
+import json
+import subprocess
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gait import cli
+from gait.detect import networks, people, weights
+from gait.detect.networks import JOINTS, Crop, Person
+from gait.errors import UserError
+from gait.io.keypoints_file import read
+from gait.io.video import Frame
+
+HAVE = all(weights.find(w) for w in (weights.PERSON, weights.LANDMARKS["full"]))
+needs_weights = pytest.mark.skipif(not HAVE, reason="the detector's weights are absent: gait detect --fetch")
+RED, BLUE = (40, 40, 220), (220, 40, 40)
+
+
+class Stage:
+    """People as rectangles of colour, and the two networks that see them exactly."""
+
+    def __init__(self, monkeypatch):
+        self.places = {}
+        monkeypatch.setattr(
+            people, "PersonNetwork", lambda: lambda image: list(map(self.crop, self.places.values()))
+        )
+        monkeypatch.setattr(people, "LandmarkNetwork", lambda name: self.landmarks)
+        self.detector = people.PeopleDetector()
+
+    @staticmethod
+    def crop(place):
+        return Crop(np.array([place, 100.0]), 200.0, 0.0)
+
+    def landmarks(self, image, crop):
+        """See the person nearest to the middle of a crop."""
+        near = min(self.places.values(), key=lambda place: abs(place - crop.centre[0]), default=np.inf)
+        if abs(near - crop.centre[0]) > 60:
+            return Person(0.1, np.zeros((16, 2)), np.zeros(16), crop)
+        x = near + 15.0 * np.array([1, -1] * 8)
+        y = np.array([60, 60, 75, 75, 90, 90, 110, 110, 140, 140, 170, 170, 172, 172, 174, 174.0])
+        return Person(0.9, np.column_stack([x, y]), np.ones(16), self.crop(near))
+
+    def step(self, number, **places):
+        self.places = places
+        image = np.zeros((200, 640, 3), np.uint8)
+        for name, place in places.items():
+            image[50:180, max(int(place) - 20, 0) : int(place) + 20] = RED if name == "red" else BLUE
+        found = self.detector.step(Frame(number, number / 25, image))
+        return {one.id: float(person.uv[:, 0].mean()) for one, person in found}
+
+
+@pytest.fixture
+def stage(monkeypatch):
+    return Stage(monkeypatch)
+
+
+def test_two_people_keep_their_ids(stage):
+    for n in range(40):
+        found = stage.step(n, red=100 + 4 * n, blue=500)
+        assert found == {1: pytest.approx(100 + 4 * n), 2: pytest.approx(500)}
+
+
+def test_one_who_returns_has_the_old_id(stage):
+    for n in range(10):
+        stage.step(n, red=300)
+    for n in range(10, 40):
+        assert stage.step(n) == {}
+    assert [set(stage.step(n, red=330)) for n in range(40, 50)][-1] == {1}
+
+
+def test_another_in_the_same_place_is_new(stage):
+    for n in range(10):
+        stage.step(n, red=300)
+    for n in range(10, 30):
+        stage.step(n)
+    assert [set(stage.step(n, blue=310)) for n in range(30, 40)][-1] == {2}
+
+
+def test_people_at_one_place_are_one(stage):
+    stage.step(0, red=200, blue=400)
+    for n in range(1, 30):
+        found = stage.step(n, red=min(200 + 8 * n, 396), blue=400)
+        assert len(found) == len({round(x, 3) for x in found.values()})
+
+
+def test_a_crop_follows_at_the_persons_speed(stage):
+    for n in range(10):
+        assert set(stage.step(n, red=100 + 50 * n)) == {1}
+
+
+def test_the_main_person_is_in_view_long_and_large():
+    def followed(frames, height):
+        return SimpleNamespace(frames=list(range(frames)), height=height)
+
+    small, large = followed(100, 50), followed(60, 200)
+    assert people.main_person([small, large]) is large
+
+
+def test_tiles_cover_the_picture():
+    for width, height, side in ((1280, 720, 720), (720, 1280, 360), (640, 480, 640)):
+        covered = np.zeros((height, width), bool)
+        for left, top, right, bottom in networks._tiles(width, height, side):
+            covered[top:bottom, left:right] = True
+        assert covered.all()
+
+
+def test_absent_weights_name_the_remedy(tmp_path, monkeypatch):
+    monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
+    with pytest.raises(UserError, match="pose_detection.tflite: .* run gait detect --fetch"):
+        weights.load(weights.PERSON)
+
+
+def test_damaged_weights_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
+    (tmp_path / weights.PERSON.file).write_bytes(b"another network")
+    with pytest.raises(UserError, match="is damaged or of another network; delete it"):
+        weights.load(weights.PERSON)
+
+
+def test_a_package_that_cannot_be_had_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setenv("GAIT_WEIGHTS", str(tmp_path))
+    failed = subprocess.CompletedProcess([], 1, "", "a\nERROR: no network\n")
+    monkeypatch.setattr(subprocess, "run", lambda *args, **kwargs: failed)
+    with pytest.raises(
+        UserError, match=r"mediapipe==.*cannot be downloaded \(ERROR: no network\); try again"
+    ):
+        weights.fetch(lambda line: None)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [[], ["VIDEO"], ["-o", "k.csv"]])
+def test_usage(words, capsys):
+    assert cli.main(["detect", *words]) == 2
+    assert "give VIDEO and -o KEYPOINTS.csv, or --fetch" in capsys.readouterr().err
+
+
+@needs_weights
+def test_both_runtimes_give_the_same_landmarks():
+    data = weights.load(weights.LANDMARKS["full"])
+    x = np.random.default_rng(1).random((1, 256, 256, 3)).astype(np.float32)
+    lite, opencv = networks._litert(data), networks._opencv(data)
+    if lite is None:
+        pytest.skip("LiteRT is not installed")
+    a, b = lite(x), opencv(x)
+    for name, tolerance in (("Identity", 0.01), ("Identity_1", 1e-4)):
+        assert np.abs(a[name].ravel() - b[name].ravel()).max() < tolerance
+    assert a["Identity_3"].shape == b["Identity_3"].shape
+
+
+@needs_weights
+def test_no_person_writes_nothing(tmp_path, capsys):
+    from gait import VideoWriter
+
+    noise = np.random.default_rng(2)
+    with VideoWriter(tmp_path / "noise.mp4", 25) as video:
+        for _ in range(3):
+            video.write(noise.integers(0, 255, (240, 320, 3), np.uint8))
+    out = tmp_path / "k.csv"
+    assert cli.main(["detect", str(tmp_path / "noise.mp4"), "-o", str(out)]) == 1
+    assert "no person found" in capsys.readouterr().err
+    assert not out.exists()
+
+
+@needs_weights
+def test_a_simulated_walk_is_found(tmp_path, capsys):
+    clip = tmp_path / "walk"
+    assert cli.main(["simulate", "-o", str(clip), "--frames", "8", "--size", "480x360", "--quiet"]) == 0
+    out = tmp_path / "k.csv"
+    capsys.readouterr()
+    assert cli.main(["detect", str(clip / "video.mp4"), "-o", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["person"] == 1
+    keypoints, _ = read(out, tuple(JOINTS))
+    assert len(keypoints.frame) >= 6
