@@ -174,7 +174,7 @@ $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(SRC_DIRS) $(if $(filter
 
 define kernel_rule
 $(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(SRC_DIRS)
-	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<)) $(FLAGS_$(1)) $(CFLAGS) -c $$< -o $$@
+	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<)) $(FLAGS_$(1)) $(if $(filter scalar,$(1)),$(LEAST)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 

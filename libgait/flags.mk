@@ -19,7 +19,8 @@ CLANG_VECTOR   := -ftree-vectorize
 # At -O3 gcc would unroll every loop over 16 lanes besides vectorising it: half as large again, no faster.
 GCC_KERNEL     := --param=max-completely-peel-times=8
 
-# Kernels are compiled once per instruction set; the results of `scalar` define those of the others.
+# Kernels are compiled once per instruction set; the results of `scalar` define those of the others.  It runs only
+# where a mask allows no other, so that release builds compile it at -Os.
 X86_ISAS     := avx2 avx512
 FLAGS_scalar := -DKERNEL_SCALAR -fno-tree-vectorize -fno-tree-slp-vectorize
 FLAGS_base   :=

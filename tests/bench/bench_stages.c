@@ -99,7 +99,7 @@ static void silhouette_count(const struct features *f, const struct grid_mask *w
                              int32_t *covered)
 {
     PART(STAGE_SILHOUETTE, b.plain->silhouette_count(f, whole, area, covered));
-    b.cells += (double)(*area / FG_ONE);
+    b.cells += (double)(*area / FOREGROUND_ONE);
     b.bodies++;
 }
 
@@ -107,7 +107,7 @@ static int32_t shown_of(const struct like_body *body)
 {
     int32_t shown = 0;
     for (int32_t l = 0; l < body->setup->limbs; l++)
-        for (int i = 0; i < LIKE_FACING; i++)
+        for (int i = 0; i < LIKE_HALF; i++)
             shown += body->seen[l].value[i] != TEXTURE_HIDDEN;
     return shown;
 }

@@ -27,7 +27,7 @@ void verdict_size(verdict *v, const bench_result *r)
 static int32_t points(const gait_model *m)
 {
     enum { EDGE_POINTS = 16 }; /* of a limb: edges_count */
-    return m->limbs * (LIKE_FACING + EDGE_POINTS);
+    return m->limbs * (LIKE_HALF + EDGE_POINTS);
 }
 
 /* One line; `more`: more is better. */

@@ -3,7 +3,7 @@
 #include "check.h"
 
 /* Camera at (0, -5, 1.5) looking along +y: x right, y down, z forward. */
-static gait_camera facing(void)
+static gait_camera toward_origin(void)
 {
     return (gait_camera){.width = 640,
                          .height = 480,
@@ -17,7 +17,7 @@ static gait_camera facing(void)
 
 static void test_project(void)
 {
-    gait_camera const c = facing();
+    gait_camera const c = toward_origin();
     float uv[2] = {-1.0f, -2.0f};
     CHECK(camera_project(&c, (float[3]){0, 0, 1.5f}, uv) == 5.0f);
     CHECK(uv[0] == 319.5f && uv[1] == 239.5f);
@@ -31,14 +31,14 @@ static void test_project(void)
 
 static void test_valid(void)
 {
-    gait_camera c = facing();
+    gait_camera c = toward_origin();
     CHECK(camera_valid(&c));
     c.R[0] = -1.0f; /* mirror */
     CHECK(!camera_valid(&c));
-    c = facing();
+    c = toward_origin();
     c.R[4] = 0.01f; /* skew */
     CHECK(!camera_valid(&c));
-    c = facing();
+    c = toward_origin();
     c.R[0] = 1.0004f; /* rounding of a text file */
     CHECK(camera_valid(&c));
     float *const number[] = {&c.fx, &c.fy, &c.cx, &c.cy, &c.R[3], &c.t[2], &c.distortion[4]};
@@ -52,7 +52,7 @@ static void test_valid(void)
     }
     c.fx = 0.0f;
     CHECK(!camera_valid(&c));
-    c = facing();
+    c = toward_origin();
     c.height = 0;
     CHECK(!camera_valid(&c));
 }
@@ -60,7 +60,7 @@ static void test_valid(void)
 /* Numbers of OpenCV's projectPoints, which works in double. */
 static void test_distort(void)
 {
-    gait_camera c = facing();
+    gait_camera c = toward_origin();
     float u, v;
     CHECK(!camera_distorted(&c));
     camera_distort(&c, 100.0f, 50.0f, &u, &v);

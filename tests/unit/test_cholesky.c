@@ -68,7 +68,7 @@ static void test_forward(int32_t n)
         about[i] = (float)V[i];
     k->cholesky_forward_float(U, n, ld, about, ld);
     k->cholesky_forward(U, n, ld, V, ld, CHOLESKY_LANES);
-    cholesky_ahead(U, n, ld, one);
+    cholesky_forward_vector(U, n, ld, one);
     for (int32_t i = 0; i < n; i++)
         largest = fmax(largest, fabs(one[i]));
     for (int32_t i = 0; i < n; i++) {

@@ -240,7 +240,7 @@ static void test_size(void)
     for (uint32_t i = 0; i < 3 * TOY_POINTS * N; i++)
         t->joint[i] = 0.1f * (float)(i / N) + 0.02f * normal(i, 3);
     gait_estimate const sure = estimate(11);
-    t->core->stature_doubt = (float)doubt;
+    t->core->stature_sd_ratio = (float)doubt;
     gait_estimate const e = estimate(11);
     for (int p = 0; p < TOY_POINTS; p++)
         for (int k = 0; k < 3; k++) {
@@ -258,7 +258,7 @@ static void test_size(void)
     gait_estimate const two = estimate(11);
     CHECK(memcmp(two.joint_sd, sure.joint_sd, sizeof sure.joint_sd) == 0);
     t->cfg.cameras = 1;
-    t->core->stature_doubt = 0.0f;
+    t->core->stature_sd_ratio = 0.0f;
 }
 
 /* Means of the plain fields, the pelvis they imply, speed, and angles of the mean state. */

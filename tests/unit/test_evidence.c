@@ -72,7 +72,7 @@ static void test_soften(void)
             power *= 0.5f;
         for (int32_t i = 0; i < MOST; i++)
             was[i] = ll[i];
-        evidence_soften(&p, ll);
+        evidence_anneal(&p, ll);
         for (int32_t i = 0; i < MOST; i++)
             CHECK(ll[i] == power * was[i]);
     }

@@ -48,12 +48,12 @@ static void make_scene(int32_t channels)
     memset(f.inside, 0xff, GRID_SIZE * sizeof *f.inside);
 }
 
-/* Foreground of a cell from its bit planes, [0, FG_ONE]. */
+/* Foreground of a cell from its bit planes, [0, FOREGROUND_ONE]. */
 static int32_t fg_at(int32_t x, int32_t y)
 {
     int32_t p = 0;
-    for (int32_t k = 0; k < FG_PLANES; k++)
-        p |= (int32_t)(f.fg[k][y][x >> 6] >> (x & 63) & 1) << k;
+    for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+        p |= (int32_t)(f.foreground[k][y][x >> 6] >> (x & 63) & 1) << k;
     return p;
 }
 
@@ -62,13 +62,13 @@ static void test_no_change(void)
 {
     for (int32_t channels = 1; channels <= 3; channels += 2) {
         make_scene(channels);
-        memset(f.fg, 0xff, FG_PLANES * sizeof *f.fg); /* of the frame before */
+        memset(f.foreground, 0xff, FOREGROUND_PLANES * sizeof *f.foreground); /* of the frame before */
         run->features_foreground(&f, &frame, &plate);
         int32_t set = 0;
-        for (int32_t k = 0; k < FG_PLANES; k++)
+        for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
             for (int32_t y = 0; y < GRID_SIZE; y++)
-                set += f.fg[k][y][0] != 0 || f.fg[k][y][1] != 0;
-        CHECK(f.fg_total == 0 && set == 0);
+                set += f.foreground[k][y][0] != 0 || f.foreground[k][y][1] != 0;
+        CHECK(f.foreground_total == 0 && set == 0);
     }
 }
 
@@ -82,7 +82,7 @@ static void test_exposure(void)
                 for (int32_t i = 0; i < VIEW_PIXELS; i++)
                     frame.channel[c][i] = (uint8_t)(plate.channel[c][i] * gain / 16);
             run->features_foreground(&f, &frame, &plate);
-            CHECK(f.fg_total < GRID_SIZE * GRID_SIZE * FG_ONE / 200);
+            CHECK(f.foreground_total < GRID_SIZE * GRID_SIZE * FOREGROUND_ONE / 200);
         }
 }
 
@@ -109,8 +109,8 @@ static void test_square(void)
                 *(in ? &inside : &outside) += fg_at(x, y);
                 total += fg_at(x, y);
             }
-        CHECK(total == f.fg_total);
-        CHECK(inside > 30 * 40 * FG_ONE * 3 / 4);
+        CHECK(total == f.foreground_total);
+        CHECK(inside > 30 * 40 * FOREGROUND_ONE * 3 / 4);
         CHECK(outside < 200);
     }
 }
@@ -129,9 +129,9 @@ static void test_channels(void)
         }
         frame.channels = plate.channels = k ? 3 : 1;
         run->features_foreground(&f, &frame, &plate);
-        total[k] = f.fg_total;
+        total[k] = f.foreground_total;
     }
-    CHECK(total[0] == total[1] && total[0] > 15 * GRID_SIZE * FG_ONE / 2);
+    CHECK(total[0] == total[1] && total[0] > 15 * GRID_SIZE * FOREGROUND_ONE / 2);
 }
 
 /* A shadow keeps the colour of what it falls on: it counts less than paint of the same distance. */
@@ -169,7 +169,7 @@ static void test_unseen(void)
     for (int32_t y = 0; y < GRID_SIZE; y++)
         for (int32_t x = 0; x < GRID_SIZE; x++)
             outside += fg_at(x, y) > 0 && !(x >= 20 && x < 64 && y < 100);
-    CHECK(outside == 0 && f.fg_total > 100 * 44 * FG_ONE / 2);
+    CHECK(outside == 0 && f.foreground_total > 100 * 44 * FOREGROUND_ONE / 2);
 }
 
 /* ---- edges ---- */
@@ -339,7 +339,7 @@ static void test_compute(void)
     f.map = (view_map){.scale = 1.0f, .u0 = -100.0f, .v0 = -50.0f};
     view_sample(run, &f.map, &cam, &im, &plate);
     toy_features(run, &f, &cam, &im, &plate, false, &scratch);
-    CHECK(f.has_image && f.has_fg && f.fg_total == 0);
+    CHECK(f.has_image && f.has_foreground && f.foreground_total == 0);
     CHECK(memcmp(scratch.planes.channel[0], plate.channel[0], VIEW_PIXELS) ==
           0); /* in bands as in one piece */
     int32_t cells = 0;
@@ -348,7 +348,7 @@ static void test_compute(void)
     CHECK(cells == W / 2 * (H / 2));
     CHECK(f.edge[20 * VIEW_SIZE + 20].trace == 0 && f.edge[120 * VIEW_SIZE + 180].trace > 5);
     toy_features(run, &f, &cam, &im, NULL, true, &scratch); /* no plate; grey levels in paper mode */
-    CHECK(f.has_image && !f.has_fg);
+    CHECK(f.has_image && !f.has_foreground);
     int32_t wrong = 0;
     for (int32_t y = 0; y < H; y++)
         for (int32_t x = 0; x < W; x++)
@@ -357,11 +357,11 @@ static void test_compute(void)
     im.format = GAIT_RGB8;
     im.stride = 3 * W;
     toy_features(run, &f, &cam, &im, &plate, false, &scratch); /* a grey plate: its luma is compared */
-    CHECK(f.has_image && f.has_fg && f.fg_total > 0);
+    CHECK(f.has_image && f.has_foreground && f.foreground_total > 0);
     im.data = NULL;
-    f.has_fg = true;
+    f.has_foreground = true;
     toy_features(run, &f, &cam, &im, &plate, false, &scratch);
-    CHECK(!f.has_image && !f.has_fg);
+    CHECK(!f.has_image && !f.has_foreground);
 }
 
 int main(void)

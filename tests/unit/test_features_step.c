@@ -61,17 +61,18 @@ static void test_plate(void)
         float const before = t->core->map[0].u0;
         CHECK(features_step(t, &f, &w) == 1);
         moved += t->core->map[0].u0 != before;
-        CHECK(t->camera[0].features.has_fg && t->camera[0].features.fg_total == 0);
+        CHECK(t->camera[0].features.has_foreground && t->camera[0].features.foreground_total == 0);
     }
     CHECK(moved > 6);
     f.image[0] = toy_image(shot[0]);
     particle_state const there = {.f = {[F_X] = toy_walk(20.0f / 30.0f).pelvis[0], [F_STATURE] = 1.75f}};
-    CHECK(features_step(t, &f, &there) == 1 && t->camera[0].features.fg_total > 800 * FG_ONE);
+    CHECK(features_step(t, &f, &there) == 1 && t->camera[0].features.foreground_total > 800 * FOREGROUND_ONE);
     CHECK(gait_tracker_set_background(t, 0, NULL) == GAIT_OK);
-    CHECK(features_step(t, &f, &there) == 1 && !t->camera[0].features.has_fg);
+    CHECK(features_step(t, &f, &there) == 1 && !t->camera[0].features.has_foreground);
     gait_image const plate = toy_image(shot[0]); /* another plate takes effect at once */
     CHECK(gait_tracker_set_background(t, 0, &plate) == GAIT_OK);
-    CHECK(features_step(t, &f, &there) == 1 && t->camera[0].features.has_fg && t->camera[0].features.fg_total == 0);
+    CHECK(features_step(t, &f, &there) == 1 && t->camera[0].features.has_foreground &&
+          t->camera[0].features.foreground_total == 0);
     toy_tracker_free(t);
 }
 
@@ -97,8 +98,8 @@ static void test_formats(void)
         for (int n = 0; n < 9; n++) { /* also changing from frame to frame */
             gait_frame f = toy_frame(n);
             f.image[0] = image[n < 6 ? n / 2 : n % 3];
-            CHECK(features_step(t, &f, &w) == 1 && t->camera[0].features.has_fg);
-            CHECK(t->camera[0].features.fg_total < GRID_SIZE * GRID_SIZE / 8); /* luma is rounded */
+            CHECK(features_step(t, &f, &w) == 1 && t->camera[0].features.has_foreground);
+            CHECK(t->camera[0].features.foreground_total < GRID_SIZE * GRID_SIZE / 8); /* luma is rounded */
         }
         toy_tracker_free(t);
     }
@@ -112,7 +113,8 @@ static void test_behind(void)
     particle_state w = {.f = {[F_X] = 0.0f, [F_Y] = -5.6f, [F_STATURE] = 1.75f}};
     for (int k = 0; k < 2; k++)
         f.image[k] = toy_image(shot[k]);
-    CHECK(features_step(t, &f, &w) == 1 && !t->camera[0].features.has_image && t->camera[1].features.has_image);
+    CHECK(features_step(t, &f, &w) == 1 && !t->camera[0].features.has_image &&
+          t->camera[1].features.has_image);
     w.f[F_Y] = 0.0f;
     CHECK(features_step(t, &f, &w) == 2);
     f.image[0].data = NULL;

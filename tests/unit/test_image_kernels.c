@@ -86,26 +86,28 @@ static void sample_case(uint32_t n)
 /* ---- maps ---- */
 typedef struct maps {
     unsigned char grey[VIEW_PIXELS + 2 * GUARD], edge[VIEW_PIXELS * sizeof(edge_cell) + 2 * GUARD];
-    unsigned char surface[VIEW_PIXELS + 2 * GUARD], fg[FG_PLANES * GRID_SIZE * GRID_WORDS * 8 + 2 * GUARD];
+    unsigned char surface[VIEW_PIXELS + 2 * GUARD],
+        foreground[FOREGROUND_PLANES * GRID_SIZE * GRID_WORDS * 8 + 2 * GUARD];
     unsigned char pairs[PAIRS * sizeof(uint16_t) + 2 * GUARD];
-    int32_t fg_total;
+    int32_t foreground_total;
 } maps;
 
 static void compute(const kernels *run, const view_planes *im, const view_planes *plate,
                     uint64_t (*inside)[GRID_WORDS], maps *out)
 {
     static edge_rows rows;
-    guarded const g[] = {
-        guard_fill(out->grey, VIEW_PIXELS), guard_fill(out->edge, VIEW_PIXELS * sizeof(edge_cell)),
-        guard_fill(out->surface, VIEW_PIXELS), guard_fill(out->fg, FG_PLANES * GRID_SIZE * GRID_WORDS * 8),
-        guard_fill(out->pairs, PAIRS * sizeof(uint16_t))};
-    features f = {.inside = inside, .fg = (uint64_t (*)[GRID_SIZE][GRID_WORDS])(void *)g[3].begin};
+    guarded const g[] = {guard_fill(out->grey, VIEW_PIXELS),
+                         guard_fill(out->edge, VIEW_PIXELS * sizeof(edge_cell)),
+                         guard_fill(out->surface, VIEW_PIXELS),
+                         guard_fill(out->foreground, FOREGROUND_PLANES * GRID_SIZE * GRID_WORDS * 8),
+                         guard_fill(out->pairs, PAIRS * sizeof(uint16_t))};
+    features f = {.inside = inside, .foreground = (uint64_t (*)[GRID_SIZE][GRID_WORDS])(void *)g[3].begin};
     run->view_grey(im, 0, VIEW_SIZE, g[0].begin);
     run->features_edges(g[0].begin, (edge_cell *)(void *)g[1].begin, &rows);
     run->features_contrast(g[0].begin, (int8_t *)g[2].begin);
     run->features_pairs((int8_t *)g[2].begin, (uint16_t *)(void *)g[4].begin);
     run->features_foreground(&f, im, plate);
-    out->fg_total = f.fg_total;
+    out->foreground_total = f.foreground_total;
     for (size_t i = 0; i < sizeof g / sizeof *g; i++)
         CHECK(guard_whole(&g[i]));
 }
@@ -138,7 +140,8 @@ static void maps_case(uint32_t n)
         CHECK(memcmp(want.edge, have.edge, sizeof want.edge) == 0);
         CHECK(memcmp(want.surface, have.surface, sizeof want.surface) == 0);
         CHECK(memcmp(want.pairs, have.pairs, sizeof want.pairs) == 0);
-        CHECK(memcmp(want.fg, have.fg, sizeof want.fg) == 0 && want.fg_total == have.fg_total);
+        CHECK(memcmp(want.foreground, have.foreground, sizeof want.foreground) == 0 &&
+              want.foreground_total == have.foreground_total);
     }
 }
 

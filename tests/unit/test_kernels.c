@@ -46,10 +46,10 @@ static uint64_t word(uint32_t index, uint32_t draw, uint32_t kind)
 
 static void test_silhouette_count(void)
 {
-    static uint64_t fg[FG_PLANES][GRID_SIZE][GRID_WORDS], inside[GRID_SIZE][GRID_WORDS];
-    static uint64_t words[GRID_STARTS][FG_PLANES + 1][GRID_SIZE];
+    static uint64_t foreground[FOREGROUND_PLANES][GRID_SIZE][GRID_WORDS], inside[GRID_SIZE][GRID_WORDS];
+    static uint64_t words[GRID_STARTS][FOREGROUND_PLANES + 1][GRID_SIZE];
     static grid_mask body;
-    features f = {.fg = fg, .inside = inside, .words = words};
+    features f = {.foreground = foreground, .inside = inside, .words = words};
     for (uint32_t round = 0; round < 400; round++) {
         int32_t const first = (int32_t)(round * 37 % 128),
                       last = first + (int32_t)(round * 11 % 129) % (129 - first);
@@ -59,8 +59,8 @@ static void test_silhouette_count(void)
                 uint32_t const at = y * GRID_WORDS + w;
                 body.word[w][y] = word(at, 10 * round, round % 3);
                 inside[y][w] = word(at, 10 * round + 1, round / 3 % 4);
-                for (uint32_t k = 0; k < FG_PLANES; k++)
-                    fg[k][y][w] = word(at, 10 * round + 2 + k, round / 12 % 4);
+                for (uint32_t k = 0; k < FOREGROUND_PLANES; k++)
+                    foreground[k][y][w] = word(at, 10 * round + 2 + k, round / 12 % 4);
             }
         body.first = round % 5 ? first : 0;
         body.last = round % 5 ? last : GRID_SIZE;
@@ -73,11 +73,11 @@ static void test_silhouette_count(void)
                 if (!toy_cell(&body, x, y) || !(inside[y][x >> 6] & bit))
                     continue;
                 cells++;
-                for (int32_t k = 0; k < FG_PLANES; k++)
-                    under += fg[k][y][x >> 6] & bit ? 1 << k : 0;
+                for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+                    under += foreground[k][y][x >> 6] & bit ? 1 << k : 0;
             }
         isa_scalar()->silhouette_count(&f, &body, &area, &covered);
-        CHECK(area == FG_ONE * cells && covered == under);
+        CHECK(area == FOREGROUND_ONE * cells && covered == under);
         for (int k = 0; k < isa_count(); k++) {
             int32_t a = -1, c = -1;
             isa_at(k)->silhouette_count(&f, &body, &a, &c);

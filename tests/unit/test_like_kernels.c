@@ -139,8 +139,8 @@ static void test_sample(void)
                 for (int32_t i = 0; i < LIKE_SAMPLES; i++) {
                     int32_t const at = (i - 2 * want[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
                     int8_t const value = look(l, i, lane);
-                    missing += at >= LIKE_FACING && value != TEXTURE_HIDDEN;
-                    if (at < LIKE_FACING && value != want[l].value[at]) {
+                    missing += at >= LIKE_HALF && value != TEXTURE_HIDDEN;
+                    if (at < LIKE_HALF && value != want[l].value[at]) {
                         bool const flip = value == TEXTURE_HIDDEN || want[l].value[at] == TEXTURE_HIDDEN;
                         flipped += flip;
                         rounded += !flip;
@@ -173,8 +173,8 @@ static void fill(like_patch *p, uint32_t round, uint32_t salt)
 {
     for (uint32_t l = 0; l < LIMBS; l++) {
         p[l].turn = (uint8_t)(draw(l, 4 * round + salt) >> (round % 3 ? 6 : 0));
-        for (uint32_t i = 0; i < LIKE_FACING; i++) {
-            uint32_t const r = draw(l * LIKE_FACING + i, 4 * round + salt + 1);
+        for (uint32_t i = 0; i < LIKE_HALF; i++) {
+            uint32_t const r = draw(l * LIKE_HALF + i, 4 * round + salt + 1);
             int32_t const value = round % 4 == 0   ? (int32_t)(r % 255) - 127
                                   : round % 4 == 1 ? (r & 1 ? 127 : -127)
                                                    : (int32_t)(r % 9);
@@ -208,7 +208,7 @@ static void test_compare(void)
             known[i] = (int8_t)draw(i, round);
         for (uint32_t l = 0; l < LIMBS; l++)
             for (uint32_t i = 0; i < BLOCK; i++)
-                v->outline.limb[l].facing[i] = fabsf(uniform(l * BLOCK + i, round));
+                v->outline.limb[l].cos_tilt[i] = fabsf(uniform(l * BLOCK + i, round));
         memset(want, 0xa5, sizeof want); /* as guard_fill: other bodies' are left alone */
         isa_scalar()->texture_costs(&b, want);
         for (uint32_t i = 0; i < LIMBS * BLOCK; i++) /* theirs for the sums */
@@ -321,8 +321,8 @@ static void test_edges(void)
             v->outline.limb[l].depth[lane] = draw(l, round + 200) % 6 ? 3.0f : 0.0f;
             int32_t const first = (int32_t)(draw(l, round + 300) % 9 * LAYERS_BAND);
             grid_mask_frame(mask, first, first + (int32_t)(draw(l, round + 400) % 64),
-                       round % 4 ? (int32_t)(draw(l, round + 500) % 8 * GRID_STEP) : 0,
-                       round % 4 ? 64 : GRID_SIZE);
+                            round % 4 ? (int32_t)(draw(l, round + 500) % 8 * GRID_STEP) : 0,
+                            round % 4 ? 64 : GRID_SIZE);
             for (uint32_t y = 0; y < GRID_SIZE; y++)
                 for (uint32_t w = 0; w < GRID_WORDS; w++)
                     mask->word[w][y] = round % 3

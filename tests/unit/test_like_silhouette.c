@@ -38,22 +38,22 @@ static void test_counts(void)
             for (int32_t w = 0; w < GRID_WORDS; w++)
                 body.whole.word[w][y] = drawn[y][w];
         body.whole.width = GRID_SIZE;
-        for (uint32_t k = 0; k < FG_PLANES; k++)
-            random_words(8 * round + 2 + k, v->f.fg[k]);
+        for (uint32_t k = 0; k < FOREGROUND_PLANES; k++)
+            random_words(8 * round + 2 + k, v->f.foreground[k]);
         body.whole.first = first;
         body.whole.last = last;
-        v->f.has_fg = true;
-        v->f.fg_total = 0;
+        v->f.has_foreground = true;
+        v->f.foreground_total = 0;
         for (int32_t y = 0; y < GRID_SIZE; y++)
             for (int32_t x = 0; x < GRID_SIZE; x++) {
                 int32_t p = 0;
-                for (int32_t k = 0; k < FG_PLANES; k++) {
-                    v->f.fg[k][y][x >> 6] &= v->f.inside[y][x >> 6];
-                    p |= bit((const uint64_t (*)[GRID_WORDS])v->f.fg[k], x, y) << k;
+                for (int32_t k = 0; k < FOREGROUND_PLANES; k++) {
+                    v->f.foreground[k][y][x >> 6] &= v->f.inside[y][x >> 6];
+                    p |= bit((const uint64_t (*)[GRID_WORDS])v->f.foreground[k], x, y) << k;
                 }
                 bool const see = bit((const uint64_t (*)[GRID_WORDS])v->f.inside, x, y);
                 bool const in = y >= first && y < last && bit((const uint64_t (*)[GRID_WORDS])drawn, x, y);
-                v->f.fg_total += p;
+                v->f.foreground_total += p;
                 inside += see && in ? 1.0 - p / 15.0 : 0.0;
                 under += see && in ? p / 15.0 : 0.0;
                 outside += see && !in ? p / 15.0 : 0.0;
@@ -77,7 +77,7 @@ static void test_silent(void)
 {
     toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
     like_body b = {.setup = &v->setup, .features = &v->f, .layers = &body};
-    v->f.has_fg = false;
+    v->f.has_foreground = false;
     like_silhouette_count(&b);
     CHECK(like_silhouette_parts(&b).explained == 0.0f && like_silhouette_parts(&b).missed == 0.0f);
     CHECK(like_silhouette.log_likelihood(&b) == 0.0f && like_silhouette.support(&b) == 0.0f);

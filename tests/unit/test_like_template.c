@@ -13,7 +13,7 @@ static like_patch seen[LIMBS];
 static void hide_all(void)
 {
     for (int l = 0; l < LIMBS; l++)
-        memset(seen[l].value, TEXTURE_HIDDEN, LIKE_FACING);
+        memset(seen[l].value, TEXTURE_HIDDEN, LIKE_HALF);
 }
 
 static void test_update(void)
@@ -58,14 +58,14 @@ static void test_turns(void)
         template_clear(template, LIMBS);
         for (int l = 0; l < LIMBS; l++) {
             seen[l].turn = (uint8_t)((turn + 5 * l) % LIKE_DIRECTIONS);
-            for (int i = 0; i < LIKE_FACING; i++)
+            for (int i = 0; i < LIKE_HALF; i++)
                 seen[l].value[i] = (int8_t)(5 * i - 40 + l);
         }
         template_update(template, LIMBS, seen);
         for (int l = 0; l < LIMBS; l++)
             for (int i = 0; i < LIKE_SAMPLES; i++) {
                 int const at = (i - 2 * seen[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
-                int const want = at < LIKE_FACING ? (5 * at - 40 + l) * TEMPLATE_ONE : TEMPLATE_EMPTY;
+                int const want = at < LIKE_HALF ? (5 * at - 40 + l) * TEMPLATE_ONE : TEMPLATE_EMPTY;
                 CHECK(template[l * LIKE_SAMPLES + i] == want);
             }
         template_ring(template, LIMBS, ring);
@@ -86,8 +86,8 @@ static void test_term(void)
     b.known = ring;
     template_clear(template, LIMBS);
     seen[0].turn = seen[1].turn = 0;
-    memset(seen[0].value, 10, LIKE_FACING);
-    memset(seen[1].value, 10, LIKE_FACING);
+    memset(seen[0].value, 10, LIKE_HALF);
+    memset(seen[1].value, 10, LIKE_HALF);
     template_ring(template, LIMBS, ring);
     CHECK(like_template.log_likelihood(&b) == -1.5f);
     for (int i = 0; i < SAMPLES; i++)
@@ -99,10 +99,10 @@ static void test_term(void)
     CHECK(like_template.log_likelihood(&b) == 0.0f);
     double want = 0.0;
     for (int l = 0; l < LIMBS; l++)
-        for (int i = 0; i < LIKE_FACING; i++) {
-            int const d = l * LIKE_FACING + i - 15;
+        for (int i = 0; i < LIKE_HALF; i++) {
+            int const d = l * LIKE_HALF + i - 15;
             seen[l].value[i] = (int8_t)(10 + d);
-            want += 2.5 * log(1.0 + d * d / 1024.0) / (LIMBS * LIKE_FACING);
+            want += 2.5 * log(1.0 + d * d / 1024.0) / (LIMBS * LIKE_HALF);
         }
     CHECK_NEAR(like_template.log_likelihood(&b), -want, 0.01);
     seen[1].value[15] = 127;

@@ -9,13 +9,13 @@ static toy_body *v;
 static like_patch now[TOY_LIMBS], then[TOY_LIMBS];
 
 /* One limb with this cosine to the image plane; n samples seen in both frames, differing by d; the rest in one. */
-static float limb(int32_t mode, double facing, int n, int d)
+static float limb(int32_t mode, double cos_tilt, int n, int d)
 {
     v = toy_body_new(0, mode);
     v->setup.limbs = 1;
-    v->outline.limb[0].facing[LANE] = (float)facing;
+    v->outline.limb[0].cos_tilt[LANE] = (float)cos_tilt;
     now[0].turn = then[0].turn = 0;
-    for (int i = 0; i < LIKE_FACING; i++) {
+    for (int i = 0; i < LIKE_HALF; i++) {
         now[0].value[i] = (int8_t)(i < n ? 20 : i % 2 ? TEXTURE_HIDDEN : 3);
         then[0].value[i] = (int8_t)(i < n ? 20 - d : i % 2 ? 100 : TEXTURE_HIDDEN);
     }
@@ -42,15 +42,15 @@ static double mixture(double q, double visible, double occluded)
 /* Default form: mean Student-t cost; "occluded" costs 1.6; share of 12.8 samples seen in both frames. */
 static void test_robust(void)
 {
-    static const double facing[] = {1.0, 0.9, 0.5, 0.0};
+    static const double cos_tilt[] = {1.0, 0.9, 0.5, 0.0};
     static const int diff[] = {0, 5, 16, 40, 100};
-    for (size_t k = 0; k < sizeof facing / sizeof *facing; k++)
+    for (size_t k = 0; k < sizeof cos_tilt / sizeof *cos_tilt; k++)
         for (size_t i = 0; i < sizeof diff / sizeof *diff; i++) {
-            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, facing[k], 16, diff[i]),
-                       mixture(facing[k], -cost(diff[i]), -1.6), 0.01);
-            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, facing[k], 8, diff[i]),
-                       mixture(facing[k] * 8.0 / 12.8, -cost(diff[i]), -1.6), 0.01);
-            CHECK(limb(GAIT_MODE_DEFAULT, facing[k], 7, diff[i]) == -1.6f); /* too few: occluded */
+            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, cos_tilt[k], 16, diff[i]),
+                       mixture(cos_tilt[k], -cost(diff[i]), -1.6), 0.01);
+            CHECK_NEAR(limb(GAIT_MODE_DEFAULT, cos_tilt[k], 8, diff[i]),
+                       mixture(cos_tilt[k] * 8.0 / 12.8, -cost(diff[i]), -1.6), 0.01);
+            CHECK(limb(GAIT_MODE_DEFAULT, cos_tilt[k], 7, diff[i]) == -1.6f); /* too few: occluded */
         }
     /* Bounded on both sides: neither a match nor a mismatch of one limb decides alone. */
     CHECK_NEAR(limb(GAIT_MODE_DEFAULT, 1.0, 16, 0), 0.0, 1e-5);
@@ -64,17 +64,17 @@ static void test_robust(void)
  * is not seen has the density 0.0018. */
 static void test_paper(void)
 {
-    static const double facing[] = {1.0, 0.8, 0.6, 0.2};
+    static const double cos_tilt[] = {1.0, 0.8, 0.6, 0.2};
     static const int diff[] = {0, 3, 10, 30};
-    for (size_t k = 0; k < sizeof facing / sizeof *facing; k++) {
-        double const f2 = facing[k] * facing[k], tan2 = fmin((1.0 - f2) / f2, 9.0);
+    for (size_t k = 0; k < sizeof cos_tilt / sizeof *cos_tilt; k++) {
+        double const f2 = cos_tilt[k] * cos_tilt[k], tan2 = fmin((1.0 - f2) / f2, 9.0);
         double const var = 2.0 * 9.0 + 64.0 * (1.0 + tan2);
         for (size_t i = 0; i < sizeof diff / sizeof *diff; i++) {
             double const log_p = -0.5 * log(2.0 * 3.14159265358979 * var) - diff[i] * diff[i] / (2.0 * var);
-            CHECK_NEAR(limb(GAIT_MODE_PAPER, facing[k], 16, diff[i]), mixture(facing[k], log_p, log(0.0018)),
-                       0.01);
-            CHECK_NEAR(limb(GAIT_MODE_PAPER, facing[k], 10, diff[i]),
-                       mixture(facing[k] * 10.0 / 12.8, log_p, log(0.0018)), 0.01);
+            CHECK_NEAR(limb(GAIT_MODE_PAPER, cos_tilt[k], 16, diff[i]),
+                       mixture(cos_tilt[k], log_p, log(0.0018)), 0.01);
+            CHECK_NEAR(limb(GAIT_MODE_PAPER, cos_tilt[k], 10, diff[i]),
+                       mixture(cos_tilt[k] * 10.0 / 12.8, log_p, log(0.0018)), 0.01);
         }
     }
     CHECK_NEAR(limb(GAIT_MODE_PAPER, 1.0, 5, 0), log(0.0018), 0.01);
@@ -87,11 +87,11 @@ static void test_turned(void)
 {
     for (int from = 0; from < LIKE_DIRECTIONS; from++)
         for (int by = -8; by < 8; by++) {
-            int const both = LIKE_FACING - 2 * abs(by);
+            int const both = LIKE_HALF - 2 * abs(by);
             CHECK_NEAR(limb(GAIT_MODE_DEFAULT, 1.0, 16, 0), 0.0, 1e-5);
             then[0].turn = (uint8_t)from;
             now[0].turn = (uint8_t)((from + by) & (LIKE_DIRECTIONS - 1));
-            for (int i = 0; i < LIKE_FACING; i++) { /* a point's value is its number */
+            for (int i = 0; i < LIKE_HALF; i++) { /* a point's value is its number */
                 then[0].value[i] = (int8_t)(4 * ((2 * from + i) % LIKE_SAMPLES));
                 now[0].value[i] = (int8_t)(4 * ((2 * now[0].turn + i) % LIKE_SAMPLES));
             }
@@ -113,9 +113,9 @@ static void test_limbs(void)
     float const one = limb(GAIT_MODE_DEFAULT, 0.9, 16, 7);
     v->setup.limbs = 3;
     for (int l = 1; l < 3; l++) {
-        v->outline.limb[l].facing[LANE] = 0.9f;
-        memset(now[l].value, l == 1 ? 20 : TEXTURE_HIDDEN, LIKE_FACING);
-        memset(then[l].value, 13, LIKE_FACING);
+        v->outline.limb[l].cos_tilt[LANE] = 0.9f;
+        memset(now[l].value, l == 1 ? 20 : TEXTURE_HIDDEN, LIKE_HALF);
+        memset(then[l].value, 13, LIKE_HALF);
     }
     like_body b = {.setup = &v->setup,
                    .features = &v->f,

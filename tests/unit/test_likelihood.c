@@ -72,7 +72,7 @@ static void test_sample(void)
     for (int32_t l = 0; l < TOY_LIMBS; l++)
         for (int i = 0; i < LIKE_SAMPLES; i++) {
             const like_surface *const f = &v->setup.surface[l];
-            float p[3], uv[2] = {0}, facing = 0.0f, range = 0.0f;
+            float p[3], uv[2] = {0}, incidence = 0.0f, range = 0.0f;
             for (int k = 0; k < 3; k++) {
                 const float *const r = frames.R + 9 * v->setup.geometry[l].frame + 3 * k;
                 const float *const projection = v->cam.R; /* camera centre: -R't */
@@ -81,15 +81,15 @@ static void test_sample(void)
                 float const n = r[0] * f->normal[0][i] + r[1] * f->normal[1][i] + r[2] * f->normal[2][i];
                 p[k] = frames.o[3 * v->setup.geometry[l].frame + k] +
                        s.stature * (r[0] * f->point[0][i] + r[1] * f->point[1][i] + r[2] * f->point[2][i]);
-                facing += n * (centre - p[k]);
+                incidence += n * (centre - p[k]);
                 range += (centre - p[k]) * (centre - p[k]);
             }
-            facing /= sqrtf(range);
+            incidence /= sqrtf(range);
             camera_project(&v->cam, p, uv);
             int32_t const at_half = (i - 2 * v->seen[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
-            int8_t const have = at_half < LIKE_FACING ? v->seen[l].value[at_half] : TEXTURE_HIDDEN;
+            int8_t const have = at_half < LIKE_HALF ? v->seen[l].value[at_half] : TEXTURE_HIDDEN;
             int32_t const id = ids[(int32_t)(uv[1] + 0.5f) * SCENE_W + (int32_t)(uv[0] + 0.5f)];
-            if (facing < 0.15f) {
+            if (incidence < 0.15f) {
                 back++;
                 wrong += have != TEXTURE_HIDDEN;
             } else if (have != TEXTURE_HIDDEN) {
@@ -144,8 +144,8 @@ static void test_costs(void)
     }
     CHECK(wrong == 0);
     /* The sum over a limb, and over all limbs of robust ones, leaves the count alone. */
-    CHECK(LIKE_FACING * (s->square.one[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
-    CHECK(MODEL_MAX_LIMBS * LIKE_FACING * (s->robust.one[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
+    CHECK(LIKE_HALF * (s->square.one[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
+    CHECK(MODEL_MAX_LIMBS * LIKE_HALF * (s->robust.one[LIKE_COSTS - 2] - LIKE_COUNT_ONE) < LIKE_COUNT_ONE);
 }
 
 /* ---- all terms together ---- */

@@ -59,7 +59,8 @@ static void test_cameras_add(void)
     gait_estimate e;
     toy_tracker_step(both, 20, half, &e);
     toy_tracker_step(first, 20, half, &e);
-    CHECK(memcmp(both->loglik_raw, first->loglik_raw, N * sizeof *both->loglik_raw) == 0 && !(e.flags & GAIT_EST_NO_IMAGE));
+    CHECK(memcmp(both->loglik_raw, first->loglik_raw, N * sizeof *both->loglik_raw) == 0 &&
+          !(e.flags & GAIT_EST_NO_IMAGE));
     toy_tracker_free(both);
     toy_tracker_free(first);
 }
@@ -130,7 +131,7 @@ static void test_ancestor(void)
         for (int32_t l = 0; l < TOY_LIMBS; l++) {
             const like_patch *const a = &t->texture[i * TOY_LIMBS + l];
             const like_patch *const b = &then[parent * TOY_LIMBS + l];
-            for (int32_t k = 0; k < LIKE_FACING && a->turn == b->turn; k++)
+            for (int32_t k = 0; k < LIKE_HALF && a->turn == b->turn; k++)
                 shared += a->value[k] != TEXTURE_HIDDEN && b->value[k] != TEXTURE_HIDDEN;
         }
         CHECK(shared > 60);      /* the same walker a frame later */

@@ -107,11 +107,11 @@ static void test_front_cone(void)
                 CHECK_NEAR(p.y[k], low ? v + reach : v - reach, 0.01);
             }
             CHECK_NEAR(p.depth, 4.0, 1e-5);
-            CHECK_NEAR(p.facing, 1.0, 1e-5);
+            CHECK_NEAR(p.cos_tilt, 1.0, 1e-5);
         }
 }
 
-/* Pointing at the camera: nothing but the ends, not facing. */
+/* Pointing at the camera: nothing but the ends, not cos_tilt. */
 static void test_pointing_cone(void)
 {
     static const float number[LIMB_SHAPE] = {0, 0.2f, 0, 0, -0.2f, 0, 0.10f, 0.06f, 0.10f, 0.06f};
@@ -120,7 +120,7 @@ static void test_pointing_cone(void)
     const float at[3] = {0, 4, 0};
     limb_polygon p;
     outline_limb(&g, upright, at, 1.0f, &cam, &whole, &p);
-    CHECK_NEAR(p.facing, 0.0, 1e-3);
+    CHECK_NEAR(p.cos_tilt, 0.0, 1e-3);
     CHECK_NEAR(p.depth, 4.0, 1e-5);
     for (int k = 0; k < 4; k++)
         CHECK(fabsf(p.x[k] - 320.0f) < 16.0f && fabsf(p.y[k] - 240.0f) < 16.0f && isfinite(p.x[k]));
@@ -155,7 +155,7 @@ static void test_ellipsoid(void)
     CHECK_NEAR(sum[0], 320.0, 0.01);
     CHECK_NEAR(sum[1], 240.0, 0.01);
     CHECK_NEAR(p.depth, 5.0, 1e-5);
-    CHECK(p.facing == 1.0f);
+    CHECK(p.cos_tilt == 1.0f);
     /* Off the axis a ball is wider than high by the slope of its ray. */
     const float aside[3] = {2.5f, 5, 0};
     double most = 0.0;
@@ -307,13 +307,13 @@ static void test_walker(void)
                     projection[k] += R9[3 * i + k] * ((float)dot3(R9 + 3 * i, c) + cam.t[i]);
             double const sine = dot3(projection, d) / sqrt(dot3(projection, projection) * dot3(d, d));
             if (limbs[l].shape == LIMB_CONE)
-                CHECK_NEAR(p.facing, sqrt(1.0 - sine * sine), 1e-3);
+                CHECK_NEAR(p.cos_tilt, sqrt(1.0 - sine * sine), 1e-3);
         }
     }
     CHECK(f.points > 70000);
     CHECK(f.off_axis < 0.05); /* pixels */
     CHECK(f.out < 0.2);       /* of the size: a foreshortened end's ellipse is cut */
-    CHECK(f.simd_f64 < 0.01);     /* the surface touches the outline */
+    CHECK(f.simd_f64 < 0.01); /* the surface touches the outline */
 }
 
 /* Every lane of a block has the polygon of its own body. */
@@ -351,7 +351,7 @@ static void test_lanes(void)
             const outline_lanes *const q = &block.limb[l];
             for (int32_t k = 0; k < outline_vertices(&limbs[l]); k++)
                 wrong += q->x[k][lane] != p.x[k] || q->y[k][lane] != p.y[k];
-            wrong += q->depth[lane] != p.depth || q->facing[lane] != p.facing;
+            wrong += q->depth[lane] != p.depth || q->cos_tilt[lane] != p.cos_tilt;
         }
     CHECK(wrong == 0);
 }

@@ -157,7 +157,7 @@ static void test_implausible(void)
     target = film_tracker(&cfg, 7, 0.3f);
     target_digest = gait_tracker_digest(target);
     for (int k = 0; k < 3; k++) {
-        t->core->stature_doubt = doubt[k];
+        t->core->stature_sd_ratio = doubt[k];
         unsigned char *const kept = save(t, &bytes);
         refuse(kept, bytes, GAIT_ERR_CORRUPT);
         free(kept);

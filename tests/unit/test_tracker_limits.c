@@ -164,8 +164,7 @@ static void test_unknown_phase(void)
         CHECK(e.status != GAIT_TRACK_LOST && (e.status == GAIT_TRACK_INIT || n > 24));
     }
     look(&e, 44, &have);
-    CHECK(e.status == GAIT_TRACK_TRACKING &&
-          have.phase < 0.02); /* legs and arms tell left from right here */
+    CHECK(e.status == GAIT_TRACK_TRACKING && have.phase < 0.02); /* legs and arms tell left from right here */
     toy_tracker_free(t);
 }
 
@@ -212,11 +211,10 @@ static void test_appearance(void)
     CHECK(known[1][0] >= known[0][0] && known[1][1] > 100);
     for (int c = 0; c < 2; c++) { /* each its own */
         int32_t near = 0, both = 0;
-        for (int i = 0; i < TOY_LIMBS * LIKE_FACING; i++) {
-            const like_patch *const p = &t->estimate_patch[c * TOY_LIMBS + i / LIKE_FACING];
-            int32_t const now = p->value[i % LIKE_FACING],
-                          point = (2 * p->turn + i % LIKE_FACING) % LIKE_SAMPLES;
-            int32_t const mean = t->template[0][c][i / LIKE_FACING * LIKE_SAMPLES + point] / TEMPLATE_ONE;
+        for (int i = 0; i < TOY_LIMBS * LIKE_HALF; i++) {
+            const like_patch *const p = &t->estimate_patch[c * TOY_LIMBS + i / LIKE_HALF];
+            int32_t const now = p->value[i % LIKE_HALF], point = (2 * p->turn + i % LIKE_HALF) % LIKE_SAMPLES;
+            int32_t const mean = t->template[0][c][i / LIKE_HALF * LIKE_SAMPLES + point] / TEMPLATE_ONE;
             both += now != TEXTURE_HIDDEN;
             near += now != TEXTURE_HIDDEN && abs(now - mean) < 25;
         }

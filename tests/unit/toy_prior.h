@@ -30,7 +30,7 @@ static inline dynamics quiet(int32_t mode, uint64_t seed)
     return (dynamics){.cfg = &cfg,
                       .rule = state_layout_init(toy_model(), &cfg, kernels_choose(~0u)),
                       .seed = seed,
-                      .stature_doubt = 0.05f};
+                      .stature_sd_ratio = 0.05f};
 }
 
 /* Particles first .. first + BLOCK - 1 over one interval of dt seconds at an age. */

@@ -17,7 +17,7 @@ static double dot(const double *u, const double *v, int32_t count)
     return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
 }
 
-void cholesky_ahead(const double *A, int32_t n, int32_t ld, double *v)
+void cholesky_forward_vector(const double *A, int32_t n, int32_t ld, double *v)
 {
     for (int32_t i = 0; i < n; i++) {
         const double *const u = A + (size_t)i * (size_t)ld;
@@ -27,7 +27,7 @@ void cholesky_ahead(const double *A, int32_t n, int32_t ld, double *v)
     }
 }
 
-void cholesky_back(const double *A, int32_t n, int32_t ld, double *v)
+void cholesky_backward(const double *A, int32_t n, int32_t ld, double *v)
 {
     memset(v + n, 0, (size_t)(ld - n) * sizeof *v);
     for (int32_t first = cholesky_padded(n) - CHOLESKY_LANES; first >= 0; first -= CHOLESKY_LANES) {
@@ -51,7 +51,7 @@ void cholesky_solve(const double *A, int32_t n, int32_t ld, double *theta)
 {
     for (int32_t i = 0; i < n; i++)
         theta[i] = A[(size_t)i * (size_t)ld + (size_t)n];
-    cholesky_back(A, n, ld, theta);
+    cholesky_backward(A, n, ld, theta);
 }
 
 double cholesky_log_det(const double *A, int32_t n, int32_t ld)

@@ -25,9 +25,9 @@ void cholesky_solve(const double *A, int32_t n, int32_t ld, double *theta);
 /* sum of log U_ii. */
 double cholesky_log_det(const double *A, int32_t n, int32_t ld);
 /* v = U^-T v, in place. */
-void cholesky_ahead(const double *A, int32_t n, int32_t ld, double *v);
+void cholesky_forward_vector(const double *A, int32_t n, int32_t ld, double *v);
 /* v = U^-1 v, in place; ld numbers, those past n become 0. */
-void cholesky_back(const double *A, int32_t n, int32_t ld, double *v);
+void cholesky_backward(const double *A, int32_t n, int32_t ld, double *v);
 /* Eigenvectors of a symmetric S (n x n, full, ld) by Jacobi rotations: S becomes diagonal, row i of V (ld)
  * the vector of S[i][i]. Largest first. */
 void symmetric_eigen(double *S, double *V, int32_t n, int32_t ld);

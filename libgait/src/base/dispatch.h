@@ -118,7 +118,7 @@ struct particle_block;
        const struct kin_body *body, struct like_pose *out))                                                  \
     K(void, surface_sample,                                                                                  \
       (const struct like_setup *s, const struct features *f, const struct like_pose *pose, int32_t lane,     \
-       const struct layers *drawn, struct like_patch *seen))                                                 \
+       const struct layers *drawn, struct like_patch *out))                                                  \
     K(void, texture_costs, (const struct like_body *b, int32_t (*cost)[16]))                                 \
     K(void, texture_logs,                                                                                    \
       (const struct like_setup *s, const struct outline_block *outline, const int32_t (*cost)[16],           \

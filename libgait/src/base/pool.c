@@ -36,12 +36,12 @@ struct gait_pool {
     atomic_int next;    /* task to hand out */
 };
 
-enum { LOOKS = 20000 }; /* 0.4 to 0.5 ms, of all helpers together: there may be more than cores */
+enum { SPINS = 20000 }; /* 0.4 to 0.5 ms, of all helpers together: there may be more than cores */
 
 /* While *value is `known`, or while it is not, but not for long. */
-static void look_on(const gait_pool *p, const atomic_uint *value, unsigned known, bool same)
+static void spin_while(const gait_pool *p, const atomic_uint *value, unsigned known, bool same)
 {
-    int32_t left = LOOKS / i_max(p->helpers, 1);
+    int32_t left = SPINS / i_max(p->helpers, 1);
     while (left-- > 0 && (atomic_load_explicit(value, memory_order_relaxed) == known) == same)
 #if defined(__x86_64__)
         __builtin_ia32_pause();
@@ -61,23 +61,23 @@ static void work_off(gait_pool *p, const job *j)
 static void *helper(void *arg)
 {
     gait_pool *const p = arg;
-    unsigned seen = 0;
+    unsigned last = 0;
     bool fresh = false; /* from a job: the next one may be near */
     pthread_mutex_lock(&p->lock);
     while (!p->quit) {
         if (fresh) {
             fresh = false;
             pthread_mutex_unlock(&p->lock);
-            look_on(p, &p->number, seen, true);
+            spin_while(p, &p->number, last, true);
             pthread_mutex_lock(&p->lock);
             continue;
         }
-        if (!p->now.fn || p->number == seen) {
+        if (!p->now.fn || p->number == last) {
             pthread_cond_wait(&p->work, &p->lock);
             continue;
         }
         job const mine = p->now;
-        seen = p->number;
+        last = p->number;
         p->busy++;
         pthread_mutex_unlock(&p->lock);
         work_off(p, &mine);
@@ -102,7 +102,7 @@ static void run(void *user, gait_task_fn *fn, void *ctx, int32_t count)
     pthread_cond_broadcast(&p->work);
     pthread_mutex_unlock(&p->lock);
     work_off(p, &mine);
-    look_on(p, &p->busy, 0, false);
+    spin_while(p, &p->busy, 0, false);
     pthread_mutex_lock(&p->lock);
     while (p->busy)
         pthread_cond_wait(&p->done, &p->lock);

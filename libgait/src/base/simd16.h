@@ -130,11 +130,11 @@ static inline void simd16_bilinear(const int32_t *four, const int32_t *u, const 
 }
 
 #if defined(__AVX512VBMI__)
-#define SIMD16_BETWEEN
+#define SIMD16_BILINEAR_BYTES
 /* Bilinear look-up of bytes: pairs of one with that below it, 256 in a row; at u, v, 1/256 of their distance, rounded
  * towards 0, where shown (negative), elsewhere `hidden`. */
-static inline void simd16_between(const uint16_t *pairs, const int32_t *u, const int32_t *v,
-                                  const int32_t *shown, int8_t hidden, int8_t *out)
+static inline void simd16_bilinear_bytes(const uint16_t *pairs, const int32_t *u, const int32_t *v,
+                                         const int32_t *shown, int8_t hidden, int8_t *out)
 {
     __m512i const x = _mm512_loadu_si512(u), y = _mm512_loadu_si512(v), low = _mm512_set1_epi32(255);
     __m512i const at = _mm512_ternarylogic_epi32(_mm512_srai_epi32(x, 8), y, low, 0xf4);
@@ -181,7 +181,7 @@ static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, i
 }
 
 /* Sixteen numbers to be read again and again: in registers. */
-static inline void simd16_once(const float *in, float *restrict out)
+static inline void simd16_load(const float *in, float *restrict out)
 {
 #if defined(__AVX512F__)
     _mm512_storeu_ps(out, _mm512_loadu_ps(in));
@@ -278,7 +278,7 @@ static inline void simd16_repeat(const float *two, int32_t count, float *restric
 }
 
 /* Eight numbers, and again. */
-static inline void simd16_twice(const float *eight, float *restrict out)
+static inline void simd16_duplicate(const float *eight, float *restrict out)
 {
 #if defined(__AVX512DQ__) /* in pieces, what follows would wait for them */
     _mm512_storeu_ps(out, _mm512_broadcast_f32x8(_mm256_loadu_ps(eight)));
@@ -295,9 +295,9 @@ enum { SIMD16_ROWS = 4 };
 enum { SIMD16_ROWS = 8 };
 #endif
 
-/* Of each word the bits from the first to the second number of a pair, 0 to 64, go behind those of `whole`: what is seen
+/* Of each word the bits from the first to the second number of a pair, 0 to 64, go behind those of `whole`: what is visible
  * of them, and all. */
-static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, uint64_t *restrict seen)
+static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, uint64_t *restrict visible)
 {
 #if defined(__AVX512F__)
     __m512i const ones = _mm512_set1_epi64(-1), both = _mm512_loadu_si512(span);
@@ -305,25 +305,25 @@ static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, u
     __m512i const to = _mm512_sllv_epi64(ones, _mm512_srli_epi64(both, 32));
     __m512i const nearer = _mm512_loadu_si512(whole);
     _mm512_storeu_si512(whole, _mm512_ternarylogic_epi64(nearer, from, to, 0xf4));
-    _mm512_storeu_si512(seen, _mm512_ternarylogic_epi64(nearer, from, to, 0x04));
+    _mm512_storeu_si512(visible, _mm512_ternarylogic_epi64(nearer, from, to, 0x04));
 #elif defined(__AVX2__)
     __m256i const ones = _mm256_set1_epi64x(-1), both = _mm256_loadu_si256((const __m256i_u *)span);
     __m256i const from = _mm256_sllv_epi64(ones, _mm256_and_si256(both, _mm256_set1_epi64x(0xffffffff)));
     __m256i const mine = _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_srli_epi64(both, 32)), from);
     __m256i const nearer = _mm256_loadu_si256((const __m256i_u *)whole);
     _mm256_storeu_si256((__m256i_u *)whole, _mm256_or_si256(nearer, mine));
-    _mm256_storeu_si256((__m256i_u *)seen, _mm256_andnot_si256(nearer, mine));
+    _mm256_storeu_si256((__m256i_u *)visible, _mm256_andnot_si256(nearer, mine));
 #else
     for (int32_t i = 0; i < SIMD16_ROWS; i++) {
         uint64_t const mine = grid_bits(span[2 * i], span[2 * i + 1]), nearer = whole[i];
         whole[i] = nearer | mine;
-        seen[i] = mine & ~nearer;
+        visible[i] = mine & ~nearer;
     }
 #endif
 }
 
 /* Sixteen numbers of sixteen bodies: from in[number][body] to out[body][number], a cache line each. */
-static inline void simd16_deal(const float (*restrict in)[SIMD16], float (*restrict out)[SIMD16])
+static inline void simd16_transpose(const float (*restrict in)[SIMD16], float (*restrict out)[SIMD16])
 {
 #if defined(__AVX2__)
     for (int32_t a = 0; a < SIMD16; a += 8)

@@ -87,7 +87,8 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .forward_noise = c->forward_noise * root_dt,
         .lateral_noise = c->lateral_noise * root_dt,
         .heading_noise = c->heading_noise * root_dt,
-        .stature_noise = (settling ? c->stature_noise_start : c->stature_noise) * d->stature_doubt * root_dt,
+        .stature_noise =
+            (settling ? c->stature_noise_start : c->stature_noise) * d->stature_sd_ratio * root_dt,
         .rate = relax(dt, c->rate_time, c->rate_noise * mean_rate),
         .level = relax(dt, c->tilt_time, c->vertical_noise),
         .turn_beyond = age > 0.0f ? turns_beyond(relax(dt, c->turn_time, 0.0f).keep) : INFINITY,

@@ -11,7 +11,7 @@ typedef struct dynamics {
     const gait_tracker_config *cfg;
     state_layout rule;
     uint64_t seed;
-    float stature_doubt; /* deviation of stature at the start, fraction of it */
+    float stature_sd_ratio; /* deviation of stature at the start, fraction of it */
 } dynamics;
 
 /* Particle i of the prior: independent normals about mean (gait_tracker_start). */

@@ -6,18 +6,18 @@ static const double NONE = -1e300; /* log of 0 */
 static const double ENOUGH = 0.2;  /* of the particles must keep weight */
 static const float LEAST = 0.05f;  /* power at which to give up */
 
-double evidence_of(const pf *p, const float *ll)
+double evidence_of(const pf *p, const float *loglik)
 {
     double top = NONE, sum = 0.0, total = 0.0;
     for (int32_t i = 0; i < p->n; i++) {
-        top = (double)ll[i] > top ? (double)ll[i] : top;
+        top = (double)loglik[i] > top ? (double)loglik[i] : top;
         total += p->weight[i];
     }
     for (int32_t begin = 0; begin < p->n; begin += CHUNK) {
         double l[CHUNK], e[CHUNK];
         int32_t const count = i_min(CHUNK, p->n - begin);
         for (int32_t i = 0; i < count; i++)
-            l[i] = ll[begin + i] > -1e30f ? (double)ll[begin + i] - top : NONE;
+            l[i] = loglik[begin + i] > -1e30f ? (double)loglik[begin + i] - top : NONE;
         m_exp64_all(l, count, e);
         for (int32_t i = 0; i < count; i++)
             sum += p->weight[begin + i] * e[i];
@@ -26,24 +26,24 @@ double evidence_of(const pf *p, const float *ll)
 }
 
 /* Log of a particle's weight after the likelihood to a power. */
-static double log_after(const pf *p, const float *ll, float power, int32_t i)
+static double log_after(const pf *p, const float *loglik, float power, int32_t i)
 {
-    return p->log_weight[i] + (double)(power * ll[i]);
+    return p->log_weight[i] + (double)(power * loglik[i]);
 }
 
 /* Effective sample size that the likelihood to a power would leave. */
-static double ess_after(const pf *p, const float *ll, float power)
+static double ess_after(const pf *p, const float *loglik, float power)
 {
     double top = NONE, sum = 0.0, square = 0.0;
     for (int32_t i = 0; i < p->n; i++) {
-        double const l = log_after(p, ll, power, i);
+        double const l = log_after(p, loglik, power, i);
         top = l > top && l < -NONE ? l : top;
     }
     for (int32_t begin = 0; begin < p->n; begin += CHUNK) {
         double l[CHUNK], w[CHUNK];
         int32_t const count = i_min(CHUNK, p->n - begin);
         for (int32_t i = 0; i < count; i++)
-            l[i] = log_after(p, ll, power, begin + i) - top;
+            l[i] = log_after(p, loglik, power, begin + i) - top;
         m_exp64_all(l, count, w);
         for (int32_t i = 0; i < count; i++) {
             sum += w[i];
@@ -53,16 +53,16 @@ static double ess_after(const pf *p, const float *ll, float power)
     return square > 0.0 ? sum * sum / square : 0.0;
 }
 
-void evidence_temper(float *ll, int32_t n, float power)
+void evidence_temper(float *loglik, int32_t n, float power)
 {
     for (int32_t i = 0; i < n; i++)
-        ll[i] *= power;
+        loglik[i] *= power;
 }
 
-void evidence_soften(const pf *p, float *ll)
+void evidence_anneal(const pf *p, float *loglik)
 {
     float power = 1.0f;
-    while (power > LEAST && ess_after(p, ll, power) < ENOUGH * (double)p->n)
+    while (power > LEAST && ess_after(p, loglik, power) < ENOUGH * (double)p->n)
         power *= 0.5f;
-    evidence_temper(ll, p->n, power);
+    evidence_temper(loglik, p->n, power);
 }

@@ -14,13 +14,14 @@ float root_channel(const gait_model *m, int32_t c, float phase, float pace, cons
 }
 
 /* The first components tell people apart in pictures; more only add noise that particles must search. */
-enum { TELLING = 5 };
+enum { DEFAULT_COMPONENTS = 5 };
 
 static int32_t components_used(const gait_model *m, const gait_tracker_config *cfg)
 {
     if (cfg->components >= 0)
         return cfg->components;
-    return cfg->mode == GAIT_MODE_PAPER || m->components < TELLING ? m->components : TELLING;
+    return cfg->mode == GAIT_MODE_PAPER || m->components < DEFAULT_COMPONENTS ? m->components
+                                                                              : DEFAULT_COMPONENTS;
 }
 
 state_layout state_layout_init(const gait_model *m, const gait_tracker_config *cfg, const kernels *run)

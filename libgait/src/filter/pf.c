@@ -44,13 +44,13 @@ double pf_ess(const pf *p)
     return 1.0 / sum;
 }
 
-pf_summary pf_update(pf *p, const float *ll)
+pf_summary pf_update(pf *p, const float *loglik)
 {
     double const none = -1e300;
     pf_summary s = {.best = 0};
     double top = none, sum = 0.0;
     for (int32_t i = 0; i < p->n; i++) {
-        double const l = p->log_weight[i] + (double)ll[i];
+        double const l = p->log_weight[i] + (double)loglik[i];
         /* The comparison is false for NaN and for infinities of either sign. */
         bool const finite = l > none && l < -none;
         p->cumulative[i] = finite;
@@ -66,7 +66,7 @@ pf_summary pf_update(pf *p, const float *ll)
         return s;
     }
     for (int32_t i = 0; i < p->n; i++) {
-        double const l = p->log_weight[i] + (double)ll[i] - top;
+        double const l = p->log_weight[i] + (double)loglik[i] - top;
         p->log_weight[i] = p->cumulative[i] ? l : none;
     }
     m_exp64_all(p->log_weight, p->n, p->weight); /* 0 of none */

@@ -12,7 +12,7 @@ typedef struct pf {
 } pf;
 
 typedef struct pf_summary {
-    double log_evidence; /* log sum w exp(ll): p(observation | past) */
+    double log_evidence; /* log sum w exp(loglik): p(observation | past) */
     double ess;          /* effective sample size, 1 / sum w^2 */
     int32_t best;        /* first particle of the largest weight */
     bool degenerate;     /* no particle had a finite likelihood: the weights were left alone */
@@ -21,8 +21,8 @@ typedef struct pf_summary {
 pf pf_layout(arena *a, int32_t n);
 void pf_uniform(pf *p);
 
-/* Multiply the weights by exp(ll) and normalise; a NaN counts as impossible. */
-pf_summary pf_update(pf *p, const float *ll);
+/* Multiply the weights by exp(loglik) and normalise; a NaN counts as impossible. */
+pf_summary pf_update(pf *p, const float *loglik);
 
 double pf_ess(const pf *p);
 

@@ -4,8 +4,8 @@
 
 void rejuvenation_set(rejuvenation *m, float seconds, float time)
 {
-    m->pull = time > 0.0f ? 1.0f - m_exp(-seconds / time) : 0.0f;
-    m->spread = __builtin_sqrtf(m->pull * (1.0f - m->pull));
+    m->shrink = time > 0.0f ? 1.0f - m_exp(-seconds / time) : 0.0f;
+    m->noise = __builtin_sqrtf(m->shrink * (1.0f - m->shrink));
 }
 
 void rejuvenation_rows(const particle_set *from, int32_t begin, int32_t end, float *row)
@@ -39,11 +39,11 @@ static drawn draw(const rejuvenation *m, int32_t i)
 
 static void rejuvenate_row(const rejuvenation *m, const drawn *d, float *restrict out)
 {
-    float const pull = m->pull, spread = m->spread;
+    float const shrink = m->shrink, noise = m->noise;
     for (int32_t f = 0; f < m->fields; f += 4)
         for (int32_t k = f; k < f + 4; k++) /* four at once */
-            out[k] =
-                d->own[k] + (pull * (d->towards[k] - d->own[k]) + spread * (d->apart[0][k] - d->apart[1][k]));
+            out[k] = d->own[k] +
+                     (shrink * (d->towards[k] - d->own[k]) + noise * (d->apart[0][k] - d->apart[1][k]));
 }
 
 typedef struct angles { /* of a lane each: own, and how far it is from others */
@@ -63,7 +63,7 @@ static void rejuvenate_angles(const rejuvenation *m, const angles *a, float turn
     float const unit = TWO_PI_F / turn;
     for (int32_t lane = 0; lane < BLOCK; lane++) {
         float const towards = m_wrap_pi(unit * a->towards[lane]), apart = m_wrap_pi(unit * a->apart[lane]);
-        out[lane] = a->own[lane] + (m->pull * towards + m->spread * apart) / unit;
+        out[lane] = a->own[lane] + (m->shrink * towards + m->noise * apart) / unit;
     }
 }
 

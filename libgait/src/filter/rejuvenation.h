@@ -17,11 +17,11 @@ typedef struct rejuvenation { /* of one frame, after resampling */
     const int32_t *parent; /* n: drawn by weight */
     int32_t n, split;      /* particles from `split` on are another mode, which mingles by itself */
     uint64_t seed;
-    uint32_t frame;     /* counter of the random numbers */
-    float pull, spread; /* a and sqrt(a (1 - a)); 0: nothing changes */
+    uint32_t frame;      /* counter of the random numbers */
+    float shrink, noise; /* a and sqrt(a (1 - a)); 0: nothing changes */
 } rejuvenation;
 
-/* Set pull and spread for so many seconds since the last; time: seconds in which particles forget, 0: never. */
+/* Set shrink and noise for so many seconds since the last; time: seconds in which particles forget, 0: never. */
 void rejuvenation_set(rejuvenation *m, float seconds, float time);
 
 /* Floats of a particle's row: its fields and zeros. */

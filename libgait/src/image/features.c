@@ -8,9 +8,10 @@ features features_layout(arena *a)
     f.edge = TAKE(a, edge_cell, VIEW_PIXELS);
     f.surface = TAKE(a, int8_t, VIEW_PIXELS);
     f.pairs = TAKE(a, uint16_t, VIEW_PIXELS);
-    f.fg = (uint64_t (*)[GRID_SIZE][GRID_WORDS])arena_take(a, sizeof *f.fg, FG_PLANES);
+    f.foreground =
+        (uint64_t (*)[GRID_SIZE][GRID_WORDS])arena_take(a, sizeof *f.foreground, FOREGROUND_PLANES);
     f.inside = (uint64_t (*)[GRID_WORDS])arena_take(a, sizeof *f.inside, GRID_SIZE);
-    f.words = (uint64_t (*)[FG_PLANES + 1][GRID_SIZE]) arena_take(a, sizeof *f.words, GRID_STARTS);
+    f.words = (uint64_t (*)[FOREGROUND_PLANES + 1][GRID_SIZE]) arena_take(a, sizeof *f.words, GRID_STARTS);
     return f;
 }
 
@@ -36,7 +37,7 @@ static void refresh_inside(const kernels *run, features *f, const gait_camera *c
 void features_begin(features *f, const gait_image *im, features_scratch *s)
 {
     f->has_image = im->data != NULL;
-    f->has_fg = false;
+    f->has_foreground = false;
     s->planes.channels = image_channels(im->format);
 }
 
@@ -60,9 +61,9 @@ static void words_of(const uint64_t (*row)[GRID_WORDS], int32_t column, uint64_t
 void features_words(features *f)
 {
     for (int32_t s = 0; s < GRID_STARTS; s++) {
-        for (int32_t k = 0; k < FG_PLANES; k++)
-            words_of((const uint64_t (*)[GRID_WORDS])f->fg[k], s * GRID_STEP, f->words[s][k]);
-        words_of((const uint64_t (*)[GRID_WORDS])f->inside, s * GRID_STEP, f->words[s][FG_PLANES]);
+        for (int32_t k = 0; k < FOREGROUND_PLANES; k++)
+            words_of((const uint64_t (*)[GRID_WORDS])f->foreground[k], s * GRID_STEP, f->words[s][k]);
+        words_of((const uint64_t (*)[GRID_WORDS])f->inside, s * GRID_STEP, f->words[s][FOREGROUND_PLANES]);
     }
 }
 
@@ -71,8 +72,8 @@ static void foreground(const kernels *run, features *f, const gait_camera *cam, 
 {
     view_planes const luma = {.channel = {s->grey}, .channels = 1};
     refresh_inside(run, f, cam);
-    f->has_fg = plate != NULL;
-    if (!f->has_fg)
+    f->has_foreground = plate != NULL;
+    if (!f->has_foreground)
         return;
     run->features_foreground(f, plate->channels == 1 ? &luma : &s->planes, plate);
     features_words(f);

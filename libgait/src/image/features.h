@@ -6,11 +6,11 @@
 #include "image/view.h"
 
 enum {
-    FG_PLANES = 4,        /* bits of a cell's foreground probability */
-    FG_ONE = 15,          /* probability 1 */
-    EDGE_ONE = 120,       /* edge tensor of trace 1 */
-    CONTRAST_UNIT = 32,   /* one local standard deviation */
-    TEXTURE_HIDDEN = -128 /* marks a surface sample that was not seen */
+    FOREGROUND_PLANES = 4, /* bits of a cell's foreground probability */
+    FOREGROUND_ONE = 15,   /* probability 1 */
+    EDGE_ONE = 120,        /* edge tensor of trace 1 */
+    CONTRAST_UNIT = 32,    /* one local standard deviation */
+    TEXTURE_HIDDEN = -128  /* marks a surface sample that was not seen */
 };
 
 typedef struct edge_cell { /* smoothed, contrast-normalised edge tensor: n'Tn is the response to a normal n */
@@ -25,25 +25,26 @@ typedef struct features_keypoints {               /* joints located in the frame
 
 typedef struct features {
     view_map map;
-    bool has_image;   /* this frame had an image */
-    bool has_fg;      /* and a background plate */
-    edge_cell *edge;  /* VIEW_PIXELS */
-    int8_t *surface;  /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
-    uint16_t *pairs;  /* VIEW_PIXELS: each with its lower neighbour in the byte above it */
-    int32_t fg_total; /* sum of foreground over the grid, FG_ONE = 1 */
-    uint64_t (*fg)[GRID_SIZE][GRID_WORDS]; /* FG_PLANES bit planes of the foreground probability */
-    uint64_t (*inside)[GRID_WORDS];        /* cells that the camera sees, */
-    view_map inside_map;                   /* found for this place of the region */
+    bool has_image;      /* this frame had an image */
+    bool has_foreground; /* and a background plate */
+    edge_cell *edge;     /* VIEW_PIXELS */
+    int8_t *surface; /* VIEW_PIXELS: what surface samples see: local contrast, or grey - 128 in paper mode */
+    uint16_t *pairs; /* VIEW_PIXELS: each with its lower neighbour in the byte above it */
+    int32_t foreground_total; /* sum of foreground over the grid, FOREGROUND_ONE = 1 */
+    uint64_t (
+        *foreground)[GRID_SIZE][GRID_WORDS]; /* FOREGROUND_PLANES bit planes of the foreground probability */
+    uint64_t (*inside)[GRID_WORDS];          /* cells that the camera sees, */
+    view_map inside_map;                     /* found for this place of the region */
     /* The planes of fg, then inside, in words that begin at each multiple of GRID_STEP columns: grid_mask's. */
-    uint64_t (*words)[FG_PLANES + 1][GRID_SIZE]; /* GRID_STARTS */
+    uint64_t (*words)[FOREGROUND_PLANES + 1][GRID_SIZE]; /* GRID_STARTS */
     features_keypoints keypoints;
 } features;
 
-enum { EDGE_SIZES = 32, EDGE_SOFT = 4 }; /* rows kept, by row number modulo this */
+enum { EDGE_SIZE_ROWS = 32, EDGE_SMOOTH_ROWS = 4 }; /* rows kept, by row number modulo this */
 
 typedef struct edge_rows { /* of the edge tensor on its way: rings of rows */
-    uint16_t size[EDGE_SIZES][VIEW_SIZE];
-    int16_t once[3][EDGE_SOFT][VIEW_SIZE], twice[3][EDGE_SOFT][VIEW_SIZE];
+    uint16_t size[EDGE_SIZE_ROWS][VIEW_SIZE];
+    int16_t once[3][EDGE_SMOOTH_ROWS][VIEW_SIZE], twice[3][EDGE_SMOOTH_ROWS][VIEW_SIZE];
 } edge_rows;
 
 typedef struct features_scratch { /* shared by the cameras */
@@ -71,7 +72,7 @@ enum { FEATURES_EDGES, FEATURES_SURFACE, FEATURES_FOREGROUND, FEATURES_MAPS };
 
 /* One of them.  plate: resampled empty scene, with colour only if the frame has, or NULL; raw: surface keeps grey
  * levels (paper mode).  Kernels (kernels.h):
- *   features_foreground  fg and fg_total where inside
+ *   features_foreground  fg and foreground_total where inside
  *   features_edges       edge tensors of a grey plane
  *   features_contrast    local contrast of a grey plane
  *   features_pairs       each value of the surface with that below it */

@@ -66,7 +66,7 @@ static int32_t without_shadow(int32_t total, int32_t across, int32_t scene2)
     return total - shade + shade / SHADOW_SHARE;
 }
 
-/* Probabilities of a row, FG_ONE = 1, from the evidence that each cell of 2 x 2 pixels changed: grey levels
+/* Probabilities of a row, FOREGROUND_ONE = 1, from the evidence that each cell of 2 x 2 pixels changed: grey levels
  * squared over three channels. */
 KERNEL_ROW void probability_row(cells *restrict s, int32_t channels, uint8_t *restrict p)
 {
@@ -79,7 +79,7 @@ KERNEL_ROW void probability_row(cells *restrict s, int32_t channels, uint8_t *re
             s->total[x] = without_shadow(s->total[x], s->across[x], s->scene2[x]);
     for (int32_t x = 0; x < GRID_SIZE; x++) {
         int32_t const d = s->total[x];
-        p[x] = (uint8_t)quotient(FG_ONE * d + (d + half) / 2, d + half);
+        p[x] = (uint8_t)quotient(FOREGROUND_ONE * d + (d + half) / 2, d + half);
     }
 }
 
@@ -99,7 +99,7 @@ static uint64_t bits_of(const uint8_t *p, int32_t k)
 void KERNEL(features_foreground)(features *f, const view_planes *im, const view_planes *plate)
 {
     int32_t const gain = exposure_gain(im, plate);
-    f->fg_total = 0;
+    f->foreground_total = 0;
     for (int32_t y = 0; y < GRID_SIZE; y++) {
         cells row = {.total = {0}};
         uint8_t p[GRID_SIZE];
@@ -107,10 +107,10 @@ void KERNEL(features_foreground)(features *f, const view_planes *im, const view_
             cells_add(&row, im->channel[c] + 2 * y * VIEW_SIZE, plate->channel[c] + 2 * y * VIEW_SIZE, gain);
         probability_row(&row, im->channels, p);
         for (int32_t w = 0; w < GRID_WORDS; w++)
-            for (int32_t k = 0; k < FG_PLANES; k++) {
+            for (int32_t k = 0; k < FOREGROUND_PLANES; k++) {
                 uint64_t const bits = bits_of(p + 64 * w, k) & f->inside[y][w];
-                f->fg[k][y][w] = bits;
-                f->fg_total += grid_popcount(bits) << k;
+                f->foreground[k][y][w] = bits;
+                f->foreground_total += grid_popcount(bits) << k;
             }
     }
 }
@@ -216,7 +216,7 @@ KERNEL_ROW void tensor_row(const int16_t *restrict gx, const int16_t *restrict g
 }
 
 /* 1-2-1 along a row. */
-KERNEL_ROW void soften_along(padded_row *restrict in, int16_t *restrict out)
+KERNEL_ROW void smooth_along(padded_row *restrict in, int16_t *restrict out)
 {
     replicate_ends(in);
     for (int32_t x = 0; x < VIEW_SIZE; x++)
@@ -224,7 +224,7 @@ KERNEL_ROW void soften_along(padded_row *restrict in, int16_t *restrict out)
 }
 
 /* 1-2-1 across three rows, over 16 towards zero. */
-KERNEL_ROW void soften_across(const int16_t *restrict u, const int16_t *restrict p, const int16_t *restrict d,
+KERNEL_ROW void smooth_across(const int16_t *restrict u, const int16_t *restrict p, const int16_t *restrict d,
                               int16_t *restrict out)
 {
     for (int32_t x = 0; x < VIEW_SIZE; x++) {
@@ -234,10 +234,10 @@ KERNEL_ROW void soften_across(const int16_t *restrict u, const int16_t *restrict
 }
 
 /* The same for row y of a ring. */
-static void soften_ring(int16_t (*ring)[VIEW_SIZE], int32_t y, int16_t *out)
+static void smooth_ring(int16_t (*ring)[VIEW_SIZE], int32_t y, int16_t *out)
 {
-    soften_across(ring[i_max(y - 1, 0) % EDGE_SOFT], ring[y % EDGE_SOFT],
-                  ring[i_min(y + 1, LAST) % EDGE_SOFT], out);
+    smooth_across(ring[i_max(y - 1, 0) % EDGE_SMOOTH_ROWS], ring[y % EDGE_SMOOTH_ROWS],
+                  ring[i_min(y + 1, LAST) % EDGE_SMOOTH_ROWS], out);
 }
 
 KERNEL_ROW void pack_row(const int16_t *restrict xx, const int16_t *restrict yy, const int16_t *restrict xy,
@@ -260,7 +260,7 @@ static void begin_row(const uint8_t *grey, int32_t y, const uint16_t *column, ed
     gradient_row(grey, y, gx, gy);
     tensor_row(gx, gy, sum, tensor);
     for (int32_t k = 0; k < 3; k++)
-        soften_along(&tensor[k], s->once[k][y % EDGE_SOFT]);
+        smooth_along(&tensor[k], s->once[k][y % EDGE_SMOOTH_ROWS]);
 }
 
 /* Row y across and once more along: into the second ring. */
@@ -268,8 +268,8 @@ static void middle_row(int32_t y, edge_rows *s)
 {
     padded_row row;
     for (int32_t k = 0; k < 3; k++) {
-        soften_ring(s->once[k], y, row.v + 1);
-        soften_along(&row, s->twice[k][y % EDGE_SOFT]);
+        smooth_ring(s->once[k], y, row.v + 1);
+        smooth_along(&row, s->twice[k][y % EDGE_SMOOTH_ROWS]);
     }
 }
 
@@ -277,7 +277,7 @@ static void end_row(int32_t y, edge_rows *s, edge_cell *out)
 {
     int16_t row[3][VIEW_SIZE];
     for (int32_t k = 0; k < 3; k++)
-        soften_ring(s->twice[k], y, row[k]);
+        smooth_ring(s->twice[k], y, row[k]);
     pack_row(row[0], row[1], row[2], out + y * VIEW_SIZE);
 }
 
@@ -286,15 +286,15 @@ void KERNEL(features_edges)(const uint8_t *grey, edge_cell *out, edge_rows *s)
 {
     uint16_t column[VIEW_SIZE]; /* sums of the gradient's size over 2 EDGE_RADIUS + 1 rows */
     for (int32_t y = 0; y <= EDGE_RADIUS; y++) {
-        uint16_t *const size = s->size[y % EDGE_SIZES];
+        uint16_t *const size = s->size[y % EDGE_SIZE_ROWS];
         size_row(grey, y, size);
         for (int32_t x = 0; x < VIEW_SIZE; x++)
             column[x] = (uint16_t)(y == 0 ? (EDGE_RADIUS + 1) * size[x] : column[x] + size[x]);
     }
     for (int32_t y = 0; y < VIEW_SIZE + 2; y++) {
         if (y < VIEW_SIZE) {
-            const uint16_t *const sub = s->size[i_max(y - EDGE_RADIUS, 0) % EDGE_SIZES];
-            uint16_t *const add = s->size[i_min(y + EDGE_RADIUS + 1, LAST) % EDGE_SIZES];
+            const uint16_t *const sub = s->size[i_max(y - EDGE_RADIUS, 0) % EDGE_SIZE_ROWS];
+            uint16_t *const add = s->size[i_min(y + EDGE_RADIUS + 1, LAST) % EDGE_SIZE_ROWS];
             begin_row(grey, y, column, s);
             if (y + EDGE_RADIUS + 1 <= LAST)
                 size_row(grey, y + EDGE_RADIUS + 1, add);

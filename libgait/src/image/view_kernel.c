@@ -58,12 +58,12 @@ static uint8_t tap_bilinear(const gait_image *im, int32_t step, int32_t c, int32
 }
 
 /* Frames of less than two rows or columns, and such that an offset does not fit 32 bits. */
-static bool is_odd(const gait_image *im)
+static bool is_degenerate(const gait_image *im)
 {
     return im->width < 2 || im->height < 2 || (int64_t)im->height * im->stride > INT32_MAX;
 }
 
-static void bilinear_odd(const gait_image *im, int32_t step, const places *at, uint8_t *const row[3])
+static void bilinear_degenerate(const gait_image *im, int32_t step, const places *at, uint8_t *const row[3])
 {
     for (int32_t c = 0; c < step; c++)
         for (int32_t i = 0; i < VIEW_SIZE; i++)
@@ -141,8 +141,8 @@ KERNEL_ROW void bilinear_row(const gait_image *im, int32_t step, bool bent, cons
                              uint8_t *const row[3])
 {
     taps t;
-    if (is_odd(im)) {
-        bilinear_odd(im, step, at, row);
+    if (is_degenerate(im)) {
+        bilinear_degenerate(im, step, at, row);
         return;
     }
     locate(im, step, at, &t);

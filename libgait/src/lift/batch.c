@@ -47,8 +47,8 @@ static void set_rows(const lift_table *t, const segment_posterior *b, const doub
     for (int32_t i = 0; i < 2; i++, row += t->ld, w += t->ld) {
         memset(row, 0, (size_t)t->ld * sizeof *row);
         memcpy(row, w, (size_t)t->n * sizeof *row);
-        cholesky_ahead(b->U, t->n, t->ld, row);
-        cholesky_back(b->U, t->n, t->ld, row);
+        cholesky_forward_vector(b->U, t->n, t->ld, row);
+        cholesky_backward(b->U, t->n, t->ld, row);
         for (int32_t k = 0; k < t->n; k++)
             row[k] /= noise_sd;
     }

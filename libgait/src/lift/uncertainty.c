@@ -124,7 +124,7 @@ void lift_uncertain(const lift_table *t, const segment_posterior *b, segment_pos
     for (int32_t i = 0; i < count; i++) {
         double const variance = S[i * (ld + 1)];
         sd[i] = variance > 0.0 ? sqrt(variance) : 0.0;
-        cholesky_back(b->U, n, ld, V + (size_t)i * (size_t)ld);
+        cholesky_backward(b->U, n, ld, V + (size_t)i * (size_t)ld);
     }
     displacements(t, b, V, count, mode);
 }

@@ -27,11 +27,11 @@ static inline void cone(const float *w, limb_points *restrict out)
 /* The octagon's sides, twice round. */
 static inline void ellipsoid(const like_sides *s, int32_t lane, limb_points *restrict out)
 {
-    simd16_twice(s->part[0][lane], out->x);
-    simd16_twice(s->part[0][lane] + 8, out->y);
-    simd16_twice(s->part[1][lane], out->dx);
-    simd16_twice(s->part[1][lane] + 8, out->dy);
-    simd16_twice(s->part[2][lane], out->normal);
+    simd16_duplicate(s->part[0][lane], out->x);
+    simd16_duplicate(s->part[0][lane] + 8, out->y);
+    simd16_duplicate(s->part[1][lane], out->dx);
+    simd16_duplicate(s->part[1][lane] + 8, out->dy);
+    simd16_duplicate(s->part[2][lane], out->normal);
 #pragma GCC unroll 1
     for (int32_t i = 0; i < SIMD16; i++)
         out->share[i] = i < 8 ? 0.25f : 0.75f;

@@ -47,7 +47,7 @@ static void prepare_cone(const outline_lanes *o, like_sides *restrict out)
                           w[LIKE_SIDE_NORMAL + k]});
     middle(o->x, corners, w[LIKE_SIDE_INNER]);
     middle(o->y, corners, w[LIKE_SIDE_INNER + 1]);
-    simd16_deal((const body_lanes *)w, out->part[0]);
+    simd16_transpose((const body_lanes *)w, out->part[0]);
 }
 
 /* In parts: x and y of the eight sides, dx and dy, normals and the middle. */
@@ -60,7 +60,7 @@ static void prepare_ellipsoid(const outline_lanes *o, like_sides *restrict out)
     middle(o->x, corners, w[2][8]);
     middle(o->y, corners, w[2][9]);
     for (int32_t k = 0; k < 3; k++)
-        simd16_deal((const body_lanes *)w[k], out->part[k]);
+        simd16_transpose((const body_lanes *)w[k], out->part[k]);
 }
 
 void KERNEL(edges_prepare)(const outline_block *outline, const limb_geometry *limbs, int32_t count,

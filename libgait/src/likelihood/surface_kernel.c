@@ -27,9 +27,9 @@ static void choose_half(const like_surface *s, body_lanes *restrict w, const flo
         float e[3], m[3]; /* from the camera to the limb's frame and to its middle, in the frame, statures */
         int32_t count = 0, last = 0;
         for (int32_t k = 0; k < 3; k++) {
-            e[k] = stature * w[LIKE_VIEW_EYE + k][i];
+            e[k] = stature * w[LIKE_VIEW_ORIGIN + k][i];
             m[k] = e[k] + s->middle[k];
-            w[LIKE_VIEW_EYE + k][i] = e[k];
+            w[LIKE_VIEW_ORIGIN + k][i] = e[k];
         }
         for (int32_t d = 0; d < LIKE_AZIMUTHS; d++) {
             last = s->side[0][d] * m[0] + s->side[1][d] * m[1] + s->side[2][d] * m[2] < 0.0f;
@@ -74,7 +74,8 @@ void KERNEL(surface_pose)(const like_setup *s, const gait_camera *cam, const vie
         to_camera(cam, body->R[f], body->o[f], R, t);
         for (int32_t k = 0; k < 3; k++) {
             for (int32_t i = 0; i < BLOCK; i++) {
-                w[LIKE_VIEW_EYE + k][i] = R[k][i] * t[0][i] + R[3 + k][i] * t[1][i] + R[6 + k][i] * t[2][i];
+                w[LIKE_VIEW_ORIGIN + k][i] =
+                    R[k][i] * t[0][i] + R[3 + k][i] * t[1][i] + R[6 + k][i] * t[2][i];
                 R[k][i] *= scale[i];
                 R[3 + k][i] *= scale[i];
                 R[6 + k][i] *= scale[i];
@@ -87,15 +88,15 @@ void KERNEL(surface_pose)(const like_setup *s, const gait_camera *cam, const vie
         for (int32_t r = 0; r < 2; r++)
             to_image(focus[r], middle[r], t[r], t[2], w[LIKE_VIEW_SHIFT + r]);
         choose_half(&s->surface[l], w, scale, out->limb[l].turn);
-        simd16_deal((const body_lanes *)w, out->limb[l].view);
+        simd16_transpose((const body_lanes *)w, out->limb[l].view);
     }
 }
 
 /* ---- the points of one body ---- */
 
-typedef struct spots {                      /* where the points of half a limb are */
-    int32_t u[LIKE_FACING], v[LIKE_FACING]; /* 1/256 working pixels, 0 where not shown */
-    int32_t shown[LIKE_FACING];             /* negative: faces the camera well enough, in the image */
+typedef struct spots {                  /* where the points of half a limb are */
+    int32_t u[LIKE_HALF], v[LIKE_HALF]; /* 1/256 working pixels, 0 where not shown */
+    int32_t shown[LIKE_HALF];           /* negative: faces the camera well enough, in the image */
 } spots;
 
 static inline uint32_t u_max(uint32_t a, uint32_t b)
@@ -110,18 +111,18 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
     int32_t const first = 2 * pose->turn[lane];
     const float *const w = pose->view[lane];
     const float *const X = w + LIKE_VIEW_IMAGE, *const Y = X + 3, *const Z = Y + 3,
-                       *const E = w + LIKE_VIEW_EYE;
+                       *const E = w + LIKE_VIEW_ORIGIN;
     float const X0 = X[0], X1 = X[1], X2 = X[2], Y0 = Y[0], Y1 = Y[1], Y2 = Y[2], Z0 = Z[0], Z1 = Z[1],
                 Z2 = Z[2];
     float const E0 = E[0], E1 = E[1], E2 = E[2], S0 = w[LIKE_VIEW_SHIFT], S1 = w[LIKE_VIEW_SHIFT + 1],
                 S2 = w[LIKE_VIEW_SHIFT + 2];
     float const graze = w[LIKE_VIEW_GRAZE];
-    float px[LIKE_FACING], py[LIKE_FACING], pz[LIKE_FACING];
-    simd16_once(s->point[0] + first, px);
-    simd16_once(s->point[1] + first, py);
-    simd16_once(s->point[2] + first, pz);
+    float px[LIKE_HALF], py[LIKE_HALF], pz[LIKE_HALF];
+    simd16_load(s->point[0] + first, px);
+    simd16_load(s->point[1] + first, py);
+    simd16_load(s->point[2] + first, pz);
 #pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++) {
+    for (int32_t i = 0; i < LIKE_HALF; i++) {
         int32_t const j = first + i;
         float const nx = s->normal[0][j], ny = s->normal[1][j], nz = s->normal[2][j];
         float const z = f_max(Z0 * px[i] + Z1 * py[i] + Z2 * pz[i] + S2, CAMERA_NEAR), inv = 1.0f / z;
@@ -137,19 +138,19 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
 }
 
 /* Bilinear look-up in the surface map, rounded towards 0. */
-static inline void look_up(const features *f, const spots *p, int8_t *restrict value)
+static inline void read_surface(const features *f, const spots *p, int8_t *restrict value)
 {
-#ifdef SIMD16_BETWEEN
-    simd16_between(f->pairs, p->u, p->v, p->shown, TEXTURE_HIDDEN, value);
+#ifdef SIMD16_BILINEAR_BYTES
+    simd16_bilinear_bytes(f->pairs, p->u, p->v, p->shown, TEXTURE_HIDDEN, value);
 #else
-    int32_t at[LIKE_FACING], quad[LIKE_FACING], all[LIKE_FACING];
+    int32_t at[LIKE_HALF], quad[LIKE_HALF], all[LIKE_HALF];
 #pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++)
+    for (int32_t i = 0; i < LIKE_HALF; i++)
         at[i] = p->v[i] >> 8 << 8 | p->u[i] >> 8;
     simd16_lookup_every(2, f->pairs, at, p->shown, quad);
     simd16_bilinear(quad, p->u, p->v, all);
 #pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++)
+    for (int32_t i = 0; i < LIKE_HALF; i++)
         all[i] = p->shown[i] < 0 ? all[i] : TEXTURE_HIDDEN;
     simd16_narrow(all, value);
 #endif
@@ -157,7 +158,7 @@ static inline void look_up(const features *f, const spots *p, int8_t *restrict v
 
 /* One step for all limbs after the other: what a limb waits for is filled with the next one's work. */
 void KERNEL(surface_sample)(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,
-                            const layers *drawn, like_patch *restrict seen)
+                            const layers *drawn, like_patch *restrict out)
 {
     spots p[MODEL_MAX_LIMBS];
     for (int32_t l = 0; l < s->limbs; l++)
@@ -165,7 +166,7 @@ void KERNEL(surface_sample)(const like_setup *s, const features *f, const like_p
     for (int32_t l = 0; l < s->limbs; l++)
         hide(&drawn->visible[l], p[l].u, p[l].v, LIKE_CELL_BITS, p[l].shown);
     for (int32_t l = 0; l < s->limbs; l++) {
-        seen[l].turn = (uint8_t)pose->limb[l].turn[lane];
-        look_up(f, &p[l], seen[l].value);
+        out[l].turn = (uint8_t)pose->limb[l].turn[lane];
+        read_surface(f, &p[l], out[l].value);
     }
 }

@@ -6,19 +6,19 @@ void template_clear(int16_t *template, int32_t limbs)
         template[i] = TEMPLATE_EMPTY;
 }
 
-static int16_t approach(int16_t known, int32_t seen)
+static int16_t approach(int16_t known, int32_t value)
 {
-    int32_t const slow = 10, now = seen * TEMPLATE_ONE; /* frames: a tenth of what is new */
+    int32_t const slow = 10, now = value * TEMPLATE_ONE; /* frames: a tenth of what is new */
     return (int16_t)(known == TEMPLATE_EMPTY ? now : known + (now - known) / slow);
 }
 
-void template_update(int16_t *template, int32_t limbs, const like_patch *seen)
+void template_update(int16_t *template, int32_t limbs, const like_patch *patch)
 {
     for (int32_t l = 0; l < limbs; l++)
-        for (int32_t i = 0; i < LIKE_FACING; i++) {
-            int16_t *const point = template + l * LIKE_SAMPLES + (2 * seen[l].turn + i) % LIKE_SAMPLES;
-            if (seen[l].value[i] != TEXTURE_HIDDEN)
-                *point = approach(*point, seen[l].value[i]);
+        for (int32_t i = 0; i < LIKE_HALF; i++) {
+            int16_t *const point = template + l * LIKE_SAMPLES + (2 * patch[l].turn + i) % LIKE_SAMPLES;
+            if (patch[l].value[i] != TEXTURE_HIDDEN)
+                *point = approach(*point, patch[l].value[i]);
         }
 }
 

@@ -9,7 +9,7 @@ enum { TEMPLATE_ONE = 64, TEMPLATE_EMPTY = INT16_MIN }; /* steps per unit of the
 void template_clear(int16_t *template, int32_t limbs);
 
 /* Move every point seen in this frame a tenth of the way to what was seen. */
-void template_update(int16_t *template, int32_t limbs, const like_patch *seen);
+void template_update(int16_t *template, int32_t limbs, const like_patch *patch);
 
 /* The template as bodies are compared with it: limbs x LIKE_RING values, TEXTURE_HIDDEN where it knows
  * nothing. */

@@ -17,9 +17,9 @@ enum {
     LIKE_AZIMUTHS = 8,
     LIKE_SAMPLES = LIKE_ROWS * LIKE_AZIMUTHS, /* surface points of a limb */
     LIKE_DIRECTIONS =
-        2 * LIKE_AZIMUTHS,          /* rings are staggered by half a step: two points face each of these */
-    LIKE_FACING = LIKE_SAMPLES / 2, /* points of the half turned to the camera */
-    LIKE_RING = LIKE_SAMPLES + LIKE_FACING, /* once around and on, so that every half is in one piece */
+        2 * LIKE_AZIMUTHS,        /* rings are staggered by half a step: two points face each of these */
+    LIKE_HALF = LIKE_SAMPLES / 2, /* points of the half turned to the camera */
+    LIKE_RING = LIKE_SAMPLES + LIKE_HALF, /* once around and on, so that every half is in one piece */
     LIKE_FEW = 8,            /* points seen in both frames below which a limb counts as occluded */
     LIKE_COSTS = 256,        /* entries of a cost table */
     LIKE_COST_ONE = 256,     /* 1 nat in the robust one */
@@ -46,7 +46,7 @@ enum {
     LIKE_SUBPIXELS = 256, /* of a working pixel, in one direction */
     LIKE_CELL_BITS = 9    /* of them in a cell of the grid, which has two pixels */
 };
-enum { LIKE_VIEW_IMAGE = 0, LIKE_VIEW_SHIFT = 9, LIKE_VIEW_EYE = 12, LIKE_VIEW_GRAZE = 15 };
+enum { LIKE_VIEW_IMAGE = 0, LIKE_VIEW_SHIFT = 9, LIKE_VIEW_ORIGIN = 12, LIKE_VIEW_GRAZE = 15 };
 enum {
     LIKE_SIDE_X = 0,
     LIKE_SIDE_Y = 2,
@@ -82,8 +82,8 @@ typedef struct like_outline {
 
 /* What the half of a limb that is turned to the camera looks like. */
 typedef struct like_patch {
-    uint8_t turn;              /* its first direction; modulo LIKE_DIRECTIONS */
-    int8_t value[LIKE_FACING]; /* or TEXTURE_HIDDEN; as the surface points from 2 turn on */
+    uint8_t turn;            /* its first direction; modulo LIKE_DIRECTIONS */
+    int8_t value[LIKE_HALF]; /* or TEXTURE_HIDDEN; as the surface points from 2 turn on */
 } like_patch;
 
 /* Costs of differences between surface samples, with LIKE_COUNT_ONE in each; and without it their bytes, of which a
@@ -126,7 +126,7 @@ typedef struct like_body { /* one body in one camera, as the terms see it */
     like_block *terms;               /* its block's */
     const int8_t *known;             /* limbs x LIKE_RING: running appearance (like_template.h), or NULL */
     int32_t area,
-        covered; /* cells of the body that the camera sees, and the foreground in them; FG_ONE = 1 */
+        covered; /* cells of the body that the camera sees, and the foreground in them; FOREGROUND_ONE = 1 */
 } like_body;
 
 typedef struct like_edge_tally {
@@ -146,9 +146,9 @@ extern const like_term like_texture, like_silhouette, like_edges, like_template,
 
 /* Look up the surface of every limb of one lane in the frame. */
 static inline void like_sample(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,
-                               const layers *drawn, like_patch *seen)
+                               const layers *drawn, like_patch *out)
 {
-    s->run->surface_sample(s, f, pose, lane, drawn, seen);
+    s->run->surface_sample(s, f, pose, lane, drawn, out);
 }
 
 /* Edges along the visible outline, of [0, 1]; chance: what a line of any direction would meet there. */

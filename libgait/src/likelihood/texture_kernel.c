@@ -25,18 +25,17 @@ static void compare_all(rows *r, int32_t limbs, const like_costs *cost, int32_t 
 #else
 static inline int32_t compare(const int8_t *restrict a, const int8_t *restrict b, const int32_t *cost)
 {
-    int32_t x[LIKE_FACING], y[LIKE_FACING], difference[LIKE_FACING], both[LIKE_FACING], one[LIKE_FACING],
-        sum = 0;
+    int32_t x[LIKE_HALF], y[LIKE_HALF], difference[LIKE_HALF], both[LIKE_HALF], one[LIKE_HALF], sum = 0;
     simd16_widen(a, x);
     simd16_widen(b, y);
 #pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++) {
+    for (int32_t i = 0; i < LIKE_HALF; i++) {
         difference[i] = i_max(x[i] - y[i], y[i] - x[i]);
         both[i] = -((x[i] != TEXTURE_HIDDEN) & (y[i] != TEXTURE_HIDDEN));
     }
     simd16_lookup(cost, difference, both, one);
 #pragma GCC unroll 1
-    for (int32_t i = 0; i < LIKE_FACING; i++)
+    for (int32_t i = 0; i < LIKE_HALF; i++)
         sum += one[i];
     return sum;
 }
@@ -53,11 +52,11 @@ static void compare_all(const rows *r, int32_t limbs, const like_costs *cost, in
 static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs,
                           const like_costs *cost, int32_t *sum)
 {
-    int8_t padded[MODEL_MAX_LIMBS][3 * LIKE_FACING];
+    int8_t padded[MODEL_MAX_LIMBS][3 * LIKE_HALF];
     rows r;
     for (int32_t l = 0; l < limbs; l++) {
         memset(padded[l], TEXTURE_HIDDEN, sizeof padded[l]);
-        memcpy(padded[l] + LIKE_FACING, then[l].value, LIKE_FACING);
+        memcpy(padded[l] + LIKE_HALF, then[l].value, LIKE_HALF);
     }
     for (int32_t l = 0; l < limbs; l++) {
         int32_t const ahead = (now[l].turn - then[l].turn + LIKE_AZIMUTHS) & (LIKE_DIRECTIONS - 1);
@@ -67,7 +66,7 @@ static void compare_limbs(const like_patch *now, const like_patch *then, int32_t
     compare_all(&r, limbs, cost, sum);
 }
 
-/* Share of the about LIKE_SAMPLES / 2 points facing the camera that both frames show. */
+/* Share of the about LIKE_SAMPLES / 2 points cos_tilt the camera that both frames show. */
 static inline float visible_share(int32_t both)
 {
     return f_min((float)both / (0.4f * (float)LIKE_SAMPLES), 1.0f);
@@ -82,24 +81,24 @@ static inline float mixture(float q, float log_visible, float log_occluded)
 }
 
 /* Robust, contrast-normalised form: mean Student-t cost. */
-static inline float robust(int32_t both, int32_t cost, float facing)
+static inline float robust(int32_t both, int32_t cost, float cos_tilt)
 {
     float const log_occluded = -1.6f; /* as bad as a typical mismatch */
     float const mean = (float)cost / (float)(i_max(both, 1) * LIKE_COST_ONE);
-    float const seen = mixture(facing * visible_share(both), -mean, log_occluded);
-    return both < LIKE_FEW ? log_occluded : seen;
+    float const log_mixture = mixture(cos_tilt * visible_share(both), -mean, log_occluded);
+    return both < LIKE_FEW ? log_occluded : log_mixture;
 }
 
 /* Literal form: mean squared grey-level difference, normal density, sigma growing with the viewing angle. */
-static inline float literal(int32_t both, int32_t squares, float facing)
+static inline float literal(int32_t both, int32_t squares, float cos_tilt)
 {
     float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared */
-    float const tan2 = f_min((1.0f - facing * facing) / f_max(facing * facing, 1e-3f), 9.0f);
+    float const tan2 = f_min((1.0f - cos_tilt * cos_tilt) / f_max(cos_tilt * cos_tilt, 1e-3f), 9.0f);
     float const var = 2.0f * image_var + model_var * (1.0f + tan2);
     float const log_visible =
         -0.5f * m_log(TWO_PI_F * var) - (float)squares / (2.0f * var * (float)i_max(both, 1));
-    float const seen = mixture(facing * visible_share(both), log_visible, LIKE_PAPER_OCCLUDED);
-    return both < LIKE_FEW ? LIKE_PAPER_OCCLUDED : seen;
+    float const log_mixture = mixture(cos_tilt * visible_share(both), log_visible, LIKE_PAPER_OCCLUDED);
+    return both < LIKE_FEW ? LIKE_PAPER_OCCLUDED : log_mixture;
 }
 
 void KERNEL(texture_costs)(const like_body *b, int32_t (*cost)[BLOCK])
@@ -118,13 +117,13 @@ void KERNEL(texture_logs)(const like_setup *s, const outline_block *outline, con
     for (int32_t i = 0; i < BLOCK; i++)
         log[i] = 0.0f;
     for (int32_t l = 0; l < s->limbs; l++) {
-        const float *const facing = outline->limb[l].facing;
+        const float *const cos_tilt = outline->limb[l].cos_tilt;
         if (s->paper)
             for (int32_t i = 0; i < BLOCK; i++)
-                log[i] += literal(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, facing[i]);
+                log[i] += literal(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, cos_tilt[i]);
         else
             for (int32_t i = 0; i < BLOCK; i++)
-                log[i] += robust(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, facing[i]);
+                log[i] += robust(cost[l][i] / LIKE_COUNT_ONE, cost[l][i] % LIKE_COUNT_ONE, cos_tilt[i]);
     }
 }
 

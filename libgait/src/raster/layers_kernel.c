@@ -133,7 +133,7 @@ static void deal_lines(const int32_t *column, layers_limb *restrict out)
             line[slot][0][0][i] -= (float)column[i];
             line[slot][0][1][i] += (float)column[i];
         }
-    simd16_deal((const float (*)[SIMD16])line, (float (*)[SIMD16])out->line);
+    simd16_transpose((const float (*)[SIMD16])line, (float (*)[SIMD16])out->line);
 }
 
 /* Most bodies are no wider than a word; its first column is a multiple of GRID_STEP. */
@@ -199,7 +199,7 @@ static inline int32_t cell_from(float x)
 /* The bits in a word, SIMD16_ROWS rows at once, each as its left and its right column; what was stored so is loaded so. */
 static inline __attribute__((always_inline)) void draw_limb(const float *line, int32_t lines, int32_t top,
                                                             int32_t end, uint64_t *restrict whole,
-                                                            uint64_t *restrict seen)
+                                                            uint64_t *restrict visible)
 {
     float at[LAYERS_LINES][2 * SIMD16_ROWS], slope[LAYERS_LINES][2 * SIMD16_ROWS], y[2 * SIMD16_ROWS];
     int32_t const first = top / LAYERS_BAND * LAYERS_BAND;
@@ -230,7 +230,7 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
             row[i] += SIMD16_ROWS;
             y[i] += (float)SIMD16_ROWS;
         }
-        simd16_cover(span, whole + strip, seen + strip);
+        simd16_cover(span, whole + strip, visible + strip);
     }
 }
 

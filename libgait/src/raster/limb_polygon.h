@@ -10,12 +10,12 @@ typedef struct vec3 {
     float x, y, z;
 } vec3;
 
-typedef struct part { /* a limb and the frame that carries it, seen by a camera */
+typedef struct limb_projection { /* a limb and the frame that carries it, seen by a camera */
     const limb_geometry *g;
     float R[9], o[3], scale;
     const gait_camera *cam;
     const view_map *map;
-} part;
+} limb_projection;
 
 static inline vec3 rotate(const float *M, float x, float y, float z)
 {
@@ -24,14 +24,14 @@ static inline vec3 rotate(const float *M, float x, float y, float z)
 }
 
 /* Model vector of the frame (statures) to camera axes, metres. */
-static inline vec3 turn(const part *p, const float v[3])
+static inline vec3 turn(const limb_projection *p, const float v[3])
 {
     vec3 const w = rotate(p->R, p->scale * v[0], p->scale * v[1], p->scale * v[2]);
     return rotate(p->cam->R, w.x, w.y, w.z);
 }
 
 /* Model point of the frame to camera coordinates. */
-static inline vec3 place(const part *p, const float v[3])
+static inline vec3 place(const limb_projection *p, const float v[3])
 {
     const float *const t = p->cam->t;
     vec3 const w = rotate(p->R, p->scale * v[0], p->scale * v[1], p->scale * v[2]);
@@ -43,7 +43,7 @@ typedef struct spot { /* a camera point in the working image with the Jacobian's
     float x, y, inv_z, slope_x, slope_y;
 } spot;
 
-static inline spot project(const part *q, vec3 p)
+static inline spot project(const limb_projection *q, vec3 p)
 {
     const gait_camera *const cam = q->cam;
     const view_map *const map = q->map;
@@ -53,7 +53,7 @@ static inline spot project(const part *q, vec3 p)
 }
 
 /* Image displacement of a small camera vector at a spot. */
-static inline void image_vector(const part *p, const spot *s, vec3 v, float out[2])
+static inline void image_vector(const limb_projection *p, const spot *s, vec3 v, float out[2])
 {
     float const k = s->inv_z * p->map->scale;
     out[0] = p->cam->fx * k * (v.x - s->slope_x * v.z);
@@ -74,7 +74,7 @@ static inline void put(limb_polygon *out, int32_t k, float x, float y)
 }
 
 /* A tapered elliptic cylinder as a quadrilateral. */
-static inline void part_cone(const part *p, limb_polygon *out)
+static inline void cone_polygon(const limb_projection *p, limb_polygon *out)
 {
     const limb_geometry *const g = p->g;
     vec3 const p0 = place(p, g->start), p1 = place(p, g->end);
@@ -102,11 +102,11 @@ static inline void part_cone(const part *p, limb_polygon *out)
     float const sin2 =
         dot * dot / f_max((lx * lx + ly * ly + lz * lz) * (mx * mx + my * my + mz * mz), 1e-12f);
     out->depth = f_min(p0.z, p1.z) > CAMERA_NEAR ? mz : 0.0f;
-    out->facing = __builtin_sqrtf(f_max(1.0f - sin2, 0.0f));
+    out->cos_tilt = __builtin_sqrtf(f_max(1.0f - sin2, 0.0f));
 }
 
 /* An ellipsoid as an octagon. */
-static inline void part_ellipsoid(const part *p, limb_polygon *out)
+static inline void ellipsoid_polygon(const limb_projection *p, limb_polygon *out)
 {
     static const float COS[8] = {1.0f,  0.70710678f,  0.0f, -0.70710678f,
                                  -1.0f, -0.70710678f, 0.0f, 0.70710678f};
@@ -136,19 +136,19 @@ static inline void part_ellipsoid(const part *p, limb_polygon *out)
     for (int32_t k = 0; k < 8; k++)
         put(out, k, s.x + grow * l11 * COS[k], s.y + grow * (l21 * COS[k] + l22 * SIN[k]));
     out->depth = c.z > CAMERA_NEAR ? c.z : 0.0f;
-    out->facing = 1.0f;
+    out->cos_tilt = 1.0f;
 }
 
 /* R, o, scale: the limb's frame in the world and metres per model length. */
 static inline void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale,
                                 const gait_camera *cam, const view_map *map, limb_polygon *out)
 {
-    part p = {.g = g, .scale = scale, .cam = cam, .map = map};
+    limb_projection p = {.g = g, .scale = scale, .cam = cam, .map = map};
     memcpy(p.R, R, sizeof p.R);
     memcpy(p.o, o, sizeof p.o);
     if (g->shape == LIMB_ELLIPSOID)
-        part_ellipsoid(&p, out);
+        ellipsoid_polygon(&p, out);
     else
-        part_cone(&p, out);
+        cone_polygon(&p, out);
 }
 #endif

@@ -21,12 +21,12 @@ void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out);
 typedef struct limb_polygon {
     float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES]; /* working pixels */
     float depth;                                      /* metres, of the limb's middle; 0: behind the camera */
-    float facing;                                     /* cosine of the angle between limb and image plane */
+    float cos_tilt;                                   /* cosine of the angle between limb and image plane */
 } limb_polygon;
 
 typedef struct outline_lanes { /* the same in BLOCK bodies */
     float x[RAST_MAX_VERTICES][BLOCK], y[RAST_MAX_VERTICES][BLOCK];
-    float depth[BLOCK], facing[BLOCK];
+    float depth[BLOCK], cos_tilt[BLOCK];
 } outline_lanes;
 
 /* Here and in what is made of it the limbs come last: a tracker has memory for those of its model only. */

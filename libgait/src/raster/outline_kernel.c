@@ -2,17 +2,17 @@
 #include "base/dispatch.h"
 #include "raster/limb_polygon.h"
 
-static part part_of(const limb_geometry *g, const kin_body *body, int32_t lane, const gait_camera *cam,
-                    const view_map *map)
+static limb_projection projection_of(const limb_geometry *g, const kin_body *body, int32_t lane,
+                                     const gait_camera *cam, const view_map *map)
 {
     const float (*const R)[BLOCK] = body->R[g->frame], (*const o)[BLOCK] = body->o[g->frame];
-    return (part){.g = g,
-                  .R = {R[0][lane], R[1][lane], R[2][lane], R[3][lane], R[4][lane], R[5][lane], R[6][lane],
-                        R[7][lane], R[8][lane]},
-                  .o = {o[0][lane], o[1][lane], o[2][lane]},
-                  .scale = body->scale[g->frame][lane],
-                  .cam = cam,
-                  .map = map};
+    return (limb_projection){.g = g,
+                             .R = {R[0][lane], R[1][lane], R[2][lane], R[3][lane], R[4][lane], R[5][lane],
+                                   R[6][lane], R[7][lane], R[8][lane]},
+                             .o = {o[0][lane], o[1][lane], o[2][lane]},
+                             .scale = body->scale[g->frame][lane],
+                             .cam = cam,
+                             .map = map};
 }
 
 static void store(const limb_polygon *q, int32_t vertices, int32_t lane, outline_lanes *restrict out)
@@ -22,7 +22,7 @@ static void store(const limb_polygon *q, int32_t vertices, int32_t lane, outline
         out->y[k][lane] = q->y[k];
     }
     out->depth[lane] = q->depth;
-    out->facing[lane] = q->facing;
+    out->cos_tilt[lane] = q->cos_tilt;
 }
 
 void KERNEL(outline_project)(const limb_geometry *limbs, int32_t count, const kin_body *restrict body,
@@ -35,16 +35,16 @@ void KERNEL(outline_project)(const limb_geometry *limbs, int32_t count, const ki
         if (g.shape == LIMB_ELLIPSOID)
             KERNEL_LANES
         for (int32_t i = 0; i < BLOCK; i++) {
-            part const p = part_of(&g, body, i, &projection, &window);
+            limb_projection const p = projection_of(&g, body, i, &projection, &window);
             limb_polygon q;
-            part_ellipsoid(&p, &q);
+            ellipsoid_polygon(&p, &q);
             store(&q, 8, i, &out->limb[l]);
         }
         else KERNEL_LANES for (int32_t i = 0; i < BLOCK; i++)
         {
-            part const p = part_of(&g, body, i, &projection, &window);
+            limb_projection const p = projection_of(&g, body, i, &projection, &window);
             limb_polygon q;
-            part_cone(&p, &q);
+            cone_polygon(&p, &q);
             store(&q, 4, i, &out->limb[l]);
         }
     }

@@ -103,7 +103,7 @@ static void mean_rotation(const sums *s, particle_state *w)
  * same in all frames of one camera: whatever the particles agree on, these tell a size that was in doubt to 1 %. */
 static float size_doubt(const gait_tracker *t)
 {
-    float const told = 0.01f, doubt = t->core->stature_doubt;
+    float const told = 0.01f, doubt = t->core->stature_sd_ratio;
     bool const one_view = t->cfg.cameras == 1 && t->cfg.joint_sd_model > 0.0f;
     return one_view ? told * doubt / __builtin_sqrtf(told * told + doubt * doubt) : 0.0f;
 }

@@ -24,7 +24,8 @@ float hypotheses_settled_time(const gait_tracker *t)
 
 static void enter(gait_tracker *t, int32_t stage)
 {
-    t->core->hypotheses = (hypotheses_state){.stage = stage, .since = t->core->utime, .known = stage == HYPOTHESES_ONE};
+    t->core->hypotheses =
+        (hypotheses_state){.stage = stage, .since = t->core->utime, .known = stage == HYPOTHESES_ONE};
 }
 
 void hypotheses_acquire(gait_tracker *t)
@@ -322,7 +323,7 @@ static pf_summary update_hypotheses(gait_tracker *t, float dt)
         inner[side] = evidence_of(&h, t->loglik_without_silhouette + first);
         whole[side] = evidence_of(&h, t->loglik_raw + first);
         if (hypotheses_acquiring(t))
-            evidence_soften(&h, t->loglik + first);
+            evidence_anneal(&h, t->loglik + first);
         s[side] = pf_update(&h, t->loglik + first);
         s[side].best += first;
         if (s[side].degenerate)
@@ -348,14 +349,15 @@ pf_summary hypotheses_update(gait_tracker *t, float dt)
     if (t->core->hypotheses.stage == HYPOTHESES_TWO)
         return update_hypotheses(t, dt);
     if (t->core->hypotheses.stage == HYPOTHESES_ACQUISITION)
-        evidence_soften(&t->filter, t->loglik);
+        evidence_anneal(&t->filter, t->loglik);
     return pf_update(&t->filter, t->loglik);
 }
 
 bool hypotheses_open(const gait_tracker *t)
 {
     const hypotheses_state *const m = &t->core->hypotheses;
-    return m->stage == HYPOTHESES_ACQUISITION || (m->stage == HYPOTHESES_TWO && m->odds < SURE && m->odds > -SURE);
+    return m->stage == HYPOTHESES_ACQUISITION ||
+           (m->stage == HYPOTHESES_TWO && m->odds < SURE && m->odds > -SURE);
 }
 
 bool hypotheses_acquiring(const gait_tracker *t)

@@ -61,12 +61,13 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
     bool ok = c.current >= 0 && c.current < t->past.depth && (c.started == 0 || c.started == 1);
     ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->room && c.fewer >= 0 && c.fewer < t->room;
     ok &= c.less >= 0 && c.less <= t->most - 16;
-    ok &= c.hypotheses.stage >= HYPOTHESES_ONE && c.hypotheses.stage <= HYPOTHESES_TWO && c.hypotheses.since <= c.utime;
-    ok &=
-        c.hypotheses.odds > -1e6 && c.hypotheses.odds < 1e6 && c.hypotheses.lead > -1e12 && c.hypotheses.lead < 1e12; /* no NaN */
+    ok &= c.hypotheses.stage >= HYPOTHESES_ONE && c.hypotheses.stage <= HYPOTHESES_TWO &&
+          c.hypotheses.since <= c.utime;
+    ok &= c.hypotheses.odds > -1e6 && c.hypotheses.odds < 1e6 && c.hypotheses.lead > -1e12 &&
+          c.hypotheses.lead < 1e12; /* no NaN */
     ok &= c.start_utime <= c.utime && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
     ok &= c.rejuvenation_utime <= c.utime && c.rejuvenation_utime >= c.start_utime;
-    ok &= c.missed >= 0.0f && c.missed < 1e9f && c.stature_doubt >= 0.0f && c.stature_doubt < 1e9f;
+    ok &= c.missed >= 0.0f && c.missed < 1e9f && c.stature_sd_ratio >= 0.0f && c.stature_sd_ratio < 1e9f;
     ok &= f_finite(&c.front_back, 1);
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};

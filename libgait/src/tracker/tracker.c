@@ -155,7 +155,7 @@ void tracker_clear(gait_tracker *t)
 dynamics tracker_dynamics(const gait_tracker *t)
 {
     return (dynamics){
-        .cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed, .stature_doubt = t->core->stature_doubt};
+        .cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed, .stature_sd_ratio = t->core->stature_sd_ratio};
 }
 
 /* Standard deviation of the phase below which a start says which leg is which, strides. */
@@ -165,7 +165,7 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
 {
     tracker_clear(t);
     t->core->started = 1;
-    t->core->stature_doubt = sd->stature / f_max(mean->stature, LEAST_STATURE);
+    t->core->stature_sd_ratio = sd->stature / f_max(mean->stature, LEAST_STATURE);
     t->core->utime = t->core->start_utime = t->core->support_utime = t->core->rejuvenation_utime = utime;
     if (sd->phase < PHASE_KNOWN)
         hypotheses_settle(t);
@@ -218,7 +218,7 @@ static void move_block(const move_job *j, int32_t begin, int32_t lanes)
     const gait_tracker *const t = j->t;
     particle_set to = t->particles;
     particle_block then, now;
-    if (j->rejuvenation.pull > 0.0f)
+    if (j->rejuvenation.shrink > 0.0f)
         rejuvenate_block(&j->rejuvenation, begin, lanes, &then);
     else
         particle_block_get(&j->from, t->filter.parent + begin, lanes, &then);
@@ -269,7 +269,7 @@ static void predict(gait_tracker *t, float dt, bool resampled, bool stay, uint32
     dynamics const d = tracker_dynamics(t);
     move_job j = {.t = t, .from = t->particles};
     j.rejuvenation = rejuvenation_after(t, resampled, frame);
-    if (j.rejuvenation.pull > 0.0f)
+    if (j.rejuvenation.shrink > 0.0f)
         task_run(&t->cfg.exec, t->cfg.tasks, j.from.n, BLOCK, rows_range, &j);
     j.step = dynamics_step_init(&d, dt, hypotheses_settled_time(t), frame);
     t->core->current = (t->core->current + 1) % t->past.depth;

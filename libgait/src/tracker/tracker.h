@@ -24,13 +24,13 @@ typedef struct tracker_core { /* small mutable state; saved and hashed with the 
     int64_t rejuvenation_utime; /* when the particles last rejuvenated, or were of no one mode */
     uint64_t frame;             /* steps since start */
     int32_t started;
-    int32_t current;     /* which of the generations kept holds the particles */
-    uint32_t textured;   /* bit c: there are surface samples of camera c's previous frame */
-    int32_t met;         /* the images have supported it since the start */
-    int32_t part;        /* this frame supports but a part of it */
-    float stature_doubt; /* as in dynamics */
-    float missed;        /* foreground that is usually left unexplained, nats */
-    float front_back;    /* front_back_score() lately */
+    int32_t current;        /* which of the generations kept holds the particles */
+    uint32_t textured;      /* bit c: there are surface samples of camera c's previous frame */
+    int32_t met;            /* the images have supported it since the start */
+    int32_t part;           /* this frame supports but a part of it */
+    float stature_sd_ratio; /* as in dynamics */
+    float missed;           /* foreground that is usually left unexplained, nats */
+    float front_back;       /* front_back_score() lately */
     double ess;
     hypotheses_state hypotheses;
     particle_state last; /* when the images last supported it */
