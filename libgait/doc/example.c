@@ -51,12 +51,12 @@ int main(int argc, char **argv)
     cfg.camera[0] = (gait_camera){.width = W, .height = H, .fx = s[0], .fy = s[1], .cx = s[2], .cy = s[3]};
     memcpy(cfg.camera[0].R, s + 4, sizeof cfg.camera[0].R);
     memcpy(cfg.camera[0].t, s + 13, sizeof cfg.camera[0].t);
-    gait_tracker_prior(model, &mean, &sd); /* any person, within about 0.1 m and rad of the given start */
+    gait_tracker_prior(model, &mean, &sd, NULL); /* any person, within about 0.1 m and rad of the given start */
     mean.pelvis[0] = s[16], mean.pelvis[1] = s[17], mean.heading = s[18];
     sd.pelvis[0] = sd.pelvis[1] = sd.heading = 0.1f;
     if (gait_tracker_init(memory, sizeof memory, model, &cfg, &t, &err) < 0)
         return fail(argv[2], err.text);
-    gait_tracker_set_background(t, 0, &(gait_image){empty[0], W, H, W, GAIT_GREY8});
+    gait_tracker_set_background(t, 0, &(gait_image){empty[0], W, H, W, GAIT_GREY8}, NULL);
     gait_tracker_start(t, &mean, &sd, 0, NULL);
     for (int i = 4; i < argc; i++, frame.utime += 33333) {
         if (!take(argv[i], picture, NULL))

@@ -126,7 +126,7 @@ static bool take_turn(runner *r, int32_t steps, const bench_limit *limit, messag
         bool const first_round = r->count < frames;
         if (first_round && (r->frame == 0 || r->count == steps))
             r->result->digest = gait_tracker_digest(r->tracker[0]);
-        r->result->particles = gait_tracker_particles(r->tracker[0], NULL, NULL, 0);
+        r->result->particles = gait_tracker_particles(r->tracker[0], NULL, NULL, 0, NULL);
         if (ok && (r->result->particles > r->result->plan.particles) != r->result->plan.search)
             ok = message_set(why, "frame %d is tracked with %d particles", (int)r->frame,
                              (int)r->result->particles);
@@ -226,7 +226,7 @@ static bool make_tracker(runner *r, int k, const gait_model *model, const gait_t
     gait_error err = {.text = ""};
     return (gait_tracker_init(r->memory + (size_t)k * r->each, r->each, model, cfg, &r->tracker[k], &err) ==
                 GAIT_OK &&
-            gait_tracker_set_background(r->tracker[k], 0, plate) == GAIT_OK) ||
+            gait_tracker_set_background(r->tracker[k], 0, plate, NULL) == GAIT_OK) ||
            message_set(why, "%s", err.text);
 }
 

@@ -57,7 +57,7 @@ bool bench_scene_make(bench_scene *s, const gait_model *model, int32_t width, in
     uint8_t *const ids = malloc(bytes / 3);
     s->plate = malloc(bytes);
     s->pixels = malloc(bytes * (size_t)frames);
-    bool ok = ids && s->plate && s->pixels && gait_model_get_info(model, &info) == GAIT_OK;
+    bool ok = ids && s->plate && s->pixels && gait_model_get_info(model, &info, NULL) == GAIT_OK;
     if (!ok)
         message_set(why, "not enough memory for %d frames of %d x %d", (int)frames, (int)width, (int)height);
     else
@@ -68,8 +68,8 @@ bool bench_scene_make(bench_scene *s, const gait_model *model, int32_t width, in
             particle_state.pelvis[0] =
                 -0.5f * (float)frames / FPS * particle_state.stature * info.stride_hz * info.stride_length;
         }
-        ok = gait_model_pelvis_height(model, &particle_state, &particle_state.pelvis[2]) == GAIT_OK &&
-             gait_render(model, &s->camera, &particle_state, ids, width) == GAIT_OK;
+        ok = gait_model_pelvis_height(model, &particle_state, &particle_state.pelvis[2], NULL) == GAIT_OK &&
+             gait_render(model, &s->camera, &particle_state, ids, width, NULL) == GAIT_OK;
         if (f == 0)
             s->start = particle_state;
         draw_frame(s, ids, s->pixels + (size_t)f * bytes);

@@ -47,7 +47,7 @@ class Shape:
 
 def _tracked(names: Iterable[str] = ANGLES) -> tuple[str, ...]:
     """Those of the angles that have an offset in the tracker by default."""
-    wanted = TrackerConfig.default().offset_angles
+    wanted = Model().info.posture_angles
     return tuple(name for name in names if wanted >> ANGLES.index(name) & 1)
 
 

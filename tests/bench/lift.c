@@ -1,8 +1,8 @@
 /* lift.c - speed of lifting: microseconds of CPU per frame of a stream of 15 points, estimate included, by instruction
  * set; segments per second by the gain and one by one; what is wanted of the best set, and whether it was reached. */
-#include "trackd/file.h"
+#include "gait_lift.h"
+#include "trackd/model_file.h"
 #include "trackd/options.h"
-#include "gait.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -29,7 +29,7 @@ static const option options[] = {
 enum { OPTIONS = sizeof options / sizeof *options };
 
 typedef struct bench {
-    file_bytes blob;
+    model_file file;
     gait_lift_info info;
     gait_lift *lift;
     void *memory;
@@ -61,7 +61,7 @@ static gait_lift_config config(uint32_t mask, int projection)
                              .R = {1, 0, 0, 0, 0, -1, 0, 1, 0},
                              .t = {0, 1, 6}};
     c.lag = settings.lag;
-    c.misfit = 0.0; /* the walker is drawn, not real */
+    c.fit_threshold = 0.0; /* the walker is drawn, not real */
     c.report = (1u << POINTS) - 1;
     c.cpu_mask = mask;
     return c;
@@ -71,14 +71,14 @@ static bool open_lift(bench *b, const gait_lift_config *c)
 {
     gait_error err = {0};
     size_t bytes;
-    bool ok = gait_lift_bytes(b->blob.data, b->blob.size, c, &bytes, &err) == GAIT_OK;
+    bool ok = gait_lift_bytes(b->file.model, c, &bytes, &err) == GAIT_OK;
     if (ok && bytes > b->bytes) {
         free(b->memory);
         b->memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
         b->bytes = bytes;
     }
     ok = ok && b->memory &&
-         gait_lift_init(b->memory, bytes, b->blob.data, b->blob.size, c, &b->lift, &err) == GAIT_OK;
+         gait_lift_init(b->memory, bytes, b->file.model, c, &b->lift, &err) == GAIT_OK;
     if (!ok)
         fprintf(stderr, "lift: %s: %s\n", settings.model, b->memory ? err.text : "not enough memory");
     return ok;
@@ -115,7 +115,7 @@ static bool stream(bench *b, uint32_t mask)
         see((double)i / RATE, b->uv);
         double const before = now();
         ok = gait_lift_push(b->lift, 1000 + (int64_t)i * 1000000 / RATE, b->uv, b->sd, NULL) == GAIT_OK;
-        bool const there = gait_lift_estimate(b->lift, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING;
+        bool const there = gait_lift_estimate(b->lift, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING;
         double const us = now() - before;
         if (there && start_us == 0.0) {
             start_us = us; /* the heading was searched for */
@@ -149,7 +149,7 @@ static bool batch(bench *b, uint32_t mask)
         b->uv[i] = 0.3 * sin(0.1 * (double)i);
     double const before = now();
     for (int k = 0; k < 10; k++)
-        if (gait_lift_batch(b->lift, BATCH, b->uv, b->mean) != GAIT_OK)
+        if (gait_lift_batch(b->lift, BATCH, b->uv, b->mean, NULL) != GAIT_OK)
             return false;
     double const gain_us = (now() - before) / (10 * BATCH);
     double const middle = now();
@@ -167,9 +167,9 @@ static bool batch(bench *b, uint32_t mask)
 static bool prepare(bench *b, message *why)
 {
     gait_error err = {0};
-    if (!file_read(settings.model, "model", &b->blob, why))
+    if (!model_file_open(&b->file, settings.model, why))
         return false;
-    if (gait_lift_get_info(b->blob.data, b->blob.size, &b->info, &err) != GAIT_OK)
+    if (gait_lift_get_info(b->file.model, &b->info, &err) != GAIT_OK)
         return message_set(why, "%.100s: %.120s", settings.model, err.text);
     size_t const points = (size_t)b->info.frames * (size_t)b->info.markers;
     b->uv = calloc(points * BATCH * 2, sizeof *b->uv);
@@ -211,6 +211,6 @@ int main(int argc, char **argv)
     free(b.mean);
     free(b.sd);
     free(b.memory);
-    free(b.blob.data);
+    model_file_close(&b.file);
     return ok ? 0 : result == OPTION_BAD ? 2 : 1;
 }

@@ -72,8 +72,8 @@ def _odd() -> None:
         tracks = lift_tracks.tracked(joints, camera, lift_tracks.BALANCING_NOISE, 0.0)
         true = np.stack([joints.places[joint] for joint in tracks.names], axis=1)
         row: list[object] = [name]
-        for misfit in (LiftConfig.default().misfit, STRICT):
-            config = LiftConfig.default(misfit=misfit)
+        for misfit in (LiftConfig.default().fit_threshold, STRICT):
+            config = LiftConfig.default(fit_threshold=misfit)
             at, found, sd, tracked = streamed(tracks, camera, None, config)
             apart = np.linalg.norm(found - true[at], axis=2).mean(axis=1)
             inside = np.mean(np.abs(found - true[at]) < lift_tracks.WITHIN * sd)

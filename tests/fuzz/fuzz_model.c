@@ -23,13 +23,13 @@ static void use(const gait_model *m)
     gait_state mean, sd;
     gait_pose pose;
     void *memory = NULL;
-    if (gait_tracker_prior(m, &mean, &sd) != GAIT_OK)
+    if (gait_tracker_prior(m, &mean, &sd, NULL) != GAIT_OK)
         return;
     for (int i = 0; i < 3; i++) {
         mean.phase = 0.33f * (float)i;
-        gait_model_pelvis_height(m, &mean, &mean.pelvis[2]);
-        gait_model_pose(m, &mean, &pose);
-        gait_render(m, &cam, &mean, ids, WIDTH);
+        gait_model_pelvis_height(m, &mean, &mean.pelvis[2], NULL);
+        gait_model_pose(m, &mean, &pose, NULL);
+        gait_render(m, &cam, &mean, ids, WIDTH, NULL);
     }
     gait_tracker *const t = fuzz_tracker(m, &memory);
     if (t)

@@ -26,10 +26,10 @@ void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, 
     gait_state mean, sd;
     if (gait_model_init(room, sizeof room, fuzz_aligned(blob, blob_size, &copy), blob_size, &model, NULL) !=
             GAIT_OK ||
-        gait_tracker_prior(model, &mean, &sd) != GAIT_OK || !(tracker = fuzz_tracker(model, &memory)))
+        gait_tracker_prior(model, &mean, &sd, NULL) != GAIT_OK || !(tracker = fuzz_tracker(model, &memory)))
         abort();
     fuzz_steps(tracker, &mean, &sd, 0, 3);
-    if (gait_tracker_save(tracker, out, cap, size) != GAIT_OK)
+    if (gait_tracker_save(tracker, out, cap, size, NULL) != GAIT_OK)
         abort();
     memset(out + HASH_AT, 0, sizeof(uint64_t));
     repair(out, *size);

@@ -83,7 +83,7 @@ void fuzz_steps(gait_tracker *t, const gait_state *mean, const gait_state *sd, i
         pixels[1][i] = i % WIDTH > 40 && i % WIDTH < 56 ? 250 : pixels[0][i];
     }
     gait_image const plate = {pixels[0], WIDTH, HEIGHT, WIDTH, GAIT_GREY8};
-    gait_tracker_set_background(t, 0, &plate);
+    gait_tracker_set_background(t, 0, &plate, NULL);
     if (mean && gait_tracker_start(t, mean, sd, utime, NULL) != GAIT_OK)
         return;
     for (int f = 0; f < frames; f++) {

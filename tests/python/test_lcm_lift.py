@@ -190,7 +190,7 @@ def test_who_is_suddenly_elsewhere_is_ambiguous(tmp_path: Path) -> None:
         lifter.push(utime, pixels)
         now = lifter.estimate()
         if now is not None:
-            want.append(TrackStatus.AMBIGUOUS if now.flags & LiftFlag.MISFIT else now.status)
+            want.append(TrackStatus.AMBIGUOUS if now.flags & LiftFlag.POOR_FIT else now.status)
     _, lifted = lift(tmp_path, happenings)
     assert [m.status for m in lifted] == want and want.count(TrackStatus.AMBIGUOUS) > 3
     assert want[-1] == TrackStatus.TRACKING

@@ -365,7 +365,7 @@ def test_a_stream_follows_and_waits_as_told() -> None:
         assert (frame is None) == (i < 3)
         if frame is None or frame.status.name == "INIT":
             continue
-        assert frame.frame == i - 3 and not frame.flags & LiftFlag.MISFIT
+        assert frame.frame == i - 3 and not frame.flags & LiftFlag.POOR_FIT
         errors.append(np.linalg.norm(frame.markers - truth[i - 3], axis=1).mean())
         inside.append(np.abs(frame.markers - truth[i - 3]) < 1.645 * frame.sd)
     assert len(errors) == 90 - 14

@@ -31,7 +31,7 @@ def estimate(i):
         log_evidence=-80.5 - i,
         ess=123.4,
         phase_r=0.9,
-        mode_mass=1.0,
+        hypothesis_weight=1.0,
         speed=1.25,
         mean=State(phase=0.1 * i, stride_hz=0.9, stature=1.7, heading=-1.0, coef=rng.normal(size=5)),
         sd=State(),

@@ -1,5 +1,5 @@
 /* The field table against the header: every struct is there and its fields tile it without a hole. */
-#include "gait.h"
+#include "gait_lift.h"
 
 #include "check.h"
 

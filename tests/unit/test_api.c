@@ -38,7 +38,7 @@ static void test_memory(void)
         intact &= mem[i] == 0xa5;
     CHECK(intact);
     gait_model_info info;
-    CHECK(gait_model_get_info(m, &info) == GAIT_OK && info.joints == TOY_POINTS);
+    CHECK(gait_model_get_info(m, &info, NULL) == GAIT_OK && info.joints == TOY_POINTS);
     free(block);
 }
 
@@ -53,20 +53,20 @@ static void test_null(void)
     gait_state s = toy_state(0.0f);
     float height;
     static _Alignas(GAIT_ALIGN) unsigned char mem[1024];
-    CHECK(gait_model_bytes(NULL, bytes, &n, &err) == GAIT_ERR_ARG && n == 5 && err.status == GAIT_ERR_ARG);
+    CHECK(gait_model_bytes(NULL, bytes, &n, &err) == GAIT_ERR_ARG && n == 5 && err.result == GAIT_ERR_ARG);
     CHECK(gait_model_bytes(data, bytes, NULL, NULL) == GAIT_ERR_ARG);
     CHECK(gait_model_bytes(data, 3, &n, NULL) == GAIT_ERR_MAGIC && n == 5);
     CHECK(gait_model_init(NULL, sizeof mem, data, bytes, &m, NULL) == GAIT_ERR_ARG);
     CHECK(gait_model_init(mem, sizeof mem, NULL, bytes, &m, NULL) == GAIT_ERR_ARG);
     CHECK(gait_model_init(mem, sizeof mem, data, bytes, NULL, NULL) == GAIT_ERR_ARG && !m);
-    CHECK(gait_model_get_info(NULL, &info) == GAIT_ERR_ARG);
-    CHECK(gait_model_get_info(toy_model(), NULL) == GAIT_ERR_ARG);
-    CHECK(gait_model_pose(NULL, &s, &pose) == GAIT_ERR_ARG);
-    CHECK(gait_model_pose(toy_model(), NULL, &pose) == GAIT_ERR_ARG);
-    CHECK(gait_model_pose(toy_model(), &s, NULL) == GAIT_ERR_ARG);
-    CHECK(gait_model_pelvis_height(NULL, &s, &height) == GAIT_ERR_ARG);
-    CHECK(gait_model_pelvis_height(toy_model(), NULL, &height) == GAIT_ERR_ARG);
-    CHECK(gait_model_pelvis_height(toy_model(), &s, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_get_info(NULL, &info, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_get_info(toy_model(), NULL, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_pose(NULL, &s, &pose, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_pose(toy_model(), NULL, &pose, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_pose(toy_model(), &s, NULL, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_pelvis_height(NULL, &s, &height, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_pelvis_height(toy_model(), NULL, &height, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_model_pelvis_height(toy_model(), &s, NULL, NULL) == GAIT_ERR_ARG);
     CHECK(!gait_model_joint_name(NULL, 0) && !gait_model_angle_name(NULL, 0));
     CHECK(!gait_model_limb_name(NULL, 0));
 }
@@ -76,10 +76,17 @@ static void test_info(void)
     const gait_model *const m = toy_model();
     gait_model_info info;
     memset(&info, 0xff, sizeof info);
-    CHECK(gait_model_get_info(m, &info) == GAIT_OK);
+    CHECK(gait_model_get_info(m, &info, NULL) == GAIT_OK);
     CHECK(info.joints == TOY_POINTS && info.angles == TOY_ANGLES && info.limbs == TOY_LIMBS);
     CHECK(info.proportions == TOY_PROPORTIONS);
     CHECK(info.components == TOY_COMPONENTS && info.phases == TOY_PHASES && info.digest != 0);
+    uint32_t mask = 7;
+    CHECK(info.cyclic && info.posture_angles == (1u << 3 | 1u << 6 | 1u << 9 | 1u << 10 | TOY_TRUNK));
+    CHECK(gait_model_angle_mask(m, " torso_x  torso_y ", &mask, NULL) == GAIT_OK && mask == TOY_TRUNK);
+    CHECK(gait_model_angle_mask(m, "", &mask, NULL) == GAIT_OK && mask == 0);
+    gait_error err = {0};
+    CHECK(gait_model_angle_mask(m, "torso_x torso", &mask, &err) == GAIT_ERR_ARG && mask == 0);
+    CHECK(strstr(err.text, "no angle torso") != NULL);
     CHECK(info.stride_hz == 0.92f && info.stride_hz_sd == 0.07f);
     CHECK(info.stride_length == 0.80f && info.stride_length_sd == 0.06f);
     CHECK(strcmp(gait_model_joint_name(m, 0), "pelvis") == 0);
@@ -105,14 +112,14 @@ static void test_state(void)
         float const kept = *number[i];
         float height = -3.0f;
         *number[i] = i % 2 ? nanf("") : HUGE_VALF;
-        CHECK(gait_model_pose(m, &s, &pose) == GAIT_ERR_ARG && memcmp(&pose, &before, sizeof pose) == 0);
-        CHECK(gait_model_pelvis_height(m, &s, &height) == GAIT_ERR_ARG && height == -3.0f);
+        CHECK(gait_model_pose(m, &s, &pose, NULL) == GAIT_ERR_ARG && memcmp(&pose, &before, sizeof pose) == 0);
+        CHECK(gait_model_pelvis_height(m, &s, &height, NULL) == GAIT_ERR_ARG && height == -3.0f);
         *number[i] = kept;
     }
     s.stature = 0.0f;
-    CHECK(gait_model_pose(m, &s, &pose) == GAIT_ERR_ARG);
+    CHECK(gait_model_pose(m, &s, &pose, NULL) == GAIT_ERR_ARG);
     s.stature = 1.8f;
-    CHECK(gait_model_pose(m, &s, &pose) == GAIT_OK && pose.joint[0][2] == s.pelvis[2]);
+    CHECK(gait_model_pose(m, &s, &pose, NULL) == GAIT_OK && pose.joint[0][2] == s.pelvis[2]);
 }
 
 int main(void)

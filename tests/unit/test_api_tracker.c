@@ -10,7 +10,7 @@ static void refuse(const gait_tracker_config *cfg, gait_result want, int32_t ind
     gait_tracker *t = NULL;
     static _Alignas(GAIT_ALIGN) unsigned char memory[64];
     CHECK(gait_tracker_bytes(toy_model(), cfg, &bytes, &err) == want);
-    CHECK(bytes == 5 && err.status == want && (index == -2 || err.index == index));
+    CHECK(bytes == 5 && err.result == want && (index == -2 || err.index == index));
     if (!strstr(err.text, word))
         fprintf(stderr, "\"%s\" does not name \"%s\"\n", err.text, word);
     CHECK(strstr(err.text, word) != NULL);
@@ -180,7 +180,7 @@ static void test_start(void)
     static gait_state particle[4];
     static float weight[4];
     gait_error err = {0};
-    CHECK(gait_tracker_particles(t, particle, weight, 4) == GAIT_ERR_STATE);
+    CHECK(gait_tracker_particles(t, particle, weight, 4, NULL) == GAIT_ERR_STATE);
     CHECK(gait_tracker_start(NULL, &good, &doubt, 0, &err) == GAIT_ERR_ARG);
     CHECK(gait_tracker_start(t, NULL, &doubt, 0, &err) == GAIT_ERR_ARG);
     CHECK(gait_tracker_start(t, &good, NULL, 0, &err) == GAIT_ERR_ARG);
@@ -305,16 +305,16 @@ static void test_prior(void)
     gait_state mean, sd;
     gait_tracker_config const cfg = toy_config(1);
     gait_tracker *const t = toy_tracker_new(&cfg);
-    CHECK(gait_tracker_prior(toy_model(), &mean, &sd) == GAIT_OK);
+    CHECK(gait_tracker_prior(toy_model(), &mean, &sd, NULL) == GAIT_OK);
     CHECK(mean.stride_hz == 0.92f && sd.stride_hz == 0.07f && mean.stature == 1.72f && sd.stature == 0.09f);
     CHECK(sd.phase >= 0.5f && sd.heading >= 3.1415f && sd.coef[0] == 1.0f && sd.coef[1] == 1.0f &&
           sd.coef[2] == 0.0f);
     CHECK(sd.offset[0] == 0.05f && sd.offset[TOY_ANGLES - 1] == 0.05f && sd.offset[TOY_ANGLES] == 0.0f);
     CHECK_NEAR(mean.pelvis[2], 0.53 * 1.72, 0.05);
     CHECK(gait_tracker_start(t, &mean, &sd, 0, NULL) == GAIT_OK);
-    CHECK(gait_tracker_prior(NULL, &mean, &sd) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_prior(toy_model(), NULL, &sd) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_prior(toy_model(), &mean, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_prior(NULL, &mean, &sd, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_prior(toy_model(), NULL, &sd, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_prior(toy_model(), &mean, NULL, NULL) == GAIT_ERR_ARG);
     toy_tracker_free(t);
 }
 
@@ -328,13 +328,13 @@ static void test_background(void)
         gait_image bad = good;
         int32_t *const number[] = {&bad.width, &bad.height, &bad.stride, &bad.format};
         *number[k] -= 1;
-        CHECK(gait_tracker_set_background(t, 0, &bad) == GAIT_ERR_ARG);
+        CHECK(gait_tracker_set_background(t, 0, &bad, NULL) == GAIT_ERR_ARG);
     }
-    CHECK(gait_tracker_set_background(NULL, 0, &good) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_set_background(t, -1, &good) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_set_background(t, 2, &good) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_set_background(t, 1, &good) == GAIT_OK);
-    CHECK(gait_tracker_set_background(t, 1, NULL) == GAIT_OK);
+    CHECK(gait_tracker_set_background(NULL, 0, &good, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_background(t, -1, &good, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_background(t, 2, &good, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_background(t, 1, &good, NULL) == GAIT_OK);
+    CHECK(gait_tracker_set_background(t, 1, NULL, NULL) == GAIT_OK);
     toy_tracker_free(t);
 }
 
@@ -346,15 +346,15 @@ static void test_particles(void)
     gait_state s[3];
     float weight[3] = {-1.0f, -1.0f, -1.0f};
     toy_tracker_start(t, 0, 1.0f);
-    CHECK(gait_tracker_particles(t, NULL, NULL, 0) == 300);
-    CHECK(gait_tracker_particles(t, s, weight, 2) == 300);
+    CHECK(gait_tracker_particles(t, NULL, NULL, 0, NULL) == 300);
+    CHECK(gait_tracker_particles(t, s, weight, 2, NULL) == 300);
     CHECK(weight[0] == 1.0f / 300.0f && weight[1] == weight[0] && weight[2] == -1.0f);
     CHECK_NEAR(s[0].pelvis[0], -1.3, 0.3);
     CHECK(s[0].pelvis[0] != s[1].pelvis[0]);
-    CHECK(gait_tracker_particles(NULL, s, weight, 2) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_particles(t, NULL, weight, 2) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_particles(t, s, NULL, 2) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_particles(t, s, weight, -1) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_particles(NULL, s, weight, 2, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_particles(t, NULL, weight, 2, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_particles(t, s, NULL, 2, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_particles(t, s, weight, -1, NULL) == GAIT_ERR_ARG);
     CHECK(gait_tracker_digest(NULL) == 0);
     toy_tracker_free(t);
 }

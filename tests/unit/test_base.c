@@ -25,10 +25,10 @@ static void test_finite(void)
 
 static void test_fail(void)
 {
-    gait_error err = {.status = 7};
+    gait_error err = {.result = 7};
     CHECK(base_fail(NULL, GAIT_ERR_ARG, 3, "unseen") == GAIT_ERR_ARG);
     CHECK(base_fail(&err, GAIT_ERR_LIMIT, 2, "camera %d: %s", 2, "too wide") == GAIT_ERR_LIMIT);
-    CHECK(err.status == GAIT_ERR_LIMIT && err.index == 2 && strcmp(err.text, "camera 2: too wide") == 0);
+    CHECK(err.result == GAIT_ERR_LIMIT && err.index == 2 && strcmp(err.text, "camera 2: too wide") == 0);
     base_fail(&err, GAIT_ERR_ARG, -1, "%0200d", 1);
     CHECK(strlen(err.text) == sizeof err.text - 1);
 }

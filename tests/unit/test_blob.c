@@ -242,7 +242,7 @@ static void test_message(void)
     memcpy(b, good, sizeof b);
     b[good_bytes - 100] ^= 4;
     CHECK(blob_open(b, good_bytes, &out, &err) == GAIT_ERR_CORRUPT && out.bytes == 1);
-    CHECK(err.status == GAIT_ERR_CORRUPT && strstr(err.text, "checksum"));
+    CHECK(err.result == GAIT_ERR_CORRUPT && strstr(err.text, "checksum"));
     toy_put(b + TABLE + 3 * ENTRY + 8, 9, 4);
     seal(b, good_bytes);
     CHECK(blob_open(b, good_bytes, &out, &err) == GAIT_ERR_CORRUPT && err.index == 3);

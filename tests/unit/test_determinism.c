@@ -67,9 +67,9 @@ static uint64_t run_frames(const gait_tracker_config *cfg, int save_at, int fram
     if (save_at) {
         size_t bytes = 0;
         hash = advance(cfg, t, 0, save_at, hash);
-        CHECK(gait_tracker_save(t, NULL, 0, &bytes) == GAIT_OK);
+        CHECK(gait_tracker_save(t, NULL, 0, &bytes, NULL) == GAIT_OK);
         unsigned char *const mem = malloc(bytes);
-        CHECK(mem && gait_tracker_save(t, mem, bytes, &bytes) == GAIT_OK);
+        CHECK(mem && gait_tracker_save(t, mem, bytes, &bytes, NULL) == GAIT_OK);
         toy_tracker_free(t);
         t = start(cfg, 7, 0.3f);
         CHECK(gait_tracker_restore(t, mem, bytes, NULL) == GAIT_OK);

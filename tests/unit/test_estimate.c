@@ -82,7 +82,7 @@ static void test_phase(void)
         CHECK(e.mean.phase >= 0.0f && e.mean.phase < 1.0f);
         CHECK_NEAR(e.phase_r, length, 1e-5);
         CHECK_NEAR(e.sd.phase, sqrt(-2.0 * log(length)) / 6.283185307, 1e-4);
-        CHECK_NEAR(e.mode_mass, 1.0, 1e-6);
+        CHECK_NEAR(e.hypothesis_weight, 1.0, 1e-6);
     }
 }
 
@@ -114,7 +114,7 @@ static void test_no_phase(void)
     CHECK_NEAR(e.phase_r, 0.0, 1e-5);
     CHECK(e.sd.phase > 0.5f && isfinite(e.sd.phase));
     CHECK(e.mean.phase >= 0.0f && e.mean.phase < 1.0f);
-    CHECK_NEAR(e.mode_mass, 11.0 / N, 0.051); /* within 0.15 of the best: 11 .. 13 of 40 */
+    CHECK_NEAR(e.hypothesis_weight, 11.0 / N, 0.051); /* within 0.15 of the best: 11 .. 13 of 40 */
 }
 
 /* ---- modes ---- */
@@ -142,7 +142,7 @@ static void test_modes(void)
                 square += t->filter.weight[i] * d * d;
             }
             gait_estimate const e = estimate(best);
-            CHECK_NEAR(e.mode_mass, mass, 1e-6);
+            CHECK_NEAR(e.hypothesis_weight, mass, 1e-6);
             CHECK_NEAR(e.mean.stature, stature / mass, 1e-6);
             CHECK_NEAR(e.mean.stride_hz, best ? 0.8 : 1.0, 1e-6);
             CHECK_NEAR(e.sd.stature, sqrt(square), 1e-6); /* over all particles */
@@ -190,7 +190,7 @@ static void test_rotation(void)
                 sum[k] += t->filter.weight[i] * R[k];
         }
         gait_estimate const e = estimate(3);
-        CHECK_NEAR(e.mode_mass, 1.0, 1e-6);
+        CHECK_NEAR(e.hypothesis_weight, 1.0, 1e-6);
         rotation(e.mean.heading, e.mean.pitch, e.mean.roll, R);
         for (int k = 0; k < 9; k++)
             best += R[k] * sum[k]; /* larger: nearer */
@@ -295,7 +295,7 @@ static void test_fields(void)
     for (int k = 0; k < 3; k++)
         CHECK_NEAR(e.mean.pelvis[k], s.pelvis[k], 1e-5);
     gait_pose pose;
-    CHECK(gait_model_pose(toy_model(), &e.mean, &pose) == GAIT_OK);
+    CHECK(gait_model_pose(toy_model(), &e.mean, &pose, NULL) == GAIT_OK);
     CHECK(memcmp(pose.angle, e.pose.angle, sizeof pose.angle) == 0);
     particle_state const heaviest = particle_get(particles, 2);
     gait_state const best = particle_to_state(&t->rule, &heaviest);

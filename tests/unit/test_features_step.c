@@ -16,7 +16,7 @@ static gait_tracker *tracker(int32_t cameras, uint32_t terms)
     gait_tracker *const t = toy_tracker_new(&cfg);
     for (int k = 0; k < cameras; k++) {
         gait_image const plate = toy_image(wall[k]);
-        CHECK(gait_tracker_set_background(t, k, &plate) == GAIT_OK);
+        CHECK(gait_tracker_set_background(t, k, &plate, NULL) == GAIT_OK);
     }
     toy_tracker_start(t, 20, 1.0f);
     return t;
@@ -31,7 +31,7 @@ static void test_region(void)
     gait_estimate e;
     gait_pose pose;
     toy_tracker_step(t, 20, see, &e);
-    CHECK(gait_model_pose(toy_model(), &s, &pose) == GAIT_OK);
+    CHECK(gait_model_pose(toy_model(), &s, &pose, NULL) == GAIT_OK);
     for (int k = 0; k < 2; k++) {
         gait_camera const cam = toy_camera(k);
         float high = 1e9f, low = -1e9f;
@@ -67,10 +67,10 @@ static void test_plate(void)
     f.image[0] = toy_image(shot[0]);
     particle_state const there = {.f = {[F_X] = toy_walk(20.0f / 30.0f).pelvis[0], [F_STATURE] = 1.75f}};
     CHECK(features_step(t, &f, &there) == 1 && t->camera[0].features.foreground_total > 800 * FOREGROUND_ONE);
-    CHECK(gait_tracker_set_background(t, 0, NULL) == GAIT_OK);
+    CHECK(gait_tracker_set_background(t, 0, NULL, NULL) == GAIT_OK);
     CHECK(features_step(t, &f, &there) == 1 && !t->camera[0].features.has_foreground);
     gait_image const plate = toy_image(shot[0]); /* another plate takes effect at once */
-    CHECK(gait_tracker_set_background(t, 0, &plate) == GAIT_OK);
+    CHECK(gait_tracker_set_background(t, 0, &plate, NULL) == GAIT_OK);
     CHECK(features_step(t, &f, &there) == 1 && t->camera[0].features.has_foreground &&
           t->camera[0].features.foreground_total == 0);
     toy_tracker_free(t);
@@ -94,7 +94,7 @@ static void test_formats(void)
     particle_state const w = {.f = {[F_X] = -0.4f, [F_STATURE] = 1.75f}};
     for (int plate = 0; plate < 3; plate++) {
         gait_tracker *const t = tracker(1, GAIT_TERM_SILHOUETTE);
-        CHECK(gait_tracker_set_background(t, 0, &image[plate]) == GAIT_OK);
+        CHECK(gait_tracker_set_background(t, 0, &image[plate], NULL) == GAIT_OK);
         for (int n = 0; n < 9; n++) { /* also changing from frame to frame */
             gait_frame f = toy_frame(n);
             f.image[0] = image[n < 6 ? n / 2 : n % 3];

@@ -18,7 +18,7 @@ static history seen;
 static void note(const gait_tracker *t, int n, const gait_estimate *e)
 {
     float weight[PARTICLES];
-    CHECK(gait_tracker_particles(t, seen.state[n], weight, PARTICLES) == PARTICLES);
+    CHECK(gait_tracker_particles(t, seen.state[n], weight, PARTICLES, NULL) == PARTICLES);
     memcpy(seen.parent[n], t->filter.parent, sizeof seen.parent[n]);
     seen.estimate[n] = *e;
 }
@@ -97,11 +97,11 @@ static void test_kept(void)
         film_step(t, 1, n, 0, &e);
     uint64_t const digest = gait_tracker_digest(t);
     CHECK(gait_tracker_lagged(t, 3, &a, NULL) == GAIT_OK && gait_tracker_digest(t) == digest);
-    CHECK(gait_tracker_save(t, NULL, 0, &bytes) == GAIT_OK);
+    CHECK(gait_tracker_save(t, NULL, 0, &bytes, NULL) == GAIT_OK);
     unsigned char *const kept = malloc(bytes);
     if (!kept)
         abort();
-    CHECK(gait_tracker_save(t, kept, bytes, &bytes) == GAIT_OK);
+    CHECK(gait_tracker_save(t, kept, bytes, &bytes, NULL) == GAIT_OK);
     CHECK(gait_tracker_restore(u, kept, bytes, NULL) == GAIT_OK);
     CHECK(gait_tracker_lagged(u, 3, &b, NULL) == GAIT_OK && memcmp(&a, &b, sizeof a) == 0);
     toy_tracker_start(u, 0, 0.5f); /* a new start forgets */

@@ -119,11 +119,11 @@ static uint32_t work(gait_tracker *t, const gait_tracker_config *cfg)
         ok &= gait_tracker_step(t, &f, &e, NULL) == GAIT_OK;
         stages |= 1u << t->core->hypotheses.stage;
         ok &= gait_tracker_lagged(t, n < 5 ? n : 5, &e, NULL) == GAIT_OK;
-        ok &= gait_tracker_particles(t, state, weight, 400) == t->cfg.particles;
-        ok &= gait_model_pose(toy_model(), &e.mean, &pose) == GAIT_OK;
-        ok &= gait_render(toy_model(), &cfg->camera[0], &e.mean, ids, cfg->camera[0].width) == GAIT_OK;
+        ok &= gait_tracker_particles(t, state, weight, 400, NULL) == t->cfg.particles;
+        ok &= gait_model_pose(toy_model(), &e.mean, &pose, NULL) == GAIT_OK;
+        ok &= gait_render(toy_model(), &cfg->camera[0], &e.mean, ids, cfg->camera[0].width, NULL) == GAIT_OK;
         if (n % 10 == 3) {
-            ok &= gait_tracker_save(t, snapshot, sizeof snapshot, &bytes) == GAIT_OK;
+            ok &= gait_tracker_save(t, snapshot, sizeof snapshot, &bytes, NULL) == GAIT_OK;
             ok &= gait_tracker_restore(t, snapshot, bytes, NULL) == GAIT_OK;
         }
     }
@@ -151,12 +151,12 @@ static void test_no_allocation(int film_kind)
 /* A lifter: segments alone and a stream that is followed, lost and found. */
 static void test_lifting_allocates_nothing(void)
 {
-    toy_lift_model(2, 0);
+    toy_lift_learn(2, 0);
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
     c.sd = 1.0;
     gait_lift *l = NULL;
     armed = true;
-    bool ok = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_blob, toy_lift_blob_bytes, &c,
+    bool ok = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_model, &c,
                              &l, NULL) == GAIT_OK;
     ok = ok && passer_segment(l, &c) && passer_stream(l, &c, 3 * PASSER_WAY);
     armed = false;

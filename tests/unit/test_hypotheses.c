@@ -128,9 +128,9 @@ static void copy_into(gait_tracker *to, const gait_tracker *from)
 {
     size_t bytes = 0;
     gait_error err;
-    CHECK(gait_tracker_save(from, NULL, 0, &bytes) == GAIT_OK);
+    CHECK(gait_tracker_save(from, NULL, 0, &bytes, NULL) == GAIT_OK);
     void *const snapshot = malloc(bytes);
-    CHECK(snapshot && gait_tracker_save(from, snapshot, bytes, &bytes) == GAIT_OK);
+    CHECK(snapshot && gait_tracker_save(from, snapshot, bytes, &bytes, NULL) == GAIT_OK);
     CHECK(gait_tracker_restore(to, snapshot, bytes, &err) == GAIT_OK);
     free(snapshot);
 }
@@ -146,7 +146,7 @@ static void test_a_search_takes_more(void)
     for (int n = 0; n < 45; n++) {
         gait_estimate e[2];
         bool const open = t->core->hypotheses.stage != HYPOTHESES_ONE;
-        CHECK(!open || gait_tracker_particles(t, NULL, NULL, 0) == 2 * N);
+        CHECK(!open || gait_tracker_particles(t, NULL, NULL, 0, NULL) == 2 * N);
         if (t->core->hypotheses.stage == HYPOTHESES_TWO && n > 30)
             t->core->hypotheses.odds = 30.0;
         if (n == 20)
@@ -157,7 +157,7 @@ static void test_a_search_takes_more(void)
         film_step(other, 1, n, 0, &e[1]);
         CHECK(gait_tracker_digest(t) == gait_tracker_digest(other));
     }
-    CHECK(t->core->hypotheses.stage == HYPOTHESES_ONE && gait_tracker_particles(t, NULL, NULL, 0) == N);
+    CHECK(t->core->hypotheses.stage == HYPOTHESES_ONE && gait_tracker_particles(t, NULL, NULL, 0, NULL) == N);
     CHECK(gait_tracker_set_particles(t, N + 1, &err) == GAIT_ERR_LIMIT);
     toy_tracker_free(t);
     toy_tracker_free(other);

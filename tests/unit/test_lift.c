@@ -36,7 +36,7 @@ static void test_exact(void)
         toy_draw(&toy_lift_prior, 0, (uint32_t)k, heading, place, X);
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.0, 1, uv);
         CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK && fit.converged);
-        CHECK(gait_lift_positions(l, mean, sd) == GAIT_OK);
+        CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
         CHECK_NEAR(largest_error(), 0.0, 5e-3);
         CHECK_NEAR(cos(fit.heading - heading), 1.0, 1e-4);
         CHECK_NEAR(fit.place[0], place[0], 1e-2);
@@ -70,7 +70,7 @@ static void test_coverage(int projection, double noise)
         toy_draw(&toy_lift_prior, 0, seed, 0.0, place, X);
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, noise, seed + 1, uv);
         CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
-        CHECK(gait_lift_positions(l, mean, sd) == GAIT_OK);
+        CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
         for (int i = 0; i < 3 * TOY_SEGMENT; i++) {
             double const e = (mean[i] - X[i / 3][i % 3]) / sd[i];
             square += e * e;
@@ -95,14 +95,14 @@ static void test_missing(void)
     toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 3, uv);
     see_all(1.0);
     CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK &&
-          gait_lift_positions(l, mean, sd) == GAIT_OK);
+          gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
     for (int i = 0; i < 3 * TOY_SEGMENT; i++)
         all_sd += sd[i];
     for (int i = 0; i < TOY_SEGMENT; i += 3)
         seen[i] = i % 2 ? INFINITY : i % 4 ? NAN : -1.0;
     uv[2 * 3] = uv[2 * 6 + 1] = NAN;
     CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK &&
-          gait_lift_positions(l, mean, sd) == GAIT_OK);
+          gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
     CHECK(fit.observed == 2 * (TOY_SEGMENT - TOY_SEGMENT / 3) && largest_error() < 0.2);
     for (int i = 0; i < 3 * TOY_SEGMENT; i++)
         some_sd += sd[i];
@@ -128,7 +128,7 @@ static void test_report(void)
         c.report = k == 0 ? ~UINT64_C(0) : 5u << (TOY_MARKERS - 3);
         gait_lift *const l = toy_lift_open(&c);
         CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
-        CHECK(gait_lift_positions(l, each[k][0], each[k][1]) == GAIT_OK);
+        CHECK(gait_lift_positions(l, each[k][0], each[k][1], NULL) == GAIT_OK);
     }
     CHECK(memcmp(each[0], each[1], sizeof each[0]) == 0);
 }
@@ -136,7 +136,7 @@ static void test_report(void)
 /* The component that made a body explains it. */
 static void test_mixture(void)
 {
-    toy_lift_model(2, 0);
+    toy_lift_learn(2, 0);
     gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
     gait_lift *const l = toy_lift_open(&c);
     see_all(1.0);
@@ -148,7 +148,7 @@ static void test_mixture(void)
         CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
         CHECK(fit.component == k % 2 && fit.share > 0.9 && fit.share <= 1.0);
     }
-    toy_lift_model(1, 0);
+    toy_lift_learn(1, 0);
 }
 
 /* Many at once are as each alone. */
@@ -162,7 +162,7 @@ static void test_batch(void)
     gait_lift *const l = toy_lift_open(&c);
     const double place[3] = {0.5, -0.2, 0.01};
     gait_lift_fit fit;
-    CHECK(gait_lift_batch(l, 1, many[0], batch[0]) == GAIT_ERR_STATE);
+    CHECK(gait_lift_batch(l, 1, many[0], batch[0], NULL) == GAIT_ERR_STATE);
     see_all(0.02);
     for (int i = 0; i < TOY_SEGMENT; i += 5)
         seen[i] = INFINITY;
@@ -170,10 +170,10 @@ static void test_batch(void)
         toy_draw(&toy_lift_prior, 0, 40 + k, c.heading, place, X);
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.02, k, many[k]);
     }
-    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK && gait_lift_batch(l, MANY, many[0], batch[0]) == GAIT_OK);
+    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK && gait_lift_batch(l, MANY, many[0], batch[0], NULL) == GAIT_OK);
     for (int k = 0; k < MANY; k++) {
         CHECK(gait_lift_segment(l, many[k], seen, &fit, NULL) == GAIT_OK);
-        CHECK(gait_lift_positions(l, mean, sd) == GAIT_OK);
+        CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
         for (int i = 0; i < 3 * TOY_SEGMENT; i++)
             CHECK_NEAR(batch[k][i], mean[i], 1e-12);
     }
@@ -191,12 +191,12 @@ static void test_uncertain(void)
     const double place[3] = {0.0};
     double deviation[2], along = 0.0, all = 0.0;
     gait_lift_fit fit;
-    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation) == GAIT_ERR_STATE);
+    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation, NULL) == GAIT_ERR_STATE);
     toy_draw(&toy_lift_prior, 0, 2, 0.0, place, X);
     toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.01, 1, uv);
     see_all(0.01);
     CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
-    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation) == GAIT_OK);
+    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation, NULL) == GAIT_OK);
     for (int i = 0; i < TOY_SEGMENT; i++)
         for (int a = 0; a < 3; a++) {
             along += a == 1 ? mode[0][i][a] * mode[0][i][a] : 0.0;
@@ -205,7 +205,7 @@ static void test_uncertain(void)
     CHECK(along > 0.9999 * all && deviation[0] > deviation[1]);
     CHECK_NEAR(sqrt(all), deviation[0], 1e-9 * deviation[0]);
     CHECK_NEAR(deviation[0], 10.0 * sqrt(TOY_SEGMENT), 0.1);
-    CHECK(gait_lift_uncertain(l, gait_lift_unknowns(l) + 1, mode[0][0], deviation) == GAIT_ERR_ARG);
+    CHECK(gait_lift_uncertain(l, gait_lift_unknowns(l) + 1, mode[0][0], deviation, NULL) == GAIT_ERR_ARG);
 }
 
 /* The scale is 1 where nothing tells of the modes, and grows with how far the motion is from the mean. */
@@ -217,7 +217,7 @@ static void test_scale(void)
     const double place[3] = {0.0};
     double last = 0.0;
     gait_lift_fit fit;
-    CHECK(gait_lift_scale(l) == 0.0 && gait_lift_scale(NULL) == 0.0);
+    CHECK(gait_lift_scale(l, &last, NULL) == GAIT_ERR_STATE && gait_lift_scale(NULL, &last, NULL) == GAIT_ERR_ARG);
     for (int far = 0; far < 4; far++) {
         toy_draw(&toy_lift_prior, 0, 2, 0.0, place, X);
         for (int i = 0; i < TOY_SEGMENT; i++)
@@ -228,15 +228,18 @@ static void test_scale(void)
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.001, 1, uv);
         see_all(0.001);
         CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
-        CHECK(gait_lift_scale(l) > last);
-        last = gait_lift_scale(l);
+        double scale = 0.0;
+        CHECK(gait_lift_scale(l, &scale, NULL) == GAIT_OK && scale > last);
+        last = scale;
         CHECK(far > 0 || last < 1.0);
     }
     CHECK(last > 1.0);
     see_all(INFINITY);
     CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
-    CHECK_NEAR(gait_lift_scale(l), 1.0, 1e-12);
-    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK && gait_lift_scale(l) == 0.0); /* of no motion */
+    CHECK(gait_lift_scale(l, &last, NULL) == GAIT_OK);
+    CHECK_NEAR(last, 1.0, 1e-12);
+    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK);
+    CHECK(gait_lift_scale(l, &last, NULL) == GAIT_ERR_STATE); /* a gain has no motion */
 }
 
 static void test_arguments(void)
@@ -246,13 +249,13 @@ static void test_arguments(void)
     gait_error err = {0};
     gait_lift_fit fit;
     size_t bytes = 0;
-    CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, &good, &bytes, NULL) == GAIT_OK &&
+    CHECK(gait_lift_bytes(toy_lift_model, &good, &bytes, NULL) == GAIT_OK &&
           bytes > 1000);
-    CHECK(gait_lift_init(toy_lift_memory, bytes - 1, toy_lift_blob, toy_lift_blob_bytes, &good, &l, &err) ==
+    CHECK(gait_lift_init(toy_lift_memory, bytes - 1, toy_lift_model, &good, &l, &err) ==
           GAIT_ERR_MEMORY);
-    CHECK(gait_lift_init(toy_lift_memory + 8, bytes, toy_lift_blob, toy_lift_blob_bytes, &good, &l, &err) ==
+    CHECK(gait_lift_init(toy_lift_memory + 8, bytes, toy_lift_model, &good, &l, &err) ==
           GAIT_ERR_MEMORY);
-    CHECK(gait_lift_bytes(NULL, 0, &good, &bytes, &err) == GAIT_ERR_ARG && !l);
+    CHECK(gait_lift_bytes(NULL, &good, &bytes, &err) == GAIT_ERR_ARG && !l);
     CHECK(gait_lift_segment(NULL, uv, NULL, &fit, NULL) == GAIT_ERR_ARG);
     gait_lift_config bad[16];
     for (int i = 0; i < 16; i++)
@@ -268,7 +271,7 @@ static void test_arguments(void)
     bad[8].max_rate = 0;
     bad[9].camera.fx = 0;
     bad[10].turn_sd = 0;
-    bad[11].misfit = -1;
+    bad[11].fit_threshold = -1;
     bad[12].place[0] = INFINITY;
     bad[13].projection = GAIT_LIFT_ORTHOGRAPHIC;
     bad[13].axis[0][1] = 0.1;
@@ -276,31 +279,31 @@ static void test_arguments(void)
     bad[15].camera.t[1] = -5e4f;
     for (int i = 0; i < 16; i++) {
         err.text[0] = '\0';
-        CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, &bad[i], &bytes, &err) == GAIT_ERR_ARG);
+        CHECK(gait_lift_bytes(toy_lift_model, &bad[i], &bytes, &err) == GAIT_ERR_ARG);
         CHECK(strstr(err.text, "lift config") != NULL);
     }
     bad[0].struct_size = 0;
-    CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, &bad[0], &bytes, &err) == GAIT_ERR_STRUCT);
+    CHECK(gait_lift_bytes(toy_lift_model, &bad[0], &bytes, &err) == GAIT_ERR_STRUCT);
     l = toy_lift_open(&good);
     CHECK(strcmp(gait_lift_marker_name(l, 3), "l_shoulder") == 0 && !gait_lift_marker_name(l, TOY_MARKERS));
-    CHECK(gait_lift_positions(l, mean, sd) == GAIT_ERR_STATE);
-    CHECK(gait_lift_least_squares(l, mean) == GAIT_ERR_STATE);
+    CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_ERR_STATE);
+    CHECK(gait_lift_least_squares(l, mean, NULL) == GAIT_ERR_STATE);
 }
 
 /* A prior with turned copies lies in the axes of the world: its heading is not looked for. */
 static void test_world_axes(void)
 {
-    toy_lift_model(1, 8);
+    toy_lift_learn(1, 8);
     gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
     gait_lift *const l = toy_lift_open(&c);
     CHECK(gait_lift_unknowns(l) == TOY_MODES + 3);
-    toy_lift_model(1, 0);
+    toy_lift_learn(1, 0);
     CHECK(gait_lift_unknowns(toy_lift_open(&c)) == TOY_MODES + 4);
 }
 
 int main(void)
 {
-    toy_lift_model(1, 0);
+    toy_lift_learn(1, 0);
     test_exact();
     test_coverage(GAIT_LIFT_PERSPECTIVE, 2.0);
     test_coverage(GAIT_LIFT_ORTHOGRAPHIC, 0.02);

@@ -13,7 +13,7 @@ static _Alignas(GAIT_ALIGN) unsigned char outside[2 * CANARY + TOY_LIFT_BYTES];
 static size_t bytes_of(const gait_lift_config *c)
 {
     size_t bytes = 0;
-    CHECK(gait_lift_bytes(toy_lift_blob, toy_lift_blob_bytes, c, &bytes, NULL) == GAIT_OK);
+    CHECK(gait_lift_bytes(toy_lift_model, c, &bytes, NULL) == GAIT_OK);
     return bytes;
 }
 
@@ -33,10 +33,10 @@ static uint64_t run(const gait_lift_config *c, unsigned char fill)
     gait_lift_frame f;
     CHECK(need <= TOY_LIFT_BYTES);
     memset(outside, fill, sizeof outside);
-    CHECK(gait_lift_init(outside + CANARY, need, toy_lift_blob, toy_lift_blob_bytes, c, &l, NULL) == GAIT_OK);
+    CHECK(gait_lift_init(outside + CANARY, need, toy_lift_model, c, &l, NULL) == GAIT_OK);
     CHECK(passer_segment(l, c));
     CHECK(passer_stream(l, c, PUSHES));
-    CHECK(gait_lift_estimate(l, &f) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &f, NULL) == GAIT_OK);
     uint64_t const h = hash_fnv1a(HASH_INIT, &f, sizeof f);
     CHECK(passer_segment(l, c));
     gait_lift_reset(l);
@@ -48,7 +48,7 @@ static uint64_t run(const gait_lift_config *c, unsigned char fill)
 
 static void test_canaries(int projection, int components)
 {
-    toy_lift_model(components, 0);
+    toy_lift_learn(components, 0);
     gait_lift_config c = toy_lift_config(projection);
     c.sd = 1.0;
     c.lag = 7;
@@ -61,18 +61,18 @@ static void test_canaries_of_a_batch(void)
 {
     enum { COUNT = 5 };
     static double uv[COUNT * TOY_SEGMENT * 2], sd[TOY_SEGMENT], mean[COUNT * TOY_SEGMENT * 3];
-    toy_lift_model(1, 0);
+    toy_lift_learn(1, 0);
     gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
     c.heading_sd = 0.0;
     c.lag = -1;
     size_t const need = bytes_of(&c);
     gait_lift *l = NULL;
     memset(outside, 0x5a, sizeof outside);
-    CHECK(gait_lift_init(outside + CANARY, need, toy_lift_blob, toy_lift_blob_bytes, &c, &l, NULL) ==
+    CHECK(gait_lift_init(outside + CANARY, need, toy_lift_model, &c, &l, NULL) ==
           GAIT_OK);
     for (int i = 0; i < TOY_SEGMENT; i++)
         sd[i] = i % 5 ? 0.01 : INFINITY;
-    CHECK(gait_lift_fix(l, sd, NULL) == GAIT_OK && gait_lift_batch(l, COUNT, uv, mean) == GAIT_OK);
+    CHECK(gait_lift_fix(l, sd, NULL) == GAIT_OK && gait_lift_batch(l, COUNT, uv, mean, NULL) == GAIT_OK);
     CHECK(intact(outside, CANARY, 0x5a) &&
           intact(outside + CANARY + need, sizeof outside - CANARY - need, 0x5a));
 }
@@ -80,13 +80,13 @@ static void test_canaries_of_a_batch(void)
 /* One byte less is refused; the need grows with what is asked for and not otherwise. */
 static void test_sizes(void)
 {
-    toy_lift_model(1, 0);
+    toy_lift_learn(1, 0);
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
     size_t const base = bytes_of(&c);
     gait_lift *l = NULL;
     gait_error err = {0};
     CHECK(base % GAIT_ALIGN == 0);
-    CHECK(gait_lift_init(outside, base - 1, toy_lift_blob, toy_lift_blob_bytes, &c, &l, &err) != GAIT_OK);
+    CHECK(gait_lift_init(outside, base - 1, toy_lift_model, &c, &l, &err) != GAIT_OK);
     CHECK(l == NULL && strlen(err.text) > 0);
     c.max_rate *= 2.0;
     CHECK(bytes_of(&c) > base);

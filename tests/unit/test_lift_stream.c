@@ -28,7 +28,7 @@ static void steady_model(void)
             for (int k = 0; k < TOY_MODES; k++)
                 toy_lift_prior.mode[0][k][i][a] = toy_lift_prior.mode[0][k][first][a];
         }
-    toy_lift_blob_bytes = toy_segments_write(toy_lift_blob, &toy_lift_prior);
+    toy_lift_load();
 }
 
 static int64_t utime_of(int frame)
@@ -88,7 +88,7 @@ static void test_follows(int32_t lag)
     int count = 0;
     for (int i = 0; i < STREAM; i++) {
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-        gait_result const s = gait_lift_estimate(l, &out);
+        gait_result const s = gait_lift_estimate(l, &out, NULL);
         CHECK((s == GAIT_OK) == (i >= lag));
         if (s != GAIT_OK)
             continue;
@@ -98,7 +98,7 @@ static void test_follows(int32_t lag)
             continue;
         error += error_of(&out, &worst);
         count++;
-        CHECK(out.flags == 0 && out.misfit < 3.0);
+        CHECK(out.flags == 0 && out.chi2_per_observation < 3.0);
     }
     CHECK(count > STREAM - 3 * span);
     CHECK_NEAR(error / count, 0.0, 0.035);
@@ -115,26 +115,26 @@ static void test_pauses(void)
     for (int j = 0; j < TOY_MARKERS; j++)
         seen[j] = -1.0;
     CHECK(gait_lift_push(l, 1000, uv, seen, NULL) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) == GAIT_ERR_STATE); /* nobody yet */
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_ERR_STATE); /* nobody yet */
     for (int i = 0; i < 40; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
     before = out.sd[3][1];
     for (int j = 0; j < TOY_MARKERS; j++)
         seen[j] = INFINITY;
     for (int i = 40; i < 46; i++)
         CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
     CHECK(out.sd[3][1] > 1.2 * before);
     for (int i = 46; i < 70; i++)
         CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) != GAIT_OK || out.status == GAIT_TRACK_INIT);
+    CHECK(gait_lift_estimate(l, &out, NULL) != GAIT_OK || out.status == GAIT_TRACK_INIT);
     for (int i = 90; i < STREAM; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING && out.frame < 30);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING && out.frame < 30);
     CHECK(error_of(&out, &worst) < 0.06);
     CHECK(push(l, &c, STREAM + 60, 1.0) == GAIT_OK); /* two seconds later */
-    CHECK(gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_INIT && out.frame == 0);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_INIT && out.frame == 0);
 }
 
 static void test_order(void)
@@ -150,7 +150,7 @@ static void test_order(void)
     CHECK(push(l, &c, 0, 1.0) == GAIT_OK);
     c.lag = -1;
     l = toy_lift_open(&c);
-    CHECK(push(l, &c, 0, 1.0) == GAIT_ERR_STATE && gait_lift_estimate(l, &out) == GAIT_ERR_STATE);
+    CHECK(push(l, &c, 0, 1.0) == GAIT_ERR_STATE && gait_lift_estimate(l, &out, NULL) == GAIT_ERR_STATE);
 }
 
 static void estimate_of(uint64_t report, uint32_t mask, gait_lift_frame *f)
@@ -162,7 +162,7 @@ static void estimate_of(uint64_t report, uint32_t mask, gait_lift_frame *f)
     gait_lift *const l = toy_lift_open(&c);
     for (int i = 0; i < 20; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, f) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, f, NULL) == GAIT_OK);
 }
 
 /* Only what is asked for is estimated, the same as with all the others. */
@@ -192,7 +192,7 @@ static void test_wrong_points(double off)
             for (int a = 0; a < 2; a++)
                 uv[2 * (i % TOY_MARKERS) + a] += i % 2 ? off : -off;
         CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-        if (gait_lift_estimate(l, &out) != GAIT_OK || out.status != GAIT_TRACK_TRACKING)
+        if (gait_lift_estimate(l, &out, NULL) != GAIT_OK || out.status != GAIT_TRACK_TRACKING)
             continue;
         most = fmax(most, error_of(&out, &worst));
         count++;
@@ -214,7 +214,7 @@ static void test_zeros(void)
             uv[2 * j] = uv[2 * j + 1] = !zeros ? NAN : i % 2 ? 0.0 : -1.0;
             CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
         }
-        CHECK(gait_lift_estimate(l, zeros ? &out : &other) == GAIT_OK);
+        CHECK(gait_lift_estimate(l, zeros ? &out : &other, NULL) == GAIT_OK);
     }
     CHECK(memcmp(&out, &other, sizeof out) == 0);
 }
@@ -231,20 +231,20 @@ static void test_noise(void)
             for (int j = 0; j < TOY_MARKERS; j++)
                 seen[j] = isfinite(seen[j]) ? 1.0 : seen[j];
             CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
-            if (gait_lift_estimate(l, &out) == GAIT_OK && out.status == GAIT_TRACK_TRACKING)
+            if (gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING)
                 sd[loud] += out.sd[3][1] / STREAM;
         }
-        CHECK(loud ? out.misfit > 4.0 : out.misfit < 2.0);
+        CHECK(loud ? out.chi2_per_observation > 4.0 : out.chi2_per_observation < 2.0);
     }
     CHECK(sd[1] > 2.0 * sd[0] && sd[1] < 4.0 * sd[0]);
 }
 
 /* A segment that does not fit is looked for anew: somebody else walks the other way. */
-static void test_misfit(void)
+static void test_poor_fit(void)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
     c.lag = 0;
-    c.misfit = 4.0;
+    c.fit_threshold = 4.0;
     c.sd = 0.5;
     gait_lift *const l = toy_lift_open(&c);
     double X[TOY_MARKERS][3];
@@ -256,9 +256,9 @@ static void test_misfit(void)
                 X[j][a] = -X[j][a];
         toy_lift_see(&c, (const double (*)[3])X, TOY_MARKERS, 0.5, (uint32_t)i, uv);
         CHECK(gait_lift_push(l, utime_of(i), uv, NULL, NULL) == GAIT_OK);
-        CHECK(i < 20 || gait_lift_estimate(l, &out) == GAIT_OK);
-        flagged += (out.flags & GAIT_LIFT_MISFIT) != 0;
-        CHECK(i < 20 || (out.status == GAIT_TRACK_AMBIGUOUS) == ((out.flags & GAIT_LIFT_MISFIT) != 0));
+        CHECK(i < 20 || gait_lift_estimate(l, &out, NULL) == GAIT_OK);
+        flagged += (out.flags & GAIT_LIFT_POOR_FIT) != 0;
+        CHECK(i < 20 || (out.status == GAIT_TRACK_AMBIGUOUS) == ((out.flags & GAIT_LIFT_POOR_FIT) != 0));
     }
     CHECK(flagged > 0 && out.status == GAIT_TRACK_TRACKING);
     for (int j = 0; j < TOY_MARKERS; j++)
@@ -275,7 +275,7 @@ static uint64_t digest(uint32_t mask)
     uint64_t h = HASH_INIT;
     for (int i = 0; i < STREAM; i++) {
         (void)push(l, &c, i, 1.0);
-        if (gait_lift_estimate(l, &out) == GAIT_OK)
+        if (gait_lift_estimate(l, &out, NULL) == GAIT_OK)
             h = hash_fnv1a(h, &out, sizeof out);
     }
     return h;
@@ -293,7 +293,7 @@ int main(int argc, char **argv)
     test_pauses();
     test_order();
     test_report();
-    test_misfit();
+    test_poor_fit();
     test_noise();
     for (double off = 50.0; off < 1e31; off *= 10.0)
         test_wrong_points(off);

@@ -9,7 +9,7 @@ static void detect(const gait_camera *cam, const gait_state *s, float noise, uin
                    gait_keypoint *out)
 {
     gait_pose pose;
-    CHECK(gait_model_pose(toy_model(), s, &pose) == GAIT_OK);
+    CHECK(gait_model_pose(toy_model(), s, &pose, NULL) == GAIT_OK);
     for (int p = 0; p < TOY_POINTS; p++) {
         float uv[2] = {0.0f}, ud, vd;
         CHECK(camera_project(cam, pose.joint[p], uv) > 0.0f);
@@ -40,7 +40,7 @@ static void test_cost(void)
     gait_pose pose;
     like_body const b = look_through(v, 3);
     CHECK(like_keypoints.flag == GAIT_TERM_KEYPOINTS && strcmp(like_keypoints.name, "keypoints") == 0);
-    CHECK(gait_model_pose(toy_model(), &s, &pose) == GAIT_OK);
+    CHECK(gait_model_pose(toy_model(), &s, &pose, NULL) == GAIT_OK);
     v->f.keypoints = (features_keypoints){0};
     CHECK(like_keypoints.log_likelihood(&b) == 0.0f && like_keypoints.support(&b) == 0.0f);
     for (int p = 0; p < 4; p++) {

@@ -68,7 +68,7 @@ static void test_sample(void)
     toy_body_at(v, now, NULL);
     toy_body_body(v, &s);
     CHECK(model_place_state(toy_model(), &s, &frames) == GAIT_OK);
-    CHECK(gait_render(toy_model(), &v->cam, &s, ids, SCENE_W) == GAIT_OK);
+    CHECK(gait_render(toy_model(), &v->cam, &s, ids, SCENE_W, NULL) == GAIT_OK);
     for (int32_t l = 0; l < TOY_LIMBS; l++)
         for (int i = 0; i < LIKE_SAMPLES; i++) {
             const like_surface *const f = &v->setup.surface[l];

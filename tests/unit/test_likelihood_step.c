@@ -21,7 +21,7 @@ static gait_tracker *tracker(int32_t cameras, int first_camera, uint32_t terms)
     gait_tracker *const t = toy_tracker_new(&cfg);
     for (int k = 0; k < cameras; k++) {
         gait_image const plate = toy_image(wall[k + first_camera]);
-        CHECK(gait_tracker_set_background(t, k, &plate) == GAIT_OK);
+        CHECK(gait_tracker_set_background(t, k, &plate, NULL) == GAIT_OK);
     }
     toy_tracker_start(t, 20, 1.0f);
     return t;
@@ -75,7 +75,7 @@ static void test_particles(void)
     float weight[N];
     gait_estimate e;
     toy_tracker_step(t, 20, see, &e);
-    CHECK(gait_tracker_particles(t, s, weight, N) == N);
+    CHECK(gait_tracker_particles(t, s, weight, N, NULL) == N);
     v->f.map = t->core->map[0];
     toy_body_at(v, shot[1][0], wall[1]);
     v->setup = *t->like;
@@ -83,7 +83,7 @@ static void test_particles(void)
     for (int32_t i = 0; i < N; i++) {
         like_body const b = toy_body_body(v, &s[i]);
         gait_pose pose;
-        CHECK(gait_model_pose(toy_model(), &s[i], &pose) == GAIT_OK);
+        CHECK(gait_model_pose(toy_model(), &s[i], &pose, NULL) == GAIT_OK);
         worst = fmax(worst, fabs((double)(t->loglik_raw[i] - toy_likelihood(&b))));
         for (int32_t p = 0; p < 3 * TOY_POINTS; p++)
             place = fmax(place, fabs((double)(t->joint[p * N + i] - pose.joint[p / 3][p % 3])));

@@ -36,7 +36,7 @@ static void test_refused(void)
     memset(memory, 0xc3, need + GAIT_ALIGN);
     CHECK(gait_tracker_init(memory, need - 1, toy_model(), &cfg, &t, &err) == GAIT_ERR_MEMORY && !t);
     snprintf(told, sizeof told, "%zu", need);
-    CHECK(strstr(err.text, told) && err.status == GAIT_ERR_MEMORY);
+    CHECK(strstr(err.text, told) && err.result == GAIT_ERR_MEMORY);
     CHECK(gait_tracker_init(memory, 0, toy_model(), &cfg, &t, NULL) == GAIT_ERR_MEMORY && !t);
     for (size_t off = 1; off < GAIT_ALIGN; off += 21)
         CHECK(gait_tracker_init(memory + off, need, toy_model(), &cfg, &t, NULL) == GAIT_ERR_MEMORY && !t);

@@ -52,7 +52,7 @@ static int32_t twin(int32_t point)
 /* Heading along x: mirrored in the track's vertical plane every joint lies on its twin. */
 static void test_the_image_is_the_mirrored_body(void)
 {
-    state_layout const r = rule(GAIT_OFFSETS_TRUNK);
+    state_layout const r = rule(TOY_TRUNK);
     mirror x;
     mirror_init(&x, &r);
     for (uint32_t i = 0; i < 12; i++) {
@@ -60,8 +60,8 @@ static void test_the_image_is_the_mirrored_body(void)
         gait_state const a = particle_to_state(&r, &w), b = particle_to_state(&r, &other);
         gait_pose here, there;
         double worst = 0.0;
-        CHECK(gait_model_pose(toy_model(), &a, &here) == GAIT_OK);
-        CHECK(gait_model_pose(toy_model(), &b, &there) == GAIT_OK);
+        CHECK(gait_model_pose(toy_model(), &a, &here, NULL) == GAIT_OK);
+        CHECK(gait_model_pose(toy_model(), &b, &there, NULL) == GAIT_OK);
         for (int32_t p = 0; p < TOY_POINTS; p++) {
             const float *const one = here.joint[p], *const two = there.joint[twin(p)];
             worst = fmax(worst, fabs((double)(one[0] - two[0])));
@@ -75,7 +75,7 @@ static void test_the_image_is_the_mirrored_body(void)
 /* Twice is nothing; place, rate, heading and stature never change. */
 static void test_twice_is_nothing(void)
 {
-    state_layout const r = rule(GAIT_OFFSETS_TRUNK);
+    state_layout const r = rule(TOY_TRUNK);
     mirror x;
     mirror_init(&x, &r);
     for (uint32_t i = 0; i < 12; i++) {

@@ -127,7 +127,7 @@ static void test_refused(void)
         gait_result const s = model_open(buf, bytes, &m, &err);
         if (s != GAIT_ERR_CORRUPT || !strstr(err.text, p->tag))
             fprintf(stderr, "patch %zu of %s: %s, %s\n", i, p->tag, gait_result_name(s), err.text);
-        CHECK(s == GAIT_ERR_CORRUPT && strstr(err.text, p->tag) && err.status == s);
+        CHECK(s == GAIT_ERR_CORRUPT && strstr(err.text, p->tag) && err.result == s);
         CHECK(m.frames == -7); /* outputs left alone */
     }
 }

@@ -45,7 +45,7 @@ static void test_against_layers(void)
         particle_body(&rule, &w, &body);
         toy_project(limbs, m->limbs, &body, &cam, &map, &outline);
         toy_draw(&outline, limbs, m->limbs, 0, &drawn);
-        CHECK(gait_render(m, &cam, &s, ids, SIDE) == GAIT_OK);
+        CHECK(gait_render(m, &cam, &s, ids, SIDE, NULL) == GAIT_OK);
         for (int32_t y = 0; y < GRID_SIZE; y++)
             for (int32_t x = 0; x < GRID_SIZE; x++) {
                 int32_t id = 0;
@@ -69,9 +69,9 @@ static void test_bands(void)
     cam.fx = cam.fy = 1024.0f;
     cam.cx = 256.0f;
     cam.cy = 256.0f;
-    CHECK(gait_render(toy_model(), &cam, &s, ids, SIDE) == GAIT_OK);
+    CHECK(gait_render(toy_model(), &cam, &s, ids, SIDE, NULL) == GAIT_OK);
     cam.cy += 37.0f;
-    CHECK(gait_render(toy_model(), &cam, &s, other, SIDE) == GAIT_OK);
+    CHECK(gait_render(toy_model(), &cam, &s, other, SIDE, NULL) == GAIT_OK);
     int32_t wrong = 0, drawn = 0;
     for (int32_t y = 0; y < SIDE - 37; y++)
         for (int32_t x = 0; x < SIDE; x++) {
@@ -89,7 +89,7 @@ static void test_writes(void)
     gait_camera cam = camera(W, H);
     gait_state s = toy_walk(0.8f);
     memset(ids, 0xee, sizeof ids);
-    CHECK(gait_render(toy_model(), &cam, &s, ids, STRIDE) == GAIT_OK);
+    CHECK(gait_render(toy_model(), &cam, &s, ids, STRIDE, NULL) == GAIT_OK);
     int32_t unwritten = 0, beside = 0;
     for (int32_t y = 0; y < H; y++)
         for (int32_t x = 0; x < STRIDE; x++)
@@ -98,7 +98,7 @@ static void test_writes(void)
         beside += ids[i] != 0xee;
     CHECK(unwritten == 0 && beside == 0);
     s.pelvis[1] = -50.0f; /* behind the camera: an empty picture */
-    CHECK(gait_render(toy_model(), &cam, &s, ids, STRIDE) == GAIT_OK);
+    CHECK(gait_render(toy_model(), &cam, &s, ids, STRIDE, NULL) == GAIT_OK);
     int32_t any = 0;
     for (int32_t i = 0; i < W; i++)
         any += ids[75 * STRIDE + i] != 0;
@@ -120,7 +120,7 @@ static void test_places(void)
     for (int n = 0; n < 20; n++) {
         gait_state const s = toy_walk(0.08f * (float)n);
         gait_pose pose;
-        CHECK(gait_render(m, &cam, &s, ids, SCENE_W) == GAIT_OK && gait_model_pose(m, &s, &pose) == GAIT_OK);
+        CHECK(gait_render(m, &cam, &s, ids, SCENE_W, NULL) == GAIT_OK && gait_model_pose(m, &s, &pose, NULL) == GAIT_OK);
         for (size_t k = 0; k < sizeof part / sizeof *part; k++) {
             const float *const a = pose.joint[toy_find_point(m, part[k].from)];
             const float *const b = pose.joint[toy_find_point(m, part[k].to)];
@@ -140,20 +140,20 @@ static void test_errors(void)
     const gait_model *const m = toy_model();
     gait_camera cam = camera(64, 64);
     gait_state s = toy_walk(0.0f);
-    CHECK(gait_render(NULL, &cam, &s, ids, 64) == GAIT_ERR_ARG);
-    CHECK(gait_render(m, NULL, &s, ids, 64) == GAIT_ERR_ARG);
-    CHECK(gait_render(m, &cam, NULL, ids, 64) == GAIT_ERR_ARG);
-    CHECK(gait_render(m, &cam, &s, NULL, 64) == GAIT_ERR_ARG);
-    CHECK(gait_render(m, &cam, &s, ids, 63) == GAIT_ERR_ARG);
+    CHECK(gait_render(NULL, &cam, &s, ids, 64, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, NULL, &s, ids, 64, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, &cam, NULL, ids, 64, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, &cam, &s, NULL, 64, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, &cam, &s, ids, 63, NULL) == GAIT_ERR_ARG);
     memset(ids, 9, 64);
     s.phase = NAN;
-    CHECK(gait_render(m, &cam, &s, ids, 64) == GAIT_ERR_ARG && ids[0] == 9);
+    CHECK(gait_render(m, &cam, &s, ids, 64, NULL) == GAIT_ERR_ARG && ids[0] == 9);
     s.phase = 0.0f;
     cam.width = RAST_LIMIT + 1;
-    CHECK(gait_render(m, &cam, &s, ids, RAST_LIMIT + 1) == GAIT_ERR_ARG);
+    CHECK(gait_render(m, &cam, &s, ids, RAST_LIMIT + 1, NULL) == GAIT_ERR_LIMIT);
     cam.width = 64;
     cam.R[0] = 2.0f;
-    CHECK(gait_render(m, &cam, &s, ids, 64) == GAIT_ERR_ARG && ids[0] == 9);
+    CHECK(gait_render(m, &cam, &s, ids, 64, NULL) == GAIT_ERR_ARG && ids[0] == 9);
 }
 
 int main(void)

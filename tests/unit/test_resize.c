@@ -15,7 +15,7 @@ static gait_tracker_config config(int32_t particles)
 
 static int32_t count(const gait_tracker *t)
 {
-    return gait_tracker_particles(t, NULL, NULL, 0);
+    return gait_tracker_particles(t, NULL, NULL, 0, NULL);
 }
 
 static void test_refused(void)
@@ -66,7 +66,7 @@ static double total_weight(const gait_tracker *t)
     static gait_state state[ROOM];
     static float weight[ROOM];
     double sum = 0.0;
-    int32_t const n = gait_tracker_particles(t, state, weight, ROOM);
+    int32_t const n = gait_tracker_particles(t, state, weight, ROOM, NULL);
     for (int32_t i = 0; i < n; i++)
         sum += (double)weight[i];
     return sum;
@@ -76,9 +76,9 @@ static double total_weight(const gait_tracker *t)
 static gait_tracker *saved_and_restored(gait_tracker *t, const gait_tracker_config *cfg)
 {
     size_t bytes = 0;
-    CHECK(gait_tracker_save(t, NULL, 0, &bytes) == GAIT_OK);
+    CHECK(gait_tracker_save(t, NULL, 0, &bytes, NULL) == GAIT_OK);
     unsigned char *const mem = malloc(bytes);
-    CHECK(mem && gait_tracker_save(t, mem, bytes, &bytes) == GAIT_OK);
+    CHECK(mem && gait_tracker_save(t, mem, bytes, &bytes, NULL) == GAIT_OK);
     toy_tracker_free(t);
     gait_tracker *const to = film_tracker(cfg, 3, 1.0f);
     CHECK(gait_tracker_restore(to, mem, bytes, NULL) == GAIT_OK);

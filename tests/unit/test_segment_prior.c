@@ -1,18 +1,27 @@
 /* A segment prior of a blob: its views, and an error that names the section at fault. */
+#include "gait_lift.h"
 #include "model/segment_prior.h"
 
 #include "check.h"
+#include "toy_model.h"
 #include "toy_segment.h"
 
 static _Alignas(GAIT_ALIGN) unsigned char buf[TOY_BYTES];
 static toy_segments toy;
+
+static gait_result open_prior(size_t bytes, segment_prior *p, gait_error *err)
+{
+    blob b;
+    gait_result const s = blob_open(buf, bytes, &b, err);
+    return s == GAIT_OK ? segment_open(&b, p, err) : s;
+}
 
 static void test_views(void)
 {
     segment_prior p;
     toy_segments_fill(&toy, 2, 8);
     size_t const bytes = toy_segments_write(buf, &toy);
-    CHECK(segment_open(buf, bytes, &p, NULL) == GAIT_OK);
+    CHECK(open_prior(bytes, &p, NULL) == GAIT_OK);
     CHECK(p.markers == TOY_MARKERS && p.frames == TOY_FRAMES_SEEN && p.hop == TOY_HOP && p.headings == 8);
     CHECK(p.components == 2 && p.modes == TOY_MODES && p.fps == TOY_FPS && p.gamma == TOY_GAMMA);
     CHECK(p.stature == TOY_STATURE && strcmp(p.name[1], "l_hip") == 0 && p.weight[1] == 0.3f);
@@ -48,7 +57,7 @@ static void test_refused(void)
         toy_segments_fill(&toy, 1, 0);
         memcpy(patches[i].at, patches[i].as_int ? (const void *)&n : (const void *)&x, 4);
         size_t const bytes = toy_segments_write(buf, &toy);
-        gait_result const s = segment_open(buf, bytes, &p, &err);
+        gait_result const s = open_prior(bytes, &p, &err);
         if (s != GAIT_ERR_CORRUPT || !strstr(err.text, patches[i].tag))
             fprintf(stderr, "patch %zu of %s: %s, %s\n", i, patches[i].tag, gait_result_name(s), err.text);
         CHECK(s == GAIT_ERR_CORRUPT && strstr(err.text, patches[i].tag) && p.markers == -7);
@@ -62,27 +71,51 @@ static void test_counts(void)
     gait_error err = {0};
     toy_segments_fill(&toy, 1, 0);
     toy.count[4] = TOY_MODES + 1;
-    CHECK(segment_open(buf, toy_segments_write(buf, &toy), &p, &err) == GAIT_ERR_CORRUPT);
+    CHECK(open_prior(toy_segments_write(buf, &toy), &p, &err) == GAIT_ERR_CORRUPT);
     CHECK(strstr(err.text, "SGMD") != NULL);
     toy_segments_fill(&toy, 1, 0);
     toy.count[0] = GAIT_MAX_SEGMENT_FRAMES + 1;
-    CHECK(segment_open(buf, toy_segments_write(buf, &toy), &p, &err) == GAIT_ERR_LIMIT);
-    toy_file f = toy_begin(buf, 0);
-    CHECK(segment_open(buf, toy_finish(&f), &p, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "gait learn"));
+    CHECK(open_prior(toy_segments_write(buf, &toy), &p, &err) == GAIT_ERR_LIMIT);
 }
 
-/* A blob may hold segments alone; whoever wants to track with it is told what to do. */
+/* A blob may hold segments alone: it can be lifted with; every use that needs the cyclic model explains itself. */
 static void test_no_cyclic_model(void)
 {
+    static _Alignas(GAIT_ALIGN) unsigned char memory[1024];
     gait_error err = {0};
+    gait_model *m = NULL;
+    gait_model_info info;
+    gait_lift_info lift;
+    gait_tracker_config cfg;
+    gait_pose pose;
+    gait_state state = {.stature = 1.8f}, sd;
     size_t need = 0;
     toy_segments_fill(&toy, 1, 0);
     size_t const bytes = toy_segments_write(buf, &toy);
-    CHECK(gait_model_bytes(buf, bytes, &need, &err) == GAIT_ERR_CORRUPT);
-    CHECK(strstr(err.text, "CHNM") && strstr(err.text, "without --segments only"));
+    CHECK(gait_model_init(memory, sizeof memory, buf, bytes, &m, &err) == GAIT_OK);
+    CHECK(gait_model_get_info(m, &info, &err) == GAIT_OK && !info.cyclic && info.joints == 0);
+    CHECK(gait_lift_get_info(m, &lift, &err) == GAIT_OK && lift.markers == TOY_MARKERS);
+    CHECK(lift.digest == info.digest);
+    CHECK(!gait_model_joint_name(m, 0) && !gait_model_angle_name(m, 0));
+    gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
+    CHECK(gait_tracker_bytes(m, &cfg, &need, &err) == GAIT_ERR_ARG);
+    CHECK(strstr(err.text, "without --segments only") != NULL);
+    CHECK(gait_model_pose(m, &state, &pose, &err) == GAIT_ERR_ARG && strstr(err.text, "no cyclic model"));
+    CHECK(gait_tracker_prior(m, &state, &sd, NULL) == GAIT_ERR_ARG);
     toy_file f = toy_begin(buf, 0);
-    CHECK(gait_model_bytes(buf, toy_finish(&f), &need, &err) == GAIT_ERR_CORRUPT);
-    CHECK(strstr(err.text, "CHNM") && !strstr(err.text, "--segments"));
+    CHECK(gait_model_bytes(buf, toy_finish(&f), &need, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "CHNM"));
+}
+
+/* A model without segments says how to learn them. */
+static void test_no_segments(void)
+{
+    gait_error err = {0};
+    gait_lift_info info;
+    gait_lift_config cfg;
+    size_t need = 0;
+    gait_lift_default(&cfg);
+    CHECK(gait_lift_get_info(toy_model(), &info, &err) == GAIT_ERR_ARG && strstr(err.text, "gait learn"));
+    CHECK(gait_lift_bytes(toy_model(), &cfg, &need, &err) == GAIT_ERR_ARG && strstr(err.text, "--segments"));
 }
 
 int main(void)
@@ -91,5 +124,6 @@ int main(void)
     test_refused();
     test_counts();
     test_no_cyclic_model();
+    test_no_segments();
     return CHECK_DONE();
 }

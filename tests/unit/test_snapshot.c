@@ -16,13 +16,13 @@ static gait_tracker_config small(int32_t cameras)
 
 static unsigned char *save(const gait_tracker *t, size_t *bytes)
 {
-    CHECK(gait_tracker_save(t, NULL, 0, bytes) == GAIT_OK);
+    CHECK(gait_tracker_save(t, NULL, 0, bytes, NULL) == GAIT_OK);
     unsigned char *const mem = malloc(*bytes);
     size_t again = 0;
     if (!mem)
         abort();
-    CHECK(gait_tracker_save(t, mem, *bytes - 1, &again) == GAIT_ERR_MEMORY && again == 0);
-    CHECK(gait_tracker_save(t, mem, *bytes, &again) == GAIT_OK && again == *bytes);
+    CHECK(gait_tracker_save(t, mem, *bytes - 1, &again, NULL) == GAIT_ERR_MEMORY && again == 0);
+    CHECK(gait_tracker_save(t, mem, *bytes, &again, NULL) == GAIT_OK && again == *bytes);
     return mem;
 }
 
@@ -100,7 +100,7 @@ static void refuse(const unsigned char *mem, size_t bytes, gait_result want)
 {
     gait_error err = {0};
     gait_result const s = gait_tracker_restore(target, mem, bytes, &err);
-    CHECK((want == GAIT_OK ? s < 0 : s == want) && err.status == s && err.text[0]);
+    CHECK((want == GAIT_OK ? s < 0 : s == want) && err.result == s && err.text[0]);
     CHECK(gait_tracker_digest(target) == target_digest);
 }
 
@@ -205,19 +205,19 @@ static void test_other(void)
         refuse(kept, bytes, GAIT_ERR_VERSION);
         toy_tracker_free(target);
     }
-    static _Alignas(GAIT_ALIGN) unsigned char blob[TOY_BYTES], place[1024], room[1 << 23];
+    static _Alignas(GAIT_ALIGN) unsigned char file[TOY_BYTES], place[1024], room[1 << 23];
     gait_model *model = NULL;
-    size_t const blob_bytes = toy_write(blob, TOY_PHASES, TOY_COMPONENTS);
-    blob[blob_bytes - 64] ^= 1; /* a model that differs by a bit of its limbs */
-    toy_seal(blob, blob_bytes);
-    CHECK(gait_model_init(place, sizeof place, blob, blob_bytes, &model, NULL) == GAIT_OK);
+    size_t const file_bytes = toy_write(file, TOY_PHASES, TOY_COMPONENTS);
+    file[file_bytes - 64] ^= 1; /* a model that differs by a bit of its limbs */
+    toy_seal(file, file_bytes);
+    CHECK(gait_model_init(place, sizeof place, file, file_bytes, &model, NULL) == GAIT_OK);
     CHECK(gait_tracker_init(room, sizeof room, model, &cfg, &target, NULL) == GAIT_OK);
     target_digest = gait_tracker_digest(target);
     refuse(kept, bytes, GAIT_ERR_VERSION);
     CHECK(gait_tracker_restore(NULL, kept, bytes, NULL) == GAIT_ERR_ARG);
     CHECK(gait_tracker_restore(t, NULL, bytes, NULL) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_save(NULL, kept, bytes, &bytes) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_save(t, kept, bytes, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_save(NULL, kept, bytes, &bytes, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_save(t, kept, bytes, NULL, NULL) == GAIT_ERR_ARG);
     toy_tracker_free(t);
     free(kept);
 }

@@ -126,7 +126,7 @@ static uint64_t colour_digest(uint32_t terms, int32_t format, int32_t plate_form
     gait_estimate e;
     tint(0, plate_format, plate); /* the walker is elsewhere in frame 0 */
     image.format = plate_format == GAIT_GREY8 ? GAIT_RGB8 : plate_format;
-    CHECK(gait_tracker_set_background(t, 0, &image) == GAIT_OK);
+    CHECK(gait_tracker_set_background(t, 0, &image, NULL) == GAIT_OK);
     for (int n = 30; n < 40; n++) {
         gait_frame f = toy_frame(n);
         tint(n, format, shot);

@@ -15,9 +15,9 @@ static void test_first_frame(void)
         gait_tracker *const t = film_tracker(&cfg, 10, 1.0f);
         gait_estimate e;
         int32_t equal = 0;
-        CHECK(gait_tracker_particles(t, before, weight, 300) == 300 && weight[0] == 1.0f / 300.0f);
+        CHECK(gait_tracker_particles(t, before, weight, 300, NULL) == 300 && weight[0] == 1.0f / 300.0f);
         film_step(t, 1, 10 + late, 0, &e);
-        CHECK(gait_tracker_particles(t, after, weight, 300) == 300 && weight[0] != 1.0f / 300.0f);
+        CHECK(gait_tracker_particles(t, after, weight, 300, NULL) == 300 && weight[0] != 1.0f / 300.0f);
         for (int i = 0; i < 300; i++)
             equal += memcmp(&before[i], &after[i], sizeof *after) == 0;
         CHECK(equal == (late ? 0 : 300) && e.frame == 0 && !(e.flags & GAIT_EST_RESAMPLED));
@@ -33,7 +33,7 @@ static void refuse(gait_tracker *t, gait_frame f, gait_result want, const char *
     gait_error err = {0};
     memset(&e, 0x5a, sizeof e);
     kept = e;
-    CHECK(gait_tracker_step(t, &f, &e, &err) == want && err.status == want);
+    CHECK(gait_tracker_step(t, &f, &e, &err) == want && err.result == want);
     CHECK(strstr(err.text, word) != NULL);
     CHECK(gait_tracker_digest(t) == digest && memcmp(&e, &kept, sizeof e) == 0);
 }
@@ -102,7 +102,7 @@ static void test_occluded(void)
         gait_estimate e;
         int lost_at = 0;
         if (!plate)
-            CHECK(gait_tracker_set_background(t, 0, NULL) == GAIT_OK);
+            CHECK(gait_tracker_set_background(t, 0, NULL, NULL) == GAIT_OK);
         memset(blank, 128, sizeof blank);
         for (int n = 0; n < 20; n++)
             film_step(t, 1, n, 0, &e);
@@ -189,7 +189,7 @@ static void test_ambiguous(void)
         gait_estimate e;
         film_step(t, 1, 10, 0, &e);
         CHECK(e.status == cases[k].status);
-        CHECK_NEAR(e.mode_mass, 1.0 - 0.01 * cases[k].apart, 1e-5);
+        CHECK_NEAR(e.hypothesis_weight, 1.0 - 0.01 * cases[k].apart, 1e-5);
         toy_tracker_free(t);
     }
 }

@@ -22,7 +22,7 @@ static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, 
     gait_tracker *const t = toy_tracker_new(cfg);
     for (int k = 0; k < cfg->cameras; k++) {
         gait_image const plate = toy_image(film_wall[k]);
-        if (gait_tracker_set_background(t, k, &plate) != GAIT_OK)
+        if (gait_tracker_set_background(t, k, &plate, NULL) != GAIT_OK)
             abort();
     }
     toy_tracker_start(t, n, simd_f64);

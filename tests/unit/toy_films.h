@@ -38,7 +38,7 @@ static inline gait_tracker_config films_config(int film_kind)
 {
     gait_tracker_config cfg = toy_config(SCENE_CAMERAS);
     cfg.particles = 100; /* not a multiple of a block */
-    cfg.offset_angles = GAIT_OFFSETS_TRUNK;
+    cfg.offset_angles = TOY_TRUNK;
     if (film_kind == FILMS_PAPER)
         films_paper(&cfg);
     else if (film_kind == FILMS_GIVEN)
@@ -82,8 +82,8 @@ static inline void films_detect(const gait_camera *cam, int n, gait_keypoint *ou
     gait_state const truth = toy_walk((float)n / 30.0f);
     gait_pose pose;
     gait_model_info info;
-    if (gait_model_pose(toy_model(), &truth, &pose) != GAIT_OK ||
-        gait_model_get_info(toy_model(), &info) != GAIT_OK)
+    if (gait_model_pose(toy_model(), &truth, &pose, NULL) != GAIT_OK ||
+        gait_model_get_info(toy_model(), &info, NULL) != GAIT_OK)
         abort();
     for (int32_t j = 0; j < info.joints; j++) {
         uint32_t const chance = toy_hash((uint32_t)n, (uint32_t)j, 91);
@@ -116,7 +116,7 @@ static inline void films_start(gait_tracker *t, const gait_tracker_config *cfg, 
 {
     for (int k = 0; k < cfg->cameras; k++) {
         gait_image const plate = films_wall(cfg, k);
-        if (gait_tracker_set_background(t, k, &plate) != GAIT_OK)
+        if (gait_tracker_set_background(t, k, &plate, NULL) != GAIT_OK)
             abort();
     }
     if (cfg->acquisition_particles > 0)

@@ -9,12 +9,20 @@ enum { TOY_LIFT_BYTES = 1 << 20 };
 
 static _Alignas(GAIT_ALIGN) unsigned char toy_lift_blob[TOY_BYTES], toy_lift_memory[TOY_LIFT_BYTES];
 static toy_segments toy_lift_prior;
-static size_t toy_lift_blob_bytes;
+static gait_model *toy_lift_model;
 
-static inline void toy_lift_model(int components, int headings)
+/* The model of what toy_lift_prior holds. */
+static inline void toy_lift_load(void)
+{
+    static _Alignas(GAIT_ALIGN) unsigned char memory[1024];
+    size_t const bytes = toy_segments_write(toy_lift_blob, &toy_lift_prior);
+    CHECK(gait_model_init(memory, sizeof memory, toy_lift_blob, bytes, &toy_lift_model, NULL) == GAIT_OK);
+}
+
+static inline void toy_lift_learn(int components, int headings)
 {
     toy_segments_fill(&toy_lift_prior, components, headings);
-    toy_lift_blob_bytes = toy_segments_write(toy_lift_blob, &toy_lift_prior);
+    toy_lift_load();
 }
 
 /* A camera 5 m in front, which looks along +y. */
@@ -39,8 +47,7 @@ static inline gait_lift *toy_lift_open(const gait_lift_config *c)
 {
     gait_lift *l = NULL;
     gait_error err = {0};
-    gait_result const s = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_blob,
-                                         toy_lift_blob_bytes, c, &l, &err);
+    gait_result const s = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_model, c, &l, &err);
     if (s != GAIT_OK)
         fprintf(stderr, "gait_lift_init: %s\n", err.text);
     CHECK(s == GAIT_OK);

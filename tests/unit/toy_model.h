@@ -327,6 +327,8 @@ static inline void toy_put_curves(toy_file *f, int phases, int components)
     toy_section(f, "GAIT", 3, 1, 8, 1, 1, gait);
 }
 
+#define TOY_TRUNK (1u << TOY_TORSO | 1u << (TOY_TORSO + 1)) /* mask of torso_x and torso_y */
+
 /* Write a blob into buf (at least TOY_BYTES, all of which are cleared); phases [8, 32], components [0, 2]. */
 static inline size_t toy_write(unsigned char *buf, int phases, int components)
 {
@@ -380,7 +382,7 @@ static inline int32_t toy_find_point(const gait_model *m, const char *name)
 static inline gait_state toy_state(float phase)
 {
     gait_state s = {.phase = phase, .stride_hz = 0.92f, .stature = 1.75f};
-    if (gait_model_pelvis_height(toy_model(), &s, &s.pelvis[2]) != GAIT_OK)
+    if (gait_model_pelvis_height(toy_model(), &s, &s.pelvis[2], NULL) != GAIT_OK)
         abort();
     return s;
 }

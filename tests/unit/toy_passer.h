@@ -36,10 +36,10 @@ static inline bool passer_segment(gait_lift *l, const gait_lift_config *c)
     toy_draw(&toy_lift_prior, 0, 3, 0.4, place, X);
     toy_lift_see(c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 7, uv);
     bool ok = gait_lift_segment(l, uv, NULL, &fit, NULL) == GAIT_OK;
-    ok &= gait_lift_positions(l, mean, sd) == GAIT_OK;
-    ok &= gait_lift_posterior(l, unknown, covariance) == GAIT_OK;
-    ok &= gait_lift_uncertain(l, 1, mean, &largest) == GAIT_OK && largest > 0.0;
-    return ok && gait_lift_least_squares(l, mean) == GAIT_OK;
+    ok &= gait_lift_positions(l, mean, sd, NULL) == GAIT_OK;
+    ok &= gait_lift_posterior(l, unknown, covariance, NULL) == GAIT_OK;
+    ok &= gait_lift_uncertain(l, 1, mean, &largest, NULL) == GAIT_OK && largest > 0.0;
+    return ok && gait_lift_least_squares(l, mean, NULL) == GAIT_OK;
 }
 
 /* A stream of `frames`, each asked for at once; false if a call failed or nobody was followed, in frames that fit and in
@@ -51,7 +51,7 @@ static inline bool passer_stream(gait_lift *l, const gait_lift_config *c, int fr
     for (int i = 0; i < frames; i++) {
         gait_lift_frame f;
         ok &= passer_push(l, c, i) == GAIT_OK;
-        if (gait_lift_estimate(l, &f) == GAIT_OK && f.status != GAIT_TRACK_INIT) {
+        if (gait_lift_estimate(l, &f, NULL) == GAIT_OK && f.status != GAIT_TRACK_INIT) {
             followed++;
             fits += f.status == GAIT_TRACK_TRACKING;
         }

@@ -88,7 +88,7 @@ static inline void toy_paint(const gait_camera *cam, const gait_state *s, uint8_
     const gait_model *const m = toy_model();
     float end[TOY_LIMBS][2][2] = {{{0}}};
     kin_frames at;
-    if (model_place_state(m, s, &at) != GAIT_OK || gait_render(m, cam, s, ids, SCENE_W) != GAIT_OK)
+    if (model_place_state(m, s, &at) != GAIT_OK || gait_render(m, cam, s, ids, SCENE_W, NULL) != GAIT_OK)
         abort();
     for (int32_t l = 0; l < TOY_LIMBS; l++)
         for (int32_t e = 0; e < 2; e++) {

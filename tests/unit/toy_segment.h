@@ -1,6 +1,7 @@
 /* toy_segment.h - a segment prior written as a blob, and views of a body drawn from it, for tests. */
 #ifndef TOY_SEGMENT_H
 #define TOY_SEGMENT_H
+#include "gait_lift.h"
 #include "toy_blob.h"
 
 #include <math.h>

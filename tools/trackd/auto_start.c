@@ -78,14 +78,14 @@ static double crown_share(const gait_model *m, double stature)
     gait_model_info info;
     double sum = 0;
     int32_t crown = 0;
-    gait_model_get_info(m, &info);
+    gait_model_get_info(m, &info, NULL);
     for (int32_t j = 0; j < info.joints; j++)
         crown = strcmp(gait_model_joint_name(m, j), "head_top") == 0 ? j : crown;
     for (int i = 0; i < 8; i++) {
         gait_state s = {.phase = (float)i / 8, .stature = (float)stature};
         gait_pose pose;
         float height;
-        if (gait_model_pelvis_height(m, &s, &height) != GAIT_OK || gait_model_pose(m, &s, &pose) != GAIT_OK)
+        if (gait_model_pelvis_height(m, &s, &height, NULL) != GAIT_OK || gait_model_pose(m, &s, &pose, NULL) != GAIT_OK)
             return 1;
         sum += (double)(pose.joint[crown][2] + height);
     }
@@ -174,7 +174,7 @@ static bool set_motion(const path *p, const gait_model *m, gait_state *mean, gai
                  doubt = p->velocity_sd / (speed > 1e-6 ? speed : 1e-6);
     if (speed < SLOW || doubt > 0.5)
         return false;
-    gait_model_get_info(m, &info);
+    gait_model_get_info(m, &info, NULL);
     mean->heading = (float)atan2(p->velocity[1], p->velocity[0]);
     sd->heading = (float)hypot(HEADING_SD, doubt);
     double const rate = speed / (double)(info.stride_length * mean->stature);
@@ -193,7 +193,7 @@ static bool first_state(const auto_start *s, const gait_camera *camera, const ga
     double const factor = scale_of(s, lens[2], model, mean, sd);
     path const p = path_of(s, lens, height_lead, factor);
     if (!set_motion(&p, model, mean, sd) ||
-        gait_model_pelvis_height(model, mean, &mean->pelvis[2]) != GAIT_OK)
+        gait_model_pelvis_height(model, mean, &mean->pelvis[2], NULL) != GAIT_OK)
         return false;
     double const x = p.end[0] - lens[0], y = p.end[1] - lens[1], distance = hypot(x, y),
                  depth = depth_sd(distance);

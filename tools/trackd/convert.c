@@ -104,7 +104,7 @@ void convert_estimate(const gait_model *model, const gait_model_info *info, cons
     convert_state(&in->best, info, &m->best);
     m->ess = in->ess;
     m->phase_r = in->phase_r;
-    m->mode_mass = in->mode_mass;
+    m->mode_mass = in->hypothesis_weight;
     m->speed = in->speed;
     m->njoints = info->joints;
     m->joints = out->joint;

@@ -70,7 +70,7 @@ static bool load_lift(service *s, const settings *want, lift_service *lift, sink
     if (!lift_service_open(lift, model, &set, out, why))
         return false;
     s->lift = lift;
-    s->track.memory_bytes += lift->blob.size + lift->memory_bytes;
+    s->track.memory_bytes += lift->file.bytes + lift->memory_bytes;
     return true;
 }
 

@@ -74,7 +74,7 @@ static bool read_pelvis(const fields *f, int spread, const gait_model *model, in
             io->sd.pelvis[i] = (float)PELVIS_SD;
         }
     }
-    if (known_axes == 2 && gait_model_pelvis_height(model, &io->mean, &io->mean.pelvis[2]) != GAIT_OK)
+    if (known_axes == 2 && gait_model_pelvis_height(model, &io->mean, &io->mean.pelvis[2], NULL) != GAIT_OK)
         return message_set(why, "%s: the model gives no height for the pelvis; give z too", f->path);
     if (sds != 0) {
         if (!fields_numbers(f, spread, "pelvis", value, sds == 3 ? 3 : 1, 0, MAX_SD,
@@ -109,7 +109,7 @@ bool init_file_read(const char *path, const gait_model *model, init_state *out, 
 {
     fields f;
     init_state state = {.frame = -1};
-    if (gait_tracker_prior(model, &state.mean, &state.sd) != GAIT_OK)
+    if (gait_tracker_prior(model, &state.mean, &state.sd, NULL) != GAIT_OK)
         return message_set(why, "%s: the model has no prior", path);
     bool const ok = fields_open(&f, path, "init", why) && parse(&f, model, &state, why);
     fields_close(&f);

@@ -2,7 +2,7 @@
 #ifndef TRACKD_KEYPOINTS_VIEW_H
 #define TRACKD_KEYPOINTS_VIEW_H
 #include "byte_reader.h"
-#include "gait.h"
+#include "gait_lift.h"
 #include "message.h"
 
 typedef struct keypoints_view {

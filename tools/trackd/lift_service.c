@@ -34,10 +34,10 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
     c->cpu_mask = set->cpu_mask;
     /* any camera asks for as much memory */
     c->camera = (gait_camera){.width = 1, .height = 1, .fx = 1, .fy = 1, .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    if (!file_read(model, "model", &s->blob, why))
+    if (!model_file_open(&s->file, model, why))
         return false;
-    if (gait_lift_get_info(s->blob.data, s->blob.size, &s->info, &err) != GAIT_OK ||
-        gait_lift_bytes(s->blob.data, s->blob.size, c, &s->memory_bytes, &err) != GAIT_OK)
+    if (gait_lift_get_info(s->file.model, &s->info, &err) != GAIT_OK ||
+        gait_lift_bytes(s->file.model, c, &s->memory_bytes, &err) != GAIT_OK)
         return message_set(why, "--lift: %.100s: %.120s", model, err.text);
     size_t const padded = (s->memory_bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
     s->memory = aligned_alloc(GAIT_ALIGN, padded);
@@ -47,7 +47,7 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
 void lift_service_close(lift_service *s)
 {
     free(s->memory);
-    free(s->blob.data);
+    model_file_close(&s->file);
     *s = (lift_service){0};
 }
 
@@ -60,7 +60,7 @@ bool lift_service_camera(lift_service *s, const gait_camera *camera, message *wh
                            "another camera than the one in use was announced and is ignored; restart for it");
     gait_lift_config c = s->config;
     c.camera = *camera;
-    if (gait_lift_init(s->memory, s->memory_bytes, s->blob.data, s->blob.size, &c, &s->lift, &err) != GAIT_OK)
+    if (gait_lift_init(s->memory, s->memory_bytes, s->file.model, &c, &s->lift, &err) != GAIT_OK)
         return message_set(why, "--lift: %s", err.text);
     s->config = c;
     return true;
@@ -129,7 +129,7 @@ static bool send(lift_service *s, int64_t step_us, message *why)
                             .model_digest = (int64_t)s->info.digest,
                             .njoints = known ? s->info.markers : 0,
                             .joints = s->joint};
-    m.flags = e->flags & GAIT_LIFT_UNSEEN ? GAITMSG_ESTIMATE_T_FLAG_NO_IMAGE : 0;
+    m.flags = e->flags & GAIT_LIFT_UNOBSERVED ? GAITMSG_ESTIMATE_T_FLAG_NO_IMAGE : 0;
     m.mean.heading = (float)e->heading;
     m.mean.stature = (float)(s->config.stature > 0.0 ? s->config.stature : (double)s->info.stature);
     for (int32_t j = 0; j < m.njoints; j++) {
@@ -187,7 +187,7 @@ bool lift_service_keypoints(lift_service *s, keypoints_view *v, int64_t receive_
         return message_set(why, "tracks: %s", err.text);
     }
     s->past[s->frames % LIFT_SERVICE_PAST] = (lift_past){v->utime, v->frame, receive_utime};
-    bool const there = gait_lift_estimate(s->lift, &s->estimate) == GAIT_OK;
+    bool const there = gait_lift_estimate(s->lift, &s->estimate, NULL) == GAIT_OK;
     int64_t const step_us = monotonic_us() - before;
     histogram_add(&s->step, step_us);
     return !there || send(s, step_us, why);

@@ -1,10 +1,10 @@
 /* lift_service.h - the lifter as a service: 2-D tracks of one camera in, 3-D joints out, whatever carries them. */
 #ifndef TRACKD_LIFT_SERVICE_H
 #define TRACKD_LIFT_SERVICE_H
-#include "file.h"
-#include "gait.h"
+#include "gait_lift.h"
 #include "gaitmsg_joint_t.h"
 #include "histogram.h"
+#include "model_file.h"
 #include "sink.h"
 #include "keypoints_view.h"
 
@@ -23,7 +23,7 @@ typedef struct lift_past { /* what the source said of a frame */
 
 typedef struct lift_service {
     sink *out;
-    file_bytes blob;
+    model_file file;
     gait_lift_config config;
     gait_lift_info info;
     gait_lift *lift; /* NULL until the camera is known */

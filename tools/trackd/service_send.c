@@ -8,7 +8,7 @@ enum { MESSAGE_ROOM = 1 << 16 }; /* estimate and status, with room to spare */
 
 static void send_particles(service *s, const image_view *v)
 {
-    int32_t const n = gait_tracker_particles(s->track.tracker, s->hypothesis, s->cloud.weight, s->hypotheses);
+    int32_t const n = gait_tracker_particles(s->track.tracker, s->hypothesis, s->cloud.weight, s->hypotheses, NULL);
     s->cloud.utime = v->utime;
     s->cloud.frame = v->frame;
     s->cloud.n = n < 0 ? 0 : n;

@@ -11,32 +11,21 @@ static size_t padded(size_t bytes)
 bool tracking_open(tracking *t, const char *model_path, const gait_tracker_config *config, message *why)
 {
     gait_error err = {.text = ""};
-    size_t bytes = 0;
     *t = (tracking){.config = *config};
-    if (!file_read(model_path, "model", &t->blob, why))
+    if (!model_file_open(&t->file, model_path, why))
         return false;
-    gait_result status = gait_model_bytes(t->blob.data, t->blob.size, &bytes, &err);
-    if (status == GAIT_OK) {
-        t->model_memory = aligned_alloc(GAIT_ALIGN, padded(bytes));
-        if (!t->model_memory)
-            return message_set(why, "%s: not enough memory for %zu bytes", model_path, bytes);
-        status = gait_model_init(t->model_memory, bytes, t->blob.data, t->blob.size, &t->model, &err);
-    }
-    if (status == GAIT_OK)
-        status = gait_model_get_info(t->model, &t->info);
-    if (status == GAIT_OK)
-        status = gait_tracker_prior(t->model, &t->prior_mean, &t->prior_sd);
-    t->memory_bytes = t->model_bytes = t->blob.size + bytes;
-    return status == GAIT_OK ||
-           message_set(why, "%.100s: not a usable model: %s (%s); learn it anew or give another", model_path,
-                       err.text, gait_result_name(status));
+    t->model = t->file.model;
+    t->memory_bytes = t->model_bytes = t->file.bytes;
+    if (gait_model_get_info(t->model, &t->info, &err) == GAIT_OK &&
+        gait_tracker_prior(t->model, &t->prior_mean, &t->prior_sd, &err) == GAIT_OK)
+        return true;
+    return message_set(why, "%.100s: %s", model_path, err.text);
 }
 
 void tracking_close(tracking *t)
 {
     free(t->block);
-    free(t->model_memory);
-    free(t->blob.data);
+    model_file_close(&t->file);
     *t = (tracking){0};
 }
 
@@ -90,7 +79,7 @@ bool tracking_set_background(tracking *t, const gait_image *plate, message *why)
     for (int32_t y = 0; y < plate->height; y++)
         memcpy(t->plate + (size_t)y * row, plate->data + (ptrdiff_t)y * plate->stride, row);
     t->background = (gait_image){t->plate, plate->width, plate->height, (int32_t)row, plate->format};
-    gait_result const status = gait_tracker_set_background(t->tracker, 0, &t->background);
+    gait_result const status = gait_tracker_set_background(t->tracker, 0, &t->background, NULL);
     return status == GAIT_OK || message_set(why, "background refused: %s", gait_result_name(status));
 }
 

@@ -1,13 +1,11 @@
 /* tracking.h - one model, one camera, one tracker in one block of memory that is taken once. */
 #ifndef TRACKD_TRACKING_H
 #define TRACKD_TRACKING_H
-#include "file.h"
-#include "gait.h"
+#include "model_file.h"
 
 typedef struct tracking {
-    file_bytes blob;
-    gait_model *model;
-    void *model_memory;
+    model_file file;
+    const gait_model *model;
     gait_model_info info;
     gait_state prior_mean, prior_sd;
     gait_tracker_config config;

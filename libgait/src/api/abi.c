@@ -1,5 +1,6 @@
 /* abi.c - layout of every public struct, so that bindings can check themselves on import. */
 #include "base/base.h"
+#include "gait_lift.h"
 
 /* A struct's own row comes first, then its fields in order. */
 #define STRUCT(T)   {#T, "", 0, (uint32_t)sizeof(T)}
@@ -10,7 +11,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
     /* clang-format off: a struct's fields stand together */
     static const gait_abi_field table[] = {
         STRUCT(gait_error),
-        FIELD(gait_error, status),
+        FIELD(gait_error, result),
         FIELD(gait_error, index),
         FIELD(gait_error, text),
         STRUCT(gait_image),
@@ -58,11 +59,14 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_model_info, stride_hz_sd),
         FIELD(gait_model_info, stride_length),
         FIELD(gait_model_info, stride_length_sd),
+        FIELD(gait_model_info, cyclic),
+        FIELD(gait_model_info, posture_angles),
         FIELD(gait_model_info, digest),
         STRUCT(gait_tracker_config),
         FIELD(gait_tracker_config, struct_size),
-        FIELD(gait_tracker_config, mode),
         FIELD(gait_tracker_config, seed),
+        FIELD(gait_tracker_config, offset_angles),
+        FIELD(gait_tracker_config, mode),
         FIELD(gait_tracker_config, particles),
         FIELD(gait_tracker_config, acquisition_particles),
         FIELD(gait_tracker_config, components),
@@ -96,7 +100,6 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_tracker_config, stature_noise_start),
         FIELD(gait_tracker_config, offset_noise),
         FIELD(gait_tracker_config, proportion_noise),
-        FIELD(gait_tracker_config, offset_angles),
         FIELD(gait_tracker_config, cpu_mask),
         FIELD(gait_tracker_config, joint_sd_model),
         FIELD(gait_tracker_config, camera),
@@ -120,7 +123,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_estimate, joint_sd),
         FIELD(gait_estimate, ess),
         FIELD(gait_estimate, phase_r),
-        FIELD(gait_estimate, mode_mass),
+        FIELD(gait_estimate, hypothesis_weight),
         FIELD(gait_estimate, speed),
         FIELD(gait_estimate, status),
         FIELD(gait_estimate, flags),
@@ -151,7 +154,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_lift_config, lag),
         FIELD(gait_lift_config, max_rate),
         FIELD(gait_lift_config, max_gap),
-        FIELD(gait_lift_config, misfit),
+        FIELD(gait_lift_config, fit_threshold),
         FIELD(gait_lift_config, report),
         FIELD(gait_lift_config, axis),
         FIELD(gait_lift_config, camera),
@@ -159,7 +162,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         STRUCT(gait_lift_fit),
         FIELD(gait_lift_fit, log_evidence),
         FIELD(gait_lift_fit, log10_volume),
-        FIELD(gait_lift_fit, misfit),
+        FIELD(gait_lift_fit, chi2),
         FIELD(gait_lift_fit, heading),
         FIELD(gait_lift_fit, heading_sd),
         FIELD(gait_lift_fit, place),
@@ -172,7 +175,7 @@ const gait_abi_field *gait_abi_fields(uint32_t *count)
         FIELD(gait_lift_frame, utime),
         FIELD(gait_lift_frame, frame),
         FIELD(gait_lift_frame, heading),
-        FIELD(gait_lift_frame, misfit),
+        FIELD(gait_lift_frame, chi2_per_observation),
         FIELD(gait_lift_frame, status),
         FIELD(gait_lift_frame, flags),
         FIELD(gait_lift_frame, marker),

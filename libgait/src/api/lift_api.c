@@ -23,68 +23,64 @@ void gait_lift_default(gait_lift_config *cfg)
         .lag = 5,
         .max_rate = 60.0,
         .max_gap = 0.5,
-        .misfit = 9.0,
+        .fit_threshold = 9.0,
         .report = ~UINT64_C(0),
         .axis = {{1.0, 0.0, 0.0}, {0.0, 0.0, 1.0}},
         .cpu_mask = ~0u,
     };
 }
 
-gait_result gait_lift_bytes(const void *blob, size_t blob_bytes, const gait_lift_config *cfg, size_t *bytes,
-                            gait_error *err)
+gait_result gait_lift_bytes(const gait_model *m, const gait_lift_config *cfg, size_t *bytes, gait_error *err)
 {
-    if (!blob || !cfg || !bytes)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_bytes: null pointer");
-    segment_prior prior;
-    gait_result const s = lifter_open(blob, blob_bytes, cfg, &prior, err);
+    if (!m || !cfg || !bytes)
+        return base_null(err, "gait_lift_bytes");
+    gait_result const s = lifter_check(m, cfg, err);
     if (s != GAIT_OK)
         return s;
     arena a = {.base = NULL};
-    (void)lifter_layout(&a, &prior, cfg, kernels_choose(cfg->cpu_mask));
+    (void)lifter_layout(&a, &m->segments, cfg, kernels_choose(cfg->cpu_mask));
     *bytes = a.used;
     return GAIT_OK;
 }
 
-gait_result gait_lift_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
-                           const gait_lift_config *cfg, gait_lift **out, gait_error *err)
+gait_result gait_lift_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_lift_config *cfg,
+                           gait_lift **out, gait_error *err)
 {
-    if (!mem || !blob || !cfg || !out)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_init: null pointer");
-    segment_prior prior;
-    gait_result s = lifter_open(blob, blob_bytes, cfg, &prior, err);
-    if (s != GAIT_OK)
-        return s;
+    if (!mem || !out)
+        return base_null(err, "gait_lift_init");
     arena a = {.base = NULL};
-    (void)lifter_layout(&a, &prior, cfg, kernels_choose(cfg->cpu_mask));
-    s = arena_place(&a, mem, mem_bytes, err);
+    gait_result s = gait_lift_bytes(m, cfg, &a.used, err);
+    if (s == GAIT_OK)
+        s = arena_place(&a, mem, mem_bytes, err);
     if (s != GAIT_OK)
         return s;
-    gait_lift *const self = lifter_layout(&a, &prior, cfg, kernels_choose(cfg->cpu_mask));
+    gait_lift *const self = lifter_layout(&a, &m->segments, cfg, kernels_choose(cfg->cpu_mask));
+    int32_t const frames = m->segments.frames;
     lift_stream_reset(&self->stream);
-    for (int32_t f = 0; f < prior.frames; f++)
+    for (int32_t f = 0; f < frames; f++)
         self->at[f] = f;
-    self->window = (lift_window){.frames = prior.frames, .at = self->at, .uv = self->uv, .sd = self->sd};
+    self->window = (lift_window){.frames = frames, .at = self->at, .uv = self->uv, .sd = self->sd};
     *out = self;
     return GAIT_OK;
 }
 
-gait_result gait_lift_get_info(const void *blob, size_t blob_bytes, gait_lift_info *out, gait_error *err)
+gait_result gait_lift_get_info(const gait_model *m, gait_lift_info *out, gait_error *err)
 {
-    if (!blob || !out)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_get_info: null pointer");
-    segment_prior p;
-    gait_result const s = segment_open(blob, blob_bytes, &p, err);
-    if (s == GAIT_OK)
-        *out = (gait_lift_info){.markers = p.markers,
-                                .frames = p.frames,
-                                .hop = p.hop,
-                                .headings = p.headings,
-                                .components = p.components,
-                                .modes = p.modes,
-                                .fps = p.fps,
-                                .stature = p.stature,
-                                .digest = p.digest};
-    return s;
+    if (!m || !out)
+        return base_null(err, "gait_lift_get_info");
+    const segment_prior *const p = &m->segments;
+    if (p->markers == 0)
+        return lifter_no_prior(err);
+    *out = (gait_lift_info){.markers = p->markers,
+                            .frames = p->frames,
+                            .hop = p->hop,
+                            .headings = p->headings,
+                            .components = p->components,
+                            .modes = p->modes,
+                            .fps = p->fps,
+                            .stature = p->stature,
+                            .digest = m->digest};
+    return GAIT_OK;
 }
 
 const char *gait_lift_marker_name(const gait_lift *l, int32_t marker)
@@ -102,34 +98,6 @@ static void describe_fit(const gait_lift *l, const lift_outcome *found, gait_lif
 {
     const lift_table *const t = &l->table;
     const segment_posterior *const b = &l->posterior;
-    double const log_10 = 2.30258509299404568402;
-    *out = (gait_lift_fit){.log_evidence = lift_evidence(t, b),
-                           .log10_volume = -cholesky_log_det(b->U, t->n, t->ld) / log_10,
-                           .misfit = lift_chi2(t, b),
-                           .heading = lift_heading(t, b),
-                           .share = found->share,
-                           .component = b->component,
-                           .observed = b->observed,
-                           .iterations = found->iterations,
-                           .converged = found->converged};
-    if (t->turn >= 0) /* the last unknown: its variance is that of the last pivot */
-        out->heading_sd = b->turn_sd / b->U[t->turn * (t->ld + 1)];
-    for (int32_t i = 0; i < 3; i++)
-        out->place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
-}
-
-gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
-                              gait_error *err)
-{
-    if (!l || !uv || !out)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_segment: null pointer");
-    const lift_table *const t = &l->table;
-    lift_outcome found;
-    lifter_take(l, points_of(t), uv, sd, l->uv, l->sd);
-    memcpy(l->posterior.place, t->cfg.place, sizeof t->cfg.place);
-    l->fitted = l->windowed = lift_fit(t, &l->search, &l->window, &l->posterior, &found);
-    if (!l->fitted)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: observations out of any range");
     describe_fit(l, &found, out);
     return GAIT_OK;
 }
@@ -138,7 +106,7 @@ gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const doubl
                                      gait_lift_fit *out, gait_error *err)
 {
     if (!l || !uv || !weighted || !out)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_segment_robust: null pointer");
+        return base_null(err, "gait_lift_segment_robust");
     const lift_table *const t = &l->table;
     lift_outcome found;
     int32_t outliers;
@@ -158,7 +126,7 @@ gait_result gait_lift_expect(gait_lift *l, const double place[3], double heading
                              gait_error *err)
 {
     if (!l || !place)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_expect: null pointer");
+        return base_null(err, "gait_lift_expect");
     gait_lift_config cfg = l->table.cfg;
     if (!l->any_heading)
         return base_fail(
@@ -194,12 +162,20 @@ static void read_frame(const gait_lift *l, const segment_posterior *b, int32_t f
     }
 }
 
-gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd)
+static gait_result need_segment(bool there, const char *function, gait_error *err)
+{
+    return there ? GAIT_OK
+                 : base_fail(err, GAIT_ERR_STATE, -1, "%s: no segment yet; call gait_lift_segment() first",
+                             function);
+}
+
+gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_error *err)
 {
     if (!l || !mean)
-        return GAIT_ERR_ARG;
-    if (!l->fitted)
-        return GAIT_ERR_STATE;
+        return base_null(err, "gait_lift_positions");
+    gait_result const s = need_segment(l->fitted, "gait_lift_positions", err);
+    if (s != GAIT_OK)
+        return s;
     for (int32_t f = 0; f < l->table.prior.frames; f++)
         read_frame(l, &l->posterior, f, true, mean, sd);
     return GAIT_OK;
@@ -210,29 +186,36 @@ int32_t gait_lift_unknowns(const gait_lift *l)
     return l ? l->table.n : GAIT_ERR_ARG;
 }
 
-gait_result gait_lift_posterior(gait_lift *l, double *mean, double *covariance)
+gait_result gait_lift_posterior(gait_lift *l, double *mean, double *covariance, gait_error *err)
 {
     if (!l || !mean)
-        return GAIT_ERR_ARG;
-    if (!l->fitted)
-        return GAIT_ERR_STATE;
+        return base_null(err, "gait_lift_posterior");
+    gait_result const s = need_segment(l->fitted, "gait_lift_posterior", err);
+    if (s != GAIT_OK)
+        return s;
     memcpy(mean, l->posterior.theta, (size_t)l->table.n * sizeof *mean);
     if (covariance)
         lift_covariance(&l->table, &l->posterior, &l->spare, covariance);
     return GAIT_OK;
 }
 
-double gait_lift_scale(gait_lift *l)
+gait_result gait_lift_scale(gait_lift *l, double *scale, gait_error *err)
 {
-    return l && l->windowed ? sqrt(lift_scale(&l->table, &l->posterior, &l->spare)) : 0.0;
+    if (!l || !scale)
+        return base_null(err, "gait_lift_scale");
+    gait_result const s = need_segment(l->windowed, "gait_lift_scale", err);
+    if (s == GAIT_OK)
+        *scale = sqrt(lift_scale(&l->table, &l->posterior, &l->spare));
+    return s;
 }
 
-gait_result gait_lift_least_squares(gait_lift *l, double *mean)
+gait_result gait_lift_least_squares(gait_lift *l, double *mean, gait_error *err)
 {
     if (!l || !mean)
-        return GAIT_ERR_ARG;
-    if (!l->windowed)
-        return GAIT_ERR_STATE;
+        return base_null(err, "gait_lift_least_squares");
+    gait_result const s = need_segment(l->windowed, "gait_lift_least_squares", err);
+    if (s != GAIT_OK)
+        return s;
     lift_least_squares(&l->table, &l->window, &l->posterior, &l->spare);
     segment_posterior alone = l->posterior;
     alone.theta = l->spare.theta;
@@ -241,20 +224,23 @@ gait_result gait_lift_least_squares(gait_lift *l, double *mean)
     return GAIT_OK;
 }
 
-gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, double *sd)
+gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, double *sd, gait_error *err)
 {
-    if (!l || !mode || !sd || count < 1 || count > l->table.n)
-        return GAIT_ERR_ARG;
-    if (!l->fitted)
-        return GAIT_ERR_STATE;
-    lift_uncertain(&l->table, &l->posterior, &l->spare, count, mode, sd);
-    return GAIT_OK;
+    if (!l || !mode || !sd)
+        return base_null(err, "gait_lift_uncertain");
+    if (count < 1 || count > l->table.n)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_uncertain: count = %d is outside [1, %d]",
+                         (int)count, (int)l->table.n);
+    gait_result const s = need_segment(l->fitted, "gait_lift_uncertain", err);
+    if (s == GAIT_OK)
+        lift_uncertain(&l->table, &l->posterior, &l->spare, count, mode, sd);
+    return s;
 }
 
 gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err)
 {
     if (!l || !sd)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_fix: null pointer");
+        return base_null(err, "gait_lift_fix");
     lift_table *const t = &l->table;
     if (t->projection.perspective || t->turn >= 0)
         return base_fail(err, GAIT_ERR_STATE, -1,
@@ -269,12 +255,14 @@ gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err)
     return GAIT_OK;
 }
 
-gait_result gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean)
+gait_result gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean, gait_error *err)
 {
-    if (!l || !uv || !mean || count < 0)
-        return GAIT_ERR_ARG;
+    if (!l || !uv || !mean)
+        return base_null(err, "gait_lift_batch");
+    if (count < 0)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_batch: count = %d is negative", (int)count);
     if (!l->gain.ready)
-        return GAIT_ERR_STATE;
+        return base_fail(err, GAIT_ERR_STATE, -1, "gait_lift_batch: no gain yet; call gait_lift_fix() first");
     size_t const points = points_of(&l->table);
     for (size_t i = 0; i < (size_t)count; i++)
         lift_gain_apply(&l->table, &l->gain, uv + i * points * 2, mean + i * points * 3);
@@ -284,7 +272,7 @@ gait_result gait_lift_batch(gait_lift *l, int32_t count, const double *uv, doubl
 gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err)
 {
     if (!l || !uv)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_lift_push: null pointer");
+        return base_null(err, "gait_lift_push");
     const lift_table *const t = &l->table;
     if (t->cfg.lag < 0)
         return base_fail(err, GAIT_ERR_STATE, -1,
@@ -300,12 +288,15 @@ gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const 
     return GAIT_OK;
 }
 
-gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out)
+gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *err)
 {
     if (!l || !out)
-        return GAIT_ERR_ARG;
-    return l->table.cfg.lag >= 0 && lift_stream_estimate(&l->table, &l->stream, out) ? GAIT_OK
-                                                                                     : GAIT_ERR_STATE;
+        return base_null(err, "gait_lift_estimate");
+    if (l->table.cfg.lag < 0 || !lift_stream_estimate(&l->table, &l->stream, out))
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "gait_lift_estimate: no frame of %d frames ago; push more, or lower config lag",
+                         (int)l->table.cfg.lag);
+    return GAIT_OK;
 }
 
 void gait_lift_reset(gait_lift *l)

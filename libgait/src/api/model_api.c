@@ -1,7 +1,11 @@
 /* model_api.c - public functions of the library and of models: check the arguments, then one call down. */
+#include "api/check.h"
 #include "api/kernels.h"
 #include "base/cpu.h"
 #include "model/kinematics.h"
+#include "raster/render.h"
+
+#include <string.h>
 
 uint32_t gait_version(void)
 {
@@ -50,12 +54,12 @@ const char *gait_result_name(gait_result s)
     return "unknown gait_result";
 }
 
-gait_result gait_model_bytes(const void *blob, size_t blob_bytes, size_t *bytes, gait_error *err)
+gait_result gait_model_bytes(const void *data, size_t data_bytes, size_t *bytes, gait_error *err)
 {
-    if (!blob || !bytes)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_model_bytes: null pointer");
+    if (!data || !bytes)
+        return base_null(err, "gait_model_bytes");
     gait_model m;
-    gait_result const s = model_open(blob, blob_bytes, &m, err);
+    gait_result const s = model_open(data, data_bytes, &m, err);
     if (s != GAIT_OK)
         return s;
     arena a = {.base = NULL};
@@ -64,13 +68,13 @@ gait_result gait_model_bytes(const void *blob, size_t blob_bytes, size_t *bytes,
     return GAIT_OK;
 }
 
-gait_result gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_t blob_bytes,
+gait_result gait_model_init(void *mem, size_t mem_bytes, const void *data, size_t data_bytes,
                             gait_model **out, gait_error *err)
 {
-    if (!mem || !blob || !out)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_model_init: null pointer");
+    if (!mem || !data || !out)
+        return base_null(err, "gait_model_init");
     gait_model m;
-    gait_result s = model_open(blob, blob_bytes, &m, err);
+    gait_result s = model_open(data, data_bytes, &m, err);
     if (s != GAIT_OK)
         return s;
     arena a = {.base = NULL};
@@ -81,10 +85,10 @@ gait_result gait_model_init(void *mem, size_t mem_bytes, const void *blob, size_
     return s;
 }
 
-gait_result gait_model_get_info(const gait_model *m, gait_model_info *out)
+gait_result gait_model_get_info(const gait_model *m, gait_model_info *out, gait_error *err)
 {
     if (!m || !out)
-        return GAIT_ERR_ARG;
+        return base_null(err, "gait_model_get_info");
     *out = (gait_model_info){.joints = m->points,
                              .angles = m->angles,
                              .components = m->components,
@@ -95,6 +99,8 @@ gait_result gait_model_get_info(const gait_model *m, gait_model_info *out)
                              .stride_hz_sd = m->stride_hz_sd,
                              .stride_length = m->stride_length,
                              .stride_length_sd = m->stride_length_sd,
+                             .cyclic = m->cyclic,
+                             .posture_angles = model_posture_angles(m),
                              .digest = m->digest};
     return GAIT_OK;
 }
@@ -114,16 +120,62 @@ const char *gait_model_limb_name(const gait_model *m, int32_t limb)
     return m && limb >= 0 && limb < m->limbs ? m->limb_name[limb] : NULL;
 }
 
-gait_result gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out)
+gait_result gait_model_angle_mask(const gait_model *m, const char *names, uint32_t *mask, gait_error *err)
 {
-    if (!m || !s || !out)
-        return GAIT_ERR_ARG;
-    return model_pose_state(m, s, out);
+    if (!m || !names || !mask)
+        return base_null(err, "gait_model_angle_mask");
+    uint32_t found = 0;
+    for (const char *at = names + strspn(names, " "); *at; at += strspn(at, " ")) {
+        size_t const length = strcspn(at, " ");
+        int32_t const a = model_find_angle(m, at, length);
+        if (a < 0)
+            return base_fail(err, GAIT_ERR_ARG, -1, "gait_model_angle_mask: the model has no angle %.*s",
+                             (int)length, at);
+        found |= UINT32_C(1) << a;
+        at += length;
+    }
+    *mask = found;
+    return GAIT_OK;
 }
 
-gait_result gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out)
+/* Explains why a pose failed. */
+static gait_result state_result(gait_result s, const char *function, gait_error *err)
+{
+    if (s == GAIT_OK)
+        return s;
+    return base_fail(err, s, -1, "%s: the state holds a number that is not finite, or stature is not positive",
+                     function);
+}
+
+gait_result gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out, gait_error *err)
 {
     if (!m || !s || !out)
-        return GAIT_ERR_ARG;
-    return model_pelvis_height(m, s, out);
+        return base_null(err, "gait_model_pose");
+    gait_result const fault = model_need_cyclic(m, err);
+    return fault != GAIT_OK ? fault : state_result(model_pose_state(m, s, out), "gait_model_pose", err);
+}
+
+gait_result gait_model_pelvis_height(const gait_model *m, const gait_state *s, float *out, gait_error *err)
+{
+    if (!m || !s || !out)
+        return base_null(err, "gait_model_pelvis_height");
+    gait_result const fault = model_need_cyclic(m, err);
+    return fault != GAIT_OK ? fault
+                            : state_result(model_pelvis_height(m, s, out), "gait_model_pelvis_height", err);
+}
+
+gait_result gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
+                        int32_t ids_stride, gait_error *err)
+{
+    if (!m || !cam || !s || !ids)
+        return base_null(err, "gait_render");
+    gait_result fault = model_need_cyclic(m, err);
+    if (fault == GAIT_OK)
+        fault = check_camera(cam, -1, err);
+    if (fault != GAIT_OK)
+        return fault;
+    if (ids_stride < cam->width)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_render: ids_stride = %d is below the camera's width of %d",
+                         (int)ids_stride, (int)cam->width);
+    return state_result(render_limbs(m, cam, s, ids, ids_stride), "gait_render", err);
 }

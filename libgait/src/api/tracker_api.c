@@ -1,10 +1,9 @@
-/* tracker_api.c - the public tracker and render functions: argument checks, then one call down. */
+/* tracker_api.c - public functions of the tracker: check the arguments, then call down. */
+#include "api/check.h"
 #include "api/kernels.h"
-#include "image/camera.h"
 #include "base/cpu.h"
 #include "image/image.h"
 #include "likelihood/likelihood.h"
-#include "raster/render.h"
 #include "tracker/snapshot.h"
 #include <stddef.h>
 #include <string.h>
@@ -57,7 +56,7 @@ void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
         .proportion_noise = 0.15f,
         .joint_sd_model = 0.015f,
         .offset_noise = 0.58f,
-        .offset_angles = GAIT_OFFSETS_TRUNK | GAIT_OFFSETS_ARMS,
+        .offset_angles = -1,
         .cpu_mask = ~0u,
     };
     if (paper) { /* random walks of Ormoneit et al. 2000, eqs. 5-9, who leave the rates open */
@@ -146,6 +145,8 @@ static gait_result check_config(const gait_model *m, const gait_tracker_config *
         GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE | GAIT_TERM_KEYPOINTS;
     if (!m || !cfg)
         return base_fail(err, GAIT_ERR_ARG, -1, "model or config is NULL");
+    if (!m->cyclic)
+        return model_need_cyclic(m, err);
     if (cfg->struct_size != sizeof *cfg)
         return base_fail(err, GAIT_ERR_STRUCT, -1, "config not filled by gait_tracker_default()");
     if (cfg->mode != GAIT_MODE_DEFAULT && cfg->mode != GAIT_MODE_PAPER)
@@ -173,18 +174,16 @@ static gait_result check_config(const gait_model *m, const gait_tracker_config *
     if (cfg->terms == 0 || (cfg->terms & ~known) != 0)
         return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
                          (unsigned)cfg->terms);
+    if (cfg->offset_angles < -1 || cfg->offset_angles > UINT32_MAX)
+        return base_fail(err, GAIT_ERR_ARG, -1, "config offset_angles = %lld is neither -1 nor a mask of angles",
+                         (long long)cfg->offset_angles);
     if (!cpu_mask_valid(cfg->cpu_mask))
         return base_fail(err, GAIT_ERR_ARG, -1, "config cpu_mask = 0x%x is not ~0u or a set of GAIT_CPU_*",
                          (unsigned)cfg->cpu_mask);
     for (int32_t c = 0; c < cfg->cameras; c++) {
-        if (!camera_valid(&cfg->camera[c]))
-            return base_fail(
-                err, GAIT_ERR_ARG, c,
-                "camera %d: size and focal lengths must be positive, R a rotation, all numbers finite",
-                (int)c);
-        if (cfg->camera[c].width > RAST_LIMIT || cfg->camera[c].height > RAST_LIMIT)
-            return base_fail(err, GAIT_ERR_LIMIT, c, "camera %d: %d x %d pixels, at most %d each way", (int)c,
-                             (int)cfg->camera[c].width, (int)cfg->camera[c].height, RAST_LIMIT);
+        gait_result const s = check_camera(&cfg->camera[c], c, err);
+        if (s != GAIT_OK)
+            return s;
     }
     return check_numbers(cfg, err);
 }
@@ -222,23 +221,50 @@ gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
     return GAIT_OK;
 }
 
-gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate)
+/* Pixels as the camera gives them. */
+static gait_result check_image(const gait_tracker *t, int32_t camera, const gait_image *im, const char *what,
+                               gait_error *err)
 {
-    if (!t || camera < 0 || camera >= t->cfg.cameras)
-        return GAIT_ERR_ARG;
-    camera_state *const s = &t->camera[camera];
-    if (plate && plate->data &&
-        !image_valid(plate, t->cfg.camera[camera].width, t->cfg.camera[camera].height))
-        return GAIT_ERR_ARG;
-    s->background = plate ? *plate : (gait_image){0};
-    s->plate_stale = true;
+    const gait_camera *const cam = &t->cfg.camera[camera];
+    if (!image_channels(im->format))
+        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d has unknown format %d", what, (int)camera,
+                         (int)im->format);
+    if (im->width != cam->width || im->height != cam->height)
+        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d is %d x %d, the camera is %d x %d", what,
+                         (int)camera, (int)im->width, (int)im->height, (int)cam->width, (int)cam->height);
+    int32_t const least = cam->width * image_channels(im->format);
+    if (im->stride < least)
+        return base_fail(err, GAIT_ERR_ARG, camera,
+                         "%s of camera %d has stride %d, %d pixels of %s take at least %d", what, (int)camera,
+                         (int)im->stride, (int)cam->width,
+                         least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (int)least);
     return GAIT_OK;
 }
 
-gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd)
+gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate,
+                                        gait_error *err)
+{
+    if (!t)
+        return base_null(err, "gait_tracker_set_background");
+    if (camera < 0 || camera >= t->cfg.cameras)
+        return base_fail(err, GAIT_ERR_ARG, camera, "background: camera %d is outside [0, %d]", (int)camera,
+                         (int)t->cfg.cameras - 1);
+    gait_result const s =
+        plate && plate->data ? check_image(t, camera, plate, "background", err) : GAIT_OK;
+    if (s != GAIT_OK)
+        return s;
+    t->camera[camera].background = plate ? *plate : (gait_image){0};
+    t->camera[camera].plate_stale = true;
+    return GAIT_OK;
+}
+
+gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd, gait_error *err)
 {
     if (!m || !mean || !sd)
-        return GAIT_ERR_ARG;
+        return base_null(err, "gait_tracker_prior");
+    gait_result const fault = model_need_cyclic(m, err);
+    if (fault != GAIT_OK)
+        return fault;
     *mean = (gait_state){.stride_hz = m->stride_hz, .stature = m->stature_mean};
     *sd = (gait_state){.phase = 0.5f,
                        .stride_hz = m->stride_hz_sd,
@@ -253,7 +279,7 @@ gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
         sd->proportion[k] = 1.0f;
     for (int32_t a = 0; a < m->angles; a++)
         sd->offset[a] = model_posture_sd(m, a);
-    return gait_model_pelvis_height(m, mean, &mean->pelvis[2]);
+    return gait_model_pelvis_height(m, mean, &mean->pelvis[2], err);
 }
 
 static gait_result check_start(const gait_state *mean, const gait_state *sd, gait_error *err)
@@ -298,20 +324,10 @@ static gait_result check_frame(const gait_tracker *t, const gait_frame *frame, g
                          "%.3f s since the last frame, max_dt is %.3f s: start again", 1e-6 * (double)dt,
                          (double)t->cfg.max_dt);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        const gait_image *const im = &frame->image[c];
-        const gait_camera *const cam = &t->cfg.camera[c];
-        if (im->data && !image_channels(im->format))
-            return base_fail(err, GAIT_ERR_ARG, c, "image of camera %d has unknown format %d", (int)c,
-                             (int)im->format);
-        int32_t const least = cam->width * image_channels(im->format);
-        if (im->data && im->width == cam->width && im->stride < least)
-            return base_fail(err, GAIT_ERR_ARG, c,
-                             "image of camera %d has stride %d, %d pixels of %s take at least %d", (int)c,
-                             (int)im->stride, (int)cam->width,
-                             least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (int)least);
-        if (im->data && !image_valid(im, cam->width, cam->height))
-            return base_fail(err, GAIT_ERR_ARG, c, "image of camera %d is %d x %d, the camera is %d x %d",
-                             (int)c, (int)im->width, (int)im->height, (int)cam->width, (int)cam->height);
+        gait_result const s =
+            frame->image[c].data ? check_image(t, c, &frame->image[c], "image", err) : GAIT_OK;
+        if (s != GAIT_OK)
+            return s;
     }
     return GAIT_OK;
 }
@@ -350,12 +366,14 @@ gait_result gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_
     return GAIT_OK;
 }
 
-int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap)
+int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap, gait_error *err)
 {
-    if (!t || cap < 0 || (cap > 0 && (!s || !weight)))
-        return GAIT_ERR_ARG;
+    if (!t || (cap > 0 && (!s || !weight)))
+        return base_null(err, "gait_tracker_particles");
+    if (cap < 0)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_tracker_particles: cap = %d is negative", (int)cap);
     if (!t->core->started)
-        return GAIT_ERR_STATE;
+        return base_fail(err, GAIT_ERR_STATE, -1, "no particles before gait_tracker_start()");
     for (int32_t i = 0; i < i_min(cap, t->cfg.particles); i++) {
         particle_state const w = particle_get(&t->particles, i);
         s[i] = particle_to_state(&t->rule, &w);
@@ -369,12 +387,13 @@ uint64_t gait_tracker_digest(const gait_tracker *t)
     return t ? snapshot_digest(t) : 0;
 }
 
-gait_result gait_tracker_save(const gait_tracker *t, void *mem, size_t cap, size_t *bytes)
+gait_result gait_tracker_save(const gait_tracker *t, void *mem, size_t cap, size_t *bytes, gait_error *err)
 {
     if (!t || !bytes)
-        return GAIT_ERR_ARG;
+        return base_null(err, "gait_tracker_save");
     if (mem && cap < snapshot_bytes(t))
-        return GAIT_ERR_MEMORY;
+        return base_fail(err, GAIT_ERR_MEMORY, -1, "the snapshot takes %zu bytes, got %zu", snapshot_bytes(t),
+                         cap);
     *bytes = snapshot_bytes(t);
     if (mem)
         snapshot_save(t, mem);
@@ -386,13 +405,4 @@ gait_result gait_tracker_restore(gait_tracker *t, const void *mem, size_t bytes,
     if (!t || !mem)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker or snapshot is NULL");
     return snapshot_restore(t, mem, bytes, err);
-}
-
-gait_result gait_render(const gait_model *m, const gait_camera *cam, const gait_state *s, uint8_t *ids,
-                        int32_t ids_stride)
-{
-    if (!m || !cam || !s || !ids || !camera_valid(cam) || cam->width > RAST_LIMIT ||
-        cam->height > RAST_LIMIT || ids_stride < cam->width)
-        return GAIT_ERR_ARG;
-    return render_limbs(m, cam, s, ids, ids_stride);
 }

@@ -7,7 +7,7 @@ gait_result base_fail(gait_error *err, gait_result s, int index, const char *fmt
 {
     if (!err)
         return s;
-    err->status = s;
+    err->result = s;
     err->index = index;
     va_list args;
     va_start(args, fmt);
@@ -15,4 +15,9 @@ gait_result base_fail(gait_error *err, gait_result s, int index, const char *fmt
         err->text[0] = '\0';
     va_end(args);
     return s;
+}
+
+gait_result base_null(gait_error *err, const char *function)
+{
+    return base_fail(err, GAIT_ERR_ARG, -1, "%s: null pointer", function);
 }

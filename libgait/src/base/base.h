@@ -69,4 +69,6 @@ static inline bool f_finite(const float *x, size_t n)
 __attribute__((format(printf, 4, 5)))
 #endif
 gait_result base_fail(gait_error *err, gait_result s, int index, const char *fmt, ...);
+/* GAIT_ERR_ARG: a pointer that the function needs is NULL. */
+gait_result base_null(gait_error *err, const char *function);
 #endif

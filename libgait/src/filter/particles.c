@@ -33,8 +33,9 @@ state_layout state_layout_init(const gait_model *m, const gait_tracker_config *c
                       .plain_root = cfg->mode == GAIT_MODE_PAPER};
     for (int32_t j = 0; j < m->phases; j++)
         r.mean_height += m->curves[j * m->channels + m->root_channel + ROOT_HEIGHT] / (float)m->phases;
+    uint32_t const offsets = cfg->offset_angles < 0 ? model_posture_angles(m) : (uint32_t)cfg->offset_angles;
     for (int32_t a = 0; a < m->angles; a++)
-        if (cfg->offset_angles >> a & 1u)
+        if (offsets >> a & 1u)
             r.angle[r.offsets++] = a;
     return r;
 }

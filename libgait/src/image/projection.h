@@ -1,6 +1,7 @@
 /* projection.h - how a camera or an orthographic view measures a point: two rows g . X = y, linear about a guess. */
 #ifndef GAIT_IMAGE_PROJECTION_H
 #define GAIT_IMAGE_PROJECTION_H
+#include "gait_lift.h"
 #include "base/base.h"
 
 typedef struct projection {

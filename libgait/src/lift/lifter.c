@@ -57,7 +57,7 @@ gait_result lifter_check_config(const gait_lift_config *c, gait_error *err)
         : c->lag < -1 || c->lag > 64                       ? "lag is not in [-1, 64]"
         : !within(c->max_rate, 1.0, 1000.0)                ? "max_rate is not in [1, 1000] Hz"
         : !within(c->max_gap, 1e-3, 60.0)                  ? "max_gap is not in [0.001, 60] seconds"
-        : !within(c->misfit, 0.0, 1e9)                     ? "misfit is not in [0, 1e9]"
+        : !within(c->fit_threshold, 0.0, 1e9)              ? "fit_threshold is not in [0, 1e9]"
         : !cpu_mask_valid(c->cpu_mask)                     ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
         : c->projection == GAIT_LIFT_ORTHOGRAPHIC && !orthonormal(c->axis)
             ? "axis is not two unit vectors at right angles"
@@ -104,11 +104,15 @@ gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_c
     return self;
 }
 
-gait_result lifter_open(const void *blob, size_t bytes, const gait_lift_config *cfg, segment_prior *prior,
-                        gait_error *err)
+gait_result lifter_no_prior(gait_error *err)
 {
-    gait_result const s = lifter_check_config(cfg, err);
-    return s == GAIT_OK ? segment_open(blob, bytes, prior, err) : s;
+    return base_fail(err, GAIT_ERR_ARG, -1,
+                     "the model holds no segment prior: learn it with gait learn ... --segments learnt");
+}
+
+gait_result lifter_check(const gait_model *m, const gait_lift_config *cfg, gait_error *err)
+{
+    return m->segments.markers ? lifter_check_config(cfg, err) : lifter_no_prior(err);
 }
 
 void lifter_take(const gait_lift *l, size_t points, const double *uv, const double *sd, double *to_uv,

@@ -276,8 +276,8 @@ static bool open_segments(const lift_table *t, lift_stream *s)
 static bool contradicts(const lift_table *t, const stream_segment *segment, double share)
 {
     const segment_posterior *const b = &segment->posterior[segment->best];
-    bool const wrong = lift_chi2(t, b) > share * t->cfg.misfit * b->observed || mostly_outliers(segment);
-    return wrong && t->cfg.misfit > 0.0 && t->cfg.heading_sd < 0.0;
+    bool const wrong = lift_chi2(t, b) > share * t->cfg.fit_threshold * b->observed || mostly_outliers(segment);
+    return wrong && t->cfg.fit_threshold > 0.0 && t->cfg.heading_sd < 0.0;
 }
 
 /* The search for segment `index`: a robust fit to all the frames that fall into it, whatever its posterior was.
@@ -491,13 +491,13 @@ bool lift_stream_estimate(const lift_table *t, const lift_stream *s, gait_lift_f
         blend_segment(t, s, segment_at(s, i), &q, &b, out);
     }
     out->heading = lift_heading(t, b.main);
-    out->misfit = b.main->observed ? lift_chi2(t, b.main) / b.main->observed : 0.0;
-    double const wider = out->misfit > 1.0 ? out->misfit : 1.0;
+    out->chi2_per_observation = b.main->observed ? lift_chi2(t, b.main) / b.main->observed : 0.0;
+    double const wider = out->chi2_per_observation > 1.0 ? out->chi2_per_observation : 1.0;
     for (int32_t r = 0; r < q.count; r++)
         for (int32_t a = 0; a < 3; a++)
             out->sd[t->order[r]][a] = sqrt(wider * out->sd[t->order[r]][a]);
-    bool const poor = s->poor_fit || (t->cfg.misfit > 0.0 && out->misfit > t->cfg.misfit);
+    bool const poor = s->poor_fit || (t->cfg.fit_threshold > 0.0 && out->chi2_per_observation > t->cfg.fit_threshold);
     out->status = poor ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
-    out->flags = (b.observed ? 0u : GAIT_LIFT_UNSEEN) | (poor ? GAIT_LIFT_MISFIT : 0u);
+    out->flags = (b.observed ? 0u : GAIT_LIFT_UNOBSERVED) | (poor ? GAIT_LIFT_POOR_FIT : 0u);
     return true;
 }

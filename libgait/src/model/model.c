@@ -192,28 +192,62 @@ static void read_limbs(sections *r, gait_model *m)
     }
 }
 
+static void read_cyclic(sections *r, gait_model *m)
+{
+    read_channels(r, m);
+    read_curves(r, m);
+    read_statistics(r, m);
+    read_pace(r, m);
+    read_frames(r, m);
+    read_proportions(r, m);
+    read_shifts(r, m);
+    read_points(r, m);
+    read_limbs(r, m);
+}
+
 gait_result model_open(const void *data, size_t bytes, gait_model *m, gait_error *err)
 {
     sections r = {.what = "model", .err = err};
     gait_model t = {0};
     r.status = blob_open(data, bytes, &r.b, err);
-    if (r.status == GAIT_OK && !blob_has(&r.b, "CHNM") && blob_has(&r.b, "SGNM"))
-        sections_refuse(&r, GAIT_ERR_CORRUPT, "CHNM",
-                        "missing: only segments were learnt; learn without --segments only to track");
-    read_channels(&r, &t);
-    read_curves(&r, &t);
-    read_statistics(&r, &t);
-    read_pace(&r, &t);
-    read_frames(&r, &t);
-    read_proportions(&r, &t);
-    read_shifts(&r, &t);
-    read_points(&r, &t);
-    read_limbs(&r, &t);
+    if (r.status == GAIT_OK && blob_has(&r.b, "SGNM"))
+        r.status = segment_open(&r.b, &t.segments, err);
+    t.cyclic = t.segments.markers == 0 || blob_has(&r.b, "CHNM");
+    if (t.cyclic)
+        read_cyclic(&r, &t);
     if (r.status != GAIT_OK)
         return r.status;
     t.digest = hash_fnv1a(HASH_INIT, data, bytes);
     *m = t;
     return GAIT_OK;
+}
+
+gait_result model_need_cyclic(const gait_model *m, gait_error *err)
+{
+    if (m->cyclic)
+        return GAIT_OK;
+    return base_fail(err, GAIT_ERR_ARG, -1,
+                     "the model holds no cyclic model: learn it without --segments only to track with it");
+}
+
+int32_t model_find_angle(const gait_model *m, const char *name, size_t length)
+{
+    for (int32_t a = 0; a < m->angles; a++)
+        if (strlen(m->channel_name[a]) == length && memcmp(m->channel_name[a], name, length) == 0)
+            return a;
+    return -1;
+}
+
+uint32_t model_posture_angles(const gait_model *m)
+{
+    static const char names[][20] = {"torso_x",         "torso_y",         "l_shoulder_flexion", "r_shoulder_flexion",
+                                     "l_elbow_flexion", "r_elbow_flexion"};
+    uint32_t mask = 0;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        int32_t const a = model_find_angle(m, names[i], strlen(names[i]));
+        mask |= a < 0 ? 0u : 1u << a;
+    }
+    return mask;
 }
 
 /* The series at the phases of the mean curves, T x M, summed from the constant up. */

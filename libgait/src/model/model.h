@@ -2,6 +2,7 @@
 #ifndef GAIT_MODEL_MODEL_H
 #define GAIT_MODEL_MODEL_H
 #include "base/arena.h"
+#include "model/segment_prior.h"
 
 enum {
     MODEL_MAX_FRAMES = 24,
@@ -17,6 +18,8 @@ enum { LIMB_CONE = 0, LIMB_ELLIPSOID = 1 };
 enum { FRAME_INFO = 8, FRAME_ROTATIONS = 3, LIMB_INFO = 2, LIMB_SHAPE = 10, MODEL_NAME = 32 };
 
 struct gait_model {
+    bool cyclic;            /* false: only a segment prior, what follows is 0 */
+    segment_prior segments; /* markers 0: none */
     int32_t frames, points, limbs, angles;
     int32_t channels;     /* M = angles + MODEL_ROOT_CHANNELS */
     int32_t phases;       /* T */
@@ -66,6 +69,15 @@ static inline float model_posture_sd(const gait_model *m, int32_t a)
 
 /* Check a blob and fill m with views into it (pace_curve is none); err names the section at fault. */
 gait_result model_open(const void *data, size_t bytes, gait_model *m, gait_error *err);
+
+/* GAIT_ERR_ARG: the model has no cyclic part. */
+gait_result model_need_cyclic(const gait_model *m, gait_error *err);
+
+/* Index of the angle whose name is the first `length` characters of `name`; -1: there is none. */
+int32_t model_find_angle(const gait_model *m, const char *name, size_t length);
+
+/* Mask of the angles of trunk and arms whose posture differs most between people. */
+uint32_t model_posture_angles(const gait_model *m);
 
 /* Place a copy of m in the arena, and pace_curve, made of its series.  NULL when counting or on overflow. */
 gait_model *model_layout(arena *a, const gait_model *m);

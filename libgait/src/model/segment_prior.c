@@ -1,6 +1,6 @@
 #include "model/segment_prior.h"
 
-#include "base/hash.h"
+#include "gait_lift.h"
 #include "model/sections.h"
 
 enum { COUNTS = 8, RATES = 8 };
@@ -65,21 +65,15 @@ static void read_shapes(sections *s, segment_prior *p)
         sections_require(s, p->residual[i] > 0.0f, "SGPS", "holds a variance that is not positive");
 }
 
-gait_result segment_open(const void *data, size_t bytes, segment_prior *p, gait_error *err)
+gait_result segment_open(const blob *b, segment_prior *p, gait_error *err)
 {
-    sections s = {.what = "segment prior", .err = err};
+    sections s = {.b = *b, .what = "segment prior", .err = err};
     segment_prior t = {0};
-    s.status = blob_open(data, bytes, &s.b, err);
-    if (s.status == GAIT_OK && !blob_has(&s.b, "SGNM"))
-        sections_refuse(&s, GAIT_ERR_CORRUPT, "SGNM",
-                        "missing: learn it with gait learn ... --segments learnt");
     read_counts(&s, &t);
     read_rates(&s, &t);
     read_weights(&s, &t);
     read_shapes(&s, &t);
-    if (s.status != GAIT_OK)
-        return s.status;
-    t.digest = hash_fnv1a(HASH_INIT, data, bytes);
-    *p = t;
-    return GAIT_OK;
+    if (s.status == GAIT_OK)
+        *p = t;
+    return s.status;
 }

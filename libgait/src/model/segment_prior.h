@@ -1,7 +1,7 @@
 /* segment_prior.h - the prior over motion segments of a blob as typed views.  Lengths are fractions of stature. */
 #ifndef GAIT_MODEL_SEGMENT_PRIOR_H
 #define GAIT_MODEL_SEGMENT_PRIOR_H
-#include "base/base.h"
+#include "model/blob.h"
 
 enum { SEGMENT_NAME = 32 }; /* bytes of a name */
 
@@ -20,12 +20,10 @@ typedef struct segment_prior {
     const float *mode;                /* K x k x F x J x 3, times their standard deviations */
     const float *sd;                  /* K x k: these standard deviations */
     const float *residual;            /* K x J: variance per coordinate outside the modes */
-
-    uint64_t digest; /* FNV-1a of the blob */
 } segment_prior;
 
-/* Check a blob's segment sections and fill p with views into it; err names the section at fault. */
-gait_result segment_open(const void *data, size_t bytes, segment_prior *p, gait_error *err);
+/* Check the segment sections of a blob and fill p with views into it; err names the section at fault. */
+gait_result segment_open(const blob *b, segment_prior *p, gait_error *err);
 
 /* Mean of component c at frame f, (J x 3); mode i of component c at frame f, (J x 3). */
 static inline const float *segment_mean(const segment_prior *p, int32_t c, int32_t f)

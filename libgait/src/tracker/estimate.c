@@ -197,7 +197,7 @@ particle_state estimate_crowd(const gait_tracker *t, const crowd *c, int32_t bes
     if (model_pose_state(t->model, &shown, &pose) == GAIT_OK)
         memcpy(out->pose.angle, pose.angle, sizeof pose.angle);
     out->phase_r = resultant_length(s.phase[0], s.phase[1]);
-    out->mode_mass = (float)s.mass;
+    out->hypothesis_weight = (float)s.mass;
     out->speed = estimate_speed(t, &mean);
     return mean;
 }

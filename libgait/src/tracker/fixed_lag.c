@@ -93,11 +93,11 @@ static void place_joints(gait_tracker *t, const crowd *c)
 }
 
 /* What was lost stays lost; whether the modes are told apart is known better now. */
-static int32_t status_now(const gait_tracker *t, int32_t then, float mode_mass)
+static int32_t status_now(const gait_tracker *t, int32_t then, float hypothesis_weight)
 {
     if (then == GAIT_TRACK_LOST)
         return then;
-    if (mode_mass >= 0.7f && !hypotheses_open(t))
+    if (hypothesis_weight >= 0.7f && !hypotheses_open(t))
         return GAIT_TRACK_TRACKING;
     return then == GAIT_TRACK_INIT ? then : GAIT_TRACK_AMBIGUOUS;
 }
@@ -117,6 +117,6 @@ void fixed_lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
     estimate_crowd(t, &c, pf_heaviest(&weights), &e);
     e.ess = (float)pf_ess(&weights);
     e.flags = note.flags;
-    e.status = status_now(t, note.status, e.mode_mass);
+    e.status = status_now(t, note.status, e.hypothesis_weight);
     *out = e;
 }

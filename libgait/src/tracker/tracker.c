@@ -292,7 +292,7 @@ static int32_t judge(const gait_tracker *t, float dt, bool degenerate, const gai
         return GAIT_TRACK_LOST;
     if (hypotheses_acquiring(t) || !t->core->met)
         return GAIT_TRACK_INIT;
-    if (e->mode_mass < 0.7f)
+    if (e->hypothesis_weight < 0.7f)
         return seconds_since(t, t->core->start_utime) < acquire ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
     bool const open = hypotheses_open(t) || track_loss_doubts_front(t) || phase_jumps(t, dt, e);
     return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;

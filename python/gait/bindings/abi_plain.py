@@ -83,16 +83,16 @@ class Projection(IntEnum):
 
 
 class LiftFlag(IntFlag):
-    """What an estimate of a stream is worth, ``GAIT_LIFT_UNSEEN`` and so on."""
+    """What an estimate of a stream is worth, ``GAIT_LIFT_UNOBSERVED`` and so on."""
 
-    UNSEEN = 1
-    MISFIT = 2
+    UNOBSERVED = 1
+    POOR_FIT = 2
 
 
 class Error(ctypes.Structure):
     """``gait_error``."""
 
-    _fields_ = [("status", c_int32), ("index", c_int32), ("text", c_char * 120)]
+    _fields_ = [("result", c_int32), ("index", c_int32), ("text", c_char * 120)]
 
 
 class AbiField(ctypes.Structure):

@@ -30,8 +30,8 @@ class Estimate:
         Effective number of particles.
     phase_r : float
         How sure the phase is, [0, 1].
-    mode_mass : float
-        Weight of the dominant mode, [0, 1].
+    hypothesis_weight : float
+        Weight of the dominant left/right hypothesis, [0, 1].
     speed : float
         Metres per second along the ground.
     mean, sd, best : State
@@ -53,7 +53,7 @@ class Estimate:
     log_evidence: float
     ess: float
     phase_r: float
-    mode_mass: float
+    hypothesis_weight: float
     speed: float
     mean: State
     sd: State
@@ -80,7 +80,7 @@ class Estimate:
             log_evidence=c.log_evidence,
             ess=c.ess,
             phase_r=c.phase_r,
-            mode_mass=c.mode_mass,
+            hypothesis_weight=c.hypothesis_weight,
             speed=c.speed,
             mean=State.from_c(c.mean, info.components, info.angles),
             sd=State.from_c(c.sd, info.components, info.angles),

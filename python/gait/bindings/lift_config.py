@@ -36,7 +36,7 @@ class LiftConfig:
     lag: int
     max_rate: float
     max_gap: float
-    misfit: float
+    fit_threshold: float
     report: int
     cpu_mask: int
 

@@ -17,7 +17,7 @@ from gait.bindings import abi
 from gait.bindings.abi import LiftFlag, TrackStatus
 from gait.bindings.library import aligned, check, library
 from gait.bindings.lift_config import LiftConfig as LiftConfig
-from gait.bindings.model import read_blob
+from gait.bindings.model import Model, load
 from gait.errors import GaitError
 from gait.camera.camera import Camera
 
@@ -52,8 +52,8 @@ class Fit:
         log p(observations), nats, of the best heading and component.
     log10_volume : float
         log10 of posterior over prior volume of all unknowns.
-    misfit : float
-        Sum of squared residuals in deviations.
+    chi2 : float
+        Sum of squared residuals in standard deviations.
     heading, heading_sd : float
         Radians about z; 0 = along +x.
     place : ndarray of shape (3,)
@@ -67,7 +67,7 @@ class Fit:
 
     log_evidence: float
     log10_volume: float
-    misfit: float
+    chi2: float
     heading: float
     heading_sd: float
     place: Array
@@ -93,8 +93,8 @@ class LiftedFrame:
     flags : LiftFlag
     heading : float
         Radians.
-    misfit : float
-        Squared deviations per number observed.
+    chi2_per_observation : float
+        Squared standard deviations per number observed.
     markers, sd : ndarray of shape (J, 3)
         Posterior mean and standard deviation, metres, world; 0 for those not in the config's `report`.
     """
@@ -104,7 +104,7 @@ class LiftedFrame:
     status: TrackStatus
     flags: LiftFlag
     heading: float
-    misfit: float
+    chi2_per_observation: float
     markers: Array
     sd: Array
 
@@ -114,7 +114,7 @@ class Lifter:
 
     Parameters
     ----------
-    source : path or bytes, optional
+    source : Model, path or bytes, optional
         Blob with a segment prior; the model of the package if left out or None.
     view : Camera, or array_like of shape (2, 3)
         Calibrated camera, tracks in pixels; or the directions of u and v in the world of an orthographic
@@ -150,7 +150,7 @@ class Lifter:
 
     def __init__(
         self,
-        source: str | os.PathLike[str] | bytes | None = None,
+        source: Model | str | os.PathLike[str] | bytes | None = None,
         view: Camera | ArrayLike | None = None,
         config: LiftConfig | None = None,
         **settings: object,
@@ -163,29 +163,17 @@ class Lifter:
             )
         if isinstance(source, Camera) or view is None:
             raise TypeError("a view is missing; write Lifter(view=camera), or Lifter(model, camera)")
-        contents = source if isinstance(source, bytes) else read_blob(source)
-        self._blob = aligned(len(contents))
-        self._blob[:] = np.frombuffer(contents, np.uint8)
+        self._model = source._loaded if isinstance(source, Model) else load(source)
         self.config = config or LiftConfig.default()
         c, error, size = self.config.to_c(view), abi.Error(), ctypes.c_size_t()
-        blob = (self._blob.ctypes.data, len(contents))
-        lib = library()
-        check(lib.gait_lift_bytes(*blob, ctypes.byref(c), ctypes.byref(size), ctypes.byref(error)), error)
+        lib, model, err = library(), self._model.handle, ctypes.byref(error)
+        check(lib.gait_lift_bytes(model, ctypes.byref(c), ctypes.byref(size), err), error)
         self.memory_bytes = size.value
         self._memory, self._handle = aligned(size.value), ctypes.c_void_p()
-        check(
-            lib.gait_lift_init(
-                self._memory.ctypes.data,
-                size.value,
-                *blob,
-                ctypes.byref(c),
-                ctypes.byref(self._handle),
-                ctypes.byref(error),
-            ),
-            error,
-        )
+        where = (self._memory.ctypes.data, size.value)
+        check(lib.gait_lift_init(*where, model, ctypes.byref(c), ctypes.byref(self._handle), err), error)
         info = abi.LiftInfoC()
-        check(lib.gait_lift_get_info(*blob, ctypes.byref(info), ctypes.byref(error)), error)
+        check(lib.gait_lift_get_info(model, ctypes.byref(info), err), error)
         self.info = LiftInfo(**{item.name: getattr(info, item.name) for item in fields(LiftInfo)})
         markers = range(self.info.markers)
         self.names = tuple(lib.gait_lift_marker_name(self._handle, j).decode() for j in markers)
@@ -267,7 +255,7 @@ class Lifter:
     def positions(self) -> tuple[Array, Array]:
         """Give posterior mean and standard deviation (F, J, 3) of the last segment or of `fix`; metres."""
         mean, sd = np.empty((*self._shape, 3)), np.empty((*self._shape, 3))
-        status = library().gait_lift_positions(self._handle, mean.ctypes.data, sd.ctypes.data)
+        status = library().gait_lift_positions(self._handle, mean.ctypes.data, sd.ctypes.data, None)
         check(status, words=FITTED)
         return mean, sd
 
@@ -275,7 +263,7 @@ class Lifter:
         """Mean (n,) and covariance (n, n) of modes, place, stature and heading; each N(0, 1) a priori."""
         count = library().gait_lift_unknowns(self._handle)
         mean, covariance = np.empty(count), np.empty((count, count))
-        status = library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data)
+        status = library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data, None)
         check(status, words=FITTED)
         return mean, covariance
 
@@ -288,15 +276,14 @@ class Lifter:
         within 1.81.  With a camera the doubt about size and place is in the deviations as well and does not
         shrink with the motion: do not multiply by less than 1.  Takes milliseconds; none after `fix`.
         """
-        scale = float(library().gait_lift_scale(self._handle))
-        if not scale > 0:
-            check(abi.Status.STATE, words=FITTED)
-        return scale
+        scale = ctypes.c_double()
+        check(library().gait_lift_scale(self._handle, ctypes.byref(scale), None), words=FITTED)
+        return scale.value
 
     def least_squares(self) -> Array:
         """Fit the last segment's observations alone (F, J, 3): least squares of minimum norm."""
         mean = np.empty((*self._shape, 3))
-        check(library().gait_lift_least_squares(self._handle, mean.ctypes.data), words=FITTED)
+        check(library().gait_lift_least_squares(self._handle, mean.ctypes.data, None), words=FITTED)
         return mean
 
     def uncertain(self, count: int = 3) -> tuple[Array, Array]:
@@ -313,7 +300,7 @@ class Lifter:
         if not 1 <= count <= most:
             raise ValueError(f"count is {count}; give one from 1 to {most}")
         sd, modes = np.empty(count), np.empty((count, *self._shape, 3))
-        status = library().gait_lift_uncertain(self._handle, count, modes.ctypes.data, sd.ctypes.data)
+        status = library().gait_lift_uncertain(self._handle, count, modes.ctypes.data, sd.ctypes.data, None)
         check(status, words=FITTED)
         return sd, modes
 
@@ -327,7 +314,7 @@ class Lifter:
         count = len(np.asarray(uv))
         seen, _ = self._observations(uv, None, count, *self._shape)
         mean = np.empty((*seen.shape[:-1], 3))
-        status = library().gait_lift_batch(self._handle, count, seen.ctypes.data, mean.ctypes.data)
+        status = library().gait_lift_batch(self._handle, count, seen.ctypes.data, mean.ctypes.data, None)
         check(status, words=GAIN)
         return mean
 
@@ -350,7 +337,7 @@ class Lifter:
         """Estimate the frame `lag` frames before the last one pushed; None: not so many yet."""
         c = abi.LiftFrameC()
         try:
-            check(library().gait_lift_estimate(self._handle, ctypes.byref(c)))
+            check(library().gait_lift_estimate(self._handle, ctypes.byref(c), None))
         except GaitError as exc:
             if exc.status == abi.Status.STATE:
                 return None
@@ -362,7 +349,7 @@ class Lifter:
             status=TrackStatus(c.status),
             flags=LiftFlag(c.flags),
             heading=c.heading,
-            misfit=c.misfit,
+            chi2_per_observation=c.chi2_per_observation,
             markers=np.array(c.marker)[:count],
             sd=np.array(c.sd)[:count],
         )

@@ -26,6 +26,42 @@ NOT_CYCLIC = "holds no cyclic model; learn it without --segments only"
 
 
 @dataclass(frozen=True)
+class LoadedModel:
+    """A ``gait_model`` and the memory that it lies in."""
+
+    handle: ctypes.c_void_p
+    blob: NDArray[np.uint8]
+    memory: NDArray[np.uint8]
+
+
+def load(source: str | os.PathLike[str] | bytes | None) -> LoadedModel:
+    """Check and take in a blob: a file, its contents, or the package's own (None).
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read or is refused.
+    GaitError
+        If a blob given as bytes is refused.
+    """
+    contents = source if isinstance(source, bytes) else read_blob(source)
+    lib = library()
+    blob = aligned(len(contents))
+    blob[:] = np.frombuffer(contents, np.uint8)
+    size, error, handle = ctypes.c_size_t(), abi.Error(), ctypes.c_void_p()
+    where, err = (blob.ctypes.data, len(contents)), ctypes.byref(error)
+    try:
+        check(lib.gait_model_bytes(*where, ctypes.byref(size), err), error)
+        memory = aligned(size.value)
+        check(lib.gait_model_init(memory.ctypes.data, size.value, *where, ctypes.byref(handle), err), error)
+    except GaitError as exc:
+        if isinstance(source, bytes):
+            raise
+        raise UserError(f"{source or 'walk.gait'}: {exc.text}; copy or learn it again") from exc
+    return LoadedModel(handle, blob, memory)
+
+
+@dataclass(frozen=True)
 class ModelInfo:
     """What a model holds.
 
@@ -45,6 +81,10 @@ class ModelInfo:
         Strides per second: mean of the training set, and standard deviation between subjects.
     stride_length, stride_length_sd : float
         Fractions of stature, likewise.
+    cyclic : int
+        1, or 0 for a blob that holds a segment prior alone.
+    posture_angles : int
+        Bit i: angle i is of trunk or arms, whose posture differs most between people.
     digest : int
         Hash of the blob.
     """
@@ -59,6 +99,8 @@ class ModelInfo:
     stride_hz_sd: float
     stride_length: float
     stride_length_sd: float
+    cyclic: int
+    posture_angles: int
     digest: int
 
 
@@ -85,32 +127,13 @@ class Model:
 
     def __init__(self, source: str | os.PathLike[str] | bytes | None = None) -> None:
         self._lib = library()
-        if isinstance(source, bytes):
-            self._load(source)
-            return
-        contents = read_blob(source)
-        try:
-            self._load(contents)
-        except GaitError as exc:
-            if {"SGNM", "CURV"} & set(decode(contents)) == {"SGNM"}:
-                raise UserError(f"{source}: {NOT_CYCLIC}") from exc
-            raise UserError(f"{source or 'walk.gait'}: {exc.text}; copy or learn it again") from exc
-
-    def _load(self, blob: bytes) -> None:
-        """Check and take in a blob."""
-        self._blob = aligned(len(blob))
-        self._blob[:] = np.frombuffer(blob, np.uint8)
-        size, error, handle = ctypes.c_size_t(), abi.Error(), ctypes.c_void_p()
-        where = (self._blob.ctypes.data, len(blob))
-        check(self._lib.gait_model_bytes(*where, ctypes.byref(size), ctypes.byref(error)), error)
-        self._memory = aligned(size.value)
-        status = self._lib.gait_model_init(
-            self._memory.ctypes.data, size.value, *where, ctypes.byref(handle), ctypes.byref(error)
-        )
-        check(status, error)
-        self.handle = handle
-        self.info = self._read_info()
-        names, info = self._lib, self.info
+        name = "the blob" if isinstance(source, bytes) else str(source or "walk.gait")
+        self._loaded = load(source)
+        self.handle = self._loaded.handle
+        self.info = info = self._read_info()
+        if not info.cyclic:
+            raise UserError(f"{name}: {NOT_CYCLIC}")
+        names, handle = self._lib, self.handle
         self.joint_names = tuple(names.gait_model_joint_name(handle, i).decode() for i in range(info.joints))
         self.angle_names = tuple(names.gait_model_angle_name(handle, i).decode() for i in range(info.angles))
         self.limb_names = tuple(names.gait_model_limb_name(handle, i).decode() for i in range(info.limbs))
@@ -120,22 +143,30 @@ class Model:
 
     def pose(self, state: State) -> tuple[Array, Array]:
         """Joint positions (P, 3) in the world, metres, and joint angles (A,), radians, of one hypothesis."""
-        c = abi.PoseC()
-        check(self._lib.gait_model_pose(self.handle, ctypes.byref(state.to_c()), ctypes.byref(c)))
+        c, error = abi.PoseC(), abi.Error()
+        where = (ctypes.byref(state.to_c()), ctypes.byref(c), ctypes.byref(error))
+        check(self._lib.gait_model_pose(self.handle, *where), error)
         return pose_arrays(c, self.info.joints, self.info.angles)
 
     def pelvis_height(self, state: State) -> float:
         """Height of the pelvis over the ground that the model predicts, metres (for any ``state.pelvis``)."""
-        height = ctypes.c_float()
-        check(
-            self._lib.gait_model_pelvis_height(self.handle, ctypes.byref(state.to_c()), ctypes.byref(height))
-        )
+        height, error = ctypes.c_float(), abi.Error()
+        where = (ctypes.byref(state.to_c()), ctypes.byref(height), ctypes.byref(error))
+        check(self._lib.gait_model_pelvis_height(self.handle, *where), error)
         return height.value
+
+    def angle_mask(self, names: str) -> int:
+        """Bit i for each angle i named in `names`, separated by spaces; for ``TrackerConfig.offset_angles``."""
+        mask, error = ctypes.c_uint32(), abi.Error()
+        where = (names.encode(), ctypes.byref(mask), ctypes.byref(error))
+        check(self._lib.gait_model_angle_mask(self.handle, *where), error)
+        return mask.value
 
     def prior(self) -> tuple[State, State]:
         """Mean and standard deviation of a walker of whom nothing is known, with the pelvis at the origin."""
-        mean, sd = abi.StateC(), abi.StateC()
-        check(self._lib.gait_tracker_prior(self.handle, ctypes.byref(mean), ctypes.byref(sd)))
+        mean, sd, error = abi.StateC(), abi.StateC(), abi.Error()
+        where = (ctypes.byref(mean), ctypes.byref(sd), ctypes.byref(error))
+        check(self._lib.gait_tracker_prior(self.handle, *where), error)
         sizes = (self.info.components, self.info.angles)
         return State.from_c(mean, *sizes), State.from_c(sd, *sizes)
 
@@ -143,15 +174,14 @@ class Model:
         """Draw a hypothesis through an ideal lens: (height, width) of limb index + 1, or 0 for none."""
         ids = np.zeros((camera.height, camera.width), np.uint8)
         pixels = ids.ctypes.data_as(ctypes.POINTER(ctypes.c_uint8))
-        view, walker = camera_c(camera), state.to_c()
-        check(
-            self._lib.gait_render(self.handle, ctypes.byref(view), ctypes.byref(walker), pixels, camera.width)
-        )
+        view, error = camera_c(camera), abi.Error()
+        drawn = (ctypes.byref(view), ctypes.byref(state.to_c()), pixels, camera.width, ctypes.byref(error))
+        check(self._lib.gait_render(self.handle, *drawn), error)
         return ids
 
     def _read_info(self) -> ModelInfo:
         c = abi.ModelInfoC()
-        check(self._lib.gait_model_get_info(self.handle, ctypes.byref(c)))
+        check(self._lib.gait_model_get_info(self.handle, ctypes.byref(c), None))
         return ModelInfo(**{name: getattr(c, name) for name, *_ in c._fields_ if name != "reserved"})
 
 

@@ -231,7 +231,7 @@ def estimate_of(message: Any) -> Estimate:
         log_evidence=message.log_evidence,
         ess=message.ess,
         phase_r=message.phase_r,
-        mode_mass=message.mode_mass,
+        hypothesis_weight=message.mode_mass,
         speed=message.speed,
         mean=state_of(message.mean),
         sd=state_of(message.sd),

@@ -96,7 +96,7 @@ class Tracker:
         if plate is not None:
             plate = np.array(plate, order="C")
             view = ctypes.byref(image_view(plate, self.cameras[camera], "background"))
-        check(self._lib.gait_tracker_set_background(self._handle, camera, view))
+        check(self._lib.gait_tracker_set_background(self._handle, camera, view, ctypes.byref(self._error)), self._error)
         if plate is None:
             self._plates.pop(camera, None)
         else:
@@ -213,11 +213,12 @@ class Tracker:
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
-        count = check(self._lib.gait_tracker_particles(self._handle, None, None, 0))
+        err = ctypes.byref(self._error)
+        count = check(self._lib.gait_tracker_particles(self._handle, None, None, 0, err), self._error)
         states = (abi.StateC * count)()
         weights = np.zeros(count, np.float32)
         pointer = weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float))
-        check(self._lib.gait_tracker_particles(self._handle, states, pointer, count))
+        check(self._lib.gait_tracker_particles(self._handle, states, pointer, count, err), self._error)
         return np.ctypeslib.as_array(states), weights
 
     def digest(self) -> int:
@@ -230,9 +231,9 @@ class Tracker:
         Empty scenes are not in it: give the other tracker its own (`set_background`).
         """
         size = ctypes.c_size_t()
-        check(self._lib.gait_tracker_save(self._handle, None, 0, ctypes.byref(size)))
+        check(self._lib.gait_tracker_save(self._handle, None, 0, ctypes.byref(size), None))
         room = aligned(size.value)
-        check(self._lib.gait_tracker_save(self._handle, room.ctypes.data, size.value, ctypes.byref(size)))
+        check(self._lib.gait_tracker_save(self._handle, room.ctypes.data, size.value, ctypes.byref(size), None))
         return room[: size.value].tobytes()
 
     def restore(self, snapshot: bytes) -> None:

@@ -1,0 +1,8 @@
+/* check.h - argument checks that several public functions share. */
+#ifndef GAIT_API_CHECK_H
+#define GAIT_API_CHECK_H
+#include "base/base.h"
+
+/* A camera that can be projected with; `index` is its number in errors, -1: the only one. */
+gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err);
+#endif
