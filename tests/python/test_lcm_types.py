@@ -182,7 +182,7 @@ def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
             theirs.status,
             theirs.flags,
         )
-        for name in ("joints", "joint_sd", "angles", "ess", "phase_r", "mode_mass", "speed", "log_evidence"):
+        for name in ("joints", "joint_sd", "angles", "ess", "phase_r", "speed", "log_evidence"):
             np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), name)
         assert ours.joint_names == theirs.joint_names
         for part in ("mean", "sd", "best"):

@@ -38,7 +38,8 @@ def coasting(mode, count):
         noise["turn_time"] = 0.2  # so that turn rates change in the few steps looked at
     changes = {"particles": 8000, "resample_ess": 0.0, "settle_time": 0.15} | noise
     config = TrackerConfig.default(mode, proportions=-1 if mode is Mode.DEFAULT else 0, **changes)
-    tracker, moves = Tracker(MODEL, camera(), config, tasks=2), Transitions(CURVES, config)
+    tracker = Tracker(MODEL, camera(), config, tasks=2)
+    moves = Transitions(CURVES, tracker.config)
     mean = state_at(MODEL, SECTIONS, 0.0)
     sd = State(phase=0.1, stride_hz=0.1, stature=0.05, heading=0.2, pitch=0.03, roll=0.03)
     sd.pelvis, sd.coef, sd.offset = np.full(3, 0.05), np.ones(MODEL.info.components), np.full(24, 0.05)
@@ -165,7 +166,7 @@ def test_a_new_start_begins_motions_of_its_own():
 def test_the_spool_gives_back_what_it_took_and_knows_the_starts():
     config = TrackerConfig.default(particles=64)
     tracker = Tracker(MODEL, camera(), config)
-    moves, kept = Transitions(CURVES, config), []
+    moves, kept = Transitions(CURVES, tracker.config), []
     with Spool(moves) as spool:
         for begin in (0, 40):
             tracker.start(state_at(MODEL, SECTIONS, 0.0), State(), 33333 * begin)
@@ -189,7 +190,7 @@ def test_who_becomes_ambiguous_has_settled_all_the_same():
     tracker = Tracker(MODEL, camera(), config)
     tracker.start(state_at(MODEL, SECTIONS, 0.0), State(), 0)
     said = [TrackStatus.AMBIGUOUS] * 2 + [TrackStatus.TRACKING] * 40 + [TrackStatus.AMBIGUOUS] * 5
-    with Spool(Transitions(CURVES, config)) as spool:
+    with Spool(Transitions(CURVES, tracker.config)) as spool:
         for i, status in enumerate([*said, TrackStatus.INIT, TrackStatus.AMBIGUOUS, TrackStatus.TRACKING]):
             spool.add(tracker, replace(tracker.step(None, 33333 * i), status=status))
         told = [spool.step_to(i).settling for i in range(1, len(spool))]

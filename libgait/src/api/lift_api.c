@@ -98,6 +98,34 @@ static void describe_fit(const gait_lift *l, const lift_outcome *found, gait_lif
 {
     const lift_table *const t = &l->table;
     const segment_posterior *const b = &l->posterior;
+    double const log_10 = 2.30258509299404568402;
+    *out = (gait_lift_fit){.log_evidence = lift_evidence(t, b),
+                           .log10_volume = -cholesky_log_det(b->U, t->n, t->ld) / log_10,
+                           .chi2 = lift_chi2(t, b),
+                           .heading = lift_heading(t, b),
+                           .share = found->share,
+                           .component = b->component,
+                           .observed = b->observed,
+                           .iterations = found->iterations,
+                           .converged = found->converged};
+    if (t->turn >= 0) /* the last unknown: its variance is that of the last pivot */
+        out->heading_sd = b->turn_sd / b->U[t->turn * (t->ld + 1)];
+    for (int32_t i = 0; i < 3; i++)
+        out->place[i] = b->place[i] + t->cfg.place_sd[i] * b->theta[t->prior.modes + i];
+}
+
+gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
+                              gait_error *err)
+{
+    if (!l || !uv || !out)
+        return base_null(err, "gait_lift_segment");
+    const lift_table *const t = &l->table;
+    lift_outcome found;
+    lifter_take(l, points_of(t), uv, sd, l->uv, l->sd);
+    memcpy(l->posterior.place, t->cfg.place, sizeof t->cfg.place);
+    l->fitted = l->windowed = lift_fit(t, &l->search, &l->window, &l->posterior, &found);
+    if (!l->fitted)
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: observations out of any range");
     describe_fit(l, &found, out);
     return GAIT_OK;
 }

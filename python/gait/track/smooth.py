@@ -354,7 +354,7 @@ def smoothed(
         status=_status(then.status, mass),
         ess=float(len(states)),
         phase_r=phase_r,
-        mode_mass=mass,
+        hypothesis_weight=mass,
         speed=then.speed * _pace(then.mean, mean),
         mean=mean,
         sd=sd,

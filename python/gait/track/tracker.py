@@ -72,6 +72,8 @@ class Tracker:
         self.model = model
         self.cameras = _camera_list(cameras)
         self._tasks, config = _task_source(tasks), config or TrackerConfig.default()
+        if config.offset_angles < 0:
+            config = replace(config, offset_angles=model.info.posture_angles)
         self.config = replace(config, tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
         self._error = abi.Error()
         c = self._c_config()

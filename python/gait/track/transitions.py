@@ -63,7 +63,7 @@ class Transitions:
     ----------
     curves : ModelCurves
     config : TrackerConfig
-        Of the tracker, with its components resolved or -1.
+        Of the tracker (`gait.Tracker.config`): `offset_angles` is a mask, not -1.
     """
 
     def __init__(self, curves: ModelCurves, config: TrackerConfig) -> None:
