@@ -32,7 +32,8 @@ DOC = ROOT / "libgait/doc"
 BIN = ROOT / ".venv/bin"
 SHORT = ["--frames", "48", "--fps", "15", "--size", "480x360", "--quiet"]
 FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
-PAGES = [ROOT / "README.md", *sorted(DOC.rglob("*.md"))]
+RUN = [ROOT / "README.md", *sorted(DOC.rglob("*.md"))]
+PAGES = [*RUN, ROOT / ".github/CONTRIBUTING.md"]  # the last has tests of its own
 ENV = {k: v for k, v in os.environ.items() if not k.startswith("MAKE")}
 # The README's lines of C stand among declarations that their names speak for.
 AMONG = """#include <gait.h>
@@ -57,6 +58,7 @@ class Block:
     language: str
     text: str
     file: str = ""
+    edit: str = ""
     skip: str = ""
 
     @property
@@ -165,7 +167,7 @@ def stand_in(clip, folder):
     (folder / "points.csv").write_text("\n".join(["u,v,x,y", *rows, ""]))
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if ALL[p]], ids=lambda p: p.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize("page", [p for p in RUN if ALL[p]], ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_the_blocks_of_a_page_work(page, folder, clip, installed):
     todo = ALL[page]
     if any("pkg-config" in block.text for block in todo) and not shutil.which("pkg-config"):
@@ -190,7 +192,7 @@ COMMANDS_SHOWN = sorted({c for page in PAGES for block in ALL[page] for c in blo
 @pytest.mark.parametrize("command", [c for c in COMMANDS_SHOWN if c.startswith("make ")])
 def test_make_targets_exist(command):
     shown = run("make", "help", cwd=ROOT).stdout
-    targets = [word for word in command.split()[1:] if "=" not in word]
+    targets = [word for word in command.split("&&")[0].split()[1:] if not re.search("[=/]", word)]
     assert [t for t in targets if f" {t} " not in shown] == []
 
 
@@ -243,6 +245,18 @@ def test_options_named_in_the_text_exist():
         options = [o for words in quoted for o in re.findall(r"(?<![\w-])--[a-z][\w-]*", words)]
         unknown += [(page.name, o) for o in options if o not in known]
     assert unknown == []
+
+
+def test_files_named_in_the_text_exist():
+    """Paths from the top of the repository, and test programs."""
+    missing = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        made = {block.file for block in ALL[page]}
+        names = re.findall(r"`((?:libgait|python|tests|tools|lcm_types|\.github)/[\w./-]*\w)`", text)
+        names += [f"tests/unit/{name}.c" for name in re.findall(r"build/release/unit/(test_\w+)", text)]
+        missing += [(page.name, name) for name in names if name not in made and not (ROOT / name).exists()]
+    assert missing == []
 
 
 def test_every_command_has_a_place_in_the_docs():
