@@ -1,4 +1,4 @@
-"""The C example tracks a drawn person, built with the flags of pkg-config, and for another CPU under emulation."""
+"""The C example tracks a drawn person: built with pkg-config, and for another CPU under emulation."""
 
 import csv
 import os
