@@ -1,4 +1,4 @@
-/* base.h - what every module may use: assertions, min/max, constants, error reporting. */
+/* base.h - what every file may use: assertions, min/max, constants, error reporting. */
 #ifndef GAIT_BASE_BASE_H
 #define GAIT_BASE_BASE_H
 #include "gait.h"
@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* Checks that cost nothing in a release: callers above api.c are trusted. */
+/* Checks that cost nothing in a release build. Arguments from outside are checked in api/ instead. */
 #ifdef NDEBUG
 #define GAIT_ASSERT(x) ((void)0)
 #else
@@ -23,7 +23,7 @@ _Static_assert(CHAR_BIT == 8 && sizeof(float) == 4 && sizeof(double) == 8, "IEEE
 _Static_assert(FLT_RADIX == 2 && FLT_MANT_DIG == 24 && DBL_MANT_DIG == 53, "IEEE 754 binary32 and binary64");
 _Static_assert(FLT_EVAL_METHOD == 0, "excess precision breaks determinism");
 
-/* Branch-free in a loop over lanes.  A NaN in the first argument gives the second. */
+/* Branch-free in a loop over lanes. If the first argument is NaN the result is the second. */
 static inline float f_min(float a, float b)
 {
     return a < b ? a : b;
@@ -34,7 +34,7 @@ static inline float f_max(float a, float b)
     return a > b ? a : b;
 }
 
-/* NaN gives lo, so a clamped value is always safe to convert to an integer. */
+/* NaN gives lo, so that a clamped value is always safe to convert to an integer. */
 static inline float f_clamp(float x, float lo, float hi)
 {
     return f_min(f_max(x, lo), hi);
@@ -55,7 +55,7 @@ static inline int32_t i_clamp(int32_t x, int32_t lo, int32_t hi)
     return i_min(i_max(x, lo), hi);
 }
 
-/* Every one of n floats is finite. */
+/* True if all n floats are finite. */
 static inline bool f_finite(const float *x, size_t n)
 {
     bool ok = true;
@@ -64,7 +64,7 @@ static inline bool f_finite(const float *x, size_t n)
     return ok;
 }
 
-/* Fill err (may be NULL) with status, index and one formatted line; returns s. */
+/* Fill err (may be NULL) with the result code, an index and one formatted line. Returns s. */
 #if defined(__GNUC__)
 __attribute__((format(printf, 4, 5)))
 #endif

@@ -3,7 +3,7 @@
 #include "base/fmath.h"
 #include "base/simd_f64.h"
 
-/* Sum of u[j] v[j], j < count, a multiple of CHOLESKY_LANES, in so many chains. */
+/* Sum of u[j] v[j] over j < count, a multiple of CHOLESKY_LANES, in as many independent chains. */
 static double dot(const double *u, const double *v, int32_t count)
 {
     simd_f64 sum[CHOLESKY_LANES / SIMD_F64] = {{0.0}};
@@ -34,7 +34,7 @@ void cholesky_backward(const double *A, int32_t n, int32_t ld, double *v)
         int32_t const last = first + CHOLESKY_LANES;
         const double *const rows = A + (size_t)first * (size_t)ld;
         double inverse[CHOLESKY_LANES];
-        for (int32_t i = first; i < i_min(last, n); i++) { /* what the blocks behind have settled */
+        for (int32_t i = first; i < i_min(last, n); i++) { /* subtract the part of the solved blocks */
             const double *const u = A + (size_t)i * (size_t)ld;
             inverse[i - first] = 1.0 / u[i];
             v[i] -= dot(u + last, v + last, ld - last);
@@ -62,7 +62,7 @@ double cholesky_log_det(const double *A, int32_t n, int32_t ld)
     return sum;
 }
 
-/* Turn rows p and q of M by (c, s). */
+/* Rotate rows p and q of M by (c, s). */
 static void turn(double *M, int32_t n, int32_t ld, int32_t p, int32_t q, double c, double s)
 {
     double *const a = M + (size_t)p * (size_t)ld, *const b = M + (size_t)q * (size_t)ld;
@@ -73,7 +73,7 @@ static void turn(double *M, int32_t n, int32_t ld, int32_t p, int32_t q, double 
     }
 }
 
-/* Make S[p][q] zero (Jacobi; Golub and Van Loan, section 8.5); false if it is within `tiny` of it. */
+/* Make S[p][q] zero (Jacobi; Golub and Van Loan, section 8.5). False if it is already within `tiny` of zero. */
 static bool annihilate(double *S, double *V, int32_t n, int32_t ld, int32_t p, int32_t q, double tiny)
 {
     double const off = S[p * ld + q], dp = S[p * ld + p], dq = S[q * ld + q];
@@ -94,7 +94,7 @@ static bool annihilate(double *S, double *V, int32_t n, int32_t ld, int32_t p, i
     return true;
 }
 
-/* Exchange the pairs i and j. */
+/* Swap the eigenpairs i and j. */
 static void mirror(double *S, double *V, int32_t n, int32_t ld, int32_t i, int32_t j)
 {
     double const s = S[i * ld + i];

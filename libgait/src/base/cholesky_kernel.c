@@ -1,5 +1,5 @@
-/* Inner loops of normal equations: each element is a sum in the order of the rows, so that lanes change
- * nothing.  Blocks of eight rows stay in registers while the others go by. */
+/* Inner loops of normal equations. Each element is a sum in the order of the rows, so that the number of
+ * lanes does not change the result. Blocks of eight rows stay in registers while the other rows are read. */
 #include "base/cholesky.h"
 #include "base/simd_f64.h"
 
@@ -41,7 +41,8 @@ void KERNEL(cholesky_forward_float)(const double *U, int32_t n, int32_t ld, floa
         update_float(V, V, width, i, 0, width, -1.0f, T, ld, V, width, i, T + i * (ld + 1));
 }
 
-/* Factor a block on the diagonal, the first n of its rows: first as L D L', whose pivots wait for no root. */
+/* Factor the first n rows of a block on the diagonal: first as L D L', so that the pivots do not wait for
+ * square roots. */
 static bool factor_corner(double *A, int32_t ld, int32_t n)
 {
     for (int32_t i = 0; i < n; i++) {
@@ -53,7 +54,7 @@ static bool factor_corner(double *A, int32_t ld, int32_t n)
             double const part = row[k] * inverse;
             double *const to = A + k * ld;
             _Pragma("GCC unroll 8") for (int32_t j = 0; j < ROWS;
-                                         j += SIMD_F64) /* left of k they mean nothing */
+                                         j += SIMD_F64) /* columns left of k are undefined */
                 simd_f64_store(to + j, simd_f64_load(to + j) - part * simd_f64_load(row + j));
         }
     }

@@ -1,8 +1,8 @@
-/* cholesky_update.h - what factoring and forward substitution spend their time in; included once for each type
- * of NUMBER: SIMD_F64S as many as a register holds, UPDATE the function's name. */
+/* cholesky_update.h - the inner loop of factoring and forward substitution. Included once for each type:
+ * NUMBER is the element, SIMD_F64S the register, UPDATE the name of the function. */
 
-/* Columns [first, last) of rows i to i + 7: C = B + sign F'W, `count` rows of both one after the other; then,
- * with a block T on the diagonal of F, T^-T of that. */
+/* Columns [first, last) of rows i to i + 7: C = B + sign F'W, where F and W have `count` rows. If T, a block
+ * on the diagonal of F, is given, the result is multiplied by T^-T. */
 static void UPDATE(const NUMBER *B, NUMBER *C, int32_t ldc, int32_t i, int32_t first, int32_t last,
                    NUMBER sign, const NUMBER *F, int32_t ldf, const NUMBER *W, int32_t ldw, int32_t count,
                    const NUMBER *T)
@@ -24,7 +24,9 @@ static void UPDATE(const NUMBER *B, NUMBER *C, int32_t ldc, int32_t i, int32_t f
             EACH_ROW(k) a[k] += f[k] * x;
         }
         EACH_ROW(k) a[k] *= sign;
-        __asm__("" : "+m"(corner)); /* else all of it is widened first, and through memory again */
+        __asm__(
+            ""
+            : "+m"(corner)); /* otherwise the compiler widens all of it first and reads it back from memory */
         if (T)
             EACH_ROW(p)
             {

@@ -8,7 +8,7 @@ bool cpu_mask_valid(uint32_t mask)
 #if defined(__x86_64__)
 #include <cpuid.h>
 
-/* Register state that the operating system saves: bit 1 SSE, 2 AVX, 5..7 AVX-512. */
+/* Register state that the operating system saves: bit 1 SSE, bit 2 AVX, bits 5 to 7 AVX-512. */
 static uint32_t saved_state(void)
 {
     uint32_t low, high;

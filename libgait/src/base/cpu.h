@@ -1,4 +1,4 @@
-/* cpu.h - what this CPU can do. */
+/* cpu.h - instruction sets that this CPU supports. */
 #ifndef GAIT_BASE_CPU_H
 #define GAIT_BASE_CPU_H
 #include "base/base.h"
@@ -6,6 +6,6 @@
 /* GAIT_CPU_* bits that this CPU and its operating system support, for the instruction sets of this build. */
 uint32_t cpu_features(void);
 
-/* A config's cpu_mask: all bits, or only those of GAIT_CPU_*. */
+/* True if a config's cpu_mask has all bits set, or only those of GAIT_CPU_*. */
 bool cpu_mask_valid(uint32_t mask);
 #endif

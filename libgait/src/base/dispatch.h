@@ -1,18 +1,20 @@
-/* dispatch.h - inner loops compiled once per instruction set (ISA); a tracker chooses one when it is made.
+/* dispatch.h - inner loops (kernels) compiled once per instruction set (ISA). An object chooses its ISA when
+ * it is initialised.
  *
- * A kernel is a plain C function in a file NAME_kernel.c, written KERNEL(name) and listed in KERNELS below.
- * The Makefile compiles the file for each ISA; `scalar`, without any vector code, is the definition, and the
- * others must give the same bits: + - * / and square roots per element, sums of integers, and sums of floats
- * only in an order that the source fixes.  A kernel file has no external names but its kernels. */
+ * A kernel is a plain C function KERNEL(name) in a file NAME_kernel.c, listed in KERNELS below. The Makefile
+ * compiles the file once for each ISA. The `scalar` version, without any vector code, defines the result.
+ * The others must give the same bits, so a kernel uses only + - * / and square roots per element, sums of
+ * integers, and sums of floats in an order that the source fixes. A kernel file has no external names but
+ * its kernels. The tables of all kernels are in api/kernels.c. */
 #ifndef GAIT_BASE_DISPATCH_H
 #define GAIT_BASE_DISPATCH_H
 #include "base/base.h"
 
-enum { BLOCK = 16 }; /* bodies that a kernel works on at once, one a lane */
+enum { BLOCK = 16 }; /* bodies or particles that a kernel works on at once, one per lane */
 
 typedef float body_lanes[BLOCK];
 
-/* Types of higher layers, which a kernel's own file includes. */
+/* Types of higher folders, which the file of a kernel includes. */
 struct dynamics_step;
 struct edge_cell;
 struct edge_rows;
@@ -37,14 +39,14 @@ struct particle_block;
 
 /* Result, name, parameters. */
 #define KERNELS(K)                                                                                           \
-    /* Upper triangle of A += W'W, A and W of ld columns (dense.h) */                                        \
+    /* Upper triangle of A += W'W, A and W of ld columns (base/cholesky.h) */                                \
     K(void, cholesky_rank, (double *A, int32_t ld, const double *W, int32_t rows))                           \
-    /* A = U'U, n rows, U may be A; A[.][n]: b -> U^-T b, y'y -> what theta leaves; false: not definite */   \
+    /* A = U'U, n rows, U may be A; column n becomes U^-T b and the residual; false: not definite */         \
     K(bool, cholesky_factor, (const double *A, double *U, int32_t n, int32_t ld))                            \
-    /* Z = U^-T Z, `width` columns (a multiple of CHOLESKY_LANES), cholesky_padded(n) rows of ldz numbers */ \
+    /* Z = U^-T Z, `width` columns (a multiple of CHOLESKY_LANES), cholesky_padded(n) rows of ldz */         \
     K(void, cholesky_forward,                                                                                \
       (const double *U, int32_t n, int32_t ld, double *Z, int32_t ldz, int32_t width))                       \
-    /* V = U^-T V with floats, ld x width (of CHOLESKY_FLOATS); past V lies room for ld x ld more */         \
+    /* V = U^-T V with floats, ld x width (of CHOLESKY_FLOATS), followed by ld x ld floats of scratch */     \
     K(void, cholesky_forward_float, (const double *U, int32_t n, int32_t ld, float *V, int32_t width))       \
     /* x[j] += sum_i theta[i] mode[i * stride + j], j < width */                                             \
     K(void, lift_sum,                                                                                        \
@@ -64,15 +66,15 @@ struct particle_block;
       (float *v, size_t stride, size_t apart, const double *shape, int32_t modes, double M[9][8]))           \
     /* x[j] += sum_i Z[i * stride + j]^2, j < width, of CHOLESKY_LANES */                                    \
     K(void, lift_squares, (double *x, int32_t width, const float *Z, size_t stride, int32_t rows))           \
-    /* Every channel at each lane's phase with the first `components` scores: eq. 3 of Ormoneit et al. */    \
+    /* Every channel at each lane's phase from the first `components` scores (Ormoneit et al., eq. 3). */    \
     K(void, kin_curves,                                                                                      \
       (const struct gait_model *m, const struct kin_input *in, int32_t components,                           \
        struct kin_channels *out))                                                                            \
-    /* Every frame in the world; `proportions` scores of the limbs' lengths are in use. */                   \
+    /* Every frame in the world; the first `proportions` scores of limb lengths apply. */                    \
     K(void, kin_pose,                                                                                        \
       (const struct gait_model *m, const struct kin_channels *ch, const struct kin_input *in,                \
        int32_t proportions, struct kin_body *out))                                                           \
-    /* A captured frame in the region's working image, and its maps. */                                      \
+    /* A captured frame resampled to the working image, and its feature maps. */                             \
     K(void, view_rows,                                                                                       \
       (const struct view_map *map, const gait_camera *cam, const gait_image *im, int32_t begin, int32_t end, \
        const struct view_planes *out))                                                                       \
@@ -83,7 +85,7 @@ struct particle_block;
     K(void, features_edges, (const uint8_t *grey, struct edge_cell *out, struct edge_rows *s))               \
     K(void, features_contrast, (const uint8_t *grey, int8_t *out))                                           \
     K(void, features_pairs, (const int8_t *surface, uint16_t *pairs))                                        \
-    /* A block of particles over one interval, and their weights. */                                         \
+    /* A block of particles over one interval. */                                                            \
     K(void, dynamics_move,                                                                                   \
       (const struct dynamics_step *s, int32_t first, const struct particle_block *from,                      \
        struct particle_block *to))                                                                           \
@@ -99,20 +101,20 @@ struct particle_block;
     K(void, estimate_rotations,                                                                              \
       (const float *heading, const float *pitch, const float *roll, const double *weight,                    \
        const uint8_t *use, int32_t n, double out[16]))                                                       \
-    /* log(exp(a[i]) + exp(b + part[i])) into part */                                                        \
+    /* part[i] = log(exp(a[i]) + exp(b + part[i])) */                                                        \
     K(void, track_loss_join, (const float *a, float b, int32_t n, float *part))                              \
-    /* The limbs of a block of bodies in one camera's working image. */                                      \
+    /* Outlines of the limbs of a block of bodies in one camera's working image. */                          \
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \
        const gait_camera *cam, const struct view_map *map, struct outline_block *out))                       \
-    /* The same as edges in the grid, with their depth order; then one of these bodies as masks. */          \
+    /* Outlines as lines in the grid, with the depth order of the limbs; then masks of one body. */          \
     K(void, layers_prepare,                                                                                  \
       (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
        struct layers_block *out))                                                                            \
     K(void, layers_draw, (const struct layers_block *block, int32_t lane, struct layers *out))               \
     K(void, silhouette_count,                                                                                \
       (const struct features *f, const struct grid_mask *whole, int32_t *area, int32_t *covered))            \
-    /* The limbs of a block before a camera, what one body's surface shows, and how that compares. */        \
+    /* Surface points of a block of bodies in a camera, samples of one body, and their comparison. */        \
     K(void, surface_pose,                                                                                    \
       (const struct like_setup *s, const gait_camera *cam, const struct view_map *map,                       \
        const struct kin_body *body, struct like_pose *out))                                                  \
@@ -124,13 +126,13 @@ struct particle_block;
       (const struct like_setup *s, const struct outline_block *outline, const int32_t (*cost)[16],           \
        float *restrict log))                                                                                 \
     K(int64_t, template_cost, (const struct like_body *b))                                                   \
-    /* The sides of a block's limbs, and the edges along one body's. */                                      \
+    /* Sides of the limbs of a block of bodies, and the gradient along those of one body. */                 \
     K(void, edges_prepare,                                                                                   \
       (const struct outline_block *outline, const struct limb_geometry *limbs, int32_t count,                \
        struct like_outline *out))                                                                            \
     K(void, edges_count, (const struct like_body *b, struct like_edge_tally *out))
 
-/* Those of this build, best last, with the bit that a CPU mask must have. */
+/* The instruction sets of this build, best last, each with the bit that a CPU mask must have. */
 #if defined(__x86_64__)
 #define KERNEL_ISAS(S) S(scalar, 0) S(base, GAIT_CPU_BASE) S(avx2, GAIT_CPU_AVX2) S(avx512, GAIT_CPU_AVX512)
 #else
@@ -143,7 +145,7 @@ typedef struct kernels {
     KERNELS(KERNEL_MEMBER)
 } kernels;
 
-/* Before a loop whose passes do not depend on one another, where the compiler cannot see that. */
+/* Put before a loop whose iterations do not depend on each other where the compiler cannot see that. */
 #if defined(KERNEL_SCALAR)
 #define KERNEL_LANES
 #elif defined(__clang__)
@@ -154,8 +156,8 @@ typedef struct kernels {
 #define KERNEL_LANES
 #endif
 
-#ifdef KERNEL_ISA /* in a kernel's file: what it is being compiled for */
-/* A loop over one row, kept apart from the loops about it: of some nests compilers make no vector code. */
+#ifdef KERNEL_ISA /* in a kernel file: the ISA that it is compiled for */
+/* A loop over one row, kept out of the enclosing loops: compilers do not vectorise some nested loops. */
 #define KERNEL_ROW                                 static __attribute__((noinline))
 #define KERNEL_JOIN(name, isa)                     name##_##isa
 #define KERNEL_NAME(name, isa)                     KERNEL_JOIN(name, isa)

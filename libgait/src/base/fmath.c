@@ -10,7 +10,7 @@ static double from_bits64(uint64_t u)
     return x;
 }
 
-enum { SIMD16 = 16 }; /* divisions that do not wait for one another */
+enum { SIMD16 = 16 }; /* independent divisions */
 
 static void exp_lanes(const double *restrict x, double *restrict out)
 {

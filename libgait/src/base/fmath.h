@@ -1,7 +1,7 @@
-/* fmath.h - float functions with the same bits on every compiler and CPU: polynomials after Moshier's Cephes,
- * IEEE + - * / and sqrt only, no table, no branch (a loop over lanes vectorises), no undefined conversion.
- * Needs round to nearest, -ffp-contract=off and no -ffast-math.  Errors are the measured maxima of
- * tests/unit/test_fmath.c against double libm. */
+/* fmath.h - float functions that give the same bits with every compiler and CPU: polynomials after Moshier's
+ * Cephes, only IEEE + - * / and sqrt, no tables, no branches (so that loops over lanes vectorise), no
+ * undefined conversions. They need rounding to nearest, -ffp-contract=off and no -ffast-math. The stated
+ * errors are the maxima measured by tests/unit/test_fmath.c against libm in double precision. */
 #ifndef GAIT_BASE_FMATH_H
 #define GAIT_BASE_FMATH_H
 #include "base/base.h"
@@ -22,7 +22,7 @@ static inline float m_from_bits(uint32_t u)
     return x;
 }
 
-/* a where take is all ones, b where it is 0: the select that every compiler turns into vector code. */
+/* a where take is all ones, b where it is 0. Every compiler turns this select into vector code. */
 static inline float m_select(uint32_t take, float a, float b)
 {
     return m_from_bits((m_bits(a) & take) | (m_bits(b) & ~take));
@@ -34,7 +34,7 @@ static inline uint32_t m_less(float a, float b)
     return 0u - (uint32_t)(a < b);
 }
 
-/* Exact: beyond 2^23 every float is an integer.  NaN stays NaN. */
+/* Exact, because every float beyond 2^23 is an integer. NaN stays NaN. */
 static inline float m_floor(float x)
 {
     float const y = f_clamp(x, -8388608.0f, 8388607.0f);
@@ -49,14 +49,14 @@ static inline float m_round(float x)
     return (x + magic) - magic;
 }
 
-/* x modulo 1 in [0, 1): exact but for the last rounding of a negative x.  NaN gives 0. */
+/* x modulo 1 in [0, 1). Exact except for the last rounding of a negative x. NaN gives 0. */
 static inline float m_wrap1(float x)
 {
     float const f = x - m_floor(x);
     return m_select(m_less(f, 1.0f), f, 0.0f); /* -1e-9 would round to 1 */
 }
 
-/* x modulo 2 pi in [-pi, pi] (rounded to float); absolute error < 3e-7 for |x| <= 8192, no use beyond. */
+/* x modulo 2 pi in [-pi, pi] (rounded to float). Absolute error < 3e-7 for |x| <= 8192; not for larger x. */
 static inline float m_wrap_pi(float x)
 {
     float const k = m_round(f_clamp(x, -8192.0f, 8192.0f) * (1.0f / TWO_PI_F));
@@ -105,8 +105,8 @@ static inline float m_log(float x)
     return (f + y) + e * 0.693359375f;
 }
 
-/* Absolute error < 1e-7 for |x| <= 8192; beyond, and for NaN, some value in [-1, 1].  (Not f_clamp: where x comes
- * from memory the compiler makes branches of it, and the loop no vector code.) */
+/* Absolute error < 1e-7 for |x| <= 8192; beyond, and for NaN, some value in [-1, 1]. f_clamp is not used
+ * here: where x comes from memory the compiler makes branches of it and does not vectorise the loop. */
 static inline void m_sincos(float x, float *s, float *c)
 {
     float const y = m_select(m_less(fabsf(x), 8193.0f), x, 0.0f);
@@ -122,7 +122,7 @@ static inline void m_sincos(float x, float *s, float *c)
     *c = m_from_bits(m_bits(m_select(swap, sn, cs)) ^ (((q + 1u) & 2u) << 30));
 }
 
-void m_sincos_one(float x, float *s, float *c); /* the same, where there are few */
+void m_sincos_one(float x, float *s, float *c); /* the same, not inlined */
 
 /* Absolute error < 3e-7; in [-pi, pi]; 0 for y = x = 0.  Arguments finite and below 1e37. */
 float m_atan2(float y, float x);

@@ -6,24 +6,25 @@
 enum {
     GRID_SIZE = 128, /* the grid is GRID_SIZE x GRID_SIZE cells */
     GRID_WORDS = 2,  /* 64-bit words per row of the grid */
-    GRID_SPARE = 16, /* rows of a mask beyond the grid: written in passing, never read */
-    GRID_SMALL = 32, /* rows of 64 columns that are looked up in registers */
+    GRID_SPARE = 16, /* rows of a mask beyond the grid: may be written, never read */
+    GRID_SMALL = 32, /* most rows of 64 columns that fit in registers */
     GRID_STEP = 8,   /* a word can begin at any multiple of this many columns */
     GRID_STARTS = 64 / GRID_STEP + 1
 };
 
-/* Rows [first, last) and columns from `column` on, a multiple of GRID_STEP; the rest is empty and not written. */
+/* Rows [first, last) and `width` columns from `column`, a multiple of GRID_STEP. Everything else is empty
+ * and not stored. */
 typedef struct grid_mask {
     _Alignas(
         GAIT_ALIGN) uint64_t word[GRID_WORDS][GRID_SIZE + GRID_SPARE]; /* from column, and from column + 64 */
     int32_t first, last, column, width; /* width: 64, or 128 from column 0 on */
-    /* For look-ups: the last of 64 columns, twice `first` less one, twice the rows; small: 64 columns and at most
-     * GRID_SMALL rows, of which the first begins a line of the cache. */
+    /* For lookups: the last of 64 columns; 2 first - 1; 2 (last - first). small: 64 columns and at most
+     * GRID_SMALL rows, the first of which begins a cache line. */
     int32_t edge, half, halves;
     bool small;
 } grid_mask;
 
-/* What a mask holds, and what follows from it. */
+/* Set the rows and columns of a mask and the values derived from them. */
 static inline void grid_mask_frame(grid_mask *m, int32_t first, int32_t last, int32_t column, int32_t width)
 {
     m->first = first;
@@ -36,14 +37,15 @@ static inline void grid_mask_frame(grid_mask *m, int32_t first, int32_t last, in
     m->small = (width == 64) & (last - first <= GRID_SMALL) & (first % 8 == 0);
 }
 
-/* Bits [begin, end) of a word, begin >= 0, end <= 64; begin >= end: none.  No branch: a loop becomes vector code. */
+/* Bits [begin, end) of a word, begin >= 0, end <= 64; none if begin >= end. No branch, so that loops
+ * vectorise. */
 static inline uint64_t grid_bits(int32_t begin, int32_t end)
 {
     uint64_t const ones = (uint64_t)(int64_t)-(int32_t)(begin < end);
     return (ones >> ((uint32_t)(begin - end) & 63u)) << ((uint32_t)begin & 63u);
 }
 
-/* Which of the 32-bit halves of a mask's words holds the cell x columns right of the mask's first in row y. */
+/* Index of the 32-bit half word of a mask that has the cell x columns right of the first column in row y. */
 static inline int32_t grid_half(int32_t x, int32_t y)
 {
     return 2 * y + (x >> 5) + (x < 64 ? 0 : 2 * (GRID_SIZE + GRID_SPARE) - 2);

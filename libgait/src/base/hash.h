@@ -8,7 +8,7 @@
 /* FNV-1a, 64 bits: continue h (HASH_INIT at first) over n bytes. */
 uint64_t hash_fnv1a(uint64_t h, const void *p, size_t n);
 
-/* Digest of n bytes, a multiple of 32, eight at a time: for large states. */
+/* Digest of n bytes, a multiple of 32, in words of 8 bytes: for large states. */
 uint64_t hash_state(const void *p, size_t n);
 
 /* CRC-32 with zlib's polynomial and convention: crc is 0 at first, then the last result. */

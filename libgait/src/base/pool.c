@@ -1,5 +1,6 @@
-/* pool.c - tasks on POSIX threads: whoever is free takes the next one.  Who has to wait looks on for a while before it
- * sleeps: the jobs of a step follow one another closely, and waking a thread takes as long as some of them. */
+/* pool.c - runs tasks on POSIX threads: each free thread takes the next task. A thread that has to wait
+ * spins for a while before it sleeps, because the jobs of a step follow one another closely and waking a
+ * thread takes as long as some of them. */
 #ifndef GAIT_NO_THREADS
 #define _POSIX_C_SOURCE 200809L
 #endif
@@ -25,7 +26,7 @@ typedef struct job {
 } job;
 
 struct gait_pool {
-    pthread_mutex_t lock; /* of everything but `next`; `number` and `busy` are looked at without it */
+    pthread_mutex_t lock; /* protects everything but `next`; `number` and `busy` may be read without it */
     pthread_cond_t work, done;
     pthread_t *thread; /* helpers; the caller of a job works as well */
     int32_t helpers;
@@ -36,9 +37,9 @@ struct gait_pool {
     atomic_int next;    /* task to hand out */
 };
 
-enum { SPINS = 20000 }; /* 0.4 to 0.5 ms, of all helpers together: there may be more than cores */
+enum { SPINS = 20000 }; /* 0.4 to 0.5 ms, shared among all helpers: there may be more of them than cores */
 
-/* While *value is `known`, or while it is not, but not for long. */
+/* Spin while (*value == known) == same, for a limited time. */
 static void spin_while(const gait_pool *p, const atomic_uint *value, unsigned known, bool same)
 {
     int32_t left = SPINS / i_max(p->helpers, 1);
@@ -46,7 +47,7 @@ static void spin_while(const gait_pool *p, const atomic_uint *value, unsigned kn
 #if defined(__x86_64__)
         __builtin_ia32_pause();
 #elif defined(__aarch64__)
-        __asm__ volatile("isb" ::: "memory"); /* waits about as long as the other's pause */
+        __asm__ volatile("isb" ::: "memory"); /* waits about as long as the pause of x86 */
 #else
         continue;
 #endif
@@ -62,7 +63,7 @@ static void *helper(void *arg)
 {
     gait_pool *const p = arg;
     unsigned last = 0;
-    bool fresh = false; /* from a job: the next one may be near */
+    bool fresh = false; /* just finished a job, so the next one may be near */
     pthread_mutex_lock(&p->lock);
     while (!p->quit) {
         if (fresh) {
@@ -90,7 +91,8 @@ static void *helper(void *arg)
     return NULL;
 }
 
-/* The job is closed with the lock held and nobody busy: no helper can take a task of the next one for it. */
+/* The job is closed with the lock taken and no helper busy, so that no helper can take a task of the next
+ * job for it. */
 static void run(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 {
     gait_pool *const p = user;
@@ -132,7 +134,7 @@ gait_result gait_pool_bytes(int32_t threads, size_t *bytes, gait_error *err)
     return GAIT_OK;
 }
 
-/* Signals are for the threads of the program. */
+/* Helpers block all signals, so that the program's own threads receive them. */
 static bool start_helpers(gait_pool *p, int32_t count)
 {
     sigset_t all, before;

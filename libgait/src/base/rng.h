@@ -1,5 +1,5 @@
-/* rng.h - counter-based random numbers: Philox4x32-10 (Salmon et al. 2011).
- * A number is a pure function of (seed, stream, frame, index, draw): who asks, and when, does not matter. */
+/* rng.h - counter-based random numbers: Philox4x32-10 (Salmon et al. 2011). A number is a pure function of
+ * (seed, stream, frame, index, draw), so the order of the calls does not matter. */
 #ifndef GAIT_BASE_RNG_H
 #define GAIT_BASE_RNG_H
 #include "base/fmath.h"

@@ -1,4 +1,4 @@
-/* simd16.h - for kernels, what compilers do not find out in loops over sixteen elements. */
+/* simd16.h - SIMD code for kernels where compilers do not find it in loops over sixteen elements. */
 #ifndef GAIT_BASE_SIMD16_H
 #define GAIT_BASE_SIMD16_H
 #include "base/grid_mask.h"
@@ -11,7 +11,8 @@ enum { SIMD16 = 16 };
 #if defined(__AVX2__)
 #include <immintrin.h>
 
-/* An unconditional gather would wait for what its register held before.  The distance is part of the instruction. */
+/* A gather without a mask would depend on the old value of its register. The scale is part of the
+ * instruction. */
 static inline __m256i simd16_lookup8(const void *table, int32_t bytes, __m256i index, __m256i take)
 {
     __m256i const none = _mm256_setzero_si256();
@@ -49,7 +50,7 @@ static inline void simd16_lookup_every(int32_t bytes, const void *table, const i
         int32_t found = 0;
         if (take[i] < 0)
             memcpy(&found, (const char *)table + (ptrdiff_t)bytes * index[i], sizeof found);
-        out[i] = found; /* which can be the indices' place */
+        out[i] = found; /* out may be index */
     }
 #endif
 }
@@ -91,7 +92,7 @@ static inline void words_store(int32_t *v, simd16_words w)
 #endif
 
 #if defined(SIMD16_WORDS)
-/* What is left of a fraction of 256 in the low half of each word, the fraction in the high one. */
+/* For each word, 256 - fraction in the low half and the fraction (low byte) in the high half. */
 static inline simd16_words words_shares(simd16_words v)
 {
     simd16_words const f = WORDS_AND(v, WORDS_OP(set1_epi32)(255));
@@ -100,8 +101,8 @@ static inline simd16_words words_shares(simd16_words v)
 }
 #endif
 
-/* Between four neighbours, the bytes left, left below, right, right below of a word, at 1/256 of their distance, in the
- * low bytes of u and v; rounded towards 0. */
+/* Bilinear interpolation between the four bytes of a word (left, left below, right, right below), with
+ * fractions in 1/256 in the low bytes of u and v; rounded towards 0. */
 static inline void simd16_bilinear(const int32_t *four, const int32_t *u, const int32_t *v, int32_t *out)
 {
 #if defined(SIMD16_WORDS)
@@ -131,8 +132,8 @@ static inline void simd16_bilinear(const int32_t *four, const int32_t *u, const 
 
 #if defined(__AVX512VBMI__)
 #define SIMD16_BILINEAR_BYTES
-/* Bilinear look-up of bytes: pairs of one with that below it, 256 in a row; at u, v, 1/256 of their distance, rounded
- * towards 0, where shown (negative), elsewhere `hidden`. */
+/* Bilinear interpolation of bytes at (u, v), in 1/256 of their distance, rounded towards 0, where shown is
+ * negative; `hidden` elsewhere. pairs: each byte with the one below it, 256 in a row. */
 static inline void simd16_bilinear_bytes(const uint16_t *pairs, const int32_t *u, const int32_t *v,
                                          const int32_t *shown, int8_t hidden, int8_t *out)
 {
@@ -156,8 +157,8 @@ static inline void simd16_bilinear_bytes(const uint16_t *pairs, const int32_t *u
 }
 #endif
 
-/* The sum over `count` words, a multiple of LANES, of byte 1 times the low half of the pair and byte 3 times the high
- * one. */
+/* Sum over `count` words, a multiple of SIMD16, of byte 1 times the low half of the pair plus byte 3 times
+ * the high half. */
 static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, int32_t count)
 {
     int32_t sum = 0;
@@ -180,7 +181,7 @@ static inline int32_t odd_bytes_dot(const int32_t *bytes, const int32_t *pair, i
     return sum;
 }
 
-/* Sixteen numbers to be read again and again: in registers. */
+/* Copy sixteen numbers that are read repeatedly into registers. */
 static inline void simd16_load(const float *in, float *restrict out)
 {
 #if defined(__AVX512F__)
@@ -190,7 +191,7 @@ static inline void simd16_load(const float *in, float *restrict out)
 #endif
 }
 
-/* Bytes to words: in pieces, what follows would wait for them. */
+/* Bytes to words. Written out because in pieces the next instruction would wait for the stores. */
 static inline void simd16_widen(const int8_t *in, int32_t *out)
 {
 #if defined(__AVX512F__)
@@ -204,7 +205,7 @@ static inline void simd16_widen(const int8_t *in, int32_t *out)
 #endif
 }
 
-/* Words to bytes, which they fit. */
+/* Words to bytes; the values fit. */
 static inline void simd16_narrow(const int32_t *in, int8_t *out)
 {
 #if defined(__AVX2__)
@@ -220,7 +221,7 @@ static inline void simd16_narrow(const int32_t *in, int8_t *out)
 }
 
 #if defined(__AVX512VBMI__)
-#define SIMD16_BYTES 4 /* rows of LANES bytes in a register */
+#define SIMD16_BYTES 4 /* rows of SIMD16 bytes in a register */
 
 static inline __m512i bytes_load(const int8_t *const *row)
 {
@@ -240,7 +241,8 @@ static inline __m512i bytes_lookup(const uint8_t *table, __m512i index)
     return _mm512_mask_blend_epi8(_mm512_movepi8_mask(index), low, high);
 }
 
-/* For each pair of rows the sum over differences d, where neither byte is `none`, of low[d] + 2^8 high[d] + 2^24. */
+/* For each pair of rows, the sum over the elements where neither byte is `none` of low[d] + 2^8 high[d] +
+ * 2^24, where d is the absolute difference. */
 static inline void bytes_costs(const int8_t *const *a, const int8_t *const *b, int8_t none,
                                const uint8_t *low, const uint8_t *high, int32_t *sum)
 {
@@ -258,7 +260,7 @@ static inline void bytes_costs(const int8_t *const *a, const int8_t *const *b, i
 }
 #endif
 
-/* Two numbers in turn, `count` in all, a multiple of eight. */
+/* Fill out with the two numbers in turn, `count` in all, a multiple of eight. */
 static inline void simd16_repeat(const float *two, int32_t count, float *restrict out)
 {
 #if defined(__AVX512F__)
@@ -277,10 +279,10 @@ static inline void simd16_repeat(const float *two, int32_t count, float *restric
 #endif
 }
 
-/* Eight numbers, and again. */
+/* Copy eight numbers twice. */
 static inline void simd16_duplicate(const float *eight, float *restrict out)
 {
-#if defined(__AVX512DQ__) /* in pieces, what follows would wait for them */
+#if defined(__AVX512DQ__) /* written out because in pieces the next instruction would wait for the stores */
     _mm512_storeu_ps(out, _mm512_broadcast_f32x8(_mm256_loadu_ps(eight)));
 #else
     memcpy(out, eight, 8 * sizeof *out);
@@ -288,15 +290,15 @@ static inline void simd16_duplicate(const float *eight, float *restrict out)
 #endif
 }
 
-/* Rows of masks at once, as many as the two ends of fill a register. */
+/* Rows of masks processed at once: as many as have their two ends in one register. */
 #if defined(__AVX2__) && !defined(__AVX512F__)
 enum { SIMD16_ROWS = 4 };
 #else
 enum { SIMD16_ROWS = 8 };
 #endif
 
-/* Of each word the bits from the first to the second number of a pair, 0 to 64, go behind those of `whole`: what is visible
- * of them, and all. */
+/* Draw one limb into rows of masks. The bits from the first to the second number of each pair (0 to 64) are
+ * set in `whole`; those that were not set before are returned in `visible`. */
 static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, uint64_t *restrict visible)
 {
 #if defined(__AVX512F__)
@@ -322,7 +324,8 @@ static inline void simd16_cover(const int32_t *span, uint64_t *restrict whole, u
 #endif
 }
 
-/* Sixteen numbers of sixteen bodies: from in[number][body] to out[body][number], a cache line each. */
+/* Transpose sixteen numbers of sixteen bodies from in[number][body] to out[body][number], one cache line
+ * each. */
 static inline void simd16_transpose(const float (*restrict in)[SIMD16], float (*restrict out)[SIMD16])
 {
 #if defined(__AVX2__)
@@ -330,7 +333,7 @@ static inline void simd16_transpose(const float (*restrict in)[SIMD16], float (*
         for (int32_t b = 0; b < SIMD16; b += 8) {
             __m256 r[8], s[8];
 #pragma GCC unroll 8
-            for (int32_t i = 0; i < 8; i++) /* four numbers of two halves of the bodies in each */
+            for (int32_t i = 0; i < 8; i++) /* four numbers of each half of the bodies in each */
                 r[i] =
                     _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(in[a + (i & 3)] + b + (i & 4))),
                                          _mm_loadu_ps(in[a + 4 + (i & 3)] + b + (i & 4)), 1);

@@ -1,4 +1,4 @@
-/* simd_f64.h - for kernels, as many doubles as a register of the instruction set holds. */
+/* simd_f64.h - for kernels: as many doubles as a register of the instruction set has. */
 #ifndef GAIT_BASE_SIMD_F64_H
 #define GAIT_BASE_SIMD_F64_H
 #include <stdint.h>
@@ -7,7 +7,7 @@
 #include <immintrin.h>
 #endif
 
-/* Anywhere in memory, beside plain numbers. */
+/* May be loaded from any address that is aligned to T. */
 #define SIMD_F64_OF(T, bytes) typedef T __attribute__((vector_size(bytes), aligned(sizeof(T)), may_alias))
 
 #if defined(KERNEL_SCALAR)

@@ -2,7 +2,7 @@
 
 #include <stdatomic.h>
 
-enum { SHARES = 512 }; /* of a part: so that none waits long for another */
+enum { SHARES = 512 }; /* per part, so that no task waits long for another */
 
 typedef struct work {
     task_range_fn *fn;

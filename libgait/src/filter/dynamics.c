@@ -12,7 +12,7 @@ static void normals(const dynamics *d, uint32_t stream, uint32_t frame, int32_t 
 
 particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const gait_state *sd, int32_t i)
 {
-    float const level_sd = 0.03f; /* metres: how far the ground may be from z = 0 */
+    float const level_sd = 0.03f; /* metres: uncertainty of the ground level about z = 0 */
     int32_t const q = d->rule.components;
     float n[NORMALS], u[4];
     gait_state s = *mean;
@@ -36,16 +36,17 @@ particle_state dynamics_draw(const dynamics *d, const gait_state *mean, const ga
         s.offset[a] += sd->offset[a] * n[state_layout_offset(&d->rule) + k];
     }
     particle_state w = particle_from_state(&d->rule, &s);
-    /* The given height of the pelvis and the ground at z = 0 are two measurements of one level (paper:
-     * one). */
+    /* The given height of the pelvis and the ground at z = 0 are two measurements of one level (paper mode:
+     * only the first is used). */
     float const var = sd->pelvis[2] * sd->pelvis[2];
     float const trust = d->rule.plain_root ? 1.0f : level_sd * level_sd / (level_sd * level_sd + var);
     w.f[F_Z] = trust * w.f[F_Z] + __builtin_sqrtf(trust) * sd->pelvis[2] * n[8];
     return w;
 }
 
-/* Return to zero with time constant tau (never if 0), plus noise per sqrt(second): the exact transition,
- * so that the frame rate does not matter and the stationary deviation is noise sqrt(tau / 2). */
+/* Relaxation to zero with time constant tau (none if 0) plus noise per sqrt(second). This is the exact
+ * transition, so that the frame rate does not matter and the stationary standard deviation is noise sqrt(tau
+ * / 2). */
 static relaxing relax(float dt, float tau, float noise)
 {
     if (!(tau > 0.0f))
@@ -55,13 +56,13 @@ static relaxing relax(float dt, float tau, float noise)
     return (relaxing){keep, noise * __builtin_sqrtf(share * dt)};
 }
 
-/* The return that keeps a deviation of 1 with so much noise. */
+/* Relaxation that keeps a standard deviation of 1 with this noise. */
 static relaxing relax_to_one(float dt, float noise)
 {
     return relax(dt, noise > 0.0f ? 2.0f / (noise * noise) : 0.0f, noise);
 }
 
-/* What the sum of two squared normals exceeds but for a share of cases; never if that is 1. */
+/* The value that the sum of two squared normals exceeds with probability 1 - share; infinite if share is 1. */
 static float turns_beyond(float share)
 {
     return (float)(-2.0 * m_log64(1.0 - (double)share));

@@ -1,10 +1,10 @@
-/* One interval of BLOCK walkers, a lane each: eqs. 5-9 as resolved in the design document. */
+/* One interval of BLOCK particles, one per lane: eqs. 5-9 as resolved in the design document. */
 #include "filter/dynamics.h"
 #include "base/fmath.h"
 #include "base/dispatch.h"
 #include "base/rng.h"
 
-enum { NORMALS = 4 * ((F_MAX + 2 + 3) / 4) }; /* one for a field, two for turns */
+enum { NORMALS = 4 * ((F_MAX + 2 + 3) / 4) }; /* one per field, and two for new turn rates */
 
 KERNEL_ROW void words(uint64_t seed, uint32_t frame, uint32_t first, uint32_t draw,
                       uint32_t (*restrict out)[BLOCK])
@@ -52,7 +52,7 @@ KERNEL_ROW void advance(const dynamics_step *s, const particle_block *restrict f
     }
 }
 
-/* Forward speed of the stride halfway through the interval, statures per stride: eq. 3 for one function. */
+/* Forward speed in the middle of the interval, statures per stride: eq. 3 for one channel. */
 KERNEL_ROW void speeds(const dynamics_step *s, const particle_block *restrict from,
                        const float *restrict turn, float *restrict out)
 {
@@ -81,7 +81,7 @@ KERNEL_ROW void speeds(const dynamics_step *s, const particle_block *restrict fr
     }
 }
 
-/* Eq. 8: forward along the heading, so far in a stride, by so many. */
+/* Eq. 8: move along the heading by the speed (statures per stride) times the advance of the phase. */
 KERNEL_ROW void walk(const dynamics_step *s, const particle_block *restrict from,
                      const float (*restrict n)[BLOCK], const float *restrict turn,
                      const float *restrict speed, particle_block *restrict to)
@@ -102,8 +102,9 @@ KERNEL_ROW void walk(const dynamics_step *s, const particle_block *restrict from
         to->f[F_HEADING][lane] = m_wrap_pi(heading[lane]);
 }
 
-/* Now and then a walker takes another turn rate, every second time none: a course that wanders by so much at all times
- * would let swaying hips pass for turning.  a and b, normal, are a point with an exponential square and any direction. */
+/* Now and then a particle draws a new turn rate, half of the time 0. With a turn rate that diffused by the
+ * same amount all the time, swaying hips would pass for turning. a and b are normal, so (a, b) is a point
+ * with an exponentially distributed square and a uniform direction. */
 KERNEL_ROW void take_turns(const dynamics_step *s, const float *restrict a, const float *restrict b,
                            const float *restrict n, const float *restrict x, float *restrict out)
 {
@@ -136,13 +137,13 @@ void KERNEL(dynamics_move)(const dynamics_step *s, int32_t first, const particle
     else
         speeds(s, from, turn, speed);
     walk(s, from, (const float (*)[BLOCK])n, turn, speed, to);
-    /* eq. 9, and the level of the ground: tilt and level return to the model's own */
+    /* eq. 9, and the level of the ground: level, pitch and roll relax to the model's own */
     relax(s->level, from->f[F_Z], n[4], to->f[F_Z]);
     relax(s->tilt, from->f[F_PITCH], n[6], to->f[F_PITCH]);
     relax(s->tilt, from->f[F_ROLL], n[7], to->f[F_ROLL]);
     take_turns(s, n[s->fields], n[s->fields + 1], n[9], from->f[F_TURN], to->f[F_TURN]);
     grow(s, from->f[F_STATURE], n[8], to->f[F_STATURE]);
-    /* the scores relax to the population (eq. 5); proportions and posture hardly change */
+    /* the scores relax to the mean of people (eq. 5); proportions and posture hardly change */
     for (int32_t k = F_COEF; k < s->fields; k++)
         relax(k < s->proportion ? s->score
               : k < s->offset   ? s->shape

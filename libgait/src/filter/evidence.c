@@ -1,10 +1,10 @@
 #include "filter/evidence.h"
 #include "base/fmath.h"
 
-enum { CHUNK = 64 };               /* particles whose exponentials are taken at once */
+enum { CHUNK = 64 };               /* particles whose exponentials are computed at once */
 static const double NONE = -1e300; /* log of 0 */
-static const double ENOUGH = 0.2;  /* of the particles must keep weight */
-static const float LEAST = 0.05f;  /* power at which to give up */
+static const double ENOUGH = 0.2;  /* share of the particles that must keep weight */
+static const float LEAST = 0.05f;  /* smallest power */
 
 double evidence_of(const pf *p, const float *loglik)
 {
@@ -25,13 +25,13 @@ double evidence_of(const pf *p, const float *loglik)
     return sum > 0.0 ? top + m_log64(sum / total) : NONE;
 }
 
-/* Log of a particle's weight after the likelihood to a power. */
+/* Log weight of a particle after multiplication by the likelihood to a power. */
 static double log_after(const pf *p, const float *loglik, float power, int32_t i)
 {
     return p->log_weight[i] + (double)(power * loglik[i]);
 }
 
-/* Effective sample size that the likelihood to a power would leave. */
+/* Effective sample size after multiplication by the likelihood to a power. */
 static double ess_after(const pf *p, const float *loglik, float power)
 {
     double top = NONE, sum = 0.0, square = 0.0;

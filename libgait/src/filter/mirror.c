@@ -2,7 +2,7 @@
 #include "base/fmath.h"
 #include <string.h>
 
-/* The channel named alike on the other side; the channel itself if it has no side. */
+/* The channel of the same name on the other side; the channel itself if it has no side. */
 static int32_t partner_of(const gait_model *m, int32_t channel)
 {
     const char *const name = m->channel_name[channel];
@@ -15,7 +15,7 @@ static int32_t partner_of(const gait_model *m, int32_t channel)
     return channel;
 }
 
-/* Signed axis (1 x, 2 y, 3 z) about which a channel turns its frame; 0: none. */
+/* Signed axis (1 x, 2 y, 3 z) about which a channel rotates its frame; 0: none. */
 static int32_t axis_of(const gait_model *m, int32_t channel)
 {
     for (int32_t f = 0; f < m->frames; f++) {
@@ -27,7 +27,7 @@ static int32_t axis_of(const gait_model *m, int32_t channel)
     return 0;
 }
 
-/* The mirror y -> -y keeps turns about y and reverses those about x and z. */
+/* The reflection y -> -y keeps rotations about y and reverses those about x and z. */
 static float mirror_sign(const gait_model *m, int32_t channel, int32_t partner)
 {
     int32_t const root = channel - m->root_channel, a = axis_of(m, channel), b = axis_of(m, partner);
@@ -37,7 +37,7 @@ static float mirror_sign(const gait_model *m, int32_t channel, int32_t partner)
     return keeps == same_sense ? 1.0f : -1.0f;
 }
 
-/* Curve k (0: mean) in the mirror, half a stride on, at sample j. */
+/* Curve k (0: mean) in the mirror, half a stride later, at sample j. */
 static float mirrored(const mirror *x, const gait_model *m, int32_t k, int32_t j, int32_t channel)
 {
     int32_t const half = (j + m->phases / 2) % m->phases;
@@ -45,8 +45,8 @@ static float mirrored(const mirror *x, const gait_model *m, int32_t k, int32_t j
                                         (size_t)x->partner[channel]];
 }
 
-/* Sums over phases and angles of component i with the mirrored curve k (less the mean for k = 0), and with
- * itself. */
+/* Inner products over phases and angles of component i with the mirrored curve k (minus the mean for k = 0),
+ * and with itself. */
 static void project(const mirror *x, const gait_model *m, int32_t i, int32_t k, double *with, double *own)
 {
     *with = *own = 0.0;

@@ -13,7 +13,8 @@ float root_channel(const gait_model *m, int32_t c, float phase, float pace, cons
     return kin_channel(m, m->root_channel + c, phase, pace, coef, components);
 }
 
-/* The first components tell people apart in pictures; more only add noise that particles must search. */
+/* Components used by default. The first ones distinguish people in images; more only add dimensions that the
+ * particles must search. */
 enum { DEFAULT_COMPONENTS = 5 };
 
 static int32_t components_used(const gait_model *m, const gait_tracker_config *cfg)
@@ -69,7 +70,7 @@ void particle_block_put(particle_set *p, int32_t first, int32_t lanes, const par
         block_copy(field(p, f) + first, w->f[f], lanes);
 }
 
-/* Sway to the left and height of the pelvis over the track, metres. */
+/* Sway to the left and height of the pelvis relative to the path, metres. */
 static void pelvis_offset(const state_layout *r, const particle_state *w, float *sway, float *height)
 {
     float const H = w->f[F_STATURE], phase = w->f[F_PHASE], pace = state_layout_pace(r, w->f[F_RATE]);
@@ -134,7 +135,7 @@ particle_state particle_set_place(const particle_set *p, const double *weight)
 {
     const float *const x = field(p, F_X), *const y = field(p, F_Y), *const z = field(p, F_Z),
                        *const stature = field(p, F_STATURE);
-    double sum_x = 0.0, sum_y = 0.0, sum_z = 0.0, sum_stature = 0.0; /* none waits for another */
+    double sum_x = 0.0, sum_y = 0.0, sum_z = 0.0, sum_stature = 0.0; /* independent sums */
     for (int32_t i = 0; i < p->n; i++) {
         sum_x += weight[i] * (double)x[i];
         sum_y += weight[i] * (double)y[i];
@@ -149,13 +150,13 @@ particle_state particle_set_place(const particle_set *p, const double *weight)
     return w;
 }
 
-typedef struct block { /* fields of BLOCK particle_block */
+typedef struct block { /* the fields of BLOCK particles */
     kin_input in;
-    float turn[BLOCK]; /* which no pose depends on */
+    float turn[BLOCK]; /* no pose depends on it */
     float offset[GAIT_MAX_ANGLES][BLOCK];
 } block;
 
-/* Rates in in.pace become what kin_pace says of them, the track and level in in.pelvis the pelvis; then curves,
+/* Replace stride rates in in.pace by their pace, and path and level in in.pelvis by the pelvis; then curves,
  * posture and kinematics. */
 static void block_bodies(const state_layout *r, block *b, kin_body *out)
 {
@@ -187,7 +188,7 @@ static void block_bodies(const state_layout *r, block *b, kin_body *out)
     r->run->kin_pose(r->model, &ch, in, r->proportions, out);
 }
 
-/* Where field f of a block's walkers goes. */
+/* Where field f of the particles of a block is stored. */
 static float *block_field(const state_layout *r, block *b, int32_t f)
 {
     kin_input *const in = &b->in;

@@ -69,7 +69,7 @@ pf_summary pf_update(pf *p, const float *loglik)
         double const l = p->log_weight[i] + (double)loglik[i] - top;
         p->log_weight[i] = p->cumulative[i] ? l : none;
     }
-    m_exp64_all(p->log_weight, p->n, p->weight); /* 0 of none */
+    m_exp64_all(p->log_weight, p->n, p->weight); /* exp(none) is 0 */
     for (int32_t i = 0; i < p->n; i++)
         sum += p->weight[i];
     double const log_sum = m_log64(sum);
@@ -84,7 +84,7 @@ pf_summary pf_update(pf *p, const float *loglik)
     return s;
 }
 
-/* Integer weights, so that sums are exact in any order; returns their total. */
+/* Cumulative weights in integers, so that sums are exact in any order. Returns their total. */
 static uint64_t make_cumulative(pf *p)
 {
     double top = 0.0;
@@ -101,7 +101,7 @@ static uint64_t make_cumulative(pf *p)
 void pf_resize(pf *p, int32_t count, uint32_t u)
 {
     uint64_t const n = (uint64_t)count, total = make_cumulative(p), step = total / n, rest = total % n;
-    uint64_t at = (uint64_t)u * step >> 32, over = 0; /* start + floor(i total / n), without 128 bits */
+    uint64_t at = (uint64_t)u * step >> 32, over = 0; /* offset + floor(i total / n), in 64 bits */
     int32_t from = 0;
     for (uint64_t i = 0; i < n; i++) {
         while (from < p->n - 1 && p->cumulative[from] <= at)
@@ -126,7 +126,7 @@ void pf_resample_multinomial(pf *p, uint64_t seed, uint32_t stream, uint32_t fra
     for (int32_t i = 0; i < p->n; i++) {
         uint32_t r[4];
         rng_bits(seed, stream, frame, (uint32_t)i, 0, r);
-        /* total < 2^52 and r < 2^64: the bias of the remainder is below 2^-12 of a ticket. */
+        /* total < 2^52 and r < 2^64: the bias of the remainder is below 2^-12 of one unit. */
         uint64_t const at = ((uint64_t)r[0] << 32 | r[1]) % total;
         int32_t low = 0, high = p->n - 1;
         while (low < high) {
@@ -154,7 +154,7 @@ void pf_inherit(pf *p, int32_t before, void *array, size_t bytes)
 {
     unsigned char *const part = array;
     uint64_t *const waiting = p->cumulative,
-                    done = UINT64_MAX; /* how many others still have to copy a part */
+                    done = UINT64_MAX; /* number of particles that have yet to copy this part */
     for (int32_t i = 0; i < i_max(p->n, before); i++)
         waiting[i] = 0;
     for (int32_t i = 0; i < p->n; i++)
@@ -167,7 +167,7 @@ void pf_inherit(pf *p, int32_t before, void *array, size_t bytes)
             waiting[from]--;
             i = from;
         }
-    /* Those left wait for one another in rings. */
+    /* The remaining particles form cycles. */
     for (int32_t first = 0; first < p->n; first++)
         for (int32_t i = first; p->parent[i] != i && waiting[i] != done; i = p->parent[i]) {
             waiting[i] = done;

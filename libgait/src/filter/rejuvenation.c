@@ -19,7 +19,7 @@ void rejuvenation_rows(const particle_set *from, int32_t begin, int32_t end, flo
     }
 }
 
-typedef struct drawn { /* rows of a particle and of three that are drawn by weight */
+typedef struct drawn { /* rows of a particle and of three others drawn by weight */
     const float *own, *towards, *apart[2];
 } drawn;
 
@@ -46,7 +46,7 @@ static void rejuvenate_row(const rejuvenation *m, const drawn *d, float *restric
                      (shrink * (d->towards[k] - d->own[k]) + noise * (d->apart[0][k] - d->apart[1][k]));
 }
 
-typedef struct angles { /* of a lane each: own, and how far it is from others */
+typedef struct angles { /* per lane: the particle's own angle and its differences from others */
     float own[BLOCK], towards[BLOCK], apart[BLOCK];
 } angles;
 
@@ -57,7 +57,7 @@ static void take_angle(const drawn *d, int32_t f, int32_t lane, angles *out)
     out->apart[lane] = d->apart[0][f] - d->apart[1][f];
 }
 
-/* Differences go round: of a turn, in units of it. */
+/* Angles wrap at `turn`, so differences are wrapped as well. */
 static void rejuvenate_angles(const rejuvenation *m, const angles *a, float turn, float *restrict out)
 {
     float const unit = TWO_PI_F / turn;

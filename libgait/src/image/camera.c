@@ -2,7 +2,7 @@
 
 #include "base/vec.h"
 
-/* Rows of R are unit vectors at right angles, to 1e-3, and right-handed. */
+/* True if the rows of R are orthonormal to 1e-3 and right-handed. */
 static bool rotation_valid(const float R[9])
 {
     for (int i = 0; i < 3; i++)
@@ -27,7 +27,7 @@ bool camera_distorted(const gait_camera *c)
     return any;
 }
 
-/* ideal = (distorted - tangential) / radial, again and again. */
+/* Iterate ideal = (distorted - tangential) / radial. */
 void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2])
 {
     enum { PASSES = 40 };

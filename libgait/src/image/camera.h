@@ -1,14 +1,14 @@
-/* camera.h - pinhole projection and lens distortion; conventions of gait_camera in gait.h. */
+/* camera.h - pinhole projection and lens distortion, with the conventions of gait_camera in gait.h. */
 #ifndef GAIT_IMAGE_CAMERA_H
 #define GAIT_IMAGE_CAMERA_H
 #include "base/base.h"
 
-#define CAMERA_NEAR 0.05f /* metres: nothing nearer is projected */
+#define CAMERA_NEAR 0.05f /* metres: points nearer than this are not projected */
 
-/* Size and focal lengths positive, all numbers finite, R orthonormal to 1e-3 with det R > 0. */
+/* True if size and focal lengths are positive, all numbers finite, and R orthonormal to 1e-3 with det R > 0. */
 bool camera_valid(const gait_camera *c);
 
-/* Some distortion coefficient is not 0. */
+/* True if some distortion coefficient is not 0. */
 bool camera_distorted(const gait_camera *c);
 
 /* Ideal pixel (u, v) to the pixel of the captured image (OpenCV's k1 k2 p1 p2 k3). */
@@ -24,18 +24,18 @@ static inline void camera_distort(const gait_camera *c, float u, float v, float 
     *vd = c->fy * yd + c->cy;
 }
 
-/* The other way: a pixel of the captured image to the ideal one, by a fixed point that a lens contracts within its
- * picture. */
+/* The inverse: a pixel of the captured image to the ideal pixel, by fixed-point iteration, which converges
+ * for lenses within their image. */
 void camera_ideal(const gait_camera *c, const double distorted[2], double ideal[2]);
 
-/* From the lens to a point, both in the world, metres. */
+/* Vector from the camera centre to the point p, both in the world, metres. */
 static inline void camera_to(const gait_camera *c, const float p[3], float ray[3])
 {
     for (int32_t k = 0; k < 3; k++)
         ray[k] = p[k] + c->R[k] * c->t[0] + c->R[3 + k] * c->t[1] + c->R[6 + k] * c->t[2];
 }
 
-/* World point to ideal pixel; returns its depth Z.  uv is left alone when Z <= CAMERA_NEAR. */
+/* World point to ideal pixel. Returns its depth Z; uv is not written if Z <= CAMERA_NEAR. */
 static inline float camera_project(const gait_camera *c, const float p[3], float uv[2])
 {
     const float *const R = c->R;

@@ -24,7 +24,7 @@ features_scratch features_scratch_layout(arena *a)
     return s;
 }
 
-/* What the camera sees of the region, anew where that has moved. */
+/* Recompute which cells lie inside the camera's image if the region has moved. */
 static void refresh_inside(const kernels *run, features *f, const gait_camera *cam)
 {
     const view_map *const now = &f->map, *const then = &f->inside_map;
@@ -51,7 +51,7 @@ void features_sample(const kernels *run, const features *f, int32_t band, const 
     run->view_grey(&s->planes, band * ROWS, (band + 1) * ROWS, s->grey);
 }
 
-/* One word of each row, from a column on. */
+/* One word of each row, beginning at a column. */
 static void words_of(const uint64_t (*row)[GRID_WORDS], int32_t column, uint64_t *restrict out)
 {
     for (int32_t y = 0; y < GRID_SIZE; y++)

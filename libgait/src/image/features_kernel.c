@@ -5,7 +5,8 @@
 
 /* ---- foreground probability of the grid's cells, by comparison with the background plate ---- */
 
-/* Exposure of the frame against the plate in 1/256, half to double, over pixels that changed little. */
+/* Exposure of the frame relative to the plate in 1/256, between half and double, over pixels that changed
+ * little. */
 static int32_t exposure_gain(const view_planes *im, const view_planes *plate)
 {
     int64_t frame = 0, scene = 0, count = 0;
@@ -24,20 +25,20 @@ static int32_t exposure_gain(const view_planes *im, const view_planes *plate)
             scene += sum_b;
             count += calm;
         }
-    /* Too few or too dark pixels say nothing of the exposure. */
+    /* Too few or too dark pixels do not determine the exposure. */
     if (count < VIEW_PIXELS / 16 || scene < 8 * count)
         return 256;
     return i_clamp((int32_t)(frame * 256 / scene), 128, 512);
 }
 
-/* Of two numbers below 2^31: exact, because the quotient of two such integers that is not one is further from
- * the next than a double is long. */
+/* Integer quotient of two numbers below 2^31. Exact, because a quotient of such integers that is not an
+ * integer differs from the next integer by more than the rounding of a double. */
 static int32_t quotient(int32_t a, int32_t b)
 {
     return (int32_t)((double)a / (double)b);
 }
 
-typedef struct cells { /* one row of the grid, over the channels */
+typedef struct cells { /* one row of the grid, summed over the channels */
     int32_t total[GRID_SIZE], across[GRID_SIZE], scene2[GRID_SIZE]; /* |I - B|^2, <I, B>, <B, B> */
 } cells;
 
@@ -55,19 +56,20 @@ KERNEL_ROW void cells_add(cells *restrict s, const uint8_t *restrict a, const ui
     }
 }
 
-/* What a shadow explains, the plate's colour at 2/5 .. 1 of its brightness, counts a SHADOW_SHARE-th. */
+/* A change that a shadow explains (the plate's colour at 2/5 to 1 of its brightness) counts only 1 /
+ * SHADOW_SHARE. */
 static int32_t without_shadow(int32_t total, int32_t across, int32_t scene2)
 {
     enum { SHADOW_SHARE = 6 };
-    int32_t const ratio = quotient(256 * across, i_max(scene2, 1)); /* brightness against the plate, 1/256 */
+    int32_t const ratio = quotient(256 * across, i_max(scene2, 1)); /* to the plate, 1/256 */
     int32_t const dark = ratio >= 102 && ratio < 256 ? 256 - ratio : 0;
-    /* |I - B|^2 = |I - r B|^2 + (1 - r)^2 |B|^2: colour and shade */
+    /* |I - B|^2 = |I - r B|^2 + (1 - r)^2 |B|^2: colour and brightness */
     int32_t const shade = i_min((dark * dark / 256) * (scene2 / 16) / 16, total);
     return total - shade + shade / SHADOW_SHARE;
 }
 
-/* Probabilities of a row, FOREGROUND_ONE = 1, from the evidence that each cell of 2 x 2 pixels changed: grey levels
- * squared over three channels. */
+/* Foreground probabilities of a row, FOREGROUND_ONE = 1, from the squared change of each cell of 2 x 2
+ * pixels: grey levels squared, summed over three channels. */
 KERNEL_ROW void probability_row(cells *restrict s, int32_t channels, uint8_t *restrict p)
 {
     int32_t const half = 3 * 9 * 9; /* squared difference at which a cell is as likely foreground as not */
@@ -117,7 +119,7 @@ void KERNEL(features_foreground)(features *f, const view_planes *im, const view_
 
 /* ---- sums over a sliding window of a row, with its ends replicated ---- */
 
-/* The row with `radius` more on each side. */
+/* Width of a row with `radius` more values on each side. */
 #define WINDOW_WIDTH(radius) (VIEW_SIZE + 2 * (radius))
 #define WINDOW_AREA(radius)  ((2 * (radius) + 1) * (2 * (radius) + 1))
 
@@ -132,7 +134,8 @@ static void window_ends(int32_t *padded, int32_t radius)
     }
 }
 
-/* Sums of eight neighbours, of which the sums of longer windows are made: out[i] = padded[i] + ... + padded[i + 7]. */
+/* Sums of eight neighbours, from which the sums of longer windows are made: out[i] = padded[i] + ... +
+ * padded[i + 7]. */
 static void window_eight(const int32_t *padded, int32_t radius, int32_t *restrict out)
 {
     for (int32_t i = 0; i < WINDOW_WIDTH(radius) - 7; i++)
@@ -157,7 +160,7 @@ KERNEL_ROW void gradient_row(const uint8_t *restrict grey, int32_t y, int16_t *r
                              int16_t *restrict gy)
 {
     const uint8_t *const p = grey + y * VIEW_SIZE;
-    padded_row sum, rise; /* of three rows: smoothed, and from the upper to the lower */
+    padded_row sum, rise; /* of three rows: smoothed, and the lower minus the upper */
     if (y == 0 || y == LAST) {
         memset(gx, 0, VIEW_SIZE * sizeof *gx);
         memset(gy, 0, VIEW_SIZE * sizeof *gy);
@@ -187,7 +190,7 @@ KERNEL_ROW void size_row(const uint8_t *restrict grey, int32_t y, uint16_t *rest
     }
 }
 
-/* Sums of the columns' sums over 2 EDGE_RADIUS + 1 of them. */
+/* Sums over 2 EDGE_RADIUS + 1 of the column sums. */
 KERNEL_ROW void edge_sum_row(const uint16_t *restrict column, int32_t *restrict sum)
 {
     int32_t padded[WINDOW_WIDTH(EDGE_RADIUS)], eight[WINDOW_WIDTH(EDGE_RADIUS)];
@@ -199,7 +202,8 @@ KERNEL_ROW void edge_sum_row(const uint16_t *restrict column, int32_t *restrict 
         sum[i] = eight[i] + eight[i + 8] + eight[i + 16] + padded[i + 24];
 }
 
-/* gg'/(|g|^2 + k^2): an outer product that saturates at trace 1, k = local mean gradient and a noise floor. */
+/* gg'/(|g|^2 + k^2): an outer product that saturates at trace 1, with k^2 from the local mean gradient and a
+ * noise floor. */
 KERNEL_ROW void tensor_row(const int16_t *restrict gx, const int16_t *restrict gy,
                            const int32_t *restrict sum, padded_row *restrict out)
 {
@@ -215,7 +219,7 @@ KERNEL_ROW void tensor_row(const int16_t *restrict gx, const int16_t *restrict g
     }
 }
 
-/* 1-2-1 along a row. */
+/* Smooth a row with 1-2-1. */
 KERNEL_ROW void smooth_along(padded_row *restrict in, int16_t *restrict out)
 {
     replicate_ends(in);
@@ -223,7 +227,7 @@ KERNEL_ROW void smooth_along(padded_row *restrict in, int16_t *restrict out)
         out[x] = (int16_t)(in->v[x] + 2 * in->v[x + 1] + in->v[x + 2]);
 }
 
-/* 1-2-1 across three rows, over 16 towards zero. */
+/* Smooth across three rows with 1-2-1 and divide by 16, towards zero. */
 KERNEL_ROW void smooth_across(const int16_t *restrict u, const int16_t *restrict p, const int16_t *restrict d,
                               int16_t *restrict out)
 {
@@ -233,7 +237,7 @@ KERNEL_ROW void smooth_across(const int16_t *restrict u, const int16_t *restrict
     }
 }
 
-/* The same for row y of a ring. */
+/* The same for row y of a ring of rows. */
 static void smooth_ring(int16_t (*ring)[VIEW_SIZE], int32_t y, int16_t *out)
 {
     smooth_across(ring[i_max(y - 1, 0) % EDGE_SMOOTH_ROWS], ring[y % EDGE_SMOOTH_ROWS],
@@ -246,11 +250,11 @@ KERNEL_ROW void pack_row(const int16_t *restrict xx, const int16_t *restrict yy,
     for (int32_t i = 0; i < VIEW_SIZE; i++) {
         uint32_t const trace = (uint8_t)((xx[i] + yy[i]) / 8), xx_yy = (uint8_t)((xx[i] - yy[i]) / 8);
         uint32_t const xy2 = (uint8_t)(xy[i] / 4), cell = trace | xx_yy << 8 | xy2 << 24;
-        memcpy(&out[i], &cell, sizeof cell); /* in the order of edge_cell */
+        memcpy(&out[i], &cell, sizeof cell); /* in the order of the fields of edge_cell */
     }
 }
 
-/* Tensors of row y into the first ring, smoothed along the row. */
+/* Tensors of row y, smoothed along the row, into the first ring. */
 static void begin_row(const uint8_t *grey, int32_t y, const uint16_t *column, edge_rows *s)
 {
     int16_t gx[VIEW_SIZE], gy[VIEW_SIZE];
@@ -263,7 +267,7 @@ static void begin_row(const uint8_t *grey, int32_t y, const uint16_t *column, ed
         smooth_along(&tensor[k], s->once[k][y % EDGE_SMOOTH_ROWS]);
 }
 
-/* Row y across and once more along: into the second ring. */
+/* Smooth row y across and once more along, into the second ring. */
 static void middle_row(int32_t y, edge_rows *s)
 {
     padded_row row;
@@ -281,10 +285,11 @@ static void end_row(int32_t y, edge_rows *s, edge_cell *out)
     pack_row(row[0], row[1], row[2], out + y * VIEW_SIZE);
 }
 
-/* 1-2-1 in both directions, twice, is the tolerance of an edge's place, about 1.4 pixels. */
+/* Smoothing twice with 1-2-1 in both directions gives the tolerance for the position of an edge, about 1.4
+ * pixels. */
 void KERNEL(features_edges)(const uint8_t *grey, edge_cell *out, edge_rows *s)
 {
-    uint16_t column[VIEW_SIZE]; /* sums of the gradient's size over 2 EDGE_RADIUS + 1 rows */
+    uint16_t column[VIEW_SIZE]; /* sums of the gradient size over 2 EDGE_RADIUS + 1 rows */
     for (int32_t y = 0; y <= EDGE_RADIUS; y++) {
         uint16_t *const size = s->size[y % EDGE_SIZE_ROWS];
         size_row(grey, y, size);
@@ -310,7 +315,7 @@ void KERNEL(features_edges)(const uint8_t *grey, edge_cell *out, edge_rows *s)
 
 /* ---- local contrast: grey level by the mean and standard deviation of a box around it ---- */
 
-typedef struct columns { /* sums over 2 CONTRAST_RADIUS + 1 rows, with replicated ends */
+typedef struct columns { /* sums over 2 CONTRAST_RADIUS + 1 rows, with the ends replicated */
     int32_t grey[WINDOW_WIDTH(CONTRAST_RADIUS)], square[WINDOW_WIDTH(CONTRAST_RADIUS)];
 } columns;
 
@@ -369,7 +374,7 @@ KERNEL_ROW void pack_pairs(const uint8_t *restrict p, uint16_t *restrict pairs)
         pairs[i] = (uint16_t)(p[i] | p[i + VIEW_SIZE] << 8);
 }
 
-/* Those of the last row are missing; nobody looks there. */
+/* The last row has no pairs; it is never read. */
 void KERNEL(features_pairs)(const int8_t *surface, uint16_t *pairs)
 {
     for (int32_t i = 0; i < PAIRS; i += PAIRS_AT_ONCE)

@@ -3,7 +3,7 @@
 #include "image/camera.h"
 #include "base/fmath.h"
 
-#define NEAREST 0.1 /* metres before the lens: nothing is taken to be nearer */
+#define NEAREST 0.1 /* metres in front of the camera: the smallest depth used */
 
 void projection_init(projection *e, const gait_lift_config *cfg)
 {
@@ -58,7 +58,7 @@ void projection_rows_ray(const projection *e, const double ideal[2], double dept
     }
 }
 
-/* Lower triangle of the noise's Cholesky factor. */
+/* Lower Cholesky factor of the noise covariance. */
 static void noise_root(const projection_rows *r, double sd, double residual, double *l11, double *l21,
                        double *l22)
 {

@@ -1,8 +1,8 @@
-/* view.h - the region of interest of one camera, resampled so that the walker has a fixed size in it.
+/* view.h - the region of interest of one camera, resampled so that the person has a fixed size in it.
  *
- * All image evidence is measured in this working image of VIEW_SIZE x VIEW_SIZE pixels in which the
- * predicted person is about VIEW_PERSON pixels tall, whatever the camera's resolution: cost and constants
- * do not depend on the distance.  Two working pixels make one cell of the rasteriser's grid. */
+ * All image evidence is measured in this working image of VIEW_SIZE x VIEW_SIZE pixels, in which the
+ * predicted person is about VIEW_PERSON pixels tall whatever the camera's resolution. Cost and constants
+ * therefore do not depend on the distance. Two working pixels make one cell of the grid. */
 #ifndef GAIT_IMAGE_VIEW_H
 #define GAIT_IMAGE_VIEW_H
 #include "base/arena.h"
@@ -21,19 +21,20 @@ typedef struct view_planes { /* resampled planes: R, G, B, or grey in the first 
     int32_t channels;
 } view_planes;
 
-/* Centre and size the region on a person whose middle is at pixel uv and who is `tall` pixels high.
- * Returns false and keeps the map while the person stays well inside it, so that static pixels are not
- * resampled differently from frame to frame. */
+/* Centre and scale the region on a person whose middle is at pixel uv and who is `tall` pixels high. Returns
+ * false and keeps the map while the person stays well inside it, so that static pixels are not resampled
+ * differently from frame to frame. */
 bool view_follow(view_map *map, const float uv[2], float tall);
 
-/* Kernels (kernels.h), the first and the last for working rows begin .. end - 1:
- *   view_rows    one captured frame (bilinear, or a box of pixels where the working image is coarser), undoing
- *                the lens distortion; out has as many planes as the frame has channels
- *   view_inside  working pixels whose source lies inside the frame, as bits of the RAST grid
- *   view_grey    luma of the planes: (77 R + 150 G + 29 B) / 256; grey may be one of them */
+/* Kernels (base/dispatch.h); view_rows and view_grey process working rows begin .. end - 1:
+ *
+ *    view_rows    resample one captured frame (bilinear, or the mean of a box of pixels where the working image is
+ *                 coarser) and undo the lens distortion; out has as many planes as the frame has channels
+ *    view_inside  cells whose source pixel lies inside the frame, as bits of the grid
+ *    view_grey    luma of the planes: (77 R + 150 G + 29 B) / 256; grey may be one of the planes */
 view_planes view_planes_layout(arena *a, int32_t channels);
 
-/* All rows of a frame, and how many planes it has. */
+/* Resample all rows of a frame, and set the number of planes. */
 void view_sample(const kernels *run, const view_map *map, const gait_camera *cam, const gait_image *im,
                  view_planes *out);
 #endif

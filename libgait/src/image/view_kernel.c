@@ -7,21 +7,22 @@
 
 enum {
     FRACTION = 256, /* fixed-point steps of a source pixel */
-    MAX_SIDE = 16,  /* of the box of source pixels that one working pixel averages */
-    SPAN = 512,     /* source pixels of a row that are summed at a time */
+    MAX_SIDE = 16,  /* side of the box of source pixels that one working pixel averages */
+    SPAN = 512,     /* source pixels of a row that are summed at once */
     BOX_BYTES = 3 * (SPAN + MAX_SIDE)
 };
 
-typedef struct places { /* of one row of the working image in the captured frame, 1/FRACTION pixels */
+typedef struct places { /* source positions of one row of the working image, 1/FRACTION pixels */
     int32_t u[VIEW_SIZE], v[VIEW_SIZE];
 } places;
 
-typedef struct taps { /* the first of four source pixels about each working pixel; weights of the others */
+typedef struct
+    taps { /* the first of the four source pixels around each working pixel, and the weights of the others */
     int32_t offset[VIEW_SIZE];
     uint32_t x[VIEW_SIZE], y[VIEW_SIZE];
 } taps;
 
-typedef struct blend { /* of source pixels side by side, FRACTION times */
+typedef struct blend { /* horizontally interpolated source pixels, times FRACTION */
     int32_t of;        /* offset of the first; -1: none yet */
     uint16_t channel[3][VIEW_SIZE];
 } blend;
@@ -57,7 +58,7 @@ static uint8_t tap_bilinear(const gait_image *im, int32_t step, int32_t c, int32
     return (uint8_t)((top * (FRACTION - fy) + low * fy + (1 << 15)) >> 16);
 }
 
-/* Frames of less than two rows or columns, and such that an offset does not fit 32 bits. */
+/* Frames with fewer than two rows or columns, and frames whose offsets do not fit in 32 bits. */
 static bool is_degenerate(const gait_image *im)
 {
     return im->width < 2 || im->height < 2 || (int64_t)im->height * im->stride > INT32_MAX;
@@ -70,7 +71,7 @@ static void bilinear_degenerate(const gait_image *im, int32_t step, const places
             row[c][i] = tap_bilinear(im, step, c, at->u[i], at->v[i]);
 }
 
-/* The last row and column are reached with weight FRACTION from those before. */
+/* The last row and column are reached with weight FRACTION from the ones before. */
 static void locate(const gait_image *im, int32_t step, const places *at, taps *restrict t)
 {
     int32_t const right = im->width - 1, low = im->height - 1;
@@ -83,7 +84,8 @@ static void locate(const gait_image *im, int32_t step, const places *at, taps *r
     }
 }
 
-/* The byte that begins at bit `a` of word `wa` (left pixel) and at bit `b` of word `wb` (right pixel). */
+/* Interpolate between the byte at bit `a` of word `wa` (left pixel) and the one at bit `b` of `wb` (right
+ * pixel). */
 static void blend_bytes(const uint32_t *restrict wa, int32_t a, const uint32_t *restrict wb, int32_t b,
                         const uint32_t *restrict x, uint16_t *restrict out)
 {
@@ -91,7 +93,7 @@ static void blend_bytes(const uint32_t *restrict wa, int32_t a, const uint32_t *
         out[i] = (uint16_t)((wa[i] >> a & 255u) * (FRACTION - x[i]) + (wb[i] >> b & 255u) * x[i]);
 }
 
-/* Two pixels are in a word, or with colour in two: bytes r g b r and b r g b. */
+/* Two grey pixels are in one word, two colour pixels in two words: bytes r g b r and b r g b. */
 static void blend_row(const uint8_t *from, int32_t step, const taps *t, blend *restrict out)
 {
     uint32_t word[2][VIEW_SIZE];
@@ -120,8 +122,8 @@ static void blend_rows(const uint16_t *restrict top, const uint16_t *restrict lo
         out[i] = (uint8_t)((top[i] * (FRACTION - y[i]) + low[i] * y[i] + (1u << 15)) >> 16);
 }
 
-/* Two source rows that follow one another.  Without a lens all working rows have the same columns, so that what one
- * blended serves the next. */
+/* Two consecutive source rows. Without lens distortion all working rows have the same columns, so that a row
+ * interpolated for one working row serves the next. */
 typedef struct blends {
     blend row[2];
 } blends;
@@ -168,8 +170,8 @@ static box box_of(const gait_image *im, int32_t side)
     return b;
 }
 
-/* Into sum: over ny rows and, from each byte on, nx pixels to the right.  Those that reach past the bytes are
- * not whole. */
+/* Into sum, for each byte: the sum over ny rows and nx pixels to the right. Sums that reach beyond the last
+ * byte are incomplete. */
 static void box_sums(const uint8_t *from, int32_t stride, int32_t step, const box *b, int32_t bytes,
                      uint16_t *restrict sum)
 {
@@ -196,7 +198,8 @@ static void box_sums(const uint8_t *from, int32_t stride, int32_t step, const bo
     }
 }
 
-/* Working pixels from `begin` on whose boxes lie in the same rows and in one span; low, high: their columns. */
+/* End of the run of working pixels from `begin` whose boxes lie in the same rows and in one span; low, high:
+ * their columns. */
 static int32_t run_end(const places *corner, int32_t begin, int32_t *low, int32_t *high)
 {
     int32_t end = begin;
@@ -211,7 +214,7 @@ static int32_t run_end(const places *corner, int32_t begin, int32_t *low, int32_
     return end;
 }
 
-/* at: where the pixels look; afterwards the corners of their boxes. */
+/* at: source positions; replaced by the corners of their boxes. */
 KERNEL_ROW void box_row(const gait_image *im, int32_t step, int32_t side, places *at, uint8_t *const row[3])
 {
     box const b = box_of(im, side);

@@ -1,7 +1,7 @@
-/* Image gradient along the visible outlines of the limbs, normal to them. */
+/* The edge term: image gradient along the visible outlines of the limbs, normal to them. */
 #include "likelihood/term.h"
 
-enum { ENOUGH = 16 }; /* points below which the outline counts as unseen */
+enum { ENOUGH = 16 }; /* least points of an outline that count as visible */
 
 static float log_likelihood(const like_body *b)
 {
@@ -12,8 +12,8 @@ static float log_likelihood(const like_body *b)
     return (float)t.response / (float)(t.points * 2 * 64 * EDGE_ONE) - 1.0f;
 }
 
-/* With nobody there the outline meets edges of any direction: a tenth more than chance is asked for, and
- * something where the picture has no edges at all. */
+/* Log likelihood ratio against an empty scene, where the outline meets edges of any direction: 10 % more
+ * than that is required, and a minimum where the image has no edges at all. */
 static float support(const like_body *b)
 {
     float const least = 0.005f;

@@ -6,9 +6,9 @@
 
 #include <string.h>
 
-/* A limb has LANES points: eight along each side of a cone, two along each side of an ellipsoid's octagon. */
+/* A limb has SIMD16 points: eight along each side of a cone, two along each side of an ellipsoid's octagon. */
 
-typedef struct limb_points { /* of each point */
+typedef struct limb_points { /* the side that each point is on, and where on it */
     float x[SIMD16], y[SIMD16], dx[SIMD16], dy[SIMD16], normal[SIMD16], share[SIMD16];
 } limb_points;
 
@@ -24,7 +24,7 @@ static inline void cone(const float *w, limb_points *restrict out)
         out->share[i] = ((float)(i >> 1) + 0.5f) / 8.0f;
 }
 
-/* The octagon's sides, twice round. */
+/* The sides of the octagon, twice. */
 static inline void ellipsoid(const like_sides *s, int32_t lane, limb_points *restrict out)
 {
     simd16_duplicate(s->part[0][lane], out->x);
@@ -37,10 +37,10 @@ static inline void ellipsoid(const like_sides *s, int32_t lane, limb_points *res
         out->share[i] = i < 8 ? 0.25f : 0.75f;
 }
 
-typedef struct spots {                     /* points of the limbs' outlines */
-    int32_t cell[MODEL_MAX_LIMBS][SIMD16]; /* of the edge map: where, then what is there */
-    int32_t x[MODEL_MAX_LIMBS][SIMD16], y[MODEL_MAX_LIMBS][SIMD16]; /* cell of the grid a little inside */
-    int32_t shown[MODEL_MAX_LIMBS][SIMD16];                         /* negative: in the image */
+typedef struct spots {                     /* points on the outlines of the limbs */
+    int32_t cell[MODEL_MAX_LIMBS][SIMD16]; /* index into the edge map, then the edge tensor there */
+    int32_t x[MODEL_MAX_LIMBS][SIMD16], y[MODEL_MAX_LIMBS][SIMD16]; /* cell a little inside */
+    int32_t shown[MODEL_MAX_LIMBS][SIMD16];                         /* negative: inside the image */
     int32_t normal[MODEL_MAX_LIMBS][SIMD16];
 } spots;
 
@@ -54,15 +54,15 @@ static inline void place(const limb_points *s, const float inner[2], int32_t k, 
         int32_t const u = (int32_t)x, v = (int32_t)y;
         out->normal[k][i] = (int32_t)s->normal[i];
         out->cell[k][i] = v * VIEW_SIZE + u;
-        /* There the limb's own mask tells whether something nearer hides this point. */
+        /* There the visible mask of the limb shows whether something nearer hides this point. */
         out->x[k][i] = (int32_t)(outer * x + inner_x);
         out->y[k][i] = (int32_t)(outer * y + inner_y);
         out->shown[k][i] = -((uint32_t)(u | v) < VIEW_SIZE);
     }
 }
 
-/* Apart from the look-ups, which might read the sums: they would be kept in memory.  n'Tn = (trace + (xx - yy) cos 2a +
- * 2 xy sin 2a) / 2, doubled; nothing where nothing is shown. */
+/* Kept out of the lookups: the compiler would keep the sums in memory, because the lookups might read them.
+ * 2 n'Tn = trace + (xx - yy) cos 2a + 2 xy sin 2a; 0 where a point is hidden. */
 static like_edge_tally tally(const spots *p, int32_t limbs)
 {
     const int32_t *const cell = p->cell[0], *const shown = p->shown[0];
@@ -85,7 +85,7 @@ void KERNEL(edges_count)(const like_body *b, like_edge_tally *restrict out)
         if (b->setup->geometry[l].shape == LIMB_ELLIPSOID) {
             ellipsoid(o, lane, &s);
             place(&s, o->part[2][lane] + 8, l, &p);
-        } else { /* twice, so that the sides need not be written down */
+        } else { /* `place` is called in both branches so that the sides stay in registers */
             cone(o->part[0][lane], &s);
             place(&s, o->part[0][lane] + LIKE_SIDE_INNER, l, &p);
         }

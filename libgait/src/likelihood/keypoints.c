@@ -1,19 +1,20 @@
-/* Joints that somebody else has found in the image: robust distance to where the body would show them. */
+/* The keypoint term: robust distance between the joints that a detector found in the image and the projected
+ * joints of the body. */
 #include "likelihood/term.h"
 
 #include "image/camera.h"
 #include "base/fmath.h"
 
-#define STRANGE 8.0f /* deviations at which a joint says as much as nobody would */
-#define BEHIND  1e6f /* squared deviations of a joint behind the camera */
+#define STRANGE 8.0f /* standard deviations at which a joint is as likely as without a person */
+#define BEHIND  1e6f /* squared standard deviations of a joint behind the camera */
 
-/* Student-t with 4 degrees of freedom in two dimensions: squared deviations to nats. */
+/* Student-t with 4 degrees of freedom in two dimensions: squared standard deviations to nats. */
 static float cost(float square)
 {
     return 3.0f * m_log(1.0f + 0.25f * square);
 }
 
-/* Mean cost of the joints seen. */
+/* Mean cost of the joints that were found. */
 static float mean_cost(const like_body *b)
 {
     const features_keypoints *const found = &b->features->keypoints;

@@ -6,7 +6,8 @@ static const like_term *const TERMS[LIKE_TERMS] = {
     [LIKE_TEMPLATE] = &like_template, [LIKE_KEYPOINTS] = &like_keypoints,
 };
 
-/* Point and outward normal on one ring, at this angle from the lateral axis; z from 0 at the start to 1. */
+/* Point and outward normal on a ring of the surface, at this angle from the lateral axis; z runs from 0 at
+ * the start of the limb to 1 at its end. */
 static void surface_point(const limb_geometry *g, float z, float angle, float point[3], float normal[3])
 {
     float s, c, ra = g->a0 + (g->a1 - g->a0) * z, rb = g->b0 + (g->b1 - g->b0) * z, norm = 0.0f;
@@ -54,7 +55,8 @@ static void cost_set(like_costs *c, int32_t difference, int32_t cost)
     c->high[difference] = (uint8_t)(cost >> 8);
 }
 
-/* Student-t with 4 degrees of freedom, scale half a local standard deviation: a square loses real clips. */
+/* Student-t with 4 degrees of freedom and a scale of half a local standard deviation: a squared cost loses
+ * track on real clips. */
 static void costs_init(like_setup *s)
 {
     float const scale = 0.5f * (float)CONTRAST_UNIT;
@@ -85,7 +87,7 @@ void like_evaluate(const like_body *b)
     const like_setup *const s = b->setup;
     if ((s->terms & GAIT_TERM_TEXTURE) && b->ancestor)
         s->run->texture_costs(b, b->terms->cost);
-    for (int32_t k = LIKE_TEXTURE + 1; k < LIKE_TERMS; k++) /* like_sum() has the texture's */
+    for (int32_t k = LIKE_TEXTURE + 1; k < LIKE_TERMS; k++) /* texture comes in like_sum() */
         b->terms->nats[k][b->lane] =
             s->terms & TERMS[k]->flag ? s->weight[k] * TERMS[k]->log_likelihood(b) : 0.0f;
 }

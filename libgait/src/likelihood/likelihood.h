@@ -5,14 +5,14 @@
 
 void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_config *cfg, const kernels *run);
 
-/* One body's terms into its block's, of the texture what its block goes on with. */
+/* Evaluate the terms of one body into its block; of the texture, the costs that like_sum() needs. */
 void like_evaluate(const like_body *b);
 
-/* The rest of the texture, if the bodies have ancestors, and sums over the terms. */
+/* Finish the texture term, if the bodies have ancestors, and sum over the terms. */
 void like_sum(const like_setup *s, const outline_block *outline, bool ancestors, like_block *terms,
               float sum[BLOCK]);
 
-/* Sum of the weighted terms over the hypothesis that nobody is there: positive if the frame shows this
- * body. */
+/* Weighted sum of the terms as a log likelihood ratio against "no person is there": positive if the frame
+ * shows this body. */
 float like_support(const like_body *b);
 #endif

@@ -3,11 +3,12 @@
 #include "base/simd16.h"
 #include "likelihood/term.h"
 
-typedef struct side_words { /* where the words of one side go */
+typedef struct side_words { /* where the values of one side are stored */
     float *x, *y, *dx, *dy, *normal;
 } side_words;
 
-/* The side between two corners; what is behind the camera, short or no number lies outside the picture. */
+/* The side between two corners. A side behind the camera, too short or not finite is placed outside the
+ * image. */
 static void side(const outline_lanes *o, int32_t from, int32_t next, side_words out)
 {
     float const outside = -1e4f, far = 1e6f;
@@ -27,7 +28,7 @@ static void side(const outline_lanes *o, int32_t from, int32_t next, side_words 
     }
 }
 
-/* What a limb's middle adds to the cells of its inner points. */
+/* The part of the inner points that comes from the middle of the limb, cells. */
 static void middle(const body_lanes *v, const int32_t corner[4], float *restrict out)
 {
     float const far = 1e6f, share = 0.125f * LIKE_INWARD;
@@ -50,7 +51,7 @@ static void prepare_cone(const outline_lanes *o, like_sides *restrict out)
     simd16_transpose((const body_lanes *)w, out->part[0]);
 }
 
-/* In parts: x and y of the eight sides, dx and dy, normals and the middle. */
+/* In three parts: x and y of the eight sides; dx and dy; normals and the middle. */
 static void prepare_ellipsoid(const outline_lanes *o, like_sides *restrict out)
 {
     static const int32_t corners[4] = {0, 2, 4, 6};

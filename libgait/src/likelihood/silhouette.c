@@ -1,7 +1,9 @@
-/* Silhouette both ways: background inside the body and foreground that the body leaves unexplained. */
+/* The silhouette term, in both directions: background inside the body and foreground that the body does not
+ * explain. */
 #include "likelihood/term.h"
 
-/* Area of a standing person of VIEW_PERSON / 2 cells, about 0.16 height^2: the same for every particle. */
+/* Area of a standing person who is VIEW_PERSON / 2 cells tall, about 0.16 height^2: the same for every
+ * particle. */
 static const float TYPICAL = 0.16f * 0.25f * (float)VIEW_PERSON * (float)VIEW_PERSON * (float)FOREGROUND_ONE;
 
 void like_silhouette_count(like_body *b)
@@ -18,7 +20,7 @@ static float log_likelihood(const like_body *b)
     return -((float)(b->area - b->covered) + b->setup->missed_weight * missed) / TYPICAL;
 }
 
-/* With nobody there all foreground is missed and no background is inside. */
+/* Without a person all foreground is missed and no background is inside the body. */
 static float support(const like_body *b)
 {
     if (!b->features->has_foreground)

@@ -1,4 +1,5 @@
-/* Bits of the body's rows, of the field of view and of the foreground, counted together. */
+/* Area and foreground of a body: bits of its rows, of the field of view and of the foreground, counted
+ * together. */
 #include "image/features.h"
 #include "base/dispatch.h"
 

@@ -9,19 +9,20 @@
 
 /* ---- a block of bodies before a camera: one lane a body ---- */
 
-/* Of the directions 0 .. 7 and their opposites 8 .. 15, those on one side of a plane through the limb follow
- * one another: `count` of the first eight lie there, and the last of these does or does not. */
+/* Of the directions 0 .. 7 and their opposites 8 .. 15, those on one side of a plane through the limb are
+ * consecutive: `count` of the first eight are on that side, and `last` is 1 if direction 7 is. */
 static inline int32_t first_direction(int32_t count, int32_t last)
 {
     return (LIKE_AZIMUTHS + (last ? -count : count)) & (LIKE_DIRECTIONS - 1);
 }
 
-/* A normal is across the limb's axis, so what counts is the direction in which the camera sees the axis: a
- * normal that leads away from the camera there does so at its point, too, a radius further out. */
+/* A normal is perpendicular to the limb's axis, so the direction from which the camera views the axis
+ * decides: a normal that points away from the camera on the axis also does so at its point, a radius further
+ * out. */
 static void choose_half(const like_surface *s, body_lanes *restrict w, const float *scale,
                         int32_t *restrict turn)
 {
-    float const grazing = 0.2f; /* |n.v| below which a point grazes the outline */
+    float const grazing = 0.2f; /* |n.v| below which a point is too close to the outline */
     for (int32_t i = 0; i < BLOCK; i++) {
         float const stature = 1.0f / scale[i];
         float e[3], m[3]; /* from the camera to the limb's frame and to its middle, in the frame, statures */
@@ -40,7 +41,7 @@ static void choose_half(const like_surface *s, body_lanes *restrict w, const flo
     }
 }
 
-/* A limb's frame and its origin in the camera's axes. */
+/* A limb's frame and its origin in camera axes. */
 static void to_camera(const gait_camera *cam, const body_lanes *R, const body_lanes *o,
                       body_lanes *restrict turn, body_lanes *restrict place)
 {
@@ -54,7 +55,7 @@ static void to_camera(const gait_camera *cam, const body_lanes *R, const body_la
     }
 }
 
-/* What takes a row of camera coordinates, x or y, and depth to 1/256 working pixels times depth. */
+/* Camera coordinates (a row, x or y, and depth) to 1/256 working pixels times depth. */
 static void to_image(float focus, float middle, const float *row, const float *depth, float *restrict out)
 {
     for (int32_t i = 0; i < BLOCK; i++)
@@ -94,9 +95,9 @@ void KERNEL(surface_pose)(const like_setup *s, const gait_camera *cam, const vie
 
 /* ---- the points of one body ---- */
 
-typedef struct spots {                  /* where the points of half a limb are */
+typedef struct spots {                  /* the points of half a limb */
     int32_t u[LIKE_HALF], v[LIKE_HALF]; /* 1/256 working pixels, 0 where not shown */
-    int32_t shown[LIKE_HALF];           /* negative: faces the camera well enough, in the image */
+    int32_t shown[LIKE_HALF];           /* negative: faces the camera well enough and is in the image */
 } spots;
 
 static inline uint32_t u_max(uint32_t a, uint32_t b)
@@ -104,10 +105,10 @@ static inline uint32_t u_max(uint32_t a, uint32_t b)
     return a > b ? a : b;
 }
 
-/* Points of half a limb; what is read again stays in registers. */
+/* Project the points of half a limb. Values that are read repeatedly stay in registers. */
 static inline void place(const like_surface *s, const like_pose_limb *pose, int32_t lane, spots *restrict out)
 {
-    float const end = (float)((VIEW_SIZE - 1) * LIKE_SUBPIXELS); /* a pixel more has no neighbours */
+    float const end = (float)((VIEW_SIZE - 1) * LIKE_SUBPIXELS); /* one pixel further has no neighbours */
     int32_t const first = 2 * pose->turn[lane];
     const float *const w = pose->view[lane];
     const float *const X = w + LIKE_VIEW_IMAGE, *const Y = X + 3, *const Z = Y + 3,
@@ -129,7 +130,7 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
         float const x = (X0 * px[i] + X1 * py[i] + X2 * pz[i] + S0) * inv;
         float const y = (Y0 * px[i] + Y1 * py[i] + Y2 * pz[i] + S1) * inv;
         float const away = nx * E0 + ny * E1 + nz * E2 + s->outward[j];
-        /* Floats that are not negative are in the order of their bits; the others' are greater. */
+        /* Floats that are not negative are ordered as their bits; negative ones have greater bits. */
         int32_t const shown = -((away < graze) & (u_max(m_bits(x), m_bits(y)) < m_bits(end)));
         out->shown[i] = shown;
         out->u[i] = shown ? (int32_t)x : 0;
@@ -137,7 +138,7 @@ static inline void place(const like_surface *s, const like_pose_limb *pose, int3
     }
 }
 
-/* Bilinear look-up in the surface map, rounded towards 0. */
+/* Read the surface map by bilinear interpolation, rounded towards 0. */
 static inline void read_surface(const features *f, const spots *p, int8_t *restrict value)
 {
 #ifdef SIMD16_BILINEAR_BYTES
@@ -156,7 +157,8 @@ static inline void read_surface(const features *f, const spots *p, int8_t *restr
 #endif
 }
 
-/* One step for all limbs after the other: what a limb waits for is filled with the next one's work. */
+/* Each step runs over all limbs before the next one begins, so that the waits of one limb are filled with
+ * work on another. */
 void KERNEL(surface_sample)(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,
                             const layers *drawn, like_patch *restrict out)
 {

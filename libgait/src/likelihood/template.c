@@ -8,7 +8,7 @@ void template_clear(int16_t *template, int32_t limbs)
 
 static int16_t approach(int16_t known, int32_t value)
 {
-    int32_t const slow = 10, now = value * TEMPLATE_ONE; /* frames: a tenth of what is new */
+    int32_t const slow = 10, now = value * TEMPLATE_ONE; /* frames: the weight of a new sample is a tenth */
     return (int16_t)(known == TEMPLATE_EMPTY ? now : known + (now - known) / slow);
 }
 
@@ -32,7 +32,7 @@ void template_ring(const int16_t *template, int32_t limbs, int8_t *ring)
         }
 }
 
-/* Mean robust cost over all points that the template knows and the body shows. */
+/* Mean robust cost over all points that have a template and are visible. */
 static float log_likelihood(const like_body *b)
 {
     int32_t const enough = 32;

@@ -1,4 +1,5 @@
-/* Brightness constancy along each particle's own history (Ormoneit et al. 2000, eqs. 10-13). */
+/* The texture term: brightness constancy along each particle's own history (Ormoneit et al. 2000, eqs.
+ * 10-13). */
 #include "likelihood/term.h"
 
 #include <string.h>
@@ -9,14 +10,15 @@ static float log_likelihood(const like_body *b)
     float log[BLOCK];
     if (!b->ancestor)
         return 0.0f;
-    memset(cost, 0, sizeof b->terms->cost); /* of the other bodies */
+    memset(cost, 0, sizeof b->terms->cost); /* costs of the other lanes */
     b->setup->run->texture_costs(b, cost);
     b->setup->run->texture_logs(b->setup, b->outline, (const int32_t (*)[BLOCK])cost, log);
     return log[b->lane];
 }
 
-/* With nobody there every limb is as good as occluded.  Only the paper's mode asks: its other evidence is
- * none, while a motionless background predicts itself too well to speak against silhouette and edges. */
+/* Without a person every limb is as good as occluded. Only the paper's mode uses this, because it has no
+ * other evidence; in the default mode a static background predicts itself too well to be compared with
+ * silhouette and edges. */
 static float support(const like_body *b)
 {
     if (!b->setup->paper || !b->ancestor)

@@ -1,21 +1,22 @@
-/* What limbs look like and looked like (Ormoneit et al. 2000, eqs. 10-13). */
+/* Comparison of the limbs' surfaces with those of the ancestor (Ormoneit et al. 2000, eqs. 10-13) and with
+ * the template. */
 #include "base/fmath.h"
 #include "base/dispatch.h"
 #include "likelihood/term.h"
 #include "base/simd16.h"
 #include <string.h>
 
-enum { PLACES = (MODEL_MAX_LIMBS + 3) / 4 * 4 }; /* for limbs, four at a time */
+enum { PLACES = (MODEL_MAX_LIMBS + 3) / 4 * 4 }; /* number of limbs, rounded up to four at a time */
 
-typedef struct rows { /* points of each limb */
+typedef struct rows { /* samples of each limb */
     const int8_t *now[PLACES], *then[PLACES];
 } rows;
 
-/* Sums of costs over the points of each limb, with LIKE_COUNT_ONE for each point that is seen in both. */
+/* Sums of costs over the points of each limb, plus LIKE_COUNT_ONE for each point that is visible in both. */
 #ifdef SIMD16_BYTES
 static void compare_all(rows *r, int32_t limbs, const like_costs *cost, int32_t *sum)
 {
-    for (int32_t l = limbs; l % SIMD16_BYTES != 0; l++) { /* nobody reads their sums */
+    for (int32_t l = limbs; l % SIMD16_BYTES != 0; l++) { /* their sums are not read */
         r->now[l] = r->now[0];
         r->then[l] = r->then[0];
     }
@@ -47,8 +48,8 @@ static void compare_all(const rows *r, int32_t limbs, const like_costs *cost, in
 }
 #endif
 
-/* The ancestor's half may begin elsewhere: its values are laid among hidden ones and read from where `now`
- * begins. */
+/* The ancestor's half may begin at another direction: its samples are copied between hidden ones and read
+ * from where `now` begins. */
 static void compare_limbs(const like_patch *now, const like_patch *then, int32_t limbs,
                           const like_costs *cost, int32_t *sum)
 {
@@ -66,21 +67,21 @@ static void compare_limbs(const like_patch *now, const like_patch *then, int32_t
     compare_all(&r, limbs, cost, sum);
 }
 
-/* Share of the about LIKE_SAMPLES / 2 points cos_tilt the camera that both frames show. */
+/* Share of the about LIKE_SAMPLES / 2 points facing the camera that are visible in both frames. */
 static inline float visible_share(int32_t both)
 {
     return f_min((float)both / (0.4f * (float)LIKE_SAMPLES), 1.0f);
 }
 
-/* Mixture of "visible and constant" and "occluded" for one limb (eq. 12), as a log. */
+/* Log of the mixture of "visible and constant" and "occluded" for one limb (eq. 12). */
 static inline float mixture(float q, float log_visible, float log_occluded)
 {
     float const d = log_visible - log_occluded;
-    /* log(q e^v + (1 - q) e^o) with e^o taken out; beyond 30 nats more does not matter. */
+    /* log(q e^v + (1 - q) e^o) with e^o factored out; differences beyond 30 nats do not matter. */
     return log_occluded + m_log(q * m_exp(f_clamp(d, -30.0f, 30.0f)) + (1.0f - q));
 }
 
-/* Robust, contrast-normalised form: mean Student-t cost. */
+/* The robust, contrast-normalised form: mean Student-t cost. */
 static inline float robust(int32_t both, int32_t cost, float cos_tilt)
 {
     float const log_occluded = -1.6f; /* as bad as a typical mismatch */
@@ -89,7 +90,8 @@ static inline float robust(int32_t both, int32_t cost, float cos_tilt)
     return both < LIKE_FEW ? log_occluded : log_mixture;
 }
 
-/* Literal form: mean squared grey-level difference, normal density, sigma growing with the viewing angle. */
+/* The form of the paper: mean squared grey-level difference, normal density, sigma growing with the viewing
+ * angle. */
 static inline float literal(int32_t both, int32_t squares, float cos_tilt)
 {
     float const image_var = 9.0f, model_var = 64.0f; /* grey levels squared */

@@ -1,4 +1,5 @@
-/* visible.h - which points of a limb its own mask shows: what is nearer hides the others.  For kernels. */
+/* visible.h - for kernels: which points of a limb are visible, that is in the limb's own mask, from which
+ * the cells that nearer limbs hide were removed. */
 #ifndef GAIT_LIKELIHOOD_VISIBLE_H
 #define GAIT_LIKELIHOOD_VISIBLE_H
 #include "base/dispatch.h"
@@ -6,7 +7,7 @@
 #include "base/grid_mask.h"
 
 #if defined(__AVX512F__)
-#define HIDE_ANY KERNEL_ROW /* few masks are not small: it would only take registers */
+#define HIDE_ANY KERNEL_ROW /* most masks are small: inlining this would only use registers */
 #else
 #define HIDE_ANY static inline
 #endif
@@ -30,7 +31,8 @@ HIDE_ANY void hide_any(const grid_mask *mask, const int32_t *x, const int32_t *y
 }
 
 #if defined(__AVX512F__)
-/* Two rows of halves in each register; columns count from the last one, which comes first in a word. */
+/* Two rows of half words in each register. Columns count down from the last one, which comes first in a
+ * word. */
 static inline void hide_small(const grid_mask *mask, const int32_t *x, const int32_t *y, int32_t shift,
                               int32_t *restrict shown)
 {
@@ -50,7 +52,8 @@ static inline void hide_small(const grid_mask *mask, const int32_t *x, const int
 }
 #endif
 
-/* Of the cells that are shown (negative), at 2^shift x and y, those in a mask remain so. */
+/* Points are shown where `shown` is negative. Points at (x, y) in units of 2^-shift cells stay shown only
+ * where their cell is in the mask. */
 static inline void hide(const grid_mask *mask, const int32_t *x, const int32_t *y, int32_t shift,
                         int32_t *restrict shown)
 {

@@ -42,7 +42,7 @@ static bool all_zero(const unsigned char *p, size_t n)
     return any == 0;
 }
 
-/* CRC of the file with the CRC field itself taken as 0. */
+/* CRC of the file with its CRC field set to 0. */
 static uint32_t file_crc(const unsigned char *data, size_t bytes)
 {
     static const unsigned char zero[4];
@@ -65,7 +65,7 @@ static gait_result check_header(const void *data, size_t bytes, blob *out, gait_
         return base_fail(err, GAIT_ERR_VERSION, -1, "blob: format %u.%u, this build reads %d.x", h.major,
                          h.minor, GAIT_FORMAT_MAJOR);
     if (h.total != bytes)
-        return base_fail(err, GAIT_ERR_CORRUPT, -1, "blob: %zu bytes given, the header says %llu", bytes,
+        return base_fail(err, GAIT_ERR_CORRUPT, -1, "blob: %zu bytes given, the header has %llu", bytes,
                          (unsigned long long)h.total);
     if (file_crc(data, bytes) != h.crc)
         return base_fail(err, GAIT_ERR_CORRUPT, -1, "blob: checksum does not match");
@@ -121,7 +121,8 @@ static uint32_t next_section(const blob *b, uint64_t pos)
     return best;
 }
 
-/* Walk the file in order: every byte is table, section or zero, and no section is met inside another. */
+/* Walk through the file in order: every byte belongs to a table or a section or is zero, and no sections
+ * overlap. */
 static gait_result check_layout(const blob *b, gait_error *err)
 {
     uint32_t left = 0, i;

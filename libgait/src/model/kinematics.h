@@ -1,5 +1,5 @@
-/* kinematics.h - curves and forward kinematics of BLOCK bodies at once: structure of arrays, one lane a body.
- * Frames and signs: doc/model-format.md.  Lane results do not depend on the other lanes. */
+/* kinematics.h - curves and forward kinematics of BLOCK bodies at once: structures of arrays, one lane a
+ * body. Frames and signs: doc/model-format.md. The result of a lane does not depend on the other lanes. */
 #ifndef GAIT_MODEL_KINEMATICS_H
 #define GAIT_MODEL_KINEMATICS_H
 #include "base/dispatch.h"
@@ -29,8 +29,8 @@ typedef struct kin_body {
     float scale[KIN_MAX_FRAMES][BLOCK]; /* metres per model length in the frame */
 } kin_body;
 
-/* How much faster than the mean somebody walks: standard deviations between people of the stride rate, at most
- * as far from it as was learnt.  0 for a rate of 0, which is not known. */
+/* Stride rate relative to the mean, in standard deviations between people, limited to the learned range. 0
+ * for a rate of 0, which means unknown. */
 static inline float kin_pace(const gait_model *m, float stride_hz)
 {
     float const most = 2.0f;
@@ -39,28 +39,29 @@ static inline float kin_pace(const gait_model *m, float stride_hz)
     return f_clamp((stride_hz - m->stride_hz) / m->stride_hz_sd, -most, most);
 }
 
-/* One channel of one body: the same bits as the kernel kin_curves gives. */
+/* One channel of one body: the same bits as the kernel kin_curves. */
 float kin_channel(const gait_model *m, int32_t channel, float phase, float pace, const float *coef,
                   int32_t components);
 
-/* By how much the first `proportions` scores change the pelvis's height, relatively. */
+/* Relative change of the height of the pelvis due to the first `proportions` scores. */
 float kin_height_change(const gait_model *m, const float *score, int32_t proportions);
 
-/* The reported points, metres, world: P x 3 x BLOCK. */
+/* The reported joints, metres, world: P x 3 x BLOCK. */
 void kin_points(const gait_model *m, const kin_body *b, float (*xyz)[3][BLOCK]);
 
-typedef struct kin_frames { /* one body's frames in the world */
+typedef struct kin_frames { /* the frames of one body in the world */
     float R[KIN_MAX_FRAMES * 9], o[KIN_MAX_FRAMES * 3];
     float scale[KIN_MAX_FRAMES]; /* metres per model length */
 } kin_frames;
 
-/* Frames of one body; errors as below. */
+/* Frames of one body. Errors are those of model_pose_state. */
 gait_result model_place_state(const gait_model *m, const gait_state *s, kin_frames *out);
 
-/* One body: curves, kinematics, points and angles; unused entries of out are 0.
- * GAIT_ERR_ARG, and out left alone, when a number in s is not finite or the stature is not positive. */
+/* Pose of one body: curves, kinematics, joints and angles; unused entries of out are 0. GAIT_ERR_ARG, with
+ * out unchanged, if a number in s is not finite or the stature is not positive. */
 gait_result model_pose_state(const gait_model *m, const gait_state *s, gait_pose *out);
 
-/* Height of the pelvis over the ground that the curves give for s, metres; errors as above. */
+/* Height of the pelvis above the ground that the curves give for s, metres. Errors are those of
+ * model_pose_state. */
 gait_result model_pelvis_height(const gait_model *m, const gait_state *s, float *out);
 #endif

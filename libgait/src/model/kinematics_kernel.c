@@ -3,9 +3,9 @@
 #include "model/kinematics.h"
 #include "model/kinematics_simd.h"
 
-enum { PART = 16 }; /* channels at once */
+enum { PART = 16 }; /* channels computed at once */
 
-/* Of a model that has fewer. */
+/* Curves of a model with fewer than PART channels. */
 KERNEL_ROW void few_curves(const gait_model *m, const kin_input *in, int32_t components, kin_channels *out)
 {
     for (int32_t lane = 0; lane < BLOCK; lane++) {

@@ -1,5 +1,5 @@
-/* kinematics_simd.h - curves and forward kinematics of n bodies, one lane a body; inlined, so that the loops over lanes
- * become vector code. */
+/* kinematics_simd.h - curves and forward kinematics of n bodies, one lane a body; inline, so that the loops
+ * over lanes vectorise. */
 #ifndef GAIT_MODEL_KINEMATICS_SIMD_H
 #define GAIT_MODEL_KINEMATICS_SIMD_H
 #include "base/fmath.h"
@@ -8,20 +8,20 @@
 
 #include <string.h>
 
-/* The code is written once for n lanes; always inlined, so that n is a constant: BLOCK, or 1 for one body. */
+/* The code is written for n lanes and always inlined, so that n is a constant: BLOCK, or 1 for one body. */
 #if defined(__GNUC__)
 #define KIN_INLINE static inline __attribute__((always_inline))
 #else
 #define KIN_INLINE static inline
 #endif
 
-/* n bodies: component i of an array lies at [i * n + lane].  Shapes as in kin_input and kin_body. */
+/* n bodies: component i of an array is at [i * n + lane]. Shapes as in kin_input and kin_body. */
 typedef struct bodies {
     const float *channel;                /* M x n */
     const float *heading, *pitch, *roll; /* n */
     const float *pelvis;                 /* 3 x n */
     const float *stature;                /* n */
-    const float *score;                  /* p x n: of the proportions, the first `proportions` in use */
+    const float *score; /* p x n: scores of the proportions, of which the first `proportions` are used */
     int32_t proportions;
     float *R, *o, *scale; /* F x 9 x n, F x 3 x n, F x n */
 } bodies;
@@ -45,7 +45,7 @@ KIN_INLINE void curves_part(const gait_model *m, float phase, float pace, const 
     }
 }
 
-/* (x, y) turned by the angle with this sine and cosine. */
+/* Rotate (x, y) by the angle with this sine and cosine. */
 KIN_INLINE void turn(float s, float c, float *x, float *y)
 {
     float const was = *x;
@@ -53,7 +53,7 @@ KIN_INLINE void turn(float s, float c, float *x, float *y)
     *y = c * *y - s * was;
 }
 
-/* Columns a and b of R turned into each other by the angles with these sines and cosines. */
+/* Rotate columns a and b of R into each other by the angles with these sines and cosines. */
 KIN_INLINE void turn_columns(float *R, int a, int b, const float *s, const float *c, int n)
 {
     for (int lane = 0; lane < n; lane++) {
@@ -93,7 +93,7 @@ KIN_INLINE void place_root(const gait_model *m, const bodies *b, int n)
     memcpy(b->o, b->pelvis, 3 * (size_t)n * sizeof(float));
 }
 
-/* Metres per model length in every frame: stature, changed by the limbs' proportions. */
+/* Metres per model length in every frame: the stature, changed by the limbs' proportions. */
 KIN_INLINE void scale_frames(const gait_model *m, const bodies *b, int n)
 {
     for (int32_t f = 0; f < m->frames; f++) {
@@ -119,7 +119,7 @@ KIN_INLINE void place_point(const float *R, const float *o, const float *scale, 
         }
 }
 
-/* Move the origin o (3 x n) of frame f by what the proportions shift it in its parent's axes R. */
+/* Shift the origin o (3 x n) of frame f in its parent's axes R by what the proportions require. */
 KIN_INLINE void shift_origin(const gait_model *m, const bodies *b, int32_t f, const float *R,
                              float *restrict o, int n)
 {

@@ -72,7 +72,7 @@ static void read_statistics(sections *r, gait_model *m)
                      "has a negative sd");
 }
 
-/* Optional: models without it walk alike at every stride rate. */
+/* Optional: without it the curves do not depend on the stride rate. */
 static void read_pace(sections *r, gait_model *m)
 {
     if (r->status != GAIT_OK || !blob_has(&r->b, "PACE"))
@@ -91,7 +91,7 @@ static void read_pace(sections *r, gait_model *m)
     m->pace_terms = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
 }
 
-/* The pairs (axis, channel) of a frame: n of them valid, the others 0. */
+/* True if the n pairs (axis, channel) of a frame are valid and the others 0. */
 static bool rotations_valid(const gait_model *m, const int32_t info[FRAME_INFO])
 {
     bool ok = info[1] >= 0 && info[1] <= FRAME_ROTATIONS;
@@ -126,7 +126,7 @@ static void read_frames(sections *r, gait_model *m)
     }
 }
 
-/* Optional: models without it have one body for everybody. */
+/* Optional: without it all people have the same proportions. */
 static void read_proportions(sections *r, gait_model *m)
 {
     uint32_t dims[4] = {SECTION_ANY, (uint32_t)m->frames + 1};
@@ -141,7 +141,7 @@ static void read_proportions(sections *r, gait_model *m)
     m->proportions = r->status == GAIT_OK ? (int32_t)dims[0] : 0;
 }
 
-/* Optional: models without it change lengths in proportion alone. */
+/* Optional: without it proportions only scale lengths. */
 static void read_shifts(sections *r, gait_model *m)
 {
     uint32_t dims[4] = {(uint32_t)m->proportions, (uint32_t)m->frames, 3};
@@ -169,7 +169,8 @@ static void read_points(sections *r, gait_model *m)
         sections_require(r, m->point_frame[i] >= 0 && m->point_frame[i] < m->frames, "PTNI", "no such frame");
 }
 
-/* Radii positive; an axis of some length that is not along y, from which the first radius is measured. */
+/* True if all radii are positive and the axis has a length and is not along y, from which the first radius
+ * is measured. */
 static bool limb_valid(const float s[LIMB_SHAPE])
 {
     float const dx = s[3] - s[0], dy = s[4] - s[1], dz = s[5] - s[2];
@@ -227,7 +228,7 @@ gait_result model_need_cyclic(const gait_model *m, gait_error *err)
     if (m->cyclic)
         return GAIT_OK;
     return base_fail(err, GAIT_ERR_ARG, -1,
-                     "the model holds no cyclic model: learn it without --segments only to track with it");
+                     "the model has no cyclic part: learn it without --segments only to track with it");
 }
 
 int32_t model_find_angle(const gait_model *m, const char *name, size_t length)
@@ -240,8 +241,9 @@ int32_t model_find_angle(const gait_model *m, const char *name, size_t length)
 
 uint32_t model_posture_angles(const gait_model *m)
 {
-    static const char names[][20] = {"torso_x",         "torso_y",         "l_shoulder_flexion", "r_shoulder_flexion",
-                                     "l_elbow_flexion", "r_elbow_flexion"};
+    static const char names[][20] = {
+        "torso_x",         "torso_y",        "l_shoulder_flexion", "r_shoulder_flexion",
+        "l_elbow_flexion", "r_elbow_flexion"};
     uint32_t mask = 0;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         int32_t const a = model_find_angle(m, names[i], strlen(names[i]));
@@ -250,7 +252,7 @@ uint32_t model_posture_angles(const gait_model *m)
     return mask;
 }
 
-/* The series at the phases of the mean curves, T x M, summed from the constant up. */
+/* The series at the phases of the mean curves, T x M, summed from the constant term up. */
 static void unfold_pace(const gait_model *m, float *curve)
 {
     int32_t const T = m->phases, M = m->channels;

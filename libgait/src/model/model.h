@@ -1,4 +1,4 @@
-/* model.h - a checked blob as typed views.  Lengths are fractions of stature, angles radians. */
+/* model.h - a checked model file as typed views. Lengths are fractions of stature, angles radians. */
 #ifndef GAIT_MODEL_MODEL_H
 #define GAIT_MODEL_MODEL_H
 #include "base/arena.h"
@@ -29,7 +29,7 @@ struct gait_model {
 
     const float *curves;       /* (1 + q) x T x M: mean, then component k times its standard deviation */
     const float *pace_series;  /* pace_terms x M: constant, then cosine and sine of each harmonic */
-    int32_t pace_terms;        /* odd; 0: the mean is the same at every rate */
+    int32_t pace_terms;        /* 1 + 2 x harmonics; 0: the mean is the same at every rate */
     const float *pace_curve;   /* T x M: change of the mean per unit of kin_pace; NULL: none */
     const float *channel_stat; /* M x 4: residual sd, smallest, largest, sd of the static offset */
     const float *score_stat;   /* q x 3: singular-value sd, between-subject sd, within-subject sd */
@@ -37,8 +37,7 @@ struct gait_model {
     /* p x (F + 1): relative change of the lengths in each frame, then of the pelvis's height, per standard
      * deviation; NULL if p is 0 */
     const float *proportion;
-    const float
-        *shift; /* p x F x 3: how far each frame's origin is moved in its parent besides; may be NULL */
+    const float *shift; /* p x F x 3: shift of each frame's origin in its parent, in addition; may be NULL */
 
     float stride_hz, stride_hz_sd;         /* strides per second: mean, sd between subjects */
     float stride_cv;                       /* variation of the stride time within a subject */
@@ -60,14 +59,14 @@ struct gait_model {
     uint64_t digest; /* FNV-1a of the blob */
 };
 
-/* Deviation among people of the posture of angle a, radians. */
+/* Standard deviation between people of the posture of angle a, radians. */
 static inline float model_posture_sd(const gait_model *m, int32_t a)
 {
     float const learnt = m->channel_stat[4 * a + 3];
-    return learnt > 0.0f ? learnt : 0.035f; /* 2 degrees, where too few people were seen to tell */
+    return learnt > 0.0f ? learnt : 0.035f; /* 2 degrees, where too few people were recorded to estimate it */
 }
 
-/* Check a blob and fill m with views into it (pace_curve is none); err names the section at fault. */
+/* Check a blob and fill m with views into it (without pace_curve); err names the section at fault. */
 gait_result model_open(const void *data, size_t bytes, gait_model *m, gait_error *err);
 
 /* GAIT_ERR_ARG: the model has no cyclic part. */
@@ -79,6 +78,6 @@ int32_t model_find_angle(const gait_model *m, const char *name, size_t length);
 /* Mask of the angles of trunk and arms whose posture differs most between people. */
 uint32_t model_posture_angles(const gait_model *m);
 
-/* Place a copy of m in the arena, and pace_curve, made of its series.  NULL when counting or on overflow. */
+/* Place a copy of m in the arena, and its pace_curve. NULL when counting or on overflow. */
 gait_model *model_layout(arena *a, const gait_model *m);
 #endif

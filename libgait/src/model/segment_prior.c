@@ -60,9 +60,9 @@ static void read_shapes(sections *s, segment_prior *p)
     p->sd = sections_floats(s, "SGSD", 2, (uint32_t[4]){K, k});
     p->residual = sections_floats(s, "SGPS", 2, (uint32_t[4]){K, J});
     for (uint32_t i = 0; s->status == GAIT_OK && i < K * k; i++)
-        sections_require(s, p->sd[i] >= 0.0f, "SGSD", "holds a negative deviation");
+        sections_require(s, p->sd[i] >= 0.0f, "SGSD", "has a negative standard deviation");
     for (uint32_t i = 0; s->status == GAIT_OK && i < K * J; i++)
-        sections_require(s, p->residual[i] > 0.0f, "SGPS", "holds a variance that is not positive");
+        sections_require(s, p->residual[i] > 0.0f, "SGPS", "has a variance that is not positive");
 }
 
 gait_result segment_open(const blob *b, segment_prior *p, gait_error *err)

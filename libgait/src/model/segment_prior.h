@@ -1,4 +1,5 @@
-/* segment_prior.h - the prior over motion segments of a blob as typed views.  Lengths are fractions of stature. */
+/* segment_prior.h - the prior over motion segments of a blob as typed views. Lengths are fractions of
+ * stature. */
 #ifndef GAIT_MODEL_SEGMENT_PRIOR_H
 #define GAIT_MODEL_SEGMENT_PRIOR_H
 #include "model/blob.h"
@@ -8,11 +9,11 @@ enum { SEGMENT_NAME = 32 }; /* bytes of a name */
 typedef struct segment_prior {
     int32_t markers, frames;   /* J, F */
     int32_t hop;               /* frames from one segment to the next, [1, F] */
-    int32_t headings;          /* 0: heading-normalised; else turned copies, in the axes of the world */
+    int32_t headings;          /* 0: heading-normalised; otherwise number of rotated copies, in world axes */
     int32_t components, modes; /* K Gaussians of k modes each */
     float fps;
-    float gamma;   /* factor of the residual variance that held-out recordings ask for */
-    float stature; /* mean of the people learnt from, metres */
+    float gamma;   /* factor of the residual variance, fitted to held-out recordings */
+    float stature; /* mean of the people in the training data, metres */
 
     const char (*name)[SEGMENT_NAME]; /* J */
     const float *weight;              /* K */

@@ -1,5 +1,5 @@
-/* The limbs of a block of bodies as lines in the grid, one lane a body; then one body's lines as masks, one lane a
- * row, each limb without what stands before it. */
+/* The limbs of a block of bodies as lines in the grid, one lane a body; then the lines of one body as masks,
+ * one lane a row, each limb without the cells that nearer limbs hide. */
 #include "base/dispatch.h"
 #include "base/simd16.h"
 #include "raster/layers.h"
@@ -8,11 +8,11 @@
 
 /* ---- lines, lanes are bodies ---- */
 
-/* Corners are clamped to so many cells beyond the grid's first, and no line is less steep: one that crosses two rows
- * cannot be, and one that crosses a single row is right there. */
+/* Corners are clamped to this many cells from the grid's first, and slopes to SHALLOW: a line that crosses
+ * two rows cannot be shallower, and one that crosses a single row is exact there. */
 #define FAR     512.0f
 #define SHALLOW (2.0f * FAR) /* cells in a row */
-#define NOWHERE 1e6f         /* column of a line that bounds nothing */
+#define NOWHERE 1e6f         /* column of a line that does not bound anything */
 
 /* Working pixels to grid cells: the centre of cell c is working pixel 2 c + 1/2. */
 static float to_cell(float v)
@@ -23,11 +23,11 @@ static float to_cell(float v)
 /* First row whose centre is at or below y. */
 static int32_t row_from(float y)
 {
-    enum { BELOW = 1024 }; /* makes the number positive, which is rounded down */
+    enum { BELOW = 1024 }; /* makes the number positive before it is rounded down */
     return BELOW - (int32_t)((float)BELOW - y);
 }
 
-typedef struct box { /* cells that the limbs in front of the camera can meet */
+typedef struct box { /* bounding box, cells */
     int32_t left[BLOCK], right[BLOCK], top[BLOCK], end[BLOCK];
 } box;
 
@@ -41,7 +41,7 @@ static box box_empty(void)
     return b;
 }
 
-/* What a limb meets grows what the body does, by whole bands of rows. */
+/* Clip the rows of a limb, and extend the box of the body by them in whole bands of rows. */
 static void box_join(box *restrict body, const box *limb, const float *depth, layers_limb *restrict out)
 {
     for (int32_t i = 0; i < BLOCK; i++) {
@@ -67,7 +67,7 @@ static void corners_of(const outline_lanes *limb, int32_t n, corners *restrict c
             float const x = to_cell(limb->x[k][i]), y = to_cell(limb->y[k][i]);
             c->x[k][i] = x;
             c->y[k][i] = y;
-            /* a column more on either side, because lines are rounded */
+            /* one more column on each side, because lines are rounded */
             own->left[i] = i_min(own->left[i], row_from(x) - 2);
             own->right[i] = i_max(own->right[i], row_from(x) + 2);
             own->top[i] = i_min(own->top[i], row_from(y));
@@ -75,10 +75,10 @@ static void corners_of(const outline_lanes *limb, int32_t n, corners *restrict c
         }
 }
 
-/* Where a limb's lines go: at, slope; left, right; body. */
+/* The lines of a limb by [at, slope][left, right][body]. */
 typedef float line_lanes[2][2][BLOCK];
 
-/* The side from corner j to corner k, which goes down on the right if the corners go round clockwise. */
+/* The side from corner j to corner k. Going down, it is on the right if the corners are in clockwise order. */
 static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwise, line_lanes *restrict out)
 {
     KERNEL_LANES
@@ -99,13 +99,14 @@ static void side(const corners *c, int32_t j, int32_t k, const int32_t *clockwis
     }
 }
 
-/* Opposite sides of an octagon, and the ends of a cone, are parallel: one is on the left, the other on the right. */
+/* Opposite sides of an octagon, and the two ends of a cone, are parallel: one of them is on the left, the
+ * other on the right. */
 static void limb_lines(const outline_lanes *limb, int32_t n, box *restrict body, layers_limb *restrict out)
 {
     corners c;
     int32_t clockwise[BLOCK];
     box own = box_empty();
-    line_lanes *const line = (line_lanes *)out->line; /* dealt out when the columns are known */
+    line_lanes *const line = (line_lanes *)out->line; /* transposed when the columns are known */
     corners_of(limb, n, &c, &own);
     for (int32_t i = 0; i < BLOCK; i++) {
         int32_t const a = n / 4, b = n / 2, d = n / 4 + n / 2;
@@ -123,7 +124,7 @@ static void limb_lines(const outline_lanes *limb, int32_t n, box *restrict body,
     box_join(body, &own, limb->depth, out);
 }
 
-/* Columns from the body's first on, body by body. */
+/* Make columns relative to the first one of each body, and transpose to body by body. */
 static void deal_lines(const int32_t *column, layers_limb *restrict out)
 {
     line_lanes line[LAYERS_LINES];
@@ -136,7 +137,7 @@ static void deal_lines(const int32_t *column, layers_limb *restrict out)
     simd16_transpose((const float (*)[SIMD16])line, (float (*)[SIMD16])out->line);
 }
 
-/* Most bodies are no wider than a word; its first column is a multiple of GRID_STEP. */
+/* Most bodies are no wider than a word, which begins at a multiple of GRID_STEP. */
 static void choose_columns(const box *body, layers_block *restrict out)
 {
     for (int32_t i = 0; i < BLOCK; i++) {
@@ -149,7 +150,7 @@ static void choose_columns(const box *body, layers_block *restrict out)
     }
 }
 
-/* Each limb's place from near to far, by counting those before it. */
+/* The depth order by counting, for each limb, the limbs before it. */
 static void depth_order(const outline_lanes *limb, int32_t count, layers_block *restrict out)
 {
     float key[MODEL_MAX_LIMBS][BLOCK];
@@ -189,14 +190,15 @@ void KERNEL(layers_prepare)(const outline_block *outline, const limb_geometry *l
 
 /* ---- masks, lanes are rows ---- */
 
-/* The first cell of a word whose centre is at or right of a column; so little left of it is rounding. */
+/* The first cell of a word whose centre is at or right of a column, except for rounding errors. */
 static inline int32_t cell_from(float x)
 {
     float const slack = 1.0f / 1024.0f; /* cells */
     return i_clamp((int32_t)(x + (1.0f - slack)), 0, 64);
 }
 
-/* The bits in a word, SIMD16_ROWS rows at once, each as its left and its right column; what was stored so is loaded so. */
+/* The bits of one limb in one word, SIMD16_ROWS rows at once, each as a left and a right column. Arrays are
+ * stored and loaded in pieces of the same size, so that loads do not wait. */
 static inline __attribute__((always_inline)) void draw_limb(const float *line, int32_t lines, int32_t top,
                                                             int32_t end, uint64_t *restrict whole,
                                                             uint64_t *restrict visible)
@@ -234,7 +236,7 @@ static inline __attribute__((always_inline)) void draw_limb(const float *line, i
     }
 }
 
-/* One word of every row. */
+/* Draw one word of every row. */
 static void draw_word(const layers_block *block, int32_t lane, int32_t word, layers *restrict out)
 {
     uint64_t *const whole = out->whole.word[word];

@@ -1,4 +1,4 @@
-/* limb_polygon.h - the polygon of one limb of one body; inlined, so that a loop over bodies becomes vector code. */
+/* limb_polygon.h - the polygon of one limb of one body; inline, so that a loop over bodies vectorises. */
 #ifndef GAIT_RASTER_LIMB_POLYGON_H
 #define GAIT_RASTER_LIMB_POLYGON_H
 #include "image/camera.h"
@@ -10,7 +10,7 @@ typedef struct vec3 {
     float x, y, z;
 } vec3;
 
-typedef struct limb_projection { /* a limb and the frame that carries it, seen by a camera */
+typedef struct limb_projection { /* a limb, the frame it is fixed to, and the camera */
     const limb_geometry *g;
     float R[9], o[3], scale;
     const gait_camera *cam;
@@ -23,14 +23,14 @@ static inline vec3 rotate(const float *M, float x, float y, float z)
                   M[6] * x + M[7] * y + M[8] * z};
 }
 
-/* Model vector of the frame (statures) to camera axes, metres. */
+/* Vector in the frame (statures) to camera axes, metres. */
 static inline vec3 turn(const limb_projection *p, const float v[3])
 {
     vec3 const w = rotate(p->R, p->scale * v[0], p->scale * v[1], p->scale * v[2]);
     return rotate(p->cam->R, w.x, w.y, w.z);
 }
 
-/* Model point of the frame to camera coordinates. */
+/* Point in the frame to camera coordinates. */
 static inline vec3 place(const limb_projection *p, const float v[3])
 {
     const float *const t = p->cam->t;
@@ -39,7 +39,7 @@ static inline vec3 place(const limb_projection *p, const float v[3])
     return (vec3){c.x + t[0], c.y + t[1], c.z + t[2]};
 }
 
-typedef struct spot { /* a camera point in the working image with the Jacobian's ingredients */
+typedef struct spot { /* a projected point in the working image, with the factors of the Jacobian */
     float x, y, inv_z, slope_x, slope_y;
 } spot;
 
@@ -52,7 +52,7 @@ static inline spot project(const limb_projection *q, vec3 p)
                   (cam->fy * sy + cam->cy - map->v0) * map->scale, inv, sx, sy};
 }
 
-/* Image displacement of a small camera vector at a spot. */
+/* Image displacement of a small camera vector at a projected point. */
 static inline void image_vector(const limb_projection *p, const spot *s, vec3 v, float out[2])
 {
     float const k = s->inv_z * p->map->scale;
@@ -60,7 +60,7 @@ static inline void image_vector(const limb_projection *p, const spot *s, vec3 v,
     out[1] = p->cam->fy * k * (v.y - s->slope_y * v.z);
 }
 
-/* Half width of the ellipse with semi-axes a, b along direction n (support function). */
+/* Half width of the ellipse with semi-axes a, b along the direction n (support function). */
 static inline float support(const float a[2], const float b[2], float nx, float ny)
 {
     float const p = nx * a[0] + ny * a[1], q = nx * b[0] + ny * b[1];
@@ -90,7 +90,8 @@ static inline void cone_polygon(const limb_projection *p, limb_polygon *out)
     image_vector(p, &s1, sag, b);
     float const a1[2] = {a[0] * g->a1, a[1] * g->a1}, b1[2] = {b[0] * g->b1, b[1] * g->b1};
     float const w0 = support(a0, b0, -ey, ex), w1 = support(a1, b1, -ey, ex);
-    /* A foreshortened limb shows the ellipse at its end; most of its depth is added to the quadrilateral. */
+    /* A foreshortened limb shows the ellipse at its end: most of the depth of that ellipse is added to the
+     * quadrilateral. */
     float const e0 = 0.7f * support(a0, b0, ex, ey), e1 = 0.7f * support(a1, b1, ex, ey);
     put(out, 0, s0.x - ex * e0 - ey * w0, s0.y - ey * e0 + ex * w0);
     put(out, 1, s1.x + ex * e1 - ey * w1, s1.y + ey * e1 + ex * w1);
@@ -113,7 +114,7 @@ static inline void ellipsoid_polygon(const limb_projection *p, limb_polygon *out
     static const float SIN[8] = {0.0f, 0.70710678f,  1.0f,  0.70710678f,
                                  0.0f, -0.70710678f, -1.0f, -0.70710678f};
     const limb_geometry *const g = p->g;
-    float const grow = 1.054f; /* the octagon then has the ellipse's area */
+    float const grow = 1.054f; /* gives the octagon the area of the ellipse */
     float middle[3], half[3], v[3][2];
     for (int32_t k = 0; k < 3; k++) {
         middle[k] = 0.5f * (g->start[k] + g->end[k]);
@@ -139,7 +140,7 @@ static inline void ellipsoid_polygon(const limb_projection *p, limb_polygon *out
     out->cos_tilt = 1.0f;
 }
 
-/* R, o, scale: the limb's frame in the world and metres per model length. */
+/* The polygon of a limb. R, o, scale: the limb's frame in the world and metres per model length. */
 static inline void outline_limb(const limb_geometry *g, const float R[9], const float o[3], float scale,
                                 const gait_camera *cam, const view_map *map, limb_polygon *out)
 {

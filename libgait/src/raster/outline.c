@@ -15,7 +15,7 @@ void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out)
         float const ax = g.end[0] - g.start[0], ay = g.end[1] - g.start[1], az = g.end[2] - g.start[2];
         float const inv = 1.0f / __builtin_sqrtf(ax * ax + ay * ay + az * az);
         float const d[3] = {ax * inv, ay * inv, az * inv};
-        /* The frame's y axis made orthogonal to the limb; a limb along y takes x instead. */
+        /* The frame's y axis, made orthogonal to the limb; for a limb along y, the x axis. */
         float const c = d[1];
         float e[3] = {-c * d[0], 1.0f - c * c, -c * d[2]};
         if (c * c > 0.98f) {

@@ -5,31 +5,31 @@
 #include "raster/rast.h"
 #include "image/view.h"
 
-typedef struct limb_geometry { /* one body part in its frame, statures */
+typedef struct limb_geometry { /* one limb in its frame, statures */
     float start[3], end[3];
-    float lateral[3],
-        sagittal[3]; /* unit vectors across the limb; radii a along the first, b along the second */
+    float lateral[3], sagittal[3]; /* unit vectors across the limb: along radii a, along radii b */
     float a0, b0, a1, b1;
     int32_t frame, shape; /* shape: LIMB_CONE or LIMB_ELLIPSOID */
 } limb_geometry;
 
-/* All limbs of the model with radii multiplied by girth; out holds MODEL_MAX_LIMBS. */
+/* The limbs of the model with radii multiplied by girth; out has MODEL_MAX_LIMBS elements. */
 void limb_geometry_init(const gait_model *m, float girth, limb_geometry *out);
 
-/* One limb in the working image.  Cones: vertices 0-1 and 3-2 are the two sides, 4 in all; ellipsoids: 8
- * around. */
+/* One limb in the working image. Cones have 4 vertices: 0-1 and 3-2 are the two long sides. Ellipsoids have
+ * 8. */
 typedef struct limb_polygon {
     float x[RAST_MAX_VERTICES], y[RAST_MAX_VERTICES]; /* working pixels */
-    float depth;                                      /* metres, of the limb's middle; 0: behind the camera */
-    float cos_tilt;                                   /* cosine of the angle between limb and image plane */
+    float depth;    /* metres, of the middle of the limb; 0: behind the camera */
+    float cos_tilt; /* cosine of the angle between limb and image plane */
 } limb_polygon;
 
-typedef struct outline_lanes { /* the same in BLOCK bodies */
+typedef struct outline_lanes { /* the same for BLOCK bodies */
     float x[RAST_MAX_VERTICES][BLOCK], y[RAST_MAX_VERTICES][BLOCK];
     float depth[BLOCK], cos_tilt[BLOCK];
 } outline_lanes;
 
-/* Here and in what is made of it the limbs come last: a tracker has memory for those of its model only. */
+/* Limbs come last here and in the structs made from this one, because a tracker has memory only for the
+ * limbs of its model. */
 typedef struct outline_block {
     outline_lanes limb[MODEL_MAX_LIMBS];
 } outline_block;

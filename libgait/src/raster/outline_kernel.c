@@ -1,4 +1,4 @@
-/* The limbs of BLOCK bodies as polygons: one lane a body. */
+/* The limbs of BLOCK bodies as polygons, one lane a body. */
 #include "base/dispatch.h"
 #include "raster/limb_polygon.h"
 

@@ -4,7 +4,7 @@ enum { SUB = 256 }; /* sub-pixel steps */
 
 typedef struct edge { /* crosses rows first <= y < last */
     int32_t first, last;
-    uint32_t at, slope; /* column there, 1/65536 pixel, modulo 2^32; at is raised for the shift to round up */
+    uint32_t at, slope; /* column at row 0, 1/65536 pixel, modulo 2^32; offset so that the shift rounds up */
 } edge;
 
 /* Nearest integer, ties away from 0; clamped to +-limit, NaN to -limit. */
@@ -26,15 +26,14 @@ static int32_t row_from(int32_t y)
     return (y + SUB - 1) >> 8;
 }
 
-/* The edge between two vertices in sub-pixels, the same whichever comes first.  Its column is off by less than 1/256
- * pixel plus 1/65536 for each row from its top: the slope is rounded. */
+/* The edge between two vertices in sub-pixels, the same in both directions. Because the slope is rounded,
+ * its column is off by less than 1/256 pixel plus 1/65536 per row from its top. */
 static edge edge_of(int32_t xa, int32_t ya, int32_t xb, int32_t yb)
 {
     bool const down = ya < yb;
     int32_t const x0 = down ? xa : xb, y0 = down ? ya : yb, x1 = down ? xb : xa, y1 = down ? yb : ya;
     int32_t const first = row_from(y0);
-    float const most =
-        2147483520.0f; /* the largest float below 2^31; reached by edges between two rows only */
+    float const most = 2147483520.0f; /* the largest float below 2^31; only edges between two rows reach it */
     float const slope = (float)(x1 - x0) / (float)i_max(y1 - y0, 1);
     int32_t const step = nearest(slope * 65536.0f, most);
     int32_t const start = nearest(slope * (float)(first * SUB - y0) * 256.0f, most);
@@ -42,7 +41,7 @@ static edge edge_of(int32_t xa, int32_t ya, int32_t xb, int32_t yb)
     return (edge){first, row_from(y1), at + 65535u, (uint32_t)step};
 }
 
-/* Column of the first pixel centre at or right of an edge in a row that it crosses. */
+/* Column of the first pixel centre at or right of an edge, in a row that the edge crosses. */
 static int32_t column(const edge *e, int32_t y)
 {
     return (int32_t)(e->at + e->slope * (uint32_t)y) >> 16;

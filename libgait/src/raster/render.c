@@ -3,7 +3,7 @@
 #include "raster/limb_polygon.h"
 #include <string.h>
 
-/* Paint one polygon in bands of GRID_SIZE rows. */
+/* Paint one polygon, in bands of GRID_SIZE rows. */
 static void paint(const limb_polygon *p, int32_t n, uint8_t id, uint8_t *ids, const gait_camera *cam,
                   int32_t stride)
 {
@@ -38,7 +38,7 @@ gait_result render_limbs(const gait_model *m, const gait_camera *cam, const gait
     }
     for (int32_t row = 0; row < cam->height; row++)
         memset(ids + (size_t)row * (size_t)stride, 0, (size_t)cam->width);
-    /* From far to near: nearer limbs are painted over. */
+    /* From far to near, so that nearer limbs are painted over farther ones. */
     for (int32_t k = layers_order(depth, 1, m->limbs, order) - 1; k >= 0; k--)
         paint(&poly[order[k]], outline_vertices(&limbs[order[k]]), (uint8_t)(order[k] + 1), ids, cam, stride);
     return GAIT_OK;
