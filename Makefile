@@ -317,12 +317,16 @@ eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tes
 	@$(PY) tests/bench/eval_lift.py $(ARGS)
 
 # ---- packages ------------------------------------------------------------------------------------------------
+# The wheel runs on systems with glibc 2.28: thread functions are those of the oldest glibc for the CPU.
+OLDEST_x86_64  := GLIBC_2.2.5
+OLDEST_aarch64 := GLIBC_2.17
 WHEEL := libgait-$(VERSION)-py3-none-manylinux_2_28_$(CPU).whl
 wheel: $(READY) ## Python package with the library inside, in build/wheel (CC=aarch64-linux-gnu-gcc for that CPU)
 	@command -v cmake >/dev/null || { echo 'wheel: no cmake: install it' >&2; exit 1; }
 	@$(VENV)/bin/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w build/wheel ./python \
 	    $(patsubst %,-C %,wheel.tags=$(WHEEL:libgait-$(VERSION)-%.whl=%) build-dir=$(abspath build/cmake-$(CPU)) \
 	        cmake.define.CMAKE_C_COMPILER=$(CC) cmake.define.CMAKE_CXX_COMPILER=$(CXX) cmake.define.GAIT_EIGEN=$(abspath $(EIGEN)) \
+	        $(addprefix cmake.define.GAIT_OLDEST_GLIBC=,$(OLDEST_$(CPU))) \
 	        $(if $(FOREIGN),cmake.define.CMAKE_SYSTEM_NAME=Linux cmake.define.CMAKE_SYSTEM_PROCESSOR=$(CPU)))
 	@$(VENV)/bin/auditwheel show build/wheel/$(WHEEL) | grep -E '"manylinux_2_(5|12|17|2[4678])_$(CPU)"' >/dev/null || \
 	    { echo 'wheel: needs a newer glibc than 2.28: see auditwheel show build/wheel/$(WHEEL)' >&2; exit 1; }

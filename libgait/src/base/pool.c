@@ -13,7 +13,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
-#ifdef OLDEST_GLIBC /* for wheels: these moved from libpthread to libc in 2.32 and 2.34 and got new versions there */
+#ifdef OLDEST_GLIBC /* for wheels: glibc 2.32 and 2.34 moved these from libpthread to libc, with new versions */
 __asm__(".symver pthread_create, pthread_create@" OLDEST_GLIBC);
 __asm__(".symver pthread_join, pthread_join@" OLDEST_GLIBC);
 __asm__(".symver pthread_sigmask, pthread_sigmask@" OLDEST_GLIBC);
