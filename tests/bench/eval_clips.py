@@ -118,8 +118,8 @@ def models(clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], N
 def _learning_key() -> str:
     """Digest of the sources that learning uses and of the names and sizes of the data."""
     package = ROOT / "python" / "gait"
-    folders = [package.glob(f"{name}/*.py") for name in ("body", "io", "learn")]
-    others = (package / name for name in ("kernels.py", "cli/learn.py", "cli/learn_run.py"))
+    folders = [package.glob(f"{name}/*.py") for name in ("body", "io", "learn/**")]
+    others = package.glob("cli/learn*.py")
     digest = hashlib.sha256()
     for path in sorted(itertools.chain(*folders, others)):
         digest.update(path.read_bytes())

@@ -29,8 +29,7 @@ from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_corpus, segment_motion
 from gait.learn.segments.segment_corpus import Corpus
 from gait.learn.solve import readers
-from gait.lift.figures_segment import placed_as_learnt
-from gait.lift.posterior import place
+from gait.lift.figures_segment import Gaussian, placed_as_learnt
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
@@ -157,7 +156,7 @@ def _error(found: Floats, truth: Floats) -> float:
 def errors_of(known: HeldOut, sd: float) -> Errors:
     """Lift all segments seen with a noise."""
     lifters = _lifters(known)
-    learnt = place(known.prior, stature=known.stature, ground_sd=0.0, height_sd=0.0)
+    learnt = Gaussian.of(known.prior, known.stature)
     errors, inside, scaled, volumes = [], [], [], []
     for side, truth, uv, spread in _seen(known, sd, 0.0):
         lifter = lifters[side]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import table
@@ -20,7 +21,9 @@ from scipy.optimize import brentq
 from gait.bindings.lifter import Lifter
 from gait.lift.figures_segment import placed_as_learnt
 from gait.lift.observe import Observations, orthographic
-from gait.lift.posterior import Gaussian, Posterior, infer, place
+sys.path.insert(0, str(Path(__file__).parents[1] / "reference"))
+
+from segment_posterior import Gaussian, Posterior, infer, place
 
 NOISE = (0.005, 0.010, 0.020, 0.050, 0.100, 0.200, 0.500, 1.000)  # metres
 PAPER = -14.0  # the paper's volume; it does not say at what noise

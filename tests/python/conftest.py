@@ -2,6 +2,8 @@
 
 import os
 import signal
+import sys
+from pathlib import Path
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     # Before numpy is loaded: threads of processes side by side would only wait for each other's processors.
@@ -9,6 +11,8 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     # A shell that starts something in the background lets it, and all that it starts, ignore interruptions.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "reference"))  # numpy versions of what the C library computes
 
 
 def pytest_terminal_summary(terminalreporter):

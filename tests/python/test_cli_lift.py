@@ -17,7 +17,7 @@ from gait.io.trc import read_trc
 from gait.lift import motion, outliers, size
 from gait.lift.result import METHODS
 from gait.io.keypoints_file import Tracks, read, write
-from gait.lift.uncertain import Uncertain
+from gait.lift.explain import Uncertain
 
 FRAMES, MARKERS = 6, 12
 VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "none": []}

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from lift_reference import dual
+from segment_posterior import Person, dual, explain, infer, place
 from toy_segments import FRONT, toy_prior
 
 from gait.camera.camera import Camera
-from gait.lift.heading import Person, explain
 from gait.lift.observe import Observations, orthographic, perspective
-from gait.lift.posterior import infer, place
 
 CAMERA = Camera.looking((0.0, -7.0, 1.6), (0.0, 0.0, 0.9), (640, 480), 700.0)
 PIXEL = 1.0

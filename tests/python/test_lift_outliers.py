@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import robust
 
+from gait.bindings.lifter import remove_spikes, weight_outliers
 from gait.lift.outliers import shake, without_jumps
 from gait.io.keypoints_file import Tracks
 
@@ -44,28 +46,30 @@ def test_many_jumps_beside_gaps():
     assert jumps == [(5, "l_ankle"), (17, "l_ankle"), (18, "l_ankle"), (40, "l_ankle")]
 
 
-def test_the_furthest_goes_first_whatever_it_bends():
-    """As measured anew after each, at the ends too."""
-    rng = np.random.default_rng(3)
-    tracks = swinging(30, frames=200)
-    tracks.uv[rng.random((200, 2)) < 0.1] = np.nan
-    wild = rng.random((200, 2)) < 0.08
+@pytest.mark.parametrize("seed", range(5))
+def test_spikes_are_those_of_the_numpy_version(seed):
+    """Measured anew after each removal, beside gaps and at the ends."""
+    rng = np.random.default_rng(seed)
+    tracks = swinging(30, frames=120)
+    tracks.uv[rng.random((120, 2)) < 0.1] = np.nan
+    wild = rng.random((120, 2)) < 0.08
     tracks.uv[wild] += rng.normal(0, 200, (wild.sum(), 2))
-    tracks.uv[[0, 1, 198, 199], 0] += (300, 0)
-    uv, gone = tracks.uv.copy(), []
-    for j, name in enumerate(tracks.names):
-        while True:
-            rows = np.flatnonzero(np.isfinite(uv[:, j, 0]))
-            on = [
-                [np.interp(tracks.time[b], tracks.time[[a, c]], uv[[a, c], j, i]) for i in range(2)]
-                for a, b, c in zip(rows, rows[1:], rows[2:], strict=False)
-            ]
-            apart = np.pad(np.linalg.norm(uv[rows[1:-1], j] - on, axis=1), 1)
-            if apart.max() <= 8 * max(np.sqrt(1.5) * 3.0, 1.4826 * np.median(apart)):
-                break
-            gone.append((int(rows[apart.argmax()]), name))
-            uv[rows[apart.argmax()], j] = np.nan
-    assert len(gone) > 15 and without_jumps(tracks, 3.0)[1] == sorted(gone)
+    tracks.uv[[0, 1, 118, 119], 0] += (300, 0)
+    sd = rng.uniform(2, 4, (120, 2))
+    kept = remove_spikes(tracks.time, tracks.uv, sd)
+    for j in range(2):
+        gone = robust.spikes(tracks.time, tracks.uv[:, j], sd[:, j])
+        assert len(gone) > 3
+        np.testing.assert_array_equal(np.flatnonzero(kept[:, j] < 0), sorted(gone))
+    np.testing.assert_array_equal(kept[kept > 0], sd[kept > 0])
+
+
+@pytest.mark.parametrize("count", [1, 2, 15])
+def test_outliers_are_weighted_as_by_the_numpy_version(count):
+    rng = np.random.default_rng(count)
+    for far in (1.0, 30.0, 3000.0):
+        square, sd = far * rng.chisquare(2, count), rng.uniform(1, 3, count)
+        np.testing.assert_allclose(weight_outliers(square, sd), robust.weighted(square, sd), rtol=1e-12)
 
 
 def test_few_points_are_left_alone():

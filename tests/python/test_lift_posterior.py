@@ -4,16 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lift_reference import dual, likelihood_only, log10_volume
+from segment_posterior import dual, infer, likelihood_only, log10_volume, place, uncertain_modes
 from toy_segments import FRONT as AXES
 from toy_segments import toy_prior
 
-from gait.errors import UserError
-from gait.lift import uncertain
-from gait.lift.equations import Parallel, looking_along
 from gait.lift.observe import Observations, Rows, orthographic
-from gait.lift.posterior import by_likelihood, infer, place
-from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
+from gait.lift.explain import share_along, share_rigid
 
 DEPTH = np.array([0.0, 1, 0])
 
@@ -65,16 +61,6 @@ def test_evidence_is_the_density_of_the_measurements():
     assert np.allclose(found.points, mean, atol=1e-9)
     after = covariance - gain @ pick @ covariance
     assert np.allclose(found.sd**2, np.diag(after).reshape(gaussian.mean.shape), rtol=1e-6, atol=1e-11)
-    about = _about_the_middle(gaussian.mean.shape, 1, 3)
-    rooted = np.diag(about @ after @ about.T).reshape(gaussian.mean.shape)
-    assert np.allclose(found.rooted_sd(1, 3) ** 2, rooted, rtol=1e-6, atol=1e-11)
-
-
-def _about_the_middle(shape, left, right):
-    """Matrix that takes the middle of two markers from all places (F, J, 3)."""
-    every = np.eye(np.prod(shape)).reshape(*shape, -1)
-    middle = (every[:, [left]] + every[:, [right]]) / 2
-    return (every - middle).reshape(-1, every.shape[-1])
 
 
 def test_the_posterior_is_symmetric_positive_and_within_the_prior():
@@ -226,33 +212,3 @@ def test_subspace_estimate_is_the_papers():
     assert np.abs(unseen[..., 1]).max() < 1e-12  # what was not measured, depth, is not moved
     assert (found.sd**2 <= variance + 1e-12).all()
     assert np.allclose(found.sd[..., 1] ** 2, variance[..., 1])
-
-
-def test_the_likelihood_is_the_limit_of_a_prior_ever_wider_in_its_modes():
-    """Places and deviations; what moves the whole body keeps its prior."""
-    gaussian = place(toy_prior(4, 6, 8), ground_sd=0.5)
-    _, rows = measured(gaussian)
-    wide = gaussian.modes.copy()
-    wide[: len(wide) - gaussian.rigid] *= 1e4
-    found = by_likelihood(infer(gaussian, rows))
-    limit = infer(replace(gaussian, modes=wide), rows)
-    np.testing.assert_allclose(found.points, limit.points, atol=1e-5)
-    np.testing.assert_allclose(found.sd, limit.sd, rtol=1e-4)
-    assert (found.sd > infer(gaussian, rows).sd).all()
-
-
-def test_the_likelihood_alone_refuses_modes_that_nothing_tells():
-    gaussian = place(toy_prior(3, 5, 40, seed=4))  # 30 numbers seen
-    _, rows = measured(gaussian)
-    with pytest.raises(UserError, match="of 40 modes"):
-        by_likelihood(infer(gaussian, rows))
-
-
-def test_what_segments_leave_is_the_median_and_depth_comes_first():
-    gaussian = place(toy_prior(5, 10, 12))
-    segments = [infer(gaussian, measured(gaussian, sd)[1]) for sd in (0.01, 0.03, 0.2)]
-    left = uncertain.of(segments, Parallel(looking_along("y"), 1.0, np.zeros(2)))
-    assert left.log10_volume == segments[1].log10_volume
-    assert left.along[0] >= 0.999 and left.rigid[0] >= 0.99 and (np.diff(left.sd) <= 0).all()
-    # a displacement of all markers by the ground's deviation is that many metres of each
-    assert left.sd[0] == pytest.approx(10, rel=0.01)

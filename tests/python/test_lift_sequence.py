@@ -15,14 +15,14 @@ from gait.lift import motion, result, sequence, tridiagonal
 from gait.lift import block_arrowhead as bordered
 from gait.lift import soft_constraints as soft
 from gait.lift import chain as chains
-from gait.lift.chain import Around, Freedom, Segment, overlapping, restricted
+from gait.lift.chain import Around, Freedom, Segment, overlapping
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.lift.grid import Grid
 from gait.lift.observe import Observations
 from gait.lift.refuse import Unlike
 from gait.lift.sequence import Seen, Start, smooth
 from gait.io.keypoints_file import Tracks
-from gait.lift.uncertain import Uncertain
+from gait.lift.explain import Uncertain
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
 LEFT = Uncertain(0.0, *np.zeros((4, 3)))
@@ -324,12 +324,12 @@ def test_a_motion_estimated_by_its_segments_says_so(monkeypatch):
 
 
 def test_restricted_prior_is_its_marginal(prior):
-    part = restricted(prior, prior.names[1:3])
+    part = prior.restricted(prior.names[1:3])
     assert part.mean.shape == (1, FRAMES, 2, 3)
     np.testing.assert_array_equal(part.modes, prior.modes[:, :, :, 1:3])
     odd = replace(toy_prior(7, 4, 3))
-    assert restricted(odd, odd.names).frames == 6
-    assert Grid.over(np.array([0.0, 1.0]), restricted(odd, odd.names)).blocks == 7
+    assert odd.restricted(odd.names).frames == 6
+    assert Grid.over(np.array([0.0, 1.0]), odd.restricted(odd.names)).blocks == 7
 
 
 @pytest.mark.parametrize("method", result.METHODS)
@@ -372,7 +372,7 @@ def test_numbers_out_of_range_are_refused_in_one_line(monkeypatch):
     def failing(*_args, **_kwargs):
         raise np.linalg.LinAlgError("not positive definite")
 
-    monkeypatch.setattr(motion.start, "explanations", failing)
+    monkeypatch.setattr(motion.explain, "explanations", failing)
     prior = toy_prior(6, 19, 4)
     uv = np.full((12, 3, 2), 100.0)
     tracks = Tracks(np.arange(12), np.arange(12) / 20.0, prior.names[:3], uv, np.ones((12, 3)))

@@ -11,7 +11,7 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.camera.camera import Camera
 from gait.lift import chain as chains
 from gait.lift import motion, size
-from gait.lift.chain import Around, Freedom, overlapping, restricted
+from gait.lift.chain import Around, Freedom, overlapping
 from gait.lift.equations import Perspective
 from gait.lift.observe import Observations
 from gait.lift.result import Options
@@ -28,7 +28,7 @@ VIEWS = {"from the side": (0.5, -6.0, 1.4), "towards": (12.0, 0.3, 1.5)}
 def walk():
     """The shipped prior of joints, and its mean motion walking on along x, on a grid."""
     shipped = SegmentPrior.load()
-    prior = restricted(shipped, tuple(n for n in shipped.names if n in JOINTS))
+    prior = shipped.restricted(tuple(n for n in shipped.names if n in JOINTS))
     half = prior.frames // 2
     mean = STATURE * prior.mean[0]
     step = (mean[half:] - mean[:half]).mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
@@ -115,7 +115,7 @@ def test_bones_tell_the_size():
     places, small, _ = person(prior, 0.6)
     ratio = size.bones_ratio(prior, small, STATURE) / size.bones_ratio(prior, places, STATURE)
     assert ratio == pytest.approx(0.6)
-    nameless = restricted(prior, prior.names[:2])
+    nameless = prior.restricted(prior.names[:2])
     assert size.bones_ratio(nameless, places[:, :2], STATURE) == 1.0
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-import lift_reference as reference
 import numpy as np
 import pytest
+import segment_posterior as reference
 from scipy.optimize import minimize_scalar
 from toy_segments import FRONT as AXES
 from toy_segments import toy_blob, toy_prior
@@ -18,8 +18,8 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.errors import GaitError
 from gait.camera.camera import Camera
 from gait.io import blob
-from gait.lift import heading, observe, posterior
-from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
+from gait.lift import observe
+from gait.lift.explain import share_along, share_rigid
 
 FRAMES, MARKERS = 10, 19
 FREEDOM = 4  # of the scale of a motion
@@ -64,12 +64,12 @@ def noisy(uv: np.ndarray, sd: np.ndarray, rng: np.random.Generator) -> np.ndarra
 def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float) -> None:
     contents, prior = model()
     rng = np.random.default_rng(0)
-    gaussian = posterior.place(prior, heading=angle, stature_sd=stature_sd)
+    gaussian = reference.place(prior, heading=angle, stature_sd=stature_sd)
     truth = gaussian.draw(rng)
     sd = deviations(rng, 0.01, 0.05)
     uv = noisy(truth @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
-    want = posterior.infer(gaussian, rows)
+    want = reference.infer(gaussian, rows)
     papers, _, _ = reference.dual(gaussian, rows)
     lifter = Lifter(contents, AXES, known(heading=angle, heading_sd=0.0, stature_sd=stature_sd))
     fit = lifter.segment(uv, sd)
@@ -87,13 +87,13 @@ def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float
     np.testing.assert_allclose(lifter.least_squares(), reference.likelihood_only(gaussian, rows), atol=1e-8)
 
 
-def _likeliest_scale(gaussian: posterior.Gaussian, rows: observe.Rows) -> float:
+def _likeliest_scale(gaussian: reference.Gaussian, rows: observe.Rows) -> float:
     """Factor of the modes by which the evidence is largest, its square inverse gamma of FREEDOM a priori."""
     own = np.arange(len(gaussian.modes)) < len(gaussian.modes) - gaussian.rigid
 
     def loss(x: float) -> float:
         modes = gaussian.modes * np.where(own, np.exp(x / 2), 1)[:, None, None, None]
-        evidence = posterior.infer(replace(gaussian, modes=modes), rows).log_evidence
+        evidence = reference.infer(replace(gaussian, modes=modes), rows).log_evidence
         return FREEDOM * (x + np.exp(-x)) / 2 - evidence
 
     return float(
@@ -104,11 +104,11 @@ def _likeliest_scale(gaussian: posterior.Gaussian, rows: observe.Rows) -> float:
 def test_uncertain_displacements_equal_the_numpy_ones() -> None:
     contents, prior = model()
     rng = np.random.default_rng(3)
-    gaussian = posterior.place(prior)
+    gaussian = reference.place(prior)
     sd = deviations(rng, 0.01, 0.05)
     uv = noisy(gaussian.draw(rng) @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
-    want_sd, want = uncertain_modes(posterior.infer(gaussian, rows), 4)
+    want_sd, want = reference.uncertain_modes(reference.infer(gaussian, rows), 4)
     lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     lifter.segment(uv, sd)
     got_sd, got = lifter.uncertain(4)
@@ -123,7 +123,7 @@ def test_drawn_from_the_prior_intervals_cover_what_they_say() -> None:
     contents, prior = model(size=20)
     lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     rng = np.random.default_rng(7)
-    gaussian = posterior.place(prior)
+    gaussian = reference.place(prior)
     inside, squares, count = [], 0.0, 0
     for _ in range(400):
         truth = gaussian.draw(rng)
@@ -143,7 +143,7 @@ def test_scaled_intervals_hold_motions_of_any_distance_from_the_mean(far: float)
     contents, prior = model(size=20)
     lifter = Lifter(contents, AXES, known(heading_sd=0.0, place_sd=(0.0, 0.0, 0.0)))
     rng = np.random.default_rng(8)
-    gaussian = posterior.place(prior, ground_sd=0.0, height_sd=0.0)
+    gaussian = reference.place(prior, ground_sd=0.0, height_sd=0.0)
     inside = {"plain": [], "scaled": []}
     for _ in range(100):
         truth = gaussian.mean + far * (gaussian.draw(rng) - gaussian.mean)
@@ -155,7 +155,7 @@ def test_scaled_intervals_hold_motions_of_any_distance_from_the_mean(far: float)
     assert far == 1.0 or np.mean(inside["plain"]) < 0.8
 
 
-def _scores(gaussian: posterior.Gaussian, truth: np.ndarray) -> np.ndarray:
+def _scores(gaussian: reference.Gaussian, truth: np.ndarray) -> np.ndarray:
     """Scores of a draw: least squares over all its coordinates, which have little residual."""
     flat = gaussian.modes.reshape(len(gaussian.modes), -1)
     return np.linalg.lstsq(flat.T, (truth - gaussian.mean).ravel(), rcond=None)[0]
@@ -165,7 +165,7 @@ def test_a_perspective_fit_is_the_maximum_of_the_posterior() -> None:
     """The derivative of the negative log posterior, the lens included, vanishes at the solution."""
     contents, prior = model(size=12)
     rng = np.random.default_rng(5)
-    truth = posterior.place(prior, heading=1.2, ground_sd=0.8).draw(rng, residual=False)
+    truth = reference.place(prior, heading=1.2, ground_sd=0.8).draw(rng, residual=False)
     sd = deviations(rng, 2.0, 4.0)
     uv = noisy(CAMERA.project(truth), sd, rng)
     # without residual the noise does not depend on the depth
@@ -192,18 +192,18 @@ def test_a_perspective_fit_is_the_maximum_of_the_posterior() -> None:
 def test_an_unknown_heading_is_found_as_in_numpy(angle: float) -> None:
     contents, prior = model(size=20)
     rng = np.random.default_rng(int(10 * abs(angle)))
-    truth = posterior.place(prior, heading=angle, ground_sd=1.0).draw(rng)
+    truth = reference.place(prior, heading=angle, ground_sd=1.0).draw(rng)
     sd = np.full((FRAMES, MARKERS), 0.01)
     uv = noisy(truth @ AXES.T, sd, rng)
     seen = observe.Observations(uv, sd)
-    person = heading.Person(stature_sd=0.09)  # the default of both, unless a stature is given
-    want = heading.explain(prior, lambda _: observe.orthographic(seen, AXES), person)[0]
-    floor = LiftConfig.default(place_sd=(posterior.GROUND_SD, posterior.GROUND_SD, heading.ALONE_FLOOR_SD))
+    person = reference.Person(stature_sd=0.09)  # the default of both, unless a stature is given
+    want = reference.explain(prior, lambda _: observe.orthographic(seen, AXES), person)[0]
+    floor = LiftConfig.default(place_sd=(reference.GROUND_SD, reference.GROUND_SD, reference.ALONE_FLOOR_SD))
     lifter = Lifter(contents, AXES, floor)
     fit = lifter.segment(uv, sd)
     assert np.cos(fit.heading - angle) > 0.999
     assert np.cos(fit.heading - want.heading) > 1 - 1e-8
-    np.testing.assert_allclose(lifter.positions()[0], want.posterior.points, atol=1e-4)
+    np.testing.assert_allclose(lifter.positions()[0], want.reference.points, atol=1e-4)
 
 
 def test_the_component_of_a_mixture_is_chosen_by_evidence() -> None:
@@ -211,12 +211,12 @@ def test_the_component_of_a_mixture_is_chosen_by_evidence() -> None:
     lifter = Lifter(contents, AXES, known(heading_sd=0.0))
     rng = np.random.default_rng(2)
     for component in range(3):
-        gaussian = posterior.place(prior, component)
+        gaussian = reference.place(prior, component)
         uv = gaussian.draw(rng) @ AXES.T
         fit = lifter.segment(uv, 0.05)
         rows = observe.orthographic(observe.Observations(uv, np.full(uv.shape[:2], 0.05)), AXES)
         score = [
-            posterior.infer(posterior.place(prior, c), rows).log_evidence + np.log(prior.weights[c])
+            reference.infer(reference.place(prior, c), rows).log_evidence + np.log(prior.weights[c])
             for c in range(3)
         ]
         assert fit.component == component == int(np.argmax(score))
@@ -258,7 +258,7 @@ def test_intervals_hold_people_of_any_stature() -> None:
     off = []
     for _ in range(60):
         stature = prior.stature + 0.09 * rng.normal()
-        gaussian = posterior.place(prior, stature=stature, heading=0.4, ground_sd=1.0)
+        gaussian = reference.place(prior, stature=stature, heading=0.4, ground_sd=1.0)
         truth = gaussian.draw(rng)
         uv = CAMERA.project(truth) + 2.0 * rng.normal(size=(FRAMES, MARKERS, 2))
         given = stature + 0.04 * rng.normal()
@@ -284,7 +284,7 @@ def test_missing_markers_cost_what_the_deviations_say() -> None:
     contents, prior = model(size=20)
     rng = np.random.default_rng(9)
     lifter = Lifter(contents, AXES, known(heading_sd=0.0, place_sd=(10.0, 0.0, 0.03)))
-    gaussian = posterior.place(prior, ground_sd=0.0)
+    gaussian = reference.place(prior, ground_sd=0.0)
     found: dict[float, list[tuple[float, float]]] = {0.0: [], 0.3: [], 0.5: []}
     for _ in range(60):
         truth = gaussian.draw(rng)

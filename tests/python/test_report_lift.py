@@ -17,7 +17,7 @@ from gait.learn.segments import segment_motion
 from gait.lift import figures_base, figures_clip, motion, result
 from gait.lift.equations import Parallel, Perspective, looking_along
 from gait.io.keypoints_file import Tracks, read, write
-from gait.lift.uncertain import Uncertain
+from gait.lift.explain import Uncertain
 
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
 FIGURES = {"spectrum", "synthesis", "draws", "estimates", "uncertain"}

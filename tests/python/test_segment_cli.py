@@ -5,6 +5,7 @@ import json
 import mocap_files as files
 import numpy as np
 import pytest
+from segment_posterior import infer, place, uncertain_modes
 from marked_walker import FULL, walker
 from test_marker_files import write_trc
 from toy_segments import FRONT
@@ -16,8 +17,7 @@ from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.errors import UserError
 from gait.io import blob
 from gait.lift.observe import Observations, orthographic
-from gait.lift.posterior import infer, place
-from gait.lift.uncertain import share_along, share_rigid, uncertain_modes
+from gait.lift.explain import share_along, share_rigid
 
 
 @pytest.fixture(scope="module")

@@ -142,6 +142,8 @@ int main(void)
 {
     for (int32_t n = 1; n <= MOST; n += 6)
         test_system(n);
+    test_system(8); /* y is the first row of a block of its own */
+    test_system(16);
     test_forward(MOST);
     test_forward(6);
     test_eigen(2);

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -146,6 +146,38 @@ class SegmentPrior:
             stature=stature,
             segments=segments,
             recordings=recordings,
+        )
+
+    def sections(self) -> dict[str, blob.Array]:
+        """Sections SGNM ... SGPS of a blob that holds this prior, in the order of the file."""
+        counts = [self.frames, self.hop, self.headings, self.components, self.size, self.segments]
+        return {
+            "SGNM": blob.pack_names(list(self.names)),
+            "SGIN": np.array([*counts, self.recordings, 0], np.int32),
+            "SGRT": np.array([self.fps, self.gamma, self.stature, 0, 0, 0, 0, 0], np.float32),
+            "SGWT": self.weights.astype(np.float32),
+            "SGMN": self.mean.astype(np.float32),
+            "SGMD": self.modes.reshape(*self.modes.shape[:3], -1).astype(np.float32),
+            "SGSD": self.sd.astype(np.float32),
+            "SGPS": self.residual.astype(np.float32),
+        }
+
+    def restricted(self, names: tuple[str, ...]) -> SegmentPrior:
+        """Prior of some of the markers over an even number of frames."""
+        at, frames = self.index(names), self.frames // 2 * 2
+        return replace(
+            self,
+            names=names,
+            hop=min(self.hop, frames),
+            mean=self.mean[:, :frames, at],
+            modes=self.modes[:, :, :frames, at],
+            residual=self.residual[:, at],
+        )
+
+    def widened(self, factor: float) -> SegmentPrior:
+        """Prior with `factor` times the deviations from its mean, for motions it was not learnt from."""
+        return replace(
+            self, modes=factor * self.modes, sd=factor * self.sd, residual=factor**2 * self.residual
         )
 
 

@@ -33,7 +33,7 @@ from gait.io.trc import write_trc
 from gait.lift import motion, result
 from gait.io.track_file import write_lifted
 from gait.io.keypoints_file import FURTHEST, Tracks
-from gait.lift.uncertain import Uncertain
+from gait.lift.explain import Uncertain
 
 _ONLY_TRACKS = (
     *("orthographic", "metres_per_unit", "height", "pixel_sd", "floor_sd", "method", "no_contact"),

@@ -13,7 +13,7 @@ and where somebody's joints are taken to be - are numbers g of their own, and th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -95,20 +95,8 @@ class Chain:
     log_det: float
 
 
-def restricted(prior: SegmentPrior, names: tuple[str, ...]) -> SegmentPrior:
-    """Prior of some of the markers over an even number of frames."""
-    at, frames = prior.index(names), prior.frames // 2 * 2
-    return replace(
-        prior,
-        names=names,
-        mean=prior.mean[:, :frames, at],
-        modes=prior.modes[:, :, :frames, at],
-        residual=prior.residual[:, at],
-    )
-
-
 def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
-    """Make the chain of a prior (`restricted`) with 2 b frames a segment."""
+    """Make the chain of a prior (`SegmentPrior.restricted`) with 2 b frames a segment."""
     segments, frames, markers = around.places.shape[:3]
     size, lasting = 3 * markers * frames // 2, WHOLE + 3 * markers
     diagonal, below = np.zeros((segments + 1, size, size)), np.zeros((segments, size, size))

@@ -77,8 +77,11 @@ class Parallel:
 
     def rows(self, seen: Observations, places: Floats, lengths: Floats, guess: Floats | None = None) -> Rows:
         """Rows of what is seen if a unit of the picture has `lengths` (T,) metres."""
-        metric = Observations((seen.uv - self.origin) * lengths[:, None, None], seen.sd * lengths[:, None])
-        return orthographic(metric, self.axes[:2])
+        return orthographic(self.metric(seen, lengths), self.axes[:2])
+
+    def metric(self, seen: Observations, lengths: Floats) -> Observations:
+        """Observations in metres from the origin if a unit of the picture has `lengths` (T,) metres."""
+        return Observations((seen.uv - self.origin) * lengths[:, None, None], seen.sd * lengths[:, None])
 
     def project(self, places: Floats, lengths: Floats) -> Floats:
         """Picture coordinates (T, J, 2) of places (T, J, 3)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,6 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
 from gait.learn.report.figures_base import Drawing, grid, line_legend
 from gait.lift.figures_base import AHEAD, SIDE, Strips
-from gait.lift.posterior import Gaussian, place
 
 Floats = npt.NDArray[np.float64]
 
@@ -21,6 +20,42 @@ SYNTHESIS = 40  # modes of the paper's fig. 2
 NOISE = 0.02  # metres, of the points seen in figs. 3, 5 and 6
 DRAWS = MODES = 3
 SWING = 2.0  # deviations by which uncertain modes are drawn
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Segments of people of one stature: mean + sum_i alpha_i modes_i + residual, alpha ~ N(0, I); metres.
+
+    Attributes
+    ----------
+    mean : (F, J, 3)
+    modes : (k, F, J, 3)
+        Times their standard deviations.
+    residual : (J,)
+        Variance of each coordinate outside the modes.
+    """
+
+    mean: Floats
+    modes: Floats
+    residual: Floats
+
+    @staticmethod
+    def of(prior: SegmentPrior, stature: float, component: int = 0) -> Gaussian:
+        """Component of a prior, placed as it was learnt."""
+        used = prior.modes[component][prior.sd[component] > 0]
+        residual = stature**2 * prior.gamma * prior.residual[component]
+        return Gaussian(stature * prior.mean[component], stature * used, residual)
+
+    def projected(self, x: Floats, count: int | None = None) -> Floats:
+        """Nearest segment to x (F, J, 3) in the span of the first modes about the mean."""
+        flat = self.modes[:count].reshape(len(self.modes[:count]), -1).T
+        scores = np.linalg.lstsq(flat, (x - self.mean).ravel(), rcond=None)[0]
+        return np.asarray(self.mean + (flat @ scores).reshape(x.shape))
+
+    def draw(self, rng: np.random.Generator, residual: bool = True) -> Floats:
+        """Segment (F, J, 3) from the prior."""
+        x = self.mean + np.tensordot(rng.normal(size=len(self.modes)), self.modes, 1)
+        return x + rng.normal(size=x.shape) * np.sqrt(self.residual)[:, None] * residual
 
 
 @dataclass(frozen=True)
@@ -60,14 +95,14 @@ class Case:
 def case(model: str | None, truth: Floats | None, stature: float, what: str, seed: int) -> Case:
     """See a segment, or one drawn from a model's prior if `truth` is None, from behind with noise."""
     prior, rng = SegmentPrior.load(model), np.random.default_rng(seed)
-    gaussian = place(prior, stature=stature, ground_sd=0.0, height_sd=0.0)
+    gaussian = Gaussian.of(prior, stature)
     x = gaussian.draw(rng) if truth is None else truth
     axes = np.stack([AHEAD, [0.0, 0.0, 1.0]])
     uv = x @ axes.T + NOISE * rng.normal(size=(*x.shape[:2], 2))
     lifter = Lifter(model, axes, placed_as_learnt(stature))
     fit = lifter.segment(uv, NOISE)
     if fit.component:
-        gaussian = place(prior, fit.component, stature=stature, ground_sd=0.0, height_sd=0.0)
+        gaussian = Gaussian.of(prior, stature, fit.component)
     return Case(
         prior,
         x,
@@ -121,7 +156,7 @@ def spectrum(c: Case) -> Drawing:
 def synthesis(c: Case) -> Drawing:
     """Draw the segment beside its projection on the first modes (fig. 2)."""
     used = c.gaussian.modes[:SYNTHESIS]
-    projected = replace(c.gaussian, modes=used).projected(c.truth)
+    projected = c.gaussian.projected(c.truth, SYNTHESIS)
     strips = _strips(c, ("from the side", "from ahead"))
     for row, across in enumerate((SIDE, AHEAD)):
         strips.add(row, c.truth, across, DARK, ghost=True)

@@ -16,14 +16,13 @@ import numpy.typing as npt
 
 from gait.body.skeleton import JOINTS
 from gait.bindings.segment_prior import SegmentPrior
-from gait.errors import UserError
-from gait.lift import sequence, size, start, uncertain
-from gait.lift.chain import Freedom, blended, in_turn, restricted
+from gait.errors import GaitError, UserError
+from gait.lift import explain, sequence, size
+from gait.lift.chain import Freedom, blended, in_turn
 from gait.lift.equations import Parallel, Perspective, View
 from gait.lift.grid import Grid, interpolated
-from gait.lift.heading import Explanation, Person
+from gait.lift.explain import SegmentFit, SegmentLifter
 from gait.lift.observe import Observations, resampled
-from gait.lift.posterior import Posterior, by_likelihood
 from gait.lift.refuse import Unlike, require_metres, require_seen, require_size
 from gait.lift.result import Motion, Options
 from gait.lift.sequence import Lifted, Seen, Start
@@ -64,7 +63,7 @@ def lift(
         If segments are too short, or too little is seen.
     """
     require(prior, tracks, view, options)
-    prior = restricted(prior, names)
+    prior = prior.restricted(names)
     grid = Grid.over(tracks.time, prior)
     if options.method != "smooth":
         return _lift(prior, tracks, view, options, grid, update)
@@ -87,7 +86,7 @@ def evidence(prior: SegmentPrior, tracks: Tracks, view: View, options: Options) 
     names = tuple(name for name in prior.names if name in {*tracks.names, *sequence.HIPS})
     smooth = replace(options, method="smooth")
     try:
-        prior = restricted(prior, names)
+        prior = prior.restricted(names)
         return _lift(prior, tracks, view, smooth, Grid.over(tracks.time, prior), lambda done: None).evidence
     except UserError:
         return -np.inf
@@ -106,7 +105,7 @@ def _widest_needed(
     refused: Unlike | None = None
     for wider in WIDER:
         try:
-            found = _lift(widened(prior, wider), tracks, view, options, grid, update)
+            found = _lift(prior.widened(wider), tracks, view, options, grid, update)
         except Unlike as error:
             refused = refused or error
             if best is None:
@@ -150,19 +149,12 @@ def _unlike(
     )
 
 
-def widened(prior: SegmentPrior, factor: float) -> SegmentPrior:
-    """Prior with `factor` times the deviations from its mean, for motions it was not learnt from."""
-    return replace(
-        prior, modes=factor * prior.modes, sd=factor * prior.sd, residual=factor**2 * prior.residual
-    )
-
-
 @contextmanager
 def _numbers_in_range() -> Iterator[None]:
     """Unlike if numbers leave their range on the way."""
     try:
         yield
-    except np.linalg.LinAlgError:
+    except (np.linalg.LinAlgError, GaitError):
         raise Unlike(
             "the tracks look like no motion that the model knows; check the camera, the points' names and "
             "that v points down"
@@ -186,20 +178,24 @@ def _lift(
     lengths = np.ones(len(grid.time))
     if isinstance(view, Parallel):
         lengths = view.lengths(sampled, prior.mean[0].mean(axis=0), stature)
+        sampled = view.metric(sampled, lengths)
     # a start must not shrink a motion that does not fit: its noise in the picture would grow
-    person = Person(stature=stature, stature_sd=0.0 if options.method == "smooth" else stature_sd)
-    found = start.explanations(prior, sampled, view, lengths, person, update)
+    start_sd = 0.0 if options.method == "smooth" else stature_sd
+    lifter = SegmentLifter(prior, view, stature, start_sd)
+    found = explain.explanations(lifter, prior, sampled, update)
     require_seen(found, grid, tracks, alone=options.method != "smooth")
-    chosen = start.course(found)
+    course = explain.course(found)
     if options.method == "likelihood":
-        chosen = [replace(e, posterior=by_likelihood(e.posterior)) for e in chosen]
+        fits = explain.without_prior(prior, view, stature, start_sd, course)
+    else:
+        fits = [lifter.solve(each) for each in course]
     if options.method != "smooth":
-        return _alone(prior, chosen, tracks, view, grid, lengths, stature, options.method != "segment")
+        return _alone(prior, fits, tracks, view, grid, lengths, stature, options.method != "segment")
     first = Start(
-        heading=np.array([e.heading for e in chosen]),
-        component=np.array([e.component for e in chosen]),
+        heading=np.array([fit.heading for fit in fits]),
+        component=np.array([fit.component for fit in fits]),
         stature=stature,
-        places=blended(np.stack([e.posterior.points for e in chosen]), grid.frames),
+        places=blended(np.stack([fit.places for fit in fits]), grid.frames),
         lengths=lengths,
     )
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
@@ -221,7 +217,7 @@ def _lift(
         found_motion.steps,
         found_motion.settled,
         found_motion.log_volume_ratio,
-        uncertain.of([e.posterior for e in chosen], view),
+        explain.summarise(fits, view),
         found_motion.evidence,
         found_motion.misfit,
         resized=sized.factor,
@@ -258,7 +254,7 @@ def _sized(
 
 def _alone(
     prior: SegmentPrior,
-    chosen: list[Explanation],
+    fits: list[SegmentFit],
     tracks: Tracks,
     view: View,
     grid: Grid,
@@ -267,16 +263,16 @@ def _alone(
     blend: bool,
 ) -> Motion:
     """Segments estimated alone, mixed or one after another."""
-    places = np.stack([e.posterior.points for e in chosen])
-    spread = np.stack([e.posterior.sd for e in chosen])
-    about_hips = np.stack([_rooted_sd(e.posterior, prior) for e in chosen])
+    places, spread = np.stack([fit.places for fit in fits]), np.stack([fit.sd for fit in fits])
     join = blended if blend else in_turn
     at = grid.between(tracks.time)
     placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
     markers = prior.index(tracks.names)
-    rooted = places
+    rooted, about_hips = places, spread
     if set(sequence.HIPS) <= set(prior.names):
-        rooted = places - places[:, :, prior.index(sequence.HIPS)].mean(axis=2, keepdims=True)
+        hips = prior.index(sequence.HIPS)
+        rooted = places - places[:, :, hips].mean(axis=2, keepdims=True)
+        about_hips = np.stack([fit.rooted_sd(hips) for fit in fits])
     sd, rooted_sd = (
         interpolated(_mixed(*of, join, grid.frames), at[0], np.abs(at[1]))
         for of in ((places, spread), (rooted, about_hips))
@@ -290,8 +286,8 @@ def _alone(
         stature=stature,
         steps=0,
         settled=True,
-        log_volume_ratio=float(np.mean([e.posterior.log10_volume for e in chosen])),
-        uncertain=uncertain.of([e.posterior for e in chosen], view),
+        log_volume_ratio=float(np.mean([fit.log10_volume for fit in fits])),
+        uncertain=explain.summarise(fits, view),
     )
 
 
@@ -302,14 +298,6 @@ def _mixed(places: Floats, sd: Floats, join: Callable[[Floats, int], Floats], ha
     """
     apart = join(places**2, half) - join(places, half) ** 2
     return np.asarray(np.sqrt(join(sd, half) ** 2 + np.maximum(apart, 0.0)))
-
-
-def _rooted_sd(found: Posterior, prior: SegmentPrior) -> Floats:
-    """Deviations (F, J, 3) about the middle of the hips; of the places if there are no hips."""
-    if not set(sequence.HIPS) <= set(prior.names):
-        return found.sd
-    left, right = prior.index(sequence.HIPS)
-    return found.rooted_sd(int(left), int(right))
 
 
 def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gait.bindings.lifter import remove_spikes
 from gait.io.keypoints_file import Tracks
 
 Array = NDArray[np.float64]
@@ -31,11 +32,10 @@ def without_jumps(tracks: Tracks, sd: float) -> tuple[Tracks, list[tuple[int, st
     jumps : list of (frame, name)
         In the order of time.
     """
-    uv = tracks.uv.copy()
-    gone: list[tuple[int, str]] = []
-    for j, name in enumerate(tracks.names):
-        gone += [(int(tracks.frame[t]), name) for t in _clear(tracks.time, uv[:, j], sd)]
-    return replace(tracks, uv=uv), sorted(gone)
+    kept = remove_spikes(tracks.time, tracks.uv, np.full(tracks.uv.shape[:2], sd))
+    spikes = tracks.seen & (kept < 0)
+    named = [(int(tracks.frame[t]), tracks.names[j]) for t, j in np.argwhere(spikes)]
+    return replace(tracks, uv=np.where(spikes[..., None], np.nan, tracks.uv)), named
 
 
 def shake(tracks: Tracks) -> float:
@@ -48,31 +48,3 @@ def shake(tracks: Tracks) -> float:
     if not seen.size or np.median(np.diff(tracks.time)) > QUICK:
         return np.nan
     return float(SPREAD * np.median(seen) / np.sqrt(20) * np.median(tracks.confidence[tracks.seen]))
-
-
-def _clear(time: Array, uv: Array, sd: float) -> list[int]:
-    """Set the jumps of one point (T, 2) to NaN; returns their rows."""
-    gone: list[int] = []
-    seen = np.flatnonzero(np.isfinite(uv).all(axis=1))
-    distance = _off_line(time[seen], uv[seen])
-    while seen.size >= FEWEST:
-        scale = max(PAIR * sd, SPREAD * float(np.median(distance)))
-        worst = int(distance.argmax())
-        if distance[worst] <= LIMIT * scale:
-            break
-        gone.append(int(seen[worst]))
-        uv[seen[worst]] = np.nan
-        seen, distance = np.delete(seen, worst), np.delete(distance, worst)
-        for beside in (worst - 1, worst):  # whose lines have changed
-            rows = seen[max(beside - 1, 0) : beside + 2]
-            distance[beside] = _off_line(time[rows], uv[rows])[1] if rows.size == 3 else 0.0
-    return gone
-
-
-def _off_line(time: Array, uv: Array) -> Array:
-    """Distance of each place (n, 2) from the line between its neighbours at its time; the ends: 0."""
-    if len(uv) < 3:
-        return np.zeros(len(uv))
-    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
-    inner = uv[1:-1] - (1 - share) * uv[:-2] - share * uv[2:]
-    return np.pad(np.hypot(*inner.T), 1)

@@ -10,10 +10,9 @@ from gait.errors import UsageError, UserError
 from gait.camera.camera import Camera
 from gait.lift.equations import Parallel
 from gait.lift.grid import Grid
-from gait.lift.heading import Explanation
+from gait.lift.explain import FEWEST, Explanation
 from gait.lift.observe import LONGEST_GAP, Observations
 from gait.lift.result import Options
-from gait.lift.start import FEWEST
 from gait.io.keypoints_file import Tracks
 
 Floats = npt.NDArray[np.float64]

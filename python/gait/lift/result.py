@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gait.lift.posterior import FLOOR_SD
-from gait.lift.uncertain import Uncertain
+from gait.lift.explain import Uncertain
 
 Floats = npt.NDArray[np.float64]
 
+FLOOR_SD = 0.03  # metres, of the floor's height
 METHODS = ("smooth", "blend", "segment", "likelihood")
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.lift import block_arrowhead as bordered
-from gait.lift import robust_weights as doubt
+from gait.bindings.lifter import weight_outliers
 from gait.lift import soft_constraints as soft
 from gait.lift.block_arrowhead import Information
 from gait.lift.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
@@ -92,7 +92,7 @@ class Lifted:
     evidence : float
         Logarithm of the density of what is seen, without the soft constraints, but for a constant.
     doubted : (T, P)
-        Points that lost their say (`gait.lift.robust_weights`).
+        Outliers, which were down-weighted.
     misfit : float
         Squared deviations per number seen; about 1 if the motion is of the prior's kind, more if it is not.
     """
@@ -130,7 +130,7 @@ def smooth(
     state = _State(around, start.places, start.lengths, 0)
     settled = False
     while not settled and state.steps < MOST_STEPS:
-        problem.doubt(state)
+        problem.weight(state)
         before, state = state, problem.step(state, constrained=state.steps >= FREE_STEPS)
         settled = state.steps > FREE_STEPS and _change(state.places - before.places) < SETTLED
     return problem.result(state, settled)
@@ -207,11 +207,10 @@ class _Problem:
         around = overlapping(places, self.grid.frames)
         return Around(heading, component, stature, around, around)
 
-    def doubt(self, state: _State) -> None:
-        """Leave points that are far from an estimate less to say (`gait.lift.robust_weights`)."""
+    def weight(self, state: _State) -> None:
+        """Down-weight points that are far from an estimate."""
         places = self._at_video(state.places)[:, self.seen.markers]
-        said = self.view.project(places, self._at_video(state.lengths))
-        self.points = doubt.doubted(self.seen.points, said)
+        self.points = weighted(self.seen.points, self.view.project(places, self._at_video(state.lengths)))
 
     def system(self, state: _State, constrained: bool) -> _System:
         """Linear problem around an estimate."""
@@ -276,7 +275,7 @@ class _Problem:
             steps=state.steps,
             settled=settled,
             log_volume_ratio=bare.log_volume_ratio,
-            evidence=bare.evidence - doubt.price(self.seen.points, self.points),
+            evidence=bare.evidence - _cost(self.seen.points, self.points),
             doubted=self.points.sd > self.seen.points.sd,
             misfit=bare.square / max(2 * int(self.seen.points.seen.sum()), 1),
         )
@@ -315,6 +314,22 @@ class _Problem:
                 )
                 total += (weights[:, i] * weights[:, k])[:, None, None] * value
         return total
+
+
+def weighted(points: Observations, predicted: Floats) -> Observations:
+    """Points with larger deviations where they are far from their predictions (T, P, 2)."""
+    sd = points.sd.copy()
+    square = np.sum((points.uv - predicted) ** 2, axis=2) / sd**2
+    for t, seen in enumerate(points.seen):
+        if seen.any():
+            sd[t, seen] = weight_outliers(square[t, seen], sd[t, seen])
+    return Observations(points.uv, sd)
+
+
+def _cost(points: Observations, trusted: Observations) -> float:
+    """Logarithm of the points' density that larger deviations cost: two coordinates each."""
+    seen = points.seen
+    return 2 * float(np.log(trusted.sd[seen] / points.sd[seen]).sum())
 
 
 def _deviations(variances: Floats) -> Floats:

@@ -1,28 +1,31 @@
-"""Posterior of a segment given 2-D observations (Leventon and Freeman 1998, eqs. 5 and 6).
+"""Posterior of a segment given 2-D observations in numpy: the independent reference of the C lifter in tests.
 
-With alpha ~ N(0, I) (the modes are given times their standard deviations), measurements y = G alpha + noise
-about the mean and noise of covariance R:
+Leventon and Freeman (1998), eqs. 5 and 6.  With alpha ~ N(0, I) (the modes are given times their standard
+deviations), measurements y = G alpha + noise about the mean and noise of covariance R:
 
     alpha = G' (G G' + R)^-1 y = (I + G' R^-1 G)^-1 G' R^-1 y,    Q = (I + G' R^-1 G)^-1.
 
-The first is the paper's form (dual), the second the information form, which is used here; they are equal
-(tests).  R holds the noise of the observations and the markers' variance outside the modes.
+The first is the paper's form (`dual`), the second the information form (`infer`).  R holds the noise of the
+observations and the markers' variance outside the modes.  `explain` searches for an unknown heading: starts
+all round, each refined with the turn by a small angle as one more mode; the evidence decides.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from gait.body.skeleton import axis_rotation
 from gait.bindings.segment_prior import SegmentPrior
-from gait.errors import UserError
+from gait.body.skeleton import axis_rotation
 from gait.lift.observe import Rows
 
 Floats = npt.NDArray[np.float64]
+
+LEADING = 3  # modes whose scores enter the shapes that views are linearised around
 
 GROUND_SD = 10.0  # metres, of where somebody stands
 FLOOR_SD = 0.03  # metres, of the floor's height
@@ -237,29 +240,6 @@ def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
     return Posterior(gaussian, rows, s, alpha, (covariance + covariance.T) / 2, evidence)
 
 
-def by_likelihood(found: Posterior) -> Posterior:
-    """Estimate the modes by the measurements alone: least squares, the limit of ever larger deviations.
-
-    What moves the body as a whole keeps what is known of it: no view from far away tells a distance.
-
-    Raises
-    ------
-    UserError
-        If the measurements leave a combination of modes open.
-    """
-    count, rigid = len(found.alpha), found.gaussian.rigid
-    design = np.concatenate([found.system.design, np.eye(count)[count - rigid :]])
-    rank = int(np.linalg.matrix_rank(design))
-    if rank < count:
-        raise UserError(
-            f"the points seen in a segment tell {rank - rigid} of {count - rigid} modes, and the likelihood "
-            "alone says nothing of the others; give more points, or use --method blend"
-        )
-    inverse = np.linalg.pinv(design)
-    alpha = inverse[:, : len(found.system.y)] @ found.system.y
-    return replace(found, alpha=alpha, covariance=inverse @ inverse.T)
-
-
 def _deviations(covariances: Floats) -> Floats:
     """Square roots of the diagonals (..., 3) of covariances, none below zero but for rounding."""
     return np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0))
@@ -270,3 +250,205 @@ def _inverse(precision: Floats) -> Floats:
     scale = 1 / np.sqrt(np.diagonal(precision))
     root = np.linalg.inv(np.linalg.cholesky(precision * np.outer(scale, scale))) * scale
     return np.asarray(root.T @ root)
+
+
+STARTS = 8  # headings all round from which a latent one is looked for
+TURN_SD = 0.4  # radians from a start: half of what lies between two
+PASSES = 12
+SETTLED = 1e-4  # radians, and metres of the mean place, between passes
+FAR_SD = 100.0  # metres, of the place on the ground in the first pass
+ALONE_FLOOR_SD = 0.05  # metres: a segment alone hangs less on it than a sequence
+SAME = 0.2  # radians: explanations that are nearer are one
+
+#: Rows given a guess of the places (F, J, 3): `observe.perspective`, or `observe.orthographic` of any guess.
+Measure = Callable[[Floats], Rows]
+
+
+@dataclass(frozen=True)
+class Person:
+    """What is known of somebody before the measurements.
+
+    Attributes
+    ----------
+    stature, stature_sd : float
+        Metres, as in `posterior.place`.
+    at : (x, y)
+        Where to look first, metres.
+    headings : sequence of float or None
+        Radians, from which to look for a latent heading; None: all round.
+    """
+
+    stature: float | None = None
+    stature_sd: float = 0.0
+    at: tuple[float, float] = (0.0, 0.0)
+    headings: Sequence[float] | None = None
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A component of the prior at a heading, and the posterior there.
+
+    Attributes
+    ----------
+    component : int
+    heading : float
+        Of the prior's axes in the world, radians.
+    posterior : Posterior
+        If the heading is latent the last mode is the turn, `TURN_SD` radians per deviation.
+    share : float
+        Probability among the explanations of the same call.
+    """
+
+    component: int
+    heading: float
+    posterior: Posterior
+    share: float
+
+
+def explain(prior: SegmentPrior, measure: Measure, person: Person | None = None) -> list[Explanation]:
+    """All distinct explanations of a segment's measurements, the most probable first."""
+    known = person or Person()
+    starts = [0.0]
+    if prior.headings == 0:
+        starts = list(np.arange(STARTS) * 2 * np.pi / STARTS if known.headings is None else known.headings)
+    found = [
+        _refined(prior, component, measure, float(start), known)
+        for component in range(prior.components)
+        for start in starts
+    ]
+    return _distinct(found, prior)
+
+
+def _refined(
+    prior: SegmentPrior, component: int, measure: Measure, start: float, person: Person
+) -> Explanation:
+    """Take Gauss-Newton passes from a start until heading and place settle; the share is not yet known."""
+    heading, at, ground_sd, free = start, np.array(person.at), FAR_SD, prior.headings == 0
+    places: Floats | None = None
+    shape: Floats | None = None
+    for _ in range(PASSES):
+        gaussian = place(
+            prior,
+            component,
+            stature=person.stature,
+            stature_sd=person.stature_sd,
+            heading=heading,
+            at=at,
+            ground_sd=ground_sd,
+            height_sd=ALONE_FLOOR_SD,
+        )
+        guess, first = gaussian.mean if places is None else places, len(gaussian.modes) - gaussian.rigid
+        if free:
+            gaussian = with_turn(gaussian, guess, at, start - heading)
+        posterior = infer(gaussian, measure(gaussian.mean if shape is None else shape))
+        places, shape, turn = posterior.points, _shape(posterior), 0.0
+        if free:
+            turn = start - heading + TURN_SD * float(posterior.alpha[-1])
+        heading, at = heading + turn, at + ground_sd * posterior.alpha[first : first + 2]
+        ground_sd = GROUND_SD
+        if max(abs(turn), float(np.abs((places - guess).mean(axis=(0, 1))).max())) < SETTLED:
+            break
+    return Explanation(component, heading, posterior, 0.0)
+
+
+def _shape(posterior: Posterior) -> Floats:
+    """Places by the leading modes and the rigid ones: see `chain.moved` for what the others would do."""
+    alpha = posterior.alpha.copy()
+    alpha[LEADING : len(alpha) - posterior.gaussian.rigid] = 0
+    return np.asarray(posterior.gaussian.mean + np.tensordot(alpha, posterior.gaussian.modes, 1))
+
+
+def with_turn(gaussian: Gaussian, about: Floats, pivot: Floats, offset: float) -> Gaussian:
+    """Append the mode of a turn, which is `offset` radians on average and deviates by `TURN_SD`.
+
+    Parameters
+    ----------
+    about : (F, J, 3)
+        Places that are turned.
+    pivot : (2,)
+        Around it, on the ground.
+    """
+    away = about[..., :2] - pivot
+    step = np.stack([-away[..., 1], away[..., 0], np.zeros(away.shape[:-1])], axis=-1)
+    return replace(
+        gaussian,
+        mean=gaussian.mean + offset * step,
+        modes=np.concatenate([gaussian.modes, TURN_SD * step[None]]),
+        rigid=gaussian.rigid + 1,
+    )
+
+
+def _distinct(found: list[Explanation], prior: SegmentPrior) -> list[Explanation]:
+    """One of each kind with its share, the most probable first; those of one component that met are one."""
+    score = np.array([_evidence(e.posterior) + np.log(prior.weights[e.component]) for e in found])
+    shares = np.exp(score - score.max())
+    shares /= shares.sum()
+    kept: list[Explanation] = []
+    for k in np.argsort(-score, kind="stable"):
+        one = found[k]
+        same = next((i for i, other in enumerate(kept) if _same(one, other)), None)
+        if same is None:
+            kept.append(replace(one, share=float(shares[k])))
+        else:
+            kept[same] = replace(kept[same], share=kept[same].share + float(shares[k]))
+    return sorted(kept, key=lambda e: -e.share)
+
+
+def _evidence(posterior: Posterior) -> float:
+    """Log density of the observations in the picture: rows of farther points count by longer units."""
+    return posterior.log_evidence + 0.5 * float(np.log(posterior.rows.variance).sum())
+
+
+def _same(a: Explanation, b: Explanation) -> bool:
+    apart = (a.heading - b.heading + np.pi) % (2 * np.pi) - np.pi
+    return a.component == b.component and bool(abs(apart) < SAME)
+
+
+def uncertain_modes(found: Posterior, count: int) -> tuple[Floats, Floats]:
+    """Directions of largest posterior deviation, within the modes.
+
+    Returns
+    -------
+    sd : (count,)
+        Metres, along the unit vectors below, largest first.
+    modes : (count, F, J, 3)
+        Unit vectors over all coordinates.
+    """
+    q, r = np.linalg.qr(found.gaussian.modes.reshape(len(found.gaussian.modes), -1).T)
+    values, vectors = np.linalg.eigh(r @ found.covariance @ r.T)
+    order = np.argsort(values)[::-1][:count]
+    modes = (q @ vectors[:, order]).T.reshape(-1, *found.gaussian.mean.shape)
+    return np.sqrt(np.maximum(values[order], 0)), modes
+
+
+def dual(gaussian: Gaussian, rows: Rows) -> tuple[Floats, Floats, float]:
+    """Eqs. 5 and 6 with a matrix of the measurements' size: alpha, covariance and log evidence."""
+    s = system(gaussian, rows)
+    wide = s.design @ s.design.T + np.eye(len(s.y))
+    gain = np.linalg.solve(wide, s.design).T
+    alpha, covariance = gain @ s.y, np.eye(len(gaussian.modes)) - gain @ s.design
+    spread = np.linalg.slogdet(wide)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
+    fit = s.y @ (s.y - s.design @ alpha)
+    return alpha, covariance, -0.5 * float(fit + spread + len(s.y) * np.log(2 * np.pi))
+
+
+def log10_volume(gaussian: Gaussian, rows: Rows) -> float:
+    """log10 sqrt(det Q / det Lambda) in closed form: -1/2 sum log10(1 + s_i^2), s of the whitened design."""
+    s = np.linalg.svd(system(gaussian, rows).design, compute_uv=False)
+    return float(-0.5 * np.log10(1 + s**2).sum())
+
+
+def likelihood_only(gaussian: Gaussian, rows: Rows) -> Floats:
+    """Segment (F, J, 3) in the span of the modes that fits the measurements best, whatever the prior says.
+
+    Of all that do, the one nearest to the mean (least squares of minimum norm); the deviations of the
+    observations weigh them, the prior has no part.
+    """
+    norm = np.linalg.norm(gaussian.modes.reshape(len(gaussian.modes), -1), axis=1)
+    unit = gaussian.modes / norm[:, None, None, None]
+    weight = 1 / np.sqrt(rows.variance)
+    design = np.einsum("nai,mni->nam", rows.direction, unit[:, rows.frame, rows.marker])
+    y = weight * rows.shifted(gaussian.mean).value
+    flat = (design * weight[..., None]).reshape(y.size, -1)
+    scores = np.linalg.lstsq(flat, y.ravel(), rcond=1e-10)[0]
+    return np.asarray(gaussian.mean + np.tensordot(scores, unit, 1))
