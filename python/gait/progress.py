@@ -1,4 +1,4 @@
-"""Progress on stderr for work of more than two seconds; nothing when stderr is not a terminal."""
+"""Notes and progress on stderr, and how long things took."""
 
 from __future__ import annotations
 
@@ -7,18 +7,27 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 _PATIENCE = 2.0  # seconds of work before a bar appears
 _PERIOD = 0.1  # seconds between two drawings of the bar
 _WIDTH = 40  # characters
 
 
+def note(text: str, quiet: bool = False) -> None:
+    """Print a line on stderr unless `quiet`."""
+    if not quiet:
+        print(text, file=sys.stderr, flush=True)
+
+
 @contextmanager
-def progress(words: str, total: int | None, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Yield a function to call with the count done so far.
+def progress(what: str, total: int | None, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """Yield a function to call with the count done so far; it draws a bar on a terminal.
 
     Parameters
     ----------
-    words : str
+    what : str
         What is being done.
     total : int or None
         Count when finished; None if unknown.
@@ -35,7 +44,7 @@ def progress(words: str, total: int | None, quiet: bool = False) -> Iterator[Cal
         now = time.monotonic()
         if shown and now >= due:
             due, drawn = now + _PERIOD, True
-            sys.stderr.write(f"\r{words} {_bar(done, total, now - start)}\x1b[K")
+            sys.stderr.write(f"\r{what} {_bar(done, total, now - start)}\x1b[K")
             sys.stderr.flush()
 
     try:
@@ -53,3 +62,9 @@ def _bar(done: int, total: int | None, elapsed: float) -> str:
     share = min(done / total, 1.0)
     left = round(elapsed * (1.0 / share - 1.0)) if share else 0
     return f"[{'#' * round(share * _WIDTH):<{_WIDTH}}] {share:4.0%} {left // 60}:{left % 60:02d}"
+
+
+def durations(values: ArrayLike) -> dict[str, float]:
+    """Median, 99th percentile and maximum of at least one duration."""
+    median, p99, longest = np.percentile(np.asarray(values, float), [50, 99, 100])
+    return {"median": float(median), "p99": float(p99), "max": float(longest)}

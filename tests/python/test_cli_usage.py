@@ -45,8 +45,8 @@ RANGES = [
     *((f"--seed {n}", f"from 0 to {2**64 - 1}") for n in ("-1", str(2**64))),
     *((f"--height {m}", f"{m}: is not a stature; give metres from 0.5 to 2.5") for m in ("17", "nan", "x")),
     ("--start 50 --stop 20", "--stop 20: must be greater than --start 50"),
-    ("--tracks-sd 0", "0: give a number above 0"),
-    ("--tracks-sd 3", "--tracks-sd: needs --tracks"),
+    ("--keypoints-sd 0", "0: give a number above 0"),
+    ("--keypoints-sd 3", "--keypoints-sd: needs --keypoints"),
     ("--stop 0", "--stop 0: must be greater than --start 0"),
 ]
 
@@ -73,14 +73,14 @@ def test_every_command_has_help(command, capsys):
 def test_the_help_names_the_defaults_of_the_library(command, capsys):
     with pytest.raises(SystemExit):
         main([command, "--help"])
-    assert f"hypotheses ({TrackerConfig.default().particles}" in " ".join(capsys.readouterr().out.split())
+    assert f"particle set ({TrackerConfig.default().particles}" in " ".join(capsys.readouterr().out.split())
 
 
 def test_help_without_a_library(tmp_path):
     words = [sys.executable, "-m", "gait", "track", "--help"]
     nowhere = os.environ | {"GAIT_LIBRARY": str(tmp_path / "none.so")}
     done = subprocess.run(words, env=nowhere, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "hypotheses" in done.stdout, done.stderr
+    assert done.returncode == 0 and "particle set" in done.stdout, done.stderr
 
 
 def test_the_list_of_commands(capsys):

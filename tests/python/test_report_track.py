@@ -14,7 +14,7 @@ from gait.cli import main
 from gait.motion.parameters import QUANTITIES, measure
 from gait.report.colours import BLUE, ORANGE
 from gait.report.drawing import side_colour
-from gait.report.parameter_plots import path_plot
+from gait.report.parameter_page import path_plot
 
 
 @pytest.fixture(scope="module")

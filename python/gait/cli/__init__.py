@@ -1,9 +1,10 @@
 """The ``gait`` command.
 
-Each command is a row of ``COMMANDS`` and a module here, whose docstring is the text of ``--help``, with
-``add_arguments(parser)`` and ``run(args) -> int``.  Every command gets ``--quiet``, and ``--json`` unless the
-module says ``JSON = False``.  Figures go to stdout, words and progress to stderr.
-Exit codes are 0 ok, 1 failed, 2 usage.
+Each command is a row of ``COMMANDS`` and a module here with ``add_arguments(parser)`` and
+``run(args) -> int``.  The module's docstring is the text of ``--help``; its ``EXAMPLES``, if any, come last.
+Every command gets ``--quiet``, and ``--json`` unless the module has ``JSON = False``.  Figures go to stdout,
+notes and progress to stderr.
+Exit codes are 0 for success, 1 for a failure, 2 for wrong usage.
 """
 
 from __future__ import annotations
@@ -14,14 +15,13 @@ import os
 import re
 import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from importlib import import_module
-from types import FrameType
 from typing import NamedTuple, NoReturn
 
 from gait import extras, reproducible
 from gait._version import __version__
+from gait.cli.signals import Interruptible
 from gait.errors import GaitError, UsageError, UserError
 
 
@@ -35,23 +35,27 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "learn": Command("learn", "learn a cyclic model from motion capture", ("mocap",)),
-    "info": Command("info", "what a model holds"),
+    "info": Command("info", "show what a model holds"),
     "track": Command("track", "track a walking person in a video file", ("video",)),
-    "eval": Command("evaluate", "errors of a track against the truth", ("video",)),
-    "detect": Command("detect", "2-D joints of the people in a video", ("video",)),
-    "lift": Command("lift", "2-D joint tracks, or a video, to 3-D", ("video", "mocap")),
+    "eval": Command("evaluate", "compare a track with the truth", ("video",)),
+    "detect": Command("detect", "find the 2-D keypoints of the people in a video", ("video",)),
+    "lift": Command("lift", "lift 2-D keypoints, or a video, to 3-D motion", ("video", "mocap")),
     "render": Command("render", "draw a pose or a model", ("video",)),
-    "camera": Command("camera", "where a camera stands, from points measured on the ground", ("video",)),
-    "simulate": Command("simulate", "make a test clip of a walker with its exact truth", ("video",)),
+    "camera": Command("camera", "find where a camera stands from points measured on the ground", ("video",)),
+    "simulate": Command("simulate", "make a test clip of a walking person with exact truth", ("video",)),
     "capture": Command("capture", "send the frames of a video or a camera over LCM", ("video", "lcm")),
     "record": Command("record", "record the estimates of gait-trackd into a track file", ("video", "lcm")),
     "demo": Command(
         "demo", "run capture, tracker and recorder on a clip and report", ("video", "lcm", "report")
     ),
-    "report": Command("report", "overlay video and HTML page of a tracked clip", ("video", "lcm", "report")),
-    "report track": Command("report_track", "gait parameters of a track, with plots", ("video", "report")),
+    "report": Command(
+        "report", "make an overlay video and an HTML page of a tracked clip", ("video", "lcm", "report")
+    ),
+    "report track": Command(
+        "report_track", "measure the gait parameters of a track, with plots", ("video", "report")
+    ),
     "report lift": Command(
-        "report_lift", "figures of the segment prior and of lifting", ("video", "report", "mocap")
+        "report_lift", "draw figures of the segment prior and of lifting", ("video", "report", "mocap")
     ),
     "view": Command("view", "watch the estimates of gait-trackd in a browser", ("video", "lcm")),
 }
@@ -70,10 +74,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         words[:2] = [" ".join(words[:2])]
     command = f" {words[0]}" if words and words[0] in COMMANDS else ""
     try:
-        with _terminated_like_interrupted():
+        with Interruptible(signal.SIGTERM):
             args = _parser(words).parse_args(list(_joined(words)))
             code = int(args.run(args))
-            sys.stdout.flush()  # at exit a reader that has left would be told in words of Python
+            sys.stdout.flush()  # at exit Python would complain about a reader that has left
             return code
     except UsageError as exc:
         _failed(command, str(exc))
@@ -87,7 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(text, file=sys.stderr)
         return 1
-    except BrokenPipeError:  # the reader of our output has left, which is its right
+    except BrokenPipeError:  # the reader of our output has left, which is no failure of ours
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
@@ -97,38 +101,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _failed(command, "interrupted")
 
 
-@contextlib.contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """Let SIGTERM end a command as Ctrl-C does, so that no temporary file stays behind."""
-    if threading.current_thread() is not threading.main_thread():  # where handlers cannot be set
-        yield
-        return
-    previous = signal.signal(signal.SIGTERM, _interrupted)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)
-
-
-def _interrupted(number: int, frame: FrameType | None) -> None:
-    """Handle a signal as Python handles Ctrl-C."""
-    raise KeyboardInterrupt
-
-
 def _failed(command: str, text: str) -> int:
     print(f"gait{command}: {' '.join(text.split())}", file=sys.stderr)
     return 1
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser, of the commands too, that says what is wrong in one line."""
+    """Parser that reports what is wrong in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: error: {message}\n")
 
 
 class _Version(argparse.Action):
-    """Say the versions, for which the library is loaded, and end."""
+    """Print the versions of package and library, and exit."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from gait.bindings.library import library, version_text  # here, as it loads numpy
@@ -139,12 +125,14 @@ class _Version(argparse.Action):
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """Parser of the command named first in `words`, else one that imports no command and only lists them."""
+    """Parser of the command named first in `words`; without one it lists the commands and imports none."""
     parser = _Parser(
         prog="gait",
         description="Learn how people walk from motion capture and track them in calibrated video.",
     )
-    parser.add_argument("--version", action=_Version, nargs=0, help="say the versions of package and library")
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="print the versions of package and library"
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     chosen = words[0] if words and words[0] in COMMANDS else None
     for name, command in COMMANDS.items() if chosen is None else [(chosen, COMMANDS[chosen])]:
@@ -153,18 +141,21 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             continue
         module = import_module(f"gait.cli.{command.module}")
         sub = commands.add_parser(
-            name, description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+            name,
+            description=module.__doc__,
+            epilog=getattr(module, "EXAMPLES", None),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         module.add_arguments(sub)
         if getattr(module, "JSON", True):
             _offer(sub, "--json", "print the figures as JSON")
-        _offer(sub, "--quiet", "no words and no progress on stderr")
+        _offer(sub, "--quiet", "print no notes and no progress")
         sub.set_defaults(run=module.run)
     return parser
 
 
 def _joined(words: Sequence[str]) -> Iterator[str]:
-    """Words with ``--option -x`` and ``--option -1,0,0`` as one, as argparse takes ``-x`` for an option."""
+    """Join ``--orthographic -x`` or ``-1,0,0`` into one word, as argparse takes ``-x`` for an option."""
     held = ""
     for word in words:
         if held and _DIRECTION.fullmatch(word):
@@ -179,6 +170,6 @@ def _joined(words: Sequence[str]) -> Iterator[str]:
 
 
 def _offer(parser: argparse.ArgumentParser, option: str, text: str) -> None:
-    """Add a switch that every command has, unless the command words it itself."""
+    """Add a switch that every command has, unless the command defines it itself."""
     with contextlib.suppress(argparse.ArgumentError):
         parser.add_argument(option, action="store_true", help=text)

@@ -1,22 +1,21 @@
 """Send the frames of a video file or of a camera over LCM, as a camera in the field would.
 
-A file is sent at the rate at which it was taken, with the capture times it would have had, beginning now.
-The number of each frame goes along, so that a receiver can count what it missed.  Calibration and empty scene
-are announced at the start and every two seconds.  With --init the tracker gets a START for the right frame.
+A file is sent at the rate at which it was taken, with the capture times it would have had, starting now.
+Each frame carries its number, so that a receiver can count what it missed.  Calibration and empty scene are
+announced at the start and every two seconds.  With --init the tracker gets a START for the right frame.
 
---wait makes sure that a tracker listens: the stream begins when gait-trackd has confirmed camera, empty scene
-and START.  Without it the stream begins at once.
+--wait makes sure that a tracker listens: the stream begins when gait-trackd has confirmed the camera, the
+empty scene and START.  Without it the stream begins at once.
 
 --url file:///PATH.log?mode=w writes an LCM log instead, which gait-trackd plays without loss.
 
-Ends after the last frame, or with an interrupt (Ctrl-C, SIGTERM) after a whole one.
+The command ends after the last frame, or when interrupted (Ctrl-C, SIGTERM), never within a frame.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator
 from contextlib import closing, suppress
 from itertools import chain
@@ -28,70 +27,58 @@ from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
 from gait.cli import values
-from gait.cli.ending import Ending
+from gait.cli.signals import Interruptible
 from gait.errors import UsageError, UserError
 from gait.io.files import require_unread
 from gait.io.video import Frame, background, read_plate
 from gait.lcm.capture import DeviceSource, FileSource, Pacer, Publisher, Setup, is_device, parse_rate
 from gait.lcm.link import buffer_warning, is_log, lcm_url, log_of
-from gait.progress import progress
+from gait.progress import note, progress
+
+EXAMPLES = """\
+examples:
+  gait capture walk.mp4 --camera camera.json --background auto --init auto --wait 30
+  gait capture /dev/video0 --camera camera.json --background empty.png
+  gait capture walk.mp4 --camera camera.json --init init.json --rate max --url file:///tmp/walk.log?mode=w
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
-        "source", metavar="VIDEO|DEVICE", help="file that FFmpeg reads, or camera: 0, /dev/video0"
-    )
-    parser.add_argument(
-        "--camera", metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name, to announce"
-    )
-    parser.add_argument(
-        "--background", default="none", metavar="PNG|auto|none", help="empty scene to announce (none)"
-    )
-    parser.add_argument("--init", metavar="INIT.json|auto", help="first state, sent as START (none)")
-    parser.add_argument(
-        "-m", "--model", metavar="M.gait", help="whose prior fills what --init leaves open (the shipped one)"
-    )
-    parser.add_argument(
-        "--height", type=values.stature, metavar="M", help="the person's stature in metres, for --init"
-    )
-    parser.add_argument(
-        "--start", type=values.whole(0), default=0, metavar="F", help="first frame to send (0)"
-    )
-    parser.add_argument("--stop", type=values.whole(0), metavar="F", help="first frame not to send")
-    parser.add_argument("--rate", default="true", metavar="true|max|HZ", help="speed of sending (true)")
-    parser.add_argument(
-        "--jpeg", type=values.whole(1, 100), metavar="Q", help="compress frames with this quality, 1 to 100"
-    )
-    parser.add_argument("--grey", action="store_true", help="send grey frames")
-    parser.add_argument("--loop", action="store_true", help="repeat the file until interrupted")
-    parser.add_argument(
-        "--stream", type=values.whole(*values.STREAM), default=0, metavar="I", help="number of the camera (0)"
-    )
-    parser.add_argument(
-        "--wait", type=values.seconds, default=0.0, metavar="S", help="for a tracker, at most S seconds (0)"
-    )
-    parser.add_argument("--url", metavar="URL", help="LCM (LCM_DEFAULT_URL or multicast on this machine)")
+    add = parser.add_argument
+    add("source", metavar="VIDEO|DEVICE", help="file that FFmpeg reads, or camera: 0, /dev/video0")
+    values.add_camera(parser, ", to announce")
+    values.add_clip(parser, "send", init="none", background="none")
+    parser.set_defaults(init=None, start=0)
+    values.add_model(parser, "model whose prior fills in what --init leaves open")
+    add("--rate", default="true", metavar="true|max|HZ", help="speed of sending (true)")
+    add("--jpeg", type=values.whole(1, 100), metavar="Q", help="compress frames with this quality, 1 to 100")
+    add("--grey", action="store_true", help="send grey frames")
+    add("--loop", action="store_true", help="repeat the file until interrupted")
+    stream = values.whole(*values.STREAM)
+    add("--stream", type=stream, default=0, metavar="I", help="number of the camera (0)")
+    add("--wait", type=values.seconds, default=0.0, metavar="S", help="for a tracker, at most S seconds (0)")
+    values.add_url(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Send and report."""
     url, rate = lcm_url(args.url), parse_rate(args.rate)
     _require_sense(args, url)
-    with Ending() as ending:
+    with Interruptible() as signals:
         source = _source(args)
         setup = _setup(args, source)
         warning = buffer_warning(url)
-        if warning and not args.quiet:
-            print(f"gait capture: {warning}", file=sys.stderr)
+        if warning:
+            note(f"gait capture: {warning}", args.quiet)
         with closing(Publisher(url, setup)) as publisher:
-            pacer = _send(args, source, publisher, rate, ending)
+            pacer = _send(args, source, publisher, rate, signals)
     _report(args, publisher, pacer)
     return 0
 
 
 def _require_sense(args: argparse.Namespace, url: str) -> None:
-    """Raise unless the options go together, and a log to write is none of the files to read."""
+    """Raise unless the options fit together and the log to write is none of the files to read."""
     if args.stop is not None:
         values.require_order(args.start, args.stop)
     if args.height is not None and not args.init:
@@ -108,21 +95,21 @@ def _send(
     source: FileSource | DeviceSource,
     publisher: Publisher,
     rate: float | None,
-    ending: Ending,
+    signals: Interruptible,
 ) -> Pacer:
-    """Send all, or until an interrupt, which is the way to end a camera or a loop."""
+    """Send all frames, or until an interrupt, which is the way to end a camera or a loop."""
     if args.wait > 0:
         publisher.meet(args.wait)
     frames = _primed(source)
     pacer = publisher.begin(source, float("inf") if source.live else rate, args.wait)
     total = None if isinstance(source, DeviceSource) or args.loop else (args.stop or source.video.count)
     with progress("sending", total, args.quiet) as update, suppress(KeyboardInterrupt):
-        publisher.send(frames, pacer, update, ending.whole)
+        publisher.send(frames, pacer, update, signals.uninterrupted)
     return pacer
 
 
 def _primed(source: FileSource | DeviceSource) -> Iterator[Frame]:
-    """Frames of the source; of a file the first is decoded already, which may have taken long to find."""
+    """Frames of the source; the first of a file is already decoded, as it may take long to find."""
     frames = source.frames()
     if isinstance(source, DeviceSource):
         return frames
@@ -169,8 +156,8 @@ def _start(args: argparse.Namespace, source: FileSource | DeviceSource, setup: S
     model = Model(args.model)
     if args.init != "auto":
         start = Start.read(args.init, model, height=args.height)
-        if setup.camera and not args.quiet and not setup.camera.shows(model.pose(start.mean)[0]):
-            print(f"{args.init}: {OUTSIDE}", file=sys.stderr)
+        if setup.camera and not setup.camera.shows(model.pose(start.mean)[0]):
+            note(f"{args.init}: {OUTSIDE}", args.quiet)
         return start
     if isinstance(source, DeviceSource) or setup.camera is None:
         raise UsageError("--init auto: needs a video file and --camera; give an init file")

@@ -1,4 +1,4 @@
-"""Print what a model holds: source, sizes, statistics, checksum, and the acknowledgement it asks for."""
+"""Print what a model holds: source, sizes, statistics, checksum, and the acknowledgement that it asks for."""
 
 from __future__ import annotations
 
@@ -21,6 +21,12 @@ GAIT = (
     "stature_sd_m",
 )  # fmt: skip
 """Names of the numbers in section GAIT."""
+
+EXAMPLES = """\
+examples:
+  gait info model.gait
+  gait info model.gait --json
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,11 +1,11 @@
 """Record the estimates of gait-trackd from LCM into a track file.
 
 Ends after --frames estimates, when none has come for --until-idle seconds, at the end of a log, when another
-stream begins (the numbers of its frames start again), or with an interrupt (Ctrl-C, SIGTERM); the file is
-complete in every case.  Two trackers on one URL end it too, as a failure.
+stream begins (its frame numbers start again), or when interrupted (Ctrl-C, SIGTERM); the file is complete in
+every case.  It also ends, as a failure, when two trackers use one URL.
 
-Figures: frames written; frames the tracker dropped; estimates lost on the way here; the time of a step; the
-latency from capture to arrival here.
+The figures are: frames written; frames the tracker dropped; estimates lost on the way here; the duration of a
+step; the latency from capture to arrival here.
 
 To record everything, frames included, use lcm-logger (in the same environment): lcm-logger -l URL FILE.log;
 play it with gait-trackd --url file://FILE.log?speed=0.
@@ -16,35 +16,31 @@ from __future__ import annotations
 import argparse
 import json
 import signal
-import sys
 from typing import Any
 
 from gait.cli import values
 from gait.io.files import require_outputs
 from gait.lcm.link import is_log, lcm_url, log_of
-from gait.lcm.record import ESTIMATE, LAGGED, Recorder
+from gait.lcm.record import ESTIMATE, LAGGED, LISTENING, Recorder
+from gait.progress import note
 
-LISTENING = "listening"
-"""First word on stderr once every estimate from now on will be recorded."""
+EXAMPLES = """\
+examples:
+  gait record -o track.csv --log estimates.log --until-idle 5
+  gait record -o track.csv --url file:///tmp/estimates.log?speed=0
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("-o", "--output", required=True, metavar="OUT.csv", help="the track")
-    parser.add_argument("--url", metavar="URL", help="LCM (LCM_DEFAULT_URL or multicast on this machine)")
-    parser.add_argument("--frames", type=values.whole(1), metavar="N", help="end after N estimates")
-    parser.add_argument(
-        "--until-idle", type=values.seconds, metavar="S", help="end when none has come for S seconds"
-    )
-    parser.add_argument(
-        "--patience", type=values.seconds, metavar="S", help="fail if none has come at all after S seconds"
-    )
-    parser.add_argument(
-        "--lagged", action="store_true", help="each frame as it looked some frames later (gait-trackd --lag)"
-    )
-    parser.add_argument(
-        "--log", metavar="E.log", help="also write the messages to an LCM log, for gait report"
-    )
+    add = parser.add_argument
+    add("-o", "--output", required=True, metavar="OUT.csv", help="the track")
+    values.add_url(parser)
+    add("--frames", type=values.whole(1), metavar="N", help="end after N estimates")
+    add("--until-idle", type=values.seconds, metavar="S", help="end when none has come for S seconds")
+    add("--patience", type=values.seconds, metavar="S", help="fail if none has come at all after S seconds")
+    add("--lagged", action="store_true", help="each frame as estimated some frames later (gait-trackd --lag)")
+    add("--log", metavar="E.log", help="also write the messages to an LCM log, for gait report")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,16 +54,13 @@ def run(args: argparse.Namespace) -> int:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, stop)
-    if not args.quiet:
-        print(f"{LISTENING} on {url}", file=sys.stderr, flush=True)
+    note(f"{LISTENING} on {url}", args.quiet)
     recorder.run(args.frames, args.until_idle, args.patience)
-    if recorder.other and not args.quiet:
-        print(f"gait record: ended, as {recorder.other}; record it into another file", file=sys.stderr)
+    if recorder.other:
+        note(f"gait record: ended, as {recorder.other}; record it into another file", args.quiet)
     figures = recorder.summary()
-    if recorder.damage and not args.quiet:
-        print(
-            f"gait record: messages left out: {figures['damaged']}, first: {recorder.damage}", file=sys.stderr
-        )
+    if recorder.damage:
+        note(f"gait record: messages left out: {figures['damaged']}, first: {recorder.damage}", args.quiet)
     print(json.dumps(figures) if args.json else text(figures))
     return 0
 

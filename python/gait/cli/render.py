@@ -1,11 +1,11 @@
-"""Draw a pose of a walking model, or what the model has learned.
+"""Draw a pose of a walking model, or everything the model has learned.
 
-Without --strip: one walker, at --phase or in the state of --state, seen by --camera or by a built-in one.
+Without --strip: one person at --phase or in the state of --state, seen by --camera or by a built-in one.
 With --strip: a sheet with the mean cycle and each principal component at -2, 0 and +2 standard deviations
-over eight phases, from the right side.
+at eight phases, from the right side.
 
-The JSON of --state may hold phase, stride_hz, stature, heading, pitch, roll (radians), pelvis [x, y, z]
-and coef [c1, c2, ...]; what it leaves out is the average walker on the ground at the origin.
+The JSON of --state may have phase, stride_hz, stature, heading, pitch, roll (radians), pelvis [x, y, z] and
+coef [c1, c2, ...].  The rest is that of the average person, standing on the ground at the origin.
 """
 
 from __future__ import annotations
@@ -17,33 +17,33 @@ import cv2
 from gait.bindings.model import Model
 from gait.bindings.state import POSE_SCALARS, State
 from gait.camera.camera import Camera
-from gait.cli.values import between
+from gait.cli import values
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
 from gait.io.files import replacing, require_outputs
-from gait.report.drawing import draw_room, draw_strip, room_camera
+from gait.report.drawing import default_view, draw_sheet, draw_standing
 
 JSON = False
 
 _RANGES = {"phase": (0.0, 1.0), "stride_hz": (0.1, 4.0), "stature": (0.5, 2.5)}
 
+EXAMPLES = """\
+examples:
+  gait render --phase 0.25 -o pose.png
+  gait render -m model.gait --strip -o model.png
+"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("-m", "--model", metavar="M.gait", help="walking model (the shipped one)")
+    values.add_model(parser)
     parser.add_argument("-o", "--output", required=True, metavar="OUT.png", help="the picture")
-    parser.add_argument(
-        "--camera", metavar="CAM", help="JSON, OpenCV YAML/XML or FILE.toml:name (built-in view)"
-    )
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument(
-        "--phase",
-        type=between(0, 1, "a share of the stride"),
-        metavar="P",
-        help="of the stride, 0 = right heel strike (0)",
-    )
-    what.add_argument("--state", metavar="JSON", help="file with the whole state")
-    what.add_argument("--strip", action="store_true", help="sheet of all components")
+    values.add_camera(parser, " (default: a built-in view)")
+    add = parser.add_mutually_exclusive_group().add_argument
+    share = values.between(0, 1, "a share of the stride")
+    add("--phase", type=share, metavar="P", help="of the stride, 0 at the right heel strike (0)")
+    add("--state", metavar="JSON", help="file with the whole state")
+    add("--strip", action="store_true", help="draw the sheet of all components")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,11 +53,11 @@ def run(args: argparse.Namespace) -> int:
     if args.strip:
         if args.camera:
             raise UserError("--camera: --strip has its own view; leave one of them out")
-        picture = draw_strip(model)
+        picture = draw_sheet(model)
     else:
         state = _state(args, model)
-        camera = Camera.read(args.camera) if args.camera else room_camera(state)
-        picture = draw_room(model, state, camera)
+        camera = Camera.read(args.camera) if args.camera else default_view(state)
+        picture = draw_standing(model, state, camera)
     with replacing(args.output) as temporary:
         try:
             cv2.imwrite(str(temporary), picture)
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _state(args: argparse.Namespace, model: Model) -> State:
-    """Walker of --phase or --state; on the ground at the origin unless placed."""
+    """State of --phase or --state; on the ground at the origin unless placed."""
     state = State(stride_hz=model.info.stride_hz)
     if args.phase is not None:
         state.phase = args.phase % 1.0

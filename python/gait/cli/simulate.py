@@ -2,14 +2,14 @@
 
 Writes video.mp4, background.png (the empty scene), camera.json, truth.csv (joints in metres and pixels),
 init.json (the truth at frame 0 with some error, to start a tracker), meta.json (heel strikes, stature and how
-it was made) and contact.jpg into DIR.  The same options and seed give the same pictures.
+the clip was made) and contact.jpg into DIR.  The same options and seed give the same pictures.
 
 presets (other options change them):
   demo     side view, left to right, 4 s
   side     side view, right to left, the exposure flickers by 1 %
   oblique  at 45 degrees, coming nearer
   toward   5 s straight towards the camera
-  pole     at 45 degrees, a pole hides the walker for a while, strong background
+  pole     at 45 degrees, a pole hides the person for a while, strong background
 """
 
 from __future__ import annotations
@@ -23,6 +23,12 @@ from typing import Any
 from gait.progress import progress
 from gait.simulate import FILES, PRESETS, Scenario, simulate
 from gait.simulate.scenario import DIRECTIONS, GENERATOR, VIEWS
+
+EXAMPLES = """\
+examples:
+  gait simulate -o walk
+  gait simulate -o walk --preset pole --seed 7 --stature 1.68 --size 1280x720
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Make the clip and say what is in it."""
+    """Make the clip and print what is in it."""
     scenario = replace(PRESETS[args.preset], **_given(args))
     begun = time.perf_counter()
     with progress("rendering", scenario.frames, args.quiet) as update:

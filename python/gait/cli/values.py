@@ -1,17 +1,20 @@
-"""Values of options with their ranges, as types of `argparse`: a fault is a usage error naming the range."""
+"""Options that commands share: types of values with their ranges, and common arguments."""
 
 from __future__ import annotations
 
-from argparse import ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 
+from gait.bindings.abi import Mode
 from gait.bindings.initial import STATURE
-from gait.errors import UsageError
+from gait.errors import LibraryError, UsageError
+from gait.track.config import TrackerConfig
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
 THREADS = (1, 256)  # GAIT_POOL_MAX
 SEED = (0, (1 << 64) - 1)
 STREAM = (0, 30)
+CAMERA = "camera file: JSON, OpenCV YAML or XML, or FILE.toml:NAME"
 
 
 def whole(low: int, high: int | None = None) -> Callable[[str], int]:
@@ -60,7 +63,7 @@ def positive(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """Finite times, none or more, in seconds."""
+    """Finite times from 0 up, in seconds."""
     value = _number(text)
     if not 0 <= value < float("inf"):
         raise ArgumentTypeError(f"{text}: give seconds from 0 up")
@@ -68,13 +71,72 @@ def seconds(text: str) -> float:
 
 
 def require_order(start: int, stop: int) -> None:
-    """Raise UsageError unless there are frames from `start` up to, without, `stop`."""
+    """Raise UsageError unless `start` comes before `stop`."""
     if stop <= start:
         raise UsageError(f"--stop {stop}: must be greater than --start {start}")
 
 
+def add_camera(parser: ArgumentParser, note: str = "", required: bool = False) -> None:
+    """Add ``--camera``."""
+    parser.add_argument("--camera", required=required, metavar="CAM", help=CAMERA + note)
+
+
+def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
+    """Add ``--model``; None stands for the model of the package."""
+    parser.add_argument("-m", "--model", metavar="M.gait", help=f"{what} (default: the one of the package)")
+
+
+def add_url(parser: ArgumentParser) -> None:
+    """Add ``--url``."""
+    parser.add_argument(
+        "--url",
+        metavar="URL",
+        help="LCM network or log (default: LCM_DEFAULT_URL, or multicast on this host)",
+    )
+
+
+def add_clip(parser: ArgumentParser, use: str, init: str = "auto", background: str = "auto") -> None:
+    """Add ``--init --background --height --start --stop``; `use` is what happens to the frames."""
+    parser.add_argument("--init", default=init, metavar="INIT.json|auto", help=f"first state ({init})")
+    parser.add_argument(
+        "--background",
+        default=background,
+        metavar="PNG|auto|none",
+        help=f"empty scene: an image, auto for the median of the clip, or none ({background})",
+    )
+    parser.add_argument("--height", type=stature, metavar="M", help="the person's stature in metres")
+    parser.add_argument("--start", type=whole(0), metavar="F", help=f"first frame to {use}, counted from 0")
+    parser.add_argument("--stop", type=whole(0), metavar="F", help=f"frame to stop before, not to {use}")
+
+
+def add_filter(parser: ArgumentParser, threads: int) -> None:
+    """Add ``--particles --threads``."""
+    usual, paper = _particles(Mode.DEFAULT), _particles(Mode.PAPER)
+    parser.add_argument(
+        "--particles",
+        type=whole(*PARTICLES),
+        metavar="N",
+        help=f"size of the particle set ({usual}, paper mode {paper}; {PARTICLES[0]} to {PARTICLES[1]})",
+    )
+    parser.add_argument(
+        "--threads",
+        type=whole(*THREADS),
+        default=threads,
+        metavar="T",
+        help=f"of the tracker, up to {THREADS[1]}; the result does not depend on it ({threads})",
+    )
+
+
+def _particles(mode: Mode) -> str:
+    """Write the default number of particles; without the library the help must still be readable."""
+    try:
+        return str(TrackerConfig.default(mode).particles)
+    except LibraryError:
+        return "the library's default"
+
+
 def _number(text: str) -> float:
-    """Read a number, NaN if the text is none."""
+    """Read a number; NaN if the text is none."""
     try:
         return float(text)
     except ValueError:

@@ -1,6 +1,6 @@
-"""Watch a tracker at work: each estimate of gait-trackd drawn into its frame.
+"""Watch a tracker at work: each estimate of gait-trackd is drawn into its frame.
 
-Opens a page on this machine (its address is printed) that any browser shows.  With --save the first finished
+Serves a page on this machine that any browser shows, and prints its address.  With --save the first finished
 picture is written to a PNG file instead, and the command ends.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
 import time
 
 import cv2
@@ -16,29 +15,34 @@ import cv2
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
 from gait.cli import values
-from gait.cli.ending import Ending
+from gait.cli.signals import Interruptible
 from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.video import Image
 from gait.lcm.link import lcm_url
 from gait.lcm.viewer import Screen, Viewer
+from gait.progress import note
 
 JSON = False
 _TURN = 0.1  # seconds
 
+EXAMPLES = """\
+examples:
+  gait view --camera camera.json
+  gait view --save estimate.png
+"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--url", metavar="URL", help="LCM (LCM_DEFAULT_URL or multicast on this machine)")
-    parser.add_argument("--save", metavar="PNG", help="write one picture and end")
-    parser.add_argument(
-        "--patience", type=values.seconds, default=30.0, metavar="S", help="of --save, seconds (30)"
-    )
-    port, stream = values.whole(0, 65535), values.whole(*values.STREAM)
-    parser.add_argument("--port", type=port, default=0, metavar="N", help="of the page (any that is free)")
-    parser.add_argument("--stream", type=stream, default=0, metavar="I", help="number of the camera (0)")
-    parser.add_argument("--camera", metavar="CAM", help="calibration (from GAIT_CAMERA_<i>)")
-    parser.add_argument("-m", "--model", metavar="M.gait", help="that tracks (the shipped one)")
+    values.add_url(parser)
+    add, port, stream = parser.add_argument, values.whole(0, 65535), values.whole(*values.STREAM)
+    add("--save", metavar="PNG", help="write one picture and end")
+    add("--patience", type=values.seconds, default=30.0, metavar="S", help="seconds that --save waits (30)")
+    add("--port", type=port, default=0, metavar="N", help="of the page (any that is free)")
+    add("--stream", type=stream, default=0, metavar="I", help="number of the camera (0)")
+    values.add_camera(parser, " (default: from GAIT_CAMERA_<i>)")
+    values.add_model(parser, "model that is tracked")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -51,12 +55,12 @@ def run(args: argparse.Namespace) -> int:
     screen = Screen(args.port)
     viewer = Viewer(url, args.stream, model, camera, screen.show)
     print(screen.address, flush=True)
-    with Ending(), contextlib.suppress(KeyboardInterrupt):  # the way to end it
+    with Interruptible(), contextlib.suppress(KeyboardInterrupt):  # the user ends it so
         while viewer.handle(_TURN):
             pass
     screen.close()
-    if viewer.damage and not args.quiet:
-        print(f"gait view: left out: {viewer.damage}", file=sys.stderr)
+    if viewer.damage:
+        note(f"gait view: left out: {viewer.damage}", args.quiet)
     return 0
 
 
@@ -64,8 +68,7 @@ def _save(args: argparse.Namespace, url: str, model: Model, camera: Camera | Non
     pictures: list[Image] = []
     with replacing(args.save) as path:
         viewer = Viewer(url, args.stream, model, camera, pictures.append)
-        if not args.quiet:
-            print(f"listening on {url}", file=sys.stderr, flush=True)
+        note(f"listening on {url}", args.quiet)
         deadline = time.monotonic() + args.patience
         while not pictures and time.monotonic() < deadline and viewer.handle(_TURN):
             pass

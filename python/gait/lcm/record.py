@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings.estimate import Estimate
-from gait.durations import spread
 from gait.errors import UserError
 from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame
 from gait.lcm.link import LogWriter, break_of, handle, is_log, listener, log_of, now
 from gait.lcm.messages import estimate_after, estimate_of
+from gait.progress import durations
+
+LISTENING = "listening"
+"""First word of the note that every estimate from now on will be recorded."""
 
 _NO_IMAGE = np.empty((0, 0), np.uint8)
 _TURN = 0.1  # seconds, longest wait before looking whether to stop
@@ -28,7 +31,7 @@ _QUEUE = 1000  # estimates that may wait for the disk
 
 @dataclass
 class Figures:
-    """What was seen on the way: one entry per estimate, milliseconds."""
+    """What was measured on the way: one entry per estimate, milliseconds."""
 
     step: list[float] = field(default_factory=list)
     latency: list[float] = field(default_factory=list)
@@ -56,8 +59,8 @@ class Figures:
             "lost": self.lost,
             "damaged": self.damaged,
             "fps": (len(self.utime) - 1) / span if span > 0 else None,
-            "step_ms": spread(self.step) if self.step else None,
-            "latency_ms": spread(self.latency) if live and self.latency else None,
+            "step_ms": durations(self.step) if self.step else None,
+            "latency_ms": durations(self.latency) if live and self.latency else None,
             "model_digest": _hex(last.model_digest) if last else None,
             "digest": _hex(last.tracker_digest) if last else None,
         }

@@ -19,7 +19,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import find_peaks
 
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
@@ -125,6 +124,8 @@ def furthest(time: Array, reach: Array) -> Array:
     reach : ndarray of shape (n,)
         Metres that a foot is ahead of the pelvis (or behind it, to find toe-offs).
     """
+    from scipy.signal import find_peaks  # slow to load
+
     step = float(np.median(np.diff(time)))
     peaks, _ = find_peaks(reach, height=_REACH, distance=max(1, round(_APART / step)))
     before, top, after = reach[peaks - 1], reach[peaks], reach[peaks + 1]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +19,6 @@ from numpy.typing import NDArray
 
 from gait.body.model_curves import ModelCurves
 from gait.errors import UserError
-from gait.io.files import replacing
 from gait.io.track_file import Track
 from gait.motion.footfalls import (
     SIDES,
@@ -368,7 +366,7 @@ def _number(score: str) -> int:
 
 
 def as_json(track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> dict[str, Any]:
-    """Everything but the curves, for JSON: what is not known is null."""
+    """Everything but the curves, for JSON: unknown values are null."""
     found = {
         "frames": [int(track.frame[0]), int(track.frame[-1])],
         "uncertainty": parameters.source,
@@ -427,16 +425,20 @@ def curve_rows(cycles: Mapping[str, AngleCycle]) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def write_json(path: str | os.PathLike[str], found: Mapping[str, Any]) -> None:
-    """Write a JSON file."""
-    with replacing(path) as temporary:
-        text = json.dumps(found, indent=1, allow_nan=False) + "\n"
-        Path(temporary).write_text(text, encoding="utf-8")
+def write_tables(
+    folder: Path, found: Mapping[str, Any], parameters: Parameters, cycles: Mapping[str, AngleCycle]
+) -> None:
+    """Write parameters.json (`found`, of `as_json`), events.csv, strides.csv and curves.csv into `folder`."""
+    text = json.dumps(found, indent=1, allow_nan=False) + "\n"
+    (folder / "parameters.json").write_text(text, encoding="utf-8")
+    _write_csv(folder / "events.csv", found["events"])
+    _write_csv(folder / "strides.csv", list(stride_rows(parameters)))
+    _write_csv(folder / "curves.csv", list(curve_rows(cycles)))
 
 
-def write_csv(path: str | os.PathLike[str], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows of the same keys; what is not known is left empty."""
-    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows of the same keys; unknown values are left empty."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(rows[0] if rows else ())
         for row in rows:

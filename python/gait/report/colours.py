@@ -4,6 +4,9 @@ from __future__ import annotations
 
 BLUE, ORANGE, GREY, DARK = "#2a6f97", "#d9722e", "#9a9a9a", "#222222"
 
+STATUS_TINTS = {"init": "#c8c8c8", "ambiguous": "#f4d06f", "lost": "#e07a7a"}
+"""Background of frames whose status is not tracking."""
+
 ON_PAPER = {"left": BLUE, "right": ORANGE, "middle": DARK}
 OVER_PICTURES = {"left": (235, 165, 60), "right": (50, 125, 250), "middle": (190, 215, 120)}
 """BGR; brighter, to show on dark clothes, and pale green for the middle."""

@@ -225,7 +225,7 @@ _MARGIN = (120, 44)  # left and top of the sheet, pixels
 _SHEET_FONT = cv2.FONT_HERSHEY_DUPLEX
 
 
-def room_camera(state: State) -> Camera:
+def default_view(state: State) -> Camera:
     """Camera that shows a walker from in front and the left, slightly from above."""
     target = np.array([*state.pelvis[:2], 0.5 * state.stature])
     angle = state.heading + np.radians(50)
@@ -233,7 +233,7 @@ def room_camera(state: State) -> Camera:
     return Camera.looking(target + away, target, (720, 900), 2280.0)
 
 
-def draw_room(model: Model, state: State, camera: Camera) -> Image:
+def draw_standing(model: Model, state: State, camera: Camera) -> Image:
     """Draw a walker on a ground of half-metre squares, (h, w, 3) BGR."""
     canvas = np.full((camera.height, camera.width, 3), _PAPER, np.uint8)
     middle = np.round(2 * np.asarray(state.pelvis[:2])) / 2
@@ -248,7 +248,7 @@ def draw_room(model: Model, state: State, camera: Camera) -> Image:
     return Overlay(model, camera).figure(canvas, state)
 
 
-def draw_strip(model: Model) -> Image:
+def draw_sheet(model: Model) -> Image:
     """Draw the sheet, columns phases.
 
     Rows are the mean, then at -2, 0 and +2 deviations the stride rate (where the mean follows it) and scores.

@@ -93,7 +93,7 @@ def linear(rgb: object) -> Array:
 
 
 def tile_noise(rng: np.random.Generator, cells: tuple[int, int], size: int = SIZE) -> Floats:
-    """Return smooth tiling noise (size, size): `cells` bumps down and across, mean 0, standard deviation 1."""
+    """Return smooth noise (size, size) that tiles, mean 0, variance 1: `cells` bumps down and across."""
     coarse = rng.standard_normal(cells).astype(np.float32)
     wrapped = np.pad(coarse, 2, mode="wrap")
     step_y, step_x = size / cells[0], size / cells[1]

@@ -1,25 +1,20 @@
-"""Plots of the page of ``gait report track``, as SVG text."""
+"""The page of ``gait report track``: gait parameters with their uncertainty, and angles over the norm."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
+from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from gait.io.track_file import Track
 from gait.motion.footfalls import SIDES, contacts, stride_time
 from gait.motion.parameters import PERCENT, QUANTITIES, AngleCycle, Parameters
-from gait.report.colours import DARK, GREY, ON_PAPER
+from gait.report.colours import DARK, GREY, ON_PAPER, STATUS_TINTS
+from gait.report.page import Page
+from gait.report.plots import Painter, svg_figure
 
-Array = NDArray[np.float64]
-Painter = Callable[[Axes], None]
-
-_TINT = {"lost": "#e07a7a", "ambiguous": "#f4d06f"}
 _WIDTH = 7.6  # inches
 _GROUPS = (
     ("hip_flexion", "knee_flexion", "ankle_flexion"),
@@ -30,7 +25,7 @@ _TRUNK = (("torso_x", "torso_y", "torso_z"), ("neck_x", "neck_y", "neck_z"))
 
 
 def footfall_plot(track: Track, parameters: Parameters) -> str:
-    """Draw the contacts of both feet over time; ticks are strikes with two deviations."""
+    """Draw the contacts of both feet over time; ticks: strikes and toe-offs with two standard deviations."""
     stride = stride_time(parameters.events)
 
     def paint(axes: Axes) -> None:
@@ -59,11 +54,11 @@ def footfall_plot(track: Track, parameters: Parameters) -> str:
         axes.set_xlim(track.time[0], track.time[-1])
         axes.grid(axis="y", visible=False)
 
-    return _figure([[paint]], 1.7)
+    return svg_figure([[paint]], (_WIDTH, 1.7))
 
 
 def stride_plot(track: Track, parameters: Parameters) -> str:
-    """Draw quantities stride by stride with two deviations; strides that are not sure are hollow."""
+    """Draw quantities stride by stride with two standard deviations; uncertain strides are hollow."""
 
     def painter(name: str, title: str) -> Painter:
         def paint(axes: Axes) -> None:
@@ -99,7 +94,7 @@ def stride_plot(track: Track, parameters: Parameters) -> str:
         "stance_percent",
     )
     painters = [painter(name, QUANTITIES[name]) for name in names]
-    return _figure([painters[:3], painters[3:]], 4.2, legend=True)
+    return svg_figure([painters[:3], painters[3:]], (_WIDTH, 4.2), legend=True)
 
 
 def angle_plot(cycles: Mapping[str, AngleCycle], trunk: bool = False) -> str | None:
@@ -112,14 +107,14 @@ def angle_plot(cycles: Mapping[str, AngleCycle], trunk: bool = False) -> str | N
         known = [n for n in group if n in cycles or f"r_{n}" in cycles or f"l_{n}" in cycles]
         if known:
             rows.append([_angle_painter(name, cycles) for name in known])
-    return _figure(rows, 2.1 * len(rows), legend=not trunk) if rows else None
+    return svg_figure(rows, (_WIDTH, 2.1 * len(rows)), legend=not trunk) if rows else None
 
 
 def _angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:
     def paint(axes: Axes) -> None:
         first = cycles.get(f"r_{name}") or cycles.get(f"l_{name}") or cycles[name]
         low, high = first.norm_mean - 2 * first.norm_sd, first.norm_mean + 2 * first.norm_sd
-        axes.fill_between(PERCENT, low, high, color=GREY, alpha=0.25, lw=0, label="norm, 2 deviations")
+        axes.fill_between(PERCENT, low, high, color=GREY, alpha=0.25, lw=0, label="norm, 2 sd")
         for side, key in (("right", f"r_{name}"), ("left", f"l_{name}"), ("right", name)):
             if key not in cycles:
                 continue
@@ -132,8 +127,8 @@ def _angle_painter(name: str, cycles: Mapping[str, AngleCycle]) -> Painter:
     return paint
 
 
-def deviation_plot(cycles: Mapping[str, AngleCycle]) -> str:
-    """Draw the deviation from the norm of every angle over the cycle."""
+def departure_plot(cycles: Mapping[str, AngleCycle]) -> str:
+    """Draw the departure of every angle from the norm over the cycle."""
     names = list(cycles)
 
     def paint(axes: Axes) -> None:
@@ -144,13 +139,13 @@ def deviation_plot(cycles: Mapping[str, AngleCycle]) -> str:
         axes.set(yticks=range(len(names)), xlabel="% of the stride")
         axes.set_yticklabels([name.replace("_", " ") for name in names], fontsize=7)
         axes.grid(visible=False)
-        axes.figure.colorbar(image, ax=axes, label="deviations from the norm's mean", extend="both")
+        axes.figure.colorbar(image, ax=axes, label="sd from the mean of the norm", extend="both")
 
-    return _figure([[paint]], 0.6 + 0.17 * len(names))
+    return svg_figure([[paint]], (_WIDTH, 0.6 + 0.17 * len(names)))
 
 
 def path_plot(track: Track, parameters: Parameters) -> str:
-    """Draw the way of the pelvis and where the feet stood, seen from above."""
+    """Draw the path of the pelvis and where the feet stood, seen from above."""
     stride = stride_time(parameters.events)
 
     def paint(axes: Axes) -> None:
@@ -162,33 +157,71 @@ def path_plot(track: Track, parameters: Parameters) -> str:
         axes.set_aspect("equal", adjustable="datalim")
         axes.legend(fontsize=7)
 
-    return _figure([[paint]], 3.0)
+    return svg_figure([[paint]], (_WIDTH, 3.0))
 
 
 def _tint(axes: Axes, track: Track) -> None:
-    """Colour the ground of frames that are lost or ambiguous."""
+    """Tint the background of frames that are lost or ambiguous."""
     half = 0.5 * float(np.median(np.diff(track.time)))
     for time, status in zip(track.time, track.status, strict=True):
-        if status in _TINT:
-            axes.axvspan(time - half, time + half, color=_TINT[status], alpha=0.5, lw=0)
+        if status in ("lost", "ambiguous"):
+            axes.axvspan(time - half, time + half, color=STATUS_TINTS[status], alpha=0.5, lw=0)
 
 
-def _figure(rows: Sequence[Sequence[Painter]], height: float, legend: bool = False) -> str:
-    """Draw rows of axes; `legend` above them all, from the first."""
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "gait", "font.size": 8}):
-        figure = Figure(figsize=(_WIDTH, height), layout="constrained")
-        columns = max(len(row) for row in rows)
-        grid = figure.add_gridspec(len(rows), columns)
-        for i, row in enumerate(rows):
-            for k, paint in enumerate(row):
-                axes = figure.add_subplot(grid[i, k])
-                axes.grid(alpha=0.25)
-                axes.spines[["top", "right"]].set_visible(False)
-                paint(axes)
-                axes.title.set_fontsize(8)
-        if legend:
-            handles, labels = figure.axes[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-        text = io.StringIO()
-        figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    return text.getvalue()[text.getvalue().index("<svg") :]
+HEAD = ("", "right", "left", "both", "asymmetry, %")
+"""Columns of `parameter_rows`."""
+
+
+def parameter_page(name: str, track: Track, parameters: Parameters, cycles: Mapping[str, AngleCycle]) -> str:
+    """Return the HTML page of the track called `name`."""
+    page = Page(f"{name}: gait parameters")
+    page.words(
+        f"Frames {track.frame[0]} to {track.frame[-1]}. Each value is the mean over the strides without lost "
+        "or ambiguous frames, plus or minus the standard deviation of that mean; in brackets, the standard "
+        f"deviation between strides. Source of the uncertainty: {parameters.source}. "
+        "Asymmetry is 200 (right - left) / (right + left)."
+    )
+    page.grid("Parameters", HEAD, parameter_rows(parameters))
+    page.figure("Foot contacts", footfall_plot(track, parameters))
+    page.words(
+        "Ticks mark heel strikes (above) and toe-offs (below) with two standard deviations. "
+        "The track was lost where the background is red, and ambiguous where it is yellow."
+    )
+    page.figure("Strides", stride_plot(track, parameters))
+    page.words(
+        "Bars span two standard deviations each way. "
+        "Hollow markers are strides with lost or ambiguous frames."
+    )
+    for trunk, heading in ((False, "Angles of the limbs"), (True, "Angles of trunk and neck")):
+        drawing = angle_plot(cycles, trunk)
+        if drawing is not None:
+            page.figure(heading, drawing)
+    if cycles:
+        page.figure("Departure from the norm", departure_plot(cycles))
+        page.words(
+            "The norm is the people the model was learned from. Where the image does not show a limb, the "
+            "tracker fills it in from the same people, so the true departure is larger than shown, most of "
+            "all for small or hidden limbs."
+        )
+    page.figure("Seen from above", path_plot(track, parameters))
+    return page.text()
+
+
+def parameter_rows(parameters: Parameters) -> list[list[str]]:
+    """Return the cells of the table of parameters, under `HEAD`."""
+    rows = []
+    for name, row in parameters.summary().items():
+        cells = [_cell(row[side], name) for side in ("right", "left", "both")]
+        rows.append([QUANTITIES[name], *cells, _cell(row.get("asymmetry_percent"), "percent")])
+    return rows
+
+
+def _cell(value: dict[str, Any] | None, name: str) -> str:
+    if value is None:
+        return ""
+    digits = 1 if name.endswith(("percent", "spm")) else 3
+    text = f"{value['mean']:.{digits}f}"
+    if np.isfinite(value["sd"]):
+        text += f" ± {value['sd']:.{digits}f}"
+    between = value.get("between", np.nan)
+    return text + (f" ({between:.{digits}f})" if np.isfinite(between) else "")

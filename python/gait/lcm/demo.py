@@ -1,0 +1,394 @@
+"""Run capture, tracker and recorder as processes that belong together, on a clip, and report."""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from gait.bindings.initial import Start
+from gait.bindings.model import Model
+from gait.camera.camera import Camera
+from gait.errors import UsageError, UserError
+from gait.io.fields import read_json
+from gait.io.files import require_folder
+from gait.io.track_file import read_truth
+from gait.io.video import Video, read_plate
+from gait.lcm.link import ROUTE_REMEDY, multicast_works, private_url, receive_buffer
+from gait.lcm.record import LISTENING
+from gait.lcm.report import write_report
+from gait.motion.evaluate import Measures
+from gait.progress import note
+
+_GRACE = 5.0  # seconds that a process may take to end when asked
+_TURN = 0.05  # seconds between two looks
+_PR_SET_PDEATHSIG = 1
+
+
+class Child:
+    """One process and its name for messages."""
+
+    def __init__(self, name: str, process: subprocess.Popen[str]) -> None:
+        self.name, self.process = name, process
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self.process.poll() is None
+
+    def interrupt(self) -> None:
+        """Ask it to end in good order."""
+        if self.running:
+            self.process.send_signal(signal.SIGINT)
+
+    def wait_for_word(self, word: str) -> None:
+        """Return when a line on its piped stderr begins with `word`.
+
+        Raises
+        ------
+        UserError
+            If it ends without.
+        """
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            if line.startswith(word):
+                return
+            print(line, end="", file=sys.stderr)
+        raise UserError(f"{self.name}: ended before it was ready; see its output above")
+
+    def result(self, patience: float) -> str:
+        """Wait for its end and return what it printed.
+
+        Raises
+        ------
+        UserError
+            If it failed or did not end; its own words are on stderr already.
+        """
+        try:
+            printed, words = self.process.communicate(timeout=patience)
+        except subprocess.TimeoutExpired:
+            raise UserError(f"{self.name}: did not end within {patience:g} s; see its output above") from None
+        if words:
+            print(words, end="", file=sys.stderr)
+        if self.process.returncode != 0:
+            raise UserError(
+                f"{self.name}: failed with exit code {self.process.returncode}; see its output above"
+            )
+        return printed
+
+
+class Session:
+    """Start processes that end with this one: at the end of the block, however it ends, even by SIGKILL.
+
+    Ends nothing that it did not start.
+    """
+
+    def __init__(self) -> None:
+        self._children: list[Child] = []
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, exc: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for child in self._children:
+            child.interrupt()
+        deadline = time.monotonic() + _GRACE
+        for child in self._children:
+            _end(child.process, deadline)
+
+    def start(self, name: str, command: Sequence[str], *, pipe_errors: bool = False) -> Child:
+        """Start a process whose stdout is kept, and whose stderr is kept too if `pipe_errors`.
+
+        It gets a session of its own, so that Ctrl-C reaches this process alone, which then ends the others.
+        """
+        try:
+            process = subprocess.Popen(
+                list(command),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE if pipe_errors else None,
+                text=True,
+                start_new_session=True,
+                preexec_fn=_die_with_parent,
+            )
+        except OSError as exc:
+            raise UserError(f"{command[0]}: cannot be started ({exc.strerror}); run make tools") from None
+        self._children.append(Child(name, process))
+        return self._children[-1]
+
+    def wait(self, awaited: Child, needed: Sequence[Child]) -> None:
+        """Return when `awaited` has ended; fail at once if one of the `needed` ends before it."""
+        while awaited.running:
+            for child in needed:
+                if not child.running:
+                    raise UserError(f"{child.name}: ended too early; see its output above")
+            time.sleep(_TURN)
+
+
+def _end(process: subprocess.Popen[str], deadline: float) -> None:
+    """Wait until `deadline` (monotonic clock), then kill."""
+    try:
+        process.wait(max(0.0, deadline - time.monotonic()))
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    for stream in (process.stdout, process.stderr):
+        if stream is not None:
+            stream.close()
+
+
+def _die_with_parent() -> None:
+    """Ask Linux to end this process when its parent dies, however that happens."""
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+RESULTS = ("track.csv", "overlay.mp4", "report.html")
+_READY = 60.0  # seconds in which the tracker must have confirmed camera and start
+_LARGE = 1 << 21  # bytes of a colour frame that no receiver keeps up with
+_IDLE = 2.0  # seconds without an estimate that end the recording
+_END = 30.0  # seconds that a process may take to end once its work is done
+_BESIDE = {"camera": "camera.json", "init": "init.json", "background": "background.png", "truth": "truth.csv"}
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What to track, and how; see ``gait demo --help``.
+
+    Attributes
+    ----------
+    output : Path
+        Folder for the results.
+    trackd, model : str
+        The tracker's program and its model.
+    threads : int
+        Of the tracker.
+    video, camera, init, background, truth : str, optional
+        The clip and its files; those left out are looked for beside the video.  Without a video a clip is
+        rendered.
+    height : float, optional
+        The person's stature, metres.
+    start, stop, particles : int, optional
+        As for gait capture and gait-trackd.
+    quiet : bool
+        Print no notes and no progress.
+    """
+
+    output: Path
+    trackd: str
+    model: str
+    threads: int
+    video: str | None = None
+    camera: str | None = None
+    init: str | None = None
+    background: str | None = None
+    truth: str | None = None
+    height: float | None = None
+    start: int | None = None
+    stop: int | None = None
+    particles: int | None = None
+    quiet: bool = False
+
+    def run(self) -> tuple[dict[str, Any], Measures | None]:
+        """Make the clip if need be, run the processes, and write the report.
+
+        Returns
+        -------
+        recording : dict
+            The figures of ``gait record --json``.
+        measures : dict or None
+            The errors, if there is a truth.
+
+        Raises
+        ------
+        UserError
+            If an input cannot be read or one of the processes fails.
+        """
+        if not Path(self.trackd).is_file():
+            raise UserError(f"{self.trackd}: no such program; run make tools, or give --trackd")
+        self._check_inputs()
+        require_folder(self.output)
+        self.output.mkdir(parents=True, exist_ok=True)
+        live = multicast_works()
+        with _alone(self.output), Session() as session:
+            for name in RESULTS:
+                (self.output / name).unlink(missing_ok=True)  # if this run fails they would look like its own
+            clip = self._with_clip(session)
+            if live:
+                recording = clip._run_live(session)
+            else:
+                note(f"gait demo: no latency will be measured: {ROUTE_REMEDY}; using a log file")
+                recording = clip._run_through_log(session)
+            assert clip.video is not None and clip.camera is not None
+            measures = write_report(
+                str(self.output / "estimates.log"),
+                str(self.output / "track.csv"),
+                clip.video,
+                clip.camera,
+                str(self.output / "report.html"),
+                overlay=str(self.output / "overlay.mp4"),
+                truth=clip.truth,
+                model=self.model,
+                live=live,
+                quiet=self.quiet,
+            )
+        return recording, measures
+
+    def _check_inputs(self) -> None:
+        """Read what the user gave, so that a fault shows before anything is rendered or started."""
+        model = Model(self.model)
+        if self.video is None:
+            for name in _BESIDE:
+                if getattr(self, name) not in (None, "auto", "none"):
+                    raise UsageError(
+                        f"--{name}: belongs to a clip of your own; give --video too (make demo VIDEO=)"
+                    )
+            return
+        size = Video(self.video).size
+        clip = self._complete()
+        assert clip.camera is not None
+        Camera.read(clip.camera, size)
+        if clip.init not in (None, "auto"):
+            Start.read(clip.init, model, height=self.height)
+        if clip.background not in (None, "auto", "none"):
+            read_plate(clip.background, size)
+        if clip.truth is not None:
+            read_truth(clip.truth)
+
+    def _with_clip(self, session: Session) -> Demo:
+        """Return this demo with all files of its clip, which is rendered unless it is the user's."""
+        if self.video is not None:
+            return self._complete()
+        folder = self.output / "clip"
+        note("rendering a clip", self.quiet)
+        session.start("gait simulate", [*_gait("simulate"), "-o", str(folder)]).result(600.0)
+        return replace(self, video=str(folder / "video.mp4"))._complete()
+
+    def _complete(self) -> Demo:
+        """Fill in the files that lie beside the video."""
+        assert self.video is not None
+        beside = {name: Path(self.video).parent / file for name, file in _BESIDE.items()}
+        found: dict[str, Any] = {
+            name: getattr(self, name) or (str(path) if path.is_file() else None)
+            for name, path in beside.items()
+        }
+        if found["camera"] is None:
+            raise UserError(
+                f"{self.video}: has no camera.json beside it; give --camera (make demo CAMERA=...)"
+            )
+        return replace(self, **found)
+
+    def _run_live(self, session: Session) -> dict[str, Any]:
+        """Run all three at once over multicast; return the figures of the recording."""
+        url = private_url()
+        tracker = session.start("gait-trackd", self._trackd(url))
+        recorder = session.start("gait record", self._record(url), pipe_errors=True)
+        recorder.wait_for_word(LISTENING)
+        sending = ["--url", url, "--wait", str(_READY), *self._compression(session)]
+        capture = session.start("gait capture", [*self._capture(), *sending])
+        session.wait(capture, needed=[tracker, recorder])
+        capture.result(_END)
+        figures: dict[str, Any] = json.loads(recorder.result(_END))
+        tracker.interrupt()
+        note(f"gait-trackd: {tracker.result(_END).strip()}", self.quiet)
+        return figures
+
+    def _compression(self, session: Session) -> list[str]:
+        """Options of gait capture that let a receiver's buffer take two frames, in colour if possible."""
+        assert self.video is not None
+        width, height = Video(self.video).size
+        if 2 * 3 * width * height <= receive_buffer():
+            return []
+        if session.start("gait-trackd", [self.trackd, "--version"]).result(_END).strip().endswith("jpeg yes"):
+            note("frames are larger than half the receive buffer: sent as JPEG", self.quiet)
+            return ["--jpeg", "90"]
+        if 3 * width * height <= _LARGE:
+            return []
+        note(
+            "frames are larger than half the receive buffer and gait-trackd has no JPEG: sent in grey",
+            self.quiet,
+        )
+        return ["--grey"]
+
+    def _run_through_log(self, session: Session) -> dict[str, Any]:
+        """Run one after the other through files: nothing is lost, nothing is in real time."""
+        frames, estimates = ((self.output / name).resolve() for name in ("frames.log", "sent.log"))
+        for file in (frames, estimates):
+            file.unlink(missing_ok=True)
+        try:
+            to_log = ["--url", f"file://{frames}?mode=w", "--rate", "max"]
+            session.start("gait capture", [*self._capture(), *to_log]).result(600.0)
+            tracker = self._trackd(f"file://{frames}?speed=0")
+            tracker += ["--out", f"file://{estimates}?mode=w"]
+            note(f"gait-trackd: {session.start('gait-trackd', tracker).result(3600.0).strip()}", self.quiet)
+            recorder = session.start("gait record", self._record(f"file://{estimates}?speed=0"))
+            figures: dict[str, Any] = json.loads(recorder.result(600.0))
+        finally:
+            for file in (frames, estimates):
+                file.unlink(missing_ok=True)
+        return figures
+
+    def _trackd(self, url: str) -> list[str]:
+        particles = ["--particles", str(self.particles)] if self.particles else []
+        threads = ["--threads", str(self.threads)]
+        return [self.trackd, "--model", self.model, "--url", url, *threads, *particles]
+
+    def _record(self, url: str) -> list[str]:
+        files = ["-o", str(self.output / "track.csv"), "--log", str(self.output / "estimates.log")]
+        return [*_gait("record"), "--url", url, *files, "--until-idle", str(_IDLE), "--json"]
+
+    def _capture(self) -> list[str]:
+        """Command line of gait capture without the URL."""
+        init = self.init or "auto"
+        start = self.start if self.start is not None else _frame_of(init)
+        given = {
+            "camera": self.camera,
+            "init": init,
+            "background": self.background or "auto",
+            "model": self.model,
+            "height": self.height,
+            "stop": self.stop,
+            "start": start,
+        }
+        options = [w for name, value in given.items() if value is not None for w in (f"--{name}", str(value))]
+        assert self.video is not None
+        return [*_gait("capture"), self.video, *options, *(["--quiet"] if self.quiet else [])]
+
+
+@contextmanager
+def _alone(out: Path) -> Iterator[None]:
+    """Lock the folder for this demo; the lock goes with the process, however that ends."""
+    folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UserError(f"{out}: another demo is writing there; wait for it or give -o DIR") from None
+        yield
+    finally:
+        os.close(folder)
+
+
+def _gait(command: str) -> list[str]:
+    """Start of the command line of a command, run by this very Python."""
+    return [sys.executable, "-m", "gait", command]
+
+
+def _frame_of(init: str) -> int:
+    """Frame of an init file: frames before it need not be sent."""
+    if init == "auto":
+        return 0
+    fields = read_json(init, "init")
+    return fields.integer("frame", 0, 1 << 31, "give the frame number, from 0") if "frame" in fields else 0
