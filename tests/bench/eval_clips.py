@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import itertools
 import json
 import subprocess
 import sys
@@ -118,10 +117,9 @@ def models(clips: list[Clip], folder: Path, jobs: int, update: Callable[[int], N
 def _learning_key() -> str:
     """Digest of the sources that learning uses and of the names and sizes of the data."""
     package = ROOT / "python" / "gait"
-    folders = [package.glob(f"{name}/*.py") for name in ("body", "io", "learn/**")]
-    others = package.glob("cli/learn*.py")
+    patterns = ("body/*.py", "io/*.py", "learn/**/*.py", "cli/learn*.py")
     digest = hashlib.sha256()
-    for path in sorted(itertools.chain(*folders, others)):
+    for path in sorted(path for pattern in patterns for path in package.glob(pattern)):
         digest.update(path.read_bytes())
     for path in sorted(p for p in MOCAP.rglob("*") if p.is_file()):
         digest.update(f"{path.relative_to(MOCAP)} {path.stat().st_size}".encode())

@@ -64,7 +64,7 @@ def test_the_page_needs_nothing_else_and_its_drawings_are_sound(folder, capsys):
     assert len(drawings) == 6
     for drawing in drawings:
         ElementTree.fromstring(drawing.replace("xlink:href", "href"))
-    for heading in ("Parameters", "Contacts of the feet", "Strides", "Deviation from the norm"):
+    for heading in ("Parameters", "Foot contacts", "Strides", "Departure from the norm"):
         assert f"<h2>{heading}</h2>" in page
 
 
