@@ -2,9 +2,11 @@
 #include "bench_clock.h"
 #include "tracker/estimate.h"
 #include "tracker/features_step.h"
-#include "tracker/track_loss.h"
+#include "tracker/fixed_lag.h"
+#include "tracker/front_back.h"
 #include "tracker/hypotheses.h"
 #include "tracker/likelihood_step.h"
+#include "tracker/track_loss.h"
 
 const char *const bench_stage_name[BENCH_STAGES] = {
     [STAGE_FEATURES] = "features",     [STAGE_RESAMPLE] = "resample",     [STAGE_PROPAGATE] = "propagate",
@@ -108,14 +110,14 @@ static int32_t shown_of(const struct like_body *body)
     int32_t shown = 0;
     for (int32_t l = 0; l < body->setup->limbs; l++)
         for (int i = 0; i < LIKE_HALF; i++)
-            shown += body->seen[l].value[i] != TEXTURE_HIDDEN;
+            shown += body->samples[l].value[i] != TEXTURE_HIDDEN;
     return shown;
 }
 
 static void edges_count(const struct like_body *body, struct like_edge_tally *out)
 {
     b.plain->edges_count(body, out);
-    if (b.looked++ % SPARSE == 0 && body->seen) {
+    if (b.looked++ % SPARSE == 0 && body->samples) {
         b.surface += shown_of(body);
         b.edges += out->points;
         b.counted++;
@@ -232,7 +234,7 @@ static void stage_end(int stage, double outer_ns, int64_t since)
 WRAP(int32_t, features_step, (gait_tracker * t, const gait_frame *frame, const particle_state *predicted))
 {
     int32_t cameras;
-    WHOLE(STAGE_FEATURES, cameras = __real_look_frame(t, frame, predicted));
+    WHOLE(STAGE_FEATURES, cameras = __real_features_step(t, frame, predicted));
     return cameras;
 }
 
@@ -241,70 +243,86 @@ WRAP(void, pf_inherit, (pf * p, int32_t before, void *array, size_t bytes))
     WHOLE(STAGE_RESAMPLE, __real_pf_inherit(p, before, array, bytes));
 }
 
-WRAP(bool, hypotheses_resample, (gait_tracker * t, uint32_t frame))
+WRAP(bool, hypotheses_resample, (gait_tracker * t, uint32_t counter))
 {
     bool done;
-    WHOLE(STAGE_RESAMPLE, done = __real_modes_resample(t, frame));
+    WHOLE(STAGE_RESAMPLE, done = __real_hypotheses_resample(t, counter));
     return done;
 }
 
 WRAP(void, likelihood_step, (gait_tracker * t))
 {
     b.weighing = b.on;
-    WHOLE(STAGE_LIKELIHOOD, __real_weigh_particles(t));
+    WHOLE(STAGE_LIKELIHOOD, __real_likelihood_step(t));
     b.weighing = false;
 }
 
-/* Tasks that belong to no stage move the particles, or begin stages of their own. */
+/* Tasks that belong to no stage predict the particles, or begin stages of their own. */
+WRAP(void, task_run_beside,
+     (const gait_tasks *exec, int32_t tasks, void (*beside)(void *ctx), int32_t items, int32_t block,
+      task_range_fn *fn, void *ctx))
+{
+    if (b.weighing || b.within)
+        __real_task_run_beside(exec, tasks, beside, items, block, fn, ctx);
+    else
+        WHOLE(STAGE_PROPAGATE, __real_task_run_beside(exec, tasks, beside, items, block, fn, ctx));
+}
+
 WRAP(void, task_run,
      (const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn, void *ctx))
 {
-    if (b.weighing || b.within)
-        __real_task_run(exec, tasks, items, block, fn, ctx);
-    else
-        WHOLE(STAGE_PROPAGATE, __real_task_run(exec, tasks, items, block, fn, ctx));
+    __wrap_task_run_beside(exec, tasks, NULL, items, block, fn, ctx);
 }
 
 WRAP(pf_summary, hypotheses_update, (gait_tracker * t, float dt))
 {
     pf_summary s;
-    WHOLE(STAGE_WEIGHTS, s = __real_modes_reweigh(t, dt));
+    WHOLE(STAGE_WEIGHTS, s = __real_hypotheses_update(t, dt));
     return s;
 }
 
-WRAP(void, track_loss_allow_hidden, (gait_tracker * t))
+WRAP(void, track_loss_bound, (gait_tracker * t))
 {
-    WHOLE(STAGE_WEIGHTS, __real_loss_allow_hidden(t));
+    WHOLE(STAGE_WEIGHTS, __real_track_loss_bound(t));
 }
 
 WRAP(particle_state, particle_set_place, (const particle_set *particles, const double *weight))
 {
-    particle_state w;
-    WHOLE(STAGE_ESTIMATE, w = __real_population_place(particles, weight));
-    return w;
+    particle_state p;
+    WHOLE(STAGE_ESTIMATE, p = __real_particle_set_place(particles, weight));
+    return p;
 }
 
-WRAP(particle_state, estimate_fill, (gait_tracker * t, int32_t best, gait_estimate *out))
+WRAP(particle_state, estimate_particles, (gait_tracker * t, int32_t best, gait_estimate *out))
 {
-    particle_state w;
-    WHOLE(STAGE_ESTIMATE, w = __real_estimate_fill(t, best, out));
-    return w;
+    particle_state p;
+    WHOLE(STAGE_ESTIMATE, p = __real_estimate_particles(t, best, out));
+    return p;
 }
 
-WRAP(void, track_loss_update, (gait_tracker * t, const particle_state *mean))
+WRAP(track_loss_verdict, track_loss_check, (gait_tracker * t, bool lost, const particle_state *mean))
 {
-    WHOLE(STAGE_ESTIMATE, __real_loss_watch(t, mean));
+    track_loss_verdict v;
+    WHOLE(STAGE_ESTIMATE, v = __real_track_loss_check(t, lost, mean));
+    return v;
 }
 
-WRAP(void, fixed_lag_keep, (gait_tracker * t, const gait_estimate *e))
+WRAP(float, front_back_update, (gait_tracker * t, bool restart, const particle_state *mean))
 {
-    WHOLE(STAGE_LAG, __real_lag_keep(t, e));
+    float margin;
+    WHOLE(STAGE_ESTIMATE, margin = __real_front_back_update(t, restart, mean));
+    return margin;
+}
+
+WRAP(void, fixed_lag_record, (gait_tracker * t, const gait_estimate *e))
+{
+    WHOLE(STAGE_LAG, __real_fixed_lag_record(t, e));
 }
 
 /* Parts of the likelihood that are no kernels. */
 WRAP(void, particle_set_bodies, (const state_layout *r, const particle_set *p, int32_t begin, kin_body *out))
 {
-    PART(STAGE_KINEMATICS, __real_population_bodies(r, p, begin, out));
+    PART(STAGE_KINEMATICS, __real_particle_set_bodies(r, p, begin, out));
 }
 
 WRAP(void, kin_points, (const gait_model *m, const kin_body *body, float (*xyz)[3][BLOCK]))

@@ -44,7 +44,7 @@ static void weigh(int32_t best)
 static gait_estimate estimate(int32_t best)
 {
     gait_estimate e = {0};
-    estimate_fill(t, best, &e);
+    estimate_particles(t, best, &e);
     return e;
 }
 
@@ -291,14 +291,14 @@ static void test_fields(void)
         w.f[f] = (float)mean[f];
     w.f[F_PHASE] = e.mean.phase;
     w.f[F_HEADING] = e.mean.heading;
-    gait_state const s = particle_to_state(&t->rule, &w);
+    gait_state const s = particle_to_state(&t->layout, &w);
     for (int k = 0; k < 3; k++)
         CHECK_NEAR(e.mean.pelvis[k], s.pelvis[k], 1e-5);
     gait_pose pose;
     CHECK(gait_model_pose(toy_model(), &e.mean, &pose, NULL) == GAIT_OK);
     CHECK(memcmp(pose.angle, e.pose.angle, sizeof pose.angle) == 0);
     particle_state const heaviest = particle_get(particles, 2);
-    gait_state const best = particle_to_state(&t->rule, &heaviest);
+    gait_state const best = particle_to_state(&t->layout, &heaviest);
     CHECK(memcmp(&best, &e.best, sizeof best) == 0);
     double forward = 0.0;
     for (int j = 0; j < TOY_PHASES; j++)

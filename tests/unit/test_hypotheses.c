@@ -63,10 +63,10 @@ static void test_sides_live_on(void)
         film_step(t, 1, n, 0, &e);
         for (int32_t i = 0; i < N; i++)
             CHECK((t->filter.parent[i] >= HALF) == (i >= HALF) && hypothesis_of(t, i) == (i >= HALF));
-        double const share = 1.0 / (1.0 + exp(-t->core->hypotheses.odds));
+        double const share = 1.0 / (1.0 + exp(-t->core->hypotheses.log_odds));
         CHECK_NEAR(weight_of(t, HALF, N), share, 1e-9);
         CHECK_NEAR(weight_of(t, 0, HALF), 1.0 - share, 1e-9);
-        t->core->hypotheses.odds = n % 2 ? 3.0 : -3.5; /* far, but not decided; the weights must follow */
+        t->core->hypotheses.log_odds = n % 2 ? 3.0 : -3.5; /* far, but not decided; the weights must follow */
     }
     toy_tracker_free(t);
 }
@@ -79,7 +79,7 @@ static void test_the_loser_is_given_up(void)
         gait_estimate e;
         for (int n = 0; n < 20; n++)
             film_step(t, 1, n, 0, &e);
-        t->core->hypotheses.odds = winner ? 30.0 : -30.0;
+        t->core->hypotheses.log_odds = winner ? 30.0 : -30.0;
         double const phase = phase_of(t, winner * HALF);
         film_step(t, 1, 20, 0, &e);
         CHECK(t->core->hypotheses.stage == HYPOTHESES_ONE && e.flags & GAIT_EST_RESAMPLED);
@@ -115,7 +115,7 @@ static void test_stature_settles_when_all_is_known(void)
         t->cfg.settle_time = 0.1f;
         for (int n = 0; n < 45; n++) {
             if (t->core->hypotheses.stage == HYPOTHESES_TWO)
-                t->core->hypotheses.odds = known ? 30.0 : 0.0;
+                t->core->hypotheses.log_odds = known ? 30.0 : 0.0;
             film_step(t, 1, n, 0, &e);
         }
         spread[known] = stature_spread(t);
@@ -148,7 +148,7 @@ static void test_a_search_takes_more(void)
         bool const open = t->core->hypotheses.stage != HYPOTHESES_ONE;
         CHECK(!open || gait_tracker_particles(t, NULL, NULL, 0, NULL) == 2 * N);
         if (t->core->hypotheses.stage == HYPOTHESES_TWO && n > 30)
-            t->core->hypotheses.odds = 30.0;
+            t->core->hypotheses.log_odds = 30.0;
         if (n == 20)
             copy_into(other, t);
         film_step(t, 1, n, 0, &e[0]);
@@ -169,7 +169,7 @@ static void test_open_odds_are_ambiguous(void)
     gait_tracker *const t = begin(0.5f);
     gait_estimate e;
     for (int n = 0; n < 45; n++) {
-        t->core->hypotheses.odds = 0.0;
+        t->core->hypotheses.log_odds = 0.0;
         film_step(t, 1, n, 0, &e);
         CHECK(e.status != GAIT_TRACK_TRACKING && (e.status == GAIT_TRACK_INIT || n > 24));
         CHECK(hypotheses_settled_time(t) == 0.0f);

@@ -100,7 +100,7 @@ static const outline_block *outline_of(const gait_tracker *t, int32_t i)
     static kin_body body;
     static outline_block out;
     particle_state const w = particle_get(&t->particles, i);
-    particle_body(&t->rule, &w, &body);
+    particle_body(&t->layout, &w, &body);
     toy_project(t->like->geometry, TOY_LIMBS, &body, &t->cfg.camera[0], &t->camera[0].features.map, &out);
     return &out;
 }
@@ -188,7 +188,7 @@ static void test_support(void)
     const uint8_t *const see[] = {shot[0][0], shot[1][0]};
     gait_estimate e;
     toy_tracker_step(t, 20, see, &e);
-    particle_state w = particle_from_state(&t->rule, &s);
+    particle_state w = particle_from_state(&t->layout, &s);
     float const there = likelihood_of_particle(t, &w).support;
     w.f[F_X] += 0.5f;
     CHECK(there > 1.0f && likelihood_of_particle(t, &w).support < -1.0f);

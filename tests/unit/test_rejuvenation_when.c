@@ -50,7 +50,7 @@ static void test_within_modes(void)
         searched += searching && (f.flags & GAIT_EST_RESAMPLED);
         rejuvenated = rejuvenated || !alike(never, soon);
         CHECK(soon->core->hypotheses.stage != HYPOTHESES_ONE && !(searching && rejuvenated));
-        never->core->hypotheses.odds = soon->core->hypotheses.odds = 0.0; /* open */
+        never->core->hypotheses.log_odds = soon->core->hypotheses.log_odds = 0.0; /* open */
     }
     CHECK(searched > 0 && rejuvenated);
     toy_tracker_free(never);

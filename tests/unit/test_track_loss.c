@@ -55,7 +55,7 @@ static void test_hidden(void)
     for (int n = 20; n < 45; n++) {
         show(t, n, -1, &e);
         CHECK((e.status == GAIT_TRACK_LOST) == (n >= 29) && track_loss_is_lost(t) == (n >= 29));
-        CHECK(!t->core->part);
+        CHECK(!t->core->partly_hidden);
     }
     for (int n = 45; n < 60; n++) {
         show(t, n, n, &e);
@@ -93,7 +93,7 @@ static void test_hidden_in_part(void)
         const uint8_t *const shots[SCENE_CAMERAS] = {behind_post(n, toy_walk(1.0f).pelvis[0]), NULL};
         toy_tracker_step(t, n, shots, &e);
         said += e.status != GAIT_TRACK_TRACKING && n > 10;
-        parts += t->core->part;
+        parts += t->core->partly_hidden;
     }
     CHECK(said == 0);
     CHECK(parts >= 5);
@@ -127,7 +127,7 @@ static void test_something_else(void)
         const uint8_t *const shots[SCENE_CAMERAS] = {
             n < 20 ? film[0][n] : screen_behind(toy_walk((float)n / 30.0f).pelvis[0]), NULL};
         toy_tracker_step(t, n, shots, &e);
-        parts += t->core->part;
+        parts += t->core->partly_hidden;
     }
     CHECK(parts == 0);
     toy_tracker_free(t);
@@ -168,20 +168,20 @@ static void test_facing(void)
     gait_estimate e;
     for (int n = 0; n < 30; n++) {
         show(t, n, n, &e);
-        CHECK(!track_loss_doubts_front(t) && e.status == GAIT_TRACK_TRACKING);
+        CHECK(t->core->front_back_margin >= 0.0f && e.status == GAIT_TRACK_TRACKING);
     }
-    particle_state const right = particle_from_state(&t->rule, &e.mean);
+    particle_state const right = particle_from_state(&t->layout, &e.mean);
     particle_state turned = right, away = right;
     turned.f[F_HEADING] = m_wrap_pi(turned.f[F_HEADING] + PI_F);
     away.f[F_HEADING] = 0.5f * PI_F;
     CHECK(front_back_score(t, &right) > 0.01f && front_back_score(t, &turned) < -0.01f);
     CHECK(front_back_score(t, &away) == 0.0f);
-    t->core->front_back = -0.02f;
+    t->core->front_back_margin = -0.02f;
     show(t, 30, 30, &e);
-    CHECK(track_loss_doubts_front(t) && e.status == GAIT_TRACK_AMBIGUOUS);
+    CHECK(t->core->front_back_margin < 0.0f && e.status == GAIT_TRACK_AMBIGUOUS);
     for (int n = 31; n < 60; n++)
         show(t, n, n, &e);
-    CHECK(!track_loss_doubts_front(t) && e.status == GAIT_TRACK_TRACKING);
+    CHECK(t->core->front_back_margin >= 0.0f && e.status == GAIT_TRACK_TRACKING);
     toy_tracker_free(t);
 }
 

@@ -4,7 +4,9 @@
 #include "base/cpu.h"
 #include "image/image.h"
 #include "likelihood/likelihood.h"
+#include "tracker/fixed_lag.h"
 #include "tracker/snapshot.h"
+#include "tracker/tracker.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -339,7 +341,9 @@ gait_result gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_est
     if (!t->core->started)
         return base_fail(err, GAIT_ERR_STATE, -1, "step before start");
     gait_result const s = check_frame(t, frame, err);
-    return s != GAIT_OK ? s : tracker_step(t, frame, out);
+    if (s == GAIT_OK)
+        tracker_step(t, frame, out);
+    return s;
 }
 
 gait_result gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *out, gait_error *err)
@@ -359,10 +363,10 @@ gait_result gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_
 {
     if (!t)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker is NULL");
-    if (particles < 16 || particles > t->most)
+    if (particles < 16 || particles > t->config_particles)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "%d particles are outside [16, %d], the tracker's own",
-                         (int)particles, (int)t->most);
-    tracker_want(t, particles);
+                         (int)particles, (int)t->config_particles);
+    tracker_set_target(t, particles);
     return GAIT_OK;
 }
 
@@ -376,7 +380,7 @@ int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weig
         return base_fail(err, GAIT_ERR_STATE, -1, "no particles before gait_tracker_start()");
     for (int32_t i = 0; i < i_min(cap, t->cfg.particles); i++) {
         particle_state const w = particle_get(&t->particles, i);
-        s[i] = particle_to_state(&t->rule, &w);
+        s[i] = particle_to_state(&t->layout, &w);
         weight[i] = (float)t->filter.weight[i];
     }
     return t->cfg.particles;

@@ -101,8 +101,8 @@ struct particle_block;
     K(void, estimate_rotations,                                                                              \
       (const float *heading, const float *pitch, const float *roll, const double *weight,                    \
        const uint8_t *use, int32_t n, double out[16]))                                                       \
-    /* part[i] = log(exp(a[i]) + exp(b + part[i])) */                                                        \
-    K(void, track_loss_join, (const float *a, float b, int32_t n, float *part))                              \
+    /* hidden[i] = log(exp(visible[i]) + exp(base + hidden[i])) */                                           \
+    K(void, track_loss_join, (const float *visible, float base, int32_t n, float *hidden))                   \
     /* Outlines of the limbs of a block of bodies in one camera's working image. */                          \
     K(void, outline_project,                                                                                 \
       (const struct limb_geometry *limbs, int32_t count, const struct kin_body *body,                        \

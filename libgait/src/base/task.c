@@ -5,6 +5,7 @@
 enum { SHARES = 512 }; /* per part, so that no task waits long for another */
 
 typedef struct work {
+    void (*beside)(void *ctx); /* or NULL */
     task_range_fn *fn;
     void *ctx;
     int32_t items, tasks;
@@ -24,17 +25,19 @@ static void run_part(work *w, int32_t part, int32_t task)
 static void run_one(void *ctx, int32_t task)
 {
     work *const w = ctx;
+    if (task == 0 && w->beside)
+        w->beside(w->ctx);
     for (int32_t k = 0; k < w->tasks; k++)
         run_part(w, (task + k) % w->tasks, task);
 }
 
-void task_run(const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn,
-              void *ctx)
+void task_run_beside(const gait_tasks *exec, int32_t tasks, void (*beside)(void *ctx), int32_t items,
+                     int32_t block, task_range_fn *fn, void *ctx)
 {
     GAIT_ASSERT(tasks > 0 && tasks <= TASK_MOST && items >= 0 && block > 0);
     int32_t const parts = exec->run ? tasks : 1, blocks = items / block + (items % block > 0);
     int32_t const part = blocks / parts + (blocks % parts > 0);
-    work w = {.fn = fn, .ctx = ctx, .items = items, .tasks = parts};
+    work w = {.beside = beside, .fn = fn, .ctx = ctx, .items = items, .tasks = parts};
     w.part = part * block;
     w.share = block * i_max(part / SHARES, 1);
     for (int32_t k = 0; k < parts; k++)
@@ -43,4 +46,10 @@ void task_run(const gait_tasks *exec, int32_t tasks, int32_t items, int32_t bloc
         exec->run(exec->user, run_one, &w, tasks);
     else
         run_one(&w, 0);
+}
+
+void task_run(const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn,
+              void *ctx)
+{
+    task_run_beside(exec, tasks, NULL, items, block, fn, ctx);
 }

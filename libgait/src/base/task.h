@@ -15,4 +15,9 @@ typedef void task_range_fn(void *ctx, int32_t begin, int32_t end, int32_t task);
  * as task 0. */
 void task_run(const gait_tasks *exec, int32_t tasks, int32_t items, int32_t block, task_range_fn *fn,
               void *ctx);
+
+/* The same, and once `beside` (NULL: nothing), which task 0 calls first while the other tasks begin with the items.  It
+ * must not depend on them. */
+void task_run_beside(const gait_tasks *exec, int32_t tasks, void (*beside)(void *ctx), int32_t items,
+                     int32_t block, task_range_fn *fn, void *ctx);
 #endif

@@ -13,6 +13,19 @@ float root_channel(const gait_model *m, int32_t c, float phase, float pace, cons
     return kin_channel(m, m->root_channel + c, phase, pace, coef, components);
 }
 
+/* The stride's length is the mean of its forward speed over the phase. */
+float particle_speed(const state_layout *r, const particle_state *p)
+{
+    const gait_model *const m = r->model;
+    float const pace = state_layout_pace(r, p->f[F_RATE]);
+    float sum = 0.0f;
+    if (r->plain_root)
+        return p->f[F_STATURE] * p->f[F_RATE] * m->stride_length;
+    for (int32_t j = 0; j < m->phases; j++)
+        sum += root_channel(m, ROOT_FORWARD, (float)j / (float)m->phases, pace, p->f + F_COEF, r->components);
+    return p->f[F_STATURE] * p->f[F_RATE] * sum / (float)m->phases;
+}
+
 /* Components used by default. The first ones distinguish people in images; more only add dimensions that the
  * particles must search. */
 enum { DEFAULT_COMPONENTS = 5 };

@@ -105,6 +105,9 @@ void particle_body(const state_layout *r, const particle_state *w, kin_body *out
 /* kin_pace of a stride rate; 0 in paper mode. */
 float state_layout_pace(const state_layout *r, float stride_hz);
 
+/* Speed along the ground, metres per second: stride length times stride rate. */
+float particle_speed(const state_layout *r, const particle_state *p);
+
 /* Channel c (ROOT_*) at a phase: eq. 3 for one channel. */
 float root_channel(const gait_model *m, int32_t c, float phase, float pace, const float *coef,
                    int32_t components);

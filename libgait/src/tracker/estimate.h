@@ -1,22 +1,22 @@
-/* estimate.h - what to report of the weighted particles (doc/method.md, filter). */
+/* estimate.h - the estimate that is reported of weighted particles. */
 #ifndef GAIT_TRACKER_ESTIMATE_H
 #define GAIT_TRACKER_ESTIMATE_H
-#include "tracker/tracker.h"
+#include "tracker/tracker_state.h"
 
-/* Metres per second along the ground: stride length times stride rate. */
-float estimate_speed(const gait_tracker *t, const particle_state *w);
+#define DOMINANT_MASS 0.7f /* weight from which the dominant mode alone is the estimate */
 
-typedef struct crowd { /* weighted particles, whose joints are in t->joint */
-    particle_set particles;
-    const int32_t *who; /* n: which of the people; NULL: all */
+typedef struct weighted_particles { /* their joints are in t->joint */
+    particle_set all;
+    const int32_t *index; /* n: which of all; NULL: every one.  Their fields are gathered in t->lag.column */
     int32_t n;
     const double *weight; /* n */
-} crowd;
+} weighted_particles;
 
-/* Means, deviations, dominant mode and joints; best is the heaviest of the crowd.  Returns the mean of the dominant
- * mode.  Writes t->mode and, unless the crowd is all people, t->ll, t->used and t->inner. */
-particle_state estimate_crowd(const gait_tracker *t, const crowd *c, int32_t best, gait_estimate *out);
+/* Means, standard deviations, dominant mode and joints; best: the heaviest particle.  Returns the mean of the dominant
+ * mode, which t->in_mode marks. */
+particle_state estimate_weighted(const gait_tracker *t, const weighted_particles *p, int32_t best,
+                                 gait_estimate *out);
 
 /* The same of the current particles. */
-particle_state estimate_fill(const gait_tracker *t, int32_t best, gait_estimate *out);
+particle_state estimate_particles(const gait_tracker *t, int32_t best, gait_estimate *out);
 #endif

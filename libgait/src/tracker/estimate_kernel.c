@@ -1,148 +1,150 @@
-/* Sums over the weighted particles: of every LANES-th one, then over the lanes in order.  Those not in use are
- * multiplied by 0: of a choice gcc 12 makes masked loads, with AVX2 under the wrong
- * mask.  LANES: below 32 it unrolls the loops over them first and then finds less to do at once. */
-#include "base/fmath.h"
+/* Weighted sums over the particles: CHUNK running sums, each of every CHUNK-th particle, added up in order at the end, so
+ * that all instruction sets give the same bits.  Particles outside of the mode are multiplied by 0: for a conditional gcc 12
+ * generates masked loads, with AVX2 under the wrong mask.  With a CHUNK below 32 gcc unrolls the inner loops before it
+ * vectorises, which is slower. */
 #include "base/dispatch.h"
+#include "base/fmath.h"
 #include <string.h>
 
-enum { SIMD16 = 64 };
+enum { CHUNK = 64 };
 
-typedef struct ends { /* the particles after the last whole LANES, and none that weigh anything */
-    float v[3][SIMD16];
-    double weight[SIMD16];
-    uint8_t use[SIMD16];
-} ends;
+typedef struct tail { /* the particles after the last whole CHUNK, filled up with weights of 0 */
+    float v[3][CHUNK];
+    double weight[CHUNK];
+    uint8_t in_mode[CHUNK];
+} tail;
 
 KERNEL_ROW double total(const double *lane)
 {
     double sum = 0.0;
-    for (int32_t i = 0; i < SIMD16; i++)
+    for (int32_t i = 0; i < CHUNK; i++)
         sum += lane[i];
     return sum;
 }
 
-/* Particles first .. n - 1; use may be NULL. */
-KERNEL_ROW ends ends_of(int32_t n, int32_t count, const float *const v[], const double *weight,
-                        const uint8_t *use)
+/* in_mode may be NULL. */
+KERNEL_ROW tail tail_of(int32_t n, int32_t count, const float *const v[], const double *weight,
+                        const uint8_t *in_mode)
 {
-    int32_t const first = n - n % SIMD16;
-    ends e;
-    memset(&e, 0, sizeof e);
+    int32_t const first = n - n % CHUNK;
+    tail rest;
+    memset(&rest, 0, sizeof rest);
     for (int32_t k = 0; k < count; k++)
-        memcpy(e.v[k], v[k] + first, (size_t)(n - first) * sizeof(float));
-    memcpy(e.weight, weight + first, (size_t)(n - first) * sizeof(double));
-    if (use)
-        memcpy(e.use, use + first, (size_t)(n - first));
-    return e;
+        memcpy(rest.v[k], v[k] + first, (size_t)(n - first) * sizeof(float));
+    memcpy(rest.weight, weight + first, (size_t)(n - first) * sizeof(double));
+    if (in_mode)
+        memcpy(rest.in_mode, in_mode + first, (size_t)(n - first));
+    return rest;
 }
 
 /* ---- moments ---- */
 KERNEL_ROW void moments_add(const float *restrict v, const double *restrict weight,
-                            const uint8_t *restrict use, int32_t n, double about,
-                            double (*restrict sum)[SIMD16])
+                            const uint8_t *restrict in_mode, int32_t n, double about,
+                            double (*restrict sum)[CHUNK])
 {
-    for (int32_t i = 0; i < n; i += SIMD16)
-        for (int32_t lane = 0; lane < SIMD16; lane++) {
+    for (int32_t i = 0; i < n; i += CHUNK)
+        for (int32_t lane = 0; lane < CHUNK; lane++) {
             double const d = (double)v[i + lane] - about, wd = weight[i + lane] * d;
             sum[0][lane] += wd;
             sum[1][lane] += wd * d;
-            sum[2][lane] += (double)use[i + lane] * wd;
+            sum[2][lane] += (double)in_mode[i + lane] * wd;
         }
 }
 
-void KERNEL(estimate_moments)(const float *v, const double *weight, const uint8_t *use, int32_t n,
+void KERNEL(estimate_moments)(const float *v, const double *weight, const uint8_t *in_mode, int32_t n,
                               double about, double out[3])
 {
-    ends const e = ends_of(n, 1, &v, weight, use);
-    double sum[3][SIMD16] = {{0.0}};
-    moments_add(v, weight, use, n - n % SIMD16, about, sum);
-    moments_add(e.v[0], e.weight, e.use, SIMD16, about, sum);
+    tail const rest = tail_of(n, 1, &v, weight, in_mode);
+    double sum[3][CHUNK] = {{0.0}};
+    moments_add(v, weight, in_mode, n - n % CHUNK, about, sum);
+    moments_add(rest.v[0], rest.weight, rest.in_mode, CHUNK, about, sum);
     for (int32_t k = 0; k < 3; k++)
         out[k] = total(sum[k]);
 }
 
 /* ---- directions ---- */
-KERNEL_ROW void terms_add(const float (*restrict term)[SIMD16], int32_t count, const double *restrict weight,
-                          double (*restrict sum)[SIMD16])
+KERNEL_ROW void terms_add(const float (*restrict term)[CHUNK], int32_t count, const double *restrict weight,
+                          double (*restrict sum)[CHUNK])
 {
     for (int32_t k = 0; k < count; k++)
-        for (int32_t lane = 0; lane < SIMD16; lane++)
+        for (int32_t lane = 0; lane < CHUNK; lane++)
             sum[k][lane] += weight[lane] * (double)term[k][lane];
 }
 
-/* The weights of those in use. */
-KERNEL_ROW void weights_used(const double *restrict weight, const uint8_t *restrict use, double *restrict out)
+/* The weights of the particles in the mode. */
+KERNEL_ROW void mode_weights(const double *restrict weight, const uint8_t *restrict in_mode,
+                             double *restrict out)
 {
-    for (int32_t lane = 0; lane < SIMD16; lane++)
-        out[lane] = (double)use[lane] * weight[lane];
+    for (int32_t lane = 0; lane < CHUNK; lane++)
+        out[lane] = (double)in_mode[lane] * weight[lane];
 }
 
-KERNEL_ROW void directions(const float *restrict angle, float turn, float (*restrict out)[SIMD16])
+KERNEL_ROW void directions(const float *restrict angle, float turn, float (*restrict out)[CHUNK])
 {
-    for (int32_t lane = 0; lane < SIMD16; lane++)
+    for (int32_t lane = 0; lane < CHUNK; lane++)
         m_sincos(turn * angle[lane], &out[1][lane], &out[0][lane]);
 }
 
-static void resultant_add(const float *angle, float turn, const double *weight, const uint8_t *use, int32_t n,
-                          double (*sum)[SIMD16])
+static void resultant_add(const float *angle, float turn, const double *weight, const uint8_t *in_mode,
+                          int32_t n, double (*sum)[CHUNK])
 {
-    float cs[2][SIMD16];
-    double used[SIMD16];
-    for (int32_t i = 0; i < n; i += SIMD16) {
+    float cs[2][CHUNK];
+    double mode_weight[CHUNK];
+    for (int32_t i = 0; i < n; i += CHUNK) {
         directions(angle + i, turn, cs);
-        weights_used(weight + i, use + i, used);
-        terms_add((const float (*)[SIMD16])cs, 2, weight + i, sum);
-        terms_add((const float (*)[SIMD16])cs, 2, used, sum + 2);
+        mode_weights(weight + i, in_mode + i, mode_weight);
+        terms_add((const float (*)[CHUNK])cs, 2, weight + i, sum);
+        terms_add((const float (*)[CHUNK])cs, 2, mode_weight, sum + 2);
     }
 }
 
-void KERNEL(estimate_resultant)(const float *angle, float turn, const double *weight, const uint8_t *use,
+void KERNEL(estimate_resultant)(const float *angle, float turn, const double *weight, const uint8_t *in_mode,
                                 int32_t n, double out[4])
 {
-    ends const e = ends_of(n, 1, &angle, weight, use);
-    double sum[4][SIMD16] = {{0.0}};
-    resultant_add(angle, turn, weight, use, n - n % SIMD16, sum);
-    resultant_add(e.v[0], turn, e.weight, e.use, SIMD16, sum);
+    tail const rest = tail_of(n, 1, &angle, weight, in_mode);
+    double sum[4][CHUNK] = {{0.0}};
+    resultant_add(angle, turn, weight, in_mode, n - n % CHUNK, sum);
+    resultant_add(rest.v[0], turn, rest.weight, rest.in_mode, CHUNK, sum);
     for (int32_t k = 0; k < 4; k++)
         out[k] = total(sum[k]);
 }
 
 /* All angles in one array before they are wrapped: of m_wrap_pi of a difference gcc makes branches. */
 KERNEL_ROW void near_to(const float *restrict phase, const float *restrict heading, float phase0,
-                        float heading0, uint8_t *restrict use)
+                        float heading0, uint8_t *restrict in_mode)
 {
     float const near_phase = 0.15f * TWO_PI_F, near_heading = 0.5f;
-    float off[2 * SIMD16];
-    for (int32_t i = 0; i < SIMD16; i++) {
+    float off[2 * CHUNK];
+    for (int32_t i = 0; i < CHUNK; i++) {
         off[i] = TWO_PI_F * (phase[i] - phase0);
-        off[SIMD16 + i] = heading[i] - heading0;
+        off[CHUNK + i] = heading[i] - heading0;
     }
-    for (int32_t i = 0; i < 2 * SIMD16; i++)
+    for (int32_t i = 0; i < 2 * CHUNK; i++)
         off[i] = fabsf(m_wrap_pi(off[i]));
-    for (int32_t i = 0; i < SIMD16; i++)
-        use[i] = (uint8_t)(m_less(off[i], near_phase) & m_less(off[SIMD16 + i], near_heading) & 1u);
+    for (int32_t i = 0; i < CHUNK; i++)
+        in_mode[i] = (uint8_t)(m_less(off[i], near_phase) & m_less(off[CHUNK + i], near_heading) & 1u);
 }
 
-KERNEL_ROW void mass_add(const double *restrict weight, const uint8_t *restrict use, double *restrict sum)
+KERNEL_ROW void mass_add(const double *restrict weight, const uint8_t *restrict in_mode, double *restrict sum)
 {
-    for (int32_t lane = 0; lane < SIMD16; lane++)
-        sum[lane] += (double)use[lane] * weight[lane];
+    for (int32_t lane = 0; lane < CHUNK; lane++)
+        sum[lane] += (double)in_mode[lane] * weight[lane];
 }
 
 double KERNEL(estimate_mode)(const float *phase, const float *heading, const double *weight, int32_t n,
-                             int32_t best, uint8_t *use)
+                             int32_t best, uint8_t *in_mode)
 {
     const float *const angles[] = {phase, heading};
-    double sum[SIMD16] = {0.0};
-    int32_t const whole = n - n % SIMD16;
-    ends e = ends_of(n, 2, angles, weight, NULL);
-    for (int32_t i = 0; i < whole; i += SIMD16) {
-        near_to(phase + i, heading + i, phase[best], heading[best], use + i);
-        mass_add(weight + i, use + i, sum);
+    double sum[CHUNK] = {0.0};
+    int32_t const whole = n - n % CHUNK;
+    tail rest = tail_of(n, 2, angles, weight, NULL);
+    for (int32_t i = 0; i < whole; i += CHUNK) {
+        near_to(phase + i, heading + i, phase[best], heading[best], in_mode + i);
+        mass_add(weight + i, in_mode + i, sum);
     }
-    near_to(e.v[0], e.v[1], phase[best], heading[best], e.use);
-    mass_add(e.weight, e.use, sum);
-    memcpy(use + whole, e.use, (size_t)(n - whole));
+    near_to(rest.v[0], rest.v[1], phase[best], heading[best], rest.in_mode);
+    mass_add(rest.weight, rest.in_mode, sum);
+    memcpy(in_mode + whole, rest.in_mode, (size_t)(n - whole));
     return total(sum);
 }
 
@@ -151,9 +153,9 @@ enum { PAIRS = 10 };
 
 /* Products of the components of the quaternion of Rz(heading) Ry(pitch) Rx(roll), w x y z. */
 KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pitch,
-                         const float *restrict roll, float (*restrict pair)[SIMD16])
+                         const float *restrict roll, float (*restrict pair)[CHUNK])
 {
-    for (int32_t i = 0; i < SIMD16; i++) {
+    for (int32_t i = 0; i < CHUNK; i++) {
         float sh, ch, sp, cp, sr, cr;
         m_sincos(0.5f * heading[i], &sh, &ch);
         m_sincos(0.5f * pitch[i], &sp, &cp);
@@ -174,25 +176,25 @@ KERNEL_ROW void pairs_of(const float *restrict heading, const float *restrict pi
 }
 
 static void rotations_add(const float *heading, const float *pitch, const float *roll, const double *weight,
-                          const uint8_t *use, int32_t n, double (*sum)[SIMD16])
+                          const uint8_t *in_mode, int32_t n, double (*sum)[CHUNK])
 {
-    float pair[PAIRS][SIMD16];
-    double used[SIMD16];
-    for (int32_t i = 0; i < n; i += SIMD16) {
+    float pair[PAIRS][CHUNK];
+    double mode_weight[CHUNK];
+    for (int32_t i = 0; i < n; i += CHUNK) {
         pairs_of(heading + i, pitch + i, roll + i, pair);
-        weights_used(weight + i, use + i, used);
-        terms_add((const float (*)[SIMD16])pair, PAIRS, used, sum);
+        mode_weights(weight + i, in_mode + i, mode_weight);
+        terms_add((const float (*)[CHUNK])pair, PAIRS, mode_weight, sum);
     }
 }
 
 void KERNEL(estimate_rotations)(const float *heading, const float *pitch, const float *roll,
-                                const double *weight, const uint8_t *use, int32_t n, double out[16])
+                                const double *weight, const uint8_t *in_mode, int32_t n, double out[16])
 {
     static const uint8_t place[16] = {0, 1, 2, 3, 1, 4, 5, 6, 2, 5, 7, 8, 3, 6, 8, 9};
-    ends const e = ends_of(n, 3, (const float *const[]){heading, pitch, roll}, weight, use);
-    double sum[PAIRS][SIMD16] = {{0.0}};
-    rotations_add(heading, pitch, roll, weight, use, n - n % SIMD16, sum);
-    rotations_add(e.v[0], e.v[1], e.v[2], e.weight, e.use, SIMD16, sum);
+    tail const rest = tail_of(n, 3, (const float *const[]){heading, pitch, roll}, weight, in_mode);
+    double sum[PAIRS][CHUNK] = {{0.0}};
+    rotations_add(heading, pitch, roll, weight, in_mode, n - n % CHUNK, sum);
+    rotations_add(rest.v[0], rest.v[1], rest.v[2], rest.weight, rest.in_mode, CHUNK, sum);
     for (int32_t k = 0; k < 16; k++)
         out[k] = total(sum[place[k]]);
 }

@@ -1,23 +1,27 @@
 #include "tracker/features_step.h"
 #include "image/camera.h"
 
-/* Aim one camera's region at the walker; false if the walker is behind it. */
-static bool aim(gait_tracker *t, int32_t c, const particle_state *w)
+static const float CENTRE_HEIGHT = 0.52f; /* of the region above the ground, statures */
+static const float NEAREST = 0.1f;        /* metres in front of the camera at which a person can be seen */
+
+/* Centre one camera's region on the person; false if they are behind the camera. */
+static bool move_region(gait_tracker *t, int32_t c, const particle_state *p)
 {
     const gait_camera *const cam = &t->cfg.camera[c];
-    float const H = w->f[F_STATURE], middle[3] = {w->f[F_X], w->f[F_Y], w->f[F_Z] + 0.52f * H};
+    float const stature = p->f[F_STATURE];
+    float const centre[3] = {p->f[F_X], p->f[F_Y], p->f[F_Z] + CENTRE_HEIGHT * stature};
     float uv[2];
-    float const depth = camera_project(cam, middle, uv);
-    if (!(depth > 0.1f))
+    float const depth = camera_project(cam, centre, uv);
+    if (!(depth > NEAREST))
         return false;
-    float const tall = H * f_max(cam->fx, cam->fy) / depth;
+    float const tall = stature * f_max(cam->fx, cam->fy) / depth;
     if (view_follow(&t->core->map[c], uv, tall))
         t->camera[c].plate_stale = true;
     return true;
 }
 
-/* Resample the background where the region moved or the frames changed between grey and colour: a grey
- * frame is compared with a grey plate. */
+/* Resample the background if the region moved or the frames changed between grey and colour: a grey frame is compared
+ * with a grey plate. */
 static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
 {
     camera_state *const s = &t->camera[c];
@@ -32,64 +36,69 @@ static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
     s->plate_stale = false;
 }
 
-/* Tracks of one camera without the lens's distortion. */
-static void take_keypoints(const gait_tracker *t, int32_t c, const gait_keypoint *track, features_keypoints *out)
+static bool keypoint_seen(const gait_keypoint *k)
+{
+    return k->sd > 0.0f && k->sd <= FLT_MAX && f_finite(&k->u, 1) && f_finite(&k->v, 1);
+}
+
+/* One camera's keypoints, undistorted. */
+static void take_keypoints(const gait_tracker *t, int32_t c, const gait_keypoint *keypoints,
+                           features_keypoints *out)
 {
     *out = (features_keypoints){0};
-    for (int32_t p = 0; track && (t->cfg.terms & GAIT_TERM_KEYPOINTS) && p < t->model->points; p++) {
-        const gait_keypoint *const one = &track[p];
-        bool const seen =
-            one->sd > 0.0f && one->sd <= FLT_MAX && f_finite(&one->u, 1) && f_finite(&one->v, 1);
-        if (!seen)
-            continue;
+    for (int32_t p = 0; keypoints && (t->cfg.terms & GAIT_TERM_KEYPOINTS) && p < t->model->points; p++) {
+        const gait_keypoint *const k = &keypoints[p];
         double ideal[2];
-        camera_ideal(&t->cfg.camera[c], (const double[2]){(double)one->u, (double)one->v}, ideal);
+        if (!keypoint_seen(k))
+            continue;
+        camera_ideal(&t->cfg.camera[c], (const double[2]){(double)k->u, (double)k->v}, ideal);
         out->u[p] = (float)ideal[0];
         out->v[p] = (float)ideal[1];
-        out->inverse_sd[p] = 1.0f / one->sd;
+        out->inverse_sd[p] = 1.0f / k->sd;
         out->count++;
     }
 }
 
-typedef struct job { /* one camera's frame */
+typedef struct features_job { /* one camera's frame */
     gait_tracker *t;
     int32_t c;
-    gait_image im;
+    gait_image image;
     const view_planes *plate;
-} job;
+} features_job;
 
 static void sample_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
-    const job *const j = ctx;
+    const features_job *const j = ctx;
     gait_tracker *const t = j->t;
     (void)task;
-    for (int32_t i = begin; i < end; i++)
-        features_sample(t->like->run, &t->camera[j->c].features, i, &t->cfg.camera[j->c], &j->im, &t->scratch);
+    for (int32_t band = begin; band < end; band++)
+        features_sample(t->like->run, &t->camera[j->c].features, band, &t->cfg.camera[j->c], &j->image,
+                        &t->planes);
 }
 
 static void map_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
-    const job *const j = ctx;
+    const features_job *const j = ctx;
     gait_tracker *const t = j->t;
     (void)task;
-    for (int32_t i = begin; i < end; i++)
-        features_map(t->like->run, &t->camera[j->c].features, i, &t->cfg.camera[j->c], j->plate, t->like->paper,
-                     &t->scratch);
+    for (int32_t map = begin; map < end; map++)
+        features_map(t->like->run, &t->camera[j->c].features, map, &t->cfg.camera[j->c], j->plate,
+                     t->like->paper, &t->planes);
 }
 
-/* One camera's features. */
-static void look(gait_tracker *t, int32_t c, const gait_frame *frame, const particle_state *predicted)
+static void camera_features(gait_tracker *t, int32_t c, const gait_frame *frame,
+                            const particle_state *predicted)
 {
     camera_state *const s = &t->camera[c];
-    job j = {.t = t, .c = c, .im = frame->image[c]};
-    if (!aim(t, c, predicted))
-        j.im.data = NULL;
+    features_job j = {.t = t, .c = c, .image = frame->image[c]};
+    if (!move_region(t, c, predicted))
+        j.image.data = NULL;
     s->features.map = t->core->map[c];
-    if (s->plate.channel[0] && s->background.data && j.im.data) {
-        refresh_plate(t, c, j.im.format == GAIT_GREY8);
+    if (s->plate.channel[0] && s->background.data && j.image.data) {
+        refresh_plate(t, c, j.image.format == GAIT_GREY8);
         j.plate = &s->plate;
     }
-    features_begin(&s->features, &j.im, &t->scratch);
+    features_begin(&s->features, &j.image, &t->planes);
     if (s->features.has_image) {
         task_run(&t->cfg.exec, t->cfg.tasks, FEATURES_BANDS, 1, sample_range, &j);
         task_run(&t->cfg.exec, t->cfg.tasks, FEATURES_MAPS, 1, map_range, &j);
@@ -101,7 +110,7 @@ int32_t features_step(gait_tracker *t, const gait_frame *frame, const particle_s
 {
     int32_t count = 0;
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        look(t, c, frame, predicted);
+        camera_features(t, c, frame, predicted);
         count += t->camera[c].features.has_image;
     }
     return count;

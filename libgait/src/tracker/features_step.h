@@ -1,8 +1,9 @@
-/* features_step.h - what the cameras see of a frame where the walker should be. */
+/* features_step.h - feature extraction: each camera's region of interest follows the person. */
 #ifndef GAIT_TRACKER_FEATURES_STEP_H
 #define GAIT_TRACKER_FEATURES_STEP_H
-#include "tracker/tracker.h"
+#include "tracker/tracker_state.h"
 
-/* Move each camera's region to the predicted walker and compute its features.  Returns how many cameras saw. */
+/* Move each camera's region to the predicted particle and compute its features.  Returns the number of cameras that have
+ * an image of it. */
 int32_t features_step(gait_tracker *t, const gait_frame *frame, const particle_state *predicted);
 #endif

@@ -1,51 +1,67 @@
 #include "tracker/front_back.h"
-#include "image/camera.h"
 #include "base/fmath.h"
+#include "image/camera.h"
 #include "tracker/likelihood_step.h"
 
-/* Is the walker seen from a side, not from in front or behind, where turning round changes little? */
-static bool seen_aside(const gait_camera *c, const particle_state *w)
+static const float SIDE_VIEW = 0.3f; /* least sine of the angle between heading and line of sight */
+static const float EDGE_SHARE =
+    0.5f; /* share of the edge strength beyond chance that must speak for the front */
+static const float AVERAGE_TIME = 1.0f; /* seconds over which the score is averaged */
+static const float FIRST_SCORE = 0.03f; /* the average to begin with */
+
+/* From in front or behind a turn by 180 degrees changes little. */
+static bool seen_from_side(const gait_camera *c, const particle_state *p)
 {
-    float const least = 0.3f; /* of the sine of the angle to the line of sight */
-    float at[3], sn, cs;
-    camera_to(c, w->f + F_X, at);
-    m_sincos_one(w->f[F_HEADING], &sn, &cs);
-    float const across = cs * at[1] - sn * at[0];
-    return across * across > least * least * (at[0] * at[0] + at[1] * at[1]);
+    float to[3], sn, cs;
+    camera_to(c, p->f + F_X, to);
+    m_sincos_one(p->f[F_HEADING], &sn, &cs);
+    float const across = cs * to[1] - sn * to[0];
+    return across * across > SIDE_VIEW * SIDE_VIEW * (to[0] * to[0] + to[1] * to[1]);
 }
 
-/* The walker in the first lane, in the others turned round in phases evenly apart. */
-static void turn_round(const particle_state *w, particle_block *out)
+/* The body in the first lane; in the others the body turned by 180 degrees, at evenly spaced phases. */
+static void turned_bodies(const particle_state *p, particle_block *out)
 {
     for (int32_t f = 0; f < F_MAX; f++)
-        for (int32_t i = 0; i < BLOCK; i++)
-            out->f[f][i] = w->f[f];
-    for (int32_t i = 1; i < BLOCK; i++) {
-        out->f[F_PHASE][i] = m_wrap1(w->f[F_PHASE] + (float)i / (float)(BLOCK - 1));
-        out->f[F_HEADING][i] = m_wrap_pi(w->f[F_HEADING] + PI_F);
+        for (int32_t lane = 0; lane < BLOCK; lane++)
+            out->f[f][lane] = p->f[f];
+    for (int32_t lane = 1; lane < BLOCK; lane++) {
+        out->f[F_PHASE][lane] = m_wrap1(p->f[F_PHASE] + (float)lane / (float)(BLOCK - 1));
+        out->f[F_HEADING][lane] = m_wrap_pi(p->f[F_HEADING] + PI_F);
     }
 }
 
-float front_back_score(gait_tracker *t, const particle_state *person)
+float front_back_score(gait_tracker *t, const particle_state *p)
 {
     likelihood_scratch *const w = &t->work[0];
-    particle_block poses;
-    float const enough = 0.5f; /* of the edges beyond chance */
+    particle_block bodies;
     float sum = 0.0f, cameras = 0.0f;
-    turn_round(person, &poses);
-    particle_block_bodies(&t->rule, &poses, &w->body);
+    turned_bodies(p, &bodies);
+    particle_block_bodies(&t->layout, &bodies, &w->body);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        float along[BLOCK], chance[BLOCK], turned = 0.0f;
-        if (!t->camera[c].features.has_image || !seen_aside(&t->cfg.camera[c], person))
+        float edges[BLOCK], chance[BLOCK], turned = 0.0f;
+        if (!t->camera[c].features.has_image || !seen_from_side(&t->cfg.camera[c], p))
             continue;
         likelihood_outline(t, c, w);
-        for (int32_t i = 0; i < BLOCK; i++) {
-            like_body const b = likelihood_body(t, c, 0, i, w, NULL);
-            along[i] = like_edges_along(&b, &chance[i]);
-            turned = i > 0 ? f_max(turned, along[i]) : turned;
+        for (int32_t lane = 0; lane < BLOCK; lane++) {
+            like_body const b = likelihood_body(t, c, 0, lane, w, NULL);
+            edges[lane] = like_edges_along(&b, &chance[lane]);
+            turned = lane > 0 ? f_max(turned, edges[lane]) : turned;
         }
-        sum += along[0] - turned - enough * (along[0] - chance[0]);
+        sum += edges[0] - turned - EDGE_SHARE * (edges[0] - chance[0]);
         cameras += 1.0f;
     }
     return cameras > 0.0f ? sum / cameras : 0.0f;
+}
+
+/* When only parts of the body are seen, the edges of the occluder tell nothing. */
+float front_back_update(gait_tracker *t, bool restart, const particle_state *mean)
+{
+    float const before = t->core->front_back_margin;
+    if (restart)
+        return FIRST_SCORE;
+    if (t->core->partly_hidden || !(t->cfg.terms & GAIT_TERM_EDGES))
+        return before;
+    float const score = front_back_score(t, mean), share = f_min(seconds_unsupported(t) / AVERAGE_TIME, 1.0f);
+    return before + (score == 0.0f ? 0.0f : share * (score - before));
 }

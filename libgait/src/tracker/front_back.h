@@ -1,14 +1,17 @@
-/* front_back.h - does the picture tell which way a walker looks?
+/* front_back.h - check that the images show the front of the body where the estimate has it.
  *
- * Who walks backwards, or stands, gets support from the images as well: the body lies where the person is.  But then its
- * outline follows the edges no better than that of somebody who looks the other way, in one phase or another.  The edges
- * that a line of any direction would meet are the measure, so contrast and clutter do not matter. */
+ * A person walking backwards, or standing, is also supported by the images, since the body is in the right place.  But
+ * its outline then follows the image edges no better than that of a body turned by 180 degrees at some phase.  Scores are
+ * relative to the edge strength that a line of random direction would meet, so contrast and clutter do not matter. */
 #ifndef GAIT_TRACKER_FRONT_BACK_H
 #define GAIT_TRACKER_FRONT_BACK_H
-#include "tracker/tracker.h"
+#include "tracker/tracker_state.h"
 
-/* By how much more edges the walker's outline meets than that of the walker turned round, in the phase that meets most,
- * less half of what it meets beyond chance: negative if the picture does not tell.  The mean over cameras that see the
- * walker from a side; 0 if there are none. */
-float front_back_score(gait_tracker *t, const particle_state *w);
+/* Edge strength along the outline of the body, less that of the best turned body, less half of what exceeds chance:
+ * negative if front and back cannot be told apart.  Mean over cameras that see the person from a side; 0 if there are
+ * none. */
+float front_back_score(gait_tracker *t, const particle_state *p);
+
+/* The running mean of the score after this frame; restart: the person has just been found. */
+float front_back_update(gait_tracker *t, bool restart, const particle_state *mean);
 #endif

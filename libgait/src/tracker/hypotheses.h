@@ -1,41 +1,51 @@
-/* hypotheses.h - left and right: two hypotheses half a stride apart, kept alive until the image decides.
+/* hypotheses.h - left and right: two hypotheses half a stride apart, tracked until the images decide.
  *
- * A mixture of two particle filters (Vermaak, Doucet and Perez 2003).  Each side owns half of the
- * particles; within a side they are weighed and resampled as ever, so chance cannot end a side.  The
- * sides' weights are moved by their evidence alone, from even odds.  An estimate takes all particles: a
- * particle's weight is its side's times its own.
+ * A mixture of two particle filters (Vermaak, Doucet and Perez 2003).  Each hypothesis owns half of the particles, which
+ * are weighed and resampled among themselves, so sampling noise cannot eliminate a hypothesis.  Only the evidence of its
+ * particles moves the weight of a hypothesis, from even odds.  In an estimate a particle's weight is the product of its
+ * own and that of its hypothesis.
  *
- * The odds leave the silhouette out: the two outlines differ by errors of the body's shape more than by
- * the side that is in front, and such an error does not average out.  Frames nearer together than
- * config evidence_time count less, here as in the particles' weights, because their errors are the same. */
+ * The odds leave out the silhouette: the outlines of the two hypotheses differ by errors of the body's shape more than by
+ * which leg is in front, and such errors do not average out.  Frames closer together than config evidence_time count
+ * less, here as in the particles' weights, because their errors are correlated.
+ *
+ * Stages: after a start with an open phase HYPOTHESES_ACQUISITION finds the phase modulo half a stride, HYPOTHESES_TWO
+ * decides between left and right, HYPOTHESES_ONE tracks. */
 #ifndef GAIT_TRACKER_HYPOTHESES_H
 #define GAIT_TRACKER_HYPOTHESES_H
-#include "tracker/tracker.h"
+#include "tracker/tracker_state.h"
 
-/* After a start that leaves the phase open the filter first looks for the phase modulo half a stride. */
+/* The phase is open: begin acquisition (in paper mode there is only one hypothesis). */
 void hypotheses_acquire(gait_tracker *t);
 
-/* Lost: both sides are one search again. */
-void hypotheses_drop(gait_tracker *t);
-
-/* One side is known: nothing to decide. */
+/* Left and right are known: one hypothesis. */
 void hypotheses_settle(gait_tracker *t);
 
-/* Resample what has become too uneven; true if anything was. */
-bool hypotheses_resample(gait_tracker *t, uint32_t frame);
+/* The person is lost: treat the particles as one set, redrawn as such. */
+void hypotheses_drop(gait_tracker *t);
 
-/* After the prediction: lay the particles out as two sides if the search is over. */
+/* The odds of the two are so clear that one can be given up; and give it up. */
+bool hypotheses_decided(const gait_tracker *t);
+void hypotheses_merge(gait_tracker *t);
+
+/* Acquisition has lasted long enough; and lay the particles out as two hypotheses.  The weights must be even, as after
+ * resampling.  Clears the templates. */
+bool hypotheses_acquired(const gait_tracker *t);
 void hypotheses_split(gait_tracker *t);
 
-/* Multiply the weights by the likelihood t->used, tempered, the sides' by their evidence over dt seconds. */
+/* Resample if the effective sample size is too small or the number of particles changes; true if so. */
+bool hypotheses_resample(gait_tracker *t, uint32_t counter);
+
+/* Multiply the weights of the particles by the tempered likelihood exp(loglik), those of two hypotheses by their
+ * evidence.  dt: seconds since the last frame. */
 pf_summary hypotheses_update(gait_tracker *t, float dt);
 
-/* Whether left and right are still open. */
+/* Left and right are not yet known. */
 bool hypotheses_open(const gait_tracker *t);
 
-/* Seconds since phase, left and right have been known: from then on stature settles. */
-float hypotheses_settled_time(const gait_tracker *t);
-
-/* Too early to tell anything. */
+/* Too early to report anything. */
 bool hypotheses_acquiring(const gait_tracker *t);
+
+/* Seconds since phase, left and right have been known, 0 before: from then on stature settles. */
+float hypotheses_settled_time(const gait_tracker *t);
 #endif

@@ -1,30 +1,24 @@
-/* likelihood_step.h - image evidence of bodies: every particle's log-likelihood. */
+/* likelihood_step.h - likelihood of the images given each particle, and given any other body. */
 #ifndef GAIT_TRACKER_LIKELIHOOD_STEP_H
 #define GAIT_TRACKER_LIKELIHOOD_STEP_H
-#include "tracker/tracker.h"
+#include "tracker/tracker_state.h"
 
-/* Place a task's arrays; w NULL: only count. */
-void likelihood_scratch_layout(arena *a, const gait_model *m, likelihood_scratch *w);
-
-/* Log-likelihoods t->ll, joints and surface samples of all particles; t->used: the nats of foreground that
- * each explains. */
+/* Fills loglik_raw, loglik_without_silhouette, explained, joint and texture for all particles. */
 void likelihood_step(gait_tracker *t);
 
-/* Surface samples of particle i in camera c by limb, NULL if none are kept. */
-like_patch *texture_of(const gait_tracker *t, int32_t i, int32_t c);
+typedef struct body_evidence { /* of one body, over all cameras */
+    float
+        support; /* log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term can tell */
+    like_parts parts; /* foreground explained and left over, nats */
+} body_evidence;
 
-/* What the cameras say of one walker. */
-typedef struct likelihood_verdict {
-    float support;    /* how much better it explains the frame than nobody, nats */
-    like_parts parts; /* if it may be hidden in part */
-} likelihood_verdict;
+/* Writes the body's surface samples to t->estimate_patch. */
+body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p);
 
-/* Also takes the walker's surface samples into t->estimate_patch. */
-likelihood_verdict likelihood_of_particle(gait_tracker *t, const particle_state *w);
-
-/* For bodies apart from the particles: outlines of those in w->body in camera c, and one of them, ready for the terms;
- * seen: where its surface samples go, or NULL. */
+/* Project the block of bodies in w->body into camera c. */
 void likelihood_outline(const gait_tracker *t, int32_t c, likelihood_scratch *w);
-like_body likelihood_body(const gait_tracker *t, int32_t c, int32_t side, int32_t lane, likelihood_scratch *w,
-                     like_patch *seen);
+
+/* One body of the projected block, ready for the terms.  samples: receives its surface samples; or NULL. */
+like_body likelihood_body(const gait_tracker *t, int32_t c, int32_t hypothesis, int32_t lane,
+                          likelihood_scratch *w, like_patch *samples);
 #endif

@@ -1,4 +1,5 @@
 #include "tracker/snapshot.h"
+#include "base/fmath.h"
 #include "base/hash.h"
 #include <string.h>
 
@@ -6,7 +7,7 @@ typedef struct snapshot_header {
     char magic[8];
     uint32_t abi, version;
     uint64_t bytes;         /* of the whole snapshot */
-    uint64_t model, config; /* digests: a snapshot fits only a tracker made alike */
+    uint64_t model, config; /* digests: a snapshot fits only a tracker of the same model and configuration */
     uint64_t body;          /* hash of the state that follows */
 } snapshot_header;
 
@@ -17,12 +18,11 @@ static size_t state_bytes(const gait_tracker *t)
     return (size_t)(t->state_end - (unsigned char *)t->core);
 }
 
-/* The configuration without pointers: where threads come from, how many pieces they get and what the CPU can do
- * does not matter. */
+/* The configuration without what does not change results: threads, tasks and instruction sets. */
 static uint64_t config_digest(const gait_tracker *t)
 {
     gait_tracker_config c = t->cfg;
-    c.particles = t->most;
+    c.particles = t->config_particles;
     memset(&c.camera[c.cameras], 0, (size_t)(GAIT_MAX_CAMERAS - c.cameras) * sizeof *c.camera);
     memset(&c.exec, 0, sizeof c.exec);
     c.tasks = 0;
@@ -48,7 +48,7 @@ void snapshot_save(const gait_tracker *t, void *mem)
     memcpy((unsigned char *)mem + sizeof h, t->core, state_bytes(t));
 }
 
-/* Where an array of the state lies in the body of a snapshot, which need not be aligned. */
+/* An array of the state in the body of a snapshot, which need not be aligned. */
 static const unsigned char *in_body(const gait_tracker *t, const unsigned char *body, const void *array)
 {
     return body + ((const unsigned char *)array - (const unsigned char *)t->core);
@@ -58,17 +58,18 @@ static bool core_plausible(const gait_tracker *t, const unsigned char *body)
 {
     tracker_core c;
     memcpy(&c, body, sizeof c);
-    bool ok = c.current >= 0 && c.current < t->past.depth && (c.started == 0 || c.started == 1);
-    ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->room && c.fewer >= 0 && c.fewer < t->room;
-    ok &= c.less >= 0 && c.less <= t->most - 16;
-    ok &= c.hypotheses.stage >= HYPOTHESES_ONE && c.hypotheses.stage <= HYPOTHESES_TWO &&
-          c.hypotheses.since <= c.utime;
-    ok &= c.hypotheses.odds > -1e6 && c.hypotheses.odds < 1e6 && c.hypotheses.lead > -1e12 &&
-          c.hypotheses.lead < 1e12; /* no NaN */
+    bool ok = c.generation >= 0 && c.generation < t->history.depth && (c.started == 0 || c.started == 1);
+    ok &= c.ess >= 0.0 && c.ess <= 2.0 * (double)t->capacity && c.below_capacity >= 0 &&
+          c.below_capacity < t->capacity;
+    ok &= c.below_config >= 0 && c.below_config <= t->config_particles - 16;
+    const hypotheses_state *const h = &c.hypotheses;
+    ok &= h->stage >= HYPOTHESES_ONE && h->stage <= HYPOTHESES_TWO && h->since <= c.utime;
+    ok &= fabs(h->log_odds) < 1e6 && fabs(h->recent_log_ratio) < 1e12; /* false for NaN */
     ok &= c.start_utime <= c.utime && c.support_utime <= c.utime && c.support_utime >= c.start_utime;
     ok &= c.rejuvenation_utime <= c.utime && c.rejuvenation_utime >= c.start_utime;
-    ok &= c.missed >= 0.0f && c.missed < 1e9f && c.stature_sd_ratio >= 0.0f && c.stature_sd_ratio < 1e9f;
-    ok &= f_finite(&c.front_back, 1);
+    ok &= c.usual_unexplained >= 0.0f && c.usual_unexplained < 1e9f && c.stature_sd_ratio >= 0.0f &&
+          c.stature_sd_ratio < 1e9f;
+    ok &= f_finite(&c.front_back_margin, 1);
     for (int32_t k = 0; k < t->cfg.cameras; k++) {
         const float map[3] = {c.map[k].scale, c.map[k].u0, c.map[k].v0};
         ok &= f_finite(map, 3) && map[0] >= 0.0f && map[0] <= 2.0f;
@@ -81,39 +82,40 @@ static bool weights_plausible(const gait_tracker *t, const unsigned char *body)
     tracker_core c;
     double sum = 0.0;
     memcpy(&c, body, sizeof c);
-    for (int32_t i = 0; i < t->room - c.fewer; i++) {
+    for (int32_t i = 0; i < t->capacity - c.below_capacity; i++) {
         double weight, log_weight;
         int32_t parent;
         memcpy(&weight, in_body(t, body, &t->filter.weight[i]), sizeof weight);
         memcpy(&log_weight, in_body(t, body, &t->filter.log_weight[i]), sizeof log_weight);
         memcpy(&parent, in_body(t, body, &t->filter.parent[i]), sizeof parent);
-        if (!(weight >= 0.0 && log_weight <= 1.0 && log_weight >= -2e300) || parent < 0 || parent >= t->room)
+        if (!(weight >= 0.0 && log_weight <= 1.0 && log_weight >= -2e300) || parent < 0 ||
+            parent >= t->capacity)
             return false;
         sum += weight;
     }
     return sum > 0.999 && sum < 1.001;
 }
 
-/* Indices and numbers of the generations kept; those of steps not yet done are zero. */
-static bool past_plausible(const gait_tracker *t, const unsigned char *body)
+/* Slots of the history that no step has filled yet are zero. */
+static bool history_plausible(const gait_tracker *t, const unsigned char *body)
 {
-    const fixed_lag *const l = &t->past;
-    size_t const generations = (size_t)l->depth, n = (size_t)l->room, values = n * (size_t)l->fields;
+    const particle_history *const h = &t->history;
+    size_t const generations = (size_t)h->depth, n = (size_t)h->capacity, values = n * (size_t)h->fields;
     for (size_t i = 0; i < generations; i++) {
         int32_t count;
-        memcpy(&count, in_body(t, body, &l->count[i]), sizeof count);
-        if (count < 0 || count > l->room)
+        memcpy(&count, in_body(t, body, &h->count[i]), sizeof count);
+        if (count < 0 || count > h->capacity)
             return false;
     }
     for (size_t i = 0; i < generations * n; i++) {
         int32_t parent;
-        memcpy(&parent, in_body(t, body, &l->parent[i]), sizeof parent);
-        if (parent < 0 || parent >= l->room)
+        memcpy(&parent, in_body(t, body, &h->parent[i]), sizeof parent);
+        if (parent < 0 || parent >= h->capacity)
             return false;
     }
     for (size_t i = 0; i < generations * values; i++) {
         float v;
-        memcpy(&v, in_body(t, body, &l->value[i]), sizeof v);
+        memcpy(&v, in_body(t, body, &h->value[i]), sizeof v);
         if (!f_finite(&v, 1))
             return false;
     }
@@ -123,10 +125,10 @@ static bool past_plausible(const gait_tracker *t, const unsigned char *body)
 static bool template_plausible(const gait_tracker *t, const unsigned char *body)
 {
     for (int32_t k = 0; k < 2 * t->cfg.cameras; k++) {
-        const int16_t *const known = t->template[k / t->cfg.cameras][k % t->cfg.cameras];
-        for (int32_t i = 0; known && i < t->model->limbs * LIKE_SAMPLES; i++) {
+        const int16_t *const template = t->template[k / t->cfg.cameras][k % t->cfg.cameras];
+        for (int32_t i = 0; template && i < t->model->limbs * LIKE_SAMPLES; i++) {
             int16_t v;
-            memcpy(&v, in_body(t, body, &known[i]), sizeof v);
+            memcpy(&v, in_body(t, body, &template[i]), sizeof v);
             if (v != TEMPLATE_EMPTY && (v < -127 * TEMPLATE_ONE || v > 127 * TEMPLATE_ONE))
                 return false;
         }
@@ -139,36 +141,37 @@ gait_result snapshot_restore(gait_tracker *t, const void *mem, size_t bytes, gai
     const unsigned char *const body = (const unsigned char *)mem + sizeof(snapshot_header);
     snapshot_header h;
     if (bytes < sizeof h)
-        return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot of %zu bytes is shorter than its header",
+        return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot of %zu bytes is too short for its header",
                          bytes);
     memcpy(&h, mem, sizeof h);
     if (memcmp(h.magic, MAGIC, sizeof MAGIC) != 0)
-        return base_fail(err, GAIT_ERR_MAGIC, -1, "not a tracker snapshot");
+        return base_fail(err, GAIT_ERR_MAGIC, -1, "these bytes are not a tracker snapshot");
     if (h.abi != GAIT_ABI || h.version != GAIT_VERSION)
-        return base_fail(err, GAIT_ERR_VERSION, -1, "snapshot of library version %u, this is %u", h.version,
-                         (unsigned)GAIT_VERSION);
+        return base_fail(err, GAIT_ERR_VERSION, -1, "snapshot made by library version %u, this is version %u",
+                         h.version, (unsigned)GAIT_VERSION);
     if (h.model != t->model->digest || h.config != config_digest(t))
         return base_fail(err, GAIT_ERR_VERSION, -1,
                          "snapshot of a tracker with another model or configuration");
     if (h.bytes != bytes || bytes != snapshot_bytes(t) || h.body != hash_state(body, state_bytes(t)))
-        return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot is damaged: length or checksum do not match");
-    if (!core_plausible(t, body) || !weights_plausible(t, body) || !past_plausible(t, body) ||
+        return base_fail(err, GAIT_ERR_CORRUPT, -1,
+                         "snapshot is damaged: its length or checksum does not match");
+    if (!core_plausible(t, body) || !weights_plausible(t, body) || !history_plausible(t, body) ||
         !template_plausible(t, body))
-        return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot holds a number outside its range");
+        return base_fail(err, GAIT_ERR_CORRUPT, -1, "snapshot contains a number outside its range");
     memcpy(t->core, body, state_bytes(t));
-    tracker_set_count(t, t->room - t->core->fewer);
-    tracker_want(t, t->most - t->core->less);
+    tracker_set_count(t, t->capacity - t->core->below_capacity);
+    tracker_set_target(t, t->config_particles - t->core->below_config);
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         t->camera[c].plate_stale = true;
     return GAIT_OK;
 }
 
-/* Times count from the start, so that the same walk at another time of day has the same digest. */
+/* Times are taken relative to the start, so that the same walk at another time of day has the same digest. */
 uint64_t snapshot_digest(const gait_tracker *t)
 {
     unsigned char *const arrays = (unsigned char *)t->filter.log_weight; /* the core comes first */
     tracker_core core;
-    memcpy(&core, t->core, sizeof core); /* with its padding, which is zero */
+    memcpy(&core, t->core, sizeof core); /* with the padding, which is zero */
     core.utime -= core.start_utime;
     core.support_utime -= core.start_utime;
     core.rejuvenation_utime -= core.start_utime;

@@ -1,7 +1,7 @@
-/* snapshot.h - save, restore and hash the whole mutable state of a tracker. */
+/* snapshot.h - save, restore and hash the mutable state of a tracker. */
 #ifndef GAIT_TRACKER_SNAPSHOT_H
 #define GAIT_TRACKER_SNAPSHOT_H
-#include "tracker/tracker.h"
+#include "tracker/tracker_state.h"
 
 size_t snapshot_bytes(const gait_tracker *t);
 void snapshot_save(const gait_tracker *t, void *mem);

@@ -1,27 +1,31 @@
-/* track_loss.h - notice from the images that nobody is where the track is, and find the walker again.
+/* track_loss.h - notice that the images no longer support the track, and search for the person again.
  *
- * Nobody: the frame is explained better without the estimated body than with it.  Until that has lasted
- * for a while nothing changes: whoever is hidden for a moment goes on as predicted, because the
- * likelihood of being hidden bounds that of every particle from below.  After that some of the particles
- * are drawn anew in every frame from a region round the last place that grows with time (after augmented
- * Monte-Carlo localisation; Thrun, Burgard and Fox 2005, 8.3.3).  The transition is then a mixture of
- * following and being elsewhere; more particles are drawn from its second part than its probability, and
- * weigh that much less. */
+ * A frame does not support the estimate if it is explained better without the body than with it.  Nothing changes until
+ * that has lasted for a while: an occluded person is tracked as predicted, because the likelihood of being hidden bounds
+ * that of every particle from below.  After that some particles are redrawn in every frame from a region around the last
+ * supported place that grows with time (after augmented Monte-Carlo localisation; Thrun, Burgard and Fox 2005, 8.3.3).
+ * The transition is then a mixture of following and of being elsewhere; more particles are drawn from the second
+ * component than its probability, with correspondingly smaller weights. */
 #ifndef GAIT_TRACKER_TRACK_LOSS_H
 #define GAIT_TRACKER_TRACK_LOSS_H
-#include "tracker/tracker.h"
+#include "tracker/tracker_state.h"
 
 bool track_loss_is_lost(const gait_tracker *t);
 
-/* Would the walker, turned round, fit what was seen lately as well, so that the pose is not to be trusted? */
-bool track_loss_doubts_front(const gait_tracker *t);
+/* After the prediction, while lost: redraw some particles.  The weights must be even, as after resampling. */
+void track_loss_redraw(gait_tracker *t, uint32_t counter);
 
-/* After the prediction: while lost, draw some particles anew.  The others are even, as resampled. */
-void track_loss_search(gait_tracker *t, uint32_t frame);
+/* After the likelihood step: loglik from loglik_raw, bounded below by the log-likelihood of a hidden person. */
+void track_loss_bound(gait_tracker *t);
 
-/* Bound t->ll from below by that of a hidden walker. */
-void track_loss_allow_hidden(gait_tracker *t);
+typedef enum track_loss_support { SUPPORT_NONE, SUPPORT_PART, SUPPORT_WHOLE } track_loss_support;
+typedef struct track_loss_verdict {
+    track_loss_support support; /* SUPPORT_PART: only foreground that some parts of the body explain */
+    float usual_unexplained;    /* new value of the state's */
+    bool phase_as_predicted;    /* the phase follows from that of the last supported estimate */
+    bool phase_expired;         /* that one is too old to predict from */
+} track_loss_verdict;
 
-/* Take note of whether the frame supports the estimated walker. */
-void track_loss_update(gait_tracker *t, const particle_state *mean);
+/* Whether the frame supports the estimate.  Writes the estimate's surface samples to t->estimate_patch. */
+track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_state *mean);
 #endif

@@ -1,27 +1,29 @@
-/* Particles as likely as somebody who is hidden at the least, but for the parts that are seen. */
-#include "base/fmath.h"
+/* Log of the sum of two likelihoods: of a particle as visible and of a hidden person. */
 #include "base/dispatch.h"
+#include "base/fmath.h"
 #include <string.h>
 
-enum { SIMD16 = 64 }; /* as many at once, so that the loop needs no remainder */
+enum { CHUNK = 64 }; /* particles at once, so that the vectorised loop needs no remainder */
 
-KERNEL_ROW void join(const float *restrict a, float b, float *restrict part)
+/* hidden: less `base` on entry, the log of the sum on return. */
+KERNEL_ROW void join(const float *restrict visible, float base, float *restrict hidden)
 {
-    for (int32_t i = 0; i < SIMD16; i++) {
-        float const hidden = b + part[i];
-        float const more = f_max(a[i], hidden), less = f_min(a[i], hidden);
-        part[i] = more + m_log(1.0f + m_exp(less - more));
+    for (int32_t i = 0; i < CHUNK; i++) {
+        float const other = base + hidden[i];
+        float const more = f_max(visible[i], other), less = f_min(visible[i], other);
+        hidden[i] = more + m_log(1.0f + m_exp(less - more));
     }
 }
 
-void KERNEL(track_loss_join)(const float *a, float b, int32_t n, float *part)
+void KERNEL(track_loss_join)(const float *visible, float base, int32_t n, float *hidden)
 {
-    int32_t const whole = n - n % SIMD16;
-    float end[2][SIMD16] = {{0.0f}};
-    for (int32_t i = 0; i < whole; i += SIMD16)
-        join(a + i, b, part + i);
-    memcpy(end[0], a + whole, (size_t)(n - whole) * sizeof *a);
-    memcpy(end[1], part + whole, (size_t)(n - whole) * sizeof *part);
-    join(end[0], b, end[1]);
-    memcpy(part + whole, end[1], (size_t)(n - whole) * sizeof *part);
+    int32_t const whole = n - n % CHUNK;
+    size_t const rest = (size_t)(n - whole) * sizeof *hidden;
+    float end[2][CHUNK] = {{0.0f}};
+    for (int32_t i = 0; i < whole; i += CHUNK)
+        join(visible + i, base, hidden + i);
+    memcpy(end[0], visible + whole, rest);
+    memcpy(end[1], hidden + whole, rest);
+    join(end[0], base, end[1]);
+    memcpy(hidden + whole, end[1], rest);
 }

@@ -1,305 +1,119 @@
 #include "tracker/tracker.h"
-#include "likelihood/likelihood.h"
-#include "tracker/estimate.h"
 #include "base/fmath.h"
-#include "tracker/features_step.h"
-#include "tracker/track_loss.h"
 #include "filter/rejuvenation.h"
+#include "tracker/estimate.h"
+#include "tracker/features_step.h"
+#include "tracker/fixed_lag.h"
+#include "tracker/front_back.h"
 #include "tracker/hypotheses.h"
 #include "tracker/likelihood_step.h"
-#include <string.h>
+#include "tracker/track_loss.h"
 
-/* Texture samples are kept where a term compares them with those of the ancestor or the template. */
-static bool wants_texture(const gait_tracker_config *cfg)
-{
-    return (cfg->terms & (GAIT_TERM_TEXTURE | GAIT_TERM_TEMPLATE)) != 0;
-}
-
-/* The mutable state first and in one stretch: saving, restoring and hashing copy it whole. */
-static void layout_state(arena *a, gait_tracker *t)
-{
-    int32_t const n = t->cfg.particles, cameras = t->cfg.cameras;
-    size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
-    t->core = TAKE(a, tracker_core, 1);
-    t->filter = pf_layout(a, n);
-    if (wants_texture(&t->cfg))
-        t->texture = TAKE(a, like_patch, (size_t)n * (size_t)(cameras * t->model->limbs));
-    for (int32_t c = 0; c < 2 * cameras && wants_texture(&t->cfg); c++)
-        t->template[c / cameras][c % cameras] = TAKE(a, int16_t, samples);
-    fixed_lag_layout_state(&t->past, a, t->cfg.lag, n, state_layout_fields(&t->rule));
-    t->state_end = TAKE(a, unsigned char, 1);
-}
-
-/* The joints take the place of the planes that a frame's features were made from, and these that of the rows in which
- * particles mingle. */
-static void layout_shared(arena *a, gait_tracker *t)
-{
-    arena size = {.cap = SIZE_MAX, .solid = true};
-    features_scratch_layout(&size);
-    int32_t const floats = i_max(3 * t->model->points, rejuvenation_stride(state_layout_fields(&t->rule)));
-    size_t const all = (size_t)floats * (size_t)t->cfg.particles * sizeof *t->joint;
-    size_t const bytes = all > size.used ? all : size.used;
-    t->joint = (float *)(void *)TAKE(a, unsigned char, bytes);
-    arena planes = {.base = (unsigned char *)t->joint, .cap = bytes, .solid = true};
-    t->scratch = features_scratch_layout(&planes);
-}
-
-/* Without threads there is but one task.  The lagged estimate uses the first one's scratch; what it needs besides takes
- * the place of the others'. */
-static void layout_tasks(arena *a, gait_tracker *t)
-{
-    int32_t const tasks = t->cfg.exec.run ? t->cfg.tasks : 1;
-    arena past = {.cap = SIZE_MAX, .solid = true}, others = past;
-    fixed_lag_layout_work(&t->past, &past);
-    for (int32_t k = 1; k < tasks; k++)
-        likelihood_scratch_layout(&others, t->model, NULL);
-    t->work = TAKE(a, likelihood_scratch, tasks);
-    likelihood_scratch_layout(a, t->model, t->work);
-    size_t const bytes = past.used > others.used ? past.used : others.used;
-    past = others = (arena){.base = TAKE(a, unsigned char, bytes), .cap = bytes, .solid = true};
-    fixed_lag_layout_work(&t->past, &past);
-    for (int32_t k = 1; k < tasks; k++)
-        likelihood_scratch_layout(&others, t->model, t->work ? t->work + k : NULL);
-}
-
-static void layout_work(arena *a, gait_tracker *t)
-{
-    int32_t const n = t->cfg.particles;
-    size_t const limbs = (size_t)t->model->limbs;
-    for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        t->camera[c].features = features_layout(a);
-        if (t->cfg.terms & GAIT_TERM_SILHOUETTE)
-            t->camera[c].plate = view_planes_layout(a, 3);
-    }
-    t->like = TAKE(a, like_setup, 1);
-    t->loglik_raw = TAKE(a, float, n);
-    t->loglik = TAKE(a, float, n);
-    t->loglik_without_silhouette = TAKE(a, float, n);
-    layout_shared(a, t);
-    t->mirror = TAKE(a, mirror, 1);
-    t->mode = TAKE(a, uint8_t, n);
-    if (wants_texture(&t->cfg))
-        t->estimate_patch = TAKE(a, like_patch, (size_t)t->cfg.cameras * limbs);
-    for (int32_t c = 0; c < 2 * t->cfg.cameras && wants_texture(&t->cfg); c++)
-        t->known[c / t->cfg.cameras][c % t->cfg.cameras] = TAKE(a, int8_t, LIKE_RING *limbs);
-    layout_tasks(a, t);
-}
-
-/* Two sides need twice the particles of one, and so does a phase that is open. */
-static int32_t acquisition_count(const gait_tracker *t)
-{
-    int32_t const twice = t->wanted > INT32_MAX / 2 ? t->wanted : 2 * t->wanted;
-    return i_max(t->wanted, i_min(twice, t->cfg.acquisition_particles));
-}
-
-int32_t tracker_count(const gait_tracker *t)
-{
-    return t->core->hypotheses.stage == HYPOTHESES_ACQUISITION ? acquisition_count(t) : t->wanted;
-}
-
-gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg,
-                             const kernels *run)
-{
-    gait_tracker *const self = TAKE(a, gait_tracker, 1);
-    gait_tracker t = {.model = m, .cfg = *cfg, .most = cfg->particles, .wanted = cfg->particles};
-    t.cfg.particles = t.room = acquisition_count(&t);
-    t.rule = state_layout_init(m, &t.cfg, run);
-    t.cfg.components = t.rule.components;
-    t.cfg.proportions = t.rule.proportions;
-    a->solid = true;
-    layout_state(a, &t);
-    a->solid = false;
-    layout_work(a, &t);
-    if (!self || a->overflow)
-        return NULL;
-    like_setup_init(t.like, m, &t.cfg, run);
-    mirror_init(t.mirror, &t.rule);
-    *self = t;
-    return self;
-}
-
-void tracker_set_count(gait_tracker *t, int32_t particles)
-{
-    t->cfg.particles = t->filter.n = particles;
-    t->past.count[t->core->current] = particles;
-    t->particles = fixed_lag_particles(&t->past, t->core->current);
-    t->core->fewer = t->room - particles;
-}
-
-void tracker_want(gait_tracker *t, int32_t particles)
-{
-    t->wanted = particles;
-    t->core->less = t->most - particles;
-}
-
-static void even_weights(gait_tracker *t)
-{
-    pf_uniform(&t->filter);
-    pf_keep(&t->filter);
-    t->core->ess = (double)t->cfg.particles;
-}
-
-void tracker_clear(gait_tracker *t)
-{
-    memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
-    tracker_want(t, t->wanted);
-    tracker_set_count(t, t->wanted);
-    for (int32_t c = 0; c < t->cfg.cameras; c++) {
-        t->camera[c].plate_stale = true;
-        for (int32_t side = 0; side < 2 && t->template[side][c]; side++)
-            template_clear(t->template[side][c], t->model->limbs);
-    }
-    even_weights(t);
-}
-
-dynamics tracker_dynamics(const gait_tracker *t)
-{
-    return (dynamics){
-        .cfg = &t->cfg, .rule = t->rule, .seed = t->cfg.seed, .stature_sd_ratio = t->core->stature_sd_ratio};
-}
-
-/* Standard deviation of the phase below which a start says which leg is which, strides. */
-static const float PHASE_KNOWN = 0.2f;
+static const float KNOWN_PHASE_SD = 0.2f; /* strides: a start with less says which leg is which */
+static const float SETTLE_TIME = 1.0f;    /* seconds after a start in which several modes are normal */
+static const float PHASE_JUMP = 0.2f;     /* strides: a larger departure from the predicted phase is a jump */
+static const double DEGENERATE_ESS = 2.0;
 
 void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime)
 {
+    tracker_core *const core = t->core;
     tracker_clear(t);
-    t->core->started = 1;
-    t->core->stature_sd_ratio = sd->stature / f_max(mean->stature, LEAST_STATURE);
-    t->core->utime = t->core->start_utime = t->core->support_utime = t->core->rejuvenation_utime = utime;
-    if (sd->phase < PHASE_KNOWN)
+    core->started = 1;
+    core->stature_sd_ratio = sd->stature / f_max(mean->stature, LEAST_STATURE);
+    core->utime = core->start_utime = core->support_utime = core->rejuvenation_utime = utime;
+    if (sd->phase < KNOWN_PHASE_SD)
         hypotheses_settle(t);
     else
         hypotheses_acquire(t);
     tracker_set_count(t, tracker_count(t));
-    even_weights(t);
-    t->core->last = particle_from_state(&t->rule, mean);
-    t->core->phase = mean->phase;
-    t->core->rate = mean->stride_hz;
+    tracker_even_weights(t);
+    core->last_seen = particle_from_state(&t->layout, mean);
+    core->reported_phase = mean->phase;
+    core->reported_rate = mean->stride_hz;
     dynamics const d = tracker_dynamics(t);
     for (int32_t i = 0; i < t->cfg.particles; i++) {
-        particle_state const w = dynamics_draw(&d, mean, sd, i);
-        particle_put(&t->particles, i, &w);
+        particle_state const p = dynamics_draw(&d, mean, sd, i);
+        particle_put(&t->particles, i, &p);
     }
 }
 
-static float seconds_since(const gait_tracker *t, int64_t utime)
-{
-    return 1e-6f * (float)(t->core->utime - utime);
-}
-
-/* Every particle's surface samples become its ancestor's, if there are any of the previous frame. */
-static void inherit(gait_tracker *t)
-{
-    int32_t const before = t->past.count[fixed_lag_slot(&t->past, t->core->current, 1)];
-    if (t->core->textured)
-        pf_inherit(&t->filter, before, t->texture,
-                   (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
-}
-
+/* ---- rejuvenate and predict ---- */
 typedef struct move_job {
     gait_tracker *t;
-    particle_set from;
+    particle_set from; /* the generation before */
     rejuvenation rejuvenation;
     dynamics_step step;
-    int32_t first; /* items before the particles: BLOCK if they inherit meanwhile, else 0 */
 } move_job;
+
+/* Particles are rejuvenated after resampling, within their hypothesis; not while they have no single mode, because
+ * a mean of two modes is in neither. */
+static rejuvenation rejuvenation_of(const gait_tracker *t, bool resampled, bool modes_known, uint32_t counter)
+{
+    rejuvenation r = {.fields = t->particles.fields,
+                      .row = t->rows,
+                      .parent = t->filter.parent,
+                      .n = t->filter.n,
+                      .split = hypotheses_boundary(t),
+                      .seed = t->cfg.seed,
+                      .frame = counter};
+    if (modes_known && resampled)
+        rejuvenation_set(&r, seconds_since(t, t->core->rejuvenation_utime), t->cfg.rejuvenation_time);
+    return r;
+}
 
 static void rows_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     const move_job *const j = ctx;
     (void)task;
     for (int32_t i = begin; i < end; i += BLOCK)
-        rejuvenation_rows(&j->from, i, i_min(i + BLOCK, end), j->t->joint);
-}
-
-static void move_block(const move_job *j, int32_t begin, int32_t lanes)
-{
-    const gait_tracker *const t = j->t;
-    particle_set to = t->particles;
-    particle_block then, now;
-    if (j->rejuvenation.shrink > 0.0f)
-        rejuvenate_block(&j->rejuvenation, begin, lanes, &then);
-    else
-        particle_block_get(&j->from, t->filter.parent + begin, lanes, &then);
-    if (j->step.dt > 0.0f)
-        t->like->run->dynamics_move(&j->step, begin, &then, &now);
-    particle_block_put(&to, begin, lanes, j->step.dt > 0.0f ? &now : &then);
+        rejuvenation_rows(&j->from, i, i_min(i + BLOCK, end), j->t->rows);
 }
 
 static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
 {
     const move_job *const j = ctx;
+    const gait_tracker *const t = j->t;
+    particle_set to = t->particles;
     (void)task;
-    for (int32_t i = begin; i < end; i += BLOCK)
-        if (i < j->first)
-            inherit(j->t);
+    for (int32_t i = begin; i < end; i += BLOCK) {
+        int32_t const lanes = i_min(BLOCK, end - i);
+        particle_block then, now;
+        if (j->rejuvenation.shrink > 0.0f)
+            rejuvenate_block(&j->rejuvenation, i, lanes, &then);
         else
-            move_block(j, i - j->first, i_min(BLOCK, end - i));
+            particle_block_get(&j->from, t->filter.parent + i, lanes, &then);
+        if (j->step.dt > 0.0f)
+            t->like->run->dynamics_move(&j->step, i, &then, &now);
+        particle_block_put(&to, i, lanes, j->step.dt > 0.0f ? &now : &then);
+    }
 }
 
-/* Particles mingle where they were drawn by weight, each with those of its mode; between two modes there is nobody. */
-static rejuvenation rejuvenation_after(gait_tracker *t, bool resampled, uint32_t frame)
+/* Every particle's surface samples become those of its ancestor. */
+static void inherit_texture(void *ctx)
 {
-    bool const known_mode = t->core->hypotheses.stage != HYPOTHESES_ACQUISITION && !track_loss_is_lost(t);
-    rejuvenation m = {.fields = t->particles.fields,
-                      .row = t->joint,
-                      .parent = t->filter.parent,
-                      .n = t->filter.n,
-                      .split = hypotheses_boundary(t),
-                      .seed = t->cfg.seed,
-                      .frame = frame};
-    if (known_mode && resampled)
-        rejuvenation_set(&m, seconds_since(t, t->core->rejuvenation_utime), t->cfg.rejuvenation_time);
-    if (!known_mode || resampled)
-        t->core->rejuvenation_utime = t->core->utime;
-    return m;
-}
-
-/* Will the particles still be children of those ancestors when the frame is looked at?  Not if they become two sides, or
- * some are drawn anew. */
-static bool ancestors_stay(const gait_tracker *t)
-{
-    return t->core->hypotheses.stage != HYPOTHESES_ACQUISITION && !track_loss_is_lost(t);
+    const move_job *const j = ctx;
+    gait_tracker *const t = j->t;
+    pf_inherit(&t->filter, j->from.n, t->texture,
+               (size_t)(t->cfg.cameras * t->like->limbs) * sizeof *t->texture);
 }
 
 /* Move every particle from its ancestor into the next generation, which becomes the current one. */
-static void predict(gait_tracker *t, float dt, bool resampled, bool stay, uint32_t frame)
+static void predict(gait_tracker *t, float dt, const rejuvenation *r, uint32_t counter)
 {
     dynamics const d = tracker_dynamics(t);
-    move_job j = {.t = t, .from = t->particles};
-    j.rejuvenation = rejuvenation_after(t, resampled, frame);
-    if (j.rejuvenation.shrink > 0.0f)
+    move_job j = {.t = t, .from = t->particles, .rejuvenation = *r};
+    if (r->shrink > 0.0f)
         task_run(&t->cfg.exec, t->cfg.tasks, j.from.n, BLOCK, rows_range, &j);
-    j.step = dynamics_step_init(&d, dt, hypotheses_settled_time(t), frame);
-    t->core->current = (t->core->current + 1) % t->past.depth;
+    j.step = dynamics_step_init(&d, dt, hypotheses_settled_time(t), counter);
+    t->core->generation = (t->core->generation + 1) % t->history.depth;
     tracker_set_count(t, t->filter.n);
-    j.first = stay ? BLOCK : 0;
-    task_run(&t->cfg.exec, t->cfg.tasks, j.first + t->cfg.particles, BLOCK, move_range, &j);
+    task_run_beside(&t->cfg.exec, t->cfg.tasks, t->core->sampled_cameras ? inherit_texture : NULL,
+                    t->cfg.particles, BLOCK, move_range, &j);
 }
 
-/* Does the reported phase follow from the one before? */
-static bool phase_jumps(const gait_tracker *t, float dt, const gait_estimate *e)
-{
-    float const jump = 0.2f, expected = t->core->phase + dt * t->core->rate; /* strides */
-    return fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - expected))) > TWO_PI_F * jump;
-}
-
-static int32_t judge(const gait_tracker *t, float dt, bool degenerate, const gait_estimate *e)
-{
-    float const acquire = 1.0f; /* seconds */
-    if (degenerate || track_loss_is_lost(t))
-        return GAIT_TRACK_LOST;
-    if (hypotheses_acquiring(t) || !t->core->met)
-        return GAIT_TRACK_INIT;
-    if (e->hypothesis_weight < 0.7f)
-        return seconds_since(t, t->core->start_utime) < acquire ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
-    bool const open = hypotheses_open(t) || track_loss_doubts_front(t) || phase_jumps(t, dt, e);
-    return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
-}
-
-/* Which cameras saw this frame, as bits. */
-static uint32_t seeing(const gait_tracker *t)
+/* ---- after the estimate ---- */
+/* Cameras with an image in this frame, as bits. */
+static uint32_t cameras_seeing(const gait_tracker *t)
 {
     uint32_t mask = 0;
     for (int32_t c = 0; c < t->cfg.cameras; c++)
@@ -307,68 +121,112 @@ static uint32_t seeing(const gait_tracker *t)
     return mask;
 }
 
-static void remember_appearance(gait_tracker *t)
+/* Record whether the frame supports the estimate.  When the person is found again, left and right are open unless the
+ * phase is as predicted. */
+static void update_track_loss(gait_tracker *t, bool lost, const particle_state *mean)
+{
+    tracker_core *const core = t->core;
+    hypotheses_state *const h = &core->hypotheses;
+    track_loss_verdict const v = track_loss_check(t, lost, mean);
+    core->partly_hidden = v.support == SUPPORT_PART;
+    core->usual_unexplained = v.usual_unexplained;
+    if (v.support == SUPPORT_NONE) {
+        if (lost && (h->stage != HYPOTHESES_TWO || v.phase_expired))
+            hypotheses_drop(t);
+        return;
+    }
+    bool const left_right = h->left_right_known || h->stage == HYPOTHESES_TWO;
+    if (lost && !(left_right && v.phase_as_predicted))
+        hypotheses_acquire(t);
+    core->front_back_margin = front_back_update(t, lost || !core->found, mean);
+    core->support_utime = core->utime;
+    core->last_seen = *mean;
+    core->found = 1;
+}
+
+static int32_t status_of(const gait_tracker *t, float dt, const gait_estimate *e)
+{
+    const tracker_core *const core = t->core;
+    float const predicted = core->reported_phase + dt * core->reported_rate;
+    bool const jumps = fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - predicted))) > TWO_PI_F * PHASE_JUMP;
+    if (track_loss_is_lost(t))
+        return GAIT_TRACK_LOST;
+    if (hypotheses_acquiring(t) || !core->found)
+        return GAIT_TRACK_INIT;
+    if (e->hypothesis_weight < DOMINANT_MASS)
+        return seconds_since(t, core->start_utime) < SETTLE_TIME ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
+    bool const open = hypotheses_open(t) || core->front_back_margin < 0.0f || jumps;
+    return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
+}
+
+static void learn_appearance(gait_tracker *t)
 {
     for (int32_t c = 0; c < t->cfg.cameras; c++)
         if (t->camera[c].features.has_image && t->template[0][c])
             template_update(t->template[0][c], t->model->limbs, t->estimate_patch + c * t->model->limbs);
 }
 
-/* Weigh the particles by the frame and fill in the estimate. */
-static void observe(gait_tracker *t, float dt, gait_estimate *out)
-{
-    likelihood_step(t);
-    track_loss_allow_hidden(t);
-    pf_summary const s = hypotheses_update(t, dt);
-    t->core->ess = s.ess;
-    t->core->textured = wants_texture(&t->cfg) ? seeing(t) : 0;
-    out->log_evidence = s.log_evidence;
-    out->flags |= s.degenerate || s.ess < 2.0 ? GAIT_EST_DEGENERATE : 0;
-    particle_state const mean = estimate_fill(t, s.best, out);
-    track_loss_update(t, &mean);
-    out->status = judge(t, dt, s.degenerate, out);
-    if (out->status == GAIT_TRACK_TRACKING && t->core->hypotheses.stage == HYPOTHESES_ONE && !t->core->part)
-        remember_appearance(t);
-}
-
-/* No camera saw anything: the prediction is the estimate. */
-static void coast(gait_tracker *t, float dt, gait_estimate *out)
-{
-    likelihood_step(t);                /* no camera: only the joints */
-    t->core->ess = pf_ess(&t->filter); /* resampled weights are even */
-    t->core->textured = 0;
-    estimate_fill(t, pf_heaviest(&t->filter), out);
-    out->flags |= GAIT_EST_NO_IMAGE;
-    out->status = judge(t, dt, false, out);
-}
-
-gait_result tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
+/* ---- the step ---- */
+void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
 {
     tracker_core *const core = t->core;
+    hypotheses_state *const h = &core->hypotheses;
     float const dt = 1e-6f * (float)(frame->utime - core->utime);
+    uint32_t const counter = (uint32_t)core->frame; /* of the random numbers */
     gait_estimate e = {.utime = frame->utime, .frame = core->frame};
-    uint32_t const counter = (uint32_t)core->frame;
     core->utime = frame->utime;
-    if (track_loss_is_lost(t))
-        core->ess = 0.0; /* particles drawn anew weigh what others do */
+    bool const lost = track_loss_is_lost(t);
+
+    /* Resample. */
+    if (hypotheses_decided(t))
+        hypotheses_merge(t);
+    if (lost)
+        core->ess = 0.0; /* redrawn particles have less weight than the others */
     bool const resampled = core->frame > 0 && hypotheses_resample(t, counter);
-    bool const stay = ancestors_stay(t);
-    predict(t, dt, resampled, stay, counter);
-    hypotheses_split(t);
-    track_loss_search(t, counter);
-    if (!stay)
-        inherit(t);
+
+    /* Rejuvenate and predict.  Particles that are split or redrawn have no samples of their ancestors' surface. */
+    bool const modes_known = h->stage != HYPOTHESES_ACQUISITION && !lost;
+    bool const split = hypotheses_acquired(t);
+    bool const redraw =
+        lost && h->stage != HYPOTHESES_TWO && !split; /* two hypotheses go on as predicted for a while */
+    if (split || redraw)
+        core->sampled_cameras = 0;
+    rejuvenation const r = rejuvenation_of(t, resampled, modes_known, counter);
+    if (resampled || !modes_known)
+        core->rejuvenation_utime = core->utime;
+    predict(t, dt, &r, counter);
+    if (split)
+        hypotheses_split(t);
+    if (redraw)
+        track_loss_redraw(t, counter);
+
+    /* Features, likelihood and weights. */
     particle_state const place = particle_set_place(&t->particles, t->filter.weight);
-    if (features_step(t, frame, &place) > 0)
-        observe(t, dt, &e);
-    else
-        coast(t, dt, &e);
-    e.flags |= resampled ? GAIT_EST_RESAMPLED : 0;
-    e.ess = (float)core->ess;
-    fixed_lag_keep(t, &e);
-    core->phase = e.mean.phase;
-    core->rate = e.mean.stride_hz;
+    bool const seen = features_step(t, frame, &place) > 0;
+    likelihood_step(t); /* without an image: only the joints */
+    if (seen)
+        track_loss_bound(t);
+    pf_summary const s = seen ? hypotheses_update(t, dt)
+                              : (pf_summary){.best = pf_heaviest(&t->filter), .ess = pf_ess(&t->filter)};
+    core->ess = s.ess;
+    core->sampled_cameras = uses_texture(&t->cfg) ? cameras_seeing(t) : 0;
+
+    /* Estimate and track loss. */
+    particle_state const mean = estimate_particles(t, s.best, &e);
+    if (seen)
+        update_track_loss(t, lost, &mean);
+    bool const degenerate = s.degenerate || s.ess < DEGENERATE_ESS;
+    e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
+    e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (seen ? 0 : GAIT_EST_NO_IMAGE) |
+              (seen && degenerate ? GAIT_EST_DEGENERATE : 0);
+    e.ess = (float)s.ess;
+    e.log_evidence = s.log_evidence;
+    if (e.status == GAIT_TRACK_TRACKING && h->stage == HYPOTHESES_ONE && !core->partly_hidden)
+        learn_appearance(t);
+
+    fixed_lag_record(t, &e);
+    core->reported_phase = e.mean.phase;
+    core->reported_rate = e.mean.stride_hz;
     core->frame++;
     *out = e;
-    return GAIT_OK;
 }

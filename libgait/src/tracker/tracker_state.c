@@ -1,0 +1,201 @@
+#include "tracker/tracker_state.h"
+#include "filter/rejuvenation.h"
+#include "likelihood/likelihood.h"
+#include <stddef.h>
+#include <string.h>
+
+/* ---- layout ---- */
+static void layout_history(particle_history *h, arena *a, int32_t lag, int32_t n, int32_t fields)
+{
+    h->depth = i_max(lag, 1) + 1;
+    h->capacity = n;
+    h->fields = fields;
+    h->record = TAKE(a, generation_record, h->depth);
+    h->count = TAKE(a, int32_t, h->depth);
+    h->value = TAKE(a, float, (size_t)h->depth *(size_t)fields *(size_t)n);
+    h->parent = TAKE(a, int32_t, (size_t)h->depth *(size_t)n);
+}
+
+/* The mutable state, first and without gaps: it is saved, restored and hashed as one block. */
+static void layout_state(arena *a, gait_tracker *t)
+{
+    int32_t const n = t->cfg.particles, cameras = t->cfg.cameras;
+    size_t const samples = (size_t)t->model->limbs * LIKE_SAMPLES;
+    t->core = TAKE(a, tracker_core, 1);
+    t->filter = pf_layout(a, n);
+    if (uses_texture(&t->cfg))
+        t->texture = TAKE(a, like_patch, (size_t)n * (size_t)(cameras * t->model->limbs));
+    for (int32_t c = 0; c < 2 * cameras && uses_texture(&t->cfg); c++)
+        t->template[c / cameras][c % cameras] = TAKE(a, int16_t, samples);
+    layout_history(&t->history, a, t->cfg.lag, n, state_layout_fields(&t->layout));
+    t->state_end = TAKE(a, unsigned char, 1);
+}
+
+/* One block serves in turn the rows for rejuvenation, the planes that features are made from, and the joints. */
+static void layout_joints(arena *a, gait_tracker *t)
+{
+    arena size = {.cap = SIZE_MAX, .solid = true};
+    features_scratch_layout(&size);
+    int32_t const floats = i_max(3 * t->model->points, rejuvenation_stride(state_layout_fields(&t->layout)));
+    size_t const all = (size_t)floats * (size_t)t->cfg.particles * sizeof *t->joint;
+    size_t const bytes = all > size.used ? all : size.used;
+    t->joint = t->rows = (float *)(void *)TAKE(a, unsigned char, bytes);
+    arena planes = {.base = (unsigned char *)t->joint, .cap = bytes, .solid = true};
+    t->planes = features_scratch_layout(&planes);
+}
+
+/* Place one task's arrays; w NULL: only count. */
+static void layout_likelihood_scratch(arena *a, const gait_model *m, likelihood_scratch *w)
+{
+    size_t const limbs = (size_t)m->limbs;
+    void *const outline = arena_take(a, sizeof(outline_lanes), limbs);
+    void *const lines = arena_take(a, offsetof(layers_block, limb) + limbs * sizeof(layers_limb), 1);
+    void *const sides = arena_take(a, sizeof(like_sides), limbs);
+    void *const pose = arena_take(a, sizeof(like_pose_limb), limbs);
+    void *const drawn = arena_take(a, offsetof(layers, visible) + limbs * sizeof(grid_mask), 1);
+    void *const points = arena_take(a, sizeof *w->points, (size_t)m->points);
+    if (!w)
+        return;
+    w->outline = outline;
+    w->lines = lines;
+    w->sides = sides;
+    w->pose = pose;
+    w->layers = drawn;
+    w->points = points;
+}
+
+static void layout_lag(arena *a, gait_tracker *t)
+{
+    t->lag.ancestor = TAKE(a, int32_t, t->capacity);
+    t->lag.weight = TAKE(a, double, t->capacity);
+}
+
+/* Without threads there is one task.  The lagged estimate runs between steps, in the scratch of the tasks. */
+static void layout_tasks(arena *a, gait_tracker *t)
+{
+    int32_t const tasks = t->cfg.exec.run ? t->cfg.tasks : 1;
+    arena lag = {.cap = SIZE_MAX, .solid = true}, others = lag;
+    layout_lag(&lag, t);
+    for (int32_t k = 1; k < tasks; k++)
+        layout_likelihood_scratch(&others, t->model, NULL);
+    t->work = TAKE(a, likelihood_scratch, tasks);
+    layout_likelihood_scratch(a, t->model, t->work);
+    size_t const bytes = lag.used > others.used ? lag.used : others.used;
+    lag = others = (arena){.base = TAKE(a, unsigned char, bytes), .cap = bytes, .solid = true};
+    layout_lag(&lag, t);
+    for (int32_t k = 1; k < tasks; k++)
+        layout_likelihood_scratch(&others, t->model, t->work ? t->work + k : NULL);
+}
+
+static void layout_logliks(arena *a, gait_tracker *t)
+{
+    int32_t const n = t->cfg.particles;
+    t->loglik_raw = t->lag.column[0] = TAKE(a, float, n);
+    t->loglik = t->lag.column[1] = TAKE(a, float, n);
+    t->loglik_without_silhouette = t->lag.column[2] = TAKE(a, float, n);
+}
+
+static void layout_work(arena *a, gait_tracker *t)
+{
+    int32_t const cameras = t->cfg.cameras;
+    size_t const limbs = (size_t)t->model->limbs;
+    for (int32_t c = 0; c < cameras; c++) {
+        t->camera[c].features = features_layout(a);
+        if (t->cfg.terms & GAIT_TERM_SILHOUETTE)
+            t->camera[c].plate = view_planes_layout(a, 3);
+    }
+    t->like = TAKE(a, like_setup, 1);
+    layout_logliks(a, t);
+    layout_joints(a, t);
+    t->mirror = TAKE(a, mirror, 1);
+    t->in_mode = TAKE(a, uint8_t, t->cfg.particles);
+    if (uses_texture(&t->cfg))
+        t->estimate_patch = TAKE(a, like_patch, (size_t)cameras * limbs);
+    for (int32_t c = 0; c < 2 * cameras && uses_texture(&t->cfg); c++)
+        t->template_ring[c / cameras][c % cameras] = TAKE(a, int8_t, LIKE_RING *limbs);
+    layout_tasks(a, t);
+}
+
+/* Two hypotheses need twice the particles of one, and so does an open phase. */
+static int32_t acquisition_count(const gait_tracker *t)
+{
+    int32_t const target = t->target_particles, twice = target > INT32_MAX / 2 ? target : 2 * target;
+    return i_max(target, i_min(twice, t->cfg.acquisition_particles));
+}
+
+gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg,
+                             const kernels *run)
+{
+    gait_tracker *const self = TAKE(a, gait_tracker, 1);
+    gait_tracker t = {
+        .model = m, .cfg = *cfg, .config_particles = cfg->particles, .target_particles = cfg->particles};
+    t.cfg.particles = t.capacity = acquisition_count(&t);
+    t.layout = state_layout_init(m, &t.cfg, run);
+    t.cfg.components = t.layout.components;
+    t.cfg.proportions = t.layout.proportions;
+    a->solid = true;
+    layout_state(a, &t);
+    a->solid = false;
+    layout_work(a, &t);
+    if (!self || a->overflow)
+        return NULL;
+    like_setup_init(t.like, m, &t.cfg, run);
+    mirror_init(t.mirror, &t.layout);
+    *self = t;
+    return self;
+}
+
+/* ---- particles in use ---- */
+particle_set history_particles(const particle_history *h, int32_t slot)
+{
+    return (particle_set){.n = h->count[slot],
+                          .fields = h->fields,
+                          .value = h->value + (size_t)slot * (size_t)h->fields * (size_t)h->capacity};
+}
+
+int32_t tracker_count(const gait_tracker *t)
+{
+    return t->core->hypotheses.stage == HYPOTHESES_ACQUISITION ? acquisition_count(t) : t->target_particles;
+}
+
+void tracker_set_count(gait_tracker *t, int32_t particles)
+{
+    t->cfg.particles = t->filter.n = particles;
+    t->history.count[t->core->generation] = particles;
+    t->particles = history_particles(&t->history, t->core->generation);
+    t->core->below_capacity = t->capacity - particles;
+}
+
+void tracker_set_target(gait_tracker *t, int32_t particles)
+{
+    t->target_particles = particles;
+    t->core->below_config = t->config_particles - particles;
+}
+
+void tracker_even_weights(gait_tracker *t)
+{
+    pf_uniform(&t->filter);
+    pf_keep(&t->filter);
+    t->core->ess = (double)t->filter.n;
+}
+
+void tracker_clear(gait_tracker *t)
+{
+    memset(t->core, 0, (size_t)(t->state_end - (unsigned char *)t->core));
+    tracker_set_target(t, t->target_particles);
+    tracker_set_count(t, t->target_particles);
+    for (int32_t c = 0; c < t->cfg.cameras; c++) {
+        t->camera[c].plate_stale = true;
+        for (int32_t h = 0; h < 2 && t->template[h][c]; h++)
+            template_clear(t->template[h][c], t->model->limbs);
+    }
+    tracker_even_weights(t);
+}
+
+dynamics tracker_dynamics(const gait_tracker *t)
+{
+    return (dynamics){.cfg = &t->cfg,
+                      .rule = t->layout,
+                      .seed = t->cfg.seed,
+                      .stature_sd_ratio = t->core->stature_sd_ratio};
+}

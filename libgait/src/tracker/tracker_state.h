@@ -1,0 +1,199 @@
+/* tracker_state.h - everything a tracker keeps: the state that is saved and hashed, and the working memory of a step.
+ *
+ * The parts of a step (features_step, likelihood_step, hypotheses, track_loss, front_back, estimate) read this struct and
+ * report a result; tracker.c calls them in order and writes tracker_core. */
+#ifndef GAIT_TRACKER_TRACKER_STATE_H
+#define GAIT_TRACKER_TRACKER_STATE_H
+#include "base/task.h"
+#include "filter/dynamics.h"
+#include "filter/mirror.h"
+#include "filter/pf.h"
+#include "likelihood/template.h"
+
+/* Which readings of left and right the particles represent (hypotheses.h). */
+enum { HYPOTHESES_ONE, HYPOTHESES_ACQUISITION, HYPOTHESES_TWO };
+typedef struct hypotheses_state {
+    int32_t stage;
+    int32_t left_right_known; /* left and right have been decided before */
+    int64_t since;            /* when the stage began, microseconds */
+    double log_odds;          /* HYPOTHESES_TWO: of the second hypothesis over the first */
+    double recent_log_ratio;  /* the same over the last few frames and for all terms, nats */
+} hypotheses_state;
+
+/* Saved and hashed in this order, followed by the arrays of gait_tracker up to state_end. */
+typedef struct tracker_core {
+    int64_t utime, start_utime;
+    int64_t support_utime;      /* when an image last supported the estimate */
+    int64_t rejuvenation_utime; /* when the particles were last rejuvenated, or last had no single mode */
+    uint64_t frame;             /* steps since start */
+    int32_t started;
+    int32_t generation;       /* slot of the history that holds the current particles */
+    uint32_t sampled_cameras; /* bit c: there are surface samples of camera c's previous frame */
+    int32_t found;            /* an image has supported the estimate since the start */
+    int32_t partly_hidden;    /* the last image supports only parts of the body */
+    float stature_sd_ratio;   /* standard deviation of stature at the start, fraction of the stature */
+    float usual_unexplained;  /* foreground that the estimate usually leaves unexplained, nats */
+    float front_back_margin;  /* running mean of front_back_score() */
+    double ess;
+    hypotheses_state hypotheses;
+    particle_state last_seen;            /* the estimate when an image last supported it */
+    float reported_phase, reported_rate; /* of the last estimate; strides, strides per second */
+    view_map map[GAIT_MAX_CAMERAS];
+    int32_t below_capacity; /* particles in use: gait_tracker.capacity less this */
+    int32_t below_config; /* particles wanted outside acquisition: gait_tracker.config_particles less this */
+} tracker_core;
+
+typedef struct camera_state {
+    features features;
+    view_planes plate;     /* background resampled to the region of interest */
+    gait_image background; /* borrowed; data NULL: none */
+    bool plate_stale;
+} camera_state;
+
+typedef struct likelihood_scratch { /* one per task; its arrays are as long as the model's limbs and points */
+    kin_body body;
+    outline_block *outline;
+    layers_block *lines;
+    like_outline *sides;
+    like_pose *pose;
+    layers *layers;
+    like_block terms;
+    float (*points)[3][BLOCK];
+} likelihood_scratch;
+
+typedef struct generation_record { /* what an estimate reports of its frame as a whole */
+    int64_t age;                   /* microseconds since start */
+    uint64_t frame;
+    double log_evidence;
+    int32_t status;
+    uint32_t flags;
+} generation_record;
+
+/* The last generations of particles: a ring, in which the lagged estimate follows ancestors. */
+typedef struct particle_history {
+    int32_t depth; /* generations kept: the configured lag and the current one, at least two */
+    int32_t capacity, fields;
+    generation_record *record; /* depth */
+    int32_t *count;            /* depth: particles of each generation */
+    float *value;              /* depth x fields x capacity, of which fields x count are in use */
+    int32_t *parent;           /* depth x capacity: indices into the generation before */
+} particle_history;
+
+typedef struct lag_scratch { /* of fixed_lag_estimate() */
+    int32_t *ancestor;       /* capacity: those with descendants today, */
+    double *weight;          /* capacity: and the weight of these descendants */
+    float *column[3]; /* capacity: the ancestors' values of a field; the memory of the log-likelihoods */
+} lag_scratch;
+
+struct gait_tracker {
+    const gait_model *model;
+    gait_tracker_config cfg;  /* particles: those in use now */
+    int32_t config_particles; /* of the caller's config */
+    int32_t target_particles; /* that the caller wants outside acquisition */
+    int32_t capacity;         /* particles that fit into the memory */
+    state_layout layout;
+    like_setup *like;
+    /* Mutable state: one block of memory from core to state_end. */
+    tracker_core *core;
+    like_patch *
+        texture; /* n x cameras x limbs: surface samples of the particles; of their ancestors until the likelihood
+                          * step replaces them.  NULL: no term needs them */
+    pf filter;
+    int16_t *template
+        [2][GAIT_MAX_CAMERAS]; /* appearance under each hypothesis; with one hypothesis only the first */
+    particle_history history;
+    unsigned char *state_end;
+    particle_set particles; /* the current generation */
+    /* Recomputed in every step. */
+    camera_state camera[GAIT_MAX_CAMERAS];
+    float *loglik_raw;                /* n: log-likelihood, all terms and cameras */
+    float *loglik_without_silhouette; /* n */
+    union {                           /* one array of n: */
+        float *explained; /* after the likelihood step: foreground that each particle explains, nats; */
+        float *loglik;    /* after track_loss_bound(): the log-likelihood that moves the weights */
+    };
+    float *
+        joint; /* points x 3 x n, metres: of the particles, or of the ancestors that fixed_lag_estimate() gathers */
+    float *rows;             /* until the particles have moved: rejuvenation_rows(); in the memory of joint */
+    features_scratch planes; /* until the features are complete; in the memory of joint */
+    mirror *mirror;          /* constant */
+    uint8_t *in_mode;        /* n: 1 for particles of the dominant mode */
+    like_patch *estimate_patch; /* cameras x limbs: surface samples of the estimate */
+    int8_t *template_ring
+        [2][GAIT_MAX_CAMERAS]; /* limbs x LIKE_RING: the templates as this frame is compared with them */
+    likelihood_scratch *work;  /* tasks, or 1 without threads */
+    lag_scratch lag;           /* ancestor and weight: in the memory of the work of all tasks but the first */
+};
+
+/* Place a tracker in memory; NULL if the arena only counts or overflows.  run: the kernels to use; NULL: when counting. */
+gait_tracker *tracker_layout(arena *a, const gait_model *m, const gait_tracker_config *cfg,
+                             const kernels *run);
+void tracker_clear(gait_tracker *t);
+
+/* From now on this many particles are in use. */
+void tracker_set_count(gait_tracker *t, int32_t particles);
+
+/* Set target_particles, which the saved state records. */
+void tracker_set_target(gait_tracker *t, int32_t particles);
+
+/* Particles the next step should use, if it can change their number: up to twice the target during acquisition. */
+int32_t tracker_count(const gait_tracker *t);
+
+/* Give all particles the same weight and no ancestors but themselves. */
+void tracker_even_weights(gait_tracker *t);
+
+dynamics tracker_dynamics(const gait_tracker *t);
+
+/* Particles in a slot of the history. */
+particle_set history_particles(const particle_history *h, int32_t slot);
+static inline int32_t *history_parents(const particle_history *h, int32_t slot)
+{
+    return h->parent + (size_t)slot * (size_t)h->capacity;
+}
+
+/* The slot `back` generations before another. */
+static inline int32_t history_slot(const particle_history *h, int32_t slot, int32_t back)
+{
+    return (slot + h->depth - back) % h->depth;
+}
+
+/* Surface samples of particle i in camera c by limb, or NULL. */
+static inline like_patch *texture_of(const gait_tracker *t, int32_t i, int32_t c)
+{
+    size_t const at = ((size_t)i * (size_t)t->cfg.cameras + (size_t)c) * (size_t)t->like->limbs;
+    return t->texture ? t->texture + at : NULL;
+}
+
+static inline bool uses_texture(const gait_tracker_config *cfg)
+{
+    return (cfg->terms & (GAIT_TERM_TEXTURE | GAIT_TERM_TEMPLATE)) != 0;
+}
+
+/* First particle of a hypothesis of two; hypothesis 2: the end. */
+static inline int32_t hypothesis_first(int32_t n, int32_t hypothesis)
+{
+    return hypothesis == 0 ? 0 : hypothesis == 1 ? (n + 1) / 2 : n;
+}
+
+/* First particle of the second hypothesis; the number of particles if there is only one. */
+static inline int32_t hypotheses_boundary(const gait_tracker *t)
+{
+    return hypothesis_first(t->filter.n, t->core->hypotheses.stage == HYPOTHESES_TWO ? 1 : 2);
+}
+
+static inline int32_t hypothesis_of(const gait_tracker *t, int32_t particle)
+{
+    return particle >= hypotheses_boundary(t);
+}
+
+static inline float seconds_since(const gait_tracker *t, int64_t utime)
+{
+    return 1e-6f * (float)(t->core->utime - utime);
+}
+
+/* Seconds since an image last supported the estimate. */
+static inline float seconds_unsupported(const gait_tracker *t)
+{
+    return seconds_since(t, t->core->support_utime);
+}
+#endif
