@@ -47,8 +47,8 @@ static size_t damage(uint8_t *data, size_t size, uint64_t *s)
 
 uint8_t *fuzz_aligned(const uint8_t *data, size_t size, void **memory)
 {
-    size_t const room = (size + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
-    uint8_t *const at = aligned_alloc(GAIT_ALIGN, room ? room : GAIT_ALIGN);
+    size_t const padded = (size + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
+    uint8_t *const at = aligned_alloc(GAIT_ALIGN, padded ? padded : GAIT_ALIGN);
     if (!at)
         abort();
     memcpy(at, data, size);

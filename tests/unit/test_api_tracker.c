@@ -34,7 +34,8 @@ static void test_integers(void)
         {offsetof(gait_tracker_config, particles), (1 << 20) + 1, GAIT_ERR_LIMIT, "particles"},
         {offsetof(gait_tracker_config, particles), INT32_MIN, GAIT_ERR_LIMIT, "particles"},
         {offsetof(gait_tracker_config, acquisition_particles), -1, GAIT_ERR_LIMIT, "acquisition_particles"},
-        {offsetof(gait_tracker_config, acquisition_particles), (1 << 20) + 1, GAIT_ERR_LIMIT, "acquisition_particles"},
+        {offsetof(gait_tracker_config, acquisition_particles), (1 << 20) + 1, GAIT_ERR_LIMIT,
+         "acquisition_particles"},
         {offsetof(gait_tracker_config, components), -2, GAIT_ERR_LIMIT, "components"},
         {offsetof(gait_tracker_config, components), TOY_COMPONENTS + 1, GAIT_ERR_LIMIT, "components"},
         {offsetof(gait_tracker_config, tasks), 0, GAIT_ERR_LIMIT, "tasks"},
@@ -175,7 +176,7 @@ static void test_start(void)
 {
     gait_tracker_config const cfg = toy_config(1);
     gait_tracker *const t = toy_tracker_new(&cfg);
-    gait_state const good = toy_walk(0.2f), doubt = toy_doubt(1.0f);
+    gait_state const good = toy_walk(0.2f), doubt = toy_start_sd(1.0f);
     uint64_t const digest = gait_tracker_digest(t);
     static gait_state particle[4];
     static float weight[4];
@@ -230,7 +231,7 @@ static void test_absurd_starts(void)
     gait_tracker *const t = toy_tracker_new(&cfg);
     gait_error err;
     for (size_t k = 0; k < sizeof starts / sizeof *starts; k++) {
-        gait_state mean = toy_walk(0.2f), sd = toy_doubt(1.0f);
+        gait_state mean = toy_walk(0.2f), sd = toy_start_sd(1.0f);
         if (starts[k].mean != 0.0f)
             set_number(&mean, starts[k].member / sizeof(float), starts[k].mean);
         else
@@ -281,12 +282,12 @@ static void test_the_widest_starts_stay_finite(void)
     film_make(1, 3);
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
     for (int way = 0; way < 4; way++) { /* each alone or all together, up or down */
-        gait_state mean = toy_walk(0.0f), sd = toy_doubt(1.0f);
+        gait_state mean = toy_walk(0.0f), sd = toy_start_sd(1.0f);
         for (size_t k = 0; k < sizeof mean / sizeof(float); k++) {
             gait_estimate e;
             if (way < 2) {
                 mean = toy_walk(0.0f);
-                sd = toy_doubt(1.0f);
+                sd = toy_start_sd(1.0f);
             }
             set_number(&sd, k, 10.0f);
             set_far(t, &mean, &sd, k, way % 2 ? 1.0f : -1.0f);

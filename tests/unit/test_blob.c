@@ -96,7 +96,7 @@ static void test_flipped(void)
     CHECK(memcmp(b, good, good_bytes) == 0);
 }
 
-/* Exchange the tags of every two sections: an error unless they have the same type and shape. */
+/* Swap the tags of every two sections: an error unless they have the same type and shape. */
 static void test_swapped(void)
 {
     static _Alignas(GAIT_ALIGN) unsigned char b[TOY_BYTES];

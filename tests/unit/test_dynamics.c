@@ -26,17 +26,17 @@ static void noisy(void)
 
 /* ---- motion without noise ---- */
 
-/* Whoever walks faster than the mean goes further in a stride; in paper mode the stride is fixed. */
+/* People who walk faster than the mean go further in a stride; in paper mode the stride is fixed. */
 static void test_pace(void)
 {
     const gait_model *const m = toy_shifted();
     for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++)
-        for (int32_t deviations = -3; deviations <= 3; deviations++) {
+        for (int32_t sds = -3; sds <= 3; sds++) {
             dynamics d = quiet(mode, 1);
             d.rule.model = m;
             cfg.rate_time = 0.0f; /* the rate stays */
-            particle_state w = {{[F_RATE] = m->stride_hz + (float)deviations * m->stride_hz_sd, [F_STATURE] = 2.0f}};
-            float const rate = w.f[F_RATE], clipped = f_clamp((float)deviations, -2.0f, 2.0f);
+            particle_state w = {{[F_RATE] = m->stride_hz + (float)sds * m->stride_hz_sd, [F_STATURE] = 2.0f}};
+            float const rate = w.f[F_RATE], clipped = f_clamp((float)sds, -2.0f, 2.0f);
             for (int32_t k = 0; k < 200; k++)
                 w = move_one(&d, &w, 1.0f / (200.0f * rate), 1.0f, (uint32_t)k, 3);
             float const own = mode == GAIT_MODE_PAPER ? m->stride_length : 0.80f + 0.05f * clipped;
@@ -86,7 +86,7 @@ static void test_drift(void)
         }
 }
 
-/* The rate returns to the population's, or never. */
+/* The rate returns to the mean of people, or never. */
 static void test_rate(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 1);
@@ -113,7 +113,7 @@ static void test_paper_way(void)
 /* ---- motion with noise ---- */
 
 /* Fields of many particles after `seconds` in steps of dt; everyone starts alike. */
-static void spread_after(const dynamics *d, const particle_state *from, float dt, float seconds, float age,
+static void sample_after(const dynamics *d, const particle_state *from, float dt, float seconds, float age,
                          double v[FIELDS][DRAWS])
 {
     int32_t const steps = (int32_t)(seconds / dt + 0.5f);
@@ -148,7 +148,7 @@ static particle_state standing(void)
 static double sampled[2][FIELDS][DRAWS];
 
 /* After a second: random walks t s^2, relaxing fields s^2 tau/2 (1 - exp(-2t/tau)), phase with its rate's integral. */
-static void test_spread(void)
+static void test_variances(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 9);
     particle_state const from = standing();
@@ -156,7 +156,7 @@ static void test_spread(void)
     noisy();
     cfg.settle_time = 0.0f;
     cfg.rate_time = 0.0f;
-    spread_after(&d, &from, (float)dt, (float)T, 1.0f, sampled[0]);
+    sample_after(&d, &from, (float)dt, (float)T, 1.0f, sampled[0]);
     double const s = 0.02 * own, integral = s * s * T * T * T / 3.0 * (1.0 - 1.5 * dt / T);
     check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, s * sqrt(T), DRAWS);
     check_moments(moments_of(sampled[0][F_PHASE], DRAWS), own * T, sqrt(0.02 * 0.02 * T + integral), DRAWS);
@@ -192,7 +192,7 @@ static void test_stationary(void)
         cfg.rate_time = 0.5f;
         cfg.offset_noise = 1.5f; /* time constant 0.89 s */
         cfg.proportion_noise = 1.5f;
-        spread_after(&d, &from, steps[k], 4.0f, 9.0f, sampled[0]);
+        sample_after(&d, &from, steps[k], 4.0f, 9.0f, sampled[0]);
         check_moments(moments_of(sampled[0][F_PITCH], DRAWS), 0.0, 0.033 * sqrt(0.25), DRAWS);
         check_moments(moments_of(sampled[0][F_Z], DRAWS), 0.0, 0.0096 * sqrt(0.25), DRAWS);
         check_moments(moments_of(sampled[0][F_COEF], DRAWS), 0.0, 0.66 * sqrt(0.3), DRAWS);
@@ -213,7 +213,7 @@ static void test_slow(void)
         dynamics const d = quiet(GAIT_MODE_DEFAULT, 60);
         cfg.tilt_noise = 0.033f;
         cfg.tilt_time = times[k];
-        spread_after(&d, &from, 0.04f, 0.2f, 9.0f, sampled[0]);
+        sample_after(&d, &from, 0.04f, 0.2f, 9.0f, sampled[0]);
         var[k] = moments_of(sampled[0][F_PITCH], DRAWS).var;
         CHECK_NEAR(var[k] / var[0], 1.0, k == 3 ? 0.004 : 1e-4);
     }
@@ -230,9 +230,9 @@ static void test_frame_rate(void)
     from.f[F_HEADING] = 0.5f;
     from.f[F_PITCH] = 0.1f;
     from.f[F_COEF] = 1.0f;
-    spread_after(&d, &from, 1.0f / 30.0f, 1.0f, 0.0f, sampled[0]);
+    sample_after(&d, &from, 1.0f / 30.0f, 1.0f, 0.0f, sampled[0]);
     for (int k = 0; k < 2; k++) {
-        spread_after(&d, &from, k ? 1.0f / 3.0f : 1.0f / 15.0f, 1.0f, 0.0f, sampled[1]);
+        sample_after(&d, &from, k ? 1.0f / 3.0f : 1.0f / 15.0f, 1.0f, 0.0f, sampled[1]);
         for (int f = 0; f < FIELDS; f++) {
             moments const a = moments_of(sampled[0][f], DRAWS), b = moments_of(sampled[1][f], DRAWS);
             double const slack = f == F_X || f == F_Y || f == F_PHASE ? (k ? 0.35 : 0.07) : 0.0;
@@ -273,10 +273,10 @@ static void test_settling(void)
     double const own = (double)toy_model()->stride_hz;
     noisy();
     cfg.rate_time = 0.0f;
-    spread_after(&d, &from, 0.1f, 0.1f, 0.95f, sampled[0]);
+    sample_after(&d, &from, 0.1f, 0.1f, 0.95f, sampled[0]);
     check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.02 * own * sqrt(0.1), DRAWS);
     check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.05 * 0.1 * sqrt(0.1), DRAWS);
-    spread_after(&d, &from, 0.1f, 0.1f, 1.0f, sampled[0]);
+    sample_after(&d, &from, 0.1f, 0.1f, 1.0f, sampled[0]);
     check_moments(moments_of(sampled[0][F_RATE], DRAWS), own, 0.02 * own * sqrt(0.1), DRAWS);
     check_moments(moments_of(sampled[0][F_STATURE], DRAWS), 1.75, 1.75 * 0.05 * 0.02 * sqrt(0.1), DRAWS);
 }
@@ -291,7 +291,7 @@ static void test_turn_rates(void)
         particle_state from = standing();
         from.f[F_TURN] = cfg.turn_sd = 0.25f;
         cfg.turn_time = 2.0f;
-        spread_after(&d, &from, steps[k], 1.0f, 0.1f, sampled[0]);
+        sample_after(&d, &from, steps[k], 1.0f, 0.1f, sampled[0]);
         double as_before = 0.0, straight = 0.0, square = 0.0;
         for (int i = 0; i < DRAWS; i++) {
             double const rate = sampled[0][F_TURN][i];
@@ -302,7 +302,7 @@ static void test_turn_rates(void)
         CHECK_NEAR(as_before / DRAWS, kept, 2.25 / sqrt(DRAWS));
         CHECK_NEAR(straight / DRAWS, other, 2.25 / sqrt(DRAWS));
         CHECK_NEAR(square, other * 0.0625, 4.5 * 0.0625 * sqrt(3.0 * other / DRAWS));
-        spread_after(&d, &from, steps[k], steps[k], 0.0f, sampled[0]);     /* one step, of age 0 */
+        sample_after(&d, &from, steps[k], steps[k], 0.0f, sampled[0]);     /* one step, of age 0 */
         CHECK_NEAR(moments_of(sampled[0][F_TURN], DRAWS).var, 0.0, 1e-12); /* all as before */
     }
 }
@@ -329,7 +329,7 @@ static void test_independent(void)
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 50), other = quiet(GAIT_MODE_DEFAULT, 51);
     particle_state const from = standing();
     noisy();
-    spread_after(&d, &from, 0.04f, 0.04f, 0.0f, sampled[0]);
+    sample_after(&d, &from, 0.04f, 0.04f, 0.0f, sampled[0]);
     for (int a = 0; a < FIELDS; a++)
         for (int b = 0; b < a; b++) {
             moments const x = moments_of(sampled[0][a], DRAWS), y = moments_of(sampled[0][b], DRAWS);
@@ -385,7 +385,7 @@ int main(void)
     test_pace();
     test_rate();
     test_paper_way();
-    test_spread();
+    test_variances();
     test_stationary();
     test_slow();
     test_frame_rate();

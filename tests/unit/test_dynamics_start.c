@@ -52,7 +52,7 @@ static void test_draw(void)
         }
 }
 
-/* No deviation: every particle is the mean, pelvis and all. */
+/* With a standard deviation of 0 every particle is the mean, including the pelvis. */
 static void test_draw_exact(void)
 {
     for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
@@ -83,7 +83,7 @@ static void test_draw_level(void)
     check_moments(moments_of(v, DRAWS), 0.06 * trust, sqrt(trust) * 0.04, DRAWS);
 }
 
-/* Unknown phase and heading are uniform over the circle; wild rates and statures stay possible. */
+/* Unknown phase and heading are uniform over the circle; extreme rates and statures stay possible. */
 static void test_draw_broad(void)
 {
     dynamics const d = quiet(GAIT_MODE_DEFAULT, 7);

@@ -1,4 +1,4 @@
-/* What likelihoods say of weighted particles: against libm's sums, whatever their number; broken ones; annealing. */
+/* Evidence of weighted particles against sums by libm for any number of particles; likelihoods that are not finite; annealing. */
 #include "filter/evidence.h"
 #include "toy_filter.h"
 
@@ -41,7 +41,7 @@ static void test_mean(void)
     }
 }
 
-/* Impossible particles weigh, but say nothing; where all are, there is no evidence. */
+/* Impossible particles keep their weight but add no evidence; if all are impossible there is no evidence. */
 static void test_broken(void)
 {
     static const float broken[] = {NAN, -INFINITY, -2e30f};

@@ -115,7 +115,7 @@ static void test_square(void)
     }
 }
 
-/* A grey picture says as much as the same picture in three equal channels, where it grew brighter. */
+/* A grey image gives the same foreground as the same image in three equal channels, where it grew brighter. */
 static void test_channels(void)
 {
     int32_t total[2];

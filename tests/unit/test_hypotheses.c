@@ -11,7 +11,7 @@ static gait_tracker *begin(float phase_sd)
 {
     gait_tracker_config cfg = toy_config(1);
     cfg.particles = N;
-    return film_doubtful(&cfg, phase_sd);
+    return film_uncertain(&cfg, phase_sd);
 }
 
 static double weight_of(const gait_tracker *t, int32_t from, int32_t to)
@@ -142,7 +142,7 @@ static void test_a_search_takes_more(void)
     gait_error err;
     cfg.particles = N;
     cfg.acquisition_particles = 3 * N;
-    gait_tracker *const t = film_doubtful(&cfg, 0.5f), *const other = film_doubtful(&cfg, 0.5f);
+    gait_tracker *const t = film_uncertain(&cfg, 0.5f), *const other = film_uncertain(&cfg, 0.5f);
     for (int n = 0; n < 45; n++) {
         gait_estimate e[2];
         bool const open = t->core->hypotheses.stage != HYPOTHESES_ONE;

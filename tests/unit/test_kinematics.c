@@ -16,7 +16,7 @@ static gait_state random_state(uint32_t i)
     rng_normal4(9, 1, 0, i, 0, x);
     rng_normal4(9, 2, 0, i, 0, y);
     return (gait_state){.phase = u[0],
-                        .stride_hz = 0.6f + 0.6f * u[3], /* four deviations either way */
+                        .stride_hz = 0.6f + 0.6f * u[3], /* four standard deviations either way */
                         .stature = 1.5f + 0.5f * u[1],
                         .heading = 6.28f * (u[2] - 0.5f),
                         .pitch = 0.1f * x[0],
@@ -156,7 +156,7 @@ static void test_curves(void)
     CHECK(isfinite(mean_at(3e30f, 2, score)[0]));
 }
 
-/* Half a stride later the walker is its own mirror image. */
+/* Half a stride later the person is their own mirror image. */
 static void test_mirror(void)
 {
     const gait_model *const m = toy_model();
@@ -257,7 +257,7 @@ static void test_shoulder_rotation(void)
     }
 }
 
-/* Heading turns the walker about z, pitch leans it forward, roll lifts its left side. */
+/* Heading rotates the body about z, pitch leans it forward, roll lifts its left side. */
 static void test_placement(void)
 {
     const gait_model *const m = driven(-1);
@@ -291,7 +291,7 @@ static void test_pelvis_height(void)
     }
 }
 
-/* The toy walker stands on its ground: feet never below it, one always near it. */
+/* The toy person stands on the ground: feet never below it, one always near it. */
 static void test_ground(void)
 {
     const gait_model *const m = toy_model();
@@ -306,7 +306,7 @@ static void test_ground(void)
     }
 }
 
-/* A state without a rate, and one at the mean rate, have the mean cycle; beyond two deviations nothing changes. */
+/* A state without a rate, and one at the mean rate, have the mean cycle; beyond two standard deviations nothing changes. */
 static void test_pace(void)
 {
     const gait_model *const plain = toy_model(), *const m = toy_shifted();

@@ -10,13 +10,13 @@
 /* Any phases, scores and angles; now and then a huge one. */
 static kin_input random_input(uint32_t round)
 {
-    static const float odd[] = {1e30f, -1e30f, 9000.0f, 1e38f};
+    static const float extreme[] = {1e30f, -1e30f, 9000.0f, 1e38f};
     kin_input in;
     float *const v = (float *)(void *)&in;
     for (uint32_t i = 0; i < sizeof in / sizeof *v; i++) {
         float x[4];
         rng_normal4(41, 0, 0, i, round, x);
-        v[i] = x[1] > 2.5f && round % 2 ? odd[i % 4] : x[0];
+        v[i] = x[1] > 2.5f && round % 2 ? extreme[i % 4] : x[0];
     }
     for (int lane = 0; lane < BLOCK; lane++)
         in.stature[lane] = 1.5f + 0.01f * (float)lane;

@@ -1,4 +1,4 @@
-/* Depth order: by hand on rectangles, by brute force on the toy walker. */
+/* Depth order: by hand on rectangles, by brute force on the toy person. */
 #include "api/kernels.h"
 #include "raster/layers.h"
 
@@ -135,8 +135,8 @@ static void test_hiding(void)
     CHECK(drawn.whole.first == drawn.whole.last && count(&drawn.whole) == 0);
 }
 
-/* The walker: every cell belongs to the nearest limb whose polygon covers it. */
-static void test_walker(void)
+/* The toy person: every cell belongs to the nearest limb whose polygon covers it. */
+static void test_person(void)
 {
     const gait_model *const m = toy_model();
     gait_tracker_config cfg;
@@ -191,6 +191,6 @@ int main(void)
     test_cells();
     test_columns();
     test_hiding();
-    test_walker();
+    test_person();
     return CHECK_DONE();
 }

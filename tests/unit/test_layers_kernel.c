@@ -1,4 +1,4 @@
-/* Outlines, edges and masks of every instruction set against the scalar ones: walkers, and any bits as coordinates. */
+/* Outlines, edges and masks of every instruction set against the scalar ones: toy people, and any bits as coordinates. */
 #include "kernel_check.h"
 #include "raster/layers.h"
 
@@ -14,7 +14,7 @@ static layers drawn[BLOCK];
 static _Alignas(GAIT_ALIGN) unsigned char memory[sizeof(layers_block) + sizeof(outline_block) +
                                                  sizeof(layers) + 2 * GUARD];
 
-/* Rows beyond a mask's are nobody's: each set may have drawn others in vain. */
+/* Rows outside a mask are undefined: each instruction set may have written others. */
 static bool same_mask(const grid_mask *a, const grid_mask *b)
 {
     bool same = a->first == b->first && a->last == b->last && a->column == b->column && a->width == b->width;
@@ -33,7 +33,7 @@ static bool same_layers(const layers *a, const layers *b, int32_t count)
                           (size_t)(MODEL_MAX_LIMBS - count) * sizeof *a->visible) == 0;
 }
 
-/* Each other set draws the block as `outline`, `edges` and `drawn` say. */
+/* Each other set draws the block as in `outline`, `edges` and `drawn`. */
 static void compare_layers(const limb_geometry *limbs, int32_t count)
 {
     memset(&edges, 0xa5, sizeof edges);
@@ -55,7 +55,7 @@ static void compare_layers(const limb_geometry *limbs, int32_t count)
 }
 
 /* Bodies of a block, each lane another, some of them at or behind the camera. */
-static void walkers(int round, const state_layout *rule, particle_set *p)
+static void people(int round, const state_layout *rule, particle_set *p)
 {
     for (int32_t i = 0; i < BLOCK; i++) {
         gait_state s = toy_walk(0.13f * (float)round + 0.21f * (float)i);
@@ -68,7 +68,7 @@ static void walkers(int round, const state_layout *rule, particle_set *p)
     }
 }
 
-static void test_walkers(void)
+static void test_people(void)
 {
     const gait_model *const m = toy_model();
     gait_tracker_config cfg;
@@ -82,7 +82,7 @@ static void test_walkers(void)
     for (int round = 0; round < 30; round++) {
         gait_camera const cam = toy_camera(round % 2);
         view_map const map = {.scale = 1.4f, .u0 = 85.0f + (float)round, .v0 = 60.0f};
-        walkers(round, &rule, &p);
+        people(round, &rule, &p);
         particle_set_bodies(&rule, &p, 0, &body);
         memset(&outline, 0xa5, sizeof outline);
         isa_scalar()->outline_project(limbs, m->limbs, &body, &cam, &map, &outline);
@@ -96,7 +96,7 @@ static void test_walkers(void)
 }
 
 /* Any bits, and the numbers at which something changes. */
-static float odd(uint32_t index, uint32_t draw)
+static float extreme(uint32_t index, uint32_t draw)
 {
     static const float numbers[] = {NAN,   INFINITY, -INFINITY, 1e30f,  FLT_MAX, 0.0f,  -0.0f,
                                     31999, -32001,   127.5f,    128.0f, 256.5f,  1e-40f};
@@ -110,18 +110,18 @@ static float odd(uint32_t index, uint32_t draw)
                            : (float)(r[2] % 300000) / 1000.0f - 20.0f;
 }
 
-static void odd_limb(uint32_t l, uint32_t round, outline_lanes *out)
+static void extreme_limb(uint32_t l, uint32_t round, outline_lanes *out)
 {
     for (uint32_t k = 0; k < RAST_MAX_VERTICES; k++)
         for (uint32_t lane = 0; lane < BLOCK; lane++) {
             uint32_t const i = (l * RAST_MAX_VERTICES + k) * BLOCK + lane;
-            out->x[k][lane] = odd(i, 4 * round);
-            out->y[k][lane] = odd(i, 4 * round + 1);
+            out->x[k][lane] = extreme(i, 4 * round);
+            out->y[k][lane] = extreme(i, 4 * round + 1);
         }
     for (uint32_t lane = 0; lane < BLOCK; lane++) {
         uint32_t const i = l * BLOCK + lane;
         out->depth[lane] =
-            round % 2 ? f_min(odd(i, 4 * round + 2), 1e30f) : (float)(i * 7 % 5); /* many are equal */
+            round % 2 ? f_min(extreme(i, 4 * round + 2), 1e30f) : (float)(i * 7 % 5); /* many are equal */
     }
 }
 
@@ -132,7 +132,7 @@ static void test_garbage(void)
     for (uint32_t round = 0; round < 40; round++) {
         int32_t const count = (int32_t)(round * 7 % (MODEL_MAX_LIMBS + 1));
         for (uint32_t l = 0; l < MODEL_MAX_LIMBS; l++) {
-            odd_limb(l, round, &outline.limb[l]);
+            extreme_limb(l, round, &outline.limb[l]);
             limbs[l].shape = (l + round) % 3 ? LIMB_CONE : LIMB_ELLIPSOID;
         }
         compare_layers(limbs, count);
@@ -149,7 +149,7 @@ static void test_garbage(void)
 
 int main(void)
 {
-    test_walkers();
+    test_people();
     test_garbage();
     return CHECK_DONE();
 }

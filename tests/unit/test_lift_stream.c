@@ -83,7 +83,7 @@ static void test_follows(int32_t lag)
     c.lag = lag;
     gait_lift *const l = toy_lift_open(&c);
     int const span =
-        (TOY_FRAMES_SEEN - 1) * RATE / (int)TOY_FPS + 1; /* frames until a first segment is whole */
+        (TOY_SEGMENT_FRAMES - 1) * RATE / (int)TOY_FPS + 1; /* frames until a first segment is whole */
     double error = 0.0, worst = 0.0;
     int count = 0;
     for (int i = 0; i < STREAM; i++) {
@@ -131,7 +131,8 @@ static void test_pauses(void)
     CHECK(gait_lift_estimate(l, &out, NULL) != GAIT_OK || out.status == GAIT_TRACK_INIT);
     for (int i = 90; i < STREAM; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING && out.frame < 30);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING &&
+          out.frame < 30);
     CHECK(error_of(&out, &worst) < 0.06);
     CHECK(push(l, &c, STREAM + 60, 1.0) == GAIT_OK); /* two seconds later */
     CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_INIT && out.frame == 0);

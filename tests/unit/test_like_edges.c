@@ -81,7 +81,7 @@ static void test_direction(void)
         CHECK_NEAR(like_edges.log_likelihood(&b), -0.5, 0.03);
         edge_field(angle, 0.0, false);
         CHECK_NEAR(like_edges.log_likelihood(&b), -1.0, 1e-6);
-        CHECK(like_edges.support(&b) < 0.0f); /* a picture without edges shows nobody */
+        CHECK(like_edges.support(&b) < 0.0f); /* an image without edges shows no person */
     }
 }
 

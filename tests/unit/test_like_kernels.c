@@ -26,7 +26,7 @@ static float uniform(uint32_t index, uint32_t what)
 
 /* ---- points of a limb ---- */
 
-/* Bodies of a block: about the walker, turned anyhow, some near the camera or behind it. */
+/* Bodies of a block: around the toy person, rotated at random, some near the camera or behind it. */
 static void bodies(uint32_t round)
 {
     gait_state s = toy_walk(0.5f);
@@ -56,7 +56,7 @@ static void bodies(uint32_t round)
 }
 
 /* One surface point of one lane as it was written down first: no half is left out. */
-static int8_t look(int32_t l, int32_t i, int32_t lane)
+static int8_t sample(int32_t l, int32_t i, int32_t lane)
 {
     const like_surface *const s = &v->setup.surface[l];
     int32_t const f = v->setup.geometry[l].frame;
@@ -92,7 +92,7 @@ static int8_t look(int32_t l, int32_t i, int32_t lane)
     return (int8_t)((top * (256 - (b & 255)) + low * (b & 255)) / 65536);
 }
 
-/* The region turned so that the walker leaves it on one side, or is small in it. */
+/* The region turned so that the person leaves it on one side, or is small in it. */
 static void shift_region(uint32_t round)
 {
     static const float scale[] = {1.4f, 0.4f, 2.0f};
@@ -138,7 +138,7 @@ static void test_sample(void)
             for (int32_t l = 0; l < TOY_LIMBS; l++)
                 for (int32_t i = 0; i < LIKE_SAMPLES; i++) {
                     int32_t const at = (i - 2 * want[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
-                    int8_t const value = look(l, i, lane);
+                    int8_t const value = sample(l, i, lane);
                     missing += at >= LIKE_HALF && value != TEXTURE_HIDDEN;
                     if (at < LIKE_HALF && value != want[l].value[at]) {
                         bool const flip = value == TEXTURE_HIDDEN || want[l].value[at] == TEXTURE_HIDDEN;
@@ -290,9 +290,9 @@ static like_edge_tally walk_limbs(int32_t lane)
 static float corner(uint32_t round, uint32_t at)
 {
     static const float simd_f64[] = {128.0f, 300.0f, 1e5f, 1e7f, 0.2f, 128.0f};
-    static const float odd[] = {NAN, INFINITY, -INFINITY, 256.0f, 0.0f, -0.0f};
+    static const float extreme[] = {NAN, INFINITY, -INFINITY, 256.0f, 0.0f, -0.0f};
     uint32_t const pick = draw(at, round + 9000);
-    return round % 8 == 7 && pick % 5 == 0 ? odd[pick / 5 % 6]
+    return round % 8 == 7 && pick % 5 == 0 ? extreme[pick / 5 % 6]
                                            : 128.0f + simd_f64[round % 6] * uniform(at, round + 5000);
 }
 

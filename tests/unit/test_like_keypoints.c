@@ -1,4 +1,4 @@
-/* Joints found by somebody else: what the term says of one body, and that a tracker which is given them does better. */
+/* Keypoints of a detector: the term for one body, and that a tracker does better with them. */
 #include "toy_error.h"
 #include "toy_body.h"
 
@@ -24,7 +24,7 @@ static void detect(const gait_camera *cam, const gait_state *s, float noise, uin
 /* ---- the term ---- */
 static float points[GAIT_MAX_JOINTS][3][BLOCK];
 
-static like_body look_through(toy_body *v, int lane)
+static like_body toy_view(toy_body *v, int lane)
 {
     return (like_body){.setup = &v->setup,
                        .features = &v->f,
@@ -38,7 +38,7 @@ static void test_cost(void)
     toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
     gait_state const s = toy_walk(0.3f);
     gait_pose pose;
-    like_body const b = look_through(v, 3);
+    like_body const b = toy_view(v, 3);
     CHECK(like_keypoints.flag == GAIT_TERM_KEYPOINTS && strcmp(like_keypoints.name, "keypoints") == 0);
     CHECK(gait_model_pose(toy_model(), &s, &pose, NULL) == GAIT_OK);
     v->f.keypoints = (features_keypoints){0};
@@ -73,7 +73,7 @@ static error follow(const given *g, uint64_t *digest)
 {
     gait_tracker_config cfg = toy_config(1);
     cfg.terms = g->terms;
-    cfg.term_weight[2] = 1.0f; /* an image that says little */
+    cfg.term_weight[2] = 1.0f; /* an image with little evidence */
     cfg.term_weight[4] = 8.0f;
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
     gait_keypoint track[GAIT_MAX_JOINTS];
@@ -90,7 +90,7 @@ static error follow(const given *g, uint64_t *digest)
         f.keypoints[0] = g->keypoints ? track : NULL;
         CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
         if (n >= 15)
-            look(&e, n, &out);
+            measure_error(&e, n, &out);
     }
     *digest = gait_tracker_digest(t);
     toy_tracker_free(t);
@@ -99,7 +99,7 @@ static error follow(const given *g, uint64_t *digest)
 
 static void test_tracker(void)
 {
-    uint64_t plain, ignored, alone, helped, odd;
+    uint64_t plain, ignored, alone, helped, outliers;
     given g = {.terms = GAIT_TERM_EDGES, .noise = 1.0f};
     error const edges = follow(&g, &plain);
     g.keypoints = true;
@@ -108,10 +108,10 @@ static void test_tracker(void)
     g.terms = GAIT_TERM_EDGES | GAIT_TERM_KEYPOINTS;
     error const both = follow(&g, &helped);
     g.strange = true;
-    error const strange = follow(&g, &odd);
+    error const strange = follow(&g, &outliers);
     g = (given){.terms = GAIT_TERM_KEYPOINTS, .noise = 1.0f, .keypoints = true};
     error const tracks = follow(&g, &alone);
-    CHECK(helped != plain && odd != helped && alone != helped);
+    CHECK(helped != plain && outliers != helped && alone != helped);
     CHECK(both.joint < 0.8 * edges.joint && both.joint < 0.04);
     CHECK(strange.joint < 1.5 * both.joint && tracks.joint < 0.05);
 }

@@ -84,7 +84,7 @@ static void test_silent(void)
     CHECK(like_silhouette.flag == GAIT_TERM_SILHOUETTE);
 }
 
-/* The walker on its wall: nearly all its area is found, and nearly nothing else. */
+/* The person before the wall: nearly all its area is found, and nearly nothing else. */
 static void test_scene(void)
 {
     static uint8_t wall[SCENE_PIXELS], shot[SCENE_PIXELS];
@@ -99,7 +99,7 @@ static void test_scene(void)
         CHECK(like_silhouette.log_likelihood(&b) > -0.3f);
         CHECK(like_silhouette.support(&b) > 0.1f);
         gait_state away = s;
-        away.pelvis[0] += 0.6f; /* both wrong: the body on the wall, the walker unexplained */
+        away.pelvis[0] += 0.6f; /* both wrong: the body on the wall, the person unexplained */
         away.pelvis[1] += 0.4f;
         like_body const c = toy_body_body(v, &away);
         CHECK(like_silhouette.log_likelihood(&c) < -0.7f);

@@ -86,8 +86,8 @@ static void test_sample(void)
             }
             incidence /= sqrtf(range);
             camera_project(&v->cam, p, uv);
-            int32_t const at_half = (i - 2 * v->seen[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
-            int8_t const have = at_half < LIKE_HALF ? v->seen[l].value[at_half] : TEXTURE_HIDDEN;
+            int32_t const at_half = (i - 2 * v->patch[l].turn + LIKE_SAMPLES) % LIKE_SAMPLES;
+            int8_t const have = at_half < LIKE_HALF ? v->patch[l].value[at_half] : TEXTURE_HIDDEN;
             int32_t const id = ids[(int32_t)(uv[1] + 0.5f) * SCENE_W + (int32_t)(uv[0] + 0.5f)];
             if (incidence < 0.15f) {
                 back++;
@@ -136,7 +136,8 @@ static void test_costs(void)
 {
     const like_setup *const s = &toy_body_new(0, GAIT_MODE_DEFAULT)->setup;
     int32_t wrong = 0;
-    for (int d = 0; d < LIKE_COSTS; d++) { /* Student-t, 4 degrees of freedom, scale half a local deviation */
+    for (int d = 0; d < LIKE_COSTS;
+         d++) { /* Student-t, 4 degrees of freedom, scale half a local standard deviation */
         double const r = d / 16.0;
         wrong += fabs(s->robust.one[d] - LIKE_COUNT_ONE - 2.5 * log(1.0 + r * r / 4.0) * LIKE_COST_ONE) > 0.6;
         wrong += s->square.one[d] != LIKE_COUNT_ONE + d * d;
@@ -198,13 +199,13 @@ static void score(toy_body *v, int frame, float sum[SHAPES][3][IMAGE_TERMS])
     toy_body_at(v, before, wall);
     toy_body_body(v, &true_before);
     template_clear(template, TOY_LIMBS);
-    template_update(template, TOY_LIMBS, v->seen);
+    template_update(template, TOY_LIMBS, v->patch);
     template_ring(template, TOY_LIMBS, known);
     for (int k = 0; k < SHAPES; k++)
         for (int sign = -1; sign <= 1; sign++) {
             gait_state const s = displaced(v, frame - 1, k, sign);
             toy_body_body(v, &s);
-            memcpy(ancestor[k][sign + 1], v->seen, sizeof v->seen);
+            memcpy(ancestor[k][sign + 1], v->patch, sizeof v->patch);
         }
     toy_body_at(v, now, wall);
     for (int k = 0; k < SHAPES; k++)
@@ -230,7 +231,7 @@ static void check_camera(int camera)
     }
     for (int i = 0; i < IMAGE_TERMS; i++)
         for (int k = 0; k < SHAPES; k++) {
-            /* Texture alone hardly tells a posture: both frames are wrong alike. */
+            /* Texture alone hardly determines the posture: both frames are wrong in the same way. */
             float const margin = i == 0 ? (k > 8 ? -0.4f : 0.1f) : i == 1 ? 0.03f : 0.06f;
             float const nearer = f_max(sum[k][0][i], sum[k][2][i]);
             if (!(sum[k][1][i] > nearer + margin))
@@ -240,7 +241,7 @@ static void check_camera(int camera)
         }
 }
 
-/* Weights and selection of the terms; where a walker is there is more support than where none is. */
+/* Weights and selection of the terms; there is more support where a person is than where no person is. */
 static void test_sum(void)
 {
     toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
@@ -250,7 +251,7 @@ static void test_sum(void)
     toy_body_aim(v, &s);
     toy_body_at(v, now, wall);
     like_body b = toy_body_body(v, &s);
-    b.ancestor = v->seen;
+    b.ancestor = v->patch;
     for (uint32_t set = 0; set < 16; set++) {
         double want = 0.0, support = 0.0;
         v->setup.terms = set;
@@ -265,7 +266,7 @@ static void test_sum(void)
         CHECK_NEAR(like_support(&b), support, 1e-4);
     }
     CHECK(like_support(&b) > 0.5f);
-    toy_body_at(v, wall, wall); /* nobody there */
+    toy_body_at(v, wall, wall); /* no person there */
     b = toy_body_body(v, &s);
     CHECK(like_support(&b) < -0.5f);
 }

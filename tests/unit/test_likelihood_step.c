@@ -134,7 +134,7 @@ static void test_ancestor(void)
             for (int32_t k = 0; k < LIKE_HALF && a->turn == b->turn; k++)
                 shared += a->value[k] != TEXTURE_HIDDEN && b->value[k] != TEXTURE_HIDDEN;
         }
-        CHECK(shared > 60);      /* the same walker a frame later */
+        CHECK(shared > 60);      /* the same person a frame later */
         if (i == 5 || i == 25) { /* worked out again from the samples */
             like_body const b = {.setup = t->like,
                                  .features = &t->camera[0].features,

@@ -1,4 +1,4 @@
-/* The exchange of left and right: the mirrored body half a stride on, at the same place. */
+/* The mirror of left and right: the mirrored body half a stride on, at the same place. */
 #include "api/kernels.h"
 #include "filter/mirror.h"
 

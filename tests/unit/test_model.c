@@ -220,7 +220,7 @@ static gait_result open_shifted(uint32_t rows, uint32_t columns, uint32_t shifts
     return model_open(buf, toy_finish(&f), m, err);
 }
 
-/* PACE of `terms` by `channels` numbers and so much deviation of the stride rate in an otherwise sound model. */
+/* PACE of `terms` by `channels` numbers and a given standard deviation of the stride rate in an otherwise sound model. */
 static gait_result open_paced(uint32_t terms, uint32_t channels, const float *series, float rate_sd,
                               gait_model *m, gait_error *err)
 {
@@ -244,7 +244,7 @@ static bool pace_refused(uint32_t terms, uint32_t channels, const float *series,
            strstr(err.text, "PACE");
 }
 
-/* A Fourier series that the phases can show, of moderate numbers, and a deviation of the rate to count in. */
+/* A Fourier series that the phases can show, of moderate numbers, and a standard deviation of the rate as its unit. */
 static void test_pace(void)
 {
     static float series[9 * (TOY_CHANNELS + 1)];
@@ -277,10 +277,10 @@ static void test_pace_unfolds(void)
         series[i * TOY_CHANNELS + channel] = a[i];
     CHECK(open_paced(5, TOY_CHANNELS, series, 0.07f, &m, NULL) == GAIT_OK);
     arena count = {.base = NULL}, small = {.base = place, .cap = sizeof m},
-          room = {.base = place, .cap = sizeof place};
+          own_memory = {.base = place, .cap = sizeof place};
     CHECK(!model_layout(&count, &m) && !model_layout(&small, &m) && small.overflow);
-    const gait_model *const own = model_layout(&room, &m);
-    CHECK(own && own->pace_curve && room.used == count.used);
+    const gait_model *const own = model_layout(&own_memory, &m);
+    CHECK(own && own->pace_curve && own_memory.used == count.used);
     for (int j = 0; own && j < m.phases; j++) {
         double const turn = 2.0 * TOY_PI * j / m.phases;
         double const want =
@@ -333,7 +333,7 @@ static void test_proportions(void)
         CHECK(open_proportions(1, columns, &m, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "PROP"));
 }
 
-/* Every section but META is needed; without PROP everybody has the same proportions. */
+/* Every section but META is needed; without PROP all people have the same proportions. */
 static void test_missing(void)
 {
     for (size_t i = 1; i < TOY_SECTIONS; i++) {

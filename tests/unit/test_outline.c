@@ -198,7 +198,7 @@ static void test_behind(void)
         }
 }
 
-/* ---- the toy walker in many poses, against its projected ends and surface ---- */
+/* ---- the toy person in many poses, against its projected ends and surface ---- */
 typedef struct view_of_limb {
     const float *R, *o;
     float scale;
@@ -271,7 +271,7 @@ static void check_limb(const limb_geometry *g, const view_of_limb *v, const limb
     f->simd_f64 = fmax(f->simd_f64, -touch / size);
 }
 
-static void test_walker(void)
+static void test_person(void)
 {
     const gait_model *const m = toy_model();
     limb_geometry limbs[MODEL_MAX_LIMBS];
@@ -363,7 +363,7 @@ int main(void)
     test_pointing_cone();
     test_ellipsoid();
     test_behind();
-    test_walker();
+    test_person();
     test_lanes();
     return CHECK_DONE();
 }

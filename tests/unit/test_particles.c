@@ -139,7 +139,7 @@ static void test_root_channel(void)
     CHECK(isfinite(root_channel(m, ROOT_HEIGHT, NAN, 0.0f, NULL, 0)));
 }
 
-/* Bodies of a population are those of the particles' states, and the tail repeats the last. */
+/* Bodies of a particle set are those of the particles' states, and the tail repeats the last. */
 static void test_bodies(void)
 {
     enum { N = 21 };

@@ -84,7 +84,7 @@ static void test_broken(void)
         pf_resample_systematic(&p, 123456789u);
         for (int i = 0; i < N; i++)
             CHECK(p.parent[i] != 2 && p.parent[i] != 5 && p.weight[i] == 0.125);
-        /* All of them: the weights are left alone, and that is told. */
+        /* All of them: the weights stay unchanged, and the summary reports it. */
         pf_uniform(&p);
         for (uint32_t i = 0; i < N; i++)
             ll[i] = 3.0f * uniform(i, 1);
@@ -111,7 +111,7 @@ static void test_single(void)
             pf p = toy_filter(N);
             float ll[N];
             for (int i = 0; i < N; i++)
-                ll[i] = i == at ? 0.0f : -2000.0f; /* below what exp() can tell from 0 */
+                ll[i] = i == at ? 0.0f : -2000.0f; /* exp() of it is 0 */
             pf_summary const s = pf_update(&p, ll);
             CHECK(s.best == at && p.weight[at] == 1.0 && s.ess == 1.0);
             if (multinomial)

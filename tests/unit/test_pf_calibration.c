@@ -10,11 +10,11 @@ static void linear_ranks(double claimed, double chi2[DIM])
     static double value[TOY_MOST];
     int32_t count[DIM][RANKS] = {{0}};
     linear const s = linear_new(DIM, 0.25);
-    linear told = s;
-    told.R = claimed;
+    linear assumed = s;
+    assumed.R = claimed;
     for (uint64_t run = 0; run < RUNS; run++) {
         linear_world w = linear_start(&s, 3000 + run);
-        linear_filter f = linear_filter_new(&told, N, 3000 + run);
+        linear_filter f = linear_filter_new(&assumed, N, 3000 + run);
         for (int t = 0; t < STEPS; t++) {
             linear_next(&w);
             linear_filter_step(&f, &w);

@@ -1,5 +1,5 @@
 /* Simulation-based calibration of the library's dynamics (Talts et al. 2018): truths walk by eqs. 5-9 written
- * out here in double precision, every field is seen with normal noise, and the truth ranks uniformly among
+ * out here in double precision, every field is observed with normal noise, and the truth ranks uniformly among
  * draws of the filter's posterior: an error in the prior, the motion, the weights or resampling shows. */
 #include "toy_crowd.h"
 
@@ -7,7 +7,7 @@ enum { FIELDS = F_COEF + 4, FRAMES = 5, NORMALS = 16 };
 
 static const double DT = 0.1, PI = 3.14159265358979324;
 
-/* Deviations of the start. */
+/* Standard deviations of the start. */
 static const double start_sd[FIELDS] = {
     [F_PHASE] = 0.05,  [F_RATE] = 0.05,    [F_X] = 0.1,        [F_Y] = 0.1,        [F_Z] = 0.02,
     [F_HEADING] = 0.2, [F_PITCH] = 0.05,   [F_ROLL] = 0.05,    [F_STATURE] = 0.05, [F_TURN] = 0.3,
@@ -56,7 +56,8 @@ static double relaxed(double x, double tau, double noise, double n)
  * +- 0.03 m) are two measurements of one thing. */
 static void truth_start(const state_layout *rule, const gait_state *mean, const double n[NORMALS], double *x)
 {
-    double const floor = 0.03, doubt = start_sd[F_Z], trust = floor * floor / (floor * floor + doubt * doubt);
+    double const floor = 0.03, height_sd = start_sd[F_Z],
+                 trust = floor * floor / (floor * floor + height_sd * height_sd);
     double s[FIELDS];
     for (int f = 0; f < FIELDS; f++)
         s[f] = start_sd[f] * n[f];
@@ -103,11 +104,12 @@ static void truth_move(const gait_model *m, const double n[NORMALS], double *x)
     x[F_STATURE] *= 1.0 + 0.03 * root * n[8];
     for (int k = 0; k < 2; k++)
         x[F_COEF + k] = relaxed(x[F_COEF + k], 2.0, 0.8, n[9 + k]);
-    x[F_COEF + 2] = relaxed(x[F_COEF + 2], 2.0 / (0.8 * 0.8), 0.8, n[11]);  /* stationary deviation 1 */
+    x[F_COEF + 2] =
+        relaxed(x[F_COEF + 2], 2.0 / (0.8 * 0.8), 0.8, n[11]); /* stationary standard deviation 1 */
     x[F_COEF + 3] = relaxed(x[F_COEF + 3], 2.0 / (1.2 * 1.2), 0.06, n[12]); /* 1.2 of 0.05 */
 }
 
-/* ---- what is seen: every field in every frame, `noise` times as uncertain as at the start ---- */
+/* ---- what is observed: every field in every frame, `noise` times as uncertain as at the start ---- */
 
 /* A field's difference from a value; of phase and heading the shorter way round. */
 static double apart(int field, double a, double b)
@@ -116,11 +118,11 @@ static double apart(int field, double a, double b)
     return turn > 0.0 ? a - b - turn * floor((a - b) / turn + 0.5) : a - b;
 }
 
-static float log_likelihood(const particle_state *w, const double seen[FIELDS], double noise)
+static float log_likelihood(const particle_state *w, const double observed[FIELDS], double noise)
 {
     double cost = 0.0;
     for (int f = 0; f < FIELDS; f++) {
-        double const z = apart(f, (double)w->f[f], seen[f]) / (noise * start_sd[f]);
+        double const z = apart(f, (double)w->f[f], observed[f]) / (noise * start_sd[f]);
         cost += 0.5 * z * z;
     }
     return (float)-cost;
@@ -151,7 +153,7 @@ static double lot(uint64_t run, int field, int32_t i)
     return 1e-9 * (double)n[0];
 }
 
-/* One truth, one filter; counts the truth's rank in every field, of the difference from what was seen
+/* One truth, one filter; counts the truth's rank in every field, of the difference from what was observed
  * last. */
 static void simulate(uint64_t run, int32_t particles, double noise, int32_t count[FIELDS][RANKS])
 {
@@ -160,7 +162,7 @@ static void simulate(uint64_t run, int32_t particles, double noise, int32_t coun
     gait_state const mean = toy_state(0.2f);
     dynamics const d = lively(run);
     crowd c = crowd_new(&d, particles);
-    double x[FIELDS], seen[FIELDS], n[NORMALS];
+    double x[FIELDS], observed[FIELDS], n[NORMALS];
     crowd_start(&c, &mean);
     normals(run, 100, 0, n);
     truth_start(&d.rule, &mean, n, x);
@@ -169,17 +171,17 @@ static void simulate(uint64_t run, int32_t particles, double noise, int32_t coun
         truth_move(toy_model(), n, x);
         normals(run, 102, t, n);
         for (int f = 0; f < FIELDS; f++)
-            seen[f] = x[f] + noise * start_sd[f] * n[f];
+            observed[f] = x[f] + noise * start_sd[f] * n[f];
         crowd_predict(&c, (float)DT, (float)(t * DT), (uint32_t)t);
         for (int32_t i = 0; i < particles; i++)
-            ll[i] = log_likelihood(c.now + i, seen, noise);
-        crowd_weigh(&c, ll);
+            ll[i] = log_likelihood(c.now + i, observed, noise);
+        crowd_update(&c, ll);
     }
     pf_resample_multinomial(&c.p, run, 103, 0);
     for (int f = 0; f < FIELDS; f++) {
         for (int32_t i = 0; i < particles; i++)
-            value[i] = apart(f, (double)c.now[i].f[f], seen[f]) + lot(run, f, i);
-        count[f][ranks_of(c.p.parent, value, apart(f, x[f], seen[f]) + lot(run, f, -1))]++;
+            value[i] = apart(f, (double)c.now[i].f[f], observed[f]) + lot(run, f, i);
+        count[f][ranks_of(c.p.parent, value, apart(f, x[f], observed[f]) + lot(run, f, -1))]++;
     }
 }
 
@@ -196,7 +198,7 @@ static void test_ranks(int32_t runs, int32_t particles, double noise)
 
 int main(void)
 {
-    test_ranks(2000, 256, 1e3); /* next to nothing is seen: prior and motion alone */
+    test_ranks(2000, 256, 1e3); /* next to nothing is observed: prior and motion alone */
     test_ranks(400, 4096, 3.5); /* particles enough for fourteen fields */
     return CHECK_DONE();
 }

@@ -1,17 +1,17 @@
-/* The library's own motion over many walkers against closed forms within 2 %: phase and
+/* The library's own motion over many particles against closed forms within 2 %: phase and
  * rate, then every field that relaxes.  With 10^5 draws 2 % are 4.5 standard errors of a variance. */
 #include "toy_filter.h"
 #include "toy_prior.h"
 
-enum { WALKERS = 100000, FIELDS = F_COEF + 4 };
+enum { PARTICLES = 100000, FIELDS = F_COEF + 4 };
 
-static double start[WALKERS], turned[WALKERS]; /* rate at the start; strides since */
-static double value[FIELDS][WALKERS];          /* at the end */
+static double start[PARTICLES], turned[PARTICLES]; /* rate at the start; strides since */
+static double value[FIELDS][PARTICLES];            /* at the end */
 
-/* Move everyone from `from`, the rate's deviation at the start aside, `steps` times. */
+/* Move every particle from `from`, with its own rate at the start, `steps` times. */
 static void move_all(const dynamics *d, const particle_state *from, float rate_sd, int32_t steps, float dt)
 {
-    for (int32_t i = 0; i < WALKERS; i += BLOCK) {
+    for (int32_t i = 0; i < PARTICLES; i += BLOCK) {
         particle_state w[BLOCK];
         double turns[BLOCK] = {0.0};
         for (int32_t lane = 0; lane < BLOCK; lane++) {
@@ -41,10 +41,10 @@ static void move_all(const dynamics *d, const particle_state *from, float rate_s
 
 static double covariance(const double *a, const double *b)
 {
-    double const ma = moments_of(a, WALKERS).mean, mb = moments_of(b, WALKERS).mean;
+    double const ma = moments_of(a, PARTICLES).mean, mb = moments_of(b, PARTICLES).mean;
     double sum = 0.0;
-    for (int i = 0; i < WALKERS; i++)
-        sum += (a[i] - ma) * (b[i] - mb) / WALKERS;
+    for (int i = 0; i < PARTICLES; i++)
+        sum += (a[i] - ma) * (b[i] - mb) / PARTICLES;
     return sum;
 }
 
@@ -53,9 +53,9 @@ static double worst; /* relative error of a variance */
 /* Within 2 % of a variance and within 4.5 standard errors of a mean. */
 static void check_law(const double *v, double mean, double var)
 {
-    moments const m = moments_of(v, WALKERS);
+    moments const m = moments_of(v, PARTICLES);
     worst = fmax(worst, fabs(m.var / var - 1.0));
-    CHECK_NEAR(m.mean, mean, 4.5 * sqrt(var / WALKERS) + 1e-5);
+    CHECK_NEAR(m.mean, mean, 4.5 * sqrt(var / PARTICLES) + 1e-5);
     CHECK_NEAR(m.var / var, 1.0, 0.02);
 }
 
@@ -88,7 +88,7 @@ static void test_integrated(void)
     }
 }
 
-/* A rate that returns to the population's: it keeps its stationary variance, forgets as exp(-t / tau), and
+/* A rate that returns to the mean of people: it keeps its stationary variance, forgets as exp(-t / tau), and
  * the phase is its sum: Langevin's formula for steps. */
 static void test_returning(void)
 {
@@ -111,7 +111,7 @@ static void test_returning(void)
     }
 }
 
-/* Whatever relaxes ends at noise^2 tau / 2, at any frame rate; proportions and posture at the deviations
+/* A field that relaxes ends at noise^2 tau / 2, at any frame rate; proportions and posture at the standard deviations
  * given. */
 static void test_stationary(void)
 {

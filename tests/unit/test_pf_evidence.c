@@ -4,7 +4,7 @@
 enum { RUNS = 200, STEPS = 20, N = 2000 };
 
 /* Mean of exp(log Z - log Z_Kalman) within three standard errors of 1, resampling now and then and in
- * every step.  So few steps keep its logarithm's deviation below 0.5 at this N. */
+ * every step.  So few steps keep the standard deviation of its logarithm below 0.5 at this N. */
 static void test_unbiased(void)
 {
     static const double thresholds[] = {0.5, 1.1};

@@ -1,4 +1,4 @@
-/* Phase alone, moved by the library's dynamics and seen ambiguously, against a filter on a grid. */
+/* Phase alone, moved by the library's dynamics and observed ambiguously, against a filter on a grid. */
 #include "toy_crowd.h"
 
 enum { CELLS = 4096, BINS = 32, FRAMES = 50, SEEDS = 3 };
@@ -8,9 +8,9 @@ static const double DT = 1.0 / 30.0, NOISE = 0.03,
 static const double FULL = 6.28318530717958648;
 
 /* Nearly as likely with the legs mirrored. */
-static double log_likelihood(double phase, double seen)
+static double log_likelihood(double phase, double observed)
 {
-    double const a = FULL * (phase - seen);
+    double const a = FULL * (phase - observed);
     return 0.02 * cos(a) + 0.8 * cos(2.0 * a);
 }
 
@@ -42,11 +42,11 @@ static void grid_predict(grid *g)
     }
 }
 
-static void grid_weigh(grid *g, double seen)
+static void grid_update(grid *g, double observed)
 {
     double total = 0.0;
     for (int i = 0; i < g->cells; i++) {
-        g->p[i] *= exp(log_likelihood((i + 0.5) / g->cells, seen));
+        g->p[i] *= exp(log_likelihood((i + 0.5) / g->cells, observed));
         total += g->p[i];
     }
     for (int i = 0; i < g->cells; i++)
@@ -85,8 +85,8 @@ static double distance(const double a[BINS], const double b[BINS])
     return sum;
 }
 
-/* What is seen of a walk. */
-static double seen_phase(uint64_t seed, int frame)
+/* What is observed of a walk. */
+static double observed_phase(uint64_t seed, int frame)
 {
     float n[4];
     rng_normal4(seed, 9, (uint32_t)frame, 0, 0, n);
@@ -100,7 +100,7 @@ static void grid_run(int cells, uint64_t seed, double bin[FRAMES][BINS])
     g = grid_even(cells);
     for (int t = 0; t < FRAMES; t++) {
         grid_predict(&g);
-        grid_weigh(&g, seen_phase(seed, t));
+        grid_update(&g, observed_phase(seed, t));
         grid_bins(&g, bin[t]);
     }
 }
@@ -120,8 +120,8 @@ static double particles_off(int32_t n, uint64_t seed, double exact[FRAMES][BINS]
     for (int t = 0; t < FRAMES; t++) {
         crowd_predict(&c, (float)DT, 1.0f, (uint32_t)t);
         for (int32_t i = 0; i < n; i++)
-            ll[i] = (float)log_likelihood((double)c.now[i].f[F_PHASE], seen_phase(seed, t));
-        crowd_weigh(&c, ll);
+            ll[i] = (float)log_likelihood((double)c.now[i].f[F_PHASE], observed_phase(seed, t));
+        crowd_update(&c, ll);
         crowd_bins(&c, bin);
         sum += distance(bin, exact[t]) / FRAMES;
     }
@@ -141,12 +141,12 @@ static void test_grid(void)
     CHECK(worst < 1e-3);
 }
 
-/* Probability of the half turn that does not lie about the phase seen last. */
-static double other_hypothesis(const double bin[BINS], double seen)
+/* Probability of the half turn that does not lie about the phase observed last. */
+static double other_hypothesis(const double bin[BINS], double observed)
 {
     double sum = 0.0;
     for (int k = 0; k < BINS / 2; k++)
-        sum += bin[(int)(BINS * (seen + 0.25) + k) % BINS];
+        sum += bin[(int)(BINS * (observed + 0.25) + k) % BINS];
     return sum;
 }
 
@@ -158,7 +158,7 @@ static void test_particles(void)
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         grid_run(CELLS, seed, exact);
         double const off = particles_off(TOY_MOST, seed, exact);
-        double const other = other_hypothesis(exact[FRAMES - 1], seen_phase(seed, FRAMES - 1));
+        double const other = other_hypothesis(exact[FRAMES - 1], observed_phase(seed, FRAMES - 1));
         CHECK(other > 0.05 && other < 0.95);
         CHECK(off <= 0.03);
         FIGURE("K5: total variation %.4f, other side %.3f\n", off, other);

@@ -4,7 +4,7 @@
 enum { SEEDS = 20, STEPS = 50, FEW = 2000, MANY = 10000 };
 
 /* The mean's error falls as 1 / sqrt(N) and is that of a correct filter (numpy twin: 6 .. 7 / sqrt(N));
- * the variance is right.  The slope is that of the mean logarithm: the mean square hangs on a few
+ * the variance is right.  The slope is that of the mean logarithm: the mean square depends on a few
  * surprising observations. */
 static void test_five(void)
 {

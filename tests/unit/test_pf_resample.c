@@ -198,7 +198,7 @@ static void test_seed(void)
     }
 }
 
-/* Largest tracker: 2^20 equal weights would overflow narrower tickets. */
+/* Largest tracker: 2^20 equal weights would overflow narrower cumulative weights. */
 static void test_largest(void)
 {
     enum { LARGEST = 1 << 20 };

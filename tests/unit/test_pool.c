@@ -113,7 +113,7 @@ typedef struct meeting {
     int open[2]; /* does the task's thread take SIGTERM? */
 } meeting;
 
-static void look(void *ctx, int32_t task)
+static void check_other(void *ctx, int32_t task)
 {
     meeting *const m = ctx;
     sigset_t now;
@@ -130,7 +130,7 @@ static void test_signals(void)
     meeting m = {.open = {0}};
     pthread_barrier_init(&m.both, NULL, 2);
     for (int round = 0; round < 20; round++) {
-        tasks.run(tasks.user, look, &m, 2);
+        tasks.run(tasks.user, check_other, &m, 2);
         CHECK(m.open[0] + m.open[1] == 1);
     }
     pthread_barrier_destroy(&m.both);

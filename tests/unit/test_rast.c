@@ -234,8 +234,8 @@ static void test_outside(void)
 /* Any bits as coordinates: no trap, and the spans stay inside the window. */
 static void test_garbage(void)
 {
-    static const float odd[] = {NAN,      INFINITY,  -INFINITY, 1e30f, -1e30f, FLT_MAX,
-                                16000.0f, -16000.0f, 0.0f,      -0.0f, 127.5f, 1e-40f};
+    static const float extreme[] = {NAN,      INFINITY,  -INFINITY, 1e30f, -1e30f, FLT_MAX,
+                                    16000.0f, -16000.0f, 0.0f,      -0.0f, 127.5f, 1e-40f};
     int32_t wrong = 0, huge = 0;
     for (uint32_t i = 0; i < 20000; i++) {
         float x[N], y[N];
@@ -246,8 +246,8 @@ static void test_garbage(void)
             uint32_t r[4];
             rng_bits(5, 0, 0, i, (uint32_t)k, r);
             memcpy(&x[k], &r[0], sizeof *x);
-            x[k] = r[2] % 4 ? odd[r[2] / 4 % (sizeof odd / sizeof *odd)] : x[k];
-            y[k] = r[3] % 4 ? odd[r[3] / 4 % (sizeof odd / sizeof *odd)] : (float)(r[1] % 200);
+            x[k] = r[2] % 4 ? extreme[r[2] / 4 % (sizeof extreme / sizeof *extreme)] : x[k];
+            y[k] = r[3] % 4 ? extreme[r[3] / 4 % (sizeof extreme / sizeof *extreme)] : (float)(r[1] % 200);
         }
         rast_convex(x, y, n, top, width, &s);
         wrong += s.first < top || s.last > top + GRID_SIZE || s.first > s.last;

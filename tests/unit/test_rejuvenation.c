@@ -81,7 +81,7 @@ static crowd first, second;
 static void test_mean_and_covariance_remain(void)
 {
     particle_set const from = normal_crowd(&first);
-    double const stature = mean(&first, F_STATURE), spread = covariance(&first, F_STATURE, F_STATURE);
+    double const stature = mean(&first, F_STATURE), variance = covariance(&first, F_STATURE, F_STATURE);
     double const both = covariance(&first, F_STATURE, F_X), score = covariance(&first, F_COEF, F_COEF);
     static crowd start;
     start = first;
@@ -91,14 +91,14 @@ static void test_mean_and_covariance_remain(void)
         memcpy(first.value, second.value, sizeof first.value);
     }
     CHECK_NEAR(mean(&first, F_STATURE), stature, 0.1 * 0.01);
-    CHECK_NEAR(covariance(&first, F_STATURE, F_STATURE) / spread, 1.0, 0.15);
+    CHECK_NEAR(covariance(&first, F_STATURE, F_STATURE) / variance, 1.0, 0.15);
     CHECK_NEAR(covariance(&first, F_STATURE, F_X) / both, 1.0, 0.15);
     CHECK_NEAR(covariance(&first, F_COEF, F_COEF) / score, 1.0, 0.15);
     double shared = 0.0; /* exp(-2.5) of who they were is left */
     for (int32_t i = 0; i < N; i++)
         shared += ((double)first.value[F_STATURE * N + i] - stature) *
                   ((double)start.value[F_STATURE * N + i] - stature);
-    CHECK_NEAR(shared / N / spread, 0.082, 0.06);
+    CHECK_NEAR(shared / N / variance, 0.082, 0.06);
 }
 
 static void test_angles_go_the_short_way(void)
@@ -114,7 +114,7 @@ static void test_angles_go_the_short_way(void)
     }
 }
 
-/* By weight: whoever has no descendants lends nothing. */
+/* By weight: a particle without descendants is never drawn. */
 static void test_others_are_drawn_by_weight(void)
 {
     particle_set const from = normal_crowd(&first);
@@ -130,7 +130,7 @@ static void test_others_are_drawn_by_weight(void)
 }
 
 /* Two modes far apart stay what they are. */
-static void test_modes_mingle_by_themselves(void)
+static void test_hypotheses_are_rejuvenated_separately(void)
 {
     particle_set const from = normal_crowd(&first);
     for (int32_t i = 0; i < N; i++) {
@@ -175,7 +175,7 @@ int main(void)
     test_mean_and_covariance_remain();
     test_angles_go_the_short_way();
     test_others_are_drawn_by_weight();
-    test_modes_mingle_by_themselves();
+    test_hypotheses_are_rejuvenated_separately();
     test_nothing_changes_without_time();
     return CHECK_DONE();
 }

@@ -1,4 +1,4 @@
-/* When a tracker's particles mingle: after they were drawn by weight, within a mode, never in paper mode. */
+/* When a tracker rejuvenates its particles: after resampling, within a hypothesis, never in paper mode. */
 #include "tracker/hypotheses.h"
 
 #include "toy_film.h"
@@ -9,7 +9,7 @@ static gait_tracker *begin(float phase_sd, float rejuvenation_time)
 {
     gait_tracker_config cfg = toy_config(1);
     cfg.rejuvenation_time = rejuvenation_time;
-    return film_doubtful(&cfg, phase_sd);
+    return film_uncertain(&cfg, phase_sd);
 }
 
 static bool alike(const gait_tracker *a, const gait_tracker *b)
@@ -36,7 +36,7 @@ static void test_after_resampling(void)
     toy_tracker_free(soon);
 }
 
-/* Not while a phase is searched: between two modes there is nobody.  Left and right, once apart, mingle by themselves. */
+/* Not during acquisition, because there is no person between two hypotheses. Left and right hypotheses are rejuvenated separately. */
 static void test_within_modes(void)
 {
     gait_tracker *const never = begin(0.5f, 0.0f), *const soon = begin(0.5f, 0.5f);

@@ -133,7 +133,7 @@ static void test_waits_while_forked(void)
     gait_tracker_config const cfg = config(ROOM);
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
     gait_state const mean = toy_walk(0.0f);
-    gait_state sd = toy_doubt(1.0f);
+    gait_state sd = toy_start_sd(1.0f);
     int waited = 0;
     sd.phase = 0.5f; /* unknown */
     CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
@@ -157,7 +157,7 @@ static uint64_t search(int32_t store_at)
     gait_tracker *t = film_tracker(&cfg, 0, 1.0f);
     CHECK(gait_tracker_set_particles(t, FEW, NULL) == GAIT_OK);
     gait_state const mean = toy_walk(0.0f);
-    gait_state sd = toy_doubt(1.0f);
+    gait_state sd = toy_start_sd(1.0f);
     sd.phase = 0.5f; /* unknown */
     CHECK(gait_tracker_start(t, &mean, &sd, toy_frame(0).utime, NULL) == GAIT_OK);
     for (int n = 0; n < SHOTS; n++) {

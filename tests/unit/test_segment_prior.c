@@ -22,7 +22,7 @@ static void test_views(void)
     toy_segments_fill(&toy, 2, 8);
     size_t const bytes = toy_segments_write(buf, &toy);
     CHECK(open_prior(bytes, &p, NULL) == GAIT_OK);
-    CHECK(p.markers == TOY_MARKERS && p.frames == TOY_FRAMES_SEEN && p.hop == TOY_HOP && p.headings == 8);
+    CHECK(p.markers == TOY_MARKERS && p.frames == TOY_SEGMENT_FRAMES && p.hop == TOY_HOP && p.headings == 8);
     CHECK(p.components == 2 && p.modes == TOY_MODES && p.fps == TOY_FPS && p.gamma == TOY_GAMMA);
     CHECK(p.stature == TOY_STATURE && strcmp(p.name[1], "l_hip") == 0 && p.weight[1] == 0.3f);
     CHECK(segment_mean(&p, 1, 2)[3 * 4 + 1] == toy.mean[1][2 * TOY_MARKERS + 4][1]);
@@ -41,7 +41,7 @@ typedef struct patch {
 static void test_refused(void)
 {
     const patch patches[] = {
-        {"SGIN", &toy.count[1], 1, 0},           {"SGIN", &toy.count[1], 1, TOY_FRAMES_SEEN + 1},
+        {"SGIN", &toy.count[1], 1, 0},           {"SGIN", &toy.count[1], 1, TOY_SEGMENT_FRAMES + 1},
         {"SGIN", &toy.count[2], 1, 3},           {"SGIN", &toy.count[0], 1, -1},
         {"SGRT", &toy.rate[0], 0, 1e-6},         {"SGRT", &toy.rate[1], 0, -1},
         {"SGRT", &toy.rate[2], 0, NAN},          {"SGWT", &toy.weight[0], 0, 0},
@@ -100,13 +100,13 @@ static void test_no_cyclic_model(void)
     gait_tracker_default(&cfg, GAIT_MODE_DEFAULT);
     CHECK(gait_tracker_bytes(m, &cfg, &need, &err) == GAIT_ERR_ARG);
     CHECK(strstr(err.text, "without --segments only") != NULL);
-    CHECK(gait_model_pose(m, &state, &pose, &err) == GAIT_ERR_ARG && strstr(err.text, "no cyclic model"));
+    CHECK(gait_model_pose(m, &state, &pose, &err) == GAIT_ERR_ARG && strstr(err.text, "no cyclic part"));
     CHECK(gait_tracker_prior(m, &state, &sd, NULL) == GAIT_ERR_ARG);
     toy_file f = toy_begin(buf, 0);
     CHECK(gait_model_bytes(buf, toy_finish(&f), &need, &err) == GAIT_ERR_CORRUPT && strstr(err.text, "CHNM"));
 }
 
-/* A model without segments says how to learn them. */
+/* The error for a model without segments names the remedy. */
 static void test_no_segments(void)
 {
     gait_error err = {0};

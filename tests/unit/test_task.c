@@ -72,7 +72,7 @@ static void check_cover(const record *r, int32_t items)
     CHECK(ok);
 }
 
-/* A task begins with its own part and, where nobody else has, goes on with the others'. */
+/* A task begins with its own part and, where no other task has, continues with those of the others. */
 static void test_own_part(void)
 {
     enum { TASKS = 4, ITEMS = 1000 };

@@ -9,7 +9,7 @@ enum { FRAMES = 60 };
 static error follow(const gait_tracker_config *cfg, int every, uint32_t (*missing)(int n))
 {
     gait_tracker *const t = film_tracker(cfg, 0, 1.0f);
-    gait_state start = toy_walk(0.0f), sd = toy_doubt(1.0f);
+    gait_state start = toy_walk(0.0f), sd = toy_start_sd(1.0f);
     error out = {0};
     gait_estimate e;
     start.phase += 0.03f;
@@ -23,7 +23,7 @@ static error follow(const gait_tracker_config *cfg, int every, uint32_t (*missin
         CHECK(e.utime == toy_frame(n).utime);
         out.status[e.status]++;
         if (n >= 15)
-            look(&e, n, &out);
+            measure_error(&e, n, &out);
     }
     toy_tracker_free(t);
     return out;
@@ -92,7 +92,7 @@ static void test_paper(void)
         film_step(t, 1, n, 0, &e);
         check_sane(t, &e, &cfg, n);
         CHECK(!(e.flags & GAIT_EST_RESAMPLED) == (n == 0));
-        look(&e, n, &have);
+        measure_error(&e, n, &have);
         int32_t descents = 0; /* independent draws: ancestors in no order */
         for (int32_t i = 1; i < cfg.particles; i++)
             descents += t->filter.parent[i] < t->filter.parent[i - 1];
@@ -135,7 +135,7 @@ static uint64_t colour_digest(uint32_t terms, int32_t format, int32_t plate_form
         f.image[0] = image;
         CHECK(gait_tracker_step(t, &f, &e, NULL) == GAIT_OK);
     }
-    look(&e, 39, &have);
+    measure_error(&e, 39, &have);
     CHECK(have.across < 0.06 && have.phase < 0.03);
     uint64_t const digest = gait_tracker_digest(t);
     toy_tracker_free(t);

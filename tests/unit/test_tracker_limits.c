@@ -82,7 +82,7 @@ static void test_refusals(void)
     CHECK(gait_tracker_step(t, &f, NULL, NULL) == GAIT_ERR_ARG);
     film_step(t, 2, 11, 0, &e); /* and it goes on */
     CHECK(e.frame == 1 && e.status == GAIT_TRACK_TRACKING);
-    gait_state const mean = toy_walk(0.0f), sd = toy_doubt(1.0f);
+    gait_state const mean = toy_walk(0.0f), sd = toy_start_sd(1.0f);
     CHECK(gait_tracker_start(t, &mean, &sd, INT64_MIN, NULL) == GAIT_OK);
     f.utime = INT64_MAX;
     refuse(t, f, GAIT_ERR_STATE, "max_dt");
@@ -136,13 +136,13 @@ static void test_no_image(void)
         CHECK((e.status == GAIT_TRACK_LOST) == (n >= 29)); /* 0.33 s after frame 19 */
     }
     CHECK(e.sd.pelvis[0] > 1.5f * sd && e.sd.phase > 0.0f);
-    look(&e, 35, &have);
+    measure_error(&e, 35, &have);
     CHECK(have.across < 0.15 && have.phase < 0.04); /* half a second on its own */
     for (int n = 36; n < 46; n++)
         film_step(t, 2, n, 0, &e);
     CHECK(!(e.flags & GAIT_EST_NO_IMAGE) && e.status == GAIT_TRACK_TRACKING);
     have = (error){0};
-    look(&e, 45, &have);
+    measure_error(&e, 45, &have);
     CHECK(have.across < 0.03 && have.phase < 0.015);
     toy_tracker_free(t);
 }
@@ -154,7 +154,7 @@ static void test_unknown_phase(void)
     cfg.particles = 600;
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
     gait_state const mean = toy_walk(0.0f);
-    gait_state sd = toy_doubt(1.0f);
+    gait_state sd = toy_start_sd(1.0f);
     gait_estimate e;
     error have = {0};
     sd.phase = 0.5f;
@@ -163,7 +163,7 @@ static void test_unknown_phase(void)
         film_step(t, 2, n, 0, &e);
         CHECK(e.status != GAIT_TRACK_LOST && (e.status == GAIT_TRACK_INIT || n > 24));
     }
-    look(&e, 44, &have);
+    measure_error(&e, 44, &have);
     CHECK(e.status == GAIT_TRACK_TRACKING && have.phase < 0.02); /* legs and arms tell left from right here */
     toy_tracker_free(t);
 }

@@ -68,17 +68,18 @@ static void test_follow(void)
         CHECK_NEAR((to[0] - map.u0) * map.scale, 127.5, 1e-3);
         CHECK_NEAR((to[1] - map.v0) * map.scale, 127.5, 1e-3);
     }
-    /* A walker coming nearer in small steps is followed: the region stays within its slack. */
+    /* A person coming nearer in small steps is followed: the region stays within its slack. */
     for (int i = 0; i < 200; i++) {
         float const tall = 100.0f * powf(1.01f, (float)i);
         view_follow(&map, uv, tall);
         CHECK_NEAR(map.scale * f_clamp(tall, 96.0f, 6144.0f), 192.0, 12.0);
     }
-    static const float odd[] = {0.0f, -5.0f, NAN, 1e9f, INFINITY}; /* no size is refused, none overflows */
-    for (size_t k = 0; k < sizeof odd / sizeof *odd; k++) {
+    static const float extreme[] = {0.0f, -5.0f, NAN, 1e9f,
+                                    INFINITY}; /* no size is refused, none overflows */
+    for (size_t k = 0; k < sizeof extreme / sizeof *extreme; k++) {
         map = (view_map){0};
-        CHECK(view_follow(&map, uv, odd[k]));
-        CHECK(map.scale == (odd[k] > 1e6f ? 1.0f / 32.0f : 2.0f) && isfinite(map.u0));
+        CHECK(view_follow(&map, uv, extreme[k]));
+        CHECK(map.scale == (extreme[k] > 1e6f ? 1.0f / 32.0f : 2.0f) && isfinite(map.u0));
     }
 }
 

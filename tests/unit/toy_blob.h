@@ -17,7 +17,7 @@ enum { TOY_BYTES = 32768 };
 typedef struct toy_file {
     unsigned char *at;
     size_t used;
-    uint32_t sections, room; /* written, announced */
+    uint32_t sections, announced; /* written; to be written */
 } toy_file;
 
 static inline void toy_put(unsigned char *p, uint64_t v, int bytes)
@@ -49,13 +49,13 @@ static inline void toy_seal(unsigned char *b, size_t bytes)
 static inline toy_file toy_begin(unsigned char *buf, uint32_t sections)
 {
     memset(buf, 0, TOY_BYTES);
-    return (toy_file){.at = buf, .used = (64 + 48 * (size_t)sections + 63) / 64 * 64, .room = sections};
+    return (toy_file){.at = buf, .used = (64 + 48 * (size_t)sections + 63) / 64 * 64, .announced = sections};
 }
 
 /* Write the header; returns the size of the blob. */
 static inline size_t toy_finish(toy_file *f)
 {
-    if (f->sections != f->room)
+    if (f->sections != f->announced)
         abort();
     memcpy(f->at, "GAITMDL\n", 8);
     toy_put(f->at + 8, 1, 2);
@@ -78,7 +78,7 @@ static inline void toy_section4(toy_file *f, const char *tag, uint32_t type, uin
         toy_put(e + 4 + 4 * i, field[i], 4);
     toy_put(e + 32, f->used, 8);
     toy_put(e + 40, bytes, 8);
-    if (f->used + bytes + 63 > TOY_BYTES || f->sections > f->room)
+    if (f->used + bytes + 63 > TOY_BYTES || f->sections > f->announced)
         abort();
     memcpy(f->at + f->used, data, bytes);
     f->used = (f->used + bytes + 63) & ~(size_t)63;

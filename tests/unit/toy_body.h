@@ -4,8 +4,8 @@
  *   toy_body_aim(v, &state);                           region around a body
  *   toy_body_at(v, grey, wall);                        features of a frame; wall NULL: no plate
  *   like_body b = toy_body_body(v, &state);            outline, layers and surface samples, until the next call */
-#ifndef TOY_LOOK_H
-#define TOY_LOOK_H
+#ifndef TOY_BODY_H
+#define TOY_BODY_H
 #include "api/kernels.h"
 #include "likelihood/likelihood.h"
 #include "toy_draw.h"
@@ -25,7 +25,7 @@ typedef struct toy_body {
     like_outline sides;
     like_pose pose;
     layers drawn;
-    like_patch seen[TOY_LIMBS];
+    like_patch patch[TOY_LIMBS];
     like_block terms;
 } toy_body;
 
@@ -80,14 +80,14 @@ static inline like_body toy_body_body(toy_body *v, const gait_state *s)
     toy_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
     v->setup.run->edges_prepare(&v->outline, v->setup.geometry, v->setup.limbs, &v->sides);
     v->setup.run->surface_pose(&v->setup, &v->cam, &v->f.map, &v->body, &v->pose);
-    like_sample(&v->setup, &v->f, &v->pose, LANE, &v->drawn, v->seen);
+    like_sample(&v->setup, &v->f, &v->pose, LANE, &v->drawn, v->patch);
     like_body b = {.setup = &v->setup,
                    .features = &v->f,
                    .outline = &v->outline,
                    .sides = &v->sides,
                    .lane = LANE,
                    .layers = &v->drawn,
-                   .samples = v->seen,
+                   .samples = v->patch,
                    .terms = &v->terms};
     like_silhouette_count(&b);
     return b;

@@ -1,10 +1,10 @@
-/* toy_crowd.h - walkers as particles: the filter's core with the library's own motion (dynamics.h), for
+/* toy_crowd.h - people as particles: the filter's core with the library's own motion (dynamics.h), for
  * tests with likelihoods of their own.
  *
  *   dynamics const d = quiet(GAIT_MODE_DEFAULT, seed);   then set the noises in cfg
  *   crowd c = crowd_new(&d, n);                          n a multiple of BLOCK; fill c.now[i]
  *   crowd_predict(&c, dt, age, frame);                   resamples first if fewer than half are effective
- *   crowd_weigh(&c, ll); */
+ *   crowd_update(&c, ll); */
 #ifndef TOY_CROWD_H
 #define TOY_CROWD_H
 #include "toy_filter.h"
@@ -38,7 +38,7 @@ static inline void crowd_predict(crowd *c, float dt, float age, uint32_t frame)
     c->next = old;
 }
 
-static inline void crowd_weigh(crowd *c, const float *ll)
+static inline void crowd_update(crowd *c, const float *ll)
 {
     c->ess = pf_update(&c->p, ll).ess;
 }

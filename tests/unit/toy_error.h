@@ -10,7 +10,7 @@ typedef struct error {
     int status[4];
 } error;
 
-static inline void look(const gait_estimate *e, int n, error *out)
+static inline void measure_error(const gait_estimate *e, int n, error *out)
 {
     gait_state const truth = toy_walk((float)n / 30.0f);
     gait_pose pose;
@@ -42,7 +42,8 @@ static inline void check_sane(const gait_tracker *t, const gait_estimate *e, con
     CHECK_NEAR(sum, 1.0, 1e-4);
     CHECK_NEAR(e->ess * square, 1.0, 1e-3);
     CHECK(e->frame == (uint64_t)steps && isfinite(e->log_evidence));
-    CHECK(e->phase_r >= 0.0f && e->phase_r <= 1.0f && e->hypothesis_weight > 0.0f && e->hypothesis_weight <= 1.0001f);
+    CHECK(e->phase_r >= 0.0f && e->phase_r <= 1.0f && e->hypothesis_weight > 0.0f &&
+          e->hypothesis_weight <= 1.0001f);
     for (int p = 0; p < TOY_POINTS; p++)
         for (int k = 0; k < 3; k++)
             CHECK(isfinite(e->pose.joint[p][k]) && e->joint_sd[p][k] >= 0.0f && e->joint_sd[p][k] < 2.0f);

@@ -30,10 +30,10 @@ static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, 
 }
 
 /* A tracker of cfg, started at frame 0 with so wide a phase. */
-static inline gait_tracker *film_doubtful(const gait_tracker_config *cfg, float phase_sd)
+static inline gait_tracker *film_uncertain(const gait_tracker_config *cfg, float phase_sd)
 {
     gait_tracker *const t = film_tracker(cfg, 0, 1.0f);
-    toy_tracker_doubt(t, phase_sd);
+    toy_tracker_start_uncertain(t, phase_sd);
     return t;
 }
 

@@ -1,7 +1,7 @@
 /* toy_films.h - films that together take a tracker through all that it does.
  *
  *   gait_tracker_config cfg = films_config(FILMS_GIVEN);
- *   films_start(t, &cfg, n, wide);                    with backgrounds; a search always at frame 0
+ *   films_start(t, &cfg, n, factor);                  with backgrounds; acquisition always starts at frame 0
  *   gait_frame f = films_frame(&cfg, n, missing);     but of the cameras in `missing` (bits); valid until the next
  *
  * Call film_make() first. */
@@ -48,7 +48,7 @@ static inline gait_tracker_config films_config(int film_kind)
     return cfg;
 }
 
-/* What the film is of is told by the settings, so that tests can change the others. */
+/* The settings determine the film, so that tests can change the others. */
 static inline bool films_is_given(const gait_tracker_config *cfg)
 {
     return cfg->terms & GAIT_TERM_KEYPOINTS;
@@ -91,8 +91,8 @@ static inline void films_detect(const gait_camera *cam, int n, gait_keypoint *ou
         camera_project(cam, pose.joint[j], uv);
         camera_distort(cam, uv[0], uv[1], &u, &v);
         out[j] = (gait_keypoint){.u = u + (float)(chance % 5) - 2.0f,
-                              .v = v + (float)(chance / 5 % 5) - 2.0f,
-                              .sd = chance % 11 ? 2.0f : 0.0f};
+                                 .v = v + (float)(chance / 5 % 5) - 2.0f,
+                                 .sd = chance % 11 ? 2.0f : 0.0f};
     }
 }
 
@@ -112,7 +112,7 @@ static inline gait_frame films_frame(const gait_tracker_config *cfg, int n, uint
     return f;
 }
 
-static inline void films_start(gait_tracker *t, const gait_tracker_config *cfg, int n, float simd_f64)
+static inline void films_start(gait_tracker *t, const gait_tracker_config *cfg, int n, float factor)
 {
     for (int k = 0; k < cfg->cameras; k++) {
         gait_image const plate = films_wall(cfg, k);
@@ -120,8 +120,8 @@ static inline void films_start(gait_tracker *t, const gait_tracker_config *cfg, 
             abort();
     }
     if (cfg->acquisition_particles > 0)
-        toy_tracker_doubt(t, 0.5f);
+        toy_tracker_start_uncertain(t, 0.5f);
     else
-        toy_tracker_start(t, n, simd_f64);
+        toy_tracker_start(t, n, factor);
 }
 #endif

@@ -14,7 +14,7 @@
 
 enum { TOY_MOST = 10240 }; /* particles */
 
-/* Even weights, everybody its own ancestor; room for more; the next call takes the same memory. */
+/* Uniform weights, every particle its own ancestor; capacity for more; the next call takes the same memory. */
 static inline pf toy_filter(int32_t n)
 {
     static _Alignas(GAIT_ALIGN) unsigned char memory[TOY_MOST * 28 + 4 * GAIT_ALIGN];

@@ -191,7 +191,7 @@ static inline pf_summary linear_filter_step(linear_filter *f, const linear_world
 
 /* ---- one against the other ---- */
 typedef struct linear_error {
-    double square;     /* of the mean, in posterior deviations */
+    double square;     /* of the mean, in posterior standard deviations */
     double log_square; /* its logarithm */
     double variance;   /* particles / exact */
     double ess;        /* share of n; all four: mean over steps and components */

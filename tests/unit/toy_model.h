@@ -1,4 +1,4 @@
-/* toy_model.h - a small but plausible walker as a valid blob, for tests that need a model.
+/* toy_model.h - a small but plausible person as a valid blob, for tests that need a model.
  *
  *   size_t bytes;
  *   const void *blob = toy_model_blob(&bytes);  static, aligned, written once: T = 32, q = 2, about 20 kB

@@ -1,4 +1,4 @@
-/* toy_passer.h - 2-D points of somebody who passes the camera again and again, with gaps, and all that is asked. */
+/* toy_passer.h - 2-D points of a person who passes the camera again and again, with gaps, and all that is asked. */
 #ifndef TOY_PASSER_H
 #define TOY_PASSER_H
 #include "toy_lift.h"
@@ -42,7 +42,7 @@ static inline bool passer_segment(gait_lift *l, const gait_lift_config *c)
     return ok && gait_lift_least_squares(l, mean, NULL) == GAIT_OK;
 }
 
-/* A stream of `frames`, each asked for at once; false if a call failed or nobody was followed, in frames that fit and in
+/* A stream of `frames`, each asked for at once; false if a call failed or no person was tracked, in frames that fit and in
  * frames that do not, as after a jump. */
 static inline bool passer_stream(gait_lift *l, const gait_lift_config *c, int frames)
 {

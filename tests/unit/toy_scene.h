@@ -1,4 +1,4 @@
-/* toy_scene.h - a synthetic walker in front of a textured wall, seen by two cameras.
+/* toy_scene.h - a synthetic person in front of a textured wall, seen by two cameras.
  *
  *   gait_camera cam = toy_camera(0);          0: from the side, 1: obliquely from the front; SCENE_W x SCENE_H
  *   gait_state s = toy_walk(0.5f);            the truth, seconds after the start, walking along +x
@@ -81,7 +81,7 @@ static inline uint8_t toy_skin(int32_t limb, const float from[2], const float to
     return (uint8_t)(level + toy_hash(band, (uint32_t)limb, across > 0.0f) % 40);
 }
 
-/* Draw the walker over a picture; stops the test if the library refuses it. */
+/* Draw the person over an image; stops the test if the library refuses it. */
 static inline void toy_paint(const gait_camera *cam, const gait_state *s, uint8_t *grey)
 {
     static uint8_t ids[SCENE_PIXELS];

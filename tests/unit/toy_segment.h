@@ -7,12 +7,12 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { TOY_FRAMES_SEEN = 6, TOY_HOP = 3, TOY_MARKERS = 9, TOY_MODES = 5, TOY_SEGMENT_SECTIONS = 8 };
+enum { TOY_SEGMENT_FRAMES = 6, TOY_HOP = 3, TOY_MARKERS = 9, TOY_MODES = 5, TOY_SEGMENT_SECTIONS = 8 };
 #define TOY_FPS     20.0f
 #define TOY_STATURE 1.7f
 #define TOY_GAMMA   1.5f
 
-enum { TOY_SEGMENT = TOY_FRAMES_SEEN * TOY_MARKERS }; /* points of a segment */
+enum { TOY_SEGMENT = TOY_SEGMENT_FRAMES * TOY_MARKERS }; /* points of a segment */
 
 /* Uniform in [-1, 1): the same numbers everywhere. */
 static inline double toy_random(uint32_t *state)
@@ -46,7 +46,7 @@ static inline void toy_segments_fill(toy_segments *s, int components, int headin
     memset(s, 0, sizeof *s);
     for (int j = 0; j < TOY_MARKERS; j++)
         snprintf(s->name[j], sizeof s->name[j], j < 4 ? "%s" : "marker %s%d", j < 4 ? names[j] : "", j);
-    const int32_t count[8] = {TOY_FRAMES_SEEN, TOY_HOP, headings, components, TOY_MODES, 40, 4, 0};
+    const int32_t count[8] = {TOY_SEGMENT_FRAMES, TOY_HOP, headings, components, TOY_MODES, 40, 4, 0};
     memcpy(s->count, count, sizeof count);
     s->rate[0] = TOY_FPS;
     s->rate[1] = TOY_GAMMA;
@@ -78,8 +78,8 @@ static inline void toy_segments_fill(toy_segments *s, int components, int headin
 static inline size_t toy_segments_write(unsigned char *buf, const toy_segments *s)
 {
     uint32_t const K = (uint32_t)s->count[3];
-    const uint32_t mean[4] = {K, TOY_FRAMES_SEEN, TOY_MARKERS, 3};
-    const uint32_t mode[4] = {K, TOY_MODES, TOY_FRAMES_SEEN, 3 * TOY_MARKERS};
+    const uint32_t mean[4] = {K, TOY_SEGMENT_FRAMES, TOY_MARKERS, 3};
+    const uint32_t mode[4] = {K, TOY_MODES, TOY_SEGMENT_FRAMES, 3 * TOY_MARKERS};
     toy_file f = toy_begin(buf, TOY_SEGMENT_SECTIONS);
     toy_section(&f, "SGNM", 1, 2, TOY_MARKERS, 32, 1, s->name);
     toy_section(&f, "SGIN", 2, 1, 8, 1, 1, s->count);

@@ -1,9 +1,9 @@
-/* toy_tracker.h - trackers of the toy walker for tests, with numbers of their own instead of the library's defaults.
+/* toy_tracker.h - trackers of the toy person for tests, with numbers of their own instead of the library's defaults.
  *
  *   gait_tracker_config cfg = toy_config(1);         300 particles, all terms; change what the test needs
  *   gait_tracker *t = toy_tracker_new(&cfg);         in exactly the memory it asks for; stops the test on failure
  *   toy_tracker_start(t, n, 0.5f);                   near the truth of frame n, with half the usual spread
- *   toy_tracker_doubt(t, 0.5f);                      at frame 0, with so wide a phase
+ *   toy_tracker_start_uncertain(t, 0.5f);                      at frame 0, with this standard deviation of the phase
  *   toy_tracker_step(t, n, shots, &e);               frame n of the scene; shots[camera] NULL: missed
  *   toy_tracker_free(t); */
 #ifndef TOY_TRACKER_H
@@ -81,18 +81,18 @@ static inline void toy_tracker_free(gait_tracker *t)
     free(t); /* a tracker lies at the start of its memory */
 }
 
-/* Deviations of a start by hand, times `wide`. */
-static inline gait_state toy_doubt(float simd_f64)
+/* Standard deviations of a start by hand, times `factor`. */
+static inline gait_state toy_start_sd(float factor)
 {
-    gait_state sd = {.phase = 0.04f * simd_f64,
-                     .stride_hz = 0.05f * simd_f64,
-                     .stature = 0.02f * simd_f64,
-                     .heading = 0.08f * simd_f64,
-                     .pitch = 0.02f * simd_f64,
-                     .roll = 0.02f * simd_f64,
-                     .pelvis = {0.05f * simd_f64, 0.05f * simd_f64, 0.03f * simd_f64}};
+    gait_state sd = {.phase = 0.04f * factor,
+                     .stride_hz = 0.05f * factor,
+                     .stature = 0.02f * factor,
+                     .heading = 0.08f * factor,
+                     .pitch = 0.02f * factor,
+                     .roll = 0.02f * factor,
+                     .pelvis = {0.05f * factor, 0.05f * factor, 0.03f * factor}};
     for (int k = 0; k < TOY_COMPONENTS; k++)
-        sd.coef[k] = 0.5f * simd_f64;
+        sd.coef[k] = 0.5f * factor;
     return sd;
 }
 
@@ -104,15 +104,15 @@ static inline void toy_tracker_begin(gait_tracker *t, int n, const gait_state *s
         toy_stop("start", &err);
 }
 
-static inline void toy_tracker_start(gait_tracker *t, int n, float simd_f64)
+static inline void toy_tracker_start(gait_tracker *t, int n, float factor)
 {
-    gait_state const sd = toy_doubt(simd_f64);
+    gait_state const sd = toy_start_sd(factor);
     toy_tracker_begin(t, n, &sd);
 }
 
-static inline void toy_tracker_doubt(gait_tracker *t, float phase_sd)
+static inline void toy_tracker_start_uncertain(gait_tracker *t, float phase_sd)
 {
-    gait_state sd = toy_doubt(1.0f);
+    gait_state sd = toy_start_sd(1.0f);
     sd.phase = phase_sd;
     toy_tracker_begin(t, 0, &sd);
 }
