@@ -24,7 +24,7 @@ define_of = $(shell awk '$$2 == "$(1)" { print $$3 }' $(HEADER))
 ABI     := $(call define_of,GAIT_ABI)
 VERSION := $(call define_of,GAIT_VERSION_MAJOR).$(call define_of,GAIT_VERSION_MINOR).$(call define_of,GAIT_VERSION_PATCH)
 
-# Another compiler brings its own tools (CC=aarch64-linux-gnu-gcc) and, for another CPU, its own folder.
+# Another compiler has its own tools (CC=aarch64-linux-gnu-gcc) and, for another CPU, its own folder.
 found_or = $(if $(shell command -v $(1) 2>/dev/null),$(1),$(2))
 CROSS   := $(shell printf '%s\n' $(CC) | sed -n 's/^\(.*-\)g\{0,1\}cc\(-[0-9.]*\)\{0,1\}$$/\1/p')
 OBJCOPY := $(or $(OBJCOPY),$(call found_or,$(CROSS)objcopy,objcopy))
@@ -97,10 +97,10 @@ help: ## list the targets
 	@echo 'make test     build and test everything'
 	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo; echo '* needs the data beside the repository (../shared/data); without it, tests that need some are skipped'
-	@echo 'eval, eval-learn, eval-lift fail if a bound is missed; bench, bench-lift say MISSED: rates hang on the host'
+	@echo 'eval, eval-learn, eval-lift fail if a bound is missed; bench, bench-lift print MISSED: rates depend on the host'
 	@echo 'config=release|debug|sanitize|thread (now $(config)), werror=1: warnings are errors'
 
-# What objects were made with: as it changes, they are made anew.
+# What the objects were built with; when it changes they are rebuilt.
 MADE_WITH := CC=$(CC) CXX=$(CXX) OPT=$(OPT) CFLAGS=$(CFLAGS) CXXFLAGS=$(CXXFLAGS) LDFLAGS=$(LDFLAGS)
 MADE := $(B)/.made_with
 ifneq ($(strip $(shell cat $(MADE) 2>/dev/null)),$(strip $(MADE_WITH)))
@@ -109,7 +109,7 @@ endif
 $(MADE): libgait/flags.mk | $(B)/
 	@printf '%s\n' '$(subst ','\'',$(MADE_WITH))' > $@.$$$$ && mv $@.$$$$ $@
 
-# Said before anything is built or fetched.
+# Checked before anything is built or fetched.
 COMPILED := $(filter-out help setup $(READY) lint format clean uninstall,$(or $(MAKECMDGOALS),help))
 has = $(shell command -v $(firstword $(1)) 2>/dev/null)
 ifneq ($(COMPILED),)
@@ -145,36 +145,36 @@ $(READY): python/constraints.txt python/pyproject.toml
 # An environment does not survive being moved.
 MOVED := $(shell test -h $(VENV) || test ! -f $(READY) || test "$$(cat $(READY))" = "$$(pwd -P)" || rm $(READY))
 
-# say CC file: one line a command, or with V=1 the command itself
-say = $(if $(V),,@echo '  $(1)' && )
+# log CC file: one line for each command, or with V=1 the command itself
+log = $(if $(V),,@echo '  $(1)' && )
 
 # ---- library -------------------------------------------------------------------------------------------------
 lib: $(LIBS) ## libgait.so and libgait.a in build/<config>
 
-# Linked by the C compiler: a C++ runtime dependency would not link.
+# Linked by the C compiler: a dependency on the C++ runtime would fail to link.
 $(B)/libgait.so: $(OBJ)
-	$(call say,LD   $@)$(CC) $(OPT) -shared -Wl,--no-undefined,-z,noseparate-code -Wl,-soname,$(@F).$(ABI) $(LDFLAGS) -o $@.$$$$ $(OBJ) -lm -pthread && \
+	$(call log,LD   $@)$(CC) $(OPT) -shared -Wl,--no-undefined,-z,noseparate-code -Wl,-soname,$(@F).$(ABI) $(LDFLAGS) -o $@.$$$$ $(OBJ) -lm -pthread && \
 	    mv $@.$$$$ $@.$(ABI)
 	@ln -sf $(@F).$(ABI) $@
 
-# One object whose internal names are local, so that nothing unprefixed meets the user's own names.
+# One object whose internal names are local, so that they cannot clash with the user's names.
 $(B)/libgait.a: $(OBJ)
-	$(call say,AR   $@)$(CC) -r -nostdlib -o $(B)/libgait.o $(OBJ)
+	$(call log,AR   $@)$(CC) -r -nostdlib -o $(B)/libgait.o $(OBJ)
 	@$(OBJCOPY) --localize-hidden $(B)/libgait.o
 	@rm -f $@
 	@$(AR) rcs $@ $(B)/libgait.o
 
 $(B)/src/%.c.o: libgait/src/%.c Makefile $(MADE) | $(SRC_DIRS)
-	$(call say,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(call C_FLAGS,$(notdir $<)) $(CFLAGS) -c $< -o $@
+	$(call log,CC   $<)$(CC) -std=c11 $(LIBGAIT) $(CWARN) $(call C_FLAGS,$(notdir $<)) $(CFLAGS) -c $< -o $@
 
 $(B)/src/%.cpp.o: libgait/src/%.cpp Makefile $(MADE) | $(SRC_DIRS) $(if $(filter $(VENV)/%,$(EIGEN)),$(READY))
 	@test -f $(EIGEN)/Eigen/Core || { echo 'lib: no Eigen/Core in EIGEN=$(EIGEN): give the folder that has it, or install' \
 	    'libeigen3-dev' >&2; exit 1; }
-	$(call say,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) -isystem $(EIGEN) $(CXX_FLAGS) $(WARN) $(call C_FLAGS,$(notdir $<)) $(CXXFLAGS) -c $< -o $@
+	$(call log,CXX  $<)$(CXX) -std=c++14 $(LIBGAIT) -isystem $(EIGEN) $(CXX_FLAGS) $(WARN) $(call C_FLAGS,$(notdir $<)) $(CXXFLAGS) -c $< -o $@
 
 define kernel_rule
 $(B)/src/%.$(1).o: libgait/src/%.c Makefile $(MADE) | $(SRC_DIRS)
-	$$(call say,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<)) $(FLAGS_$(1)) $(if $(filter scalar,$(1)),$(LEAST)) $(CFLAGS) -c $$< -o $$@
+	$$(call log,CC   $$< ($(1)))$(CC) -std=c11 $(LIBGAIT) $(CWARN) -DKERNEL_ISA=$(1) $$(call KERNEL_FLAGS,$$(notdir $$<)) $(FLAGS_$(1)) $(if $(filter scalar,$(1)),$(LEAST)) $(CFLAGS) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 
@@ -183,7 +183,7 @@ $(foreach isa,$(KERNEL_ISAS),$(eval $(call kernel_rule,$(isa))))
 
 # ---- LCM tools -----------------------------------------------------------------------------------------------
 LCM_TYPES := $(sort $(wildcard lcm_types/*.lcm))
-# JPEG frames where the system has libjpeg's headers; elsewhere gait-trackd says so.
+# JPEG frames need libjpeg's headers; without them gait-trackd reports that it cannot decode JPEG.
 JPEG_LIBS := $(shell pkg-config --libs libjpeg 2>/dev/null)
 JPEG_CFLAGS := $(if $(JPEG_LIBS),-DHAVE_LIBJPEG $(shell pkg-config --cflags libjpeg))
 LCM_CFLAGS := -isystem $(SITE)/include -isystem build/lcm
@@ -192,27 +192,27 @@ LCM_LIBS = -L$(SITE)/lib -llcm -Wl,-rpath,'$$ORIGIN/$(shell realpath -ms --relat
 tools: $(TOOLS) build/lcm/.stamp ## LCM programs in build/bin, LCM types in build/lcm
 
 build/lcm/.stamp: $(LCM_TYPES) | $(READY) build/lcm/python/
-	$(call say,LCM  lcm_types)$(VENV)/bin/lcm-gen -c --c-cpath build/lcm --c-hpath build/lcm -p --ppath build/lcm/python $(LCM_TYPES)
+	$(call log,LCM  lcm_types)$(VENV)/bin/lcm-gen -c --c-cpath build/lcm --c-hpath build/lcm -p --ppath build/lcm/python $(LCM_TYPES)
 	@touch $@
 
 $(B)/libgaitmsg.a: build/lcm/.stamp $(MADE) | $(B)/lcm/
-	$(call say,AR   $@)for f in $(LCM_TYPES:lcm_types/%.lcm=%); do \
+	$(call log,AR   $@)for f in $(LCM_TYPES:lcm_types/%.lcm=%); do \
 	    $(CC) $(OPT) -g $(LCM_CFLAGS) -c build/lcm/$$f.c -o $(B)/lcm/$$f.o || exit 1; done
 	@rm -f $@
 	@$(AR) rcs $@ $(LCM_TYPES:lcm_types/%.lcm=$(B)/lcm/%.o)
 
 TOOL_PARTS := $(patsubst tools/%,$(B)/tools/%.o,$(sort $(wildcard tools/trackd/*.c)))
 $(BIN)/gait-trackd: $(TOOL_PARTS) $(B)/libgait.a $(B)/libgaitmsg.a | $(BIN)/
-	$(call say,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) $(JPEG_LIBS) -lm
+	$(call log,LD   $@)$(CC) $(OPT) -pthread $(LDFLAGS) -o $@ $^ $(LCM_LIBS) $(JPEG_LIBS) -lm
 
 $(B)/tools/%.c.o: tools/%.c Makefile $(MADE) build/lcm/.stamp | $(B)/tools/trackd/
-	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
+	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -pthread -Ilibgait/include -Itools $(LCM_CFLAGS) \
 	    $(JPEG_CFLAGS) $(CFLAGS) -c $< -o $@
 
 # ---- tests ---------------------------------------------------------------------------------------------------
 test: built check unit python-test ## everything below that can fail
 
-# As many compilers at a time as there are processors, unless make was told how many.
+# As many compilers at a time as there are processors, unless make has a -j option.
 JOBS = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell getconf _NPROCESSORS_ONLN))
 built:
 	@$(MAKE) --no-print-directory $(JOBS) setup lib tools $(UNIT)
@@ -223,9 +223,9 @@ check: lib ## symbols, heap, threads, globals, size, layers, stack, recursion, h
 unit: $(UNIT) ## C tests
 	@tests/unit/run.sh $(UNIT)
 
-# Against the objects, so that internal functions can be called.
+# Linked with the objects, so that tests can call internal functions.
 $(B)/unit/%: tests/unit/%.c $(OBJ) Makefile $(MADE) | $(B)/unit/
-	$(call say,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -iquote libgait/src $(CFLAGS) \
+	$(call log,CC   $<)$(CC) -std=c11 -D_POSIX_C_SOURCE=200809L $(COMMON) -MT $@ -MF $@.d $(CWARN) -pthread -Ilibgait/include -iquote libgait/src $(CFLAGS) \
 	    $(LDFLAGS) -o $@ $< $(OBJ) -lm
 
 # A process for each processor; the tests of a file stay together, they share what is slow to make.
@@ -236,7 +236,7 @@ python-test: setup lib tools ## Python tests (ARGS='-k blob' to choose)
 asan: ## C tests under the address and undefined-behaviour sanitizers
 	@LIMIT=1200 $(MAKE) --no-print-directory config=sanitize unit
 
-# What shares data among threads; others have one.
+# Tests that share data among threads; the others have one thread.
 THREADED := $(patsubst %,$(B)/unit/test_%,pool task determinism)
 unit-threads: $(THREADED)
 	@tests/unit/run.sh $^
@@ -247,7 +247,7 @@ tsan: ## C tests of threads under the thread sanitizer
 # The plain program needs no libFuzzer; with clang: -fsanitize=fuzzer instead of standalone.c's main.
 FUZZ := $(patsubst tests/fuzz/%.c,$(B)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
 $(B)/fuzz/%: tests/fuzz/%.c tests/fuzz/standalone.c tests/fuzz/fuzz.h $(OBJ) Makefile $(MADE) | $(B)/fuzz/
-	$(call say,CC   $<)$(CC) -std=c11 $(OPT) -g -ffp-contract=off $(CWARN) -Ilibgait/include -iquote libgait/src \
+	$(call log,CC   $<)$(CC) -std=c11 $(OPT) -g -ffp-contract=off $(CWARN) -Ilibgait/include -iquote libgait/src \
 	    $(CFLAGS) $(LDFLAGS) -o $@ $(filter %.c %.o,$^) -lm
 
 fuzz-run: $(FUZZ)
@@ -279,16 +279,16 @@ BENCH_WRAP := $(shell sed -n 's/^WRAP.[^,]*, \([a-z_]*\),.*/-Wl,--wrap=\1/p' tes
 BENCH_CC = $(CC) -std=c11 -D_DEFAULT_SOURCE -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -Ilibgait/include -iquote libgait/src -Itools $(CFLAGS)
 define bench_isa_rule
 $(B)/bench/%_kernel.$(1).o: tests/bench/%_kernel.c Makefile $(MADE) | $(B)/bench/
-	$$(call say,CC   $$< ($(1)))$$(BENCH_CC) -DKERNEL_ISA=$(1) $(FAST_FLAGS) $(FLAGS_$(1)) -c $$< -o $$@
+	$$(call log,CC   $$< ($(1)))$$(BENCH_CC) -DKERNEL_ISA=$(1) $(FAST_FLAGS) $(FLAGS_$(1)) -c $$< -o $$@
 endef
 $(foreach isa,$(KERNEL_ISAS),$(eval $(call bench_isa_rule,$(isa))))
 $(B)/bench/%.o: tests/bench/%.c Makefile $(MADE) | $(B)/bench/
-	$(call say,CC   $<)$(BENCH_CC) -c $< -o $@
+	$(call log,CC   $<)$(BENCH_CC) -c $< -o $@
 $(B)/bench/step: $(BENCH_OBJ) $(BENCH_PARTS) $(OBJ)
-	$(call say,LD   $@)$(CC) $(OPT) $(BENCH_WRAP) $(LDFLAGS) -o $@ $^ -lm -pthread
+	$(call log,LD   $@)$(CC) $(OPT) $(BENCH_WRAP) $(LDFLAGS) -o $@ $^ -lm -pthread
 
 $(B)/bench/lift: $(B)/bench/lift.o $(BENCH_PARTS) $(OBJ)
-	$(call say,LD   $@)$(CC) $(OPT) $(LDFLAGS) -o $@ $^ -lm -pthread
+	$(call log,LD   $@)$(CC) $(OPT) $(LDFLAGS) -o $@ $^ -lm -pthread
 
 CPU_NAME = $(shell sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo 2>/dev/null | head -n 1 | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9-')
 BENCH_CSV = $(if $(filter --record,$(ARGS)),tests/bench/results,build/bench)/$(or $(CPU_NAME),$(MACHINE)).csv

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""calls.py LIMIT FILE.ci...: no function calls itself, and no path takes more than LIMIT bytes of stack.
+"""calls.py LIMIT FILE.ci...: no recursion, and no path of calls needs more than LIMIT bytes of stack.
 
-The files are gcc's call graphs (-fcallgraph-info=su), read where gcc ran.  A call through a pointer reaches
-the kernels of that name, or what POINTERS names; any other every function whose address is taken.  The stack
-of functions that are not in the graphs is not counted: libc's, and those of a caller who brings threads.
+The files are gcc's call graphs (-fcallgraph-info=su), read in the folder where gcc ran.  A call through a
+pointer reaches the kernels of that name or the functions in POINTERS, otherwise every function whose address
+is taken.  The stack of functions outside the graphs is not counted: libc's, and those of a caller's threads.
 """
 
 import re
@@ -38,7 +38,7 @@ class Function(NamedTuple):
 
 
 class Graph(NamedTuple):
-    """Functions by title, whom they call by name, and the places where they call through pointers."""
+    """Functions by title, the functions that they call, and the places where they call through pointers."""
 
     functions: dict[str, Function]
     calls: dict[str, set[str]]

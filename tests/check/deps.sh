@@ -1,6 +1,6 @@
 #!/bin/sh
-# deps.sh LIBRARY: needs libc and libm only, and of those only threads and functions whose result is exact on every
-# system.  (Before glibc 2.34 threads were a file of their own.)
+# deps.sh LIBRARY: it needs libc and libm only, and of those only threads and functions whose result is exact on every
+# system.  (Before glibc 2.34 threads were in a separate library.)
 libs='libc\.so\.6|libm\.so\.6|libpthread\.so\.0|libc\.musl-.*|ld-linux.*'
 text='mem(cpy|set|move|cmp|chr)|str(len|cmp|ncmp|chr|rchr|nlen)|vsnprintf'
 exact='(sqrt|floor|ceil|trunc|rint|nearbyint|fabs|fmod|ldexp|frexp|scalbn)f?'

@@ -1,8 +1,8 @@
 #!/bin/sh
 # The digests of the tracker (test_determinism, every film) and of the lifter (test_lift_stream) are those pinned in
 # these tests at every optimisation level, with every compiler found and for every instruction set of the CPU, here
-# and on an emulated aarch64, where the tests of the kernels run as well.  What is not there is skipped, and listed at
-# the end.
+# and on an emulated aarch64, where the tests of the kernels run as well.  What is missing is skipped and listed
+# at the end.
 cd "$(dirname "$0")/../.." || exit 1
 release=$(sed -n 's/^OPT_release *:= *//p' Makefile)
 kernels=$(echo tests/unit/test_*kernel*.c tests/unit/test_fmath.c | sed 's|tests/unit/||g; s|\.c||g')
@@ -25,9 +25,9 @@ compare() { # CC BUILD_FOLDER OPT [RUNNER]
     for part in determinism:16 lift_stream:4; do
         test=test_${part%:*}
         make_tests "$1" "$2" "$3" $test
-        said=$($4 "$2/unit/$test" digest)
+        output=$($4 "$2/unit/$test" digest)
         code=$?
-        lines=$(echo "$said" | grep -cE '^(digest [0-9a-f]{16} [0-9a-f]{16} |skipped )[a-z0-9-]+$')
+        lines=$(echo "$output" | grep -cE '^(digest [0-9a-f]{16} [0-9a-f]{16} |skipped )[a-z0-9-]+$')
         runs=$((runs + 1))
         [ $code -eq 0 ] && [ "$lines" -eq "${part#*:}" ] ||
             fail "$test $1 $3: ended with $code, printed $lines of ${part#*:} lines"
@@ -40,7 +40,7 @@ compare() { # CC BUILD_FOLDER OPT [RUNNER]
                 [ "$have" = "$want" ] || fail "$name: wanted $want" ;;
             esac
         done <<END
-$said
+$output
 END
     done
 }
@@ -63,8 +63,8 @@ if here $arm-gcc $arm-g++ qemu-aarch64; then
     make_tests $arm-gcc build/$arm-release "$release" $kernels
     for test in $kernels; do
         runs=$((runs + 1))
-        said=$(qemu-aarch64 "build/$arm-release/unit/$test") || fail "$test on an emulated $arm"
-        echo "golden: $arm $said"
+        output=$(qemu-aarch64 "build/$arm-release/unit/$test") || fail "$test on an emulated $arm"
+        echo "golden: $arm $output"
     done
 else
     skip "$arm-gcc, $arm-g++ and qemu-aarch64" "Debian: g++-$arm qemu-user"

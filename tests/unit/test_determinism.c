@@ -31,10 +31,10 @@ static void run_backwards(void *user, gait_task_fn *fn, void *ctx, int32_t count
         fn(ctx, count);
 }
 
-static gait_tracker *start(const gait_tracker_config *cfg, int n, float simd_f64)
+static gait_tracker *start(const gait_tracker_config *cfg, int n, float factor)
 {
     gait_tracker *const t = toy_tracker_new(cfg);
-    films_start(t, cfg, n, simd_f64);
+    films_start(t, cfg, n, factor);
     return t;
 }
 

@@ -5,13 +5,13 @@
 enum { MOST = 200 };
 
 /* Weights that do not sum to 1, likelihoods over `wide` nats. */
-static pf uneven(int32_t n, float simd_f64, float ll[MOST])
+static pf uneven(int32_t n, float scale, float ll[MOST])
 {
     pf p = toy_filter(n);
     for (int32_t i = 0; i < n; i++) {
         p.weight[i] = 0.1 + (double)toy_uniform(3, (uint32_t)i, 0);
         p.log_weight[i] = log(p.weight[i]);
-        ll[i] = simd_f64 * toy_uniform(3, (uint32_t)i, 1);
+        ll[i] = scale * toy_uniform(3, (uint32_t)i, 1);
     }
     return p;
 }
@@ -65,10 +65,10 @@ static void test_broken(void)
 /* The largest power of 1, 1/2 ... 1/32 that leaves a fifth of the particles. */
 static void test_soften(void)
 {
-    for (float simd_f64 = 1.0f; simd_f64 < 3e4f; simd_f64 *= 1.7f) {
+    for (float scale = 1.0f; scale < 3e4f; scale *= 1.7f) {
         float ll[MOST], was[MOST], power = 1.0f;
-        pf const p = uneven(MOST, simd_f64, ll);
-        while (power > 0.05f && ess_of(&p, ll, power, simd_f64) < 0.2 * MOST)
+        pf const p = uneven(MOST, scale, ll);
+        while (power > 0.05f && ess_of(&p, ll, power, scale) < 0.2 * MOST)
             power *= 0.5f;
         for (int32_t i = 0; i < MOST; i++)
             was[i] = ll[i];

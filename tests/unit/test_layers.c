@@ -84,7 +84,7 @@ static void test_cells(void)
 /* Bodies of any width anywhere across the grid and beyond it, two limbs each. */
 static void test_columns(void)
 {
-    int32_t wrong = 0, narrow = 0, simd_f64 = 0;
+    int32_t wrong = 0, narrow = 0, wide = 0;
     for (int32_t apart = 0; apart < 130; apart += 9)
         for (int32_t x = -40; x < 140; x++) { /* cells */
             float const a = 2.0f * (float)x, b = a + 2.0f * (float)apart;
@@ -98,10 +98,10 @@ static void test_columns(void)
             }
             wrong += drawn.whole.column % GRID_STEP;
             narrow += drawn.whole.width == 64;
-            simd_f64 += drawn.whole.width == GRID_SIZE;
+            wide += drawn.whole.width == GRID_SIZE;
         }
     CHECK(wrong == 0);
-    CHECK(narrow > 500 && simd_f64 > 500);
+    CHECK(narrow > 500 && wide > 500);
 }
 
 /* The nearer one hides the farther one, whatever their indices. */

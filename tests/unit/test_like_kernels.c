@@ -289,11 +289,11 @@ static like_edge_tally walk_limbs(int32_t lane)
 /* Corners in the image, about it, far off, all in one place, or no numbers at all. */
 static float corner(uint32_t round, uint32_t at)
 {
-    static const float simd_f64[] = {128.0f, 300.0f, 1e5f, 1e7f, 0.2f, 128.0f};
+    static const float scale[] = {128.0f, 300.0f, 1e5f, 1e7f, 0.2f, 128.0f};
     static const float extreme[] = {NAN, INFINITY, -INFINITY, 256.0f, 0.0f, -0.0f};
     uint32_t const pick = draw(at, round + 9000);
     return round % 8 == 7 && pick % 5 == 0 ? extreme[pick / 5 % 6]
-                                           : 128.0f + simd_f64[round % 6] * uniform(at, round + 5000);
+                                           : 128.0f + scale[round % 6] * uniform(at, round + 5000);
 }
 
 static void test_edges(void)

@@ -231,7 +231,7 @@ static double outside(const limb_polygon *p, int n, const float at[2])
 }
 
 typedef struct fit { /* how well polygons hold their limbs */
-    double out, simd_f64, off_axis;
+    double out, beyond, off_axis;
     int points;
 } fit;
 
@@ -268,7 +268,7 @@ static void check_limb(const limb_geometry *g, const view_of_limb *v, const limb
             f->points++;
         }
     f->out = fmax(f->out, touch / size);
-    f->simd_f64 = fmax(f->simd_f64, -touch / size);
+    f->beyond = fmax(f->beyond, -touch / size);
 }
 
 static void test_person(void)
@@ -313,7 +313,7 @@ static void test_person(void)
     CHECK(f.points > 70000);
     CHECK(f.off_axis < 0.05); /* pixels */
     CHECK(f.out < 0.2);       /* of the size: a foreshortened end's ellipse is cut */
-    CHECK(f.simd_f64 < 0.01); /* the surface touches the outline */
+    CHECK(f.beyond < 0.01);   /* the surface touches the outline */
 }
 
 /* Every lane of a block has the polygon of its own body. */

@@ -17,7 +17,7 @@ static inline void film_make(int cameras, int frames)
 }
 
 /* A tracker of cfg with the walls as backgrounds, started at frame n. */
-static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, float simd_f64)
+static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, float factor)
 {
     gait_tracker *const t = toy_tracker_new(cfg);
     for (int k = 0; k < cfg->cameras; k++) {
@@ -25,7 +25,7 @@ static inline gait_tracker *film_tracker(const gait_tracker_config *cfg, int n, 
         if (gait_tracker_set_background(t, k, &plate, NULL) != GAIT_OK)
             abort();
     }
-    toy_tracker_start(t, n, simd_f64);
+    toy_tracker_start(t, n, factor);
     return t;
 }
 
