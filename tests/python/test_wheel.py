@@ -93,9 +93,9 @@ def test_import_gait_needs_numpy_alone(numpy_alone, tmp_path):
 
 
 def test_a_missing_extra_is_one_line(numpy_alone, tmp_path):
+    words = {"learn": "learn walks -o model.gait", "detect": "detect walk.mp4 -o keypoints.csv"}
     for name, command in COMMANDS.items():
-        words = "learn walks -o model.gait" if name == "learn" else name
-        done = run([numpy_alone / "bin/gait", *words.split()], tmp_path)
+        done = run([numpy_alone / "bin/gait", *words.get(name, name).split()], tmp_path)
         assert done.stderr.count("\n") == 1
         if command.extras:
             assert done.stderr.startswith(f"gait {name} needs ") and done.returncode == 1, done.stderr

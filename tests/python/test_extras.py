@@ -1,0 +1,66 @@
+"""Extras: pyproject.toml, constraints.txt and the table of gait.extras name the same packages."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from gait import extras
+from gait.cli import COMMANDS, main
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+PYTHON = Path(__file__).resolve().parents[2] / "python"
+PROJECT = tomllib.loads((PYTHON / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OPTIONAL = PROJECT["optional-dependencies"]
+IMPORTED = {
+    "opencv-python-headless": "cv2",
+    "ai-edge-litert": "ai_edge_litert",
+}  # by another name than installed
+
+
+def packages(requirements):
+    """Names of required packages, without those of this project's own extras."""
+    names = [re.match(r"[\w.-]+", one)[0] for one in requirements]
+    return {name for name in names if name != "libgait"}
+
+
+@pytest.mark.parametrize("extra", extras.EXTRAS)
+def test_an_extra_brings_what_its_table_says(extra):
+    installed = {IMPORTED.get(name, name) for name in packages(OPTIONAL[extra])} - {"dask"}
+    assert installed == set(extras.EXTRAS[extra])
+
+
+def test_all_has_every_extra_that_a_command_needs():
+    needed = {extra for command in COMMANDS.values() for extra in command.extras}
+    assert needed <= set(re.findall(r"\w+", OPTIONAL["all"][0])) & set(extras.EXTRAS)
+
+
+def test_every_package_has_an_exact_version_for_development():
+    lines = (PYTHON / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    exact = {line.partition("==")[0] for line in lines if "==" in line}
+    required = packages([*PROJECT["dependencies"], *(one for group in OPTIONAL.values() for one in group)])
+    assert required <= exact
+
+
+def test_missing_packages_are_named_with_their_extras(monkeypatch):
+    monkeypatch.setattr(extras, "find_spec", lambda module: None)
+    assert extras.remedy("gait x", ["lcm"]) == "gait x needs LCM: pip install 'libgait[lcm]'"
+    assert extras.remedy("gait x", [], "cv2").endswith("OpenCV, PyAV and SciPy: pip install 'libgait[video]'")
+    assert extras.remedy("gait x", [], "elsewhere") == ""
+    monkeypatch.undo()
+    assert extras.remedy("gait x", ["video"]) == ""
+
+
+def test_a_command_without_its_extra_ends_with_one_line(monkeypatch, capsys):
+    def absent(name):
+        raise ModuleNotFoundError(f"No module named {name!r}", name="av")
+
+    monkeypatch.setattr("gait.cli.import_module", absent)
+    monkeypatch.setattr(extras, "find_spec", lambda module: None if module in ("av", "cv2") else object())
+    assert main(["track"]) == 1
+    assert capsys.readouterr().err == "gait track needs OpenCV and PyAV: pip install 'libgait[video]'\n"
