@@ -274,7 +274,7 @@ model: setup lib ## learn the default model from MOCAP= *
 BENCH_ISA := $(foreach isa,$(KERNEL_ISAS),$(B)/bench/bench_limit_kernel.$(isa).o)
 BENCH_SRC := tests/bench/step.c $(filter-out %_kernel.c,$(sort $(wildcard tests/bench/bench_*.c)))
 BENCH_OBJ := $(BENCH_SRC:tests/bench/%.c=$(B)/bench/%.o) $(BENCH_ISA)
-BENCH_PARTS := $(patsubst %,$(B)/tools/trackd/%.c.o,file message model_file options workers)
+BENCH_PARTS := $(patsubst %,$(B)/tools/trackd/%.c.o,common options)
 BENCH_WRAP := $(shell sed -n 's/^WRAP.[^,]*, \([a-z_]*\),.*/-Wl,--wrap=\1/p' tests/bench/bench_stages.c)
 BENCH_CC = $(CC) -std=c11 -D_DEFAULT_SOURCE -D_POSIX_C_SOURCE=200809L $(COMMON) $(CWARN) -Ilibgait/include -iquote libgait/src -Itools $(CFLAGS)
 define bench_isa_rule

@@ -2,7 +2,7 @@
  * look-ups and squared differences (the texture-only limit of doc/limits.md). */
 #ifndef BENCH_LIMIT_H
 #define BENCH_LIMIT_H
-#include "trackd/message.h"
+#include "trackd/common.h"
 
 #include <stdint.h>
 

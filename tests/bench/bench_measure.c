@@ -1,7 +1,7 @@
 #include "bench_measure.h"
 #include "bench_clock.h"
 #include "bench_limit.h"
-#include "trackd/workers.h"
+#include "trackd/common.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* bench_scene.h - a drawn walker who crosses a textured scene, in colour, at the same size whatever the picture's. */
 #ifndef BENCH_SCENE_H
 #define BENCH_SCENE_H
-#include "trackd/message.h"
+#include "trackd/common.h"
 #include "gait.h"
 
 typedef struct bench_scene {

@@ -1,7 +1,7 @@
 /* lift.c - speed of lifting: microseconds of CPU per frame of a stream of 15 points, estimate included, by instruction
  * set; segments per second by the gain and one by one; what is wanted of the best set, and whether it was reached. */
 #include "gait_lift.h"
-#include "trackd/model_file.h"
+#include "trackd/common.h"
 #include "trackd/options.h"
 
 #include <math.h>

@@ -3,7 +3,7 @@
 #include "bench_limit.h"
 #include "bench_report.h"
 #include "bench_verdict.h"
-#include "trackd/file.h"
+#include "trackd/common.h"
 #include "trackd/options.h"
 #include "gait_pool.h"
 

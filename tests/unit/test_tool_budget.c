@@ -1,5 +1,5 @@
 /* Which frames a latency budget lets through, and how the number of particles follows it. */
-#include "../../tools/trackd/budget.c"
+#include "../../tools/trackd/timing.c"
 #include "check.h"
 
 enum { MS = 1000 };

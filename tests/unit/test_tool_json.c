@@ -1,6 +1,6 @@
 /* The JSON reader of the tools: grammar, limits, and access by key.  Built with its sources, which need no library. */
 #include "../../tools/trackd/json.c"
-#include "../../tools/trackd/message.c"
+#include "../../tools/trackd/common.c"
 #include "check.h"
 
 static json_node nodes[32];

@@ -4,6 +4,165 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* ---- blob_finder ---- */
+enum {
+    LEAST_STEP = 14, /* grey levels of change that count, at least, */
+    NOISE_STEPS = 5, /* and in robust deviations of the picture's noise */
+    ANOTHER = 18,    /* by which half of a picture differs from another scene, at least */
+    GAP = 3,         /* cells of low contrast that a body may be torn by */
+    LEAST_HEIGHT = 15
+};
+
+/* Where the running sum of a histogram passes half of it. */
+static int32_t middle_of(const int32_t *count, int32_t bins)
+{
+    int64_t total = 0, sum = 0;
+    int32_t i = 0;
+    for (int32_t k = 0; k < bins; k++)
+        total += count[k];
+    while (i < bins - 1 && (sum += count[i]) * 2 < total)
+        i++;
+    return i;
+}
+
+/* Grey level of a pixel: of one channel, or of all if the pictures are of different kinds (channel -1). */
+static int32_t level(const gait_image *image, int32_t x, int32_t y, int32_t channel)
+{
+    const uint8_t *const row = image->data + (ptrdiff_t)y * image->stride;
+    if (image->format == GAIT_GREY8)
+        return row[x];
+    return channel >= 0 ? row[3 * x + channel] : (row[3 * x] + 2 * row[3 * x + 1] + row[3 * x + 2]) / 4;
+}
+
+static int32_t difference(const blob_finder *f, const gait_image *a, const gait_image *b, int32_t cell,
+                          int32_t channel)
+{
+    int32_t const x = cell % f->width * f->step, y = cell / f->width * f->step;
+    return level(a, x, y, channel) - level(b, x, y, channel);
+}
+
+/* Change of each cell against the plate, without that of the exposure: most of the picture is background. */
+static void compare(blob_finder *f, const gait_image *image, const gait_image *plate)
+{
+    bool const alike = image->format == plate->format && image->format != GAIT_GREY8;
+    int32_t const cells = f->width * f->height, first = alike ? 0 : -1, last = alike ? 2 : -1;
+    memset(f->change, 0, (size_t)cells * sizeof *f->change);
+    for (int32_t c = first; c <= last; c++) {
+        int32_t count[511] = {0};
+        for (int32_t i = 0; i < cells; i++)
+            count[255 + difference(f, image, plate, i, c)]++;
+        int32_t const exposure = middle_of(count, 511) - 255;
+        for (int32_t i = 0; i < cells; i++) {
+            int32_t const d = abs(difference(f, image, plate, i, c) - exposure);
+            f->change[i] = (int16_t)(d > f->change[i] ? d : f->change[i]);
+        }
+    }
+}
+
+/* Mean over 3 x 3 cells, in quarters of a grey level; returns four times the median. */
+static int32_t smooth(blob_finder *f)
+{
+    int32_t count[1024] = {0};
+    for (int32_t y = 0; y < f->height; y++)
+        for (int32_t x = 0; x < f->width; x++) {
+            int32_t sum = 0, n = 0;
+            for (int32_t v = y - (y > 0); v <= y + (y < f->height - 1); v++)
+                for (int32_t u = x - (x > 0); u <= x + (x < f->width - 1); u++, n++)
+                    sum += f->change[v * f->width + u];
+            f->smooth[y * f->width + x] = (int16_t)(4 * sum / n);
+            count[4 * sum / n]++;
+        }
+    return middle_of(count, 1024);
+}
+
+typedef struct patch {
+    int32_t x0, x1, y0, y1, area; /* the last ones belong to it */
+} patch;
+
+/* All cells that hang together with `from`, over gaps of up to GAP cells up and down, into f->queue. */
+static patch flood(blob_finder *f, int32_t from)
+{
+    patch p = {f->width, 0, f->height, 0, 0};
+    f->queue[p.area++] = from;
+    f->mask[from] = 2;
+    for (int32_t k = 0; k < p.area; k++) {
+        int32_t const x = f->queue[k] % f->width, y = f->queue[k] / f->width;
+        p.x0 = x < p.x0 ? x : p.x0;
+        p.x1 = x > p.x1 ? x : p.x1;
+        p.y0 = y < p.y0 ? y : p.y0;
+        p.y1 = y > p.y1 ? y : p.y1;
+        for (int32_t v = y - GAP; v <= y + GAP; v++)
+            for (int32_t u = x - 1; u <= x + 1; u++)
+                if (u >= 0 && u < f->width && v >= 0 && v < f->height && f->mask[v * f->width + u] == 1) {
+                    f->mask[v * f->width + u] = 2;
+                    f->queue[p.area++] = v * f->width + u;
+                }
+    }
+    return p;
+}
+
+/* In full view, upright and filled as a standing person is? */
+static bool person_like(const blob_finder *f, const patch *p)
+{
+    int32_t const wide = p->x1 - p->x0 + 1, tall = p->y1 - p->y0 + 1;
+    return p->x0 > 0 && p->y0 > 0 && p->x1 < f->width - 1 && p->y1 < f->height - 1 && tall >= LEAST_HEIGHT &&
+           tall > wide && 20 * p->area > 3 * wide * tall;
+}
+
+/* Median column of the patch in f->queue between two rows, cells. */
+static double column_of(const blob_finder *f, const patch *p, int32_t last_row)
+{
+    int32_t count[BLOB_CELLS / 320] = {0};
+    for (int32_t k = 0; k < p->area; k++)
+        if (f->queue[k] / f->width <= last_row)
+            count[f->queue[k] % f->width]++;
+    return (double)middle_of(count, f->width);
+}
+
+static void measure(const blob_finder *f, const patch *p, blob *out)
+{
+    double const s = f->step, tall = p->y1 - p->y0 + 1;
+    out->foot[0] = s * column_of(f, p, p->y1);
+    out->foot[1] = s * (p->y1 + 0.5);
+    out->head[0] = s * column_of(f, p, p->y0 + (int32_t)(0.1 * tall));
+    out->head[1] = s * (p->y0 - 0.5);
+    out->area = p->area;
+}
+
+/* Fill f->smooth; returns four times the median. */
+static int32_t change(blob_finder *f, const gait_image *image, const gait_image *plate)
+{
+    int32_t const larger = image->width > image->height ? image->width : image->height;
+    f->step = (larger + 319) / 320;
+    f->width = image->width / f->step;
+    f->height = image->height / f->step;
+    compare(f, image, plate);
+    return smooth(f);
+}
+
+bool blob_another_scene(blob_finder *f, const gait_image *image, const gait_image *plate)
+{
+    return change(f, image, plate) > 4 * ANOTHER;
+}
+
+bool blob_find(blob_finder *f, const gait_image *image, const gait_image *plate, blob *out)
+{
+    out->area = 0;
+    int32_t const noise = NOISE_STEPS * change(f, image, plate) * 3 / 2,
+                  least = noise > 4 * LEAST_STEP ? noise : 4 * LEAST_STEP;
+    for (int32_t i = 0; i < f->width * f->height; i++)
+        f->mask[i] = f->smooth[i] > least;
+    for (int32_t i = 0; i < f->width * f->height; i++) {
+        if (f->mask[i] != 1)
+            continue;
+        patch const p = flood(f, i);
+        if (p.area > out->area && person_like(f, &p))
+            measure(f, &p, out);
+    }
+    return out->area > 0;
+}
+
+/* ---- auto_start ---- */
 /* As in gait/track/autostart.py and gait/image/detection.py. */
 static const double WINDOW = 1.0, KEEP = 1.5; /* seconds */
 static const double LEAD = 0.1;               /* statures the lowest foot is nearer than the pelvis */
@@ -85,7 +244,8 @@ static double crown_share(const gait_model *m, double stature)
         gait_state s = {.phase = (float)i / 8, .stature = (float)stature};
         gait_pose pose;
         float height;
-        if (gait_model_pelvis_height(m, &s, &height, NULL) != GAIT_OK || gait_model_pose(m, &s, &pose, NULL) != GAIT_OK)
+        if (gait_model_pelvis_height(m, &s, &height, NULL) != GAIT_OK ||
+            gait_model_pose(m, &s, &pose, NULL) != GAIT_OK)
             return 1;
         sum += (double)(pose.joint[crown][2] + height);
     }
@@ -143,7 +303,8 @@ static void fit(const double *time, const double *place, int32_t n, double *end,
 
 static path path_of(const auto_start *s, const double lens[3], double lead, double factor)
 {
-    double time[AUTO_START_DETECTIONS], place[2][AUTO_START_DETECTIONS], off[AUTO_START_DETECTIONS], mean = 0, square = 0;
+    double time[AUTO_START_DETECTIONS], place[2][AUTO_START_DETECTIONS], off[AUTO_START_DETECTIONS],
+        mean = 0, square = 0;
     int32_t const n = s->count;
     path p;
     for (int32_t i = 0; i < n; i++) {
@@ -214,8 +375,9 @@ static double age(const auto_start *s, int64_t utime)
     return 1e-6 * (double)(utime - s->seen[0].utime);
 }
 
-bool auto_start_add(auto_start *s, const gait_image *frame, const gait_image *plate, const gait_camera *camera,
-                 const gait_model *model, int64_t utime, gait_state *mean, gait_state *sd)
+bool auto_start_add(auto_start *s, const gait_image *frame, const gait_image *plate,
+                    const gait_camera *camera, const gait_model *model, int64_t utime, gait_state *mean,
+                    gait_state *sd)
 {
     blob b;
     detection one = {.utime = utime};

@@ -1,6 +1,6 @@
 #include "convert.h"
 
-#include "camera_file.h"
+#include "input_files.h"
 
 #include <math.h>
 #include <stddef.h>

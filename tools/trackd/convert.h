@@ -5,7 +5,7 @@
 #include "gaitmsg_camera_t.h"
 #include "gaitmsg_estimate_t.h"
 #include "gaitmsg_state_t.h"
-#include "message.h"
+#include "common.h"
 
 /* An estimate message with the arrays it points to; it must not move once filled. */
 typedef struct estimate_message {

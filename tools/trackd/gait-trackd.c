@@ -1,12 +1,10 @@
 /* gait-trackd - frames in, estimates out, over LCM.  `gait-trackd --help` is the manual. */
-#include "trackd/camera_file.h"
-#include "trackd/jpeg.h"
-#include "trackd/link.h"
-#include "trackd/log_scan.h"
-#include "trackd/pnm.h"
+#include "trackd/input_files.h"
+#include "trackd/image_view.h"
+#include "trackd/lcm_link.h"
 #include "trackd/receiver.h"
 #include "trackd/settings.h"
-#include "trackd/workers.h"
+#include "trackd/common.h"
 
 #include <inttypes.h>
 #include <signal.h>
@@ -89,7 +87,7 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
         return false;
     if (want->tracks_term) {
         keypoint_cue_open(&p->cue, s->track.model, s->track.info.joints,
-                        want->tracks_sd > 0 ? want->tracks_sd : 4);
+                          want->tracks_sd > 0 ? want->tracks_sd : 4);
         s->cue = &p->cue;
     }
     s->max_gap = (double)want->max_gap;

@@ -1,10 +1,18 @@
-/* image_view.h - look into an encoded gaitmsg.image_t where it lies: every length is checked, nothing is copied.
- * The generated decoder allocates, and trusts the lengths in the message. */
+/* image_view.h - read an encoded gaitmsg.image_t in place, and decode JPEG. */
 #ifndef TRACKD_IMAGE_VIEW_H
 #define TRACKD_IMAGE_VIEW_H
+#include "common.h"
 #include "gait.h"
-#include "message.h"
 
+/* ---- JPEG frames, where the build found libjpeg. */
+/* Whether this build decodes JPEG. */
+bool jpeg_supported(void);
+/* Decode into `pixels`, which has room for width x height x 3 bytes: grey stays grey, anything else becomes RGB. */
+bool jpeg_decode(const uint8_t *data, size_t size, int32_t width, int32_t height, uint8_t *pixels,
+                 gait_image *out, message *why);
+
+/* ---- look into an encoded gaitmsg.image_t where it lies: every length is checked, nothing is copied.
+ * The generated decoder allocates, and trusts the lengths in the message. */
 typedef struct image_view {
     int64_t utime;
     int64_t frame; /* metadata "frame"; -1: none */

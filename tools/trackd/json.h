@@ -1,12 +1,14 @@
-/* json.h - strict JSON (RFC 8259) into nodes of the caller; strings are checked but their escapes stay as they are.
- * NaN and Infinity, which JSON does not have, come through as NAN so that the reader of a key can refuse them by name.
- */
+/* json.h - strict JSON (RFC 8259), and checked access to the keys of a small JSON file. */
 #ifndef TRACKD_JSON_H
 #define TRACKD_JSON_H
-#include "message.h"
+#include "common.h"
 
 #include <stddef.h>
+#include <stdint.h>
 
+/* ---- strict JSON (RFC 8259) into nodes of the caller; strings are checked but their escapes stay as they are.
+ * NaN and Infinity, which JSON does not have, come through as NAN so that the reader of a key can refuse them by name.
+ */
 typedef enum json_type { JSON_NULL, JSON_BOOL, JSON_NUMBER, JSON_STRING, JSON_ARRAY, JSON_OBJECT } json_type;
 
 /* One value; its parts follow it.  An object's parts are key, value, key, value. */
@@ -31,4 +33,29 @@ int json_find(const json_doc *doc, int object, const char *key);
 /* Copy the numbers of a value: one number, or an array of them, nested or not.  Returns how many there are (also
  * beyond cap), or -1 if anything else is in it. */
 int json_numbers(const json_doc *doc, int value, double *out, int cap);
+
+/* ---- checked access to the keys of a small JSON file: every fault is one line naming file, key and remedy. */
+enum { FIELDS_NODES = 256 };
+
+typedef struct fields {
+    const char *path;
+    json_doc doc;
+    json_node node[FIELDS_NODES];
+    file_bytes bytes;
+} fields;
+
+/* Read the file, which must hold one JSON object; `what` names its kind.  Close it again in every case. */
+bool fields_open(fields *f, const char *path, const char *what, message *why);
+void fields_close(fields *f);
+
+/* Value of `key` of `object` (0: the whole file), or -1. */
+int fields_find(const fields *f, int object, const char *key);
+/* Exactly `count` numbers in [low, high] under the key, nested or not; the remedy ends the line of failure. */
+bool fields_numbers(const fields *f, int object, const char *key, double *out, int count, double low,
+                    double high, const char *remedy, message *why);
+/* One whole number in [low, high] under a key of the file. */
+bool fields_whole(const fields *f, const char *key, int64_t *out, double low, double high, const char *remedy,
+                  message *why);
+/* Every key of `object` must be one of the `count` known ones, and there once. */
+bool fields_only(const fields *f, int object, const char *const *known, int count, message *why);
 #endif

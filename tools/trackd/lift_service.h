@@ -3,10 +3,10 @@
 #define TRACKD_LIFT_SERVICE_H
 #include "gait_lift.h"
 #include "gaitmsg_joint_t.h"
-#include "histogram.h"
-#include "model_file.h"
-#include "sink.h"
-#include "keypoints_view.h"
+#include "timing.h"
+#include "common.h"
+#include "lcm_link.h"
+#include "keypoints.h"
 
 enum { LIFT_SERVICE_PAST = 65 }; /* more than the longest lag */
 

@@ -1,6 +1,6 @@
 #include "options.h"
 
-#include "file.h"
+#include "common.h"
 
 #include <errno.h>
 #include <inttypes.h>

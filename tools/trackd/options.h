@@ -1,7 +1,7 @@
 /* options.h - one table serves the command line, the configuration file and --help. */
 #ifndef TRACKD_OPTIONS_H
 #define TRACKD_OPTIONS_H
-#include "message.h"
+#include "common.h"
 
 #include <stddef.h>
 

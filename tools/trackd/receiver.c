@@ -1,7 +1,7 @@
 #define _GNU_SOURCE /* ppoll */
 #include "receiver.h"
 
-#include "link.h"
+#include "lcm_link.h"
 
 #include <errno.h>
 #include <poll.h>

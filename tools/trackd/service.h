@@ -1,20 +1,19 @@
-/* service.h - the tracker as a service: messages in, messages out, whatever carries them. */
+/* service.h - the tracker as a service: messages in, messages out, independent of the transport. */
 #ifndef TRACKD_SERVICE_H
 #define TRACKD_SERVICE_H
-#include "start_trigger.h"
-#include "budget.h"
+#include "auto_start.h"
 #include "convert.h"
 #include "gaitmsg_command_t.h"
 #include "gaitmsg_particles_t.h"
 #include "gaitmsg_status_t.h"
-#include "histogram.h"
+#include "keypoints.h"
+#include "lcm_link.h"
 #include "lift_service.h"
-#include "sink.h"
 #include "strides.h"
-#include "auto_start.h"
+#include "timing.h"
 #include "tracking.h"
-#include "keypoint_cue.h"
 
+/* ---- the tracker as a service: messages in, messages out, whatever carries them. */
 /* Since the program's start or the last RESET. */
 typedef struct service_counts {
     int64_t frames, dropped, rejected;
@@ -35,18 +34,18 @@ enum { SERVICE_IDLE_NOT, SERVICE_IDLE_CAMERA, SERVICE_IDLE_START, SERVICE_IDLE_S
 typedef struct service {
     tracking track;
     lift_service *lift; /* the second service; NULL: not asked for */
-    keypoint_cue *cue;    /* joints of a detector for the tracker; NULL: not asked for */
+    keypoint_cue *cue;  /* joints of a detector for the tracker; NULL: not asked for */
     sink *out;          /* where messages go */
     int threads;
     int stream; /* number of the camera, [0, 30] */
     bool has_init;
     init_state init; /* of --init FILE */
     start_trigger start;
-    bool compared;   /* the empty scene with a frame */
-    bool seek;       /* start with whoever walks in, and again when lost */
+    bool compared;         /* the empty scene with a frame */
+    bool seek;             /* start with whoever walks in, and again when lost */
     auto_start auto_start; /* looks for them */
-    int8_t state;    /* GAITMSG_STATUS_T_* */
-    bool news;       /* the state has changed since the last status */
+    int8_t state;          /* GAITMSG_STATUS_T_* */
+    bool news;             /* the state has changed since the last status */
     int64_t command_id;
     service_counts counts;
     int64_t came, tracked;   /* frames since the program's start, whatever RESET says */
@@ -98,4 +97,9 @@ uint64_t service_digest(const service *s); /* 0 before the camera is known */
 int64_t service_now(void);
 /* The same of a clock that nobody sets, from any beginning. */
 int64_t service_ticks(void);
+
+/* ---- what the service publishes. */
+/* GAIT_ESTIMATE, and GAIT_PARTICLES when asked for; `received` is when the frame had arrived. */
+void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
+                           int64_t step_us);
 #endif

@@ -1,8 +1,6 @@
 /* service_frame.c - what a frame does to the service: the start comes, the tracker steps, somebody is looked for. */
 #include "service.h"
 
-#include "service_send.h"
-
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -41,7 +39,8 @@ static bool begin(service *s, const image_view *v)
     start_trigger_answer const answer = start_trigger_reached(&s->start, v, s->max_gap, &utime, &why);
     if (answer == START_TRIGGER_WAIT)
         return false;
-    if (answer == START_TRIGGER_MISSED || !tracking_start(&s->track, &s->start.mean, &s->start.sd, utime, &why)) {
+    if (answer == START_TRIGGER_MISSED ||
+        !tracking_start(&s->track, &s->start.mean, &s->start.sd, utime, &why)) {
         stop(s, &why);
         return false;
     }
@@ -107,8 +106,8 @@ static bool spot(service *s, const image_view *v, const gait_image *frame)
 {
     gait_state mean = s->track.prior_mean, sd = s->track.prior_sd;
     if (!s->seek || !s->track.background.data ||
-        !auto_start_add(&s->auto_start, frame, &s->track.background, &s->track.config.camera[0], s->track.model,
-                     v->utime, &mean, &sd))
+        !auto_start_add(&s->auto_start, frame, &s->track.background, &s->track.config.camera[0],
+                        s->track.model, v->utime, &mean, &sd))
         return false;
     auto_start_reset(&s->auto_start);
     start_trigger_by_time(&s->start, &mean, &sd, v->utime);

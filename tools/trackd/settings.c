@@ -1,7 +1,7 @@
 #include "settings.h"
 
 #include "gait_pool.h"
-#include "link.h"
+#include "lcm_link.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -6,7 +6,8 @@
 typedef struct settings { /* 0 or empty: not given, unless said otherwise */
     char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
     char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
-    int32_t stream, particles, adapt_particles, acquisition_particles, components, threads, tasks, lag, cpu_mask;
+    int32_t stream, particles, adapt_particles, acquisition_particles, components, threads, tasks, lag,
+        cpu_mask;
     uint64_t seed;
     float max_gap, budget_ms;
     char lift_model[OPTION_TEXT];

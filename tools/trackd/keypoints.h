@@ -1,12 +1,48 @@
-/* keypoint_cue.h - 2-D joints of a detector as a term of the tracker's likelihood.
+/* keypoints.h - 2-D keypoints of a detector: read from an encoded gaitmsg.tracks_t, and used as a term of the likelihood. */
+#ifndef TRACKD_KEYPOINTS_H
+#define TRACKD_KEYPOINTS_H
+#include "byte_reader.h"
+#include "common.h"
+#include "gait.h"
+#include "gait_lift.h"
+
+/* ---- look into an encoded gaitmsg.tracks_t where it lies: every length is checked, nothing is copied. */
+typedef struct keypoints_view {
+    int64_t utime, frame;
+    int32_t count;
+    byte_reader tracks; /* what keypoints_view_next() goes through */
+} keypoints_view;
+
+typedef struct track_view {
+    const char *name; /* in the message */
+    float u, v, confidence;
+} track_view;
+
+/* Which points of messages a model takes: those that it knows, each once, with a confidence from 0 to 1. */
+typedef struct keypoints_sieve {
+    int64_t left_out;             /* points */
+    bool told[3];                 /* by reason, once on stderr */
+    bool named[GAIT_MAX_MARKERS]; /* by the message so far */
+} keypoints_sieve;
+
+/* A new message begins. */
+void keypoints_sieve_begin(keypoints_sieve *s);
+/* Is the point of use?  `joint` is its index in the model, -1: unknown. */
+bool keypoints_sieve_pass(keypoints_sieve *s, const track_view *track, int32_t joint);
+
+/* false, with the reason: another type, or shorter than its lengths say. */
+bool keypoints_view_open(keypoints_view *v, const void *message_bytes, size_t size, message *why);
+/* The next track; false: there are no more. */
+bool keypoints_view_next(keypoints_view *v, track_view *out);
+/* Deviation of a track, pixels, where one with full confidence has `sd`; -1: not seen. */
+double keypoints_view_sd(const track_view *track, double sd);
+/* false, with the reason that no track of a message is of a joint that is known. */
+bool keypoints_view_strangers(message *why);
+
+/* ---- 2-D joints of a detector as a term of the tracker's likelihood.
  *
  * They belong to the frame of their capture time.  A detector needs a while, so a frame whose joints have not come
  * is held until they do, at the longest until the next frame comes. */
-#ifndef TRACKD_KEYPOINT_CUE_H
-#define TRACKD_KEYPOINT_CUE_H
-#include "gait.h"
-#include "keypoints_view.h"
-
 enum { KEYPOINT_CUE_PAST = 8 }; /* messages that wait for their frames */
 
 typedef struct cue_joints {

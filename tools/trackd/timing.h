@@ -1,9 +1,24 @@
-/* budget.h - how old an estimate may be: which frames are dropped for it, and how many particles keep it. */
-#ifndef TRACKD_BUDGET_H
-#define TRACKD_BUDGET_H
+/* timing.h - quantiles of step times, and the latency budget: which frames are dropped, how many particles are used. */
+#ifndef TRACKD_TIMING_H
+#define TRACKD_TIMING_H
 #include <stdbool.h>
 #include <stdint.h>
 
+/* ---- quantiles of times in fixed memory, exact to 1.6 %. */
+enum { HISTOGRAM_BINS = 27 * 64 };
+
+typedef struct histogram { /* all zero: empty */
+    int64_t count;
+    int32_t largest;
+    uint32_t bin[HISTOGRAM_BINS];
+} histogram;
+
+/* Add one time in microseconds; negative counts as 0. */
+void histogram_add(histogram *h, int64_t us);
+/* The value below which `share` of the times lie, microseconds; 0 when empty. */
+int32_t histogram_quantile(const histogram *h, double share);
+
+/* ---- how old an estimate may be: which frames are dropped for it, and how many particles keep it. */
 /* Why the number of particles has changed. */
 typedef enum budget_reason { BUDGET_SLOW, BUDGET_DROPPED, BUDGET_SPARE } budget_reason;
 

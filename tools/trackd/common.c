@@ -1,0 +1,107 @@
+#include "common.h"
+
+#include "gait.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- message ---- */
+bool message_set(message *m, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    vsnprintf(m->text, sizeof m->text, format, args);
+    va_end(args);
+    return false;
+}
+
+/* ---- file ---- */
+/* Far above any model, camera or picture; stops a device or a wrong file from filling the memory. */
+enum { MAX_FILE = 1 << 28 };
+
+static bool read_stream(FILE *f, const char *path, const char *what, file_bytes *out, message *why)
+{
+    long size = -1;
+    if (fseek(f, 0, SEEK_END) == 0)
+        size = ftell(f);
+    if (size < 0 || size > MAX_FILE || fseek(f, 0, SEEK_SET) != 0)
+        return message_set(
+            why, "%s: no %s file, as it is no regular file of reasonable size; give the name of one", path,
+            what);
+    size_t const room = ((size_t)size + 1 + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
+    out->data = aligned_alloc(GAIT_ALIGN, room);
+    if (!out->data)
+        return message_set(why, "%s: not enough memory for %ld bytes", path, size);
+    out->size = fread(out->data, 1, (size_t)size, f);
+    memset(out->data + out->size, 0, room - out->size);
+    if (out->size == (size_t)size)
+        return true;
+    free(out->data);
+    *out = (file_bytes){0};
+    return message_set(why, "%s: cannot be read to its end", path);
+}
+
+bool file_read(const char *path, const char *what, file_bytes *out, message *why)
+{
+    *out = (file_bytes){0};
+    FILE *const f = fopen(path, "rb");
+    if (!f)
+        return message_set(why, "%s: cannot open the %s file: %s", path, what, strerror(errno));
+    bool const ok = read_stream(f, path, what, out, why);
+    fclose(f);
+    return ok;
+}
+
+/* ---- model_file ---- */
+bool model_file_open(model_file *m, const char *path, message *why)
+{
+    gait_error err = {.text = ""};
+    size_t bytes = 0;
+    *m = (model_file){0};
+    if (!file_read(path, "model", &m->blob, why))
+        return false;
+    gait_result status = gait_model_bytes(m->blob.data, m->blob.size, &bytes, &err);
+    if (status == GAIT_OK) {
+        m->memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+        if (!m->memory)
+            return message_set(why, "%s: not enough memory for %zu bytes", path, bytes);
+        status = gait_model_init(m->memory, bytes, m->blob.data, m->blob.size, &m->model, &err);
+    }
+    m->bytes = m->blob.size + bytes;
+    return status == GAIT_OK ||
+           message_set(why, "%.100s: not a usable model: %s (%s); learn it anew or give another", path,
+                       err.text, gait_result_name(status));
+}
+
+void model_file_close(model_file *m)
+{
+    free(m->memory);
+    free(m->blob.data);
+    *m = (model_file){0};
+}
+
+/* ---- workers ---- */
+bool workers_start(workers *w, int32_t threads, message *why)
+{
+    gait_error err = {.text = ""};
+    *w = (workers){0};
+    if (gait_pool_bytes(threads, &w->bytes, &err) != GAIT_OK)
+        return message_set(why, "--threads %d: %s", (int)threads, err.text);
+    w->memory = aligned_alloc(GAIT_ALIGN, (w->bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+    if (!w->memory)
+        return message_set(why, "not enough memory for %d threads", (int)threads);
+    if (gait_pool_init(w->memory, w->bytes, threads, &w->pool, &err) == GAIT_OK)
+        return true;
+    workers_stop(w);
+    return message_set(why, "--threads %d: %s", (int)threads, err.text);
+}
+
+void workers_stop(workers *w)
+{
+    gait_pool_stop(w->pool);
+    free(w->memory);
+    *w = (workers){0};
+}

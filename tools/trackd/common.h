@@ -1,0 +1,48 @@
+/* common.h - what every part uses: one-line errors, whole files in memory, models, the pool of threads, clocks. */
+#ifndef TRACKD_COMMON_H
+#define TRACKD_COMMON_H
+#include "gait.h"
+#include "gait_pool.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* ---- one line saying what went wrong, filled by whoever notices first. */
+typedef struct message {
+    char text[256];
+} message;
+
+/* Write the line; always returns false, so that a caller can end with `return message_set(...)`. */
+bool message_set(message *m, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* ---- a whole file in memory. */
+typedef struct file_bytes {
+    unsigned char *data; /* aligned to GAIT_ALIGN, with a NUL after the last byte; free() it */
+    size_t size;         /* without that NUL */
+} file_bytes;
+
+/* `what` names the kind of file in the message: "model". */
+bool file_read(const char *path, const char *what, file_bytes *out, message *why);
+
+/* ---- a model read from its file, in memory that is taken once. */
+typedef struct model_file {
+    file_bytes blob;
+    void *memory;
+    gait_model *model;
+    size_t bytes; /* of blob and model */
+} model_file;
+
+bool model_file_open(model_file *m, const char *path, message *why);
+void model_file_close(model_file *m);
+
+/* ---- the library's pool of threads in memory of its own. */
+typedef struct workers {
+    gait_pool *pool;
+    void *memory;
+    size_t bytes;
+} workers;
+
+/* `threads` in all, the caller's included. */
+bool workers_start(workers *w, int32_t threads, message *why);
+void workers_stop(workers *w);
+#endif

@@ -1,0 +1,277 @@
+#include "input_files.h"
+
+#include "json.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- pnm ---- */
+enum { MAX_PIXELS = 1 << 14 };
+
+/* Next number of the header; space and comments before it are skipped.  -1: none. */
+static int32_t header_number(const unsigned char **at)
+{
+    const unsigned char *s = *at;
+    int32_t value = 0;
+    while (*s == ' ' || *s == '\t' || *s == '\r' || *s == '\n' || *s == '#') {
+        if (*s == '#')
+            while (s[1] && s[1] != '\n')
+                s++;
+        s++;
+    }
+    if (*s < '0' || *s > '9')
+        return -1;
+    for (; *s >= '0' && *s <= '9'; s++)
+        value = value > MAX_PIXELS ? value : value * 10 + (*s - '0');
+    *at = s;
+    return value;
+}
+
+static bool parse_pnm(const char *path, const file_bytes *bytes, gait_image *out, message *why)
+{
+    const unsigned char *at = bytes->data + 2;
+    if (bytes->data[0] != 'P' || (bytes->data[1] != '5' && bytes->data[1] != '6'))
+        return message_set(why, "%s: not a binary PGM or PPM file; convert it (magick plate.png plate.ppm)",
+                           path);
+    out->format = bytes->data[1] == '5' ? GAIT_GREY8 : GAIT_RGB8;
+    out->width = header_number(&at);
+    out->height = header_number(&at);
+    if (header_number(&at) != 255 || out->width < 1 || out->height < 1 || out->width > MAX_PIXELS ||
+        out->height > MAX_PIXELS)
+        return message_set(why, "%s: damaged header or not 8 bits a sample; write it anew", path);
+    out->data = at + 1;
+    out->stride = out->width * (out->format == GAIT_GREY8 ? 1 : 3);
+    size_t const wanted = (size_t)out->stride * (size_t)out->height;
+    return bytes->size >= wanted + (size_t)(out->data - bytes->data) ||
+           message_set(why, "%s: shorter than its header says; write it anew", path);
+}
+
+bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why)
+{
+    if (!file_read(path, "background", bytes, why))
+        return false;
+    if (bytes->size > 2 && parse_pnm(path, bytes, out, why))
+        return true;
+    if (bytes->size <= 2)
+        message_set(why, "%s: not a binary PGM or PPM file; convert it (magick plate.png plate.ppm)", path);
+    free(bytes->data);
+    *bytes = (file_bytes){0};
+    return false;
+}
+
+/* ---- camera_file ---- */
+static double dot(const float *a, const float *b)
+{
+    return (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
+}
+
+bool camera_rotation_ok(const gait_camera *camera)
+{
+    const float *const a = camera->R, *const b = a + 3, *const c = a + 6;
+    float const cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    double const fault[] = {dot(a, a) - 1, dot(b, b) - 1, dot(a, b), dot(cross, c) - 1};
+    double worst = 0;
+    for (size_t i = 0; i < sizeof fault / sizeof *fault; i++)
+        worst = fmax(worst, fabs(fault[i]));
+    return worst < 3e-3;
+}
+
+static bool read_pixels(const fields *f, const char *key, int32_t *out, message *why)
+{
+    int64_t value = 0;
+    bool const ok = fields_whole(f, key, &value, 1, CAMERA_PIXELS,
+                                 "give the size of the video in read_pixels pixels", why);
+    *out = (int32_t)value;
+    return ok;
+}
+
+static bool read_numbers(const fields *f, const char *key, float *out, int count, double low, double high,
+                         const char *remedy, message *why)
+{
+    double value[9];
+    if (!fields_numbers(f, 0, key, value, count, low, high, remedy, why))
+        return false;
+    for (int i = 0; i < count; i++)
+        out[i] = (float)value[i];
+    return true;
+}
+
+/* 0, 4 or 5 numbers; an absent key is an ideal read_distortion. */
+static bool read_distortion(const fields *f, float out[5], message *why)
+{
+    const char *const remedy = "give k1 k2 p1 p2 [k3] (0, 4 or 5 numbers)";
+    int const value = fields_find(f, 0, "distortion");
+    int const count = value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
+    memset(out, 0, 5 * sizeof *out);
+    if (count != 0 && count != 4 && count != 5)
+        return message_set(why, "%s: distortion is not such a list; %s", f->path, remedy);
+    return count == 0 || read_numbers(f, "distortion", out, count, -1e3, 1e3, remedy, why);
+}
+
+static bool parse_camera(const fields *f, gait_camera *c, message *why)
+{
+    static const char *const known[] = {"width", "height", "fx", "fy",         "cx",
+                                        "cy",    "R",      "t",  "distortion", "note"};
+    if (!fields_only(f, 0, known, sizeof known / sizeof *known, why))
+        return false;
+    const char *const focal = "give the focal length in pixels", *const middle =
+                                                                     "give the principal point in pixels";
+    if (!read_pixels(f, "width", &c->width, why) || !read_pixels(f, "height", &c->height, why) ||
+        !read_numbers(f, "fx", &c->fx, 1, 1e-3, 1e9, focal, why) ||
+        !read_numbers(f, "fy", &c->fy, 1, 1e-3, 1e9, focal, why) ||
+        !read_numbers(f, "cx", &c->cx, 1, -1e6, 1e6, middle, why) ||
+        !read_numbers(f, "cy", &c->cy, 1, -1e6, 1e6, middle, why) ||
+        !read_numbers(f, "R", c->R, 9, -2, 2, "give the rotation from world to camera, 3 rows of 3", why) ||
+        !read_numbers(f, "t", c->t, 3, -1e6, 1e6,
+                      "give the translation from world to camera, 3 numbers in metres", why) ||
+        !read_distortion(f, c->distortion, why))
+        return false;
+    return camera_rotation_ok(c) ||
+           message_set(why, "%s: R is not a rotation; its rows must be orthogonal, of length 1, right-handed",
+                       f->path);
+}
+
+/* The kinds of file that `gait capture` reads and this program does not. */
+static bool others_kind(const char *path)
+{
+    static const char *const endings[] = {".toml", ".yaml", ".yml", ".xml"};
+    const char *const folder = strrchr(path, '/'), *const name = folder ? folder + 1 : path;
+    size_t const length = strcspn(name, ":"); /* FILE.toml:name chooses a camera */
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+        size_t const n = strlen(endings[i]);
+        if (length >= n && memcmp(name + length - n, endings[i], n) == 0)
+            return true;
+    }
+    return false;
+}
+
+bool camera_file_read(const char *path, gait_camera *out, message *why)
+{
+    fields f;
+    gait_camera camera = {0};
+    if (others_kind(path))
+        return message_set(why,
+                           "%.100s: gait-trackd reads JSON only; give this file to `gait capture --camera`, "
+                           "which sends it over LCM, and no --camera here",
+                           path);
+    bool const ok = fields_open(&f, path, "camera", why) && parse_camera(&f, &camera, why);
+    fields_close(&f);
+    if (ok)
+        *out = camera;
+    return ok;
+}
+
+/* ---- init_file ---- */
+/* Numbers of the file beside the pelvis; sd is taken where it gives a value but no standard deviation. */
+static const struct {
+    const char *key, *remedy;
+    size_t offset;
+    double low, high, sd;
+} scalars[] = {
+    {"heading_rad", "give the walking direction about z in radians, 0 = along +x",
+     offsetof(gait_state, heading), -7, 7, 0.1},
+    {"phase", "give the phase of the stride from 0 (right heel strike) to 1", offsetof(gait_state, phase), 0,
+     1, 0.05},
+    {"stride_hz", "give strides (two steps) per second, about 0.9", offsetof(gait_state, stride_hz), 0.1, 4,
+     0.05},
+    {"stature_m", "give the person's height in metres", offsetof(gait_state, stature), 0.5, 2.5, 0.03},
+};
+/* "sd" may hold the first five. */
+static const char *const known_keys[] = {"pelvis",    "heading_rad", "phase", "stride_hz",
+                                         "stature_m", "frame",       "sd"};
+
+enum { SCALARS = sizeof scalars / sizeof *scalars, KNOWN_KEYS = sizeof known_keys / sizeof *known_keys };
+static const double PELVIS_SD = 0.05, MAX_SD = 10, FAR = 1e4;
+
+static void put(gait_state *s, size_t offset, double value)
+{
+    float const narrow = (float)value;
+    memcpy((char *)s + offset, &narrow, sizeof narrow);
+}
+
+/* `spread`: the object of standard deviations, or -1. */
+static bool read_scalar(const fields *f, int spread, int k, init_state *io, message *why)
+{
+    const char *const key = scalars[k].key;
+    double value;
+    if (fields_find(f, 0, key) >= 0) {
+        if (!fields_numbers(f, 0, key, &value, 1, scalars[k].low, scalars[k].high, scalars[k].remedy, why))
+            return false;
+        put(&io->mean, scalars[k].offset, value);
+        put(&io->sd, scalars[k].offset, scalars[k].sd);
+    }
+    if (spread >= 0 && fields_find(f, spread, key) >= 0) {
+        if (!fields_numbers(f, spread, key, &value, 1, 0, MAX_SD, "give a standard deviation, not negative",
+                            why))
+            return false;
+        put(&io->sd, scalars[k].offset, value);
+    }
+    return true;
+}
+
+/* How many numbers a key holds; 0 if it is absent. */
+static int count_of(const fields *f, int object, const char *key)
+{
+    int const value = object < 0 ? -1 : fields_find(f, object, key);
+    return value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
+}
+
+/* Two numbers get the model's height over ground, which depends on the rest of the state. */
+static bool read_pelvis(const fields *f, int spread, const gait_model *model, init_state *io, message *why)
+{
+    const char *const place = "give x and y (and z if known_keys) of the pelvis in metres";
+    int const known_axes = count_of(f, 0, "pelvis") == 3 ? 3 : 2, sds = count_of(f, spread, "pelvis");
+    double value[3];
+    if (fields_find(f, 0, "pelvis") >= 0) {
+        if (!fields_numbers(f, 0, "pelvis", value, known_axes, -FAR, FAR, place, why))
+            return false;
+        for (int i = 0; i < 3; i++) {
+            io->mean.pelvis[i] = i < known_axes ? (float)value[i] : io->mean.pelvis[i];
+            io->sd.pelvis[i] = (float)PELVIS_SD;
+        }
+    }
+    if (known_axes == 2 && gait_model_pelvis_height(model, &io->mean, &io->mean.pelvis[2], NULL) != GAIT_OK)
+        return message_set(why, "%s: the model gives no height for the pelvis; give z too", f->path);
+    if (sds != 0) {
+        if (!fields_numbers(f, spread, "pelvis", value, sds == 3 ? 3 : 1, 0, MAX_SD,
+                            "give one number or three, metres", why))
+            return false;
+        for (int i = 0; i < 3; i++)
+            io->sd.pelvis[i] = (float)value[sds == 3 ? i : 0];
+    }
+    return true;
+}
+
+static bool parse_init(const fields *f, const gait_model *model, init_state *io, message *why)
+{
+    int const spread = fields_find(f, 0, "sd");
+    if (!fields_only(f, 0, known_keys, KNOWN_KEYS, why))
+        return false;
+    if (spread >= 0 && f->node[spread].type != JSON_OBJECT)
+        return message_set(why, "%s: sd is not an object; give standard deviations by key", f->path);
+    if (spread >= 0 && !fields_only(f, spread, known_keys, SCALARS + 1, why))
+        return false;
+    if (fields_find(f, 0, "frame") >= 0 &&
+        !fields_whole(f, "frame", &io->frame, 0, 1u << 31, "give the frame number, from 0", why))
+        return false;
+    for (int k = 0; k < SCALARS; k++)
+        if (!read_scalar(f, spread, k, io, why))
+            return false;
+    io->mean.phase -= floorf(io->mean.phase);
+    return read_pelvis(f, spread, model, io, why);
+}
+
+bool init_file_read(const char *path, const gait_model *model, init_state *out, message *why)
+{
+    fields f;
+    init_state state = {.frame = -1};
+    if (gait_tracker_prior(model, &state.mean, &state.sd, NULL) != GAIT_OK)
+        return message_set(why, "%s: the model has no prior", path);
+    bool const ok = fields_open(&f, path, "init", why) && parse_init(&f, model, &state, why);
+    fields_close(&f);
+    if (ok)
+        *out = state;
+    return ok;
+}

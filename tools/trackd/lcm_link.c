@@ -1,0 +1,221 @@
+#include "lcm_link.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <netinet/in.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+/* ---- log_scan ---- */
+enum {
+    HEAD = 28,                       /* bytes before the channel's name, */
+    SYNC = 0xEDA1DA01 - (1LL << 32), /* the first four of them */
+    LONGEST = 1000                   /* bytes of a name at which LCM stops */
+};
+
+static int64_t big_endian(const unsigned char *at)
+{
+    return (int32_t)((uint32_t)at[0] << 24 | (uint32_t)at[1] << 16 | (uint32_t)at[2] << 8 | at[3]);
+}
+
+/* Bytes of the event at the file's place; 0 where none begins there. */
+static int64_t event_bytes(FILE *f)
+{
+    unsigned char head[HEAD];
+    if (fread(head, 1, HEAD, f) != HEAD || big_endian(head) != SYNC)
+        return 0;
+    int64_t const name = big_endian(head + 20), data = big_endian(head + 24);
+    return name <= 0 || name >= LONGEST || data < 0 ? 0 : HEAD + name + data;
+}
+
+int64_t log_scan(const char *path, message *why)
+{
+    struct stat is;
+    int64_t at = 0, events = 0, size = 0;
+    FILE *const f = fopen(path, "rb");
+    why->text[0] = '\0';
+    if (!f || fstat(fileno(f), &is) != 0 || !S_ISREG(is.st_mode)) {
+        if (f)
+            fclose(f);
+        return -1;
+    }
+    while (at < is.st_size && (size = event_bytes(f)) > 0 && at + size <= is.st_size) {
+        at += size;
+        events++;
+        fseeko(f, (off_t)at, SEEK_SET);
+    }
+    fclose(f);
+    if (is.st_size == 0)
+        message_set(why, "%.160s: this log is empty", path);
+    else if (at != is.st_size)
+        message_set(
+            why, "%.150s: this log is damaged or breaks off at byte %" PRId64 ", after %" PRId64 " messages",
+            path, at, events);
+    return events;
+}
+
+/* ---- link ---- */
+#define ROUTE_REMEDY "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
+
+/* liblcm writes pages about a missing route to stderr; one line of ours says as much. */
+static int mute(void)
+{
+    fflush(stderr);
+    int const saved = dup(STDERR_FILENO), null = open("/dev/null", O_WRONLY);
+    if (saved >= 0 && null >= 0)
+        dup2(null, STDERR_FILENO);
+    if (null >= 0)
+        close(null);
+    return saved;
+}
+
+static void unmute(int saved)
+{
+    if (saved < 0)
+        return;
+    fflush(stderr);
+    dup2(saved, STDERR_FILENO);
+    close(saved);
+}
+
+const char *link_url(const char *url)
+{
+    const char *const environment = getenv("LCM_DEFAULT_URL");
+    if (url && *url)
+        return url;
+    return environment && *environment ? environment : LINK_DEFAULT_URL;
+}
+
+bool link_is_log(const char *url)
+{
+    return strncmp(url, "file://", 7) == 0;
+}
+
+char link_log(const char *url, char path[LINK_PATH])
+{
+    const char *const name = url + (link_is_log(url) ? 7 : 0), *at = strchr(name, '?');
+    char mode = 'r';
+    snprintf(path, LINK_PATH, "%.*s", at ? (int)(at - name) : LINK_PATH - 1, name);
+    for (; at; at = strchr(at + 1, '&'))
+        if (strncmp(at + 1, "mode=", 5) == 0)
+            mode = at[6] && strchr("rwa", at[6]) && (at[7] == '\0' || at[7] == '&') ? at[6] : 0;
+    return mode;
+}
+
+/* The address of udpm://ADDRESS:PORT, if it is one that LCM cannot send to. */
+static bool not_multicast(const char *url, char address[INET_ADDRSTRLEN])
+{
+    struct in_addr in;
+    size_t const length = strncmp(url, "udpm://", 7) == 0 ? strcspn(url + 7, ":?") : 0;
+    if (length == 0 || length >= INET_ADDRSTRLEN)
+        return false;
+    snprintf(address, INET_ADDRSTRLEN, "%.*s", (int)length, url + 7);
+    return inet_pton(AF_INET, address, &in) == 1 && !IN_MULTICAST(ntohl(in.s_addr));
+}
+
+lcm_t *link_open(const char *url, message *why)
+{
+    char path[LINK_PATH], address[INET_ADDRSTRLEN];
+    int const saved = mute();
+    lcm_t *const lcm = lcm_create(url);
+    unmute(saved);
+    link_log(url, path);
+    if (!lcm && link_is_log(url) && log_scan(path, why) != 0)
+        message_set(why, "%.160s: cannot open this log; give file:///PATH?speed=0", url);
+    else if (!lcm && not_multicast(url, address))
+        message_set(why, "%.100s: %s is not a multicast address; give one from 224.0.0.0 to 239.255.255.255",
+                    url, address);
+    else if (!lcm && !link_is_log(url) && strstr(url, "udpm://")) /* or mpudpm:// */
+        message_set(why, "%.120s: cannot open LCM; " ROUTE_REMEDY, url);
+    else if (!lcm && !link_is_log(url))
+        message_set(
+            why,
+            "%.120s: cannot open LCM; give udpm://ADDRESS:PORT or file:///PATH?speed=0 (?mode=w to write)",
+            url);
+    return lcm;
+}
+
+lcm_subscription_t *link_subscribe(lcm_t *lcm, const char *channel, lcm_msg_handler_t fn, void *user,
+                                   int capacity, message *why)
+{
+    int const saved = mute();
+    lcm_subscription_t *const s = lcm_subscribe(lcm, channel, fn, user);
+    unmute(saved);
+    if (s)
+        lcm_subscription_set_queue_capacity(s, capacity);
+    else
+        message_set(why, "cannot receive %s; " ROUTE_REMEDY, channel);
+    return s;
+}
+
+/* ---- sink ---- */
+bool sink_open(sink *s, const char *url, message *why)
+{
+    char path[LINK_PATH];
+    char const mode[2] = {link_log(url, path)};
+    *s = (sink){0};
+    if (!link_is_log(url))
+        return (s->lcm = link_open(url, why)) != NULL;
+    s->log = lcm_eventlog_create(path, mode);
+    return s->log || message_set(why, "%.160s: this log cannot be written: %s", path, strerror(errno));
+}
+
+static void lost(sink *s, const char *what)
+{
+    if (s->failed++ == 0)
+        message_set(&s->fault, "%s", what);
+}
+
+/* As LCM's log provider writes it, dated now. */
+static bool write_event(lcm_eventlog_t *log, const char *channel, const uint8_t *bytes, int size)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_REALTIME, &t);
+    lcm_eventlog_event_t e = {.timestamp = (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000,
+                              .channellen = (int32_t)strlen(channel),
+                              .datalen = size,
+                              .channel = (char *)channel, /* LCM lacks const; read only */
+                              .data = (void *)bytes};
+    return lcm_eventlog_write_event(log, &e) == 0 && !ferror(log->f);
+}
+
+void sink_publish(sink *s, const char *channel, const uint8_t *bytes, int size)
+{
+    if (size <= 0)
+        return;
+    if (s->lcm && lcm_publish(s->lcm, channel, bytes, (unsigned)size) != 0) {
+        lost(s, "LCM could not send them");
+        if (s->failed == 1)
+            fprintf(stderr, "gait-trackd: LCM could not send a message of %d bytes on %s\n", size, channel);
+    }
+    errno = 0;
+    if (s->log && (s->failed || !write_event(s->log, channel, bytes, size)))
+        lost(s, strerror(errno));
+}
+
+bool sink_ended(const sink *s, message *why)
+{
+    return s->log && s->failed &&
+           !message_set(why, "--out: the log cannot be written: %.180s", s->fault.text);
+}
+
+bool sink_close(sink *s, message *why)
+{
+    if (s->lcm)
+        lcm_destroy(s->lcm);
+    if (s->log && fflush(s->log->f) != 0 && !s->failed)
+        lost(s, strerror(errno));
+    bool const ok = s->failed == 0 ||
+                    message_set(why, "--out: %s %.180s",
+                                s->log ? "the log cannot be written:" : "messages were lost:", s->fault.text);
+    if (s->log)
+        lcm_eventlog_destroy(s->log);
+    *s = (sink){0};
+    return ok;
+}
