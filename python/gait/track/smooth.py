@@ -307,7 +307,7 @@ def pose_all(model: Model, states: NDArray[np.void]) -> tuple[NDArray[np.float32
     angles = np.empty((len(flat), model.info.angles), np.float32)
     begin, size, call = flat.ctypes.data, flat.dtype.itemsize, library().gait_model_pose
     for i in range(len(flat)):
-        check(call(model.handle, ctypes.cast(begin + i * size, pointer), ctypes.byref(pose)))
+        check(call(model.handle, ctypes.cast(begin + i * size, pointer), ctypes.byref(pose), None))
         joints[i], angles[i] = joint[: model.info.joints], angle[: model.info.angles]
     shape = states.shape
     return joints.reshape(*shape, *joints.shape[1:]), angles.reshape(*shape, *angles.shape[1:])
