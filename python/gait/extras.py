@@ -1,4 +1,4 @@
-"""Optional packages: which extra of libgait brings them, and what to say when they are missing."""
+"""Optional packages: which extra of libgait brings them, and the message when they are missing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EXTRAS = {
 
 
 def remedy(user: str, extras: Sequence[str], module: str | None = None) -> str:
-    """Say in one line what `user` needs of these extras and how to install it; empty if nothing is missing.
+    """Return one line: what `user` needs of these extras and how to install it; empty if nothing is missing.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ TOOLS = "sh sed tr cat mkdir dirname uname printf test awk expr ls head cut real
 
 
 @pytest.fixture
-def bare(tmp_path):
+def checkout(tmp_path):
     """Copy of what the library is built from, and a folder of programs without Python and compilers."""
     for name in ("Makefile", "libgait", "python/constraints.txt", "python/pyproject.toml"):
         target = tmp_path / "gait" / name
@@ -27,50 +27,55 @@ def bare(tmp_path):
     return tmp_path
 
 
-def program(bare, name: str, says: str) -> None:
-    """Put a program there that only says something."""
-    path = bare / "bin" / name
-    path.write_text(f"#!/bin/sh\necho '{says}'\n")
+def program(checkout, name: str, text: str) -> None:
+    """Put a program there that only prints `text`."""
+    path = checkout / "bin" / name
+    path.write_text(f"#!/bin/sh\necho '{text}'\n")
     path.chmod(0o755)
 
 
-def make(bare, *words: str) -> subprocess.CompletedProcess[str]:
+def make(checkout, *words: str) -> subprocess.CompletedProcess[str]:
     env = {
         k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k not in ("EIGEN", "CC", "CXX")
     }
-    env["PATH"] = str(bare / "bin")
+    env["PATH"] = str(checkout / "bin")
     return subprocess.run(
-        [bare / "bin/make", *words], cwd=bare / "gait", env=env, capture_output=True, text=True, timeout=120
+        [checkout / "bin/make", *words],
+        cwd=checkout / "gait",
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
 
 
-def test_the_library_needs_no_python(bare):
+def test_the_library_needs_no_python(checkout):
     for name in ("gcc", "g++", "cc"):
-        program(bare, name, "x86_64-linux-gnu")
-    done = make(bare, "-n", "lib", "CC=gcc", "EIGEN=/opt/eigen")
+        program(checkout, name, "x86_64-linux-gnu")
+    done = make(checkout, "-n", "lib", "CC=gcc", "EIGEN=/opt/eigen")
     assert done.returncode == 0, done.stderr
     assert "isystem /opt/eigen" in done.stdout and "linalg.cpp" in done.stdout
     assert "pip" not in done.stdout and "python" not in done.stdout
 
 
-def test_eigen_of_the_system_is_found(bare):
+def test_eigen_of_the_system_is_found(checkout):
     for name in ("gcc", "g++", "cc"):
-        program(bare, name, "x86_64-linux-gnu")
-    program(bare, "pkg-config", "-I/opt/from/pkgconfig/eigen3")
-    assert "-isystem /opt/from/pkgconfig/eigen3" in make(bare, "-n", "lib", "CC=gcc").stdout
+        program(checkout, name, "x86_64-linux-gnu")
+    program(checkout, "pkg-config", "-I/opt/from/pkgconfig/eigen3")
+    assert "-isystem /opt/from/pkgconfig/eigen3" in make(checkout, "-n", "lib", "CC=gcc").stdout
 
 
-def test_without_eigen_and_python_the_remedy_is_told(bare):
-    done = make(bare, ".venv/.ready")
+def test_without_eigen_and_python_the_remedy_is_shown(checkout):
+    done = make(checkout, ".venv/.ready")
     assert done.returncode != 0
     assert "install libeigen3-dev or set EIGEN=" in done.stderr
 
 
-def test_a_cross_compiler_brings_its_tools_and_has_its_own_folder(bare):
-    program(bare, "cc", "x86_64-linux-gnu")
+def test_a_cross_compiler_brings_its_tools_and_has_its_own_folder(checkout):
+    program(checkout, "cc", "x86_64-linux-gnu")
     for name in ("gcc", "g++", "ar", "objcopy"):
-        program(bare, f"armv8x-none-linux-{name}", "armv8x-none-linux")
-    done = make(bare, "-n", "lib", "CC=armv8x-none-linux-gcc", "EIGEN=/opt/eigen")
+        program(checkout, f"armv8x-none-linux-{name}", "armv8x-none-linux")
+    done = make(checkout, "-n", "lib", "CC=armv8x-none-linux-gcc", "EIGEN=/opt/eigen")
     assert done.returncode == 0, done.stderr
     for name in ("gcc -std=c11", "g++ -std=c++14", "ar rcs", "objcopy --localize-hidden"):
         assert f"armv8x-none-linux-{name}" in done.stdout
@@ -84,8 +89,8 @@ def test_a_library_without_threads_needs_none(tmp_path):
     options = ["-std=c11", "-Wpedantic", "-Werror", "-DGAIT_NO_THREADS", f"-I{ROOT}/libgait/include"]
     options += ["-iquote", f"{ROOT}/libgait/src", "-c"]
     subprocess.run(["cc", *options, source, "-o", tmp_path / "pool.o"], check=True)
-    said = subprocess.run(["nm", tmp_path / "pool.o"], capture_output=True, text=True, check=True).stdout
-    assert "pthread" not in said and "gait_pool" not in said
+    symbols = subprocess.run(["nm", tmp_path / "pool.o"], capture_output=True, text=True, check=True).stdout
+    assert "pthread" not in symbols and "gait_pool" not in symbols
 
 
 @pytest.mark.parametrize(
@@ -100,14 +105,14 @@ def test_figures_of_a_machine_are_kept_only_if_asked(words, folder):
     assert ("--page tests/bench/results/bench.md" in command) == (folder == "tests/bench/results/")
 
 
-def compile_one(bare, *words: str) -> str:
+def compile_one(checkout, *words: str) -> str:
     """What make does, with this machine's compilers, for one object."""
     env = {
         k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k not in ("CC", "CFLAGS", "OPT")
     }
     done = subprocess.run(
         ["make", "build/release/src/base/base.c.o", *words],
-        cwd=bare / "gait",
+        cwd=checkout / "gait",
         env=env,
         capture_output=True,
         text=True,
@@ -117,48 +122,48 @@ def compile_one(bare, *words: str) -> str:
     return done.stdout
 
 
-def test_objects_are_made_anew_for_other_options_only(bare):
+def test_objects_are_made_anew_for_other_options_only(checkout):
     made, kept = "CC   libgait/src/base/base.c", "is up to date"
     for options in ((), ("CFLAGS=-DX='\"it'\\''s\"'",), ("OPT=-O1",), ("CC=gcc", "CXX=g++"), ()):
-        assert made in compile_one(bare, *options), options
-        assert kept in compile_one(bare, *options), options
-    assert "-DX" in compile_one(bare, "-n", "CFLAGS=-DX") and kept in compile_one(bare)
+        assert made in compile_one(checkout, *options), options
+        assert kept in compile_one(checkout, *options), options
+    assert "-DX" in compile_one(checkout, "-n", "CFLAGS=-DX") and kept in compile_one(checkout)
 
 
-def test_a_source_with_flags_of_its_own_that_is_gone_is_named(bare):
+def test_a_source_with_flags_of_its_own_that_is_gone_is_named(checkout):
     for name in ("gcc", "g++", "cc"):
-        program(bare, name, "x86_64-linux-gnu")
-    (bare / "gait/libgait/src/base/fmath.c").unlink()
-    done = make(bare, "-n", "lib", "CC=gcc", "EIGEN=/opt/eigen")
+        program(checkout, name, "x86_64-linux-gnu")
+    (checkout / "gait/libgait/src/base/fmath.c").unlink()
+    done = make(checkout, "-n", "lib", "CC=gcc", "EIGEN=/opt/eigen")
     assert done.returncode != 0 and "flags.mk lists fmath.c, which libgait/src does not have" in done.stderr
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "remedy"),
     [
         (["CC=nocc"], "no C compiler 'nocc': install it or set CC="),
         (["CC=gcc", "CXX=nocxx"], "no C++ compiler 'nocxx': install it or set CXX="),
     ],
 )
-def test_a_missing_compiler_is_told_before_anything_is_done(bare, words, said):
-    program(bare, "gcc", "x86_64-linux-gnu")
+def test_a_missing_compiler_is_reported_before_anything_is_done(checkout, words, remedy):
+    program(checkout, "gcc", "x86_64-linux-gnu")
     for target in ("lib", "test"):
-        done = make(bare, target, *words)
-        assert done.returncode != 0 and done.stderr.count("\n") == 1 and said in done.stderr
-    assert not (bare / "gait/.venv").exists()
+        done = make(checkout, target, *words)
+        assert done.returncode != 0 and done.stderr.count("\n") == 1 and remedy in done.stderr
+    assert not (checkout / "gait/.venv").exists()
 
 
-def test_a_folder_without_eigen_is_named(bare):
+def test_a_folder_without_eigen_is_named(checkout):
     for name in ("gcc", "g++", "cc"):
-        program(bare, name, "x86_64-linux-gnu")
-    done = make(bare, "build/release/src/base/linalg.cpp.o", "CC=gcc", "EIGEN=/nonexistent")
+        program(checkout, name, "x86_64-linux-gnu")
+    done = make(checkout, "build/release/src/base/linalg.cpp.o", "CC=gcc", "EIGEN=/nonexistent")
     assert done.returncode != 0 and "no Eigen/Core in EIGEN=/nonexistent" in done.stderr
 
 
-def test_the_tools_are_not_built_for_another_cpu_and_say_what_to_do(bare):
-    program(bare, "cc", "x86_64-linux-gnu")
+def test_the_tools_are_not_built_for_another_cpu_and_the_remedy_is_shown(checkout):
+    program(checkout, "cc", "x86_64-linux-gnu")
     for name in ("gcc", "g++", "ar", "objcopy"):
-        program(bare, f"armv8x-none-linux-{name}", "armv8x-none-linux")
-    done = make(bare, "tools", "CC=armv8x-none-linux-gcc", "EIGEN=/opt/eigen")
+        program(checkout, f"armv8x-none-linux-{name}", "armv8x-none-linux")
+    done = make(checkout, "tools", "CC=armv8x-none-linux-gcc", "EIGEN=/opt/eigen")
     assert done.returncode != 0 and done.stderr.count("\n") == 1
     assert "not for armv8x-none-linux: on that machine run `make tools`" in done.stderr

@@ -30,7 +30,7 @@ def packages(requirements):
 
 
 @pytest.mark.parametrize("extra", extras.EXTRAS)
-def test_an_extra_brings_what_its_table_says(extra):
+def test_an_extra_brings_what_its_table_has(extra):
     installed = {IMPORTED.get(name, name) for name in packages(OPTIONAL[extra])} - {"dask"}
     assert installed == set(extras.EXTRAS[extra])
 

@@ -88,10 +88,10 @@ def test_a_prefix_with_a_space(tmp_path):
     if shutil.which("pkg-config"):
         (tmp_path / "a.c").write_text(PROGRAM)
         env = {"PATH": "/usr/bin:/bin", "PKG_CONFIG_PATH": str(prefix / "lib/pkgconfig")}
-        told = subprocess.run(
+        flags = subprocess.run(
             ["pkg-config", "--cflags", "--libs", "gait"], env=env, check=True, capture_output=True, text=True
         ).stdout
-        subprocess.run(["sh", "-c", f"cc '{tmp_path}/a.c' -o '{tmp_path}/a' {told}"], check=True)
+        subprocess.run(["sh", "-c", f"cc '{tmp_path}/a.c' -o '{tmp_path}/a' {flags}"], check=True)
     assert make("uninstall", f"PREFIX={prefix}").returncode == 0
     assert not [p for p in prefix.rglob("*") if not p.is_dir()]
 

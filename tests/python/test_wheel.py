@@ -115,7 +115,7 @@ def test_help_is_quick(numpy_alone, tmp_path):
 
 
 def test_the_wheel_makes_a_clip_and_tracks_it(tmp_path):
-    """As the README says, with nothing on the PATH but the environment: no compiler, no system FFmpeg."""
+    """The commands of the README, with only the environment on the PATH: no compiler, no FFmpeg."""
     venv = tmp_path / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", venv], check=True)
     pins = ["--no-compile", "--constraint", ROOT / "python/constraints.txt"]

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.bindings import abi
 from gait._version import __version__
+from gait.bindings import abi
 from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryError
 
 _HERE = Path(__file__).resolve().parents[1]
@@ -93,6 +93,6 @@ def check(status: int, error: abi.Error | None = None, words: str = "") -> int:
 
 def aligned(size: int) -> NDArray[np.uint8]:
     """Memory of `size` bytes at an address that is a multiple of GAIT_ALIGN."""
-    room = np.zeros(size + abi.ALIGN, np.uint8)
-    skip = -room.ctypes.data % abi.ALIGN
-    return room[skip : skip + size]
+    space = np.zeros(size + abi.ALIGN, np.uint8)
+    skip = -space.ctypes.data % abi.ALIGN
+    return space[skip : skip + size]
