@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.body.skeleton import EVAL15
-from gait.lift.clip_segments import ClipSegments
-from gait.lift.fit_clip import ClipFit, fit_clip
-from gait.lift.corrections import Correction
+from gait.lift.video.clip_segments import ClipSegments
+from gait.lift.video.corrections import Correction
+from gait.lift.video.fit_clip import ClipFit, fit_clip
 from gait.motion.evaluate import root_errors
 
 Array = NDArray[np.float64]

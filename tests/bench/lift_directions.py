@@ -14,7 +14,7 @@ import table
 from lift_mocap import MOCAP, HeldOut, one_of_each
 
 from gait.bindings.lifter import LiftConfig, Lifter
-from gait.lift.figures_segment import placed_as_learnt
+from gait.lift.report.segment_figures import placed_as_learnt
 from gait.lift.uncertain import share_along, share_rigid
 
 Floats = npt.NDArray[np.float64]

@@ -25,21 +25,19 @@ from lift_clicks import POINTING, Score, corrected, score
 from lift_sticks import Walk, bends, depth_gaps, jump, stick_clip
 from scipy import stats
 
-from gait.body.skeleton import EVAL15, JOINTS
 from gait.bindings.model import read_cyclic
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import EVAL15, JOINTS
 from gait.camera.camera import Camera
+from gait.io.track_file import read_truth
 from gait.io.video import Video, read_plate
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_motion
 from gait.learn.solve import readers
-from gait.lift.phase_prior import Beginning
-from gait.lift.clip_segments import ClipSegments, Settings
-from gait.lift.fit_clip import fit_clip
-from gait.lift.sensors import Film
-from gait.lift.corrections import Correction, Placement, read_placement
-from gait.lift.views import CameraView
-from gait.io.track_file import read_truth
+from gait.lift.video.clip_segments import ClipSegments, Settings
+from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_placement
+from gait.lift.video.fit_clip import fit_clip
+from gait.lift.video.sensors import CameraView, Film
 from gait.progress import progress
 
 PARTS = ("sticks", "clips", "outdoor")
@@ -250,11 +248,11 @@ def _segments(clip: Clip, model: Path, plated: bool) -> tuple[ClipSegments, np.n
         stride_hz=start.get("stride_hz"),
     )
     prior = SegmentPrior.load(model)
-    beginning = Beginning.of(prior, read_cyclic(model), placed)
+    phase_prior = PhasePrior.of(prior, read_cyclic(model), placed)
     size = placed.stature * view.scale(np.array(start["pelvis"]))
     plate = read_plate(str(clip.plate), video.size) if plated else None
     film = Film.make(video.frames(start["frame"]), size, plate)
-    segments = ClipSegments(prior, view, film, placed, (), Settings(), beginning)
+    segments = ClipSegments(prior, view, film, placed, (), Settings(), phase_prior)
     return segments, truth.eval15()[: len(film.times)]
 
 
@@ -272,8 +270,8 @@ def _outdoor(prior: SegmentPrior) -> None:
         placed.stature * view.scale(np.array([*placed.ground, 0.9])),
         read_plate(str(clip.plate), video.size),
     )
-    beginning = Beginning.of(prior, read_cyclic(None), placed)
-    some, rows = ClipSegments(prior, view, film, placed, (), Settings(), beginning), []
+    phase_prior = PhasePrior.of(prior, read_cyclic(None), placed)
+    some, rows = ClipSegments(prior, view, film, placed, (), Settings(), phase_prior), []
     known = None
     for _ in range(4):
         fit = fit_clip(some, known)

@@ -22,14 +22,14 @@ import numpy.typing as npt
 import table
 from eval_clips import DATA
 
-from gait.body.skeleton import axis_rotation
 from gait.bindings.lifter import Lifter
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import axis_rotation
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_corpus, segment_motion
 from gait.learn.segments.segment_corpus import Corpus
 from gait.learn.solve import readers
-from gait.lift.figures_segment import Gaussian, placed_as_learnt
+from gait.lift.report.segment_figures import Gaussian, placed_as_learnt
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

@@ -14,13 +14,13 @@ import lift_tracks
 import numpy as np
 import table
 
-from gait.body.skeleton import EVAL15
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import EVAL15
 from gait.camera.camera import Camera
-from gait.learn.corpus.stage import one_thread
-from gait.lift.size import tells_distance
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_truth
+from gait.learn.corpus.stage import one_thread
+from gait.lift.smooth.size import tells_distance
 from gait.progress import progress
 
 PARTS = {
@@ -57,8 +57,8 @@ def main() -> int:
     return 0
 
 
-def _part(whole: Tracks, names: list[str]) -> Tracks:
-    """Tracks of some joints only."""
+def _part(whole: Keypoints, names: list[str]) -> Keypoints:
+    """Keypoints of some joints only."""
     kept = [i for i, name in enumerate(whole.names) if name in names]
     return replace(
         whole,

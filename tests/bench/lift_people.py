@@ -24,16 +24,16 @@ import numpy.typing as npt
 import table
 from eval_plan import Clip
 
-from gait.body.skeleton import EVAL15, axis_rotation
 from gait.bindings.lifter import LiftConfig
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import EVAL15, axis_rotation
 from gait.camera.camera import Camera
+from gait.io.track_file import Joints, read_truth
 from gait.learn.corpus.stage import one_thread
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_motion
 from gait.learn.solve import readers
-from gait.lift import motion
-from gait.io.track_file import Joints, read_truth
+from gait.lift.smooth import motion
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]

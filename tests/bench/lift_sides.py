@@ -19,12 +19,13 @@ import table
 
 from gait.body.skeleton import EVAL15
 from gait.errors import UserError
-from gait.learn.corpus.stage import one_thread
-from gait.lift import motion, outliers, sides
-from gait.lift.equations import Perspective
-from gait.lift.result import Options
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import Joints
+from gait.learn.corpus.stage import one_thread
+from gait.lift.keypoints import noise, swaps
+from gait.lift.segment.view import Perspective
+from gait.lift.smooth import motion
+from gait.lift.smooth.motion import Options
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
@@ -91,7 +92,7 @@ def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[
     begin = int(rng.integers(1, len(frames) - case.length))
     spoilt = exchanged(tracks, PARTS[case.part], begin, begin + case.length)
     clock = [time.perf_counter()]
-    back = put_back(walk, spoilt)
+    back = undo_swaps(walk, spoilt)
     clock.append(time.perf_counter())
     errors = []
     for seen in (tracks, spoilt, back):
@@ -103,9 +104,9 @@ def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[
     return [*errors, judging / lifting, (spoilt.seen & ~right).sum(), *moved]
 
 
-def _error(walk: lift_people.Walk, seen: Tracks, places: Floats, rows: slice) -> float:
+def _error(walk: lift_people.Walk, seen: Keypoints, places: Floats, rows: slice) -> float:
     """Root error of a walk in some rows, mm; infinite if its lift is refused."""
-    steady, _ = outliers.without_jumps(seen, lift_tracks.NOISE)
+    steady, _ = noise.without_spikes(seen, lift_tracks.NOISE)
     try:
         lifted = lift_tracks.lifted(walk.prior, steady, walk.camera, lift_tracks.NOISE)
     except UserError:
@@ -114,25 +115,25 @@ def _error(walk: lift_people.Walk, seen: Tracks, places: Floats, rows: slice) ->
     return lift_tracks.root_error(lifted.places[:, order][rows], places[rows], lift_tracks.HIPS)
 
 
-def put_back(walk: lift_people.Walk, tracks: Tracks) -> Tracks:
-    """Tracks with sides put back as by gait lift."""
+def undo_swaps(walk: lift_people.Walk, tracks: Keypoints) -> Keypoints:
+    """Keypoints with sides put back as by gait lift."""
     view, options = Perspective(walk.camera), Options(pixel_sd=lift_tracks.NOISE)
-    return sides.put_back(
+    return swaps.undo_swaps(
         tracks,
         options.pixel_sd,
         lambda part: motion.evidence(walk.prior, part, view, options),
     )[0]
 
 
-def exchanged(tracks: Tracks, joints: tuple[str, ...], begin: int, end: int) -> Tracks:
-    """Tracks with left and right of joints exchanged in some rows."""
+def exchanged(tracks: Keypoints, joints: tuple[str, ...], begin: int, end: int) -> Keypoints:
+    """Keypoints with left and right of joints exchanged in some rows."""
     left, right = ([tracks.names.index(f"{side}_{joint}") for joint in joints] for side in "lr")
     uv = tracks.uv.copy()
     uv[begin:end, left + right] = tracks.uv[begin:end, right + left]
     return replace(tracks, uv=uv)
 
 
-def _differ(one: Tracks, other: Tracks, among: npt.NDArray[np.bool_]) -> int:
+def _differ(one: Keypoints, other: Keypoints, among: npt.NDArray[np.bool_]) -> int:
     """Points among some that are not where the other tracks have them."""
     return int((among & one.seen & (one.uv != other.uv).any(axis=2)).sum())
 

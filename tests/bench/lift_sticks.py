@@ -8,16 +8,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.body.skeleton import BONES
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import BONES
 from gait.camera.camera import Camera
 from gait.io.video import Frame, Image
-from gait.lift.clip_segments import ClipSegments, Settings
-from gait.lift.energy import PLACE
-from gait.lift.fit_clip import ClipFit, Sequence
-from gait.lift.sensors import Film
-from gait.lift.corrections import Placement
-from gait.lift.views import CameraView
+from gait.lift.video.clip_segments import ClipSegments, Settings
+from gait.lift.video.corrections import Placement
+from gait.lift.video.energy import PLACE
+from gait.lift.video.fit_clip import ClipFit, Sequence
+from gait.lift.video.sensors import CameraView, Film
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from eval_plan import Clip
 from gait import TrackStatus
 from gait.bindings.lifter import LiftConfig, Lifter
 from gait.camera.camera import Camera
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_truth
 from gait.progress import progress
 
@@ -89,13 +89,13 @@ def _odd() -> None:
     table.publish("lift_odd", "A motion that no prior knows, live", ["camera", *head], rows, note)
 
 
-def _wrong(tracks: Tracks, share: float = WRONG) -> Tracks:
-    """Tracks of a detector that puts single points elsewhere."""
+def _wrong(tracks: Keypoints, share: float = WRONG) -> Keypoints:
+    """Keypoints of a detector that puts single points elsewhere."""
     return lift_tracks.wild(tracks, share, np.random.default_rng(2))
 
 
-def _legs(tracks: Tracks) -> Tracks:
-    """Tracks of a detector that takes one leg for the other in the middle of the clip."""
+def _legs(tracks: Keypoints) -> Keypoints:
+    """Keypoints of a detector that takes one leg for the other in the middle of the clip."""
     left, right = (
         [tracks.names.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in "lr"
     )
@@ -112,7 +112,7 @@ def _row(clip: Clip, model: Path) -> list[object]:
     tracks = lift_tracks.tracked(joints, camera, lift_tracks.NOISE, lift_tracks.GAPS)
     usual, stature = LiftConfig.default(), eval_clips.meta_of(clip.folder)["stature_m"]
 
-    def lifted(config: LiftConfig, seen: Tracks = tracks) -> list[float]:
+    def lifted(config: LiftConfig, seen: Keypoints = tracks) -> list[float]:
         return _judged(*streamed(seen, camera, model, config)[:3], joints.eval15())
 
     root, apart, _, share = lifted(usual)
@@ -125,7 +125,7 @@ def _row(clip: Clip, model: Path) -> list[object]:
     return [clip.name, *figures, "yes" if met else "NO"]
 
 
-def _many(tracks: Tracks, camera: Camera, model: Path, true: Floats) -> list[float]:
+def _many(tracks: Keypoints, camera: Camera, model: Path, true: Floats) -> list[float]:
     """Share of frames tracked among many wrong points; median and worst mm of those, and coverage."""
     at, found, sd, tracked = streamed(_wrong(tracks, MANY), camera, model, LiftConfig.default())
     relied = at[tracked], found[tracked], sd[tracked]
@@ -141,7 +141,7 @@ def _judged(at: Ints, found: Floats, sd: Floats, true: Floats) -> list[float]:
 
 
 def streamed(
-    tracks: Tracks, camera: Camera, model: Path | None, config: LiftConfig
+    tracks: Keypoints, camera: Camera, model: Path | None, config: LiftConfig
 ) -> tuple[Ints, Floats, Floats, Flags]:
     """Frames (n) that come out of the live lifter, joints and deviations (n, P, 3), whether TRACKING (n)."""
     lifter = Lifter(model, camera, config)

@@ -3,7 +3,7 @@
 
     make eval-lift, or lift_tracks.py
 
-Tracks are the true joints in the picture with noise and gaps.  Priors leave out the walker's subject.
+Keypoints are the true joints in the picture with noise and gaps.  Priors leave out the walker's subject.
 """
 
 from __future__ import annotations
@@ -19,16 +19,17 @@ import numpy as np
 import numpy.typing as npt
 import table
 
-from gait.body.skeleton import EVAL15, axis_rotation
 from gait.bindings.segment_prior import SegmentPrior
-from gait.errors import UserError
+from gait.body.skeleton import EVAL15, axis_rotation
 from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
+from gait.io.track_file import Joints, read_truth
 from gait.io.trc import read_trc
 from gait.learn.corpus.stage import one_thread
-from gait.lift import motion, outliers, result
-from gait.lift.equations import Parallel, Perspective, View, looking_along
-from gait.io.keypoints_file import Tracks
-from gait.io.track_file import Joints, read_truth
+from gait.lift.keypoints import noise
+from gait.lift.segment.view import Parallel, Perspective, View, looking_along
+from gait.lift.smooth import motion
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
@@ -59,18 +60,18 @@ def main() -> int:
     return any("NO" in row for row in rows)
 
 
-def tracked(joints: Joints, camera: Camera, noise: float, gaps: float) -> Tracks:
+def tracked(joints: Joints, camera: Camera, noise: float, gaps: float) -> Keypoints:
     """Joints of EVAL15 in the picture with noise and gaps."""
     rng = np.random.default_rng(1)
     names = tuple(name for name in EVAL15 if name in joints.places)
     uv = np.stack([camera.project(joints.places[name]) for name in names], axis=1)
     uv = uv + noise * rng.normal(size=uv.shape)
     uv[rng.random(uv.shape[:2]) < gaps] = np.nan
-    return Tracks(joints.frame, joints.time, names, uv, np.ones(uv.shape[:2]))
+    return Keypoints(joints.frame, joints.time, names, uv, np.ones(uv.shape[:2]))
 
 
-def wild(tracks: Tracks, share: float, rng: np.random.Generator) -> Tracks:
-    """Tracks of a detector that puts a share of the points anywhere."""
+def wild(tracks: Keypoints, share: float, rng: np.random.Generator) -> Keypoints:
+    """Keypoints of a detector that puts a share of the points anywhere."""
     off = rng.random(tracks.seen.shape) < share
     return replace(tracks, uv=tracks.uv + off[..., None] * rng.normal(0, OFF, tracks.uv.shape))
 
@@ -99,7 +100,7 @@ def _static(prior: SegmentPrior, names: tuple[str, ...], truth: Floats, hips: li
     return root_error(turned, truth, hips)
 
 
-def _view(camera: Camera | None, tracks: Tracks) -> View:
+def _view(camera: Camera | None, tracks: Keypoints) -> View:
     if camera:
         return Perspective(camera)
     return Parallel(looking_along("y"), None, np.nanmedian(tracks.uv, axis=(0, 1)), steady=False)
@@ -107,15 +108,15 @@ def _view(camera: Camera | None, tracks: Tracks) -> View:
 
 def lifted(
     prior: SegmentPrior,
-    tracks: Tracks,
+    tracks: Keypoints,
     camera: Camera | None,
     noise: float,
     method: str = "smooth",
-    floor_sd: float = result.Options.floor_sd,
+    floor_sd: float = motion.Options.floor_sd,
     stature: float | None = None,
-) -> result.Motion:
+) -> motion.Motion:
     """Lift tracks by a camera, or without one."""
-    options = result.Options(method=method, pixel_sd=noise, floor_sd=floor_sd, stature=stature)
+    options = motion.Options(method=method, pixel_sd=noise, floor_sd=floor_sd, stature=stature)
     return motion.lift(prior, tracks, _view(camera, tracks), options, motion.output_names(prior, tracks))
 
 
@@ -138,7 +139,7 @@ def _clips() -> list[list[object]]:
             blend = lifted(prior, tracks, camera, NOISE, "blend")
             stature = float(eval_clips.meta_of(clip.folder)["stature_m"])
             known = lifted(prior, tracks, camera, NOISE, floor_sd=FLOOR_KNOWN, stature=stature)
-            steady, _ = outliers.without_jumps(wild(tracks, WILD, np.random.default_rng(2)), NOISE)
+            steady, _ = noise.without_spikes(wild(tracks, WILD, np.random.default_rng(2)), NOISE)
             spoilt = lifted(prior, steady, camera, NOISE)
             order = [found.names.index(name) for name in EVAL15]
             error = root_error(found.places[:, order], truth, HIPS)
@@ -182,11 +183,11 @@ def _clips() -> list[list[object]]:
         "wild: abs mm",
         "wild: coverage",
     ]
-    table.publish("lift_dev", "Tracks of the development clips", [*head, "met"], rows, note)
+    table.publish("lift_dev", "Keypoints of the development clips", [*head, "met"], rows, note)
     return rows
 
 
-def _blind(prior: SegmentPrior, tracks: Tracks, camera: Camera, truth: Floats) -> float:
+def _blind(prior: SegmentPrior, tracks: Keypoints, camera: Camera, truth: Floats) -> float:
     """Error of the tracks alone; NaN if there is no estimate."""
     try:
         found = lifted(prior, tracks, None, NOISE)
@@ -196,20 +197,20 @@ def _blind(prior: SegmentPrior, tracks: Tracks, camera: Camera, truth: Floats) -
     return root_error(_upright(found.places[:, order], camera), truth, HIPS)
 
 
-def _absolute(found: result.Motion, truth: Floats, order: list[int]) -> float:
+def _absolute(found: motion.Motion, truth: Floats, order: list[int]) -> float:
     """Median over frames of the mean distance in the world, mm."""
     apart = np.linalg.norm(found.places[:, order] - truth, axis=2)
     return 1000 * float(np.median(apart.mean(axis=1)))
 
 
-def judged(found: result.Motion, truth: Floats) -> list[float]:
+def judged(found: motion.Motion, truth: Floats) -> list[float]:
     """Root-aligned and absolute median error, mm, and the share of coordinates in their 90 % intervals."""
     order = [found.names.index(name) for name in EVAL15]
     root = root_error(found.places[:, order], truth, HIPS)
     return [root, _absolute(found, truth, order), _coverage(found, truth, order)[0]]
 
 
-def _coverage(found: result.Motion, truth: Floats, order: list[int]) -> tuple[float, float]:
+def _coverage(found: motion.Motion, truth: Floats, order: list[int]) -> tuple[float, float]:
     """Shares of coordinates in their 90 % intervals: in the world, and about the hips."""
     places, sd = found.places[:, order], found.sd[:, order]
     hips = [order.index(found.names.index(name)) for name in ("l_hip", "r_hip")]

@@ -19,8 +19,10 @@ from lift_mocap import AXES, MOCAP, ONE_OF_EACH, HeldOut, one_of_each
 from scipy.optimize import brentq
 
 from gait.bindings.lifter import Lifter
-from gait.lift.figures_segment import placed_as_learnt
-from gait.lift.observe import Observations, orthographic
+from gait.lift.keypoints.observations import Observations
+from gait.lift.report.segment_figures import placed_as_learnt
+from gait.lift.smooth.rows import orthographic
+
 sys.path.insert(0, str(Path(__file__).parents[1] / "reference"))
 
 from segment_posterior import Gaussian, Posterior, infer, place

@@ -1,4 +1,4 @@
-"""`gait lift` of tracks, end to end."""
+"""`gait lift` of keypoints, end to end."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import pytest
 from toy_segments import toy_blob, toy_prior
 
 from gait.body.skeleton import JOINTS
-from gait.cli import lift, main
 from gait.camera.camera import Camera
+from gait.cli import lift, main
+from gait.io.keypoints_file import Keypoints, read, write
 from gait.io.trc import read_trc
-from gait.lift import motion, outliers, size
-from gait.lift.result import METHODS
-from gait.io.keypoints_file import Tracks, read, write
-from gait.lift.explain import Uncertain
+from gait.lift.keypoints import noise
+from gait.lift.segment.explain import Uncertain
+from gait.lift.smooth import motion, size
+from gait.lift.smooth.motion import METHODS
 
 FRAMES, MARKERS = 6, 12
 VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "none": []}
@@ -25,7 +26,7 @@ VIEWS = {"camera": ["--camera", "cam.json"], "flat": ["--orthographic", "y"], "n
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A model, a camera, tracks of the mean motion with noise, and the truth."""
+    """A model, a camera, keypoints of the mean motion with noise, and the truth."""
     monkeypatch.chdir(tmp_path)
     prior = toy_prior(FRAMES, MARKERS, 4, seed=5)
     (tmp_path / "m.gait").write_bytes(toy_blob(prior))
@@ -37,7 +38,7 @@ def folder(tmp_path, monkeypatch):
     uv = camera.project(places) + rng.normal(size=(len(places), MARKERS, 2))
     uv[rng.random(uv.shape[:2]) < 0.1] = np.nan
     time = np.arange(len(places)) / 20
-    write("t.csv", Tracks(np.arange(len(places)), time, prior.names, uv, np.ones(uv.shape[:2])))
+    write("t.csv", Keypoints(np.arange(len(places)), time, prior.names, uv, np.ones(uv.shape[:2])))
     np.save("truth.npy", places)
     return tmp_path
 
@@ -119,8 +120,8 @@ def test_the_likelihood_alone_is_less_sure_and_has_the_same_columns(folder, caps
 def test_the_likelihood_alone_needs_more_points_than_the_prior(folder, capsys):
     prior = toy_prior(FRAMES, MARKERS, 60, seed=5)
     (folder / "m.gait").write_bytes(toy_blob(prior))
-    tracks, _ = read("t.csv", prior.names)
-    few = Tracks(tracks.frame, tracks.time, tracks.names[:4], tracks.uv[:, :4], tracks.confidence[:, :4])
+    keypoints, _ = read("t.csv", prior.names)
+    few = Keypoints(keypoints.frame, keypoints.time, keypoints.names[:4], keypoints.uv[:, :4], keypoints.confidence[:, :4])
     write("few.csv", few)
     command = ["lift", "few.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--quiet"]
     assert main([*command, "--method", "likelihood"]) == 1
@@ -142,8 +143,8 @@ def test_views_the_other_way(folder, axis, vector):
 
 @pytest.mark.parametrize(("share", "milli"), [(1 / 640, 1), (1, 1000)])
 def test_other_units_are_told(folder, capsys, share, milli):
-    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4).names)
-    write("u.csv", replace(tracks, uv=tracks.uv * share, time=tracks.time * milli))
+    keypoints, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4).names)
+    write("u.csv", replace(keypoints, uv=keypoints.uv * share, time=keypoints.time * milli))
     assert main(["lift", "u.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json"]) == 1
     words = capsys.readouterr().err
     assert "u.csv: " in words and ("give pixels" if share < 1 else "give seconds") in words
@@ -179,9 +180,9 @@ def test_trc_and_sd(folder, capsys):
         (["--camera", "no.json"], 1, "no.json"),
         (["--floor-sd", "0.1"], 2, "goes with --camera and --method smooth"),
         (["--camera", "cam.json", "--floor-sd", "0.1", "--method", "blend"], 2, "--method smooth"),
-        (["--start", "0"], 2, "--start is for a video, and t.csv holds tracks"),
-        (["--overlay", "o.mp4"], 2, "--overlay is for a video, and t.csv holds tracks"),
-        (["--placement", "cam.json"], 2, "--placement is for a video, and t.csv holds tracks"),
+        (["--start", "0"], 2, "--start is for a video, and t.csv holds keypoints"),
+        (["--overlay", "o.mp4"], 2, "--overlay is for a video, and t.csv holds keypoints"),
+        (["--placement", "cam.json"], 2, "--placement is for a video, and t.csv holds keypoints"),
         (["-o", "t.csv"], 1, "t.csv: is read by this command; give the output another name"),
         (["--trc", "./out.csv"], 1, "./out.csv: two outputs have this name"),
         (["-o", ""], 1, "name is empty"),
@@ -215,13 +216,13 @@ def test_options_out_of_range(folder, capsys, option, words):
         (lambda t: replace(t, time=t.time + 1e6 * (t.frame > 8)), "line 11: 1e+06 s after the frame before"),
         (lambda t: replace(t, time=t.time * 1e-9), "u.csv: time goes on by 5e-11 from frame to frame"),
         (lambda t: replace(t, uv=t.uv * 1e9), "give a number of at most 1e+06"),
-        (lambda t: Tracks(t.frame[:1], t.time[:1], t.names, t.uv[:1], t.confidence[:1]), "has one frame"),
+        (lambda t: Keypoints(t.frame[:1], t.time[:1], t.names, t.uv[:1], t.confidence[:1]), "has one frame"),
     ],
 )
 def test_tracks_that_cannot_be(folder, capsys, change, words):
-    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4).names)
-    changed = change(tracks)
-    head = ["frame", "time", *(f"{name}_{axis}" for name in tracks.names for axis in "uv")]
+    keypoints, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4).names)
+    changed = change(keypoints)
+    head = ["frame", "time", *(f"{name}_{axis}" for name in keypoints.names for axis in "uv")]
     with open("u.csv", "w", newline="") as file:
         table = csv.writer(file)
         table.writerow(head)
@@ -237,9 +238,9 @@ def test_video_needs_placement(folder, capsys):
     assert main(["lift", "clip.mp4", "-m", "m.gait", "-o", "out.csv"]) == 2
     assert "--placement" in capsys.readouterr().err
     assert main(["lift", "clip.mp4", "-o", "out.csv", "--height", "1.7"]) == 2
-    assert "--height is for tracks, and clip.mp4 is a video" in capsys.readouterr().err
+    assert "--height is for keypoints, and clip.mp4 is a video" in capsys.readouterr().err
     assert main(["lift", "clip.mp4", "-o", "out.csv", "--method", "smooth"]) == 2
-    assert "--method is for tracks" in capsys.readouterr().err
+    assert "--method is for keypoints" in capsys.readouterr().err
     assert main(["lift", "absent", "-o", "out.csv", "--method", "smooth"]) == 1
     assert "absent: no such file" in capsys.readouterr().err
     assert main(["lift", "absent.mp4", "-o", "out.csv", "--method", "smooth"]) == 1
@@ -248,10 +249,10 @@ def test_video_needs_placement(folder, capsys):
 
 def damaged(change):
     """Rewrite t.csv with its pixels changed."""
-    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
-    uv = tracks.uv.copy()
+    keypoints, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
+    uv = keypoints.uv.copy()
     change(uv)
-    write("t.csv", replace(tracks, uv=uv))
+    write("t.csv", replace(keypoints, uv=uv))
 
 
 def test_a_gap_is_bridged_with_larger_deviations(folder):
@@ -289,22 +290,22 @@ def test_blending_needs_every_segment(folder, capsys):
 
 
 def test_one_wild_point_changes_little(folder, capsys):
-    tracks, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
-    row = int(np.flatnonzero(tracks.seen[1:-1, 3])[4]) + 1
-    uv = tracks.uv.copy()
+    keypoints, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
+    row = int(np.flatnonzero(keypoints.seen[1:-1, 3])[4]) + 1
+    uv = keypoints.uv.copy()
     uv[row, 3] += 20
-    write("wild.csv", replace(tracks, uv=uv))
+    write("wild.csv", replace(keypoints, uv=uv))
     command = ["-m", "m.gait", "--camera", "cam.json", "--pixel-sd", "1", "--json"]
     assert main(["lift", "wild.csv", *command, "-o", "wild.out.csv"]) == 0
     said = capsys.readouterr()
     summary = json.loads(said.out)
     assert summary["jumps"] == 1
-    assert summary["left_out"] == [{"frame": int(tracks.frame[row]), "point": tracks.names[3]}]
-    assert f"{tracks.names[3]} in frame {tracks.frame[row]} (--keep-jumps)" in said.err
+    assert summary["left_out"] == [{"frame": int(keypoints.frame[row]), "point": keypoints.names[3]}]
+    assert f"{keypoints.names[3]} in frame {keypoints.frame[row]} (--keep-spikes)" in said.err
     assert main(["lift", "t.csv", *command, "-o", "out.csv"]) == 0
-    far = np.linalg.norm(lifted("wild.out.csv", tracks.names) - lifted("out.csv", tracks.names), axis=2)
+    far = np.linalg.norm(lifted("wild.out.csv", keypoints.names) - lifted("out.csv", keypoints.names), axis=2)
     assert far.max() < 0.1
-    assert main(["lift", "wild.csv", *command, "-o", "kept.csv", "--keep-jumps"]) == 0
+    assert main(["lift", "wild.csv", *command, "-o", "kept.csv", "--keep-spikes"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["jumps"] == 0
 
 
@@ -314,7 +315,7 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
     (folder / "long.json").write_text(json.dumps(camera | {"fx": 6e7, "fy": 6e7}))
     assert main(command) == 1
     assert "long.json: focal length of 6e+07 pixels is over 1000 times" in capsys.readouterr().err
-    # a lens that could be, not one that took these tracks
+    # a lens that could be, not one that took these keypoints
     (folder / "long.json").write_text(json.dumps(camera | {"fx": 6e5, "fy": 6e5}))
     code = main(command)
     said = capsys.readouterr().err
@@ -324,7 +325,7 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
 def test_few_joints_are_told(folder, capsys, monkeypatch):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv"]
     for tells, view in ((True, "camera"), (False, "camera"), (False, "none")):
-        monkeypatch.setattr(size, "tells_distance", lambda tracks, tells=tells: tells)
+        monkeypatch.setattr(size, "tells_distance", lambda keypoints, tells=tells: tells)
         assert main([*command, *VIEWS[view]]) == 0
         told = "hips and ankles are hardly seen" in capsys.readouterr().err
         assert told == (view == "camera" and not tells)
@@ -333,13 +334,13 @@ def test_few_joints_are_told(folder, capsys, monkeypatch):
 def test_doubts_are_told(folder, capsys, monkeypatch):
     lift = motion.lift
 
-    def doubting(prior, tracks, *args):
-        doubted = np.zeros(tracks.uv.shape[:2], bool)
+    def doubting(prior, keypoints, *args):
+        doubted = np.zeros(keypoints.uv.shape[:2], bool)
         doubted[2:6, 3] = doubted[4, 1] = True
-        return replace(lift(prior, tracks, *args), doubted=doubted, alone=True, steps=0, wider=2.0)
+        return replace(lift(prior, keypoints, *args), outliers=doubted, alone=True, steps=0, wider=2.0)
 
     monkeypatch.setattr(motion, "lift", doubting)
-    monkeypatch.setattr(outliers, "shake", lambda tracks: 5.0)
+    monkeypatch.setattr(noise, "shake", lambda keypoints: 5.0)
     command = ["lift", "t.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv"]
     assert main([*command, "--json"]) == 0
     said = capsys.readouterr()

@@ -155,7 +155,7 @@ def tracks(scene):
     names = (*MODEL.joint_names, "nose")
     uv = np.concatenate([uv, np.full((20, 1, 2), 100.0)], axis=1)
     frame = np.arange(20)
-    found = tracks_file.Tracks(frame, frame / 30, names, uv, np.ones(uv.shape[:2]))
+    found = tracks_file.Keypoints(frame, frame / 30, names, uv, np.ones(uv.shape[:2]))
     tracks_file.write(scene / "tracks.csv", found)
     return scene / "tracks.csv"
 

@@ -132,7 +132,7 @@ def test_points_of_no_use_are_left_out_and_counted(tmp_path: Path) -> None:
 
 
 def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None:
-    """Tracks that come after that are counted and named, and change nothing."""
+    """Keypoints that come after that are counted and named, and change nothing."""
     without, said = play(tmp_path, frames())
     assert said == (0, 0, 0) and without.frames == FRAMES  # also the last one, when the log ends
     late = [event for i in range(FRAMES) for event in ([image(i), tracks(i - 1)] if i else [image(0)])]

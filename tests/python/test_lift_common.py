@@ -7,13 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gait.body.skeleton import EVAL15, JOINTS
 from gait.bindings.segment_prior import SegmentPrior
-from gait.lift import common
-from gait.lift import fit_correlation as likeness
-from gait.lift.descent import Link, information, normal
-from gait.lift.fit_clip import fit_clip
-from gait.lift.tridiagonal import factor
+from gait.body.skeleton import EVAL15, JOINTS
+from gait.lift.smooth.block_arrowhead import factor
+from gait.lift.video import descent, fit_clip
+from gait.lift.video.descent import Link, information, normal
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
 
@@ -47,7 +45,7 @@ def chain():
         start = state.copy()
         start[-6] += segment * clip.hop * 1.2
         energy = clip.energy(segment, 0, start)
-        seen = energy.reading.value + energy.misfit(start).reshape(energy.reading.value.shape)
+        seen = energy.reading.value + energy.residuals(start).reshape(energy.reading.value.shape)
         energies.append(replace(energy, reading=replace(energy.reading, value=seen)))
         states.append(start)
     link = Link(prior.hop, np.sqrt(2) * energies[0].shape.residual)
@@ -61,8 +59,8 @@ def seen_elsewhere(energy, state, error):
     uv, _ = energy.view.project(places)
     pixels = np.array([energy.view.scale(body.mean(axis=0)) for body in places])
     middle = (uv.min(axis=1) + uv.max(axis=1)) / 2
-    shift = pixels[:, None] * np.array(common.SHIFT_SD) * error[:2]
-    wrong = uv + shift[:, None] + error[2] * common.SIZE_SD * (uv - middle[:, None])
+    shift = pixels[:, None] * np.array(descent.SHIFT_SD) * error[:2]
+    wrong = uv + shift[:, None] + error[2] * descent.SIZE_SD * (uv - middle[:, None])
     more, plain = (energy.sticks.responses(at, reading.places, reading.blur)[0] for at in (wrong, uv))
     return replace(energy, reading=replace(reading, value=reading.value - np.exp(state[-2]) * (more - plain)))
 
@@ -77,7 +75,7 @@ def markers(energies, states):
 @pytest.mark.parametrize("which", [0, 1, 2], ids=["across", "along", "size"])
 def test_an_error_moves_the_estimate_as_foretold(chain, which):
     energies, link, states = chain
-    moves = common.moves(energies, information(energies, link, states), states, np.zeros(2))
+    moves = descent.moves(energies, information(energies, link, states), states, np.zeros(2))
     error = np.zeros(3)
     error[which] = SMALL
     wrong = [seen_elsewhere(e, s, error) for e, s in zip(energies, states, strict=True)]
@@ -90,26 +88,26 @@ def test_an_error_moves_the_estimate_as_foretold(chain, which):
 def test_without_sensors_there_is_nothing_to_get_wrong(chain):
     energies, link, states = chain
     blind = [replace(energy, reading=None) for energy in energies]
-    assert not common.moves(blind, information(blind, link, states), states, np.ones(2)).any()
-    assert np.isnan(likeness.likeness(blind, states))
+    assert not descent.moves(blind, information(blind, link, states), states, np.ones(2)).any()
+    assert np.isnan(fit_clip.fit_correlation(blind, states))
 
 
 def test_a_drift_is_a_shift_of_each_segment_by_how_far_it_drifted(chain):
     energies, link, states = chain
     factor = information(energies, link, states)
     both, first, second = (
-        common.moves(energies, factor, states, np.array(drifted))
+        descent.moves(energies, factor, states, np.array(drifted))
         for drifted in ((0.5, 0.5), (0.5, 0.0), (0.0, 0.5))
     )
     for axis in (0, 1):
-        alike = 0.5 / common.SHIFT_SD[axis] * both[..., axis]
+        alike = 0.5 / descent.SHIFT_SD[axis] * both[..., axis]
         assert both[..., 3 + axis] == pytest.approx(alike, abs=1e-9)
         assert (first + second)[..., 3 + axis] == pytest.approx(alike, abs=1e-9)
 
 
 def test_likeness_is_the_share_of_the_sensors_that_the_figure_explains(chain):
     energies, _, states = chain
-    assert likeness.likeness(energies, states) > 0.99
+    assert fit_clip.fit_correlation(energies, states) > 0.99
     rng, found = np.random.default_rng(0), []
     for noise in (0.5, 5.0):
         blurred = []
@@ -117,12 +115,12 @@ def test_likeness_is_the_share_of_the_sensors_that_the_figure_explains(chain):
             value = energy.reading.value
             more = noise * value.std() * rng.normal(size=value.shape)
             blurred.append(replace(energy, reading=replace(energy.reading, value=value + more)))
-        found.append(likeness.likeness(blurred, states))
+        found.append(fit_clip.fit_correlation(blurred, states))
     assert found[0] > 0.8 and abs(found[1]) < 0.4
 
 
 def test_a_figure_that_explains_little_may_have_drifted():
-    drifts = [likeness.drift(alike) for alike in (np.nan, 1.0, likeness.HELD, 0.6, 0.3, -0.5)]
+    drifts = [fit_clip.drift(alike) for alike in (np.nan, 1.0, fit_clip.HELD, 0.6, 0.3, -0.5)]
     assert drifts[:3] == [0.0, 0.0, 0.0]
     assert 0 < drifts[3] < drifts[4] == drifts[5] < 0.3
 
@@ -143,10 +141,10 @@ def test_intervals_hold_what_they_say(monkeypatch):
         walker = stranger(seed)
         clip = lift_sticks.stick_clip(prior, walker, np.radians(angle), seed)
         truth = walker.joints[:, [JOINTS.index(name) for name in EVAL15]]
-        fit, markers = fit_clip(clip), prior.index(EVAL15)
+        fit, markers = fit_clip.fit_clip(clip), prior.index(EVAL15)
         held.append(lift_clicks.score(clip, fit, truth, EVAL15).coverage)
         squares.append(np.mean(((fit.places[:, markers] - truth) / fit.sd[:, markers]) ** 2))
     assert min(held) > 0.8
     assert 0.4 < np.sqrt(np.mean(squares)) < 1.2
-    monkeypatch.setattr(common, "moves", lambda chain, factor, states, drifted: np.zeros((*states.shape, 3)))
-    assert np.median(fit_clip(clip, fit.sequence).sd) < 0.95 * np.median(fit.sd)  # it counts
+    monkeypatch.setattr(fit_clip, "moves", lambda chain, factor, states, drifted: np.zeros((*states.shape, 3)))
+    assert np.median(fit_clip.fit_clip(clip, fit.sequence).sd) < 0.95 * np.median(fit.sd)  # it counts

@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gait.body.skeleton import EVAL15
 from gait.bindings.estimate import TrackStatus
 from gait.bindings.lifter import Lifter
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import EVAL15
 from gait.camera.camera import Camera
-from gait.lift import motion, outliers, result
-from gait.lift.sequence import weighted
-from gait.lift.equations import Perspective
-from gait.lift.observe import Observations
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints import noise
+from gait.lift.keypoints.observations import Observations
+from gait.lift.segment.view import Perspective
+from gait.lift.smooth import motion
+from gait.lift.smooth.smoother import weighted
 
 SD, FAR = 3.0, 4.0
 CAMERA = Camera.looking((1.5, -6.0, 1.4), (1.0, 0, 0.9), (960, 720), 900)
@@ -58,7 +59,7 @@ def test_what_is_not_seen_is_not_judged():
 
 @pytest.fixture(scope="module")
 def walk():
-    """Shipped prior, its mean motion going on along x for two seconds, and its tracks with noise."""
+    """Shipped prior, its mean motion going on along x for two seconds, and its keypoints with noise."""
     prior = SegmentPrior.load()
     half = prior.frames // 2
     body = 1.7 * prior.mean[0][:, prior.index(EVAL15)]
@@ -66,21 +67,21 @@ def walk():
     places = np.concatenate([body[:half] + k * step for k in range(8)])
     uv = CAMERA.project(places) + SD * np.random.default_rng(1).normal(size=(*places.shape[:2], 2))
     frames = np.arange(len(places))
-    return prior, places, Tracks(frames, frames / prior.fps, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
+    return prior, places, Keypoints(frames, frames / prior.fps, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
 
 
 def test_a_point_wrong_for_a_second_hardly_matters(walk):
-    prior, places, tracks = walk
-    uv = tracks.uv.copy()
-    wrong = slice(10, 30), tracks.names.index("r_wrist")
+    prior, places, keypoints = walk
+    uv = keypoints.uv.copy()
+    wrong = slice(10, 30), keypoints.names.index("r_wrist")
     uv[wrong] += (70.0, -50.0)
-    names = motion.output_names(prior, tracks)
-    order = [names.index(name) for name in tracks.names]
+    names = motion.output_names(prior, keypoints)
+    order = [names.index(name) for name in keypoints.names]
     errors, evidence = [], []
-    for given in (tracks, replace(tracks, uv=uv)):
-        found = motion.lift(prior, given, Perspective(CAMERA), result.Options(pixel_sd=SD), names)
-        assert found.settled and not found.alone and found.doubted is not None
-        assert found.doubted[wrong].all() == (given is not tracks)
+    for given in (keypoints, replace(keypoints, uv=uv)):
+        found = motion.lift(prior, given, Perspective(CAMERA), motion.Options(pixel_sd=SD), names)
+        assert found.settled and not found.alone and found.outliers is not None
+        assert found.outliers[wrong].all() == (given is not keypoints)
         evidence.append(found.evidence)
         apart = found.places[:, order] - places
         errors.append(np.linalg.norm(apart - apart.mean(axis=1, keepdims=True), axis=2).mean())
@@ -88,29 +89,29 @@ def test_a_point_wrong_for_a_second_hardly_matters(walk):
     assert evidence[1] < evidence[0] - 20  # each of the 20 frames pays at least one
 
 
-def spoilt(tracks, share, seed):
-    """Tracks of which a share of the points is anywhere."""
+def spoilt(keypoints, share, seed):
+    """Keypoints of which a share of the points is anywhere."""
     rng = np.random.default_rng(seed)
-    wild = rng.random(tracks.seen.shape) < share
-    return replace(tracks, uv=tracks.uv + wild[..., None] * rng.normal(0, 150, tracks.uv.shape))
+    wild = rng.random(keypoints.seen.shape) < share
+    return replace(keypoints, uv=keypoints.uv + wild[..., None] * rng.normal(0, 150, keypoints.uv.shape))
 
 
 def test_somebody_is_found_among_wild_points(walk):
-    prior, places, tracks = walk
-    names = motion.output_names(prior, tracks)
-    steady, _ = outliers.without_jumps(spoilt(tracks, 0.15, 1), SD)
-    found = motion.lift(prior, steady, Perspective(CAMERA), result.Options(pixel_sd=SD), names)
-    apart = found.places[:, [names.index(name) for name in tracks.names]] - places
+    prior, places, keypoints = walk
+    names = motion.output_names(prior, keypoints)
+    steady, _ = noise.without_spikes(spoilt(keypoints, 0.15, 1), SD)
+    found = motion.lift(prior, steady, Perspective(CAMERA), motion.Options(pixel_sd=SD), names)
+    apart = found.places[:, [names.index(name) for name in keypoints.names]] - places
     assert found.settled and not found.alone
     assert np.linalg.norm(apart, axis=2).mean() < 0.1
 
 
-def live(tracks, share, seed):
-    """Frames of a live lift of spoilt tracks."""
+def live(keypoints, share, seed):
+    """Frames of a live lift of spoilt keypoints."""
     lifter = Lifter(view=CAMERA)
     uv = np.full((len(lifter.names), 2), np.nan)
-    order = [lifter.names.index(name) for name in tracks.names]
-    for time, seen in zip(tracks.time, spoilt(tracks, share, seed).uv, strict=True):
+    order = [lifter.names.index(name) for name in keypoints.names]
+    for time, seen in zip(keypoints.time, spoilt(keypoints, share, seed).uv, strict=True):
         uv[order] = seen
         lifter.push(round(1e6 * time), uv)
         now = lifter.estimate()
@@ -119,9 +120,9 @@ def live(tracks, share, seed):
 
 
 def test_a_live_start_finds_somebody_among_wild_points(walk):
-    _, places, tracks = walk
+    _, places, keypoints = walk
     for seed in range(6):
-        frames = list(live(tracks, 0.15, seed))
+        frames = list(live(keypoints, 0.15, seed))
         assert len(frames) == len(places) - 9
         for now, found, _ in frames:
             assert now.status == TrackStatus.TRACKING
@@ -130,10 +131,10 @@ def test_a_live_start_finds_somebody_among_wild_points(walk):
 
 def test_what_a_live_start_gets_wrong_is_not_relied_on(walk):
     """Three points in ten are anywhere: what is called tracked lies near, or in its intervals."""
-    _, places, tracks = walk
+    _, places, keypoints = walk
     wrong = 0
     for seed in range(12):
-        for now, found, sd in live(tracks, 0.3, seed):
+        for now, found, sd in live(keypoints, 0.3, seed):
             apart = np.abs(found - places[now.frame])
             near = apart.mean() < 0.3 or np.mean(apart < 1.645 * sd) > 0.8
             wrong += not near

@@ -9,10 +9,11 @@ from toy_segments import toy_prior
 
 from gait.camera.camera import Camera
 from gait.errors import UserError
-from gait.lift import explain
-from gait.lift.equations import Parallel, Perspective, looking_along
-from gait.lift.explain import Explanation, SegmentLifter
-from gait.lift.observe import Observations, orthographic, perspective
+from gait.lift.keypoints.observations import Observations
+from gait.lift.segment import explain
+from gait.lift.segment.explain import Explanation, SegmentLifter
+from gait.lift.segment.view import Parallel, Perspective, looking_along
+from gait.lift.smooth.rows import orthographic, perspective
 
 CAMERA = Camera.looking((0.0, -7.0, 1.6), (0.0, 0.0, 0.9), (640, 480), 700.0)
 FAR = Parallel(looking_along("y"), 1.0, np.zeros(2))

@@ -6,7 +6,8 @@ from segment_posterior import Person, dual, explain, infer, place
 from toy_segments import FRONT, toy_prior
 
 from gait.camera.camera import Camera
-from gait.lift.observe import Observations, orthographic, perspective
+from gait.lift.keypoints.observations import Observations
+from gait.lift.smooth.rows import orthographic, perspective
 
 CAMERA = Camera.looking((0.0, -7.0, 1.6), (0.0, 0.0, 0.9), (640, 480), 700.0)
 PIXEL = 1.0

@@ -7,19 +7,28 @@ import numpy as np
 import pytest
 from toy_segments import toy_prior
 
-from gait.body.skeleton import JOINTS
 from gait.bindings.model import read_cyclic
 from gait.bindings.segment_prior import SegmentPrior
-from gait.errors import UserError
+from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
+from gait.errors import UserError
 from gait.io.video import Frame
-from gait.lift import sensors
-from gait.lift.phase_prior import Beginning
-from gait.lift.descent import Link, normal
-from gait.lift.energy import GAIN, HEADING, PLACE, Anchor, Energy, Reading, Shape, Springs
-from gait.lift.corrections import CLICK_SD, as_json, read_corrections, read_placement
-from gait.lift.stick import Sticks, stick_responses
-from gait.lift.views import CameraView, FlatView
+from gait.lift.video import sensors
+from gait.lift.video.corrections import CLICK_SD, PhasePrior, as_json, read_corrections, read_placement
+from gait.lift.video.descent import Link, normal
+from gait.lift.video.energy import (
+    GAIN,
+    HEADING,
+    PLACE,
+    Anchor,
+    Corrections,
+    Energy,
+    Reading,
+    Shape,
+    Sticks,
+    stick_responses,
+)
+from gait.lift.video.sensors import CameraView, FlatView
 
 CAMERA = replace(
     Camera.looking((6, -1, 1.4), (0, 0, 0.9), (640, 480), 500.0),
@@ -52,7 +61,7 @@ def energy_of(view, headings=0, **parts):
         np.zeros(shape.size),
         np.full(shape.size, 2.0),
         reading=Reading(rng.uniform(size=(5, 80)), grid, np.full(5, 12.0), 0.3),
-        springs=Springs(
+        corrections=Corrections(
             np.array([0, 3]), np.array([2, 9]), rng.uniform(100, 300, (2, 2)), np.array([3.0, 5])
         ),
         anchor=Anchor(slice(3), rng.normal(size=(3, len(JOINTS), 3)), np.full(len(JOINTS), 0.05)),
@@ -113,16 +122,16 @@ def test_the_energy_is_eq_7():
     rows, _ = energy.rows(state)
     places, _ = energy.shape.positions(state, energy.weights, slice(None))
     uv, _ = energy.view.project(places)
-    springs, reading = energy.springs, energy.reading
-    pulled = uv[springs.frame, springs.marker] - springs.uv
+    corrections, reading = energy.corrections, energy.reading
+    pulled = uv[corrections.frame, corrections.marker] - corrections.uv
     value, _ = energy.sticks.responses(uv[:, energy.sticks.markers], reading.places, reading.blur)
     seen = state[-1] + np.exp(state[GAIN]) * value - reading.value
-    wanted = ((pulled / springs.sd[:, None]) ** 2).sum() + (seen**2).sum() / reading.sd**2
+    wanted = ((pulled / corrections.sd[:, None]) ** 2).sum() + (seen**2).sum() / reading.sd**2
     assert rows @ rows == pytest.approx(wanted + (state**2).sum() / 4)
 
 
 def test_a_chain_ties_neighbours_where_they_overlap():
-    energy, state = energy_of(VIEWS["flat"], reading=None, springs=None, anchor=None)
+    energy, state = energy_of(VIEWS["flat"], reading=None, corrections=None, anchor=None)
     link = Link(3, np.full(len(JOINTS), 0.02))
     states = np.stack([state, state + 0.1])
     apart, tied = normal([energy, energy], None, states), normal([energy, energy], link, states)
@@ -271,9 +280,9 @@ def test_a_phase_tells_which_leg_is_ahead(tmp_path):
     def ahead(phase):
         """How far the left ankle is before the right one in the first frame, metres."""
         path.write_text(json.dumps(ROUGH | {"phase": phase, "stride_hz": 0.9}))
-        beginning = Beginning.of(prior, cycle, read_placement(path, prior, True))
-        state = np.concatenate([beginning.mean[0], np.zeros(6)])
-        assert (beginning.sd[0] <= 1).all() and beginning.sd[0].min() < 0.6
+        phase_prior = PhasePrior.of(prior, cycle, read_placement(path, prior, True))
+        state = np.concatenate([phase_prior.mean[0], np.zeros(6)])
+        assert (phase_prior.sd[0] <= 1).all() and phase_prior.sd[0].min() < 0.6
         ankles, _ = Shape.of(prior, 0, 1.7).positions(
             state, np.eye(prior.frames), prior.index(["l_ankle", "r_ankle"])
         )
@@ -283,7 +292,7 @@ def test_a_phase_tells_which_leg_is_ahead(tmp_path):
     assert ahead(0.5) == pytest.approx(-ahead(0.0), rel=0.2)
     for vague in ({"phase": 0.5, "sd": {"phase": 0.3}}, {}):
         path.write_text(json.dumps(ROUGH | vague))
-        assert Beginning.of(prior, cycle, read_placement(path, prior, True)) is None
+        assert PhasePrior.of(prior, cycle, read_placement(path, prior, True)) is None
 
 
 def test_without_a_plate_noise_has_no_edges():

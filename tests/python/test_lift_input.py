@@ -12,8 +12,9 @@ from toy_segments import toy_blob, toy_prior
 from gait.camera.camera import Camera
 from gait.cli import lift_tracks, main
 from gait.cli.lift import PIXEL_SD
-from gait.io.keypoints_file import Tracks, read, shared_place, write
-from gait.lift import motion, outliers, switches
+from gait.io.keypoints_file import Keypoints, read, shared_place, write
+from gait.lift.keypoints import noise
+from gait.lift.smooth import motion
 
 FRAMES, MARKERS = 6, 12
 FRONT = (640, 480)
@@ -21,7 +22,7 @@ FRONT = (640, 480)
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A model, a camera and tracks of the mean motion with noise."""
+    """A model, a camera and keypoints of the mean motion with noise."""
     monkeypatch.chdir(tmp_path)
     prior = toy_prior(FRAMES, MARKERS, 4, seed=5)
     (tmp_path / "m.gait").write_bytes(toy_blob(prior))
@@ -36,15 +37,15 @@ def folder(tmp_path, monkeypatch):
 
 def save(path, uv, step=1 / 20):
     names = toy_prior(FRAMES, MARKERS, 4, seed=5).names
-    write(path, Tracks(np.arange(len(uv)), np.arange(len(uv)) * step, names, uv, np.ones(uv.shape[:2])))
+    write(path, Keypoints(np.arange(len(uv)), np.arange(len(uv)) * step, names, uv, np.ones(uv.shape[:2])))
 
 
 def pixels():
     return read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].uv.copy()
 
 
-def lift(capsys, tracks="t.csv", camera="cam.json", *options):
-    code = main(["lift", tracks, "-m", "m.gait", "--camera", camera, "-o", "out.csv", *options])
+def lift(capsys, keypoints="t.csv", camera="cam.json", *options):
+    code = main(["lift", keypoints, "-m", "m.gait", "--camera", camera, "-o", "out.csv", *options])
     return code, capsys.readouterr().err
 
 
@@ -68,8 +69,8 @@ def test_a_calibration_of_another_size_is_told(folder, capsys):
 
 def test_the_share_outside_counts_points_that_are_seen():
     uv = np.array([[[0.0, 0], [639, 479], [640, 5], [np.nan, np.nan], [3, -1]]])
-    tracks = Tracks(np.arange(1), np.zeros(1), tuple("abcde"), uv, np.ones((1, 5)))
-    assert tracks.outside(FRONT) == 0.5
+    keypoints = Keypoints(np.arange(1), np.zeros(1), tuple("abcde"), uv, np.ones((1, 5)))
+    assert keypoints.outside(FRONT) == 0.5
 
 
 def test_minus_one_is_refused_as_zero_is(folder, capsys):
@@ -160,9 +161,9 @@ def test_wild_points_are_no_other_person(folder):
     wild = rng.random(uv.shape[:2]) < 0.7
     uv[wild] += rng.normal(size=uv.shape)[wild] * 100
     names = toy_prior(FRAMES, MARKERS, 4, seed=5).names
-    tracks = Tracks(np.arange(30), np.arange(30) / 20, names, uv, np.ones(uv.shape[:2]))
-    assert switches.switches(tracks) == []
-    assert switches.switches(replace(tracks, uv=pixels())) == []
+    keypoints = Keypoints(np.arange(30), np.arange(30) / 20, names, uv, np.ones(uv.shape[:2]))
+    assert noise.person_changes(keypoints) == []
+    assert noise.person_changes(replace(keypoints, uv=pixels())) == []
 
 
 def test_a_picture_upside_down_names_v(folder, capsys):
@@ -186,8 +187,8 @@ def test_exchanged_sides_are_put_back_and_told(folder, capsys):
     )
     put = [{"joint": joint, "first": 5, "last": 8} for joint in ("shoulder", "elbow")]
     assert json.loads(capsys.readouterr().out)["put_back"] == put
-    for tracks, options in (("swapped.csv", ["--keep-sides"]), ("t.csv", [])):
-        code, said = lift(capsys, tracks, "cam.json", *options)
+    for keypoints, options in (("swapped.csv", ["--keep-sides"]), ("t.csv", [])):
+        code, said = lift(capsys, keypoints, "cam.json", *options)
         assert code == 0 and "put back" not in said
 
 
@@ -209,6 +210,6 @@ def test_wild_points_are_no_noise(folder):
     wild = rng.random(uv.shape[:2]) < 0.15
     uv[wild] += rng.normal(0, 60, (wild.sum(), 2))
     save("wild.csv", uv)
-    tracks = read("wild.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0]
-    assert outliers.shake(tracks) > 1.3 * PIXEL_SD
-    assert lift_tracks.noise(tracks, True) == PIXEL_SD
+    keypoints = read("wild.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0]
+    assert noise.shake(keypoints) > 1.3 * PIXEL_SD
+    assert lift_tracks.noise_of(keypoints, True) == PIXEL_SD

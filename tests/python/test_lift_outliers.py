@@ -1,4 +1,4 @@
-"""Points that jump are taken out of 2-D tracks, quick motion is not; noise is told from motion."""
+"""Points that jump are taken out of 2-D keypoints, quick motion is not; noise is told from motion."""
 
 from dataclasses import replace
 
@@ -7,42 +7,42 @@ import pytest
 import robust
 
 from gait.bindings.lifter import remove_spikes, weight_outliers
-from gait.lift.outliers import shake, without_jumps
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints.noise import shake, without_spikes
 
 
-def swinging(rate: float, frames: int = 60, seed: int = 4) -> Tracks:
+def swinging(rate: float, frames: int = 60, seed: int = 4) -> Keypoints:
     """A foot and a wrist that swing by 60 and 40 pixels once a second, 3 px of noise."""
     time = np.arange(frames) / rate
     turn = 2 * np.pi * time[:, None]
     u = 300 + 30 * time[:, None] + np.array([60, 40]) * np.sin(turn)
     v = 200 + np.array([20, 10]) * np.cos(turn) + np.zeros((1, 2))
     uv = np.stack([u, v], axis=2) + np.random.default_rng(seed).normal(0, 3, (frames, 2, 2))
-    return Tracks(np.arange(frames), time, ("l_ankle", "r_wrist"), uv, np.ones((frames, 2)))
+    return Keypoints(np.arange(frames), time, ("l_ankle", "r_wrist"), uv, np.ones((frames, 2)))
 
 
 @pytest.mark.parametrize("rate", [10, 30, 60])
 def test_quick_motion_stays(rate):
-    tracks = swinging(rate)
-    kept, jumps = without_jumps(tracks, 3.0)
+    keypoints = swinging(rate)
+    kept, jumps = without_spikes(keypoints, 3.0)
     assert jumps == []
-    np.testing.assert_array_equal(kept.uv, tracks.uv)
+    np.testing.assert_array_equal(kept.uv, keypoints.uv)
 
 
 @pytest.mark.parametrize("off", [(80, 0), (0, -150), (-1000, 1000)])
 def test_a_jump_is_taken_out_and_named(off):
-    tracks = swinging(30)
-    tracks.uv[20, 1] += off
-    kept, jumps = without_jumps(tracks, 3.0)
+    keypoints = swinging(30)
+    keypoints.uv[20, 1] += off
+    kept, jumps = without_spikes(keypoints, 3.0)
     assert jumps == [(20, "r_wrist")]
-    assert np.isnan(kept.uv[20, 1]).all() and kept.seen.sum() == tracks.seen.sum() - 1
+    assert np.isnan(kept.uv[20, 1]).all() and kept.seen.sum() == keypoints.seen.sum() - 1
 
 
 def test_many_jumps_beside_gaps():
-    tracks = swinging(30)
-    tracks.uv[[5, 17, 18, 40], 0] = 0.0
-    tracks.uv[30:36, 1] = np.nan
-    _, jumps = without_jumps(tracks, 3.0)
+    keypoints = swinging(30)
+    keypoints.uv[[5, 17, 18, 40], 0] = 0.0
+    keypoints.uv[30:36, 1] = np.nan
+    _, jumps = without_spikes(keypoints, 3.0)
     assert jumps == [(5, "l_ankle"), (17, "l_ankle"), (18, "l_ankle"), (40, "l_ankle")]
 
 
@@ -50,15 +50,15 @@ def test_many_jumps_beside_gaps():
 def test_spikes_are_those_of_the_numpy_version(seed):
     """Measured anew after each removal, beside gaps and at the ends."""
     rng = np.random.default_rng(seed)
-    tracks = swinging(30, frames=120)
-    tracks.uv[rng.random((120, 2)) < 0.1] = np.nan
+    keypoints = swinging(30, frames=120)
+    keypoints.uv[rng.random((120, 2)) < 0.1] = np.nan
     wild = rng.random((120, 2)) < 0.08
-    tracks.uv[wild] += rng.normal(0, 200, (wild.sum(), 2))
-    tracks.uv[[0, 1, 118, 119], 0] += (300, 0)
+    keypoints.uv[wild] += rng.normal(0, 200, (wild.sum(), 2))
+    keypoints.uv[[0, 1, 118, 119], 0] += (300, 0)
     sd = rng.uniform(2, 4, (120, 2))
-    kept = remove_spikes(tracks.time, tracks.uv, sd)
+    kept = remove_spikes(keypoints.time, keypoints.uv, sd)
     for j in range(2):
-        gone = robust.spikes(tracks.time, tracks.uv[:, j], sd[:, j])
+        gone = robust.spikes(keypoints.time, keypoints.uv[:, j], sd[:, j])
         assert len(gone) > 3
         np.testing.assert_array_equal(np.flatnonzero(kept[:, j] < 0), sorted(gone))
     np.testing.assert_array_equal(kept[kept > 0], sd[kept > 0])
@@ -73,22 +73,22 @@ def test_outliers_are_weighted_as_by_the_numpy_version(count):
 
 
 def test_few_points_are_left_alone():
-    tracks = swinging(30, frames=4)
-    tracks.uv[1] += 500
-    assert without_jumps(tracks, 3.0)[1] == []
+    keypoints = swinging(30, frames=4)
+    keypoints.uv[1] += 500
+    assert without_spikes(keypoints, 3.0)[1] == []
 
 
 @pytest.mark.parametrize("noise", [0.0, 4.0, 12.0])
 def test_noise_is_told_from_motion(noise):
-    """The tracks have 3 px of their own."""
-    tracks = swinging(30, frames=300)
-    more = noise * np.random.default_rng(7).standard_normal(tracks.uv.shape)
-    assert shake(replace(tracks, uv=tracks.uv + more)) == pytest.approx(np.hypot(3, noise), rel=0.12)
+    """The keypoints have 3 px of their own."""
+    keypoints = swinging(30, frames=300)
+    more = noise * np.random.default_rng(7).standard_normal(keypoints.uv.shape)
+    assert shake(replace(keypoints, uv=keypoints.uv + more)) == pytest.approx(np.hypot(3, noise), rel=0.12)
 
 
 def test_noise_is_not_told_of_slow_pictures_or_single_frames():
-    tracks = swinging(10)
-    assert np.isnan(shake(tracks))
-    gaps = tracks.uv.copy()
+    keypoints = swinging(10)
+    assert np.isnan(shake(keypoints))
+    gaps = keypoints.uv.copy()
     gaps[::3] = np.nan
-    assert np.isnan(shake(replace(tracks, time=tracks.time / 10, uv=gaps)))
+    assert np.isnan(shake(replace(keypoints, time=keypoints.time / 10, uv=gaps)))

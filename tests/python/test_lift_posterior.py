@@ -8,8 +8,9 @@ from segment_posterior import dual, infer, likelihood_only, log10_volume, place,
 from toy_segments import FRONT as AXES
 from toy_segments import toy_prior
 
-from gait.lift.observe import Observations, Rows, orthographic
-from gait.lift.explain import share_along, share_rigid
+from gait.lift.keypoints.observations import Observations
+from gait.lift.segment.explain import share_along, share_rigid
+from gait.lift.smooth.rows import Rows, orthographic
 
 DEPTH = np.array([0.0, 1, 0])
 

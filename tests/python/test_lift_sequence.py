@@ -1,4 +1,4 @@
-"""The smoother over a sequence of 2-D tracks against dense algebra, and what it promises."""
+"""The smoother over a sequence of 2-D keypoints against dense algebra, and what it promises."""
 
 from __future__ import annotations
 
@@ -9,20 +9,16 @@ import pytest
 from toy_segments import toy_prior
 
 from gait.body.skeleton import axis_rotation
-from gait.errors import UserError
 from gait.camera.camera import Camera
-from gait.lift import motion, result, sequence, tridiagonal
-from gait.lift import block_arrowhead as bordered
-from gait.lift import soft_constraints as soft
-from gait.lift import chain as chains
-from gait.lift.chain import Around, Freedom, Segment, overlapping
-from gait.lift.equations import Parallel, Perspective, looking_along
-from gait.lift.grid import Grid
-from gait.lift.observe import Observations
-from gait.lift.refuse import Unlike
-from gait.lift.sequence import Seen, Start, smooth
-from gait.io.keypoints_file import Tracks
-from gait.lift.explain import Uncertain
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints.observations import Grid, Observations
+from gait.lift.segment.explain import Uncertain
+from gait.lift.segment.view import Parallel, Perspective, looking_along
+from gait.lift.smooth import block_arrowhead, chain, motion, smoother, soft_constraints
+from gait.lift.smooth.chain import Around, Freedom, Segment, overlapping
+from gait.lift.smooth.motion import Unlike
+from gait.lift.smooth.smoother import Seen, Start, smooth
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
 LEFT = Uncertain(0.0, *np.zeros((4, 3)))
@@ -76,7 +72,7 @@ def test_tridiagonal_is_dense_algebra():
         below[s] += square[4:, :4]
     vector = rng.normal(size=(4, 4))
     full = dense(diagonal, below)
-    factor = tridiagonal.factor(diagonal, below)
+    factor = block_arrowhead.factor(diagonal, below)
     solved = np.linalg.solve(full, vector.ravel())
     np.testing.assert_allclose(factor.solve(vector[..., None]).ravel(), solved, rtol=1e-9)
     assert factor.log_det == pytest.approx(np.linalg.slogdet(full)[1])
@@ -88,13 +84,13 @@ def test_tridiagonal_is_dense_algebra():
 
 def test_tridiagonal_refuses_indefinite():
     with pytest.raises(np.linalg.LinAlgError, match="block 1"):
-        tridiagonal.factor(np.stack([np.eye(2), -np.eye(2)]), np.zeros((1, 2, 2)))
+        block_arrowhead.factor(np.stack([np.eye(2), -np.eye(2)]), np.zeros((1, 2, 2)))
 
 
 def test_border_is_dense_algebra(prior):
-    found = chains.chain(prior, around(prior), FREEDOM)
+    found = chain.chain(prior, around(prior), FREEDOM)
     full, vector = whole(found.information)
-    solution = bordered.solve(found.information)
+    solution = block_arrowhead.solve(found.information)
     blocks, size = found.information.vector.shape
     mean = np.linalg.solve(full, vector)
     np.testing.assert_allclose(solution.blocks.ravel(), mean[: blocks * size], atol=1e-8)
@@ -111,7 +107,7 @@ def test_border_is_dense_algebra(prior):
 def test_chain_holds_each_overlap_once(prior):
     """Its first segment has the segment's own covariance, its determinant is that of the factors."""
     there = around(prior)
-    found = chains.chain(prior, there, FREEDOM)
+    found = chain.chain(prior, there, FREEDOM)
     full, vector = whole(found.information)
     assert found.log_det == pytest.approx(np.linalg.slogdet(full)[1])
     segment = Segment(prior, there, FREEDOM, 0)
@@ -126,7 +122,7 @@ def test_chain_holds_each_overlap_once(prior):
 def test_what_lasts_is_no_surer_for_a_longer_sequence(prior):
     """Before anything is seen the size of the body is as open in the long run as in one segment."""
     freedom, blocks = Freedom(stature=1.7, stature_sd=0.1, height_sd=0.05), 12
-    found = chains.chain(prior, around(prior, blocks), freedom)
+    found = chain.chain(prior, around(prior, blocks), freedom)
     covariance = np.linalg.inv(whole(found.information)[0])
     half = np.zeros((blocks, FRAMES // 2, MARKERS, 3))
     half[..., 3, 2], half[..., 0, 2] = 1, -1  # height of one marker over another
@@ -136,15 +132,15 @@ def test_what_lasts_is_no_surer_for_a_longer_sequence(prior):
         along = np.pad(along / (used * FRAMES // 2), (0, len(covariance) - along.size))
         spread.append(np.sqrt(along @ covariance @ along))
     body = 1.7 * (prior.mean[0, :, 3, 2] - prior.mean[0, :, 0, 2]).mean()
-    offsets = 2 * (chains.THROUGHOUT * chains.LASTING * prior.gamma * prior.residual[0, [0, 3]].mean())
-    least = np.sqrt((0.1 / 1.7 * body) ** 2 + 1.7**2 * (offsets + 2 * chains.OFFSET_SD**2))
+    offsets = 2 * (chain.THROUGHOUT * chain.LASTING * prior.gamma * prior.residual[0, [0, 3]].mean())
+    least = np.sqrt((0.1 / 1.7 * body) ** 2 + 1.7**2 * (offsets + 2 * chain.OFFSET_SD**2))
     assert spread[1] > 0.99 * least
     assert spread[1] < spread[0]
 
 
 def drawn(prior, rng):
     """Motion drawn from the chain, (grid, J, 3)."""
-    found = chains.chain(prior, around(prior), FREEDOM)
+    found = chain.chain(prior, around(prior), FREEDOM)
     matrix, vector = whole(found.information)
     covariance = np.linalg.inv(matrix)
     mean = covariance @ vector
@@ -153,7 +149,7 @@ def drawn(prior, rng):
 
 
 def observed(prior, places, view, sd, rng, missing=0.1):
-    """Tracks between the frames of the grid, and what was seen there."""
+    """Keypoints between the frames of the grid, and what was seen there."""
     grid = Grid(0.0, prior.fps, BLOCKS, FRAMES // 2)
     time = np.arange(0.0, grid.time[-1], 1 / 30)
     frames, weights = grid.between(time)
@@ -173,7 +169,7 @@ def test_smoother_covers_what_is_drawn_from_its_prior(prior):
         there.heading,
         there.component,
         1.7,
-        chains.blended(there.places, FRAMES // 2),
+        chain.blended(there.places, FRAMES // 2),
         np.ones(BLOCKS * 3),
     )
     for _ in range(40):
@@ -203,12 +199,12 @@ def test_scale_does_not_drift_with_noise():
     time = np.arange(FRAMES * 2) / 20
     places = body[np.minimum(np.arange(FRAMES * 2), FRAMES - 1)]
     uv = camera.project(places) + 3 * rng.normal(size=(*places.shape[:2], 2))
-    tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
+    keypoints = Keypoints(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
     found = motion.lift(
         prior,
-        tracks,
+        keypoints,
         Perspective(camera),
-        result.Options(contact=False, bones=False),
+        motion.Options(contact=False, bones=False),
         prior.names,
     )
     size = np.linalg.norm(found.places - found.places.mean(axis=1, keepdims=True))
@@ -217,8 +213,8 @@ def test_scale_does_not_drift_with_noise():
 
 
 def rows_of(prior):
-    layout = soft.Layout(BLOCKS, FRAMES // 2, len(prior.names), None)
-    return soft.Rows(layout)
+    layout = soft_constraints.Layout(BLOCKS, FRAMES // 2, len(prior.names), None)
+    return soft_constraints.Rows(layout)
 
 
 def residual(rows, places):
@@ -235,7 +231,7 @@ def test_bones_cost_nothing_to_a_rigid_or_resized_body():
     turns = [axis_rotation(2, 0.1 * t) for t in range(BLOCKS * FRAMES // 2)]
     places = np.stack([body @ turn.T for turn in turns])
     rows = rows_of(prior)
-    soft.bones(rows, prior.names, places)
+    soft_constraints.bones(rows, prior.names, places)
     assert residual(rows, places) == pytest.approx(0, abs=1e-6)
     assert residual(rows, 1.1 * places) == pytest.approx(0, abs=1e-6)
     stretched = places * np.linspace(1, 1.2, len(places))[:, None, None]
@@ -250,8 +246,8 @@ def test_contacts_hold_slow_low_feet_only():
     places[:, [still, moving], 2] = 0.0
     places[:, moving, 0] += np.arange(BLOCKS * 3) * 0.1  # 2 m/s
     rows = rows_of(prior)
-    sure = soft.contacts(rows, prior.names, places, 20.0)
-    feet = [name for name in soft.FEET if name in names]
+    sure = soft_constraints.contacts(rows, prior.names, places, 20.0)
+    feet = [name for name in soft_constraints.FEET if name in names]
     assert sure[:, feet.index("l_toe")].min() > 0.9
     assert sure[:, feet.index("r_toe")].max() < 0.01
     slid = places.copy()
@@ -261,12 +257,12 @@ def test_contacts_hold_slow_low_feet_only():
 
 def test_blending_keeps_what_segments_agree_on():
     values = np.arange(12.0)[:, None]
-    np.testing.assert_allclose(chains.blended(overlapping(values, 3), 3), values)
+    np.testing.assert_allclose(chain.blended(overlapping(values, 3), 3), values)
 
 
 def test_lifting_needs_four_frames():
     prior = toy_prior(3, 4, 3)
-    tracks = Tracks(
+    keypoints = Keypoints(
         np.arange(9),
         np.arange(9) / 20,
         prior.names,
@@ -275,36 +271,36 @@ def test_lifting_needs_four_frames():
     )
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     with pytest.raises(motion.UserError, match="4 or more"):
-        motion.lift(prior, tracks, view, result.Options(), prior.names)
+        motion.lift(prior, keypoints, view, motion.Options(), prior.names)
 
 
 def lifted_by(monkeypatch, outcomes):
     """Lift with a smoother whose attempts end as told, one by one: an error, or a misfit."""
     prior, pending = toy_prior(6, 4, 3), list(outcomes)
 
-    def attempt(prior, tracks, view, options, grid, update):
+    def attempt(prior, keypoints, view, options, grid, update):
         nothing = np.zeros((9, 4, 3))
         if options.method == "blend":
-            return result.Motion(
+            return motion.Motion(
                 prior.names, nothing, nothing, nothing, nothing[..., 0], 1.8, 0, True, 0.0, LEFT
             )
         ends = pending.pop(0)
         if isinstance(ends, Exception):
             raise ends
-        whole = result.Motion(
+        whole = motion.Motion(
             prior.names, nothing + 1, nothing, nothing, nothing[..., 0], 1.7, 9, False, 0.0, LEFT
         )
-        return replace(whole, evidence=-ends, misfit=ends)
+        return replace(whole, evidence=-ends, chi2_per_observation=ends)
 
     monkeypatch.setattr(motion, "_lift", attempt)
-    tracks = Tracks(np.arange(9), np.arange(9) / 20, prior.names, np.ones((9, 4, 2)), np.ones((9, 4)))
+    keypoints = Keypoints(np.arange(9), np.arange(9) / 20, prior.names, np.ones((9, 4, 2)), np.ones((9, 4)))
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
-    return motion.lift(prior, tracks, view, result.Options(), prior.names), pending
+    return motion.lift(prior, keypoints, view, motion.Options(), prior.names), pending
 
 
 def test_a_wider_prior_is_tried_where_a_narrow_one_fails(monkeypatch):
     found, _ = lifted_by(monkeypatch, [Unlike("1"), Unlike("2"), 1.2])
-    assert found.wider == 4 and found.misfit == 1.2
+    assert found.wider == 4 and found.chi2_per_observation == 1.2
     found, pending = lifted_by(monkeypatch, [9.0, 3.0, Unlike("4"), 1.0])
     assert found.wider == 2 and pending == [1.0]
 
@@ -320,7 +316,7 @@ def test_a_motion_estimated_by_its_segments_says_so(monkeypatch):
     """Iterations, rest and stature are then those of the segments, not of the smoother that went astray."""
     found, _ = lifted_by(monkeypatch, [1.0])  # came to no rest
     assert found.alone and found.settled and found.steps == 0 and found.stature == 1.8
-    assert (found.places == 0).all() and found.misfit == 1.0
+    assert (found.places == 0).all() and found.chi2_per_observation == 1.0
 
 
 def test_restricted_prior_is_its_marginal(prior):
@@ -332,23 +328,23 @@ def test_restricted_prior_is_its_marginal(prior):
     assert Grid.over(np.array([0.0, 1.0]), odd.restricted(odd.names)).blocks == 7
 
 
-@pytest.mark.parametrize("method", result.METHODS)
+@pytest.mark.parametrize("method", motion.METHODS)
 def test_without_a_camera_the_lowest_feet_are_on_the_floor(method):
     prior = toy_prior(FRAMES, 19, 4, seed=5)
     time = np.arange(FRAMES * 2) / 20
     places = np.tile(1.7 * prior.mean[0], (2, 1, 1))
     view = Parallel(looking_along("y"), 1.0, np.array([0.0, 3.0]))  # v begins anywhere
     uv = view.project(places, np.ones(len(time)))
-    tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
-    options = result.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    keypoints = Keypoints(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
+    options = motion.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
     view = replace(view, origin=np.nanmean(uv, axis=(0, 1)))
-    found = motion.lift(prior, tracks, view, options, prior.names)
+    found = motion.lift(prior, keypoints, view, options, prior.names)
     feet = [n for n, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
     floor = prior.stature * prior.mean[:, :, feet, 2].min()
     assert feet and np.quantile(found.places[:, feet, 2].min(axis=1), 0.1) == pytest.approx(floor)
 
 
-@pytest.mark.parametrize("method", result.METHODS)
+@pytest.mark.parametrize("method", motion.METHODS)
 def test_deviations_about_the_hips_are_those_of_differences(method):
     """About the hips the common displacement, which a far view does not tell, drops out."""
     prior = toy_prior(FRAMES, 12, 4, seed=5)
@@ -357,11 +353,11 @@ def test_deviations_about_the_hips_are_those_of_differences(method):
     places = 1.7 * (prior.mean[0, 0] + drift)
     view = Parallel(looking_along("y"), 1.0, np.zeros(2))
     uv = view.project(places, np.ones(len(time)))
-    tracks = Tracks(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
-    options = result.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
-    found = motion.lift(prior, tracks, view, options, prior.names)
+    keypoints = Keypoints(np.arange(len(time)), time, prior.names, uv, np.ones(uv.shape[:2]))
+    options = motion.Options(method=method, stature=1.7, pixel_sd=0.01, contact=False, bones=False)
+    found = motion.lift(prior, keypoints, view, options, prior.names)
     assert found.sd[..., 1].min() > 5 and found.rooted_sd[..., 1].max() < 1  # metres
-    hips = [prior.names.index(name) for name in sequence.HIPS]
+    hips = [prior.names.index(name) for name in smoother.HIPS]
     both = found.rooted_sd[:, hips]
     np.testing.assert_allclose(both[:, 0], both[:, 1], rtol=1e-4)  # opposite ends of one difference
 
@@ -375,28 +371,28 @@ def test_numbers_out_of_range_are_refused_in_one_line(monkeypatch):
     monkeypatch.setattr(motion.explain, "explanations", failing)
     prior = toy_prior(6, 19, 4)
     uv = np.full((12, 3, 2), 100.0)
-    tracks = Tracks(np.arange(12), np.arange(12) / 20.0, prior.names[:3], uv, np.ones((12, 3)))
+    keypoints = Keypoints(np.arange(12), np.arange(12) / 20.0, prior.names[:3], uv, np.ones((12, 3)))
     view = Perspective(Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600))
     for method in ("smooth", "blend"):
         with pytest.raises(UserError, match="no motion that the model knows"):
-            motion.lift(prior, tracks, view, result.Options(method=method), prior.names)
+            motion.lift(prior, keypoints, view, motion.Options(method=method), prior.names)
 
 
 def test_nothing_before_the_lens_is_refused_in_one_line(monkeypatch):
-    rows = Perspective.rows
+    rows = smoother.rows_of
 
-    def none(self, *around):
-        found = rows(self, *around)
+    def none(*around):
+        found = rows(*around)
         return replace(found, **{part.name: getattr(found, part.name)[:0] for part in fields(found)})
 
     prior = toy_prior(6, 19, 4)
     camera = Camera.looking((0, -4, 1.5), (0, 0, 0.9), (640, 480), 600)
     uv = 320.0 + 50.0 * np.random.default_rng(1).standard_normal((12, 19, 2))
-    tracks = Tracks(np.arange(12), np.arange(12) / 20.0, prior.names, uv, np.ones((12, 19)))
-    monkeypatch.setattr(Perspective, "rows", none)
+    keypoints = Keypoints(np.arange(12), np.arange(12) / 20.0, prior.names, uv, np.ones((12, 19)))
+    monkeypatch.setattr(smoother, "rows_of", none)
     with pytest.raises(UserError, match="v points down"):
-        motion.lift(prior, tracks, Perspective(camera), result.Options(), prior.names)
+        motion.lift(prior, keypoints, Perspective(camera), motion.Options(), prior.names)
 
 
 def test_variances_below_zero_by_rounding_are_zero():
-    np.testing.assert_array_equal(sequence._deviations(np.array([-1e-18, 0.0, 4.0])), [0.0, 0.0, 2.0])
+    np.testing.assert_array_equal(smoother._deviations(np.array([-1e-18, 0.0, 4.0])), [0.0, 0.0, 2.0])

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gait.lift import flips
-from gait.lift.sides import CLEAR, put_back
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints import swaps
+from gait.lift.keypoints.swaps import CLEAR, undo_swaps
 
 NAMES = ("pelvis", "l_knee", "r_knee", "l_ankle", "r_ankle")
 LEFT, RIGHT = [1, 3], [2, 4]
@@ -20,7 +20,7 @@ def walking(rate=30.0, gaps=0.0, noise=NOISE):
     time = np.arange(FRAMES) / rate
     uv = places(time) + noise * rng.normal(size=(FRAMES, 5, 2))
     uv[rng.random((FRAMES, 5)) < gaps] = np.nan
-    return Tracks(np.arange(FRAMES) + 7, time, NAMES, uv, rng.uniform(0.8, 1, (FRAMES, 5)))
+    return Keypoints(np.arange(FRAMES) + 7, time, NAMES, uv, rng.uniform(0.8, 1, (FRAMES, 5)))
 
 
 def places(time):
@@ -31,71 +31,71 @@ def places(time):
     return np.stack([u, v + np.zeros_like(u)], axis=2)
 
 
-def model(tracks):
-    """Log density of tracks by one who knows how these legs swing."""
-    square = ((tracks.uv - places(tracks.time)) ** 2).sum(axis=2) / NOISE**2
+def model(keypoints):
+    """Log density of keypoints by one who knows how these legs swing."""
+    square = ((keypoints.uv - places(keypoints.time)) ** 2).sum(axis=2) / NOISE**2
     return -0.5 * float(np.nansum(np.minimum(square, 50)))
 
 
-def exchanged(tracks, first, last, left=LEFT, right=RIGHT):
-    """Tracks with sides exchanged in rows `first` to `last`."""
-    uv, confidence = tracks.uv.copy(), tracks.confidence.copy()
+def exchanged(keypoints, first, last, left=LEFT, right=RIGHT):
+    """Keypoints with sides exchanged in rows `first` to `last`."""
+    uv, confidence = keypoints.uv.copy(), keypoints.confidence.copy()
     for values in (uv, confidence):
         values[first : last + 1, left + right] = values[first : last + 1, right + left]
-    return replace(tracks, uv=uv, confidence=confidence)
+    return replace(keypoints, uv=uv, confidence=confidence)
 
 
 @pytest.mark.parametrize("rate", [10, 25, 30, 60])
 @pytest.mark.parametrize("gaps", [0.0, 0.1])
 def test_what_is_right_stays(rate, gaps):
-    tracks = walking(rate, gaps)
-    kept, found = put_back(tracks, NOISE, model)
+    keypoints = walking(rate, gaps)
+    kept, found = undo_swaps(keypoints, NOISE, model)
     assert found == []
-    np.testing.assert_array_equal(kept.uv, tracks.uv)
-    np.testing.assert_array_equal(kept.confidence, tracks.confidence)
+    np.testing.assert_array_equal(kept.uv, keypoints.uv)
+    np.testing.assert_array_equal(kept.confidence, keypoints.confidence)
 
 
 @pytest.mark.parametrize("rate", [10, 30, 60])
 @pytest.mark.parametrize(("first", "last"), [(20, 20), (31, 36), (30, 50), (0, 9), (75, 89)])
 def test_exchanged_legs_are_put_back_and_named(rate, first, last):
-    tracks = walking(rate)
-    back, found = put_back(exchanged(tracks, first, last), NOISE, model)
+    keypoints = walking(rate)
+    back, found = undo_swaps(exchanged(keypoints, first, last), NOISE, model)
     assert [each.joint for each in found] == ["knee", "ankle"]
     for each in found:
         assert abs(each.spans[0][0] - 7 - first) <= 1 and abs(each.spans[-1][1] - 7 - last) <= 1
-    off = np.linalg.norm(back.uv - tracks.uv, axis=2)
+    off = np.linalg.norm(back.uv - keypoints.uv, axis=2)
     assert off.max() < 20  # where the legs meet either reading may be right
-    assert np.array_equal(back.confidence[off == 0], tracks.confidence[off == 0])
+    assert np.array_equal(back.confidence[off == 0], keypoints.confidence[off == 0])
 
 
 def test_one_joint_alone_and_gaps():
-    tracks = walking(gaps=0.15)
-    back, found = put_back(exchanged(tracks, 40, 55, [3], [4]), NOISE, model)
+    keypoints = walking(gaps=0.15)
+    back, found = undo_swaps(exchanged(keypoints, 40, 55, [3], [4]), NOISE, model)
     assert [each.joint for each in found] == ["ankle"]
-    assert np.nanmax(np.linalg.norm(back.uv - tracks.uv, axis=2)) < 20
+    assert np.nanmax(np.linalg.norm(back.uv - keypoints.uv, axis=2)) < 20
 
 
 def test_several_stretches():
     spoilt = exchanged(exchanged(walking(), 10, 14), 60, 70)
-    _, found = put_back(spoilt, NOISE, model)
+    _, found = undo_swaps(spoilt, NOISE, model)
     assert [len(each.spans) for each in found] == [2, 2]
 
 
 def test_wild_points_do_not_hide_an_exchange():
-    tracks, rng = walking(), np.random.default_rng(3)
-    wild = rng.random(tracks.uv.shape[:2]) < 0.05
-    tracks.uv[wild] += 150 * rng.normal(size=(wild.sum(), 2))
-    back, found = put_back(exchanged(tracks, 60, 80), NOISE, model)
+    keypoints, rng = walking(), np.random.default_rng(3)
+    wild = rng.random(keypoints.uv.shape[:2]) < 0.05
+    keypoints.uv[wild] += 150 * rng.normal(size=(wild.sum(), 2))
+    back, found = undo_swaps(exchanged(keypoints, 60, 80), NOISE, model)
     assert [each.joint for each in found] == ["knee", "ankle"]
-    off = np.linalg.norm(back.uv - tracks.uv, axis=2)
+    off = np.linalg.norm(back.uv - keypoints.uv, axis=2)
     assert off[~wild].max() < 30
-    assert put_back(tracks, NOISE, model)[1] == []
+    assert undo_swaps(keypoints, NOISE, model)[1] == []
 
 
 def test_the_motion_decides():
     """What goes on better exchanged stays where the motion does not fit better for it."""
     spoilt = exchanged(walking(), 30, 50)
-    back, found = put_back(spoilt, NOISE, lambda tracks: 0.0)
+    back, found = undo_swaps(spoilt, NOISE, lambda keypoints: 0.0)
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
 
@@ -106,7 +106,7 @@ def test_what_fits_hardly_better_stays():
     spoilt = exchanged(right, 30, 50)
     gain = model(right) - model(spoilt)
     for nats, put in ((0.7 * 2 * CLEAR, False), (1.5 * 2 * CLEAR, True)):
-        _, found = put_back(spoilt, NOISE, lambda tracks, share=nats / gain: share * model(tracks))
+        _, found = undo_swaps(spoilt, NOISE, lambda keypoints, share=nats / gain: share * model(keypoints))
         assert bool(found) == put
 
 
@@ -114,14 +114,14 @@ def test_what_fits_hardly_better_stays():
 def test_more_than_few_frames_are_left_alone(first):
     """Which of the two is right is open then."""
     spoilt = exchanged(walking(), first, 89)
-    back, found = put_back(spoilt, NOISE, model)
+    back, found = undo_swaps(spoilt, NOISE, model)
     assert found == []
     np.testing.assert_array_equal(back.uv, spoilt.uv)
 
 
 def test_slow_pictures_and_few_frames_are_left_alone():
     spoilt = exchanged(walking(8), 30, 40)
-    assert put_back(spoilt, NOISE, model) == (spoilt, [])
+    assert undo_swaps(spoilt, NOISE, model) == (spoilt, [])
     few = exchanged(walking(), 1, 1)
     few = replace(
         few,
@@ -130,17 +130,17 @@ def test_slow_pictures_and_few_frames_are_left_alone():
         uv=few.uv[:2],
         confidence=few.confidence[:2],
     )
-    assert put_back(few, NOISE, model) == (few, [])
+    assert undo_swaps(few, NOISE, model) == (few, [])
     alone = replace(walking(), names=("pelvis", "l_knee", "r_hip", "neck", "r_ankle"))
-    assert put_back(alone, NOISE, model)[1] == []
+    assert undo_swaps(alone, NOISE, model)[1] == []
     never = replace(walking(), uv=np.full((FRAMES, 5, 2), np.nan))
-    assert put_back(never, NOISE, model)[1] == []
+    assert undo_swaps(never, NOISE, model)[1] == []
 
 
 def test_an_outlier_is_no_exchange():
-    tracks = walking()
-    tracks.uv[33, 3] += [150, -60]
-    assert put_back(tracks, NOISE, model)[1] == []
+    keypoints = walking()
+    keypoints.uv[33, 3] += [150, -60]
+    assert undo_swaps(keypoints, NOISE, model)[1] == []
 
 
 @pytest.mark.parametrize(
@@ -150,22 +150,22 @@ def test_a_false_proposal_beside_a_true_one_falls_alone(monkeypatch, right, wron
     flags = np.zeros((FRAMES, 2), bool)
     for first, last in (right, wrong):
         flags[first : last + 1] = True
-    monkeypatch.setattr(flips, "suspected", lambda *_: flags)
-    _, found = put_back(exchanged(walking(), *right), NOISE, model)
+    monkeypatch.setattr(swaps, "suspected", lambda *_: flags)
+    _, found = undo_swaps(exchanged(walking(), *right), NOISE, model)
     assert [each.spans for each in found] == [[(right[0] + 7, right[1] + 7)]] * 2
 
 
 def test_a_point_whose_partner_is_missing_goes_with_its_limb():
-    tracks = walking()
-    tracks.uv[45:48, 3] = np.nan
-    back, _ = put_back(exchanged(tracks, 40, 55), NOISE, model)
-    assert np.array_equal(back.seen, tracks.seen)
+    keypoints = walking()
+    keypoints.uv[45:48, 3] = np.nan
+    back, _ = undo_swaps(exchanged(keypoints, 40, 55), NOISE, model)
+    assert np.array_equal(back.seen, keypoints.seen)
 
 
 def test_a_stretch_is_judged_by_its_surroundings_without_wild_points():
-    tracks, parts = walking(), []
-    tracks.uv[33, 0] += 300
-    put_back(exchanged(tracks, 30, 40), NOISE, lambda part: parts.append(part) or model(part))
+    keypoints, parts = walking(), []
+    keypoints.uv[33, 0] += 300
+    undo_swaps(exchanged(keypoints, 30, 40), NOISE, lambda part: parts.append(part) or model(part))
     assert parts
     for part in parts:
         assert part.frame[0] == 7 and abs(int(part.frame[-1]) - (40 + 30 + 7)) <= 1  # a second more

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from toy_segments import toy_prior
 
-from gait.body.skeleton import EVAL15, JOINTS
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import EVAL15, JOINTS
 from gait.camera.camera import Camera
-from gait.lift import chain as chains
-from gait.lift import motion, size
-from gait.lift.chain import Around, Freedom, overlapping
-from gait.lift.equations import Perspective
-from gait.lift.observe import Observations
-from gait.lift.result import Options
-from gait.lift.sequence import Seen, Start, smooth
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints.observations import Observations
+from gait.lift.segment.view import Perspective
+from gait.lift.smooth import chain, motion, size
+from gait.lift.smooth.chain import Around, Freedom, overlapping
+from gait.lift.smooth.motion import Options
+from gait.lift.smooth.smoother import Seen, Start, smooth
 
 STATURE, SECONDS, EXACT = 1.7, 2, 0.3  # metres, s, pixels
 SHAKY, FARTHEST_OFF = 40.0, 0.03  # pixels; share of the distance
@@ -39,7 +38,7 @@ def walk():
 
 def drawn(prior, around, rng):
     """Motion drawn from the chain of a person of known stature on a known floor, (grid, J, 3)."""
-    found = chains.chain(prior, around, Freedom(STATURE, 1e-4, 1e-4))
+    found = chain.chain(prior, around, Freedom(STATURE, 1e-4, 1e-4))
     information = found.information
     count, size_ = information.vector.shape
     full = np.zeros((count, size_, count, size_))
@@ -66,8 +65,8 @@ def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, 
     segments = len(mean) // half - 1
     headings, components = np.zeros(segments), np.zeros(segments, int)
     with monkeypatch.context() as near:  # draws that stay in the picture
-        near.setattr(chains, "GROUND_SD", 0.5)
-        near.setattr(chains, "HEADING_SD", 0.02)
+        near.setattr(chain, "GROUND_SD", 0.5)
+        near.setattr(chain, "HEADING_SD", 0.02)
         shapes = overlapping(mean, half)
         around = Around(headings, components, STATURE, shapes, shapes)
         motions = [drawn(prior, around, np.random.default_rng(seed)) for seed in range(4)]
@@ -94,8 +93,8 @@ def test_noise_of_any_size_leaves_a_walker_at_their_distance(walk):
     uv = camera.project(places[:, prior.index(EVAL15)])
     uv = uv + SHAKY * np.random.default_rng(1).normal(size=uv.shape)
     time = np.arange(len(places)) / prior.fps
-    tracks = Tracks(np.arange(len(places)), time, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
-    found = motion.lift(prior, tracks, Perspective(camera), Options(pixel_sd=SHAKY), prior.names)
+    keypoints = Keypoints(np.arange(len(places)), time, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
+    found = motion.lift(prior, keypoints, Perspective(camera), Options(pixel_sd=SHAKY), prior.names)
     away = (found.places - places).mean(axis=(0, 1)) @ camera.R[2]
     assert abs(away) < FARTHEST_OFF * 6.0
 
@@ -126,9 +125,9 @@ def test_a_short_person_who_walks_as_learnt_is_left_short(walk):
     camera = Camera.looking(VIEWS["from the side"], (0, 0, 0.9), (640, 480), 600)
     uv = camera.project(places[:, prior.index(EVAL15)])
     time = np.arange(len(places)) / prior.fps
-    tracks = Tracks(np.arange(len(places)), time, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
-    found = motion.lift(prior, tracks, Perspective(camera), Options(pixel_sd=1.0, floor_sd=0.01), prior.names)
-    assert found.misfit < motion.MISFIT and found.wider == 1
+    keypoints = Keypoints(np.arange(len(places)), time, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
+    found = motion.lift(prior, keypoints, Perspective(camera), Options(pixel_sd=1.0, floor_sd=0.01), prior.names)
+    assert found.chi2_per_observation < motion.POOR_FIT and found.wider == 1
     assert size.bones_ratio(prior, found.places, prior.stature) < 0.87  # an unlikely size
     assert found.resized == 1
     assert np.linalg.norm(found.places - places, axis=2).mean() < 0.1
@@ -171,16 +170,16 @@ def test_a_likely_size_is_left_alone_and_its_deviations_follow_the_misfit():
 
 
 def test_parts_that_hardly_tell_the_distance():
-    def tracks(*names, share=1.0):
+    def keypoints(*names, share=1.0):
         uv = np.zeros((10, len(names), 2))
         uv[round(10 * share) :] = np.nan
-        return Tracks(np.arange(10), np.arange(10) / 30, names, uv, np.ones(uv.shape[:2]))
+        return Keypoints(np.arange(10), np.arange(10) / 30, names, uv, np.ones(uv.shape[:2]))
 
-    assert size.tells_distance(tracks("r_hip", "l_ankle"))
-    assert size.tells_distance(tracks("pelvis", "r_ankle", "head_top"))
-    assert not size.tells_distance(tracks("l_hip", "r_hip", "l_shoulder"))
-    assert not size.tells_distance(tracks("r_ankle"))
-    assert not size.tells_distance(tracks("r_hip", "l_ankle", share=0.4))
+    assert size.tells_distance(keypoints("r_hip", "l_ankle"))
+    assert size.tells_distance(keypoints("pelvis", "r_ankle", "head_top"))
+    assert not size.tells_distance(keypoints("l_hip", "r_hip", "l_shoulder"))
+    assert not size.tells_distance(keypoints("r_ankle"))
+    assert not size.tells_distance(keypoints("r_hip", "l_ankle", share=0.4))
 
 
 @pytest.mark.parametrize(("seen", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)])
@@ -190,8 +189,8 @@ def test_without_ankles_the_distance_is_as_open_as_the_size(walk, seen, sure):
     camera = Camera.looking(VIEWS["towards"], (0, 0, 0.9), (640, 480), 900)
     uv = camera.project(places[:, prior.index(seen)])
     time = np.arange(len(places)) / prior.fps
-    tracks = Tracks(np.arange(len(places)), time, tuple(seen), uv, np.ones(uv.shape[:2]))
-    found = motion.lift(prior, tracks, Perspective(camera), Options(pixel_sd=1.0), prior.names)
+    keypoints = Keypoints(np.arange(len(places)), time, tuple(seen), uv, np.ones(uv.shape[:2]))
+    found = motion.lift(prior, keypoints, Perspective(camera), Options(pixel_sd=1.0), prior.names)
     distance = float(np.linalg.norm(places - (-camera.R.T @ camera.t), axis=2).mean())
     spread = float(np.median(np.sqrt(found.sd**2 @ camera.R[2] ** 2))) / distance
     assert (spread < size.PROPORTION_SD) == sure
@@ -208,11 +207,11 @@ def test_one_who_fits_but_floats_is_as_large_as_the_bones(walk, floats):
         small = small - [0.0, 0.0, motion._height(small, prior)]
     time = np.arange(len(small)) / prior.fps
     seen = np.ones(small.shape[:2])
-    tracks = Tracks(np.arange(len(small)), time, prior.names, camera.project(small), seen)
+    keypoints = Keypoints(np.arange(len(small)), time, prior.names, camera.project(small), seen)
     sd = np.full_like(small, 0.01)
     options = Options(stature=STATURE, floor_sd=0.02)
     found = motion._sized(
-        prior, tracks, Perspective(camera), options, size.Resized(small, sd, sd), misfit=0.5
+        prior, keypoints, Perspective(camera), options, size.Resized(small, sd, sd), chi2=0.5
     )
     ratio = size.bones_ratio(prior, small, STATURE)
     assert found.factor == (pytest.approx(1 / ratio) if floats else 1)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from gait.body.skeleton import EVAL15, JOINTS
 from gait.bindings.segment_prior import SegmentPrior
-from gait.lift import motion, result
-from gait.lift.equations import Perspective
-from gait.lift.soft_constraints import BONES, FEET
-from gait.io.keypoints_file import Tracks
+from gait.body.skeleton import EVAL15, JOINTS
+from gait.io.keypoints_file import Keypoints
+from gait.lift.segment.view import Perspective
+from gait.lift.smooth import motion
+from gait.lift.smooth.soft_constraints import BONES, FEET
 from gait.simulate.scenario import Scenario
 from gait.simulate.stage import set_stage
 
@@ -29,11 +29,11 @@ def figures(stage):
     truth = np.stack([points[name] for name in EVAL15], axis=1)
     uv = stage.camera.project(truth) + NOISE * np.random.default_rng(5).standard_normal((FRAMES, 15, 2))
     number = np.arange(FRAMES)
-    tracks = Tracks(number, number / FPS, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
+    keypoints = Keypoints(number, number / FPS, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
 
     def of(contact, bones):
-        options = result.Options(pixel_sd=NOISE, stature=stage.body.stature, contact=contact, bones=bones)
-        found = motion.lift(SegmentPrior.load(), tracks, Perspective(stage.camera), options, tuple(JOINTS))
+        options = motion.Options(pixel_sd=NOISE, stature=stage.body.stature, contact=contact, bones=bones)
+        found = motion.lift(SegmentPrior.load(), keypoints, Perspective(stage.camera), options, tuple(JOINTS))
         places = dict(zip(found.names, np.moveaxis(found.places, 1, 0), strict=True))
         slide = [speed(places[f])[speed(points[f]) < STANDING] for f in FEET if f in places]
         lengths = [np.linalg.norm(places[a] - places[b], axis=1).std() for a, b in BONES]

@@ -9,18 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gait.body.skeleton import EVAL15, JOINTS, pose
-from gait.cli import lift_video, main
 from gait.bindings.model import read_blob
 from gait.bindings.segment_prior import TAGS, SegmentPrior
+from gait.body.skeleton import EVAL15, JOINTS, pose
+from gait.cli import lift_video, main
 from gait.errors import UserError
-from gait.io.video import Video, VideoWriter
 from gait.io import blob
-from gait.lift.clip_segments import Settings
-from gait.lift.cylinder import LIMBS, Figure
-from gait.lift.cylinder_picture import draw_figure
-from gait.lift.fit_clip import _share, fit_clip
-from gait.lift.corrections import (
+from gait.io.video import Video, VideoWriter
+from gait.lift.video.clip_segments import Settings
+from gait.lift.video.corrections import (
     CLICK_SD,
     HEADING_SD,
     PHASE_SD,
@@ -32,7 +29,8 @@ from gait.lift.corrections import (
     read_corrections,
     read_placement,
 )
-from gait.lift.suggest import suggest
+from gait.lift.video.figure import LIMBS, Figure, draw_figure
+from gait.lift.video.fit_clip import _share, fit_clip, suggest
 from gait.motion.evaluate import root_errors
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
@@ -121,7 +119,7 @@ def test_corrections_of_a_marker_err_alike_within_a_segment(clip):
     def lasting(*spots):
         held = [Correction(frame, joint, (300.0, 200.0), 3.0) for frame, joint in spots]
         energy = replace(clip, corrections=held).energy(0, 0, clip.mean_state(), looking=False)
-        return energy.springs.sd**2 - 3.0**2
+        return energy.corrections.sd**2 - 3.0**2
 
     (knee,), (wrist,) = lasting((0, "l_knee")), lasting((2, "r_wrist"))
     assert lasting((0, "l_knee"), (2, "l_knee"), (2, "r_wrist")) == pytest.approx([2 * knee, 2 * knee, wrist])
@@ -135,7 +133,7 @@ def test_the_papers_way_is_continuous_in_depth(clip, monkeypatch):
     assert len(gaps) == len(clip.starts) - 1 > 2
     assert np.abs(gaps).max() < GAP
     assert lift_sticks.jump(alone, fit) < 0.01 * STATURE
-    monkeypatch.setattr("gait.lift.fit_clip._continuous", lambda _, sequence: sequence)
+    monkeypatch.setattr("gait.lift.video.fit_clip._continuous", lambda _, sequence: sequence)
     assert np.abs(lift_sticks.depth_gaps(alone, fit_clip(alone).sequence)).max() > 100 * GAP
 
 
@@ -209,7 +207,7 @@ def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
     figures = json.loads(capsys.readouterr().out)
     assert figures["frames"] == 24 and figures["corrections"]["given"] == 12
     assert figures["corrections"]["miss_px"]["with"] < figures["corrections"]["miss_px"]["without"]
-    assert len(figures["suggest"]) <= 3 and figures["likeness"] > lift_video.DOUBTFUL
+    assert len(figures["suggest"]) <= 3 and figures["fit_correlation"] > lift_video.DOUBTFUL
     assert Video(tmp_path / "o.mp4").count == 24
     with open(tmp_path / "out.csv", newline="") as file:
         rows = list(csv.DictReader(file))

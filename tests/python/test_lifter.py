@@ -12,14 +12,14 @@ from scipy.optimize import minimize_scalar
 from toy_segments import FRONT as AXES
 from toy_segments import toy_blob, toy_prior
 
-from gait.body.skeleton import axis_rotation
 from gait.bindings.lifter import LiftConfig, Lifter, LiftFlag
 from gait.bindings.segment_prior import SegmentPrior
-from gait.errors import GaitError
+from gait.body.skeleton import axis_rotation
 from gait.camera.camera import Camera
+from gait.errors import GaitError
 from gait.io import blob
-from gait.lift import observe
-from gait.lift.explain import share_along, share_rigid
+from gait.lift.segment.explain import share_along, share_rigid
+from gait.lift.smooth import rows as observe
 
 FRAMES, MARKERS = 10, 19
 FREEDOM = 4  # of the scale of a motion
@@ -203,7 +203,7 @@ def test_an_unknown_heading_is_found_as_in_numpy(angle: float) -> None:
     fit = lifter.segment(uv, sd)
     assert np.cos(fit.heading - angle) > 0.999
     assert np.cos(fit.heading - want.heading) > 1 - 1e-8
-    np.testing.assert_allclose(lifter.positions()[0], want.reference.points, atol=1e-4)
+    np.testing.assert_allclose(lifter.positions()[0], want.posterior.points, atol=1e-4)
 
 
 def test_the_component_of_a_mixture_is_chosen_by_evidence() -> None:

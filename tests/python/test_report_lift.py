@@ -11,13 +11,14 @@ import pytest
 import threadpoolctl
 from toy_segments import toy_blob, toy_prior
 
-from gait.cli import main, report_lift
 from gait.camera.camera import Camera
+from gait.cli import main, report_lift
+from gait.io.keypoints_file import Keypoints, read, write
 from gait.learn.segments import segment_motion
-from gait.lift import figures_base, figures_clip, motion, result
-from gait.lift.equations import Parallel, Perspective, looking_along
-from gait.io.keypoints_file import Tracks, read, write
-from gait.lift.explain import Uncertain
+from gait.lift.report import motion_figures
+from gait.lift.segment.explain import Uncertain
+from gait.lift.segment.view import Parallel, Perspective, looking_along
+from gait.lift.smooth import motion
 
 MOCAP = Path(__file__).parents[2] / "../shared/data/mocap"
 FIGURES = {"spectrum", "synthesis", "draws", "estimates", "uncertain"}
@@ -30,7 +31,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "m.gait").write_bytes(toy_blob(prior))
     walk = prior.mean[0, :1] + np.arange(12)[:, None, None] * (0.02, 0, 0)  # as the prior's mean
     uv = 200 * walk[..., [0, 2]] * (1, -1)
-    write("t.csv", Tracks(np.arange(12), np.arange(12) / 20, prior.names, uv, np.ones(uv.shape[:2])))
+    write("t.csv", Keypoints(np.arange(12), np.arange(12) / 20, prior.names, uv, np.ones(uv.shape[:2])))
     return tmp_path
 
 
@@ -58,28 +59,28 @@ def test_dots_are_where_a_right_estimate_is(far):
     view = Parallel(looking_along("y"), None, np.zeros(2)) if far else Perspective(camera)
     uv = 150 * places @ view.axes[:2].T + (40, 30) if far else camera.project(places)
     uv[1, 2] = np.nan
-    tracks = Tracks(np.arange(2), np.arange(2) / 20, ("a", "b", "c"), uv, np.ones((2, 3)))
+    keypoints = Keypoints(np.arange(2), np.arange(2) / 20, ("a", "b", "c"), uv, np.ones((2, 3)))
     left = Uncertain(0.0, *np.zeros((4, 3)))
-    found = result.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0, left)
+    found = motion.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0, left)
     for frame, seen in ((0, 3), (1, 2)):
-        drawn, points = figures_clip._in_picture(view, found, frame, tracks)
+        drawn, points = motion_figures._in_picture(view, found, frame, keypoints)
         assert drawn.shape == (3, 2) and points.shape == (seen, 2)
         np.testing.assert_allclose(drawn[:seen], points, atol=1e-6)
 
 
 def test_a_camera_is_of_a_clip(folder, capsys):
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--camera", "cam.json"]) == 2
-    assert "give its tracks with --clip" in capsys.readouterr().err and not (folder / "r").exists()
+    assert "give its keypoints with --clip" in capsys.readouterr().err and not (folder / "r").exists()
 
 
 def test_the_method_is_of_a_clip(folder, monkeypatch, capsys):
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--method", "blend"]) == 2
-    assert "give its tracks with --clip" in capsys.readouterr().err and not (folder / "r").exists()
+    assert "give its keypoints with --clip" in capsys.readouterr().err and not (folder / "r").exists()
     lift, methods = motion.lift, []
 
-    def watched(prior, tracks, view, options, *args):
+    def watched(prior, keypoints, view, options, *args):
         methods.append(options.method)
-        return lift(prior, tracks, view, options, *args)
+        return lift(prior, keypoints, view, options, *args)
 
     monkeypatch.setattr(motion, "lift", watched)
     command = ["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]
@@ -90,14 +91,14 @@ def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch
     """Threads of the linear algebra get in each other's way at matrices this small."""
     lift, seen = motion.lift, []
 
-    def watched(prior, tracks, *args):
-        seen.append(({pool["num_threads"] for pool in threadpoolctl.threadpool_info()}, tracks))
-        return lift(prior, tracks, *args)
+    def watched(prior, keypoints, *args):
+        seen.append(({pool["num_threads"] for pool in threadpoolctl.threadpool_info()}, keypoints))
+        return lift(prior, keypoints, *args)
 
-    tracks, _ = read("t.csv", toy_prior(6, 19, 4, seed=5).names)
-    uv = tracks.uv.copy()
+    keypoints, _ = read("t.csv", toy_prior(6, 19, 4, seed=5).names)
+    uv = keypoints.uv.copy()
     uv[6, 3] += 500
-    write("t.csv", replace(tracks, uv=uv))
+    write("t.csv", replace(keypoints, uv=uv))
     monkeypatch.setattr(motion, "lift", watched)
     with threadpoolctl.threadpool_limits(2):
         assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 0
@@ -110,7 +111,7 @@ def test_an_interruption_leaves_nothing(folder, capsys, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(figures_clip, "clip", interrupted)  # after all other figures
+    monkeypatch.setattr(motion_figures, "clip", interrupted)  # after all other figures
     before = sorted(folder.iterdir())
     assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 1
     assert "interrupted" in capsys.readouterr().err and sorted(folder.iterdir()) == before
@@ -171,10 +172,10 @@ def test_every_figure_has_a_column_of_its_own():
     names = ("head_top", "neck", "pelvis", "l_hip", "l_knee", "l_ankle", "r_hip", "r_knee", "r_ankle")
     truth = rng.normal(size=(9, len(names), 3)) * (0.3, 0.3, 0.4) + (0, 0, 0.8)
     off = truth + np.linspace(0, 2, 9)[:, None, None] * (1, 0, -1)
-    strips = figures_base.Strips(("truth", "off"), names, 1.7, 20.0)
-    strips.add(0, truth, figures_base.SIDE, "black")
-    strips.add(1, truth, figures_base.SIDE, "black", ghost=True)
-    strips.add(1, off, figures_base.SIDE, "blue", path=truth)
+    strips = motion_figures.Strips(("truth", "off"), names, 1.7, 20.0)
+    strips.add(0, truth, motion_figures.SIDE, "black")
+    strips.add(1, truth, motion_figures.SIDE, "black", ghost=True)
+    strips.add(1, off, motion_figures.SIDE, "blue", path=truth)
     figure = strips.figure()
     assert [text.get_text() for text in figure.axes[0].texts] == [
         f"{t:.2f} s" for t in (0, 0.1, 0.2, 0.3, 0.4)

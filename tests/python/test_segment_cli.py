@@ -5,19 +5,20 @@ import json
 import mocap_files as files
 import numpy as np
 import pytest
-from segment_posterior import infer, place, uncertain_modes
 from marked_walker import FULL, walker
+from segment_posterior import infer, place, uncertain_modes
 from test_marker_files import write_trc
 from toy_segments import FRONT
 
 import gait.cli
-from gait.body.skeleton import EVAL15, JOINTS
 from gait.bindings.model import Model
 from gait.bindings.segment_prior import TAGS, SegmentPrior
+from gait.body.skeleton import EVAL15, JOINTS
 from gait.errors import UserError
 from gait.io import blob
-from gait.lift.observe import Observations, orthographic
-from gait.lift.explain import share_along, share_rigid
+from gait.lift.keypoints.observations import Observations
+from gait.lift.segment.explain import share_along, share_rigid
+from gait.lift.smooth.rows import orthographic
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import axis_rotation
-from gait.lift.observe import Rows
+from gait.lift.smooth.rows import (Rows)
 
 Floats = npt.NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from gait.cli import values
 from gait.detect import weights
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
-from gait.io.keypoints_file import Tracks, write
+from gait.io.keypoints_file import Keypoints, write
 from gait.io.video import Video
 from gait.progress import progress
 
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     uv[rows] = [person.uv for person in chosen.keypoints]
     confidence[rows] = [person.confidence for person in chosen.keypoints]
     time = np.array([times[int(n)] for n in frames])
-    write(args.output, Tracks(frames, time, tuple(JOINTS), uv, confidence))
+    write(args.output, Keypoints(frames, time, tuple(JOINTS), uv, confidence))
     table = [
         {
             "id": p.id,

@@ -1,6 +1,6 @@
-"""2-D tracks of joints, or a video, to motion in space with standard deviations.
+"""2-D keypoints of joints, or a video, to motion in space with standard deviations.
 
-TRACKS.csv has the columns frame,time,<joint>_u,<joint>_v and, if known, <joint>_c: pixels (u to the right,
+KEYPOINTS.csv has the columns frame,time,<joint>_u,<joint>_v and, if known, <joint>_c: pixels (u to the right,
 v down, centres at integers) and a confidence from 0 to 1 that divides the noise; empty cells are not seen.
 Joints are those of the model's segment prior (gait info M.gait).  The prior over short segments of motion
 fills in the depth and what is not seen (Leventon and Freeman 1998).
@@ -12,7 +12,7 @@ along the line of sight, and the lowest feet are put on the floor.
 
 OUT.csv: frame,time and for each joint _x,_y,_z (metres) and _sx,_sy,_sz (posterior standard deviations).
 
-A VIDEO instead of tracks needs --placement: see the options under "from a video".
+A VIDEO instead of keypoints needs --placement: see the options under "from a video".
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from typing import Any
 
 import numpy as np
 
-from gait.cli import lift_doubts, lift_prior, lift_tracks, lift_video, values
 from gait.bindings.initial import STATURE
+from gait.cli import lift_doubts, lift_prior, lift_tracks, lift_video, values
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
-from gait.io.trc import write_trc
-from gait.lift import motion, result
+from gait.io.keypoints_file import FURTHEST, Keypoints
 from gait.io.track_file import write_lifted
-from gait.io.keypoints_file import FURTHEST, Tracks
-from gait.lift.explain import Uncertain
+from gait.io.trc import write_trc
+from gait.lift.segment.explain import Uncertain
+from gait.lift.smooth import motion
 
 _ONLY_TRACKS = (
     *("orthographic", "metres_per_unit", "height", "pixel_sd", "floor_sd", "method", "no_contact"),
-    *("no_bones", "ignore_unknown", "keep_sides", "keep_jumps", "trc"),
+    *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc"),
 )
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
-PIXEL_SD, FLOOR_SD = result.Options.pixel_sd, result.Options.floor_sd  # pixels, metres
+PIXEL_SD, FLOOR_SD = motion.Options.pixel_sd, motion.Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
 WHOLE = 0.5  # of its energy: what moves all joints alike is of the body
 UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view without perspective
@@ -48,7 +48,7 @@ UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("input", metavar="TRACKS.csv|VIDEO", help="2-D tracks, or a video with --placement")
+    parser.add_argument("input", metavar="KEYPOINTS.csv|VIDEO", help="2-D keypoints, or a video with --placement")
     parser.add_argument(
         "-o", "--output", required=True, metavar="OUT.csv", help="places and standard deviations, metres"
     )
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--all-markers", action="store_true", help="write all markers of the prior, not its joints alone"
     )
-    add = parser.add_argument_group("from tracks").add_argument
+    add = parser.add_argument_group("from keypoints").add_argument
     add(
         "--orthographic",
         metavar="AXIS",
@@ -95,7 +95,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--method",
-        choices=result.METHODS,
+        choices=motion.METHODS,
         help="smooth (default): one Gaussian over the whole sequence; blend: overlapping segments, each "
         "estimated alone, mixed as in the paper; segment: one after another; likelihood: as blend without "
         "the prior of the modes (least squares), for comparison",
@@ -109,7 +109,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="keep left and right as they are where they seem exchanged for some frames",
     )
     add(
-        "--keep-jumps",
+        "--keep-spikes",
         action="store_true",
         help="keep points that are far from where they were a frame before and after",
     )
@@ -118,7 +118,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lift tracks, or pass a video on."""
+    """Lift keypoints, or pass a video on."""
     suffix = Path(args.input).suffix.lower()
     video = suffix not in (".csv", ".txt") and bool(suffix or args.placement)
     if video and not set("%:") & set(args.input) and not Path(args.input).exists():
@@ -132,37 +132,37 @@ def run(args: argparse.Namespace) -> int:
         return lift_video.run(args)
     _check(args)
     prior = lift_prior.load(args.model, args.quiet)
-    tracks = lift_tracks.read(args.input, prior, args.pixel_sd or PIXEL_SD, args.ignore_unknown, args.quiet)
-    pixel_sd = args.pixel_sd or lift_tracks.noise(tracks, args.quiet)
+    keypoints = lift_tracks.read(args.input, prior, args.pixel_sd or PIXEL_SD, args.ignore_unknown, args.quiet)
+    pixel_sd = args.pixel_sd or lift_tracks.noise_of(keypoints, args.quiet)
     mended: dict[str, Any] = {"exchanged": 0, "put_back": [], "jumps": 0, "left_out": []}
-    view = lift_tracks.view(tracks, args.camera, args.orthographic, args.metres_per_unit, args.quiet)
+    view = lift_tracks.view(keypoints, args.camera, args.orthographic, args.metres_per_unit, args.quiet)
     options = _options(args, pixel_sd)
     if not args.keep_sides:
-        tracks, sides = lift_tracks.with_sides(
-            args.input, prior, tracks, view, options, args.quiet, " (--keep-sides)"
+        keypoints, sides = lift_tracks.with_sides(
+            args.input, prior, keypoints, view, options, args.quiet, " (--keep-sides)"
         )
         mended |= sides
-    if not args.keep_jumps:
-        tracks, left_out = lift_tracks.without_jumps(tracks, pixel_sd, args.quiet, " (--keep-jumps)")
+    if not args.keep_spikes:
+        keypoints, left_out = lift_tracks.without_spikes(keypoints, pixel_sd, args.quiet, " (--keep-spikes)")
         mended |= left_out
-    names = motion.output_names(prior, tracks, args.all_markers)
-    found = lift_tracks.lift(args.input, prior, tracks, view, options, names, args.quiet)
+    names = motion.output_names(prior, keypoints, args.all_markers)
+    found = lift_tracks.lift(args.input, prior, keypoints, view, options, names, args.quiet)
     _require_person(args, found)
     if not args.quiet:
         camera, jumps = bool(args.camera), int(mended["jumps"])
-        for words in lift_doubts.of(found, tracks, options, prior.stature, camera, jumps):
+        for words in lift_doubts.of(found, keypoints, options, prior.stature, camera, jumps):
             print(words, file=sys.stderr)
-    write_lifted(args.output, tracks.frame, tracks.time, names, found.places, found.sd)
+    write_lifted(args.output, keypoints.frame, keypoints.time, names, found.places, found.sd)
     if args.trc:
-        write_trc(args.trc, names, tracks.time, found.places, _rate(tracks))
-    summary = _summary(args, tracks, found) | mended | {"pixel_sd": pixel_sd}
+        write_trc(args.trc, names, keypoints.time, found.places, _rate(keypoints))
+    summary = _summary(args, keypoints, found) | mended | {"pixel_sd": pixel_sd}
     print(json.dumps(summary) if args.json else _text(summary))
     return 0
 
 
-def _options(args: argparse.Namespace, pixel_sd: float) -> result.Options:
-    return result.Options(
-        args.method or result.METHODS[0],
+def _options(args: argparse.Namespace, pixel_sd: float) -> motion.Options:
+    return motion.Options(
+        args.method or motion.METHODS[0],
         args.height,
         pixel_sd,
         args.floor_sd or FLOOR_SD,
@@ -172,15 +172,15 @@ def _options(args: argparse.Namespace, pixel_sd: float) -> result.Options:
 
 
 def _require_own(args: argparse.Namespace, video: bool) -> None:
-    """Refuse options of a video for tracks and of tracks for a video, which would do nothing."""
-    kind, other = ("is a video", "tracks") if video else ("holds tracks", "a video")
+    """Refuse options of a video for keypoints and of keypoints for a video, which would do nothing."""
+    kind, other = ("is a video", "keypoints") if video else ("holds keypoints", "a video")
     for option in _ONLY_TRACKS if video else _ONLY_VIDEO:
         value = getattr(args, option)
         if value is not None and value is not False:
             raise UsageError(f"--{option.replace('_', '-')} is for {other}, and {args.input} {kind}")
 
 
-def _require_person(args: argparse.Namespace, found: result.Motion) -> None:
+def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
     """Refuse an estimate that no person can be."""
     if not np.isfinite(found.error).any():
         raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
@@ -205,18 +205,18 @@ def _check(args: argparse.Namespace) -> None:
         raise UsageError("--floor-sd goes with --camera and --method smooth")
 
 
-def _rate(tracks: Tracks) -> float:
+def _rate(keypoints: Keypoints) -> float:
     """Frames per second."""
-    return float((len(tracks.time) - 1) / (tracks.time[-1] - tracks.time[0])) if len(tracks.time) > 1 else 1.0
+    return float((len(keypoints.time) - 1) / (keypoints.time[-1] - keypoints.time[0])) if len(keypoints.time) > 1 else 1.0
 
 
-def _summary(args: argparse.Namespace, tracks: Tracks, found: result.Motion) -> dict[str, Any]:
+def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motion) -> dict[str, Any]:
     """Figures of ``--json``."""
     return {
-        "frames": len(tracks.frame),
-        "method": args.method or result.METHODS[0],
-        "markers": {"seen": list(tracks.names), "estimated": list(found.names)},
-        "seen_share": float(tracks.seen.mean()),
+        "frames": len(keypoints.frame),
+        "method": args.method or motion.METHODS[0],
+        "markers": {"seen": list(keypoints.names), "estimated": list(found.names)},
+        "seen_share": float(keypoints.seen.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
         "sd_mm": 1000 * float(np.median(found.sd)),
         "stature_m": found.stature if found.steps else None,  # segments alone keep what was believed
@@ -224,10 +224,10 @@ def _summary(args: argparse.Namespace, tracks: Tracks, found: result.Motion) -> 
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
         "segments": _segments(found.uncertain, found.names),
-        "misfit": found.misfit if np.isfinite(found.misfit) else None,
+        "misfit": found.chi2_per_observation if np.isfinite(found.chi2_per_observation) else None,
         "prior_widened": found.wider,
         "segments_alone": found.alone,
-        "doubted": 0 if found.doubted is None else int(found.doubted.sum()),
+        "doubted": 0 if found.outliers is None else int(found.outliers.sum()),
         "resized": found.resized,
     }
 

@@ -1,13 +1,14 @@
-"""Why a motion that `gait lift` estimated from tracks may be wrong, in words."""
+"""Why a motion that `gait lift` estimated from keypoints may be wrong, in words."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gait.cli import lift_tracks
-from gait.lift import motion, outliers, size
-from gait.lift.result import Motion, Options
-from gait.io.keypoints_file import Tracks
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints import noise
+from gait.lift.smooth import motion, size
+from gait.lift.smooth.motion import Motion, Options
 
 FAR = 4.0  # noise alone gives a median of 1.2
 UNTOLD = (
@@ -18,7 +19,7 @@ BORNE = 0.18  # share of wrong points; one in seven does little harm, one in fiv
 UNUSUAL = 2.5  # deviations of a stature; one of 80 people is as unusual
 
 
-def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bool, jumps: int) -> list[str]:
+def of(found: Motion, keypoints: Keypoints, options: Options, usual: float, camera: bool, jumps: int) -> list[str]:
     """Say why the result may be wrong, a line each.
 
     Parameters
@@ -31,11 +32,11 @@ def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bo
         Points that were left out before.
     """
     far = float(np.nanmedian(found.error)) / options.pixel_sd
-    doubted, shake = _doubted(found, tracks.names), outliers.shake(tracks)
-    lost = _lost(found, tracks, jumps)
+    doubted, shake = _doubted(found, keypoints.names), noise.shake(keypoints)
+    lost = _lost(found, keypoints, jumps)
     shaky = shake > lift_tracks.SHAKY * options.pixel_sd and found.wider > 1
     doubts = {
-        UNTOLD: camera and not size.tells_distance(tracks),
+        UNTOLD: camera and not size.tells_distance(keypoints),
         f"left with little say, far from where the rest has them: {doubted}": bool(doubted),
         f"{lost:.0%} of the points are wrong, as it seems, which is more than it bears: do not rely on it": (
             lost > BORNE
@@ -56,17 +57,17 @@ def of(found: Motion, tracks: Tracks, options: Options, usual: float, camera: bo
     return [words for words, holds in doubts.items() if holds]
 
 
-def _lost(found: Motion, tracks: Tracks, jumps: int) -> float:
+def _lost(found: Motion, keypoints: Keypoints, jumps: int) -> float:
     """Share of the points that were left out or doubted."""
-    doubted = 0 if found.doubted is None else int(found.doubted.sum())
-    return (jumps + doubted) / max(int(tracks.seen.sum()) + jumps, 1)
+    doubted = 0 if found.outliers is None else int(found.outliers.sum())
+    return (jumps + doubted) / max(int(keypoints.seen.sum()) + jumps, 1)
 
 
 def _doubted(found: Motion, names: tuple[str, ...]) -> str:
-    """Points of the tracks that were doubted, and in how many frames."""
-    if found.doubted is None:
+    """Points of the keypoints that were doubted, and in how many frames."""
+    if found.outliers is None:
         return ""
-    counts = zip(names, found.doubted.sum(axis=0).tolist(), strict=True)
+    counts = zip(names, found.outliers.sum(axis=0).tolist(), strict=True)
     return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= DOUBTED)
 
 

@@ -1,4 +1,4 @@
-"""2-D tracks of a clip as `gait lift` and `gait report lift` take them: read, seen in a view, lifted."""
+"""2-D keypoints of a clip as `gait lift` and `gait report lift` take them: read, seen in a view, lifted."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 
 from gait.bindings.segment_prior import SegmentPrior
-from gait.errors import UserError
 from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io import keypoints_file as keypoints_file
+from gait.io.keypoints_file import Keypoints, shared_place
 from gait.learn.corpus.stage import one_thread
-from gait.lift import motion, outliers, sides, switches
-from gait.io import keypoints_file as tracks_file
-from gait.lift.equations import Parallel, Perspective, View, looking_along
-from gait.lift.result import Motion, Options
-from gait.io.keypoints_file import Tracks, shared_place
+from gait.lift.keypoints import noise, swaps
+from gait.lift.segment.view import Parallel, Perspective, View, looking_along
+from gait.lift.smooth import motion
+from gait.lift.smooth.motion import Motion, Options
 from gait.progress import progress
 
 MOST_JUMPS, MOST_SPANS = 5, 4  # named
@@ -25,28 +26,28 @@ BESIDE = 0.1  # of the points: fewer are those of somebody whom the picture cuts
 SHAKY = 1.3  # times a standard deviation from which points shake more than it says
 
 
-def read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, quiet: bool) -> Tracks:
-    """Read tracks of points of a prior whose noise is `sd`, and tell what is left out."""
-    tracks, ignored = tracks_file.read(path, prior.names, ignore_unknown)
-    tracks.require_motion(path)
-    tracks.require_spread(path, sd)
+def read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, quiet: bool) -> Keypoints:
+    """Read keypoints of points of a prior whose noise is `sd`, and tell what is left out."""
+    keypoints, ignored = keypoints_file.read(path, prior.names, ignore_unknown)
+    keypoints.require_motion(path)
+    keypoints.require_spread(path, sd)
     if ignored and not quiet:
         print(f"left out, unknown to the model: {' '.join(ignored)}", file=sys.stderr)
     if not quiet:
-        for words in _remarks(tracks):
+        for words in _remarks(keypoints):
             print(words, file=sys.stderr)
-    return tracks
+    return keypoints
 
 
-def _remarks(tracks: Tracks) -> Iterator[str]:
-    """Tell what in tracks is no motion of one person."""
-    if found := shared_place(tracks.uv):
+def _remarks(keypoints: Keypoints) -> Iterator[str]:
+    """Tell what in keypoints is no motion of one person."""
+    if found := shared_place(keypoints.uv):
         (u, v), count = found
         yield (
             f"{count} points are at exactly {u:g}, {v:g}: if a detector puts there what it does not see, "
             "leave the cells empty"
         )
-    if changes := switches.switches(tracks)[:MOST_JUMPS]:
+    if changes := noise.person_changes(keypoints)[:MOST_JUMPS]:
         places = [
             f"at frame {first}" if last is None else f"in frames {first} to {last}" for first, last in changes
         ]
@@ -56,13 +57,13 @@ def _remarks(tracks: Tracks) -> Iterator[str]:
         )
 
 
-def noise(tracks: Tracks, quiet: bool) -> float:
+def noise_of(keypoints: Keypoints, quiet: bool) -> float:
     """Tell the points' deviation at full confidence: the usual one, or how much they shake if it is more.
 
     Points that jump are no shaking: among many, others would pass for right.
     """
     usual = Options.pixel_sd
-    shake = outliers.shake(outliers.without_jumps(tracks, usual)[0])
+    shake = noise.shake(noise.without_spikes(keypoints, usual)[0])
     if not shake > SHAKY * usual:
         return usual
     if not quiet:
@@ -77,31 +78,31 @@ def noise(tracks: Tracks, quiet: bool) -> float:
 def with_sides(
     path: str,
     prior: SegmentPrior,
-    tracks: Tracks,
+    keypoints: Keypoints,
     seen_in: View,
     options: Options,
     quiet: bool,
     hint: str = "",
-) -> tuple[Tracks, dict[str, Any]]:
+) -> tuple[Keypoints, dict[str, Any]]:
     """Put left and right back where they were exchanged, tell where (and `hint`); with figures of ``--json``.
 
     Raises
     ------
     UserError
-        One line that names the file `path` of the tracks, if they cannot be lifted.
+        One line that names the file `path` of the keypoints, if they cannot be lifted.
     """
     with _naming(path):
-        motion.require(prior, tracks, seen_in, options)
-    with one_thread(), progress("sides", len(tracks.time), quiet) as update:
+        motion.require(prior, keypoints, seen_in, options)
+    with one_thread(), progress("sides", len(keypoints.time), quiet) as update:
 
-        def evidence(part: Tracks) -> float:
-            update(int(np.searchsorted(tracks.frame, part.frame[0])))
+        def evidence(part: Keypoints) -> float:
+            update(int(np.searchsorted(keypoints.frame, part.frame[0])))
             return motion.evidence(prior, part, seen_in, options)
 
-        found, exchanged = sides.put_back(tracks, options.pixel_sd, evidence)
+        found, exchanged = swaps.undo_swaps(keypoints, options.pixel_sd, evidence)
     if exchanged and not quiet:
         print(_exchanged(exchanged) + hint, file=sys.stderr)
-    moved = (found.uv != tracks.uv).any(axis=2) & tracks.seen
+    moved = (found.uv != keypoints.uv).any(axis=2) & keypoints.seen
     spans = [
         {"joint": each.joint, "first": first, "last": last}
         for each in exchanged
@@ -110,7 +111,7 @@ def with_sides(
     return found, {"exchanged": int(moved.sum()), "put_back": spans}
 
 
-def _exchanged(exchanged: list[sides.Exchanged]) -> str:
+def _exchanged(exchanged: list[swaps.Swapped]) -> str:
     """Name stretches of frames, the longest first, and what was exchanged in them."""
     joints: dict[tuple[int, int], list[str]] = {}
     for each in exchanged:
@@ -122,13 +123,13 @@ def _exchanged(exchanged: list[sides.Exchanged]) -> str:
     return f"left and right were exchanged and are put back: {'; '.join(named)}{more}"
 
 
-def without_jumps(tracks: Tracks, sd: float, quiet: bool, hint: str = "") -> tuple[Tracks, dict[str, Any]]:
+def without_spikes(keypoints: Keypoints, sd: float, quiet: bool, hint: str = "") -> tuple[Keypoints, dict[str, Any]]:
     """Leave out single points that jump, tell which (and `hint`); with figures of ``--json``."""
-    tracks, jumps = outliers.without_jumps(tracks, sd)
+    keypoints, jumps = noise.without_spikes(keypoints, sd)
     if jumps and not quiet:
         print(_jumped(jumps) + hint, file=sys.stderr)
     left_out = [{"frame": frame, "point": name} for frame, name in jumps]
-    return tracks, {"jumps": len(jumps), "left_out": left_out}
+    return keypoints, {"jumps": len(jumps), "left_out": left_out}
 
 
 def _jumped(jumps: list[tuple[int, str]]) -> str:
@@ -139,13 +140,13 @@ def _jumped(jumps: list[tuple[int, str]]) -> str:
 
 
 def view(
-    tracks: Tracks,
+    keypoints: Keypoints,
     camera: str | None,
     axis: str | None = None,
     metres: float | None = None,
     quiet: bool = False,
 ) -> View:
-    """See tracks through a calibrated camera, or else from far away; tell if they cannot be of its picture.
+    """See keypoints through a calibrated camera, or else from far away; tell if they cannot be of its picture.
 
     Parameters
     ----------
@@ -158,7 +159,7 @@ def view(
     """
     if camera:
         calibrated = Camera.read(camera)
-        beside = tracks.outside(calibrated.size)
+        beside = keypoints.outside(calibrated.size)
         if beside > BESIDE and not quiet:
             picture = "{}x{}".format(*calibrated.size)
             print(
@@ -167,29 +168,29 @@ def view(
                 file=sys.stderr,
             )
         return Perspective(calibrated)
-    middle = np.nanmedian(tracks.uv, axis=(0, 1))  # wild points do not move it
+    middle = np.nanmedian(keypoints.uv, axis=(0, 1))  # wild points do not move it
     return Parallel(looking_along(axis or "y"), metres, middle, steady=bool(axis))
 
 
 def lift(
     path: str,
     prior: SegmentPrior,
-    tracks: Tracks,
+    keypoints: Keypoints,
     seen_in: View,
     options: Options,
     names: tuple[str, ...],
     quiet: bool,
 ) -> Motion:
-    """Lift tracks with a bar of progress; matrices are too small for several threads to gain.
+    """Lift keypoints with a bar of progress; matrices are too small for several threads to gain.
 
     Raises
     ------
     UserError
-        One line that names the file `path` of the tracks.
+        One line that names the file `path` of the keypoints.
     """
-    segments = motion.segments_of(prior, tracks)
+    segments = motion.segments_of(prior, keypoints)
     with one_thread(), progress("segments", segments, quiet) as update, _naming(path):
-        return motion.lift(prior, tracks, seen_in, options, names, update)
+        return motion.lift(prior, keypoints, seen_in, options, names, update)
 
 
 @contextmanager

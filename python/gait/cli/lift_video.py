@@ -12,26 +12,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.body.skeleton import JOINTS
-from gait.cli import lift_prior, values
 from gait.bindings.model import read_blob, read_cyclic
 from gait.bindings.segment_prior import SegmentPrior
-from gait.errors import UsageError, UserError
+from gait.body.skeleton import JOINTS
 from gait.camera.camera import Camera
-from gait.io.video import Video, VideoWriter, background, require_video_name
+from gait.cli import lift_prior, values
+from gait.errors import UsageError, UserError
 from gait.io.blob import decode
-from gait.learn.corpus.stage import one_thread
-from gait.lift import suggest
 from gait.io.track_file import write_lifted
-from gait.lift.phase_prior import Beginning
-from gait.lift.clip_segments import ClipSegments, Settings
-from gait.lift.cylinder import Figure
-from gait.lift.cylinder_picture import draw_figure
-from gait.lift.fit_clip import ClipFit, fit_clip, work
-from gait.lift.fit_correlation import DOUBTFUL, HELD
-from gait.lift.sensors import Film
-from gait.lift.corrections import Correction, Placement, read_corrections, read_placement
-from gait.lift.views import CameraView, FlatView, View
+from gait.io.video import Video, VideoWriter, background, require_video_name
+from gait.learn.corpus.stage import one_thread
+from gait.lift.video.clip_segments import ClipSegments, Settings
+from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_corrections, read_placement
+from gait.lift.video.figure import Figure, draw_figure
+from gait.lift.video.fit_clip import DOUBTFUL, ENOUGH, HELD, ClipFit, fit_clip, suggest, work
+from gait.lift.video.sensors import CameraView, Film, FlatView, View
 from gait.progress import progress
 
 Floats = npt.NDArray[np.float64]
@@ -109,11 +104,11 @@ def run(args: argparse.Namespace) -> int:
     used = [c for c in corrections if first <= c.frame < first + len(film.times)]
     if len(used) < len(corrections) and not args.quiet:
         print(f"{len(corrections) - len(used)} corrections of frames that are not used", file=sys.stderr)
-    beginning = Beginning.of(prior, _cycle(args.model), placement)
-    clip = ClipSegments(prior, view, film, placement, used, Settings(joined=not args.alone), beginning)
+    phase_prior = PhasePrior.of(prior, _cycle(args.model), placement)
+    clip = ClipSegments(prior, view, film, placement, used, Settings(joined=not args.alone), phase_prior)
     free, fit = _fits(clip, args.quiet)
-    if fit.likeness < DOUBTFUL and not args.quiet:
-        print(_doubt(args, fit.likeness), file=sys.stderr)
+    if fit.fit_correlation < DOUBTFUL and not args.quiet:
+        print(_doubt(args, fit.fit_correlation), file=sys.stderr)
     figure = Figure.fit(fit.places, prior.names)
     shown = [i for i, name in enumerate(prior.names) if name in JOINTS or args.all_markers]
     names = [prior.names[i] for i in shown]
@@ -125,10 +120,10 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _doubt(args: argparse.Namespace, likeness: float) -> str:
+def _doubt(args: argparse.Namespace, fit_correlation: float) -> str:
     remedy = "--background or --corrections" if args.background == "none" else "--corrections"
     return (
-        f"{args.input}: little of what the sensors read is the person (it correlates by {likeness:.2f} with "
+        f"{args.input}: little of what the sensors read is the person (it correlates by {fit_correlation:.2f} with "
         f"the stick figure, by {HELD:g} before a known background): the figure may have left, deviations are "
         f"widened; look with --overlay and give {remedy}"
     )
@@ -226,8 +221,8 @@ def _draw(args: argparse.Namespace, video: Video, clip: ClipSegments, fit: ClipF
         progress("drawing", len(fit.frame), args.quiet) as update,
     ):
         for k, frame in enumerate(video.frames(first, first + len(fit.frame))):
-            springs = [(c, _marker(clip, fit, c)) for c in clip.corrections if c.frame == frame.number]
-            film.write(draw_figure(frame.image, clip.view, surfaces[k], joints[k], springs))
+            corrections = [(c, _marker(clip, fit, c)) for c in clip.corrections if c.frame == frame.number]
+            film.write(draw_figure(frame.image, clip.view, surfaces[k], joints[k], corrections))
             update(k + 1)
 
 
@@ -241,9 +236,9 @@ def _summary(clip: ClipSegments, free: ClipFit, fit: ClipFit, figure: Figure, mo
     """Figures of ``--json``."""
     frames, given = len(fit.frame), len(clip.corrections)
     pixels = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
-    enough = suggest.ENOUGH * clip.placement.stature * pixels
+    enough = ENOUGH * clip.placement.stature * pixels
     before, after = _misses(clip, free), _misses(clip, fit)
-    wanted = suggest.suggest(clip, fit)
+    wanted = suggest(clip, fit)
     joints = clip.prior.index([j for j in JOINTS if j in clip.prior.names])
     return {
         "frames": frames,
@@ -260,7 +255,7 @@ def _summary(clip: ClipSegments, free: ClipFit, fit: ClipFit, figure: Figure, mo
             "wanted": len(wanted),
             "wanted_per_frame": len(wanted) / frames,
         },
-        "likeness": fit.likeness if np.isfinite(fit.likeness) else None,
+        "fit_correlation": fit.fit_correlation if np.isfinite(fit.fit_correlation) else None,
         "sd_mm": 1000 * float(np.median(fit.sd[:, joints])),
         "figure": {
             "stature_m": figure.stature,

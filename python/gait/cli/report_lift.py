@@ -3,7 +3,7 @@
 Writes into DIR: report.html (needs nothing else) and the figures as PNG.  spectrum: variances of the modes
 before and after something was seen (fig. 3); synthesis: a segment from 40 modes (2); draws from the prior
 (4); estimates: original, projection, likelihood only, Bayes (5); what is least certain (6); and a clip (7) if
---clip gives its 2-D tracks.  The segment is the one with most motion of --mocap, which should not be one that
+--clip gives its 2-D keypoints.  The segment is the one with most motion of --mocap, which should not be one that
 the model was learnt from; without it, a draw from the prior.
 """
 
@@ -22,23 +22,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.cli import lift_tracks, values
 from gait.bindings.segment_prior import SegmentPrior
-from gait.report.page import Page
+from gait.cli import lift_tracks, values
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
+from gait.io.keypoints_file import Keypoints
 from gait.learn.report.figures_base import Drawing
 from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_corpus, segment_motion
 from gait.learn.segments.segment_corpus import Corpus
 from gait.learn.solve import readers
-from gait.lift import figures_clip
-from gait.lift.equations import View
-from gait.lift.figures_segment import Case, case, drawings
-from gait.lift.motion import output_names
-from gait.lift.result import METHODS, Motion, Options
-from gait.io.keypoints_file import Tracks
+from gait.lift.report import motion_figures
+from gait.lift.report.segment_figures import Case, case, drawings
+from gait.lift.segment.view import View
+from gait.lift.smooth.motion import METHODS, Motion, Options, output_names
 from gait.progress import progress
+from gait.report.page import Page
 
 Floats = npt.NDArray[np.float64]
 
@@ -57,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="recording (.amc .bvh .c3d .trc .csv) to look at (default: a draw from the prior)",
     )
-    parser.add_argument("--clip", metavar="TRACKS.csv", help="2-D tracks of a clip, as for gait lift")
+    parser.add_argument("--clip", metavar="KEYPOINTS.csv", help="2-D keypoints of a clip, as for gait lift")
     parser.add_argument(
         "--camera", metavar="CAM", help="the clip's calibration (default: seen level and from far away)"
     )
@@ -78,9 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw, write, print."""
     if args.camera and not args.clip:
-        raise UsageError("--camera is of a clip; give its tracks with --clip")
+        raise UsageError("--camera is of a clip; give its keypoints with --clip")
     if args.method and not args.clip:
-        raise UsageError("--method is of a clip; give its tracks with --clip")
+        raise UsageError("--method is of a clip; give its keypoints with --clip")
     require_folder(args.output)
     prior = SegmentPrior.load(args.model)
     lifted = _clip(args, prior) if args.clip else None
@@ -100,24 +99,24 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Tracks, Motion, View]:
-    """Lift the tracks of the clip as `gait lift` does."""
+def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Motion, View]:
+    """Lift the keypoints of the clip as `gait lift` does."""
     options = Options(args.method or METHODS[0])
-    tracks = lift_tracks.read(args.clip, prior, options.pixel_sd, ignore_unknown=True, quiet=args.quiet)
-    options = replace(options, pixel_sd=lift_tracks.noise(tracks, args.quiet))
-    view = lift_tracks.view(tracks, args.camera, quiet=args.quiet)
-    tracks, _ = lift_tracks.with_sides(args.clip, prior, tracks, view, options, args.quiet)
-    tracks, _ = lift_tracks.without_jumps(tracks, options.pixel_sd, args.quiet)
-    found = lift_tracks.lift(args.clip, prior, tracks, view, options, output_names(prior, tracks), args.quiet)
-    return tracks, found, view
+    keypoints = lift_tracks.read(args.clip, prior, options.pixel_sd, ignore_unknown=True, quiet=args.quiet)
+    options = replace(options, pixel_sd=lift_tracks.noise_of(keypoints, args.quiet))
+    view = lift_tracks.view(keypoints, args.camera, quiet=args.quiet)
+    keypoints, _ = lift_tracks.with_sides(args.clip, prior, keypoints, view, options, args.quiet)
+    keypoints, _ = lift_tracks.without_spikes(keypoints, options.pixel_sd, args.quiet)
+    found = lift_tracks.lift(args.clip, prior, keypoints, view, options, output_names(prior, keypoints), args.quiet)
+    return keypoints, found, view
 
 
 def _drawings(
-    args: argparse.Namespace, shown: Case, lifted: tuple[Tracks, Motion, View] | None
+    args: argparse.Namespace, shown: Case, lifted: tuple[Keypoints, Motion, View] | None
 ) -> Iterator[Drawing]:
     yield from drawings(shown, args.seed)
     if lifted:
-        yield figures_clip.clip(*lifted, Path(args.clip).name)
+        yield motion_figures.clip(*lifted, Path(args.clip).name)
 
 
 def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:

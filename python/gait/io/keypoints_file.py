@@ -1,4 +1,4 @@
-"""Files of 2-D joint tracks: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``, empty cells = not seen.
+"""Files of 2-D joint keypoints: CSV ``frame,time,<joint>_u,<joint>_v[,<joint>_c]``, empty cells = not seen.
 
 Columns may also be separated by tabs, or by semicolons with decimal commas.
 """
@@ -31,7 +31,7 @@ FURTHEST = 1e6  # pixels, or units of an orthographic view
 
 
 @dataclass(frozen=True)
-class Tracks:
+class Keypoints:
     """Points followed in one view over T frames.
 
     Attributes
@@ -98,12 +98,12 @@ class Tracks:
 
 def read(
     path: str | os.PathLike[str], known: Sequence[str], ignore_unknown: bool = False
-) -> tuple[Tracks, list[str]]:
-    """Read tracks of points named in `known`.
+) -> tuple[Keypoints, list[str]]:
+    """Read keypoints of points named in `known`.
 
     Returns
     -------
-    tracks : Tracks
+    keypoints : Keypoints
     ignored : list of str
         Points that are not in `known`.
 
@@ -116,7 +116,7 @@ def read(
     columns = {name: i for i, name in enumerate(head)}
     for name in ("frame", "time"):
         if name not in columns:
-            raise UserError(f"{path}: column {name} is missing; tracks are frame,time,<joint>_u,<joint>_v")
+            raise UserError(f"{path}: column {name} is missing; keypoints are frame,time,<joint>_u,<joint>_v")
     points = list(dict.fromkeys(name[:-2] for name in head if name[-2:] in ("_u", "_v")))
     if not points:
         raise UserError(f"{path}: no columns <joint>_u,<joint>_v; name them by joint, such as l_knee_u")
@@ -153,20 +153,20 @@ def read(
     if not np.isfinite(uv).any():
         raise UserError(f"{path}: no point is seen in any frame; fill _u and _v")
     refuse_sentinels(path, names, uv)
-    return Tracks(frame, time, tuple(names), uv, confidence), ignored
+    return Keypoints(frame, time, tuple(names), uv, confidence), ignored
 
 
-def write(path: str | os.PathLike[str], tracks: Tracks) -> None:
-    """Write tracks so that `read` gets them back (hundredths of a pixel)."""
-    head = ["frame", "time", *(f"{name}_{axis}" for name in tracks.names for axis in "uvc")]
+def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
+    """Write keypoints so that `read` gets them back (hundredths of a pixel)."""
+    head = ["frame", "time", *(f"{name}_{axis}" for name in keypoints.names for axis in "uvc")]
     with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(head)
-        for t, frame in enumerate(tracks.frame):
-            row = [str(frame), f"{tracks.time[t]:.6f}"]
-            for j, (u, v) in enumerate(tracks.uv[t]):
+        for t, frame in enumerate(keypoints.frame):
+            row = [str(frame), f"{keypoints.time[t]:.6f}"]
+            for j, (u, v) in enumerate(keypoints.uv[t]):
                 seen = np.isfinite(u)
-                row += [f"{u:.4f}", f"{v:.4f}", f"{tracks.confidence[t, j]:.3g}"] if seen else ["", "", ""]
+                row += [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"] if seen else ["", "", ""]
             table.writerow(row)
 
 
@@ -218,14 +218,14 @@ class _Numbers:
 def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a CSV, all of one width."""
     if not Path(path).is_file():
-        raise UserError(f"{path}: no such file of tracks")
+        raise UserError(f"{path}: no such file of keypoints")
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
         lines = [row for _, row in table_rows(text) if row]
     except (UnicodeDecodeError, csv.Error) as exc:
         raise UserError(f"{path}: not a CSV file ({exc})") from None
     if len(lines) < 2:
-        raise UserError(f"{path}: has no rows; tracks are a header and one row per frame")
+        raise UserError(f"{path}: has no rows; keypoints are a header and one row per frame")
     head = [name.strip() for name in lines[0]]
     twice = next((name for name in head if head.count(name) > 1), None)
     if twice is not None:

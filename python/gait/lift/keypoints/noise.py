@@ -1,0 +1,97 @@
+"""Noise of 2-D keypoints: points that a detector put elsewhere for a frame or two, and how much all shake.
+
+Where 2-D keypoints change from one person to another: most points jump alike from one frame to the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.lifter import remove_spikes
+from gait.io.keypoints_file import Keypoints
+
+Array = NDArray[np.float64]
+
+LIMIT = 8.0  # deviations from the line between neighbours beyond which a point is no noise
+SPREAD = 1.4826  # median absolute deviation to standard deviation, normal noise
+FEWEST = 5  # sights of a point that tell
+QUICK = 0.051  # seconds from frame to frame (20 a second): with longer steps motion looks like noise
+PAIR = np.sqrt(1.5)  # sd of a point against the middle of its neighbours, over that of one point
+
+
+def without_spikes(keypoints: Keypoints, sd: float) -> tuple[Keypoints, list[tuple[int, str]]]:
+    """Take out points that lie far off the line between the same point's neighbours in time.
+
+    The measure of a point is the larger of the noise `sd` (pixels) and the median of its own distances from
+    that line, which holds its acceleration.  The furthest goes first, because it bends its neighbours' lines.
+
+    Returns
+    -------
+    keypoints : Keypoints
+        With these points not seen.
+    jumps : list of (frame, name)
+        In the order of time.
+    """
+    kept = remove_spikes(keypoints.time, keypoints.uv, np.full(keypoints.uv.shape[:2], sd))
+    spikes = keypoints.seen & (kept < 0)
+    named = [(int(keypoints.frame[t]), keypoints.names[j]) for t, j in np.argwhere(spikes)]
+    return replace(keypoints, uv=np.where(spikes[..., None], np.nan, keypoints.uv)), named
+
+
+def shake(keypoints: Keypoints) -> float:
+    """Noise at full confidence that no motion explains, pixels; NaN where too few frames follow soon.
+
+    By third differences: white noise's are sqrt(20) times as large, and a walk's at `QUICK` a pixel.
+    """
+    third = np.abs(np.diff(keypoints.uv, 3, axis=0))
+    seen = third[np.isfinite(third)]
+    if not seen.size or np.median(np.diff(keypoints.time)) > QUICK:
+        return np.nan
+    return float(SPREAD * np.median(seen) / np.sqrt(20) * np.median(keypoints.confidence[keypoints.seen]))
+
+
+FEWEST = 4  # points seen before and after
+FAR = 0.25  # of the person's extent in the picture: nobody moves so much more than in the frames around
+AROUND = 5  # frames before and after that tell how the points move
+SOON = 2.0  # times the usual step of time: later, somebody may be anywhere
+
+
+def person_changes(keypoints: Keypoints) -> list[tuple[int, int | None]]:
+    """Find stretches on somebody else: first and last frame; None where the track stays there."""
+    if len(keypoints.time) < 2:
+        return []
+    jumps = np.flatnonzero(_jumps(keypoints)).tolist()
+    begins, ends = jumps[::2], jumps[1::2]
+    last = [int(keypoints.frame[t]) for t in ends]
+    return list(zip([int(keypoints.frame[t + 1]) for t in begins], [*last, None], strict=False))
+
+
+def _jumps(keypoints: Keypoints) -> NDArray[np.bool_]:
+    """Whether most points jump alike after each frame but the last, (T - 1,)."""
+    moves, step = np.diff(keypoints.uv, axis=0), np.diff(keypoints.time)
+    excess = moves - _around(moves)
+    jumped = np.zeros(len(moves), bool)
+    for t in np.flatnonzero(step <= SOON * np.median(step)):
+        both = np.isfinite(excess[t]).all(axis=1)
+        if both.sum() < FEWEST:
+            continue
+        extent = float(np.ptp(keypoints.uv[t, both], axis=0).max())
+        shift = np.median(excess[t, both], axis=0)
+        length = float(np.linalg.norm(shift))
+        alike = np.linalg.norm(excess[t, both] - shift, axis=1) < length / 2
+        jumped[t] = length > FAR * extent and alike.mean() > 0.5
+    return jumped
+
+
+def _around(moves: Array) -> Array:
+    """Median of each point's moves (T, J, 2) in the frames around; its own where there are no others."""
+    padded = np.pad(moves, ((AROUND, AROUND), (0, 0), (0, 0)), constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1, axis=0)
+    known = np.where(np.isfinite(windows), windows, np.inf)
+    ordered, count = np.sort(known, axis=-1), np.isfinite(windows).sum(axis=-1)
+    middle = np.maximum(count - 1, 0)[..., None] // 2
+    median = np.take_along_axis(ordered, middle, axis=-1)[..., 0]
+    return np.where(np.isfinite(median), median, moves)

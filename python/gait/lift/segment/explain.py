@@ -1,0 +1,303 @@
+"""Every segment of a sequence alone, by the C library's lifter, and the most probable course through them.
+
+A segment seen from far away fits nearly as well when it is mirrored in depth.  So all distinct headings that
+explain a segment are kept, and its neighbours decide which it is (Viterbi over the explanations).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.bindings.lifter import Fit, LiftConfig, Lifter
+from gait.bindings.segment_prior import SegmentPrior
+from gait.errors import UserError
+from gait.io import blob
+from gait.lift.keypoints.observations import Observations
+from gait.lift.segment.view import Perspective, View
+
+Floats = npt.NDArray[np.float64]
+
+FEWEST = 4  # points that must be seen of a segment for an estimate of its own
+STARTS = 8  # headings all round from which an unknown one is searched for
+START_SD = 0.4  # radians from a start: half of the distance between two
+SAME = 0.2  # radians: explanations that are nearer are one
+TURN_SD = 0.7  # radians by which the heading changes in half a segment
+GROUND_SD = 10.0  # metres, of the place on the ground
+FLOOR_SD = 0.05  # metres, of the floor's height; a single segment depends on it less than a sequence
+ANY_HEIGHT = 10.0  # metres, of the floor's height without a camera
+MOST_SEARCHES = 5  # while the place found is far from the expected one
+FLAT = 100.0  # times the modes' deviations: next to no prior
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A heading that explains a segment.
+
+    Attributes
+    ----------
+    heading : float
+        Of the prior's axes in the world, radians.
+    component : int
+        Of the prior's mixture.
+    place : (3,)
+        Where on the ground, metres.
+    share : float
+        Probability among the explanations of the same segment.
+    seen : Observations
+        The segment's points, outliers down-weighted.
+    """
+
+    heading: float
+    component: int
+    place: Floats
+    share: float
+    seen: Observations
+
+
+@dataclass(frozen=True)
+class SegmentFit:
+    """Posterior of a segment.
+
+    Attributes
+    ----------
+    heading : float
+    component : int
+    places, sd : (F, J, 3)
+        Mean and standard deviations, metres.
+    log10_volume : float
+        log10 of the posterior's volume over the prior's.
+    mode_sd : (n,)
+        Deviations of its displacements over all markers and frames, metres, the least certain first.
+    modes : (n, F, J, 3)
+        These displacements, one deviation long.
+    """
+
+    heading: float
+    component: int
+    places: Floats
+    sd: Floats
+    log10_volume: float
+    mode_sd: Floats
+    modes: Floats
+
+    def rooted_sd(self, ends: npt.NDArray[np.intp]) -> Floats:
+        """Standard deviations (F, J, 3) about the middle of two markers."""
+        apart = self.modes - self.modes[:, :, ends].mean(axis=2, keepdims=True)
+        outside = np.maximum(self.sd**2 - (self.modes**2).sum(axis=0), 0.0)
+        middle = outside[:, ends].sum(axis=1, keepdims=True) / 4
+        own = outside + middle
+        own[:, ends] -= outside[:, ends]  # half of an end is in the middle
+        return np.asarray(np.sqrt((apart**2).sum(axis=0) + own))
+
+
+class SegmentLifter:
+    """Explains segments of a prior (`SegmentPrior.restricted`) in a view, by the C library.
+
+    Parameters
+    ----------
+    stature, stature_sd : float
+        Metres.
+    """
+
+    def __init__(self, prior: SegmentPrior, view: View, stature: float, stature_sd: float) -> None:
+        height_sd = FLOOR_SD if view.grounded else ANY_HEIGHT
+        config = LiftConfig.default(
+            stature=stature, stature_sd=stature_sd, place_sd=(GROUND_SD, GROUND_SD, height_sd), lag=-1
+        )
+        seen_by = view.camera if isinstance(view, Perspective) else view.axes[:2]
+        self._prior, self._latent, self._place = prior, prior.headings == 0, np.zeros(3)
+        self._lifter = Lifter(blob.encode(prior.sections()), seen_by, config)
+
+    def explanations(self, seen: Observations) -> list[Explanation]:
+        """All distinct explanations of a segment, the most probable first; none if next to nothing is seen."""
+        if seen.seen.sum() < FEWEST:
+            return []
+        fit, weighted = self._robust(seen)
+        points = Observations(seen.uv, np.where(weighted > 0, weighted, np.inf))
+        if not self._latent:
+            return [Explanation(fit.heading, fit.component, fit.place, 1.0, points)]
+        fits = [self._fit(points, start, self._place) for start in 2 * np.pi / STARTS * np.arange(STARTS)]
+        score = np.array([f.log_evidence + np.log(self._prior.weights[f.component]) for f in fits])
+        shares = np.exp(score - score.max())
+        shares /= shares.sum()
+        found: list[Explanation] = []
+        for k in np.argsort(-score, kind="stable"):
+            one = Explanation(fits[k].heading, fits[k].component, fits[k].place, float(shares[k]), points)
+            same = next((i for i, other in enumerate(found) if _same(one, other)), None)
+            if same is None:
+                found.append(one)
+            else:
+                found[same] = replace(found[same], share=found[same].share + one.share)
+        return sorted(found, key=lambda e: -e.share)
+
+    def solve(self, chosen: Explanation) -> SegmentFit:
+        """Posterior of an explanation."""
+        fit = self._fit(chosen.seen, chosen.heading, chosen.place)
+        places, sd = self._lifter.positions()
+        mode_sd, modes = self._lifter.uncertain(len(self._lifter.posterior()[0]))
+        return SegmentFit(fit.heading, fit.component, places, sd, fit.log10_volume, mode_sd, modes)
+
+    def open_modes(self, chosen: Explanation) -> float:
+        """How many of the modes the points of an explanation leave open: the sum of their variances."""
+        fit = self._fit(chosen.seen, chosen.heading, chosen.place)
+        used = self._prior.sd[fit.component] > 0
+        return float(np.diag(self._lifter.posterior()[1])[: len(used)][used].sum())
+
+    def _fit(self, seen: Observations, heading: float, place: Floats) -> Fit:
+        """Fit a segment near a heading and a place."""
+        if self._latent:
+            self._lifter.expect((place[0], place[1], 0.0), heading, START_SD)
+        return self._lifter.segment(seen.uv, seen.sd)
+
+    def _robust(self, seen: Observations) -> tuple[Fit, Floats]:
+        """Search for any heading, with outliers down-weighted, near the place of the segment before."""
+        if not self._latent:
+            return self._lifter.segment_robust(seen.uv, seen.sd)
+        for _ in range(MOST_SEARCHES):
+            before = self._place
+            self._lifter.expect((before[0], before[1], 0.0))
+            fit, weighted = self._lifter.segment_robust(seen.uv, seen.sd)
+            self._place = fit.place
+            if np.linalg.norm((fit.place - before)[:2]) < GROUND_SD / 2:
+                break
+        return fit, weighted
+
+
+def _same(a: Explanation, b: Explanation) -> bool:
+    apart = (a.heading - b.heading + np.pi) % (2 * np.pi) - np.pi
+    return a.component == b.component and bool(abs(apart) < SAME)
+
+
+def explanations(
+    lifter: SegmentLifter,
+    prior: SegmentPrior,
+    seen: Observations,
+    update: Callable[[int], None] = lambda done: None,
+) -> list[list[Explanation]]:
+    """Explain every segment of a grid alone; none where next to nothing is seen.
+
+    Parameters
+    ----------
+    seen : Observations
+        Of the prior's markers on whole blocks of half a segment, in the lifter's units.
+    """
+    half = prior.frames // 2
+    found = []
+    for s in range(len(seen.uv) // half - 1):
+        found.append(lifter.explanations(seen.part(s * half, s * half + prior.frames)))
+        update(s + 1)
+    return found
+
+
+def without_prior(
+    prior: SegmentPrior, view: View, stature: float, stature_sd: float, chosen: Sequence[Explanation]
+) -> list[SegmentFit]:
+    """Estimate segments by the measurements alone: the limit of ever larger deviations of the modes.
+
+    What moves the body as a whole keeps its prior: no view from far away shows a distance.
+
+    Raises
+    ------
+    UserError
+        If the measurements of a segment leave a combination of modes open.
+    """
+    flat = SegmentLifter(replace(prior, modes=FLAT * prior.modes), view, stature, stature_sd)
+    for each in chosen:
+        count, left = prior.size, round(flat.open_modes(each))
+        if left:
+            raise UserError(
+                f"the points seen in a segment determine {count - left} of {count} modes, and the likelihood "
+                "alone says nothing about the others; give more points, or use --method blend"
+            )
+    return [flat.solve(each) for each in chosen]
+
+
+def course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
+    """Choose one explanation of every segment: probable, and with headings that change little.
+
+    Segments without any take that of the nearest one before or after.
+    """
+    known = [s for s, choices in enumerate(found) if choices]
+    chosen = dict(zip(known, _course([found[s] for s in known]), strict=True))
+    return [chosen[min(known, key=lambda k: abs(k - s))] for s in range(len(found))]
+
+
+def _course(found: Sequence[Sequence[Explanation]]) -> list[Explanation]:
+    """Choose among explanations of segments that all have some."""
+    score = _log_shares(found[0])
+    back = []
+    for before, now in zip(found, found[1:], strict=False):
+        turn = np.subtract.outer([e.heading for e in now], [e.heading for e in before])
+        turn = (turn + np.pi) % (2 * np.pi) - np.pi
+        table = score - 0.5 * (turn / TURN_SD) ** 2
+        back.append(table.argmax(axis=1))
+        # segments overlap by half: half of the evidence is their neighbour's
+        score = table.max(axis=1) + 0.5 * _log_shares(now)
+    chosen = [int(score.argmax())]
+    for best in reversed(back):
+        chosen.append(int(best[chosen[-1]]))
+    return [choices[i] for choices, i in zip(found, reversed(chosen), strict=True)]
+
+
+def _log_shares(choices: Sequence[Explanation]) -> Floats:
+    return np.log(np.maximum([e.share for e in choices], 1e-300))
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """What segments leave uncertain, medians over them (Leventon and Freeman 1998, fig. 6).
+
+    Attributes
+    ----------
+    log10_volume : float
+        log10 of the posterior's volume over the prior's.
+    sd : (COUNT,)
+        Deviations of the least certain displacements, rms per marker, metres, largest first.
+    along, rigid : (COUNT,)
+        Shares of their energy along the line of sight, and that move the whole body as one.
+    shares : (COUNT, J)
+        Shares of their energy by marker.
+    """
+
+    log10_volume: float
+    sd: Floats
+    along: Floats
+    rigid: Floats
+    shares: Floats
+
+
+COUNT = 3  # displacements, as in the paper's fig. 6
+
+
+def summarise(segments: Sequence[SegmentFit], view: View) -> Uncertain:
+    """Sum up the segments of a sequence."""
+    each = np.median([_least_certain(found, view) for found in segments], axis=0)
+    volume = float(np.median([found.log10_volume for found in segments]))
+    return Uncertain(volume, each[:, 0], each[:, 1], each[:, 2], each[:, 3:])
+
+
+def _least_certain(found: SegmentFit, view: View) -> Floats:
+    """Deviation, share along the line of sight, rigid share and shares by marker, (COUNT, 3 + J)."""
+    sight, size = view.sight(found.places), np.sqrt(found.places[..., 0].size)
+    rows = zip(found.mode_sd[:COUNT].tolist(), found.modes[:COUNT], strict=True)
+    return np.array(
+        [
+            [s / size, share_along(m, sight), share_rigid(m), *np.sum(m**2, axis=(0, 2)) / np.sum(m**2)]
+            for s, m in rows
+        ]
+    )
+
+
+def share_along(mode: Floats, axis: Floats) -> float:
+    """Share of a mode's energy (F, J, 3) that is along a unit vector (3,)."""
+    return float(np.sum((mode @ axis) ** 2) / np.sum(mode**2))
+
+
+def share_rigid(mode: Floats) -> float:
+    """Share of a mode's energy (F, J, 3) that is one displacement of all markers in all frames."""
+    points = mode.reshape(-1, 3)
+    return float(len(points) * np.sum(points.mean(axis=0) ** 2) / np.sum(points**2))

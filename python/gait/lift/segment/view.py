@@ -1,0 +1,136 @@
+"""Views whose scale may be unknown, as rows that are linear in the markers and in the scale.
+
+A calibrated camera and a parallel view of known scale give the rows of `gait.lift.observe`.  Where the scale
+is unknown, the length l of one unit of the picture is one more number per frame: a point seen at (u, v) obeys
+right . X - u l = 0 and down . X - v l = 0, with the noise sd l.  Near a guess this is linearised there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.camera.camera import Camera
+from gait.errors import UsageError
+from gait.lift.keypoints.observations import Observations
+
+Floats = npt.NDArray[np.float64]
+
+AXES = {"x": (1.0, 0, 0), "y": (0, 1.0, 0), "z": (0, 0, 1.0)}
+
+
+@dataclass(frozen=True)
+class Perspective:
+    """View of a calibrated camera."""
+
+    camera: Camera
+    scaled = False  #: whether the scale is unknown
+    grounded = True  #: whether the height over the floor z = 0 is known
+
+    @property
+    def axes(self) -> Floats:
+        """Right, down and ahead in the world, rows of (3, 3)."""
+        return np.asarray(self.camera.R)
+
+    def project(self, places: Floats, lengths: Floats) -> Floats:
+        """Pixels (T, J, 2) of places (T, J, 3)."""
+        return self.camera.project(places)
+
+    def sight(self, places: Floats) -> Floats:
+        """Direction (3,) from the lens to the middle of places (F, J, 3)."""
+        ray = places.mean(axis=(0, 1)) - self.camera.centre
+        return np.asarray(ray / np.linalg.norm(ray))
+
+
+@dataclass(frozen=True)
+class Parallel:
+    """View from far away.
+
+    Attributes
+    ----------
+    axes : (3, 3)
+        Right, down and ahead in the world as rows.
+    metres : float or None
+        Length of one unit of the picture; None: unknown.
+    origin : (2,)
+        Point of the picture that stays where it is when the scale changes.
+    steady : bool
+        An unknown scale does not change in time.
+    """
+
+    axes: Floats
+    metres: float | None
+    origin: Floats
+    steady: bool = True
+    grounded = False
+
+    @property
+    def scaled(self) -> bool:
+        """Whether the scale is unknown."""
+        return self.metres is None
+
+    def metric(self, seen: Observations, lengths: Floats) -> Observations:
+        """Observations in metres from the origin if a unit of the picture has `lengths` (T,) metres."""
+        return Observations((seen.uv - self.origin) * lengths[:, None, None], seen.sd * lengths[:, None])
+
+    def project(self, places: Floats, lengths: Floats) -> Floats:
+        """Picture coordinates (T, J, 2) of places (T, J, 3)."""
+        return np.asarray(places @ self.axes[:2].T / lengths[:, None, None] + self.origin)
+
+    def sight(self, places: Floats) -> Floats:
+        """Direction (3,) of view, the same for all places."""
+        return self.axes[2]
+
+    def lengths(self, seen: Observations, mean: Floats, stature: float) -> Floats:
+        """Guess the lengths (T,) of a unit from the extents of what is seen and of a mean body (J, 3)."""
+        if self.metres is not None:
+            return np.full(len(seen.uv), self.metres)
+        flat = stature * mean @ self.axes[:2].T
+        ratio = np.full(len(seen.uv), np.nan)
+        for t, known in enumerate(seen.seen):
+            if known.sum() >= 3:
+                ratio[t] = _extent(flat[known]) / max(_extent(seen.uv[t, known]), 1e-9)
+        if np.isnan(ratio).all():
+            raise UsageError("no frame has three points from which to tell the scale; give --camera")
+        known = np.flatnonzero(np.isfinite(ratio))
+        if self.steady:
+            return np.full(len(ratio), float(np.median(ratio[known])))
+        return np.asarray(np.interp(np.arange(len(ratio)), known, _smoothed(ratio[known])))
+
+
+View = Perspective | Parallel
+
+
+def _extent(points: Floats) -> float:
+    """Spread of points (n, 2) along their main direction."""
+    return float(np.linalg.norm(points - points.mean(axis=0), ord=2))
+
+
+def _smoothed(values: Floats, reach: int = 15) -> Floats:
+    """Take the running median."""
+    return np.array(
+        [np.median(values[max(0, i - reach) : i + reach + 1]) for i in range(len(values))], np.float64
+    )
+
+
+def looking_along(text: str) -> Floats:
+    """Axes (3, 3) of a view along `x`, `-y` or `1,2,0` of a world with z up: right, down, ahead.
+
+    Raises
+    ------
+    UsageError
+        If it is no direction.
+    """
+    name = text.lstrip("+-")
+    try:
+        ahead = np.array(AXES[name] if name in AXES else [float(v) for v in text.split(",")], float)
+        if ahead.shape != (3,) or not 0 < np.linalg.norm(ahead) < np.inf:
+            raise ValueError
+    except ValueError:
+        raise UsageError(f"--orthographic {text}: give x, y, z, with - the other way, or X,Y,Z") from None
+    ahead = ahead / np.linalg.norm(ahead) * (-1 if name in AXES and text.startswith("-") else 1)
+    right = np.cross(ahead, [0.0, 0, 1])
+    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0, 0])
+    return np.stack([right, np.cross(ahead, right), ahead])

@@ -1,0 +1,474 @@
+"""How keypoints are lifted, and what comes of it.
+
+What lifting refuses: keypoints that show too little, and estimates that are no person.
+
+From keypoints of points in one view to motion in space, by any of four methods.
+
+smooth: one Gaussian over the whole sequence (`gait.lift.sequence`).  blend: overlapping segments estimated
+alone and mixed by triangular weights (Leventon and Freeman 1998).  segment: segments one after another.
+likelihood: as blend, by least squares in the modes instead of the prior, for comparison (their fig. 5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import JOINTS
+from gait.camera.camera import Camera
+from gait.errors import GaitError, UsageError, UserError
+from gait.io.keypoints_file import Keypoints
+from gait.lift.keypoints.observations import LONGEST_GAP, Grid, Observations, interpolated, resampled
+from gait.lift.segment import explain
+from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLifter, Uncertain
+from gait.lift.segment.view import Parallel, Perspective, View
+from gait.lift.smooth import size, smoother
+from gait.lift.smooth.chain import Freedom, blended, in_turn
+from gait.lift.smooth.smoother import Lifted, Seen, Start
+
+Floats = npt.NDArray[np.float64]
+
+FLOOR_SD = 0.03  # metres, of the floor's height
+METHODS = ("smooth", "blend", "segment", "likelihood")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to lift.
+
+    Attributes
+    ----------
+    method : one of METHODS
+    stature : float or None
+        Metres; None: unknown.
+    pixel_sd : float
+        Noise of points seen with full confidence.
+    floor_sd : float
+        How well the ground of the camera's world is where the person stands, metres.
+    contact, bones : bool
+        Feet stay put; bones keep their length.
+    """
+
+    method: str = "smooth"
+    stature: float | None = None
+    pixel_sd: float = 3.0
+    floor_sd: float = FLOOR_SD
+    contact: bool = True
+    bones: bool = True
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Lifted keypoints.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The J markers.
+    places, sd : (T, J, 3)
+        Metres, and posterior standard deviations.
+    rooted_sd : (T, J, 3)
+        Deviations of the places about the middle of the hips.
+    error : (T, P)
+        Distance in the picture from what was seen, pixels; NaN where nothing was.
+    stature : float
+        Metres; of segments alone what was believed.
+    steps : int
+        Iterations over the whole sequence; 0 for segments alone.
+    settled : bool
+    log_volume_ratio : float
+        Logarithm to base 10 of the posterior's volume over the prior's; of segments alone, their mean.
+    uncertain : Uncertain
+        What its segments, each alone, leave open.
+    evidence : float
+        Logarithm of the density of what is seen, but for a constant; NaN for segments alone.
+    chi2_per_observation : float
+        Squared deviations per number seen, about 1; NaN for segments alone.
+    wider : float
+        Factor of the prior's deviations that the keypoints asked for; 1 for motions like those learnt.
+    resized : float
+        Factor by which the fit's size was changed to that of a person; 1 for motions like those learnt.
+    alone : bool
+        Whether the motion was so unlike those learnt that its segments were estimated alone instead.
+    outliers : (T, P)
+        Points that lost their say because they are far from where the rest has them; none are told of
+        segments alone.
+    """
+
+    names: tuple[str, ...]
+    places: Floats
+    sd: Floats
+    rooted_sd: Floats
+    error: Floats
+    stature: float
+    steps: int
+    settled: bool
+    log_volume_ratio: float
+    uncertain: Uncertain
+    evidence: float = float("nan")
+    chi2_per_observation: float = float("nan")
+    wider: float = 1.0
+    resized: float = 1.0
+    alone: bool = False
+    outliers: npt.NDArray[np.bool_] | None = None
+
+
+class Unlike(UserError):
+    """The keypoints show a motion unlike the prior's: a wider prior may do."""
+
+
+HIGH = (
+    4.0  # times the distance that the person's size in the picture tells: no lens that sees feet is so high
+)
+SIZES = (0.6, 1.6)  # of the usual extent: no person is smaller or larger
+
+
+def require_metres(
+    camera: Camera, keypoints: Keypoints, prior: SegmentPrior, stature: float, options: Options
+) -> None:
+    """Refuse a camera that stands far higher than the person is away: its t is no metres."""
+    points = Observations(keypoints.uv, keypoints.deviations(options.pixel_sd))
+    seen = points.among(prior.index(keypoints.names), len(prior.names))
+    flat = Parallel(camera.R, None, np.zeros(2))
+    try:
+        lengths = flat.lengths(seen, prior.mean[0].mean(axis=0), stature)
+    except UsageError:  # too few points at a time to tell a size
+        return
+    away, height = float((camera.fx + camera.fy) / 2 * lengths[0]), float(camera.centre[2])
+    if abs(height) > HIGH * away + stature + 3 * options.floor_sd:
+        raise UserError(
+            f"the camera stands {height:.0f} m over the floor but sees somebody {away:.2g} m away: give its "
+            "t in metres (R, t: world to camera, z up, floor at z = 0)"
+        )
+
+
+def require_seen(found: list[list[Explanation]], grid: Grid, keypoints: Keypoints, alone: bool) -> None:
+    """Refuse keypoints that show next to nothing, or nothing in a segment if each is estimated `alone`."""
+    if not any(found):
+        step = float(np.median(np.diff(keypoints.time[keypoints.seen.any(axis=1)], append=np.inf)))
+        if LONGEST_GAP <= step < np.inf:
+            raise UserError(
+                f"{1 / step:.2g} frames per second with points are too few to follow a motion; give "
+                f"{np.ceil(1 / LONGEST_GAP):.0f} or more (and check time: seconds)"
+            )
+        raise UserError(f"fewer than {FEWEST} points are seen in every segment; give more of the keypoints")
+    empty = next((s for s, choices in enumerate(found) if not choices), None)
+    if alone and empty is not None:
+        at = grid.time[empty * grid.frames]
+        raise UserError(f"next to nothing is seen from {at:.2f} s on; use --method smooth across the gap")
+
+
+def require_size(places: Floats, prior: SegmentPrior, stature: float) -> None:
+    """Refuse an estimate that shrank or grew to fit a motion unlike the prior's."""
+    ratio = _extent(places) / (stature * _extent(prior.mean[0]))
+    if not SIZES[0] < ratio < SIZES[1]:
+        raise Unlike(
+            f"the estimate came out {ratio:.2f} times a person's size: the motion is unlike the model's, or "
+            "the camera wrong (R, t: world to camera, t in metres?); learn a model with such motions, or use "
+            "--method blend"
+        )
+
+
+def _extent(places: Floats) -> float:
+    """Mean distance of markers (T, J, 3) from their middle."""
+    apart = places - places.mean(axis=1, keepdims=True)
+    return float(np.linalg.norm(apart, axis=2).mean())
+
+
+KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
+ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
+WIDER = (1.0, 2.0, 4.0, 8.0)  # factors of the prior's deviations, tried in turn while the keypoints ask for it
+FLOATS = 4.0  # deviations of the floor's height from which somebody does not stand on it
+POOR_FIT = 1.3  # squared deviations per number seen from which a wider prior is tried
+
+
+def output_names(prior: SegmentPrior, keypoints: Keypoints, everything: bool = False) -> tuple[str, ...]:
+    """Markers to estimate, in the prior's order: joints, those in the keypoints, or all."""
+    return tuple(n for n in prior.names if everything or n in JOINTS or n in keypoints.names)
+
+
+def segments_of(prior: SegmentPrior, keypoints: Keypoints) -> int:
+    """Count the overlapping segments of keypoints."""
+    return Grid.over(keypoints.time, prior).blocks - 1
+
+
+def lift(
+    prior: SegmentPrior,
+    keypoints: Keypoints,
+    view: View,
+    options: Options,
+    names: tuple[str, ...],
+    update: Callable[[int], None] = lambda done: None,
+) -> Motion:
+    """Estimate markers of a prior over all frames of keypoints.
+
+    Raises
+    ------
+    UserError
+        If segments are too short, or too little is seen.
+    """
+    require(prior, keypoints, view, options)
+    prior = prior.restricted(names)
+    grid = Grid.over(keypoints.time, prior)
+    if options.method != "smooth":
+        return _lift(prior, keypoints, view, options, grid, update)
+    best = _widest_needed(prior, keypoints, view, options, grid, update)
+    if best.wider > 1 or not best.settled:
+        return _unlike(prior, keypoints, view, options, grid, best)
+    return best
+
+
+def require(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> None:
+    """Refuse a prior of too short segments, and a camera that is not in metres."""
+    if prior.frames < 4:
+        raise UserError(f"the model's segments have {prior.frames} frames; lifting needs 4 or more")
+    if isinstance(view, Perspective):
+        require_metres(view.camera, keypoints, prior, believed_stature(options, prior.stature)[0], options)
+
+
+def evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options) -> float:
+    """Log density of keypoints by the prior and the smoother, but for a constant; -inf if it refuses them."""
+    names = tuple(name for name in prior.names if name in {*keypoints.names, *smoother.HIPS})
+    smooth = replace(options, method="smooth")
+    try:
+        prior = prior.restricted(names)
+        return _lift(prior, keypoints, view, smooth, Grid.over(keypoints.time, prior), lambda done: None).evidence
+    except UserError:
+        return -np.inf
+
+
+def _widest_needed(
+    prior: SegmentPrior,
+    keypoints: Keypoints,
+    view: View,
+    options: Options,
+    grid: Grid,
+    update: Callable[[int], None],
+) -> Motion:
+    """Estimate by the prior, or by a wider one if the keypoints ask for it."""
+    best: Motion | None = None
+    refused: Unlike | None = None
+    for wider in WIDER:
+        try:
+            found = _lift(prior.widened(wider), keypoints, view, options, grid, update)
+        except Unlike as error:
+            refused = refused or error
+            if best is None:
+                continue
+            break
+        if best is not None and found.evidence <= best.evidence:
+            break
+        best = replace(found, wider=wider)
+        if not found.chi2_per_observation > POOR_FIT:
+            break
+    if best is None:
+        assert refused is not None
+        raise refused
+    return best
+
+
+def _unlike(
+    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options, grid: Grid, found: Motion
+) -> Motion:
+    """Estimate a motion that the prior does not know by its segments alone: a chain of them goes astray.
+
+    Size and deviations are by the bones and by the chi2 of the whole, which the segments do not know.
+    """
+    try:
+        alone = _lift(prior, keypoints, view, replace(options, method="blend"), grid, lambda done: None)
+    except UserError:  # segments in which next to nothing is seen
+        return found
+    chi2 = max(found.chi2_per_observation, 1.0) * found.wider**2
+    sized = _sized(prior, keypoints, view, options, alone, chi2)
+    return replace(
+        alone,
+        places=sized.places,
+        sd=sized.sd,
+        rooted_sd=sized.rooted_sd,
+        evidence=found.evidence,
+        chi2_per_observation=found.chi2_per_observation,
+        wider=found.wider,
+        resized=sized.factor,
+        outliers=found.outliers,
+        alone=True,
+    )
+
+
+@contextmanager
+def _numbers_in_range() -> Iterator[None]:
+    """Unlike if numbers leave their range on the way."""
+    try:
+        yield
+    except (np.linalg.LinAlgError, GaitError):
+        raise Unlike(
+            "the keypoints look like no motion that the model knows; check the camera, the points' names and "
+            "that v points down"
+        ) from None
+
+
+@_numbers_in_range()
+def _lift(
+    prior: SegmentPrior,
+    keypoints: Keypoints,
+    view: View,
+    options: Options,
+    grid: Grid,
+    update: Callable[[int], None],
+) -> Motion:
+    """Estimate all markers of a prior."""
+    markers = prior.index(keypoints.names)
+    points = Observations(keypoints.uv, keypoints.deviations(options.pixel_sd))
+    sampled = resampled(points, keypoints.time, grid.time).among(markers, len(prior.names))
+    stature, stature_sd = believed_stature(options, prior.stature)
+    lengths = np.ones(len(grid.time))
+    if isinstance(view, Parallel):
+        lengths = view.lengths(sampled, prior.mean[0].mean(axis=0), stature)
+        sampled = view.metric(sampled, lengths)
+    # a start must not shrink a motion that does not fit: its noise in the picture would grow
+    start_sd = 0.0 if options.method == "smooth" else stature_sd
+    lifter = SegmentLifter(prior, view, stature, start_sd)
+    found = explain.explanations(lifter, prior, sampled, update)
+    require_seen(found, grid, keypoints, alone=options.method != "smooth")
+    course = explain.course(found)
+    if options.method == "likelihood":
+        fits = explain.without_prior(prior, view, stature, start_sd, course)
+    else:
+        fits = [lifter.solve(each) for each in course]
+    if options.method != "smooth":
+        return _alone(prior, fits, keypoints, view, grid, lengths, stature, options.method != "segment")
+    first = Start(
+        heading=np.array([fit.heading for fit in fits]),
+        component=np.array([fit.component for fit in fits]),
+        stature=stature,
+        places=blended(np.stack([fit.places for fit in fits]), grid.frames),
+        lengths=lengths,
+    )
+    freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
+    seen = Seen(keypoints.time, points, markers)
+    found_motion = smoother.smooth(
+        prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
+    )
+    sized = _sized(prior, keypoints, view, options, found_motion, found_motion.chi2_per_observation)
+    places = sized.places
+    require_size(places, prior, stature)
+    error = _error(view, places[:, markers], found_motion.lengths, keypoints.uv)
+    return Motion(
+        prior.names,
+        places if view.grounded else _on_floor(places, prior),
+        sized.sd,
+        sized.rooted_sd,
+        error,
+        found_motion.stature,
+        found_motion.steps,
+        found_motion.settled,
+        found_motion.log_volume_ratio,
+        explain.summarise(fits, view),
+        found_motion.evidence,
+        found_motion.chi2_per_observation,
+        resized=sized.factor,
+        outliers=found_motion.outliers,
+    )
+
+
+def believed_stature(options: Options, usual: float) -> tuple[float, float]:
+    """Give the stature before anything is seen and how well it is known, metres; `usual`: of people."""
+    return options.stature or usual, KNOWN_SD if options.stature else PEOPLE_SD
+
+
+def _sized(
+    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options, found: Lifted | Motion, chi2: float
+) -> size.Resized:
+    """Give the estimate a person's size if it has none; only a lens leaves it open.
+
+    One that fits and stands on the floor is of its prior's kind, and prior and floor know more of its size
+    than the bones do, unless joints that nobody sees were put there by the prior to suit them.
+    """
+    fitted = size.Resized(found.places, found.sd, found.rooted_sd)
+    if isinstance(view, Parallel) or not options.bones:
+        return size.widened(fitted, chi2)
+    stature, stature_sd = believed_stature(options, prior.stature)
+    own = float(np.hypot(stature_sd / stature, size.PROPORTION_SD))
+    ratio = size.bones_ratio(prior, found.places, stature)
+    floats = abs(_height(found.places, prior)) > FLOATS * options.floor_sd
+    limit = size.UNLIKELY if chi2 > POOR_FIT or floats else size.IMPOSSIBLE
+    sized = size.resized(fitted, view.camera, ratio, own, chi2, limit)
+    if sized.factor != 1 or size.tells_distance(keypoints):
+        return sized
+    return size.of_any_size(sized, view.camera, own)
+
+
+def _alone(
+    prior: SegmentPrior,
+    fits: list[SegmentFit],
+    keypoints: Keypoints,
+    view: View,
+    grid: Grid,
+    lengths: Floats,
+    stature: float,
+    blend: bool,
+) -> Motion:
+    """Segments estimated alone, mixed or one after another."""
+    places, spread = np.stack([fit.places for fit in fits]), np.stack([fit.sd for fit in fits])
+    join = blended if blend else in_turn
+    at = grid.between(keypoints.time)
+    placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
+    markers = prior.index(keypoints.names)
+    rooted, about_hips = places, spread
+    if set(smoother.HIPS) <= set(prior.names):
+        hips = prior.index(smoother.HIPS)
+        rooted = places - places[:, :, hips].mean(axis=2, keepdims=True)
+        about_hips = np.stack([fit.rooted_sd(hips) for fit in fits])
+    sd, rooted_sd = (
+        interpolated(_mixed(*of, join, grid.frames), at[0], np.abs(at[1]))
+        for of in ((places, spread), (rooted, about_hips))
+    )
+    return Motion(
+        names=prior.names,
+        places=placed if view.grounded else _on_floor(placed, prior),
+        sd=sd,
+        rooted_sd=rooted_sd,
+        error=_error(view, placed[:, markers], scale, keypoints.uv),
+        stature=stature,
+        steps=0,
+        settled=True,
+        log_volume_ratio=float(np.mean([fit.log10_volume for fit in fits])),
+        uncertain=explain.summarise(fits, view),
+    )
+
+
+def _mixed(places: Floats, sd: Floats, join: Callable[[Floats, int], Floats], half: int) -> Floats:
+    """Deviations of overlapping segments that are mixed.
+
+    Neighbours see the same points: together they are no surer than alone, and where they differ less sure.
+    """
+    apart = join(places**2, half) - join(places, half) ** 2
+    return np.asarray(np.sqrt(join(sd, half) ** 2 + np.maximum(apart, 0.0)))
+
+
+def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:
+    """Distance of places (T, P, 3) in the picture from uv (T, P, 2); without a camera but for a shift."""
+    miss = view.project(places, lengths) - uv
+    if not view.grounded:
+        seen = np.isfinite(miss).all(axis=2, keepdims=True)
+        total = np.where(seen, miss, 0).sum(axis=1, keepdims=True)
+        miss = miss - total / np.maximum(seen.sum(axis=1, keepdims=True), 1)
+    return np.asarray(np.linalg.norm(miss, axis=2))
+
+
+def _on_floor(places: Floats, prior: SegmentPrior) -> Floats:
+    """Shift a motion of unknown height so that its lowest feet are on the floor."""
+    return places - np.array([0.0, 0.0, _height(places, prior)])
+
+
+def _height(places: Floats, prior: SegmentPrior) -> float:
+    """How high over the floor the lowest feet stand, metres; 0 without feet."""
+    feet = [i for i, name in enumerate(prior.names) if name.endswith(("_toe", "_heel", "_ankle"))]
+    if not feet:
+        return 0.0
+    lowest = prior.stature * prior.mean[:, :, feet, 2].min()
+    return float(np.quantile(places[:, feet, 2].min(axis=1), 0.1) - lowest)

@@ -1,0 +1,341 @@
+"""Motion of a whole sequence from 2-D keypoints: the exact Gaussian smoother over overlapping segments.
+
+The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints (`gait.lift.soft_constraints`), all
+linear in the places of the markers on a time grid of the prior's rate; places between its frames are
+interpolated.  What is not linear (perspective, headings, stature, lengths of bones) is linearised again
+around each estimate until it stays (Gauss-Newton).  Standard deviations are those of the last linear problem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.bindings.lifter import weight_outliers
+from gait.bindings.segment_prior import SegmentPrior
+from gait.lift.keypoints.observations import Grid, Observations, interpolated
+from gait.lift.segment.view import Parallel, View
+from gait.lift.smooth import block_arrowhead, soft_constraints
+from gait.lift.smooth.block_arrowhead import Information
+from gait.lift.smooth.chain import Around, Chain, Freedom, blended, chain, moved, overlapping
+from gait.lift.smooth.rows import rows_of, scale_free
+from gait.lift.smooth.soft_constraints import Layout, Rows
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+HIPS = ("l_hip", "r_hip")
+MOST_STEPS = 25
+SETTLED = 5e-4  # metres, rms change of the places at which the iteration stops
+FREE_STEPS = 3  # first steps, without constraints on feet and bones
+DRIFT = 5e-4  # relative change of the scale's change from one frame to the next
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen of a sequence.
+
+    Attributes
+    ----------
+    time : (T,)
+        Seconds.
+    points : Observations
+        Of T frames and P points.
+    markers : (P,)
+        Which marker of the prior each point is.
+    """
+
+    time: Floats
+    points: Observations
+    markers: Ints
+
+
+@dataclass(frozen=True)
+class Start:
+    """First guess on the grid of B blocks: see `Around`; `lengths` (grid,) of a unit of the picture."""
+
+    heading: Floats
+    component: Ints
+    stature: float
+    places: Floats
+    lengths: Floats
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """Estimated motion.
+
+    Attributes
+    ----------
+    places, sd : (T, J, 3)
+        Metres at the frames of the video, and standard deviations.
+    rooted_sd : (T, J, 3)
+        Standard deviations of the places about the middle of the hips.
+    grid : (grid, J, 3)
+        Places at the frames of the prior's rate.
+    heading : (S,)
+        Of the segments, radians.
+    stature : float
+    lengths : (T,)
+        Metres of a unit of the picture, where the view has a scale.
+    contact : (grid - 1, feet)
+        How sure feet are to stand.
+    steps : int
+        Iterations.
+    settled : bool
+        Whether they came to rest.
+    log_volume_ratio : float
+        Logarithm to base 10 of the posterior's volume over the prior's.
+    evidence : float
+        Logarithm of the density of what is seen, without the soft constraints, but for a constant.
+    outliers : (T, P)
+        Outliers, which were down-weighted.
+    chi2_per_observation : float
+        Squared deviations per number seen; about 1 if the motion is of the prior's kind, more if it is not.
+    """
+
+    places: Floats
+    sd: Floats
+    rooted_sd: Floats
+    grid: Floats
+    heading: Floats
+    stature: float
+    lengths: Floats
+    contact: Floats
+    steps: int
+    settled: bool
+    log_volume_ratio: float
+    evidence: float
+    outliers: npt.NDArray[np.bool_]
+    chi2_per_observation: float
+
+
+def smooth(
+    prior: SegmentPrior,
+    seen: Seen,
+    view: View,
+    freedom: Freedom,
+    start: Start,
+    *,
+    contact: bool = True,
+    bones: bool = True,
+) -> Lifted:
+    """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
+    unit = float(np.mean(start.lengths)) if view.scaled else None
+    problem = _Problem(prior, seen, view, freedom, unit, contact, bones)
+    around = problem.around(start.heading, start.component, start.stature, start.places)
+    state = _State(around, start.places, start.lengths, 0)
+    settled = False
+    while not settled and state.steps < MOST_STEPS:
+        problem.weight(state)
+        before, state = state, problem.step(state, constrained=state.steps >= FREE_STEPS)
+        settled = state.steps > FREE_STEPS and _change(state.places - before.places) < SETTLED
+    return problem.result(state, settled)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Estimate on the grid, and the steps that it took."""
+
+    around: Around
+    places: Floats
+    lengths: Floats
+    steps: int
+
+
+@dataclass(frozen=True)
+class _System:
+    """One linear problem."""
+
+    found: block_arrowhead.Solution
+    information: Information
+    chain: Chain
+    fit: float  #: y' W y of what is seen
+
+    @property
+    def log_volume_ratio(self) -> float:
+        """Logarithm to base 10 of the posterior's volume over the prior's."""
+        return (self.chain.log_det - self.found.log_det) / 2 / float(np.log(10))
+
+    @property
+    def square(self) -> float:
+        """Squared deviations of what is seen and of the motion from the prior, at the mean.
+
+        Raises
+        ------
+        LinAlgError
+            What is seen is so far from the prior that their difference has lost its digits.
+        """
+        explained = (self.information.vector * self.found.blocks).sum()
+        explained += self.information.edge @ self.found.lasting
+        square = self.fit + self.chain.constant - float(explained)
+        if not square > -1:  # none is below zero but for rounding
+            raise np.linalg.LinAlgError("squared deviations are negative")
+        return max(square, 0.0)
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the density of what is seen but for a constant, by Laplace's method."""
+        return 0.5 * (self.chain.log_det - self.found.log_det - self.square)
+
+
+class _Problem:
+    """Prior, observations and constraints of one sequence."""
+
+    def __init__(
+        self,
+        prior: SegmentPrior,
+        seen: Seen,
+        view: View,
+        freedom: Freedom,
+        unit: float | None,
+        contact: bool = False,
+        bones: bool = False,
+    ) -> None:
+        self.prior, self.seen, self.view, self.freedom = prior, seen, view, freedom
+        self.contact, self.bones = contact, bones
+        self.points = seen.points
+        self.grid = Grid.over(seen.time, prior)
+        self.at = self.grid.between(seen.time)
+        self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit)
+
+    def around(self, heading: Floats, component: Ints, stature: float, places: Floats) -> Around:
+        """Say what the chain is linearised around."""
+        around = overlapping(places, self.grid.frames)
+        return Around(heading, component, stature, around, around)
+
+    def weight(self, state: _State) -> None:
+        """Down-weight points that are far from an estimate."""
+        places = self._at_video(state.places)[:, self.seen.markers]
+        self.points = weighted(self.seen.points, self.view.project(places, self._at_video(state.lengths)))
+
+    def system(self, state: _State, constrained: bool) -> _System:
+        """Linear problem around an estimate."""
+        prior = chain(self.prior, state.around, self.freedom)
+        shape = blended(state.around.places, self.grid.frames)
+        rows = Rows(self.layout)
+        self._observe(rows, shape, state)
+        if constrained and self.contact:
+            soft_constraints.contacts(rows, self.prior.names, shape, self.grid.rate)
+        if constrained and self.bones:
+            soft_constraints.bones(rows, self.prior.names, shape)
+        diagonal, below, vector, fit = rows.normal()
+        own, used = prior.information, prior.information.diagonal.shape[1]
+        diagonal[:, :used, :used] += own.diagonal
+        below[:, :used, :used] += own.below
+        vector[:, :used] += own.vector
+        border = np.pad(own.border, ((0, 0), (0, diagonal.shape[1] - used), (0, 0)))
+        information = Information(diagonal, below, border, own.corner, vector, own.edge)
+        return _System(block_arrowhead.solve(information), information, prior, fit)
+
+    def _observe(self, rows: Rows, shape: Floats, state: _State) -> None:
+        near, scale = self._at_video(shape), self._at_video(state.lengths)
+        guess = self._at_video(state.places)[:, self.seen.markers]
+        seen = rows_of(self.view, self.points, near[:, self.seen.markers], scale, guess)
+        if not len(seen.frame):
+            raise np.linalg.LinAlgError("no point is before the lens")
+        factors = None
+        if isinstance(self.view, Parallel) and self.view.scaled:
+            seen, factors = scale_free(seen, near[:, self.seen.markers], scale)
+            soft_constraints.steady_lengths(rows, state.lengths, None if self.view.steady else DRIFT)
+        soft_constraints.observe(rows, seen, self.seen.markers, self.at, factors)
+
+    def _at_video(self, values: Floats) -> Floats:
+        """Interpolate values (grid, ...) at the frames of the video."""
+        return interpolated(values, *self.at)
+
+    def step(self, state: _State, constrained: bool) -> _State:
+        """Estimate by the linear problem around another."""
+        found = self.system(state, constrained).found
+        places = self.layout.places(found.blocks)
+        lengths = self.layout.lengths(found.blocks) if self.view.scaled else state.lengths
+        around = moved(self.prior, state.around, self.freedom, places, found.lasting)
+        return _State(around, places, lengths, state.steps + 1)
+
+    def result(self, state: _State, settled: bool) -> Lifted:
+        """Covariances and figures of the last estimate."""
+        system = self.system(state, constrained=True)
+        bare = self.system(state, constrained=False)
+        around, places = state.around, state.places
+        diagonal, across = system.found.covariance()
+        every = np.arange(self.layout.markers)
+        sure = soft_constraints.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
+        return Lifted(
+            places=self._at_video(places),
+            sd=_deviations(self._covariances(diagonal, across, every, every)),
+            rooted_sd=_deviations(self._rooted(diagonal, across)),
+            grid=places,
+            heading=around.heading,
+            stature=around.stature,
+            lengths=self._at_video(state.lengths),
+            contact=sure if self.contact else np.zeros_like(sure),
+            steps=state.steps,
+            settled=settled,
+            log_volume_ratio=bare.log_volume_ratio,
+            evidence=bare.evidence - _cost(self.seen.points, self.points),
+            outliers=self.points.sd > self.seen.points.sd,
+            chi2_per_observation=bare.square / max(2 * int(self.seen.points.seen.sum()), 1),
+        )
+
+    def _rooted(self, diagonal: Floats, across: Floats) -> Floats:
+        """Variances (T, J, 3) of places about the middle of the hips; of places if there are no hips."""
+        every = np.arange(self.layout.markers)
+        own = self._covariances(diagonal, across, every, every)
+        if not set(HIPS) <= set(self.prior.names):
+            return own
+        left, right = self.prior.index(HIPS)
+        with_left, with_right = (
+            self._covariances(diagonal, across, every, np.full_like(every, hip)) for hip in (left, right)
+        )
+        with_both = with_left + with_right
+        middle = with_both[:, [left, right]].sum(axis=1, keepdims=True) / 4
+        return np.asarray(own + middle - with_both)
+
+    def _covariances(self, diagonal: Floats, across: Floats, first: Ints, second: Ints) -> Floats:
+        """Covariances (T, n, 3) by coordinate of interpolated places of markers (n,) with others (n,)."""
+        frames, weights = self.at
+        layout, axes = self.layout, np.arange(3)
+        total = np.zeros((len(frames), len(first), 3))
+        for i in range(frames.shape[1]):
+            for k in range(frames.shape[1]):
+                (s, row), (o, column) = (
+                    np.divmod(layout.place(frames[:, [at]], markers)[..., None] + axes, layout.size)
+                    for at, markers in ((i, first), (k, second))
+                )
+                low, high = np.minimum(s, o), np.maximum(s, o)
+                later, sooner = np.where(s >= o, row, column), np.where(s >= o, column, row)
+                value = np.where(
+                    low == high,
+                    diagonal[high, later, sooner],
+                    across[np.minimum(low, len(across) - 1), later, sooner],
+                )
+                total += (weights[:, i] * weights[:, k])[:, None, None] * value
+        return total
+
+
+def weighted(points: Observations, predicted: Floats) -> Observations:
+    """Points with larger deviations where they are far from their predictions (T, P, 2)."""
+    sd = points.sd.copy()
+    square = np.sum((points.uv - predicted) ** 2, axis=2) / sd**2
+    for t, seen in enumerate(points.seen):
+        if seen.any():
+            sd[t, seen] = weight_outliers(square[t, seen], sd[t, seen])
+    return Observations(points.uv, sd)
+
+
+def _cost(points: Observations, trusted: Observations) -> float:
+    """Logarithm of the points' density that larger deviations cost: two coordinates each."""
+    seen = points.seen
+    return 2 * float(np.log(trusted.sd[seen] / points.sd[seen]).sum())
+
+
+def _deviations(variances: Floats) -> Floats:
+    """Square roots of variances, none of which is below zero but for rounding."""
+    return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
+
+
+def _change(difference: Floats) -> float:
+    """Rms of a change (grid, J, 3) but for that of the whole sequence, which a far view does not tell."""
+    return float(np.sqrt(np.mean((difference - difference.mean(axis=(0, 1))) ** 2)))

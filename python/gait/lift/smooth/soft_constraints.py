@@ -1,0 +1,241 @@
+"""Soft linear constraints on a sequence: observations, feet that stay put, bones of constant length.
+
+All are rows of `A x = y` with a standard deviation each; every row touches frames of two neighbouring blocks
+at most, so that A' W A is block-block_arrowhead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from gait.lift.smooth import rows as view_rows
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+FEET = ("l_toe", "r_toe", "l_heel", "r_heel")
+TRUNK = ("pelvis", "neck")
+CONTACT_SPEED = 0.2  # m/s: a foot on the ground is slower
+CONTACT_RISE = 0.04  # metres over its lowest place that a foot on the ground may be
+CONTACT_SD = 0.1  # m/s, of a foot on the ground
+BONES = (
+    *(
+        (f"{s}_{upper}", f"{s}_{lower}")
+        for s in "lr"
+        for upper, lower in (("hip", "knee"), ("knee", "ankle"))
+    ),
+    *((f"{s}_shoulder", f"{s}_elbow") for s in "lr"),
+    *((f"{s}_elbow", f"{s}_wrist") for s in "lr"),
+    *((f"{s}_ankle", f"{s}_toe") for s in "lr"),
+    ("l_hip", "r_hip"),
+    ("l_shoulder", "r_shoulder"),
+)
+WEAK = 10.0  # relative deviation of a scale from its guess: as good as free
+FIXED = 1e-4  # relative change of a scale that does not change
+LEAST_SURE = 0.05  # that a foot stands, to matter
+SHORTEST = 0.02  # metres, of a bone
+BONE_SD = 0.01  # relative change of a length from one frame to the next
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where numbers of a sequence are: blocks of b frames of J markers, then b lengths if the scale is open.
+
+    Attributes
+    ----------
+    blocks, frames, markers : int
+        B, b, J.
+    unit : float or None
+        Metres in which lengths of a unit of the picture count, one per frame; None: there are none.
+    """
+
+    blocks: int
+    frames: int
+    markers: int
+    unit: float | None
+
+    @property
+    def size(self) -> int:
+        """Numbers of a block."""
+        return self.frames * (3 * self.markers + (self.unit is not None))
+
+    @property
+    def grid(self) -> int:
+        """Frames of the sequence."""
+        return self.blocks * self.frames
+
+    def place(self, frame: Ints, marker: Ints | int) -> Ints:
+        """Index of a marker's x; y and z follow."""
+        block, inside = np.divmod(frame, self.frames)
+        return np.asarray(block * self.size + 3 * (inside * self.markers + marker))
+
+    def length(self, frame: Ints) -> Ints:
+        """Index of a frame's length of a unit of the picture."""
+        block, inside = np.divmod(frame, self.frames)
+        return np.asarray(block * self.size + 3 * self.frames * self.markers + inside)
+
+    def places(self, values: Floats) -> Floats:
+        """Places (grid, J, 3) out of values (B, size)."""
+        used = 3 * self.frames * self.markers
+        return values[:, :used].reshape(self.grid, self.markers, 3)
+
+    def lengths(self, values: Floats) -> Floats:
+        """Lengths (grid,) out of values (B, size), metres; `unit` must be known."""
+        assert self.unit is not None
+        return self.unit * values[:, 3 * self.frames * self.markers :].reshape(-1)
+
+
+class Rows:
+    """Collects rows; `normal` gives A' W A and A' W y in blocks."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self._entries: list[tuple[Ints, Ints, Floats]] = []
+        self._right: list[Floats] = []
+        self._weight: list[Floats] = []
+        self._count = 0
+
+    def add(self, columns: Ints, factors: Floats, right: Floats, sd: Floats) -> None:
+        """Add R rows: columns and factors (R, c), right-hand sides and standard deviations (R,)."""
+        rows = self._count + np.repeat(np.arange(len(columns)), columns.shape[1])
+        self._entries.append((rows, columns.ravel(), factors.ravel()))
+        self._right.append(right)
+        self._weight.append(1 / sd**2)
+        self._count += len(columns)
+
+    def normal(self) -> tuple[Floats, Floats, Floats, float]:
+        """Blocks of A' W A (B, n, n), those below (B - 1, n, n), A' W y (B, n), and y' W y."""
+        layout = self.layout
+        total = layout.blocks * layout.size
+        diagonal = np.zeros((layout.blocks, layout.size, layout.size))
+        below = np.zeros((layout.blocks - 1, layout.size, layout.size))
+        if not self._count:
+            return diagonal, below, np.zeros((layout.blocks, layout.size)), 0.0
+        rows, columns, factors = (np.concatenate(part) for part in zip(*self._entries, strict=True))
+        right, weight = np.concatenate(self._right), np.concatenate(self._weight)
+        matrix = sparse.csr_matrix((factors, (rows, columns)), shape=(self._count, total))
+        weighted = sparse.diags(weight) @ matrix
+        normal = sparse.coo_matrix(matrix.T @ weighted)
+        (at, inside), (other, across) = (np.divmod(i, layout.size) for i in (normal.row, normal.col))
+        same, next_ = at == other, at == other + 1
+        diagonal[at[same], inside[same], across[same]] = normal.data[same]
+        below[other[next_], inside[next_], across[next_]] = normal.data[next_]
+        vector = (weighted.T @ right).reshape(layout.blocks, layout.size)
+        return diagonal, below, vector, float(right @ (weight * right))
+
+
+def observe(
+    rows: Rows, seen: view_rows.Rows, markers: Ints, at: tuple[Ints, Floats], scale: Floats | None
+) -> None:
+    """Add what is seen.
+
+    Parameters
+    ----------
+    seen : gait.lift.observe.Rows
+        Of T frames and P points.
+    markers : (P,)
+        Which marker each point is.
+    at : (T, w) and (T, w)
+        Frames of the grid and weights that give the places at the frames of the video.
+    scale : (n, 2) or None
+        Factors of the length of a unit of the picture, if that is unknown.
+    """
+    frames, weights = at[0][seen.frame], at[1][seen.frame]
+    columns = rows.layout.place(frames, markers[seen.marker][:, None])[..., None] + np.arange(3)
+    columns = columns.reshape(len(frames), -1)
+    if scale is not None:
+        columns = np.hstack([columns, rows.layout.length(frames)])
+    for k in range(2):
+        factors = (weights[..., None] * seen.direction[:, k, None]).reshape(len(frames), -1)
+        if scale is not None:
+            factors = np.hstack([factors, weights * scale[:, k, None] * (rows.layout.unit or 1.0)])
+        rows.add(columns, factors, seen.value[:, k], np.sqrt(seen.variance[:, k]))
+
+
+def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> Floats:
+    """Let feet that are low and slow in `places` (grid, J, 3) stay put.
+
+    Speeds count in lengths of the trunk per second: in metres a smaller body would have slower feet, and the
+    fit would shrink it.
+
+    Returns
+    -------
+    sure : (grid - 1, feet)
+        How sure a foot stands from each frame to the next, from 0 to 1.
+    """
+    feet = np.array([names.index(name) for name in FEET if name in names], np.intp)
+    if not len(feet):
+        return np.zeros((len(places) - 1, 0))
+    sure = _contact(places[:, feet], rate)
+    frame, foot = np.nonzero(sure > LEAST_SURE)
+    first = rows.layout.place(frame, feet[foot])
+    then = rows.layout.place(frame + 1, feet[foot])
+    sd = CONTACT_SD / rate / np.sqrt(sure[frame, foot])
+    moved = places[frame + 1, feet[foot]] - places[frame, feet[foot]]
+    size, across = _trunk(rows.layout, names, places, frame)
+    for axis in range(3):
+        columns = np.column_stack([first + axis, then + axis, size])
+        factors = np.column_stack([np.tile([-1.0, 1.0], (len(frame), 1)), -moved[:, [axis]] * across])
+        rows.add(columns, factors, -moved[:, axis] * bool(size.size), sd)
+    return sure
+
+
+def _contact(feet: Floats, rate: float) -> Floats:
+    """How sure feet (grid, P, 3) stand from each frame to the next, from 0 to 1."""
+    speed = np.linalg.norm(np.diff(feet, axis=0), axis=2) * rate
+    lowest = np.quantile(feet[..., 2], 0.05, axis=0)
+    rise = np.maximum(feet[:-1, :, 2], feet[1:, :, 2]) - lowest
+    return np.asarray(1 / (1 + (speed / CONTACT_SPEED) ** 4) / (1 + (rise / CONTACT_RISE) ** 4))
+
+
+def _trunk(layout: Layout, names: Sequence[str], places: Floats, frame: Ints) -> tuple[Ints, Floats]:
+    """Columns and factors (n, 6) of the trunk's length over its present one; none if it is not known."""
+    if not set(TRUNK) <= set(names):
+        return np.zeros((len(frame), 0), np.intp), np.zeros((len(frame), 0))
+    ends = [names.index(name) for name in TRUNK]
+    along = places[frame, ends[1]] - places[frame, ends[0]]
+    along /= np.sum(along**2, axis=1, keepdims=True)
+    columns = [layout.place(frame, end)[:, None] + np.arange(3) for end in ends]
+    return np.hstack(columns), np.hstack([-along, along])
+
+
+def bones(rows: Rows, names: Sequence[str], places: Floats) -> None:
+    """Let the logarithms of bones' lengths stay as they are, linearised at `places` (grid, J, 3)."""
+    pairs = np.array([[names.index(n) for n in bone] for bone in BONES if set(bone) <= set(names)], np.intp)
+    if not len(pairs):
+        return
+    along = places[:, pairs[:, 1]] - places[:, pairs[:, 0]]
+    length = np.maximum(np.linalg.norm(along, axis=2), SHORTEST)
+    slope = along / length[..., None] ** 2
+    frame, bone = (part.ravel() for part in np.indices((len(places) - 1, len(pairs))))
+    columns, factors = [], []
+    for step, sign in ((0, -1.0), (1, 1.0)):
+        for end in (0, 1):
+            start = rows.layout.place(frame + step, pairs[bone, end])
+            columns.append(start[:, None] + np.arange(3))
+            factors.append(sign * (1.0 if end else -1.0) * slope[frame + step, bone])
+    # each side is log L about L: log L' + slope (D - D') with slope D' = 1, which cancels
+    right = np.log(length[frame, bone] / length[frame + 1, bone])
+    rows.add(np.hstack(columns), np.hstack(factors), right, np.full(len(frame), BONE_SD))
+
+
+def steady_lengths(rows: Rows, lengths: Floats, drift: float | None) -> None:
+    """Tie the lengths (grid,) of a unit of the picture to each other.
+
+    Parameters
+    ----------
+    drift : float or None
+        Relative standard deviation of the change of their change from frame to frame; None: all are equal.
+    """
+    grid, guess = rows.layout.grid, lengths / (rows.layout.unit or 1.0)
+    at = rows.layout.length(np.arange(grid))
+    rows.add(at[:, None], np.ones((grid, 1)), guess, np.full(grid, WEAK))
+    factors, sd = ([-1.0, 1.0], FIXED) if drift is None else ([1.0, -2.0, 1.0], drift)
+    count = grid - len(factors) + 1
+    columns = np.stack([at[i : i + count] for i in range(len(factors))], axis=1)
+    rows.add(columns, np.tile(factors, (count, 1)), np.zeros(count), np.full(count, sd))

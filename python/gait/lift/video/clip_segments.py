@@ -1,0 +1,223 @@
+"""The segments of a clip: which frames each covers, and its energy there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import make_interp_spline
+
+from gait.bindings.segment_prior import SegmentPrior
+from gait.lift.video import sensors
+from gait.lift.video.corrections import HEIGHT_SD, Correction, PhasePrior, Placement
+from gait.lift.video.energy import (
+    EXTRA,
+    GAIN,
+    HEADING,
+    LEVEL,
+    PLACE,
+    Anchor,
+    Corrections,
+    Energy,
+    Reading,
+    Shape,
+    Sticks,
+)
+from gait.lift.video.sensors import Film, View
+
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+FAR = 10.0  # metres: a segment may start anywhere on the ground
+TURN = 10.0  # radians: and look anywhere
+CORRELATED = 6.0  # root of the sensors, or of the markers shared by segments, that count as one reading
+BODY = 0.01  # metres: where a joint is in a clothed body is seen no better, the whole segment long
+FIRST_SD = 1.0  # of a sensor, before anything is known
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How sensors count and segments are joined.
+
+    Attributes
+    ----------
+    sensor_sd : float, optional
+        Deviation of a sensor; infinite leaves the sensors out.  If not given it is found from the clip:
+        `CORRELATED` times the rms difference of the sensors and the figure, because neighbours in the grid
+        and in time err alike.
+    gain, level : (float, float)
+        Mean and deviation of the logarithm of what a figure adds to a sensor, and of what the scene does.
+    joined : bool
+        Segments are solved together; else one after the other, as in the paper.
+    """
+
+    sensor_sd: float | None = None
+    gain: tuple[float, float] = (-0.2, 0.4)
+    level: tuple[float, float] = (0.5, 1.0)
+    joined: bool = True
+
+
+@dataclass(frozen=True)
+class ClipSegments:
+    """Segments every hop that cover a film, the first of them (`origin`) at the placement's frame.
+
+    Attributes
+    ----------
+    prior : SegmentPrior
+    view : View
+    film : Film
+        Frame times count even where the sensors are left out.
+    placement : Placement
+    corrections : sequence of Correction
+    settings : Settings
+    phase_prior : PhasePrior, optional
+        What a phase of walking says about the first segment.
+    """
+
+    prior: SegmentPrior
+    view: View
+    film: Film
+    placement: Placement
+    corrections: Sequence[Correction]
+    settings: Settings
+    phase_prior: PhasePrior | None = None
+
+    @cached_property
+    def shapes(self) -> list[Shape]:
+        """Gaussians of the prior for this person."""
+        stature = self.placement.stature
+        return [Shape.of(self.prior, c, stature) for c in range(self.prior.components)]
+
+    @cached_property
+    def sticks(self) -> Sticks:
+        """Stick figure of the prior's markers."""
+        return Sticks.of(self.prior.names)
+
+    @cached_property
+    def starts(self) -> Floats:
+        """Times (B,) at which segments start, seconds."""
+        film = self.film
+        before = np.ceil((self.placed - film.times[0]) / self.hop - 1e-6)
+        after = max(0.0, np.ceil((film.times[-1] - self.placed - self.span) / self.hop - 1e-6))
+        return np.asarray(self.placed + self.hop * np.arange(-before, after + 1))
+
+    @property
+    def placed(self) -> float:
+        """Time of the placement's frame."""
+        return float(self.film.times[self.placement.frame - self.film.first])
+
+    @property
+    def hop(self) -> float:
+        """Seconds from one segment to the next."""
+        return self.prior.hop / self.prior.fps
+
+    @property
+    def span(self) -> float:
+        """Seconds of a segment."""
+        return (self.prior.frames - 1) / self.prior.fps
+
+    @property
+    def origin(self) -> int:
+        """Index of the segment that starts at the placement's frame."""
+        return int(np.argmin(np.abs(self.starts - self.placed)))
+
+    @property
+    def sensor_sd(self) -> float:
+        """Deviation of a sensor."""
+        return FIRST_SD if self.settings.sensor_sd is None else self.settings.sensor_sd
+
+    def frames(self, segment: int) -> Indices:
+        """Frames of the film (from its first) within a segment."""
+        since = self.film.times - self.starts[segment]
+        return np.flatnonzero((since > -1e-6) & (since < max(self.span, self.hop) + 1e-6))
+
+    def weights(self, segment: int) -> Floats:
+        """Interpolate (T, F) the segment's frames at those of the film: cubic splines."""
+        times = (self.film.times[self.frames(segment)] - self.starts[segment]) * self.prior.fps
+        count = self.prior.frames
+        if count == 1:
+            return np.ones((len(times), 1))
+        spline = make_interp_spline(np.arange(count), np.eye(count), k=min(3, count - 1))
+        return np.asarray(spline(np.clip(times, 0, count - 1)))
+
+    def mean_state(self) -> Floats:
+        """State (k + 6,) that the placement and the prior's mean say."""
+        state = np.zeros(self.shapes[0].size)
+        state[PLACE] = [*self.placement.ground, 0.0]
+        state[HEADING] = self.placement.heading if self.shapes[0].turning else 0.0
+        state[[GAIN, LEVEL]] = self.settings.gain[0], self.settings.level[0]
+        return state
+
+    def first_modes(self, component: int) -> tuple[Floats, Floats]:
+        """Mean and deviations (k,) of the modes of the first segment."""
+        if self.phase_prior is None:
+            return np.zeros(self.prior.size), np.ones(self.prior.size)
+        return self.phase_prior.mean[component], self.phase_prior.sd[component]
+
+    def energy(
+        self,
+        segment: int,
+        component: int,
+        near: Floats,
+        *,
+        anchor: Anchor | None = None,
+        looking: bool = True,
+    ) -> Energy:
+        """Energy of a segment.
+
+        Parameters
+        ----------
+        segment, component : int
+        near : (k + 6,)
+            State about which the sensors are laid and the corrections' strength is found.
+        anchor : Anchor, optional
+        looking : bool
+            Whether there are sensors.
+        """
+        mean = self.mean_state()
+        sd = np.ones(len(mean))
+        placement, first = self.placement, segment == self.origin
+        if first:
+            mean[:-EXTRA], sd[:-EXTRA] = self.first_modes(component)
+        sd[PLACE] = [*[placement.ground_sd if first else FAR] * 2, HEIGHT_SD]
+        sd[HEADING] = placement.heading_sd if first else TURN
+        sd[[GAIN, LEVEL]] = self.settings.gain[1], self.settings.level[1]
+        shape, weights = self.shapes[component], self.weights(segment)
+        energy = Energy(shape, self.view, self.sticks, weights, mean, sd, anchor=anchor)
+        reading = self._reading(segment, energy, near) if looking else None
+        return replace(energy, reading=reading, corrections=self._springs(segment, shape, near))
+
+    def _reading(self, segment: int, energy: Energy, near: Floats) -> Reading | None:
+        """Sensors about the figure of a state; a state behind the lens sees nothing."""
+        if not np.isfinite(self.sensor_sd) or not len(energy.weights) or not energy.visible(near):
+            return None
+        places, _ = energy.shape.positions(near, energy.weights, self.sticks.markers)
+        uv, _ = self.view.project(places)
+        middle = (uv.min(axis=1) + uv.max(axis=1)) / 2
+        size = [self.placement.stature * self.view.scale(body.mean(axis=0)) for body in places]
+        grid = sensors.grid(middle, np.array(size))
+        value = self.film.read(self.frames(segment), grid)
+        return Reading(value, grid, np.full(len(grid), self.film.blur), self.sensor_sd)
+
+    def _springs(self, segment: int, shape: Shape, near: Floats) -> Corrections | None:
+        """Corrections in a segment's frames; what the prior leaves out at the marker weakens them.
+
+        That hardly changes within a segment, and its variance counts for that in every frame (gamma): one
+        correction of a marker has its share of it, and several of the same marker no more than one.
+        """
+        frames = (self.frames(segment) + self.film.first).tolist()
+        held = [c for c in self.corrections if c.frame in frames]
+        if not held:
+            return None
+        marker = self.prior.index([c.joint for c in held])
+        lasting = BODY**2 + shape.residual[marker] ** 2 / self.prior.frames
+        skin = self.view.scale(near[PLACE]) * np.sqrt(np.bincount(marker)[marker] * lasting)
+        return Corrections(
+            frame=np.array([frames.index(c.frame) for c in held], np.intp),
+            marker=marker,
+            uv=np.array([c.uv for c in held]),
+            sd=np.hypot([c.sd_px for c in held], skin),
+        )

@@ -1,0 +1,318 @@
+"""What the user says about a clip: where the person is at first, and corrections (corrections) in any frame.
+
+Placement (JSON), with a camera, in the form of ``gait track --init``::
+
+    {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65, "phase": 0.3,
+     "sd": {"pelvis": 0.1, "heading_rad": 0.1, "phase": 0.1}}
+
+and without one, where heading 0 is to the right of the picture and +90 degrees away from the viewer::
+
+    {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
+
+The phase of walking, from 0 (right heel strike) to 1, says which leg is ahead.
+
+Corrections (JSON): any marker of the prior in any frame; ``sd_px`` is how exactly it was pointed at::
+
+    {"corrections": [{"frame": 70, "joint": "l_knee", "uv": [1285.5, 812.0], "sd_px": 5}]}
+
+The modes of a clip's first segment where the phase of walking is known: which leg is ahead.
+
+Seen from the side both legs look alike, and a segment with left and right exchanged fits as well.  The mean
+cycle of a cyclic model at a phase, turned into modes of the segment prior, says which it is.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.bindings.initial import SCALARS, STATURE, frame_number, read_start
+from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import pose
+from gait.errors import UserError
+from gait.io import blob
+from gait.io.fields import Fields, read_json
+
+Floats = npt.NDArray[np.float64]
+Size = tuple[int, int]
+
+CLICK_SD = 4.0  # pixels, where a correction does not say
+PLACE_SD = 0.3  # metres on the ground, and radians of heading, where a placement does not say
+HEADING_SD = 0.3
+STATURE_SD = 0.03  # metres
+PHASE_SD = 0.1  # strides: a phase by eye
+RATE_SD = 0.05  # strides per second
+HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 0
+FURTHEST = 1e6  # pixels or metres
+_SPACE, _PICTURE = ("pelvis",), ("pelvis_px", "height_px")  # where the person is, with and without a camera
+_KNOWN = ("frame", *_SPACE, *_PICTURE, "heading_rad", "stature_m", "phase", "stride_hz", "sd")
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A spring that pulls a marker to a place in the picture.
+
+    Attributes
+    ----------
+    frame : int
+        Of the video, from 0.
+    joint : str
+    uv : (float, float)
+        Pixels.
+    sd_px : float
+        Standard deviation, pixels.
+    """
+
+    frame: int
+    joint: str
+    uv: tuple[float, float]
+    sd_px: float = CLICK_SD
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The rough place of the person in one frame.
+
+    Attributes
+    ----------
+    frame : int
+    ground : (2,)
+        Pelvis, metres on the ground; with a flat view, from the point shown at `pelvis_px`.
+    heading : float
+        Radians about z.
+    stature : float
+        Metres.
+    ground_sd, heading_sd, stature_sd : float
+    pelvis_px : (float, float), optional
+        Without a camera: the pelvis in the picture.
+    height_px : float, optional
+        Without a camera: how many pixels the standing person is high.
+    phase : float, optional
+        Of walking, from 0 (right heel strike) to 1.
+    stride_hz : float, optional
+        Strides per second.
+    phase_sd, stride_hz_sd : float
+    unused : tuple of str
+        Keys of the file that say nothing in this view.
+    """
+
+    frame: int
+    ground: Floats
+    heading: float
+    stature: float
+    ground_sd: float = PLACE_SD
+    heading_sd: float = HEADING_SD
+    stature_sd: float = STATURE_SD
+    pelvis_px: tuple[float, float] | None = None
+    height_px: float | None = None
+    phase: float | None = None
+    stride_hz: float | None = None
+    phase_sd: float = PHASE_SD
+    stride_hz_sd: float = RATE_SD
+    unused: tuple[str, ...] = ()
+
+
+def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated: bool) -> Placement:
+    """Read a placement file.
+
+    Raises
+    ------
+    UserError
+        One line naming file, key and remedy.
+    """
+    fields, spread = read_start(path, "placement", _KNOWN)
+    stature = prior.stature
+    if "stature_m" in fields:
+        stature = fields.number("stature_m", *STATURE, "give the person's height in metres")
+    placed = Placement(
+        frame=frame_number(fields),
+        ground=_ground(fields) if calibrated else np.zeros(2),
+        heading=fields.number("heading_rad", -7.0, 7.0, "give the body's direction about z in radians"),
+        stature=stature,
+        ground_sd=_deviation(spread, "pelvis", PLACE_SD),
+        heading_sd=_deviation(spread, "heading_rad", HEADING_SD),
+        stature_sd=_deviation(spread, "stature_m", STATURE_SD),
+        phase=_optional(fields, "phase"),
+        stride_hz=_optional(fields, "stride_hz"),
+        phase_sd=_deviation(spread, "phase", PHASE_SD),
+        stride_hz_sd=_deviation(spread, "stride_hz", RATE_SD),
+        unused=tuple(key for key in (_PICTURE if calibrated else _SPACE) if key in fields),
+    )
+    return placed if calibrated else replace(placed, **_in_picture(fields))
+
+
+def _in_picture(fields: Fields) -> dict[str, Any]:
+    """Place and size of the person in the picture."""
+    if "pelvis_px" not in fields:
+        raise fields.fail("pelvis_px", "is missing", "give the pelvis in the picture, or --camera")
+    u, v = fields.array("pelvis_px", (2,), "give column and row of the pelvis, pixels")
+    height = fields.number("height_px", 10.0, FURTHEST, "give how many pixels the person is high")
+    return {"pelvis_px": (float(u), float(v)), "height_px": height}
+
+
+def _optional(fields: Fields, key: str) -> float | None:
+    """Read a number as a start of the tracker has it; None if absent."""
+    _, (low, high), remedy = SCALARS[key]
+    return fields.number(key, low, high, remedy) if key in fields else None
+
+
+def _ground(fields: Fields) -> Floats:
+    remedy = "give x and y of the pelvis on the ground, metres"
+    three = fields.count("pelvis", remedy) == 3
+    return fields.array("pelvis", (3,) if three else (2,), remedy)[:2]
+
+
+def _deviation(spread: Fields, key: str, usual: float) -> float:
+    """Read a standard deviation: one number, or the largest of three; the usual one if absent."""
+    if key not in spread:
+        return usual
+    remedy = "give a positive standard deviation"
+    values = np.atleast_1d(spread.one_or_three(key, remedy))
+    wrong = values[(values <= 0) | (values >= FURTHEST)]
+    if len(wrong):
+        raise spread.fail(key, f"is {wrong[0]:g}", remedy)
+    return float(values.max())
+
+
+def read_corrections(
+    path: str | os.PathLike[str], prior: SegmentPrior, stop: int, first: int = 0, size: Size = (16384, 16384)
+) -> list[Correction]:
+    """Read a corrections file: of frames from `first` to before `stop`, each joint of one at most once.
+
+    Joints may lie outside the picture of `size` (width, height), but not further than it is large.
+
+    Raises
+    ------
+    UserError
+        One line naming file, correction, key and remedy.
+    """
+    fields = read_json(path, "corrections")
+    fields.only(("corrections",))
+    remedy = 'give {"corrections": [{"frame": 12, "joint": "l_knee", "uv": [x, y]}]}'
+    listed = fields.get("corrections", remedy)
+    if not isinstance(listed, list):
+        raise fields.fail("corrections", "is not a list", remedy)
+    found: list[Correction] = []
+    for number, entry in enumerate(listed, 1):
+        if not isinstance(entry, dict):
+            raise UserError(f"{path}: correction {number} is no object of keys; {remedy}")
+        fields = Fields(f"{path}: correction {number}", entry)
+        correction = _correction(fields, prior, range(first, stop), size)
+        twin = next(
+            (i for i, c in enumerate(found, 1) if (c.frame, c.joint) == (correction.frame, correction.joint)),
+            None,
+        )
+        if twin is not None:
+            what = f"points at {correction.joint} in frame {correction.frame}, as correction {twin} does"
+            raise UserError(f"{path}: correction {number} {what}; remove one of them")
+        found.append(correction)
+    return found
+
+
+def _correction(fields: Fields, prior: SegmentPrior, frames: range, size: Size) -> Correction:
+    fields.only(("frame", "joint", "uv", "sd_px"))
+    remedy = f"give a frame that is used, {frames[0]} to {frames[-1]}, or other --start and --stop"
+    frame = fields.integer("frame", frames[0], frames[-1], remedy)
+    joint = fields.get("joint", "name a joint")
+    if joint not in prior.names:
+        raise fields.fail("joint", f"is {joint!r}", f"use one of {' '.join(prior.names)}")
+    u, v = fields.array("uv", (2,), "give column and row, pixels")
+    if any(not -n <= x <= 2 * n for x, n in zip((u, v), size, strict=True)):
+        what = f"is ({u:g}, {v:g}), far outside a picture of {size[0]}x{size[1]}"
+        raise fields.fail("uv", what, "give column and row, pixels")
+    sd = CLICK_SD
+    if "sd_px" in fields:
+        sd = fields.number("sd_px", 1e-3, FURTHEST, "give a standard deviation in pixels")
+    return Correction(frame, str(joint), (float(u), float(v)), sd)
+
+
+def as_json(corrections: Sequence[Correction]) -> dict[str, list[dict[str, Any]]]:
+    """Contents of a corrections file."""
+    return {
+        "corrections": [
+            {"frame": c.frame, "joint": c.joint, "uv": list(c.uv), "sd_px": c.sd_px} for c in corrections
+        ]
+    }
+
+
+UNKNOWN_SD = 0.25  # strides: a phase less sure than that tells nothing
+
+
+@dataclass(frozen=True)
+class PhasePrior:
+    """Mean and standard deviations (K, k) of the modes of the first segment, by component."""
+
+    mean: Floats
+    sd: Floats
+
+    @staticmethod
+    def of(prior: SegmentPrior, cycle: Mapping[str, Any], placement: Placement) -> PhasePrior | None:
+        """Take the phase of a placement; None if it has none, or one that is hardly known.
+
+        Parameters
+        ----------
+        prior : SegmentPrior
+        cycle : mapping
+            Sections of a blob with a cyclic model.
+        placement : Placement
+        """
+        if placement.phase is None or placement.phase_sd >= UNKNOWN_SD:
+            return None
+        markers = [name for name in blob.unpack_names(cycle["PTNM"]) if name in prior.names]
+        columns = _columns(prior, cycle, placement, markers)
+        found = [_modes(prior, c, markers, columns) for c in range(prior.components)]
+        return PhasePrior(np.stack([mean for mean, _ in found]), np.stack([sd for _, sd in found]))
+
+
+def _columns(
+    prior: SegmentPrior, cycle: Mapping[str, Any], placement: Placement, markers: list[str]
+) -> Floats:
+    """Mean cycle about the pelvis in a segment's frames, and its steps by one deviation of what is unknown.
+
+    Returns
+    -------
+    (1 + 2 + q, F, M, 3)
+        Statures: the cycle at the phase; steps by phase, by rate and by each component of the motion.
+    """
+    rate, rate_sd = (float(value) for value in cycle["GAIT"][:2])
+    if placement.stride_hz is not None:
+        rate, rate_sd = placement.stride_hz, placement.stride_hz_sd
+    time = np.arange(prior.frames) / prior.fps
+    size = len(cycle["CURV"]) - 1
+    heading = 0.0 if prior.headings == 0 else placement.heading
+    assert placement.phase is not None
+
+    def body(phase: float, rate: float, coef: Floats) -> Floats:
+        joints, _ = pose(
+            cycle, phase + rate * time, coef, 1.0, heading, 0.0, 0.0, np.zeros(3), stride_hz=rate
+        )
+        names = blob.unpack_names(cycle["PTNM"])
+        places = joints[:, [names.index(name) for name in markers]]
+        return np.asarray(places - joints[:, names.index("pelvis"), None])
+
+    known = body(placement.phase, rate, np.zeros(size))
+    moved = [
+        body(placement.phase + placement.phase_sd, rate, np.zeros(size)),
+        body(placement.phase, rate + rate_sd, np.zeros(size)),
+        *(body(placement.phase, rate, unit) for unit in np.eye(size)),
+    ]
+    return np.stack([known, *(other - known for other in moved)])
+
+
+def _modes(prior: SegmentPrior, component: int, markers: list[str], columns: Floats) -> tuple[Floats, Floats]:
+    """Posterior mean and deviations (k,) of a component's modes, seeing markers about the pelvis."""
+    index, pelvis = prior.index(markers), prior.index(["pelvis"])
+    mean = prior.mean[component, :, index].swapaxes(0, 1) - prior.mean[component][:, pelvis]
+    modes = prior.modes[component][:, :, index] - prior.modes[component][:, :, pelvis]
+    sd = np.sqrt(prior.gamma * (prior.residual[component, index] + prior.residual[component, pelvis]))
+    rows = (modes / sd[:, None]).reshape(prior.size, -1)
+    covariance = np.linalg.inv(rows @ rows.T + np.eye(prior.size))
+    known, *steps = ((values / sd[:, None]).ravel() for values in (columns[0] - mean, *columns[1:]))
+    spread = covariance @ rows @ np.stack(steps, axis=1)
+    variance = np.diag(covariance) + (spread**2).sum(axis=1)
+    return covariance @ rows @ known, np.sqrt(np.minimum(variance, 1.0))

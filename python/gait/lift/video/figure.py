@@ -1,0 +1,189 @@
+"""The cylinder figure: one body of constant bone lengths laid on markers by least squares, frame by frame.
+
+The last step of Leventon & Freeman 1998; the fit is that of `gait.learn.solve.skeleton_fit`, which motion
+capture goes through as well.
+
+Draw the cylinder figure, its sticks and the user's corrections into a frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gait.body.skeleton import ELLIPSOID, JOINTS, default_skeleton
+from gait.errors import UserError
+from gait.io.video import Image
+from gait.learn.segments.virtual_markers import MARKERS, SKIN, marked_skeleton
+from gait.learn.solve import articulated, skeleton_fit
+from gait.learn.solve.articulated import Pose
+from gait.lift.video.corrections import Correction
+from gait.lift.video.sensors import View
+from gait.report.drawing import draw_bones, tinted
+
+Floats = npt.NDArray[np.float64]
+
+JOINT_SD, SKIN_SD = 0.01, 0.02  # statures that a joint or a marker on the skin may lie elsewhere in its limb
+FEWEST = 8  # markers
+_BODY = default_skeleton()
+LIMBS = tuple(_BODY.limbs)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A body of limbs that keep their lengths, in T poses.
+
+    Attributes
+    ----------
+    stretch : (S,)
+        Logarithms of the body's stretches (`gait.learn.solve.articulated.STRETCHES`).
+    pose : Pose
+    residual : (T, M)
+        Distance from the markers used, metres.
+    """
+
+    stretch: Floats
+    pose: Pose
+    residual: Floats
+
+    @staticmethod
+    def fit(places: Floats, names: Sequence[str]) -> Figure:
+        """Lay a body on markers (T, J, 3), metres, world with z up; markers of other bodies are left out.
+
+        Raises
+        ------
+        UserError
+            If hardly any marker is one of `gait.learn.segments.virtual_markers.MARKERS`.
+        """
+        used = [name for name in names if name in MARKERS]
+        if len(used) < FEWEST:
+            raise UserError(f"the cylinder figure needs {FEWEST} markers of {' '.join(MARKERS)}")
+        body = marked_skeleton()
+        row = [body.points.index(name) for name in used]
+        points = skeleton_fit.Points(
+            segment=body.point_frames[row].astype(np.intp),
+            at=body.point_positions[row],
+            sd=np.array([SKIN_SD if name in SKIN else JOINT_SD for name in used]),
+        )
+        found = skeleton_fit.fit(places[:, [list(names).index(name) for name in used]], points)
+        return Figure(found.stretch, found.pose, found.residual)
+
+    @property
+    def stature(self) -> float:
+        """Height of the body, metres, as if all its parts were of usual proportions."""
+        return float(np.exp(self.stretch[0]))
+
+    def joints(self) -> Floats:
+        """Places (T, 19, 3) of `gait.body.skeleton.JOINTS`, metres."""
+        segment = _BODY.point_frames.astype(np.intp)
+        local = articulated.scales(self.stretch)[segment] * _BODY.point_positions
+        posed = articulated.posed(self.pose, articulated.origins(self.stretch))
+        return posed.points(local, segment)
+
+    def lengths(self) -> dict[str, float]:
+        """Lengths of thighs, shanks, upper arms and forearms, metres."""
+        place = dict(zip(JOINTS, self.joints()[0], strict=True))
+        ends = {
+            "thigh": ("hip", "knee"), "shank": ("knee", "ankle"),
+            "upper_arm": ("shoulder", "elbow"), "forearm": ("elbow", "wrist"),
+        }  # fmt: skip
+        return {
+            f"{side}_{bone}": float(np.linalg.norm(place[f"{side}_{a}"] - place[f"{side}_{b}"]))
+            for side in "lr"
+            for bone, (a, b) in ends.items()
+        }
+
+    def surfaces(self) -> Floats:
+        """Points (T, L, P, 3), metres, on the surfaces of `LIMBS`: each limb is the hull of its points."""
+        posed = articulated.posed(self.pose, articulated.origins(self.stretch))
+        segment = np.repeat(_BODY.limb_frames[:, 0], RING * SLICES).astype(np.intp)
+        local = articulated.scales(self.stretch)[segment] * _SURFACE.reshape(-1, 3)
+        points = posed.points(local, segment)
+        return points.reshape(len(points), len(LIMBS), -1, 3)
+
+
+RING, SLICES = 20, 7  # points around a limb, and places along it
+
+
+def _surface(shape: int, row: Floats) -> Floats:
+    """Points (RING * SLICES, 3) on a limb in its segment, statures: LIMI and LIMF of model-format.md."""
+    start, end, (a0, b0, a1, b1) = row[:3], row[3:6], row[6:]
+    axis = (end - start) / np.linalg.norm(end - start)
+    first = np.array([0.0, 1.0, 0.0]) - axis[1] * axis
+    first /= np.linalg.norm(first)
+    third = np.cross(first, axis)
+    turn = 2 * np.pi * np.arange(RING) / RING
+    rings = []
+    for share in 0.5 - 0.5 * np.cos(np.pi * np.arange(SLICES) / (SLICES - 1)):
+        a, b = a0 + share * (a1 - a0), b0 + share * (b1 - b0)
+        if shape == ELLIPSOID:
+            a, b = (r * np.sqrt(max(0.0, 1 - (2 * share - 1) ** 2)) for r in (a0, b0))
+        ring = start + share * (end - start)
+        rings.append(ring + np.outer(a * np.cos(turn), first) + np.outer(b * np.sin(turn), third))
+    return np.concatenate(rings)
+
+
+_SURFACE = np.stack(
+    [_surface(int(s), row) for (_, s), row in zip(_BODY.limb_frames, _BODY.limb_shapes, strict=True)]
+)
+
+_DARK = (30, 30, 30)
+_SPRING = (90, 240, 255)  # BGR
+_BITS = 3  # of fraction in OpenCV's drawing coordinates
+
+
+def draw_figure(
+    image: Image,
+    view: View,
+    surfaces: Floats,
+    joints: Floats,
+    corrections: Sequence[tuple[Correction, Floats]] = (),
+) -> Image:
+    """Return a BGR picture with limbs, sticks and corrections.
+
+    Parameters
+    ----------
+    image : (h, w) or (h, w, 3)
+    view : View
+    surfaces : (L, P, 3)
+        Points whose hulls are the limbs, metres.
+    joints : (19, 3)
+        `gait.body.skeleton.JOINTS`.
+    corrections : sequence of (Correction, (3,))
+        Corrections of this frame and where their markers are, metres.
+    """
+    canvas = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
+    if not view.visible(surfaces):
+        return np.asarray(canvas, np.uint8)
+    size = max(0.3, 1.7 * view.scale(joints[JOINTS.index("pelvis")]) / 400)
+    width = max(1, round(1.5 * size))
+    canvas = tinted(np.asarray(canvas, np.uint8), _limb_ids(canvas.shape[:2], view, surfaces), LIMBS, width)
+    uv = dict(zip(JOINTS, view.project(joints)[0], strict=True))
+    draw_bones(canvas, uv, width + 2, _DARK)
+    draw_bones(canvas, uv, width)
+    for correction, place in corrections:
+        _draw_spring(canvas, np.asarray(correction.uv), view.project(place[None])[0][0], width)
+    return canvas
+
+
+def _limb_ids(size: tuple[int, ...], view: View, surfaces: Floats) -> npt.NDArray[np.uint8]:
+    """Limb index + 1 of every pixel, 0 for none; the nearest limbs are painted last."""
+    ids = np.zeros(size, np.uint8)
+    uv, _ = view.project(surfaces)
+    for limb in np.argsort(-view.depth(surfaces).mean(axis=1)):
+        outline = cv2.convexHull(np.clip(uv[limb], -1e6, 1e6).astype(np.float32))
+        fixed = np.rint(outline * (1 << _BITS)).astype(np.int32)
+        cv2.fillConvexPoly(ids, fixed, int(limb) + 1, cv2.LINE_8, _BITS)
+    return ids
+
+
+def _draw_spring(canvas: Image, wanted: Floats, found: Floats, width: int) -> None:
+    """Draw a line from where the user wants a marker, a circle, to where it is."""
+    near, far = (tuple(np.clip(np.rint(p), -1e6, 1e6).astype(int).tolist()) for p in (wanted, found))
+    cv2.line(canvas, near, far, _SPRING, width, cv2.LINE_AA)
+    cv2.circle(canvas, near, 3 + 2 * width, _DARK, width + 2, cv2.LINE_AA)
+    cv2.circle(canvas, near, 3 + 2 * width, _SPRING, width, cv2.LINE_AA)

@@ -1,0 +1,420 @@
+"""How far the sensors and the stick figure are alike, and what that says of the estimate.
+
+Where the figure lies on the person it explains most of what the sensors read.  Where it explains little, they
+read edges of the scene, which stand still: the figure is held back, and the longer, the further.
+
+The motion of a clip: segments every hop, each the minimum of its energy, joined to one sequence.
+
+Each segment starts from the one before (Leventon & Freeman 1998), and what both describe is one more
+observation of it.  By default all are then solved together, neighbours tied where they overlap, so that a
+correction in one helps the others.  The paper's way (`Settings.joined` False) leaves them as they are and
+moves each in depth until it goes on where the one before ended.  Either way they are blended linearly.
+
+Where the next correction tells most: the joints that are least certain in the picture.
+
+Greedy: the joint with the largest deviation in the picture is taken, as if it were corrected, and so on.  A
+correction counts for the segment that its frame lies most in the middle of, and what is close in time and of
+the same joint is not asked for again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.body.skeleton import JOINTS
+from gait.lift.video.clip_segments import CORRELATED, ClipSegments
+from gait.lift.video.corrections import CLICK_SD
+from gait.lift.video.descent import Link, descend, information, moves
+from gait.lift.video.energy import HEADING, PLACE, Anchor, Energy
+
+Floats = npt.NDArray[np.float64]
+
+HELD = 0.9  # fit_correlation of figures that follow a person before a known background
+CHANCE = 0.3  # fit_correlation that a figure anywhere in a scene may have
+DRIFT_SD = 0.04  # metres a second at twice the noise of `HELD`; the likeliest without a background
+DOUBTFUL = 0.5  # below it figures left the person in half of the clips that this was found on
+
+
+def fit_correlation(chain: Sequence[Energy], states: Floats) -> float:
+    """Correlation of what the sensors read and the figure gives at states (B, n); NaN without sensors.
+
+    Over all frames, each about its mean.
+    """
+    products = np.zeros(3)
+    for energy, state in zip(chain, states, strict=True):
+        if energy.reading is None:
+            continue
+        read = energy.reading.value
+        given = read + energy.residuals(state).reshape(read.shape)
+        read, given = (values - values.mean(axis=1, keepdims=True) for values in (read, given))
+        products += (read * given).sum(), (read * read).sum(), (given * given).sum()
+    both, one, other = products
+    return float(both / np.sqrt(one * other)) if one > 0 and other > 0 else float("nan")
+
+
+def drift(alike: float) -> float:
+    """Deviation in metres a second by which the scene may hold a figure back; 0 where it explains enough."""
+
+    def noise(value: float) -> float:
+        return float(np.sqrt(1 / max(value, CHANCE) ** 2 - 1))  # unexplained over explained deviation
+
+    return 0.0 if np.isnan(alike) else DRIFT_SD * max(0.0, noise(alike) / noise(HELD) - 1)
+
+
+Indices = npt.NDArray[np.intp]
+Update = Callable[[int], None]
+Settled = tuple[float, int, Floats]  # energy, component and state of a segment
+
+LOOSE = 0.03  # statures that the segment before may be wrong, when the next one starts from it
+BEGINNINGS = 3  # explanations of the first segment that are followed through the clip
+DIFFERENT = 0.03  # statures: mean distance of markers in explanations that differ
+START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean and from +- so many sd of these modes
+LEAST = 1e-3  # share of a segment in the blend at its ends
+LOOKS = 2  # times the sensors are laid anew about the figure found
+
+
+@dataclass(frozen=True)
+class ClipStates:
+    """Chosen components (B,) and states (B, k + 6) of the segments of a clip, and their energy."""
+
+    components: Indices
+    states: Floats
+    energy: float
+
+
+@dataclass(frozen=True)
+class ClipFit:
+    """Estimate of a clip.
+
+    Attributes
+    ----------
+    frame : (T,)
+        Numbers of the video's frames.
+    time : (T,)
+        Seconds.
+    places : (T, J, 3)
+        Markers, metres.
+    sd : (T, J, 3)
+        Posterior standard deviations.
+    sequence : ClipStates
+    covariance : (B, k + 6, k + 6)
+        Of the segments' states.
+    fit_correlation : float
+        Correlation of what the sensors read and the figure gives; NaN without sensors.
+    """
+
+    frame: Indices
+    time: Floats
+    places: Floats
+    sd: Floats
+    sequence: ClipStates
+    covariance: Floats
+    fit_correlation: float
+
+
+def fit_clip(clip: ClipSegments, known: ClipStates | None = None, update: Update | None = None) -> ClipFit:
+    """Estimate the motion of a clip.
+
+    Parameters
+    ----------
+    clip : ClipSegments
+    known : ClipStates, optional
+        Estimate with other corrections to start from, which is quicker.
+    update : callable, optional
+        Called with the count of segments done, of `work(clip)`.
+    """
+    chains = [known] if known is not None else _chains(clip, update)
+    found = min(chains, key=lambda c: c.energy)
+    if clip.settings.sensor_sd is None:
+        clip = _with_noise(clip, found)
+    if not clip.settings.joined:
+        first = _first_segments(clip)[0]
+        return _finished(clip, _continuous(clip, _one_after_the_other(clip, first, None)))
+    starts = list(chains)
+    if clip.corrections:  # nearly linear without the sensors: no wrong valley to fall into
+        starts.append(_together(clip, found, looking=False))
+    tried = [_together(clip, start) for start in starts]
+    return _finished(clip, min(tried, key=lambda t: t.energy))
+
+
+def work(clip: ClipSegments) -> int:
+    """Count of segments that `fit_clip` tells its `update` when it is done with them, at most."""
+    return len(clip.starts) * BEGINNINGS
+
+
+def _chains(clip: ClipSegments, update: Update | None) -> list[ClipStates]:
+    """Sequences that go on from different explanations of the first segment."""
+    firsts = _first_segments(clip)[:BEGINNINGS]
+    return [_one_after_the_other(clip, first, _part(update, k, clip)) for k, first in enumerate(firsts)]
+
+
+def _part(update: Update | None, chain: int, clip: ClipSegments) -> Update:
+    """Progress of one chain of several."""
+    return lambda done: None if update is None else update(chain * len(clip.starts) + done)
+
+
+def _first_segments(clip: ClipSegments) -> list[Settled]:
+    """Explanations of the segment at the placement, different ones, least energy first."""
+    tried = [
+        _settled(clip, clip.origin, component, start, None)
+        for component in range(len(clip.shapes))
+        for start in _first_starts(clip, component)
+    ]
+    kept: list[Settled] = []
+    places: list[Floats] = []
+    for found in sorted(tried, key=lambda t: t[0]):
+        body, _ = clip.shapes[found[1]].positions(found[2], np.eye(clip.prior.frames), slice(None))
+        apart = [np.linalg.norm(body - other, axis=-1).mean() for other in places]
+        if min(apart, default=np.inf) > DIFFERENT * clip.placement.stature:
+            kept.append(found)
+            places.append(body)
+    return kept
+
+
+def _one_after_the_other(clip: ClipSegments, first: Settled, update: Update | None) -> ClipStates:
+    """Segments from a first one on, then back before it, each started from its neighbour."""
+    count, origin = len(clip.starts), clip.origin
+    components, states = np.zeros(count, np.intp), np.zeros((count, clip.shapes[0].size))
+    energy, components[origin], states[origin] = first
+    for done, segment in enumerate([*range(origin + 1, count), *reversed(range(origin))], 1):
+        step = 1 if segment > origin else -1
+        old = segment - step
+        tried = []
+        for component in range(len(clip.shapes)):
+            start, anchor = _continued(clip, component, int(components[old]), states[old], step)
+            tried.append(_settled(clip, segment, component, start, anchor))
+        cost, components[segment], states[segment] = min(tried, key=lambda t: t[0])
+        energy += cost
+        if update is not None:
+            update(done)
+    return ClipStates(components, states, energy)
+
+
+def _first_starts(clip: ClipSegments, component: int) -> list[Floats]:
+    """Where the first segment's descent starts: the mean, and along the first modes to both sides."""
+    mean, sd = clip.first_modes(component)
+    start = clip.mean_state()
+    start[: len(mean)] = mean
+    starts = [start]
+    for mode in range(min(START_MODES, clip.prior.size)):
+        for side in (-START_SD, START_SD):
+            starts.append(start.copy())
+            starts[-1][mode] += side * sd[mode]
+    return starts
+
+
+def _continued(
+    clip: ClipSegments, component: int, old: int, state: Floats, step: int
+) -> tuple[Floats, Anchor]:
+    """Start of the segment after (step 1) or before (-1) a known one, and what holds it to that one."""
+    frames, hop = clip.prior.frames, clip.prior.hop
+    places, _ = clip.shapes[old].positions(state, np.eye(frames), slice(None))
+    sd = CORRELATED * np.hypot(clip.shapes[component].residual, LOOSE * clip.placement.stature)
+    shared = slice(hop, None) if step > 0 else slice(frames - hop)
+    there = slice(frames - hop) if step > 0 else slice(hop, None)
+    anchor = Anchor(there, places[shared], sd)
+    start = state.copy()
+    start[: PLACE.start] = 0.0
+    pelvis = places[:, clip.prior.names.index("pelvis")]
+    ahead = pelvis[min(hop, frames - 1), :2]
+    start[PLACE][:2] = ahead if step > 0 else 2 * pelvis[0, :2] - ahead
+    blind = Energy(
+        clip.shapes[component],
+        clip.view,
+        clip.sticks,
+        np.zeros((0, frames)),
+        start,
+        _broad(clip),
+        anchor=anchor,
+    )
+    return descend([blind], None, start[None])[0][0], anchor
+
+
+def _broad(clip: ClipSegments) -> Floats:
+    """Deviations of a state of which only the shape is known."""
+    sd = np.ones(clip.shapes[0].size)
+    sd[PLACE], sd[HEADING] = 1.0, 1.0
+    return sd
+
+
+def _settled(
+    clip: ClipSegments, segment: int, component: int, state: Floats, anchor: Anchor | None
+) -> Settled:
+    """Energy, component and state of one segment; the sensors follow it."""
+    cost = np.inf
+    for _ in range(LOOKS):
+        energy = clip.energy(segment, component, state, anchor=anchor)
+        (state,), cost = descend([energy], None, state[None])
+    return cost - 2 * float(np.log(clip.prior.weights[component])), component, state
+
+
+def _with_noise(clip: ClipSegments, sequence: ClipStates) -> ClipSegments:
+    """Clip whose sensors have the deviation that an estimate shows."""
+    chain, _ = _chain(clip, sequence, looking=True)
+    residuals = [energy.residuals(state) for energy, state in zip(chain, sequence.states, strict=True)]
+    rms = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))) if any(map(len, residuals)) else np.inf
+    return replace(clip, settings=replace(clip.settings, sensor_sd=CORRELATED * rms))
+
+
+def _chain(clip: ClipSegments, sequence: ClipStates, looking: bool) -> tuple[list[Energy], Link]:
+    """Energies of all segments about their states, and what ties them."""
+    chain = [
+        clip.energy(s, int(c), state, looking=looking)
+        for s, (c, state) in enumerate(zip(sequence.components, sequence.states, strict=True))
+    ]
+    residual = np.sqrt(np.mean([clip.shapes[int(c)].residual ** 2 for c in sequence.components], axis=0))
+    return chain, Link(clip.prior.hop, np.sqrt(2) * residual)
+
+
+def _together(clip: ClipSegments, start: ClipStates, looking: bool = True) -> ClipStates:
+    """All segments of least energy near a start, tied to their neighbours."""
+    states, cost = start.states, np.inf
+    for _ in range(LOOKS if looking else 1):
+        chain, link = _chain(clip, ClipStates(start.components, states, cost), looking)
+        states, cost = descend(chain, link, states)
+    return ClipStates(start.components, states, cost)
+
+
+def _continuous(clip: ClipSegments, sequence: ClipStates) -> ClipStates:
+    """Move each segment along the line of sight by the mean difference in depth where it meets the last."""
+    hop, frames = clip.prior.hop, clip.prior.frames
+    states = sequence.states.copy()
+    for segment in [*range(clip.origin + 1, len(states)), *reversed(range(clip.origin))]:
+        step = 1 if segment > clip.origin else -1
+        pair = sorted((segment, segment - step))
+        early, late = (
+            clip.shapes[int(sequence.components[s])].positions(states[s], np.eye(frames), slice(None))[0]
+            for s in pair
+        )
+        away = clip.view.away(states[segment][PLACE])
+        gap = step * float(((early[hop:] - late[: frames - hop]) @ away).mean())
+        states[segment, PLACE] += gap * away
+    return ClipStates(sequence.components, states, sequence.energy)
+
+
+def _share(clip: ClipSegments, segment: int) -> Floats:
+    """Triangular weights (T,) of a segment's frames in the blend.
+
+    The triangle is half a frame longer than the segment at both ends: a segment that came in at full slope in
+    one frame would leave a kink there.
+    """
+    half = 0.5 / clip.prior.fps
+    since = clip.film.times[clip.frames(segment)] - clip.starts[segment] + half
+    return np.maximum(1 - np.abs(2 * since / (clip.span + 2 * half) - 1), LEAST)
+
+
+def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
+    """Blend the segments linearly; deviations from the information of all of them and what they share."""
+    chain, link = _chain(clip, sequence, looking=True)
+    factor = information(chain, link if clip.settings.joined else None, sequence.states)
+    overlap = clip.prior.frames / clip.prior.hop  # every frame counts in so many segments
+    alike = fit_correlation(chain, sequence.states)
+    drifted = drift(alike) * (clip.starts + 0.5 * clip.span - clip.placed)
+    pulled = moves(chain, factor, sequence.states, drifted)
+    covariance = overlap * factor.covariance()[0] + pulled @ pulled.swapaxes(1, 2)
+    count, markers = len(clip.film.times), len(clip.prior.names)
+    places, variance, total = np.zeros((count, markers, 3)), np.zeros((count, markers, 3)), np.zeros(count)
+    for s, energy in enumerate(chain):
+        frames = clip.frames(s)
+        share = _share(clip, s)
+        found, slope = energy.shape.positions(sequence.states[s], energy.weights, slice(None))
+        spread = np.einsum("tjin,nm,tjim->tji", slope, covariance[s], slope, optimize=True)
+        places[frames] += share[:, None, None] * found
+        variance[frames] += share[:, None, None] * (spread + energy.shape.residual[:, None] ** 2)
+        total[frames] += share
+    frame = clip.film.first + np.arange(count)
+    places /= total[:, None, None]
+    size = clip.placement.stature_sd / clip.placement.stature * clip.view.growth(places)
+    return ClipFit(
+        frame=frame,
+        time=clip.film.times,
+        places=places,
+        sd=np.sqrt(variance / total[:, None, None] + size**2),
+        sequence=sequence,
+        covariance=covariance,
+        fit_correlation=alike,
+    )
+
+
+ENOUGH = 0.03  # statures: joints known this well in the picture need no correction
+MOST = 2.0  # corrections per frame that are counted
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A joint to correct: its frame in the video and its standard deviation in the picture, pixels."""
+
+    frame: int
+    joint: str
+    sd_px: float
+
+
+@dataclass
+class _Part:
+    """Frames of one segment: numbers (T,), slopes (T, J, 2, n) of pixels by the state, covariance (n, n)."""
+
+    frame: Indices
+    slope: Floats
+    covariance: Floats
+
+    def spread(self) -> Floats:
+        """Deviations (T, J) in the picture, both axes together."""
+        half = self.slope @ self.covariance
+        return np.asarray(np.sqrt(np.maximum((half * self.slope).sum(axis=(2, 3)), 0)))
+
+    def correct(self, at: tuple[int, int], sd: float) -> None:
+        """Take a correction of a frame and joint into the covariance."""
+        slope = self.slope[at]
+        across = self.covariance @ slope.T
+        inner = slope @ across + sd**2 * np.eye(2)
+        self.covariance = self.covariance - across @ np.linalg.solve(inner, across.T)
+
+
+def suggest(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
+    """Corrections, most useful first, until every joint is known within `ENOUGH` of the stature.
+
+    At most `MOST` per frame.
+    """
+    joints = [j for j in JOINTS if j in clip.prior.names]
+    parts = _parts(clip, fit, clip.prior.index(joints))
+    spread = [part.spread() for part in parts]
+    near = 0.5 * clip.hop / float(np.median(np.diff(clip.film.times))) if len(clip.film.times) > 1 else 1.0
+    enough = ENOUGH * clip.placement.stature
+    scale = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
+    asked: list[Suggestion] = []
+    while parts and len(asked) < MOST * len(fit.frame):
+        which = int(np.argmax([values.max(initial=0.0) for values in spread]))
+        at = np.unravel_index(np.argmax(spread[which]), spread[which].shape)
+        frame, joint = int(at[0]), int(at[1])
+        sd = float(spread[which][frame, joint])
+        if sd <= enough * scale:
+            break
+        number = int(parts[which].frame[frame])
+        asked.append(Suggestion(number, joints[joint], sd))
+        parts[which].correct((frame, joint), CLICK_SD)
+        spread[which] = parts[which].spread()
+        for part, values in zip(parts, spread, strict=True):
+            for old in asked:
+                values[np.abs(part.frame - old.frame) < near, joints.index(old.joint)] = 0.0
+    return asked
+
+
+def _parts(clip: ClipSegments, fit: ClipFit, joints: Indices) -> list[_Part]:
+    """Frames by the segment that they lie most in the middle of."""
+    middle = clip.starts + 0.5 * clip.span
+    owner = np.argmin(np.abs(clip.film.times[:, None] - middle), axis=1)
+    parts = []
+    for segment in np.unique(owner):
+        own = clip.frames(segment)
+        mine = np.isin(own, np.flatnonzero(owner == segment))
+        shape = clip.shapes[int(fit.sequence.components[segment])]
+        weights = clip.weights(segment)[mine]
+        places, by_state = shape.positions(fit.sequence.states[segment], weights, joints)
+        _, by_place = clip.view.project(places)
+        number = clip.film.first + own[mine]
+        parts.append(_Part(number, by_place @ by_state, fit.covariance[segment]))
+    return [part for part in parts if len(part.frame)]

@@ -1,0 +1,109 @@
+"""Files of 2-D keypoints: what is read, and what every fault is called."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gait.errors import UserError
+from gait.io.keypoints_file import Keypoints, read, write
+
+KNOWN = ("pelvis", "l_knee", "r_knee")
+
+
+def written(tmp_path, text):
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    return path
+
+
+def test_round_trip(tmp_path):
+    rng = np.random.default_rng(0)
+    uv = rng.uniform(0, 500, (5, 2, 2)).round(3)
+    uv[2, 1] = np.nan
+    confidence = np.where(np.isnan(uv[..., 0]), 0, 0.5)
+    keypoints = Keypoints(np.arange(3, 8), np.arange(5) / 30, ("l_knee", "pelvis"), uv, confidence)
+    write(tmp_path / "t.csv", keypoints)
+    found, ignored = read(tmp_path / "t.csv", KNOWN)
+    assert (found.names, ignored) == (keypoints.names, [])
+    np.testing.assert_array_equal(found.frame, keypoints.frame)
+    np.testing.assert_allclose(found.uv, uv)
+    np.testing.assert_allclose(found.deviations(3.0)[0], 6.0)
+    assert np.isinf(found.deviations(3.0)[2, 1])
+
+
+def test_zeros_are_an_origin_or_not_seen(tmp_path):
+    head = "frame,time,pelvis_u,pelvis_v,l_knee_u,l_knee_v"
+    origin = read(written(tmp_path, f"{head}\n0,0,0,0,.1,.5\n1,.1,0,0,.2,.5\n"), KNOWN)[0]
+    assert origin.seen.all()
+    with pytest.raises(UserError, match="line 2: pelvis is at exactly 0, 0, .* give pelvis_c 0"):
+        read(written(tmp_path, f"{head}\n0,0,0,0,0,0\n1,.1,0,0,.2,.5\n"), KNOWN)
+
+
+def test_little_confidence_is_not_seen(tmp_path):
+    path = written(tmp_path, "frame,time,pelvis_u,pelvis_v,pelvis_c\n0,0,1,2,0.05\n1,0.1,1,2,\n2,0.2,1,2,1\n")
+    assert read(path, KNOWN)[0].seen.ravel().tolist() == [False, False, True]
+
+
+HEAD = "frame,time,pelvis_u,pelvis_v"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "has no rows"),
+        (f"{HEAD}\n", "has no rows"),
+        ("time,pelvis_u,pelvis_v\n0,1,2\n", "column frame is missing"),
+        ("frame,time,x\n0,0,1\n", "no columns <joint>_u"),
+        ("frame,time,pelvis_u\n0,0,1\n", "column pelvis_v is missing"),
+        ("frame,time,nose_u,nose_v\n0,0,1,2\n", "'nose' is unknown"),
+        (f"{HEAD}\n0,0,1,2,3\n", "line 2 has 5 cells"),
+        (f"{HEAD}\n0,0,1,\n", "line 2: pelvis has only one of _u and _v"),
+        (f"{HEAD}\n0,0,1,2\n1,0.1,0,0\n", "line 3: pelvis is at exactly 0, 0"),
+        (f"{HEAD}\n0,0,1,two\n", "line 2: pelvis_v is 'two'"),
+        (f"{HEAD}\n0,0,1,2\n0,1,1,2\n", "line 3: frame is 0; it must be whole"),
+        (f"{HEAD}\n0,0,1,2\n1.5,1,1,2\n", "line 3: frame is 1.5; it must be whole"),
+        (
+            f"{HEAD}\n0,0,1,2\n1e30,1,1,2\n",
+            "frame is 1e+30; it must be whole numbers that increase, at most",
+        ),
+        (f"{HEAD}\n0,0,1,-2e6\n", "line 2: pelvis_v is '-2e6'; give a number of at most 1e+06"),
+        (f"{HEAD}\n0,0,1,2\n1,1e-9,1,2\n", "time goes on by 1e-09 from frame to frame; give seconds"),
+        (f"{HEAD}\n0,0,1,2\n1,33.3,1,2\n", "time goes on by 33.3 from frame to frame; give seconds"),
+        (f"{HEAD}\n0,0,1,2\n1,1,1,2\n", "time goes on by 1 from frame to frame; give seconds"),
+        (f"{HEAD}\n0,0,1,2\n1,0,1,2\n", "line 3: time does not increase"),
+        (f"{HEAD}\n0,,1,2\n", "line 2: time is empty"),
+        (f"{HEAD}\n0,0,,\n", "no point is seen"),
+        (f"{HEAD},pelvis_u\n0,0,1,2,3\n", "pelvis_u is there twice"),
+        (f"{HEAD},pelvis_c\n0,0,1,2,7\n", "pelvis_c is 7; give it from 0 to 1"),
+    ],
+)
+def test_faults_are_named(tmp_path, text, words):
+    with pytest.raises(UserError, match=r"t\.csv") as caught:
+        read(written(tmp_path, text), KNOWN)
+    assert words in str(caught.value)
+
+
+def test_unknown_points_can_be_left_out(tmp_path):
+    path = written(tmp_path, f"{HEAD},nose_u,nose_v\n0,0,1,2,3,4\n")
+    keypoints, ignored = read(path, KNOWN, ignore_unknown=True)
+    assert (keypoints.names, ignored) == (("pelvis",), ["nose"])
+    with pytest.raises(UserError, match="no point of the model"):
+        read(path, ("l_wrist",), ignore_unknown=True)
+
+
+def test_points_within_their_noise_tell_nothing():
+    uv = np.random.default_rng(1).uniform(0, 1, (4, 2, 2))
+    keypoints = Keypoints(np.arange(4), np.arange(4) / 20, KNOWN[:2], uv, np.ones((4, 2)))
+    with pytest.raises(
+        UserError, match=r"t.csv: all u and v lie within 0\.\d+, less than .* of 3; give pixels"
+    ):
+        keypoints.require_spread("t.csv", 3.0)
+    keypoints.require_spread("t.csv", 0.01)
+    uv[:, 1] = np.nan  # one alone may stand still
+    keypoints.require_spread("t.csv", 3.0)
+
+
+def test_missing_file():
+    with pytest.raises(UserError, match="no such file"):
+        read("nowhere.csv", KNOWN)
