@@ -321,7 +321,7 @@ eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tes
 OLDEST_x86_64  := GLIBC_2.2.5
 OLDEST_aarch64 := GLIBC_2.17
 WHEEL := libgait-$(VERSION)-py3-none-manylinux_2_28_$(CPU).whl
-wheel: $(READY) ## Python package with the library inside, in build/wheel (CC=aarch64-linux-gnu-gcc for that CPU)
+wheel: build/lcm/.stamp ## Python package with the library inside, in build/wheel (CC=aarch64-linux-gnu-gcc for that CPU)
 	@command -v cmake >/dev/null || { echo 'wheel: no cmake: install it' >&2; exit 1; }
 	@$(VENV)/bin/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w build/wheel ./python \
 	    $(patsubst %,-C %,wheel.tags=$(WHEEL:libgait-$(VERSION)-%.whl=%) build-dir=$(abspath build/cmake-$(CPU)) \
@@ -332,7 +332,7 @@ wheel: $(READY) ## Python package with the library inside, in build/wheel (CC=aa
 	    { echo 'wheel: needs a newer glibc than 2.28: see auditwheel show build/wheel/$(WHEEL)' >&2; exit 1; }
 	@echo build/wheel/$(WHEEL)
 
-sdist: $(READY) ## source package that builds without a network, in build/wheel
+sdist: build/lcm/.stamp ## source package that builds without a network, in build/wheel
 	@rm -rf build/eigen3 && mkdir -p build/eigen3 && cp -r $(EIGEN)/Eigen build/eigen3
 	@cd python && ../$(PY) -c 'from scikit_build_core.build import build_sdist; build_sdist("../build/wheel")' >/dev/null
 	@echo build/wheel/libgait-$(VERSION).tar.gz

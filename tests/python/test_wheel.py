@@ -56,6 +56,7 @@ for i in range(10):
     tracker.step(np.where(model.render(view, mean) > 0, shade, empty).astype(np.uint8), i * 40_000)
 print(tracker.digest())
 """
+LCM_MESSAGES = "from gait.lcm.link import generated; generated().estimate_t().encode()"
 
 
 def run(command, folder, **environment):
@@ -127,6 +128,7 @@ def test_the_wheel_makes_a_clip_and_tracks_it(tmp_path):
         name, *words = command.split()
         done = run([venv / "bin" / name, *words], tmp_path, PATH=str(venv / "bin"))
         assert done.returncode == 0, done.stderr
+    assert run([venv / "bin/python", "-c", LCM_MESSAGES], tmp_path).returncode == 0
     assert len((tmp_path / "t.csv").read_text().splitlines()) > 100
 
 
