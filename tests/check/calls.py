@@ -22,6 +22,7 @@ POINTERS = {  # file and name of a pointer: functions it may point to
     "task.c:run": "run",
     "pool.c:fn": "run_one",
     "task.c:fn": r"\w+_range",
+    "task.c:beside": r"inherit_\w+",
     "likelihood.c:log_likelihood": "log_likelihood",
     "likelihood.c:support": "support",
 }

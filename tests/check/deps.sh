@@ -2,7 +2,7 @@
 # deps.sh LIBRARY: it needs libc and libm only, and of those only threads and functions whose result is exact on every
 # system.  (Before glibc 2.34 threads were in a separate library.)
 libs='libc\.so\.6|libm\.so\.6|libpthread\.so\.0|libc\.musl-.*|ld-linux.*'
-text='mem(cpy|set|move|cmp|chr)|str(len|cmp|ncmp|chr|rchr|nlen)|vsnprintf'
+text='mem(cpy|set|move|cmp|chr)|str(len|cmp|ncmp|chr|rchr|nlen|spn|cspn)|vsnprintf'
 exact='(sqrt|floor|ceil|trunc|rint|nearbyint|fabs|fmod|ldexp|frexp|scalbn)f?'
 threads='pthread_(create|join|sigmask|(mutex|cond)_(init|destroy)|mutex_(un)?lock|cond_(wait|signal|broadcast))|sigfillset'
 frame='__cxa_finalize|_ITM_(de)?registerTMCloneTable|__gmon_start__|__stack_chk_fail|__assert_fail|__(memcpy|memset|memmove|vsnprintf)_chk'

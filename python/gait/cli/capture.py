@@ -39,7 +39,7 @@ EXAMPLES = """\
 examples:
   gait capture walk.mp4 --camera camera.json --background auto --init auto --wait 30
   gait capture /dev/video0 --camera camera.json --background empty.png
-  gait capture walk.mp4 --camera camera.json --init init.json --rate max --url file:///tmp/walk.log?mode=w
+  gait capture walk.mp4 --camera camera.json --init init.json --rate max --url file:///data/walk.log?mode=w
 """
 
 

@@ -27,7 +27,7 @@ from gait.progress import note
 EXAMPLES = """\
 examples:
   gait record -o track.csv --log estimates.log --until-idle 5
-  gait record -o track.csv --url file:///tmp/estimates.log?speed=0
+  gait record -o track.csv --url file:///data/estimates.log?speed=0
 """
 
 
