@@ -19,7 +19,7 @@ LONGEST_QUOTE = 40  # characters of a file that a message quotes
 
 
 def quoted(text: str) -> str:
-    """Quote what a file says in a message: short and printable, whatever the file holds."""
+    """Quote text of a file in a message: short and printable, whatever the file holds."""
     return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
 
 

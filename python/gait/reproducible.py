@@ -2,7 +2,7 @@
 
 OpenBLAS, numpy and libm choose their kernels by the CPU when they are loaded, and their last bits differ.
 The filling of gaps takes up to hundreds of steps, each by those before, and may carry that to the sixth
-decimal.  All three can be told to use what every CPU has that numpy runs on (SSE4.2); learning takes a
+decimal.  All three can be made to use what every CPU has that numpy runs on (SSE4.2); learning takes a
 little longer.
 
 `dask worker --preload-nanny gait.reproducible tcp://HOST:PORT` does so in a worker.
@@ -22,18 +22,18 @@ COMMON = {
 """Environment of a process that uses the common kernels."""
 
 _NO_WARNING = "ignore:During parsing environment variable:ImportWarning"  # numpy names features it lacks
-_RESTARTED = "GAIT_RESTARTED"  # which process was: never twice, whatever sets COMMON back at its start
+_RESTARTED = "GAIT_RESTARTED"  # process that was restarted: never twice, even if COMMON is reset at its start
 
 
 def chosen() -> dict[str, str]:
-    """Tell which of COMMON's names this process was given, and how."""
+    """Return those of COMMON's names that this process was given, with their values."""
     return {name: os.environ[name] for name in COMMON if name in os.environ}
 
 
 def settle() -> None:
-    """Start this program anew, its command line the same, unless it uses the common kernels already.
+    """Restart this program with the same command line, unless it uses the common kernels already.
 
-    A program that cannot be had again, typed or read from stdin, goes on with the kernels of its CPU.
+    A program typed or read from stdin cannot be restarted and keeps the kernels of its CPU.
     """
     again = sys.executable and sys.argv[0] not in ("", "-") and os.environ.get(_RESTARTED) != str(os.getpid())
     if again and _to_choose() and chosen() != COMMON:
@@ -50,5 +50,5 @@ def dask_setup(_: object) -> None:
 
 
 def _to_choose() -> bool:
-    """Tell whether COMMON is for this machine."""
+    """Whether COMMON applies to this machine."""
     return os.name == "posix" and os.uname().machine == "x86_64"

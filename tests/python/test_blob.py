@@ -86,7 +86,7 @@ def test_a_wrong_table_under_a_right_checksum_never_crashes(at, value):
     [
         (0, b"G0", "not a .gait model"),
         (8, struct.pack("<H", 2), "format 2.0, this package reads 1.x"),
-        (24, struct.pack("<Q", 10), "header says 10 bytes"),
+        (24, struct.pack("<Q", 10), "header states 10 bytes"),
         (64 + 4, struct.pack("<I", 9), "AAAA has an unknown type"),
         (64 + 8, struct.pack("<I", 1), "AAAA has an unknown type or shape"),
         (64 + 32, struct.pack("<Q", 1 << 40), "AAAA lies outside"),

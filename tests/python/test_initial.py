@@ -10,11 +10,11 @@ from drawn_walker import DATA, camera, clip, draw, state_at, wall, write
 from gait import Camera, Model, Start, UserError, Video
 from gait.bindings.initial import DEFAULT_SD
 from gait.bindings.model import read_blob
-from gait.track.person_detection import another_scene, one_is_grey, sightings, standing
-from gait.io.video import Frame
 from gait.io import blob
 from gait.io.track_file import read_truth
-from gait.track.auto_start import Spotter, find_start
+from gait.io.video import Frame
+from gait.track.auto_start import AutoStart, find_start
+from gait.track.person_detection import another_scene, detect_change, one_is_grey, person_between
 
 MODEL = Model()
 SECTIONS = blob.decode(read_blob(None))
@@ -208,9 +208,9 @@ def test_too_few_frames_to_find_somebody_in_are_told(tmp_path, count, words):
 
 def test_nobody_in_the_picture_is_told(tmp_path):
     write(tmp_path / "empty.mp4", [wall()] * 12)
-    with pytest.raises(UserError, match="empty.mp4: --init auto found nobody .*give --init FILE.json"):
+    with pytest.raises(UserError, match="empty.mp4: --init auto found no person .*give --init FILE.json"):
         find_start(Video(tmp_path / "empty.mp4"), camera(), wall(), MODEL)
-    with pytest.raises(UserError, match="empty.mp4: --init auto found nobody .*give --init FILE.json"):
+    with pytest.raises(UserError, match="empty.mp4: --init auto found no person .*give --init FILE.json"):
         find_start(Video(tmp_path / "empty.mp4"), camera(), None, MODEL)
 
 
@@ -260,45 +260,45 @@ def test_a_spotter_starts_with_who_walks_in(tmp_path):
     view = camera(place=(0.0, -6.0, 2.2))
     pictures, _ = clip(MODEL, SECTIONS, 45, view=view)
     write(tmp_path / "walk.mp4", pictures)
-    spotter = Spotter(view, wall(), MODEL)
+    start = AutoStart(view, wall(), MODEL)
     for frame in Video(tmp_path / "walk.mp4").frames(0):
-        spotter.see(frame)
-        if spotter.walks_in(frame):
+        start.observe(frame)
+        if start.walks_in(frame):
             break
-    found = spotter.start(latest=True)
+    found = start.state(latest=True)
     assert found.frame == frame.number and 25 <= frame.number <= 40
-    spotter.forget()
-    assert not spotter.enough() and not spotter.walks_in(frame)
+    start.forget()
+    assert not start.enough() and not start.walks_in(frame)
 
 
 def test_a_spotter_does_not_start_with_who_stands(tmp_path):
     view = camera(place=(0.0, -6.0, 2.2))
     pictures, _ = clip(MODEL, SECTIONS, 1, view=view)
     write(tmp_path / "stand.mp4", pictures * 45)
-    spotter = Spotter(view, wall(), MODEL)
+    start = AutoStart(view, wall(), MODEL)
     for frame in Video(tmp_path / "stand.mp4").frames(0):
-        spotter.see(frame)
-        assert not spotter.walks_in(frame)
-    assert spotter.full_second(frame)
+        start.observe(frame)
+        assert not start.walks_in(frame)
+    assert start.full_second(frame)
 
 
 @pytest.mark.parametrize("rate", [6, 10, 15, 25, 30, 60])
 def test_looks_alone_do_at_any_frame_rate(monkeypatch, rate):
-    """Enough sightings in time, and no more than a slow detector can give."""
+    """Enough detections in time, and no more than a slow detector can give."""
     view = camera(place=(0.0, -6.0, 2.2))
     seen = []
 
     def one(image, given):
         foot, head = view.project(np.array([[0.0, 0, 0], [0, 0, 1.7]]))
-        seen.append(standing(foot, head, view, 1.0, 0.04))
+        seen.append(person_between(foot, head, view, 1.0, 0.04))
         return seen[-1:]
 
-    monkeypatch.setattr("gait.track.auto_start.people", one)
-    spotter = Spotter(view, None, MODEL)
+    monkeypatch.setattr("gait.track.auto_start.detect_shape", one)
+    start = AutoStart(view, None, MODEL)
     for n in range(2 * rate):
         frame = Frame(n, n / rate, wall())
-        spotter.see(frame)
-    assert spotter.full_second(frame)
+        start.observe(frame)
+    assert start.full_second(frame)
     assert len(seen) <= 22
 
 
@@ -310,7 +310,7 @@ def test_who_stands_is_not_started_with_by_looks_alone(tmp_path):
     held = [np.clip(first + noise.normal(0, 2, first.shape), 0, 255).astype(np.uint8) for _ in range(34)]
     write(tmp_path / "held.mp4", held)
     video = Video(tmp_path / "held.mp4")
-    with pytest.raises(UserError, match="held.mp4: --init auto found nobody .*give --init FILE.json"):
+    with pytest.raises(UserError, match="held.mp4: --init auto found no person .*give --init FILE.json"):
         find_start(video, Camera.read(str(folder / "camera.json"), video.size), None, MODEL)
 
 
@@ -333,7 +333,7 @@ def test_a_camera_whose_height_is_wrong_is_told(tmp_path):
     true = camera()
     low = replace(true, t=-true.R @ (true.centre * [1, 1, 0.4]))
     with pytest.raises(
-        UserError, match=r"saw somebody in \d+ frames whom the camera makes 0\.\d+ m tall; check the"
+        UserError, match=r"found a person in \d+ frames that the camera makes 0\.\d+ m tall; check the"
     ):
         find_start(Video(tmp_path / "walk.mp4"), low, wall(), MODEL)
 
@@ -344,11 +344,13 @@ def test_what_a_wrong_camera_makes_of_people_is_told_by_most_frames(tmp_path):
     two[190:228, 200:215] = 255
     seen: list[float] = []
     for picture in (one, two):
-        assert not sightings(picture, wall(), camera(), seen)
+        assert not detect_change(picture, wall(), camera(), seen)
     assert len(seen) == 2 and seen[0] == seen[1] < 1
     pictures, _ = clip(MODEL, SECTIONS, 20)
     write(tmp_path / "walk.mp4", pictures)
     up = np.array([[1, 0, 0], [0, 0.5, -0.866], [0, 0.866, 0.5]])
     upward = replace(camera(), R=up, t=-up @ camera().centre)
-    with pytest.raises(UserError, match=r"saw somebody in \d+ frames whom the camera puts above the horizon"):
+    with pytest.raises(
+        UserError, match=r"found a person in \d+ frames that the camera puts above the horizon"
+    ):
         find_start(Video(tmp_path / "walk.mp4"), upward, wall(), MODEL)

@@ -17,7 +17,7 @@ from gait.io import blob
 from gait.io.track_file import read_track
 from gait.io.video import Frame
 from gait.motion.footfalls import Draws
-from gait.track.smooth import Smoother, Spool, draw_motions, pose_all, smoothed
+from gait.track.smooth import Smoother, Spool, draw_motions, smoothed
 from gait.track.transitions import Step, Transitions
 
 SECTIONS = blob.decode(read_blob(None))
@@ -58,7 +58,7 @@ def test_the_twin_moves_states_as_the_library_does(mode):
     for i, settling in ((1, True), (7, False)):
         before, theirs = tables[i], tables[i + 1]
         ours = moves.move(
-            before, Step(0.033333, settling, True, tracker.stature_doubt), np.random.default_rng(0)
+            before, Step(0.033333, settling, True, tracker.start_stature_sd), np.random.default_rng(0)
         )
         a, b = moves.difference(ours, before), moves.difference(theirs, before)
         tolerance = 5 * np.hypot(a.std(axis=0), b.std(axis=0)) / np.sqrt(len(a)) + 1e-7
@@ -180,7 +180,7 @@ def test_the_spool_gives_back_what_it_took_and_knows_the_starts():
             np.testing.assert_allclose(states, moves.table(kept[i][0]), atol=1e-5)
             np.testing.assert_array_equal(weights.astype(np.float32), kept[i][1])
         assert spool.step_to(0) is None and spool.step_to(35) is None
-        assert spool.step_to(1) == Step(pytest.approx(0.033333), True, False, tracker.stature_doubt)
+        assert spool.step_to(1) == Step(pytest.approx(0.033333), True, False, tracker.start_stature_sd)
         assert spool.step_to(31).settling and not spool.step_to(34).settling  # a second after frame 2
         assert spool.step_to(36).settling and not spool.step_to(69).settling
 
@@ -205,8 +205,8 @@ def test_what_no_number_of_frames_makes_less_is_added_as_the_library_does():
     states, _ = tracker.particles()
     with Smoother(tracker, CURVES) as smoother:
         smoother.add(Frame(0, 0.0, wall()), theirs)
-        ours = smoother._widened(0, smoothed(theirs, MODEL, states, *pose_all(MODEL, states)))
-    assert tracker.stature_doubt > 0.05
+        ours = smoother._widened(0, smoothed(theirs, MODEL, states, *MODEL.poses(states)))
+    assert tracker.start_stature_sd > 0.05
     np.testing.assert_allclose(ours.joint_sd, theirs.joint_sd, rtol=0.02)
     np.testing.assert_allclose(ours.sd.stature, theirs.sd.stature, rtol=0.02)
 

@@ -148,6 +148,21 @@ class Model:
         check(self._lib.gait_model_pose(self.handle, *where), error)
         return pose_arrays(c, self.info.joints, self.info.angles)
 
+    def poses(self, states: NDArray[np.void]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Joints (..., P, 3), metres, and angles (..., A), radians, of an array (...) of ``gait_state``."""
+        flat = np.ascontiguousarray(states).reshape(-1)
+        pose, error, pointer = abi.PoseC(), abi.Error(), ctypes.POINTER(abi.StateC)
+        joint, angle = np.ctypeslib.as_array(pose.joint), np.ctypeslib.as_array(pose.angle)
+        joints = np.empty((len(flat), self.info.joints, 3), np.float32)
+        angles = np.empty((len(flat), self.info.angles), np.float32)
+        begin, size, call = flat.ctypes.data, flat.dtype.itemsize, self._lib.gait_model_pose
+        for i in range(len(flat)):
+            state = ctypes.cast(begin + i * size, pointer)
+            check(call(self.handle, state, ctypes.byref(pose), ctypes.byref(error)), error)
+            joints[i], angles[i] = joint[: self.info.joints], angle[: self.info.angles]
+        shape = states.shape
+        return joints.reshape(*shape, *joints.shape[1:]), angles.reshape(*shape, *angles.shape[1:])
+
     def pelvis_height(self, state: State) -> float:
         """Height of the pelvis over the ground that the model predicts, metres (for any ``state.pelvis``)."""
         height, error = ctypes.c_float(), abi.Error()

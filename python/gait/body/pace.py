@@ -1,4 +1,4 @@
-"""How much faster than the mean somebody walks, which the mean cycle of a model follows (section PACE)."""
+"""Pace: how much faster than the mean a person walks, which the mean cycle of a model follows (PACE)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def pace(statistics: npt.ArrayLike, stride_hz: npt.ArrayLike) -> Floats:
 
 @cache
 def waves(terms: int, phases: int) -> Floats:
-    """Constant, then cosine and sine of each harmonic (terms, phases), `terms` odd."""
+    """Constant, then cosine and sine of each harmonic (terms, phases); `terms` is an odd number."""
     turn = 2 * np.pi * np.outer(np.arange(1, (terms + 1) // 2), np.arange(phases) / phases)
     pairs = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return np.concatenate([np.ones((1, phases)), pairs.reshape(terms - 1, phases)])

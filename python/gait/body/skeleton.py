@@ -192,7 +192,7 @@ def _points(p: Proportions) -> dict[str, tuple[str, tuple[float, float, float]]]
 
 CONE, ELLIPSOID = 0, 1
 #: Solids of a dressed body of 1.75 m, millimetres: shape, how far axes start and end from joints (left side),
-#: half axes at both ends.  Fitted to silhouettes of walkers whose pose is known (decisions.md, "What the
+#: half axes at both ends.  Fitted to silhouettes of people whose pose is known (decisions.md, "What the
 #: defaults were chosen on"): flesh lies ahead of hips and spine; the trunk reaches into the neck.
 _SOLIDS = {
     "torso": (CONE, (52, 0, 108), (61, 0, 86), (172, 133, 184, 72)),

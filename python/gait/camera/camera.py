@@ -78,14 +78,14 @@ class Camera:
         focal : float
             Pixels.
         """
-        eye = np.asarray(place, np.float64)
-        ahead = np.asarray(target, np.float64) - eye
+        centre = np.asarray(place, np.float64)
+        ahead = np.asarray(target, np.float64) - centre
         ahead /= np.linalg.norm(ahead)
         right = np.cross(ahead, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
         R = np.stack([right, np.cross(ahead, right), ahead])
         width, height = size
-        return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, R, -R @ eye)
+        return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, R, -R @ centre)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -17,7 +17,7 @@ from gait.io.fields import table_rows
 
 Array = NDArray[np.float64]
 
-LEAST = 4  # points on the ground that tell a place
+LEAST = 4  # points on the ground that determine a place
 _COLUMNS = ("u", "v", "x", "y")
 _STRAIGHT = 0.02  # of their length: points narrower than this lie on a line
 _FURTHEST = 1e6  # pixels or metres
@@ -101,9 +101,9 @@ def place(lens: Camera, points: Points) -> tuple[Camera, Array]:
     Raises
     ------
     UserError
-        If the points do not tell a place above the ground.
+        If no place above the ground fits the points.
     """
-    _require_spread(points)
+    _require_extent(points)
     K, dist = lens.matrix, lens.distortion
     _, turns, shifts, _ = cv2.solvePnPGeneric(points.world, points.uv, K, dist, flags=cv2.SOLVEPNP_SQPNP)
     found = []
@@ -114,13 +114,13 @@ def place(lens: Camera, points: Points) -> tuple[Camera, Array]:
             found.append((camera, np.hypot(*(camera.project(points.world) - points.uv).T)))
     if not found:
         raise UserError(
-            f"{points.path}: no camera above the ground sees the points so; check that z points up and that "
-            "x, y, z are right-handed"
+            f"{points.path}: no camera pose above the ground fits these points; check that z points up and "
+            "that x, y, z are right-handed"
         )
     return min(found, key=lambda one: float((one[1] ** 2).sum()))
 
 
-def _require_spread(points: Points) -> None:
+def _require_extent(points: Points) -> None:
     for what, values in (("u, v", points.uv), ("x, y, z", points.world)):
         size = np.linalg.svd(values - values.mean(axis=0), compute_uv=False)
         if not size[1] > _STRAIGHT * size[0]:

@@ -83,7 +83,7 @@ def decode(blob: bytes, name: str = "blob") -> dict[str, Array]:
         )
     if header_bytes != HEADER.size or total != len(blob) or HEADER.size + count * ENTRY.size > len(blob):
         raise UserError(
-            f"{name}: header says {total} bytes, the file has {len(blob)}; copy or learn it again"
+            f"{name}: header states {total} bytes, the file has {len(blob)}; copy or learn it again"
         )
     if crc != checksum(blob):
         raise UserError(f"{name}: checksum differs, the file is damaged; copy or learn it again")

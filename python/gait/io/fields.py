@@ -20,7 +20,7 @@ _LAST_FRAME = 2**53  # larger whole numbers are not exact as floating point
 
 
 class Fields:
-    """A mapping read from a file that knows what to say about itself.
+    """A mapping read from a file, with checked access and errors that name file and key.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Fields:
             raise self.fail(key, "is not an array of numbers", remedy) from None
 
     def only(self, known: Sequence[str]) -> None:
-        """Refuse keys that nobody reads: most are misspelt."""
+        """Refuse unknown keys: most are misspelt."""
         for key in self._data:
             if key not in known:
                 raise self.fail(key, "is not a known key", f"use {' '.join(known)}")

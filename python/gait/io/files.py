@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gait.errors import UserError, unreadable
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room on the disk, or for one user, or in one file
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk full, or quota of the user, or limit of one file
 
 
 @contextmanager
@@ -23,7 +23,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     UserError
-        If a file cannot be put there, as by `require_writable`, or has no room.
+        If a file cannot be put there, as by `require_writable`, or the disk is full.
     """
     require_writable(path)
     target = Path(os.path.realpath(path))
@@ -117,7 +117,7 @@ def require_folder(path: str | os.PathLike[str]) -> None:
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether a file can be made in a folder; in /proc not even root can, whom all permissions allow it."""
+    """Whether a file can be made in a folder; in /proc not even root can, whatever the permissions."""
     try:
         with tempfile.TemporaryFile(dir=folder):
             return os.access(folder, os.W_OK)

@@ -65,7 +65,7 @@ class Keypoints:
         return float(((seen < -0.5) | (seen > np.array(size) - 0.5)).any(axis=1).mean())
 
     def require_spread(self, path: str | os.PathLike[str], sd: float) -> None:
-        """Raise UserError if several points all lie within `sd`: not in its unit, they tell nothing."""
+        """Raise UserError if several points all lie within `sd`: they are not in its unit."""
         seen = self.uv[self.seen]
         spread = float(np.ptp(seen, axis=0).max())
         if self.seen.any(axis=0).sum() > 1 and spread <= sd:
@@ -75,7 +75,7 @@ class Keypoints:
             )
 
     def require_motion(self, path: str | os.PathLike[str]) -> None:
-        """Raise UserError unless this is one stretch of two frames or more."""
+        """Raise UserError unless this is one interval of two frames or more."""
         if len(self.time) < 2:
             raise UserError(f"{path}: has one frame; lifting is of motion, give two or more")
         gap = np.diff(self.time)

@@ -28,7 +28,7 @@ STATE_COLUMNS = (
     *("frame", "time", "status", "phase", "stride_hz", "heading_rad", "stature_m", "speed_m_s"),
     *("ess", "log_evidence"),
 )
-SPREAD_COLUMNS = ("phase_sd", "stride_hz_sd", "heading_sd_rad", "stature_sd_m")
+SD_COLUMNS = ("phase_sd", "stride_hz_sd", "heading_sd_rad", "stature_sd_m")
 STATUSES = ("init", "tracking", "ambiguous", "lost")
 
 
@@ -36,8 +36,8 @@ def header(components: int, angle_names: tuple[str, ...]) -> list[str]:
     """Column names of a track file."""
     scores = [f"c_{k + 1}" for k in range(components)]
     joints = [f"{joint}_{axis}" for joint in JOINTS for axis in ("x", "y", "z", "sx", "sy", "sz")]
-    spreads = [*SPREAD_COLUMNS, *(f"{score}_sd" for score in scores)]
-    return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names), *spreads]
+    sds = [*SD_COLUMNS, *(f"{score}_sd" for score in scores)]
+    return [*STATE_COLUMNS, *scores, *joints, *(f"{name}_deg" for name in angle_names), *sds]
 
 
 class TrackWriter:
@@ -172,7 +172,7 @@ def read_track(path: str | os.PathLike[str]) -> Track:
     """Read what ``gait track`` wrote."""
     table = _Table(path, "track")
     if _has_no_state(table):
-        raise UserError(f"{path}: has joints alone, as gait lift writes; give a track of gait track")
+        raise UserError(f"{path}: has joints alone, as gait lift writes them; give a track of gait track")
     status = table.column("status")
     for line, word in enumerate(status, 2):
         if word not in STATUSES:
@@ -181,7 +181,7 @@ def read_track(path: str | os.PathLike[str]) -> Track:
 
 
 def _has_no_state(table: _Table) -> bool:
-    """Whether it is lifted motion, or a truth: joints alone."""
+    """Whether a file has joints alone: lifted motion, or a truth."""
     return not {"status", "phase"} & table.rows.keys()
 
 
@@ -192,14 +192,14 @@ def _track(table: _Table, status: list[str], phase: Array) -> Track:
         places={name: table.vectors(name, "xyz") for name in JOINTS},
         status=status,
         phase=phase,
-        sd={name: table.deviations(name) for name in JOINTS},
+        sd={name: table.standard_deviations(name) for name in JOINTS},
         numbers={name: table.numbers(name) for name in table.rows if _is_number(name)},
     )
 
 
 def _is_number(column: str) -> bool:
     """Whether `read_track` takes a column into `Track.numbers`."""
-    known = column in STATE_COLUMNS[3:] or column in SPREAD_COLUMNS or column.endswith("_deg")
+    known = column in STATE_COLUMNS[3:] or column in SD_COLUMNS or column.endswith("_deg")
     return known or re.fullmatch(r"c_\d+(_sd)?", column) is not None
 
 
@@ -246,7 +246,7 @@ class _Table:
                 raise UserError(f"{self.path}: line {i + 2}: {name} is {cell!r}; give a finite number")
         return values
 
-    def deviations(self, joint: str) -> Array:
+    def standard_deviations(self, joint: str) -> Array:
         sd = self.vectors(joint, ("sx", "sy", "sz"))
         if (sd < 0).any():
             i, axis = np.argwhere(sd < 0)[0]

@@ -128,7 +128,7 @@ class Video:
 
 
 def _upright(frame: av.VideoFrame, pixels: str) -> Image:
-    """Picture in the pixel format asked for, turned counter-clockwise as the container says."""
+    """Picture in the pixel format asked for, turned counter-clockwise as the container asks."""
     image = np.asarray(frame.to_ndarray(format=pixels), np.uint8)
     return np.ascontiguousarray(np.rot90(image, frame.rotation // 90)) if frame.rotation % 360 else image
 

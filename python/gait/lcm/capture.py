@@ -104,7 +104,7 @@ class DeviceSource:
 
 
 def is_device(name: str) -> bool:
-    """Tell a camera of this machine from a file."""
+    """Whether a source is a camera of this machine, not a file."""
     return name.isdigit() or Path(name).is_char_device()
 
 
@@ -190,12 +190,13 @@ class _End:
         self.reason = reason
 
 
-def ahead(source: Iterable[T], room: int) -> Iterator[T]:
-    """Yield the items of `source`, which another thread draws up to `room` items early.
+def ahead(source: Iterable[T], limit: int) -> Iterator[T]:
+    """Yield the items of `source`, which another thread takes up to `limit` items early.
 
-    An exception of the source is raised here, after the items before it.
+    So a frame that is slow to decode is not sent late.  An exception of the source is raised here, after the
+    items before it.
     """
-    waiting: queue.Queue[T | _End] = queue.Queue(room)
+    waiting: queue.Queue[T | _End] = queue.Queue(limit)
     left = threading.Event()
 
     def put(item: T | _End) -> bool:
@@ -247,7 +248,7 @@ class Setup:
     plate : image or None
         Empty scene.
     start : Start or None
-        First state of the walker.
+        First state of the person.
     start_time : float
         Video time of `start`, seconds.
     jpeg : int or None
@@ -280,7 +281,7 @@ class Publisher:
             self._out.subscribe("GAIT_STATUS", self._on_status).set_queue_capacity(8)
 
     def meet(self, patience: float) -> None:
-        """Announce until a tracker has said that it knows camera and empty scene.
+        """Announce until a tracker confirms camera and empty scene.
 
         Raises
         ------
@@ -324,7 +325,7 @@ class Publisher:
         done: Callable[[int], None],
         whole: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
-        """Send each frame when it is due; `done` is told the number of each.
+        """Send each frame when it is due; `done` is called with the number of each.
 
         What goes out does so in a block of `whole`, where no interrupt may come.
         """
@@ -374,7 +375,7 @@ class Publisher:
             question()
             if self._listen(_ASK, answered):
                 return
-        heard = f"; it says: {self._status.text}" if self._status else "; none was heard"
+        heard = f"; its status: {self._status.text}" if self._status else "; none was heard"
         raise UserError(
             f"no tracker {what} after {patience:g} s{heard}; start gait-trackd on the same URL first"
         )

@@ -69,7 +69,7 @@ def log_of(url: str) -> tuple[str, str]:
 
 
 def break_of(path: str | os.PathLike[str]) -> str | None:
-    """Say where a log that is not whole breaks off, None of one that is."""
+    """Describe where an incomplete log breaks off; None if the log is complete."""
     size, at, events = Path(path).stat().st_size, 0, 0
     with open(path, "rb") as file:
         while at < size:
@@ -142,7 +142,7 @@ except ImportError as exc:  # its own fallbacks hide the reason: liblcm needs th
     raise UserError(f"lcm: cannot be loaded ({exc}); install libglib2.0-0 and the lcm wheel") from None
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
-"""Room for the receiver is part of the URL: the system's default loses 9 of 10 colour frames."""
+"""The URL sets the receive buffer: with the system's default 9 of 10 colour frames are lost."""
 
 ROUTE_REMEDY = "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
 _RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
@@ -181,7 +181,7 @@ def open_lcm(url: str | None = None) -> lcm.LCM:
 
 
 def _fault_of(url: str) -> str:
-    """Say why a log cannot be opened."""
+    """Describe why a log cannot be opened."""
     path, mode = log_of(url)
     damage = break_of(path) if mode == "r" and os.path.isfile(path) else None
     return damage or "cannot open this log; give file:///PATH?speed=0 (mode=w to write)"
@@ -222,12 +222,12 @@ def handle(link: lcm.LCM, seconds: float, log: bool) -> bool:
 
 
 def is_log(url: str) -> bool:
-    """Tell a log file, which loses nothing, from a network."""
+    """Whether a URL is a log file, which loses nothing, not a network."""
     return url.startswith(PREFIX)
 
 
 def private_url() -> str:
-    """Make a multicast URL with a port that nobody on this machine uses: a network of one's own."""
+    """Make a multicast URL with a port that is free on this machine: a private network."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("", 0))
         port = probe.getsockname()[1]

@@ -116,11 +116,11 @@ def tracks_message(
         From 0, not seen, to 1.
     """
     points = np.asarray(uv, float)
-    seen = np.isfinite(points).all(axis=1)
-    sure = np.where(seen, np.broadcast_to(confidence, len(points)), 0.0)
+    visible = np.isfinite(points).all(axis=1)
+    confidences = np.where(visible, np.broadcast_to(confidence, len(points)), 0.0)
     message = gaitmsg.tracks_t()
     message.utime, message.frame, message.ntracks = utime, frame, len(points)
-    for name, (u, v), c in zip(names, np.where(seen[:, None], points, 0.0), sure, strict=True):
+    for name, (u, v), c in zip(names, np.where(visible[:, None], points, 0.0), confidences, strict=True):
         track = gaitmsg.track_t()
         track.name, track.u, track.v, track.confidence = name, float(u), float(v), float(c)
         message.tracks.append(track)
@@ -180,7 +180,7 @@ def camera_of(message: Any) -> Camera:
 def state_message(values: State | Mapping[str, Any]) -> Any:
     """Make a ``state_t`` from a `State`, or from some of its fields: the others are NaN, unknown.
 
-    It has no room for the turn rate.
+    The message has no turn rate.
     """
     known = vars(values) if isinstance(values, State) else values
     message = gaitmsg.state_t()
@@ -192,14 +192,14 @@ def state_message(values: State | Mapping[str, Any]) -> Any:
     return message
 
 
-def _padded(values: Any, room: int) -> tuple[int, list[float]]:
-    """Count and values, with zeros up to `room`; all of them unknown if `values` is None."""
-    given = [_UNKNOWN] * room if values is None else [float(x) for x in values]
-    return len(given), given + [0.0] * (room - len(given))
+def _padded(values: Any, size: int) -> tuple[int, list[float]]:
+    """Count and values, with zeros up to `size`; all of them unknown if `values` is None."""
+    given = [_UNKNOWN] * size if values is None else [float(x) for x in values]
+    return len(given), given + [0.0] * (size - len(given))
 
 
 def state_of(message: Any) -> State:
-    """Read a ``state_t``, which has no room for the limbs' proportions: they are those of the mean body."""
+    """Read a ``state_t``; it has no limbs' proportions, which are then those of the mean body."""
     state = State(pelvis=np.array(message.pelvis, float))
     for name in POSE_SCALARS:
         setattr(state, name, float(getattr(message, name)))

@@ -88,9 +88,9 @@ class Recorder:
     stop : bool
         Set it to end `run` in good order.
     other : str or None
-        Says that another stream began, where that has ended the recording.
+        Describes another stream, if its start has ended the recording.
     damage : str or None
-        Says of the first message that was left out what is wrong with it.
+        Describes what is wrong with the first message that was left out.
     """
 
     def __init__(self, url: str, output: str, log: str | None = None, channel: str = ESTIMATE) -> None:
@@ -180,7 +180,7 @@ class Recorder:
             raise UserError(f"{path}: {fault}; {self._output} holds what came before")
 
     def _goes_on(self, previous: Any, message: Any) -> bool:
-        """Whether an estimate follows the one before; what else it tells is kept."""
+        """Whether an estimate continues the stream of the one before; if not, note why."""
         played_again = message.receive_utime == self._first  # as is the first of a log
         if not played_again and _of_two(previous, message):
             self._two = True

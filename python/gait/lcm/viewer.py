@@ -1,4 +1,4 @@
-"""Frames and estimates brought together again, and shown to a browser."""
+"""Match estimates with their frames and show them in a browser."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Viewer:
     Attributes
     ----------
     damage : str or None
-        Says of the first message that could not be shown what is wrong with it.
+        Describes what is wrong with the first message that could not be shown.
     """
 
     def __init__(
@@ -155,7 +155,7 @@ class _Request(BaseHTTPRequestHandler):
             self.send_error(404)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: stderr is for the user."""
+        """Log nothing: stderr is for the user."""
 
     def _answer(self, kind: str, body: bytes) -> None:
         self.send_response(200)

@@ -106,7 +106,7 @@ def _hip_midpoint(truth: Joints) -> Array:
 APART = 15  # frames between two that count as independent
 _BINS = 10
 _HALF = {"50": 0.6744898, "90": 1.6448536}  # half-widths of normal intervals, standard deviations
-_TINY = 1e-9  # metres; a deviation of 0 is a claim to be exact
+_TINY = 1e-9  # metres; an sd of 0 would claim to be exact
 
 
 def coverage(found: Array, sd: Array, true: Array) -> dict[str, float]:
@@ -135,8 +135,8 @@ def calibration(found: Array, sd: Array, true: Array) -> dict[str, Any]:
         ``pit``: shares of 10 equal bins of the probability integral transform over frames `APART` apart,
         ``pit_chi2`` their chi-square statistic against flat and ``pit_p`` its p-value as if coordinates were
         independent (they are not: read it as a ranking); ``z2``: mean squared error in variances, 1 where the
-        deviations are right; ``crps_mm``: continuous ranked probability score of a normal (Gneiting and
-        Raftery 2007), lower is better; ``width_mm``: mean width of the 90 % intervals.
+        standard deviations are right; ``crps_mm``: continuous ranked probability score of a normal (Gneiting
+        and Raftery 2007), lower is better; ``width_mm``: mean width of the 90 % intervals.
     """
     z = (true - found) / np.maximum(sd, _TINY)
     counts, _ = np.histogram(ndtr(z[::APART]), _BINS, (0.0, 1.0))
@@ -152,7 +152,7 @@ def calibration(found: Array, sd: Array, true: Array) -> dict[str, Any]:
 
 
 def crps(z: Array, sd: Array) -> Array:
-    """Continuous ranked probability score of normals of deviation `sd`, missed by `z` deviations."""
+    """Continuous ranked probability score of normals of standard deviation `sd`, for errors `z` * `sd`."""
     density = np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
     return np.asarray(sd * (z * (2 * ndtr(z) - 1) + 2 * density - 1 / np.sqrt(np.pi)))
 
@@ -217,15 +217,15 @@ def evaluate(
         "coverage": coverage(found, track.eval15_sd()[ours], true),
         "static": pose_errors(still, true),
         "free": None if free is None else pose_errors(free[theirs], true),
-        "root12": spread(root_errors(found, true, LIMBS)),
-        "proc": spread(procrustes_errors(found, true)),
+        "root12": summary(root_errors(found, true, LIMBS)),
+        "proc": summary(procrustes_errors(found, true)),
         "status": {word: float((status == word).mean()) for word in STATUSES},
         "trust": trust(root_errors(found, true), status),
         "calibration": calibration(found, track.eval15_sd()[ours], true),
     }
 
 
-def spread(values: Array) -> dict[str, float]:
+def summary(values: Array) -> dict[str, float]:
     """Median, mean and 90th percentile over frames."""
     return {
         "median": float(np.median(values)),
@@ -239,7 +239,7 @@ def pose_errors(found: Array, true: Array, given_up: NDArray[np.bool_] | None = 
     absolute = 1000 * np.linalg.norm(found - true, axis=2).mean(axis=1)
     root = root_errors(found, true)
     lost = root > LOST_MM if given_up is None else (root > LOST_MM) | given_up
-    return {"abs": spread(absolute), "root": spread(root), "lost": float(lost.mean())}
+    return {"abs": summary(absolute), "root": summary(root), "lost": float(lost.mean())}
 
 
 def root_errors(found: Array, true: Array, joints: list[int] = BODY) -> Array:
@@ -265,7 +265,7 @@ def procrustes_errors(found: Array, true: Array) -> Array:
 def trust(root: Array, status: NDArray[np.str_]) -> dict[str, float]:
     """How far the status can be believed, shares of all frames.
 
-    ``wrong_tracking``: off by more than `LOST_MM` while it says ``tracking``; ``weighted_lost``: frames lost,
+    ``wrong_tracking``: off by more than `LOST_MM` with status ``tracking``; ``weighted_lost``: frames lost,
     those counted twice.
     """
     off = root > LOST_MM
@@ -284,17 +284,17 @@ def phase_errors(found: Array, true: Array) -> dict[str, float]:
     error = (found - true + 0.5) % 1.0 - 0.5
     flipped = np.abs(error) > 0.25
     error = np.where(flipped, error - np.copysign(0.5, error), error)
-    return {**spread(np.abs(error)), "bias": float(error.mean()), "flips": float(flipped.mean())}
+    return {**summary(np.abs(error)), "bias": float(error.mean()), "flips": float(flipped.mean())}
 
 
 def picture_errors(found: Array, true: Array, camera: Camera) -> dict[str, float] | None:
     """Distance in pixels between the projections of EVAL15; None if nothing is before the camera."""
     distance = np.linalg.norm(camera.project(found) - camera.project(true), axis=2)
-    seen = np.isfinite(distance)
-    frames = seen.any(axis=1)
+    visible = np.isfinite(distance)
+    frames = visible.any(axis=1)
     if not frames.any():
         return None
-    return spread(np.nanmean(np.where(seen, distance, np.nan)[frames], axis=1))
+    return summary(np.nanmean(np.where(visible, distance, np.nan)[frames], axis=1))
 
 
 def _span(joints: Joints) -> str:

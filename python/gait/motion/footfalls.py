@@ -278,7 +278,7 @@ def _flat(time: Array, heel: Array, strike: Array, stride: float) -> Array:
     return out
 
 
-_COUNT = 500  # independent draws; deviations are then known to 3 %
+_COUNT = 500  # independent draws; the sd is then known to 3 %
 _FLAT = 0.2  # of a stride after the strike
 
 
@@ -344,15 +344,15 @@ _ARRAYS = ("frame", "time", "joint_names", "angle_names", "joints", "angles", "p
 def draw_contacts(
     track: Track, events: Events, feet: Mapping[str, Contacts], stride: float, draws: Draws | None
 ) -> tuple[dict[str, Contacts], Events, str]:
-    """Draws of the contacts by side, shape (D, ...); deviations of the events; and where they come from."""
+    """Draws of the contacts by side, shape (D, ...), standard deviations of the events, and their source."""
     if draws is not None:
         return (*_of_motions(draws, events, stride), f"{len(draws.phase)} motions drawn from the posterior")
     if "phase_sd" not in track.numbers:
         nothing = {side: stack([_nan_like(feet[side])]) for side in SIDES}
         return nothing, _event_sd([events], unknown=True), "unknown: the track has no column phase_sd"
     return (
-        *_of_deviations(track, events, feet, stride),
-        "the deviations of each frame, taken as independent",
+        *_independent(track, events, feet, stride),
+        "the standard deviations of each frame, taken as independent",
     )
 
 
@@ -366,10 +366,10 @@ def _of_motions(draws: Draws, events: Events, stride: float) -> tuple[dict[str, 
     return drawn, _event_sd(found)
 
 
-def _of_deviations(
+def _independent(
     track: Track, events: Events, feet: Mapping[str, Contacts], stride: float
 ) -> tuple[dict[str, Contacts], Events]:
-    """Draw each event as sure as the phase is then, its place as sure as the heel."""
+    """Draw each event with the uncertainty of the phase, and its place with that of the heel."""
     random = np.random.default_rng(0)
     time, rate = track.time, np.maximum(track.numbers["stride_hz"], 0.1)
     late = np.minimum(track.numbers["phase_sd"], 0.29) / rate  # no less sure than knowing nothing
@@ -398,7 +398,7 @@ def _of_deviations(
 
 
 def _event_sd(found: list[Events], unknown: bool = False) -> Events:
-    """Deviation of each event over draws that were matched; NaN where fewer than half have it."""
+    """Return the sd of each event over the draws that have it; NaN if fewer than half have it."""
 
     def sd(times: list[Array]) -> Array:
         stacked = np.stack(times)

@@ -146,7 +146,7 @@ def measure(track: Track, draws: Draws | None = None) -> Parameters:
     track : Track
         Of at least three frames.
     draws : Draws, optional
-        Motions drawn from the posterior; without them the deviations of the track serve.
+        Motions drawn from the posterior; without them the standard deviations of the track are used.
 
     Raises
     ------
@@ -257,14 +257,14 @@ _SMALL = 0.005  # strides, for slopes
 
 @dataclass(frozen=True)
 class AngleCycle:
-    """One angle over the cycle, degrees, each array of shape (101,) unless said otherwise.
+    """One angle over the cycle, degrees, each array of shape (101,) unless stated otherwise.
 
     Attributes
     ----------
     strides : ndarray of shape (k, 101)
         Of the sure strides.
     mean, sd : ndarray
-        Mean of the strides, and its posterior standard deviation (NaN if the track does not tell).
+        Mean of the strides, and its posterior standard deviation (NaN if the track has none).
     norm_mean, norm_sd : ndarray
         Of the people the model was learned from, at the stride rate of these strides.
     """
@@ -277,7 +277,7 @@ class AngleCycle:
 
     @property
     def z(self) -> Array:
-        """Deviation from the norm, in its standard deviations."""
+        """Departure from the norm, in its standard deviations."""
         return np.asarray((self.mean - self.norm_mean) / np.maximum(self.norm_sd, 1e-6))
 
     def summary(self) -> dict[str, Any]:
@@ -335,7 +335,7 @@ def _times(parameters: Parameters, side: str) -> Array:
 
 
 def _drawn_sd(draws: Draws, name: str, when: Array) -> Array:
-    """Deviation of the mean curve over the draws; their timing is not taken out."""
+    """Return the sd of the mean curve over the draws, differences in timing included."""
     values = np.degrees(draws.angles[:, :, draws.angle_names.index(name)].astype(float))
     means = [np.interp(when, draws.time, motion).mean(axis=0) for motion in values]
     return np.asarray(np.std(means, axis=0))
@@ -344,7 +344,7 @@ def _drawn_sd(draws: Draws, name: str, when: Array) -> Array:
 def _linear_sd(
     numbers: Mapping[str, Array], time: Array, name: str, curves: ModelCurves, when: Array
 ) -> Array:
-    """Deviation by linear propagation of phase and scores, an error being the same in every stride."""
+    """Return the sd by linear propagation from phase and scores, with equal errors in every stride."""
     if "phase_sd" not in numbers:
         return np.full(len(PERCENT), np.nan)
     scores = sorted((n for n in numbers if n.startswith("c_") and not n.endswith("_sd")), key=_number)
@@ -402,7 +402,7 @@ _EVENT = {"strike": "heel_strike", "off": "toe_off"}
 
 
 def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
-    """Strides in the order of their start, each quantity with its deviation."""
+    """Strides in the order of their start, each quantity with its standard deviation."""
     rows = []
     for side in SIDES:
         s = parameters.strides[side]
@@ -416,7 +416,7 @@ def stride_rows(parameters: Parameters) -> Iterator[dict[str, Any]]:
 
 
 def curve_rows(cycles: Mapping[str, AngleCycle]) -> Iterator[dict[str, Any]]:
-    """Mean, deviation, norm and its deviation of every angle at each percent of the stride, degrees."""
+    """Mean and norm of every angle, each with its sd, at each percent of the stride, degrees."""
     for i, percent in enumerate(PERCENT):
         row: dict[str, Any] = {"percent": int(percent)}
         for name, c in cycles.items():

@@ -48,7 +48,7 @@ def draw_panel(canvas: Image, estimate: Estimate, frame: int, scale: float) -> N
 
 
 def _dial(region: Image, estimate: Estimate, at: tuple[int, int], radius: float, scale: float) -> None:
-    """Clock face of one stride: right heel strike at the top, the hand with an arc of two deviations."""
+    """Clock face of one stride: right heel strike at the top, the hand within two standard deviations."""
     turn, spread = 360 * estimate.mean.phase, min(2 * 360 * estimate.sd.phase, 180.0)
     thin, r = max(1, round(scale)), round(radius)
     cv2.circle(region, at, r, _DIM, thin, cv2.LINE_AA)
@@ -140,7 +140,7 @@ class Overlay:
         draw_bones(canvas, uv, thick, colour)
 
     def _ellipses(self, canvas: Image, estimate: Estimate) -> None:
-        """Draw the 90 % ellipse of wrists and ankles from the axis-wise deviations."""
+        """Draw the 90 % ellipse of wrists and ankles from the standard deviations along the axes."""
         for name in ENDS:
             index = estimate.joint_names.index(name)
             steps = np.diag(estimate.joint_sd[index])
@@ -185,8 +185,8 @@ def draw_bones(canvas: Image, uv: Mapping[str, Array], thick: int, colour: Colou
 def _lens_map(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Column and row in the ideal picture of every pixel of the distorted one, each (h, w)."""
     grid = np.stack(np.meshgrid(np.arange(camera.width), np.arange(camera.height)), axis=2)
-    seen = camera.rays(grid) @ camera.R.T
-    ideal = seen[..., :2] / seen[..., 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+    in_camera = camera.rays(grid) @ camera.R.T
+    ideal = in_camera[..., :2] / in_camera[..., 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
     return ideal[..., 0].astype(np.float32), ideal[..., 1].astype(np.float32)
 
 
@@ -226,7 +226,7 @@ _SHEET_FONT = cv2.FONT_HERSHEY_DUPLEX
 
 
 def default_view(state: State) -> Camera:
-    """Camera that shows a walker from in front and the left, slightly from above."""
+    """Camera that shows a person from in front and the left, slightly from above."""
     target = np.array([*state.pelvis[:2], 0.5 * state.stature])
     angle = state.heading + np.radians(50)
     away = np.array([np.cos(angle), np.sin(angle), 0.22]) * 3 * state.stature
@@ -234,7 +234,7 @@ def default_view(state: State) -> Camera:
 
 
 def draw_standing(model: Model, state: State, camera: Camera) -> Image:
-    """Draw a walker on a ground of half-metre squares, (h, w, 3) BGR."""
+    """Draw a person on a ground of half-metre squares, (h, w, 3) BGR."""
     canvas = np.full((camera.height, camera.width, 3), _PAPER, np.uint8)
     middle = np.round(2 * np.asarray(state.pelvis[:2])) / 2
     reach = np.arange(-3, 3.5, 0.5)
@@ -251,7 +251,8 @@ def draw_standing(model: Model, state: State, camera: Camera) -> Image:
 def draw_sheet(model: Model) -> Image:
     """Draw the sheet, columns phases.
 
-    Rows are the mean, then at -2, 0 and +2 deviations the stride rate (where the mean follows it) and scores.
+    Rows are the mean, then the stride rate (where the mean follows it) and each score at -2, 0 and +2
+    standard deviations.
     """
     rows = _rows(model)
     left, top = _MARGIN
@@ -274,7 +275,7 @@ def draw_sheet(model: Model) -> Image:
 
 
 def _rows(model: Model) -> dict[str, list[State]]:
-    """Name of each row: walkers at 0, -2 and +2 deviations, for the mean at 0 alone."""
+    """States of each named row: at 0, -2 and +2 standard deviations, or the mean alone."""
     info, turns = model.info, (0.0, -2.0, 2.0)
     mean = State(stride_hz=info.stride_hz, coef=np.zeros(info.components))
     rows = {"mean": [mean]}
@@ -287,14 +288,14 @@ def _rows(model: Model) -> dict[str, list[State]]:
 
 
 def _standing(model: Model, state: State, phase: float) -> State:
-    """Walker of average size at a phase over the origin, heading along x."""
+    """Person of average size at a phase over the origin, heading along x."""
     state = replace(state, phase=phase, pelvis=np.zeros(3))
     state.pelvis[2] = model.pelvis_height(state)
     return state
 
 
 def _cell(overlay: Overlay, states: list[State]) -> Image:
-    """Body of a single walker, else sticks of three."""
+    """Draw the body of a single state, or the sticks of three."""
     camera, model = overlay.camera, overlay.model
     cell = np.full((camera.height, camera.width, 3), _PAPER, np.uint8)
     ground = round(float(camera.project([0.0, 0.0, 0.0])[1]))

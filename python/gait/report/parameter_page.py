@@ -177,8 +177,8 @@ def parameter_page(name: str, track: Track, parameters: Parameters, cycles: Mapp
     page = Page(f"{name}: gait parameters")
     page.words(
         f"Frames {track.frame[0]} to {track.frame[-1]}. Each value is the mean over the strides without lost "
-        "or ambiguous frames, plus or minus the standard deviation of that mean; in brackets, the standard "
-        f"deviation between strides. Source of the uncertainty: {parameters.source}. "
+        "or ambiguous frames, plus or minus the standard deviation of that mean; the one between strides "
+        f"is in brackets. Source of the uncertainty: {parameters.source}. "
         "Asymmetry is 200 (right - left) / (right + left)."
     )
     page.grid("Parameters", HEAD, parameter_rows(parameters))

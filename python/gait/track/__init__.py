@@ -1,1 +1,1 @@
-"""Following a walker through frames: automatic start, particle filter, smoothing."""
+"""Tracking a person through frames: automatic start, particle filter, smoothing."""

@@ -24,7 +24,7 @@ from gait.io.trc import write_trc
 from gait.io.video import Frame, Image, Video, VideoWriter, background
 from gait.progress import durations, note, progress
 from gait.report.drawing import Overlay
-from gait.track.auto_start import Spotter, find_start
+from gait.track.auto_start import AutoStart, find_start
 from gait.track.config import TrackerConfig
 from gait.track.person_detection import another_scene, one_is_grey
 from gait.track.smooth import Smoother
@@ -94,7 +94,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     Raises
     ------
     UserError
-        If a file cannot be read, nobody can be found to start with, or no frame can be tracked.
+        If a file cannot be read, if no person can be found to start with, or no frame can be tracked.
     """
     video = Video(options.video)
     camera = Camera.read(options.camera, video.size)
@@ -112,7 +112,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     if options.keypoints:
         config = replace(config, terms=config.terms | Term.KEYPOINTS)
     tracker = Tracker(model, camera, config, background=plate, tasks=options.threads)
-    restart = None if options.smooth else Spotter(camera, plate, model, options.height)
+    restart = None if options.smooth else AutoStart(camera, plate, model, options.height)
     found = tracker.follow(video, start, frames.stop, restart, keypoints)
     results = _write(options, video, tracker, frames, found)
     for frame, x, y in results.restarts:

@@ -21,7 +21,7 @@ from gait.io.video import Image
 
 Array = NDArray[np.float64]
 
-STATURE = (1.2, 2.4)  # metres by foot and head ray alone, so with room for shadows
+STATURE = (1.2, 2.4)  # metres by foot and head ray alone, so with a margin for shadows
 _GREY_STEP = 14.0  # least difference from the plate that counts, grey levels
 _NOISE_STEPS = 5.0  # and in robust standard deviations of the picture's noise
 _ANOTHER = 18.0  # grey levels by which half of a picture differs from the plate of another scene, at least
@@ -30,20 +30,20 @@ _FILL = 0.15  # a standing person covers at least this share of the box round it
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """One blob that may be a person.
+class Detection:
+    """A person, or something like one, standing on the ground.
 
     Attributes
     ----------
     foot, head : ndarray of shape (2,)
-        Lowest and highest point on the blob's middle line, pixels.
+        Lowest and highest point on the middle line, pixels.
     place : ndarray of shape (3,)
         Where the ray of `foot` meets the ground, metres.
     stature : float
         Height of the head ray over `place`, metres.
     strength : float
-        How much there is of it: pixels of a blob, votes of a detector.
-    spread : float
+        Pixels of a blob, or votes of the HOG detector.
+    sd : float
         Standard deviation of `foot` and `head` beyond a pixel or two, as a share of the person's height.
     """
 
@@ -52,7 +52,7 @@ class Sighting:
     place: Array
     stature: float
     strength: float
-    spread: float = 0.0
+    sd: float = 0.0
 
     @property
     def tall(self) -> float:
@@ -68,14 +68,14 @@ def _change(image: Image, plate: Image) -> Array:
 
 
 def another_scene(image: Image, plate: Image) -> bool:
-    """Whether half of a picture differs from the plate: it shows another scene, or the camera has moved."""
+    """Whether half of a picture differs from the plate: another scene, or the camera has moved."""
     return bool(np.median(_change(image, plate)[::4, ::4]) > _ANOTHER)
 
 
 def one_is_grey(image: Image, plate: Image) -> bool:
-    """Whether one of two BGR pictures is grey throughout, the other in colour: one scene looks like two."""
-    spread = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
-    return min(spread) == 0 and max(spread) > _COLOUR
+    """Whether one of two BGR pictures is grey throughout and the other in colour."""
+    colour = [float(np.median(np.ptp(one[::4, ::4], axis=2))) for one in (image, plate)]
+    return min(colour) == 0 and max(colour) > _COLOUR
 
 
 def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
@@ -90,12 +90,12 @@ def foreground(image: Image, plate: Image) -> NDArray[np.uint8]:
     )
 
 
-def sightings(
+def detect_change(
     image: Image, plate: Image, camera: Camera, misplaced: list[float] | None = None
-) -> list[Sighting]:
-    """Find blobs of a person's size standing on the ground in full view, largest first.
+) -> list[Detection]:
+    """Find blobs of a person's size that stand on the ground in full view, largest first.
 
-    Of blobs shaped like one, but not of one's size where they would stand, the largest's stature goes to
+    If the camera gives blobs of a person's shape an implausible stature, that of the largest is appended to
     `misplaced`.
     """
     mask = foreground(image, plate)
@@ -107,7 +107,7 @@ def sightings(
         if inside and height > 30 and height > width and area > _FILL * width * height:
             blob = labels[y : y + height, x : x + width] == i
             foot, head = _ends(blob, x, y)
-            one = standing(foot, head, camera, area)
+            one = person_between(foot, head, camera, area)
             if one is not None:
                 found.append(one)
             else:
@@ -128,18 +128,18 @@ def _ends(blob: NDArray[np.bool_], x: int, y: int) -> tuple[Array, Array]:
     return foot, head
 
 
-def standing(
-    foot: Array, head: Array, camera: Camera, strength: float, spread: float = 0.0
-) -> Sighting | None:
-    """Sighting of somebody between two pixels; None if a person on the ground is not there and that tall."""
+def person_between(
+    foot: Array, head: Array, camera: Camera, strength: float, sd: float = 0.0
+) -> Detection | None:
+    """Person between two pixels; None if no person of plausible stature can stand there."""
     stature = _stature(foot, head, camera)
     if not STATURE[0] <= stature <= STATURE[1]:
         return None
-    return Sighting(foot, head, camera.on_plane(foot), stature, strength, spread)
+    return Detection(foot, head, camera.on_plane(foot), stature, strength, sd)
 
 
 def _stature(foot: Array, head: Array, camera: Camera) -> float:
-    """Stature of whoever stands between two pixels, metres; not a number without ground under the foot."""
+    """Stature of a person who stands between two pixels, metres; NaN if there is no ground under the foot."""
     place = camera.on_plane(foot)
     if not np.isfinite(place).all():
         return float("nan")
@@ -159,7 +159,7 @@ _MARGIN = 0.125  # of the window above the head and below the feet, as the detec
 _STATURE, _STATURE_SD = 1.68, 0.12  # metres
 _ENOUGH = 3.0  # votes in all for a person
 _SAME = 0.3  # heights between the feet of windows about one person
-_SPREAD = 0.04  # of a mean of windows, heights, found on walkers of known place
+_WINDOW_SD = 0.04  # of a mean of windows, heights, found on walking people of known place
 
 
 @functools.cache
@@ -169,49 +169,49 @@ def _detector() -> cv2.HOGDescriptor:
     return hog
 
 
-def people(image: Image, camera: Camera) -> list[Sighting]:
-    """Find people standing on the ground, the strongest first; those under `LEAST` pixels are not seen."""
+def detect_shape(image: Image, camera: Camera) -> list[Detection]:
+    """Find people who stand on the ground, strongest first; people under `LEAST` pixels are missed."""
     for side in SIDES:
-        found = _people(image, min(1.0, side / max(image.shape[:2])), camera)
+        found = _detect_at_scale(image, min(1.0, side / max(image.shape[:2])), camera)
         if found or side >= max(image.shape[:2]):
             return found
     return []
 
 
-def _people(image: Image, scale: float, camera: Camera) -> list[Sighting]:
-    """People about as large as the detector's window in a picture at a scale, the strongest first."""
+def _detect_at_scale(image: Image, scale: float, camera: Camera) -> list[Detection]:
+    """People about as large as the detector's window in a picture at a scale, strongest first."""
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else image
     boxes, votes = _detector().detectMultiScale(
         small, hitThreshold=_THRESHOLD, winStride=(4, 4), padding=(16, 16), scale=1.025, groupThreshold=0
     )
     pairs = zip(boxes, np.ravel(votes), strict=True)
-    each = [_sighting(np.array(box) / scale, float(vote), camera) for box, vote in pairs]
-    left = sorted((seen for seen in each if seen is not None), key=lambda seen: -seen.strength)
+    each = [_window(np.array(box) / scale, float(vote), camera) for box, vote in pairs]
+    left = sorted((one for one in each if one is not None), key=lambda one: -one.strength)
     found = []
     while left:
         first = left[0]
-        near = [seen for seen in left if np.hypot(*(seen.foot - first.foot)) < _SAME * first.tall]
-        left = [seen for seen in left if np.hypot(*(seen.foot - first.foot)) > first.tall]
-        found.append(_mean(near, camera))
-    sure = [seen for seen in found if seen is not None and seen.strength >= _ENOUGH]
-    return sorted(sure, key=lambda seen: -seen.strength)
+        near = [one for one in left if np.hypot(*(one.foot - first.foot)) < _SAME * first.tall]
+        left = [one for one in left if np.hypot(*(one.foot - first.foot)) > first.tall]
+        found.append(_mean_window(near, camera))
+    sure = [one for one in found if one is not None and one.strength >= _ENOUGH]
+    return sorted(sure, key=lambda one: -one.strength)
 
 
-def _sighting(box: Array, vote: float, camera: Camera) -> Sighting | None:
-    """One window (x, y, width, height); the strength says how likely it is by its vote and by the stature."""
+def _window(box: Array, vote: float, camera: Camera) -> Detection | None:
+    """Person in a window (x, y, width, height); its vote and the stature give the strength."""
     x, y, width, height = box
     foot = np.array([x + width / 2, y + (1 - _MARGIN) * height])
     head = np.array([x + width / 2, y + (_MARGIN - 0.02) * height])
-    seen = standing(foot, head, camera, 1.0, _SPREAD)
-    if seen is None:
+    one = person_between(foot, head, camera, 1.0, _WINDOW_SD)
+    if one is None:
         return None
-    off = (seen.stature - _STATURE) / _STATURE_SD
+    off = (one.stature - _STATURE) / _STATURE_SD
     strength = float(np.exp(min(vote, 3.0) - 0.5 * off * off))
-    return replace(seen, strength=strength)
+    return replace(one, strength=strength)
 
 
-def _mean(near: list[Sighting], camera: Camera) -> Sighting | None:
-    share = np.array([seen.strength for seen in near])
-    foot = np.average([seen.foot for seen in near], axis=0, weights=share)
-    head = np.average([seen.head for seen in near], axis=0, weights=share)
-    return standing(foot, head, camera, float(share.sum()), _SPREAD)
+def _mean_window(near: list[Detection], camera: Camera) -> Detection | None:
+    share = np.array([one.strength for one in near])
+    foot = np.average([one.foot for one in near], axis=0, weights=share)
+    head = np.average([one.head for one in near], axis=0, weights=share)
+    return person_between(foot, head, camera, float(share.sum()), _WINDOW_SD)

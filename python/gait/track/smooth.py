@@ -1,18 +1,17 @@
-"""Smoothing: motions drawn from the posterior of a whole clip, from its last frame back to the first.
+"""Smoothing: sample motions from the posterior of a whole clip, from its last frame back to the first.
 
 Plain backward simulation (Godsill, Doucet and West 2004, JASA 99:156) picks for each frame one of the
-filter's particles, by its weight and by how well the state already drawn for the next frame follows from
-it.  With 16 numbers in a state that move little between frames hardly more than its true parent fits: of
-100 motions 8 were different.  So the pick is by a wide kernel, and what then does not fit is put right by
-linear regression (as Beaumont, Zhang and Balding 2002, Genetics 162:2025): with pairs (x, x') of a particle
-and its drawn successor and J = cov(x, x') cov(x')^-1, the state before s is x + J (s - x').  For linear
-dynamics with normal noise this is exact whatever the kernel: the smoother of Rauch, Tung and Striebel
-(1965) in draws.
+filter's particles, by its weight and by how well the state already drawn for the next frame follows from it.
+A state has 16 numbers that change little between frames, so hardly any particle but the true parent fits: of
+100 motions only 8 differed.  Therefore particles are picked by a wide kernel, and the remaining difference
+is corrected by linear regression (as in Beaumont, Zhang and Balding 2002, Genetics 162:2025): with pairs (x,
+x') of a particle and its drawn successor and J = cov(x, x') cov(x')^-1, the state before s is x + J (s -
+x').  For linear dynamics with normal noise this is exact for any kernel: it samples from the smoother of
+Rauch, Tung and Striebel (1965).
 """
 
 from __future__ import annotations
 
-import ctypes
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,10 +20,8 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.bindings import abi
 from gait.bindings.abi import Mode, TrackStatus
 from gait.bindings.estimate import Estimate
-from gait.bindings.library import check, library
 from gait.bindings.model import Model
 from gait.bindings.state import State
 from gait.body.model_curves import ModelCurves
@@ -36,10 +33,10 @@ from gait.track.transitions import HEADING, PHASE, Step, Transitions, wrap
 Array = NDArray[np.float64]
 
 _PAIRS = 1000  # particles with successors, per frame
-_WIDTH = 1.5  # of the kernel, in deviations of the successors
-_MODE = (0.25, 0.8)  # strides and radians within which motions and particles belong together
+_WIDTH = 1.5  # of the kernel, in standard deviations of the successors
+_GROUP = (0.25, 0.8)  # strides and radians within which motions and particles belong together
 _NEAR = (0.15, 0.5)  # strides and radians around a hypothesis, as in estimate.c
-_TOLD = 0.01  # share of the size that pictures resolve, as in estimate.c
+_SIZE_SD = 0.01  # share to which pictures determine the size, as in estimate.c
 _SURE = 0.7  # least mass of the hypothesis under `tracking`
 
 
@@ -56,8 +53,8 @@ class Spool:
     ----------
     utime, step : list of int
         Capture time and steps since start of each frame.
-    doubt : list of float
-        Deviation of stature at the start that each frame follows, fraction of it.
+    stature_sd : list of float
+        Standard deviation of the stature at the start that each frame follows, as a fraction of it.
     """
 
     def __init__(self, transitions: Transitions) -> None:
@@ -66,7 +63,7 @@ class Spool:
         self.utime: list[int] = []
         self.step: list[int] = []
         self._known: list[int] = []
-        self.doubt: list[float] = []
+        self.stature_sd: list[float] = []
 
     def __enter__(self) -> Spool:
         self._file = tempfile.TemporaryFile(prefix="gait-")
@@ -85,13 +82,13 @@ class Spool:
         self._file.write(table.tobytes())
         self.utime.append(estimate.utime)
         self._known.append(self._known_since(estimate))
-        self.doubt.append(tracker.stature_doubt)
+        self.stature_sd.append(tracker.start_stature_sd)
         self.step.append(estimate.frame)
 
     def _known_since(self, estimate: Estimate) -> int:
         """Index of the frame from which on phase, left and right are known; -1 if they are not.
 
-        Who becomes ambiguous later is still one walker: a search would begin with ``init``.
+        A track that becomes ambiguous later is still known: a new start would have status ``init``.
         """
         now = len(self._known)
         goes_on = now > 0 and estimate.frame == self.step[now - 1] + 1
@@ -122,7 +119,10 @@ class Spool:
         settle_time = 1e6 * self._transitions.config.settle_time
         age = self.utime[index] - self.utime[known] if known >= 0 else 0
         return Step(
-            1e-6 * (self.utime[index] - self.utime[index - 1]), age < settle_time, age > 0, self.doubt[index]
+            1e-6 * (self.utime[index] - self.utime[index - 1]),
+            age < settle_time,
+            age > 0,
+            self.stature_sd[index],
         )
 
 
@@ -145,7 +145,7 @@ def draw_motions(
     seed : int
         Of the random numbers.
     update : callable, optional
-        Told how many frames are done.
+        Called with the number of frames done.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def draw_motions(
         else:
             before = states[_pick(weights, _PAIRS, random)]
             after = transitions.move(before, step, random)
-            for these in _modes(out[:, i + 1]):
+            for these in _groups(out[:, i + 1]):
                 out[these, i] = _before(transitions, before, after, out[these, i + 1], random)
         update(frames - i)
     out[..., PHASE] %= 1.0
@@ -200,13 +200,13 @@ def _regression(b: Array, a: Array) -> tuple[Array, Array]:
 
 
 def _near(states: Array, one: Array) -> NDArray[np.bool_]:
-    """Which states are of the same mode as `one`: alike in phase and heading."""
-    phase = np.abs(wrap(states[:, PHASE] - one[PHASE], 1.0)) < _MODE[0]
-    return np.asarray(phase & (np.abs(wrap(states[:, HEADING] - one[HEADING], 2 * np.pi)) < _MODE[1]))
+    """Which states are similar to `one` in phase and heading."""
+    phase = np.abs(wrap(states[:, PHASE] - one[PHASE], 1.0)) < _GROUP[0]
+    return np.asarray(phase & (np.abs(wrap(states[:, HEADING] - one[HEADING], 2 * np.pi)) < _GROUP[1]))
 
 
-def _modes(states: Array) -> list[NDArray[np.int64]]:
-    """Group the indices of states that are alike, each group around its first."""
+def _groups(states: Array) -> list[NDArray[np.int64]]:
+    """Group the indices of similar states, each group around its first."""
     left = np.arange(len(states))
     groups = []
     while len(left):
@@ -228,7 +228,7 @@ _NOTHING = np.empty((0, 0, 3), np.uint8)
 
 
 class Smoother:
-    """Keeps what a tracker believes after each frame; at the end gives estimates that know all frames.
+    """Keeps the particles of a tracker after each frame; at the end estimates each frame from all of them.
 
     Use it in a ``with`` block; it keeps a temporary file.
 
@@ -243,7 +243,7 @@ class Smoother:
         self._tracker = tracker
         self._transitions = Transitions(curves, tracker.config)
         self._spool = Spool(self._transitions)
-        self._seen: list[tuple[Frame, Estimate]] = []
+        self._filtered: list[tuple[Frame, Estimate]] = []
 
     def __enter__(self) -> Smoother:
         self._spool.__enter__()
@@ -254,11 +254,11 @@ class Smoother:
 
     def add(self, frame: Frame, estimate: Estimate) -> None:
         """Take in a frame, whose picture is not kept, after the tracker's step."""
-        self._seen.append((frame._replace(image=_NOTHING), estimate))
+        self._filtered.append((frame._replace(image=_NOTHING), estimate))
         self._spool.add(self._tracker, estimate)
 
     def __len__(self) -> int:
-        return len(self._seen)
+        return len(self._filtered)
 
     def finish(
         self, count: int = MOTIONS, update: Callable[[int], None] = lambda done: None
@@ -268,11 +268,11 @@ class Smoother:
         tables = draw_motions(self._spool, self._transitions, count, seed, update)
         shape = tables.shape[:2]
         states = self._transitions.states(tables.reshape(-1, tables.shape[2])).reshape(shape)
-        joints, angles = pose_all(model, states)
-        frames = [frame for frame, _ in self._seen]
+        joints, angles = model.poses(states)
+        frames = [frame for frame, _ in self._filtered]
         rows = [
             (frame, self._widened(i, smoothed(estimate, model, states[:, i], joints[:, i], angles[:, i])))
-            for i, (frame, estimate) in enumerate(self._seen)
+            for i, (frame, estimate) in enumerate(self._filtered)
         ]
         return rows, Draws(
             np.array([frame.number for frame in frames], np.int64),
@@ -285,32 +285,17 @@ class Smoother:
         )
 
     def _widened(self, index: int, now: Estimate) -> Estimate:
-        """Add to a frame's deviations what no number of frames makes less, as estimate.c does.
+        """Add to a frame's standard deviations what no number of frames reduces, as estimate.c does.
 
-        That is what the model cannot express and, of one camera, the size that its pictures leave in doubt.
+        That is what the model cannot express and, with one camera, the uncertain size of the person.
         """
-        tracker, doubt = self._tracker, self._spool.doubt[index]
+        tracker, start_sd = self._tracker, self._spool.stature_sd[index]
         share, one_view = tracker.config.joint_sd_model, len(tracker.cameras) == 1
-        size = _TOLD * doubt / np.hypot(_TOLD, doubt) if one_view and share > 0 else 0.0
+        size = _SIZE_SD * start_sd / np.hypot(_SIZE_SD, start_sd) if one_view and share > 0 else 0.0
         rays = size * (now.joints - tracker.cameras[0].centre)
         joint_sd = np.sqrt(now.joint_sd**2 + (share * now.mean.stature) ** 2 + rays**2)
         stature = float(np.hypot(now.sd.stature, size * now.mean.stature))
         return replace(now, joint_sd=joint_sd, sd=replace(now.sd, stature=stature, pelvis=joint_sd[0]))
-
-
-def pose_all(model: Model, states: NDArray[np.void]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Joints (..., P, 3), metres, and angles (..., A), radians, of an array (...) of ``gait_state``."""
-    flat = np.ascontiguousarray(states).reshape(-1)
-    pose, pointer = abi.PoseC(), ctypes.POINTER(abi.StateC)
-    joint, angle = np.ctypeslib.as_array(pose.joint), np.ctypeslib.as_array(pose.angle)
-    joints = np.empty((len(flat), model.info.joints, 3), np.float32)
-    angles = np.empty((len(flat), model.info.angles), np.float32)
-    begin, size, call = flat.ctypes.data, flat.dtype.itemsize, library().gait_model_pose
-    for i in range(len(flat)):
-        check(call(model.handle, ctypes.cast(begin + i * size, pointer), ctypes.byref(pose), None))
-        joints[i], angles[i] = joint[: model.info.joints], angle[: model.info.angles]
-    shape = states.shape
-    return joints.reshape(*shape, *joints.shape[1:]), angles.reshape(*shape, *angles.shape[1:])
 
 
 def smoothed(
@@ -320,7 +305,7 @@ def smoothed(
     joints: NDArray[np.float32],
     angles: NDArray[np.float32],
 ) -> Estimate:
-    """One frame's estimate from the motions there: as the filter's, over motions in place of particles.
+    """Estimate a frame from the motions, as the filter does from its particles.
 
     Parameters
     ----------
@@ -371,7 +356,7 @@ def _pace(then: State, now: State) -> float:
 
 
 def _dominant(states: NDArray[np.void]) -> tuple[NDArray[np.bool_], float]:
-    """Which states belong to the mode with most of them, and their share."""
+    """Which states belong to the largest hypothesis, and their share."""
     phase, heading = states["phase"].astype(float), states["heading"].astype(float)
     near = np.abs(wrap(phase[:, None] - phase, 1.0)) < _NEAR[0]
     near &= np.abs(wrap(heading[:, None] - heading, 2 * np.pi)) < _NEAR[1]
@@ -380,7 +365,7 @@ def _dominant(states: NDArray[np.void]) -> tuple[NDArray[np.bool_], float]:
 
 
 def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float, float]:
-    """Mean over the mode, and standard deviation over all, of values that repeat after `turn`."""
+    """Mean over the hypothesis, and standard deviation over all, of values that repeat after `turn`."""
     unit = np.exp(2j * np.pi * values.astype(float) / turn)
     mean = (np.angle(unit[use].mean()) / (2 * np.pi)) % 1.0
     sd = np.sqrt(max(0.0, -2 * np.log(max(abs(unit.mean()), 1e-6)))) / (2 * np.pi)
@@ -388,7 +373,7 @@ def _circular(values: Array, use: NDArray[np.bool_], turn: float) -> tuple[float
 
 
 def _status(then: TrackStatus, mass: float) -> TrackStatus:
-    """Leave what was lost lost; whether the modes are told apart is known better now."""
+    """Status of a smoothed frame: lost frames stay lost, ambiguity is judged anew from the motions."""
     if then == TrackStatus.LOST or (mass < _SURE and then == TrackStatus.INIT):
         return then
     return TrackStatus.TRACKING if mass >= _SURE else TrackStatus.AMBIGUOUS

@@ -1,4 +1,4 @@
-"""Track a walker through frames: a particle filter over the states of a walking model (Ormoneit 2000)."""
+"""Track a person through frames: a particle filter over the states of a walking model (Ormoneit 2000)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from gait.track.config import TrackerConfig
 from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
 
 if TYPE_CHECKING:
-    from gait.track.auto_start import Spotter  # needs OpenCV
+    from gait.track.auto_start import AutoStart  # needs OpenCV
 
 
 class Tracker:
@@ -49,8 +49,8 @@ class Tracker:
         All the memory the filter uses; the instruction set in use: scalar, base, avx2 or avx512.
     step_seconds : float
         Time that the last `step` spent in the C library.
-    stature_doubt : float
-        Deviation of stature at the last start, fraction of it.
+    start_stature_sd : float
+        Standard deviation of the stature at the last start, as a fraction of it.
 
     Notes
     -----
@@ -87,7 +87,7 @@ class Tracker:
         self._check(self._lib.gait_tracker_init(*where, model.handle, settings, ctypes.byref(handle), err))
         self._handle = handle
         self._plates: dict[int, Image] = {}
-        self.stature_doubt = 0.0
+        self.start_stature_sd = 0.0
         self.step_seconds = 0.0
         for i, plate in enumerate(per_camera(background)):
             self.set_background(plate, i)
@@ -117,7 +117,7 @@ class Tracker:
         means, sds = ctypes.byref(mean.to_c()), ctypes.byref(sd.to_c())
         err = ctypes.byref(self._error)
         self._check(self._lib.gait_tracker_start(self._handle, means, sds, capture_time(utime), err))
-        self.stature_doubt = sd.stature / max(mean.stature, LEAST_STATURE)
+        self.start_stature_sd = sd.stature / max(mean.stature, LEAST_STATURE)
 
     def step(
         self,
@@ -182,7 +182,7 @@ class Tracker:
         video: Video,
         start: Start,
         stop: int | None = None,
-        spotter: Spotter | None = None,
+        auto_start: AutoStart | None = None,
         joints: Mapping[int, Joints] | None = None,
     ) -> Iterator[tuple[Frame, Estimate]]:
         """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
@@ -194,7 +194,7 @@ class Tracker:
         start : Start
         stop : int, optional
             First frame not to use.
-        spotter : Spotter, optional
+        auto_start : AutoStart, optional
             Looks for the person while the tracker has lost them; where it finds one the track starts anew.
         joints : mapping of int to Joints, optional
             Joints found in frames, by number; see `step`.
@@ -205,12 +205,12 @@ class Tracker:
                 self.start(start.mean, start.sd, frame.utime)
             estimate = self.step(frame.image, frame.utime, found.get(frame.number))
             yield frame, estimate
-            if spotter and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
-                spotter.forget()
-            elif spotter and estimate.status == TrackStatus.LOST:
-                spotter.see(frame)
-                if spotter.walks_in(frame):
-                    anew = spotter.start(latest=True)
+            if auto_start and estimate.status in (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS):
+                auto_start.forget()
+            elif auto_start and estimate.status == TrackStatus.LOST:
+                auto_start.observe(frame)
+                if auto_start.walks_in(frame):
+                    anew = auto_start.state(latest=True)
                     self.start(anew.mean, anew.sd, frame.utime)
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:

@@ -1,6 +1,7 @@
-"""The walker's dynamics (libgait/src/dynamics.c) in numpy, for many states at once.
+"""Dynamics of the person's state in numpy, for many states at once: what the smoother samples from.
 
-The states are those of `gait.Tracker.particles` with the pelvis brought back to the track it sways about.
+The model is that of the filter (libgait/src/filter/dynamics.c), whose kernel moves its own particles only.
+The states are those of `gait.Tracker.particles` with the pelvis replaced by the path that it sways about.
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ Array = NDArray[np.float64]
 
 PHASE, HEADING = 0, 3
 RATES = (1 / 2.1, 1 / 0.4)
-"""Strides per second that a walker may have."""
+"""Least and largest stride rate, strides per second."""
 
-TELLING = 5
-"""Scores that the default mode uses unless told (population.c)."""
+DEFAULT_SCORES = 5
+"""Scores that the default mode uses unless configured (particles.c)."""
 
 POSTURE_SD = 0.035
-"""Of an angle's posture where too few people were learnt from to tell, radians (model.h)."""
+"""Of an angle's posture offset where the model was learned from too few people, radians (model.h)."""
 
 SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll", "turn_rate")
-"""Columns of a table of states; then x, y, z of the track, scores, proportions and posture offsets in use."""
+"""Columns of a table of states; then x, y, z of the path, scores, proportions and posture offsets in use."""
 
-TURN, TRACK, COEF = 6, 7, 10
+TURN, PATH, COEF = 6, 7, 10
 
 
 @dataclass(frozen=True)
@@ -43,17 +44,17 @@ class Step:
     dt : float
         Seconds.
     settling : bool
-        The rate is loose and the stature moves fast, as until a while after phase, left and right are known.
+        The stride rate and the stature vary fast, until some time after phase, left and right are known.
     turning : bool
-        The walker may take another turn rate: as soon as phase, left and right are known.
-    stature_doubt : float
-        Deviation of stature at the start, fraction of it.
+        The turn rate may change, as soon as phase, left and right are known.
+    start_stature_sd : float
+        Standard deviation of the stature at the start, as a fraction of it.
     """
 
     dt: float
     settling: bool
     turning: bool
-    stature_doubt: float
+    start_stature_sd: float
 
 
 class Transitions:
@@ -70,7 +71,7 @@ class Transitions:
         self.curves, self.config = curves, config
         self._plain = config.mode == Mode.PAPER  # no root motion within the stride
         every = len(curves.samples) - 1
-        usual = every if self._plain else min(every, TELLING)
+        usual = every if self._plain else min(every, DEFAULT_SCORES)
         self._scores = usual if config.components < 0 else config.components
         every = len(curves.height_change)
         self._proportions = every if config.proportions < 0 else config.proportions
@@ -100,8 +101,8 @@ class Transitions:
         scalars = np.stack([particles[name] for name in SCALARS], axis=1).astype(float)
         coef = particles["coef"][:, : self._scores].astype(float)
         build = particles["proportion"][:, : self._proportions].astype(float)
-        track = particles["pelvis"].astype(float) - self._about(scalars, coef, build)
-        return np.hstack([scalars, track, coef, build, particles["offset"][:, self._offsets].astype(float)])
+        path = particles["pelvis"].astype(float) - self._about(scalars, coef, build)
+        return np.hstack([scalars, path, coef, build, particles["offset"][:, self._offsets].astype(float)])
 
     def states(self, table: Array) -> NDArray[np.void]:
         """Give the inverse of `table`."""
@@ -109,7 +110,7 @@ class Transitions:
         coef, build = self._coef(table), table[:, self._build : self._posture]
         for k, name in enumerate(SCALARS):
             out[name] = table[:, k]
-        out["pelvis"] = table[:, TRACK:COEF] + self._about(table, coef, build)
+        out["pelvis"] = table[:, PATH:COEF] + self._about(table, coef, build)
         out["coef"][:, : self._scores] = coef
         out["proportion"][:, : self._proportions] = build
         out["offset"][:, self._offsets] = table[:, self._posture :]
@@ -119,7 +120,7 @@ class Transitions:
         return table[..., COEF : COEF + self._scores]
 
     def _about(self, scalars: Array, coef: Array, build: Array) -> Array:
-        """Pelvis relative to its track, (N, 3): sway to the left and height, by phase."""
+        """Pelvis relative to its path, (N, 3): sway to the left and height, by phase."""
         phase, rate, stature, heading = scalars[:, :4].T
         sway, height = np.zeros(len(phase)), np.full(len(phase), self._height)
         if not self._plain:
@@ -145,18 +146,18 @@ class Transitions:
         rate = c.rate_noise * self.curves.stride_hz
         away = _relax(b[:, 1] - self.curves.stride_hz, dt, c.rate_time, rate, noise[:, 1])
         after[:, 1] = _reflect(self.curves.stride_hz + away)
-        grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.stature_doubt
+        grown = (c.stature_noise_start if step.settling else c.stature_noise) * step.start_stature_sd
         after[:, 2] = np.maximum(b[:, 2] * (1 + grown * root * noise[:, 2]), LEAST_STATURE)
         curve = b[:, TURN] * dt
         after[:, 3] = wrap(b[:, 3] + curve + c.heading_noise * root * noise[:, 3], 2 * np.pi)
         after[:, 4:6] = _relax(b[:, 4:6], dt, c.tilt_time, c.tilt_noise, noise[:, 4:6])
         after[:, TURN] = self._turn_rates(b[:, TURN], step, noise[:, TURN], random)
-        ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, TRACK]
-        aside = c.lateral_noise * root * noise[:, TRACK + 1]
+        ahead = self._ahead(b, turn, dt) + c.forward_noise * root * noise[:, PATH]
+        aside = c.lateral_noise * root * noise[:, PATH + 1]
         cos, sin = np.cos(b[:, 3] + curve / 2), np.sin(b[:, 3] + curve / 2)
-        after[:, TRACK] += ahead * cos - aside * sin
-        after[:, TRACK + 1] += ahead * sin + aside * cos
-        height = TRACK + 2
+        after[:, PATH] += ahead * cos - aside * sin
+        after[:, PATH + 1] += ahead * sin + aside * cos
+        height = PATH + 2
         after[:, height] = _relax(b[:, height], dt, c.tilt_time, c.vertical_noise, noise[:, height])
         for first, last, tau, sd in (
             (COEF, self._build, c.coef_time, c.coef_noise),
@@ -167,7 +168,7 @@ class Transitions:
         return after
 
     def _turn_rates(self, before: Array, step: Step, noise: Array, random: np.random.Generator) -> Array:
-        """Keep the turn rates, or take others now and then: every second time none."""
+        """Keep the turn rates, or at times draw new ones, half of which are 0."""
         c = self.config
         if not (step.turning and c.turn_time > 0):
             return before
@@ -196,7 +197,7 @@ def wrap(x: Array, turn: float) -> Array:
 
 
 def _time(noise: float) -> float:
-    """Return the time constant that keeps a deviation of 1 with so much noise."""
+    """Return the time constant at which this noise keeps a standard deviation of 1."""
     return 2 / noise**2 if noise > 0 else 0.0
 
 
