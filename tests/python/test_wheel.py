@@ -48,13 +48,15 @@ model = gait.Model()
 mean, sd = model.prior()
 view = gait.Camera.looking([0, -5, 1.2], [0, 0, 1], (320, 240), 300.0)
 empty = np.zeros((240, 320), np.uint8)
-tracker = gait.Tracker(model, view, gait.TrackerConfig.default(particles=500, seed=5), background=empty)
-tracker.start(mean, sd, 0)
-noise = np.random.default_rng(1)
-for i in range(10):
-    shade = noise.integers(100, 250, (240, 320))
-    tracker.step(np.where(model.render(view, mean) > 0, shade, empty).astype(np.uint8), i * 40_000)
-print(tracker.digest())
+for mask in (0, 1, 3, 7):  # GAIT_CPU_*: scalar, base, AVX2, AVX-512
+    config = gait.TrackerConfig.default(particles=500, seed=5, cpu_mask=mask)
+    tracker = gait.Tracker(model, view, config, background=empty)
+    tracker.start(mean, sd, 0)
+    noise = np.random.default_rng(1)
+    for i in range(10):
+        shade = noise.integers(100, 250, (240, 320))
+        tracker.step(np.where(model.render(view, mean) > 0, shade, empty).astype(np.uint8), i * 40_000)
+    print(tracker.isa, tracker.digest())
 """
 LCM_MESSAGES = "from gait.lcm.link import generated; generated().estimate_t().encode()"
 
