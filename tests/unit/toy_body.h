@@ -80,7 +80,7 @@ static inline like_body toy_body_body(toy_body *v, const gait_state *s)
     toy_draw(&v->outline, v->setup.geometry, v->setup.limbs, LANE, &v->drawn);
     v->setup.run->edges_prepare(&v->outline, v->setup.geometry, v->setup.limbs, &v->sides);
     v->setup.run->surface_pose(&v->setup, &v->cam, &v->f.map, &v->body, &v->pose);
-    like_sample(&v->setup, &v->f, &v->pose, LANE, &v->drawn, v->patch);
+    v->setup.run->surface_sample(&v->setup, &v->f, &v->pose, LANE, &v->drawn, v->patch);
     like_body b = {.setup = &v->setup,
                    .features = &v->f,
                    .outline = &v->outline,

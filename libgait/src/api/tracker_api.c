@@ -177,7 +177,8 @@ static gait_result check_config(const gait_model *m, const gait_tracker_config *
         return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
                          (unsigned)cfg->terms);
     if (cfg->offset_angles < -1 || cfg->offset_angles > UINT32_MAX)
-        return base_fail(err, GAIT_ERR_ARG, -1, "config offset_angles = %lld is neither -1 nor a mask of angles",
+        return base_fail(err, GAIT_ERR_ARG, -1,
+                         "config offset_angles = %lld is neither -1 nor a mask of angles",
                          (long long)cfg->offset_angles);
     if (!cpu_mask_valid(cfg->cpu_mask))
         return base_fail(err, GAIT_ERR_ARG, -1, "config cpu_mask = 0x%x is not ~0u or a set of GAIT_CPU_*",
@@ -229,17 +230,17 @@ static gait_result check_image(const gait_tracker *t, int32_t camera, const gait
 {
     const gait_camera *const cam = &t->cfg.camera[camera];
     if (!image_channels(im->format))
-        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d has unknown format %d", what, (int)camera,
-                         (int)im->format);
+        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d has unknown format %d", what,
+                         (int)camera, (int)im->format);
     if (im->width != cam->width || im->height != cam->height)
         return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d is %d x %d, the camera is %d x %d", what,
                          (int)camera, (int)im->width, (int)im->height, (int)cam->width, (int)cam->height);
-    int32_t const least = cam->width * image_channels(im->format);
+    int64_t const least = (int64_t)cam->width * image_channels(im->format);
     if (im->stride < least)
         return base_fail(err, GAIT_ERR_ARG, camera,
-                         "%s of camera %d has stride %d, %d pixels of %s take at least %d", what, (int)camera,
-                         (int)im->stride, (int)cam->width,
-                         least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (int)least);
+                         "%s of camera %d has stride %d, %d pixels of %s take at least %lld", what,
+                         (int)camera, (int)im->stride, (int)cam->width,
+                         least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (long long)least);
     return GAIT_OK;
 }
 
@@ -251,8 +252,7 @@ gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const g
     if (camera < 0 || camera >= t->cfg.cameras)
         return base_fail(err, GAIT_ERR_ARG, camera, "background: camera %d is outside [0, %d]", (int)camera,
                          (int)t->cfg.cameras - 1);
-    gait_result const s =
-        plate && plate->data ? check_image(t, camera, plate, "background", err) : GAIT_OK;
+    gait_result const s = plate && plate->data ? check_image(t, camera, plate, "background", err) : GAIT_OK;
     if (s != GAIT_OK)
         return s;
     t->camera[camera].background = plate ? *plate : (gait_image){0};
@@ -370,7 +370,8 @@ gait_result gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_
     return GAIT_OK;
 }
 
-int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap, gait_error *err)
+int32_t gait_tracker_particles(const gait_tracker *t, gait_state *s, float *weight, int32_t cap,
+                               gait_error *err)
 {
     if (!t || (cap > 0 && (!s || !weight)))
         return base_null(err, "gait_tracker_particles");

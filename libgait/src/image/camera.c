@@ -1,15 +1,24 @@
 #include "image/camera.h"
 
-#include "base/vec.h"
+static float dot(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static float determinant(const float m[9])
+{
+    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+           m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
 
 /* True if the rows of R are orthonormal to 1e-3 and right-handed. */
 static bool rotation_valid(const float R[9])
 {
     for (int i = 0; i < 3; i++)
         for (int j = i; j < 3; j++)
-            if (!(fabsf(v3_dot(R + 3 * i, R + 3 * j) - (i == j ? 1.0f : 0.0f)) <= 1e-3f))
+            if (!(fabsf(dot(R + 3 * i, R + 3 * j) - (i == j ? 1.0f : 0.0f)) <= 1e-3f))
                 return false;
-    return m3_det(R) > 0.0f;
+    return determinant(R) > 0.0f;
 }
 
 bool camera_valid(const gait_camera *c)

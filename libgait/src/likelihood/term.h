@@ -145,13 +145,6 @@ typedef struct like_term {
 
 extern const like_term like_texture, like_silhouette, like_edges, like_template, like_keypoints;
 
-/* Sample the surface of every limb of one lane in the frame. */
-static inline void like_sample(const like_setup *s, const features *f, const like_pose *pose, int32_t lane,
-                               const layers *drawn, like_patch *out)
-{
-    s->run->surface_sample(s, f, pose, lane, drawn, out);
-}
-
 /* Edges along the visible outline, in [0, 1]; chance: the same for a line of random direction. */
 float like_edges_along(const like_body *b, float *chance);
 

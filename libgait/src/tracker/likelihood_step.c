@@ -29,7 +29,7 @@ like_body likelihood_body(const gait_tracker *t, int32_t c, int32_t hypothesis, 
                    .known = t->template_ring[hypothesis][c]};
     t->like->run->layers_draw(w->lines, lane, w->layers);
     if (samples)
-        like_sample(t->like, b.features, w->pose, lane, w->layers, samples);
+        t->like->run->surface_sample(t->like, b.features, w->pose, lane, w->layers, samples);
     like_silhouette_count(&b);
     return b;
 }
