@@ -85,7 +85,7 @@ def test_says_what_segments_leave_uncertain(folder, capsys, view):
     assert len(set(last)) == 3 and set(last) <= set(JOINTS)
     assert "% in depth; of the whole body; of " in printed
     assert others[-1]["rigid"] > 0.5 or f"; of {' '.join(last)})" in printed
-    assert ("which the view does not tell" in printed) == (view == "flat")
+    assert ("which the view does not determine" in printed) == (view == "flat")
 
 
 def test_the_joints_that_a_displacement_moves_most_are_named():
@@ -121,7 +121,12 @@ def test_the_likelihood_alone_needs_more_points_than_the_prior(folder, capsys):
     prior = toy_prior(FRAMES, MARKERS, 60, seed=5)
     (folder / "m.gait").write_bytes(toy_blob(prior))
     keypoints, _ = read("t.csv", prior.names)
-    few = Keypoints(keypoints.frame, keypoints.time, keypoints.names[:4], keypoints.uv[:, :4], keypoints.confidence[:, :4])
+    few = replace(
+        keypoints,
+        names=keypoints.names[:4],
+        uv=keypoints.uv[:, :4],
+        confidence=keypoints.confidence[:, :4],
+    )
     write("few.csv", few)
     command = ["lift", "few.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--quiet"]
     assert main([*command, "--method", "likelihood"]) == 1
@@ -173,7 +178,7 @@ def test_trc_and_sd(folder, capsys):
     [
         (["--orthographic", "w"], 2, "give x, y, z"),
         (["--orthographic", "0,0,0"], 2, "give x, y, z"),
-        (["--orthographic", "y", "--camera", "cam.json"], 2, "two views"),
+        (["--orthographic", "y", "--camera", "cam.json"], 2, "exclude each other"),
         (["--metres-per-unit", "1"], 2, "goes with --orthographic"),
         (["--method", "blend", "--no-bones"], 2, "go with --method smooth"),
         (["-o", "nowhere/out.csv"], 1, "does not exist"),
@@ -327,7 +332,7 @@ def test_few_joints_are_told(folder, capsys, monkeypatch):
     for tells, view in ((True, "camera"), (False, "camera"), (False, "none")):
         monkeypatch.setattr(size, "tells_distance", lambda keypoints, tells=tells: tells)
         assert main([*command, *VIEWS[view]]) == 0
-        told = "hips and ankles are hardly seen" in capsys.readouterr().err
+        told = "hips and ankles, which determine the distance, are hardly seen" in capsys.readouterr().err
         assert told == (view == "camera" and not tells)
 
 
@@ -345,9 +350,9 @@ def test_doubts_are_told(folder, capsys, monkeypatch):
     assert main([*command, "--json"]) == 0
     said = capsys.readouterr()
     names = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].names
-    assert f"far from where the rest has them: {names[3]} in 4 frames\n" in said.err
+    assert f"far from their predictions: {names[3]} in 4 frames\n" in said.err
     assert (
-        "the points shake by 5 from frame to frame: taken for their noise instead of 3 (--pixel-sd)\n"
+        "the points jitter by 5 from frame to frame: used as their noise instead of 3 (--pixel-sd)\n"
         in said.err
     )
     assert "segments are estimated alone" in said.err and "widened 2 times" in said.err
@@ -355,7 +360,7 @@ def test_doubts_are_told(folder, capsys, monkeypatch):
     assert figures["doubted"] == 5 and figures["segments_alone"] and figures["pixel_sd"] == 5
     assert main([*command, "--pixel-sd", "3"]) == 0
     said = capsys.readouterr()
-    assert "the points shake by 5 from frame to frame, not 3: try --pixel-sd 5\n" in said.err
+    assert "the points jitter by 5 from frame to frame, not 3: try --pixel-sd 5\n" in said.err
     assert "iterations" not in said.out
 
 

@@ -10,7 +10,8 @@ import pytest
 from toy_segments import toy_blob, toy_prior
 
 from gait.camera.camera import Camera
-from gait.cli import lift_tracks, main
+from gait.cli import main
+from gait.lift import run as lift_run
 from gait.cli.lift import PIXEL_SD
 from gait.io.keypoints_file import Keypoints, read, shared_place, write
 from gait.lift.keypoints import noise
@@ -58,7 +59,7 @@ def other_camera(**changes):
 
 
 def test_a_calibration_of_another_size_is_told(folder, capsys):
-    told = "of the points lie outside of the camera's 320x240 picture: is other.json the calibration"
+    told = "of the points lie outside the camera's 320x240 picture: is other.json the calibration"
     other_camera(width=320, height=240)
     assert told in lift(capsys, "t.csv", "other.json")[1]
     assert told not in lift(capsys, "t.csv", "other.json", "--quiet")[1]
@@ -90,7 +91,7 @@ def test_points_at_one_place_are_told(folder, capsys, joints, place, told):
     uv[5:20, :joints] = place, place
     assert (shared_place(uv) is not None) == told
     save("u.csv", uv)
-    words = f"{15 * joints} points are at exactly {place:g}, {place:g}: if a detector"
+    words = f"{15 * joints} points are at exactly {place:g}, {place:g}: if the detector"
     assert (words in lift(capsys, "u.csv", "cam.json")[1]) == told
 
 
@@ -113,7 +114,7 @@ def test_an_unusual_stature_is_told(folder, capsys, monkeypatch):
     ):
         monkeypatch.setattr(motion, "lift", lambda *args, s=stature: replace(lifted(*args), stature=s))
         believed = 1.72 if options else usual
-        words = f"{stature:.2f} m tall, where {believed:.2f} was believed: check the camera's focal length"
+        words = f"{stature:.2f} m tall, where {believed:.2f} was expected: check the camera's focal length"
         said = lift(capsys, "t.csv", "cam.json", *options)[1]
         assert (words in said) == told and ("m tall" in said) == told
 
@@ -153,7 +154,7 @@ def test_a_change_of_person_is_told(folder, capsys, stop, where):
     uv[10:stop, :, 0] += 250
     save("u.csv", uv)
     said = lift(capsys, "u.csv")[1]
-    assert f"most points jump at once: the track changes person {where}; leave" in said
+    assert f"most points jump at once: the keypoints change to another person {where}; keep" in said
 
 
 def test_wild_points_are_no_other_person(folder):
@@ -181,7 +182,7 @@ def test_exchanged_sides_are_put_back_and_told(folder, capsys):
         uv[np.ix_([5, 6, 7, 8], pair)] = uv[np.ix_([5, 6, 7, 8], pair[::-1])]
     save("swapped.csv", uv)
     code, said = lift(capsys, "swapped.csv")
-    assert code == 0 and "put back: shoulder, elbow in frames 5 to 8 (--keep-sides)" in said
+    assert code == 0 and "swapped; undone: shoulder, elbow in frames 5 to 8 (--keep-sides)" in said
     assert (
         main(["lift", "swapped.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv", "--json"]) == 0
     )
@@ -194,7 +195,7 @@ def test_exchanged_sides_are_put_back_and_told(folder, capsys):
 
 def test_more_wrong_points_than_it_bears_are_told(folder, capsys):
     rng = np.random.default_rng(2)
-    told = "of the points are wrong, as it seems"
+    told = "of the points seem wrong"
     for share in (0.05, 0.2):
         uv = pixels()
         wild = rng.random(uv.shape[:2]) < share
@@ -212,4 +213,4 @@ def test_wild_points_are_no_noise(folder):
     save("wild.csv", uv)
     keypoints = read("wild.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0]
     assert noise.shake(keypoints) > 1.3 * PIXEL_SD
-    assert lift_tracks.noise_of(keypoints, True) == PIXEL_SD
+    assert lift_run.measured_noise(keypoints, print) == PIXEL_SD

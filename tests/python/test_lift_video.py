@@ -12,7 +12,8 @@ import pytest
 from gait.bindings.model import read_blob
 from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.body.skeleton import EVAL15, JOINTS, pose
-from gait.cli import lift_video, main
+from gait.cli import main
+from gait.lift.video import run as lift_video
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Video, VideoWriter
@@ -83,9 +84,9 @@ def test_corrections_help_and_are_kept(corrected, prior):
     (_, free), (some, fit) = corrected[0], corrected[-1]
     assert len(some.corrections) == 12
     assert root(fit, prior) < min(45, root(free, prior))
-    misses = lift_video._misses(some, fit)
+    misses = lift_video.correction_errors(some, fit)
     assert np.median(misses) < 8
-    assert np.median(misses) < np.median(lift_video._misses(some, free))
+    assert np.median(misses) < np.median(lift_video.correction_errors(some, free))
 
 
 def test_corrections_make_the_estimate_surer(corrected, clip):
@@ -231,7 +232,7 @@ def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsy
     assert lift(*words, "--stop", 20, "--output", tmp_path / "out.csv") == 0
     said = capsys.readouterr()
     assert "figure: stature" in said.out
-    assert "the figure may have left" in said.err and "give --background or --corrections" in said.err
+    assert "the figure may have lost the person" in said.err and "give --background or --corrections" in said.err
     with open(tmp_path / "out.csv", newline="") as file:
         x = [float(row["pelvis_x"]) for row in csv.DictReader(file)]
     assert len(x) == 20 and np.sign(x[-1] - x[0]) == np.sign(across)

@@ -1,14 +1,14 @@
-"""2-D keypoints of joints, or a video, to motion in space with standard deviations.
+"""Lift 2-D keypoints of a person, or a video, to 3-D motion with standard deviations.
 
-KEYPOINTS.csv has the columns frame,time,<joint>_u,<joint>_v and, if known, <joint>_c: pixels (u to the right,
-v down, centres at integers) and a confidence from 0 to 1 that divides the noise; empty cells are not seen.
-Joints are those of the model's segment prior (gait info M.gait).  The prior over short segments of motion
-fills in the depth and what is not seen (Leventon and Freeman 1998).
+KEYPOINTS.csv has the columns frame,time,<joint>_u,<joint>_v and optionally <joint>_c: pixels (u to the
+right, v down, pixel centres at integers) and a confidence from 0 to 1, which divides the standard deviation.
+Empty cells mean "not seen".  Joints are those of the model's segment prior (gait info M.gait).  The prior
+over short segments of motion supplies the depth and the joints that are not seen (Leventon and Freeman 1998).
 
-Views: --camera gives places in the camera's world.  --orthographic looks along an axis of a world with z
-up from far away; the scale comes from the person's stature unless --metres-per-unit gives it.  Without either
-the camera is taken to be level and far away (along y), its scale slowly changing.  Both leave out the place
-along the line of sight, and the lowest feet are put on the floor.
+Views: with --camera the result is in the camera's world.  --orthographic looks from far away along an axis of
+a world with z up; the scale comes from the person's stature unless --metres-per-unit gives it.  Without
+either, the camera is assumed to be level and far away (looking along y), with a slowly changing scale.  Both
+determine no position along the line of sight, and the lowest feet are put on the floor.
 
 OUT.csv: frame,time and for each joint _x,_y,_z (metres) and _sx,_sy,_sz (posterior standard deviations).
 
@@ -20,37 +20,54 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gait.bindings.initial import STATURE
-from gait.cli import lift_doubts, lift_prior, lift_tracks, lift_video, values
+from gait.body.skeleton import JOINTS
+from gait.cli import values
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
 from gait.io.keypoints_file import FURTHEST, Keypoints
 from gait.io.track_file import write_lifted
 from gait.io.trc import write_trc
+from gait.lift import run as lift_run
 from gait.lift.segment.explain import Uncertain
 from gait.lift.smooth import motion
 
-_ONLY_TRACKS = (
+FILES = """\
+P.json gives where the person roughly is in one frame; with --camera in the format of gait track --init:
+  {"frame": 64, "pelvis": [-0.1, 5.5, 0.9], "heading_rad": -1.57, "stature_m": 1.65}
+and without a camera in pixels; the result is then in the picture's axes (x to the right, y away, z up):
+  {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
+"phase" (of walking; 0: right heel strike, 0.5: left heel strike) determines which leg is in front; without it
+a person seen from the side may come out with left and right swapped.
+C.json gives positions of joints (or other markers of the model) and optionally their standard deviation
+(default: 4 pixels):
+  {"corrections": [{"frame": 70, "joint": "l_knee", "uv": [1285.5, 812], "sd_px": 5}]}
+"""
+
+_ONLY_KEYPOINTS = (
     *("orthographic", "metres_per_unit", "height", "pixel_sd", "floor_sd", "method", "no_contact"),
     *("no_bones", "ignore_unknown", "keep_sides", "keep_spikes", "trc"),
 )
 _ONLY_VIDEO = ("placement", "corrections", "background", "start", "stop", "alone", "overlay", "suggest")
 PIXEL_SD, FLOOR_SD = motion.Options.pixel_sd, motion.Options.floor_sd  # pixels, metres
 MOVED = 3  # joints named that a displacement moves most
-WHOLE = 0.5  # of its energy: what moves all joints alike is of the body
-UNTOLD_MM = 1000.0  # what is less certain than that is the distance, in a view without perspective
+WHOLE = 0.5  # share of a displacement's energy from which it moves the whole body
+UNKNOWN_MM = 1000.0  # a displacement less certain than that is the distance, in a view without perspective
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("input", metavar="KEYPOINTS.csv|VIDEO", help="2-D keypoints, or a video with --placement")
     parser.add_argument(
-        "-o", "--output", required=True, metavar="OUT.csv", help="places and standard deviations, metres"
+        "input", metavar="KEYPOINTS.csv|VIDEO", help="2-D keypoints, or a video with --placement"
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="OUT.csv", help="positions and standard deviations, metres"
     )
     parser.add_argument(
         "-m", "--model", metavar="M.gait", help="model with a segment prior (default: the shipped one)"
@@ -65,60 +82,95 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--orthographic",
         metavar="AXIS",
-        help="without a camera: look from far away along x, y, z, -x, -y, -z or X,Y,Z",
+        help="without a camera: the view is from far away along x, y, z, -x, -y, -z or X,Y,Z",
     )
     add(
         "--metres-per-unit",
         type=values.between(1e-6, 1e3, "metres"),
         metavar="M",
-        help="length of a unit of u and v, with --orthographic (default: told from the person's stature)",
+        help="length of a unit of u and v, with --orthographic (default: from the person's stature)",
     )
     add(
         "--height",
         type=values.stature,
         metavar="M",
-        help="the person's stature in metres (default: unknown, about that of the people learnt from)",
+        help="the person's stature in metres (default: unknown, near that of the people learnt from)",
     )
     add(
         "--pixel-sd",
         type=values.between(1e-6, FURTHEST, "a standard deviation"),
         metavar="SD",
         help="standard deviation of u and v at full confidence, in their unit (default: how much the points "
-        f"shake from frame to frame, at least {PIXEL_SD:g})",
+        f"jitter from frame to frame, at least {PIXEL_SD:g})",
     )
     add(
         "--floor-sd",
         type=values.between(1e-4, 100, "metres"),
         metavar="M",
-        help="how well the person stands at z = 0: a standard deviation in metres, with --camera and "
-        f"--method smooth (default: {FLOOR_SD:g}; more on steps)",
+        help="standard deviation of the floor's height around z = 0 in metres, with --camera and "
+        f"--method smooth (default: {FLOOR_SD:g}; larger on steps)",
     )
     add(
         "--method",
         choices=motion.METHODS,
         help="smooth (default): one Gaussian over the whole sequence; blend: overlapping segments, each "
-        "estimated alone, mixed as in the paper; segment: one after another; likelihood: as blend without "
-        "the prior of the modes (least squares), for comparison",
+        "estimated alone and blended as in the paper; segment: one after another; likelihood: like blend, "
+        "but without the prior of the modes (least squares), for comparison",
     )
-    add("--no-contact", action="store_true", help="smooth: let feet on the ground slide")
-    add("--no-bones", action="store_true", help="smooth: let bones change their length")
+    add("--no-contact", action="store_true", help="smooth: do not keep feet on the ground in place")
+    add("--no-bones", action="store_true", help="smooth: do not keep the lengths of bones constant")
     add("--ignore-unknown", action="store_true", help="leave out points that the model does not know")
     add(
         "--keep-sides",
         action="store_true",
-        help="keep left and right as they are where they seem exchanged for some frames",
+        help="do not undo swaps of left and right",
     )
     add(
         "--keep-spikes",
         action="store_true",
-        help="keep points that are far from where they were a frame before and after",
+        help="keep spikes: points far from where they were a frame before and after",
     )
-    add("--trc", metavar="O.trc", help="also write the places for OpenSim")
-    lift_video.add_arguments(parser)
+    add("--trc", metavar="O.trc", help="also write the positions for OpenSim")
+    _add_video_arguments(parser)
+
+
+def _add_video_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that only a video has."""
+    group = parser.add_argument_group("from a video", FILES)
+    group.add_argument(
+        "--placement", metavar="P.json", help="where the person roughly is in one frame; a video needs it"
+    )
+    group.add_argument(
+        "--corrections", metavar="C.json", help="positions of joints in any frames, given by hand"
+    )
+    group.add_argument(
+        "--background",
+        metavar="PNG|auto|none",
+        help="the empty scene, whose edges the sensors ignore: an image; auto (default), the median of the "
+        "clip; or none",
+    )
+    group.add_argument(
+        "--start", type=values.whole(0), metavar="F", help="first frame to use (default: the placement's)"
+    )
+    group.add_argument(
+        "--stop", type=values.whole(0), metavar="F", help="first frame not to use (default: to the end)"
+    )
+    group.add_argument(
+        "--alone",
+        action="store_true",
+        help="estimate segments one after the other, as in the paper (default: together)",
+    )
+    group.add_argument("--overlay", metavar="O.mp4", help="draw the cylinder figure into the video")
+    group.add_argument(
+        "--suggest",
+        type=values.whole(0),
+        metavar="N",
+        help="name the N corrections that would help most (default: 0)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lift keypoints, or pass a video on."""
+    """Lift keypoints or a video."""
     suffix = Path(args.input).suffix.lower()
     video = suffix not in (".csv", ".txt") and bool(suffix or args.placement)
     if video and not set("%:") & set(args.input) and not Path(args.input).exists():
@@ -128,43 +180,82 @@ def run(args: argparse.Namespace) -> int:
         (args.output, args.trc, args.overlay),
         (args.input, args.model, args.camera, args.placement, args.corrections, args.background),
     )
-    if video:
-        return lift_video.run(args)
-    _check(args)
-    prior = lift_prior.load(args.model, args.quiet)
-    keypoints = lift_tracks.read(args.input, prior, args.pixel_sd or PIXEL_SD, args.ignore_unknown, args.quiet)
-    pixel_sd = args.pixel_sd or lift_tracks.noise_of(keypoints, args.quiet)
-    mended: dict[str, Any] = {"exchanged": 0, "put_back": [], "jumps": 0, "left_out": []}
-    view = lift_tracks.view(keypoints, args.camera, args.orthographic, args.metres_per_unit, args.quiet)
-    options = _options(args, pixel_sd)
-    if not args.keep_sides:
-        keypoints, sides = lift_tracks.with_sides(
-            args.input, prior, keypoints, view, options, args.quiet, " (--keep-sides)"
-        )
-        mended |= sides
-    if not args.keep_spikes:
-        keypoints, left_out = lift_tracks.without_spikes(keypoints, pixel_sd, args.quiet, " (--keep-spikes)")
-        mended |= left_out
-    names = motion.output_names(prior, keypoints, args.all_markers)
-    found = lift_tracks.lift(args.input, prior, keypoints, view, options, names, args.quiet)
-    _require_person(args, found)
-    if not args.quiet:
-        camera, jumps = bool(args.camera), int(mended["jumps"])
-        for words in lift_doubts.of(found, keypoints, options, prior.stature, camera, jumps):
-            print(words, file=sys.stderr)
-    write_lifted(args.output, keypoints.frame, keypoints.time, names, found.places, found.sd)
-    if args.trc:
-        write_trc(args.trc, names, keypoints.time, found.places, _rate(keypoints))
-    summary = _summary(args, keypoints, found) | mended | {"pixel_sd": pixel_sd}
-    print(json.dumps(summary) if args.json else _text(summary))
+    summary, text = _lift_video(args) if video else _lift_keypoints(args)
+    print(json.dumps(summary) if args.json else text)
     return 0
 
 
-def _options(args: argparse.Namespace, pixel_sd: float) -> motion.Options:
+def warner(quiet: bool) -> Callable[[str], None]:
+    """Print warnings to stderr, unless quiet."""
+    return lambda words: None if quiet else print(words, file=sys.stderr)
+
+
+def _lift_keypoints(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """Lift keypoints; the summary, and in words."""
+    _check(args)
+    warn = warner(args.quiet)
+    request = lift_run.Request(
+        options=_options(args),
+        pixel_sd_given=args.pixel_sd is not None,
+        camera=args.camera,
+        axis=args.orthographic,
+        metres=args.metres_per_unit,
+        ignore_unknown=args.ignore_unknown,
+        keep_sides=args.keep_sides,
+        keep_spikes=args.keep_spikes,
+        all_markers=args.all_markers,
+    )
+    prior = lift_run.load_prior(args.model, warn)
+    lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
+    keypoints, found = lifted.keypoints, lifted.motion
+    _require_person(args, found)
+    for words in lift_run.reasons_for_doubt(lifted, prior.stature):
+        warn(words)
+    write_lifted(args.output, keypoints.frame, keypoints.time, found.names, found.places, found.sd)
+    if args.trc:
+        write_trc(args.trc, found.names, keypoints.time, found.places, _rate(keypoints))
+    summary = _summary(args, keypoints, found) | lifted.repairs | {"pixel_sd": lifted.options.pixel_sd}
+    return summary, _text(summary)
+
+
+def _lift_video(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """Lift a video; the summary, and in words."""
+    from gait.io.video import require_video_name  # OpenCV and PyAV, which keypoints do not need
+    from gait.lift.video import run as video_run
+
+    if not args.placement:
+        raise UsageError("--placement: a video needs it; it gives where the person roughly is in one frame")
+    if args.overlay:
+        require_video_name(args.overlay)
+    warn = warner(args.quiet)
+    request = video_run.Request(
+        video=args.input,
+        placement=args.placement,
+        model=args.model,
+        camera=args.camera,
+        corrections=args.corrections,
+        background=args.background or "auto",
+        start=args.start,
+        stop=args.stop,
+        joined=not args.alone,
+    )
+    prior = lift_run.load_prior(args.model, warn)
+    lifted = video_run.lift_video(request, prior, warn, args.quiet)
+    fit = lifted.fit
+    shown = [i for i, name in enumerate(prior.names) if name in JOINTS or args.all_markers]
+    names = [prior.names[i] for i in shown]
+    write_lifted(args.output, fit.frame, fit.time, names, fit.places[:, shown], fit.sd[:, shown])
+    if args.overlay:
+        video_run.draw_overlay(args.overlay, lifted, args.quiet)
+    summary = video_run.summary(lifted, args.suggest or 0)
+    return summary, _video_text(summary)
+
+
+def _options(args: argparse.Namespace) -> motion.Options:
     return motion.Options(
         args.method or motion.METHODS[0],
         args.height,
-        pixel_sd,
+        args.pixel_sd or PIXEL_SD,
         args.floor_sd or FLOOR_SD,
         not args.no_contact,
         not args.no_bones,
@@ -172,9 +263,9 @@ def _options(args: argparse.Namespace, pixel_sd: float) -> motion.Options:
 
 
 def _require_own(args: argparse.Namespace, video: bool) -> None:
-    """Refuse options of a video for keypoints and of keypoints for a video, which would do nothing."""
+    """Refuse options of a video for keypoints and vice versa, which would have no effect."""
     kind, other = ("is a video", "keypoints") if video else ("holds keypoints", "a video")
-    for option in _ONLY_TRACKS if video else _ONLY_VIDEO:
+    for option in _ONLY_KEYPOINTS if video else _ONLY_VIDEO:
         value = getattr(args, option)
         if value is not None and value is not False:
             raise UsageError(f"--{option.replace('_', '-')} is for {other}, and {args.input} {kind}")
@@ -196,7 +287,7 @@ def _check(args: argparse.Namespace) -> None:
     """Refuse options that do not go together."""
     smooth = args.method in (None, "smooth")
     if args.camera and args.orthographic:
-        raise UsageError("--camera and --orthographic are two views; give one of them")
+        raise UsageError("--camera and --orthographic exclude each other; give one of them")
     if args.metres_per_unit and not args.orthographic:
         raise UsageError("--metres-per-unit goes with --orthographic")
     if not smooth and (args.no_contact or args.no_bones):
@@ -207,7 +298,11 @@ def _check(args: argparse.Namespace) -> None:
 
 def _rate(keypoints: Keypoints) -> float:
     """Frames per second."""
-    return float((len(keypoints.time) - 1) / (keypoints.time[-1] - keypoints.time[0])) if len(keypoints.time) > 1 else 1.0
+    return (
+        float((len(keypoints.time) - 1) / (keypoints.time[-1] - keypoints.time[0]))
+        if len(keypoints.time) > 1
+        else 1.0
+    )
 
 
 def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motion) -> dict[str, Any]:
@@ -219,7 +314,7 @@ def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motio
         "seen_share": float(keypoints.seen.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
         "sd_mm": 1000 * float(np.median(found.sd)),
-        "stature_m": found.stature if found.steps else None,  # segments alone keep what was believed
+        "stature_m": found.stature if found.steps else None,  # not estimated by segments alone
         "iterations": found.steps,
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
@@ -249,8 +344,8 @@ def _text(s: dict[str, Any]) -> str:
     markers = s["markers"]
     lines = [
         f"{s['frames']} frames, {len(markers['seen'])} points seen in {s['seen_share']:.0%} of them, "
-        f"{len(markers['estimated'])} estimated",
-        f"{s['reprojection_px']:.2f} px from what was seen, median sd {s['sd_mm']:.0f} mm"
+        f"{len(markers['estimated'])} markers estimated",
+        f"{s['reprojection_px']:.2f} px from the keypoints, median sd {s['sd_mm']:.0f} mm"
         + (f", stature {s['stature_m']:.2f} m" if s["stature_m"] else ""),
     ]
     if s["iterations"]:
@@ -261,15 +356,29 @@ def _text(s: dict[str, Any]) -> str:
 
 
 def _left(segments: dict[str, Any]) -> str:
-    """Say what segments leave uncertain."""
+    """Describe what segments leave uncertain."""
     modes = segments["least_certain"]
     sd = ", ".join(f"{mode['sd_mm']:.0f}" for mode in modes)
     depth = ", ".join(f"{100 * mode['in_depth']:.0f}" for mode in modes)
     volume = segments["log10_volume_ratio"]
     moved = ["the whole body" if mode["rigid"] > WHOLE else " ".join(mode["joints"]) for mode in modes]
     words = (
-        f"a segment alone: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth; "
+        f"a single segment: volume 1e{volume:.0f} of the prior's, least certain {sd} mm ({depth} % in depth; "
         f"of {'; of '.join(moved)})"
     )
-    untold = modes[0]["sd_mm"] > UNTOLD_MM
-    return words + "; the first is how far away the person is, which the view does not tell" * bool(untold)
+    unknown = modes[0]["sd_mm"] > UNKNOWN_MM
+    return words + "; the first is the person's distance, which the view does not determine" * bool(unknown)
+
+
+def _video_text(summary: dict[str, Any]) -> str:
+    c, figure = summary["corrections"], summary["figure"]
+    lines = [
+        f"{summary['frames']} frames in {summary['segments']} segments, median sd {summary['sd_mm']:.0f} mm",
+        f"{c['given']} corrections ({c['per_frame']:.2f} per frame), {c['needed']} of them more than "
+        f"{c['within_px']:.0f} px from where the picture alone puts the joint",
+        f"{c['wanted']} more ({c['wanted_per_frame']:.2f} per frame) would bring every joint within "
+        f"{c['within_px']:.0f} px",
+        f"figure: stature {figure['stature_m']:.2f} m, {figure['residual_mm']:.0f} mm from the markers",
+    ]
+    asked = [f"frame {s['frame']:5d}  {s['joint']:<11} +- {s['sd_px']:.0f} px" for s in summary["suggest"]]
+    return "\n".join([*lines, *asked])

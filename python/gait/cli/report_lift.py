@@ -1,10 +1,10 @@
-"""Figures of the segment prior and of what it makes of a view, after Leventon and Freeman (1998).
+"""Draw figures of the segment prior and of its estimates in one view, after Leventon and Freeman (1998).
 
-Writes into DIR: report.html (needs nothing else) and the figures as PNG.  spectrum: variances of the modes
-before and after something was seen (fig. 3); synthesis: a segment from 40 modes (2); draws from the prior
-(4); estimates: original, projection, likelihood only, Bayes (5); what is least certain (6); and a clip (7) if
---clip gives its 2-D keypoints.  The segment is the one with most motion of --mocap, which should not be one that
-the model was learnt from; without it, a draw from the prior.
+Writes into DIR: report.html (self-contained) and the figures as PNG.  spectrum: variances of the modes
+before and after an observation (fig. 3); synthesis: a segment from 40 modes (2); draws from the prior (4);
+estimates: original, projection, likelihood only, Bayes (5); the least certain displacements (6); and a lifted
+clip (7) if --clip gives its 2-D keypoints.  The segment is the one with the most motion of --mocap, which
+should not be a recording that the model was learnt from; without --mocap, a draw from the prior.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import html
 import io
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gait.bindings.segment_prior import SegmentPrior
-from gait.cli import lift_tracks, values
+from gait.cli import values
+from gait.cli.lift import warner
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
 from gait.io.keypoints_file import Keypoints
@@ -32,10 +32,11 @@ from gait.learn.segment_options import Segments
 from gait.learn.segments import segment_corpus, segment_motion
 from gait.learn.segments.segment_corpus import Corpus
 from gait.learn.solve import readers
+from gait.lift import run as lift_run
 from gait.lift.report import motion_figures
 from gait.lift.report.segment_figures import Case, case, drawings
 from gait.lift.segment.view import View
-from gait.lift.smooth.motion import METHODS, Motion, Options, output_names
+from gait.lift.smooth.motion import METHODS, Motion, Options
 from gait.progress import progress
 from gait.report.page import Page
 
@@ -101,14 +102,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _clip(args: argparse.Namespace, prior: SegmentPrior) -> tuple[Keypoints, Motion, View]:
     """Lift the keypoints of the clip as `gait lift` does."""
-    options = Options(args.method or METHODS[0])
-    keypoints = lift_tracks.read(args.clip, prior, options.pixel_sd, ignore_unknown=True, quiet=args.quiet)
-    options = replace(options, pixel_sd=lift_tracks.noise_of(keypoints, args.quiet))
-    view = lift_tracks.view(keypoints, args.camera, quiet=args.quiet)
-    keypoints, _ = lift_tracks.with_sides(args.clip, prior, keypoints, view, options, args.quiet)
-    keypoints, _ = lift_tracks.without_spikes(keypoints, options.pixel_sd, args.quiet)
-    found = lift_tracks.lift(args.clip, prior, keypoints, view, options, output_names(prior, keypoints), args.quiet)
-    return keypoints, found, view
+    request = lift_run.Request(
+        Options(args.method or METHODS[0]), camera=args.camera, ignore_unknown=True, hints=False
+    )
+    found = lift_run.lift_file(args.clip, prior, request, warner(args.quiet), args.quiet)
+    return found.keypoints, found.motion, found.view
 
 
 def _drawings(

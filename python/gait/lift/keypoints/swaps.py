@@ -227,7 +227,9 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     evidence : callable
         Logarithm of the density of some frames of keypoints by a model of the motion, but for a constant.
     """
-    joints = [name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names]
+    joints = [
+        name[2:] for name in keypoints.names if name.startswith("l_") and f"r_{name[2:]}" in keypoints.names
+    ]
     if not joints or len(keypoints.time) < 3 or np.median(np.diff(keypoints.time)) > SLOWEST:
         return keypoints, []
     pairs = np.array([[keypoints.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints])
@@ -311,7 +313,9 @@ def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
     return replace(keypoints, uv=uv, confidence=confidence)
 
 
-def _judged(keypoints: Keypoints, pairs: Ints, wrong: Flags, seen: Flags, own: slice, evidence: Evidence) -> Flags:
+def _judged(
+    keypoints: Keypoints, pairs: Ints, wrong: Flags, seen: Flags, own: slice, evidence: Evidence
+) -> Flags:
     """Take in `own` rows of a proposal (T, P) what the motion confirms: all or nothing, then each limb.
 
     Where something was exchanged, other pairs may have been along with it for as long.

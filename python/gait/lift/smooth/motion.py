@@ -182,7 +182,12 @@ def _extent(places: Floats) -> float:
 
 KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
 ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
-WIDER = (1.0, 2.0, 4.0, 8.0)  # factors of the prior's deviations, tried in turn while the keypoints ask for it
+WIDER = (
+    1.0,
+    2.0,
+    4.0,
+    8.0,
+)  # factors of the prior's deviations, tried in turn while the keypoints ask for it
 FLOATS = 4.0  # deviations of the floor's height from which somebody does not stand on it
 POOR_FIT = 1.3  # squared deviations per number seen from which a wider prior is tried
 
@@ -237,7 +242,9 @@ def evidence(prior: SegmentPrior, keypoints: Keypoints, view: View, options: Opt
     smooth = replace(options, method="smooth")
     try:
         prior = prior.restricted(names)
-        return _lift(prior, keypoints, view, smooth, Grid.over(keypoints.time, prior), lambda done: None).evidence
+        return _lift(
+            prior, keypoints, view, smooth, Grid.over(keypoints.time, prior), lambda done: None
+        ).evidence
     except UserError:
         return -np.inf
 
@@ -381,7 +388,12 @@ def believed_stature(options: Options, usual: float) -> tuple[float, float]:
 
 
 def _sized(
-    prior: SegmentPrior, keypoints: Keypoints, view: View, options: Options, found: Lifted | Motion, chi2: float
+    prior: SegmentPrior,
+    keypoints: Keypoints,
+    view: View,
+    options: Options,
+    found: Lifted | Motion,
+    chi2: float,
 ) -> size.Resized:
     """Give the estimate a person's size if it has none; only a lens leaves it open.
 

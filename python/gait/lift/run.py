@@ -1,0 +1,307 @@
+"""Lift a file of 2-D keypoints as `gait lift` and `gait report lift` do: read, repair, lift, and warn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from gait.bindings.segment_prior import SegmentPrior
+from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io import keypoints_file
+from gait.io.keypoints_file import Keypoints
+from gait.learn.corpus.stage import one_thread
+from gait.lift.keypoints import noise, swaps
+from gait.lift.segment.view import Parallel, Perspective, View, looking_along
+from gait.lift.smooth import motion, size
+from gait.lift.smooth.motion import Motion, Options
+from gait.progress import progress
+
+FEW = 4  # recordings; with two of one person, intervals of other people's walks covered as little as 70 %
+MOST_NAMED = 5  # spikes, changes of person
+MOST_SPANS = 4  # named
+OUTSIDE = 0.1  # of the points: with fewer, the picture cuts the person off
+SHAKY = 1.3  # times a standard deviation from which points jitter more than it
+FAR = 4.0  # standard deviations of a median distance; noise alone gives 1.2
+OFTEN = 3  # frames in which a point is an outlier; correct ones are once in a few thousand
+TOO_MANY = 0.18  # share of wrong points; one in seven does little harm, one in five may
+UNUSUAL = 2.5  # standard deviations of a stature; one person in 80 is as unusual
+
+Warn = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """How to lift a file.
+
+    Attributes
+    ----------
+    options : Options
+        Of the method; `pixel_sd` counts only if `pixel_sd_given`, else the points' jitter is measured.
+    camera : str, optional
+        File of the calibration; without it the view is from far away.
+    axis : str, optional
+        Direction of such a view; level and with a slowly changing scale if left out.
+    metres : float, optional
+        Of a unit of u and v along `axis`; unknown if left out.
+    ignore_unknown : bool
+        Leave out points that the model does not know.
+    keep_sides, keep_spikes : bool
+        Leave swaps of left and right, and spikes, as they are.
+    all_markers : bool
+        Estimate all markers of the prior.
+    hints : bool
+        Name the options of `gait lift` in warnings.
+    """
+
+    options: Options
+    pixel_sd_given: bool = False
+    camera: str | None = None
+    axis: str | None = None
+    metres: float | None = None
+    ignore_unknown: bool = False
+    keep_sides: bool = False
+    keep_spikes: bool = False
+    all_markers: bool = False
+    hints: bool = True
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """A lifted file.
+
+    Attributes
+    ----------
+    keypoints : Keypoints
+        Without spikes and swaps.
+    view : View
+    options : Options
+        With the standard deviation that was used.
+    motion : Motion
+    repairs : dict
+        What was repaired, as in the ``--json`` summary.
+    """
+
+    keypoints: Keypoints
+    view: View
+    options: Options
+    motion: Motion
+    repairs: dict[str, Any] = field(default_factory=dict)
+
+
+def load_prior(model: str | None, warn: Warn) -> SegmentPrior:
+    """Load the prior of a model (None: the shipped one); warn if it was learnt from few recordings."""
+    prior = SegmentPrior.load(model)
+    if 0 < prior.recordings < FEW:
+        count = "one recording" if prior.recordings == 1 else f"{prior.recordings} recordings"
+        warn(
+            f"{model}: learnt from {count}, too few to show how people differ: standard deviations may come "
+            "out too small; learn it from more"
+        )
+    return prior
+
+
+def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quiet: bool) -> Lifted:
+    """Read keypoints, undo swaps of left and right, leave out spikes, and lift what remains.
+
+    Raises
+    ------
+    UserError
+        One line that names the file.
+    """
+    options, hint = request.options, request.hints
+    keypoints = _read(path, prior, options.pixel_sd, request.ignore_unknown, warn)
+    if not request.pixel_sd_given:
+        options = replace(options, pixel_sd=measured_noise(keypoints, warn))
+    view = _view(keypoints, request, warn)
+    repairs: dict[str, Any] = {"exchanged": 0, "put_back": [], "jumps": 0, "left_out": []}
+    if not request.keep_sides:
+        keypoints, found = _without_swaps(path, prior, keypoints, view, options, warn, quiet, hint)
+        repairs |= found
+    if not request.keep_spikes:
+        keypoints, found = _without_spikes(keypoints, options.pixel_sd, warn, hint)
+        repairs |= found
+    names = motion.output_names(prior, keypoints, request.all_markers)
+    segments = motion.segments_of(prior, keypoints)
+    # matrices are too small for several threads to gain
+    with one_thread(), progress("segments", segments, quiet) as update, _naming(path):
+        lifted = motion.lift(prior, keypoints, view, options, names, update)
+    return Lifted(keypoints, view, options, lifted, repairs)
+
+
+def _read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, warn: Warn) -> Keypoints:
+    """Read keypoints of a prior's markers whose noise is `sd`; warn about what is left out or looks wrong."""
+    keypoints, ignored = keypoints_file.read(path, prior.names, ignore_unknown)
+    keypoints.require_motion(path)
+    keypoints.require_spread(path, sd)
+    if ignored:
+        warn(f"left out, unknown to the model: {' '.join(ignored)}")
+    if found := keypoints_file.shared_place(keypoints.uv):
+        (u, v), count = found
+        warn(
+            f"{count} points are at exactly {u:g}, {v:g}: if the detector puts points there that it does not "
+            "see, leave the cells empty"
+        )
+    if changes := noise.person_changes(keypoints)[:MOST_NAMED]:
+        places = [
+            f"at frame {first}" if last is None else f"in frames {first} to {last}" for first, last in changes
+        ]
+        warn(
+            f"most points jump at once: the keypoints change to another person {', '.join(places)}; keep one "
+            "person's points only"
+        )
+    return keypoints
+
+
+def measured_noise(keypoints: Keypoints, warn: Warn) -> float:
+    """Measure the standard deviation at full confidence: the points' jitter, if it is more than usual.
+
+    Spikes are no jitter: among many, others would pass for correct points.
+    """
+    usual = Options.pixel_sd
+    shake = noise.shake(noise.without_spikes(keypoints, usual)[0])
+    if not shake > SHAKY * usual:
+        return usual
+    warn(
+        f"the points jitter by {shake:.2g} from frame to frame: used as their noise instead of {usual:g} "
+        "(--pixel-sd)"
+    )
+    return shake
+
+
+def _view(keypoints: Keypoints, request: Request, warn: Warn) -> View:
+    """View of the keypoints; warn if they cannot be of the camera's picture."""
+    if request.camera:
+        camera = Camera.read(request.camera)
+        outside = keypoints.outside(camera.size)
+        if outside > OUTSIDE:
+            picture = "{}x{}".format(*camera.size)
+            warn(
+                f"{outside:.0%} of the points lie outside the camera's {picture} picture: is "
+                f"{request.camera} the calibration of this video?"
+            )
+        return Perspective(camera)
+    middle = np.nanmedian(keypoints.uv, axis=(0, 1))  # outliers do not move it
+    return Parallel(looking_along(request.axis or "y"), request.metres, middle, steady=bool(request.axis))
+
+
+def _without_swaps(
+    path: str,
+    prior: SegmentPrior,
+    keypoints: Keypoints,
+    view: View,
+    options: Options,
+    warn: Warn,
+    quiet: bool,
+    hint: bool,
+) -> tuple[Keypoints, dict[str, Any]]:
+    """Undo swaps of left and right, name them, and give their figures for ``--json``."""
+    with _naming(path):
+        motion.require(prior, keypoints, view, options)
+    with one_thread(), progress("sides", len(keypoints.time), quiet) as update:
+
+        def evidence(part: Keypoints) -> float:
+            update(int(np.searchsorted(keypoints.frame, part.frame[0])))
+            return motion.evidence(prior, part, view, options)
+
+        found, swapped = swaps.undo_swaps(keypoints, options.pixel_sd, evidence)
+    if swapped:
+        warn(_named_swaps(swapped) + " (--keep-sides)" * hint)
+    moved = (found.uv != keypoints.uv).any(axis=2) & keypoints.seen
+    spans = [
+        {"joint": each.joint, "first": first, "last": last} for each in swapped for first, last in each.spans
+    ]
+    return found, {"exchanged": int(moved.sum()), "put_back": spans}
+
+
+def _named_swaps(swapped: list[swaps.Swapped]) -> str:
+    """Name intervals of frames, the longest first, and what was swapped in them."""
+    joints: dict[tuple[int, int], list[str]] = {}
+    for each in swapped:
+        for span in each.spans:
+            joints.setdefault(span, []).append(each.joint)
+    spans = sorted(joints, key=lambda span: span[0] - span[1])
+    named = [f"{', '.join(joints[span])} in frames {span[0]} to {span[1]}" for span in spans[:MOST_SPANS]]
+    more = f" and {len(spans) - MOST_SPANS} more intervals" if len(spans) > MOST_SPANS else ""
+    return f"left and right were swapped; undone: {'; '.join(named)}{more}"
+
+
+def _without_spikes(
+    keypoints: Keypoints, sd: float, warn: Warn, hint: bool
+) -> tuple[Keypoints, dict[str, Any]]:
+    """Leave out spikes, name them, and give their figures for ``--json``."""
+    keypoints, spikes = noise.without_spikes(keypoints, sd)
+    if spikes:
+        named = ", ".join(f"{name} in frame {frame}" for frame, name in spikes[:MOST_NAMED])
+        more = f" and {len(spikes) - MOST_NAMED} more" if len(spikes) > MOST_NAMED else ""
+        warn(
+            f"left out, far from where they were a frame before and after: {named}{more}"
+            + " (--keep-spikes)" * hint
+        )
+    left_out = [{"frame": frame, "point": name} for frame, name in spikes]
+    return keypoints, {"jumps": len(spikes), "left_out": left_out}
+
+
+@contextmanager
+def _naming(path: str) -> Iterator[None]:
+    """Name a file in errors."""
+    try:
+        yield
+    except UserError as error:
+        raise type(error)(f"{path}: {error}") from None
+
+
+def reasons_for_doubt(lifted: Lifted, prior_stature: float) -> list[str]:
+    """Reasons why a result may be wrong, a line each.
+
+    Parameters
+    ----------
+    prior_stature : float
+        Of the people learnt from, metres.
+    """
+    found, keypoints, options = lifted.motion, lifted.keypoints, lifted.options
+    camera = isinstance(lifted.view, Perspective)
+    far = float(np.nanmedian(found.error)) / options.pixel_sd
+    outliers, shake = _named_outliers(found, keypoints.names), noise.shake(keypoints)
+    lost = _share_lost(found, keypoints, int(lifted.repairs["jumps"]))
+    believed, sd = motion.believed_stature(options, prior_stature)
+    off = abs(found.stature - believed) / sd if found.steps else 0.0  # segments alone do not estimate it
+    lens = "the camera's focal length" if camera else "--metres-per-unit"
+    reasons = {
+        "hips and ankles, which determine the distance, are hardly seen: the person may be metres nearer or "
+        "further away": camera and not size.tells_distance(keypoints),
+        f"outliers, down-weighted because they are far from their predictions: {outliers}": bool(outliers),
+        f"{lost:.0%} of the points seem wrong, which is too many: do not rely on the result": lost > TOO_MANY,
+        f"the points jitter by {shake:.2g} from frame to frame, not {options.pixel_sd:g}: "
+        f"try --pixel-sd {shake:.2g}": shake > SHAKY * options.pixel_sd and found.wider > 1,
+        f"the motion is unlike those learnt: the prior was widened {found.wider:g} times": found.wider > 1,
+        "the smoother fails for such motions: segments are estimated alone (--method blend)": found.alone,
+        f"the person came out {found.stature:.2f} m tall, where {believed:.2f} was expected: check {lens}, "
+        "time (the frame rate) and --height": off > UNUSUAL,
+        f"the size was taken from the bones ({found.resized:.2f} times the fit's): the motion is unlike "
+        "those learnt, or the camera is wrong; standard deviations are wide, do not rely on the places": (
+            found.resized != 1
+        ),
+        f"the estimate did not converge in {found.steps} iterations: do not rely on it": not found.settled,
+        f"the estimate is {far:.0f} times --pixel-sd from the keypoints: do not rely on it; check the "
+        "camera, the names of the points, that v points down, and --pixel-sd": far > FAR,
+    }
+    return [words for words, holds in reasons.items() if holds]
+
+
+def _share_lost(found: Motion, keypoints: Keypoints, spikes: int) -> float:
+    """Share of the points that were left out or down-weighted."""
+    outliers = 0 if found.outliers is None else int(found.outliers.sum())
+    return (spikes + outliers) / max(int(keypoints.seen.sum()) + spikes, 1)
+
+
+def _named_outliers(found: Motion, names: tuple[str, ...]) -> str:
+    """Points that were often outliers, and in how many frames."""
+    if found.outliers is None:
+        return ""
+    counts = zip(names, found.outliers.sum(axis=0).tolist(), strict=True)
+    return ", ".join(f"{name} in {count} frames" for name, count in counts if count >= OFTEN)

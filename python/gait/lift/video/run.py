@@ -1,0 +1,255 @@
+"""Lift the person in a video: sensors, corrections, cylinder figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gait.bindings.model import read_blob, read_cyclic
+from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import JOINTS
+from gait.camera.camera import Camera
+from gait.errors import UserError
+from gait.io.blob import decode
+from gait.io.video import Video, VideoWriter, background
+from gait.learn.corpus.stage import one_thread
+from gait.lift.video.clip_segments import ClipSegments, Settings
+from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_corrections, read_placement
+from gait.lift.video.figure import Figure, draw_figure
+from gait.lift.video.fit_clip import DOUBTFUL, ENOUGH, HELD, ClipFit, fit_clip, suggest, work
+from gait.lift.video.sensors import CameraView, Film, FlatView, View
+from gait.progress import progress
+
+Floats = npt.NDArray[np.float64]
+
+SMALLEST = 20.0  # pixels of a person whose limbs can be distinguished
+LARGEST = 4.0  # heights of the picture
+
+Warn = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to lift and how.
+
+    Attributes
+    ----------
+    video, placement : str
+        Files.
+    model, camera, corrections : str, optional
+        Files; the shipped model, a view without a camera and no corrections if left out.
+    background : str
+        An image, ``auto`` (median of the clip) or ``none``.
+    start, stop : int, optional
+        First frame to use, and the first not to use.
+    joined : bool
+        Segments are solved together; else one after the other, as in the paper.
+    """
+
+    video: str
+    placement: str
+    model: str | None = None
+    camera: str | None = None
+    corrections: str | None = None
+    background: str = "auto"
+    start: int | None = None
+    stop: int | None = None
+    joined: bool = True
+
+
+@dataclass(frozen=True)
+class LiftedVideo:
+    """Estimates without and with the corrections, and the cylinder figure of the latter."""
+
+    video: Video
+    clip: ClipSegments
+    free: ClipFit
+    fit: ClipFit
+    figure: Figure
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Markers that are estimated."""
+        return self.clip.prior.names
+
+
+def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -> LiftedVideo:
+    """Estimate the motion in a video.
+
+    Raises
+    ------
+    UserError
+        One line that names the file at fault.
+    """
+    video = Video(request.video)
+    camera = Camera.read(request.camera, video.size) if request.camera else None
+    placement = read_placement(request.placement, prior, camera is not None)
+    if placement.unused:
+        keys = " and ".join(placement.unused)
+        warn(f"{request.placement}: not used {'with' if camera else 'without'} --camera: {keys}")
+    first, stop = _frames(request, video, placement)
+    corrections = []
+    if request.corrections:
+        corrections = read_corrections(request.corrections, prior, stop, first, video.size)
+    view = CameraView(camera) if camera else _flat(placement, prior)
+    film = _film(request, video, view, placement, prior, (first, stop), quiet)
+    used = [c for c in corrections if first <= c.frame < first + len(film.times)]
+    if len(used) < len(corrections):
+        warn(f"{len(corrections) - len(used)} corrections are in frames that are not used")
+    phase_prior = PhasePrior.of(prior, _cycle(request.model), placement)
+    settings = Settings(joined=request.joined)
+    clip = ClipSegments(prior, view, film, placement, used, settings, phase_prior)
+    free, fit = _fits(clip, quiet)
+    if fit.fit_correlation < DOUBTFUL:
+        warn(_doubt(request, fit.fit_correlation))
+    return LiftedVideo(video, clip, free, fit, Figure.fit(fit.places, prior.names))
+
+
+def _doubt(request: Request, fit_correlation: float) -> str:
+    remedy = "--background or --corrections" if request.background == "none" else "--corrections"
+    return (
+        f"{request.video}: the sensors hardly show the person (correlation with the stick figure "
+        f"{fit_correlation:.2f}, {HELD:g} before a known background): the figure may have lost the person, "
+        f"and standard deviations are widened; check with --overlay and give {remedy}"
+    )
+
+
+def _frames(request: Request, video: Video, placement: Placement) -> tuple[int, int]:
+    """First frame, and the first not used."""
+    first = placement.frame if request.start is None else request.start
+    stop = video.count if request.stop is None else min(request.stop, video.count)
+    if first >= stop:
+        raise UserError(
+            f"{request.video}: has no frame from {first} to before {stop}; its frames are 0 to "
+            f"{video.count - 1}, give other --start and --stop, or another frame in the placement"
+        )
+    if not first <= placement.frame < stop:
+        raise UserError(
+            f"{request.placement}: frame {placement.frame} is not among the frames {first} to {stop - 1}; "
+            "place the person in one of them"
+        )
+    return first, stop
+
+
+def _flat(placement: Placement, prior: SegmentPrior) -> FlatView:
+    """View without a camera: as many pixels per metre as the placement says."""
+    assert placement.pelvis_px is not None and placement.height_px is not None
+    pixels = placement.height_px / placement.stature
+    pelvis = placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
+    return FlatView(pixels, (placement.pelvis_px[0], placement.pelvis_px[1] + pixels * pelvis))
+
+
+def _cycle(model: str | None) -> Mapping[str, Any]:
+    """Sections with a cyclic model: the model's own, or those of the shipped one."""
+    sections = decode(read_blob(model))
+    return sections if "CURV" in sections else read_cyclic(None)
+
+
+def _film(
+    request: Request,
+    video: Video,
+    view: View,
+    placement: Placement,
+    prior: SegmentPrior,
+    frames: tuple[int, int],
+    quiet: bool,
+) -> Film:
+    """Sensors of the frames used."""
+    pelvis = np.append(placement.ground, placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2])
+    if not view.visible(pelvis):
+        raise UserError(
+            f"{request.placement}: pelvis is behind the camera; give its place in the camera's world"
+        )
+    height = placement.stature * view.scale(pelvis)
+    _require_in_picture(request.placement, video, view.project(pelvis)[0], height)
+    with progress("background", video.count, quiet) as update:
+        plate = background(request.background, video, update)
+    with progress("sensors", frames[1] - frames[0], quiet) as update:
+        return Film.make(video.frames(*frames), height, plate, update)
+
+
+def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) -> None:
+    """Refuse a placement of nobody in the picture: `pelvis` (2,) and `height` in pixels."""
+    wide, high = video.size
+    if not SMALLEST <= height <= LARGEST * high:
+        raise UserError(
+            f"{path}: the person would be {height:.3g} px tall in a picture of {wide}x{high}; give the place "
+            f"and stature, or height_px, of a person of {SMALLEST:g} to {LARGEST * high:g} px"
+        )
+    if (np.maximum(-pelvis, pelvis - (wide - 1, high - 1)) > height / 2).any():
+        raise UserError(
+            f"{path}: the pelvis falls at pixel ({pelvis[0]:.0f}, {pelvis[1]:.0f}) of a picture of "
+            f"{wide}x{high}; place the person where the picture shows some of it"
+        )
+
+
+def _fits(clip: ClipSegments, quiet: bool) -> tuple[ClipFit, ClipFit]:
+    """Estimates without and with the corrections."""
+    with one_thread(), progress("segments", work(clip), quiet) as update:
+        free = fit_clip(replace(clip, corrections=()), update=update)
+    if not clip.corrections:
+        return free, free
+    with one_thread(), progress("corrections", work(clip), quiet) as update:
+        return free, fit_clip(clip, update=update)
+
+
+def _marker(clip: ClipSegments, fit: ClipFit, correction: Correction) -> Floats:
+    """Place (3,) of a correction's marker in an estimate."""
+    found = fit.places[correction.frame - clip.film.first, clip.prior.index([correction.joint])[0]]
+    return np.asarray(found)
+
+
+def draw_overlay(path: str, lifted: LiftedVideo, quiet: bool) -> None:
+    """Write the video with the cylinder figure and the corrections drawn into it."""
+    video, clip, fit, figure = lifted.video, lifted.clip, lifted.fit, lifted.figure
+    surfaces, joints, first = figure.surfaces(), figure.joints(), clip.film.first
+    with VideoWriter(path, video.fps) as film, progress("drawing", len(fit.frame), quiet) as update:
+        for k, frame in enumerate(video.frames(first, first + len(fit.frame))):
+            corrections = [(c, _marker(clip, fit, c)) for c in clip.corrections if c.frame == frame.number]
+            film.write(draw_figure(frame.image, clip.view, surfaces[k], joints[k], corrections))
+            update(k + 1)
+
+
+def correction_errors(clip: ClipSegments, fit: ClipFit) -> Floats:
+    """Distances (C,) in pixels of the corrections' markers from the corrections."""
+    seen = [clip.view.project(_marker(clip, fit, c)[None])[0][0] - c.uv for c in clip.corrections]
+    return np.linalg.norm(np.reshape(seen, (-1, 2)), axis=1)
+
+
+def summary(lifted: LiftedVideo, most: int) -> dict[str, Any]:
+    """Figures of ``--json``, with the `most` most useful corrections."""
+    clip, free, fit, figure = lifted.clip, lifted.free, lifted.fit, lifted.figure
+    frames, given = len(fit.frame), len(clip.corrections)
+    pixels = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
+    enough = ENOUGH * clip.placement.stature * pixels
+    before, after = correction_errors(clip, free), correction_errors(clip, fit)
+    wanted = suggest(clip, fit)
+    joints = clip.prior.index([j for j in JOINTS if j in clip.prior.names])
+    return {
+        "frames": frames,
+        "segments": len(clip.starts),
+        "corrections": {
+            "given": given,
+            "per_frame": given / frames,
+            "needed": int((before > enough).sum()),
+            "within_px": float(enough),
+            "miss_px": {
+                "without": float(np.median(before)) if given else None,
+                "with": float(np.median(after)) if given else None,
+            },
+            "wanted": len(wanted),
+            "wanted_per_frame": len(wanted) / frames,
+        },
+        "fit_correlation": fit.fit_correlation if np.isfinite(fit.fit_correlation) else None,
+        "sd_mm": 1000 * float(np.median(fit.sd[:, joints])),
+        "figure": {
+            "stature_m": figure.stature,
+            "residual_mm": 1000 * float(np.nanmedian(figure.residual)),
+            "bones_m": figure.lengths(),
+        },
+        "suggest": [{"frame": s.frame, "joint": s.joint, "sd_px": s.sd_px} for s in wanted[:most]],
+    }
