@@ -307,7 +307,7 @@ def test_who_stands_is_not_started_with_by_looks_alone(tmp_path):
     folder = CLIPS / "oblique45_07"
     first = next(Video(folder / "video.mp4").frames(0)).image
     noise = np.random.default_rng(5)
-    held = [np.clip(first + noise.normal(0, 2, first.shape), 0, 255).astype(np.uint8) for _ in range(34)]
+    held = [np.clip(first + noise.normal(0, 2, first.shape), 0, 255).astype(np.uint8) for _ in range(26)]
     write(tmp_path / "held.mp4", held)
     video = Video(tmp_path / "held.mp4")
     with pytest.raises(UserError, match="held.mp4: --init auto found no person .*give --init FILE.json"):

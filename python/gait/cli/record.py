@@ -52,10 +52,13 @@ def run(args: argparse.Namespace) -> int:
     def stop(number: int, frame: Any) -> None:
         recorder.stop = True
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
-    note(f"{LISTENING} on {url}", args.quiet)
-    recorder.run(args.frames, args.until_idle, args.patience)
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        note(f"{LISTENING} on {url}", args.quiet)
+        recorder.run(args.frames, args.until_idle, args.patience)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
     if recorder.other:
         note(f"gait record: ended, as {recorder.other}; record it into another file", args.quiet)
     figures = recorder.summary()
