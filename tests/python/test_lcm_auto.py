@@ -56,8 +56,8 @@ def test_a_clock_set_back_far_is_a_new_search(tmp_path):
         ("GAIT_IMAGE_0", image_message(rig.picture(i), rig.utime(i) - 9_000_000, i)) for i in range(15, 60)
     ]
     got = track(tmp_path, [*rig.opening(), *rig.frames(0, 15), *back])
-    assert got.words.count("went back by 8.967 s (at most 2.000): stopped; looking for somebody anew") == 1
-    assert got.words.count("somebody found at frame") == 1 and got.rejected == 0
+    assert got.words.count("went back by 8.967 s (at most 2.000): stopped; looking for a person again") == 1
+    assert got.words.count("person found at frame") == 1 and got.rejected == 0
     assert {m.frame for m in got.estimates} >= {*range(15), *range(55, 60)}
 
 
@@ -68,12 +68,11 @@ def test_the_scene_of_another_camera_is_told_once(tmp_path):
     for begin in (scene, [*scene, rig.opening()[2]]):  # while looking for somebody, and while tracking
         told = track(tmp_path, [*begin, *rig.frames(0, 10)]).words
         assert (
-            told.count("trackd: half of the picture differs from the empty scene: give that of this camera")
-            == 1
+            told.count("trackd: half of the image differs from the background: give that of this camera") == 1
         )
 
 
 def test_who_is_looked_for_and_found_is_told(tmp_path):
     told = track(tmp_path, [*SCENE, *empty(0, 20), *later(range(45), 20)]).words
-    assert told.count("looking for somebody who walks in full view") == 1
-    assert told.count("somebody found at frame") == 1 and "differs" not in told
+    assert told.count("looking for a person who walks in full view") == 1
+    assert told.count("person found at frame") == 1 and "differs" not in told

@@ -107,7 +107,7 @@ def test_a_step_longer_than_the_budget_is_said_once(url):
             number += 1
             listener.until(lambda: len(listener.estimates) + listener.last.dropped >= number, "a sign")  # noqa: B023
         outcome = finish()
-    assert outcome.words.count("more than the budget of 20.0: fewer --particles") == 1
+    assert outcome.words.count("more than the budget of 20.0: use fewer --particles") == 1
     assert f" slow_steps {outcome.frames} " in outcome.printed
 
 
@@ -116,7 +116,7 @@ def test_a_step_longer_than_the_budget_is_said_once(url):
     [
         (["--adapt-particles", 100], "needs --budget-ms"),
         (["--adapt-particles", 100, "--budget-ms", 30], "at most the 64 of --particles"),
-        (["--budget-ms", 30, "--url", "file://x.log"], "played without loss"),
+        (["--budget-ms", 30, "--url", "file://x.log"], "played without dropping frames"),
         (["--budget-ms", 0.5], "--budget-ms"),
     ],
 )

@@ -49,7 +49,7 @@ def test_a_truncated_model_at_every_kind_of_length(tmp_path):
     blob, file = rig.MODEL.read_bytes(), tmp_path / "cut.gait"
     for size in (0, 1, 63, 64, 65, 200, len(blob) // 2, len(blob) - 1):
         file.write_bytes(blob[:size])
-        fails(["-m", file], file, "not a usable model", "learn it anew")
+        fails(["-m", file], file, "not a usable model", "learn it again")
 
 
 def test_a_damaged_model(tmp_path):
@@ -64,7 +64,7 @@ def test_a_damaged_model(tmp_path):
 def test_files_that_are_not_there(tmp_path):
     nothing = tmp_path / "nothing"
     fails(["-m", nothing], nothing, "model", "No such file")
-    fails(["-m", tmp_path], tmp_path, "no model file, as it is no regular file", "; give the name of one")
+    fails(["-m", tmp_path], tmp_path, "not a regular file", "; give the name of a model file")
     for option, what in (("--camera", "camera"), ("--init", "init")):
         fails(options(tmp_path, option, nothing), nothing, what, "No such file")
     fails(rig.command("--config", nothing)[1:], nothing, "configuration", code=2)
@@ -75,7 +75,7 @@ def test_files_that_are_not_there(tmp_path):
     ("change", "words"),
     [
         ({"fx": None}, ["fx is missing", "focal length in pixels"]),
-        ({"fx": "wide"}, ["fx is not made of numbers"]),
+        ({"fx": "wide"}, ["fx is not numeric"]),
         ({"fx": -5}, ["fx is -5"]),
         ({"fx": float("nan")}, ["fx is not finite", "focal length in pixels"]),
         ({"t": [0, -float("inf"), 4]}, ["t is not finite", "metres"]),
@@ -87,7 +87,7 @@ def test_files_that_are_not_there(tmp_path):
         ({"R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, ["R is not a rotation"]),
         ({"R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}, ["R is not a rotation"]),
         ({"t": [1, 2]}, ["t has 2 numbers", "metres"]),
-        ({"t": [1, None, 2]}, ["t is not made of numbers"]),
+        ({"t": [1, None, 2]}, ["t is not numeric"]),
         ({"distortion": [1, 2, 3]}, ["distortion", "0, 4 or 5"]),
         ({"distortion": "none"}, ["distortion"]),
         ({"distorsion": [0.1, 0, 0, 0]}, ["line 1: distorsion is not a known key"]),
@@ -105,14 +105,14 @@ def test_a_key_that_is_there_twice(tmp_path, option, content):
     file = tmp_path / "twice.json"
     key, value = next(iter(content.items()))
     file.write_text(json.dumps(content)[:-1] + f',\n"{key}": {value}}}')
-    fails(options(tmp_path, option, file), file, f"line 2: {key} is there twice; remove one")
+    fails(options(tmp_path, option, file), file, f"line 2: {key} is given twice; remove one")
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "line 1: expected a value"),
-        ("[]", "holds no JSON object"),
+        ("[]", "not a JSON object"),
         ("{", "line 1: expected a string"),
         ('{"a": 1,\n "b" 2}', "line 2: expected a colon"),
         ('{"a": 01}', "expected a comma"),
@@ -165,8 +165,8 @@ def test_the_cameras_of_the_python_side_are_accepted(tmp_path):
         ({"pelvis": [1.1e4, 0]}, ["pelvis is 11000, outside [-10000, 10000]"]),
         ({"pelvis": [1]}, ["pelvis has 1 numbers", "x and y"]),
         ({"frame": -4}, ["frame is -4"]),
-        ({"frame": 1.5}, ["frame is 1.5, no whole number", "frame number, from 0"]),
-        ({"heading_rad": "north"}, ["heading_rad is not made of numbers"]),
+        ({"frame": 1.5}, ["frame is 1.5, not a whole number", "frame number, from 0"]),
+        ({"heading_rad": "north"}, ["heading_rad is not numeric"]),
     ],
 )
 def test_a_wrong_init_file(tmp_path, change, words):
@@ -190,7 +190,7 @@ def test_init_files_of_the_python_side_are_accepted(tmp_path):
         (b"P5\n160 120\n65535\n", "8 bits"),
         (b"P5\n160 120\n255\n" + b"x" * 100, "shorter than its header"),
         (b"P5\n0 120\n255\n", "damaged header"),
-        (b"P6\n80 60\n255\n" + b"x" * (80 * 60 * 3), "background of 80x60, the camera has 160x120"),
+        (b"P6\n80 60\n255\n" + b"x" * (80 * 60 * 3), "background of 80x60, but the camera has 160x120"),
     ],
 )
 def test_a_wrong_background(tmp_path, content, words):
@@ -211,9 +211,9 @@ def test_a_background_with_comments_is_read(tmp_path):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ([], "--model FILE is needed"),
+        ([], "--model FILE is required"),
         (["--frobnicate"], "unknown argument --frobnicate"),
-        (["-m"], "--model: needs a value"),
+        (["-m"], "--model needs a value"),
         (["-m", "x", "--particles", "2.5"], "--particles 2.5: give a whole number from 16"),
         (["-m", "x", "--particles", "3"], "--particles 3: give a whole number from 16 to 1048576"),
         (["-m", "x", "--particles", "many"], "--particles many"),
@@ -222,13 +222,13 @@ def test_a_background_with_comments_is_read(tmp_path):
         (["-m", "x", "--girth", "nan"], "--girth nan"),
         (["-m", "x", "--mode", "fast"], "--mode fast: give default or paper"),
         (["-m", "x", "--quiet=maybe"], "--quiet maybe: give yes or no"),
-        (["-m", "x", "--url", "memq://"], "--url memq://: reaches nobody"),
+        (["-m", "x", "--url", "memq://"], "--url memq://: works only within one process"),
         (["-m", "x", "--background", "p.ppm"], "--background needs --camera"),
         (["-m", "x", "--lift-model", "p.gait"], "--lift-model needs --lift"),
-        (["-m", "x", "--lift-height", "1.7"], "--lift-height needs --lift"),
+        (["-m", "x", "--lift-stature", "1.7"], "--lift-stature needs --lift"),
         (["-m", "x", "--lift-sd", "3"], "--lift-sd needs --lift"),
         (["-m", "x", "--lift-lag", "0"], "--lift-lag needs --lift"),
-        (["-m", "x", "--tracks-sd", "4"], "--tracks-sd needs --tracks-term"),
+        (["-m", "x", "--keypoints-sd", "4"], "--keypoints-sd needs --keypoints-term"),
         (["-m", "x", "--cpu-mask", "8"], "--cpu-mask 8"),
         (["-m", "x", "--url", "u" * 2000], "--url: give a value of 1 to 1023 characters"),
     ],
@@ -246,17 +246,17 @@ def test_help_lists_every_option():
 
 def test_help_says_what_an_option_does_when_it_is_not_given_or_too_small():
     printed = " ".join(rig.run("--help").printed.split())
-    assert "auto, the default: start with whoever walks through" in printed
-    assert "one longer than --max-dt is bridged by predictions of at most --max-dt each" in printed
+    assert "auto, the default: start when a person has walked" in printed
+    assert "a pause longer than --max-dt is bridged by predictions of at most --max-dt each" in printed
     assert "--init FILE waits for a START" in printed
-    assert "more than a second off, or of the future, counts from its arrival" in printed
+    assert "more than a second old, or in the future, counts from its arrival" in printed
 
 
 def test_help_names_the_defaults_of_the_library():
     usual, paper = (TrackerConfig.default(mode) for mode in Mode)
     printed = rig.run("--help").printed
     assert f"default {usual.particles}, paper mode {paper.particles}\n" in printed
-    assert f"up to N; default {usual.acquisition_particles},\n" in printed
+    assert f"up to N; default {usual.acquisition_particles}, " in printed
 
 
 TERMS = [f"{term}-weight" for term in ("texture", "silhouette", "edges", "template", "tracks")]
@@ -301,9 +301,9 @@ def test_configuration_file_and_command_line(tmp_path):
         ("threads = 0\n", "line 1: --threads 0"),
         ("quiet = perhaps\n", "line 1: --quiet perhaps"),
         ("seed = 1\nlag = 3\nseed = 1\n", "line 3: seed is already given in line 1; remove one"),
-        ("config = other.conf\n", "line 1: config is for the command line; a file names no other"),
-        ("\x1b[2J\x07 = 1\n", "trackd.conf: is not text; give lines `name = value`"),
-        ("seed = 1\n\0seed = 2\n", "trackd.conf: is not text"),
+        ("config = other.conf\n", "line 1: config is allowed on the command line only"),
+        ("\x1b[2J\x07 = 1\n", "trackd.conf: not a text file; give lines `name = value`"),
+        ("seed = 1\n\0seed = 2\n", "trackd.conf: not a text file"),
     ],
 )
 def test_a_wrong_configuration_file(tmp_path, text, words):

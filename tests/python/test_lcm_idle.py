@@ -1,4 +1,4 @@
-"""gait-trackd says once why frames come and nobody is tracked, and where it listens."""
+"""gait-trackd says once why frames arrive and no person is tracked, and where it listens."""
 
 import lcm_rig as rig
 
@@ -7,15 +7,15 @@ from gait.lcm.link import gaitmsg, private_url
 from gait.lcm.messages import command_message
 
 CAMERA, SCENE, START = rig.opening()
-NO_CAMERA = "frames come, but no camera"
-NO_START = "frames come, but no START"
-NO_SCENE = "frames come, but --init auto needs the empty scene"
+NO_CAMERA = "frames arrive, but no camera"
+NO_START = "frames arrive, but no START"
+NO_SCENE = "frames arrive, but --init auto needs the background"
 
 
 def said(tmp_path, events, *options):
     """What was said of idle frames, in order."""
     outcome = rig.play(rig.write_log(tmp_path / "a.log", events), *options)
-    return [line.split(": ")[1] for line in outcome.words.splitlines() if "frames come" in line], outcome
+    return [line.split(": ")[1] for line in outcome.words.splitlines() if "frames arrive" in line], outcome
 
 
 def test_no_camera(tmp_path):
@@ -49,7 +49,7 @@ def test_a_track_that_begins_says_nothing(tmp_path):
 def test_who_was_stopped_by_a_pause_is_told_once(tmp_path):
     later = [("GAIT_IMAGE_0", rig.frame_message(i, utime=rig.utime(i + 300))) for i in range(3, 6)]
     words, outcome = said(tmp_path, [*rig.opening(), *rig.frames(0, 3), *later], "--init", "auto")
-    assert words == [] and outcome.words.count("stopped; looking for somebody anew") == 1
+    assert words == [] and outcome.words.count("stopped; looking for a person again") == 1
 
 
 def test_live_it_says_where_it_listens_and_what_it_lacks():

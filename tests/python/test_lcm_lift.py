@@ -157,12 +157,12 @@ def test_tracks_out_of_order_or_of_strangers_are_named(tmp_path: Path) -> None:
     happenings = events()
     happenings[20:20] = happenings[10:14]
     outcome, lifted = lift(tmp_path, happenings)
-    assert outcome.words.count("tracks: capture time did not advance") == 1
+    assert outcome.words.count("keypoints: capture time did not advance") == 1
     assert "lift_rejected 4" in outcome.printed and len(lifted) == FRAMES - LAG
     happenings = events()
     happenings.insert(20, ("GAIT_TRACKS_0", tracks_message(["tail"], [[1.0, 2.0]], rig.utime(3))))
     outcome, _ = lift(tmp_path, happenings)
-    assert "no point that the model knows" in outcome.words
+    assert "the model knows none of these keypoints" in outcome.words
 
 
 def test_one_stamp_far_ahead_does_not_end_the_lift(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_one_stamp_far_ahead_does_not_end_the_lift(tmp_path: Path) -> None:
     happenings[10:11] = [("GAIT_TRACKS_0", ahead)]
     outcome, lifted = lift(tmp_path, happenings)
     assert "lift_rejected 0" in outcome.printed
-    assert outcome.words.count("tracks: capture time went back by") == 1
+    assert outcome.words.count("keypoints: capture time went back by") == 1
     assert [m.frame for m in lifted[-(FRAMES - 10 - LAG) :]] == list(range(110, 100 + FRAMES - LAG))
     assert lifted[-1].status == lifted[-1].TRACKING
 
@@ -200,7 +200,7 @@ def test_what_is_not_finite_is_not_published(tmp_path: Path) -> None:
     far = camera_message(CAMERA, rig.utime(0))
     far.t, far.fx, far.fy = [0, 0, 9e3], 1e30, 1e30
     outcome, lifted = lift(tmp_path, [("GAIT_CAMERA_0", far), *events()[1:]])
-    assert "tracks: joints that are not finite came of them" in outcome.words
+    assert "keypoints gave joints that are not finite" in outcome.words
     assert all(np.isfinite([[*j.position, *j.sd] for j in m.joints]).all() for m in lifted)
     assert f"lift_frames {FRAMES} lifted {len(lifted)} " in outcome.printed
 
@@ -224,8 +224,8 @@ def test_points_of_no_use_are_left_out_counted_and_said_once(tmp_path: Path) -> 
     _, clean = lift(tmp_path, events())
     first, *tracks = events()
     outcome, lifted = lift(tmp_path, [first, *((channel, spoilt(m)) for channel, m in tracks)])
-    assert f" lift_points_left_out {5 * FRAMES} " in outcome.printed
-    assert "lift_rejected 0 lift_points" in outcome.printed
+    assert f" lift_keypoints_left_out {5 * FRAMES} " in outcome.printed
+    assert "lift_rejected 0 lift_keypoints" in outcome.printed
     assert [outcome.words.count(w) for w in ("not know it", "names it twice", "not from 0 to 1")] == [1, 1, 1]
     assert "'nose'" in outcome.words
     for a, b in zip(clean, lifted, strict=True):

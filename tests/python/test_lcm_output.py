@@ -56,7 +56,7 @@ def test_the_log_that_is_played_is_not_opened_for_writing(tmp_path):
     source = log(tmp_path)
     before = source.read_bytes()
     outcome = rig.run(*rig.command("--url", f"file://{source}?mode=w")[1:])
-    assert outcome.code == 2 and "leave ?mode= out" in outcome.words and source.read_bytes() == before
+    assert outcome.code == 2 and "leave out ?mode=" in outcome.words and source.read_bytes() == before
 
 
 @pytest.mark.parametrize("mode", ["", "?mode=r", "?speed=0", "?mode=", "?mode=write"])
@@ -96,11 +96,11 @@ def test_a_log_that_breaks_off_is_told_and_tracked_as_far_as_it_goes(tmp_path):
     whole = source.read_bytes()
     source.write_bytes(whole[:-1000])
     done = run(source, f"file://{tmp_path}/out.log?mode=w")
-    one_line(done, 1, "breaks off at byte", "after 5 messages")
+    one_line(done, 1, "truncated at byte", "after 5 messages")
     assert "frames 2 " in done.stdout
 
 
-@pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"x" * 100, "damaged or breaks off")])
+@pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"x" * 100, "damaged or truncated")])
 def test_a_log_with_nothing_in_it_is_told(tmp_path, content, words):
     source = tmp_path / "in.log"
     source.write_bytes(content)
@@ -114,7 +114,7 @@ def test_a_log_of_which_no_frame_fits_the_camera_is_told(tmp_path):
     source = rig.write_log(tmp_path / "in.log", events)
     done = run(source, f"file://{tmp_path}/out.log?mode=w", "--camera", camera)
     assert done.returncode == 1
-    said = "in.log: none of its 3 frames was tracked: picture of 160x120, the camera has 320x240"
+    said = "in.log: none of its 3 frames was tracked: image of 160x120, but the camera has 320x240"
     assert said in done.stderr.splitlines()[-1]
 
 
@@ -130,10 +130,10 @@ STOP = ("GAIT_COMMAND", command_message(gaitmsg.command_t.STOP, rig.utime(0), St
         ([*rig.opening(), *rig.frames(0, 3)], ["--stream", 1], "no frames on GAIT_IMAGE_1; --stream"),
         ([START, *rig.frames(0, 3)], [], "none of its 3 frames was tracked: no camera: give --camera"),
         ([CAMERA, SCENE, STOP, *rig.frames(0, 3)], [], "was tracked: no START: send it on GAIT_COMMAND"),
-        ([CAMERA, *rig.frames(0, 3)], [], "was tracked: --init auto needs the empty scene"),
-        ([CAMERA, SCENE, *rig.frames(0, 3)], [], "was tracked: nobody walks in full view"),
-        ([*rig.opening(9), *rig.frames(0, 3)], [], "was tracked: the frame of the start did not come"),
-        ([CAMERA], ["--lift"], "no frames on GAIT_IMAGE_0 and no tracks of a known camera"),
+        ([CAMERA, *rig.frames(0, 3)], [], "was tracked: --init auto needs the background"),
+        ([CAMERA, SCENE, *rig.frames(0, 3)], [], "was tracked: no person walks in full view"),
+        ([*rig.opening(9), *rig.frames(0, 3)], [], "was tracked: the frame of the start did not arrive"),
+        ([CAMERA], ["--lift"], "no frames on GAIT_IMAGE_0 and no keypoints of a known camera"),
     ],
 )
 def test_a_log_of_which_nothing_is_tracked_ends_with_1_and_the_reason(tmp_path, events, options, words):

@@ -1,4 +1,4 @@
-"""gait-trackd --tracks-term: joints of a detector go to the frames that they were found in."""
+"""gait-trackd --keypoints-term: joints of a detector go to the frames that they were found in."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gait.track.config import TrackerConfig
 from gait.track.tracker import Tracker
 
 FRAMES, SD = 16, 1.0
-SAID = re.compile(r"tracks (\d+) tracks_used (\d+) tracks_late (\d+)")
+SAID = re.compile(r"keypoint_messages (\d+) keypoints_used (\d+) keypoints_late (\d+)")
 
 
 @cache
@@ -46,7 +46,7 @@ def tracks(frame: int, names: list[str] | None = None) -> rig.Event:
 def play(tmp_path: Path, events: list[rig.Event], *options: object) -> tuple[rig.Outcome, tuple[int, ...]]:
     """Track a log with the term; also how many tracks came, were used and were late."""
     log = rig.write_log(tmp_path / "a.log", [*rig.opening(), *events])
-    outcome = rig.play(log, "--tracks-term", "--tracks-sd", SD, *options)
+    outcome = rig.play(log, "--keypoints-term", "--keypoints-sd", SD, *options)
     said = SAID.search(outcome.printed)
     assert said, outcome.printed
     return outcome, tuple(int(n) for n in said.groups())
@@ -126,8 +126,8 @@ def test_points_of_no_use_are_left_out_and_counted(tmp_path: Path) -> None:
         message.ntracks = len(message.tracks)
     outcome, said = play(tmp_path, events)
     assert outcome.digest == clean.digest and said == (FRAMES, FRAMES, 0)
-    assert f" points_left_out {2 * FRAMES} " in outcome.printed
-    assert outcome.words.count("'nose' is left out, the model does not know it") == 1
+    assert f" keypoints_left_out {2 * FRAMES} " in outcome.printed
+    assert outcome.words.count("'nose' is left out: the model does not know it") == 1
     assert outcome.words.count("names it twice") == 1
 
 
@@ -138,7 +138,7 @@ def test_frames_do_not_wait_longer_than_for_the_next_one(tmp_path: Path) -> None
     late = [event for i in range(FRAMES) for event in ([image(i), tracks(i - 1)] if i else [image(0)])]
     outcome, said = play(tmp_path, late)
     assert said == (FRAMES - 1, 0, FRAMES - 1) and outcome.digest == without.digest
-    assert outcome.words.count("tracks came after their frame was tracked") == 1
+    assert outcome.words.count("keypoints arrived after their frame had been tracked") == 1
 
 
 def test_a_clock_set_back_makes_no_later_tracks_late(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_memory_holds_the_largest_frame_and_does_not_grow(tmp_path: Path) -> Non
     [
         (("GAIT_TRACKS_0", tracks(5)[1].encode()[:-3]), "GAIT_TRACKS_0: damaged message"),
         (("GAIT_TRACKS_0", b"x"), "GAIT_TRACKS_0: not a gaitmsg.tracks_t"),
-        (tracks(5, [f"p{i}" for i in range(19)]), "no point that the model knows"),
+        (tracks(5, [f"p{i}" for i in range(19)]), "the model knows none of these keypoints"),
     ],
     ids=["cut", "other", "strangers"],
 )

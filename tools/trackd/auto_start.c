@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- blob_finder ---- */
+/* ---- blobs ---- */
 enum {
-    LEAST_STEP = 14, /* grey levels of change that count, at least, */
-    NOISE_STEPS = 5, /* and in robust deviations of the picture's noise */
-    ANOTHER = 18,    /* by which half of a picture differs from another scene, at least */
-    GAP = 3,         /* cells of low contrast that a body may be torn by */
+    LEAST_STEP = 14, /* smallest change that counts, grey levels */
+    NOISE_STEPS = 5, /* the same in robust standard deviations of the image noise */
+    ANOTHER = 18,    /* change of half of an image that means another scene, grey levels */
+    GAP = 3,         /* cells of low contrast that may interrupt a body */
     LEAST_HEIGHT = 15
 };
 
@@ -25,7 +25,7 @@ static int32_t middle_of(const int32_t *count, int32_t bins)
     return i;
 }
 
-/* Grey level of a pixel: of one channel, or of all if the pictures are of different kinds (channel -1). */
+/* Grey level of a pixel: of one channel, or of all if the formats differ (channel -1). */
 static int32_t level(const gait_image *image, int32_t x, int32_t y, int32_t channel)
 {
     const uint8_t *const row = image->data + (ptrdiff_t)y * image->stride;
@@ -41,7 +41,7 @@ static int32_t difference(const blob_finder *f, const gait_image *a, const gait_
     return level(a, x, y, channel) - level(b, x, y, channel);
 }
 
-/* Change of each cell against the plate, without that of the exposure: most of the picture is background. */
+/* Change of each cell against the background, less that of the exposure: most of the image is background. */
 static void compare(blob_finder *f, const gait_image *image, const gait_image *plate)
 {
     bool const alike = image->format == plate->format && image->format != GAIT_GREY8;
@@ -79,7 +79,7 @@ typedef struct patch {
     int32_t x0, x1, y0, y1, area; /* the last ones belong to it */
 } patch;
 
-/* All cells that hang together with `from`, over gaps of up to GAP cells up and down, into f->queue. */
+/* All cells connected to `from`, over vertical gaps of up to GAP cells, into f->queue. */
 static patch flood(blob_finder *f, int32_t from)
 {
     patch p = {f->width, 0, f->height, 0, 0};
@@ -101,7 +101,7 @@ static patch flood(blob_finder *f, int32_t from)
     return p;
 }
 
-/* In full view, upright and filled as a standing person is? */
+/* Whether it is in full view and upright, and fills its box as a standing person does. */
 static bool person_like(const blob_finder *f, const patch *p)
 {
     int32_t const wide = p->x1 - p->x0 + 1, tall = p->y1 - p->y0 + 1;
@@ -109,7 +109,7 @@ static bool person_like(const blob_finder *f, const patch *p)
            tall > wide && 20 * p->area > 3 * wide * tall;
 }
 
-/* Median column of the patch in f->queue between two rows, cells. */
+/* Median column of the region in f->queue between two rows, cells. */
 static double column_of(const blob_finder *f, const patch *p, int32_t last_row)
 {
     int32_t count[BLOB_CELLS / 320] = {0};
@@ -162,17 +162,17 @@ bool blob_find(blob_finder *f, const gait_image *image, const gait_image *plate,
     return out->area > 0;
 }
 
-/* ---- auto_start ---- */
-/* As in gait/track/autostart.py and gait/image/detection.py. */
+/* ---- first state ---- */
+/* As in python/gait/track/auto_start.py and person_detection.py. */
 static const double WINDOW = 1.0, KEEP = 1.5; /* seconds */
-static const double LEAD = 0.1;               /* statures the lowest foot is nearer than the pelvis */
+static const double LEAD = 0.1; /* statures by which the lowest foot is nearer than the pelvis */
 static const double DEPTH_SD = 0.10,
-                    DEPTH_SHARE = 0.02;             /* along the ray: metres, and share of the distance */
+                    DEPTH_SHARE = 0.02;             /* along the ray: metres, and fraction of the distance */
 static const double HEAD_SD = 0.03, SIDE_SD = 0.06; /* metres */
-static const double SLOW = 0.4;                     /* metres per second: stands */
+static const double SLOW = 0.4;                     /* metres per second below which a person stands */
 static const double HEADING_SD = 0.2;               /* radians, at least */
 static const double SHORTEST = 1.2, TALLEST = 2.4;  /* metres by foot and head ray */
-static const float BUILD_SHARE = 0.25f;             /* of the deviations of scores and posture */
+static const float BUILD_SHARE = 0.25f;             /* of the standard deviations of scores and posture */
 enum { ENOUGH = 8 };
 
 void auto_start_reset(auto_start *s)
@@ -202,7 +202,7 @@ static void ray_of(const gait_camera *c, const double pixel[2], double lens[3], 
     }
 }
 
-/* Where the blob stands, if it stands on the ground and is as tall as people are. */
+/* Position of a blob that stands on the ground and is as tall as a person. */
 static bool place_blob(const gait_camera *c, const blob *b, detection *out)
 {
     double lens[3], foot[3], head[3];
@@ -265,9 +265,9 @@ static double scale_of(const auto_start *s, double lens_height, const gait_model
     double at[AUTO_START_DETECTIONS], further[AUTO_START_DETECTIONS], distance[AUTO_START_DETECTIONS];
     double const share = crown_share(m, (double)mean->stature), known = (double)mean->stature;
     for (int32_t i = 0; i < s->count; i++) {
-        distance[i] = s->seen[i].distance + LEAD * known;
-        at[i] = lens_height + distance[i] * s->seen[i].head_slope;
-        further[i] = lens_height + 1.1 * distance[i] * s->seen[i].head_slope;
+        distance[i] = s->past[i].distance + LEAD * known;
+        at[i] = lens_height + distance[i] * s->past[i].head_slope;
+        further[i] = lens_height + 1.1 * distance[i] * s->past[i].head_slope;
     }
     double const stature = median(at, s->count) / share,
                  slope = (median(further, s->count) / share - stature) / 0.1;
@@ -308,10 +308,10 @@ static path path_of(const auto_start *s, const double lens[3], double lead, doub
     int32_t const n = s->count;
     path p;
     for (int32_t i = 0; i < n; i++) {
-        double const d = (s->seen[i].distance + lead) * factor;
-        time[i] = 1e-6 * (double)(s->seen[i].utime - s->seen[0].utime);
+        double const d = (s->past[i].distance + lead) * factor;
+        time[i] = 1e-6 * (double)(s->past[i].utime - s->past[0].utime);
         for (int a = 0; a < 2; a++)
-            place[a][i] = lens[a] + d * s->seen[i].away[a];
+            place[a][i] = lens[a] + d * s->past[i].away[a];
         mean += time[i] / n;
     }
     for (int a = 0; a < 2; a++)
@@ -323,26 +323,27 @@ static path path_of(const auto_start *s, const double lens[3], double lead, doub
         square += (time[i] - mean) * (time[i] - mean);
     }
     p.velocity_sd =
-        3 * 1.4826 * median(off, n) / sqrt(square); /* 3: errors of neighbouring frames go together */
+        3 * 1.4826 * median(off, n) / sqrt(square); /* 3: errors of neighbouring frames are correlated */
     return p;
 }
 
-/* Heading and cadence from the motion; false if it is too slow to tell. */
+/* Heading and cadence from the motion; false if it is too slow. */
 static bool set_motion(const path *p, const gait_model *m, gait_state *mean, gait_state *sd)
 {
     gait_model_info info;
     double const speed = hypot(p->velocity[0], p->velocity[1]),
-                 doubt = p->velocity_sd / (speed > 1e-6 ? speed : 1e-6);
-    if (speed < SLOW || doubt > 0.5)
+                 speed_rel_sd = p->velocity_sd / (speed > 1e-6 ? speed : 1e-6);
+    if (speed < SLOW || speed_rel_sd > 0.5)
         return false;
     gait_model_get_info(m, &info, NULL);
     mean->heading = (float)atan2(p->velocity[1], p->velocity[0]);
-    sd->heading = (float)hypot(HEADING_SD, doubt);
+    sd->heading = (float)hypot(HEADING_SD, speed_rel_sd);
     double const rate = speed / (double)(info.stride_length * mean->stature);
-    double const rate_sd = rate * hypot(doubt, (double)(info.stride_length_sd / info.stride_length));
-    double const known = 1 / ((double)sd->stride_hz * (double)sd->stride_hz), seen = 1 / (rate_sd * rate_sd);
-    mean->stride_hz = (float)(((double)mean->stride_hz * known + rate * seen) / (known + seen));
-    sd->stride_hz = (float)(1 / sqrt(known + seen));
+    double const rate_sd = rate * hypot(speed_rel_sd, (double)(info.stride_length_sd / info.stride_length));
+    double const known = 1 / ((double)sd->stride_hz * (double)sd->stride_hz),
+                 measured = 1 / (rate_sd * rate_sd);
+    mean->stride_hz = (float)(((double)mean->stride_hz * known + rate * measured) / (known + measured));
+    sd->stride_hz = (float)(1 / sqrt(known + measured));
     return true;
 }
 
@@ -372,7 +373,7 @@ static bool first_state(const auto_start *s, const gait_camera *camera, const ga
 
 static double age(const auto_start *s, int64_t utime)
 {
-    return 1e-6 * (double)(utime - s->seen[0].utime);
+    return 1e-6 * (double)(utime - s->past[0].utime);
 }
 
 bool auto_start_add(auto_start *s, const gait_image *frame, const gait_image *plate,
@@ -382,10 +383,10 @@ bool auto_start_add(auto_start *s, const gait_image *frame, const gait_image *pl
     blob b;
     detection one = {.utime = utime};
     while (s->count > 0 && (age(s, utime) >= KEEP || age(s, utime) < 0 || s->count == AUTO_START_DETECTIONS))
-        memmove(s->seen, s->seen + 1, (size_t)--s->count * sizeof *s->seen);
+        memmove(s->past, s->past + 1, (size_t)--s->count * sizeof *s->past);
     if (!blob_find(&s->finder, frame, plate, &b) || !place_blob(camera, &b, &one))
         return false;
-    if (s->count == 0 || utime > s->seen[s->count - 1].utime)
-        s->seen[s->count++] = one;
+    if (s->count == 0 || utime > s->past[s->count - 1].utime)
+        s->past[s->count++] = one;
     return s->count >= ENOUGH && age(s, utime) >= WINDOW && first_state(s, camera, model, mean, sd);
 }

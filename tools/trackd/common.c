@@ -7,8 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
-/* ---- message ---- */
+/* ---- messages and clocks ---- */
 bool message_set(message *m, const char *format, ...)
 {
     va_list args;
@@ -18,8 +19,35 @@ bool message_set(message *m, const char *format, ...)
     return false;
 }
 
-/* ---- file ---- */
-/* Far above any model, camera or picture; stops a device or a wrong file from filling the memory. */
+void log_line(const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fputs("gait-trackd: ", stderr);
+    vfprintf(stderr, format, args);
+    fputc('\n', stderr);
+    va_end(args);
+}
+
+static int64_t clock_us(clockid_t clock)
+{
+    struct timespec t;
+    clock_gettime(clock, &t);
+    return (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000;
+}
+
+int64_t clock_wall(void)
+{
+    return clock_us(CLOCK_REALTIME);
+}
+
+int64_t clock_monotonic(void)
+{
+    return clock_us(CLOCK_MONOTONIC);
+}
+
+/* ---- files ---- */
+/* Far more than any model, camera or image has: a device or a wrong file must not fill the memory. */
 enum { MAX_FILE = 1 << 28 };
 
 static bool read_stream(FILE *f, const char *path, const char *what, file_bytes *out, message *why)
@@ -28,20 +56,19 @@ static bool read_stream(FILE *f, const char *path, const char *what, file_bytes 
     if (fseek(f, 0, SEEK_END) == 0)
         size = ftell(f);
     if (size < 0 || size > MAX_FILE || fseek(f, 0, SEEK_SET) != 0)
-        return message_set(
-            why, "%s: no %s file, as it is no regular file of reasonable size; give the name of one", path,
-            what);
-    size_t const room = ((size_t)size + 1 + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
-    out->data = aligned_alloc(GAIT_ALIGN, room);
+        return message_set(why, "%s: not a regular file of reasonable size; give the name of a %s file", path,
+                           what);
+    size_t const capacity = ((size_t)size + 1 + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
+    out->data = aligned_alloc(GAIT_ALIGN, capacity);
     if (!out->data)
         return message_set(why, "%s: not enough memory for %ld bytes", path, size);
     out->size = fread(out->data, 1, (size_t)size, f);
-    memset(out->data + out->size, 0, room - out->size);
+    memset(out->data + out->size, 0, capacity - out->size);
     if (out->size == (size_t)size)
         return true;
     free(out->data);
     *out = (file_bytes){0};
-    return message_set(why, "%s: cannot be read to its end", path);
+    return message_set(why, "%s: cannot be read completely", path);
 }
 
 bool file_read(const char *path, const char *what, file_bytes *out, message *why)
@@ -55,7 +82,7 @@ bool file_read(const char *path, const char *what, file_bytes *out, message *why
     return ok;
 }
 
-/* ---- model_file ---- */
+/* ---- models ---- */
 bool model_file_open(model_file *m, const char *path, message *why)
 {
     gait_error err = {.text = ""};
@@ -72,7 +99,7 @@ bool model_file_open(model_file *m, const char *path, message *why)
     }
     m->bytes = m->blob.size + bytes;
     return status == GAIT_OK ||
-           message_set(why, "%.100s: not a usable model: %s (%s); learn it anew or give another", path,
+           message_set(why, "%.100s: not a usable model: %s (%s); learn it again or give another", path,
                        err.text, gait_result_name(status));
 }
 
@@ -83,7 +110,7 @@ void model_file_close(model_file *m)
     *m = (model_file){0};
 }
 
-/* ---- workers ---- */
+/* ---- threads ---- */
 bool workers_start(workers *w, int32_t threads, message *why)
 {
     gait_error err = {.text = ""};

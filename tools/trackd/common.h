@@ -7,13 +7,19 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* ---- one line saying what went wrong, filled by whoever notices first. */
+/* ---- one line that reports what went wrong, set where the fault is found. */
 typedef struct message {
     char text[256];
 } message;
 
 /* Write the line; always returns false, so that a caller can end with `return message_set(...)`. */
 bool message_set(message *m, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Print a line to stderr. */
+void log_line(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* ---- clocks, microseconds. */
+int64_t clock_wall(void);      /* since the Unix epoch */
+int64_t clock_monotonic(void); /* from an arbitrary origin, unaffected by setting the date */
 
 /* ---- a whole file in memory. */
 typedef struct file_bytes {

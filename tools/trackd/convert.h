@@ -19,7 +19,9 @@ void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_st
 bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown, gait_state *out,
                            message *why);
 bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why);
-/* Numbers differ by no more than rounding: files and messages have their own, and readers may straighten R. */
+#define CAMERA_CHANGED                                                                                       \
+    "a different camera from the one in use was announced and is ignored; restart to use it"
+/* Equal up to rounding, which differs between files and messages, and readers may orthogonalise R. */
 bool convert_same_camera(const gait_camera *a, const gait_camera *b);
 /* All but frame, step, dropped, receive_utime, step_us and tracker_digest, which are the caller's. */
 void convert_estimate(const gait_model *model, const gait_model_info *info, const gait_estimate *in,

@@ -1,4 +1,4 @@
-/* gait-trackd - frames in, estimates out, over LCM.  `gait-trackd --help` is the manual. */
+/* gait-trackd - track a person in frames that arrive over LCM.  `gait-trackd --help` is the manual. */
 #include "trackd/input_files.h"
 #include "trackd/image_view.h"
 #include "trackd/lcm_link.h"
@@ -20,7 +20,7 @@ static void on_signal(int number)
     quit = 1;
 }
 
-/* Block the signals that end us, in every thread LCM will start; `unblocked` is the mask to wait with. */
+/* Block the signals that end the program, also in threads that LCM starts; `unblocked` is the mask to wait with. */
 static void set_signals(sigset_t *unblocked)
 {
     struct sigaction const action = {.sa_handler = on_signal};
@@ -32,7 +32,7 @@ static void set_signals(sigset_t *unblocked)
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
-    signal(SIGXFSZ, SIG_IGN); /* a log that grows too large is an error of writing */
+    signal(SIGXFSZ, SIG_IGN); /* too large a log is a write error */
 }
 
 static bool read_background(service *s, const char *path, message *why)
@@ -50,12 +50,12 @@ static bool read_background(service *s, const char *path, message *why)
     return ok;
 }
 
-typedef struct parts { /* those that a service may lack */
+typedef struct parts { /* optional ones */
     lift_service lift;
     keypoint_cue cue;
 } parts;
 
-/* The second service, if it is asked for. */
+/* The second service, if requested. */
 static bool load_lift(service *s, const settings *want, lift_service *lift, sink *out, message *why)
 {
     lift_settings const set = {.stature = want->lift_stature,
@@ -72,7 +72,7 @@ static bool load_lift(service *s, const settings *want, lift_service *lift, sink
     return true;
 }
 
-/* Model, start, camera and empty scene, as far as the command line gives them. */
+/* Model, start, camera and background, as far as the command line gives them. */
 static bool load(service *s, const settings *want, parts *p, workers *threads, sink *out, message *why)
 {
     gait_tracker_config config;
@@ -85,9 +85,9 @@ static bool load(service *s, const settings *want, parts *p, workers *threads, s
     if ((has_init && !init_file_read(want->init, s->track.model, &init, why)) ||
         !load_lift(s, want, &p->lift, out, why))
         return false;
-    if (want->tracks_term) {
+    if (want->keypoints_term) {
         keypoint_cue_open(&p->cue, s->track.model, s->track.info.joints,
-                          want->tracks_sd > 0 ? want->tracks_sd : 4);
+                          want->keypoints_sd > 0 ? want->keypoints_sd : 4);
         s->cue = &p->cue;
     }
     s->max_gap = (double)want->max_gap;
@@ -120,41 +120,42 @@ static void print_summary(const service *s, bool live)
                s->budget.over, (int)(s->wanted ? s->wanted : s->track.config.particles),
                s->budget.slow_steps);
     if (s->cue)
-        printf(" tracks %" PRId64 " tracks_used %" PRId64 " tracks_late %" PRId64 " points_left_out %" PRId64,
-               s->cue->messages, s->cue->used, s->cue->late, s->cue->sieve.left_out);
+        printf(" keypoint_messages %" PRId64 " keypoints_used %" PRId64 " keypoints_late %" PRId64
+               " keypoints_left_out %" PRId64,
+               s->cue->messages, s->cue->used, s->cue->late, s->cue->filter.left_out);
     if (s->lift)
         printf(" lift_frames %" PRId64 " lifted %" PRId64 " lift_rejected %" PRId64
-               " lift_points_left_out %" PRId64 " lift_ms median %.3f p99 %.3f",
-               s->lift->frames, s->lift->lifted, s->lift->rejected, s->lift->sieve.left_out,
+               " lift_keypoints_left_out %" PRId64 " lift_ms median %.3f p99 %.3f",
+               s->lift->frames, s->lift->lifted, s->lift->rejected, s->lift->filter.left_out,
                histogram_quantile(&s->lift->step, 0.5) / 1e3, histogram_quantile(&s->lift->step, 0.99) / 1e3);
     printf(" memory_bytes %zu digest %016" PRIx64 "\n", s->track.memory_bytes, service_digest(s));
 }
 
-/* Did anything come of a log?  If not, what is lacking? */
-static bool check_yield(const char *path, const service *s, message *why)
+/* Whether anything in a log was tracked or lifted; if not, report what is missing. */
+static bool check_result(const char *path, const service *s, message *why)
 {
-    int64_t const tracks = s->lift ? s->lift->frames : 0;
+    int64_t const keypoints = s->lift ? s->lift->frames : 0;
     message lack = s->complaint;
     if (s->tracked > 0 || (s->lift && s->lift->lifted > 0))
         return true;
-    if (s->came == 0 && tracks == 0)
+    if (s->arrived == 0 && keypoints == 0)
         return message_set(why, "%.120s: no frames on GAIT_IMAGE_%d%s; --stream chooses another camera", path,
-                           s->stream, s->lift ? " and no tracks of a known camera" : "");
-    if (s->came == 0)
-        return message_set(why, "%.80s: none of its %" PRId64 " messages of tracks was lifted: %.110s", path,
-                           tracks, lack.text[0] ? lack.text : "too few");
+                           s->stream, s->lift ? " and no keypoints of a known camera" : "");
+    if (s->arrived == 0)
+        return message_set(why, "%.80s: none of its %" PRId64 " messages of keypoints was lifted: %.110s",
+                           path, keypoints, lack.text[0] ? lack.text : "too few");
     service_lack(s, &lack);
-    return message_set(why, "%.80s: none of its %" PRId64 " frames was tracked: %.130s", path, s->came,
+    return message_set(why, "%.80s: none of its %" PRId64 " frames was tracked: %.130s", path, s->arrived,
                        lack.text);
 }
 
-/* Was a log that was played whole, and of use? */
+/* Whether the log that was played is complete and gave a result. */
 static bool check_log(const char *url, const service *s, message *why)
 {
     char path[LINK_PATH];
     link_log(url, path);
     log_scan(path, why);
-    return !why->text[0] && check_yield(path, s, why);
+    return !why->text[0] && check_result(path, s, why);
 }
 
 /* Everything between the settings and the exit code. */
@@ -170,7 +171,7 @@ static bool serve(service *s, const settings *want, parts *p, workers *threads, 
     bool const ready = (!to || sink_open(&out, to, why)) && load(s, want, p, threads, &out, why) &&
                        receiver_open(&r, s, url, why);
     if (ready && !log && !want->quiet)
-        fprintf(stderr, "gait-trackd: listening on %s\n", url);
+        log_line("listening on %s", url);
     bool ok = ready && receiver_run(&r, &quit, unblocked, why);
     if (ok) {
         service_send_status(s);
@@ -197,7 +198,7 @@ int main(int argc, char **argv)
     if (result == OPTION_HELP)
         settings_help();
     if (result == OPTION_BAD)
-        fprintf(stderr, "gait-trackd: %s\n", why.text);
+        log_line("%s", why.text);
     if (result != OPTION_OK)
         return result == OPTION_HELP ? 0 : 2;
     if (want.version) {
@@ -216,6 +217,6 @@ int main(int argc, char **argv)
         keypoint_cue_close(&extra.cue);
     }
     if (!ok)
-        fprintf(stderr, "gait-trackd: %s\n", why.text);
+        log_line("%s", why.text);
     return ok ? 0 : 1;
 }

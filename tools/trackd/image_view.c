@@ -5,9 +5,9 @@
 
 #include <string.h>
 
-/* ---- jpeg ---- */
+/* ---- JPEG ---- */
 #ifdef HAVE_LIBJPEG
-/* clang-format off: jpeglib.h needs the others before it */
+/* clang-format off: jpeglib.h needs stdio.h before it */
 #include <setjmp.h>
 #include <stdio.h>
 #include <jpeglib.h>
@@ -19,7 +19,7 @@ bool jpeg_supported(void)
 }
 
 typedef struct failure {
-    struct jpeg_error_mgr base; /* first: libjpeg knows only this */
+    struct jpeg_error_mgr base; /* first member: libjpeg gets a pointer to it */
     jmp_buf back;
     message *why;
 } failure;
@@ -33,7 +33,7 @@ static void on_error(j_common_ptr info)
     longjmp(f->back, 1);
 }
 
-/* A damaged picture is an error, not a warning and grey pixels. */
+/* A damaged image is an error, not a warning and grey pixels. */
 static void on_message(j_common_ptr info, int level)
 {
     if (level < 0)
@@ -45,7 +45,7 @@ static bool decode(struct jpeg_decompress_struct *info, int32_t width, int32_t h
 {
     jpeg_read_header(info, TRUE);
     if ((int32_t)info->image_width != width || (int32_t)info->image_height != height)
-        return message_set(why, "JPEG frame of %ux%u, the camera has %dx%d; send both alike",
+        return message_set(why, "JPEG frame of %ux%u, but the camera has %dx%d; send equal sizes",
                            info->image_width, info->image_height, width, height);
     bool const grey = info->num_components == 1;
     info->out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
@@ -94,8 +94,8 @@ bool jpeg_decode(const uint8_t *data, size_t size, int32_t width, int32_t height
 }
 #endif
 
-/* ---- image_view ---- */
-/* One key and value; the frame's number is kept. */
+/* ---- messages ---- */
+/* Read one key and value; keep the frame number. */
 static void take_metadata(byte_reader *r, image_view *v)
 {
     static const char name[] = "frame";
@@ -123,7 +123,7 @@ bool image_view_open(image_view *v, const void *message_bytes, size_t size, mess
     v->frame = -1;
     for (int32_t left = bytes_int32(&r); r.ok && left > 0; left--)
         take_metadata(&r, v);
-    return r.ok || message_set(why, "damaged message: shorter than its lengths say");
+    return r.ok || message_set(why, "damaged message: shorter than its lengths state");
 }
 
 bool image_view_pixels(const image_view *v, int32_t width, int32_t height, gait_image *out, message *why)
@@ -137,7 +137,7 @@ bool image_view_pixels(const image_view *v, int32_t width, int32_t height, gait_
         {GAITMSG_IMAGE_T_PIXEL_FORMAT_BGR, GAIT_BGR8, 3, "BGR"},
     };
     if (v->width != width || v->height != height)
-        return message_set(why, "picture of %dx%d, the camera has %dx%d; send both alike", v->width,
+        return message_set(why, "image of %dx%d, but the camera has %dx%d; send equal sizes", v->width,
                            v->height, width, height);
     for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
         if (v->pixelformat != formats[i].pixelformat)
@@ -147,7 +147,7 @@ bool image_view_pixels(const image_view *v, int32_t width, int32_t height, gait_
             return message_set(why, "row_stride %d for %d pixels of %s; send at least %d", v->stride, width,
                                formats[i].name, least);
         if ((int64_t)v->stride * height > v->size)
-            return message_set(why, "size %d of a picture of %d rows of %d bytes; send all of them", v->size,
+            return message_set(why, "size %d for an image of %d rows of %d bytes; send all of them", v->size,
                                height, v->stride);
         *out = (gait_image){v->data, width, height, v->stride, formats[i].format};
         return true;

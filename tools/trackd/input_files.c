@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- pnm ---- */
+/* ---- images ---- */
 enum { MAX_PIXELS = 1 << 14 };
 
 /* Next number of the header; space and comments before it are skipped.  -1: none. */
@@ -40,12 +40,12 @@ static bool parse_pnm(const char *path, const file_bytes *bytes, gait_image *out
     out->height = header_number(&at);
     if (header_number(&at) != 255 || out->width < 1 || out->height < 1 || out->width > MAX_PIXELS ||
         out->height > MAX_PIXELS)
-        return message_set(why, "%s: damaged header or not 8 bits a sample; write it anew", path);
+        return message_set(why, "%s: damaged header, or not 8 bits per sample; write it again", path);
     out->data = at + 1;
     out->stride = out->width * (out->format == GAIT_GREY8 ? 1 : 3);
     size_t const wanted = (size_t)out->stride * (size_t)out->height;
     return bytes->size >= wanted + (size_t)(out->data - bytes->data) ||
-           message_set(why, "%s: shorter than its header says; write it anew", path);
+           message_set(why, "%s: shorter than its header states; write it again", path);
 }
 
 bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why)
@@ -61,7 +61,7 @@ bool pnm_read(const char *path, file_bytes *bytes, gait_image *out, message *why
     return false;
 }
 
-/* ---- camera_file ---- */
+/* ---- cameras ---- */
 static double dot(const float *a, const float *b)
 {
     return (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
@@ -81,8 +81,8 @@ bool camera_rotation_ok(const gait_camera *camera)
 static bool read_pixels(const fields *f, const char *key, int32_t *out, message *why)
 {
     int64_t value = 0;
-    bool const ok = fields_whole(f, key, &value, 1, CAMERA_PIXELS,
-                                 "give the size of the video in read_pixels pixels", why);
+    bool const ok =
+        fields_whole(f, key, &value, 1, CAMERA_PIXELS, "give the size of the video in whole pixels", why);
     *out = (int32_t)value;
     return ok;
 }
@@ -98,7 +98,7 @@ static bool read_numbers(const fields *f, const char *key, float *out, int count
     return true;
 }
 
-/* 0, 4 or 5 numbers; an absent key is an ideal read_distortion. */
+/* 0, 4 or 5 numbers; an absent key is an ideal lens. */
 static bool read_distortion(const fields *f, float out[5], message *why)
 {
     const char *const remedy = "give k1 k2 p1 p2 [k3] (0, 4 or 5 numbers)";
@@ -133,8 +133,8 @@ static bool parse_camera(const fields *f, gait_camera *c, message *why)
                        f->path);
 }
 
-/* The kinds of file that `gait capture` reads and this program does not. */
-static bool others_kind(const char *path)
+/* Kinds of file that `gait capture` reads and this program does not. */
+static bool is_foreign(const char *path)
 {
     static const char *const endings[] = {".toml", ".yaml", ".yml", ".xml"};
     const char *const folder = strrchr(path, '/'), *const name = folder ? folder + 1 : path;
@@ -151,7 +151,7 @@ bool camera_file_read(const char *path, gait_camera *out, message *why)
 {
     fields f;
     gait_camera camera = {0};
-    if (others_kind(path))
+    if (is_foreign(path))
         return message_set(why,
                            "%.100s: gait-trackd reads JSON only; give this file to `gait capture --camera`, "
                            "which sends it over LCM, and no --camera here",
@@ -163,7 +163,7 @@ bool camera_file_read(const char *path, gait_camera *out, message *why)
     return ok;
 }
 
-/* ---- init_file ---- */
+/* ---- starts ---- */
 /* Numbers of the file beside the pelvis; sd is taken where it gives a value but no standard deviation. */
 static const struct {
     const char *key, *remedy;
@@ -191,8 +191,8 @@ static void put(gait_state *s, size_t offset, double value)
     memcpy((char *)s + offset, &narrow, sizeof narrow);
 }
 
-/* `spread`: the object of standard deviations, or -1. */
-static bool read_scalar(const fields *f, int spread, int k, init_state *io, message *why)
+/* `sds`: the object of standard deviations, or -1. */
+static bool read_scalar(const fields *f, int sds, int k, init_state *io, message *why)
 {
     const char *const key = scalars[k].key;
     double value;
@@ -202,8 +202,8 @@ static bool read_scalar(const fields *f, int spread, int k, init_state *io, mess
         put(&io->mean, scalars[k].offset, value);
         put(&io->sd, scalars[k].offset, scalars[k].sd);
     }
-    if (spread >= 0 && fields_find(f, spread, key) >= 0) {
-        if (!fields_numbers(f, spread, key, &value, 1, 0, MAX_SD, "give a standard deviation, not negative",
+    if (sds >= 0 && fields_find(f, sds, key) >= 0) {
+        if (!fields_numbers(f, sds, key, &value, 1, 0, MAX_SD, "give a standard deviation, not negative",
                             why))
             return false;
         put(&io->sd, scalars[k].offset, value);
@@ -211,18 +211,18 @@ static bool read_scalar(const fields *f, int spread, int k, init_state *io, mess
     return true;
 }
 
-/* How many numbers a key holds; 0 if it is absent. */
+/* Number of values of a key; 0 if it is absent. */
 static int count_of(const fields *f, int object, const char *key)
 {
     int const value = object < 0 ? -1 : fields_find(f, object, key);
     return value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
 }
 
-/* Two numbers get the model's height over ground, which depends on the rest of the state. */
-static bool read_pelvis(const fields *f, int spread, const gait_model *model, init_state *io, message *why)
+/* Two coordinates are completed with the model's height of the pelvis, which depends on the rest of the state. */
+static bool read_pelvis(const fields *f, int sds, const gait_model *model, init_state *io, message *why)
 {
-    const char *const place = "give x and y (and z if known_keys) of the pelvis in metres";
-    int const known_axes = count_of(f, 0, "pelvis") == 3 ? 3 : 2, sds = count_of(f, spread, "pelvis");
+    const char *const place = "give x and y (and z if known) of the pelvis in metres";
+    int const known_axes = count_of(f, 0, "pelvis") == 3 ? 3 : 2, sd_count = count_of(f, sds, "pelvis");
     double value[3];
     if (fields_find(f, 0, "pelvis") >= 0) {
         if (!fields_numbers(f, 0, "pelvis", value, known_axes, -FAR, FAR, place, why))
@@ -233,34 +233,34 @@ static bool read_pelvis(const fields *f, int spread, const gait_model *model, in
         }
     }
     if (known_axes == 2 && gait_model_pelvis_height(model, &io->mean, &io->mean.pelvis[2], NULL) != GAIT_OK)
-        return message_set(why, "%s: the model gives no height for the pelvis; give z too", f->path);
-    if (sds != 0) {
-        if (!fields_numbers(f, spread, "pelvis", value, sds == 3 ? 3 : 1, 0, MAX_SD,
+        return message_set(why, "%s: the model has no height for the pelvis; give z too", f->path);
+    if (sd_count != 0) {
+        if (!fields_numbers(f, sds, "pelvis", value, sd_count == 3 ? 3 : 1, 0, MAX_SD,
                             "give one number or three, metres", why))
             return false;
         for (int i = 0; i < 3; i++)
-            io->sd.pelvis[i] = (float)value[sds == 3 ? i : 0];
+            io->sd.pelvis[i] = (float)value[sd_count == 3 ? i : 0];
     }
     return true;
 }
 
 static bool parse_init(const fields *f, const gait_model *model, init_state *io, message *why)
 {
-    int const spread = fields_find(f, 0, "sd");
+    int const sds = fields_find(f, 0, "sd");
     if (!fields_only(f, 0, known_keys, KNOWN_KEYS, why))
         return false;
-    if (spread >= 0 && f->node[spread].type != JSON_OBJECT)
+    if (sds >= 0 && f->node[sds].type != JSON_OBJECT)
         return message_set(why, "%s: sd is not an object; give standard deviations by key", f->path);
-    if (spread >= 0 && !fields_only(f, spread, known_keys, SCALARS + 1, why))
+    if (sds >= 0 && !fields_only(f, sds, known_keys, SCALARS + 1, why))
         return false;
     if (fields_find(f, 0, "frame") >= 0 &&
         !fields_whole(f, "frame", &io->frame, 0, 1u << 31, "give the frame number, from 0", why))
         return false;
     for (int k = 0; k < SCALARS; k++)
-        if (!read_scalar(f, spread, k, io, why))
+        if (!read_scalar(f, sds, k, io, why))
             return false;
     io->mean.phase -= floorf(io->mean.phase);
-    return read_pelvis(f, spread, model, io, why);
+    return read_pelvis(f, sds, model, io, why);
 }
 
 bool init_file_read(const char *path, const gait_model *model, init_state *out, message *why)

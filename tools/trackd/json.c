@@ -28,7 +28,7 @@ static void skip_space(parser *p)
         p->line += *p->at == '\n';
 }
 
-/* Take one expected character, with the space before it. */
+/* Skip space and one expected character. */
 static bool take(parser *p, char c)
 {
     skip_space(p);
@@ -38,7 +38,7 @@ static bool take(parser *p, char c)
     return true;
 }
 
-/* Append a node; its index, or -1 when the text holds more than the caller has room for. */
+/* Append a node; returns its index, or -1 if there are more than the caller has space for. */
 static int add(parser *p, json_type type)
 {
     if (p->doc->used == p->doc->cap) {
@@ -88,7 +88,7 @@ static const char *skip_digits(const char *s)
     return s;
 }
 
-/* End of a number by JSON's own grammar (no leading zeros, no hex, no "nan"); NULL if s starts none. */
+/* End of a number by JSON's grammar (no leading zeros, no hex, no "nan"); NULL if s does not start with one. */
 static const char *number_end(const char *s)
 {
     s += *s == '-';
@@ -111,7 +111,7 @@ static const char *number_end(const char *s)
     return s;
 }
 
-/* End of what Python's json writes for a number that is not finite; NULL if s starts none. */
+/* End of NaN or Infinity as Python's json writes them; NULL if s starts with neither. */
 static const char *not_finite_end(const char *s)
 {
     s += *s == '-';
@@ -120,14 +120,14 @@ static const char *not_finite_end(const char *s)
 
 static bool parse_number(parser *p)
 {
-    const char *const wild = not_finite_end(p->at), *const end = wild ? wild : number_end(p->at);
+    const char *const special = not_finite_end(p->at), *const end = special ? special : number_end(p->at);
     int const i = end ? add(p, JSON_NUMBER) : -1;
     if (!end)
         return fail(p, "expected a value");
     if (i < 0)
         return false;
-    p->doc->node[i].number = wild ? (double)NAN : strtod(p->at, NULL);
-    if (!wild && !isfinite(p->doc->node[i].number))
+    p->doc->node[i].number = special ? (double)NAN : strtod(p->at, NULL);
+    if (!special && !isfinite(p->doc->node[i].number))
         return fail(p, "number too large");
     p->at = end;
     return true;
@@ -237,12 +237,13 @@ bool fields_open(fields *f, const char *path, const char *what, message *why)
         return false;
     const char *const text = (const char *)f->bytes.data;
     if (strlen(text) != f->bytes.size)
-        return message_set(why, "%s: not valid JSON (a zero byte in it); write the %s anew", path, what);
-    if (!json_parse(&f->doc, f->node, FIELDS_NODES, text, &bad))
-        return message_set(why, "%s: not valid JSON (%s); mend it or write the %s anew", path, bad.text,
+        return message_set(why, "%s: not valid JSON (it contains a zero byte); write the %s file again", path,
                            what);
+    if (!json_parse(&f->doc, f->node, FIELDS_NODES, text, &bad))
+        return message_set(why, "%s: not valid JSON (%s); correct it or write the %s file again", path,
+                           bad.text, what);
     if (f->node[0].type != JSON_OBJECT)
-        return message_set(why, "%s: holds no JSON object; the %s is an object of keys in braces", path,
+        return message_set(why, "%s: not a JSON object; a %s file is an object of keys in braces", path,
                            what);
     return true;
 }
@@ -272,7 +273,7 @@ bool fields_numbers(const fields *f, int object, const char *key, double *out, i
         return message_set(why, "%s: %s is missing; %s", f->path, name, remedy);
     int const found = json_numbers(&f->doc, value, out, count);
     if (found < 0)
-        return message_set(why, "%s: %s is not made of numbers; %s", f->path, name, remedy);
+        return message_set(why, "%s: %s is not numeric; %s", f->path, name, remedy);
     if (found != count)
         return message_set(why, "%s: %s has %d numbers, not %d; %s", f->path, name, found, count, remedy);
     for (int i = 0; i < count; i++)
@@ -291,7 +292,7 @@ bool fields_whole(const fields *f, const char *key, int64_t *out, double low, do
     if (!fields_numbers(f, 0, key, &value, 1, low, high, remedy, why))
         return false;
     if (value != floor(value))
-        return message_set(why, "%s: %s is %g, no whole number; %s", f->path, key, value, remedy);
+        return message_set(why, "%s: %s is %g, not a whole number; %s", f->path, key, value, remedy);
     *out = (int64_t)value;
     return true;
 }
@@ -309,7 +310,7 @@ bool fields_only(const fields *f, int object, const char *const *known, int coun
         for (int k = f->node[i + 1].next; k < f->node[object].next; k = f->node[k + 1].next)
             if (f->node[k].length == f->node[i].length &&
                 memcmp(f->node[k].text, f->node[i].text, f->node[i].length) == 0)
-                return message_set(why, "%s: line %d: %.*s is there twice; remove one", f->path,
+                return message_set(why, "%s: line %d: %.*s is given twice; remove one", f->path,
                                    f->node[k].line, (int)f->node[k].length, f->node[k].text);
     }
     return true;

@@ -2,14 +2,13 @@
 
 #include "gaitmsg_tracks_t.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- keypoints_view ---- */
-#define LEAST_CONFIDENCE 0.1f /* points below it count as not seen, as in files of tracks */
+/* ---- messages ---- */
+#define LEAST_CONFIDENCE 0.1f /* keypoints below it count as not seen, as in keypoint files */
 
-static bool take_track(byte_reader *r, track_view *out)
+static bool read_keypoint(byte_reader *r, keypoint_view *out)
 {
     out->name = bytes_text(r);
     out->u = bytes_float(r);
@@ -21,58 +20,57 @@ static bool take_track(byte_reader *r, track_view *out)
 bool keypoints_view_open(keypoints_view *v, const void *message_bytes, size_t size, message *why)
 {
     byte_reader r = {.at = message_bytes, .left = size, .ok = true};
-    track_view each;
+    keypoint_view each;
     if (bytes_int(&r, 8) != __gaitmsg_tracks_t_get_hash())
         return message_set(why, "not a gaitmsg.tracks_t (another type or version)");
     v->utime = bytes_int(&r, 8);
     v->frame = bytes_int(&r, 8);
     v->count = bytes_int32(&r);
-    v->tracks = r;
+    v->rest = r;
     for (int32_t i = 0; r.ok && i < v->count; i++)
-        take_track(&r, &each);
-    return (r.ok && v->count >= 0) || message_set(why, "damaged message: shorter than its lengths say");
+        read_keypoint(&r, &each);
+    return (r.ok && v->count >= 0) || message_set(why, "damaged message: shorter than its lengths state");
 }
 
-bool keypoints_view_next(keypoints_view *v, track_view *out)
+bool keypoints_view_next(keypoints_view *v, keypoint_view *out)
 {
-    return v->count-- > 0 && take_track(&v->tracks, out);
+    return v->count-- > 0 && read_keypoint(&v->rest, out);
 }
 
-double keypoints_view_sd(const track_view *track, double sd)
+double keypoints_view_sd(const keypoint_view *k, double sd)
 {
-    return track->confidence >= LEAST_CONFIDENCE ? sd / (double)track->confidence : -1.0;
+    return k->confidence >= LEAST_CONFIDENCE ? sd / (double)k->confidence : -1.0;
 }
 
-void keypoints_sieve_begin(keypoints_sieve *s)
+void keypoints_filter_begin(keypoints_filter *f)
 {
-    memset(s->named, 0, sizeof s->named);
+    memset(f->named, 0, sizeof f->named);
 }
 
-bool keypoints_sieve_pass(keypoints_sieve *s, const track_view *track, int32_t joint)
+bool keypoints_filter_pass(keypoints_filter *f, const keypoint_view *k, int32_t joint)
 {
     static const char *const reason[] = {"the model does not know it", "its message names it twice",
                                          "its confidence is not from 0 to 1"};
-    bool const sure = track->confidence >= 0.0f && track->confidence <= 1.0f; /* NaN is not */
-    int const why = joint < 0 ? 0 : s->named[joint] ? 1 : !sure ? 2 : -1;
+    bool const valid = k->confidence >= 0.0f && k->confidence <= 1.0f; /* false for NaN */
+    int const why = joint < 0 ? 0 : f->named[joint] ? 1 : !valid ? 2 : -1;
     if (joint >= 0)
-        s->named[joint] = true;
+        f->named[joint] = true;
     if (why < 0)
         return true;
-    s->left_out++;
-    if (!s->told[why])
-        fprintf(stderr, "gait-trackd: tracks: point '%.40s' is left out, %s; all such points are counted\n",
-                track->name, reason[why]);
-    s->told[why] = true;
+    f->left_out++;
+    if (!f->reported[why])
+        log_line("keypoint '%.40s' is left out: %s; all such keypoints are counted", k->name, reason[why]);
+    f->reported[why] = true;
     return false;
 }
 
-bool keypoints_view_strangers(message *why)
+bool keypoints_view_unknown(message *why)
 {
-    return message_set(why, "tracks of no point that the model knows; name them pelvis, l_knee and so on");
+    return message_set(why, "the model knows none of these keypoints; name them pelvis, l_knee and so on");
 }
 
-/* ---- keypoint_cue ---- */
-enum { BESIDE_PIXELS = 1 << 16 }; /* of an image_t: its fields, metadata, the padding of rows */
+/* ---- keypoints for the tracker ---- */
+enum { BESIDE_PIXELS = 1 << 16 }; /* of an image_t: fields, metadata, padding of rows */
 
 void keypoint_cue_open(keypoint_cue *cue, const gait_model *model, int32_t joints, float sd)
 {
@@ -92,12 +90,12 @@ void keypoint_cue_forget(keypoint_cue *cue)
     cue->frame_utime = -1;
 }
 
-bool keypoint_cue_room(keypoint_cue *cue, const gait_camera *camera, message *why)
+bool keypoint_cue_allocate(keypoint_cue *cue, const gait_camera *camera, message *why)
 {
-    cue->room = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS;
-    cue->held = malloc(cue->room);
+    cue->capacity = (size_t)camera->width * (size_t)camera->height * 3 + BESIDE_PIXELS;
+    cue->held = malloc(cue->capacity);
     return cue->held ||
-           message_set(why, "--tracks-term: not enough memory for a frame of %zu bytes", cue->room);
+           message_set(why, "--keypoints-term: not enough memory for a frame of %zu bytes", cue->capacity);
 }
 
 static int32_t find(const keypoint_cue *cue, const char *name)
@@ -110,29 +108,27 @@ static int32_t find(const keypoint_cue *cue, const char *name)
 
 bool keypoint_cue_take(keypoint_cue *cue, keypoints_view *v, message *why)
 {
-    cue_joints *const to = &cue->past[cue->messages++ % KEYPOINT_CUE_PAST];
+    cue_keypoints *const to = &cue->past[cue->messages++ % KEYPOINT_CUE_PAST];
     bool const announced = v->count > 0;
     int32_t known = 0;
-    track_view track;
+    keypoint_view k;
     to->utime = -1;
     if (v->utime <= cue->frame_utime) {
         cue->late++;
-        return message_set(why,
-                           "tracks came after their frame was tracked, and are of no use to it; publish them "
-                           "before the next frame");
+        return message_set(why, "keypoints arrived after their frame had been tracked; publish them "
+                                "before the next frame");
     }
     for (int32_t j = 0; j < cue->joints; j++)
-        to->track[j].sd = -1.0f;
-    keypoints_sieve_begin(&cue->sieve);
-    while (keypoints_view_next(v, &track)) {
-        int32_t const j = find(cue, track.name);
+        to->joint[j].sd = -1.0f;
+    keypoints_filter_begin(&cue->filter);
+    while (keypoints_view_next(v, &k)) {
+        int32_t const j = find(cue, k.name);
         known += j >= 0;
-        if (keypoints_sieve_pass(&cue->sieve, &track, j))
-            to->track[j] =
-                (gait_keypoint){track.u, track.v, (float)keypoints_view_sd(&track, (double)cue->sd)};
+        if (keypoints_filter_pass(&cue->filter, &k, j))
+            to->joint[j] = (gait_keypoint){k.u, k.v, (float)keypoints_view_sd(&k, (double)cue->sd)};
     }
     if (announced && known == 0)
-        return keypoints_view_strangers(why);
+        return keypoints_view_unknown(why);
     to->utime = v->utime;
     return true;
 }
@@ -141,7 +137,7 @@ const gait_keypoint *keypoint_cue_at(const keypoint_cue *cue, int64_t utime)
 {
     for (int32_t i = 0; i < KEYPOINT_CUE_PAST; i++)
         if (cue->past[i].utime == utime)
-            return cue->past[i].track;
+            return cue->past[i].joint;
     return NULL;
 }
 
@@ -155,7 +151,7 @@ const gait_keypoint *keypoint_cue_use(keypoint_cue *cue, int64_t utime)
 
 bool keypoint_cue_hold(keypoint_cue *cue, int64_t utime, const void *image, size_t bytes, int64_t arrival)
 {
-    if (!cue->held || bytes > cue->room)
+    if (!cue->held || bytes > cue->capacity)
         return false;
     memcpy(cue->held, image, bytes);
     cue->held_bytes = bytes;

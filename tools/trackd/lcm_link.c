@@ -9,14 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
-/* ---- log_scan ---- */
+/* ---- logs ---- */
 enum {
-    HEAD = 28,                       /* bytes before the channel's name, */
+    HEAD = 28,                       /* bytes before the channel's name */
     SYNC = 0xEDA1DA01 - (1LL << 32), /* the first four of them */
-    LONGEST = 1000                   /* bytes of a name at which LCM stops */
+    LONGEST = 1000                   /* bytes of a name, LCM's limit */
 };
 
 static int64_t big_endian(const unsigned char *at)
@@ -24,7 +23,7 @@ static int64_t big_endian(const unsigned char *at)
     return (int32_t)((uint32_t)at[0] << 24 | (uint32_t)at[1] << 16 | (uint32_t)at[2] << 8 | at[3]);
 }
 
-/* Bytes of the event at the file's place; 0 where none begins there. */
+/* Bytes of the event at the file's position; 0 if there is none. */
 static int64_t event_bytes(FILE *f)
 {
     unsigned char head[HEAD];
@@ -55,15 +54,15 @@ int64_t log_scan(const char *path, message *why)
         message_set(why, "%.160s: this log is empty", path);
     else if (at != is.st_size)
         message_set(
-            why, "%.150s: this log is damaged or breaks off at byte %" PRId64 ", after %" PRId64 " messages",
+            why, "%.150s: this log is damaged or truncated at byte %" PRId64 ", after %" PRId64 " messages",
             path, at, events);
     return events;
 }
 
-/* ---- link ---- */
+/* ---- connections ---- */
 #define ROUTE_REMEDY "if this machine has no multicast route: ip route add 224.0.0.0/4 dev lo (as root)"
 
-/* liblcm writes pages about a missing route to stderr; one line of ours says as much. */
+/* liblcm writes pages about a missing route to stderr; the daemon reports it in one line. */
 static int mute(void)
 {
     fflush(stderr);
@@ -108,7 +107,7 @@ char link_log(const char *url, char path[LINK_PATH])
     return mode;
 }
 
-/* The address of udpm://ADDRESS:PORT, if it is one that LCM cannot send to. */
+/* Whether udpm://ADDRESS:PORT has an address that LCM cannot send to; returns it. */
 static bool not_multicast(const char *url, char address[INET_ADDRSTRLEN])
 {
     struct in_addr in;
@@ -154,7 +153,7 @@ lcm_subscription_t *link_subscribe(lcm_t *lcm, const char *channel, lcm_msg_hand
     return s;
 }
 
-/* ---- sink ---- */
+/* ---- output ---- */
 bool sink_open(sink *s, const char *url, message *why)
 {
     char path[LINK_PATH];
@@ -172,12 +171,10 @@ static void lost(sink *s, const char *what)
         message_set(&s->fault, "%s", what);
 }
 
-/* As LCM's log provider writes it, dated now. */
+/* As LCM's log provider writes it, with the current time. */
 static bool write_event(lcm_eventlog_t *log, const char *channel, const uint8_t *bytes, int size)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_REALTIME, &t);
-    lcm_eventlog_event_t e = {.timestamp = (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000,
+    lcm_eventlog_event_t e = {.timestamp = clock_wall(),
                               .channellen = (int32_t)strlen(channel),
                               .datalen = size,
                               .channel = (char *)channel, /* LCM lacks const; read only */
@@ -192,7 +189,7 @@ void sink_publish(sink *s, const char *channel, const uint8_t *bytes, int size)
     if (s->lcm && lcm_publish(s->lcm, channel, bytes, (unsigned)size) != 0) {
         lost(s, "LCM could not send them");
         if (s->failed == 1)
-            fprintf(stderr, "gait-trackd: LCM could not send a message of %d bytes on %s\n", size, channel);
+            log_line("LCM could not send a message of %d bytes on %s", size, channel);
     }
     errno = 0;
     if (s->log && (s->failed || !write_event(s->log, channel, bytes, size)))

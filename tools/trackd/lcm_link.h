@@ -7,42 +7,41 @@
 #include <lcm/lcm.h>
 #include <stdint.h>
 
-/* ---- is an LCM log whole? */
-/* Number of whole messages up to where the log ends or breaks off, -1 for what is no regular file; `why` says that it is
- * empty or breaks off, or nothing. */
+/* ---- whether an LCM log is complete. */
+/* Number of complete messages, -1 if this is not a regular file.  `why` reports an empty or truncated log, or is empty. */
 int64_t log_scan(const char *path, message *why);
 
 /* ---- the LCM connections of a program. */
 enum { LINK_PATH = 1024 }; /* bytes of a log's name, with its end */
 
-/* Room for the receiver is part of the URL: with the system's default a 640x480 colour stream loses 9 of 10. */
+/* The URL sets the receive buffer: with the system's default a 640x480 colour stream loses nine frames of ten. */
 #define LINK_DEFAULT_URL "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"
 
 /* `url` if given, else LCM_DEFAULT_URL of the environment, else LINK_DEFAULT_URL. */
 const char *link_url(const char *url);
 /* Open; NULL with the remedy in `why`. */
 lcm_t *link_open(const char *url, message *why);
-/* Subscribe with room for `capacity` waiting messages; NULL with the remedy in `why`. */
+/* Subscribe with a queue of `capacity` messages; NULL with the remedy in `why`. */
 lcm_subscription_t *link_subscribe(lcm_t *lcm, const char *channel, lcm_msg_handler_t fn, void *user,
                                    int capacity, message *why);
-/* A log, which is played without loss, or written. */
+/* Whether this is a log, to be played or written. */
 bool link_is_log(const char *url);
-/* Its name, and its mode: 'r', 'w' or 'a', 0 where ?mode= says anything else. */
+/* Path of a log, and its mode: 'r', 'w' or 'a', 0 if ?mode= is anything else. */
 char link_log(const char *url, char path[LINK_PATH]);
 
-/* ---- where a program publishes: LCM, or a log whose writing is watched (LCM's own log provider does not tell). */
-typedef struct sink {    /* all zero: nowhere */
+/* ---- output to LCM, or to a log with checked writes (LCM's own log provider does not report failures). */
+typedef struct sink {    /* all zero: no output */
     lcm_t *lcm;          /* or NULL */
     lcm_eventlog_t *log; /* or NULL */
     int64_t failed;      /* messages that did not go out */
     message fault;       /* of the first of them */
 } sink;
 
-/* Open `url`, a log with ?mode=w (new) or a (at its end); false with the remedy in `why`. */
+/* Open `url`; a log has ?mode=w (new) or a (append). */
 bool sink_open(sink *s, const char *url, message *why);
-/* Publish `size` bytes; that LCM refuses one is said once on stderr, and into a log nothing follows a failure. */
+/* Publish `size` bytes.  The first failure of LCM is reported on stderr; after one of a log nothing more is written. */
 void sink_publish(sink *s, const char *channel, const uint8_t *bytes, int size);
-/* Has writing of the log failed, so that there is no use in going on? */
+/* Whether writing the log has failed, so that the program should end. */
 bool sink_ended(const sink *s, message *why);
 /* Flush and close; false if anything was lost. */
 bool sink_close(sink *s, message *why);

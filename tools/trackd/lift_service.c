@@ -4,22 +4,13 @@
 #include "gaitmsg_estimate_t.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum {
-    MESSAGE_ROOM = 1 << 14, /* an estimate of all markers, with room to spare */
-    BACK_US = 1000000,      /* tracks that are older than the last by more are of another time */
+    MESSAGE_BYTES = 1 << 14, /* more than an estimate of all markers takes */
+    BACK_US = 1000000,       /* keypoints older than the last ones by more restart the stream */
 };
-
-static int64_t monotonic_us(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000;
-}
 
 bool lift_service_open(lift_service *s, const char *model, const lift_settings *set, sink *out, message *why)
 {
@@ -32,7 +23,7 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
     c->sd = (double)set->sd;
     c->lag = set->lag;
     c->cpu_mask = set->cpu_mask;
-    /* any camera asks for as much memory */
+    /* the memory does not depend on the camera */
     c->camera = (gait_camera){.width = 1, .height = 1, .fx = 1, .fy = 1, .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     if (!model_file_open(&s->file, model, why))
         return false;
@@ -55,9 +46,7 @@ bool lift_service_camera(lift_service *s, const gait_camera *camera, message *wh
 {
     gait_error err = {.text = ""};
     if (s->lift)
-        return convert_same_camera(camera, &s->config.camera) ||
-               message_set(why,
-                           "another camera than the one in use was announced and is ignored; restart for it");
+        return convert_same_camera(camera, &s->config.camera) || message_set(why, CAMERA_CHANGED);
     gait_lift_config c = s->config;
     c.camera = *camera;
     if (gait_lift_init(s->memory, s->memory_bytes, s->file.model, &c, &s->lift, &err) != GAIT_OK)
@@ -66,7 +55,7 @@ bool lift_service_camera(lift_service *s, const gait_camera *camera, message *wh
     return true;
 }
 
-/* Index of a marker by name, -1: the prior does not know it. */
+/* Index of a marker by name, or -1. */
 static int32_t find(const lift_service *s, const char *name)
 {
     for (int32_t j = 0; j < s->info.markers; j++)
@@ -75,27 +64,27 @@ static int32_t find(const lift_service *s, const char *name)
     return -1;
 }
 
-/* Observations by marker; tracks of others are left out.  Returns how many points were known. */
+/* Observations by marker.  Returns how many keypoints the prior knows. */
 static int32_t take(lift_service *s, keypoints_view *v)
 {
-    track_view track;
+    keypoint_view k;
     int32_t known = 0;
     for (int32_t j = 0; j < s->info.markers; j++)
         s->sd[j] = -1.0;
-    keypoints_sieve_begin(&s->sieve);
-    while (keypoints_view_next(v, &track)) {
-        int32_t const j = find(s, track.name);
+    keypoints_filter_begin(&s->filter);
+    while (keypoints_view_next(v, &k)) {
+        int32_t const j = find(s, k.name);
         known += j >= 0;
-        if (!keypoints_sieve_pass(&s->sieve, &track, j))
+        if (!keypoints_filter_pass(&s->filter, &k, j))
             continue;
-        s->uv[2 * j] = (double)track.u;
-        s->uv[2 * j + 1] = (double)track.v;
-        s->sd[j] = keypoints_view_sd(&track, s->config.sd);
+        s->uv[2 * j] = (double)k.u;
+        s->uv[2 * j + 1] = (double)k.v;
+        s->sd[j] = keypoints_view_sd(&k, s->config.sd);
     }
     return known;
 }
 
-/* What the source said of the frame captured at `utime`, one of the last. */
+/* The frame captured at `utime`, one of the last. */
 static const lift_past *past_of(const lift_service *s, int64_t utime)
 {
     for (int32_t i = 0; i < LIFT_SERVICE_PAST; i++)
@@ -113,13 +102,13 @@ static bool finite_joints(const gaitmsg_estimate_t *m)
     return finite;
 }
 
-/* What is not finite is not published. */
+/* Publish the estimate if it is finite. */
 static bool send(lift_service *s, int64_t step_us, message *why)
 {
-    static uint8_t room[MESSAGE_ROOM];
+    static uint8_t encoded[MESSAGE_BYTES];
     const gait_lift_frame *const e = &s->estimate;
     const lift_past *const past = past_of(s, e->utime);
-    bool const known = e->status != GAIT_TRACK_INIT; /* before that nobody knows where the joints are */
+    bool const known = e->status != GAIT_TRACK_INIT; /* until then the joints are not known */
     gaitmsg_estimate_t m = {.utime = e->utime,
                             .frame = past->frame,
                             .step = (int64_t)e->frame,
@@ -143,25 +132,25 @@ static bool send(lift_service *s, int64_t step_us, message *why)
     if (!finite_joints(&m)) {
         gait_lift_reset(s->lift);
         s->rejected++;
-        return message_set(why, "tracks: joints that are not finite came of them; the lift begins anew");
+        return message_set(why, "keypoints gave joints that are not finite; the lift restarts");
     }
-    sink_publish(s->out, "GAIT_LIFT", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &m));
+    sink_publish(s->out, "GAIT_LIFT", encoded, gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &m));
     s->lifted++;
     return true;
 }
 
-/* May tracks of this time follow the last ones, perhaps in a new stream? */
+/* Whether keypoints of this time can follow the last ones, if need be as a new stream. */
 static bool in_time(lift_service *s, int64_t utime, message *why)
 {
     if (utime < 0 || (utime <= s->last && utime >= s->last - BACK_US))
-        return message_set(why, "tracks: capture time did not advance; stamp them in order");
+        return message_set(why, "keypoints: capture time did not advance; stamp them in order");
     if (utime > s->last)
         return true;
     gait_lift_reset(s->lift);
-    if (!s->told_back)
-        fprintf(stderr, "gait-trackd: tracks: capture time went back by %.3f s: the lift begins anew\n",
-                1e-6 * (double)(s->last - utime));
-    s->told_back = true;
+    if (!s->reported_back)
+        log_line("keypoints: capture time went back by %.3f s: the lift restarts",
+                 1e-6 * (double)(s->last - utime));
+    s->reported_back = true;
     return true;
 }
 
@@ -174,21 +163,21 @@ bool lift_service_keypoints(lift_service *s, keypoints_view *v, int64_t receive_
     int32_t const announced = v->count;
     if (take(s, v) == 0 && announced > 0) {
         s->rejected++;
-        return keypoints_view_strangers(why);
+        return keypoints_view_unknown(why);
     }
     if (!in_time(s, v->utime, why)) {
         s->rejected++;
         return false;
     }
-    int64_t const before = monotonic_us();
+    int64_t const before = clock_monotonic();
     s->last = v->utime;
     if (gait_lift_push(s->lift, v->utime, s->uv, s->sd, &err) != GAIT_OK) {
         s->rejected++;
-        return message_set(why, "tracks: %s", err.text);
+        return message_set(why, "keypoints: %s", err.text);
     }
     s->past[s->frames % LIFT_SERVICE_PAST] = (lift_past){v->utime, v->frame, receive_utime};
-    bool const there = gait_lift_estimate(s->lift, &s->estimate, NULL) == GAIT_OK;
-    int64_t const step_us = monotonic_us() - before;
+    bool const ready = gait_lift_estimate(s->lift, &s->estimate, NULL) == GAIT_OK;
+    int64_t const step_us = clock_monotonic() - before;
     histogram_add(&s->step, step_us);
-    return !there || send(s, step_us, why);
+    return !ready || send(s, step_us, why);
 }

@@ -1,4 +1,4 @@
-/* lift_service.h - the lifter as a service: 2-D tracks of one camera in, 3-D joints out, whatever carries them. */
+/* lift_service.h - the lifter as a service: 2-D keypoints of one camera in, 3-D joints out. */
 #ifndef TRACKD_LIFT_SERVICE_H
 #define TRACKD_LIFT_SERVICE_H
 #include "gait_lift.h"
@@ -11,13 +11,13 @@
 enum { LIFT_SERVICE_PAST = 65 }; /* more than the longest lag */
 
 typedef struct lift_settings {
-    float stature; /* metres; 0: the learners' mean */
-    float sd;      /* pixels, of a point with full confidence */
+    float stature; /* metres; 0: mean of the training set */
+    float sd;      /* pixels, of a keypoint with confidence 1 */
     int32_t lag;   /* frames */
     uint32_t cpu_mask;
 } lift_settings;
 
-typedef struct lift_past { /* what the source said of a frame */
+typedef struct lift_past { /* one of the last frames */
     int64_t utime, frame, receive_utime;
 } lift_past;
 
@@ -30,10 +30,10 @@ typedef struct lift_service {
     void *memory;    /* taken once */
     size_t memory_bytes;
     int64_t frames, lifted, rejected;
-    int64_t last;   /* capture time of the last frame lifted; -1: none */
-    bool told_back; /* that time went back, once on stderr */
-    histogram step; /* microseconds */
-    keypoints_sieve sieve;
+    int64_t last;       /* capture time of the last frame lifted; -1: none */
+    bool reported_back; /* once on stderr: capture time went back */
+    histogram step;     /* microseconds */
+    keypoints_filter filter;
     double uv[2 * GAIT_MAX_MARKERS], sd[GAIT_MAX_MARKERS];
     gait_lift_frame estimate;
     gaitmsg_joint_t joint[GAIT_MAX_MARKERS];
@@ -45,7 +45,7 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
 void lift_service_close(lift_service *s);
 /* The first camera starts the service; another one later is an error. */
 bool lift_service_camera(lift_service *s, const gait_camera *camera, message *why);
-/* One frame's tracks, received at `receive_utime`: pushed, and what they tell published on GAIT_LIFT.
- * Tracks from more than a second before the last ones begin anew: a clock was set, or one stamp was wrong. */
+/* Push one frame's keypoints, received at `receive_utime`, and publish the result on GAIT_LIFT.  Keypoints from more
+ * than a second before the last ones restart the stream: a clock was set, or one stamp was wrong. */
 bool lift_service_keypoints(lift_service *s, keypoints_view *v, int64_t receive_utime, message *why);
 #endif

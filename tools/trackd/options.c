@@ -59,7 +59,7 @@ static bool set(const option *o, const char *text, message *why)
     if (o->kind == OPTION_FLAG)
         return set_flag(o, text, why);
     if (!text)
-        return message_set(why, "--%s: needs a value %s", o->name, o->metavar);
+        return message_set(why, "--%s needs a value %s", o->name, o->metavar);
     if (o->kind == OPTION_TEXTUAL)
         return set_text(o, text, why);
     return o->kind == OPTION_U64 ? set_u64(o, text, why) : set_number(o, text, why);
@@ -81,7 +81,7 @@ static const option *find_letter(const option *table, int count, char letter)
     return NULL;
 }
 
-/* The option an argument names, and its value when that is attached by "=". */
+/* The option that an argument names, and the value attached by "=". */
 static const option *recognise(const option *table, int count, const char *arg, const char **attached)
 {
     *attached = NULL;
@@ -126,18 +126,18 @@ typedef struct options_source { /* the file being read */
     int given[OPTIONS_MOST]; /* line that sets an option; 0: none */
 } options_source;
 
-/* May this line set the option? */
-static bool take_turn(options_source *file, const option *o, int *given, message *why)
+/* Whether this line may set the option. */
+static bool claim(options_source *file, const option *o, int *given, message *why)
 {
     if (o->value == file->path)
-        return message_set(why, "%s is for the command line; a file names no other", o->name);
+        return message_set(why, "%s is allowed on the command line only", o->name);
     if (*given)
         return message_set(why, "%s is already given in line %d; remove one", o->name, *given);
     *given = file->number;
     return true;
 }
 
-/* Apply one line of the file, which is cut up. */
+/* Apply one line of the file; modifies the line. */
 static bool apply_line(const option *table, int count, options_source *file, char *line, message *why)
 {
     line[strcspn(line, "#")] = '\0';
@@ -152,10 +152,10 @@ static bool apply_line(const option *table, int count, options_source *file, cha
     const option *const o = find(table, count, name, strlen(name));
     if (!o)
         return message_set(why, "unknown option %s; --help lists them", name);
-    return take_turn(file, o, &file->given[o - table], why) && set(o, trim(equals + 1), why);
+    return claim(file, o, &file->given[o - table], why) && set(o, trim(equals + 1), why);
 }
 
-/* Whether it is text: bytes that terminals take for commands would get into messages. */
+/* Control characters are refused, because error messages would pass them on to the terminal. */
 static bool is_text(const file_bytes *bytes)
 {
     for (size_t k = 0; k < bytes->size; k++)
@@ -174,7 +174,7 @@ bool options_file(const option *table, int count, const char *path, message *why
         return false;
     if (!is_text(&bytes)) {
         free(bytes.data);
-        return message_set(why, "%.100s: is not text; give lines `name = value`", path);
+        return message_set(why, "%.100s: not a text file; give lines `name = value`", path);
     }
     char *line = (char *)bytes.data;
     while (ok && line) {

@@ -9,19 +9,20 @@
 #include <string.h>
 
 enum {
-    FRAMES_WAITING = 64, /* two seconds of frames: the tracker skips to the last of them */
+    FRAMES_WAITING = 64, /* two seconds of frames, of which the tracker takes the last */
     OTHERS_WAITING = 256,
     STATUS_US = 1000000, /* between two messages of GAIT_STATUS */
 };
 
+#define DAMAGED "%.40s: damaged message or another version of its type"
+
 static bool open_view(service *s, const lcm_recv_buf_t *buf, const char *channel, image_view *v)
 {
-    message why, line;
+    message why;
     if (image_view_open(v, buf->data, buf->data_size, &why))
         return true;
-    message_set(&line, "%.40s: %.180s", channel, why.text);
     s->counts.rejected++;
-    service_complain(s, &line);
+    service_complain(s, "%.40s: %.180s", channel, why.text);
     return false;
 }
 
@@ -30,8 +31,8 @@ static bool newest(const receiver *r)
     return r->log || lcm_subscription_get_queue_size(r->frames) == 0;
 }
 
-/* Track the frame that was held, if there is one. */
-static void flush(receiver *r)
+/* Track the frame that waits for its keypoints, if any. */
+static void flush_held(receiver *r)
 {
     keypoint_cue *const cue = r->service->cue;
     image_view v;
@@ -47,8 +48,8 @@ static void on_frame(const lcm_recv_buf_t *buf, const char *channel, void *user)
     receiver *const r = user;
     image_view v;
     keypoint_cue *const cue = r->service->cue;
-    flush(r);
-    r->service->came++;
+    flush_held(r);
+    r->service->arrived++;
     if (!open_view(r->service, buf, channel, &v))
         return;
     bool const wait = cue && !keypoint_cue_at(cue, v.utime);
@@ -64,46 +65,32 @@ static void on_background(const lcm_recv_buf_t *buf, const char *channel, void *
         service_background(r->service, &v);
 }
 
-static void damaged(receiver *r, const char *channel)
-{
-    message why;
-    message_set(&why, "%.40s: damaged message or another version of its type", channel);
-    service_complain(r->service, &why);
-}
-
-static void complain_of(receiver *r, const char *channel, const message *why)
-{
-    message line;
-    message_set(&line, "%.40s: %.180s", channel, why->text);
-    service_complain(r->service, &line);
-}
-
-static void on_tracks(const lcm_recv_buf_t *buf, const char *channel, void *user)
+static void on_keypoints(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     receiver *const r = user;
     keypoint_cue *const cue = r->service->cue;
     keypoints_view v;
     message why;
     if (!keypoints_view_open(&v, buf->data, buf->data_size, &why)) {
-        complain_of(r, channel, &why);
+        service_complain(r->service, "%.40s: %.180s", channel, why.text);
         return;
     }
-    keypoints_view again = v; /* each goes through the tracks */
+    keypoints_view again = v; /* each reader consumes its view */
     if (r->service->lift && !lift_service_keypoints(r->service->lift, &v, buf->recv_utime, &why))
-        complain_of(r, channel, &why);
+        service_complain(r->service, "%.40s: %.180s", channel, why.text);
     if (cue && !keypoint_cue_take(cue, &again, &why))
-        complain_of(r, channel, &why);
+        service_complain(r->service, "%.40s: %.180s", channel, why.text);
     if (cue && cue->held_bytes && keypoint_cue_at(cue, cue->held_utime))
-        flush(r);
+        flush_held(r);
 }
 
-/* The same camera for the lifter. */
+/* Pass the camera on to the lifter. */
 static void lift_camera(receiver *r, const gaitmsg_camera_t *msg)
 {
     gait_camera camera;
     message why;
     if (convert_camera_message(msg, &camera, &why) && !lift_service_camera(r->service->lift, &camera, &why))
-        service_complain(r->service, &why);
+        service_complain(r->service, "%s", why.text);
 }
 
 static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -111,7 +98,7 @@ static void on_camera(const lcm_recv_buf_t *buf, const char *channel, void *user
     receiver *const r = user;
     gaitmsg_camera_t msg;
     if (gaitmsg_camera_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
-        damaged(r, channel);
+        service_complain(r->service, DAMAGED, channel);
     else {
         service_camera(r->service, &msg);
         if (r->service->lift)
@@ -124,7 +111,7 @@ static void on_command(const lcm_recv_buf_t *buf, const char *channel, void *use
     receiver *const r = user;
     gaitmsg_command_t msg;
     if (gaitmsg_command_t_decode(buf->data, 0, (int)buf->data_size, &msg) < 0)
-        damaged(r, channel);
+        service_complain(r->service, DAMAGED, channel);
     else
         service_command(r->service, &msg);
 }
@@ -140,7 +127,7 @@ static bool subscribe(receiver *r, message *why)
     r->frames = link_subscribe(r->images, name[0], on_frame, r, FRAMES_WAITING, why);
     return r->frames &&
            ((!r->service->lift && !r->service->cue) ||
-            link_subscribe(r->others, name[3], on_tracks, r, OTHERS_WAITING, why)) &&
+            link_subscribe(r->others, name[3], on_keypoints, r, OTHERS_WAITING, why)) &&
            link_subscribe(r->others, name[1], on_camera, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, name[2], on_background, r, OTHERS_WAITING, why) &&
            link_subscribe(r->others, "GAIT_COMMAND", on_command, r, OTHERS_WAITING, why);
@@ -165,7 +152,7 @@ void receiver_close(receiver *r)
     *r = (receiver){0};
 }
 
-/* Handle what is there: every other message before the next frame.  false: the connection has ended. */
+/* Handle waiting messages, all others before the next frame; false when the connection has ended. */
 static bool serve(receiver *r)
 {
     int more = 0;
@@ -174,10 +161,10 @@ static bool serve(receiver *r)
     return more >= 0 && lcm_handle_timeout(r->images, 0) >= 0;
 }
 
-/* Of a clock that nobody sets: the status comes whatever becomes of the date. */
+/* By the monotonic clock, so that setting the date does not delay the status. */
 static struct timespec until(int64_t deadline)
 {
-    int64_t const left = deadline - service_ticks();
+    int64_t const left = deadline - clock_monotonic();
     int64_t const us = left < 0 ? 0 : left > STATUS_US ? STATUS_US : left;
     return (struct timespec){.tv_sec = (time_t)(us / 1000000), .tv_nsec = (long)(us % 1000000) * 1000};
 }
@@ -188,7 +175,7 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
     struct pollfd fd[2] = {{.fd = lcm_get_fileno(r->images), .events = POLLIN},
                            {.fd = lcm_get_fileno(r->others), .events = POLLIN}};
     while (!*quit) {
-        int64_t const now = service_ticks();
+        int64_t const now = clock_monotonic();
         if (r->service->news || now >= due) {
             service_send_status(r->service);
             due = now + STATUS_US;
@@ -200,7 +187,7 @@ bool receiver_run(receiver *r, const volatile sig_atomic_t *quit, const sigset_t
         if (sink_ended(r->service->out, why))
             return false;
         if (ready > 0 && !serve(r)) {
-            flush(r);
+            flush_held(r);
             return r->log || message_set(why, "the LCM connection has failed");
         }
     }

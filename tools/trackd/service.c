@@ -5,28 +5,10 @@
 #include "image_view.h"
 
 #include <inttypes.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-/* ---- service ---- */
-static int64_t clock_us(clockid_t clock)
-{
-    struct timespec t;
-    clock_gettime(clock, &t);
-    return (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000;
-}
-
-int64_t service_now(void)
-{
-    return clock_us(CLOCK_REALTIME);
-}
-
-int64_t service_ticks(void)
-{
-    return clock_us(CLOCK_MONOTONIC);
-}
 
 void service_set_state(service *s, int8_t state, const char *text)
 {
@@ -38,21 +20,20 @@ void service_set_state(service *s, int8_t state, const char *text)
         message_set(&s->text, "%s", text);
 }
 
-void service_complain(service *s, const message *why)
+void service_complain(service *s, const char *format, ...)
 {
+    message line;
+    va_list args;
+    va_start(args, format);
+    vsnprintf(line.text, sizeof line.text, format, args);
+    va_end(args);
     s->news = true;
-    if (strcmp(s->complaint.text, why->text) != 0)
-        fprintf(stderr, "gait-trackd: %s\n", why->text);
-    s->text = s->complaint = *why;
+    if (strcmp(s->complaint.text, line.text) != 0)
+        log_line("%s", line.text);
+    s->text = s->complaint = line;
 }
 
-void service_reject(service *s, const message *why)
-{
-    s->counts.rejected++;
-    service_complain(s, why);
-}
-
-/* Not tracking: what is waited for? */
+/* The state while nothing is tracked: what the service waits for. */
 static void set_idle(service *s)
 {
     if (!s->track.tracker)
@@ -63,18 +44,17 @@ static void set_idle(service *s)
         service_set_state(s, GAITMSG_STATUS_T_READY,
                           !s->seek ? "waiting for START"
                           : s->track.background.data
-                              ? "looking for somebody who walks in, or waiting for START"
-                              : "waiting for the empty scene to look for somebody, or for START");
+                              ? "waiting for a person who walks in, or for START"
+                              : "waiting for the background to detect a person, or for START");
 }
 
-/* As many particles as were asked for. */
 static void want_all(service *s)
 {
     s->wanted = s->track.config.particles;
     gait_tracker_set_particles(s->track.tracker, s->wanted, NULL);
 }
 
-/* As after the program's start. */
+/* The state at the start of the program. */
 static void rearm(service *s)
 {
     memset(&s->counts, 0, sizeof s->counts);
@@ -93,7 +73,7 @@ static void rearm(service *s)
     set_idle(s);
 }
 
-/* Memory for the particle cloud: taken once, as large as it can become; a search may take more particles. */
+/* Memory for the particle cloud, taken once; acquisition may use more particles than tracking. */
 static bool open_particles(service *s, message *why)
 {
     const gait_tracker_config *const c = &s->track.config;
@@ -132,31 +112,30 @@ void service_close(service *s)
     tracking_close(&s->track);
 }
 
-/* Would the tracker take such a start?  It is begun anew when its frame comes; before there is a tracker nobody knows,
- * and it is asked as soon as the camera is known. */
+/* Whether the tracker accepts such a start, which begins with its frame.  Before there is a tracker the check waits for the
+ * camera. */
 static bool start_usable(service *s, const gait_state *mean, const gait_state *sd)
 {
     message why;
     if (!s->track.tracker || tracking_start(&s->track, mean, sd, 0, &why))
         return true;
-    service_complain(s, &why);
+    service_complain(s, "%s", why.text);
     return false;
 }
 
 bool service_set_camera(service *s, const gait_camera *camera, message *why)
 {
-    if (!tracking_set_camera(&s->track, camera, why) || (s->cue && !keypoint_cue_room(s->cue, camera, why)))
+    if (!tracking_set_camera(&s->track, camera, why) ||
+        (s->cue && !keypoint_cue_allocate(s->cue, camera, why)))
         return false;
-    s->track.memory_bytes += s->cue ? s->cue->room : 0;
+    s->track.memory_bytes += s->cue ? s->cue->capacity : 0;
     const tracking *const t = &s->track;
     bool const armed = s->start.armed;
-    fprintf(stderr,
-            "gait-trackd: model %016" PRIx64
-            ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
-            "tracker %zu, pool %zu, pictures %zu)\n",
-            t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
-            s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), t->memory_bytes, t->model_bytes,
-            t->tracker_bytes, s->pool_bytes, t->picture_bytes);
+    log_line("model %016" PRIx64 ", camera %dx%d, %d particles, %d thread%s, %s, %zu bytes (model %zu, "
+             "tracker %zu, pool %zu, pictures %zu)",
+             t->info.digest, camera->width, camera->height, t->config.particles, s->threads,
+             s->threads == 1 ? "" : "s", gait_cpu_name(t->config.cpu_mask), t->memory_bytes, t->model_bytes,
+             t->tracker_bytes, s->pool_bytes, t->picture_bytes);
     want_all(s);
     s->start.armed = s->start.armed && start_usable(s, &s->start.mean, &s->start.sd);
     if (s->start.armed == armed)
@@ -171,14 +150,10 @@ void service_camera(service *s, const gaitmsg_camera_t *msg)
     gait_camera camera;
     message why;
     if (!convert_camera_message(msg, &camera, &why) ||
-        (!s->track.tracker && !service_set_camera(s, &camera, &why))) {
-        service_complain(s, &why);
-        return;
-    }
-    if (!convert_same_camera(&camera, &s->track.config.camera[0])) {
-        message_set(&why, "another camera than the one in use was announced and is ignored; restart for it");
-        service_complain(s, &why);
-    }
+        (!s->track.tracker && !service_set_camera(s, &camera, &why)))
+        service_complain(s, "%s", why.text);
+    else if (!convert_same_camera(&camera, &s->track.config.camera[0]))
+        service_complain(s, CAMERA_CHANGED);
 }
 
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why)
@@ -196,9 +171,10 @@ void service_background(service *s, const image_view *v)
     bool const first = !s->track.background.data;
     if (!s->track.tracker)
         return; /* it is sent again every few seconds */
-    if (!service_pixels(s, v, &plate, &why) || !tracking_set_background(&s->track, &plate, &why))
-        service_reject(s, &why);
-    else if (first && s->state == GAITMSG_STATUS_T_READY)
+    if (!service_pixels(s, v, &plate, &why) || !tracking_set_background(&s->track, &plate, &why)) {
+        s->counts.rejected++;
+        service_complain(s, "%s", why.text);
+    } else if (first && s->state == GAITMSG_STATUS_T_READY)
         set_idle(s);
     else
         s->news = s->news || first;
@@ -211,21 +187,18 @@ static void command_start(service *s, const gaitmsg_command_t *msg)
     message why;
     if (!convert_state_message(&msg->mean, &s->track.prior_mean, &mean, &why) ||
         !convert_state_message(&msg->sd, &s->track.prior_sd, &sd, &why)) {
-        service_complain(s, &why);
-        return;
+        service_complain(s, "%s", why.text);
+    } else if (start_usable(s, &mean, &sd)) {
+        start_trigger_by_time(&s->start, &mean, &sd, msg->utime);
+        s->seek = !s->has_init;
+        set_idle(s);
     }
-    if (!start_usable(s, &mean, &sd))
-        return;
-    start_trigger_by_time(&s->start, &mean, &sd, msg->utime);
-    s->seek = !s->has_init;
-    set_idle(s);
 }
 
 void service_command(service *s, const gaitmsg_command_t *msg)
 {
-    message why;
     if (msg->id != 0 && msg->id == s->command_id)
-        return; /* sent again because its effect was not seen yet */
+        return; /* repeated, because the sender has not yet seen its effect */
     s->command_id = msg->id;
     s->news = true;
     if (msg->command == GAITMSG_COMMAND_T_START) {
@@ -236,8 +209,7 @@ void service_command(service *s, const gaitmsg_command_t *msg)
     } else if (msg->command == GAITMSG_COMMAND_T_RESET) {
         rearm(s);
     } else {
-        message_set(&why, "unknown command %d; send START, STOP or RESET", msg->command);
-        service_complain(s, &why);
+        service_complain(s, "unknown command %d; send START, STOP or RESET", msg->command);
     }
 }
 
@@ -246,8 +218,9 @@ uint64_t service_digest(const service *s)
     return s->track.tracker ? gait_tracker_digest(s->track.tracker) : 0;
 }
 
-/* ---- service_send ---- */
-enum { MESSAGE_ROOM = 1 << 16 }; /* estimate and status, with room to spare */
+/* ---- messages out ---- */
+enum { MESSAGE_BYTES = 1 << 16 }; /* more than an estimate or a status takes */
+static uint8_t encoded[MESSAGE_BYTES];
 
 static void send_particles(service *s, const image_view *v)
 {
@@ -262,8 +235,8 @@ static void send_particles(service *s, const image_view *v)
                  gaitmsg_particles_t_encode(s->particles, 0, (int)s->particles_bytes, &s->cloud));
 }
 
-/* Number the message as the source and the stream number the frame. */
-static void number(gaitmsg_estimate_t *m, const service *s, const past_frame *p)
+/* Set the counters of the message. */
+static void set_counters(gaitmsg_estimate_t *m, const service *s, const past_frame *p)
 {
     m->frame = p->frame;
     m->step = p->number;
@@ -273,7 +246,7 @@ static void number(gaitmsg_estimate_t *m, const service *s, const past_frame *p)
     m->tracker_digest = (int64_t)gait_tracker_digest(s->track.tracker);
 }
 
-/* The stride that ends with an estimate, if one does. */
+/* The stride that ends with this estimate, if any. */
 static void send_stride(service *s, const gait_estimate *e, int64_t frame)
 {
     uint8_t bytes[256];
@@ -302,10 +275,9 @@ static void send_stride(service *s, const gait_estimate *e, int64_t frame)
     sink_publish(s->out, "GAIT_STRIDE", bytes, gaitmsg_stride_t_encode(bytes, 0, sizeof bytes, &m));
 }
 
-/* The frame of `lag` steps ago as it looks now; steps without a frame of their own are passed over. */
+/* The estimate of the frame `lag` steps ago; steps that bridge a pause have no frame and are skipped. */
 static void send_lagged(service *s)
 {
-    static uint8_t room[MESSAGE_ROOM];
     static estimate_message lagged;
     gait_estimate e;
     if (gait_tracker_lagged(s->track.tracker, s->track.config.lag, &e, NULL) != GAIT_OK)
@@ -314,22 +286,21 @@ static void send_lagged(service *s)
     if (p->step != e.frame)
         return;
     convert_estimate(s->track.model, &s->track.info, &e, &lagged);
-    number(&lagged.msg, s, p);
-    sink_publish(s->out, "GAIT_ESTIMATE_LAG", room,
-                 gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, &lagged.msg));
+    set_counters(&lagged.msg, s, p);
+    sink_publish(s->out, "GAIT_ESTIMATE_LAG", encoded,
+                 gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, &lagged.msg));
     send_stride(s, &e, p->frame);
 }
 
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us)
 {
-    static uint8_t room[MESSAGE_ROOM];
     gaitmsg_estimate_t *const m = &s->estimate.msg;
     convert_estimate(s->track.model, &s->track.info, e, &s->estimate);
     past_frame *const now = &s->past[e->frame % SERVICE_PAST];
     *now = (past_frame){e->frame, v->frame, s->steps, received, (int32_t)step_us};
-    number(m, s, now);
-    sink_publish(s->out, "GAIT_ESTIMATE", room, gaitmsg_estimate_t_encode(room, 0, MESSAGE_ROOM, m));
+    set_counters(m, s, now);
+    sink_publish(s->out, "GAIT_ESTIMATE", encoded, gaitmsg_estimate_t_encode(encoded, 0, MESSAGE_BYTES, m));
     if (s->track.config.lag > 0)
         send_lagged(s);
     else
@@ -340,13 +311,12 @@ void service_send_estimate(service *s, const image_view *v, const gait_estimate 
 
 void service_send_status(service *s)
 {
-    static uint8_t room[MESSAGE_ROOM];
     char version[32];
     const histogram *const st = &s->counts.step, *const la = &s->counts.latency;
     uint32_t const v = gait_version();
     snprintf(version, sizeof version, "%u.%u.%u", v / 10000, v / 100 % 100, v % 100);
     gaitmsg_status_t const msg = {
-        .utime = service_now(),
+        .utime = clock_wall(),
         .version = version,
         .model_digest = (int64_t)s->track.info.digest,
         .tracker_digest = (int64_t)service_digest(s),
@@ -367,6 +337,6 @@ void service_send_status(service *s)
         .memory_bytes = (int64_t)s->track.memory_bytes,
         .text = s->text.text,
     };
-    sink_publish(s->out, "GAIT_STATUS", room, gaitmsg_status_t_encode(room, 0, MESSAGE_ROOM, &msg));
+    sink_publish(s->out, "GAIT_STATUS", encoded, gaitmsg_status_t_encode(encoded, 0, MESSAGE_BYTES, &msg));
     s->news = false;
 }

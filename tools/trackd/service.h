@@ -13,8 +13,7 @@
 #include "timing.h"
 #include "tracking.h"
 
-/* ---- the tracker as a service: messages in, messages out, whatever carries them. */
-/* Since the program's start or the last RESET. */
+/* Since the program started or the last RESET. */
 typedef struct service_counts {
     int64_t frames, dropped, rejected;
     histogram step, latency; /* microseconds */
@@ -22,56 +21,62 @@ typedef struct service_counts {
 
 enum { SERVICE_PAST = 65 }; /* more than the longest lag */
 
-typedef struct past_frame { /* what the source said of a frame that was tracked */
+typedef struct past_frame { /* a frame that was tracked */
     uint64_t step;          /* of the tracker */
     int64_t frame, number, receive_utime;
     int32_t step_us;
 } past_frame;
 
-/* Why frames that come are not tracked. */
-enum { SERVICE_IDLE_NOT, SERVICE_IDLE_CAMERA, SERVICE_IDLE_START, SERVICE_IDLE_SCENE, SERVICE_IDLE_LOOKING };
+/* Why incoming frames are not tracked. */
+enum {
+    SERVICE_IDLE_NOT,
+    SERVICE_IDLE_CAMERA,
+    SERVICE_IDLE_START,
+    SERVICE_IDLE_SCENE,
+    SERVICE_IDLE_SEARCHING
+};
 
 typedef struct service {
     tracking track;
-    lift_service *lift; /* the second service; NULL: not asked for */
-    keypoint_cue *cue;  /* joints of a detector for the tracker; NULL: not asked for */
+    lift_service *lift; /* the second service; NULL: not requested */
+    keypoint_cue *cue;  /* a detector's keypoints for the tracker; NULL: not requested */
     sink *out;          /* where messages go */
     int threads;
     int stream; /* number of the camera, [0, 30] */
     bool has_init;
     init_state init; /* of --init FILE */
     start_trigger start;
-    bool compared;         /* the empty scene with a frame */
-    bool seek;             /* start with whoever walks in, and again when lost */
-    auto_start auto_start; /* looks for them */
-    int8_t state;          /* GAITMSG_STATUS_T_* */
-    bool news;             /* the state has changed since the last status */
+    bool compared; /* the background with a frame */
+    bool seek;     /* start automatically, and again when the person is lost */
+    auto_start auto_start;
+    int8_t state; /* GAITMSG_STATUS_T_* */
+    bool news;    /* the state has changed since the last status */
     int64_t command_id;
     service_counts counts;
-    int64_t came, tracked;   /* frames since the program's start, whatever RESET says */
-    int64_t dropped_before;  /* value of counts.dropped at START */
-    int64_t last_frame;      /* highest number of a frame that came; -1: none */
-    int64_t last_came;       /* capture time of the last frame that came */
-    bool missed;             /* that one was not tracked, and is counted as dropped */
-    int64_t last_utime;      /* capture time of the last frame tracked, or of the start */
-    int64_t steps;           /* frames tracked since START */
-    budget budget;           /* limit 0 in a log, which is played without loss */
-    int32_t wanted;          /* particles asked for last; 0 before there is a tracker */
-    size_t pool_bytes;       /* of the threads */
-    double max_gap;          /* longest pause that is bridged by prediction, seconds */
-    int idle;                /* SERVICE_IDLE_*: said last of frames that nobody tracks */
-    message text, complaint; /* what the status says; the last line on stderr */
+    int64_t arrived, tracked; /* frames since the program started, unaffected by RESET */
+    int64_t dropped_before;   /* value of counts.dropped at START */
+    int64_t last_frame;       /* highest number of a frame that arrived; -1: none */
+    int64_t last_arrived;     /* capture time of the last frame that arrived */
+    bool missed;              /* that frame was not tracked and is counted as dropped */
+    int64_t last_utime;       /* capture time of the last tracked frame, or of the start */
+    int64_t steps;            /* frames tracked since START */
+    budget budget;            /* limit 0 for a log, which is played without dropping frames */
+    int32_t wanted;           /* particles requested last; 0 before there is a tracker */
+    size_t pool_bytes;        /* of the threads */
+    double max_gap;           /* longest pause that is bridged by prediction, seconds */
+    int idle;                 /* SERVICE_IDLE_*: reported last */
+    message text, complaint;  /* text of the status; last complaint on stderr */
     estimate_message estimate;
     past_frame past[SERVICE_PAST];
     stride_meter meter;
     uint8_t *particles; /* encoded particles_t; NULL: not sent */
     size_t particles_bytes;
     gait_state *hypothesis; /* [hypotheses] */
-    int32_t hypotheses;     /* the most there can be */
+    int32_t hypotheses;     /* capacity */
     gaitmsg_particles_t cloud;
 } service;
 
-/* `track` is open.  With `particles` the memory for GAIT_PARTICLES is taken now. */
+/* `track` is open.  With `particles`, also takes the memory for GAIT_PARTICLES. */
 bool service_open(service *s, sink *out, int stream, int threads, const init_state *init, bool particles,
                   message *why);
 void service_close(service *s);
@@ -80,26 +85,19 @@ bool service_set_camera(service *s, const gait_camera *camera, message *why);
 void service_camera(service *s, const gaitmsg_camera_t *msg);
 void service_background(service *s, const image_view *v);
 void service_command(service *s, const gaitmsg_command_t *msg);
-/* One frame that arrived at `arrival_utime`; not the `newest`: another waits behind it, this one is dropped. */
+/* A frame that arrived at `arrival_utime`; it is dropped if it is not the newest one. */
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime);
-/* Say in the status, and once on stderr, what is wrong with the input; reject: and count it. */
-void service_complain(service *s, const message *why);
-void service_reject(service *s, const message *why);
-/* Go to a state, GAITMSG_STATUS_T_*; text NULL: the status goes on saying what it says. */
+/* Report a fault of the input in the status and, unless it is the last one repeated, on stderr. */
+void service_complain(service *s, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Change the state to GAITMSG_STATUS_T_*; text NULL: keep the text of the status. */
 void service_set_state(service *s, int8_t state, const char *text);
-/* Pixels of a frame or plate as the tracker takes them. */
+/* Pixels of a frame or background in the format of the tracker. */
 bool service_pixels(service *s, const image_view *v, gait_image *out, message *why);
-/* Why no frame that came was tracked. */
+/* Why none of the frames that arrived was tracked. */
 void service_lack(const service *s, message *why);
-void service_send_status(service *s);
-uint64_t service_digest(const service *s); /* 0 before the camera is known */
-/* Wall clock, microseconds since the Unix epoch. */
-int64_t service_now(void);
-/* The same of a clock that nobody sets, from any beginning. */
-int64_t service_ticks(void);
-
-/* ---- what the service publishes. */
-/* GAIT_ESTIMATE, and GAIT_PARTICLES when asked for; `received` is when the frame had arrived. */
+/* GAIT_ESTIMATE, GAIT_ESTIMATE_LAG, GAIT_STRIDE and GAIT_PARTICLES of a frame that was tracked. */
 void service_send_estimate(service *s, const image_view *v, const gait_estimate *e, int64_t received,
                            int64_t step_us);
+void service_send_status(service *s);
+uint64_t service_digest(const service *s); /* 0 before the camera is known */
 #endif

@@ -1,12 +1,11 @@
-/* service_frame.c - what a frame does to the service: the start comes, the tracker steps, somebody is looked for. */
+/* service_frame.c - what the service does with a frame: start, step the tracker, look for a person. */
 #include "service.h"
 
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-/* Frames that never arrived, by the gap in their numbers. */
+/* Count the frames that never arrived, by the gap in their numbers. */
 static void count_gap(service *s, const image_view *v)
 {
     if (s->state == GAITMSG_STATUS_T_RUNNING && s->last_frame >= 0 && v->frame > s->last_frame + 1)
@@ -14,24 +13,24 @@ static void count_gap(service *s, const image_view *v)
     s->last_frame = v->frame > s->last_frame ? v->frame : s->last_frame;
 }
 
-/* Has this frame been here, or been counted as one that never arrived? */
-static bool again(const service *s, const image_view *v)
+/* Whether this frame has arrived before, or has been counted as one that never did. */
+static bool is_repeated(const service *s, const image_view *v)
 {
     bool const numbered = v->frame >= 0 && s->last_frame >= 0;
-    return v->utime == s->last_came ||
-           (numbered && (v->frame == s->last_frame || (v->frame < s->last_frame && v->utime < s->last_came)));
+    return v->utime == s->last_arrived ||
+           (numbered &&
+            (v->frame == s->last_frame || (v->frame < s->last_frame && v->utime < s->last_arrived)));
 }
 
-/* Not tracking any more, or not yet, for a reason that is said. */
-static void stop(service *s, const message *why)
+/* Stop tracking for a reason that has just been reported. */
+static void stop(service *s)
 {
     service_set_state(s, GAITMSG_STATUS_T_READY, NULL);
-    service_complain(s, why);
     if (!s->seek)
-        s->idle = SERVICE_IDLE_START; /* `why` says it */
+        s->idle = SERVICE_IDLE_START;
 }
 
-/* Begin to track if the armed start has come; true when the tracker runs. */
+/* Begin to track if the frame of the start has arrived; true when the tracker runs. */
 static bool begin(service *s, const image_view *v)
 {
     message why;
@@ -41,13 +40,14 @@ static bool begin(service *s, const image_view *v)
         return false;
     if (answer == START_TRIGGER_MISSED ||
         !tracking_start(&s->track, &s->start.mean, &s->start.sd, utime, &why)) {
-        stop(s, &why);
+        stop(s);
+        service_complain(s, "%s", why.text);
         return false;
     }
     s->last_utime = utime;
     s->dropped_before = s->counts.dropped;
     s->last_frame = v->frame;
-    s->last_came = v->utime;
+    s->last_arrived = v->utime;
     s->missed = false;
     s->steps = 0;
     memset(s->past, 0xff, sizeof s->past); /* no step has such a number */
@@ -56,53 +56,48 @@ static bool begin(service *s, const image_view *v)
     return true;
 }
 
-/* What becomes of somebody who is not tracked any more. */
-static const char *remedy(const service *s)
+/* What happens after tracking has stopped. */
+static const char *next_start(const service *s)
 {
-    return s->seek ? "looking for somebody anew" : "send START";
+    return s->seek ? "looking for a person again" : "send START";
 }
 
-/* Can this frame follow the last one?  A pause that is too long stops the tracker, and so does a clock that was set
- * back as far, or it would wait for ever. */
+/* Whether this frame can follow the last one.  Too long a pause stops the tracker, and so does a clock set back as far, for
+ * which it would otherwise wait. */
 static bool in_time(service *s, const image_view *v)
 {
-    message why;
-    double const pause = 1e-6 * ((double)v->utime - (double)s->last_utime); /* of any two numbers */
+    double const pause = 1e-6 * ((double)v->utime - (double)s->last_utime); /* cannot overflow */
     if (fabs(pause) > s->max_gap) {
-        message_set(&why,
-                    pause > 0 ? "no frame for %.3f s (at most %.3f): stopped; %s"
-                              : "capture time went back by %.3f s (at most %.3f): stopped; %s",
-                    fabs(pause), s->max_gap, remedy(s));
-        stop(s, &why);
+        stop(s);
+        service_complain(s,
+                         pause > 0 ? "no frame for %.3f s (at most %.3f): stopped; %s"
+                                   : "capture time went back by %.3f s (at most %.3f): stopped; %s",
+                         fabs(pause), s->max_gap, next_start(s));
         return false;
     }
-    if (pause < 0 || (pause == 0 && s->steps > 0)) {
-        message_set(&why, "capture time did not advance; stamp frames in order");
-        service_reject(s, &why);
-        return false;
-    }
-    return true;
+    if (pause > 0 || (pause == 0 && s->steps == 0))
+        return true;
+    s->counts.rejected++;
+    service_complain(s, "capture time did not advance; stamp frames in order");
+    return false;
 }
 
-/* Say if the empty scene is another one than the frame's. */
+/* Report once if the background shows another scene than the frame. */
 static void compare_scene(service *s, const gait_image *frame)
 {
-    message why;
     if (s->compared || !s->track.background.data)
         return;
     s->compared = true;
-    if (blob_another_scene(&s->auto_start.finder, frame, &s->track.background)) {
-        message_set(
-            &why,
-            "half of the picture differs from the empty scene: give that of this camera (--background, "
+    if (blob_another_scene(&s->auto_start.finder, frame, &s->track.background))
+        service_complain(
+            s,
+            "half of the image differs from the background: give that of this camera (--background, "
             "GAIT_BACKGROUND_%d)",
             s->stream);
-        service_complain(s, &why);
-    }
 }
 
-/* Look for somebody to start with; true when the tracker has begun with this frame. */
-static bool spot(service *s, const image_view *v, const gait_image *frame)
+/* Look for a person to start with; true when the tracker has started with this frame. */
+static bool try_auto_start(service *s, const image_view *v, const gait_image *frame)
 {
     gait_state mean = s->track.prior_mean, sd = s->track.prior_sd;
     if (!s->seek || !s->track.background.data ||
@@ -113,21 +108,20 @@ static bool spot(service *s, const image_view *v, const gait_image *frame)
     start_trigger_by_time(&s->start, &mean, &sd, v->utime);
     if (!begin(s, v))
         return false;
-    fprintf(stderr,
-            "gait-trackd: somebody found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees\n",
-            v->frame, (double)mean.pelvis[0], (double)mean.pelvis[1], (double)mean.heading * 57.29578);
+    log_line("person found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees", v->frame,
+             (double)mean.pelvis[0], (double)mean.pelvis[1], (double)mean.heading * 57.29578);
     return true;
 }
 
-/* Nobody is tracked: start with whoever walks in. */
-static bool spot_first(service *s, const image_view *v)
+/* No person is tracked: start with one who walks in. */
+static bool start_with_first(service *s, const image_view *v)
 {
     gait_image frame;
     message why;
     if (!s->seek || !service_pixels(s, v, &frame, &why))
         return false;
     compare_scene(s, &frame);
-    return spot(s, v, &frame);
+    return try_auto_start(s, v, &frame);
 }
 
 /* Predict through a pause longer than one step may be, in equal steps without an image. */
@@ -144,44 +138,45 @@ static gait_result bridge(service *s, int64_t utime, gait_estimate *out, gait_er
     return GAIT_OK;
 }
 
-static void say_particles(const service *s, int32_t had)
+static void log_particles(const service *s, int32_t had)
 {
     const budget *const b = &s->budget;
     if (b->reason == BUDGET_DROPPED)
-        fprintf(stderr, "gait-trackd: %d particles instead of %d: %d frames were dropped\n", (int)s->wanted,
-                (int)had, (int)b->lost);
+        log_line("%d particles instead of %d: %d frames were dropped", (int)s->wanted, (int)had,
+                 (int)b->lost);
     else
-        fprintf(stderr, "gait-trackd: %d particles instead of %d: a step %s %.1f ms of %.1f\n",
-                (int)s->wanted, (int)had, b->reason == BUDGET_SPARE ? "takes only" : "took",
-                (double)b->took_us / 1e3, (double)b->limit_us / 1e3);
+        log_line("%d particles instead of %d: a step %s %.1f ms of %.1f", (int)s->wanted, (int)had,
+                 b->reason == BUDGET_SPARE ? "takes only" : "took", (double)b->took_us / 1e3,
+                 (double)b->limit_us / 1e3);
 }
 
-/* Go on with another number of particles if the budget says so. */
+/* Change the number of particles if the budget requires it. */
 static void adapt(service *s, int64_t birth, int64_t step_us)
 {
     int32_t const had = s->wanted;
-    s->wanted = budget_stepped(&s->budget, birth, service_now(), step_us, had);
+    s->wanted = budget_stepped(&s->budget, birth, clock_wall(), step_us, had);
     if (budget_hopeless(&s->budget, s->wanted))
-        fprintf(stderr,
-                "gait-trackd: a step takes %.1f ms, more than the budget of %.1f: fewer --particles, more "
-                "--threads or --adapt-particles\n",
-                (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
+        log_line(
+            "a step takes %.1f ms, more than the budget of %.1f: use fewer --particles, more --threads or "
+            "--adapt-particles",
+            (double)s->budget.step_us / 1e3, (double)s->budget.limit_us / 1e3);
     if (s->wanted == had || gait_tracker_set_particles(s->track.tracker, s->wanted, NULL) != GAIT_OK)
         return;
-    say_particles(s, had);
+    log_particles(s, had);
     s->news = true;
 }
 
-/* Track the frame; false: it could not be used. */
+/* Track the frame; false if it cannot be used. */
 static bool step(service *s, const image_view *v, int64_t received, int64_t birth)
 {
     gait_frame frame = {.utime = v->utime};
     gait_estimate estimate;
     gait_error err = {.text = ""};
     message why;
-    int64_t const begun = service_ticks();
+    int64_t const begun = clock_monotonic();
     if (!service_pixels(s, v, &frame.image[0], &why)) {
-        service_reject(s, &why);
+        s->counts.rejected++;
+        service_complain(s, "%s", why.text);
         return false;
     }
     compare_scene(s, &frame.image[0]);
@@ -191,11 +186,11 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     if (status == GAIT_OK)
         status = gait_tracker_step(s->track.tracker, &frame, &estimate, &err);
     if (status != GAIT_OK) {
-        message_set(&why, "stopped: %s (%s); %s", err.text, gait_result_name(status), remedy(s));
-        stop(s, &why);
+        stop(s);
+        service_complain(s, "stopped: %s (%s); %s", err.text, gait_result_name(status), next_start(s));
         return false;
     }
-    int64_t const step_us = service_ticks() - begun;
+    int64_t const step_us = clock_monotonic() - begun;
     s->last_utime = v->utime;
     s->counts.frames++;
     s->tracked++;
@@ -203,32 +198,29 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     histogram_add(&s->counts.step, step_us);
     service_send_estimate(s, v, &estimate, received, step_us);
     s->steps++;
-    histogram_add(&s->counts.latency, service_now() - v->utime);
+    histogram_add(&s->counts.latency, clock_wall() - v->utime);
     adapt(s, birth, step_us);
     if (estimate.status == GAIT_TRACK_LOST)
-        spot(s, v, &frame.image[0]);
+        try_auto_start(s, v, &frame.image[0]);
     else if (estimate.status != GAIT_TRACK_INIT)
         auto_start_reset(&s->auto_start);
     return true;
 }
 
-/* May this frame be tracked, or is there a newer one, or is it too old? */
+/* Whether this frame may be tracked: it is the newest and not too old. */
 static bool fresh(service *s, bool newest, int64_t birth, int64_t now)
 {
-    message why;
     if (!newest)
         budget_missed(&s->budget);
     else if (budget_allows(&s->budget, birth, now))
         return true;
-    else {
-        message_set(&why, "frames too old for a budget of %.1f ms are dropped",
-                    (double)s->budget.limit_us / 1e3);
-        service_complain(s, &why);
-    }
+    else
+        service_complain(s, "frames too old for a budget of %.1f ms are dropped",
+                         (double)s->budget.limit_us / 1e3);
     return false;
 }
 
-/* Why are frames that come not tracked?  SERVICE_IDLE_*. */
+/* Why incoming frames are not tracked, SERVICE_IDLE_*. */
 static int idle_of(const service *s)
 {
     if (s->state == GAITMSG_STATUS_T_WAITING)
@@ -237,11 +229,11 @@ static int idle_of(const service *s)
         return SERVICE_IDLE_NOT;
     if (!s->seek)
         return SERVICE_IDLE_START;
-    return s->track.background.data ? SERVICE_IDLE_LOOKING : SERVICE_IDLE_SCENE;
+    return s->track.background.data ? SERVICE_IDLE_SEARCHING : SERVICE_IDLE_SCENE;
 }
 
-/* What is lacking in such a state. */
-static void say_lack(const service *s, int idle, message *why)
+/* What is missing in such a state. */
+static void set_lack(const service *s, int idle, message *why)
 {
     int const i = s->stream;
     if (idle == SERVICE_IDLE_CAMERA)
@@ -250,28 +242,28 @@ static void say_lack(const service *s, int idle, message *why)
         message_set(why, "no START: send it on GAIT_COMMAND, or run with --init");
     else if (idle == SERVICE_IDLE_SCENE)
         message_set(why,
-                    "--init auto needs the empty scene to find somebody: give --background, send "
+                    "--init auto needs the background to detect a person: give --background, send "
                     "GAIT_BACKGROUND_%d, or send START on GAIT_COMMAND",
                     i);
-    else if (idle == SERVICE_IDLE_LOOKING)
-        message_set(why, "nobody walks in full view for a second");
+    else if (idle == SERVICE_IDLE_SEARCHING)
+        message_set(why, "no person walks in full view for a second");
     else
-        message_set(why, "the frame of the start did not come");
+        message_set(why, "the frame of the start did not arrive");
 }
 
-/* Say once why frames come and nobody is tracked, and again when the reason is another one. */
-static void say_idle(service *s)
+/* Report why frames are not tracked, again when the reason changes. */
+static void log_idle(service *s)
 {
     message why;
     int const idle = idle_of(s);
     if (idle == s->idle)
         return;
     s->idle = idle;
-    say_lack(s, idle, &why);
-    if (idle == SERVICE_IDLE_LOOKING)
-        fprintf(stderr, "gait-trackd: looking for somebody who walks in full view\n");
+    set_lack(s, idle, &why);
+    if (idle == SERVICE_IDLE_SEARCHING)
+        log_line("looking for a person who walks in full view");
     else if (idle != SERVICE_IDLE_NOT)
-        fprintf(stderr, "gait-trackd: frames come, but %s\n", why.text);
+        log_line("frames arrive, but %s", why.text);
 }
 
 void service_lack(const service *s, message *why)
@@ -279,22 +271,22 @@ void service_lack(const service *s, message *why)
     if (s->state != GAITMSG_STATUS_T_WAITING && s->complaint.text[0])
         *why = s->complaint;
     else
-        say_lack(s, idle_of(s), why);
+        set_lack(s, idle_of(s), why);
 }
 
 void service_frame(service *s, const image_view *v, bool newest, int64_t arrival_utime)
 {
-    int64_t const now = service_now(), birth = budget_birth(v->utime, arrival_utime);
-    bool const repeated = s->state == GAITMSG_STATUS_T_RUNNING && again(s, v);
+    int64_t const now = clock_wall(), birth = budget_birth(v->utime, arrival_utime);
+    bool const repeated = s->state == GAITMSG_STATUS_T_RUNNING && is_repeated(s, v);
     count_gap(s, v);
-    say_idle(s);
+    log_idle(s);
     if (s->state == GAITMSG_STATUS_T_ARMED && !begin(s, v))
         return;
-    if (s->state == GAITMSG_STATUS_T_READY && newest && !spot_first(s, v))
+    if (s->state == GAITMSG_STATUS_T_READY && newest && !start_with_first(s, v))
         return;
     if (s->state != GAITMSG_STATUS_T_RUNNING)
         return;
-    s->last_came = v->utime;
+    s->last_arrived = v->utime;
     bool const due = !repeated || s->missed; /* counts as dropped unless it is tracked */
     s->counts.dropped -= repeated && s->missed;
     s->missed = !(fresh(s, newest, birth, now) && in_time(s, v) && step(s, v, now, birth)) && due;

@@ -12,90 +12,94 @@
 #define FLAG(field)           OPTION_FLAG, &s->field, 0, 0
 
 enum { OWN = 30, OPTIONS = OWN + TRACKER_OPTIONS };
-static char particles_help[80], search_help[160]; /* written by say_defaults() */
+static char particles_help[80], acquisition_help[200]; /* written by describe_defaults() */
 
 /* Options that write into `s`. */
 static void make_table(settings *s, option *table)
 {
     const option own[] = {
-        {"model", 'm', "FILE", "model blob (.gait), from `gait learn`; needed", TEXT(model)},
+        {"model", 'm', "FILE", "model (.gait) made by `gait learn`; required", TEXT(model)},
         {"camera", 0, "FILE",
-         "camera JSON; without it the camera comes over GAIT_CAMERA_<i> from `gait capture`,\n"
-         "        which also reads OpenCV YAML/XML and TOML",
+         "camera JSON; without it the camera arrives on GAIT_CAMERA_<i> from `gait capture`, which\n"
+         "        also reads OpenCV YAML/XML and TOML",
          TEXT(camera)},
         {"background", 0, "FILE", "empty scene, PGM or PPM; without it GAIT_BACKGROUND_<i>",
          TEXT(background)},
         {"init", 0, "FILE|auto",
-         "where the walker is at one frame (JSON); auto, the default: start with whoever walks through\n"
-         "        the empty scene in full view for a second, and again after losing them; a START on\n"
-         "        GAIT_COMMAND begins as well, with either",
+         "state of the person at one frame (JSON); auto, the default: start when a person has walked\n"
+         "        through the empty scene in full view for a second, and again after losing them; with\n"
+         "        either, a START on GAIT_COMMAND also starts the tracker",
          TEXT(init)},
         {"url", 0, "URL",
          "LCM to listen on, default $LCM_DEFAULT_URL or " LINK_DEFAULT_URL ";\n"
-         "        file://LOG?speed=0 plays a log without loss and ends with it",
+         "        file://LOG?speed=0 plays a log without dropping frames and then ends",
          TEXT(url)},
         {"out", 0, "URL",
-         "LCM to publish on, default --url; for a log: nowhere, or file://NEW?mode=w, or mode=a\n        to "
-         "add to one",
+         "LCM to publish on, default --url; when playing a log: nothing, or file://NEW?mode=w, or\n"
+         "        ?mode=a to append",
          TEXT(out)},
         {"config", 0, "FILE",
-         "lines `name = value` with the long names of these options; the command line wins", TEXT(config)},
+         "lines `name = value` with the long names of these options; the command line takes precedence",
+         TEXT(config)},
         {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
         {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
         {"particles", 'n', "N", particles_help, INT(particles, 16, 1 << 20)},
         {"budget-ms", 0, "MS",
-         "live: frames that cannot be answered within so many milliseconds of their capture are\n"
-         "        dropped and counted; a frame whose stamp is more than a second off, or of the future, "
-         "counts\n"
-         "        from its arrival; default: none",
+         "live: drop and count frames that cannot be answered within MS milliseconds of their capture; a\n"
+         "        frame whose time stamp is more than a second old, or in the future, counts from its\n"
+         "        arrival; default: no limit",
          OPTION_FLOAT, &s->budget_ms, 1, 10000},
         {"adapt-particles", 0, "LOW",
-         "with --budget-ms: take fewer particles, down to LOW, when steps are too slow or frames are\n"
-         "        dropped, and double them, up to --particles, when there is time to spare; results\n"
-         "        then depend on time; default: their number never changes",
+         "with --budget-ms: use fewer particles, down to LOW, when steps are too slow or frames are\n"
+         "        dropped, and double them, up to --particles, when there is time to spare; results then\n"
+         "        depend on timing; default: constant",
          INT(adapt_particles, 16, 1 << 20)},
-        {"acquisition-particles", 0, "N", search_help, INT(acquisition_particles, 0, 1 << 20)},
-        {"components", 0, "Q", "principal components in use; default the first 5, in paper mode all",
+        {"acquisition-particles", 0, "N", acquisition_help, INT(acquisition_particles, 0, 1 << 20)},
+        {"components", 0, "Q", "principal components to use; default the first 5, in paper mode all",
          INT(components, 0, GAIT_MAX_COMPONENTS)},
         {"lag", 0, "N",
-         "frames that GAIT_ESTIMATE_LAG and GAIT_STRIDE wait for, default 5; 0: no GAIT_ESTIMATE_LAG",
+         "frames by which GAIT_ESTIMATE_LAG and GAIT_STRIDE are delayed, default 5; 0: no GAIT_ESTIMATE_LAG",
          INT(lag, 0, 64)},
-        {"seed", 0, "N", "of the random numbers, default 1", OPTION_U64, &s->seed, 0, 0},
-        {"threads", 't', "N", "default 1; results do not depend on it", INT(threads, 1, GAIT_POOL_MAX)},
+        {"seed", 0, "N", "seed of the random numbers, default 1", OPTION_U64, &s->seed, 0, 0},
+        {"threads", 't', "N", "threads, default 1; results do not depend on it",
+         INT(threads, 1, GAIT_POOL_MAX)},
         {"tasks", 0, "N",
-         "pieces of a step that can be worked on at once, default --threads, each with memory of its\n"
-         "        own; results do not depend on it",
+         "tasks into which a step is divided, default --threads, each with its own memory; results do\n"
+         "        not depend on it",
          INT(tasks, 1, 256)},
         {"cpu-mask", 0, "N",
-         "instruction sets that may be used, added up: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none;\n"
-         "        default all that the CPU has; results do not depend on it",
+         "sum of the instruction sets to use: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none; default all\n"
+         "        that the CPU has; results do not depend on it",
          INT(cpu_mask, 0, GAIT_CPU_BASE | GAIT_CPU_AVX2 | GAIT_CPU_AVX512)},
         {"max-gap", 0, "S",
-         "longest pause between frames, default 2 seconds: one longer than --max-dt is bridged by\n"
-         "        predictions of at most --max-dt each; after one longer than this, or a clock set back as\n"
-         "        far, the tracker stops: --init auto looks for somebody anew, --init FILE waits for a START",
+         "longest pause between frames, default 2 seconds: a pause longer than --max-dt is bridged by\n"
+         "        predictions of at most --max-dt each; after a longer pause, or when the clock is set back "
+         "as\n"
+         "        far, the tracker stops: --init auto looks for a person again, --init FILE waits for a "
+         "START",
          OPTION_FLOAT, &s->max_gap, 0, 60},
-        {"particles-channel", 0, "", "publish every hypothesis on GAIT_PARTICLES", FLAG(particles_channel)},
-        {"tracks-term", 0, "",
-         "the tracker also heeds 2-D joints of a detector, GAIT_TRACKS_<i> with the capture time of the\n"
-         "        frame; a frame waits for its joints until the next one comes",
-         FLAG(tracks_term)},
-        {"tracks-sd", 0, "PX",
-         "standard deviation of a joint with confidence 1, what a detector's joints differ from the\n"
-         "        model's by included, default 4 pixels",
-         OPTION_FLOAT, &s->tracks_sd, 0.01, 1000},
+        {"particles-channel", 0, "", "publish every particle on GAIT_PARTICLES", FLAG(particles_channel)},
+        {"keypoints-term", 0, "",
+         "also use a detector's 2-D keypoints, GAIT_TRACKS_<i> with the capture time of the frame; a frame\n"
+         "        waits for its keypoints until the next one arrives",
+         FLAG(keypoints_term)},
+        {"keypoints-sd", 0, "PX",
+         "standard deviation of a keypoint with confidence 1, including how the detector's joints differ\n"
+         "        from the model's, default 4 pixels",
+         OPTION_FLOAT, &s->keypoints_sd, 0.01, 1000},
         {"lift", 0, "",
-         "also lift 2-D tracks of joints, GAIT_TRACKS_<i>, to 3-D joints with standard deviations on\n"
-         "        GAIT_LIFT, by the segment prior of the model",
+         "also lift 2-D keypoints, GAIT_TRACKS_<i>, to 3-D joints with standard deviations on GAIT_LIFT,\n"
+         "        by the segment prior of the model",
          FLAG(lift)},
-        {"lift-model", 0, "FILE", "blob with that segment prior, default --model", TEXT(lift_model)},
-        {"lift-height", 0, "M", "height of the person lifted, default the mean of those learnt from",
-         OPTION_FLOAT, &s->lift_stature, 0.5, 2.5},
-        {"lift-sd", 0, "PX", "standard deviation of a point with confidence 1, default 3 pixels",
+        {"lift-model", 0, "FILE", "model with that segment prior, default --model", TEXT(lift_model)},
+        {"lift-stature", 0, "M",
+         "stature of the person to lift, default the mean of the training set, metres", OPTION_FLOAT,
+         &s->lift_stature, 0.5, 2.5},
+        {"lift-sd", 0, "PX", "standard deviation of a keypoint with confidence 1, default 3 pixels",
          OPTION_FLOAT, &s->lift_sd, 0.01, 1000},
-        {"lift-lag", 0, "N", "frames that GAIT_LIFT waits for later ones, default 5", INT(lift_lag, 0, 64)},
-        {"version", 0, "", "say the version, and whether JPEG frames are understood", FLAG(version)},
-        {"quiet", 'q', "", "no word of where it listens, no summary at the end", FLAG(quiet)},
+        {"lift-lag", 0, "N", "frames by which GAIT_LIFT is delayed, default 5", INT(lift_lag, 0, 64)},
+        {"version", 0, "", "print the version and whether JPEG frames are supported", FLAG(version)},
+        {"quiet", 'q', "", "do not print the URL at the start and the summary at the end", FLAG(quiet)},
     };
     _Static_assert(sizeof own / sizeof *own == OWN, "every option has a place");
     _Static_assert((int)OPTIONS <= (int)OPTIONS_MOST, "a configuration file can set every option");
@@ -117,17 +121,17 @@ static void set_defaults(settings *s)
                     .lift_lag = -1};
 }
 
-/* The defaults of the library that the help names. */
-static void say_defaults(void)
+/* Defaults of the library, for the help. */
+static void describe_defaults(void)
 {
     gait_tracker_config usual, paper;
     gait_tracker_default(&usual, GAIT_MODE_DEFAULT);
     gait_tracker_default(&paper, GAIT_MODE_PAPER);
-    snprintf(particles_help, sizeof particles_help, "hypotheses; default %d, paper mode %d",
+    snprintf(particles_help, sizeof particles_help, "number of particles; default %d, paper mode %d",
              (int)usual.particles, (int)paper.particles);
-    snprintf(search_help, sizeof search_help,
-             "a search, until left and right are known, takes twice the hypotheses, up to N; default %d,\n"
-             "        paper mode %d: no more than --particles",
+    snprintf(acquisition_help, sizeof acquisition_help,
+             "until left and right are known, use twice the particles, up to N; default %d, paper mode %d:\n"
+             "        no more than --particles",
              (int)usual.acquisition_particles, (int)paper.acquisition_particles);
 }
 
@@ -136,17 +140,15 @@ void settings_help(void)
     static settings s;
     option table[OPTIONS];
     make_table(&s, table);
-    say_defaults();
+    describe_defaults();
     printf(
         "usage: gait-trackd -m MODEL.gait [--camera CAMERA.json] [--init INIT.json|auto] [options]\n\n"
-        "Track a walking person: frames come over LCM (GAIT_IMAGE_<i>), estimates go out (GAIT_ESTIMATE,\n"
-        "and GAIT_ESTIMATE_LAG: a few frames late, by what was seen since), each stride with its time, "
-        "length\n"
-        "and speed (GAIT_STRIDE), and GAIT_STATUS once a second.  Live, the newest frame wins and the "
-        "others\n"
-        "are counted as dropped.\n"
-        "Commands START, STOP and RESET come over GAIT_COMMAND.  SIGINT or SIGTERM end the program with a\n"
-        "summary.  Exit codes: 0 ok, 1 failed, 2 usage.\n\n");
+        "Track a walking person in frames that arrive over LCM (GAIT_IMAGE_<i>).  Publishes estimates\n"
+        "(GAIT_ESTIMATE), smoothed estimates a few frames later (GAIT_ESTIMATE_LAG), the time, length and\n"
+        "speed of each stride (GAIT_STRIDE), and GAIT_STATUS once a second.  Live, only the newest frame is\n"
+        "tracked; the others are counted as dropped.\n"
+        "Accepts the commands START, STOP and RESET on GAIT_COMMAND.  SIGINT or SIGTERM end the program\n"
+        "with a summary.  Exit codes: 0 ok, 1 failed, 2 usage.\n\n");
     options_help(table, OPTIONS);
 }
 
@@ -162,8 +164,8 @@ static int32_t particles(const settings *s)
     return s->particles ? s->particles : usual.particles;
 }
 
-/* An option that only means something with another one is refused without it. */
-static bool check_company(const settings *s, message *why)
+/* Refuse an option that has no effect without another one. */
+static bool check_dependencies(const settings *s, message *why)
 {
     struct {
         const char *option, *needs;
@@ -172,10 +174,10 @@ static bool check_company(const settings *s, message *why)
         {"adapt-particles", "budget-ms", s->adapt_particles > 0, s->budget_ms > 0},
         {"background", "camera", s->background[0], s->camera[0]},
         {"lift-model", "lift", s->lift_model[0], s->lift},
-        {"lift-height", "lift", s->lift_stature > 0, s->lift},
+        {"lift-stature", "lift", s->lift_stature > 0, s->lift},
         {"lift-sd", "lift", s->lift_sd > 0, s->lift},
         {"lift-lag", "lift", s->lift_lag >= 0, s->lift},
-        {"tracks-sd", "tracks-term", s->tracks_sd > 0, s->tracks_term},
+        {"keypoints-sd", "keypoints-term", s->keypoints_sd > 0, s->keypoints_term},
     };
     for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
         if (pair[i].given && !pair[i].there)
@@ -189,23 +191,24 @@ static bool same_file(const char *a, const char *b)
     return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
 }
 
-/* The log played is only read; the one written is new, and none of the files that are read. */
+/* The log that is played is only read; the one that is written must not be one of the input files. */
 static bool check_logs(const settings *s, message *why)
 {
     char from[LINK_PATH] = "", to[LINK_PATH];
     const char *const read[] = {from, s->model, s->camera, s->background, s->init, s->config, s->lift_model};
     if (link_is_log(link_url(s->url)) && link_log(link_url(s->url), from) != 'r')
-        return message_set(why, "--url %.160s: a log to listen to is only read; leave ?mode= out",
-                           link_url(s->url));
+        return message_set(why,
+                           "--url %.160s: a log to play is only read; leave out ?mode=", link_url(s->url));
     if (!link_is_log(s->out))
         return true;
     char const mode = link_log(s->out, to);
     if (mode != 'w' && mode != 'a')
-        return message_set(
-            why, "--out %.160s: gives no log to write; add ?mode=w (new) or ?mode=a (at its end)", s->out);
+        return message_set(why, "--out %.160s: not a log to write; add ?mode=w (new) or ?mode=a (append)",
+                           s->out);
     for (size_t i = 0; i < sizeof read / sizeof *read; i++)
         if (read[i][0] && same_file(read[i], to))
-            return message_set(why, "--out %.160s: would overwrite %.40s, which is read; give another name",
+            return message_set(why,
+                               "--out %.160s: would overwrite %.40s, which is an input; give another name",
                                s->out, i ? "a file" : "the log of --url");
     return true;
 }
@@ -222,14 +225,14 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
     if (result != OPTION_OK)
         return result;
     bool const ok =
-        (s->model[0] || s->version || message_set(why, "--model FILE is needed; `gait learn` makes one")) &&
+        (s->model[0] || s->version || message_set(why, "--model FILE is required; `gait learn` makes one")) &&
         (strcmp(s->mode, "paper") == 0 || strcmp(s->mode, "default") == 0 ||
          message_set(why, "--mode %.100s: give default or paper", s->mode)) &&
         (strncmp(link_url(s->url), "memq://", 7) != 0 ||
-         message_set(why, "--url memq://: reaches nobody outside one process; give udpm:// or file://")) &&
+         message_set(why, "--url memq://: works only within one process; give udpm:// or file://")) &&
         (s->budget_ms == 0 || !link_is_log(link_url(s->url)) ||
-         message_set(why, "--budget-ms: a log is played without loss; leave it out")) &&
-        check_company(s, why) && check_logs(s, why) &&
+         message_set(why, "--budget-ms: a log is played without dropping frames; leave it out")) &&
+        check_dependencies(s, why) && check_logs(s, why) &&
         (s->adapt_particles <= particles(s) ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,
                      (int)particles(s)));
@@ -248,7 +251,7 @@ void settings_tracker(const settings *s, gait_tasks exec, gait_tracker_config *c
     c->cpu_mask = (uint32_t)s->cpu_mask;
     c->tasks = s->tasks ? s->tasks : s->threads;
     c->exec = exec;
-    if (s->tracks_term)
+    if (s->keypoints_term)
         c->terms |= GAIT_TERM_KEYPOINTS;
     tracker_options_apply(&s->tracker, c);
 }

@@ -89,12 +89,12 @@ static void begin(stride_meter *m, const gait_estimate *e)
 
 bool stride_meter_add(stride_meter *m, const gait_estimate *e, stride *out)
 {
-    double const longest = 0.5, jump = 0.25; /* seconds, strides beyond what the rate explains */
+    double const longest = 0.5, limit = 0.25; /* seconds; strides from what the rate predicts */
     stride_point const now = point_of(m, e);
     double const dt = now.seconds - m->last.seconds, turn = wrapped((double)e->mean.phase - m->phase);
     bool found = false;
     if (!m->running || !(dt > 0.0) || dt > longest ||
-        fabs(wrapped(turn - (double)e->mean.stride_hz * dt)) > jump) {
+        fabs(wrapped(turn - (double)e->mean.stride_hz * dt)) > limit) {
         begin(m, e);
         return false;
     }

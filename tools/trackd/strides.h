@@ -18,7 +18,7 @@ typedef struct stride {                      /* from strike to strike of a foot 
     float speed, speed_sd;                   /* metres per second */
 } stride;
 
-typedef struct stride_point { /* what an estimate says, or a strike between two of them */
+typedef struct stride_point { /* of an estimate, or a strike between two of them */
     double seconds;           /* since the meter's first estimate */
     double late;              /* standard deviation of a strike's time, seconds */
     double place[2], sd[2];   /* pelvis over the ground, metres */

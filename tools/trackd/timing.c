@@ -45,14 +45,14 @@ int32_t histogram_quantile(const histogram *h, double share)
 /* ---- budget ---- */
 enum {
     SAME_CLOCK_US = 1000000, /* a frame does not take longer to arrive */
-    LOOK = 30,               /* steps between two looks at the frames dropped */
-    SETTLE = 8,              /* steps until step_us shows what another number of particles takes */
-    FAR = 2,                 /* steps in a row longer than the limit that are no accident */
-    TOO_MANY = 3,            /* frames dropped between two looks */
-    CALM = 90,               /* steps that are fast before the number doubles */
-    RETRY = 4,               /* frames refused for the last step's time alone before one is tried again */
-    TRIAL = 900,             /* steps after a doubling in which less again means that it was one too many */
-    PATIENCE = 32,           /* times CALM, the longest wait before so many are tried again */
+    CHECK_EVERY = 30,        /* steps between two checks of the dropped frames */
+    SETTLE = 8,              /* steps until step_us reflects a changed number of particles */
+    FAR = 2,                 /* steps in a row longer than the limit that are not chance */
+    TOO_MANY = 3,            /* frames dropped between two checks */
+    CALM = 90,               /* fast steps in a row before the number doubles */
+    RETRY = 4,               /* frames refused only because of the last step's time before one is tried */
+    TRIAL = 900,             /* steps after a doubling in which a reduction means that it failed */
+    PATIENCE = 32,           /* times CALM, the longest wait before a failed number is tried again */
 };
 
 void budget_reset(budget *b)
@@ -86,7 +86,7 @@ void budget_missed(budget *b)
     b->calm = 0;
 }
 
-/* As many as take half of the limit, if a step's time is in proportion to them. */
+/* Number of particles that takes half of the limit, if the time of a step is proportional to it. */
 static int32_t fitting(const budget *b, int64_t step_us, int32_t particles)
 {
     int64_t const fit = particles * (b->limit_us / 2) / step_us;
@@ -113,8 +113,8 @@ static int32_t choose(budget *b, int64_t step_us, int32_t particles)
     return b->calm >= CALM && twice > particles && !soon ? twice : particles;
 }
 
-/* Learn from a change how long to wait before so many are tried again. */
-static void judge(budget *b, int32_t wanted, int32_t particles)
+/* Learn from a change how long to wait before a failed number is tried again. */
+static void learn_patience(budget *b, int32_t wanted, int32_t particles)
 {
     b->wait -= b->wait > 0;
     if (wanted > particles) {
@@ -141,14 +141,14 @@ int32_t budget_stepped(budget *b, int64_t birth, int64_t now, int64_t step_us, i
     b->slow_steps += b->slow > 0;
     b->steps++;
     int32_t const wanted = b->low ? choose(b, step_us, particles) : particles;
-    judge(b, wanted, particles);
+    learn_patience(b, wanted, particles);
     b->before_us = step_us;
     b->lost = b->dropped;
-    if (wanted != particles || b->steps >= LOOK)
+    if (wanted != particles || b->steps >= CHECK_EVERY)
         b->steps = b->dropped = 0;
     if (wanted != particles)
         b->calm = 0;
-    if (wanted < particles) { /* so that frames are not refused for what steps took before */
+    if (wanted < particles) { /* so that frames are not refused because of earlier steps */
         b->step_us = b->step_us * wanted / particles;
         b->slow = 0;
     }

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- start_trigger ---- */
+/* ---- start trigger ---- */
 void start_trigger_by_file(start_trigger *a, const init_state *init)
 {
     *a = (start_trigger){
@@ -17,7 +17,7 @@ void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_
         .armed = true, .mean = *mean, .sd = *sd, .frame = -1, .utime = utime, .last_frame = -1};
 }
 
-/* Capture time of the wanted frame when it was lost: between its neighbours, evenly. */
+/* The frame of the start was lost: interpolate its capture time between its neighbours. */
 static start_trigger_answer lost_frame(const start_trigger *a, int64_t number, int64_t frame_utime,
                                        int64_t *utime, message *why)
 {
@@ -67,7 +67,7 @@ start_trigger_answer start_trigger_reached(start_trigger *a, const image_view *f
     return answer;
 }
 
-/* ---- tracking ---- */
+/* ---- tracker ---- */
 static size_t padded(size_t bytes)
 {
     return (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
@@ -122,7 +122,7 @@ static size_t row_bytes(const gait_image *image)
     return (size_t)image->width * (image->format == GAIT_GREY8 ? 1 : 3);
 }
 
-static bool same_picture(const gait_image *a, const gait_image *b)
+static bool same_image(const gait_image *a, const gait_image *b)
 {
     if (!a->data || a->format != b->format)
         return false;
@@ -136,9 +136,9 @@ bool tracking_set_background(tracking *t, const gait_image *plate, message *why)
 {
     const gait_camera *const c = &t->config.camera[0];
     if (plate->width != c->width || plate->height != c->height)
-        return message_set(why, "background of %dx%d, the camera has %dx%d; take both alike", plate->width,
-                           plate->height, c->width, c->height);
-    if (same_picture(&t->background, plate))
+        return message_set(why, "background of %dx%d, but the camera has %dx%d; give equal sizes",
+                           plate->width, plate->height, c->width, c->height);
+    if (same_image(&t->background, plate))
         return true;
     size_t const row = row_bytes(plate);
     for (int32_t y = 0; y < plate->height; y++)

@@ -5,14 +5,14 @@
 #include "image_view.h"
 #include "input_files.h"
 
-/* ---- from which frame on to track: a start waits here until the stream reaches it. */
+/* ---- start trigger: a commanded start waits until the stream reaches its frame. */
 typedef struct start_trigger {
     bool armed;
     gait_state mean, sd;
     int64_t frame;                  /* start at the frame of this number; -1: by time */
     int64_t utime;                  /* start at this capture time; 0: at the next frame */
-    int64_t last_frame, last_utime; /* of the last frame before; -1: none yet */
-    int64_t received;               /* frames, for sources that do not count */
+    int64_t last_frame, last_utime; /* of the frame before; -1: none yet */
+    int64_t received;               /* frames, for sources that do not number them */
 } start_trigger;
 
 typedef enum start_trigger_answer {
@@ -23,12 +23,12 @@ typedef enum start_trigger_answer {
 
 void start_trigger_by_file(start_trigger *a, const init_state *init);
 void start_trigger_by_time(start_trigger *a, const gait_state *mean, const gait_state *sd, int64_t utime);
-/* Has the stream reached the start?  Then `utime` is the capture time at which the state holds.  START_TRIGGER_MISSED: the
- * stream began more than `max_gap` seconds too late. */
+/* Whether the stream has reached the start; `utime` is then the capture time of the start.  START_TRIGGER_MISSED: the stream
+ * began more than `max_gap` seconds too late. */
 start_trigger_answer start_trigger_reached(start_trigger *a, const image_view *frame, double max_gap,
                                            int64_t *utime, message *why);
 
-/* ---- one model, one camera, one tracker in one block of memory that is taken once. */
+/* ---- one model, one camera, one tracker, in one block of memory that is allocated once. */
 typedef struct tracking {
     model_file file;
     const gait_model *model;
@@ -41,16 +41,16 @@ typedef struct tracking {
     gait_image background; /* data NULL: none */
     size_t model_bytes;    /* blob and model */
     size_t tracker_bytes, picture_bytes;
-    size_t memory_bytes; /* all of them and the pictures */
+    size_t memory_bytes; /* all of these */
 } tracking;
 
 /* Load the model.  `config` is complete but for camera[0]. */
 bool tracking_open(tracking *t, const char *model_path, const gait_tracker_config *config, message *why);
 void tracking_close(tracking *t);
-/* Take the block and make the tracker; only once. */
+/* Allocate the block and make the tracker; only once. */
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why);
-/* Copy the empty scene; one that is already there is left alone.  It must have the camera's size. */
+/* Copy the background, unless it is already in use.  It must have the camera's size. */
 bool tracking_set_background(tracking *t, const gait_image *plate, message *why);
-/* Begin with a state; one that makes no sense is refused and changes nothing. */
+/* Start from a state; an invalid one is refused and changes nothing. */
 bool tracking_start(tracking *t, const gait_state *mean, const gait_state *sd, int64_t utime, message *why);
 #endif
