@@ -12,8 +12,8 @@ import gait
 from gait.bindings.abi import Mode
 from gait.bindings.model import Model
 from gait.errors import GaitError
-from gait.track.tracker import Tracker
 from gait.track.config import TrackerConfig
+from gait.track.tracker import Tracker
 
 CAMERA = rig.CAMERA.to_dict()
 INIT = {"frame": 3, "pelvis": [0, 0, 0.9], "phase": 0.5, "sd": {"pelvis": 0.1}}
