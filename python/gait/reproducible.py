@@ -13,6 +13,12 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+from collections.abc import Iterator
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 COMMON = {
     "OPENBLAS_CORETYPE": "Nehalem",
@@ -47,6 +53,28 @@ def dask_setup(_: object) -> None:
     """Let the workers that a nanny starts use the common kernels."""
     if _to_choose():
         os.environ.update(COMMON)
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Let the linear algebra of numpy use one thread within the block.
+
+    Its bits then do not depend on the number of cores, and its small matrices are faster.
+    """
+    with _algebra().limit(limits=1, user_api="blas"):
+        yield
+
+
+def one_thread_for_good() -> None:
+    """Do so until the process ends: where tasks run in threads, one would end the other's limit."""
+    _algebra().limit(limits=1, user_api="blas")
+
+
+@cache
+def _algebra() -> ThreadpoolController:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def _to_choose() -> bool:

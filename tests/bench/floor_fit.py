@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from gait.body.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, curves, points
-from gait.learn.cycles.sequence import Sequence, levelled
+from gait.learn.cycles.sequence import Sequence
 from gait.learn.prior.fit import channel_scale
 from gait.learn.solve import readers, retarget
 
@@ -72,7 +72,7 @@ class Found:
 
 def walk(s: Sequence) -> Walk:
     """Take every EVERYth frame of a prepared recording with all of its joints and channels."""
-    body, measures = levelled(readers.read(s.source), s.kept), s.measures
+    body, measures = retarget.levelled(readers.read(s.source).part(*s.kept)), s.measures
     if measures is None:
         raise ValueError(f"{s.source}: no joints")
     joints = dict(body.joints)

@@ -10,7 +10,7 @@ import numpy as np
 from floor_fit import OFFSETS
 
 from gait.body.skeleton import ANGLES
-from gait.learn.model_options import DEFAULT_COMPONENTS
+from gait.learn.options import DEFAULT_COMPONENTS
 from gait.learn.prior.fit import Learned
 from gait.track.config import TrackerConfig
 

@@ -8,14 +8,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from gait.learn.prior import fpca
-from gait.learn.prior.impute import by_svd, column_mean
+from gait.learn.cycles.fourier import HARMONICS, decode, encode, fourier_basis
+from gait.learn.prior import components as pca
+from gait.learn.prior.imputation import column_mean, right_singular
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 Imputer = Callable[[Floats, Mask, int], Floats]
 
 PPCA_PASSES, PPCA_TOLERANCE = 200, 1e-5
+SVD_PASSES, SVD_TOLERANCE = 500, 1e-6  # of the paper: relative decrease of the error
 
 
 def mean(values: Floats, mask: Mask, components: int) -> Floats:
@@ -54,8 +56,25 @@ def _interpolated(values: Floats, mask: Mask, between: Callable[..., Floats]) ->
 
 def svd(values: Floats, mask: Mask, components: int) -> Floats:
     """Singular value decomposition and filling by turns, without Fourier basis (SVDimpute)."""
-    start = column_mean(values, mask)
-    return by_svd(values, mask, components, np.eye(values.shape[1]), start).filled
+    return _by_svd(values, mask, components, np.eye(values.shape[1]))
+
+
+def _by_svd(values: Floats, mask: Mask, components: int, basis: Floats) -> Floats:
+    """The paper's way (Fig. 5 steps 3-9): decompose the filled data, fill from the leading part, repeat."""
+    filled, before = mean(values, mask, 0), np.inf
+    for _ in range(SVD_PASSES):
+        coded = encode(filled, basis)
+        middle = coded.mean(axis=0)
+        leading = right_singular(coded, middle)[1][:components]
+        model = decode(middle + (coded - middle) @ leading.T @ leading, basis, values.shape[2])
+        error = float(np.sqrt(np.mean((values - model)[mask] ** 2)))
+        if error > before:
+            break
+        filled = np.where(mask, values, model)
+        if error >= before * (1 - SVD_TOLERANCE):
+            break
+        before = error
+    return filled
 
 
 def ppca(values: Floats, mask: Mask, components: int) -> Floats:
@@ -91,12 +110,12 @@ def _grams(seen: Floats, load: Floats) -> Floats:
 
 def paper(values: Floats, mask: Mask, components: int) -> Floats:
     """Functional components as in the paper."""
-    return fpca.fit(values, mask, components, method="paper").filled
+    return _by_svd(values, mask, components, fourier_basis(values.shape[1], HARMONICS))
 
 
 def ours(values: Floats, mask: Mask, components: int) -> Floats:
     """Functional components as `gait learn` finds them."""
-    return fpca.fit(values, mask, components).filled
+    return pca.fit(values, mask, components).filled
 
 
 IMPUTERS: dict[str, Imputer] = {

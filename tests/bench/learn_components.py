@@ -19,11 +19,13 @@ import gait_generator as g
 import learn_cases as cases
 
 from gait.body.skeleton import CHANNELS, default_skeleton, points
-from gait.learn.corpus.stage import one_thread_for_good
+from gait.learn.cycles.fourier import HARMONICS, fourier_basis
 from gait.learn.cycles.sequence import load
-from gait.learn.prior import fit, fpca, impute, rank
+from gait.learn.prior import components as pca
+from gait.learn.prior import fit, imputation, rank
 from gait.learn.prior.model import anova
 from gait.progress import progress
+from gait.reproducible import one_thread_for_good
 
 COLUMNS = ("measure", "case", "figure", "value", "wanted", "met")
 SEEDS = 5
@@ -94,7 +96,7 @@ def _limbs() -> Iterator[Row]:
             else:
                 angles = [10] if name.endswith("angle") else [3, 4, 5, 6, 11, 12, 13, 14]
                 taken = cases.without_channel(case, angles, np.flatnonzero(case.subject == 3))
-            found = fpca.fit(case.values, case.mask, 5).filled
+            found = pca.fit(case.values, case.mask, 5).filled
             ratio.append(case.error(found, taken) / case.error(case.oracle(), taken))
     for name, ratio in ratios.items():
         yield _row("L8", name, "RMSE / oracle", max(ratio), 1.3)
@@ -106,7 +108,7 @@ def _seams() -> Iterator[Row]:
         mean, curves = [], []
         for seed in range(SEEDS):
             rows = cases.drifting(_rng(9, seed), rise=rise)
-            found = fpca.fit(rows.values, rows.mask, 5)
+            found = pca.fit(rows.values, rows.mask, 5)
             mean.append(cases.seam(found.mean))
             curves += [cases.seam(curve) for curve in found.curves]
         name = f"cycles that rise by {rise:g} degrees"
@@ -130,7 +132,7 @@ def _angles() -> Iterator[Row]:
     angles = []
     for seed in range(SEEDS):
         case = cases.walks(_rng(10, seed))
-        angles.append(cases.principal_angles(case.modes, fpca.fit(case.values, case.mask, 5).curves))
+        angles.append(cases.principal_angles(case.modes, pca.fit(case.values, case.mask, 5).curves))
     worst = np.sort(np.array(angles), axis=1).max(axis=0)
     yield _row("L10", "20 % missing", "largest principal angle, degrees", worst[-1], 5)
     yield _row("L10", "20 % missing", "third principal angle, degrees", worst[2], 2)
@@ -141,7 +143,7 @@ def _scores() -> Iterator[Row]:
     correlation, spread, parts = [], [], []
     for seed in range(SEEDS):
         case = cases.people(_rng(11, seed))
-        found = fpca.fit(case.values, case.mask, 5)
+        found = pca.fit(case.values, case.mask, 5)
         scores = cases.mode_scores(case, found)
         correlation += [np.corrcoef(scores[:, k], case.scores[:, k])[0, 1] for k in range(5)]
         centred = case.scores - case.scores.mean(axis=0)
@@ -162,14 +164,15 @@ def _passes() -> Iterator[Row]:
         passes, rise, difference = [], [], []
         for seed in range(SEEDS):
             case = cases.walks(_rng(12, seed), missing=share)
-            found = fpca.fit(case.values, case.mask, 5)
-            other = fpca.fit(case.values, case.mask, 5, start=np.zeros(case.values.shape[1:]))
+            found = pca.fit(case.values, case.mask, 5)
+            zero, basis = np.zeros(case.values.shape[1:]), fourier_basis(g.GRID, HARMONICS)
+            other = imputation.complete(case.values, case.mask, 5, basis, zero)
             passes += [len(found.objective), len(other.objective)]
             rise += [_rise(found.objective), _rise(other.objective)]
             difference.append(np.abs(found.filled - other.filled).max())
         name = f"{share:.0%} missing"
         yield _row("L12", name, "passes", max(passes), 99)
-        yield _row("L12", name, "largest rise of the objective, relative", max(rise), impute.ROUNDING)
+        yield _row("L12", name, "largest rise of the objective, relative", max(rise), imputation.ROUNDING)
         yield _row("L12", name, "mean or zero as start, degrees", max(difference), 1e-3)
 
 
@@ -186,7 +189,7 @@ def _unseen() -> Iterator[Row]:
         model = np.empty_like(case.values)
         for person in np.unique(case.subject):
             out = case.subject == person
-            model[out] = _described(fpca.fit(case.values[~out], case.mask[~out], 5), case, out)
+            model[out] = _described(pca.fit(case.values[~out], case.mask[~out], 5), case, out)
         angles.append(np.sqrt(np.mean((model - case.values) ** 2, axis=(0, 1))))
         away = np.linalg.norm(_joints(model) - _joints(case.values), axis=-1).mean(axis=1)
         each = away.reshape(len(case.values), -1).mean(axis=1)
@@ -199,7 +202,7 @@ def _unseen() -> Iterator[Row]:
     yield _row("L13", name, "joints, median person, mm", float(np.median(distances)), 25)
 
 
-def _described(found: fpca.Components, case: cases.Case, rows: npt.NDArray[np.bool_]) -> Any:
+def _described(found: pca.Components, case: cases.Case, rows: npt.NDArray[np.bool_]) -> Any:
     """Rows (n, T, M) by the components, with scores by least squares of what is observed of each."""
     result = []
     for values, seen in zip(case.values[rows], case.mask[rows], strict=True):

@@ -30,13 +30,16 @@ from floor_shapes import ALL_OFFSETS, BARE, DIVIDED, MOST, OURS, SHAPES, TRACKED
 from gait.body.pace import series
 from gait.body.skeleton import CHANNELS, Proportions, default_skeleton
 from gait.errors import UserError
-from gait.learn.corpus import subjects
-from gait.learn.corpus.stage import one_thread, one_thread_for_good
-from gait.learn.cycles import cycles
-from gait.learn.cycles.sequence import Sequence, load, measured
-from gait.learn.prior import fit, fpca, model, pace, prior
+from gait.learn.arrays import Indices
+from gait.learn.corpus import sources
+from gait.learn.cycles import cutting
+from gait.learn.cycles.sequence import Sequence, load
+from gait.learn.mocap.tables import AngleTable
+from gait.learn.options import LearnOptions
+from gait.learn.prior import components, fit, model, people
 from gait.learn.solve import readers, retarget
 from gait.progress import progress
+from gait.reproducible import one_thread, one_thread_for_good
 
 Floats = npt.NDArray[np.float64]
 Sections = dict[str, Any]
@@ -138,12 +141,13 @@ def hold_out(sequences: list[Sequence], others: Bodies, subject: str) -> tuple[s
 
 def models(learners: list[Sequence], others: Bodies) -> tuple[dict[str, Sections], dict[str, Proportions]]:
     """Curves and proportions by the name of the model, and the bodies."""
-    paper, ours = fit.fit(learners, PAPER, kind="paper"), fit.fit(learners, others=others)
+    paper = fit.fit(learners, LearnOptions(components=PAPER, prior="paper"))
+    ours = fit.fit(learners, others=others)
     filled, subject, scale = ours.components.filled, ours.row_subject, fit.channel_scale()
-    both = np.concatenate([filled, prior.mirrored(filled)])
-    metric = prior.joint_metric(ours.components.mean, ours.proportions)
-    follows = {"PACE": series(ours.pace_curve, pace.TERMS), "GAIT": model.gait_statistics(ours)}
-    even = pace.without(filled, ours.paces[ours.cycles.sequence], ours.pace_curve)
+    both = np.concatenate([filled, people.mirrored(filled)])
+    metric = people.joint_metric(ours.components.mean, ours.proportions)
+    follows = {"PACE": series(ours.pace_curve, people.TERMS), "GAIT": model.gait_statistics(ours)}
+    even = people.at_mean_pace(filled, ours.paces[ours.cycles.sequence], ours.pace_curve)
     steps: tuple[Sections, ...] = (
         {"CURV": _plain(filled, scale)},
         {"CURV": _plain(both, scale)},
@@ -161,19 +165,19 @@ def models(learners: list[Sequence], others: Bodies) -> tuple[dict[str, Sections
 
 
 def _plain(rows: Floats, scale: Floats) -> Floats:
-    c = fpca.fit(rows * scale, np.ones(rows.shape, bool), MOST)
+    c = components.fit(rows * scale, np.ones(rows.shape, bool), MOST)
     return np.concatenate([c.mean[None], c.curves * c.sd[:, None, None]]) / scale
 
 
-def _alike(filled: Floats, subject: prior.Groups, metric: Floats) -> Floats:
-    mean, curves, _, sd, _ = prior.components(filled, subject, MOST, metric)
+def _alike(filled: Floats, subject: Indices, metric: Floats) -> Floats:
+    mean, curves, _, sd, _ = people.mirrored_components(filled, subject, MOST, metric)
     return np.concatenate([mean[None], curves * sd[:, None, None]])
 
 
 def own_cycle(s: Sequence) -> Sections:
     """A model of one walk: its mean cycle, no components, the walker's own lengths."""
-    rows = cycles.slice_cycles([s.channels], np.array([s.period.frames]), np.zeros(1), fit.SAMPLES)
-    mean = fpca.fit(rows.values, rows.mask, 0).mean
+    rows = cutting.cut_cycles([s.channels], np.array([s.period.frames]), np.zeros(1), fit.SAMPLES)
+    mean = components.fit(rows.values, rows.mask, 0).mean
     return {"CURV": mean[None], **default_skeleton(retarget.own_proportions(s.measures)).sections()}
 
 
@@ -289,8 +293,9 @@ def main() -> int:
 
 def strangers(paths: list[Path], walkers: list[str]) -> Bodies:
     """Bodies of people in other files who are none of the walkers, one each."""
-    files = dict(zip(subjects.subjects(paths), paths, strict=True))
-    return [measured(readers.read(path)) for who, path in files.items() if who not in walkers]
+    files = dict(zip(sources.subjects(paths), paths, strict=True))
+    read = [readers.read(path) for who, path in files.items() if who not in walkers]
+    return [retarget.measure(retarget.levelled(body)) for body in read if not isinstance(body, AngleTable)]
 
 
 def _load(path: Path) -> Sequence:

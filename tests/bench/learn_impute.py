@@ -29,8 +29,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import learn_cases as cases
 from learn_components import components
 
-from gait.learn.corpus.stage import one_thread_for_good
 from gait.progress import progress
+from gait.reproducible import one_thread_for_good
 
 ROOT = Path(__file__).resolve().parents[2]
 MOCAP = ROOT / "../shared/data/mocap/cmu_walk"

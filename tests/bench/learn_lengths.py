@@ -17,12 +17,12 @@ import numpy as np
 import table
 
 from gait.errors import UserError
-from gait.learn.corpus import sources
-from gait.learn.corpus.stage import one_thread
-from gait.learn.reading import DEFAULT
+from gait.learn.corpus import load
+from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.solve import readers
 from gait.learn.solve.body import Body
 from gait.learn.solve.retarget import Measures, measure
+from gait.reproducible import one_thread
 
 MARKERS = "trc"  # folder beside the walks: a walk and a run of one person, markers of OpenSim
 LIMBS = ("upper_arm", "forearm", "thigh", "shank", "foot")
@@ -66,9 +66,9 @@ def main() -> int:
         begun = time.perf_counter()
         alone = [readers.read(path) for path in paths]
         middle = time.perf_counter()
-        bodies = sources.measured([(path, True) for path in paths], people="folder")
-        held = [body.stretch if body else None for body in bodies]
-        together = [readers.read(path, DEFAULT, stretch) for path, stretch in zip(paths, held, strict=True)]
+        bodies = load.shared_lengths([(path, True) for path in paths], LearnOptions(subjects="folder"))
+        held = [body.log_scales if body else None for body in bodies]
+        together = [readers.read(path, DEFAULT, scales) for path, scales in zip(paths, held, strict=True)]
         seconds = middle - begun, time.perf_counter() - middle
     table.publish(
         "learn_lengths",

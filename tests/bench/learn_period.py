@@ -25,10 +25,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import gait_generator as g
 from learn_measures import cramer_rao, falls, gauge_free, walkers
 
-from gait.learn.corpus.stage import one_thread_for_good
 from gait.learn.cycles import align, period
 from gait.learn.cycles.sequence import load
 from gait.progress import progress
+from gait.reproducible import one_thread_for_good
 
 Floats = npt.NDArray[np.float64]
 Row = tuple[str, str, str, float, str, str]
@@ -80,7 +80,7 @@ def _aligned(job: tuple[int, float, str]) -> tuple[Floats, float, int, bool]:
     """Errors of offsets in frames, the largest in cycles, the passes, whether the objective always fell."""
     seed, style, start = job
     signals, periods, true = walkers(np.random.default_rng([5, seed, int(style)]), style)
-    found = align.align(signals, periods, start=start)
+    found = align.align(signals, periods, np.zeros(len(signals)) if start == "zeros" else None)
     errors = np.abs(gauge_free(found.offsets, true, periods))
     fell = found.converged and falls(found.objective)
     return errors, float(np.max(errors / periods)), len(found.objective), fell

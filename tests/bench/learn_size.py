@@ -18,10 +18,11 @@ from gait.body.pace import series, waves
 from gait.body.skeleton import default_skeleton, points
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn.corpus.stage import one_thread
 from gait.learn.cycles.fourier import HARMONICS
 from gait.learn.cycles.sequence import load
-from gait.learn.prior import between, fit, model, pace
+from gait.learn.options import LearnOptions
+from gait.learn.prior import fit, model, people
+from gait.reproducible import one_thread
 
 Floats = npt.NDArray[np.float64]
 
@@ -45,7 +46,7 @@ def distance(learned: fit.Learned, one: Floats, other: Floats) -> float:
     """Root mean square distance of the points about the pelvis, mm, of two stretches of channels (n, M)."""
     sections = default_skeleton(learned.proportions).sections()
     off = points(sections, one) - points(sections, other)
-    return 1000 * between.ADULT_STATURE[0] * float(np.sqrt(np.mean(np.sum(off**2, axis=-1))))
+    return 1000 * people.ADULT_STATURE[0] * float(np.sqrt(np.mean(np.sum(off**2, axis=-1))))
 
 
 def main() -> int:
@@ -57,10 +58,10 @@ def main() -> int:
         print(f"learn_size: {args.source}: no .amc files; name the folder of walks", file=sys.stderr)
         return 1
     with one_thread():
-        learned = fit.fit([load(path) for path in paths], COMPONENTS)
-        size = len(blob.encode(model.sections(learned, "walk", 1)))
+        learned = fit.fit([load(path) for path in paths], LearnOptions(components=COMPONENTS))
+        size = len(blob.encode(model.sections(learned, LearnOptions())))
         paces = learned.paces[learned.cycles.sequence]
-        whole = pace.slope(learned.components.filled, learned.row_subject, paces, TERMS)
+        whole = people.pace_slope(learned.components.filled, learned.row_subject, paces, TERMS)
     mean = learned.components.mean
     cut = distance(learned, mean + learned.pace_curve, mean + whole)
     rows = [

@@ -31,8 +31,8 @@ from gait.body.skeleton import EVAL15, JOINTS
 from gait.camera.camera import Camera
 from gait.io.track_file import read_truth
 from gait.io.video import Video, read_plate
-from gait.learn.segment_options import Segments
-from gait.learn.segments import segment_motion
+from gait.learn.options import SegmentOptions
+from gait.learn.segments import motion as segment_motion
 from gait.learn.solve import readers
 from gait.lift.video.clip_segments import ClipSegments, Settings
 from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_placement
@@ -138,9 +138,11 @@ def _clicked(prior: SegmentPrior, walk: Walk, angle: float, seed: int) -> list[f
 
 def _walk(path: Path) -> Walk:
     """Joints of a recorded walk at the prior's rate."""
-    motion = segment_motion.of(path, readers.read(path), Segments())
+    motion = segment_motion.of(path, readers.read(path), SegmentOptions())
     joints = motion.stature * motion.places[FRAMES, [motion.names.index(name) for name in JOINTS]]
-    return Walk(list(JOINTS), joints, Segments().fps, float(motion.root[FRAMES.start, 2]), motion.stature)
+    return Walk(
+        list(JOINTS), joints, SegmentOptions().fps, float(motion.root[FRAMES.start, 2]), motion.stature
+    )
 
 
 def _all_known(clip: ClipSegments, truth: np.ndarray[Any, Any]) -> ClipSegments:

@@ -25,9 +25,10 @@ from eval_clips import DATA
 from gait.bindings.lifter import Lifter
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import axis_rotation
-from gait.learn.segment_options import Segments
-from gait.learn.segments import segment_corpus, segment_motion
-from gait.learn.segments.segment_corpus import Corpus
+from gait.learn.options import SegmentOptions
+from gait.learn.segments import corpus as segment_corpus
+from gait.learn.segments import motion as segment_motion
+from gait.learn.segments.corpus import Corpus
 from gait.learn.solve import readers
 from gait.lift.report.segment_figures import Gaussian, placed_as_learnt
 from gait.progress import progress
@@ -111,7 +112,7 @@ def learnt_without(file: Path, model: Path, sources: tuple[str, ...], modes: int
 
 def held_out(file: str, folder: Path, modes: int) -> HeldOut:
     """Learn what is beside a sequence, and cut the sequence into segments placed as in the prior."""
-    path, wanted, model = MOCAP / file, Segments(source="only", people=False), folder / "m.gait"
+    path, wanted, model = MOCAP / file, SegmentOptions(source="only", people=False), folder / "m.gait"
     prior = learnt_without(path, model, (file.split("/")[0],), modes)
     motion = segment_motion.of(path, readers.read(path), wanted)
     with Corpus() as corpus:

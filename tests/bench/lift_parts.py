@@ -19,9 +19,9 @@ from gait.body.skeleton import EVAL15
 from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_truth
-from gait.learn.corpus.stage import one_thread
 from gait.lift.smooth.size import tells_distance
 from gait.progress import progress
+from gait.reproducible import one_thread
 
 PARTS = {
     "all": EVAL15,

@@ -29,12 +29,12 @@ from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import EVAL15, axis_rotation
 from gait.camera.camera import Camera
 from gait.io.track_file import Joints, read_truth
-from gait.learn.corpus.stage import one_thread
-from gait.learn.segment_options import Segments
-from gait.learn.segments import segment_motion
+from gait.learn.options import SegmentOptions
+from gait.learn.segments import motion as segment_motion
 from gait.learn.solve import readers
 from gait.lift.smooth import motion
 from gait.progress import progress
+from gait.reproducible import one_thread
 
 Floats = npt.NDArray[np.float64]
 
@@ -119,7 +119,7 @@ def _way(places: Floats) -> tuple[Floats, float]:
 
 def _recorded(subject: str, own: str) -> list[Floats]:
     """Joints (T, 15, 3) in statures of some of a person's walks, but for one."""
-    wanted, found = Segments(source="only", people=False, fps=RATE), []
+    wanted, found = SegmentOptions(source="only", people=False, fps=RATE), []
     for path in sorted((eval_clips.MOCAP / subject).glob("*.amc")):
         read = segment_motion.of(path, readers.read(path), wanted)
         places = read.places[:, [read.names.index(name) for name in EVAL15]]

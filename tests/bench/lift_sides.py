@@ -21,12 +21,12 @@ from gait.body.skeleton import EVAL15
 from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import Joints
-from gait.learn.corpus.stage import one_thread
 from gait.lift.keypoints import noise, swaps
 from gait.lift.segment.view import Perspective
 from gait.lift.smooth import motion
 from gait.lift.smooth.motion import Options
 from gait.progress import progress
+from gait.reproducible import one_thread
 
 Floats = npt.NDArray[np.float64]
 

@@ -26,11 +26,11 @@ from gait.errors import UserError
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import Joints, read_truth
 from gait.io.trc import read_trc
-from gait.learn.corpus.stage import one_thread
 from gait.lift.keypoints import noise
 from gait.lift.segment.view import Parallel, Perspective, View, looking_along
 from gait.lift.smooth import motion
 from gait.progress import progress
+from gait.reproducible import one_thread
 
 Floats = npt.NDArray[np.float64]
 

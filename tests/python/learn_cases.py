@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import gait_generator as g
 import numpy as np
 
-from gait.learn.cycles import cycles
+from gait.learn.cycles import cutting
 
 SUBJECT_SD, CYCLE_SD = 1.0, 0.44  # of the scores, shares of SCORE_SD
 REFERENCE = {"rows": 80, "samples": 64, "sd": (2.0, 1.2, 0.7), "noise": 0.45, "missing": 0.13}
@@ -129,7 +129,7 @@ def drifting(rng, sequences=12, rise=6.0):
         signals.append(z + rise * np.arange(frames)[:, None] / period)
         periods.append(period)
         offsets.append(offset)
-    return cycles.slice_cycles(signals, np.array(periods), np.array(offsets), g.GRID)
+    return cutting.cut_cycles(signals, np.array(periods), np.array(offsets), g.GRID)
 
 
 def seams(curves, neighbours=True):

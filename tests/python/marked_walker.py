@@ -1,12 +1,13 @@
 """Markers on walkers: on the default skeleton in known poses, and on recorded bodies."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from gait.body.skeleton import ANGLES, SIDES, Proportions
 from gait.learn import rotations
-from gait.learn.mocap.marker_sets import LANDMARKS, SETS
-from gait.learn.solve import articulated, retarget
-from gait.learn.solve.articulated import SEGMENTS
+from gait.learn.mocap.markers import LANDMARKS, SETS
+from gait.learn.solve import kinematics, retarget
+from gait.learn.solve.kinematics import SEGMENTS
 
 #: Labels of Plug-in-Gait's full body, as in Vicon's files.
 CENTRAL = ["SACR", "C7", "T10", "CLAV", "STRN"]
@@ -36,9 +37,9 @@ def walk_angles(frames, period, seed=0):
 
 def odd_lengths(rng, spread=0.08):
     """Stretches of somebody whose proportions are all off by `spread`."""
-    stretch = spread * rng.choice([-1.0, 1.0], articulated.STRETCH.shape[2])
+    stretch = spread * rng.choice([-1.0, 1.0], kinematics.SCALE_TABLE.shape[2])
     stretch[0] = np.log(1.82)
-    stretch[-len(articulated.LIMBS) :] = 0  # both sides alike
+    stretch[-len(kinematics.LIMBS) :] = 0  # both sides alike
     return stretch
 
 
@@ -54,15 +55,14 @@ def walker(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003
         rng = np.random.default_rng([seed, again])
     time, phase = np.arange(frames) / fps, 2 * np.pi * np.arange(frames) / period
     place = np.stack([1.3 * time, 0.02 * np.sin(phase), 0.97 + 0.02 * np.cos(2 * phase)], axis=1)
-    turn = articulated.turn_by(
-        np.stack([0.03 * np.sin(phase), 0.02 * np.cos(2 * phase), 0.1 * np.sin(phase)], 1)
-    )
-    pose = articulated.Pose(place, turn, angles)
+    turns = np.stack([0.03 * np.sin(phase), 0.02 * np.cos(2 * phase), 0.1 * np.sin(phase)], 1)
+    turn = Rotation.from_rotvec(turns).as_matrix()
+    pose = kinematics.Pose(place, turn, angles)
     marks = landmarks(labels)
     segment = np.array([SEGMENTS.index(m.segment) for m in marks])
-    local = articulated.scales(stretch)[segment] * np.array([m.at for m in marks])
+    local = kinematics.segment_scales(stretch)[segment] * np.array([m.at for m in marks])
     local = local + rng.normal(scale=0.006, size=local.shape)
-    points = articulated.posed(pose, articulated.origins(stretch)).points(local, segment)
+    points = kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)).points(local, segment)
     return points + rng.normal(scale=noise, size=points.shape), pose
 
 

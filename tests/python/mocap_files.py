@@ -6,7 +6,7 @@ import gait_generator as g
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gait.learn.mocap import mocap_asf
+from gait.learn.mocap import acclaim
 from gait.learn.mocap.recording import Y_UP
 
 # name, parent, direction, length (units of inch / 0.45), axis (degrees), dof
@@ -60,7 +60,7 @@ def toy_amc(frames=300, period=120.0, offset=10.0, speed=1.3, swing=1.0, seed=0)
     """Text of a straight walk at 120 frames/s, angles like the normative ones times `swing`."""
     phase = (np.arange(frames) - offset) / period
     curve = swing * g.mean_curves(phase) + np.random.default_rng(seed).normal(scale=0.1, size=(frames, 19))
-    unit = mocap_asf.INCH / 0.45
+    unit = acclaim.INCH / 0.45
     lines = [":FULLY-SPECIFIED", ":DEGREES"]
     for t in range(frames):
         neck, right, left = curve[t, :3], curve[t, 3:11], curve[t, 11:]
@@ -96,8 +96,8 @@ def write_toy(folder, name="77_01", **motion):
 
 def bvh_from_amc(path, rename=None, unit=0.0254 / 0.45):
     """Text of the same motion as BVH: one joint per bone, file axes kept, lengths in `unit` metres."""
-    skeleton = mocap_asf.read_skeleton(mocap_asf.find_skeleton(path))
-    motion = mocap_asf.read(path)
+    skeleton = acclaim.read_skeleton(acclaim.find_skeleton(path))
+    motion = acclaim.read(path)
     bones, scale = skeleton.bones, skeleton.metres / unit
     world = Y_UP.T @ motion.rotation @ Y_UP
     columns, lines = [motion.start[:, 0] @ Y_UP / unit], ["HIERARCHY"]

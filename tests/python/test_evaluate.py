@@ -17,7 +17,7 @@ from gait.body.skeleton import EVAL15, JOINTS
 from gait.cli import main
 from gait.io import blob
 from gait.io.track_file import Joints, Track, read_estimates, read_truth, write_lifted
-from gait.learn.segments import segment_sections
+from gait.learn.segments import fit as segment_fit
 from gait.motion.evaluate import (
     LIMBS,
     calibration,
@@ -300,7 +300,7 @@ def test_lifted_motion_is_compared_without_status_and_phase(tmp_path):
 
 def test_a_model_of_segments_alone_is_refused_by_name(tmp_path):
     path = tmp_path / "segments.gait"
-    blob.write(path, segment_sections.sections(toy_prior(4, 3, 2, 1)))
+    blob.write(path, segment_fit.sections(toy_prior(4, 3, 2, 1)))
     with pytest.raises(UserError, match="segments.gait: holds no cyclic model; learn it without"):
         read_cyclic(path)
 

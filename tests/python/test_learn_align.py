@@ -5,17 +5,17 @@ import numpy as np
 import pytest
 from learn_measures import falls, gauge_free, walkers
 
-from gait.learn.cycles import align, periodic, shift
+from gait.learn.cycles import align
 
 
-@pytest.mark.parametrize("start", ["xcorr", "zeros"])
+@pytest.mark.parametrize("start", [None, 0.0], ids=["xcorr", "zeros"])
 def test_offsets_are_found_below_a_frame(start):
     errors = {}
     for style in (0, 2, 4):
         errors[style] = []
         for seed in range(3):
             signals, periods, true = walkers(np.random.default_rng([seed, style]), float(style))
-            found = align.align(signals, periods, start=start)
+            found = align.align(signals, periods, None if start is None else np.zeros(len(signals)))
             errors[style].extend(np.abs(gauge_free(found.offsets, true, periods)))
             assert falls(found.objective) and found.converged
             assert len(found.objective) <= 12
@@ -27,21 +27,21 @@ def test_offsets_are_found_below_a_frame(start):
 
 def spoil(monkeypatch, passes, wrong):
     """After so many passes over 8 walkers put all offsets wrong by so many frames, in turn up and down."""
-    calls, best_offset = [], shift.Shift.best_offset
+    calls, best_offset = [], align._Sequence.best_offset
 
     def spoiled(sequence, table, weights, now):
         calls.append(now)
         off = wrong * (-1) ** len(calls) if len(calls) > passes * 8 else 0.0
         return best_offset(sequence, table, weights, now) + off
 
-    monkeypatch.setattr(shift.Shift, "best_offset", spoiled)
+    monkeypatch.setattr(align._Sequence, "best_offset", spoiled)
 
 
 def test_a_step_that_makes_it_worse_is_shown_and_taken_back(monkeypatch):
     signals, periods, true = walkers(np.random.default_rng(6), 2.0)
-    good = align.align(signals, periods, start="zeros")
+    good = align.align(signals, periods, np.zeros(len(signals)))
     spoil(monkeypatch, 2, 10.0)
-    bad = align.align(signals, periods, start="zeros")
+    bad = align.align(signals, periods, np.zeros(len(signals)))
     assert not falls(bad.objective) and not bad.converged
     assert bad.objective[:3] == good.objective[:3] and len(bad.objective) == 4
     assert np.max(np.abs(gauge_free(bad.offsets, true, periods))) < 3
@@ -49,7 +49,7 @@ def test_a_step_that_makes_it_worse_is_shown_and_taken_back(monkeypatch):
 
 def test_a_rise_too_small_to_look_for_is_the_end_and_taken_back(monkeypatch):
     signals, periods, true = walkers(np.random.default_rng(6), 2.0)
-    good = align.align(signals, periods, start="zeros")
+    good = align.align(signals, periods, np.zeros(len(signals)))
     spoil(monkeypatch, len(good.objective) - 1, 0.01)
     end = align.align(signals, periods, start=good.offsets)
     rise = end.objective[-1] / end.objective[-2] - 1
@@ -108,7 +108,7 @@ def test_sequences_without_whole_angles_are_aligned_by_the_others():
     signals[4][:, [k for k in range(19) if k != 18]] = np.nan
     for z in signals:
         z[:, 2] = np.nan
-    for start in ("xcorr", "zeros"):
+    for start in (None, np.zeros(len(signals))):
         found = align.align(signals, periods, start=start, hips=HIPS)
         assert np.max(np.abs(gauge_free(found.offsets, true, periods))) < 3
         assert np.isfinite(found.weights).all() and found.weights[2] == 0
@@ -137,11 +137,11 @@ def test_a_first_sequence_of_trunk_alone_is_ambiguous_and_others_start_too():
 
 
 def test_basis_is_periodic_smooth_and_a_partition_of_one():
-    basis = periodic.periodic_basis(np.array([0.0, 1.0, 0.31, 1.31, -0.69]))
+    basis = align._periodic_basis(np.array([0.0, 1.0, 0.31, 1.31, -0.69]))
     assert basis.sum(axis=1) == pytest.approx(1)
     assert basis[0] == pytest.approx(basis[1])
     assert basis[2] == pytest.approx(basis[3]) and basis[2] == pytest.approx(basis[4])
     step = 1e-3
-    around = periodic.periodic_basis(np.array([-2, -1, 0, 1, 2]) * step)
+    around = align._periodic_basis(np.array([-2, -1, 0, 1, 2]) * step)
     third = np.diff(around, 3, axis=0) / step**2
     assert np.max(np.abs(third)) < 50  # of second derivatives of order 20**2: no jump across the seam

@@ -14,8 +14,10 @@ import pytest
 from test_marker_files import write_c3d
 
 import gait.cli
+from gait import reproducible
 from gait.errors import UserError
-from gait.learn.corpus import cluster, sources
+from gait.learn.corpus import cluster, load, sources
+from gait.learn.options import LearnOptions
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: make setup")
 pytestmark = pytest.mark.filterwarnings("ignore")  # those of distributed are not ours to mend
@@ -63,19 +65,19 @@ def test_a_cluster_measures_people_alike(scheduler, tmp_path, monkeypatch):
         points = mw.walker(mw.LOWER, frames=60, again=k)[0]
         write_c3d(tmp_path / f"anna_{k}.c3d", mw.LOWER, points)
     monkeypatch.chdir(tmp_path)
-    found = sources.find(["."])
-    here, there = sources.measured(found), sources.measured(found, dask=scheduler)
-    assert [body.stretch.tobytes() for body in there] == [body.stretch.tobytes() for body in here]
+    found, _ = sources.find(["."])
+    here, there = (load.shared_lengths(found, LearnOptions(dask=dask)) for dask in (None, scheduler))
+    assert [body.log_scales.tobytes() for body in there] == [body.log_scales.tobytes() for body in here]
 
 
 def test_a_bad_file_named_by_itself_stops_the_run(walks, scheduler):
-    with pytest.raises(UserError, match="01_02x.amc:3: 2 numbers where 6"):
-        sources.load_all([(walks / "01_02x.amc", False)], dask=scheduler)
+    with pytest.raises(UserError, match="01_02x.amc:3: 2 numbers, expected 6"):
+        load.load_all([(walks / "01_02x.amc", False)], LearnOptions(dask=scheduler))
 
 
 def test_a_file_that_workers_do_not_see_is_named_with_the_remedy(walks, scheduler, tmp_path):
     with pytest.raises(UserError, match="absent.amc: a worker does not see .* under the same path"):
-        sources.load_all([(tmp_path / "absent.amc", True)], dask=scheduler)
+        load.load_all([(tmp_path / "absent.amc", True)], LearnOptions(dask=scheduler))
 
 
 @pytest.mark.parametrize("package", ["libgait", "scipy"])
@@ -83,13 +85,13 @@ def test_a_worker_of_another_version_is_refused(package, walks, scheduler, monke
     here = os.getpid()
     true = importlib.metadata.version
     monkeypatch.setattr(
-        cluster.metadata,
+        importlib.metadata,
         "version",
         lambda name: "0.0.1" if here == os.getpid() and name == package else true(name),
     )
     words = rf"worker tcp://.* has \d.* of {package}, this machine 0.0.1; install"
     with pytest.raises(UserError, match=words):
-        sources.load_all([(walks / "01_00.amc", True)], dask=scheduler)
+        load.load_all([(walks / "01_00.amc", True)], LearnOptions(dask=scheduler))
 
 
 @pytest.mark.parametrize(
@@ -107,27 +109,28 @@ def test_an_address_without_a_scheduler_is_one_line(walks, tmp_path, monkeypatch
 def test_without_dask_the_remedy_is_named(walks, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(UserError, match="needs Dask: pip install"):
-        sources.load_all([(walks / "01_00.amc", True)], dask="127.0.0.1:9")
+        load.load_all([(walks / "01_00.amc", True)], LearnOptions(dask="127.0.0.1:9"))
 
 
 def test_a_file_that_kills_its_workers_is_named(walks, tmp_path, monkeypatch):
     """Workers that die on a task are KilledWorker to the client; here a task that ends its process."""
     bad = Path(shutil.copy(walks / "01_00.amc", tmp_path / "05_01.amc"))
-    true = cluster._done
+    true = cluster._run
     monkeypatch.setattr(
         cluster,
-        "_done",
+        "_run",
         lambda task, wanted: os._exit(9) if task.path.name == "05_01.amc" else true(task, wanted),
     )
     with _two_workers() as address:  # of their own: they are gone for a while
-        _, refused = sources.load_all([(walks / "01_01.amc", True), (bad, True)], dask=address)
+        files = [(walks / "01_01.amc", True), (bad, True)]
+        refused = load.load_all(files, LearnOptions(dask=address)).refused
     assert len(refused) == 1 and refused[0].startswith(f"{bad}: the workers that read it were killed")
 
 
 def test_a_worker_with_other_kernels_is_refused_with_the_remedy(walks, scheduler, monkeypatch):
-    monkeypatch.setattr(cluster.kernels, "chosen", lambda: {"OPENBLAS_CORETYPE": "none that a worker has"})
-    with pytest.raises(UserError, match=r"CPU of worker tcp://.*--preload-nanny gait\.kernels tcp://"):
-        sources.load_all([(walks / "01_00.amc", True)], dask=scheduler)
+    monkeypatch.setattr(reproducible, "chosen", lambda: {"OPENBLAS_CORETYPE": "none that a worker has"})
+    with pytest.raises(UserError, match=r"CPU of worker tcp://.*--preload-nanny gait\.reproducible tcp://"):
+        load.load_all([(walks / "01_00.amc", True)], LearnOptions(dask=scheduler))
 
 
 def test_the_remedy_gives_the_model_of_the_command_line(walks, tmp_path):

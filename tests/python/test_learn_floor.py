@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gait.body.skeleton import CHANNELS, curves
 from gait.bindings.model import read_blob
+from gait.body.skeleton import CHANNELS, curves
 from gait.io.blob import decode
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from learn_measures import falls
 
-from gait.learn.cycles import cycles
-from gait.learn.cycles.fourier import HARMONICS
-from gait.learn.prior import bayes, fpca, impute
+from gait.learn.cycles import cutting
+from gait.learn.cycles.fourier import HARMONICS, fourier_basis
+from gait.learn.prior import components, imputation
 from gait.learn.prior.model import anova
 from gait.learn.prior.rank import LARGEST, choose
-
-METHODS = sorted(fpca.METHODS)
 
 
 @pytest.fixture(
@@ -21,7 +19,7 @@ METHODS = sorted(fpca.METHODS)
 def imputed(request):
     share, limit = request.param
     case = cases.walks(np.random.default_rng(10), missing=share)
-    return case, fpca.fit(case.values, case.mask, 5), limit
+    return case, components.fit(case.values, case.mask, 5), limit
 
 
 def test_imputation_is_near_the_oracle(imputed):
@@ -45,10 +43,8 @@ def test_imputation_beats_mean_and_line(imputed):
     assert case.error(line) > 5 * error
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_passes_descend_and_stop(imputed, method):
-    case, *_ = imputed
-    found = fpca.fit(case.values, case.mask, 5, method=method)
+def test_passes_descend_and_stop(imputed):
+    _, found, _ = imputed
     assert falls(found.objective)
     assert found.converged and 1 < len(found.objective) == len(found.rmse) < 100
     assert found.rmse[-1] < found.rmse[0]
@@ -58,58 +54,45 @@ def test_passes_stop_when_the_bound_hardly_gains():
     """A channel that half of the people never show moves on when there is nothing left to gain."""
     case = cases.people(np.random.default_rng(26), missing=0.1)
     cases.without_channel(case, [10], np.flatnonzero(case.subject % 2 == 0))
-    found = fpca.fit(case.values, case.mask, 8, tolerance=0.0)  # the model may not move at all
+    problem = imputation.Problem(case.values, case.mask, fourier_basis(g.GRID, HARMONICS))
+    start = problem.begin(imputation.column_mean(case.values, case.mask), 8)
+    found = imputation.climb(problem, start, tolerance=0.0)  # the model may not move at all
     gains = -np.diff(found.objective)
     assert found.converged and len(gains) < 200
-    assert np.all(gains[-bayes.PATIENCE :] < bayes.LEAST_GAIN)
-    assert gains[-bayes.PATIENCE - 1] >= bayes.LEAST_GAIN
+    assert np.all(gains[-imputation.PATIENCE :] < imputation.LEAST_GAIN)
+    assert gains[-imputation.PATIENCE - 1] >= imputation.LEAST_GAIN
 
 
 def test_a_pass_that_makes_it_worse_is_shown_and_not_called_convergence(monkeypatch):
     case, passes = cases.walks(np.random.default_rng(24), rows=30), []
-    maximise = bayes.Problem.maximise
+    maximise = imputation.Problem.maximise
 
-    def spoiled(problem, belief, rows):
-        after = maximise(problem, belief, rows)
+    def spoiled(problem, posterior, rows):
+        after = maximise(problem, posterior, rows)
         passes.append(after)
         if len(passes) >= 5:
             after.loadings *= 1.2
         return after
 
-    monkeypatch.setattr(bayes.Problem, "maximise", spoiled)
-    found = fpca.fit(case.values, case.mask, 5)
+    monkeypatch.setattr(imputation.Problem, "maximise", spoiled)
+    found = components.fit(case.values, case.mask, 5)
     assert not falls(found.objective) and not found.converged
     assert len(found.objective) == len(found.rmse) == 5
     assert found.rmse[-1] == found.rmse[-2]  # the better is kept
     assert case.error(found.filled) < 1.2 * case.error(case.oracle())
 
 
-def test_a_worse_pass_of_the_papers_way_is_shown_too(monkeypatch):
-    case, passes = cases.walks(np.random.default_rng(25), rows=30), []
-    right_singular = impute.right_singular
-
-    def spoiled(coded, mean):
-        singular, right = right_singular(coded, mean)
-        passes.append(len(right))
-        return singular, right[::-1] if len(passes) >= 4 else right
-
-    monkeypatch.setattr(impute, "right_singular", spoiled)
-    found = fpca.fit(case.values, case.mask, 5, method="paper")
-    assert not falls(found.objective) and not found.converged
-    assert len(found.objective) == 4 and found.noise == found.rmse[2]
-    assert case.error(found.filled) < 2 * case.error(case.oracle())  # of the third pass
-
-
 def test_start_of_the_missing_entries_does_not_matter(imputed):
     case, by_mean, _ = imputed
-    by_zero = fpca.fit(case.values, case.mask, 5, start=np.zeros(case.values.shape[1:]))
+    basis = fourier_basis(g.GRID, HARMONICS)
+    by_zero = imputation.complete(case.values, case.mask, 5, basis, np.zeros(case.values.shape[1:]))
     assert np.max(np.abs(by_mean.filled - by_zero.filled)) < 1e-3
 
 
 def test_too_many_components_hurt_little(imputed):
     case, found, _ = imputed
     for count in (8, 12):
-        more = fpca.fit(case.values, case.mask, count)
+        more = components.fit(case.values, case.mask, count)
         assert case.error(more.filled) <= 1.005 * case.error(found.filled)
         assert more.converged and falls(more.objective)
 
@@ -132,7 +115,7 @@ def test_components_are_orthonormal_with_fixed_signs(imputed):
 
 def test_scores_are_the_generators_between_and_within_people():
     case = cases.people(np.random.default_rng(18))
-    scores = cases.mode_scores(case, fpca.fit(case.values, case.mask, 5))
+    scores = cases.mode_scores(case, components.fit(case.values, case.mask, 5))
     for k in range(5):
         assert np.corrcoef(scores[:, k], case.scores[:, k])[0, 1] > 0.99
     for found, true in zip(anova(scores, case.subject), anova(case.scores, case.subject), strict=True):
@@ -144,7 +127,7 @@ def test_reference_problem_is_within_a_twentieth_of_the_oracle():
     for seed in range(5):
         case = cases.reference(np.random.default_rng(seed))
         best = case.error(case.oracle())
-        three, five = (case.error(fpca.fit(case.values, case.mask, q).filled) for q in (3, 5))
+        three, five = (case.error(components.fit(case.values, case.mask, q).filled) for q in (3, 5))
         ratios.append(three / best)
         assert five <= 1.05 * three
     assert np.median(ratios) <= 1.05
@@ -154,7 +137,7 @@ def test_whole_limbs_are_filled_from_the_others():
     rng = np.random.default_rng(15)
     case = cases.walks(rng, missing=0.1)
     taken = cases.without_limbs(case, rng)
-    found = fpca.fit(case.values, case.mask, 5)
+    found = components.fit(case.values, case.mask, 5)
     assert np.isfinite(found.filled).all()
     assert case.error(found.filled, taken) <= 1.1 * case.error(case.oracle(), taken)
 
@@ -163,7 +146,7 @@ def test_whole_limbs_are_filled_from_the_others():
 def test_people_without_some_channels_are_filled(channels, limit):
     case = cases.people(np.random.default_rng(17), missing=0.1)
     taken = cases.without_channel(case, channels, np.flatnonzero(case.subject == 3))
-    found = fpca.fit(case.values, case.mask, 5)
+    found = components.fit(case.values, case.mask, 5)
     assert np.isfinite(found.filled).all()
     assert case.error(found.filled, taken) <= limit * case.error(case.oracle(), taken)
 
@@ -174,7 +157,7 @@ def test_what_nobody_has_is_finite():
     case.mask[:, 30:60, 8] = False  # phases of nobody
     case.mask[5] = False  # a row without anything
     for count in (0, 5, 29):
-        found = fpca.fit(case.values, case.mask, count)
+        found = components.fit(case.values, case.mask, count)
         assert np.isfinite(found.filled).all() and np.isfinite(found.curves).all()
         assert np.abs(found.filled).max() < 1.5 * np.abs(case.values).max()
 
@@ -182,7 +165,7 @@ def test_what_nobody_has_is_finite():
 def test_data_without_noise_are_completed_exactly():
     case = cases.walks(np.random.default_rng(20), rows=40, noise=0.0)
     for count in (5, 7):
-        found = fpca.fit(case.values, case.mask, count)
+        found = components.fit(case.values, case.mask, count)
         assert case.error(found.filled) < 1e-3
         assert falls(found.objective)
 
@@ -215,7 +198,7 @@ def test_few_cycles_limit_the_number_of_components():
 
 def test_without_gaps_it_is_the_truncated_svd_of_the_band_limited_data():
     values = cases.walks(np.random.default_rng(13), rows=30, missing=0.0).values
-    found = fpca.fit(values, np.ones(values.shape, bool), 3)
+    found = components.fit(values, np.ones(values.shape, bool), 3)
     assert len(found.rmse) == 1 and found.converged
     spectrum = np.fft.rfft(values, axis=1)
     spectrum[:, HARMONICS + 1 :] = 0
@@ -228,15 +211,15 @@ def test_without_gaps_it_is_the_truncated_svd_of_the_band_limited_data():
 
 def test_row_order_does_not_matter():
     case, order = cases.walks(np.random.default_rng(14), rows=30), np.random.default_rng(14).permutation(30)
-    first = fpca.fit(case.values, case.mask, 4)
-    second = fpca.fit(case.values[order], case.mask[order], 4)
+    first = components.fit(case.values, case.mask, 4)
+    second = components.fit(case.values[order], case.mask[order], 4)
     assert second.curves == pytest.approx(first.curves, abs=1e-8)
 
 
 def test_units_do_not_matter():
     case = cases.walks(np.random.default_rng(23), rows=30)
-    degrees = fpca.fit(case.values, case.mask, 4)
-    radians = fpca.fit(np.radians(case.values), case.mask, 4)
+    degrees = components.fit(case.values, case.mask, 4)
+    radians = components.fit(np.radians(case.values), case.mask, 4)
     assert np.degrees(radians.filled) == pytest.approx(degrees.filled, abs=1e-7)
 
 
@@ -246,7 +229,7 @@ def drifting():
 
 
 def test_curves_close_though_the_cycles_do_not(drifting):
-    found = fpca.fit(drifting.values, drifting.mask, 5)
+    found = components.fit(drifting.values, drifting.mask, 5)
     assert cases.seam(found.mean) <= 2
     for curve in found.curves:
         assert cases.seam(curve) <= 2
@@ -261,7 +244,7 @@ def test_ramp_is_taken_off_complete_cycles(drifting):
 
 def test_cycles_are_numbered_and_short_ones_dropped(drifting):
     assert set(drifting.sequence) == set(range(12))
-    assert np.all(drifting.mask.mean(axis=(1, 2)) >= cycles.OBSERVED)
+    assert np.all(drifting.mask.mean(axis=(1, 2)) >= cutting.OBSERVED)
     assert np.all(np.diff(drifting.cycle)[np.diff(drifting.sequence) == 0] == 1)
 
 
@@ -269,7 +252,7 @@ def test_mask_reaches_no_farther_than_the_data():
     u = np.arange(-10, 300) / 120.0
     z = g.mean_curves(u)
     z[40:70, 2] = np.nan
-    values, mask = cycles.resample(u, z, g.GRID)
+    values, mask = cutting.resample(u, z, g.GRID)
     grid = np.arange(g.GRID) / g.GRID
     hole = (grid > u[39]) & (grid < u[70])
     assert not mask[hole, 2].any()

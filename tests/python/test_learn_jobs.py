@@ -1,8 +1,9 @@
-"""Files read in several processes: the same result, one line for what fails, nothing left behind."""
+"""Files read in several processes: equal results, errors of one line, bounded memory, nothing left behind."""
 
 import errno
 import gc
 import itertools
+import json
 import multiprocessing
 import os
 import signal
@@ -19,11 +20,14 @@ import mocap_files as files
 import numpy as np
 import pytest
 
-from gait import cli
+from gait.cli.signals import Interruptible
 from gait.errors import UserError
-from gait.learn.corpus import fork_server, pool, sources
+from gait.learn import arrays
+from gait.learn.arrays import ArrayFile
+from gait.learn.corpus import forkserver, load, processes, sources
 from gait.learn.corpus.stage import Task
-from gait.learn.spool import Spool
+from gait.learn.options import LearnOptions
+from gait.learn.prior import rank
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +39,7 @@ def walks(tmp_path_factory):
 @pytest.fixture
 def at_once(monkeypatch):
     """Make the pool start with the first file."""
-    monkeypatch.setattr(pool, "START", -1.0)
+    monkeypatch.setattr(processes, "START", -1.0)
 
 
 @pytest.fixture
@@ -85,10 +89,10 @@ def contents(sequences):
 
 
 def test_processes_give_the_same_bits_in_the_order_of_the_files(walks, at_once):
-    found = sources.find([str(walks)])
-    alone, refused_alone = sources.load_all(found, jobs=1)
+    found, _ = sources.find([str(walks)])
+    alone, refused_alone, _ = load.load_all(found)
     counts = []
-    together, refused = sources.load_all(found, progress=counts.append, jobs=3)
+    together, refused, _ = load.load_all(found, LearnOptions(jobs=3), counts.append)
     assert contents(together) == contents(alone) and len(together) == 5
     assert refused == refused_alone and "01_02x.amc:3" in refused[0]
     assert counts == [1, 2, 3, 4, 5, 6]
@@ -99,10 +103,9 @@ def test_bodies_of_people_of_whom_no_file_can_be_used(tmp_path, at_once):
     for name in ("02_01", "02_02", "03_01", "01_99"):
         files.write_toy(tmp_path, name, frames=110)
     files.write_toy(tmp_path, "01_00", frames=300)
-    found = sources.find([str(tmp_path)])
+    found, _ = sources.find([str(tmp_path)])
     for jobs in (1, 2):
-        others = []
-        learnt, refused = sources.load_all(found, jobs=jobs, others=others)
+        learnt, refused, others = load.load_all(found, LearnOptions(jobs=jobs))
         assert [s.subject for s in learnt] == ["01"] and len(refused) == 4
         assert len(others) == 2
         for body in others:  # all toys have the same bones
@@ -110,29 +113,29 @@ def test_bodies_of_people_of_whom_no_file_can_be_used(tmp_path, at_once):
 
 
 def test_a_bad_file_named_by_itself_stops_the_run_from_a_process_too(walks, at_once):
-    found = [(path, path.stem != "01_02x") for path, _ in sources.find([str(walks)])]
-    with pytest.raises(UserError, match="01_02x.amc:3: 2 numbers where 6"):
-        sources.load_all(found, jobs=2)
+    found = [(path, path.stem != "01_02x") for path, _ in sources.find([str(walks)])[0]]
+    with pytest.raises(UserError, match="01_02x.amc:3: 2 numbers, expected 6"):
+        load.load_all(found, LearnOptions(jobs=2))
     assert not multiprocessing.active_children()
 
 
 def test_workers_are_expected_where_much_is_to_be_read_beside_the_first_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(fork_server, "WORTH", 100)
+    monkeypatch.setattr(forkserver, "WORTH", 100)
     first, second = tmp_path / "a" / "1.amc", tmp_path / "a" / "b" / "2.amc"
     second.parent.mkdir(parents=True)
     first.write_bytes(bytes(200))
-    assert not fork_server.worth([str(tmp_path)]) and not fork_server.worth([str(first), "missing"])
+    assert not forkserver.worth([str(tmp_path)]) and not forkserver.worth([str(first), "missing"])
     second.write_bytes(bytes(101))
-    assert fork_server.worth([str(tmp_path)]) and fork_server.worth([str(first), str(second)])
+    assert forkserver.worth([str(tmp_path)]) and forkserver.worth([str(first), str(second)])
 
 
 @pytest.mark.parametrize(("jobs", "large", "starts"), [("2", True, 1), ("1", True, 0), ("2", False, 0)])
-def test_the_fork_server_starts_before_what_is_slow_to_import(jobs, large, starts, tmp_path):
+def test_the_forkserver_starts_before_what_is_slow_to_import(jobs, large, starts, tmp_path):
     """A run that ends at once: the skeleton beside a recording is none."""
     script = (
-        "import sys, gait.cli; from gait.learn.corpus import fork_server\n"
-        f"fork_server.worth = lambda sources: {large}\n"
-        "fork_server.start = lambda: print('scipy' in sys.modules)\n"
+        "import sys, gait.cli; from gait.learn.corpus import forkserver\n"
+        f"forkserver.worth = lambda sources: {large}\n"
+        "forkserver.start = lambda: print('scipy' in sys.modules)\n"
         f"gait.cli.main(['learn', 'x.asf', '-o', {str(tmp_path / 'm.gait')!r}, '--jobs', {jobs!r}])"
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
@@ -144,7 +147,7 @@ def test_the_server_that_imports_does_not_hear_an_interruption():
     """From a terminal it reaches the whole group; the command ends its server itself."""
     tell = "print(open(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read())"
     program = (
-        "from multiprocessing import forkserver; from gait.learn.corpus import fork_server as f; "
+        "from multiprocessing import forkserver; from gait.learn.corpus import forkserver as f; "
         f"f.start(); {tell}"
     )
     told = subprocess.run(
@@ -157,11 +160,11 @@ def test_the_server_that_imports_does_not_hear_an_interruption():
 def test_workers_have_the_stage_from_the_server_that_was_started():
     script = """
 import sys
-from gait.learn.corpus import fork_server
+from gait.learn.corpus import forkserver
 
 if __name__ == "__main__":
-    fork_server.start()
-    with fork_server.context().Pool(1) as pool:
+    forkserver.start()
+    with forkserver.context().Pool(1) as pool:
         print(pool.apply(eval, ("'gait.learn.corpus.stage' in __import__('sys').modules",)))
     print("gait.learn.corpus.stage" in sys.modules)
 """
@@ -171,11 +174,11 @@ if __name__ == "__main__":
 
 def test_few_small_files_do_not_start_processes_and_many_do(walks, monkeypatch):
     started, clock = [], itertools.count()
-    monkeypatch.setattr(pool, "_pooled", lambda tasks, *_: started.append(len(tasks)) or iter(()))
-    monkeypatch.setattr(pool, "time", SimpleNamespace(perf_counter=lambda: 0.1 * next(clock)))
+    monkeypatch.setattr(processes, "_pooled", lambda tasks, *_: started.append(len(tasks)) or iter(()))
+    monkeypatch.setattr(processes, "time", SimpleNamespace(perf_counter=lambda: 0.1 * next(clock)))
     task = Task(walks / "01_00.amc")
-    assert len(list(pool.prepared([task] * 3, 2))) == 3 and not started
-    done = len(list(pool.prepared([task] * 3000, 2)))
+    assert len(list(processes.prepared([task] * 3, 2))) == 3 and not started
+    done = len(list(processes.prepared([task] * 3000, 2)))
     assert started == [3000 - done] and done == 1
 
 
@@ -191,7 +194,7 @@ def test_a_file_that_kills_its_process_is_named_and_the_rest_is_read(walks, stuc
     killer = threading.Thread(target=kill_readers)
     killer.start()
     try:
-        sequences, refused = sources.load_all(found, jobs=2)
+        sequences, refused, _ = load.load_all(found, LearnOptions(jobs=2))
     finally:
         finished.set()
         killer.join()
@@ -204,9 +207,10 @@ def test_a_file_that_kills_its_process_is_named_and_the_rest_is_read(walks, stuc
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_stopped_command_leaves_no_processes(walks, stuck, tmp_path, number):
     script = (
-        "import sys, gait.cli; from pathlib import Path; from gait.learn.corpus import pool, sources\n"
-        "pool.START = -1.0\n"
-        f"sources.find = lambda *_: [(p, True) for p in sorted(Path({str(walks)!r}).glob('*.amc'))]\n"
+        "import sys, gait.cli; from pathlib import Path; from gait.learn.corpus import processes, sources\n"
+        "processes.START = -1.0\n"
+        f"files = [(p, True) for p in sorted(Path({str(walks)!r}).glob('*.amc'))]\n"
+        "sources.find = lambda *_: (files, [])\n"
         f"sys.exit(gait.cli.main(['learn', 'x', '-o', {str(tmp_path / 'm.gait')!r}, '--jobs', '2']))"
     )
     run = subprocess.Popen(
@@ -236,7 +240,7 @@ def test_a_stopped_command_leaves_no_processes(walks, stuck, tmp_path, number):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_waits_while_a_worker_starts(number):
     ended = []
-    with pytest.raises(KeyboardInterrupt), cli._terminated_like_interrupted(), fork_server.held_back():
+    with pytest.raises(KeyboardInterrupt), Interruptible(signal.SIGTERM), forkserver.held_back():
         thread = threading.Thread(target=os.kill, args=(os.getpid(), number))
         unblocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})  # as in a thread of a library
         thread.start()
@@ -257,10 +261,10 @@ def _group_lives(group):
 def test_spooled_arrays_come_back_and_leave_no_file(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     arrays = [np.arange(12.0).reshape(3, 4), np.zeros((0, 4)), np.full((2, 2), np.nan)]
-    with Spool() as spool:
+    with ArrayFile() as file:
         for array in arrays:
-            spool.put(array)
-        views = spool.views()
+            file.put(array)
+        views = file.views()
         assert not list(tmp_path.iterdir())
     for array, view in zip(arrays, views, strict=True):
         assert np.array_equal(array, view, equal_nan=True) and view.shape == array.shape
@@ -271,15 +275,94 @@ def test_signals_that_were_read_are_not_held_in_memory(walks):
     path = walks / "01_04.amc"
     held = []
     tracemalloc.start()
-    for count in (1, 9, 17):  # the first fills caches
-        sequences, _ = sources.load_all([(path, True)] * count, jobs=1)  # busy, it would start processes
+    for count in (1, 5, 9):  # the first fills caches
+        sequences = load.load_all([(path, True)] * count).sequences  # busy, it would start processes
         gc.collect()
         held.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
-    assert held[2] - held[1] < 8 * 0.5 * sequences[0].channels.nbytes
+    assert held[2] - held[1] < 4 * 0.5 * sequences[0].channels.nbytes
 
 
 def test_a_full_disk_is_one_line_with_its_remedy(walks, monkeypatch):
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: open("/dev/full", "r+b", buffering=0))  # noqa: SIM115
     with pytest.raises(UserError, match=f"{os.strerror(errno.ENOSPC)}.*set TMPDIR"):
-        sources.load_all(sources.find([str(walks)]))
+        load.load_all(sources.find([str(walks)])[0])
+
+
+STATUS = Path("/proc/self/status")
+MOST = 0.05  # MB per cycle; a cycle's values alone are 0.03 MB, and they are used in a dozen ways
+COPIES = 30, 60  # of six recordings: enough cycles for the components' fixed memory to be in use
+
+CHILD = """
+import json, sys
+from dataclasses import replace
+from pathlib import Path
+import numpy as np
+from functools import partial
+from gait.learn.cycles import align
+from gait.learn.prior import fit, imputation, model
+from gait.learn.corpus import load, sources
+from gait.learn.options import LearnOptions
+from gait.reproducible import one_thread
+from gait.learn import arrays
+
+align.ITERATIONS = 2  # more passes take time but no more memory
+imputation.climb = partial(imputation.climb, passes=2)
+
+def copy(s, k):
+    noise = 0.02 * np.random.default_rng(k).normal(size=s.channels.shape)
+    return replace(s, name=f"{s.name}-{k}", channels=arrays.stored([s.channels + noise], noise.shape[1:]))
+
+read = load.load_all(sources.find([sys.argv[1]])[0]).sequences
+with one_thread():
+    learned = fit.fit([copy(s, k) for s in read for k in range(int(sys.argv[2]))])
+    model.sections(learned, LearnOptions())
+peak = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+print(json.dumps({"cycles": len(learned.cycles.values), "peak": int(peak.split()[1]) / 1024}))
+"""
+
+
+def peak(folder, copies):
+    """Cycles learnt and the largest resident memory of the process that did, MB."""
+    words = [sys.executable, "-c", CHILD, str(folder), str(copies)]
+    out = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+    return out["cycles"], out["peak"]
+
+
+@pytest.mark.skipif(
+    not STATUS.exists() or "VmHWM" not in STATUS.read_text(), reason="no VmHWM in /proc/self/status"
+)
+def test_memory_grows_little_with_the_cycles(tmp_path):
+    for i in range(6):
+        motion = {"period": 110.0 + 6 * i, "offset": 13.0 * i, "swing": 0.85 + 0.05 * i, "seed": i}
+        files.write_toy(tmp_path / f"{i // 2:02}", f"{i // 2:02}_{i % 2:02}", frames=400, **motion)
+    (few, small), (many, large) = (peak(tmp_path, copies) for copies in COPIES)
+    assert many >= 2 * few > 700
+    assert large - small <= MOST * (many - few), f"{few} cycles: {small:.0f} MB, {many}: {large:.0f} MB"
+
+
+@pytest.mark.parametrize("people", [True, False], ids=["people", "blocks"])
+def test_choosing_the_number_of_components_keeps_cycles_on_disk(people):
+    """Memory grows by less than one copy of the cycles that are added."""
+    shape, peaks = (64, 10), []
+    for blocks in (4, 12):
+        rng = np.random.default_rng(0)
+        values = arrays.stored((rng.normal(size=(arrays.ROWS, *shape)) for _ in range(blocks)), shape)
+        groups = np.arange(len(values)) % 8 if people else None
+        tracemalloc.start()
+        rank.choose(values, np.ones(values.shape, bool), rng, groups, 5, 1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] - peaks[0] < 8 * arrays.ROWS * 8 * np.prod(shape)
+
+
+def test_rows_on_disk_are_those_put_there_also_after_their_release():
+    rows = np.random.default_rng(1).normal(size=(3 * arrays.ROWS + 5, 4, 2))
+    kept = arrays.stored((rows[part] for part in arrays.by_rows(rows)), rows.shape[1:])
+    read = []
+    for part in arrays.by_rows(kept):
+        read.append(kept[part].copy())
+    arrays.release(kept, rows)
+    np.testing.assert_array_equal(np.concatenate(read), rows)
+    np.testing.assert_array_equal(kept, rows)
+    assert arrays.stored(iter([]), (4, 2)).shape == (0, 4, 2)

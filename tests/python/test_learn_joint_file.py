@@ -10,21 +10,21 @@ from test_marker_files import write_c3d
 from gait.body.skeleton import ANGLES
 from gait.errors import UserError
 from gait.learn.cycles.sequence import load
-from gait.learn.mocap import mocap_asf
+from gait.learn.mocap import acclaim, tables
 from gait.learn.mocap.recording import Y_UP
-from gait.learn.reading import Reading
-from gait.learn.solve import body, joint_file, readers, retarget, torn_joint
+from gait.learn.options import LearnOptions
+from gait.learn.solve import body, joints, readers, retarget
 
 TRC_NAMES = {"neck": "Neck", "head": "Head", "l_toe": "LBigToe", "r_toe": "RBigToe"}
 
 
 @pytest.fixture(scope="module")
 def walker(tmp_path_factory):
-    return body.body(mocap_asf.read(files.write_toy(tmp_path_factory.mktemp("toy"), frames=400)))
+    return body.from_bones(acclaim.read(files.write_toy(tmp_path_factory.mktemp("toy"), frames=400)))
 
 
 def write_csv(path, walker):
-    names = {n: "head_top" if n == "head" else n for n in joint_file.NEEDED}
+    names = {n: "head_top" if n == "head" else n for n in tables.JOINTS}
     header = ["frame", "time", "status"] + [f"{names[n]}_{axis}" for n in names for axis in "xyz"]
     rows = [",".join(header)]
     for t in range(walker.frames):
@@ -35,7 +35,7 @@ def write_csv(path, walker):
 
 
 def write_trc(path, walker):
-    names = {n: TRC_NAMES.get(n, n[0].upper() + n[2:].title()) for n in joint_file.NEEDED}
+    names = {n: TRC_NAMES.get(n, n[0].upper() + n[2:].title()) for n in tables.JOINTS}
     head = "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"
     lines = [f"PathFileType\t4\t(X/Y/Z)\t{path.name}", head]
     lines += [
@@ -51,16 +51,16 @@ def write_trc(path, walker):
 
 
 def test_csv_and_trc_hold_the_same_joints(walker, tmp_path):
-    first = joint_file.read_csv(write_csv(tmp_path / "a.csv", walker))
+    first = joints.from_table(write_csv(tmp_path / "a.csv", walker))
     second = readers.read(write_trc(tmp_path / "a.trc", walker))
     assert first.fps == pytest.approx(120, rel=1e-3) and second.fps == 120
-    for name in joint_file.NEEDED:
+    for name in tables.JOINTS:
         assert first.joints[name] == pytest.approx(walker.joints[name], abs=1e-4), name
         assert second.joints[name] == pytest.approx(walker.joints[name], abs=1e-4), name
 
 
 def test_flexions_agree_with_the_recording_that_has_orientations(walker, tmp_path):
-    again = joint_file.read_csv(write_csv(tmp_path / "a.csv", walker))
+    again = joints.from_table(write_csv(tmp_path / "a.csv", walker))
     true, found = (np.degrees(retarget.angles(b, retarget.measure(b))) for b in (walker, again))
     for name in ("l_knee_flexion", "r_knee_flexion", "l_elbow_flexion", "r_hip_flexion", "l_hip_flexion"):
         k = ANGLES.index(name)
@@ -84,7 +84,7 @@ def without_wrist(walker):
 def test_zeros_in_a_row_are_missing_if_asked_for(walker, tmp_path):
     path = write_csv(tmp_path / "a.csv", without_wrist(walker))
     assert not readers.read(path).joints["l_wrist"][50:70, 2].any()
-    found = readers.read(path, Reading(zero_runs=True)).joints
+    found = readers.read(path, LearnOptions(zeros_missing=True)).joints
     assert np.flatnonzero(np.isnan(found["l_wrist"]).any(axis=1)).tolist() == list(range(50, 70))
     assert all(np.isfinite(place).all() for name, place in found.items() if name != "l_wrist")
 
@@ -95,8 +95,8 @@ def test_joint_centres_at_the_origin_are_missing(walker, tmp_path, kind):
     if kind == "trc":
         write_trc(path, hidden)
     else:
-        joints = np.stack([hidden.joints[n] for n in joint_file.NEEDED], axis=1)
-        write_c3d(path, joint_file.NEEDED, joints @ Y_UP)
+        places = np.stack([hidden.joints[n] for n in tables.JOINTS], axis=1)
+        write_c3d(path, tables.JOINTS, places @ Y_UP)
     sequence = load(path)
     assert np.flatnonzero(np.isnan(sequence.channels).any(axis=1)).tolist() == list(range(50, 70))
 
@@ -132,7 +132,7 @@ def test_malformed_csv_is_named(walker, tmp_path, change, words):
     path = write_csv(tmp_path / "a.csv", walker)
     path.write_text(change(path.read_text()))
     with pytest.raises(UserError, match=words):
-        joint_file.read_csv(path)
+        joints.from_table(path)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def turned(walker, turn):
 
 
 def test_y_up_is_seen(walker, tmp_path):
-    found = joint_file.read_csv(write_csv(tmp_path / "a.csv", turned(walker, Y_UP.T)))
+    found = joints.from_table(write_csv(tmp_path / "a.csv", turned(walker, Y_UP.T)))
     assert found.joints["r_knee"] == pytest.approx(walker.joints["r_knee"], abs=1e-4)
 
 
@@ -177,7 +177,7 @@ def test_y_up_is_seen(walker, tmp_path):
 )
 def test_any_other_up_is_named(walker, tmp_path, turn, words):
     with pytest.raises(UserError, match=f"a.csv: {words}"):
-        joint_file.read_csv(write_csv(tmp_path / "a.csv", turned(walker, turn)))
+        joints.from_table(write_csv(tmp_path / "a.csv", turned(walker, turn)))
 
 
 def moved(walker, joint, by, frames=(50,)):
@@ -187,12 +187,12 @@ def moved(walker, joint, by, frames=(50,)):
     return replace(walker, joints={**walker.joints, joint: place})
 
 
-@pytest.mark.parametrize("joint", joint_file.NEEDED)
+@pytest.mark.parametrize("joint", tables.JOINTS)
 @pytest.mark.parametrize("by", [(900, 0, 0), (0, 3, 0), (-0.8, 0.8, 0)])
 def test_the_joint_that_is_off_the_body_is_named(walker, joint, by):
-    names = {name: name for name in joint_file.NEEDED}
-    with pytest.raises(UserError, match=rf"^50: {joint} is \S+ m from .*, mostly \S+ m; .* or empty it$"):
-        torn_joint.refuse(moved(walker, joint, by).joints, names, str)
+    places = {name: place for name, place in moved(walker, joint, by).joints.items() if name in tables.JOINTS}
+    with pytest.raises(UserError, match=rf"^50: {joint} is \S+ m from .*, usually \S+ m; .* or empty it$"):
+        joints.require_whole(places, str)
 
 
 @pytest.mark.parametrize("by", [3, 20, 900])
@@ -222,7 +222,7 @@ def test_a_bone_half_as_long_again_is_left(walker, tmp_path):
     foot = walker.joints["r_toe"][50] - walker.joints["r_ankle"][50]
     path = write_csv(tmp_path / "a.csv", moved(walker, "r_toe", foot / 2))
     expected = walker.joints["r_toe"][50] + foot / 2
-    assert joint_file.read_csv(path).joints["r_toe"][50] == pytest.approx(expected, abs=1e-4)
+    assert joints.from_table(path).joints["r_toe"][50] == pytest.approx(expected, abs=1e-4)
 
 
 def test_few_zeros_are_off_the_body_unless_they_are_missing(walker, tmp_path):
@@ -230,13 +230,13 @@ def test_few_zeros_are_off_the_body_unless_they_are_missing(walker, tmp_path):
     path = write_csv(tmp_path / "a.csv", moved(walker, "l_wrist", -wrist, range(50, 54)))
     with pytest.raises(UserError, match="a.csv:52: l_wrist is"):
         readers.read(path)
-    assert readers.read(path, Reading(zero_runs=True)).joints["l_wrist"][50] == pytest.approx(
+    assert readers.read(path, LearnOptions(zeros_missing=True)).joints["l_wrist"][50] == pytest.approx(
         wrist[0], abs=0.05
     )
 
 
 @pytest.mark.parametrize("value", [0, np.nan])
 def test_joints_without_places_are_not_judged(value):
-    places = {name: np.full((5, 3), float(value)) for name in joint_file.NEEDED}
-    torn_joint.refuse(places, {name: name for name in places}, str)
-    torn_joint.refuse(places, {}, str)
+    places = {name: np.full((5, 3), float(value)) for name in tables.JOINTS}
+    joints.require_whole(places, str)
+    joints.require_whole({"hat": places["head"]}, str)

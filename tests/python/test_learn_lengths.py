@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gait import Model, State
+from gait.bindings.model import read_blob
 from gait.body import skeleton
 from gait.body.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
-from gait.bindings.model import read_blob
 from gait.io import blob
 from gait.learn.prior import lengths
 from gait.learn.solve import retarget

@@ -14,9 +14,9 @@ from gait import Model
 from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
 from gait.errors import UserError
 from gait.io import blob
-from gait.learn import model_options
-from gait.learn.corpus import sources
-from gait.learn.prior import fit, fpca, model
+from gait.learn.corpus import load, sources
+from gait.learn.options import PRIORS, LearnOptions
+from gait.learn.prior import components, fit, model
 
 LEGS = np.array([any(joint in name for joint in ("hip", "knee", "ankle")) for name in ANGLES])
 
@@ -29,14 +29,14 @@ def walks(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sequences(walks):
-    return sources.load_all(sources.find([str(walks)]))[0]
+    return load.load_all(sources.find([str(walks)])[0]).sequences
 
 
 def sections(learned):
     """Sections of the blob, made without a warning."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        made = model.sections(learned, "walk", 1)
+        made = model.sections(learned, LearnOptions())
     for tag, values in made.items():
         assert values.dtype.kind != "f" or np.isfinite(values).all(), tag
     return made
@@ -81,14 +81,14 @@ def test_few_cycles_give_fewer_components_and_a_line_says_so(walks, tmp_path, ca
 
 
 def test_one_subject_has_neither_proportions_nor_a_static_spread(sequences):
-    made = sections(fit.fit([s for s in sequences if s.subject == "01"], 2))
+    made = sections(fit.fit([s for s in sequences if s.subject == "01"], LearnOptions(components=2)))
     assert "PROP" not in made and not made["CHST"][:, 3].any() and not made["SCST"][:, 1].any()
     assert Model(blob.encode(made)).info.proportions == 0
 
 
 def test_three_subjects_have_proportions(sequences):
     """Toy walkers are of one skeleton: lengths change by what swing does to the stature, next to nothing."""
-    made = sections(fit.fit(sequences, 2))
+    made = sections(fit.fit(sequences, LearnOptions(components=2)))
     assert made["PROP"].shape == (1, len(made["FRMI"]) + 1)
     assert made["SHFT"].shape == (1, len(made["FRMI"]), 3) and np.abs(made["SHFT"]).max() < 2e-3
     assert np.abs(made["PROP"]).max() < 2e-3 and made["CHST"][:, 3].max() > 0
@@ -98,12 +98,12 @@ def test_bodies_of_others_tell_how_people_differ(sequences):
     """Of two people there are no proportions; a third, with long forearms, gives one."""
     two = [s for s in sequences if s.subject in ("01", "02")]
     long = replace(two[0].measures, forearm=1.2 * two[0].measures.forearm)
-    assert not len(fit.fit(two, 2).lengths)
-    learned = fit.fit(two, 2, others=[long])
+    assert not len(fit.fit(two, LearnOptions(components=2)).lengths)
+    learned = fit.fit(two, LearnOptions(components=2), others=[long])
     frames = default_skeleton().frames
     assert learned.lengths.shape == (1, len(frames) + 1)
     assert int(np.argmax(learned.lengths[0])) == frames.index("l_forearm") and learned.lengths.max() > 0.05
-    plain = fit.fit(two, 2, kind="paper", others=[long])
+    plain = fit.fit(two, LearnOptions(components=2, prior="paper"), others=[long])
     assert not len(plain.lengths) and not len(plain.shifts)
 
 
@@ -113,33 +113,35 @@ def test_the_body_of_a_person_is_of_the_recording_that_shows_most(sequences):
     unseen = np.full(2, np.nan)
     armless = replace(own[0].measures, upper_arm=unseen, forearm=unseen)
     mixed = [replace(own[0], measures=None), replace(own[0], measures=armless), own[1]]
-    arms = [fit.fit(some, 1).proportions.forearm for some in (mixed, own[1:], mixed[:2])]
+    arms = [
+        fit.fit(some, LearnOptions(components=1)).proportions.forearm for some in (mixed, own[1:], mixed[:2])
+    ]
     assert arms[0] == pytest.approx(arms[1], rel=1e-9)
     assert arms[0] != pytest.approx(arms[2], rel=1e-3)  # nobody's, so those of the default body
 
 
 def test_paper_prior_has_the_plain_components_and_one_body(sequences):
-    learned = fit.fit(sequences, 2, kind="paper")
+    learned = fit.fit(sequences, LearnOptions(components=2, prior="paper"))
     assert "PROP" not in sections(learned)
     scale, c = fit.channel_scale(), learned.components
-    plain = fpca.fit(learned.cycles.values * scale, learned.cycles.mask, 2)
+    plain = components.fit(learned.cycles.values * scale, learned.cycles.mask, 2)
     np.testing.assert_allclose(c.curves * scale, plain.curves, atol=1e-12)
     np.testing.assert_allclose(c.sd, plain.sd)
 
 
-@pytest.mark.parametrize("kind", model_options.PRIORS)
+@pytest.mark.parametrize("kind", PRIORS)
 def test_legs_alone_leave_the_rest_at_rest(sequences, kind):
     cut = [replace(s, channels=s.channels.copy()) for s in sequences]
     for s in cut:
         s.channels[:, : len(ANGLES)][:, ~LEGS] = np.nan
-    made = sections(fit.fit(cut, 2, kind=kind))
+    made = sections(fit.fit(cut, LearnOptions(components=2, prior=kind)))
     unseen = np.flatnonzero(~LEGS)
     assert not made["CHST"][unseen].any() and np.abs(made["CURV"][:, :, unseen]).max() < 1e-6
     seen = np.flatnonzero(LEGS)
     assert np.all(made["CHST"][seen, 1] < made["CHST"][seen, 2]) and np.ptp(made["CURV"][0][:, seen]) > 0.5
 
 
-@pytest.mark.parametrize("kind", model_options.PRIORS)
+@pytest.mark.parametrize("kind", PRIORS)
 def test_angles_of_the_legs_alone_are_learnt(tmp_path, kind):
     """The least that a .csv of angles may hold: no joints, no root, hips and knees."""
     names = [f"{s}_{a}_flexion" for s in "rl" for a in ("hip", "knee")]
@@ -151,9 +153,9 @@ def test_angles_of_the_legs_alone_are_learnt(tmp_path, kind):
         lines = [",".join(["frame", "time", *(f"{n}_deg" for n in names)])]
         lines += [f"{t},{t / 100:.2f}," + ",".join(f"{v:.3f}" for v in row) for t, row in enumerate(angles)]
         (tmp_path / f"{k:02}_01.csv").write_text("\n".join(lines) + "\n")
-    read, refused = sources.load_all(sources.find([str(tmp_path)]))
+    read, refused, _ = load.load_all(sources.find([str(tmp_path)])[0])
     assert len(read) == 4 and not refused and all(s.measures is None for s in read)
-    made = sections(fit.fit(read, 2, kind=kind))
+    made = sections(fit.fit(read, LearnOptions(components=2, prior=kind)))
     assert "PROP" not in made and 0.3 < made["GAIT"][3] < 1.6
     assert made["GAIT"][0] == pytest.approx(np.mean([100 / (105 + 4 * k) for k in range(4)]), rel=0.01)
     knee = np.degrees(made["CURV"][0, :, CHANNELS.index("r_knee_flexion")])

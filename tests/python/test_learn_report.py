@@ -11,19 +11,13 @@ import pytest
 
 import gait.cli
 from gait.body.skeleton import ANGLES, CHANNELS
-from gait.learn.corpus import sources
-from gait.learn.corpus.stage import one_thread
+from gait.learn.corpus import load, sources
+from gait.learn.options import LearnOptions
 from gait.learn.prior import fit
-from gait.learn.prior.subject_residuals import subject_residuals
-from gait.learn.report import (
-    figures_cycle,
-    figures_model,
-    figures_period,
-    figures_subject,
-    report,
-    report_place,
-)
-from gait.learn.report.figures_base import SHOWN, column
+from gait.learn.report import figures, figures_model
+from gait.learn.report import page as pages
+from gait.learn.report.figures_model import SHOWN
+from gait.reproducible import one_thread
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -42,12 +36,12 @@ def walks(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sequences(walks):
-    return sources.load_all(sources.find([str(walks)]))[0]
+    return load.load_all(sources.find([str(walks)])[0]).sequences
 
 
 @pytest.fixture(scope="module")
 def learned(sequences):
-    return fit.fit(sequences, 3)
+    return fit.fit(sequences, LearnOptions(components=3))
 
 
 class Page(HTMLParser):
@@ -112,31 +106,31 @@ def test_the_page_holds_everything_and_needs_nothing(walks, tmp_path, capsys):
 def test_the_table_says_what_was_cut_and_why_a_sequence_was_taken(learned):
     first = replace(learned.sequences[0], kept=(120, 400), cut=("it stands <still>", ""))
     odd = replace(learned, sequences=[first, *learned.sequences[1:]])
-    page = Page(report._sequences(odd))
+    page = Page(pages._sequences(odd))
     assert "120 to 399 (before: it stands <still>)" in page.texts
     assert any("repeats 0.9" in t or "repeats 1" in t for t in page.texts)
     assert "SNR" in page.texts and f"{np.nanmax(first.period.scores):.0f}" in page.texts
 
 
 def test_the_ratio_peaks_at_the_period_and_noise_is_flat(learned):
-    figure = figures_period.ratios(learned)
+    figure = figures.ratios(learned)
     rows, total = figure.axes[:-1], figure.axes[-1]
     assert [axes.get_ylabel() for axes in rows][:2] == ["white noise", "neck x"] and len(rows) == 25
     noise = rows[0].lines[0].get_ydata()
     assert 0.9 < np.nanmean(noise) < 1.1 and np.nanmax(noise) < rows[0].get_ylim()[1] / 2
     best = total.lines[-1].get_xdata()[0]
-    assert best == pytest.approx(figures_period.richest(learned).period.frames, abs=1.5)
+    assert best == pytest.approx(figures.richest(learned).period.frames, abs=1.5)
 
 
 def test_the_map_of_periods_shows_every_peak_however_narrow(learned):
-    (image,) = figures_period.periods(learned).axes[0].images
+    (image,) = figures.periods(learned).axes[0].images
     for row, s in zip(image.get_array(), learned.sequences, strict=True):
         assert np.nanmax(row) == 1
-        assert figures_period.GRID[np.nanargmax(row)] == pytest.approx(s.period.frames / s.fps, abs=0.011)
+        assert figures.GRID[np.nanargmax(row)] == pytest.approx(s.period.frames / s.fps, abs=0.011)
 
 
 def test_alignment_brings_the_curves_together(learned):
-    figure = figures_cycle.alignment(learned)
+    figure = figures.alignment(learned)
     before, after = figure.axes[:2]
 
     def spread(axes):
@@ -170,12 +164,12 @@ def test_names_in_the_map_do_not_lie_over_each_other(cycles, named):
     rows = np.repeat([0, 1, 2], cycles)
     mask = np.ones((len(rows), 4, len(CHANNELS)), bool)
     few = SimpleNamespace(row_subject=rows, subjects=["a", "b", "c"], cycles=SimpleNamespace(mask=mask))
-    labels = figures_cycle.missing(few).axes[0].get_yticklabels()
+    labels = figures.missing(few).axes[0].get_yticklabels()
     assert [label.get_text() for label in labels] == named
 
 
 def test_a_subject_left_out_is_followed_less_well(learned):
-    for axes in figures_subject.errors(learned).axes:
+    for axes in figures.errors(learned).axes:
         within, without = (np.asarray(line.get_xdata()) for line in axes.lines)
         assert np.all(without > within) and np.all(within > 0)
 
@@ -188,7 +182,12 @@ def test_residuals_in_millimetres_are_those_of_the_joints(learned):
     values[subject == 2, :, knee] += 0.01
     mask = np.ones(values.shape, bool)
     body = learned.proportions
-    found = subject_residuals(values, mask, learned.scale, subject, 0, body)
+
+    def residuals(mask):
+        rows = SimpleNamespace(values=values, mask=mask)
+        return fit._subject_residuals(rows, learned.scale, subject, 0, body)
+
+    found = residuals(mask)
     off = np.array([0.01 / 3, 0.01 / 3, 0.02 / 3])  # from the mean of all
     assert found.degrees[0] == pytest.approx(np.degrees(off / np.sqrt(len(ANGLES))))
     assert found.millimetres[0] == pytest.approx(1700 * body.shank * off / 14, rel=1e-4)
@@ -196,12 +195,12 @@ def test_residuals_in_millimetres_are_those_of_the_joints(learned):
         np.degrees(np.array([0.005, 0.005, 0.01]) / np.sqrt(len(ANGLES)))
     )
     mask[subject == 2, :, knee] = False
-    blind = subject_residuals(values, mask, learned.scale, subject, 0, body)
+    blind = residuals(mask)
     assert np.isnan(blind.millimetres[:, 2]).all() and np.isfinite(blind.degrees).all()
 
 
 def one_file(sequences):
-    return fit.fit(sequences[:1], 1)
+    return fit.fit(sequences[:1], LearnOptions(components=1))
 
 
 def lower_body(sequences):
@@ -210,26 +209,28 @@ def lower_body(sequences):
     cut = [replace(s, channels=s.channels.copy()) for s in sequences]
     for s in cut:
         s.channels[:, : len(ANGLES)][:, ~legs] = np.nan
-    return fit.fit(cut, 2)
+    return fit.fit(cut, LearnOptions(components=2))
 
 
 def many_subjects(sequences):
     """More sequences than have names, more subjects than have a legend or a fit of their own."""
-    many = [replace(s, subject=f"{s.subject}{k}", name=f"{s.name}_{k}") for k in range(13) for s in sequences]
-    return fit.fit(many, 4)
+    many = [
+        replace(s, subject=f"{s.subject}{k}", name=f"{s.name}_{k}") for k in range(13) for s in sequences[:5]
+    ]
+    return fit.fit(many, LearnOptions(components=4))
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning:gait.learn.prior.model")
 @pytest.mark.parametrize("make", [one_file, lower_body, many_subjects])
 def test_odd_input_gives_a_report_too(sequences, tmp_path, make):
     odd = make(sequences)
-    report.write(tmp_path, odd, "walk & run", [])
+    pages.write(tmp_path, odd, LearnOptions(activity="walk & run"), [])
     page = Page((tmp_path / "index.html").read_text())
     assert "Cyclic model of walk & run" in page.texts and "left-out" not in page.ids
     assert len(page.pictures) >= 10 and page.cells == 10 * len(odd.sequences)
     assert ("subjects" in page.ids) == (make is lower_body)
-    texts = [t.get_text() for axes in figures_cycle.cycles(odd).axes for t in axes.texts]
-    unseen = [name for name in SHOWN if not odd.cycles.mask[:, :, column(name)].any()]
+    texts = [t.get_text() for axes in figures.cycles(odd).axes for t in axes.texts]
+    unseen = [name for name in SHOWN if not odd.cycles.mask[:, :, CHANNELS.index(name)].any()]
     assert texts == ["not observed"] * len(unseen) and bool(unseen) == (make is lower_body)
 
 
@@ -243,8 +244,8 @@ def test_a_page_of_somebody_else_is_kept_and_one_of_ours_replaced(walks, learned
     assert err.count("\n") == 1 and "index.html there was not made by gait learn; choose another" in err
     assert "Home" in page.read_text() and not (tmp_path / "m.gait").exists()
     page.unlink()
-    report.write(page.parent, learned, "walk & run", [])
-    report_place.require_own(page.parent)
+    pages.write(page.parent, learned, LearnOptions(activity="walk & run"), [])
+    pages.require_own(page.parent)
 
 
 @pytest.mark.parametrize("place", ["{tmp}/file", "{tmp}/file/below"])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gait.body import skeleton
 from gait.body.skeleton import ANGLES, CHANNELS, SIDES
 from gait.learn import rotations
-from gait.learn.solve import readers, retarget, root
+from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
 
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
@@ -127,7 +127,7 @@ def test_root_channels_of_a_known_walk(heading):
     turned[:, column("root_yaw")] += heading
     walker = body_of(turned, local @ skeleton.axis_rotation(2, heading).T)
     measures = replace(retarget.measure(walker), stature=stature)
-    found, direction = root.channels(walker, measures, 120.0)
+    found, direction = retarget.root_channels(walker, measures, 120.0)
     assert np.exp(1j * direction) == pytest.approx(np.full(len(t), np.exp(1j * heading)), abs=0.01)
     assert found[:, 0] == pytest.approx(1.36 / stature, rel=0.02)
     assert found[60:-60, 1] == pytest.approx(sway[60:-60], abs=0.002)
@@ -140,7 +140,7 @@ def test_a_pelvis_that_is_not_seen_has_no_heading():
     walker = body_of(walk_channels()[0])
     measures = retarget.measure(walker)
     walker.joints["pelvis"] = np.full_like(walker.joints["pelvis"], np.nan)
-    found, direction = root.channels(walker, measures, 120.0)
+    found, direction = retarget.root_channels(walker, measures, 120.0)
     assert np.isnan(found).all() and np.isnan(direction).all()
 
 
@@ -149,13 +149,13 @@ def test_a_sloping_floor_is_found_and_levelled(slope):
     channels, phase = walk_channels()
     way = np.stack([1.36 * np.arange(len(phase)) / 120.0, 0 * phase, 0.9 + 0 * phase], axis=1)
     flat = body_of(channels, way)
-    flat_slope = root.level(flat)[1]  # a toy's feet slip: what is left of its floor
+    flat_slope = retarget.level(flat)[1]  # a toy's feet slip: what is left of its floor
     turn = skeleton.axis_rotation(1, -np.radians(slope))
     tilted = Body(
         "tilted", flat.fps, {n: p @ turn.T for n, p in flat.joints.items()}, turn @ flat.pelvis,
         {n: p @ turn.T for n, p in flat.lateral.items()},
     )  # fmt: skip
-    level, found = root.level(tilted)
+    level, found = retarget.level(tilted)
     assert np.degrees(found - flat_slope) == pytest.approx(slope, abs=0.1)
     assert np.ptp(level.joints["pelvis"][:, 2]) < 0.02
 
@@ -165,7 +165,7 @@ def test_pelvis_axes_do_not_depend_on_marker_placement():
     walker = body_of(channels)
     crooked = Body(walker.name, walker.fps, walker.joints, walker.pelvis @ rotations.from_angles(
         np.array([0.1, -0.2, 0.05]), (1, 0, 2)), walker.lateral)  # fmt: skip
-    straight, mended = root.align_pelvis(walker), root.align_pelvis(crooked)
+    straight, mended = retarget.align_pelvis(walker), retarget.align_pelvis(crooked)
     assert mended.pelvis == pytest.approx(straight.pelvis, abs=2e-3)
 
 
@@ -173,12 +173,12 @@ def test_real_walks_are_reproduced_to_8_mm():
     """The 24 angles with own lengths and a rigid shoulder girdle reach 8 mm on average (root-aligned)."""
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
-    from gait.learn.cycles.sequence import levelled, load
+    from gait.learn.cycles.sequence import load
 
     errors = []
     for name in ("02/02_01", "07/07_01", "16/16_16", "35/35_01", "38/38_01"):
         s = load(WALKS / f"{name}.amc")
-        walker = levelled(readers.read(s.source), s.kept)
+        walker = retarget.levelled(readers.read(s.source).part(*s.kept))
         own = skeleton.default_skeleton(retarget.own_proportions(s.measures)).sections()
         local = s.channels.copy()
         local[:, [column(f"root_{n}") for n in ("roll", "pitch", "yaw")]] = 0

@@ -5,12 +5,14 @@ from pathlib import Path
 import marked_walker as mw
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gait.body.skeleton import ANGLES, Proportions
 from gait.errors import UserError
 from gait.learn.mocap.recording import Y_UP
-from gait.learn.solve import articulated, marker_body, readers, retarget, root, skeleton_fit
-from gait.learn.solve.articulated import SEGMENTS
+from gait.learn.solve import kinematics, markers, readers, retarget, skeleton_fit
+from gait.learn.solve.body import Body
+from gait.learn.solve.kinematics import SEGMENTS
 
 WALKS = Path(__file__).parents[2] / "../shared/data/mocap/cmu_walk"
 FILE = Path("walk.c3d")
@@ -22,39 +24,39 @@ def columns(names):
 
 
 def angles_of(body):
-    straight = root.align_pelvis(root.level(body)[0])
+    straight = retarget.align_pelvis(retarget.level(body)[0])
     return retarget.angles(straight, retarget.measure(straight))
 
 
 @pytest.fixture(scope="module")
 def full():
     points, pose = mw.walker(mw.FULL)
-    return points, pose, marker_body.body(FILE, mw.FULL, points, 120.0)
+    return points, pose, markers.from_markers(FILE, mw.FULL, points, 120.0)
 
 
 def test_derivatives_are_exact():
     rng, frames, marks = np.random.default_rng(0), 3, 40
     segment, at = rng.integers(0, len(SEGMENTS), marks), rng.normal(scale=0.1, size=(marks, 3))
-    stretch = rng.normal(scale=0.1, size=articulated.STRETCH.shape[2])
-    turn = articulated.turn_by(rng.normal(size=(frames, 3)))
-    pose = articulated.Pose(rng.normal(size=(frames, 3)), turn, rng.normal(scale=0.5, size=(frames, 24)))
+    stretch = rng.normal(scale=0.1, size=kinematics.SCALE_TABLE.shape[2])
+    turn = Rotation.from_rotvec(rng.normal(size=(frames, 3))).as_matrix()
+    pose = kinematics.Pose(rng.normal(size=(frames, 3)), turn, rng.normal(scale=0.5, size=(frames, 24)))
 
     def world(pose, stretch):
-        local = articulated.scales(stretch)[segment] * at
-        return articulated.posed(pose, articulated.origins(stretch)).points(local, segment)
+        local = kinematics.segment_scales(stretch)[segment] * at
+        return kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)).points(local, segment)
 
-    body, small = articulated.posed(pose, articulated.origins(stretch)), 1e-6
-    by_pose, by_stretch = body.by_pose(world(pose, stretch), segment), body.by_stretch(stretch, at, segment)
-    directions = body.turns[:, segment][..., 1]
+    body, small = kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)), 1e-6
+    by_pose, by_stretch = body.by_pose(world(pose, stretch), segment), body.by_scales(stretch, at, segment)
+    directions = body.rotations[:, segment][..., 1]
     by_turn = body.directions_by_pose(directions, segment)
-    for k in range(articulated.FREEDOMS):
-        step = np.zeros((frames, articulated.FREEDOMS))
+    for k in range(kinematics.FREEDOMS):
+        step = np.zeros((frames, kinematics.FREEDOMS))
         step[:, k] = small
         ahead, behind = pose.moved(step), pose.moved(-step)
         slope = (world(ahead, stretch) - world(behind, stretch)) / (2 * small)
         assert by_pose[..., k] == pytest.approx(slope, abs=1e-7)
         turns = [
-            articulated.posed(p, articulated.origins(stretch)).turns[:, segment][..., 1]
+            kinematics.pose_skeleton(p, kinematics.segment_origins(stretch)).rotations[:, segment][..., 1]
             for p in (ahead, behind)
         ]
         assert by_turn[..., k] == pytest.approx((turns[0] - turns[1]) / (2 * small), abs=1e-7)
@@ -75,16 +77,16 @@ def test_a_walker_of_odd_lengths_is_found_again(full):
 
 
 def test_angles_have_no_offset_where_markers_sit_in_their_places():
-    stretch = np.zeros(articulated.STRETCH.shape[2])
+    stretch = np.zeros(kinematics.SCALE_TABLE.shape[2])
     stretch[0] = np.log(1.6)
     angles = mw.walk_angles(240, 120.0)
     place = np.stack([1.2 * np.arange(240) / 120, np.zeros(240), np.full(240, 0.85)], axis=1)
-    pose = articulated.Pose(place, np.tile(np.eye(3), (240, 1, 1)), angles)
+    pose = kinematics.Pose(place, np.tile(np.eye(3), (240, 1, 1)), angles)
     marks = mw.landmarks(mw.FULL)
     segment = np.array([SEGMENTS.index(m.segment) for m in marks])
-    local = articulated.scales(stretch)[segment] * np.array([m.at for m in marks])
-    points = articulated.posed(pose, articulated.origins(stretch)).points(local, segment)
-    body = marker_body.body(FILE, mw.FULL, points, 120.0)
+    local = kinematics.segment_scales(stretch)[segment] * np.array([m.at for m in marks])
+    points = kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)).points(local, segment)
+    body = markers.from_markers(FILE, mw.FULL, points, 120.0)
     assert body.residual < 1e-3
     offset = np.degrees(angles_of(body) - angles).mean(axis=0)
     assert (
@@ -97,7 +99,7 @@ def test_a_segment_without_markers_is_missing_there_and_only_there(full):
     gone = points.copy()
     gone[100:160, [mw.FULL.index(k) for k in ("LTIB", "LANK", "LHEE", "LTOE")]] = np.nan
     gone[200:220, [mw.FULL.index(k) for k in ("RELB", "RUPA", "RFRA", "RWRA", "RWRB")]] = np.nan
-    found = angles_of(marker_body.body(FILE, mw.FULL, gone, 120.0))
+    found = angles_of(markers.from_markers(FILE, mw.FULL, gone, 120.0))
     missing = np.isnan(found)
     expected = np.zeros_like(missing)
     expected[100:160, columns(["l_knee_flexion", "l_ankle_flexion"])] = True
@@ -113,7 +115,7 @@ def test_one_missing_marker_of_many_leaves_no_gap(full):
     gone = points.copy()
     gone[:, mw.FULL.index("LTIB")] = np.nan
     gone[40:90, mw.FULL.index("RTHI")] = np.nan
-    found = angles_of(marker_body.body(FILE, mw.FULL, gone, 120.0))
+    found = angles_of(markers.from_markers(FILE, mw.FULL, gone, 120.0))
     assert np.isfinite(found[:, columns(LEGS)]).all()
 
 
@@ -121,7 +123,7 @@ def test_outliers_do_not_pull(full):
     points, _, whole = full
     wild = points.copy()
     wild[50:120, mw.FULL.index("LKNE")] += (0.3, 0.2, 0.1)
-    found = angles_of(marker_body.body(FILE, mw.FULL, wild, 120.0))
+    found = angles_of(markers.from_markers(FILE, mw.FULL, wild, 120.0))
     apart = np.degrees(found - angles_of(whole))[50:120, columns(LEGS)]
     assert np.sqrt((apart**2).mean()) < 2.0
 
@@ -130,9 +132,9 @@ def test_frames_with_nobody_are_missing(full):
     points, _, _ = full
     gone = points.copy()
     gone[:50] = gone[300:] = np.nan
-    body = marker_body.body(FILE, mw.FULL, gone, 120.0)
-    straight = root.align_pelvis(root.level(body)[0])
-    channels, heading = root.channels(straight, retarget.measure(straight), 120.0)
+    body = markers.from_markers(FILE, mw.FULL, gone, 120.0)
+    straight = retarget.align_pelvis(retarget.level(body)[0])
+    channels, heading = retarget.root_channels(straight, retarget.measure(straight), 120.0)
     everything = np.concatenate([angles_of(body), channels], axis=1)
     assert np.isnan(everything[:50]).all() and np.isnan(everything[300:]).all()
     assert np.isfinite(everything[50:300]).all() and np.isfinite(heading).all()
@@ -140,8 +142,8 @@ def test_frames_with_nobody_are_missing(full):
 
 def test_legs_alone_have_legs_alone():
     points, pose = mw.walker(mw.LOWER, seed=3)
-    body = marker_body.body(FILE, mw.LOWER, points, 120.0)
-    straight = root.align_pelvis(root.level(body)[0])
+    body = markers.from_markers(FILE, mw.LOWER, points, 120.0)
+    straight = retarget.align_pelvis(retarget.level(body)[0])
     measures = retarget.measure(straight)
     found = retarget.angles(straight, measures)
     assert np.isfinite(found[:, columns(LEGS)]).all()
@@ -159,9 +161,9 @@ def test_legs_alone_have_legs_alone():
 
 def test_the_mean_body_takes_parts_from_those_who_have_them():
     points, _ = mw.walker(mw.LOWER, frames=240)
-    legs = retarget.measure(marker_body.body(FILE, mw.LOWER, points, 120.0))
+    legs = retarget.measure(markers.from_markers(FILE, mw.LOWER, points, 120.0))
     points, _ = mw.walker(mw.FULL, frames=240, seed=5)
-    whole = retarget.measure(marker_body.body(FILE, mw.FULL, points, 120.0))
+    whole = retarget.measure(markers.from_markers(FILE, mw.FULL, points, 120.0))
     both = retarget.mean_proportions([legs, whole, None])
     assert both.neck == retarget.own_proportions(whole).neck
     assert both.thigh == pytest.approx(np.mean([retarget.own_proportions(m).thigh for m in (legs, whole)]))
@@ -171,23 +173,23 @@ def test_the_mean_body_takes_parts_from_those_who_have_them():
 @pytest.mark.parametrize("turn", [np.eye(3), Y_UP.T, np.diag([1.0, -1, -1])], ids=["z-up", "y-up", "z-down"])
 def test_any_axis_may_be_up(full, turn):
     points, _, body = full
-    turned = marker_body.body(FILE, mw.FULL, points @ turn.T, 120.0)
+    turned = markers.from_markers(FILE, mw.FULL, points @ turn.T, 120.0)
     assert turned.pelvis[:, 2, 2].mean() > 0.95
     assert np.degrees(angles_of(turned)) == pytest.approx(np.degrees(angles_of(body)), abs=0.5)
 
 
 def test_a_treadmill_becomes_ground():
     points, _ = mw.walker(mw.FULL)
-    body = marker_body.body(FILE, mw.FULL, points, 120.0)
+    body = markers.from_markers(FILE, mw.FULL, points, 120.0)
     sliding = np.array([0.0, -1.5, 0.0]) * np.arange(360)[:, None] / 120
     still = body.joints["pelvis"][:, :2] - body.joints["pelvis"][:1, :2]
     on_the_spot = np.concatenate([still, np.zeros((360, 1))], axis=1)
     joints = {n: p - on_the_spot for n, p in body.joints.items()}
     joints |= {f"{s}_ankle": sliding + 0.01 * np.abs(np.sin(np.arange(360) / 19))[:, None] for s in "lr"}
-    belt = root.overground(marker_body.Body("belt", 120.0, joints, body.pelvis, body.lateral))
+    belt = retarget.overground(Body("belt", 120.0, joints, body.pelvis, body.lateral))
     travel = belt.joints["pelvis"][-1] - belt.joints["pelvis"][0]
     assert travel[:2] == pytest.approx([0, 1.5 * 359 / 120], abs=0.1)
-    assert root.overground(body) is body
+    assert retarget.overground(body) is body
 
 
 @pytest.mark.parametrize("name", ["02/02_01", "35/35_01"])
@@ -195,11 +197,11 @@ def test_markers_and_skeleton_of_one_recording_agree(name):
     """Markers put on a CMU walker's bones give the angles that his skeleton gives."""
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
-    body = root.align_pelvis(root.level(readers.read(WALKS / f"{name}.amc"))[0])
+    body = retarget.align_pelvis(retarget.level(readers.read(WALKS / f"{name}.amc"))[0])
     measures = retarget.measure(body)
     points = mw.on_body(body, measures, mw.FULL)
     points += np.random.default_rng(0).normal(scale=0.002, size=points.shape)
-    found = marker_body.body(FILE, mw.FULL, points, body.fps)
+    found = markers.from_markers(FILE, mw.FULL, points, body.fps)
     apart = np.degrees(angles_of(found) - retarget.angles(body, measures))
     assert found.residual < 0.005
     assert np.abs(apart.mean(axis=0))[columns(LEGS)].max() < 2.0
@@ -215,7 +217,7 @@ def test_points_of_no_body_are_refused():
     with pytest.raises(
         UserError, match=r"walk.c3d: the markers do not fit a body \(rms \d+ mm, worst '\w+'\)"
     ):
-        marker_body.body(FILE, mw.LOWER, points, 120.0)
+        markers.from_markers(FILE, mw.LOWER, points, 120.0)
 
 
 def test_the_core_needs_three_points():

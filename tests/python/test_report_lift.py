@@ -14,7 +14,7 @@ from toy_segments import toy_blob, toy_prior
 from gait.camera.camera import Camera
 from gait.cli import main, report_lift
 from gait.io.keypoints_file import Keypoints, read, write
-from gait.learn.segments import segment_motion
+from gait.learn.segments import motion as segment_motion
 from gait.lift.report import motion_figures
 from gait.lift.segment.explain import Uncertain
 from gait.lift.segment.view import Parallel, Perspective, looking_along

@@ -129,18 +129,18 @@ def test_all_also_learns_from_what_is_no_walk(walks, tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     assert len(told["sequences"]) == 4 and told["segments"]["recordings"] == 5
     (line,) = (line for line in told["left_out"] if "04_01" in line)
-    assert line.endswith("(its segments are used all the same)")
+    assert line.endswith("(its segments are used nevertheless)")
     assert learn(walks, path, "--segments", "learnt", "--json") == 0
     assert not any("used" in line for line in json.loads(capsys.readouterr().out)["left_out"])
 
 
 def test_all_needs_a_cyclic_model_and_names_what_does_not(walks, tmp_path, capsys):
-    """Nothing is written then: no segment is used all the same."""
+    """Nothing is written then: no segment is used nevertheless."""
     path = tmp_path / "all.gait"
     words = ("learn", walks / "04", "-o", path, "--jobs", 1, "--segment-hop", 1, "--segments")
     assert run(*words, "all") == 1 and not path.exists()
     said = capsys.readouterr().err.rstrip()
-    assert "04_01.amc: not learnt as 'walk'" in said and "used all the same" not in said
+    assert "04_01.amc: not learnt as 'walk'" in said and "used nevertheless" not in said
     assert said.endswith(
         "; for gait lift alone give --segments only: all needs recordings for a cyclic model, too"
     )
@@ -156,7 +156,7 @@ def test_recorded_markers_need_files_that_have_them(walks, tmp_path, capsys):
     assert "holds no recorded markers; leave out --segment-markers" in capsys.readouterr().err
     assert not path.exists()
     assert run(*words, "learnt", "--components", 2, "--jobs", 1) == 0
-    assert "no prior over segments: the recordings hold 0 segments" in capsys.readouterr().err
+    assert "no segment prior: the recordings hold 0 segments" in capsys.readouterr().err
     assert not set(TAGS) & set(blob.read(path))
 
 

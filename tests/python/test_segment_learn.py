@@ -1,37 +1,38 @@
-"""Learning of the prior over segments: markers, cutting, gaps, modes, held-out residual, mixture."""
+"""The segment prior: markers, cutting, gaps, modes, held-out residual, mixture, sections."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from mocap_files import write_toy
+from toy_segments import toy_blob, toy_prior
 
+from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, Proportions, default_skeleton, points
 from gait.errors import UserError
-from gait.learn.mocap.angle_file import AngleTable
-from gait.learn.segment_options import Segments
-from gait.learn.segments import (
-    segment_angles,
-    segment_basis,
-    segment_corpus,
-    segment_fit,
-    segment_heldout,
-    segment_mixture,
-    segment_motion,
-    segment_people,
-)
-from gait.learn.segments.segment_corpus import Corpus, Recorded
+from gait.io import blob
+from gait.learn.mocap.tables import AngleTable
+from gait.learn.options import SegmentOptions
+from gait.learn.segments import corpus as corpora
+from gait.learn.segments import fit
+from gait.learn.segments import motion as motions
+from gait.learn.segments.corpus import Corpus, Recorded, segments, tabulate
+from gait.learn.segments.fit import sections
 from gait.learn.segments.virtual_markers import MARKERS, SKIN, marked_skeleton
 from gait.learn.solve import readers
 
-PLAIN = Segments(people=False)
+PLAIN = SegmentOptions(people=False)
 
 
 @pytest.fixture(scope="module")
 def motion(tmp_path_factory):
     """A toy walk along +x in the file's y-up axes, 120 frames a second."""
     path = write_toy(tmp_path_factory.mktemp("walk"), "01_01", frames=420, period=120.0, speed=1.3)
-    return segment_motion.of(path, readers.read(path), Segments())
+    return motions.of(path, readers.read(path), SegmentOptions())
 
 
 def recorded(places, root, names=None, subject="a", name="a_1"):
@@ -68,12 +69,12 @@ def test_a_walk_becomes_markers_over_a_floor_at_the_rate_of_segments(motion):
 
 
 def test_people_who_were_not_recorded_come_in_opposite_pairs_on_the_same_floor(motion):
-    assert len(motion.people) == 2 * segment_people.PAIRS
+    assert len(motion.people) == 2 * motions.PAIRS
     apart = motion.people - motion.places
-    pairs = apart.reshape(segment_people.PAIRS, 2, *apart.shape[1:])
+    pairs = apart.reshape(motions.PAIRS, 2, *apart.shape[1:])
     assert np.abs(pairs.sum(axis=1)).mean() < 0.2 * np.abs(apart).mean()
     assert 0.005 < np.sqrt(np.mean(apart**2)) < 0.06  # statures
-    heights = [x[:, segment_people.FEET, 2].min(axis=1).mean() for x in (motion.places, *motion.people)]
+    heights = [x[:, motions.FEET, 2].min(axis=1).mean() for x in (motion.places, *motion.people)]
     assert np.ptp(heights) < 1e-3
 
 
@@ -81,13 +82,13 @@ def test_resampling_keeps_what_is_slow_and_filters_what_is_fast():
     time = np.arange(240) / 120
     slow, fast = np.sin(2 * np.pi * 1.5 * time), np.sin(2 * np.pi * 35 * time)
     signal = np.stack([slow + fast, slow, np.ones(240)], axis=1)[:, None]
-    found = segment_motion.resample(signal, 120, 20)[:, 0]
+    found = motions.resample(signal, 120, 20)[:, 0]
     at = np.arange(len(found)) / 20
     inside = slice(4, -4)
     assert np.abs(found - np.sin(2 * np.pi * 1.5 * at)[:, None])[inside, :2].max() < 0.02
     assert np.allclose(found[:, 2], 1)
     signal[60:120, 0, 1] = np.nan
-    gap = segment_motion.resample(signal, 120, 20)[:, 0, 1]
+    gap = motions.resample(signal, 120, 20)[:, 0, 1]
     assert np.isnan(gap[10:20]).all() and np.isfinite(gap[:10]).all() and np.isfinite(gap[21:]).all()
 
 
@@ -100,9 +101,9 @@ def test_angles_alone_walk_over_the_floor_on_their_lower_foot():
         angles[:, ANGLES.index(f"{side}_hip_flexion")] = 0.4 * np.cos(turn)
         angles[:, ANGLES.index(f"{side}_knee_flexion")] = np.maximum(0.05, -0.9 * np.sin(turn))
     table = AngleTable("legs", 100.0, angles)
-    pose = segment_angles.pose(table)
+    pose = motions._pose_of_angles(table)
     about = pose.places()
-    path = segment_angles.standing(about, Proportions())
+    path = motions.standing(about, Proportions())
     places = about + path[:, None]
     feet = [MARKERS.index(f"{s}_{part}") for s in "lr" for part in ("toe", "heel")]
     assert np.abs(places[:, feet, 2].min(axis=1)).max() < 0.05
@@ -122,11 +123,11 @@ def test_segments_begin_over_the_origin_looking_along_x():
     flat = np.einsum("abt,tjb->tja", turn, np.repeat(shape, frames, axis=0)[..., :2])
     places = np.concatenate([flat, np.repeat(shape, frames, axis=0)[..., 2:]], axis=2)
     places[..., :2] += root[:, None, :2]
-    cut = segment_corpus.segments(recorded(places, root), [f"m{k}" for k in range(5)], PLAIN)
+    cut = segments(recorded(places, root), [f"m{k}" for k in range(5)], PLAIN)
     assert cut.shape == (3, 10, 5, 3)  # frames 0, 5, 10
     assert np.allclose(cut[:, 0], shape, atol=1e-12)
     for headings, angles in ((2, (0, 90)), (8, range(0, 360, 45))):
-        turned = segment_corpus._turned(cut, headings)
+        turned = corpora._turned(cut, headings)
         assert len(turned) == len(list(angles))
         first = [np.degrees(np.arctan2(*(t[0, 0, 0, 1::-1]))) for t in turned]
         ahead = (np.array(first) - first[0]) % 360
@@ -141,7 +142,7 @@ def test_markers_that_few_show_are_not_learnt_and_gappy_segments_are_left_out():
     two[:, 3] = np.nan
     three[20:30, :2] = np.nan
     recordings = [recorded(x, root) for x in (one, two, three)]
-    table = segment_corpus.tabulate(recordings, PLAIN)
+    table = tabulate(recordings, PLAIN)
     assert table.names == ("m0", "m1", "m2")
     assert np.bincount(table.recording).tolist() == [7, 7, 4]  # those at 15, 20, 25 have gaps
 
@@ -158,9 +159,9 @@ def toy_rows(rng, count=200, frames=4, markers=5, modes=3, noise=0.01):
 def test_modes_are_those_of_the_singular_value_decomposition(count):
     """From the scatter of coordinates or, with few segments, of segments."""
     rows, *_ = toy_rows(np.random.default_rng(3), count)
-    found = segment_basis.basis(rows, 5)
+    found = fit.basis(rows, 5)
     _, s, vt = np.linalg.svd(rows - rows.mean(axis=0), full_matrices=False)
-    model = segment_heldout.fitted(found, np.ones(count, bool), 3)
+    model = fit.fitted(found, np.ones(count, bool), 3)
     assert np.allclose(model.variance, s[:3] ** 2 / (count - 1))
     assert np.allclose(np.abs((found.directions @ model.vectors).T @ vt[:3].T), np.eye(3), atol=1e-8)
     rest = (s[3:] ** 2).sum() / (count - 1) / rows.shape[1]
@@ -169,8 +170,8 @@ def test_modes_are_those_of_the_singular_value_decomposition(count):
 
 def test_rest_beyond_the_basis_is_counted_in_the_residual():
     rows, *_ = toy_rows(np.random.default_rng(3), 300)
-    whole, few = (segment_basis.basis(rows, 5, most) for most in (60, 10))
-    a, b = (segment_heldout.fitted(x, np.ones(300, bool), 3) for x in (whole, few))
+    whole, few = (fit.basis(rows, 5, most) for most in (60, 10))
+    a, b = (fit.fitted(x, np.ones(300, bool), 3) for x in (whole, few))
     assert few.scores.shape[1] == 10
     assert np.allclose(a.residual, b.residual, rtol=1e-6)
 
@@ -182,7 +183,7 @@ def test_gaps_are_filled_as_the_rest_of_the_segment_lets_expect():
     for k in range(0, 300, 3):
         start = 15 * rng.integers(4)
         gappy[k, start : start + 9] = np.nan
-    filled = segment_basis.filled(gappy, 3)
+    filled = fit.filled(gappy, 3)
     where = np.isnan(gappy)
     error, spread = (filled - rows)[where].std(), (rows - rows.mean(axis=0))[where].std()
     assert error < 0.02 < 0.5 * spread  # noise is 0.01
@@ -195,30 +196,28 @@ def test_gamma_is_what_people_left_out_ask_for():
     rows, *_ = toy_rows(rng, 600)
     subject = np.repeat(np.arange(6), 100)
     own = rng.normal(scale=0.03, size=(6, rows.shape[1]))
-    folds = segment_heldout.groups(subject, subject)
+    folds = fit.groups(subject, subject)
     assert [int(f.sum()) for f in folds] == [100] * 6
 
     def gamma(basis):
-        models = [(segment_heldout.fitted(basis, ~gone, 8), gone) for gone in folds]
-        return segment_heldout.gamma([segment_heldout.fold(basis, m, gone) for m, gone in models])
+        models = [(fit.fitted(basis, ~gone, 8), gone) for gone in folds]
+        return fit.gamma([fit.fold(basis, m, gone) for m, gone in models])
 
-    assert 1 < gamma(segment_basis.basis(rows, 5)) < 1.4  # modes fit the noise of those learnt from
-    assert gamma(segment_basis.basis(rows + own[subject], 5)) > 3
+    assert 1 < gamma(fit.basis(rows, 5)) < 1.4  # modes fit the noise of those learnt from
+    assert gamma(fit.basis(rows + own[subject], 5)) > 3
     still = np.tile(own[:, None, :15], (1, 4, 1)).reshape(6, -1)  # the same in all four frames
-    assert gamma(segment_basis.basis(rows + still[subject], 5)) > 2 * gamma(
-        segment_basis.basis(rows + own[subject], 5)
-    )
-    assert segment_heldout.gamma([]) == 1
-    assert segment_heldout.groups(np.zeros(5, int), np.zeros(5, int)) == []
+    assert gamma(fit.basis(rows + still[subject], 5)) > 2 * gamma(fit.basis(rows + own[subject], 5))
+    assert fit.gamma([]) == 1
+    assert fit.groups(np.zeros(5, int), np.zeros(5, int)) == []
 
 
 def test_fold_likelihood_is_the_density_of_the_segments():
     rng = np.random.default_rng(6)
     rows, *_ = toy_rows(rng, 120)
-    found = segment_basis.basis(rows, 5)
+    found = fit.basis(rows, 5)
     gone = np.arange(120) < 20
-    model = segment_heldout.fitted(found, ~gone, 3)
-    fold = segment_heldout.fold(found, model, gone)
+    model = fit.fitted(found, ~gone, 3)
+    fold = fit.fold(found, model, gone)
     mean = found.mean + found.directions @ model.mean
     modes = found.directions @ (model.vectors * np.sqrt(model.variance))
     differences = []
@@ -227,7 +226,7 @@ def test_fold_likelihood_is_the_density_of_the_segments():
         covariance = modes @ modes.T + np.diag(rest)
         apart = rows[gone] - mean
         quadratic = np.mean(np.sum(apart.T * np.linalg.solve(covariance, apart.T), axis=0))
-        differences.append(fold.loss(gamma) - quadratic - np.linalg.slogdet(covariance)[1])
+        differences.append(fold.deviance(gamma) - quadratic - np.linalg.slogdet(covariance)[1])
     assert np.allclose(differences, 0, atol=1e-6)
 
 
@@ -236,19 +235,19 @@ def test_a_mixture_finds_its_components_and_how_many():
     centres = np.array([[3.0, 0], [-3, 0], [0, 4]])
     label = rng.integers(3, size=600)
     scores = centres[label] + rng.normal(size=(600, 2)) * 0.3
-    found = segment_mixture.fit(scores, 3)
+    found = fit.fit_mixture(scores, 3)
     order = np.argmin(np.linalg.norm(found.means[:, None] - centres, axis=2), axis=1)
     assert sorted(order) == [0, 1, 2]
     assert np.abs(found.means - centres[order]).max() < 0.1
     assert np.allclose(found.weights, np.bincount(label)[order] / 600, atol=0.01)
-    one = segment_mixture.fit(scores, 1)
+    one = fit.fit_mixture(scores, 1)
     assert np.allclose(one.covariances[0], np.cov(scores.T)) and one.weights.tolist() == [1.0]
-    basis = segment_basis.Basis(np.zeros(6), np.eye(6)[:, :2], scores, np.zeros((600, 2)))
-    model = segment_heldout.Fitted(np.zeros(2), scores.var(axis=0), np.eye(2), np.ones(2))
+    basis = fit.Basis(np.zeros(6), np.eye(6)[:, :2], scores, np.zeros((600, 2)))
+    model = fit.Fitted(np.zeros(2), scores.var(axis=0), np.eye(2), np.ones(2))
     folds, real = [np.arange(600) % 5 == k for k in range(5)], np.ones(600, bool)
-    assert len(segment_mixture.choose(basis, model, folds, real, None).weights) == 3
+    assert len(fit.choose_mixture(basis, model, folds, real, None).weights) == 3
     single = replace(basis, scores=rng.normal(size=(600, 2)))
-    assert len(segment_mixture.choose(single, model, folds, real, None).weights) == 1
+    assert len(fit.choose_mixture(single, model, folds, real, None).weights) == 1
 
 
 def test_people_made_up_of_those_left_out_do_not_help_a_mixture():
@@ -256,12 +255,12 @@ def test_people_made_up_of_those_left_out_do_not_help_a_mixture():
     rng = np.random.default_rng(8)
     person, real = np.repeat(np.arange(6), 100), np.tile(np.arange(100) < 20, 6)
     scores = rng.normal(size=(6, 2))[person] + 0.02 * rng.normal(size=(600, 2))
-    basis = segment_basis.Basis(np.zeros(6), np.eye(6)[:, :2], scores, np.zeros((600, 2)))
-    model = segment_heldout.Fitted(np.zeros(2), scores.var(axis=0), np.eye(2), np.ones(2))
+    basis = fit.Basis(np.zeros(6), np.eye(6)[:, :2], scores, np.zeros((600, 2)))
+    model = fit.Fitted(np.zeros(2), scores.var(axis=0), np.eye(2), np.ones(2))
     folds = [person == k for k in range(6)]
-    assert len(segment_mixture.choose(basis, model, folds, real, None).weights) == 1
+    assert len(fit.choose_mixture(basis, model, folds, real, None).weights) == 1
     leaky = [one & real for one in folds]
-    assert len(segment_mixture.choose(basis, model, leaky, real, None).weights) > 1
+    assert len(fit.choose_mixture(basis, model, leaky, real, None).weights) > 1
 
 
 def test_a_prior_of_motions_has_their_mean_and_unit(motion):
@@ -270,7 +269,7 @@ def test_a_prior_of_motions_has_their_mean_and_unit(motion):
             places = motion.places + 0.002 * k
             corpus.put(f"{k}_1", str(k), None, replace(motion, places=places))
         recordings = corpus.recordings()
-    prior = segment_fit.fit(recordings, Segments(modes=12))
+    prior = fit.fit(recordings, SegmentOptions(modes=12))
     assert prior.segments == 4 * 13 and prior.recordings == 4 and prior.size == 12
     assert prior.stature == pytest.approx(motion.stature) and prior.names == MARKERS
     assert np.all(np.diff(prior.sd[0]) <= 0) and (prior.residual > 0).all()
@@ -278,14 +277,14 @@ def test_a_prior_of_motions_has_their_mean_and_unit(motion):
     assert np.allclose(norm, prior.sd[0])
     flat = prior.modes[0].reshape(12, -1)
     assert (flat[np.arange(12), np.abs(flat).argmax(axis=1)] > 0).all()
-    cut = segment_corpus.segments(recordings[0], MARKERS, Segments())
+    cut = segments(recordings[0], MARKERS, SegmentOptions())
     assert np.abs(cut.mean(axis=0) - prior.mean[0]).max() < 0.05
-    again = segment_fit.fit(recordings, Segments(modes=12))
+    again = fit.fit(recordings, SegmentOptions(modes=12))
     assert np.array_equal(again.modes, prior.modes) and again.gamma == prior.gamma
-    copies = segment_fit.fit(recordings, Segments(modes=12, headings=8))
+    copies = fit.fit(recordings, SegmentOptions(modes=12, headings=8))
     assert copies.segments == prior.segments
     assert np.abs(copies.mean[0, 0, :, :2]).max() < 1e-9  # all round: nobody looks anywhere
-    mixed = segment_fit.fit(recordings, Segments(modes=10, mixture=2))
+    mixed = fit.fit(recordings, SegmentOptions(modes=10, mixture=2))
     assert mixed.components == 2 and mixed.weights.sum() == pytest.approx(1)
 
 
@@ -295,4 +294,105 @@ def test_too_few_segments_are_an_error(motion):
         corpus.put("a_1", "a", None, short)
         recordings = corpus.recordings()
     with pytest.raises(UserError, match="hold 1 segments of 0.5 s, fewer than 8; add recordings"):
-        segment_fit.fit(recordings, Segments())
+        fit.fit(recordings, SegmentOptions())
+
+
+MOCAP = Path(__file__).parents[3] / "shared" / "data" / "mocap" / "cmu_misc"
+FOUR = ("01/01_14.amc", "02/02_04.amc", "02/02_05.amc", "02/02_07.amc")
+ALL = tuple(sorted(str(path.relative_to(MOCAP)) for path in MOCAP.glob("*/*.amc")))
+MODES = 50
+
+
+def shares(files: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Cumulative shares of the variance (MODES,) that the prior's modes hold, and by singular values."""
+    wanted = SegmentOptions(source="only", people=False, modes=MODES)
+    with Corpus() as corpus:
+        for file in files:
+            path = MOCAP / file
+            corpus.put(path.stem, path.parent.name, path, motions.of(path, readers.read(path), wanted))
+        recordings = corpus.recordings()
+        prior = fit.fit(recordings, wanted)
+        rows = np.concatenate([segments(r, prior.names, wanted) for r in recordings])
+    flat = rows.reshape(len(rows), -1)
+    values = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False) ** 2
+    variance = prior.sd[0] ** 2
+    outside = 3 * prior.frames * prior.residual[0].sum()
+    have = np.cumsum(variance / (variance.sum() + outside))
+    return have, np.cumsum(values / values.sum())[:MODES]
+
+
+@pytest.mark.skipif(not MOCAP.is_dir(), reason="no motion capture here")
+@pytest.mark.parametrize(
+    ("files", "held", "count"),
+    [(FOUR, (0.9948, 0.9972), 10), (ALL, (0.9886, 0.9933), 13)],
+    ids=["four", "all"],
+)
+def test_modes_hold_as_much_variance_as_singular_values_say(
+    files: tuple[str, ...], held: tuple[float, float], count: int
+) -> None:
+    have, want = shares(files)
+    assert np.abs(have - want).max() < 1e-3
+    assert have[[39, 49]] == pytest.approx(held, abs=1e-3)
+    assert np.searchsorted(have, 0.91) + 1 == count
+
+
+@pytest.mark.parametrize("components", [1, 3])
+def test_prior_survives_the_file(tmp_path, components):
+    """What was written is read, to the rounding of the file."""
+    prior = toy_prior(5, 8, 6, seed=2, components=components)
+    path = tmp_path / "toy.gait"
+    path.write_bytes(toy_blob(prior))
+    read = SegmentPrior.load(path)
+    assert read.names == prior.names
+    whole = ("frames", "hop", "headings", "components", "size", "segments", "recordings", "fps", "gamma")
+    assert [getattr(read, name) for name in whole] == [getattr(prior, name) for name in whole]
+    for name in ("weights", "mean", "modes", "sd", "residual", "stature"):
+        np.testing.assert_allclose(getattr(read, name), getattr(prior, name), rtol=1e-6, atol=1e-6)
+
+
+def test_markers_are_found_by_name():
+    """Places follow the order asked for; an unknown name is an error that lists the known ones."""
+    prior = toy_prior(3, 4, 2)
+    assert prior.index(["head_top", "pelvis"]).tolist() == [2, 0]
+    with pytest.raises(UserError, match="'nose' is not in the prior; it knows pelvis neck"):
+        prior.index(["nose"])
+
+
+def test_blob_without_prior_says_how_to_learn_it(tmp_path):
+    """A cyclic model without the sections, or with a part of them."""
+    with pytest.raises(UserError, match=r"x.gait: holds no segment prior; learn it with gait learn"):
+        SegmentPrior.from_sections({}, "x.gait")
+    parts = {k: v for k, v in sections(toy_prior()).items() if k != "SGSD"}
+    with pytest.raises(UserError, match="holds no section SGSD"):
+        SegmentPrior.from_sections(parts, "x.gait")
+
+
+def _changed(tag: str, change) -> dict:
+    parts = {k: v.copy() for k, v in sections(toy_prior()).items()}
+    parts[tag] = change(parts[tag])
+    return parts
+
+
+@pytest.mark.parametrize(
+    ("tag", "change"),
+    [
+        ("SGIN", lambda a: a[:5]),
+        ("SGIN", lambda a: a * np.array([1, 9, 1, 1, 1, 1, 1, 1], np.int32)),
+        ("SGIN", lambda a: a + np.array([0, 0, 3, 0, 0, 0, 0, 0], np.int32)),
+        ("SGRT", lambda a: a * np.float32(0)),
+        ("SGWT", lambda a: a * np.float32(2)),
+        ("SGMN", lambda a: a[:, 1:]),
+        ("SGMD", lambda a: a * np.float32(np.nan)),
+        ("SGSD", lambda a: -a),
+        ("SGPS", lambda a: a[:, :3]),
+    ],
+)
+def test_contradictions_are_refused(tag, change):
+    """Shapes, counts, signs and values are checked before use."""
+    with pytest.raises(UserError, match=r"bad.gait: .*; learn the model again"):
+        SegmentPrior.from_sections(_changed(tag, change), "bad.gait")
+
+
+def test_the_group_is_complete_and_ordered():
+    """The sections are those of the format, none left out."""
+    assert tuple(blob.decode(toy_blob(toy_prior()))) == TAGS

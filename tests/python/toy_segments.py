@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gait.body.skeleton import JOINTS
 from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import JOINTS
 from gait.io import blob
-from gait.learn.segments.segment_sections import sections
+from gait.learn.segments.fit import sections
 
 #: Axes of a picture taken along +y: to the right and up.
 FRONT = np.array([[1.0, 0, 0], [0, 0, 1]])

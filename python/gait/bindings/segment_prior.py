@@ -2,7 +2,7 @@
 
 A segment is F frames of J markers, in statures; the pelvis of its first frame is over the origin and the
 floor is z = 0.  With `headings` 0 its body looks along +x in the first frame.
-`gait.learn.segments.segment_sections` writes what is read here; the sections are in
+`gait.learn.segments.fit` writes what is read here; the sections are in
 libgait/doc/model-format.md.
 """
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.body.pace import slope_of
-from gait.cli import segment_text
 from gait.io import blob
 from gait.io.fields import json_of
+from gait.learn.segments import summary as segment_summary
 
 GAIT = (
     "stride_hz", "stride_hz_sd", "stride_time_cv", "stride_length", "stride_length_sd", "fps", "stature_m",
@@ -60,7 +60,7 @@ def describe(sections: Mapping[str, Any], size: int, crc: int, name: str = "blob
     if "SCST" in sections:
         result["scores"] = np.round(sections["SCST"].astype(float), 4).tolist()
     if any(tag in sections for tag in TAGS):
-        result["segments"] = segment_text.summary(SegmentPrior.from_sections(sections, name))
+        result["segments"] = segment_summary.summary(SegmentPrior.from_sections(sections, name))
     if "META" in sections:
         text, remedy = sections["META"].tobytes(), "learn the model anew"
         result["meta"] = json_of(f"{name}: section META", text, remedy, remedy)
@@ -94,7 +94,7 @@ def text(name: str, s: Mapping[str, Any]) -> str:
         shares = meta["variance_explained"][: s.get("components")]
         lines.append("variance explained: " + " ".join(f"{100 * v:.1f}" for v in shares) + " %")
     if "segments" in s:
-        lines += segment_text.lines(s["segments"])
+        lines += segment_summary.lines(s["segments"])
     if "acknowledgement" in meta:
         lines.append(meta["acknowledgement"])
     return "\n".join(lines)

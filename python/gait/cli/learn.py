@@ -3,128 +3,212 @@
 Sources are files or folders of them: .amc with its .asf beside it, .bvh, .c3d, .trc, and .csv of joint
 positions or angles, separated by ',', ';' (with decimal commas) or tabs.  Each recording is retargeted to the
 default skeleton and cut into cycles by its own period; functional principal components of all cycles give the
-mean curves and the ways in which people differ (Ormoneit and others, 2000).  In a folder, a file that cannot
-be used is named in one line and the rest is learnt.  gait info lists the sequences of a model, --report shows
-everything.
+mean curves and the ways in which people differ (Ormoneit and others, 2000).  In a folder, files that cannot
+be used are left out with one line each.  gait info lists the sequences of a model, --report shows everything.
 
-Recordings are read a few at a time and their signals wait on disk, in the folder that TMPDIR names; in memory
-are their cycles alone.  The model does not depend on --jobs or --dask, nor on the CPU if it is x86-64.
-The workers of a Dask cluster (pip install 'libgait[dask]') need this version of
-the package and the files under the same paths; start them with dask worker --preload-nanny gait.reproducible.
+Only the cycles of the recordings are in memory; their signals are on disk, in the folder that TMPDIR names.
+The model does not depend on --jobs or --dask, nor on the CPU if it is x86-64.  The workers of a Dask cluster
+(pip install 'libgait[dask]') need the same version of the package and the files under the same paths; start
+them with dask worker --preload-nanny gait.reproducible.
 
-What the columns of .csv and the marker names of .c3d and .trc must be: libgait/doc/reference/files.md.
-
-The model shipped with the package: gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait
+Columns of .csv and marker names of .c3d and .trc are described in libgait/doc/reference/files.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import sys
 from pathlib import Path
 
-from gait.cli import learn_segments, values
-from gait.learn.corpus import fork_server, subjects
-from gait.learn.model_options import DEFAULT_COMPONENTS, MOST_COMPONENTS, PRIORS
+from gait.cli import values
+from gait.errors import UsageError
+from gait.learn.corpus import forkserver
+from gait.learn.mocap import markers
+from gait.learn.options import (
+    DEFAULT_COMPONENTS,
+    MOST_COMPONENTS,
+    PERIOD_MODES,
+    PRIORS,
+    SEGMENT_HEADINGS,
+    SEGMENT_MARKERS,
+    SEGMENT_SOURCES,
+    SUBJECT_RULES,
+    LearnOptions,
+    SegmentOptions,
+)
+
+EXAMPLES = """\
+gait learn recordings/ -o M.gait --report report
+gait learn walk_01.trc walk_02.trc -o M.gait --markers map.json
+gait learn ../shared/data/mocap/cmu_walk -o python/gait/data/walk.gait    # the model in the package
+"""
+
+AUTO = "auto"
+#: Ranges of the options of segments.
+FRAMES, FPS, MODES, MIXTURE = (4, 60), (5, 240), (1, 120), (1, 16)
+SEGMENT = ("frames", "hop", "fps", "modes", "headings", "mixture", "markers")  # options --segment-...
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("sources", nargs="+", metavar="SRC", help="motion files or folders of them")
-    parser.add_argument("-o", "--output", required=True, metavar="M.gait", help="the model")
-    parser.add_argument(
+    usual, add = SegmentOptions(), parser.add_argument
+    add("sources", nargs="+", metavar="SRC", help="motion files or folders of them")
+    add("-o", "--output", required=True, metavar="M.gait", help="the model")
+    add(
         "--activity",
         default="walk",
         metavar="NAME",
-        help="what the motion is called; walk leaves out runs and the reverse (walk)",
+        help="name of the motion; walk refuses runs and run refuses walks (walk)",
     )
-    parser.add_argument(
+    add(
         "--subjects",
-        choices=subjects.RULES,
-        default=subjects.RULES[0],
+        choices=SUBJECT_RULES,
+        default=SUBJECT_RULES[0],
         help="which files are of one person. prefix: those whose names begin alike up to '_'. folder: those "
-        "of one folder. file: each alone. auto (the default): prefix; but folder for files without '_', and "
-        "for all if one prefix is in several folders, such as Anna/walk_01 and Ben/walk_01. Lengths of limbs "
-        "are found from all recordings of a person with markers",
+        "of one folder. file: each alone. auto (the default): prefix, but folder for files without '_', and "
+        "for all files if a prefix occurs in several folders, such as Anna/walk_01 and Ben/walk_01. Lengths "
+        "of limbs are measured from all recordings of a person with markers",
     )
-    parser.add_argument(
+    add(
         "--components",
-        type=_components,
+        type=lambda text: _auto_or(text, MOST_COMPONENTS),
         metavar="auto|N",
-        help="in how many ways the model can differ from the mean walk. N: so many, from 1 to "
-        f"{MOST_COMPONENTS}. auto: as many as describe data that were held out best. Without the option "
-        f"{DEFAULT_COMPONENTS}, or two less than there are cycles if that is fewer",
+        help=f"number of components, the ways to differ from the mean walk, from 1 to {MOST_COMPONENTS}. "
+        f"auto: as many as predict held-out data best. By default {DEFAULT_COMPONENTS}, or two less than "
+        "there are cycles if that is fewer",
     )
-    parser.add_argument(
+    add(
         "--prior",
         choices=PRIORS,
         default=PRIORS[0],
         help="people (the default): also allow for people who were not recorded, with lengths of limbs and "
-        "postures of their own. paper: only what the recorded cycles show, and one body for everybody",
+        "postures of their own. paper: only what the recorded cycles show, and one body for all people",
     )
-    parser.add_argument(
+    add(
         "--exclude",
         nargs="+",
         action="extend",
         default=[],
         metavar="GLOB",
-        help="leave out files whose path ends like this, such as 'cmu_walk/02/*', and folders so named",
+        help="leave out files whose path ends like this, such as 'cmu_walk/02/*', and folders of that name",
     )
-    parser.add_argument(
+    add(
         "--period-mode",
-        choices=("refined", "literal"),
-        default="refined",
+        choices=PERIOD_MODES,
+        default=PERIOD_MODES[0],
         help="literal: whole frames, at 120 per second from 50 to 250, as in the paper (refined)",
     )
-    parser.add_argument(
-        "--fps", type=_rate, metavar="F", help="frames per second (what the file says; .amc: 120)"
-    )
-    parser.add_argument(
-        "--markers", type=Path, metavar="MAP.json", help="which joints the markers of .c3d and .trc belong to"
-    )
-    parser.add_argument(
+    add("--fps", type=values.between(10, 2000, "frames per second"), metavar="F",
+        help="frames per second (default: from the file; .amc: 120)")  # fmt: skip
+    add("--markers", type=Path, metavar="MAP.json", help="where the markers of .c3d and .trc sit on the body")
+    add(
         "--zeros-missing",
         action="store_true",
         help="three or more exact zeros in a row are missing data, for systems that write 0 for what they "
         "did not see (empty cells of .csv, and points of .c3d and .trc at the origin, always are missing)",
     )
-    parser.add_argument(
-        "--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings"
+    add("--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings")
+    add("--jobs", type=values.whole(1), metavar="N", help="processes that read files (one per core)")
+    add("--dask", metavar="SCHEDULER", help="read on a Dask cluster, such as tcp://host:8786")
+    add("--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the held-out data (1)")
+    add("--report", metavar="DIR", help="also write figures and index.html into this folder")
+    add(
+        "--segments",
+        choices=SEGMENT_SOURCES,
+        default=usual.source,
+        help="what the prior over short segments, which gait lift uses, is learnt from. learnt (default): "
+        "the recordings of the cyclic model; all: whole recordings, also those that the cyclic model "
+        "refuses; none: no segment prior; only: as all, but without a cyclic model, so that gait track "
+        "cannot use the file",
     )
-    parser.add_argument(
-        "--jobs", type=values.whole(1), metavar="N", help="processes that read files (one per core)"
+    add("--segment-frames", type=values.whole(*FRAMES), metavar="F",
+        help=f"frames of a segment (default: {usual.frames})")  # fmt: skip
+    add("--segment-hop", type=values.whole(1, FRAMES[1]), metavar="H",
+        help="frames from one segment to the next (default: half of F)")  # fmt: skip
+    add("--segment-fps", type=values.whole(*FPS), metavar="R",
+        help=f"frames per second of a segment (default: {usual.fps:g})")  # fmt: skip
+    add("--segment-modes", type=values.whole(*MODES), metavar="K",
+        help=f"modes kept, at most a quarter of the segments (default: {usual.modes})")  # fmt: skip
+    add(
+        "--segment-headings",
+        choices=list(SEGMENT_HEADINGS),
+        help="free (default): gait lift finds the heading. 2: every segment also rotated by 90 degrees, as "
+        "in the paper; 8: by each 45 degrees; headings in the world are then part of the prior",
     )
-    parser.add_argument("--dask", metavar="SCHEDULER", help="read on a Dask cluster, such as tcp://host:8786")
-    parser.add_argument(
-        "--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the held-out data (1)"
+    add(
+        "--segment-mixture",
+        type=lambda text: _auto_or(text, MIXTURE[1]),
+        metavar="auto|K",
+        help=f"Gaussians in the segment prior (default: {usual.mixture}); auto: as many as predict people "
+        "left out best",
     )
-    parser.add_argument("--report", metavar="DIR", help="also write figures and index.html into this folder")
-    learn_segments.add_arguments(parser)
+    add(
+        "--segment-markers",
+        choices=SEGMENT_MARKERS,
+        help="virtual (default): 37 of the default skeleton; recorded: those that most of the files have "
+        "(.c3d, .trc)",
+    )
 
 
-def _components(text: str) -> int | str:
-    if text == "auto":
+def _auto_or(text: str, most: int) -> int | str:
+    if text == AUTO:
         return text
-    if text.isdigit() and 1 <= int(text) <= MOST_COMPONENTS:
+    if text.isdigit() and 1 <= int(text) <= most:
         return int(text)
-    raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor 1 to {MOST_COMPONENTS}")
-
-
-def _rate(text: str) -> float:
-    low, high = 10, 2000
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not low <= value <= high:
-        raise argparse.ArgumentTypeError(f"{text}: give frames per second from {low} to {high}")
-    return value
+    raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor 1 to {most}")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Let the workers of a large run import what they need while this process does."""
-    jobs = args.jobs or fork_server.cores()
-    if jobs > 1 and not args.dask and fork_server.worth(args.sources):
-        fork_server.start()
-    from gait.cli import learn_run  # scipy takes most of a second
+    """Start the processes of a large run, learn, and print the figures."""
+    options = _options(args)
+    if options.jobs > 1 and not options.dask and forkserver.worth(options.sources):
+        forkserver.start()  # its imports run beside ours
+    from gait.learn import run as learning  # SciPy takes most of a second
+    from gait.learn.report import summary
 
-    return learn_run.run(args)
+    figures = learning.run(options, lambda line: None if args.quiet else print(line, file=sys.stderr))
+    print(json.dumps(figures) if args.json else summary.text(args.output, figures))
+    return 0
+
+
+def _options(args: argparse.Namespace) -> LearnOptions:
+    """Collect the options of a run."""
+    if args.dask and args.jobs:
+        raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
+    return LearnOptions(
+        sources=tuple(args.sources),
+        exclude=tuple(args.exclude),
+        output=args.output,
+        report=args.report,
+        quiet=args.quiet,
+        activity=args.activity,
+        subjects=args.subjects,
+        components=args.components,
+        prior=args.prior,
+        period_mode=args.period_mode,
+        fps=args.fps,
+        markers=markers.read_map(args.markers) if args.markers else None,
+        zeros_missing=args.zeros_missing,
+        trim=not args.no_trim,
+        seed=args.seed,
+        segments=_segment_options(args),
+        jobs=args.jobs or forkserver.cores(),
+        dask=args.dask,
+    )
+
+
+def _segment_options(args: argparse.Namespace) -> SegmentOptions:
+    given = {name: getattr(args, f"segment_{name}") for name in SEGMENT}
+    given = {name: value for name, value in given.items() if value is not None}
+    if args.segments == "none" and given:
+        raise UsageError(f"--segment-{next(iter(given))} is for a segment prior; not with --segments none")
+    frames = given.get("frames", SegmentOptions.frames)
+    hop = given.setdefault("hop", max(1, frames // 2))
+    if hop > frames:
+        raise UsageError(f"--segment-hop {hop}: at most the {frames} of --segment-frames")
+    if "headings" in given:
+        given["headings"] = SEGMENT_HEADINGS[given["headings"]]
+    if given.get("mixture") == AUTO:
+        given["mixture"] = None
+    return SegmentOptions(source=args.segments, people=args.prior == "people", **given)

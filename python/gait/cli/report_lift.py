@@ -27,10 +27,10 @@ from gait.cli.lift import warner
 from gait.errors import UsageError, UserError
 from gait.io.files import filling, require_folder
 from gait.io.keypoints_file import Keypoints
-from gait.learn.report.figures_base import Drawing
-from gait.learn.segment_options import Segments
-from gait.learn.segments import segment_corpus, segment_motion
-from gait.learn.segments.segment_corpus import Corpus
+from gait.learn.options import SegmentOptions
+from gait.learn.segments import corpus as segment_corpus
+from gait.learn.segments import motion as segment_motion
+from gait.learn.segments.corpus import Corpus
 from gait.learn.solve import readers
 from gait.lift import run as lift_run
 from gait.lift.report import motion_figures
@@ -38,6 +38,7 @@ from gait.lift.report.segment_figures import Case, case, drawings
 from gait.lift.segment.view import View
 from gait.lift.smooth.motion import METHODS, Motion, Options
 from gait.progress import progress
+from gait.report.figures import Drawing
 from gait.report.page import Page
 
 Floats = npt.NDArray[np.float64]
@@ -119,7 +120,7 @@ def _drawings(
 
 def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
     """Segment (F, J, 3) of a recording with the most motion, and the stature; metres."""
-    wanted = Segments(source="only", frames=prior.frames, hop=prior.hop, fps=prior.fps, people=False)
+    wanted = SegmentOptions(source="only", frames=prior.frames, hop=prior.hop, fps=prior.fps, people=False)
     read = segment_motion.of(Path(path), readers.read(Path(path)), wanted)
     unknown = [name for name in prior.names if name not in read.names]
     if unknown:

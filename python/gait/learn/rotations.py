@@ -1,6 +1,6 @@
-"""Rotation matrices of whole sequences: composition from file angles, decomposition into the model's angles.
+"""Rotation matrices of whole sequences, (T, 3, 3): composed from angles, decomposed into the model's angles.
 
-Arrays are (T, 3, 3); NaN marks missing frames and stays NaN.
+Angles are radians.  NaN marks missing frames and stays NaN.
 """
 
 from __future__ import annotations
@@ -8,18 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from gait.body.skeleton import axis_rotation
+from gait.learn.arrays import Floats
 
-Floats = npt.NDArray[np.float64]
-
-GIMBAL = 0.05  # cosine of the middle angle below which the outer two are not told apart
-CLEAR = 0.3  # cosine above which the branches cannot be confused
+GIMBAL = 0.05  # cosine of the middle angle below which the outer two cannot be separated
+CLEAR = 0.3  # cosine above which the two branches cannot be confused
 
 
 def from_angles(angles: Floats, axes: Sequence[int]) -> Floats:
-    """Product Rot(axes[0], angles[..., 0]) Rot(axes[1], ...) ..., the first outermost.  Radians."""
+    """Return the product Rot(axes[0], angles[..., 0]) Rot(axes[1], angles[..., 1]) ..., first outermost."""
     result = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for k, axis in enumerate(axes):
         result = result @ axis_rotation(axis, angles[..., k])
@@ -27,9 +25,9 @@ def from_angles(angles: Floats, axes: Sequence[int]) -> Floats:
 
 
 def frame_from(z: Floats, y: Floats, exact: str = "z") -> Floats:
-    """Frames (..., 3, 3), axes as columns, with one axis along its vector and the other as near as possible.
+    """Return frames (..., 3, 3), axes as columns, from two directions.
 
-    `exact` names the axis, "z" or "y", that lies exactly along its vector.
+    `exact` ("z" or "y") names the axis that lies exactly along its vector; the other is as near as possible.
     """
     x = unit(np.cross(y, z))
     if exact == "z":
@@ -40,23 +38,13 @@ def frame_from(z: Floats, y: Floats, exact: str = "z") -> Floats:
 
 
 def unit(v: Floats) -> Floats:
-    """Vectors (..., 3) scaled to length 1; NaN where the length is 0."""
+    """Scale vectors (..., 3) to length 1; NaN where the length is 0."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     return v / np.where(length > 0, length, np.nan)
 
 
-def rotation_vectors(r: Floats) -> Floats:
-    """Axis times angle (T, 3) of rotations below half a turn."""
-    twist = np.stack(
-        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1
-    )
-    sine = np.linalg.norm(twist, axis=-1) / 2
-    angle = np.arctan2(sine, (np.trace(r, axis1=-2, axis2=-1) - 1) / 2)
-    return twist * (angle / np.where(sine > 1e-12, 2 * sine, 1))[..., None]
-
-
 def decompose_yxz(r: Floats) -> Floats:
-    """Angles (T, 3) with R = Ry(a) Rx(b) Rz(c), continuous in time."""
+    """Return the angles (T, 3) of R = Ry(a) Rx(b) Rz(c), continuous in time."""
     b = np.arcsin(np.clip(-r[:, 1, 2], -1, 1))
     outer = np.stack([np.arctan2(r[:, 0, 2], r[:, 2, 2]), b, np.arctan2(r[:, 1, 0], r[:, 1, 1])], axis=1)
 
@@ -68,7 +56,7 @@ def decompose_yxz(r: Floats) -> Floats:
 
 
 def decompose_zyx(r: Floats) -> Floats:
-    """Angles (T, 3) with R = Rz(a) Ry(b) Rx(c), continuous in time."""
+    """Return the angles (T, 3) of R = Rz(a) Ry(b) Rx(c), continuous in time."""
     b = np.arcsin(np.clip(-r[:, 2, 0], -1, 1))
     outer = np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), b, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
 
@@ -80,25 +68,25 @@ def decompose_zyx(r: Floats) -> Floats:
 
 
 def unwrap(table: Floats) -> Floats:
-    """Copy without the jumps of a whole turn in time, column by column, across gaps."""
+    """Remove jumps of a whole turn from each column, also across gaps."""
     result = table.copy()
     for column in result.T:
-        seen = np.isfinite(column)
-        column[seen] = np.unwrap(column[seen])
+        visible = np.isfinite(column)
+        column[visible] = np.unwrap(column[visible])
     return result
 
 
 def _continuous(angles: Floats, inner: Callable[[int, float], Floats]) -> Floats:
-    """Choose in each frame the branch nearest to the frame before; hold the outer angle in gimbal lock.
+    """Choose in each frame the branch nearest to the frame before; keep the outer angle in gimbal lock.
 
     (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation; near |b| = 90 degrees only a +- c is known.
     """
     if not np.any(np.cos(angles[:, 1]) < CLEAR):
         return unwrap(angles)
     result = angles.copy()
-    seen = [int(t) for t in np.flatnonzero(np.isfinite(angles).all(axis=1))]
-    previous = angles[seen[0]]
-    for t in seen[1:]:
+    visible = [int(t) for t in np.flatnonzero(np.isfinite(angles).all(axis=1))]
+    previous = angles[visible[0]]
+    for t in visible[1:]:
         now = angles[t] if np.cos(angles[t, 1]) >= GIMBAL else inner(t, float(previous[0]))
         other = np.array([now[0] + np.pi, np.pi - now[1], now[2] + np.pi])
         now, other = _nearest_turn(now, previous), _nearest_turn(other, previous)

@@ -14,12 +14,12 @@ from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io import keypoints_file
 from gait.io.keypoints_file import Keypoints
-from gait.learn.corpus.stage import one_thread
 from gait.lift.keypoints import noise, swaps
 from gait.lift.segment.view import Parallel, Perspective, View, looking_along
 from gait.lift.smooth import motion, size
 from gait.lift.smooth.motion import Motion, Options
 from gait.progress import progress
+from gait.reproducible import one_thread
 
 FEW = 4  # recordings; with two of one person, intervals of other people's walks covered as little as 70 %
 MOST_NAMED = 5  # spikes, changes of person

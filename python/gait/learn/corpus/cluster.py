@@ -1,7 +1,7 @@
-"""The per-file stage on a Dask cluster, in the order of the files.
+"""Tasks on a Dask cluster; outcomes come in the order of the files.
 
-The workers read the files themselves, so they need the same paths as this machine: a shared file system.
-They also need this package, the same versions of it, numpy, scipy and ezc3d, and the same kernels
+The workers read the files themselves, so they need the same paths as this machine, on a shared file system.
+They also need the same versions of this package, numpy, scipy and ezc3d, and the same kernels
 (`gait.reproducible`), or the results would differ.
 """
 
@@ -19,28 +19,28 @@ from typing import TYPE_CHECKING
 
 from gait import extras, reproducible
 from gait.errors import UsageError, UserError
-from gait.learn.corpus.stage import Prepared, Task, one_thread_for_good
+from gait.learn.corpus.stage import Prepared, Task
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
 ADDRESS = re.compile(r"(tcp://|tls://)?[^/\s]+:\d{1,5}")
-CONNECT = 5.0  # seconds that a scheduler gets to answer and to have a worker
-PATIENCE = 10.0  # seconds between looks at whether there still are workers
+CONNECT = 5.0  # seconds for a scheduler to answer and to have a worker
+PATIENCE = 10.0  # seconds between checks whether there still are workers
 AHEAD = 4  # files in flight per thread of the workers
 SAME = ("libgait", "numpy", "scipy", "ezc3d")  # packages on which the results depend
 
 
 @dataclass(frozen=True)
-class Unlike:
-    """A worker that would give other results: its version of a package, or other kernels (no package)."""
+class Mismatch:
+    """A worker that would give other results: its version of a package, or its kernels (no package)."""
 
     worker: str
     package: str = ""
     found: str = ""
 
     def refusal(self, address: str) -> UserError:
-        """Tell what to do about it."""
+        """Return the error with its remedy."""
         if self.package:
             return UserError(
                 f"--dask {address}: worker {self.worker} has {self.found} of {self.package}, "
@@ -52,76 +52,51 @@ class Unlike:
         )
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """What results depend on besides the task: versions of packages, and the kernels."""
-
-    versions: dict[str, str]
-    kernels: dict[str, str]
-
-
 def prepared(tasks: Sequence[Task], address: str) -> Generator[Prepared, None, None]:
-    """Outcomes of files in their order, from the workers of the scheduler at `address`.
+    """Yield the outcomes of tasks in their order, from the workers of the scheduler at `address`.
 
-    Raises
-    ------
-    UserError
-        If dask is not installed, nothing answers, the workers have other versions or do not see the files.
+    UserError if dask is not installed, nothing answers, or workers have other versions or do not see the
+    files.
     """
     with _connected(address) as client:
         _require_packages(client, address)
-        wanted = _surroundings()
+        wanted = _environment()
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
         waiting, flying = deque(tasks), deque[tuple[Path, "Future"]]()
         while waiting or flying:
             while waiting and len(flying) < ahead:
                 task = waiting.popleft()
-                flying.append((task.path, client.submit(_done, _absolute(task), wanted, pure=False)))
+                there = replace(task, path=task.path.absolute())
+                flying.append((task.path, client.submit(_run, there, wanted, pure=False)))
             path, future = flying.popleft()
             outcome = _result(client, address, path, future)
-            if isinstance(outcome, Unlike):
+            if isinstance(outcome, Mismatch):
                 raise outcome.refusal(address)
             yield _as_named(outcome, path)
 
 
-def _absolute(task: Task) -> Task:
-    """Task for whoever works in another folder."""
-    reading = task.reading
-    if reading.markers:
-        reading = replace(reading, markers=reading.markers.absolute())
-    return replace(task, path=task.path.absolute(), reading=reading)
+def _environment() -> dict[str, str]:
+    """Return what results depend on besides the task: versions of packages, and the kernels."""
+    return {package: metadata.version(package) for package in SAME} | reproducible.chosen()
 
 
-def _surroundings() -> Surroundings:
-    """Surroundings of this process."""
-    return Surroundings({package: metadata.version(package) for package in SAME}, reproducible.chosen())
+def _run(task: Task, wanted: dict[str, str]) -> Prepared | Mismatch | None:
+    """Run a task on a worker that matches the client; None if it does not see the file.
 
-
-def _done(task: Task, wanted: Surroundings) -> Prepared | Unlike | None:
-    """Do a task on a worker that is like the client; None if it does not see the file.
-
-    Every task looks: a worker may come while others are at work.
+    Every task checks this, because a worker may join while others are at work.
     """
-    if (here := _surroundings()) != wanted:
-        return _difference(here, wanted)
-    one_thread_for_good()
-    return task.done() if task.path.is_file() else None
-
-
-def _difference(here: Surroundings, wanted: Surroundings) -> Unlike:
-    """Name what makes this worker unlike the client."""
     from distributed import get_worker
 
-    worker: str = get_worker().address
-    for package, version in wanted.versions.items():
-        if here.versions[package] != version:
-            return Unlike(worker, package, here.versions[package])
-    return Unlike(worker)
+    if (here := _environment()) != wanted:
+        package = next((p for p in SAME if here[p] != wanted[p]), "")
+        return Mismatch(get_worker().address, package, here.get(package, ""))
+    reproducible.one_thread_for_good()
+    return task.run() if task.path.is_file() else None
 
 
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
-    """Client of a scheduler that answers and has a worker."""
+    """Connect to a scheduler that answers and has a worker."""
     if not ADDRESS.fullmatch(address):
         raise UsageError(f"--dask {address}: is not an address; give one such as tcp://192.168.0.7:8786")
     if lacking := extras.remedy("--dask", ["dask"]):
@@ -130,7 +105,7 @@ def _connected(address: str) -> Iterator[Client]:
 
     log = logging.getLogger("distributed")
     before = log.level
-    log.setLevel(logging.CRITICAL)  # a lost connection is one line of ours, not its tracebacks
+    log.setLevel(logging.CRITICAL)  # our one line about a lost connection, not its tracebacks
     try:
         with ExitStack() as stack:
             try:
@@ -148,16 +123,16 @@ def _connected(address: str) -> Iterator[Client]:
 
 
 def _require_packages(client: Client, address: str) -> None:
-    """Refuse workers on which a package is absent or another: they might not even read a task."""
+    """Refuse workers without a package or with another version; they might not even unpickle a task."""
     for package in SAME:
         for worker, there in client.run(metadata.version, package, on_error="return").items():
             if isinstance(there, metadata.PackageNotFoundError):
-                raise Unlike(worker, package, "none").refusal(address)
+                raise Mismatch(worker, package, "none").refusal(address)
             if isinstance(there, str) and there != metadata.version(package):
-                raise Unlike(worker, package, there).refusal(address)
+                raise Mismatch(worker, package, there).refusal(address)
 
 
-def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | Unlike | None:
+def _result(client: Client, address: str, path: Path, future: Future) -> Prepared | Mismatch | None:
     """Wait for a result while there are workers."""
     from distributed import CancelledError, KilledWorker
     from distributed.comm import CommClosedError
@@ -165,7 +140,7 @@ def _result(client: Client, address: str, path: Path, future: Future) -> Prepare
     lost = UserError(f"--dask {address}: the connection was lost at {path}; start again")
     while True:
         try:
-            outcome: Prepared | Unlike | None = future.result(timeout=PATIENCE)
+            outcome: Prepared | Mismatch | None = future.result(timeout=PATIENCE)
             return outcome
         except KilledWorker:
             killed = UserError(
@@ -181,7 +156,7 @@ def _result(client: Client, address: str, path: Path, future: Future) -> Prepare
 
 
 def _as_named(outcome: Prepared | None, path: Path) -> Prepared:
-    """Outcome as if the file had been read by the name it has here."""
+    """Return the outcome as if the file had been read under its name here."""
     if outcome is None:
         raise UserError(
             f"{path}: a worker does not see {path.absolute()}; put the files where all workers find them "

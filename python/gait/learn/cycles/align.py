@@ -1,8 +1,8 @@
 """Phases of several sequences brought to one cycle (Ormoneit 2000, section 3.2 and Fig. 3).
 
-Alternates a periodic cubic regression spline of all sequences together and the best offset of each; both
-steps lower one weighted sum of squares.  Phase of frame j of a sequence: frac((j - offset) / period).  One
-sequence at a time is in memory.
+Alternates between fitting a periodic cubic spline to all sequences and finding the best offset of each; both
+steps lower one weighted sum of squares.  The phase of frame j of a sequence is frac((j - offset) / period).
+One sequence at a time is in memory.
 """
 
 from __future__ import annotations
@@ -11,45 +11,139 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
+from scipy.interpolate import BSpline
 
 from gait.body.skeleton import ANGLES
+from gait.learn.arrays import Floats, Mask
 from gait.learn.cycles.fourier import first_harmonic
-from gait.learn.cycles.periodic import Curve
-from gait.learn.cycles.shift import BINS, Shift
-
-Floats = npt.NDArray[np.float64]
 
 ITERATIONS = 100
 TOLERANCE = 1e-6  # relative change of the objective at which to stop
+KNOTS = 20  # of the periodic spline
+TABLE = 1024  # samples of a tabulated curve
+BINS = 256  # of the circular cross-correlation
+FINEST = 0.01  # frames, last step of the search for an offset
 XCORR_ROUNDS = 3
-AMBIGUOUS = 0.75  # depth of a sequence's second best phase, of its best, at which other starts are tried
+AMBIGUOUS = 0.75  # depth of a second-best phase relative to the best at which other starts are tried
 APART = 0.1  # cycles between those phases, at least
 STARTS = 4  # most sequences whose curve serves as the first one
-#: Columns of right and left hip flexion: the phases are counted from where right minus left is largest.
+#: Columns of right and left hip flexion: phases are counted from where right minus left is largest.
 HIPS = (ANGLES.index("r_hip_flexion"), ANGLES.index("l_hip_flexion"))
 
 
 @dataclass
 class Alignment:
-    """Result of `align`.
+    """Result of `align`."""
 
-    Attributes
-    ----------
-    offsets : (n,)
-        Frames, in [0, period).
-    objective : list of float
-        Weighted sum of squares of each iteration as it came out; falls but for rounding.
-    weights : (A,)
-        Of the angles: one over the variance left by a smooth curve per sequence.
-    converged : bool
-        Whether the objective ceased to fall; not if it rose or the iterations ran out.
-    """
-
-    offsets: Floats
+    offsets: Floats  #: (n,) frames, in [0, period)
+    #: Weighted sum of squares after each iteration, falling but for rounding.
     objective: list[float] = field(default_factory=list)
+    #: (A,) of the angles: one over the variance that a smooth curve of each sequence leaves.
     weights: Floats = field(default_factory=lambda: np.ones(1))
+    #: Whether the objective stopped falling; False if it rose or the iterations ran out.
     converged: bool = False
+
+
+def _periodic_basis(phase: Floats) -> Floats:
+    """Evaluate periodic cubic B-splines with uniform knots at phases (n,): (n, KNOTS)."""
+    extended = np.arange(-3, KNOTS + 4) / KNOTS
+    basis = BSpline.design_matrix(np.mod(phase, 1.0), extended, 3).toarray()
+    basis[:, :3] += basis[:, KNOTS:]
+    return np.asarray(basis[:, :KNOTS])
+
+
+class _Curve:
+    """A periodic spline (A columns) fitted by least squares to any number of signals, added one by one."""
+
+    def __init__(self, columns: int) -> None:
+        self.gram = np.zeros((columns, KNOTS, KNOTS))
+        self.right = np.zeros((columns, KNOTS))
+
+    def add(self, phase: Floats, values: Floats, visible: Mask) -> None:
+        """Add values (T, A), 0 where missing, at phases (T,)."""
+        basis = _periodic_basis(phase)
+        self.right += (basis.T @ values).T
+        if visible.all():
+            self.gram += basis.T @ basis
+            return
+        for column, rows in enumerate(visible.T):
+            self.gram[column] += basis[rows].T @ basis[rows]
+
+    def coefficients(self) -> Floats:
+        """Return the coefficients (KNOTS, A), with a slight ridge for phases without data; 0 without any."""
+        trace = np.trace(self.gram, axis1=1, axis2=2) / KNOTS
+        ridge = (1e-9 * trace + 1e-21)[:, None, None] * np.eye(KNOTS)
+        return np.asarray(np.linalg.solve(self.gram + ridge, self.right[..., None])[..., 0].T)
+
+    def table(self) -> Floats:
+        """Tabulate the curve (TABLE, A) at phases k / TABLE."""
+        return _periodic_basis(np.arange(TABLE) / TABLE) @ self.coefficients()
+
+    @property
+    def known(self) -> Mask:
+        """Whether each column (A,) has any data."""
+        return np.asarray(np.trace(self.gram, axis1=1, axis2=2) > 0)
+
+
+class _Sequence:
+    """Signals (T, A) of one sequence, NaN where missing, and its period in frames."""
+
+    def __init__(self, signals: Floats, period: float) -> None:
+        self.period = float(period)
+        self.visible = np.isfinite(signals)
+        self.values = np.where(self.visible, signals, 0.0)
+        self.time = np.arange(len(signals))
+
+    def phase(self, offset: float) -> Floats:
+        """Return the phase (T,) of each frame."""
+        return np.mod((self.time - offset) / self.period, 1.0)
+
+    def add_to(self, curve: _Curve, offset: float) -> None:
+        """Add this sequence to those that a curve is fitted to."""
+        curve.add(self.phase(offset), self.values, self.visible)
+
+    def squares(self, table: Floats, offset: float) -> Floats:
+        """Return the sum of squares (A,) about a tabulated curve, linear between its samples."""
+        at = self.phase(offset) * TABLE
+        low = at.astype(int) % TABLE
+        part = (at - np.floor(at))[:, None]
+        curve = table[low] * (1 - part) + table[(low + 1) % TABLE] * part
+        return np.asarray((((self.values - curve) * self.visible) ** 2).sum(axis=0))
+
+    def cost(self, table: Floats, weights: Floats, offset: float) -> float:
+        """Return the weighted sum of squares."""
+        return float(self.squares(table, offset) @ weights)
+
+    def correlation(self, table: Floats, weights: Floats) -> Floats:
+        """Return the cost (BINS,) at offsets of whole bins by circular correlation, up to a constant."""
+        bins = np.minimum((self.phase(0.0) * BINS).astype(int), BINS - 1)
+        sums, counts = np.zeros((BINS, self.values.shape[1])), np.zeros((BINS, self.values.shape[1]))
+        np.add.at(sums, bins, self.values)
+        np.add.at(counts, bins, self.visible)
+        sums_hat, counts_hat = np.fft.rfft(sums, axis=0), np.fft.rfft(counts, axis=0)
+        mean = table.reshape(BINS, -1, table.shape[1]).mean(axis=1)
+        spectrum = np.conj(np.fft.rfft(mean**2 * weights, axis=0)) * counts_hat
+        spectrum -= 2 * np.conj(np.fft.rfft(mean * weights, axis=0)) * sums_hat
+        return np.asarray(np.fft.irfft(spectrum.sum(axis=1), BINS))
+
+    def best_offset(self, table: Floats, weights: Floats, now: float) -> float:
+        """Return the offset of least cost by correlation, then smaller steps and a parabola."""
+        coarse = float(np.argmin(self.correlation(table, weights))) * self.period / BINS
+        best, cost = now, self.cost(table, weights, now)
+        rough = self.cost(table, weights, coarse)
+        if rough < cost:
+            best, cost = coarse, rough
+        step = self.period / BINS
+        while step > FINEST:
+            left, right = (self.cost(table, weights, best + d) for d in (-step, step))
+            bend = left - 2 * cost + right
+            shift = 0.5 * step * (left - right) / bend if bend > 0 else 0.0
+            options = [(cost, best), (left, best - step), (right, best + step)]
+            if 0 < abs(shift) < step:
+                options.append((self.cost(table, weights, best + shift), best + shift))
+            cost, best = min(options)
+            step /= 4 if abs(shift) < step else 1.5
+        return best % self.period
 
 
 @dataclass(frozen=True)
@@ -58,20 +152,20 @@ class _Problem:
     periods: Floats
     hips: tuple[int, int] | None
 
-    def sequences(self) -> Iterator[Shift]:
-        return (Shift(z, p) for z, p in zip(self.signals, self.periods, strict=True))
+    def sequences(self) -> Iterator[_Sequence]:
+        return (_Sequence(z, p) for z, p in zip(self.signals, self.periods, strict=True))
 
-    def curve(self, offsets: Floats) -> Curve:
-        """Spline of all sequences together."""
-        curve = Curve(self.signals[0].shape[1])
+    def curve(self, offsets: Floats) -> _Curve:
+        """Fit a spline to all sequences together."""
+        curve = _Curve(self.signals[0].shape[1])
         for s, offset in zip(self.sequences(), offsets, strict=True):
             s.add_to(curve, offset)
         return curve
 
     def gauged(self, offsets: Floats) -> Floats:
-        """Offsets with the common phase fixed: the first harmonic of right minus left hip flexion a cosine.
+        """Fix the common phase of offsets: the first harmonic of right minus left hip flexion is a cosine.
 
-        It is found from the frames themselves, so that a common shift of all phases drops out exactly.
+        It is computed from the frames themselves, so that a common shift of all phases drops out exactly.
         """
         if self.hips is None:
             return offsets
@@ -86,47 +180,35 @@ class _Problem:
 def align(
     signals: list[Floats],
     periods: Floats,
-    start: str | Floats = "xcorr",
-    weights: Floats | None = None,
+    start: Floats | None = None,
     hips: tuple[int, int] | None = None,
 ) -> Alignment:
     """Find the offset of each sequence.
 
-    Parameters
-    ----------
-    signals : list of (T_i, A)
-        NaN where missing; a sequence may lack whole angles and is then aligned by the others.
-    periods : (n,)
-        Frames.
-    start : "xcorr", "zeros" or (n,)
-        Circular cross-correlation with the first sequence's curve (and with some others', if a phase is
-        ambiguous); the paper's start; or offsets.
-    weights : (A,), optional
-        By default one over each angle's noise variance; ones is the paper's choice.
-    hips : (right, left), optional
-        Columns of the hips' flexion, which fix the common phase.
+    Signals are (T_i, A), NaN where missing; a sequence may lack whole angles and is then aligned by the
+    others. Periods are frames.  `start` (n,) are offsets to start from; by default circular cross-correlation
+    with the curve of the first sequence, and of some others if a phase is ambiguous.  `hips` are the columns
+    of right and left hip flexion, which fix the common phase.
     """
     problem = _Problem(signals, np.asarray(periods, float), hips)
-    w = _noise_weights(problem) if weights is None else np.asarray(weights, float)
-    if not isinstance(start, str):
-        return _descend(problem, np.asarray(start, float), w)
-    if start == "zeros":
-        return _descend(problem, np.zeros(len(signals)), w)
-    found = [_descend(problem, offsets, w) for offsets in _xcorr_starts(problem, w)]
+    weights = _noise_weights(problem)
+    if start is not None:
+        return _descend(problem, np.asarray(start, float), weights)
+    found = [_descend(problem, offsets, weights) for offsets in _xcorr_starts(problem, weights)]
     return min(found, key=lambda a: a.objective[-1])
 
 
 def common_curve(signals: list[Floats], periods: Floats, offsets: Floats) -> Floats:
-    """Mean curve (1024, A) of aligned sequences as a periodic spline; NaN in columns that nobody has."""
+    """Return the mean curve (1024, A) of aligned sequences as a periodic spline; NaN without data."""
     curve = _Problem(signals, periods, None).curve(offsets)
     return np.where(curve.known, curve.table(), np.nan)
 
 
 def hip_phase(curve: Floats) -> float:
-    """Phase at which the first harmonic of right minus left hip flexion is largest in a curve (n, >= 24).
+    """Return the phase of a curve (n, >= 24) at which the first harmonic of the hips' difference is largest.
 
-    Where the feet are not known it stands in for the right heel strike: in the mean of CMU's walks they are
-    0.02 of a cycle apart.
+    It stands in for the right heel strike where the feet are not known; they are 0.02 of a cycle apart in the
+    mean of CMU's walks.
     """
     right, left = HIPS
     return float(-np.angle(np.fft.fft(curve[:, right] - curve[:, left])[1]) / (2 * np.pi) % 1.0)
@@ -152,23 +234,23 @@ def _descend(problem: _Problem, offsets: Floats, weights: Floats) -> Alignment:
 
 
 def _without_drift(offsets: Floats, before: Floats, periods: Floats) -> Floats:
-    """Take the common part of a change off the offsets.
+    """Remove the common part of a change from the offsets.
 
-    It leaves the fit as it is but for the places of the knots, towards which all phases would creep for ever.
+    It changes the fit only through the places of the knots, towards which all phases would creep forever.
     """
     turn = np.angle(np.mean(np.exp(2j * np.pi * (offsets - before) / periods))) / (2 * np.pi)
     return np.asarray((offsets - turn * periods) % periods)
 
 
 def _noise_weights(problem: _Problem) -> Floats:
-    """One over the variance that a periodic spline of each sequence alone leaves, mean 1; 0 if never seen."""
+    """Return one over the variance that a spline of each sequence alone leaves, mean 1; 0 if never seen."""
     columns = problem.signals[0].shape[1]
     rest, count = np.zeros(columns), np.zeros(columns)
     for s in problem.sequences():
-        alone = Curve(columns)
+        alone = _Curve(columns)
         s.add_to(alone, 0.0)
         rest += s.squares(alone.table(), 0.0)
-        count += s.seen.sum(axis=0)
+        count += s.visible.sum(axis=0)
     known = count > 0
     variance = rest[known] / count[known]
     floor = 1e-3 * float(np.mean(variance)) + 1e-12
@@ -178,7 +260,7 @@ def _noise_weights(problem: _Problem) -> Floats:
 
 
 def _xcorr_starts(problem: _Problem, weights: Floats) -> Iterator[Floats]:
-    """Offsets from the first sequence's curve, and from some others' if a sequence has an ambiguous phase."""
+    """Yield offsets from the first sequence's curve, and from some others' if a phase is ambiguous."""
     offsets, ambiguous = _xcorr_start(problem, weights, 0)
     yield offsets
     if ambiguous:
@@ -188,9 +270,9 @@ def _xcorr_starts(problem: _Problem, weights: Floats) -> Iterator[Floats]:
 
 
 def _xcorr_start(problem: _Problem, weights: Floats, first: int) -> tuple[Floats, bool]:
-    """Offsets by circular cross-correlation in some rounds, the first against one sequence's curve.
+    """Return offsets by rounds of circular cross-correlation, the first against one sequence's curve.
 
-    Returns the offsets and whether some sequence fits another phase nearly as well.
+    Also return whether some sequence fits another phase nearly as well.
     """
     offsets, ambiguous = np.zeros(len(problem.signals)), False
     alone = _Problem([problem.signals[first]], problem.periods[[first]], None)
@@ -206,7 +288,7 @@ def _xcorr_start(problem: _Problem, weights: Floats, first: int) -> tuple[Floats
 
 
 def _second(cost: Floats) -> float:
-    """Depth below the mean cost (BINS,) of the best valley away from the deepest, over the depth of that."""
+    """Return the depth of the second-best valley of the cost (BINS,) relative to the deepest."""
     reach, best = round(APART * BINS), int(np.argmin(cost))
     far = np.roll(cost, -best)[reach : BINS - reach]
     valley = int(np.argmin(far))

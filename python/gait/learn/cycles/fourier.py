@@ -1,20 +1,17 @@
-"""Curves over a cycle in the real orthonormal Fourier basis of their first harmonics."""
+"""Curves over a cycle in the real orthonormal Fourier basis of the first harmonics."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from gait.learn.spool import by_rows
-
-Floats = npt.NDArray[np.float64]
+from gait.learn.arrays import Floats, by_rows
 
 HARMONICS = 19
 FEWEST = 4  # samples: one more than a constant, a cosine and a sine
 
 
 def fourier_basis(samples: int, harmonics: int = HARMONICS) -> Floats:
-    """Real orthonormal basis (1 + 2 harmonics, samples): constant, cosines and sines."""
+    """Return the real orthonormal basis (1 + 2 harmonics, samples): constant, cosines and sines."""
     j = np.arange(samples) / samples
     angle = 2 * np.pi * np.outer(np.arange(1, harmonics + 1), j)
     waves = np.stack([np.cos(angle), np.sin(angle)], axis=1).reshape(-1, samples)
@@ -22,7 +19,7 @@ def fourier_basis(samples: int, harmonics: int = HARMONICS) -> Floats:
 
 
 def encode(curves: Floats, basis: Floats) -> Floats:
-    """Curves (n, T, M) to Fourier coefficients (n, B M)."""
+    """Convert curves (n, T, M) to Fourier coefficients (n, B M)."""
     return np.matmul(basis, curves).reshape(len(curves), len(basis) * curves.shape[2])
 
 
@@ -35,29 +32,20 @@ def encode_all(curves: Floats, basis: Floats) -> Floats:
 
 
 def decode(coded: Floats, basis: Floats, channels: int) -> Floats:
-    """Fourier coefficients (n, B M) to curves (n, T, M)."""
+    """Convert Fourier coefficients (n, B M) to curves (n, T, M)."""
     return np.matmul(basis.T, coded.reshape(len(coded), len(basis), channels))
 
 
 def first_harmonic(signal: Floats, period: float, offset: float = 0.0) -> complex:
-    """Complex amplitude of a signal (T,) at one cycle per period, by least squares with a constant.
+    """Fit one cycle per period and a constant to a signal (T,) by least squares: complex amplitude.
 
-    Parameters
-    ----------
-    signal : (T,)
-        NaN where missing.
-    period, offset : float
-        Frames; the cycle begins at `offset`.
-
-    Returns
-    -------
-    complex
-        0 if hardly anything is seen.
+    The signal is NaN where missing; 0 if hardly anything is seen.  Period and offset, where the cycle begins,
+    are frames.
     """
-    seen = np.flatnonzero(np.isfinite(signal))
-    if len(seen) < FEWEST:
+    visible = np.flatnonzero(np.isfinite(signal))
+    if len(visible) < FEWEST:
         return 0j
-    angle = 2 * np.pi * (seen - offset) / period
-    design = np.stack([np.ones(len(seen)), np.cos(angle), np.sin(angle)], axis=1)
-    _, cosine, sine = np.linalg.lstsq(design, signal[seen], rcond=None)[0]
+    angle = 2 * np.pi * (visible - offset) / period
+    design = np.stack([np.ones(len(visible)), np.cos(angle), np.sin(angle)], axis=1)
+    _, cosine, sine = np.linalg.lstsq(design, signal[visible], rcond=None)[0]
     return complex(cosine, -sine)

@@ -1,9 +1,9 @@
 """Length of the cycle by its signal-to-noise ratio (Ormoneit 2000, eq. 1).
 
-The ratio is exactly the F of one-way analysis of variance with the phase as its groups.
-`literal` is the paper's: whole frames, one bin per frame.  `refined` scores half frames with a fixed number
-of bins, prefers divisors (a multiple of the period fits as well), then maximises the F of a harmonic
-regression. Signals are (T, A) with NaN for missing entries; periods are in frames.
+The ratio is exactly the F of one-way analysis of variance with the phase as its groups.  The mode `literal`
+is the paper's: whole frames, one bin per frame.  `refined` scores half frames with a fixed number of bins,
+prefers divisors (multiples of the period fit as well), then maximises the F of a harmonic regression.
+Signals are (T, A) with NaN for missing entries; periods are in frames.
 """
 
 from __future__ import annotations
@@ -12,19 +12,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
-from gait.learn.cycles.patterns import same_columns
-
-Floats = npt.NDArray[np.float64]
+from gait.learn.arrays import Floats, Indices, Mask, same_columns
 
 BINS = 50
 HARMONICS = 8
 DIVISORS = (5, 4, 3, 2)
-DIVISOR_ANGLES = 0.8  # share of the angles that must allow a divisor of the best period
-DIVISOR_SCORE = 0.5  # of its score at the best period that an allowing angle keeps at the divisor
-#: Cycles that a sequence must hold.  Fewer than the three that a clean fold would want: the walks of CMU hold
-#: 1.7 to 3.5 strides, and their periods still agree with autocorrelation (tests/python/test_learn_cmu.py).
+DIVISOR_ANGLES = 0.8  # share of the angles that must accept a divisor of the best period
+DIVISOR_SCORE = 0.5  # share of its best score that an accepting angle keeps at the divisor
+#: Cycles that a sequence needs.  A clean fold would want three, but the walks of CMU have 1.7 to 3.5 strides,
+#: and their periods still agree with autocorrelation (tests/python/test_learn_cmu.py).
 CYCLES = 1.5
 SECONDS = (0.4, 2.1)
 LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, taken as of 120 per second
@@ -32,23 +30,12 @@ LITERAL_SECONDS = (50 / 120, 250 / 120)  # the paper's 50 to 250 frames, taken a
 
 @dataclass(frozen=True)
 class Period:
-    """Result of `find`.
+    """Result of `find`."""
 
-    Attributes
-    ----------
-    frames : float
-        Length of the cycle.
-    candidates, scores : (n,)
-        Signal-to-noise ratio, summed over the angles, of each candidate; NaN where invalid (`curves` gives
-        the angles singly).
-    sharpness : float
-        Best score over the median one; 0 where no score is valid.
-    """
-
-    frames: float
-    candidates: Floats
-    scores: Floats
-    sharpness: float
+    frames: float  #: length of the cycle
+    candidates: Floats  #: (n,) periods tried, frames
+    scores: Floats  #: (n,) their signal-to-noise ratio, summed over the angles; NaN where invalid
+    sharpness: float  #: best score over the median one; 0 where no score is valid
 
     @property
     def peak(self) -> float:
@@ -57,36 +44,30 @@ class Period:
 
 
 class Folder:
-    """Signals prepared for folding at many periods.
-
-    Parameters
-    ----------
-    signals : (T, A)
-        NaN where missing.
-    """
+    """Signals (T, A), NaN where missing, prepared for folding at many periods."""
 
     def __init__(self, signals: Floats) -> None:
-        seen = np.isfinite(signals)
-        self.total = seen.sum(axis=0)
-        mean = np.where(seen, signals, 0).sum(axis=0) / np.maximum(self.total, 1)
-        values = np.where(seen, signals - mean, 0)
+        visible = np.isfinite(signals)
+        self.total = visible.sum(axis=0)
+        mean = np.where(visible, signals, 0).sum(axis=0) / np.maximum(self.total, 1)
+        values = np.where(visible, signals - mean, 0)
         self.squares = (values**2).sum(axis=0)
-        masks, self.mask = np.unique(seen, axis=1, return_inverse=True)  # mostly one for all angles
+        masks, self.mask = np.unique(visible, axis=1, return_inverse=True)  # mostly one for all angles
         self.stacked = np.concatenate([values, masks.astype(float)], axis=1)
 
-    def literal(self, periods: npt.ArrayLike) -> Floats:
-        """Ratios (n, A) of folding at whole numbers of frames; NaN if observations are too few."""
+    def literal(self, periods: ArrayLike) -> Floats:
+        """Return ratios (n, A) of folding at whole numbers of frames; NaN if observations are too few."""
         frames = np.arange(len(self.stacked))
         return self._anova(frames % period for period in np.asarray(periods, int))
 
-    def binned(self, periods: npt.ArrayLike, bins: int) -> Floats:
-        """Signal-to-noise ratios (n, A) with a fixed number of phase bins."""
+    def binned(self, periods: ArrayLike, bins: int) -> Floats:
+        """Return signal-to-noise ratios (n, A) with a fixed number of phase bins."""
         frames = np.arange(len(self.stacked))
         phases = (frames / period % 1.0 for period in np.asarray(periods, float))
         return self._anova(np.minimum((bins * phase).astype(int), bins - 1) for phase in phases)
 
-    def _anova(self, groupings: Iterable[npt.NDArray[np.intp]]) -> Floats:
-        """Unbalanced one-way F per column: mean square between groups over mean square within."""
+    def _anova(self, groupings: Iterable[Indices]) -> Floats:
+        """Return the one-way F of each column: mean square between groups over mean square within."""
         folded = [self._folded(group) for group in groupings]
         between = np.array([squares for squares, _ in folded]).reshape(len(folded), len(self.total))
         groups = np.array([count for _, count in folded], int).reshape(between.shape)
@@ -95,8 +76,8 @@ class Folder:
         score = between / np.maximum(groups - 1, 1) * (self.total - groups) / np.where(within > 0, within, 1)
         return np.where(valid, score, np.nan)
 
-    def _folded(self, group: npt.NDArray[np.intp]) -> tuple[Floats, npt.NDArray[np.intp]]:
-        """Sum of squares between groups, and how many groups are seen, per column."""
+    def _folded(self, group: Indices) -> tuple[Floats, Indices]:
+        """Return the sum of squares between groups and the number of groups seen, per column."""
         size = np.bincount(group)
         starts = (np.cumsum(size) - size)[size > 0]
         rows = self.stacked[np.argsort(group, kind="stable")]
@@ -105,23 +86,21 @@ class Folder:
         return between, np.count_nonzero(counts, axis=0)[self.mask]
 
 
-def patterns(signals: Floats) -> list[tuple[npt.NDArray[np.bool_], Floats]]:
-    """Columns grouped by which rows are observed: (rows (T,), centred values of the group)."""
-    seen = np.isfinite(signals)
+def _centred_groups(signals: Floats) -> list[tuple[Mask, Floats]]:
+    """Group columns by which rows are observed: (rows (T,), centred values of the group)."""
+    visible = np.isfinite(signals)
     result = []
-    for columns in same_columns(seen):
-        rows = seen[:, columns[0]]
+    for columns in same_columns(visible):
+        rows = visible[:, columns[0]]
         values = signals[rows][:, columns]
         result.append((rows, values - values.mean(axis=0)))
     return result
 
 
-def harmonic_f(
-    groups: list[tuple[npt.NDArray[np.bool_], Floats]], period: float, harmonics: int = HARMONICS
-) -> float:
-    """F of the regression on a constant and harmonics, summed over columns; observed samples only."""
+def _harmonic_f(groups: list[tuple[Mask, Floats]], period: float) -> float:
+    """Return the F of the regression on a constant and harmonics, summed over columns."""
     frames = len(groups[0][0])
-    angle = 2 * np.pi / period * np.outer(np.arange(frames), np.arange(1, harmonics + 1))
+    angle = 2 * np.pi / period * np.outer(np.arange(frames), np.arange(1, HARMONICS + 1))
     design = np.concatenate([np.ones((frames, 1)), np.cos(angle), np.sin(angle)], axis=1)
     terms, score = design.shape[1], 0.0
     for rows, values in groups:
@@ -136,32 +115,17 @@ def harmonic_f(
     return score
 
 
-def curves(
-    signals: Floats, fps: float, mode: str = "refined", bounds: tuple[float, float] | None = None
-) -> tuple[Floats, Floats]:
-    """Signal-to-noise ratio of each angle against the period: the rows of the paper's figure 2.
+def curves(signals: Floats, fps: float, mode: str = "refined") -> tuple[Floats, Floats]:
+    """Return candidate periods (n,) and the signal-to-noise ratio (n, A) of each angle at them.
 
-    White noise has the law of Fisher's F and so a flat row at about 1.
-
-    Parameters
-    ----------
-    signals : (T, A)
-        NaN where missing.
-    mode : "refined" or "literal"
-        Half frames in a fixed number of bins, or whole frames in one bin each.
-    bounds : (low, high), optional
-        Frames; by default 0.4 to 2.1 s, in the literal mode 0.42 to 2.08 s (50 to 250 frames at 120 per s).
-
-    Returns
-    -------
-    candidates : (n,)
-        Periods, frames.
-    ratios : (n, A)
-        NaN where there are too few observations for the period, or the angle does not move.
+    The ratios are the rows of the paper's figure 2; NaN where there are too few observations for the period,
+    or the angle does not move.  White noise has the law of Fisher's F and so a flat row at about 1.
+    Candidates are half frames from 0.4 to 2.1 s in a fixed number of bins, or in the mode "literal" whole
+    frames from 0.42 to 2.08 s (50 to 250 at 120 per s) in one bin each.
     """
     moving = _moving(signals)
     literal = mode == "literal"
-    low, high = bounds or _bounds(fps, mode)
+    low, high = _bounds(fps, mode)
     candidates = np.arange(np.ceil(low - 1e-9), high + 0.1, 1.0 if literal else 0.5)
     folder, longest, bins = Folder(signals[:, moving]), len(signals) / CYCLES, _bins(low)
     ratios = np.full((len(candidates), signals.shape[1]), np.nan)
@@ -173,61 +137,57 @@ def curves(
     return candidates, ratios
 
 
-def find(
-    signals: Floats, fps: float, mode: str = "refined", bounds: tuple[float, float] | None = None
-) -> Period:
-    """Find the period of a sequence.
-
-    Parameters are those of `curves`.
-    """
+def find(signals: Floats, fps: float, mode: str = "refined") -> Period:
+    """Find the period of a sequence; parameters are those of `curves`."""
     moving = signals[:, _moving(signals)]
-    candidates, ratios = curves(moving, fps, mode, bounds)
+    candidates, ratios = curves(moving, fps, mode)
     scores = np.array([_total(row) for row in ratios])
     if np.isnan(scores).all():
         return Period(float("nan"), candidates, scores, 0.0)
     best = float(candidates[np.nanargmax(scores)])
     if mode != "literal":
-        low = (bounds or _bounds(fps, mode))[0]
+        low = _bounds(fps, mode)[0]
         best = _divisor(Folder(moving), _bins(low), moving, _refine(moving, best), low)
     sharpness = float(np.nanmax(scores) / np.nanmedian(scores))
     return Period(best, candidates, scores, sharpness)
 
 
 def _bounds(fps: float, mode: str) -> tuple[float, float]:
-    """Shortest and longest candidate, frames."""
+    """Return the shortest and longest candidate, frames."""
     low, high = LITERAL_SECONDS if mode == "literal" else SECONDS
     return low * fps, high * fps
 
 
 def _bins(low: float) -> int:
-    """Phase bins: not more than there are frames in the shortest cycle."""
+    """Return the number of phase bins, at most the frames of the shortest cycle."""
     return int(np.clip(1.05 * low, 8, BINS))
 
 
-def _moving(signals: Floats) -> npt.NDArray[np.bool_]:
-    """Columns that are observed and not constant."""
-    seen = np.isfinite(signals)
-    spread = np.where(seen, signals, -np.inf).max(axis=0) - np.where(seen, signals, np.inf).min(axis=0)
-    return (seen.sum(axis=0) > 2) & (spread > 1e-9)
+def _moving(signals: Floats) -> Mask:
+    """Return which columns are observed and not constant."""
+    visible = np.isfinite(signals)
+    spread = np.where(visible, signals, -np.inf).max(axis=0) - np.where(visible, signals, np.inf).min(axis=0)
+    return (visible.sum(axis=0) > 2) & (spread > 1e-9)
 
 
 def _total(scores: Floats) -> float:
-    """Sum over the valid columns, scaled up to all of them; NaN if half or more are invalid."""
+    """Return the sum over the valid columns, scaled up to all; NaN if half or more are invalid."""
     valid = np.isfinite(scores)
     return float(scores[valid].mean() * len(scores)) if 2 * valid.sum() > len(scores) else float("nan")
 
 
 def _divisor(folder: Folder, bins: int, signals: Floats, best: float, low: float) -> float:
-    """Find the smallest of best/5 ... best/2 that most angles allow, refined; else the best.
+    """Return the smallest of best/5 ... best/2 that most angles accept, refined; else the best.
 
-    Angles vote singly: in a sum of scores the trunk, which repeats every step, could outvote the legs, and a
-    multiple fitted to a recording hardly longer than itself scores a quarter above the period (CMU 38_02).
+    Each angle votes by itself: in a sum of scores the trunk, which repeats every step, could outvote the
+    legs, and a multiple fitted to a recording hardly longer than itself scores a quarter above the period
+    (CMU 38_02).
     """
     whole, *parts = folder.binned([best, *(best / divisor for divisor in DIVISORS)], bins)
     for divisor, part in zip(DIVISORS, parts, strict=True):
         voting = np.isfinite(whole) & np.isfinite(part)
-        allowing = (part >= DIVISOR_SCORE * whole)[voting]
-        enough = 2 * len(allowing) > len(part) and allowing.mean() >= DIVISOR_ANGLES
+        accepting = (part >= DIVISOR_SCORE * whole)[voting]
+        enough = 2 * len(accepting) > len(part) and accepting.mean() >= DIVISOR_ANGLES
         if enough and best / divisor >= low:
             return _refine(signals, best / divisor)
     return best
@@ -235,10 +195,10 @@ def _divisor(folder: Folder, bins: int, signals: Floats, best: float, low: float
 
 def _refine(signals: Floats, period: float) -> float:
     """Maximise the harmonic F: +-1 frame in steps of 0.1, +-0.1 in steps of 0.02, then a parabola."""
-    groups = patterns(signals)
+    groups = _centred_groups(signals)
     for width, step in ((1.0, 0.1), (0.1, 0.02)):
         grid = period + step * np.arange(-round(width / step), round(width / step) + 1)
-        score = np.array([harmonic_f(groups, p) for p in grid])
+        score = np.array([_harmonic_f(groups, p) for p in grid])
         top = int(np.clip(np.argmax(score), 1, len(grid) - 2))
         period = float(grid[top])
     left, middle, right = score[top - 1 : top + 2]

@@ -2,140 +2,90 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from gait.body.skeleton import ANGLES, ROOTS, SIDES
 from gait.errors import UserError
-from gait.learn.corpus import subjects
-from gait.learn.cycles import activity, cycles, period, trim, verdict
-from gait.learn.mocap.angle_file import AngleTable
-from gait.learn.reading import DEFAULT, Reading
+from gait.learn.arrays import Floats
+from gait.learn.cycles import cutting, period, steady, verdict
+from gait.learn.mocap.tables import AngleTable
+from gait.learn.options import DEFAULT, LearnOptions
 from gait.learn.rotations import unwrap
-from gait.learn.solve import readers, retarget, root
+from gait.learn.solve import readers, retarget
 from gait.learn.solve.body import Body
 
-Floats = npt.NDArray[np.float64]
-
 YAW = ROOTS.index("root_yaw")
-PHASES = 64  # at which it is counted how much of a cycle is seen
+PHASES = 64  # at which the observed share of a cycle is counted
 
 
 @dataclass
 class Sequence:
-    """The steady part of a recording as the learner uses it, T frames.
-
-    Attributes
-    ----------
-    name, subject : str
-    source : Path
-    fps : float
-    measures : retarget.Measures or None
-        None where the file has angles alone.
-    channels : (T, 30)
-        Angles and root channels, radians and statures; NaN where missing.
-    heading : (T,)
-        Radians; NaN where the file does not have it.
-    period : period.Period
-    strides : (n,)
-        Durations of the single strides, seconds: between forward extremes of either ankle, or of either
-        knee's flexion where the file has angles alone.
-    kept : (start, stop)
-        The frames of the file that these are.
-    cut : (before, after)
-        Why frames before and after them were left out, in words; '' if none were.
-    verdict : verdict.Verdict
-    recordings : int
-        How many recordings of the person tell the lengths of the limbs.
-    """
+    """The steady part of a recording as the learner uses it, T frames."""
 
     name: str
     subject: str
     source: Path
-    fps: float
-    measures: retarget.Measures | None
-    channels: Floats
-    heading: Floats
+    fps: float  #: frames per second
+    measures: retarget.Measures | None  #: None where the file has angles alone
+    channels: Floats  #: (T, 30) angles and root channels, radians and statures; NaN where missing
+    heading: Floats  #: (T,) radians; NaN where the file does not have it
     period: period.Period
+    #: (n,) Durations of single strides, seconds: between forward extremes of an ankle, or of a knee's flexion
+    #: where the file has angles alone.
     strides: Floats
-    kept: tuple[int, int]
-    cut: tuple[str, str]
+    kept: tuple[int, int]  #: start and stop of these frames in the file
+    cut: tuple[str, str]  #: why frames before and after them were left out; '' if none were
     verdict: verdict.Verdict
-    recordings: int = 1
+    recordings: int = 1  #: how many recordings of the person the lengths of the limbs come from
 
     @property
     def cycles(self) -> float:
-        """How many cycles the recording holds."""
+        """Number of cycles in the recording."""
         return len(self.channels) / self.period.frames
 
 
 @dataclass
 class _Motion:
-    """What is known of some frames before the period is used: see `Sequence`."""
+    """What is known of some frames before the period is used; arrays are those of `Sequence`."""
 
     angles: Floats
-    track: trim.Track
+    path: steady.RootPath
     body: Body | None = None
     measures: retarget.Measures | None = None
     root: Floats | None = None
 
 
-def levelled(body: Body, kept: tuple[int, int] | None = None) -> Body:
-    """Put a body on a level floor, with the pelvis axes in their standard place.
-
-    Parameters
-    ----------
-    kept : (start, stop), optional
-        Frames to use, all by default; the floor and the pelvis are those of these frames.
-    """
-    return root.align_pelvis(root.level(body if kept is None else _part_of_body(body, *kept))[0])
+def load(path: Path, options: LearnOptions = DEFAULT) -> Sequence:
+    """Read and prepare one file; its name stands for the person too."""
+    return prepare(path, readers.read(path, options), options)
 
 
-def measured(read: Body | AngleTable) -> retarget.Measures | None:
-    """Measure the body of a recording, whatever it does; None where the file has angles alone."""
-    return None if isinstance(read, AngleTable) else retarget.measure(levelled(read))
+def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT) -> Sequence:
+    """Prepare what was read from a file.
 
-
-def load(path: Path, reading: Reading = DEFAULT) -> Sequence:
-    """Read and prepare one file; it is named as if it were alone.
-
-    Raises
-    ------
-    UserError
-        If the file is malformed, or the motion is not cyclic, too short or of another activity.
-    """
-    return prepare(path, readers.read(path, reading), reading)
-
-
-def prepare(path: Path, read: Body | AngleTable, reading: Reading = DEFAULT) -> Sequence:
-    """Prepare what was read from a file, as `load` does.
-
-    Raises
-    ------
-    UserError
-        If the motion is not cyclic, too short or of another activity.
+    UserError if the motion is not cyclic, too short or of another activity.
     """
     motion = _motion(read)
-    kept, found = trim.Kept(0, read.frames), None
-    if reading.trim:
-        kept, found = trim.stretch(motion.angles, read.fps, reading.mode, motion.track)
+    kept, found, mode, activity = steady.Kept(0, read.frames), None, options.period_mode, options.activity
+    if options.trim:
+        kept, found = steady.steady_part(motion.angles, read.fps, mode, motion.path)
         if not kept.stop - kept.start >= period.CYCLES * found.frames:
-            raise _refused(path, reading.activity, _unsteady(kept, found, read.fps))
+            raise _refused(path, activity, _unsteady(kept, found, read.fps))
     if found is None or kept.stop - kept.start < read.frames:
-        motion = _motion(_part(read, kept.start, kept.stop))
-        found = period.find(motion.angles, read.fps, reading.mode)
-    judged, channels, heading = _judge(motion, found, reading.activity)
+        motion = _motion(read.part(kept.start, kept.stop))
+        found = period.find(motion.angles, read.fps, mode)
+    judged, channels, heading = _judge(motion, found, activity)
     if not judged.accepted:
-        other = judged.activity if {judged.activity, reading.activity} == {"walk", "run"} else ""
-        raise _refused(path, reading.activity, judged.reason, other)
-    if not cycles.fewest(channels, found.frames, PHASES):
-        raise _refused(path, reading.activity, "too little is seen of each cycle")
+        other = judged.activity if {judged.activity, activity} == {"walk", "run"} else ""
+        raise _refused(path, activity, judged.reason, other)
+    if not cutting.fewest_cycles(channels, found.frames, PHASES):
+        raise _refused(path, activity, "too little of each cycle is observed")
     return Sequence(
-        name=subjects.names([path])[0],
-        subject=subjects.subjects([path])[0],
+        name=path.stem,
+        subject=path.stem,
         source=path,
         fps=read.fps,
         measures=motion.measures,
@@ -150,64 +100,50 @@ def prepare(path: Path, read: Body | AngleTable, reading: Reading = DEFAULT) -> 
 
 
 def _refused(path: Path, wanted: str, reason: str, other: str = "") -> UserError:
-    """Error of a recording that cannot be learnt as the activity, but perhaps as another."""
+    """Return the error for a recording that cannot be learnt as the activity, but perhaps as another."""
     remedy = f"; leave it out, or give --activity {other}" if other else "; leave it out"
     return UserError(f"{path}: not learnt as {wanted!r}: {reason}{remedy}")
 
 
-def _unsteady(kept: trim.Kept, found: period.Period, fps: float) -> str:
-    """Say why the stretch that was found is no use."""
+def _unsteady(kept: steady.Kept, found: period.Period, fps: float) -> str:
+    """Return why the steady part is too short."""
     if not np.isfinite(found.frames):
-        return "it holds no cycle"
-    held = kept.stop - kept.start
+        return "no cycle found"
+    frames = kept.stop - kept.start
     return (
-        f"no steady motion: at most {held / fps:.1f} s at a time, {held / found.frames:.1f} cycles "
+        f"no steady motion: at most {frames / fps:.1f} s at a time, {frames / found.frames:.1f} cycles "
         f"(at least {period.CYCLES})"
     )
 
 
-def _part(read: Body | AngleTable, start: int, stop: int) -> Body | AngleTable:
-    """Frames start to stop of what was read."""
-    if isinstance(read, AngleTable):
-        motion = None if read.root is None else read.root[start:stop]
-        return replace(read, angles=read.angles[start:stop], root=motion)
-    return _part_of_body(read, start, stop)
-
-
-def _part_of_body(read: Body, start: int, stop: int) -> Body:
-    joints = {name: places[start:stop] for name, places in read.joints.items()}
-    lateral = {name: axes[start:stop] for name, axes in read.lateral.items()}
-    return replace(read, joints=joints, pelvis=read.pelvis[start:stop], lateral=lateral)
-
-
 def _motion(read: Body | AngleTable) -> _Motion:
-    """Angles and what else is known of what was read."""
+    """Return the angles of what was read, and what else it shows."""
     if isinstance(read, AngleTable):
-        return _Motion(read.angles, trim.Track(), root=read.root)
-    body = levelled(read)
+        return _Motion(read.angles, steady.RootPath(), root=read.root)
+    body = retarget.levelled(read)
     measures = retarget.measure(body)
     yaw = np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0])
-    track = trim.Track(body.joints["pelvis"][:, :2], unwrap(yaw[:, None])[:, 0])
-    return _Motion(retarget.angles(body, measures), track, body, measures)
+    path = steady.RootPath(body.joints["pelvis"][:, :2], unwrap(yaw[:, None])[:, 0])
+    return _Motion(retarget.angles(body, measures), path, body, measures)
 
 
 def _judge(motion: _Motion, found: period.Period, wanted: str) -> tuple[verdict.Verdict, Floats, Floats]:
-    """Verdict, channels (T, 30) and heading (T,); the last two are of use only if it is accepted."""
+    """Return the verdict, channels (T, 30) and heading (T,); the last two are valid only if accepted."""
     frames, feet = len(motion.angles), None
     moving, heading = np.full((frames, len(ROOTS)), np.nan), np.full(frames, np.nan)
     if motion.body is not None and motion.measures is not None and np.isfinite(found.frames):
-        feet = activity.of_body(motion.body, motion.measures.stature)
-        moving, heading = root.channels(motion.body, motion.measures, found.frames)
+        feet = verdict.feet_of_body(motion.body, motion.measures.stature)
+        moving, heading = retarget.root_channels(motion.body, motion.measures, found.frames)
     elif motion.root is not None and np.isfinite(found.frames):
         moving = motion.root
-        feet = activity.of_channels(np.concatenate([motion.angles, moving], axis=1))
-    footing = activity.footing(feet, found.frames) if feet is not None else None
+        feet = verdict.feet_of_channels(np.concatenate([motion.angles, moving], axis=1))
+    footing = verdict.footing(feet, found.frames) if feet is not None else None
     judged = verdict.judge(motion.angles, found, footing, wanted, moving[:, YAW])
     return judged, np.concatenate([motion.angles, moving], axis=1), heading
 
 
 def _strides(motion: _Motion, heading: Floats, frames: float) -> Floats:
-    """Time successive extremes of each leg, frames."""
+    """Return the times between successive extremes of each leg, frames."""
     durations = [np.zeros(0)]
     for s in SIDES:
         if motion.body is None:
@@ -221,7 +157,7 @@ def _strides(motion: _Motion, heading: Floats, frames: float) -> Floats:
 
 
 def _peaks(signal: Floats, frames: float) -> Floats:
-    """Sub-frame times of maxima that are the largest within 0.4 period on both sides."""
+    """Return sub-frame times of maxima that are the largest within 0.4 period on both sides."""
     reach = int(0.4 * frames)
     times = []
     for t in range(reach, len(signal) - reach):

@@ -1,47 +1,47 @@
-"""Whether a recording is cyclic, and of the activity that is learnt: the evidence and the sentence."""
+"""Whether a recording is cyclic and shows the activity to be learnt: the evidence, and the reasons in words.
+
+Walking and running differ in the feet: a runner has both off the ground at times.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from gait.body.skeleton import ANGLES, SIDES
-from gait.learn.cycles.activity import NAMES, Footing
+from gait.body.skeleton import ANGLES, JOINTS, SIDES, default_skeleton, points
+from gait.learn.arrays import Floats
 from gait.learn.cycles.fourier import first_harmonic
 from gait.learn.cycles.period import CYCLES, Period
+from gait.learn.solve.body import Body
 
-Floats = npt.NDArray[np.float64]
-
+#: Names that users may give to the two activities that can be recognised.
+NAMES = {
+    **dict.fromkeys(("walk", "walking", "gait"), "walk"),
+    **dict.fromkeys(("run", "running", "jog", "jogging"), "run"),
+}
+STANCE = 15  # percentile of a joint's height that is its height in stance; a runner's foot stands for 30 %
+CLEAR = 0.018  # statures above that from which ankle and ball of a foot are both off the ground
+FLIGHT = 0.05  # share of the time in flight above which a person runs
+SOME_FLIGHT, BOB = 0.01, 0.3  # a slow run: less flight, but the pelvis is highest while the feet are apart
 SHARPNESS = 3.0
 REPEATS = 0.75  # the walks of CMU reach 0.88 to 0.99; punching 0.69, dances and climbing less or nothing
-LEGS = 0.7  # legs within an eighth of a cycle of taking turns; the walks of CMU: 0.96 and more
+LEGS = 0.7  # legs that alternate to within an eighth of a cycle; the walks of CMU reach 0.96 and more
 LIFT = 0.02  # statures
 STEPS = 0.03  # statures
-AHEAD = 0.5  # the walks of CMU: 0.98 and more, with left and right swapped -0.98 and less
+AHEAD = 0.5  # the walks of CMU reach 0.98 and more, with left and right swapped -0.98 and less
 SWING = ("hip_flexion", "knee_flexion")
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """One measure and the limits within which it is accepted.
-
-    Attributes
-    ----------
-    name : str
-    value : float
-        NaN if it could not be measured, which is no reason to refuse.
-    least, most : float
-    words : str
-        What it means if it is outside.
-    """
+    """One measure and the limits within which it is accepted."""
 
     name: str
-    value: float
+    value: float  #: NaN if it could not be measured, which is accepted
     least: float = -np.inf
     most: float = np.inf
-    words: str = ""
+    words: str = ""  #: what a value outside the limits means
 
     @property
     def accepted(self) -> bool:
@@ -49,60 +49,43 @@ class Evidence:
         return not (self.value < self.least or self.value > self.most)
 
     def __str__(self) -> str:
-        """Words, value and limit, such as 'the cycles do not repeat (0.31, at least 0.75)'."""
+        """Words, value and limit, such as 'the cycles do not repeat (repeats 0.31, at least 0.75)'."""
         limit = f"at least {self.least:.4g}" if self.value < self.least else f"at most {self.most:.4g}"
         return f"{self.words} ({self.name} {self.value:.2g}, {limit})"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a recording shows.
+    """What a recording shows."""
 
-    Attributes
-    ----------
-    activity : str
-        'walk', 'run', or '' where the feet do not tell.
-    evidence : tuple of Evidence
-    """
-
-    activity: str
+    activity: str  #: 'walk', 'run', or '' where the feet do not show it
     evidence: tuple[Evidence, ...]
 
     @property
     def accepted(self) -> bool:
-        """Whether nothing speaks against learning from it."""
+        """Whether all evidence is accepted."""
         return all(e.accepted for e in self.evidence)
 
     @property
     def reason(self) -> str:
-        """Everything that speaks against it; '' if nothing does."""
+        """Why the recording is not accepted; '' if it is."""
         return "; ".join(str(e) for e in self.evidence if not e.accepted)
 
 
 def judge(
     angles: Floats, found: Period, feet: Footing | None, wanted: str, yaw: Floats | None = None
 ) -> Verdict:
-    """Judge the steady part of a recording.
+    """Judge the steady part of a recording: angles (T, 24), NaN where missing, and its period.
 
-    Parameters
-    ----------
-    angles : (T, 24)
-        In the order of `gait.body.skeleton.ANGLES`; NaN where missing.
-    found : Period
-    feet : Footing or None
-        None if the feet were not seen.
-    wanted : str
-        The activity that is learnt; other names than those of walking and running only ask for cycles.
-    yaw : (T,), optional
-        Of the pelvis from the direction in which it goes, radians; NaN where missing.
+    `feet` are None if they were not seen.  `wanted` is the activity to be learnt; names other than those of
+    walking and running only require cycles.  `yaw` (T,) is of the pelvis from its direction of travel,
+    radians, NaN where missing.
     """
     kind = NAMES.get(wanted.lower(), "")
     evidence = list(_cyclic(angles, found))
     known = ""
     if kind and np.isfinite(found.frames):
-        evidence.append(
-            Evidence("legs", legs(angles, found.frames), LEGS, words="the legs do not take turns")
-        )
+        evidence.append(Evidence("legs", legs(angles, found.frames), LEGS, words="the legs do not alternate"))
     if feet is not None:
         legged = all(e.accepted for e in evidence) and feet.lift >= LIFT
         known = ("run" if feet.running else "walk") if legged else ""
@@ -115,18 +98,18 @@ def judge(
 
 
 def _cyclic(angles: Floats, found: Period) -> list[Evidence]:
-    """Evidence for cycles of any kind."""
+    """Return the evidence for cycles of any kind."""
     if not np.isfinite(found.frames):
-        return [Evidence("cycles", 0.0, CYCLES, words="it holds no cycle")]
+        return [Evidence("cycles", 0.0, CYCLES, words="no cycle found")]
     return [
-        Evidence("cycles", len(angles) / found.frames, CYCLES, words="too short a steady stretch"),
+        Evidence("cycles", len(angles) / found.frames, CYCLES, words="the steady part is too short"),
         Evidence("sharpness", found.sharpness, SHARPNESS, words="no period stands out"),
-        Evidence("repeats", repeats(angles, found.frames), REPEATS, words="one cycle is not like the next"),
+        Evidence("repeats", repeats(angles, found.frames), REPEATS, words="the cycles do not repeat"),
     ]
 
 
 def _footing(feet: Footing, kind: str) -> list[Evidence]:
-    """Evidence for walking or running."""
+    """Return the evidence for walking or running."""
     result = [
         Evidence("lift", feet.lift, LIFT, words="a foot stays on the ground"),
         Evidence("steps", feet.steps, most=STEPS, words="the ground is not level"),
@@ -139,10 +122,10 @@ def _footing(feet: Footing, kind: str) -> list[Evidence]:
 
 
 def repeats(angles: Floats, period: float) -> float:
-    """Correlation of the angles with themselves a period later, all together; NaN if nothing overlaps.
+    """Return the correlation of all angles with themselves a period later; NaN if nothing overlaps.
 
-    Each cycle is so predicted by another: unlike the ratio the period is chosen by, it does not profit from
-    the choice of many means.
+    Each cycle is thus predicted by another.  Unlike the ratio that chooses the period, this does not profit
+    from a choice among many means.
     """
     time = np.arange(max(0, int(np.ceil(len(angles) - 1 - period))))
     at = time + period
@@ -157,11 +140,11 @@ def repeats(angles: Floats, period: float) -> float:
 
 
 def legs(angles: Floats, period: float) -> float:
-    """How exactly the legs take turns: 1 if half a cycle lies between them, -1 if they move together.
+    """Return how exactly the legs alternate: 1 if half a cycle lies between them, -1 if they move together.
 
-    It is the cosine of the lag beyond half a cycle between left and right, by the first harmonics of hips and
-    knees, each joint weighed by the product of its amplitudes.  How far a leg swings does not count: people
-    limp.  NaN if nothing moves or is seen.
+    It is the cosine of the lag beyond half a cycle between left and right, from the first harmonics of hips
+    and knees, each joint weighted by the product of its amplitudes.  How far a leg swings does not count,
+    because people limp.  NaN if nothing moves or is seen.
     """
     left, right = (
         np.array([first_harmonic(angles[:, ANGLES.index(f"{s}_{name}")], period) for name in SWING])
@@ -173,6 +156,89 @@ def legs(angles: Floats, period: float) -> float:
 
 
 def _about_mean(values: Floats) -> Floats:
-    seen = np.isfinite(values)
-    mean = np.where(seen, values, 0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+    visible = np.isfinite(values)
+    mean = np.where(visible, values, 0).sum(axis=0) / np.maximum(visible.sum(axis=0), 1)
     return np.asarray(values - mean)
+
+
+@dataclass(frozen=True)
+class Feet:
+    """The feet over T frames, statures above any one level; NaN where missing."""
+
+    ankle: Floats  #: (T, 2) left and right
+    ball: Floats  #: (T, 2)
+    pelvis: Floats  #: (T,)
+    apart: Floats  #: (T,) horizontal distance of the ankles
+
+
+@dataclass(frozen=True)
+class Footing:
+    """What the feet do over some cycles."""
+
+    flight: float  #: share of the time in which both feet are off the ground
+    #: Correlation of the pelvis's height with the distance of the ankles: negative in walking, where the
+    #: pelvis is highest over the standing leg, positive in running.
+    bob: float
+    lift: float  #: range of an ankle's height, statures, the smaller of both
+    steps: float  #: range of the ground under a foot, statures, the larger of both
+
+    @property
+    def limit(self) -> float:
+        """Share of flight above which this is a run; smaller where the pelvis moves as in running."""
+        return SOME_FLIGHT if self.bob >= BOB else FLIGHT
+
+    @property
+    def running(self) -> bool:
+        """Whether this is a run and not a walk."""
+        return self.flight > self.limit
+
+
+def feet_of_body(body: Body, stature: float) -> Feet:
+    """Return the feet of recorded joints."""
+    ankle, ball = (
+        np.stack([body.joints[f"{s}_{joint}"] for s in SIDES], axis=1) / stature for joint in ("ankle", "toe")
+    )
+    apart = np.linalg.norm(ankle[:, 0, :2] - ankle[:, 1, :2], axis=1)
+    return Feet(ankle[..., 2], ball[..., 2], body.joints["pelvis"][:, 2] / stature, apart)
+
+
+def feet_of_channels(channels: Floats) -> Feet:
+    """Return the feet of angles and root channels (T, 30) on the default skeleton."""
+    moving = np.where(np.isfinite(channels), channels, 0.0)
+    place = points(default_skeleton().sections(), moving)
+    ankle, ball = (place[:, [JOINTS.index(f"{s}_{joint}") for s in SIDES]] for joint in ("ankle", "toe"))
+    pelvis = channels[:, -4]
+    apart = np.linalg.norm(ankle[:, 0, :2] - ankle[:, 1, :2], axis=1)
+    return Feet(ankle[..., 2] + pelvis[:, None], ball[..., 2] + pelvis[:, None], pelvis, apart)
+
+
+def footing(feet: Feet, cycle: float) -> Footing | None:
+    """Measure the feet over at least one cycle (frames); None if they are seen for less."""
+    visible = np.isfinite(feet.ankle + feet.ball).all(axis=1) & np.isfinite(feet.pelvis + feet.apart)
+    if visible.sum() < cycle:
+        return None
+    ankle, ball = feet.ankle[visible], feet.ball[visible]
+    over = np.minimum(*(z - np.percentile(z, STANCE, axis=0) for z in (ankle, ball)))
+    return Footing(
+        flight=float((over > CLEAR).all(axis=1).mean()),
+        bob=_correlation(feet.pelvis[visible], feet.apart[visible]),
+        lift=float(np.min(np.percentile(ankle, 95, axis=0) - np.percentile(ankle, 5, axis=0))),
+        steps=float(np.max(_ground(feet, cycle))),
+    )
+
+
+def _ground(feet: Feet, cycle: float) -> Floats:
+    """Return the range (2,) of the ankles' lowest heights in windows of a cycle."""
+    height = np.where(np.isfinite(feet.ankle), feet.ankle, np.inf)
+    width = min(round(cycle), len(height))
+    lowest = np.lib.stride_tricks.sliding_window_view(height, width, axis=0).min(axis=-1)
+    lowest = np.where(np.isfinite(lowest), lowest, np.nan)
+    return np.asarray(np.nanmax(lowest, axis=0) - np.nanmin(lowest, axis=0))
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    """Return the correlation of two signals without linear trends; 0 if one is constant."""
+    time = np.linspace(-1, 1, len(a))
+    a, b = (v - np.polyval(np.polyfit(time, v, 1), time) for v in (a, b))
+    scale = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / scale if scale > 0 else 0.0

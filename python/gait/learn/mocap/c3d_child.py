@@ -1,7 +1,7 @@
-"""Reads one .c3d with ezc3d in a process of its own: damaged files can crash that library.
+"""Reads one .c3d with ezc3d in its own process, because damaged files can crash that library.
 
-Run by path with the file's name; writes labels, points (M, T, 3), rate and units as .npz to stdout.  What it
-refuses is one line on stderr and exit code 1.
+Run by path with the name of the file.  Writes labels, points (M, T, 3), rate and units as .npz to stdout; an
+error is one line on stderr and exit code 1.
 """
 
 import io
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def main(path: str) -> None:
-    """Read `path` and write the points to stdout."""
+    """Read `path` and write its points to stdout."""
     c3d = ezc3d.c3d(path)
     parameters, points = c3d["parameters"]["POINT"], c3d["data"]["points"]
     units = parameters["UNITS"]["value"] if "UNITS" in parameters else []
@@ -35,5 +35,5 @@ def _labels(parameters: dict, key: str) -> list:  # type: ignore[type-arg]
 if __name__ == "__main__":
     try:
         main(sys.argv[1])
-    except Exception as error:  # whatever ezc3d throws: the parent makes it the user's one line
+    except Exception as error:  # whatever ezc3d raises becomes the user's one line in the parent
         sys.exit(" ".join(str(error).split()) or type(error).__name__)

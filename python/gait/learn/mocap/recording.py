@@ -1,103 +1,81 @@
-"""One recorded sequence, whatever file it came from: bones with positions and orientations, z up, metres."""
+"""A recorded skeleton as the file readers return it (z up, metres), and the checks that all readers share."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from gait.errors import UserError
-from gait.learn.mocap.remarks import NOTHING, Remarks
+from gait.learn.arrays import Floats, Mask
 
-Floats = npt.NDArray[np.float64]
+#: From x left, y up, z forward (ASF, BVH) to x forward, y left, z up.
+Y_UP = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 
-Y_UP = np.array(
-    [[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]
-)  # x left, y up, z forward (ASF, BVH) to x forward, y left, z up
+FEWEST = 3  # frames: fewer give no speeds
+FARTHEST = 1000.0  # metres from the file's origin; more is damage or another unit
+DEGREES = 3600.0  # the largest plausible angle of a joint
+LONG = 5  # frames in a row in which a moving part does not stay at exactly 0
+#: Parts that must be 0 at once to be reported: an angle may be clipped at 0, but no joint stays at the
+#: origin.
+BONES, JOINTS, ANGLES = 3, 1, 3
 
 
-FEWEST = 3  # frames from which speeds are had
-FARTHEST = 1000.0  # metres from the file's origin: what is beyond is damage, or not in metres
-DEGREES = 3600.0  # no walker turns a joint that often
+@dataclass(frozen=True)
+class FileNotes:
+    """What a reader found in a file that is no error but perhaps not what the user meant."""
+
+    #: Labels of the markers as `markers.plain` gives them, if a marker map is used.
+    labels: frozenset[str] = frozenset()
+    #: Which part is exactly 0, and in which frames, as if it were missing; empty if none is.
+    zeros: str = ""
+
+
+NO_NOTES = FileNotes()
+
+
+@dataclass
+class Recording:
+    """Bones of a moving skeleton: T frames, B bones."""
+
+    name: str  #: stem of the file
+    source: Path
+    fps: float  #: frames per second
+    bones: list[str]  #: as in the file
+    start: Floats  #: (T, B, 3) metres, world with z up; NaN where missing
+    end: Floats  #: (T, B, 3)
+    rotation: Floats  #: (T, B, 3, 3) from the rest pose to the world
+    rest_start: Floats  #: (B, 3) in the rest pose, metres, same axes
+    rest_end: Floats  #: (B, 3)
+    #: Axis (3,) of bones with one rotation, in the rest pose; flexion is positive as in the file.
+    hinges: dict[str, Floats] = field(default_factory=dict)
+    notes: FileNotes = NO_NOTES
 
 
 def require_frames(path: Path, frames: int) -> None:
-    """Refuse a file of hardly any frames, whatever its kind.
-
-    Raises
-    ------
-    UserError
-    """
+    """Raise UserError if a file has hardly any frames."""
     if frames < FEWEST:
         raise UserError(f"{path}: too few frames ({frames}); a recording of a few seconds is needed")
 
 
 def require_range(path: Path, what: str, values: Floats, limit: float, unit: str) -> None:
-    """Refuse values (T, ...) whose amount is beyond a limit, naming the first frame; NaN is missing.
-
-    Raises
-    ------
-    UserError
-    """
+    """Raise UserError naming the first frame in which |values| (T, ...) exceed the limit; NaN is missing."""
     beyond = np.abs(values.reshape(len(values), -1)) > limit
     if beyond.any():
         frame = int(np.argmax(beyond.any(axis=1)))
         value = values.reshape(len(values), -1)[frame, int(np.argmax(beyond[frame]))]
         raise UserError(
-            f"{path}: frame {frame + 1}: {what} {value:.4g} {unit}, at most {limit:.0f} are plausible; "
-            "correct it, or the file's units"
+            f"{path}: frame {frame + 1}: {what} is {value:.4g} {unit}; at most {limit:.0f} is plausible; "
+            "correct the value or the units of the file"
         )
 
 
-@dataclass
-class Recording:
-    """Bones of a moving skeleton.
-
-    Attributes
-    ----------
-    name : str
-        Last part of the file's name, without suffix.
-    source : Path
-        The file.
-    fps : float
-        Frames per second.
-    bones : list of str
-        B names as in the file.
-    start, end : (T, B, 3)
-        Where each bone begins and ends, metres, world with z up; NaN where missing.
-    rotation : (T, B, 3, 3)
-        Turns a vector of the rest pose into the world.
-    rest_start, rest_end : (B, 3)
-        The rest pose, metres, axes as above.
-    hinges : dict of str to (3,)
-        Axis of bones with a single rotation, in the rest pose; flexion positive as the file has it.
-    remarks : Remarks
-    """
-
-    name: str
-    source: Path
-    fps: float
-    bones: list[str]
-    start: Floats
-    end: Floats
-    rotation: Floats
-    rest_start: Floats
-    rest_end: Floats
-    hinges: dict[str, Floats] = field(default_factory=dict)
-    remarks: Remarks = NOTHING
-
-    @property
-    def frames(self) -> int:
-        """Number of frames T."""
-        return len(self.start)
-
-
 def mask_zero_runs(columns: Floats, run: int = 3) -> Floats:
-    """Copy a bone's values (T, k) with NaN in runs of at least `run` rows of exact zeros.
+    """Copy values (T, k) of one part with NaN where at least `run` rows in a row are exactly 0.
 
-    Mocap writes 0 for what was occluded; a bone that is 0 in all rows is fixed and not missing.
+    Some systems write 0 for what was occluded.  A part that is 0 throughout is fixed, not missing.
     """
     zero = (columns == 0).all(axis=1)
     result = columns.astype(float)
@@ -108,3 +86,28 @@ def mask_zero_runs(columns: Floats, run: int = 3) -> Floats:
         if end - begin >= run:
             result[begin:end] = np.nan
     return result
+
+
+def zero_run(parts: Mapping[str, Floats], together: int) -> str:
+    """Describe the first run of LONG frames in which `together` of the parts (T, k) are exactly 0, or ''.
+
+    Parts that are 0 throughout are fixed and do not count.
+    """
+    runs = {name: _long_zeros(columns) for name, columns in parts.items()}
+    at_once = sum(runs.values(), np.zeros(len(next(iter(runs.values()), ())), int)) >= together
+    if not at_once.any():
+        return ""
+    first = int(np.argmax(at_once))
+    name = next(name for name, run in runs.items() if run[first])
+    rest = at_once[first:]
+    last = first + (len(rest) if rest.all() else int(np.argmin(rest)))
+    return f"{name} in frames {first + 1} to {last}"
+
+
+def _long_zeros(columns: Floats) -> Mask:
+    """Rows (T,) that belong to a run of LONG or more rows of exact zeros, of a part that moves."""
+    zero = (columns == 0).all(axis=1)
+    if not (zero < np.isfinite(columns).all(axis=1)).any():
+        return np.zeros(len(zero), bool)
+    begins = np.convolve(zero, np.ones(LONG), "full")[LONG - 1 :] >= LONG  # LONG rows from here are 0
+    return np.convolve(begins, np.ones(LONG), "full")[: len(zero)] > 0

@@ -1,4 +1,4 @@
-"""The whole of learning: sequences to mean curves, components and statistics."""
+"""The cyclic model: prepared sequences to mean curves, components and statistics."""
 
 from __future__ import annotations
 
@@ -7,98 +7,81 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from gait.body.skeleton import ANGLES, CHANNELS, Proportions, default_skeleton, points
+from gait.body.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, SIDES, Proportions, default_skeleton, points
 from gait.errors import UserError
-from gait.learn.cycles import align, cycles
+from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
+from gait.learn.cycles import align, cutting
+from gait.learn.cycles.fourier import decode, encode, fourier_basis
 from gait.learn.cycles.sequence import Sequence
-from gait.learn.model_options import DEFAULT_COMPONENTS
-from gait.learn.prior import fpca, ground, lengths, pace, prior, rank, unseen
-from gait.learn.prior.subject_residuals import SubjectResiduals, subject_residuals
-from gait.learn.solve import retarget
-from gait.learn.spool import by_rows, release, stored
-
-Floats = npt.NDArray[np.float64]
+from gait.learn.options import DEFAULT, DEFAULT_COMPONENTS, LearnOptions
+from gait.learn.prior import components, lengths, people, rank
+from gait.learn.prior.components import Components
+from gait.learn.prior.people import ADULT_STATURE
+from gait.learn.solve.retarget import Measures, generic_proportions, known_parts
 
 SAMPLES = 120  # phases of a cycle: five components take less than 100 kB
 MOST_NAMES = 4  # of files in a message
 #: Radians that one unit of a root channel counts for in the components: a displacement of a stature is as
-#: much as the leg's turn by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures per
-#: radian).
+#: much as a rotation of the leg by 1 / 0.3 rad (a leg's angle moves the joints below it by about 0.3 statures
+#: per radian).
 ROOT_SCALE = {"root_forward": 1.0, "root_sway": 3.3, "root_height": 3.3}
+HEIGHT, FORWARD = CHANNELS.index("root_height"), CHANNELS.index("root_forward")
+HEIGHT_HARMONICS = 4  # of the pelvis's height within a stride
+USUAL_STRIDE = 0.8  # statures, where the legs show no plausible one
+PLAUSIBLE_STRIDE = (0.3, 1.6)  # statures
+LEAST_SUBJECTS, MOST_SUBJECTS = 3, 12  # of `Learned.by_subject`; each costs a fit
+MOST_CYCLES = 600
+COMPARED = [JOINTS.index(name) for name in EVAL15 if name != "pelvis"]
 
 
 @dataclass
 class Residuals:
-    """What the components leave of the cycles.
+    """What the components leave of R cycles."""
 
-    Attributes
-    ----------
-    squares : (R, M)
-        Sum of the squares over the phases observed.
-    count : (R, M)
-        How many these are.
-    """
-
-    squares: Floats
-    count: npt.NDArray[np.intp]
+    squares: Floats  #: (R, M) sum of the squares over the observed phases
+    count: Indices  #: (R, M) number of observed phases
 
     def rms(self, rows: Any = slice(None), columns: Any = slice(None)) -> float:
-        """Root mean square over all entries of some rows and channels; NaN if there are none."""
+        """Return the rms over all entries of some rows and channels; NaN if there are none."""
         count = int(self.count[rows][:, columns].sum())
         return float(np.sqrt(np.sum(self.squares[rows][:, columns]) / count)) if count else float("nan")
 
 
+@dataclass(frozen=True)
+class SubjectResiduals:
+    """Errors of n subjects with the model of all (row 0) and of all others (row 1); NaN if unseen."""
+
+    degrees: Floats  #: (2, n) rms over the angles
+    #: (2, n) mean distance of 14 joints on one body with the pelvis aligned (position and orientation), over
+    #: the phases at which all angles are seen.
+    millimetres: Floats
+
+
 @dataclass
 class Learned:
-    """Everything that `gait learn` knows about a set of sequences.
-
-    Attributes
-    ----------
-    sequences : list of Sequence
-    subjects : list of str
-        Sorted names; `subject_index` (n,) gives each sequence's.
-    proportions : Proportions
-    alignment : align.Alignment
-        Offsets with phase 0 at the right heel strike.
-    cycles : cycles.Cycles
-        Rows of the analysis, channels in their own units.
-    components : fpca.Components
-        In the channels' own units; gaps are filled in units scaled by `scale` (M,), and `rmse` is in those.
-        Mean, components and scores are of the cycles as they would be at the mean stride rate.
-    pace_curve : (T, M)
-        How the mean curves follow the stride rate (PACE is its series); 0 in the paper's model.
-    paces : (n,)
-        Pace of each sequence.
-    lengths : (p, F + 1)
-        PROP: how limbs differ in length among people of one stature; no rows in the paper's model.
-    shifts : (p, F, 3)
-        SHFT: how origins of frames (the shoulders') differ besides.
-    static : (M,)
-        Standard deviation over subjects of a person's constant offsets from the model.
-    held_out : (n,)
-        Error on held-out blocks for 0, 1 ... components, scaled units; empty unless chosen automatically.
-    """
+    """Everything that `gait learn` finds out about n sequences."""
 
     sequences: list[Sequence]
-    subjects: list[str]
-    subject_index: npt.NDArray[np.intp]
+    subjects: list[str]  #: sorted names
+    subject_index: Indices  #: (n,) subject of each sequence
     proportions: Proportions
-    alignment: align.Alignment
-    cycles: cycles.Cycles
-    components: fpca.Components
-    pace_curve: Floats
-    paces: Floats
-    scale: Floats
-    held_out: Floats
-    lengths: Floats
-    shifts: Floats
-    static: Floats
+    alignment: align.Alignment  #: offsets with phase 0 at the right heel strike
+    cycles: cutting.Cycles  #: rows of the analysis, channels in their own units
+    #: In the channels' own units (gaps are filled, and `rmse` is, in units of `scale`); mean, components and
+    #: scores are of the cycles as they would be at the mean stride rate.
+    components: Components
+    pace_curve: Floats  #: (T, M) how the mean curves follow the stride rate; 0 in the paper's model
+    paces: Floats  #: (n,) pace of each sequence
+    scale: Floats  #: (M,)
+    held_out: Floats  #: error on held-out data for 0, 1 ... components, scaled units; empty unless "auto"
+    lengths: Floats  #: (p, F + 1) section PROP: how limbs differ in length; empty in the paper's model
+    shifts: Floats  #: (p, F, 3) section SHFT: how the origins of frames (the shoulders') differ besides
+    static: Floats  #: (M,) sd over subjects of a person's constant offsets from the model
 
     @property
     def curves(self) -> Floats:
-        """CURV: mean, then components times their standard deviation, (1 + q, T, M), own units."""
+        """Section CURV: mean, then components times their standard deviation, (1 + q, T, M), own units."""
         c = self.components
         return np.concatenate([c.mean[None], c.curves * c.sd[:, None, None]])
 
@@ -108,82 +91,68 @@ class Learned:
         values, mask = self.cycles.values, self.cycles.mask
         squares = np.empty((len(values), values.shape[2]))
         for part in by_rows(values):
-            told = self.components.reconstruct(part)
-            told += self.paces[self.cycles.sequence[part], None, None] * self.pace_curve
-            rest = np.where(mask[part], values[part] - told, 0.0)
+            model = self.components.reconstruct(part)
+            model += self.paces[self.cycles.sequence[part], None, None] * self.pace_curve
+            rest = np.where(mask[part], values[part] - model, 0.0)
             squares[part] = np.sum(rest**2, axis=1)
         return Residuals(squares, mask.sum(axis=1))
 
     @cached_property
     def by_subject(self) -> SubjectResiduals | None:
-        """What is left of each subject; None if they are too few or too many.  It costs a fit for each."""
-        values, mask, components = self.cycles.values, self.cycles.mask, len(self.components.sd)
-        return subject_residuals(values, mask, self.scale, self.row_subject, components, self.proportions)
+        """Residuals of each subject; None if they are too few or too many, as each costs a fit."""
+        return _subject_residuals(
+            self.cycles, self.scale, self.row_subject, len(self.components.sd), self.proportions
+        )
 
     @property
-    def row_subject(self) -> npt.NDArray[np.intp]:
+    def row_subject(self) -> Indices:
         """Subject index of each row of the analysis."""
         return self.subject_index[self.cycles.sequence]
 
 
 def channel_scale() -> Floats:
-    """Scale (M,) of the channels in the components."""
+    """Return the scale (M,) of the channels in the components."""
     return np.array([ROOT_SCALE.get(name, 1.0) for name in CHANNELS])
 
 
 def fit(
-    sequences: list[Sequence],
-    components: int | str | None = None,
-    seed: int = 1,
-    kind: str = "people",
-    others: list[retarget.Measures] | None = None,
+    sequences: list[Sequence], options: LearnOptions = DEFAULT, others: list[Measures] | None = None
 ) -> Learned:
     """Learn the cyclic model of prepared sequences.
 
-    Parameters
-    ----------
-    components : int, "auto" or None
-        None: DEFAULT_COMPONENTS, or two less than there are cycles if that is fewer.
-    kind : "people" or "paper"
-        The prior that reaches people who were not recorded (`gait.learn.prior.prior`), or the paper's
-        components of the recorded cycles and one body for everybody.
-    others : list of Measures, optional
-        Bodies of people whose motion is not learnt: they tell how proportions differ.
-
-    Raises
-    ------
-    UserError
-        If there are too few cycles for the components asked for.
+    `others` are bodies of people whose motion is not learnt: they show how proportions differ.  UserError if
+    there are too few cycles for the components asked for.
     """
     subjects = sorted({s.subject for s in sequences})
     index = np.array([subjects.index(s.subject) for s in sequences])
-    proportions = _mean_body(sequences, index, len(subjects))
+    own = _bodies(sequences, index, len(subjects))
+    proportions = generic_proportions(own)
     signals = [s.channels for s in sequences]
     periods = np.array([s.period.frames for s in sequences])
     alignment = align.align([z[:, : len(ANGLES)] for z in signals], periods, hips=align.HIPS)
     start = heel_strike(align.common_curve(signals, periods, alignment.offsets), proportions)
     alignment.offsets = (alignment.offsets + start * periods) % periods
     release(*signals)
-    rows = cycles.slice_cycles(signals, periods, alignment.offsets, SAMPLES)
-    wanted = most_components(len(rows.values), components, [str(s.source) for s in sequences])
+    rows = cutting.cut_cycles(signals, periods, alignment.offsets, SAMPLES)
+    wanted = most_components(len(rows.values), options.components, [str(s.source) for s in sequences])
     scale = channel_scale()
     scaled, held_out = _times(rows.values, scale), np.zeros(0)
-    if components == "auto":
-        rng = np.random.default_rng(seed)
+    if options.components == "auto":
+        rng = np.random.default_rng(options.seed)
         wanted, held_out = rank.choose(scaled, rows.mask, rng, index[rows.sequence], largest=wanted)
-    model = _own_units(fpca.fit(scaled, rows.mask, wanted), scale)
+    model = _own_units(components.fit(scaled, rows.mask, wanted), scale)
     row_subject = np.unique(index[rows.sequence], return_inverse=True)[1]
-    metric = prior.joint_metric(model.mean, proportions)
-    paces = pace.of(sequences, index)
+    metric = people.joint_metric(model.mean, proportions)
+    paces = people.paces(sequences, index)
     slope, even = np.zeros(model.mean.shape), model.filled
-    if kind == "people":
-        whole = unseen.bounded(model.filled, rows.mask, row_subject)
-        slope = pace.slope(whole, row_subject, paces[rows.sequence])
-        even = pace.without(whole, paces[rows.sequence], slope)
-        model = prior.refine(model, even, row_subject, wanted, metric)
-    static = prior.static_spread(even, row_subject, wanted, metric)
-    model = ground.grounded(model, rows.seen, proportions)
-    bodies = [*_bodies(sequences, index, len(subjects)), *(others or [])] if kind == "people" else []
+    if options.prior == "people":
+        whole = people.bounded(model.filled, rows.mask, row_subject)
+        slope = people.pace_slope(whole, row_subject, paces[rows.sequence])
+        even = people.at_mean_pace(whole, paces[rows.sequence], slope)
+        model = people.refine(model, even, row_subject, wanted, metric)
+    static = people.static_sd(even, row_subject, wanted, metric)
+    model = grounded(model, rows.visible, proportions)
+    bodies = [*own, *(others or [])] if options.prior == "people" else []
     table, shifts = lengths.learn(bodies, proportions, model.mean)
     return Learned(
         sequences=sequences,
@@ -204,12 +173,9 @@ def fit(
 
 
 def most_components(cycles: int, wanted: int | str | None, files: list[str] | None = None) -> int:
-    """Components to learn from so many cycles of these files; with "auto", to try.
+    """Return the components to learn from so many cycles of these files; with "auto", to try.
 
-    Raises
-    ------
-    UserError
-        If there are too few cycles for the number asked for, or for any.
+    UserError if there are too few cycles for the number asked for, or for any.
     """
     allowed = cycles - 2
     if isinstance(wanted, int):
@@ -225,28 +191,21 @@ def most_components(cycles: int, wanted: int | str | None, files: list[str] | No
     return wanted
 
 
-def _own_units(c: fpca.Components, scale: Floats) -> fpca.Components:
-    """Components of scaled channels in the channels' own units."""
+def _own_units(c: Components, scale: Floats) -> Components:
+    """Convert components of scaled channels to the channels' own units."""
     return replace(c, mean=c.mean / scale, curves=c.curves / scale, filled=_times(c.filled, 1 / scale))
 
 
 def _times(rows: Floats, scale: Floats) -> Floats:
-    """Put rows (R, T, M) times the scale (M,) of their channels on disk."""
+    """Scale the channels of rows (R, T, M) by (M,), on disk."""
     return stored((rows[part] * scale for part in by_rows(rows)), rows.shape[1:])
 
 
-def _mean_body(sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int) -> Proportions:
-    """Average the proportions; every subject counts once."""
-    return retarget.generic_proportions(_bodies(sequences, index, subjects))
-
-
-def _bodies(
-    sequences: list[Sequence], index: npt.NDArray[np.intp], subjects: int
-) -> list[retarget.Measures | None]:
-    """One body of each subject: of the recordings, the first that shows most of it and that most agree on."""
+def _bodies(sequences: list[Sequence], index: Indices, subjects: int) -> list[Measures | None]:
+    """Return a body of each subject, from the first recording that shows most of it and most agree on."""
 
     def known(s: Sequence) -> tuple[int, int]:
-        return retarget.known_parts(s.measures), s.recordings
+        return known_parts(s.measures), s.recordings
 
     return [
         max((s for s, k in zip(sequences, index, strict=True) if k == i), key=known).measures
@@ -255,9 +214,9 @@ def _bodies(
 
 
 def heel_strike(curve: Floats, proportions: Proportions) -> float:
-    """Phase at which the right heel is farthest ahead of the pelvis in a mean curve (n, M).
+    """Return the phase of a mean curve (n, M) at which the right heel is farthest ahead of the pelvis.
 
-    Where nobody has the angles of the right leg it is the phase at which the hips are farthest apart.
+    Without angles of the right leg it is the phase at which the hips are farthest apart.
     """
     sections = default_skeleton(proportions).sections()
     joints = default_skeleton(proportions).points
@@ -267,3 +226,86 @@ def heel_strike(curve: Floats, proportions: Proportions) -> float:
     n, top = len(forward), int(np.argmax(forward))
     left, peak, right = forward[[top - 1, top, (top + 1) % n]]
     return float((top + 0.5 * (left - right) / (left - 2 * peak + right)) / n)
+
+
+def made_up_channels(visible: Mask) -> list[str]:
+    """Return the root channels that `grounded` has to make up, for the channels (M,) observed."""
+    return [CHANNELS[c] for c in (HEIGHT, FORWARD) if not visible[c]]
+
+
+def grounded(model: Components, visible: Mask, proportions: Proportions) -> Components:
+    """Set height and speed of the pelvis in mean curves, own units, where no recording (M,) shows them."""
+    if not made_up_channels(visible):
+        return model
+    mean = model.mean.copy()
+    height, stride = _from_legs(mean, proportions)
+    if not visible[HEIGHT]:
+        mean[:, HEIGHT] = height
+    if not visible[FORWARD]:
+        mean[:, FORWARD] = stride
+    return replace(model, mean=mean)
+
+
+def _from_legs(mean: Floats, proportions: Proportions) -> tuple[Floats, float]:
+    """Return the height of the pelvis (T,), statures, and statures per stride, of mean curves (T, M).
+
+    The lower of toes and heels is on the ground.  The speed is the median of how fast it moves back under the
+    pelvis, or `USUAL_STRIDE` if that is implausible, as of a person who marches in place.
+    """
+    skeleton = default_skeleton(proportions)
+    over = {"toe": proportions.sole + proportions.toe[2], "heel": proportions.sole + proportions.heel[2]}
+    feet = [skeleton.points.index(f"{s}_{name}") for s in SIDES for name in over]
+    place = points(skeleton.sections(), mean)[:, feet]
+    below = place[:, :, 2] - np.tile(list(over.values()), len(SIDES))
+    basis = fourier_basis(len(mean), HEIGHT_HARMONICS)
+    height = decode(encode(-below.min(axis=1)[None, :, None], basis), basis, 1)[0, :, 0]
+    ahead = place[:, :, 0]
+    speed = (np.roll(ahead, 1, axis=0) - np.roll(ahead, -1, axis=0)) / 2 * len(mean)
+    stride = float(np.median(np.take_along_axis(speed, below.argmin(axis=1)[:, None], axis=1)))
+    return height, stride if PLAUSIBLE_STRIDE[0] <= stride <= PLAUSIBLE_STRIDE[1] else USUAL_STRIDE
+
+
+def _subject_residuals(
+    rows: cutting.Cycles, scale: Floats, subject: Indices, count: int, proportions: Proportions
+) -> SubjectResiduals | None:
+    """Fit the components of all, and of all but each subject; `proportions` are of the body compared on."""
+    values, mask = rows.values, rows.mask
+    number = int(subject.max()) + 1
+    if not LEAST_SUBJECTS <= number <= MOST_SUBJECTS or len(values) > MOST_CYCLES:
+        return None
+
+    def learnt(some: Mask) -> Components:
+        return components.fit(values[some] * scale, mask[some], min(count, int(some.sum()) - 1))
+
+    def left(model: Components, some: Mask) -> tuple[float, float]:
+        nearest = _nearest(model, values[some] * scale, mask[some]) / scale
+        data, visible, angles = values[some], mask[some], slice(len(ANGLES))
+        off = (nearest - data)[:, :, angles][visible[:, :, angles]]
+        whole = visible[:, :, angles].all(axis=2)
+        away = _joints(nearest[whole], proportions) - _joints(data[whole], proportions)
+        return (
+            float(np.degrees(np.sqrt(np.mean(off**2)))) if len(off) else np.nan,
+            1000 * ADULT_STATURE[0] * float(np.linalg.norm(away, axis=2).mean()) if len(away) else np.nan,
+        )
+
+    own = [subject == i for i in range(number)]
+    together = learnt(np.ones(len(subject), bool))
+    found = np.array([[left(together, some) for some in own], [left(learnt(~some), some) for some in own]])
+    return SubjectResiduals(found[:, :, 0], found[:, :, 1])
+
+
+def _nearest(model: Components, values: Floats, mask: Mask) -> Floats:
+    """Return the mean and components nearest to what is observed of rows (R, T, M)."""
+    result = np.empty_like(values)
+    for row, visible, nearest in zip(values, mask, result, strict=True):
+        basis = model.curves[:, visible].T
+        scores = np.linalg.lstsq(basis, (row - model.mean)[visible], rcond=None)[0]
+        nearest[:] = model.mean + np.tensordot(scores, model.curves, 1)
+    return result
+
+
+def _joints(channels: Floats, proportions: Proportions) -> Floats:
+    """Return joints (n, 14, 3) in the axes of the pelvis, statures, of channels (n, M)."""
+    still = channels.copy()
+    still[:, len(ANGLES) :] = 0
+    return points(default_skeleton(proportions).sections(), still)[:, COMPARED]

@@ -1,8 +1,8 @@
-"""How people of one stature differ in their proportions: limbs longer or shorter, hips, trunk and shoulders.
+"""How people of one stature differ in their proportions: sections PROP and SHFT of a blob.
 
-The lengths of every frame of the skeleton (its points, its limbs, the origins of its children) are multiplied
-by one factor; shoulders also move by themselves, because they do not follow the neck.  Principal components
-of these changes, weighed by how far they move the joints, are the sections PROP and SHFT of a blob.
+One factor scales the lengths of each frame of the skeleton (its points, its limbs, the origins of its
+children); shoulders also move by themselves, because they do not follow the neck.  The sections are the
+principal components of these changes, weighted by how far they move the joints.
 """
 
 from __future__ import annotations
@@ -11,24 +11,23 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from gait.body.skeleton import SIDES, Proportions, default_skeleton, points
+from gait.learn.arrays import Floats
 from gait.learn.solve.retarget import Measures, own_proportions
 
-Floats = npt.NDArray[np.float64]
-
 COUNT = 4  # components kept, fewer with few subjects
-LARGEST = 0.09  # relative change, or shift in statures, per deviation; the library takes no more than 0.1
+LARGEST = 0.09  # relative change, or shift in statures, per standard deviation; the library accepts 0.1
 STEP = 1e-3
-#: Frames that change together (names end so); three coordinates of the shoulders follow them in a change.
+#: Ends of the names of frames that change together; three coordinates of the shoulders follow them in a
+#: change.
 GROUPS = ("pelvis", "torso", "upper_arm", "forearm", "thigh", "shank", "foot")
 TORSO = GROUPS.index("torso")
 CHANGES = len(GROUPS) + 3
 
 
 def spans(p: Proportions) -> Floats:
-    """Characteristic length (7,) of each group, statures."""
+    """Return the characteristic length (7,) of each group, statures."""
     return np.array(
         [p.hip[1], p.neck, p.upper_arm, p.forearm, p.thigh, p.shank, float(np.hypot(p.toe[0], p.toe[2]))]
     )
@@ -37,21 +36,11 @@ def spans(p: Proportions) -> Floats:
 def learn(
     bodies: Sequence[Measures | None], mean: Proportions, pose: Floats, count: int = COUNT
 ) -> tuple[Floats, Floats]:
-    """Relative changes of lengths and shifts of origins per standard deviation of each component.
+    """Return relative changes of lengths and shifts of origins per standard deviation of each component.
 
-    Parameters
-    ----------
-    bodies : sequence of Measures
-        One per subject; those that were not seen whole are left out.
-    pose : (T, M)
-        Mean curves: joints are moved from there.
-
-    Returns
-    -------
-    table : (p, F + 1)
-        PROP: of the lengths in each frame, and of the pelvis's height.  Empty with fewer than three subjects.
-    shift : (p, F, 3)
-        SHFT: of the frames' origins, statures.
+    There is one body per subject; those not seen whole are left out.  The joints are moved from the mean
+    curves (T, M).  The changes (p, F + 1) are PROP: of the lengths in each frame, and of the pelvis's height;
+    empty with fewer than three subjects.  The shifts (p, F, 3) are SHFT: of the frames' origins, statures.
     """
     whole = [m for m in bodies if m is not None and np.isfinite(_lengths(m)).all()]
     if len(whole) < 3:
@@ -67,7 +56,7 @@ def learn(
 
 
 def tables(changes: Floats, mean: Proportions) -> tuple[Floats, Floats]:
-    """PROP (k, F + 1) and SHFT (k, F, 3) of changes (k, 10): groups relatively, then the left shoulder."""
+    """Return PROP (k, F + 1) and SHFT (k, F, 3) of changes (k, 10): relative ones, then the left shoulder."""
     frames = default_skeleton(mean).frames
     member = np.array([[name.endswith(group) for name in frames] for group in GROUPS], float)
     leg = np.array([0, 0, 0, 0, mean.thigh, mean.shank, mean.sole]) / (mean.thigh + mean.shank + mean.sole)
@@ -79,7 +68,7 @@ def tables(changes: Floats, mean: Proportions) -> tuple[Floats, Floats]:
 
 
 def _changes(bodies: Sequence[Measures]) -> Floats:
-    """Differences (n, 10) from the mean: lengths relatively, shoulders beyond what the torso does."""
+    """Return differences (n, 10) from the mean: relative lengths, then shoulders relative to the torso."""
     own = [own_proportions(m) for m in bodies]
     each, shoulder = np.array([spans(p) for p in own]), np.array([p.shoulder for p in own])
     factor = each / each.mean(axis=0)
@@ -93,7 +82,7 @@ def _lengths(m: Measures) -> Floats:
 
 
 def _effect(mean: Proportions, pose: Floats) -> Floats:
-    """Mean squared displacement (10, 10) of the points by unit changes, squared statures."""
+    """Return the mean squared displacement (10, 10) of the points by unit changes, squared statures."""
     sections: dict[str, Any] = default_skeleton(mean).sections()
     base = points(sections, pose)
     moves = []

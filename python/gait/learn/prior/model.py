@@ -14,15 +14,15 @@ from gait._version import __version__
 from gait.body.pace import series
 from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
 from gait.io import blob
-from gait.learn.prior.between import ADULT_STATURE, LENGTH_SD, RATE_SD, by_subject
+from gait.learn.arrays import Floats, Indices, Mask, by_rows, release
+from gait.learn.options import LearnOptions
 from gait.learn.prior.fit import Learned
-from gait.learn.prior.pace import TERMS
-from gait.learn.prior.rounded import rounded
-from gait.learn.spool import by_rows, release
+from gait.learn.prior.people import ADULT_STATURE, LENGTH_SD, RATE_SD, TERMS, by_subject
 
-Floats = npt.NDArray[np.float64]
-
-#: What META tells of a large corpus: so many rows of a table, and so many characters of a name, as JSON.
+#: Decimals stored: a millionth of a radian or stature is far below what recordings show, and far above the
+#: last bits (1e-12) in which the algebra of two machines differs.
+DIGITS = 6
+#: Limits of META for a large corpus: rows of a table, and characters of a name as JSON.
 MOST_ROWS, MOST_NAME = 12, 32
 GENERATOR = f"gait {__version__}"
 CMU = (
@@ -31,10 +31,13 @@ CMU = (
 )
 
 
-def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array]:
-    """All sections of the blob, META first."""
+SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")
+
+
+def sections(learned: Learned, options: LearnOptions) -> dict[str, blob.Array]:
+    """Return all sections of the blob, META first."""
     return {
-        "META": meta_section(meta(learned, activity, seed)),
+        "META": meta_section(meta(learned, options)),
         "CHNM": blob.pack_names(CHANNELS),
         "CURV": rounded(learned.curves),
         "CHST": rounded(channel_statistics(learned)),
@@ -42,30 +45,29 @@ def sections(learned: Learned, activity: str, seed: int) -> dict[str, blob.Array
         "GAIT": rounded(gait_statistics(learned)),
         **({"PACE": rounded(series(learned.pace_curve, TERMS))} if learned.pace_curve.any() else {}),
         **default_skeleton(learned.proportions).sections(),
-        **_proportions(learned),
+        **({"PROP": rounded(learned.lengths)} if len(learned.lengths) else {}),
+        **({"SHFT": rounded(learned.shifts)} if len(learned.lengths) else {}),
     }
 
 
-def _proportions(learned: Learned) -> dict[str, blob.Array]:
-    """PROP and SHFT, if proportions were learnt."""
-    if not len(learned.lengths):
-        return {}
-    return {"PROP": rounded(learned.lengths), "SHFT": rounded(learned.shifts)}
+def rounded(values: Floats) -> npt.NDArray[np.float32]:
+    """Round values as they are stored, without the sign of a zero, which a last bit decides."""
+    return (np.round(values, DIGITS) + 0.0).astype(np.float32)
 
 
 def meta_section(meta: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
-    """META as it is stored."""
+    """Encode META as it is stored."""
     return np.frombuffer(json.dumps(meta, separators=(",", ":")).encode(), np.uint8)
 
 
-def origin(activity: str, seed: int, sources: Iterable[Path]) -> dict[str, Any]:
-    """Entries of META that say what a blob is and where it comes from."""
-    made = {"activity": shortened(activity), "generator": GENERATOR, "seed": seed}
+def origin(options: LearnOptions, sources: Iterable[Path]) -> dict[str, Any]:
+    """Return the entries of META about what a blob is and where it comes from."""
+    made = {"activity": shortened(options.activity), "generator": GENERATOR, "seed": options.seed}
     return made | ({"acknowledgement": CMU} if from_cmu(sources) else {})
 
 
 def shortened(name: str) -> str:
-    """Keep the name, or as much of its beginning as MOST_NAME characters of JSON hold."""
+    """Shorten a name to MOST_NAME characters of JSON."""
     if len(json.dumps(name)) <= MOST_NAME:
         return name
     end = len(name)
@@ -75,14 +77,14 @@ def shortened(name: str) -> str:
 
 
 def from_cmu(sources: Iterable[Path]) -> bool:
-    """Whether any recording is in the CMU database's form, whose terms ask for an acknowledgement."""
+    """Whether any recording has the format of the CMU database, whose terms ask for an acknowledgement."""
     return any(source.suffix.lower() == ".amc" for source in sources)
 
 
 def channel_statistics(learned: Learned) -> Floats:
-    """CHST (M, 4): residual sd, least and largest value, sd of a held-out subject's static offset.
+    """Return CHST (M, 4): residual sd, least and largest value, sd of a held-out subject's static offset.
 
-    Zeros for channels that no recording has.
+    It is 0 for channels that no recording has.
     """
     mask, values = learned.cycles.mask, learned.cycles.values
     count = mask.sum(axis=(0, 1))
@@ -95,16 +97,16 @@ def channel_statistics(learned: Learned) -> Floats:
 
 
 def score_statistics(learned: Learned) -> Floats:
-    """SCST (q, 3): sd of the score, then between- and within-subject sd relative to it (one-way ANOVA)."""
+    """Return SCST (q, 3): sd of the score, then sd between and within subjects relative to it (ANOVA)."""
     c = learned.components
     between, within = anova(c.scores / np.maximum(c.sd, 1e-12), learned.row_subject)
     return np.stack([c.sd, between, within], axis=1)
 
 
-def anova(values: Floats, group: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Between- and within-group standard deviations of columns (n, k), unequal group sizes allowed.
+def anova(values: Floats, group: Indices) -> tuple[Floats, Floats]:
+    """Return the standard deviations of columns (n, k) between and within groups, which may differ in size.
 
-    With one group the between part is 0; with one member each, the within part.
+    The first is 0 with one group, the second with one member each.
     """
     labels, counts = np.unique(group, return_counts=True)
     n, k = len(values), len(labels)
@@ -120,9 +122,9 @@ def anova(values: Floats, group: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
 
 
 def gait_statistics(learned: Learned) -> Floats:
-    """GAIT (8,): stride rate, stride length, sample rate and stature of the training set.
+    """Return GAIT (8,): stride rate, stride length, sample rate and stature.
 
-    Where no recording shows the pelvis's path the stride is that of the mean curves (`ground`).
+    Where no recording shows the path of the pelvis the stride is that of the mean curves (`fit.grounded`).
     """
     rates = np.array([s.fps / s.period.frames for s in learned.sequences])
     column = CHANNELS.index("root_forward")
@@ -138,25 +140,25 @@ def gait_statistics(learned: Learned) -> Floats:
 
 
 def _observed(channels: Floats, column: int) -> Floats:
-    """Observed values of one of the channels (T, M) of a sequence, which lies on disk."""
+    """Return the observed values of one of the channels (T, M) of a sequence, which lies on disk."""
     values = channels[np.isfinite(channels[:, column]), column]
     release(channels)
     return values
 
 
 def stride_variation(learned: Learned) -> float:
-    """Coefficient of variation of the stride time within a sequence, pooled."""
+    """Return the pooled coefficient of variation of the stride time within a sequence."""
     parts = [s.strides / s.strides.mean() for s in learned.sequences if len(s.strides) > 1]
     squares = sum(float(np.sum((p - 1) ** 2)) for p in parts)
     return float(np.sqrt(squares / max(sum(len(p) - 1 for p in parts), 1)))
 
 
-def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
-    """META: what people and tools may want to know; degrees, metres, seconds."""
+def meta(learned: Learned, options: LearnOptions) -> dict[str, Any]:
+    """Return META: what people and tools may want to know; degrees, metres, seconds."""
     c = learned.components
     statures = [_stature(learned, name) for name in learned.subjects[:MOST_ROWS]]
     return {
-        **origin(activity, seed, [s.source for s in learned.sequences]),
+        **origin(options, [s.source for s in learned.sequences]),
         "subject_count": len(learned.subjects),
         "subjects": [shortened(name) for name in learned.subjects[:MOST_ROWS]],
         "statures_m": [None if h is None else round(h, 3) for h in statures],
@@ -174,29 +176,26 @@ def meta(learned: Learned, activity: str, seed: int) -> dict[str, Any]:
 
 
 def unobserved(learned: Learned) -> list[str]:
-    """Parts of the body, such as 'l_shoulder', of which no recording has any angle."""
-    seen = parts(np.asarray(learned.cycles.mask.any(axis=(0, 1))))
-    return [part for part in parts(np.ones(len(ANGLES), bool)) if part not in seen]
+    """Return the parts of the body, such as 'l_shoulder', of which no recording has any angle."""
+    visible = parts(np.asarray(learned.cycles.mask.any(axis=(0, 1))))
+    return [part for part in parts(np.ones(len(ANGLES), bool)) if part not in visible]
 
 
-def parts(which: npt.NDArray[np.bool_]) -> list[str]:
-    """Parts of the body that have any of some channels (>= A,), the angles first."""
+def parts(which: Mask) -> list[str]:
+    """Return the parts of the body that have any of the channels (>= A,), angles first."""
     return list(
         dict.fromkeys(name.rsplit("_", 1)[0] for name, one in zip(ANGLES, which, strict=False) if one)
     )
 
 
 def _stature(learned: Learned, subject: str) -> float | None:
-    """Mean stature of a subject, metres; None if no recording shows it."""
+    """Return the mean stature of a subject, metres; None if no recording shows it."""
     bodies = [s.measures for s in learned.sequences if s.subject == subject and s.measures is not None]
     return float(np.mean([b.stature for b in bodies])) if bodies else None
 
 
-SEQUENCE_COLUMNS = ("name", "period_ms", "cycles", "sharpness", "residual_deg")
-
-
 def sequence_table(learned: Learned) -> list[list[Any]]:
-    """Rows of SEQUENCE_COLUMNS; sharpness: peak over median SNR; residual: rms of all angles."""
+    """Return rows of SEQUENCE_COLUMNS; sharpness: peak over median SNR; residual: rms of all angles."""
     table = []
     for i, s in enumerate(learned.sequences):
         rms = learned.residuals.rms(learned.cycles.sequence == i, slice(len(ANGLES)))

@@ -5,45 +5,44 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from gait.body.skeleton import ANGLES, JOINTS, default_skeleton, points
+from gait.body.skeleton import ANGLES, CHANNELS, JOINTS, default_skeleton, points
+from gait.learn.arrays import Floats
+from gait.learn.prior.fit import SAMPLES, Learned
 from gait.report.colours import BLUE, DARK, GREY, ON_PAPER, ORANGE, side_of
-from gait.learn.prior.fit import Learned
-from gait.learn.report.figures_base import (
-    PHASE,
-    PHASE_LABEL,
-    SHOWN,
-    Floats,
-    column,
-    grid,
-    line_legend,
-    observed,
-    plain,
-    say_unobserved,
-    whole_numbers,
-    words,
-)
+from gait.report.figures import STICKS, grid, line_legend, plain
 
+SHOWN = (
+    *("r_hip_flexion", "r_knee_flexion", "r_ankle_flexion", "r_shoulder_flexion", "r_elbow_flexion"),
+    "torso_z",
+)
+PHASE = np.arange(SAMPLES) / SAMPLES
+PHASE_LABEL = "phase (0: right heel strike)"
 PHASES = 8  # of a strip
 TURNS = {"+2 sd": ORANGE, "mean": GREY, "-2 sd": BLUE}
-STEP = 0.75  # statures from one figure of a strip to the next
+STEP = 0.75  # statures from one stick figure to the next
 MOST_COMPONENTS = 8  # drawn as curves
 MOST_SPECTRUM = 20
 JOINT_ORDER = ("hip", "knee", "ankle", "shoulder", "elbow", "torso", "neck")
-_ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "toe")
-STICKS = {
-    "c": [["head_top", "neck", "pelvis"], ["l_shoulder", "neck", "r_shoulder"], ["l_hip", "pelvis", "r_hip"]],
-    **{
-        s: [[f"{s}_{j}" for j in _ARM], [f"{s}_{j}" for j in _LEG], [f"{s}_ankle", f"{s}_heel", f"{s}_toe"]]
-        for s in "lr"
-    },
-}
+
+
+def words(name: str) -> str:
+    """Return a readable name of a channel."""
+    side = {"l_": "left ", "r_": "right "}.get(name[:2], "")
+    return side + name.removeprefix("l_" if side == "left " else "r_" if side else "").replace("_", " ")
+
+
+def mark_unobserved(axes: Axes) -> None:
+    """Mark the panel of a channel that no recording has."""
+    axes.set(ylim=(-1, 1), yticks=[])
+    axes.text(0.5, 0, "not observed", ha="center", va="center", color=GREY, fontsize=9)
 
 
 def curves(learned: Learned) -> Figure:
-    """Mean and two standard deviations of the stride rate and along each component, angle by angle."""
+    """Draw mean and two standard deviations of the stride rate and of each component, angle by angle."""
     mean_curve, *turns = np.degrees(learned.curves[: 1 + MOST_COMPONENTS])
-    names, seen = [f"component {k + 1}" for k in range(len(turns))], observed(learned)
+    names, visible = [f"component {k + 1}" for k in range(len(turns))], learned.cycles.visible
     if learned.pace_curve.any():
         names, turns = ["stride rate", *names], [np.degrees(learned.pace_curve), *turns]
     figure = Figure(figsize=(11, 1.6 * len(names) + 0.7), layout="constrained")
@@ -51,9 +50,9 @@ def curves(learned: Learned) -> Figure:
     for k, row in enumerate(panels):
         for axes, name in zip(row, SHOWN, strict=True):
             plain(axes)
-            c = column(name)
-            if not seen[c]:
-                say_unobserved(axes)
+            c = CHANNELS.index(name)
+            if not visible[c]:
+                mark_unobserved(axes)
             else:
                 mean, turn = mean_curve[:, c], 2 * turns[k][:, c]
                 axes.fill_between(PHASE, mean - turn, mean + turn, color=GREY, alpha=0.2, lw=0)
@@ -70,12 +69,9 @@ def curves(learned: Learned) -> Figure:
 
 
 def strip(learned: Learned, moved: Floats | None) -> Figure:
-    """Walker over one cycle from the side and from the front.
+    """Draw stick figures over one cycle, from the side and from the front.
 
-    Parameters
-    ----------
-    moved : (T, M), optional
-        Draw the mean plus and minus two of these changes over the mean; None: the mean alone.
+    With `moved` (T, M) the mean plus and minus two of these changes is drawn over the mean.
     """
     figure, panels = grid(2, 1, 10, 4.6)
     turns = [0.0] if moved is None else [0.0, -2.0, 2.0]
@@ -100,7 +96,7 @@ def strip(learned: Learned, moved: Floats | None) -> Figure:
 
 
 def _bodies(learned: Learned, cycle: Floats) -> Floats:
-    """Joints (PHASES, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
+    """Return joints (PHASES, P, 3) of a cycle (T, M) in statures, the lowest point on the ground."""
     at = np.arange(PHASES) * len(PHASE) // PHASES
     joints = points(default_skeleton(learned.proportions).sections(), cycle[at])
     joints[:, :, 2] -= joints[:, :, 2].min(axis=1, keepdims=True)
@@ -108,12 +104,10 @@ def _bodies(learned: Learned, cycle: Floats) -> Floats:
 
 
 def _draw(axes: Axes, bodies: Floats, across: int, colour: str) -> None:
-    """Stick figures side by side; what is nearer to the viewer (the right side) is bolder.
+    """Draw stick figures side by side; the side nearer to the viewer (the right) is bolder.
 
-    Parameters
-    ----------
-    across : int
-        Coordinate along the paper: 0 forward to the right, 1 seen from ahead (its left to the right).
+    `across` is the coordinate along the paper: 0 forward to the right, 1 seen from ahead (its left to the
+    right).
     """
     for i, body in enumerate(bodies):
         for side, chains in STICKS.items():
@@ -127,7 +121,7 @@ def _draw(axes: Axes, bodies: Floats, across: int, colour: str) -> None:
 
 
 def spectrum(learned: Learned) -> Figure:
-    """Share of the variance that components explain; error on held-out data if it was asked for."""
+    """Draw the share of the variance that components explain, and the error on held-out data if computed."""
     held = np.degrees(learned.held_out)
     figure, panels = grid(1, 2 if len(held) else 1, 8 if len(held) else 5, 3.4)
     single, kept = 100 * learned.components.spectrum[:MOST_SPECTRUM], len(learned.components.sd)
@@ -144,12 +138,12 @@ def spectrum(learned: Learned) -> Figure:
         panels[1].set(xlabel="components", ylabel="error on held-out data, degrees")
         panels[1].legend(fontsize=8, frameon=False)
     for axes in panels:
-        whole_numbers(axes)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     return figure
 
 
 def residuals(learned: Learned) -> Figure:
-    """Root mean square of what the components leave of each angle."""
+    """Draw the rms of what the components leave of each angle."""
     figure, (axes,) = grid(1, 1, 8, 3.8)
     squares, count = learned.residuals.squares.sum(axis=0), learned.residuals.count.sum(axis=0)
     rest = np.degrees(np.sqrt(squares / np.maximum(count, 1)))[: len(ANGLES)]
@@ -165,7 +159,7 @@ def residuals(learned: Learned) -> Figure:
 
 
 def convergence(learned: Learned) -> Figure:
-    """Objectives of the alignment and of the filling of gaps, and its error, against their passes."""
+    """Draw the objectives of the alignment and the filling of gaps, and its error, against their passes."""
     figure, panels = grid(1, 3, 10, 3.2)
     filling = learned.components
     courses: list[tuple[str, str, list[float] | Floats]] = [
@@ -178,5 +172,5 @@ def convergence(learned: Learned) -> Figure:
         axes.set(xlabel="pass", ylabel=unit)
         axes.set_title(title, fontsize=10)
         axes.ticklabel_format(axis="y", useOffset=False)
-        whole_numbers(axes)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     return figure

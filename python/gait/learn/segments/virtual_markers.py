@@ -1,7 +1,7 @@
-"""Markers of the default skeleton: its joints, and points on the skin of its limbs (37 in all).
+"""Virtual markers of the default skeleton: its joints, and points on the skin of its limbs (37 in all).
 
-A skin marker lies on the surface of a limb, at a share of the way from its start to its end and in a
-direction of the limb's frame (x forward, y left), so that it follows the body's proportions.
+A skin marker lies on the surface of a limb, at a share of the way from start to end and in a direction of the
+limb's frame (x forward, y left), so that it follows the body's proportions.
 """
 
 from __future__ import annotations
@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from gait.body.skeleton import ELLIPSOID, JOINTS, SIDES, Proportions, Skeleton, default_skeleton
-
-Floats = npt.NDArray[np.float64]
+from gait.learn.arrays import Floats
 
 FRONT, BACK, LEFT, RIGHT = (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)
 _BONES = ("upper_arm", "forearm", "thigh", "shank")
@@ -40,7 +38,7 @@ MARKERS = (*JOINTS, *SKIN)
 
 
 def marked_skeleton(p: Proportions | None = None) -> Skeleton:
-    """Make the default skeleton with all of `MARKERS` as its points."""
+    """Return the default skeleton with all of `MARKERS` as its points."""
     body = default_skeleton(p)
     on_skin = [_on_skin(body, *place) for place in SKIN.values()]
     return replace(
@@ -52,7 +50,7 @@ def marked_skeleton(p: Proportions | None = None) -> Skeleton:
 
 
 def _on_skin(body: Skeleton, limb: str, share: float, direction: tuple[float, float]) -> tuple[int, Floats]:
-    """Frame of a limb, and the point of its surface there."""
+    """Return the frame of a limb and the point on its surface."""
     index = body.limbs.index(limb)
     (frame, shape), row = body.limb_frames[index], body.limb_shapes[index]
     start, end, (left0, ahead0, left1, ahead1) = row[:3], row[3:6], row[6:]

@@ -1,23 +1,21 @@
-"""From the bones of any recording to the joints and axes that the default skeleton needs."""
+"""Bodies: the joints and axes that the default skeleton needs, and how bones of recordings give them."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from gait.body.skeleton import SIDES
 from gait.errors import UserError
-from gait.learn.mocap.recording import Recording
-from gait.learn.mocap.remarks import NOTHING, Remarks
-from gait.learn.rotations import rotation_vectors, unit
+from gait.learn.arrays import Floats
+from gait.learn.mocap.recording import NO_NOTES, FileNotes, Recording
+from gait.learn.rotations import unit
 
-Floats = npt.NDArray[np.float64]
-
-#: Role to the names it has in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and any
-#: prefix up to ':' (Mixamo) or of a biped (3ds Max).  CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; bones
+#: Names of bones in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and any prefix up
+#: to ':' (Mixamo) or of a biped (3ds Max).  From CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; and bones
 #: named by the joint where they begin (Biovision, Xsens, SMPL).
 ALIASES = {
     "pelvis": ("root", "hips", "hip", "pelvis"),
@@ -39,55 +37,42 @@ ALIASES = {
     ),
     "{s}_hand": ("{s}hand", "{S}hand", "{S}wrist"),
 }
-RECORDED = "marker "  # begins the names of joints that are markers as a file has them
+RECORDED = "marker "  # prefix of names in `Body.joints` that are markers of the file
 BIPED = re.compile(r"^bip0*\d*")
 
 
 @dataclass
 class Body:
-    """A walker's joints and axes, T frames; metres, world with z up, NaN where missing.
+    """Joints and axes of a person, T frames; metres, world with z up, NaN where missing."""
 
-    Attributes
-    ----------
-    name, fps
-        Of the recording.
-    joints : dict of str to (T, 3)
-        pelvis (the middle of the hips), neck, head, {l,r}_{shoulder,elbow,wrist,hip,knee,ankle,toe};
-        head is any point above the neck on the head's axis.  Markers of a file, if it has any, are there as
-        RECORDED and their label.
-    pelvis : (T, 3, 3)
-        Pelvis axes forward, left, up as columns.
-    lateral : dict of str to (T, 3)
-        The head's direction to the left and the hinge axes {l,r}_{knee,elbow}, to the left in the rest pose.
-    residual : float or None
-        Rms distance of markers from the body fitted to them, metres; None if it is not fitted to markers.
-    remarks : Remarks
-        What else the reader noticed in the file.
-    """
-
-    name: str
-    fps: float
+    name: str  #: of the recording
+    fps: float  #: frames per second
+    #: Positions (T, 3): pelvis (the middle of the hips), neck, head (a point above the neck on the head's
+    #: axis), {l,r}_{shoulder,elbow,wrist,hip,knee,ankle,toe}; markers of the file as RECORDED and their
+    #: label.
     joints: dict[str, Floats]
-    pelvis: Floats
+    pelvis: Floats  #: (T, 3, 3) axes forward, left, up as columns
+    #: Directions (T, 3): the head's left, and the hinge axes {l,r}_{knee,elbow}, to the left in the rest
+    #: pose.
     lateral: dict[str, Floats] = field(default_factory=dict)
-    residual: float | None = None
-    remarks: Remarks = NOTHING
+    residual: float | None = None  #: rms distance of markers from the body, metres; None without markers
+    notes: FileNotes = NO_NOTES
 
     @property
     def frames(self) -> int:
         """Number of frames T."""
         return len(self.pelvis)
 
+    def part(self, start: int, stop: int) -> Body:
+        """Return frames start to stop."""
+        joints = {name: places[start:stop] for name, places in self.joints.items()}
+        lateral = {name: axes[start:stop] for name, axes in self.lateral.items()}
+        return replace(self, joints=joints, pelvis=self.pelvis[start:stop], lateral=lateral)
 
-def body(recording: Recording) -> Body:
-    """Find the joints of a recording.
 
-    Raises
-    ------
-    UserError
-        If a bone is missing from the file under all names that are known for it.
-    """
-    bones = _roles(recording)
+def from_bones(recording: Recording) -> Body:
+    """Return the body of a recorded skeleton; UserError if a bone is missing under all its known names."""
+    bones = _find_bones(recording)
     joints = _joints(recording, bones)
     rest = {s: recording.rest_start[bones[f"{s}_thigh"]] for s in SIDES}
     axes = _rest_axes(rest["l"] - rest["r"])
@@ -98,15 +83,15 @@ def body(recording: Recording) -> Body:
             lateral[f"{s}_{joint}"] = recording.rotation[:, bones[f"{s}_{upper}"]] @ hinge
             lateral[f"{s}_{joint}"] *= _left_sign(joint, s, joints, lateral[f"{s}_{joint}"])
     pelvis = recording.rotation[:, bones["pelvis"]] @ axes
-    return Body(recording.name, recording.fps, joints, pelvis, lateral, remarks=recording.remarks)
+    return Body(recording.name, recording.fps, joints, pelvis, lateral, notes=recording.notes)
 
 
 def _plain(name: str) -> str:
     return BIPED.sub("", "".join(c for c in name.rsplit(":", 1)[-1].lower() if c.isalnum()))
 
 
-def _roles(recording: Recording) -> dict[str, int]:
-    """Role to bone index."""
+def _find_bones(recording: Recording) -> dict[str, int]:
+    """Return the bone of each key of ALIASES."""
     known = {_plain(name): i for i, name in reversed(list(enumerate(recording.bones)))}
     found = {}
     for role, names in ALIASES.items():
@@ -126,12 +111,8 @@ def _joints(recording: Recording, bones: dict[str, int]) -> dict[str, Floats]:
     start, end = recording.start, recording.end
     joints = {"neck": start[:, bones["neck"]], "head": end[:, bones["head"]]}
     for s in SIDES:
-        for joint, bone in (
-            ("shoulder", "upper_arm"),
-            ("elbow", "forearm"),
-            ("hip", "thigh"),
-            ("knee", "shank"),
-        ):
+        starts = {"shoulder": "upper_arm", "elbow": "forearm", "hip": "thigh", "knee": "shank"}
+        for joint, bone in starts.items():
             joints[f"{s}_{joint}"] = start[:, bones[f"{s}_{bone}"]]
         hand = bones.get(f"{s}_hand")
         joints[f"{s}_wrist"] = end[:, bones[f"{s}_forearm"]] if hand is None else start[:, hand]
@@ -141,24 +122,24 @@ def _joints(recording: Recording, bones: dict[str, int]) -> dict[str, Floats]:
 
 
 def _rest_axes(left: Floats) -> Floats:
-    """Body axes of the rest pose as columns, from the direction between the hips."""
+    """Return the body axes of the rest pose as columns, from the direction between the hips."""
     y = unit(np.array([left[0], left[1], 0.0]))
     return np.stack([np.cross(y, [0.0, 0, 1]), y, [0.0, 0, 1]], axis=-1)
 
 
 def _hinge(recording: Recording, upper: int, lower: int) -> Floats:
-    """Axis of a hinge in the rest pose: the file's own, else the main axis of the relative rotations."""
+    """Return the axis of a hinge in the rest pose: the file's own, else the main axis of its rotations."""
     name = recording.bones[lower]
     if name in recording.hinges:
         return recording.hinges[name]
     relative = np.swapaxes(recording.rotation[:, upper], -1, -2) @ recording.rotation[:, lower]
-    vectors = rotation_vectors(relative[np.isfinite(relative).all(axis=(1, 2))])
+    vectors = Rotation.from_matrix(relative[np.isfinite(relative).all(axis=(1, 2))]).as_rotvec()
     _, axes = np.linalg.eigh(vectors.T @ vectors)
     return axes[:, -1]
 
 
 def _left_sign(joint: str, s: str, joints: dict[str, Floats], axis: Floats) -> float:
-    """Sign that makes the axis point left: the knee bends back and the elbow forward on average."""
+    """Return the sign that makes the axis point left: knees bend back, elbows forward, on average."""
     ends = ("hip", "knee", "ankle") if joint == "knee" else ("shoulder", "elbow", "wrist")
     a, b, c = (joints[f"{s}_{end}"] for end in ends)
     bends = np.einsum("ti,ti->t", np.cross(unit(b - a), unit(c - b)), axis)

@@ -6,115 +6,84 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from gait.body.skeleton import SIDES
 from gait.errors import UserError
-from gait.io.trc import read_trc
-from gait.learn.mocap import angle_file, c3d_file, marker_sets, mocap_asf, mocap_bvh, remarks
-from gait.learn.mocap.angle_file import AngleTable
-from gait.learn.mocap.recording import FARTHEST, Y_UP, require_frames, require_range
-from gait.learn.reading import DEFAULT, Reading
-from gait.learn.solve import joint_file, marker_body, root, torn_joint
-from gait.learn.solve.body import Body, body
-from gait.learn.solve.stretch_information import Information
+from gait.learn.arrays import Floats
+from gait.learn.mocap import acclaim, bvh, points, tables
+from gait.learn.mocap.markers import plain
+from gait.learn.mocap.recording import Y_UP, FileNotes
+from gait.learn.mocap.tables import AngleTable
+from gait.learn.options import DEFAULT, LearnOptions
+from gait.learn.solve import joints, markers
+from gait.learn.solve.body import Body, from_bones
+from gait.learn.solve.retarget import overground
+from gait.learn.solve.skeleton_fit import LengthInformation
 
-Floats = npt.NDArray[np.float64]
-
-RECORDINGS = {".amc": mocap_asf.read, ".bvh": mocap_bvh.read}
-LEG = 0.25, 1.5  #: metres from hip over knee to ankle, from small children to more than the tallest man
-MARKED = (".c3d", ".trc")  #: suffixes of files that may hold markers
-#: Suffixes that are learnt from.
-KINDS = (*RECORDINGS, *MARKED, ".csv")
+RECORDINGS = {".amc": acclaim.read, ".bvh": bvh.read}
+LEG = 0.25, 1.5  #: metres from hip over knee to ankle: small children to more than the tallest man
+#: Suffixes of the files that can be read.
+SUFFIXES = (*RECORDINGS, *points.SUFFIXES, ".csv")
 
 
-def read(path: Path, reading: Reading = DEFAULT, stretch: Floats | None = None) -> Body | AngleTable:
+def read(path: Path, options: LearnOptions = DEFAULT, log_scales: Floats | None = None) -> Body | AngleTable:
     """Read a motion file by its suffix; a .csv may hold angles alone.
 
-    Parameters
-    ----------
-    stretch : (S,), optional
-        Of the person, for files of markers (`gait.learn.solve.marker_body.body`).
-
-    Raises
-    ------
-    UserError
-        If the file is malformed or lacks a joint; it names file, place and remedy.
+    `log_scales` (S,) are the length scales of the person, for files of markers (`solve.markers`).  UserError
+    names file, place and remedy if the file is malformed or lacks a joint.
     """
     suffix = path.suffix.lower()
-    if suffix == ".csv" and angle_file.holds_angles(path):
-        return angle_file.read(path, reading.fps, reading.zero_runs)
+    if suffix == ".csv" and tables.holds_angles(path):
+        return tables.read_angles(path, options.fps, options.zeros_missing)
     if suffix in RECORDINGS:
-        walker = body(RECORDINGS[suffix](path, reading.fps, reading.zero_runs))
+        body = from_bones(RECORDINGS[suffix](path, options.fps, options.zeros_missing))
     elif suffix == ".csv":
-        walker = joint_file.read_csv(path, reading.fps, reading.zero_runs)
+        body = joints.from_table(path, options.fps, options.zeros_missing)
     else:
-        walker = _points(path, reading, stretch)
-    _require_size(path, walker)
-    return root.overground(walker)
+        body = _from_points(path, options, log_scales)
+    _require_size(path, body)
+    return overground(body)
 
 
-def _require_size(path: Path, walker: Body) -> None:
-    """Refuse a body that is no human's, which positions in other units than metres make.
+def length_information(path: Path, options: LearnOptions = DEFAULT) -> LengthInformation | None:
+    """Return what a .c3d or .trc shows of the person's length scales; None if it holds no markers of a body.
 
-    Raises
-    ------
-    UserError
+    UserError if the file is malformed, or its markers are not known.
     """
+    labels, places, _ = points.read(path)
+    if _are_joints(labels, options):
+        return None
+    return markers.length_information(path, labels, places, options.markers)
+
+
+def _from_points(path: Path, options: LearnOptions, log_scales: Floats | None) -> Body:
+    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
+    labels, places, rate = points.read(path)
+    fps = options.fps or rate
+    if _are_joints(labels, options):
+        upright = places @ Y_UP.T
+        by_name = {name: upright[:, k] for k, name in enumerate(labels)}
+        joints.require_whole(by_name, lambda frame: f"{path}: frame {frame + 1}")
+        return joints.from_joints(path, by_name, fps)
+    body = markers.from_markers(path, labels, places, fps, options.markers, log_scales)
+    return replace(body, notes=FileNotes(frozenset(map(plain, labels) if options.markers else ())))
+
+
+def _are_joints(labels: list[str], options: LearnOptions) -> bool:
+    """Whether points are centres of joints."""
+    return options.markers is None and set(tables.JOINTS) <= set(tables.find_joints(labels))
+
+
+def _require_size(path: Path, body: Body) -> None:
+    """Refuse legs that are not human, as positions in other units than metres make them."""
     hip, knee, ankle = (
-        np.stack([walker.joints[f"{s}_{joint}"] for s in SIDES]) for joint in ("hip", "knee", "ankle")
+        np.stack([body.joints[f"{s}_{joint}"] for s in SIDES]) for joint in ("hip", "knee", "ankle")
     )
     legs = np.linalg.norm(hip - knee, axis=2) + np.linalg.norm(knee - ankle, axis=2)
-    if not np.isfinite(legs).any():  # what is not seen is judged by what comes after
+    if not np.isfinite(legs).any():  # later checks judge what is not seen
         return
     leg, (least, most) = float(np.nanmedian(legs)), LEG
     if not least <= leg <= most:
         raise UserError(
-            f"{path}: legs of {leg:.3g} m, {least:g} to {most:g} are plausible; correct the file's units"
+            f"{path}: legs of {leg:.3g} m; {least:g} to {most:g} m are plausible; correct the file's units"
         )
-
-
-def information(path: Path, reading: Reading = DEFAULT) -> Information | None:
-    """Find what a file of a kind of `MARKED` tells of the person's stretches; None if no markers do.
-
-    Raises
-    ------
-    UserError
-        If the file is malformed, or its markers are not known.
-    """
-    labels, points, _ = _labelled(path)
-    if _of_joints(labels, reading):
-        return None
-    return marker_body.information(path, labels, points, reading.markers)
-
-
-def _points(path: Path, reading: Reading, stretch: Floats | None) -> Body:
-    """Read labelled points: centres of all joints (y up, as `gait track --trc` writes them), or markers."""
-    labels, points, rate = _labelled(path)
-    fps = reading.fps or rate
-    if _of_joints(labels, reading):
-        upright = points @ Y_UP.T
-        places = {name: upright[:, k] for k, name in enumerate(labels)}
-        torn_joint.refuse(places, joint_file.find(labels), lambda frame: f"{path}: frame {frame + 1}")
-        return joint_file.body(path, places, fps)
-    walker = marker_body.body(path, labels, points, fps, reading.markers, stretch)
-    known = map(marker_sets.plain, labels) if reading.markers else ()
-    return replace(walker, remarks=remarks.Remarks(frozenset(known)))
-
-
-def _of_joints(labels: list[str], reading: Reading) -> bool:
-    """Whether points are centres of joints."""
-    return reading.markers is None and set(joint_file.NEEDED) <= set(joint_file.find(labels))
-
-
-def _labelled(path: Path) -> tuple[list[str], Floats, float]:
-    """Labels, points (T, M, 3) and frames per second.
-
-    A point at exactly (0, 0, 0) is missing: so these formats write gaps.
-    """
-    labels, points, rate = (read_trc if path.suffix.lower() == ".trc" else c3d_file.read)(path)
-    require_frames(path, len(points))
-    for k, label in enumerate(labels):
-        require_range(path, f"point {label!r} at", points[:, k], FARTHEST, "metres")
-    points[(points == 0).all(axis=2)] = np.nan
-    return labels, points, rate

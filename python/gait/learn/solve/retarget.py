@@ -1,7 +1,8 @@
-"""Joints of a body to the 24 angles of the default skeleton and to the body's own proportions.
+"""Bodies as channels of the default skeleton: lengths, the 24 angles, and the motion of the pelvis (root).
 
-Every limb's frame has z against the limb and y along its hinge; angles are exact decompositions of the frames
-of neighbours (model-format.md), continuous in time.
+The frame of a limb has z against the limb and y along its hinge; angles are exact decompositions of the
+frames of neighbours (libgait/doc/model-format.md), continuous in time.  Root motion needs a level floor and a
+heading.
 """
 
 from __future__ import annotations
@@ -11,17 +12,15 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from gait.body.skeleton import ANGLES, SIDES, Proportions
+from gait.body.skeleton import ANGLES, SIDES, Proportions, axis_rotation
+from gait.learn.arrays import Floats, Indices
 from gait.learn.rotations import decompose_yxz, decompose_zyx, frame_from, unit, unwrap
 from gait.learn.solve.body import Body
 
-Floats = npt.NDArray[np.float64]
-
 HEAD = 0.141  # neck to head top, statures: files end the head's bone at different heights
-#: Trunk and upper arms of a body by anatomy, statures: recordings end the clavicle near the acromion and the
-#: spine near its back; here the shoulder's centre is lower, the neck further ahead, the elbow nearer.
+#: Trunk and upper arms by anatomy, statures.  Recordings end the clavicle near the acromion and the spine
+#: near its back; here the shoulder's centre is lower, the neck further forward, the elbow nearer.
 ANATOMICAL: dict[str, Any] = {
     "shoulder": (0.043, 0.1085, 0.2595),
     "neck": 0.3205,
@@ -29,17 +28,22 @@ ANATOMICAL: dict[str, Any] = {
     "head": (0.027, 0.0, 0.130),
     "upper_arm": 0.161,
 }
-BALL = 0.0235  # centre of the ball of the foot over the ground in stance, statures
-#: What the parts of a standing body that may be unknown take of its height, statures.
+BALL = 0.0235  # height of the ball of the foot in stance, statures
+#: Share of the height of a standing body of the parts that may be unknown, statures.
 SHARES = {"rise": Proportions().sole - BALL, "neck": Proportions().neck}
+HARMONICS = 4  # of the pelvis's path within a stride
+STANDING = 0.2  # m/s, mean speed below which the pelvis, not the path, gives the heading
+LOW = 0.15  # share of frames in which a foot is lowest: it is on the ground then
+BELT = 0.4  # m/s, least speed of the ground under a person who stays in place on a treadmill
+STEADY = 0.35  # share of the belt's speed by which half of the feet's velocities may differ from it
 STANCE_SHARE = 0.15  # share of frames in which a foot moves least: it is flat on the ground then
 
 
 @dataclass(frozen=True)
 class Measures:
-    """A body's own size, metres, of the same meaning as `gait.body.skeleton.Proportions` times the stature.
+    """A body's own lengths, metres: `gait.body.skeleton.Proportions` times the stature.
 
-    Lengths of parts that were never seen are NaN; the stature is then that of a person with the rest.
+    Lengths of parts that were never seen are NaN; the stature then follows from the rest.
     """
 
     stature: float
@@ -55,18 +59,18 @@ class Measures:
     sole: float  #: ankle over the ground in stance
 
 
-def stance(body: Body, side: str) -> npt.NDArray[np.intp]:
-    """Frames in which the foot of a side lies flat: ankle and ball, if it is known, both move least."""
+def stance(body: Body, side: str) -> Indices:
+    """Return the frames in which the foot of a side lies flat: ankle and ball (if known) move least."""
     points = [body.joints[f"{side}_{joint}"] for joint in ("ankle", "toe")]
     known = [place for place in points if np.isfinite(place).any()]
     speed = sum((np.linalg.norm(np.gradient(p, axis=0), axis=1) for p in known), np.zeros(body.frames))
-    seen = int(np.isfinite(speed).sum())
+    visible = int(np.isfinite(speed).sum())
     order = np.argsort(np.where(np.isfinite(speed), speed, np.inf), kind="stable")
-    return order[: min(max(3, int(STANCE_SHARE * seen)), seen)]
+    return order[: min(max(3, int(STANCE_SHARE * visible)), visible)]
 
 
 def measure(body: Body) -> Measures:
-    """Lengths of a body whose floor is level (any height)."""
+    """Measure a body whose floor is level (at any height)."""
     j = body.joints
 
     def distances(upper: str, lower: str) -> Floats:
@@ -96,17 +100,17 @@ def measure(body: Body) -> Measures:
 
 
 def known_parts(m: Measures | None) -> int:
-    """Count the lengths of a body that are known; 0 of none."""
+    """Count the known lengths of a body; 0 for None."""
     return 0 if m is None else sum(int(np.isfinite(getattr(m, part.name)).sum()) for part in fields(m))
 
 
 def mean(values: Floats) -> float:
-    """Mean of what is known; NaN if nothing is."""
+    """Return the mean of the finite values; NaN if there are none."""
     return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
 
 
 def median(values: Floats) -> float:
-    """Median of what is known; NaN if nothing is."""
+    """Return the median of the finite values; NaN if there are none."""
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
 
 
@@ -116,18 +120,18 @@ def _distance(a: Floats, b: Floats) -> float:
 
 def _in_frame(frames: Floats, vectors: Floats) -> Floats:
     """Mean of vectors (T, 3) seen in frames (T, 3, 3)."""
-    seen = np.einsum("tji,tj->ti", frames, vectors)
-    return np.asarray(np.nanmean(seen, axis=0)) if np.isfinite(seen).any() else np.full(3, np.nan)
+    visible = np.einsum("tji,tj->ti", frames, vectors)
+    return np.asarray(np.nanmean(visible, axis=0)) if np.isfinite(visible).any() else np.full(3, np.nan)
 
 
 def torso_frames(body: Body) -> Floats:
-    """Torso axes (T, 3, 3): up from the pelvis to the neck, left from shoulder to shoulder."""
+    """Return torso axes (T, 3, 3): up from the pelvis to the neck, left from shoulder to shoulder."""
     j = body.joints
     return frame_from(j["neck"] - j["pelvis"], j["l_shoulder"] - j["r_shoulder"])
 
 
 def angles(body: Body, measures: Measures) -> Floats:
-    """Angles (T, 24) in the order of `gait.body.skeleton.ANGLES`, radians; NaN where a joint is missing."""
+    """Return angles (T, 24) in the order of `ANGLES`, radians; NaN where a joint is missing."""
     j = body.joints
     result: dict[str, Floats] = {}
     torso = torso_frames(body)
@@ -162,34 +166,35 @@ def _about_y(frames: Floats, vectors: Floats) -> Floats:
 
 
 def _centred(table: Floats) -> Floats:
-    """Without jumps of a whole turn, each column's mean within half a turn."""
+    """Remove jumps of a whole turn, with the mean of each column within half a turn."""
     result = unwrap(table)
     for column in result.T:
-        seen = np.isfinite(column)
-        if seen.any():
-            column -= 2 * np.pi * np.round(np.mean(column[seen]) / (2 * np.pi))
+        visible = np.isfinite(column)
+        if visible.any():
+            column -= 2 * np.pi * np.round(np.mean(column[visible]) / (2 * np.pi))
     return result
 
 
 def generic_proportions(bodies: Sequence[Measures | None]) -> Proportions:
-    """Mean proportions for people who were not measured: legs and forearms recorded, the rest `ANATOMICAL`.
+    """Return proportions for people not measured: recorded legs and forearms, the rest `ANATOMICAL`.
 
-    Where hips and neck lie in a body is a matter of definition, and no image tells which is meant.  These are
-    set by the tracker's errors on the rendered bodies (MakeHuman) of the development clips of ../shared/data,
-    which are therefore no independent proof; what it costs on CMU's walkers tests/bench/learn_floor.py tells.
+    Where hips and neck lie in a body is a matter of definition that images cannot settle.  ANATOMICAL
+    minimises the tracker's errors on the rendered bodies (MakeHuman) of the development clips of
+    ../shared/data, which are therefore no independent test; tests/bench/learn_floor.py measures its cost on
+    CMU's recordings.
     """
     return replace(mean_proportions(bodies), **ANATOMICAL)
 
 
 def own_proportions(m: Measures) -> Proportions:
-    """Proportions of one body, made symmetric."""
+    """Return the proportions of one body, made symmetric."""
     return mean_proportions([m])
 
 
 def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
-    """Mean proportions of bodies, each divided by its stature; left and right made symmetric.
+    """Return mean proportions of bodies in statures, made symmetric.
 
-    Every part is the mean over those bodies that have it, generic if none does; None is a body without any.
+    Each part is averaged over the bodies that have it, generic if none does; None is a body without any.
     """
     generic, measured = Proportions(), [m for m in bodies if m is not None]
 
@@ -222,3 +227,163 @@ def mean_proportions(bodies: Sequence[Measures | None]) -> Proportions:
         heel=(generic.heel[0], 0.0, generic.heel[2] + generic.sole - sole),
         sole=sole,
     )
+
+
+def overground(body: Body) -> Body:
+    """Move a person on a treadmill, or an animation in place, over the ground.
+
+    The velocity of the feet while they are lowest is that of the belt.  Bodies that travel, and feet that do
+    not slide steadily, stay as they are.
+    """
+    path = body.joints["pelvis"]
+    visible = np.flatnonzero(np.isfinite(path[:, 0]))
+    if (
+        len(visible) < 3
+        or np.linalg.norm(path[visible[-1], :2] - path[visible[0], :2]) / len(visible) * body.fps > STANDING
+    ):
+        return body
+    sliding = [np.zeros((0, 2))]
+    for s in SIDES:
+        foot = body.joints[f"{s}_ankle"]
+        velocity = np.gradient(foot[:, :2], axis=0) * body.fps
+        known = np.isfinite(velocity).all(axis=1)
+        if known.any():
+            sliding.append(velocity[known & (foot[:, 2] <= np.quantile(foot[known, 2], LOW))])
+    slides = np.concatenate(sliding)
+    belt = np.median(slides, axis=0) if len(slides) else np.zeros(2)
+    speed = float(np.linalg.norm(belt))
+    if speed < BELT or np.median(np.linalg.norm(slides - belt, axis=1)) > STEADY * speed:
+        return body
+    shift = np.zeros((body.frames, 3))
+    shift[:, :2] = -belt * np.arange(body.frames)[:, None] / body.fps
+    return replace(body, joints={name: place + shift for name, place in body.joints.items()})
+
+
+def level(body: Body) -> tuple[Body, float]:
+    """Rotate a body so that the floor under its feet is level along the path; also return the slope, radians.
+
+    The floor is the line through the balls of the feet in stance.
+    """
+    path = body.joints["pelvis"]
+    visible = np.flatnonzero(np.isfinite(path[:, 0]))
+    travel = path[visible[-1], :2] - path[visible[0], :2] if len(visible) else np.zeros(2)
+    contacts = np.concatenate([body.joints[f"{s}_toe"][stance(body, s)] for s in SIDES])
+    contacts = contacts[np.isfinite(contacts).all(axis=1)]
+    if np.linalg.norm(travel) < 1.0 or len(contacts) < 3:
+        return body, 0.0
+    way: Floats = travel / np.linalg.norm(travel)
+    design = np.stack([np.ones(len(contacts)), contacts[:, :2] @ way], axis=1)
+    slope = float(np.arctan(_robust_line(design, contacts[:, 2])[1]))
+    turn = _about(np.array([-way[1], way[0], 0.0]), slope)
+    joints = {name: points @ turn.T for name, points in body.joints.items()}
+    lateral = {name: axes @ turn.T for name, axes in body.lateral.items()}
+    return replace(body, joints=joints, pelvis=turn @ body.pelvis, lateral=lateral), slope
+
+
+def levelled(body: Body, steepest: float = np.inf) -> Body:
+    """Put a body on a level floor, with the pelvis axes in their standard place.
+
+    A floor that slopes more than `steepest`, radians, is stairs and stays.
+    """
+    level_body, slope = level(body)
+    return align_pelvis(level_body if abs(slope) < steepest else body)
+
+
+def align_pelvis(body: Body) -> Body:
+    """Make the pelvis axes independent of the placement of markers.
+
+    The left axis becomes the line between the hips, and the forward axis is level on average: the pelvis of a
+    file may be pitched by an unknown constant.
+    """
+    if not np.isfinite(body.pelvis).any():
+        return body
+    line = unit(
+        np.nanmean(np.einsum("tji,tj->ti", body.pelvis, body.joints["l_hip"] - body.joints["r_hip"]), axis=0)
+    )
+    turned = body.pelvis @ frame_from(np.array([0.0, 0, 1]), line, exact="y")
+    pitch = np.nanmean(np.arcsin(np.clip(-turned[:, 2, 0], -1, 1)))
+    return replace(body, pelvis=turned @ axis_rotation(1, -pitch))
+
+
+def _robust_line(design: Floats, values: Floats) -> Floats:
+    """Fit a line by least squares, then twice more without points farther than twice the median error."""
+    keep = np.ones(len(values), bool)
+    line: Floats = np.zeros(2)
+    for _ in range(3):
+        line = np.asarray(np.linalg.lstsq(design[keep], values[keep], rcond=None)[0], float)
+        error = np.abs(values - design @ line)
+        keep = error <= max(2 * float(np.median(error)), 1e-4)
+    return line
+
+
+def _about(axis: Floats, angle: float) -> Floats:
+    """Return the rotation (3, 3) about a horizontal unit axis."""
+    base = axis_rotation(2, float(np.arctan2(axis[1], axis[0])))
+    return np.asarray(base @ axis_rotation(0, angle) @ base.T)
+
+
+def root_channels(body: Body, measures: Measures, period: float) -> tuple[Floats, Floats]:
+    """Return root channels (T, 6) of a level body and its heading (T,); `period` is frames per stride.
+
+    Channels are root_forward ... root_yaw: statures per stride, statures, statures, radians; NaN where the
+    pelvis is not seen.  The heading is the direction of travel, radians, constant before the pelvis is first
+    seen and after the last time; NaN if it is never seen.
+    """
+    path, frames = body.joints["pelvis"], body.frames
+    visible = np.isfinite(path[:, 0])
+    if visible.sum() < 3:
+        return np.full((frames, 6), np.nan), np.full(frames, np.nan)
+    ground = ground_height(body, measures.stature)
+    smooth, velocity, fitted = _smooth_path(path[:, :2], period)
+    first, last = np.flatnonzero(visible)[[0, -1]]
+    speed = np.linalg.norm(smooth[last] - smooth[first]) / (last + 1 - first) * body.fps
+    yaw = unwrap(np.arctan2(body.pelvis[:, 1, 0], body.pelvis[:, 0, 0])[:, None])[:, 0]
+    heading = (
+        np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])) if speed > STANDING else _mean_over(yaw, period)
+    )
+    heading = heading[np.clip(np.arange(frames), first, last)]
+    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    result = np.empty((frames, 6))
+    forward = np.sum(np.gradient(fitted, axis=0) * along, axis=1) * period / measures.stature
+    result[:, 0] = np.where(visible, forward, np.nan)
+    result[:, 1] = np.sum((path[:, :2] - smooth) * across, axis=1) / measures.stature
+    result[:, 2] = (path[:, 2] - ground) / measures.stature
+    turns = decompose_zyx(axis_rotation(2, -heading) @ body.pelvis)
+    result[:, 3:] = turns[:, ::-1]
+    return result, heading
+
+
+def ground_height(body: Body, stature: float) -> float:
+    """Return the height of the ground under the feet in stance, from their balls, else from their ankles."""
+    for joint, height in (("toe", BALL), ("ankle", Proportions().sole)):
+        lowest = median(np.array([median(body.joints[f"{s}_{joint}"][stance(body, s), 2]) for s in SIDES]))
+        if np.isfinite(lowest):
+            return lowest - height * stature
+    return float("nan")
+
+
+def _smooth_path(path: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+    """Return a slow polynomial through the path (T, 2), its derivative, and polynomial plus stride."""
+    frames = len(path)
+    t = (np.arange(frames) - frames / 2) / period
+    degree = 2 if frames < 4 * period else 5
+    angle = 2 * np.pi * np.outer(t, np.arange(1, HARMONICS + 1))
+    powers = np.vander(t, degree + 1, increasing=True)
+    design = np.concatenate([powers, np.cos(angle), np.sin(angle)], axis=1)
+    visible = np.isfinite(path[:, 0])
+    weights, *_ = np.linalg.lstsq(design[visible], path[visible], rcond=None)
+    slow = weights[: degree + 1]
+    derivative = (
+        np.vander(t, degree, increasing=True) @ (slow[1:] * np.arange(1, degree + 1)[:, None]) / period
+    )
+    return powers @ slow, derivative, design @ weights
+
+
+def _mean_over(values: Floats, period: float) -> Floats:
+    """Return the mean (T,) over one stride about each frame, shorter at the ends, without NaN."""
+    visible = np.isfinite(values)
+    width = max(1, round(period))
+    window = np.ones(width)
+    total = np.convolve(np.where(visible, values, 0), window, "same")
+    return np.asarray(total / np.maximum(np.convolve(visible, window, "same"), 1))

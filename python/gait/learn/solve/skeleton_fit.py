@@ -1,155 +1,209 @@
 """Least-squares fit of the default skeleton to points on a body: lengths of the subject, poses of all frames.
 
-The points are attached to segments at places known roughly; they may be markers on the skin or joints.  First
-the subject's stretches and the points' true places are found together with the poses of some frames
-(Levenberg-Marquardt, the poses eliminated by their Schur complement), then the poses of all frames at once.
-The loss is robust (Cauchy).  What the points do not determine is left to weak priors; the covariance says so.
+The points are fixed to segments at places known roughly; they may be markers on the skin or joints.  First
+the subject's length scales and the points' true places are found together with the poses of some frames
+(Levenberg-Marquardt, the poses eliminated by their Schur complement), then the poses of all frames.  The loss
+is robust (Cauchy).  Weak priors fix what the points do not determine; the covariance shows it.
+
+Recordings of one person combine through `LengthInformation`: what each shows of the length scales, in
+information form, adds up.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from gait.learn.solve import articulated, pose_fit, subject_fit
-from gait.learn.solve.articulated import FREEDOMS, Indices, Pose
-from gait.learn.solve.pose_fit import CHUNK
-from gait.learn.solve.stretch_information import Information
-from gait.learn.solve.subject_fit import OUTLIERS, STRETCHES, Marked, Subject
-
-Floats = npt.NDArray[np.float64]
+from gait.body.skeleton import ANGLES
+from gait.learn.arrays import Floats, Indices, Mask
+from gait.learn.solve.kinematics import (
+    FREEDOMS,
+    ORIGINS,
+    ROOT,
+    SCALE_SD,
+    SEGMENTS,
+    Pose,
+    pose_skeleton,
+    segment_origins,
+    segment_scales,
+)
 
 SIZES = (0.5, 2.5)  # metres of stature to start from
-SUBJECT_FRAMES = 60
-FEWEST = 3  # points seen in a frame that is fitted
-MANY = 0.7  # of the most points seen in a frame: so many tell of the subject
-BAD = 4  # times the median loss per point: a frame that may have come to rest elsewhere
+SUBJECT_FRAMES = 60  # frames from which the subject is found
+FEWEST = 3  # points in a frame that is fitted
+MANY = 0.7  # of the most points in a frame: frames with that many serve to find the subject
+BAD = 4  # times the median loss per point: the frame may be in a wrong minimum
+CHUNK = 128  # frames solved at once
+NOISE = 0.01  # metres: skin over bone, and what 24 angles cannot reproduce
+ANGLE_SD = 1.5  # radians about the rest pose: decides only what the points leave open
+LIMIT_SD = 0.05  # radians beyond a limit that count as one sd
+ROOT_SD = 100.0  # metres and radians: fixes a pelvis that no point determines
+OUTLIERS = (30.0, 10.0, 3.0)  # residuals beyond this many NOISE lose weight: first rounds to last
+EFFECTIVE = 5.0  # independent frames that all frames are worth: neighbours share their errors
+STATURE = 1.7  # metres, of the generic body
+#: Levenberg-Marquardt: most rounds, first damping, least, most, and its factors after a better or worse step.
+ROUNDS, DAMPING, LEAST_DAMPING, MOST_DAMPING, BETTER, WORSE = 30, 1e-3, 1e-7, 1e4, 0.2, 10.0
+GAIN = 1e-4  # of the loss: a step that gains less is the last
+_RANGES = {
+    "neck": (-80, 80), "shoulder_flexion": (-120, 190), "shoulder_abduction": (-60, 120),
+    "shoulder_rotation": (-120, 120), "elbow": (-5, 160), "hip_flexion": (-60, 140),
+    "hip_abduction": (-50, 70), "hip_rotation": (-60, 60), "knee": (-5, 165), "torso": (-60, 90),
+    "ankle": (-80, 50),
+}  # fmt: skip
+#: Least and largest values (2, 24) of the angles of a living body, radians.
+LIMITS = np.radians(
+    [[next(r[k] for part, r in _RANGES.items() if part in name) for name in ANGLES] for k in (0, 1)]
+)
+#: Weights of the segments' points in the rigid alignment: limbs move against the trunk.
+TRUNK = np.array([1.0 if name in ("pelvis", "torso") else 0.05 for name in SEGMENTS])
+LENGTHS = len(SCALE_SD)
+_PRIOR_MEAN = np.array([np.log(STATURE)] + [0.0] * (LENGTHS - 1))  # log length scales of the generic body
+
+
+@dataclass(frozen=True)
+class LengthInformation:
+    """Gaussian over log length scales (S,) in information form: independent sources add."""
+
+    matrix: Floats  #: (S, S) inverse covariance; singular where nothing is known
+    vector: Floats  #: (S,) the matrix times the mean
+
+    def __add__(self, other: LengthInformation) -> LengthInformation:
+        return LengthInformation(self.matrix + other.matrix, self.vector + other.vector)
+
+    def mean(self) -> Floats:
+        """Return the most probable log length scales (S,)."""
+        return np.asarray(np.linalg.solve(self.matrix, self.vector), float)
+
+
+PEOPLE = LengthInformation(np.diag(SCALE_SD**-2), SCALE_SD**-2 * _PRIOR_MEAN)  #: people in general
+NO_INFORMATION = LengthInformation(np.zeros((LENGTHS, LENGTHS)), np.zeros(LENGTHS))
+
+
+def log_bayes_factor(one: LengthInformation, other: LengthInformation) -> float:
+    """Return the log of how much better one body explains two findings than two bodies do."""
+    return _evidence(one + other) + _evidence(NO_INFORMATION) - _evidence(one) - _evidence(other)
+
+
+def _evidence(found: LengthInformation) -> float:
+    """Log probability of what was found of one person, up to a constant of the findings."""
+    known = PEOPLE + found
+    return float(known.vector @ known.mean() - np.linalg.slogdet(known.matrix)[1]) / 2
 
 
 @dataclass(frozen=True)
 class Points:
-    """Points fixed to segments.
+    """M points fixed to segments."""
 
-    Attributes
-    ----------
-    segment : (M,) indices into `articulated.SEGMENTS`
-    at : (M, 3)
-        Places in the segments' axes, statures.
-    sd : (M,)
-        How far they may be from there, statures.
-    """
-
-    segment: Indices
-    at: Floats
-    sd: Floats
+    segment: Indices  #: (M,) indices into `kinematics.SEGMENTS`
+    at: Floats  #: (M, 3) places in the segments' axes, statures
+    sd: Floats  #: (M,) how far the points may be from there, statures
 
 
 @dataclass
 class Fit:
-    """Result of `fit`.
+    """Result of `fit`: T frames, M points, S length scales."""
 
-    Attributes
-    ----------
-    stretch : (S,)
-        Logarithms of the subject's stretches, in the order of `articulated.STRETCHES`.
-    local : (M, 3)
-        Places of the points in their segments, metres.
-    pose : Pose
-    residual : (T, M)
-        Distance from the points observed, metres; NaN where missing.
-    covariance : (T, 30, 30)
-        Of the poses, metres and radians.
-    """
-
-    stretch: Floats
-    local: Floats
+    log_scales: Floats  #: (S,) of the subject, in the order of `kinematics.SCALES`
+    local: Floats  #: (M, 3) places of the points in their segments, metres
     pose: Pose
-    residual: Floats
-    covariance: Floats
+    residual: Floats  #: (T, M) distance from the observed points, metres; NaN where missing
+    covariance: Floats  #: (T, 30, 30) of the poses, metres and radians
 
 
-def turned(angles: Floats, points: Points, observed: Floats) -> Floats:
-    """Find the turns (T, 3, 3) of the pelvis that lay bodies of given angles (T, 24) onto points.
+def fit(observed: Floats, points: Points, log_scales: Floats | None = None) -> Fit:
+    """Fit subject and poses to observed points (T, M, 3).
 
-    `observed` is as for `fit`; turns are NaN where fewer than three points or not all angles are known.
+    Points are metres in any right-handed axes, NaN where missing.  Log length scales (S,) are kept if they
+    are given; then only places of points and poses are found.  ValueError if no frame has three points.
     """
-    data = _data(observed, points)
-    known = (data.weight.sum(axis=1) >= FEWEST) & np.isfinite(angles).all(axis=1)
-    pose = pose_fit.at_rest(len(angles))
-    pose.angles[known] = angles[known]
-    turn = pose_fit.rooted(pose, points.at, articulated.ORIGINS, data)[0].turn
-    return np.where(known[:, None, None], turn, np.nan)
+    data = _observations(observed, points)
+    picked = _frames_with_most(data.weight > 0)
+    subject = _fit_subject(data[picked], points, log_scales)
+    pose = _fit_all_frames(data, subject, picked)
+    return _with_covariance(data, subject, pose)
 
 
-def fit(observed: Floats, points: Points, stretch: Floats | None = None) -> Fit:
-    """Fit subject and poses to points.
-
-    Parameters
-    ----------
-    observed : (T, M, 3)
-        Metres, in any right-handed axes; NaN where missing.
-    points : Points
-    stretch : (S,), optional
-        The subject's stretches if they are known; then only the places of the points and the poses are found.
-
-    Raises
-    ------
-    ValueError
-        If no frame has three points.
-    """
-    data = _data(observed, points)
-    picked = _spread(data.weight > 0)
-    subject = _subject(data[picked], points, stretch)
-    pose = _all_poses(data, subject, picked)
-    return _finished(data, subject, pose)
-
-
-def information(observed: Floats, points: Points) -> tuple[Information, float]:
-    """Find what points tell of their subject's stretches, and their rms distance from its body, metres.
+def length_information(observed: Floats, points: Points) -> tuple[LengthInformation, float]:
+    """Return what points show of their subject's length scales, and their rms distance from its body, metres.
 
     Parameters and errors are those of `fit`.
     """
-    data = _data(observed, points)
-    few = data[_spread(data.weight > 0)]
-    subject = _subject(few, points, None)
-    body = articulated.posed(subject.pose, articulated.origins(subject.stretch))
+    data = _observations(observed, points)
+    few = data[_frames_with_most(data.weight > 0)]
+    subject = _fit_subject(few, points, None)
+    body = pose_skeleton(subject.pose, segment_origins(subject.log_scales))
     apart = np.linalg.norm(body.points(subject.local, few.segment) - few.observed, axis=2)
     rms = float(np.sqrt(np.mean(apart[few.weight > 0] ** 2)))
-    return subject_fit.information(subject), rms
+    return _information(subject), rms
 
 
-def enough(observed: Floats) -> bool:
-    """Whether any frame has points (T, M, 3) enough to be fitted."""
+def pelvis_rotations(angles: Floats, points: Points, observed: Floats) -> Floats:
+    """Return the pelvis rotations (T, 3, 3) that lay bodies of given angles (T, 24) onto points.
+
+    `observed` is as for `fit`; NaN where fewer than three points or not all angles are known.
+    """
+    data = _observations(observed, points)
+    known = (data.weight.sum(axis=1) >= FEWEST) & np.isfinite(angles).all(axis=1)
+    pose = _at_rest(len(angles))
+    pose.angles[known] = angles[known]
+    rotation = _aligned(pose, points.at, ORIGINS, data)[0].rotation
+    return np.where(known[:, None, None], rotation, np.nan)
+
+
+def has_enough(observed: Floats) -> bool:
+    """Whether any frame has enough points (T, M, 3) to be fitted."""
     return bool((np.isfinite(observed).all(axis=2).sum(axis=1) >= FEWEST).any())
 
 
-def _data(observed: Floats, points: Points) -> pose_fit.Data:
-    """Points as the fit takes them."""
-    seen = np.asarray(np.isfinite(observed).all(axis=2))
-    return pose_fit.Data(np.where(seen[..., None], observed, 0.0), seen.astype(float), points.segment)
+@dataclass
+class _Observations:
+    observed: Floats  # (T, M, 3), 0 where missing
+    weight: Floats  # (T, M)
+    segment: Indices  # (M,)
+
+    def __getitem__(self, frames: Indices) -> _Observations:
+        return _Observations(self.observed[frames], self.weight[frames], self.segment)
 
 
-def _subject(few: pose_fit.Data, points: Points, known: Floats | None) -> Subject:
-    """Subject by some frames, from the pelvis up: size, poses, then everything together."""
-    start = pose_fit.at_rest(len(few.weight))
-    if known is None:
-        size = np.median(pose_fit.rooted(start, points.at, articulated.ORIGINS, few)[1])
-        stretch = np.zeros(STRETCHES)
-        stretch[0] = np.log(np.clip(size, *SIZES))
-    else:
-        stretch = known
-    local = articulated.scales(stretch)[points.segment] * points.at
-    offsets = articulated.origins(stretch)
-    rooted = pose_fit.rooted(start, local, offsets, few)[0]
-    pose = pose_fit.solve(few, local, offsets, rooted, OUTLIERS[0])[0]
-    return subject_fit.fit(Marked(few, points.at, points.sd), stretch, pose, held=known is not None)
+def _observations(observed: Floats, points: Points) -> _Observations:
+    visible = np.asarray(np.isfinite(observed).all(axis=2))
+    return _Observations(np.where(visible[..., None], observed, 0.0), visible.astype(float), points.segment)
 
 
-def _spread(seen: npt.NDArray[np.bool_]) -> Indices:
-    """Frames spread over the recording in which many points are seen."""
-    count = seen.sum(axis=1)
+@dataclass(frozen=True)
+class _Subject:
+    """Some frames of a subject, its shape and its poses in them."""
+
+    data: _Observations
+    points: Points
+    shape: Floats  # (S + 3 M,) log length scales, then shifts of the points from where they should be, metres
+    pose: Pose
+
+    @property
+    def log_scales(self) -> Floats:
+        return self.shape[:LENGTHS]
+
+    @property
+    def share(self) -> float:
+        """How many times the errors of these frames are counted."""
+        return len(self.data.weight) / EFFECTIVE
+
+    @property
+    def local(self) -> Floats:
+        """Places (M, 3) of the points in their segments, metres."""
+        scale = segment_scales(self.log_scales)[self.points.segment]
+        return scale * self.points.at + self.shape[LENGTHS:].reshape(-1, 3)
+
+    def prior(self) -> tuple[Floats, Floats]:
+        """Means and standard deviations of the shape."""
+        mean = np.concatenate([_PRIOR_MEAN, np.zeros(self.points.at.size)])
+        return mean, np.concatenate([SCALE_SD, np.repeat(self.points.sd, 3) * STATURE])
+
+
+def _frames_with_most(visible: Mask) -> Indices:
+    """Pick frames spread over the recording in which many points are seen."""
+    count = visible.sum(axis=1)
     if not (count >= FEWEST).any():
         raise ValueError("no frame has three points")
     good = np.flatnonzero(count >= max(FEWEST, MANY * count.max()))
@@ -157,35 +211,248 @@ def _spread(seen: npt.NDArray[np.bool_]) -> Indices:
     return np.array([frames[np.argmax(count[frames])] for frames in bins])
 
 
-def _all_poses(data: pose_fit.Data, subject: Subject, picked: Indices) -> Pose:
-    """Poses of all frames, each started from the nearest picked one; bad ones again from good neighbours."""
-    local, offsets = subject.local, articulated.origins(subject.stretch)
+def _fit_subject(few: _Observations, points: Points, known: Floats | None) -> _Subject:
+    """Find a subject from some frames: first its size, then poses, then everything together."""
+    start = _at_rest(len(few.weight))
+    if known is None:
+        size = np.median(_aligned(start, points.at, ORIGINS, few)[1])
+        log_scales = np.zeros(LENGTHS)
+        log_scales[0] = np.log(np.clip(size, *SIZES))
+    else:
+        log_scales = known
+    local = segment_scales(log_scales)[points.segment] * points.at
+    origins = segment_origins(log_scales)
+    aligned = _aligned(start, local, origins, few)[0]
+    pose = _fit_poses(few, local, origins, aligned, OUTLIERS[0])[0]
+    shape = np.concatenate([log_scales, np.zeros(points.at.size)])
+    return _refine(_Subject(few, points, shape, pose), fixed=known is not None)
+
+
+def _refine(start: _Subject, fixed: bool) -> _Subject:
+    """Optimise shape and poses together from a start; log scales that are fixed stay as they are."""
+    mean, sd = start.prior()
+    weight, free = start.share / sd**2, slice(LENGTHS if fixed else 0, None)
+
+    def objective(s: _Subject, outlier: float) -> float:
+        body = pose_skeleton(s.pose, segment_origins(s.log_scales))
+        world = body.points(s.local, s.data.segment)
+        data = _residuals(world, s.data, outlier)[2] + _prior_cost(s.pose.angles)
+        return float(data.sum() + s.share * (((s.shape - mean) / sd) ** 2).sum())
+
+    subject = start
+    for outlier in OUTLIERS:
+        damping, cost = DAMPING, objective(subject, outlier)
+        for _ in range(ROUNDS):
+            matrix, slope, solved = _reduced(subject, outlier, damping, (weight, mean))
+            step = np.zeros(len(slope))
+            step[free] = -np.linalg.solve(matrix[free, free], slope[free])
+            steps = -(solved[..., :-1] @ step + solved[..., -1])
+            trial = replace(subject, shape=subject.shape + step, pose=subject.pose.moved(steps))
+            tried = objective(trial, outlier)
+            if tried < cost:
+                gain, cost, subject = cost - tried, tried, trial
+                damping = max(BETTER * damping, LEAST_DAMPING)
+                if gain < GAIN * cost:
+                    break
+            else:
+                damping *= WORSE
+                if damping > MOST_DAMPING:
+                    break
+    return subject
+
+
+def _information(subject: _Subject) -> LengthInformation:
+    """Return what the frames alone show of the length scales, with places of points and poses marginalised.
+
+    It is quadratic about the subject found (Gauss-Newton).
+    """
+    mean, sd = subject.prior()
+    share = subject.share
+    weight = share / sd**2
+    weight[:LENGTHS] = 0  # the prior is no observation
+    matrix, slope, _ = _reduced(subject, OUTLIERS[-1], 0.0, (weight, mean))
+    solved = np.linalg.solve(matrix[LENGTHS:, LENGTHS:], np.c_[matrix[LENGTHS:, :LENGTHS], slope[LENGTHS:]])
+    across = matrix[:LENGTHS, LENGTHS:]
+    found = (matrix[:LENGTHS, :LENGTHS] - across @ solved[:, :-1]) / share
+    left = (slope[:LENGTHS] - across @ solved[:, -1]) / share
+    found = (found + found.T) / 2
+    return LengthInformation(found, found @ subject.log_scales - left)
+
+
+def _reduced(
+    s: _Subject, outlier: float, damping: float, prior: tuple[Floats, Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """Set up the normal equations of the shape about a subject, the poses eliminated.
+
+    `prior` are inverse variances and means of the shape.  Returns the matrix (S + 3 M, S + 3 M), the slope,
+    and what gives the steps of the poses back, (K, 30, S + 3 M + 1).
+    """
+    few, pose = s.data, s.pose
+    body = pose_skeleton(pose, segment_origins(s.log_scales))
+    world = body.points(s.local, few.segment)
+    residual, weight, _ = _residuals(world, few, outlier)
+    by_pose = _rows(body.by_pose(world, few.segment) / NOISE)
+    by_shape = np.zeros((*world.shape, len(s.shape)))
+    by_shape[..., :LENGTHS] = body.by_scales(s.log_scales, s.points.at, few.segment)
+    for m, segment in enumerate(few.segment):
+        first = LENGTHS + 3 * m
+        by_shape[:, m, :, first : first + 3] = body.rotations[:, segment]
+    by_shape = _rows(by_shape / NOISE)
+    rest, heavy = _rows(residual[..., None]), np.repeat(weight, 3, axis=1)[..., None]
+    left = np.swapaxes(by_pose * heavy, 1, 2)
+    inner, mixed, pose_slope = left @ by_pose, left @ by_shape, left @ rest
+    _add_prior(inner, pose_slope[..., 0], pose.angles)
+    flat, weighted = by_shape.reshape(-1, len(s.shape)), (by_shape * heavy).reshape(-1, len(s.shape))
+    outer = weighted.T @ flat + np.diag(prior[0])
+    shape_slope = weighted.T @ rest.reshape(-1) + prior[0] * (s.shape - prior[1])
+    np.einsum("tii->ti", inner)[:] *= 1 + damping
+    np.einsum("ii->i", outer)[:] *= 1 + damping
+    solved = np.linalg.solve(inner, np.concatenate([mixed, pose_slope], axis=2))
+    crossed = np.swapaxes(mixed, 1, 2)
+    return (
+        outer - (crossed @ solved[..., :-1]).sum(axis=0),
+        shape_slope - (crossed @ solved[..., -1:]).sum(axis=0)[:, 0],
+        solved,
+    )
+
+
+def _fit_all_frames(data: _Observations, subject: _Subject, picked: Indices) -> Pose:
+    """Fit all frames, each started from the nearest picked one; bad ones again from good neighbours."""
+    local, origins = subject.local, segment_origins(subject.log_scales)
     frames = np.arange(len(data.weight))
     nearest = np.argmin(np.abs(frames[:, None] - picked[None]), axis=1)
-    start = pose_fit.rooted(subject.pose[nearest], local, offsets, data)[0]
-    pose, cost = pose_fit.solve(data, local, offsets, start, OUTLIERS[-1])
+    start = _aligned(subject.pose[nearest], local, origins, data)[0]
+    pose, cost = _fit_poses(data, local, origins, start, OUTLIERS[-1])
     count = (data.weight > 0).sum(axis=1)
     mean = cost / np.maximum(count, 1)
     good = (mean <= BAD * np.median(mean[count >= FEWEST])) & (count >= FEWEST)
     bad = np.flatnonzero(~good & (count >= FEWEST))
     if good.any() and len(bad):
         closest = np.flatnonzero(good)[np.argmin(np.abs(bad[:, None] - np.flatnonzero(good)[None]), axis=1)]
-        start = pose_fit.rooted(pose[closest], local, offsets, data[bad])[0]
-        again, cheaper = pose_fit.solve(data[bad], local, offsets, start, OUTLIERS[-1])
+        start = _aligned(pose[closest], local, origins, data[bad])[0]
+        again, cheaper = _fit_poses(data[bad], local, origins, start, OUTLIERS[-1])
         won = np.flatnonzero(cheaper < cost[bad])
         pose[bad[won]] = again[won]
     return pose
 
 
-def _finished(data: pose_fit.Data, subject: Subject, pose: Pose) -> Fit:
+def _with_covariance(data: _Observations, subject: _Subject, pose: Pose) -> Fit:
     """Add residuals and covariances."""
-    local, offsets = subject.local, articulated.origins(subject.stretch)
+    local, origins = subject.local, segment_origins(subject.log_scales)
     covariance = np.empty((len(pose), FREEDOMS, FREEDOMS))
     residual = np.empty(data.weight.shape)
     for first in range(0, len(pose), CHUNK):
         chunk = np.arange(first, min(first + CHUNK, len(pose)))
-        world = articulated.posed(pose[chunk], offsets).points(local, data.segment)
+        world = pose_skeleton(pose[chunk], origins).points(local, data.segment)
         residual[chunk] = np.linalg.norm(world - data.observed[chunk], axis=2)
-        hessian = pose_fit.normal_equations(pose[chunk], local, offsets, data[chunk], OUTLIERS[-1])[0]
+        hessian = _normal_equations(pose[chunk], local, origins, data[chunk], OUTLIERS[-1])[0]
         covariance[chunk] = np.linalg.inv(hessian)
-    return Fit(subject.stretch, local, pose, np.where(data.weight > 0, residual, np.nan), covariance)
+    return Fit(subject.log_scales, local, pose, np.where(data.weight > 0, residual, np.nan), covariance)
+
+
+def _at_rest(frames: int) -> Pose:
+    """Return poses with the pelvis at the origin and all angles zero."""
+    return Pose(np.zeros((frames, 3)), np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, len(ANGLES))))
+
+
+def _aligned(pose: Pose, local: Floats, origins: Floats, data: _Observations) -> tuple[Pose, Floats]:
+    """Move bodies of given angles rigidly onto the points, trunk first; also ratios of their sizes (T,)."""
+    still = _at_rest(len(pose))
+    still.angles = pose.angles
+    model = pose_skeleton(still, origins).points(local, data.segment)
+    w = (data.weight * TRUNK[data.segment])[..., None] + 1e-12 * data.weight[..., None]
+    total = np.maximum(w.sum(axis=1), 1e-30)
+    middle, goal = (w * model).sum(axis=1) / total, (w * data.observed).sum(axis=1) / total
+    a, b = (model - middle[:, None]) * np.sqrt(w), (data.observed - goal[:, None]) * np.sqrt(w)
+    u, s, vt = np.linalg.svd(np.swapaxes(b, 1, 2) @ a)
+    side = np.sign(np.linalg.det(u @ vt))  # a rotation, not a mirror image
+    s[:, 2] *= side
+    u[:, :, 2] *= side[:, None]
+    turn = u @ vt
+    ratio = s.sum(axis=1) / np.maximum((a**2).sum(axis=(1, 2)), 1e-30)
+    position = goal - np.einsum("tij,tj->ti", turn, middle)
+    return Pose(position, turn, pose.angles.copy()), ratio
+
+
+def _fit_poses(
+    data: _Observations, local: Floats, origins: Floats, start: Pose, outlier: float
+) -> tuple[Pose, Floats]:
+    """Find the poses of all frames from a start; poses and losses (T,)."""
+    pose, cost = start[:], np.empty(len(start))
+    for first in range(0, len(start), CHUNK):
+        chunk = np.arange(first, min(first + CHUNK, len(start)))
+        pose[chunk], cost[chunk] = _descend(pose[chunk], data[chunk], local, origins, outlier)
+    return pose, cost
+
+
+def _descend(
+    pose: Pose, data: _Observations, local: Floats, origins: Floats, outlier: float
+) -> tuple[Pose, Floats]:
+    """Levenberg-Marquardt on independent frames, each with its own damping."""
+
+    def objective(pose: Pose, some: _Observations) -> Floats:
+        world = pose_skeleton(pose, origins).points(local, data.segment)
+        return _residuals(world, some, outlier)[2] + _prior_cost(pose.angles)
+
+    cost, damping = objective(pose, data), np.full(len(pose), DAMPING)
+    active = np.arange(len(pose))
+    for _ in range(ROUNDS):
+        hessian, gradient = _normal_equations(pose[active], local, origins, data[active], outlier)
+        diagonal = np.einsum("tii->ti", hessian)
+        diagonal *= 1 + damping[active, None]
+        step = -np.asarray(np.linalg.solve(hessian, gradient[..., None])[..., 0], float)
+        moved = pose[active].moved(step)
+        tried = objective(moved, data[active])
+        better = np.asarray(tried < cost[active])
+        gain = (cost[active] - tried) / np.maximum(cost[active], 1e-9)
+        won = active[better]
+        pose[won], cost[won] = moved[np.flatnonzero(better)], tried[better]
+        damping[active] = np.maximum(damping[active] * np.where(better, BETTER, WORSE), LEAST_DAMPING)
+        active = active[(better & (gain > GAIN)) | (~better & (damping[active] < MOST_DAMPING))]
+        if not len(active):
+            break
+    return pose, cost
+
+
+def _normal_equations(
+    pose: Pose, local: Floats, origins: Floats, data: _Observations, outlier: float
+) -> tuple[Floats, Floats]:
+    """Gauss-Newton matrices (T, 30, 30) and gradients (T, 30) of the poses."""
+    body = pose_skeleton(pose, origins)
+    world = body.points(local, data.segment)
+    residual, weight, _ = _residuals(world, data, outlier)
+    slope = _rows(body.by_pose(world, data.segment) / NOISE)
+    weighted = np.swapaxes(slope * np.repeat(weight, 3, axis=1)[..., None], 1, 2)
+    hessian, gradient = weighted @ slope, (weighted @ _rows(residual[..., None]))[..., 0]
+    _add_prior(hessian, gradient, pose.angles)
+    return hessian, gradient
+
+
+def _residuals(world: Floats, data: _Observations, outlier: float) -> tuple[Floats, Floats, Floats]:
+    """Residuals (T, M, 3) in units of NOISE, robust weights (T, M) and loss (T,)."""
+    residual = (world - data.observed) / NOISE
+    square = (residual**2).sum(axis=2) / outlier**2
+    return residual, data.weight / (1 + square), (data.weight * outlier**2 * np.log1p(square)).sum(axis=1)
+
+
+def _prior_cost(angles: Floats) -> Floats:
+    """Loss (T,) of the priors on the angles."""
+    return ((angles / ANGLE_SD) ** 2 + (_beyond(angles) / LIMIT_SD) ** 2).sum(axis=1)
+
+
+def _add_prior(hessian: Floats, gradient: Floats, angles: Floats) -> None:
+    """Add the priors to the normal equations of the poses, in place."""
+    beyond, k = _beyond(angles), np.arange(ROOT, FREEDOMS)
+    hessian[:, k, k] += ANGLE_SD**-2 + (beyond != 0) * LIMIT_SD**-2
+    gradient[:, k] += angles / ANGLE_SD**2 + beyond / LIMIT_SD**2
+    hessian[:, range(ROOT), range(ROOT)] += ROOT_SD**-2
+
+
+def _beyond(angles: Floats) -> Floats:
+    """How far angles are beyond the limits, radians."""
+    return np.asarray(angles - np.clip(angles, *LIMITS))
+
+
+def _rows(table: Floats) -> Floats:
+    """Join the axes of points and of x, y, z: (T, M, 3, n) to (T, 3 M, n)."""
+    return table.reshape(len(table), -1, table.shape[-1])

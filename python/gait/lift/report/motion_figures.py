@@ -14,11 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gait.io.keypoints_file import Keypoints
-from gait.learn.report.figures_base import Drawing, plain
-from gait.learn.report.figures_model import STICKS
 from gait.lift.segment.view import Perspective, View
 from gait.lift.smooth.motion import Motion
 from gait.report.colours import DARK, GREY, ON_PAPER, side_of
+from gait.report.figures import STICKS, Drawing, plain
 
 Floats = npt.NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from gait.bindings.lifter import LiftConfig, Lifter
 from gait.bindings.segment_prior import SegmentPrior
-from gait.learn.report.figures_base import Drawing, grid, line_legend
 from gait.lift.report.motion_figures import AHEAD, SIDE, Strips
 from gait.report.colours import BLUE, DARK, GREY, ORANGE
+from gait.report.figures import Drawing, grid, line_legend
 
 Floats = npt.NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from gait.body.skeleton import ELLIPSOID, JOINTS, default_skeleton
 from gait.errors import UserError
 from gait.io.video import Image
 from gait.learn.segments.virtual_markers import MARKERS, SKIN, marked_skeleton
-from gait.learn.solve import articulated, skeleton_fit
-from gait.learn.solve.articulated import Pose
+from gait.learn.solve import skeleton_fit
+from gait.learn.solve.kinematics import Pose, pose_skeleton, segment_origins, segment_scales
 from gait.lift.video.corrections import Correction
 from gait.lift.video.sensors import View
 from gait.report.drawing import draw_bones, tinted
@@ -39,14 +39,14 @@ class Figure:
 
     Attributes
     ----------
-    stretch : (S,)
-        Logarithms of the body's stretches (`gait.learn.solve.articulated.STRETCHES`).
+    log_scales : (S,)
+        Log length scales of the body (`gait.learn.solve.kinematics.SCALES`).
     pose : Pose
     residual : (T, M)
         Distance from the markers used, metres.
     """
 
-    stretch: Floats
+    log_scales: Floats
     pose: Pose
     residual: Floats
 
@@ -70,18 +70,18 @@ class Figure:
             sd=np.array([SKIN_SD if name in SKIN else JOINT_SD for name in used]),
         )
         found = skeleton_fit.fit(places[:, [list(names).index(name) for name in used]], points)
-        return Figure(found.stretch, found.pose, found.residual)
+        return Figure(found.log_scales, found.pose, found.residual)
 
     @property
     def stature(self) -> float:
         """Height of the body, metres, as if all its parts were of usual proportions."""
-        return float(np.exp(self.stretch[0]))
+        return float(np.exp(self.log_scales[0]))
 
     def joints(self) -> Floats:
         """Places (T, 19, 3) of `gait.body.skeleton.JOINTS`, metres."""
         segment = _BODY.point_frames.astype(np.intp)
-        local = articulated.scales(self.stretch)[segment] * _BODY.point_positions
-        posed = articulated.posed(self.pose, articulated.origins(self.stretch))
+        local = segment_scales(self.log_scales)[segment] * _BODY.point_positions
+        posed = pose_skeleton(self.pose, segment_origins(self.log_scales))
         return posed.points(local, segment)
 
     def lengths(self) -> dict[str, float]:
@@ -99,9 +99,9 @@ class Figure:
 
     def surfaces(self) -> Floats:
         """Points (T, L, P, 3), metres, on the surfaces of `LIMBS`: each limb is the hull of its points."""
-        posed = articulated.posed(self.pose, articulated.origins(self.stretch))
+        posed = pose_skeleton(self.pose, segment_origins(self.log_scales))
         segment = np.repeat(_BODY.limb_frames[:, 0], RING * SLICES).astype(np.intp)
-        local = articulated.scales(self.stretch)[segment] * _SURFACE.reshape(-1, 3)
+        local = segment_scales(self.log_scales)[segment] * _SURFACE.reshape(-1, 3)
         points = posed.points(local, segment)
         return points.reshape(len(points), len(LIMBS), -1, 3)
 

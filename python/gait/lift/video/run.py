@@ -16,13 +16,13 @@ from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.blob import decode
 from gait.io.video import Video, VideoWriter, background
-from gait.learn.corpus.stage import one_thread
 from gait.lift.video.clip_segments import ClipSegments, Settings
 from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_corrections, read_placement
 from gait.lift.video.figure import Figure, draw_figure
 from gait.lift.video.fit_clip import DOUBTFUL, ENOUGH, HELD, ClipFit, fit_clip, suggest, work
 from gait.lift.video.sensors import CameraView, Film, FlatView, View
 from gait.progress import progress
+from gait.reproducible import one_thread
 
 Floats = npt.NDArray[np.float64]
 

@@ -1,0 +1,219 @@
+"""The files of a run, read and prepared; files in folders that cannot be used are left out.
+
+One body serves all recordings of a person with markers: what they show of the length scales adds up, together
+with what is known of people (the optimum of a joint fit, by one Gauss-Newton step).  The places of markers
+are each recording's own, as they are put on anew.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Generator
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gait.errors import UserError
+from gait.learn.arrays import ArrayFile, Floats
+from gait.learn.corpus import cluster, processes, sources
+from gait.learn.corpus.stage import Prepared, Task
+from gait.learn.cycles.sequence import Sequence
+from gait.learn.mocap import points
+from gait.learn.mocap.recording import FileNotes
+from gait.learn.options import DEFAULT, LearnOptions
+from gait.learn.segments.corpus import Corpus
+from gait.learn.solve.retarget import Measures, known_parts
+from gait.learn.solve.skeleton_fit import NO_INFORMATION, PEOPLE, LengthInformation, log_bayes_factor
+
+Files = list[tuple[Path, bool]]  #: paths, and whether each was found in a folder
+
+USED = " (its segments are used nevertheless)"
+ONLY = "for gait lift alone give --segments only: all also needs recordings for a cyclic model"
+NOT_YET = np.zeros((0, 0))  # channels of a sequence until they are read back from disk
+SAME_PERSON = np.log(10)  # names are right about persons ten times as often as they are wrong
+MOST_NAMES = 4  # of files in a line
+
+
+class NothingLeft(UserError):
+    """No file can be used for a cyclic model; `refused` has one line about each."""
+
+    def __init__(self, refused: list[str]) -> None:
+        self.refused = [words.removesuffix(USED) for words in refused]
+        others = f" (and none of the other {len(refused) - 1} files can be used)" if refused[1:] else ""
+        remedy = "" if self.refused == refused else f"; {ONLY}"
+        super().__init__(self.refused[0] + others + remedy)
+
+
+@dataclass
+class RunNotes:
+    """What the readers noticed in the files of a run."""
+
+    labels: set[str] = field(default_factory=set)
+    zeros: list[tuple[Path, str]] = field(default_factory=list)
+
+    def add(self, path: Path, notes: FileNotes) -> None:
+        """Add those of a file."""
+        self.labels |= notes.labels
+        if notes.zeros:
+            self.zeros.append((path, notes.zeros))
+
+
+@dataclass(frozen=True)
+class SharedLengths:
+    """Log length scales (S,) of a person, and the number of recordings they come from."""
+
+    log_scales: Floats
+    recordings: int
+
+
+class Loaded(NamedTuple):
+    """What the files of a run gave; the signals of the sequences are on disk."""
+
+    sequences: list[Sequence]
+    refused: list[str]  #: one line about each file that was left out
+    others: list[Measures]  #: bodies of people none of whose files can be used, in the order of their names
+
+
+def load_all(
+    files: Files,
+    options: LearnOptions = DEFAULT,
+    progress: Callable[[int], None] = lambda done: None,
+    *,
+    corpus: Corpus | None = None,
+    shared: list[SharedLengths | None] | None = None,
+    notes: RunNotes | None = None,
+) -> Loaded:
+    """Read and prepare files; the result does not depend on the processes that do it.
+
+    `progress` gets the number of files done, `corpus` the motions for the segment prior (a file that gave one
+    is no error), `notes` what the readers noticed.  `shared` is what `shared_lengths` returned for these
+    files; without it each file is fitted by itself.  UserError if a file named by itself cannot be used, or
+    none can.
+    """
+    paths = [path for path, _ in files]
+    shared = shared or [None] * len(paths)
+    tasks = [
+        Task(path, options, one.log_scales if one else None) for path, one in zip(paths, shared, strict=True)
+    ]
+    names, persons = sources.names(paths), sources.subjects(paths, options.subjects)
+    sequences, refused, used = list[Sequence](), list[str](), False
+    measures: list[Measures | None] = []
+    with closing(_outcomes(tasks, options)) as outcomes, ArrayFile() as signals:
+        for i, outcome in enumerate(outcomes):
+            found, error = outcome.sequence, outcome.refused
+            measures.append(outcome.body)
+            if notes is not None:
+                notes.add(paths[i], outcome.notes)
+            if corpus is not None and outcome.motion is not None:
+                corpus.put(names[i], persons[i], paths[i], outcome.motion)
+                used = True
+            if found is not None:
+                signals.put(found.channels)
+                one = shared[i]
+                count = one.recordings if one else found.recordings
+                sequences.append(
+                    replace(found, name=names[i], subject=persons[i], channels=NOT_YET, recordings=count)
+                )
+            elif error is not None and (files[i][1] or outcome.motion is not None):
+                left_out = outcome.motion is None or corpus is None
+                refused.append(f"{error}" if left_out else f"{error}{USED}")
+            elif error is not None:
+                raise error
+            progress(i + 1)
+        views = signals.views()
+    if not sequences and not (used and options.segments.source == "only"):
+        raise NothingLeft(refused)
+    for sequence, channels in zip(sequences, views, strict=True):
+        sequence.channels = channels
+    return Loaded(sequences, refused, _other_bodies(persons, measures, {s.subject for s in sequences}))
+
+
+def _outcomes(tasks: list[Task], options: LearnOptions) -> Generator[Prepared, None, None]:
+    """Yield the outcomes of tasks in their order, from this machine or a cluster."""
+    if options.dask:
+        return cluster.prepared(tasks, options.dask)
+    return processes.prepared(tasks, options.jobs)
+
+
+def _other_bodies(persons: list[str], bodies: list[Measures | None], known: set[str]) -> list[Measures]:
+    """Return the best-known body of each person without sequences, in the order of their names."""
+    best: dict[str, Measures] = {}
+    for person, body in zip(persons, bodies, strict=True):
+        if body is not None and person not in known and known_parts(body) > known_parts(best.get(person)):
+            best[person] = body
+    return [best[person] for person in sorted(best)]
+
+
+@dataclass
+class _Body:
+    """What recordings show of a body, and their files (indices)."""
+
+    found: LengthInformation = NO_INFORMATION
+    files: list[int] = field(default_factory=list)
+
+    def add(self, file: int, found: LengthInformation) -> None:
+        self.found += found
+        self.files.append(file)
+
+
+def shared_lengths(
+    files: Files,
+    options: LearnOptions = DEFAULT,
+    progress: Callable[[int], None] = lambda done: None,
+    warn: Callable[[str], None] = lambda line: None,
+) -> list[SharedLengths | None]:
+    """Measure people with several recordings of markers; None for files that are fitted by themselves.
+
+    The result does not depend on the order of the files.  `progress` gets the number of files done, `warn` a
+    line about recordings that cannot be of one body.
+    """
+    paths = [path for path, _ in files]
+    persons = sources.subjects(paths, options.subjects)
+    result: list[SharedLengths | None] = [None] * len(paths)
+    marked = [i for i, path in enumerate(paths) if path.suffix.lower() in points.SUFFIXES]
+    count = Counter(persons[i] for i in marked)
+    order = [(persons[i], os.path.abspath(path)) for i, path in enumerate(paths)]
+    several = sorted((i for i in marked if count[persons[i]] > 1), key=lambda i: order[i])
+    tasks = [Task(paths[i], options, measuring=True) for i in several]
+    with closing(_outcomes(tasks, options)) as outcomes:
+        for person, numbered in groupby(enumerate(several, 1), key=lambda item: persons[item[1]]):
+            bodies: list[_Body] = []
+            for number, file in numbered:
+                found = next(outcomes).lengths
+                if found is not None:
+                    _most_likely(bodies, found).add(file, found)
+                progress(number)
+            for body in bodies:
+                if len(body.files) > 1:
+                    shared = SharedLengths((PEOPLE + body.found).mean(), len(body.files))
+                    for i in body.files:
+                        result[i] = shared
+            for line in _other_lengths(person, [[paths[i] for i in body.files] for body in bodies]):
+                warn(line)
+    return result
+
+
+def _most_likely(bodies: list[_Body], found: LengthInformation) -> _Body:
+    """Return the body that a recording is most likely of; a new one if that is likelier."""
+    each = [log_bayes_factor(body.found, found) for body in bodies]
+    if not each or max(each) < -SAME_PERSON:
+        bodies.append(_Body())
+        return bodies[-1]
+    return bodies[int(np.argmax(each))]
+
+
+def _other_lengths(person: str, bodies: list[list[Path]]) -> list[str]:
+    """Return lines about the recordings that are not of the body of most."""
+    most = max(bodies, key=len, default=[])
+    return [
+        f"{' '.join(map(str, files[:MOST_NAMES]))}{' ...' * (len(files) > MOST_NAMES)}: limb lengths differ "
+        f"from {most[0]}, which is also taken for {person!r}; measured separately. "
+        "If these are two people, see --subjects"
+        for files in bodies
+        if files is not most
+    ]

@@ -1,0 +1,68 @@
+"""The options of one learning run: made once by the command, passed down unchanged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gait.bindings.segment_prior import HEADINGS
+from gait.learn.mocap.markers import MarkerMap
+
+DEFAULT_COMPONENTS = 8
+MOST_COMPONENTS = 16  # the library reads no more
+PRIORS = ("people", "paper")
+PERIOD_MODES = ("refined", "literal")
+#: Rules by which files belong to one person (`gait.learn.corpus.subjects`).
+SUBJECT_RULES = ("auto", "prefix", "folder", "file")
+SEGMENT_SOURCES = ("learnt", "all", "none", "only")
+SEGMENT_MARKERS = ("virtual", "recorded")
+#: Turned copies of each segment as the command names them, and as the blob stores them.
+SEGMENT_HEADINGS = {"free" if count == 0 else str(count): count for count in HEADINGS}
+
+
+@dataclass(frozen=True)
+class SegmentOptions:
+    """Options of the segment prior."""
+
+    #: learnt: the steady parts of the recordings in the cyclic model; all: whole recordings, also those the
+    #: cyclic model refuses; only: the same without a cyclic model; none: no segment prior.
+    source: str = SEGMENT_SOURCES[0]
+    frames: int = 10  #: of a segment
+    hop: int = 5  #: frames from one segment to the next
+    fps: float = 20.0  #: frames per second of the segments
+    modes: int = 50  #: at most; a quarter of the segments if that is fewer
+    headings: int = 0  #: 0, 2 or 8 (`gait.bindings.segment_prior.SegmentPrior`)
+    mixture: int | None = 1  #: Gaussians; None: as many as predict held-out people best
+    markers: str = SEGMENT_MARKERS[0]  #: virtual: of the default skeleton; recorded: those of the files
+    people: bool = True  #: also learn from people who were not recorded (`gait.learn.segments.motion`)
+
+    @property
+    def whole(self) -> bool:
+        """Whether whole recordings are used, whether or not the cyclic model accepts them."""
+        return self.source in ("all", "only")
+
+
+@dataclass(frozen=True)
+class LearnOptions:
+    """All options of `gait learn`."""
+
+    sources: tuple[str, ...] = ()  #: motion files and folders of them
+    exclude: tuple[str, ...] = ()  #: globs of files to leave out
+    output: str = ""  #: path of the model
+    report: str | None = None  #: folder of the report
+    quiet: bool = False  #: no progress and no notes on stderr
+    activity: str = "walk"  #: recordings of another known activity are refused
+    subjects: str = SUBJECT_RULES[0]
+    components: int | str | None = None  #: a number, "auto", or None for DEFAULT_COMPONENTS
+    prior: str = PRIORS[0]  #: paper: recorded cycles only; people: also people who were not recorded
+    period_mode: str = PERIOD_MODES[0]
+    fps: float | None = None  #: frames per second; None: from the file
+    markers: MarkerMap | None = None  #: for marker sets that are not known by themselves
+    zeros_missing: bool = False  #: three or more exact zeros in a row are missing data
+    trim: bool = True  #: cut starts, stops and turns off the ends of recordings
+    seed: int = 1  #: of the choice of held-out data
+    segments: SegmentOptions = SegmentOptions(source="none")
+    jobs: int = 1  #: processes that read files
+    dask: str | None = None  #: scheduler of a Dask cluster that reads them instead
+
+
+DEFAULT = LearnOptions()

@@ -1,0 +1,259 @@
+"""A prior over how people walk that reaches those who were not recorded.
+
+The paper's components (`components`) describe the recorded cycles as well as possible.  With few subjects
+that is not what a new person needs, so the completed cycles are analysed again: each also mirrored (left and
+right swapped, half a cycle later), every subject counting alike, and channels weighted by how far they move
+the joints. What is left of a subject after the components of all others gives the standard deviation of
+static offsets.
+
+The mean cycle follows the stride rate: arms and legs swing further the faster a person walks.  People differ
+at one rate, and a person differs between rates; only the latter is regressed here.  A tracker knows the rate
+anyway (it is a state of the paper's, eq. 7), so what follows it costs no score.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gait.body.pace import pace, series, waves
+from gait.body.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
+from gait.errors import UserError
+from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
+from gait.learn.cycles.fourier import HARMONICS, decode, encode, fourier_basis
+from gait.learn.cycles.sequence import Sequence
+from gait.learn.prior.components import Components
+from gait.learn.prior.imputation import leading_vectors, right_singular
+
+STEP = 1e-4  # of the numerical derivatives, radians and statures
+RIDGE = 1e-5  # squared statures per squared unit: channels that move no joint still count a little
+#: Weight of rotations of the whole body: a particle has a heading, pitch and roll of its own besides.
+TURNING = {"root_roll": 0.3, "root_pitch": 0.3, "root_yaw": 0.3}
+#: Weight of root channels that displace the whole body, statures; forward speed is per stride.
+DISPLACING = {"root_forward": 0.3, "root_sway": 1.0, "root_height": 1.0}
+AGAINST = ("torso_x", "torso_z", "neck_x", "neck_z", "root_sway", "root_roll", "root_yaw")
+RATE_SD, LENGTH_SD = 0.07, 0.06  # of stride rate and length among people, share of the mean
+ADULT_STATURE = (1.70, 0.095)  # metres, mean and sd of adults of both sexes: a prior, not a training set's
+ENOUGH = 3  # subjects that show by themselves how people differ
+LEAST_SD = 0.01  # share of the mean: recordings that are all alike still leave some uncertainty
+#: Variance of the pace of an imaginary person who walks alike at any rate: with recordings of few people, or
+#: of hardly any other rates, the slope shrinks towards 0.
+UNMOVED = 1.0
+#: Does not follow the rate: how far people step at one rate differs much, and a tracker that hardly sees the
+#: distance, as from in front, accumulates the error of its speed.  The components have it.
+LEFT_OUT = CHANNELS.index("root_forward")
+#: Coefficients of a channel's Fourier series, ten harmonics: higher ones move joints by 0.12 mm in a person
+#: whose rate is a standard deviation off (rms, `make eval-learn`), and a model stays small.
+TERMS = 21
+#: Largest sum of a channel's coefficients, radians or statures per unit of pace; libgait refuses more.
+STEEPEST = 1.0
+
+
+def mirrored(rows: Floats) -> Floats:
+    """Mirror cycles (R, T, M): left and right swapped, half a cycle later."""
+    order, sign = [], []
+    for name in CHANNELS:
+        twin = f"{SIDES[1 - SIDES.index(name[0])]}{name[1:]}" if name[:2] in ("l_", "r_") else name
+        order.append(CHANNELS.index(twin))
+        sign.append(-1.0 if name in AGAINST else 1.0)
+    return np.roll(rows[:, :, order] * sign, rows.shape[1] // 2, axis=1)
+
+
+def joint_metric(mean: Floats, proportions: Proportions) -> Floats:
+    """Return coordinates (M, M) in which distances of channels are displacements of the points.
+
+    |x @ metric|^2 is the mean squared displacement of a point about the pelvis plus that of the pelvis,
+    squared statures, for a small x whose root channels are weighted by TURNING and DISPLACING; the effect of
+    each channel is averaged over the mean curves (T, M).
+    """
+    sections = default_skeleton(proportions).sections()
+    base = points(sections, mean)
+    moves = np.empty((len(CHANNELS), base.size))
+    for k in range(len(CHANNELS)):
+        moved = mean.copy()
+        moved[:, k] += STEP
+        moves[k] = TURNING.get(CHANNELS[k], 1.0) * ((points(sections, moved) - base) / STEP).ravel()
+    whole = np.array([DISPLACING.get(name, 0.0) ** 2 for name in CHANNELS])
+    gram = moves @ moves.T / (base.size / 3) + np.diag(whole + RIDGE)
+    return np.asarray(np.linalg.cholesky(gram), float)
+
+
+def refine(plain: Components, cycles: Floats, subject: Indices, count: int, metric: Floats) -> Components:
+    """Replace the components of an analysis by those of completed cycles (R, T, M) and their mirror images.
+
+    Curves have unit length in the metric over all phases, and the entry of largest magnitude in the first
+    half of the cycle is positive.  Scores are of the rows, not of their images; every subject counts alike.
+    """
+    mean, curves, scores, sd, spectrum = mirrored_components(cycles, subject, count, metric)
+    return replace(plain, mean=mean, curves=curves, scores=scores, sd=sd, spectrum=spectrum)
+
+
+def mirrored_components(
+    filled: Floats, subject: Indices, count: int, metric: Floats
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Compute mean, curves, scores, sd and shares of the variance of cycles and their mirror images."""
+    samples, channels = filled.shape[1:]
+    basis = fourier_basis(samples, HARMONICS)
+    coded = _with_images(filled, metric, basis)
+    weight = np.tile(1 / np.bincount(subject)[subject], 2)
+    weight /= weight.sum()
+    mean = weight @ coded
+    singular, right = right_singular(coded, mean, np.sqrt(weight))
+    back = np.linalg.inv(metric)
+    curves = decode(right[:count], basis, channels) @ back
+    sign = _sign(curves)
+    return (
+        decode(mean[None], basis, channels)[0] @ back,
+        curves * sign[:, None, None],
+        (coded[: len(filled)] @ right[:count].T - mean @ right[:count].T) * sign,
+        singular[:count],
+        singular**2 / max(float(np.sum(singular**2)), 1e-300),
+    )
+
+
+def _with_images(filled: Floats, metric: Floats, basis: Floats) -> Floats:
+    """Return coefficients (2 R, P) in the metric of cycles and, below them, of their mirror images."""
+    coded = np.empty((2, len(filled), basis.shape[0] * filled.shape[2]))
+    for part in by_rows(filled):
+        coded[0, part] = encode(filled[part] @ metric, basis)
+        coded[1, part] = encode(mirrored(filled[part]) @ metric, basis)
+    return coded.reshape(-1, coded.shape[2])
+
+
+def _sign(curves: Floats) -> Floats:
+    """Return signs (q,) that make the largest entry of the first half positive.
+
+    Its mirror image in the other half is as large and perhaps of the other sign.
+    """
+    half = curves[:, : curves.shape[1] // 2].reshape(len(curves), -1)
+    return np.asarray(np.where(half[np.arange(len(half)), np.abs(half).argmax(axis=1)] < 0, -1.0, 1.0))
+
+
+def static_sd(filled: Floats, subject: Indices, count: int, metric: Floats) -> Floats:
+    """Return the sd (M,) over people of their mean offset over the cycle from what all others explain.
+
+    Zero if there are fewer than three subjects.
+    """
+    if subject.max() < 2:
+        return np.zeros(filled.shape[2])
+    basis = fourier_basis(filled.shape[1], HARMONICS)
+    coded, image = _with_images(filled, metric, basis), np.tile(subject, 2)
+    left = []
+    for held in np.unique(subject):
+        weight = np.where(image == held, 0.0, 1 / np.bincount(subject)[image])
+        weight /= weight.sum()
+        mean = weight @ coded
+        right = leading_vectors(coded, mean, np.sqrt(weight), count)
+        # The mean over a cycle is its first coefficient, and the residual of the mean that of the cycles.
+        rest = coded[: len(subject)][subject == held].mean(axis=0) - mean
+        rest -= (right @ rest) @ right
+        left.append(rest[: filled.shape[2]] / np.sqrt(filled.shape[1]) @ np.linalg.inv(metric))
+    return np.sqrt(np.mean(np.square(left), axis=0))
+
+
+def by_subject(values: Floats, group: Indices, usual: float) -> tuple[float, float]:
+    """Return mean and sd of the subjects' means; NaN values do not count.
+
+    With fewer than `ENOUGH` subjects the variance is drawn towards that of people in general, whose sd is
+    `usual` of the mean, and is never below what the sequences show.
+    """
+    group, values = group[np.isfinite(values)], values[np.isfinite(values)]
+    if not len(values):
+        return 0.0, 0.0
+    means = np.array([values[group == g].mean() for g in np.unique(group)])
+    middle, sample = float(means.mean()), means if len(means) > 1 else values
+    visible = float(sample.std(ddof=1)) if len(sample) > 1 else 0.0
+    share = min((len(means) - 1) / (ENOUGH - 1), 1.0)
+    variance = share * visible**2 + (1 - share) * max(visible, usual * middle) ** 2
+    return middle, max(float(np.sqrt(variance)), LEAST_SD * middle)
+
+
+def paces(sequences: list[Sequence], subject: Indices) -> Floats:
+    """Return the pace (n,) of sequences: their stride rates as `gait.body.pace` defines it."""
+    rates = np.array([s.fps / s.period.frames for s in sequences])
+    return pace(by_subject(rates, subject, RATE_SD), rates)
+
+
+def pace_slope(filled: Floats, subject: Indices, paces: Floats, terms: int = TERMS) -> Floats:
+    """Return the change (T, M) of the cycle per unit of pace, as steep in every person, who all count alike.
+
+    It is the least-squares slope of the differences between a person's completed cycles (R, T, M), own units,
+    and their mean, with their mirror images, as a Fourier series.  It is 0 with one person or one pace, and
+    for LEFT_OUT.  UserError if an angle changes more than any walk's, from turns of 360 degrees between
+    recordings.
+    """
+    together, variance = np.zeros(filled.shape[1:]), UNMOVED
+    people = np.unique(subject)
+    for person in people if len(people) > 1 else ():
+        rows = np.flatnonzero(subject == person)
+        away = (paces[rows] - paces[rows].mean()) / len(rows)
+        variance += float(np.sum(away**2)) * len(rows)
+        for part in by_rows(rows):
+            # Differences of the pace sum to 0, so that the mean cycle need not be taken off.
+            together += np.tensordot(away[part], filled[rows[part]], 1)
+            release(filled)
+    found = together[None] / variance
+    found[..., LEFT_OUT] = 0.0
+    slope = series(0.5 * (found + mirrored(found))[0], terms)
+    channel = int(np.abs(slope).sum(axis=0).argmax())
+    if np.abs(slope[:, channel]).sum() > STEEPEST:
+        raise UserError(
+            f"{CHANNELS[channel]}: recordings of one person differ more than walks at two rates do; "
+            "remove turns of 360 degrees from the angles, or leave recordings out with --exclude"
+        )
+    return np.asarray(waves(terms, filled.shape[1]).T @ slope)
+
+
+def at_mean_pace(filled: Floats, paces: Floats, slope: Floats) -> Floats:
+    """Return cycles (R, T, M) as they would be at the mean rate, on disk."""
+    parts = (filled[part] - paces[part, None, None] * slope for part in by_rows(filled))
+    return stored(parts, filled.shape[1:])
+
+
+def never_shown(mask: Mask, subject: Indices) -> tuple[int, Mask]:
+    """Return how many people never show channels (M,) that others show, and which these are.
+
+    `mask` (R, T, M) is what was recorded, `subject` (R,) the person of each cycle.
+    """
+    shown = np.array([mask[subject == who].any(axis=(0, 1)) for who in np.unique(subject)])
+    lacking = ~shown & shown.any(axis=0)
+    return int(lacking.any(axis=1).sum()), np.asarray(lacking.any(axis=0))
+
+
+def bounded(filled: Floats, mask: Mask, subject: Indices) -> Floats:
+    """Move channels that a person never shows no further from the mean than people usually are.
+
+    Imputation predicts them from the others linearly and without bound: a person who walks unlike all others
+    would get arms that no person has, and they would count like a recording.  Takes and returns completed
+    cycles (R, T, M); the result is on disk, or `filled` itself if there is nothing to do.
+    """
+    people = range(subject.max() + 1)
+    shown = np.array([mask[subject == who].any(axis=(0, 1)) for who in people])
+    if np.all(shown == shown.any(axis=0)):
+        return filled
+    share = shown / np.maximum(shown.sum(axis=0), 1)  # (people, M): all who show a channel count alike
+    mean = sum(share[who] * _mean(filled, subject == who) for who in people)
+    away = np.array([_mean(filled, subject == who, mean) for who in people])
+    usual = np.sum(share * away, axis=0)
+    # A channel that no person shows has no reference and stays as it is.
+    held = ~shown & shown.any(axis=0)
+    keep = np.where(held, np.sqrt(np.minimum(1.0, usual / np.maximum(away, 1e-300))), 1.0)
+    nearer = (_drawn(filled[part], mean, keep[subject[part], None]) for part in by_rows(filled))
+    return stored(nearer, filled.shape[1:])
+
+
+def _drawn(cycles: Floats, mean: Floats, keep: Floats) -> Floats:
+    """Scale the distance of cycles from the mean by `keep`; what keeps all of it stays bit for bit."""
+    return np.where(keep < 1, mean + keep * (cycles - mean), cycles)
+
+
+def _mean(filled: Floats, rows: Mask, about: Floats | None = None) -> Floats:
+    """Return the mean cycle (T, M) of some rows, or their mean square (M,) about a cycle."""
+    at = np.flatnonzero(rows)
+    total: Floats = np.zeros(filled.shape[1:])
+    for part in by_rows(at):
+        values = filled[at[part]]
+        total += np.sum(values if about is None else (values - about) ** 2, axis=0)
+        release(filled)
+    return total / len(at) if about is None else total.mean(axis=0) / len(at)

@@ -1,0 +1,152 @@
+"""A learned model in figures and in words, and what its user should know about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from gait.bindings.segment_prior import SegmentPrior
+from gait.body.skeleton import ANGLES
+from gait.io import blob
+from gait.learn.arrays import Floats
+from gait.learn.cycles.sequence import Sequence
+from gait.learn.options import DEFAULT_COMPONENTS, LearnOptions
+from gait.learn.prior import model, people
+from gait.learn.prior.fit import Learned, made_up_channels
+from gait.learn.segments import summary as segment_summary
+
+MOST_NAMES = 8  # of subjects
+
+
+def summary(
+    learned: Learned, data: bytes, refused: list[str], prior: SegmentPrior | None, report: bool
+) -> dict[str, Any]:
+    """Return the figures of what was learnt and written, with a report also those of the subjects."""
+    rate, rate_sd, variation, length, length_sd, fps = model.gait_statistics(learned)[:6].tolist()
+    residual = learned.residuals.rms(columns=slice(len(ANGLES)))
+    table = model.sequence_table(learned)
+    return {
+        "bytes": len(data),
+        "crc32": f"{blob.checksum(data):08x}",
+        "subjects": learned.subjects,
+        "sequences": [
+            dict(zip(model.SEQUENCE_COLUMNS, row, strict=True)) | _found(sequence)
+            for row, sequence in zip(table, learned.sequences, strict=True)
+        ],
+        "left_out": refused,
+        "cycles": len(learned.components.scores),
+        "components": len(learned.components.sd),
+        "variance_explained": np.cumsum(learned.components.spectrum)[: len(learned.components.sd)].tolist(),
+        "residual_deg": float(np.degrees(residual)),
+        "held_out": learned.held_out.tolist(),
+        "stride_hz": [rate, rate_sd],
+        "stride_time_cv": variation,
+        "stride_length_statures": [length, length_sd],
+        "fps": fps,
+        "alignment": learned.alignment.objective,
+        "imputation": learned.components.rmse,
+        "imputation_objective": learned.components.objective,
+        "segments": segment_summary.summary(prior) if prior else None,
+        **({"by_subject": _by_subject(learned)} if report else {}),
+    }
+
+
+def _found(s: Sequence) -> dict[str, Any]:
+    """Return where a sequence comes from and why it was accepted."""
+    return {
+        "subject": s.subject,
+        "source": str(s.source),
+        "fps": s.fps,
+        "lengths_by": s.recordings,
+        "kept": list(s.kept),
+        "cut": list(s.cut),
+        "snr": round(s.period.peak, 1),
+        "activity": s.verdict.activity,
+        "evidence": {e.name: round(e.value, 4) if np.isfinite(e.value) else None for e in s.verdict.evidence},
+    }
+
+
+def _by_subject(learned: Learned) -> list[dict[str, Any]]:
+    """Return the residuals of each subject, learnt from and left out; empty if they were not computed."""
+    if (found := learned.by_subject) is None:
+        return []
+    columns = {
+        "subject": learned.subjects,
+        "learnt_from_deg": _rounded(found.degrees[0]),
+        "left_out_deg": _rounded(found.degrees[1]),
+        "learnt_from_mm": _rounded(found.millimetres[0]),
+        "left_out_mm": _rounded(found.millimetres[1]),
+    }
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _rounded(values: Floats) -> list[float | None]:
+    return [round(v, 2) if np.isfinite(v) else None for v in values.tolist()]
+
+
+def text(path: str, s: dict[str, Any]) -> str:
+    """Format the figures for people; a segment prior alone has fewer."""
+    written = f"{path}: {s['bytes']} bytes, checksum {s['crc32']}"
+    if "sequences" not in s:
+        return f"{segment_summary.text(s['segments'])}\n{written}"
+    explained = " ".join(f"{100 * v:.0f}" for v in s["variance_explained"])
+    left = f"; {_count(len(s['left_out']), 'file')} left out" if s["left_out"] else ""
+    lines = [
+        f"{_count(len(s['sequences']), 'sequence')} of {_count(len(s['subjects']), 'subject')} "
+        f"({_listed(s['subjects'])}), "
+        f"{_count(s['cycles'], 'cycle')}{left}",
+        f"{s['stride_hz'][0]:.2f} strides/s, stride length {s['stride_length_statures'][0]:.2f} statures",
+        f"{_count(s['components'], 'component')}: {explained} % of the variance; "
+        f"residual {s['residual_deg']:.1f} deg",
+        *_left_out(s.get("by_subject", [])),
+        *([segment_summary.text(s["segments"])] if s["segments"] else []),
+        written,
+    ]
+    return "\n".join(lines)
+
+
+def _left_out(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the median residuals of subjects left out; empty if some have none."""
+    units = {"left_out_deg": "{:.1f} deg", "left_out_mm": "{:.0f} mm of joint position"}
+    if not rows or any(row[name] is None for row in rows for name in units):
+        return []
+    found = [words.format(np.median([row[name] for row in rows])) for name, words in units.items()]
+    return [f"residual of a subject left out: {', '.join(found)} (median)"]
+
+
+def notes(learned: Learned, options: LearnOptions) -> Iterator[str]:
+    """Yield what a user should know about what was learnt and may not expect."""
+    cycles, kept = len(learned.components.scores), len(learned.components.sd)
+    if options.components is None and kept < DEFAULT_COMPONENTS:
+        yield f"{cycles} cycles allow {_count(kept, 'component')} instead of {DEFAULT_COMPONENTS}"
+    if parts := model.unobserved(learned):
+        yield f"no recording shows {_words(parts)}: these stay in the rest pose"
+    stages = (
+        ("alignment", learned.alignment, "leave out recordings unlike the others"),
+        ("filling of gaps", learned.components, "add recordings or ask for fewer --components"),
+    )
+    for name, part, remedy in stages:
+        if not part.converged:
+            yield f"the {name} did not converge in {len(part.objective)} passes; {remedy}"
+    count, channels = people.never_shown(learned.cycles.mask, learned.row_subject)
+    if names := model.parts(channels):
+        shows = "person never shows" if count == 1 else "people never show"
+        yield f"{count} {shows} {_words(names)}: filled in from the others"
+    if made_up := made_up_channels(learned.cycles.visible):
+        yield f"no recording shows {' or '.join(made_up)}: taken from the motion of the legs"
+
+
+def _words(names: list[str]) -> str:
+    """Join names as in a sentence."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def _listed(names: list[str]) -> str:
+    """Join the first few names."""
+    return " ".join(names[:MOST_NAMES]) + (" ..." if len(names) > MOST_NAMES else "")
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

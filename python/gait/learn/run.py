@@ -1,0 +1,153 @@
+"""One run of `gait learn`: read, solve, cycle, fit, write."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from gait.bindings.segment_prior import SegmentPrior
+from gait.errors import UsageError, UserError
+from gait.io import blob
+from gait.io.files import require_folder, require_writable
+from gait.learn.corpus import load, sources
+from gait.learn.corpus.load import RunNotes
+from gait.learn.cycles import verdict
+from gait.learn.mocap import points
+from gait.learn.mocap.markers import plain
+from gait.learn.options import LearnOptions
+from gait.learn.prior import fit, model
+from gait.learn.report import page, summary
+from gait.learn.segments import fit as segment_fit
+from gait.learn.segments import summary as segment_summary
+from gait.learn.segments.corpus import Corpus
+from gait.learn.solve.readers import SUFFIXES
+from gait.progress import progress
+from gait.reproducible import one_thread
+
+MOST_LINES = 20  # about files left out
+MOST_NAMES = 6  # of labels
+
+Note = Callable[[str], None]
+
+
+def run(options: LearnOptions, note: Note = lambda line: None) -> dict[str, Any]:
+    """Learn a model, write it and its report, and return the figures of `report.summary`.
+
+    `note` gets lines that a user should know.  UsageError or UserError with one line if it cannot be done.
+    """
+    check(options, note)
+    with one_thread(), Corpus() as corpus:
+        loaded = _load(options, corpus, note)
+        if options.segments.source == "only":
+            return _segments_alone(options, corpus, loaded.refused)
+        learned = fit.fit(loaded.sequences, options, loaded.others)
+        _note_all(summary.notes(learned, options), note)
+        prior = _segment_prior(options, corpus, note)
+        sections = model.sections(learned, options)
+        data = blob.write(options.output, sections | (segment_fit.sections(prior) if prior else {}))
+        if options.report:
+            try:
+                page.write(Path(options.report), learned, options, loaded.refused, options.quiet)
+            except BaseException:
+                print(f"{options.output}: the model is written; the report is not", file=sys.stderr)
+                raise
+        return summary.summary(learned, data, loaded.refused, prior, bool(options.report))
+
+
+def check(options: LearnOptions, note: Note) -> None:
+    """Refuse before the work what would fail after it."""
+    if options.report and options.segments.source == "only":
+        raise UsageError("--report draws the cyclic model; leave it out, or --segments only")
+    if options.activity.lower() not in verdict.NAMES:
+        names = ", ".join(verdict.NAMES)
+        note(f"--activity {options.activity}: none of {names}: any cyclic motion is learnt")
+    output, report = Path(os.path.realpath(options.output)), options.report
+    if output.suffix.lower() in (*SUFFIXES, ".asf"):
+        raise UsageError(
+            f"-o {options.output}: is named like a recording; name the model M.gait, and sources before -o"
+        )
+    read = [*options.sources, *([str(options.markers.path)] if options.markers else [])]
+    if any(os.path.realpath(path) == str(output) for path in read if path):
+        raise UsageError(f"-o {options.output}: is also read; name the model otherwise")
+    if report and output in ((folder := Path(os.path.realpath(report))), *folder.parents):
+        raise UsageError(f"--report {report}: the model goes to {options.output}; name another folder")
+    require_writable(options.output)
+    if report:
+        require_folder(report)
+        page.require_own(Path(report))
+
+
+def _load(options: LearnOptions, corpus: Corpus, note: Note) -> load.Loaded:
+    """Find and prepare the files; report which were left out and what the readers noticed."""
+    files, closed = sources.find(options.sources, options.exclude, note)
+    markers, notes = options.markers, RunNotes()
+    if markers and not any(path.suffix.lower() in points.SUFFIXES for path, _ in files):
+        note(f"--markers {markers.path}: not used: no file is a {' or '.join(points.SUFFIXES)}")
+    different: list[str] = []
+    with progress("measuring people", None, options.quiet) as update:
+        shared = load.shared_lengths(files, options, update, different.append)
+    _note_all(different, note)
+    with progress("reading motion", len(files), options.quiet) as update:
+        try:
+            loaded = load.load_all(files, options, update, corpus=corpus, shared=shared, notes=notes)
+        except UserError as error:
+            if isinstance(error, load.NothingLeft):
+                _note_left_out(closed + error.refused[1:], "", note)
+            _note_all(_hints(options, notes), note)  # they may be the reason
+            raise
+    refused = closed + loaded.refused
+    _note_left_out(refused, " (see --json or --report)", note)
+    _note_all(_hints(options, notes), note)
+    return loaded._replace(refused=refused)
+
+
+def _hints(options: LearnOptions, notes: RunNotes) -> Iterator[str]:
+    """Yield what the readers noticed; a marker map may serve several sets, but not a misspelt label."""
+    if options.markers and notes.labels:
+        absent = [repr(name) for name in options.markers.named if plain(name) not in notes.labels]
+        if absent:
+            names = ", ".join(absent[:MOST_NAMES]) + (" ..." if len(absent) > MOST_NAMES else "")
+            yield f"--markers {options.markers.path}: no file has a marker {names}; check the spelling"
+    if notes.zeros:
+        (path, zeros), others = notes.zeros[0], len(notes.zeros) - 1
+        more = f" (and similar in {others} more file{'s' * (others > 1)})" if others else ""
+        yield f"{path}: exactly 0: {zeros}{more}; if that is missing data, give --zeros-missing"
+
+
+def _segment_prior(options: LearnOptions, corpus: Corpus, note: Note) -> SegmentPrior | None:
+    """Learn the segment prior beside a cyclic model; without enough segments, note why instead of failing."""
+    if options.segments.source == "none":
+        return None
+    try:
+        return segment_fit.fit(corpus.recordings(), options.segments)
+    except UserError as error:
+        note(f"no segment prior: {error}")
+        return None
+
+
+def _segments_alone(options: LearnOptions, corpus: Corpus, refused: list[str]) -> dict[str, Any]:
+    """Learn and write a segment prior without a cyclic model."""
+    recordings = corpus.recordings()
+    prior = segment_fit.fit(recordings, options.segments)
+    names = [model.shortened(r.name) for r in recordings[: model.MOST_ROWS]]
+    origin = model.origin(options, [r.source for r in recordings])
+    meta = model.meta_section(origin | {"recordings": names})
+    data = blob.write(options.output, {"META": meta, **segment_fit.sections(prior)})
+    figures = segment_summary.summary(prior)
+    crc = f"{blob.checksum(data):08x}"
+    return {"bytes": len(data), "crc32": crc, "left_out": refused, "segments": figures}
+
+
+def _note_all(lines: Iterable[str], note: Note) -> None:
+    for line in lines:
+        note(line)
+
+
+def _note_left_out(refused: list[str], more: str, note: Note) -> None:
+    """Report which files were left out."""
+    _note_all((f"left out: {line}" for line in refused[:MOST_LINES]), note)
+    if len(refused) > MOST_LINES:
+        note(f"left out: {len(refused) - MOST_LINES} more{more}")

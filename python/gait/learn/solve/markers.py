@@ -1,0 +1,173 @@
+"""Bodies from markers on the skin: the skeleton fitted to them stands for the person.
+
+What the markers of a frame do not determine is missing there: a joint, an axis or the pelvis is NaN where its
+standard deviation by the fit's covariance is too large.  Nothing is interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from gait.body.skeleton import JOINTS, SIDES, default_skeleton
+from gait.errors import UserError
+from gait.learn.arrays import Floats
+from gait.learn.mocap.markers import Landmark, MarkerMap, known_landmarks, plain
+from gait.learn.solve import skeleton_fit
+from gait.learn.solve.body import RECORDED, Body
+from gait.learn.solve.kinematics import HINGES, SEGMENTS, pose_skeleton, segment_origins, segment_scales
+from gait.learn.solve.skeleton_fit import LengthInformation
+
+FEWEST_LABELS = 6
+JOINT_SD = 0.03  # metres beyond which a joint is not known
+AXIS_SD = np.radians(15)  # beyond which a direction is not known
+WORST_RMS = 0.05  # metres: with a larger one, markers are not where their labels place them
+CHUNK = 512  # frames processed at once
+LEGS = [f"{s}_{joint}" for s in SIDES for joint in ("hip", "knee", "ankle")]
+
+
+def from_markers(
+    path: Path,
+    labels: list[str],
+    points: Floats,
+    fps: float,
+    marker_map: MarkerMap | None = None,
+    log_scales: Floats | None = None,
+) -> Body:
+    """Fit the skeleton to markers (T, M, 3): metres, any axis up, NaN where missing.
+
+    Without a marker map the labels of known sets are used.  `log_scales` (S,) are the person's, if other
+    recordings show them too; by default they are fitted.  UserError if too few labels are known, or the
+    markers do not fit a body.
+    """
+    points = np.where(np.isfinite(points).all(axis=2, keepdims=True), points, np.nan)
+    columns, places = _placed(path, labels, points, marker_map)
+    fit = skeleton_fit.fit(points[:, columns], places, log_scales)
+    own = {labels[k].rsplit(":", 1)[-1]: points[:, k] for k in columns}
+    body = from_fit(path.stem, fps, fit, own)
+    if not body.residual or not body.residual < WORST_RMS:
+        worst = labels[columns[int(np.nanargmax(np.nanmedian(fit.residual, axis=0)))]]
+        rms = 1000 * (body.residual or 0)
+        raise UserError(
+            f"{path}: the markers do not fit a body (rms {rms:.0f} mm, worst {worst!r})"
+            "; check labels and units, or give a --markers file"
+        )
+    unknown = [name for name in LEGS if not np.isfinite(body.joints[name]).any()]
+    if unknown:
+        raise UserError(
+            f"{path}: the known markers do not determine {unknown[0]!r}; name more in a --markers file"
+        )
+    return body
+
+
+def length_information(
+    path: Path, labels: list[str], points: Floats, marker_map: MarkerMap | None = None
+) -> LengthInformation | None:
+    """Return what markers show of the person's length scales; None if they do not fit a body.
+
+    Parameters and errors are those of `from_markers`.
+    """
+    columns, places = _placed(path, labels, points, marker_map)
+    found, rms = skeleton_fit.length_information(points[:, columns], places)
+    return found if rms < WORST_RMS else None
+
+
+def _placed(
+    path: Path, labels: list[str], points: Floats, marker_map: MarkerMap | None
+) -> tuple[list[int], skeleton_fit.Points]:
+    """Return the columns of the known markers and their places on the skeleton; some frames can be fitted."""
+    places = assign(path, labels, points, marker_map)
+    columns = list(places)
+    if not skeleton_fit.has_enough(points[:, columns]):
+        raise UserError(f"{path}: fewer than three known markers in every frame; see --markers")
+    return columns, skeleton_fit.Points(
+        segment=np.array([SEGMENTS.index(places[k].segment) for k in columns], np.intp),
+        at=np.array([places[k].at for k in columns]),
+        sd=np.array([places[k].sd for k in columns]),
+    )
+
+
+def assign(
+    path: Path, labels: list[str], points: Floats, marker_map: MarkerMap | None
+) -> dict[int, Landmark]:
+    """Return the landmark of each column whose marker is known and ever seen.
+
+    In a file of several subjects ("Anna:LASI") the one with most known markers is taken.
+    """
+    visible = [k for k in range(len(labels)) if np.isfinite(points[:, k]).all(axis=1).any()]
+    best: dict[int, Landmark] = {}
+    for subject in sorted({_subject(labels[k]) for k in visible}):
+        own = [k for k in visible if _subject(labels[k]) == subject]
+        known = marker_map.landmarks if marker_map else known_landmarks([labels[k] for k in own])
+        columns = {plain(labels[k]): k for k in reversed(own)}
+        places = {columns[label]: known[label] for label in columns if label in known}
+        best = max(best, places, key=len)
+    if len(best) < FEWEST_LABELS:
+        examples = ", ".join(labels[k] for k in visible[:5])
+        remedy = 'name more in it, or its "set"' if marker_map else "name them in a --markers file"
+        where = f" with {marker_map.path}" if marker_map else ""
+        raise UserError(
+            f"{path}: {len(best)} of {len(visible)} marker labels are known{where} ({examples} ...); {remedy}"
+        )
+    return dict(sorted(best.items()))
+
+
+def _subject(label: str) -> str:
+    return label.rsplit(":", 1)[0] if ":" in label else ""
+
+
+def from_fit(
+    name: str, fps: float, fit: skeleton_fit.Fit, markers: Mapping[str, Floats] | None = None
+) -> Body:
+    """Return the body of a fitted skeleton, with markers (T, 3) by label, z up, uncertain parts missing."""
+    positions, axes = _certain(fit)
+    joints = {joint: positions[:, k] for k, joint in enumerate(JOINTS)}
+    joints["head"] = joints.pop("head_top")
+    joints |= {RECORDED + label: places for label, places in (markers or {}).items()}
+    rotation_sd = np.sqrt(np.trace(fit.covariance[:, 3:6, 3:6], axis1=1, axis2=2))
+    pelvis = np.where((rotation_sd < AXIS_SD)[:, None, None], fit.pose.rotation, np.nan)
+    up = _z_up(fit.pose.rotation[np.isfinite(pelvis[:, 0, 0])])
+    return Body(
+        name,
+        fps,
+        {joint: place @ up.T for joint, place in joints.items()},
+        up @ pelvis,
+        {hinge: axes[:, k] @ up.T for k, hinge in enumerate(HINGES)},
+        residual=float(np.sqrt(np.nanmean(fit.residual**2))),
+    )
+
+
+def _certain(fit: skeleton_fit.Fit) -> tuple[Floats, Floats]:
+    """Joints (T, P, 3) and axes of `HINGES` (T, 5, 3), NaN where their standard deviation is too large."""
+    skeleton, origins = default_skeleton(), segment_origins(fit.log_scales)
+    segment = np.array(skeleton.point_frames, np.intp)
+    local = segment_scales(fit.log_scales)[segment] * skeleton.point_positions
+    hinged = np.array([SEGMENTS.index(part) for part in HINGES.values()])
+    points, axes = [], []
+    for first in range(0, len(fit.pose), CHUNK):
+        chunk = slice(first, first + CHUNK)
+        posed, covariance = pose_skeleton(fit.pose[chunk], origins), fit.covariance[chunk]
+        place, left = posed.points(local, segment), posed.rotations[:, hinged][..., 1]
+        unsure = _sd(posed.by_pose(place, segment), covariance) > JOINT_SD
+        points.append(np.where(unsure[..., None], np.nan, place))
+        unsure = _sd(posed.directions_by_pose(left, hinged), covariance) > AXIS_SD
+        axes.append(np.where(unsure[..., None], np.nan, left))
+    return np.concatenate(points), np.concatenate(axes)
+
+
+def _sd(slopes: Floats, covariance: Floats) -> Floats:
+    """Return the standard deviations (T, P) of vectors with derivatives (T, P, 3, 30)."""
+    frames, count = slopes.shape[:2]
+    rows = slopes.reshape(frames, 3 * count, -1)
+    return np.sqrt(((rows @ covariance) * rows).sum(axis=2).reshape(frames, count, 3).sum(axis=2))
+
+
+def _z_up(pelvis: Floats) -> Floats:
+    """Rotation to z up; up is the axis of the file that is nearest to the pelvis's own."""
+    up = pelvis[:, :, 2].mean(axis=0) if len(pelvis) else np.array([0.0, 0, 1])
+    k = int(np.argmax(np.abs(up)))
+    z = np.eye(3)[k] * np.sign(up[k])
+    x = np.eye(3)[(k + 1) % 3]
+    return np.stack([x, np.cross(z, x), z])

@@ -1,0 +1,64 @@
+"""Figures of reports: what those of learning and lifting share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+_ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "toe")
+#: Chains of joints of a stick figure: centre, left, right.
+STICKS = {
+    "c": [["head_top", "neck", "pelvis"], ["l_shoulder", "neck", "r_shoulder"], ["l_hip", "pelvis", "r_hip"]],
+    **{
+        s: [[f"{s}_{j}" for j in _ARM], [f"{s}_{j}" for j in _LEG], [f"{s}_ankle", f"{s}_heel", f"{s}_toe"]]
+        for s in "lr"
+    },
+}
+
+
+@dataclass
+class Drawing:
+    """A figure of a report."""
+
+    stem: str  #: of its PNG file
+    heading: str
+    caption: str
+    figure: Figure
+
+
+def grid(
+    rows: int,
+    columns: int,
+    width: float,
+    height: float,
+    sharex: bool = False,
+    sharey: Literal["none", "row", "all"] = "none",
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `width` x `height` inches and its axes, row by row."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = list(figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False).ravel())
+    for each in axes:
+        plain(each)
+    return figure, axes
+
+
+def plain(axes: Axes) -> None:
+    """Style axes: a faint grid and no box."""
+    axes.grid(alpha=0.25, lw=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=8)
+
+
+def line_legend(
+    figure: Figure, entries: dict[str, str], centred: bool = False, title: str | None = None
+) -> None:
+    """Add a legend above the figure: words to the colours of lines."""
+    figure.legend(
+        [Line2D([], [], color=colour, lw=2) for colour in entries.values()], list(entries),
+        loc="outside upper center" if centred else "outside upper right", ncols=len(entries),
+        fontsize=8, frameon=False, title=title, title_fontsize=8,
+    )  # fmt: skip
