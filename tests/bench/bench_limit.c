@@ -66,7 +66,7 @@ typedef struct arrays {
     uint32_t frame[2][LIMIT_SIZE * LIMIT_SIZE];
     limit_limb limb[LIMBS];
     int32_t parent[LIMIT_PARTICLES];
-    uint8_t seen[2][BYTES];
+    uint8_t samples[2][BYTES];
     float cost[LIMBS];
 } arrays;
 
@@ -76,7 +76,8 @@ bool bench_limit_make(bench_limit *b, uint32_t cpu_mask, message *why)
     *b = (bench_limit){.memory = a};
     if (!a)
         return message_set(why, "not enough memory for the limit kernel");
-    b->work = (limit_work){a->frame[0], a->frame[1], a->limb, a->parent, a->seen[0], a->seen[1], a->cost};
+    b->work =
+        (limit_work){a->frame[0], a->frame[1], a->limb, a->parent, a->samples[0], a->samples[1], a->cost};
     choose(b, cpu_mask & gait_cpu_features());
     draw(a->frame[0], 1);
     draw(a->frame[1], 2);

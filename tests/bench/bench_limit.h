@@ -16,7 +16,7 @@ typedef struct limit_work {
     const uint32_t *now, *then; /* LIMIT_SIZE^2 pixels, each with its three neighbours: one word a look-up */
     const limit_limb *limb;     /* [particles][limbs] */
     const int32_t *parent;      /* [particles], ascending */
-    uint8_t *seen;              /* [particles][limbs][samples] of the present */
+    uint8_t *samples;           /* [particles][limbs][samples] of the present */
     const uint8_t *known;       /* the same of the ancestors, in the previous frame */
     float *cost;                /* [particles][limbs] */
 } limit_work;
@@ -24,8 +24,7 @@ typedef struct limit_work {
 typedef void limit_kernel(const limit_work *w);
 
 typedef struct bench_limit {
-    limit_kernel *both,
-        *kept; /* both frames looked up; the ancestor's samples kept from the previous frame */
+    limit_kernel *both, *kept; /* both frames read; the ancestor's samples kept from the previous frame */
     limit_work work;
     void *memory;
 } bench_limit;

@@ -8,7 +8,7 @@
 limit_kernel KERNEL(limit_both), KERNEL(limit_kept);
 
 /* Samples of one limb: 16 along it, 4 across. */
-static void look(const uint32_t *restrict frame, const limit_limb *l, int32_t *restrict out)
+static void read_points(const uint32_t *restrict frame, const limit_limb *l, int32_t *restrict out)
 {
     for (int32_t i = 0; i < LIMIT_SAMPLES; i++) {
         float const s = (float)(i % 16) * (1.0f / 15), t = (float)(i / 16) * (2.0f / 3) - 1.0f;
@@ -36,8 +36,8 @@ void KERNEL(limit_both)(const limit_work *w)
     for (int32_t p = 0; p < LIMIT_PARTICLES; p++)
         for (int32_t l = 0; l < LIMIT_LIMBS; l++) {
             int32_t now[LIMIT_SAMPLES], then[LIMIT_SAMPLES];
-            look(w->now, &w->limb[p * LIMIT_LIMBS + l], now);
-            look(w->then, &w->limb[w->parent[p] * LIMIT_LIMBS + l], then);
+            read_points(w->now, &w->limb[p * LIMIT_LIMBS + l], now);
+            read_points(w->then, &w->limb[w->parent[p] * LIMIT_LIMBS + l], then);
             w->cost[p * LIMIT_LIMBS + l] = difference(now, then);
         }
 }
@@ -48,11 +48,11 @@ void KERNEL(limit_kept)(const limit_work *w)
         for (int32_t l = 0; l < LIMIT_LIMBS; l++) {
             int32_t now[LIMIT_SAMPLES], then[LIMIT_SAMPLES];
             const uint8_t *const known = w->known + (w->parent[p] * LIMIT_LIMBS + l) * LIMIT_SAMPLES;
-            uint8_t *const seen = w->seen + (p * LIMIT_LIMBS + l) * LIMIT_SAMPLES;
-            look(w->now, &w->limb[p * LIMIT_LIMBS + l], now);
+            uint8_t *const out = w->samples + (p * LIMIT_LIMBS + l) * LIMIT_SAMPLES;
+            read_points(w->now, &w->limb[p * LIMIT_LIMBS + l], now);
             for (int32_t i = 0; i < LIMIT_SAMPLES; i++) {
                 then[i] = known[i];
-                seen[i] = (uint8_t)now[i];
+                out[i] = (uint8_t)now[i];
             }
             w->cost[p * LIMIT_LIMBS + l] = difference(now, then);
         }

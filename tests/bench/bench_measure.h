@@ -1,7 +1,7 @@
 /* bench_measure.h - trackers over a scene: time of a step, of its stages, memory, digest.
  *
  * What is compared takes turns, a few steps each, and a ratio is the median over the steps: other programs, the clock
- * and the host of a virtual machine change a processor's speed by more than what is to be told apart. */
+ * and the host of a virtual machine change a processor's speed by more than the differences to be measured. */
 #ifndef BENCH_MEASURE_H
 #define BENCH_MEASURE_H
 #include "bench_scene.h"

@@ -3,7 +3,7 @@
 #define BENCH_REPORT_H
 #include "bench_measure.h"
 
-/* Results of trackers that take turns, kept until the program ends; NULL (why says so) when it fails. */
+/* Results of trackers that take turns, kept until the program ends; NULL, with the reason in `why`, when it fails. */
 const bench_result *bench_report_measure(const gait_model *model, const bench_plan *plans, int32_t count,
                                          message *why);
 /* A time of something else than a tracker: CPU milliseconds. */

@@ -77,7 +77,7 @@ bool bench_scene_make(bench_scene *s, const gait_model *model, int32_t width, in
         particle_state.pelvis[0] += particle_state.stature * info.stride_hz * info.stride_length / FPS;
     }
     free(ids);
-    return ok || message_set(why, "the walker cannot be drawn");
+    return ok || message_set(why, "the person cannot be drawn");
 }
 
 void bench_scene_free(bench_scene *s)

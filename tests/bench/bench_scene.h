@@ -1,4 +1,4 @@
-/* bench_scene.h - a drawn walker who crosses a textured scene, in colour, at the same size whatever the picture's. */
+/* bench_scene.h - a drawn person who crosses a textured scene, in colour, at the same size in images of any size. */
 #ifndef BENCH_SCENE_H
 #define BENCH_SCENE_H
 #include "trackd/common.h"

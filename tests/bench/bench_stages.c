@@ -17,7 +17,7 @@ const char *const bench_stage_name[BENCH_STAGES] = {
 };
 
 static struct {
-    bool on, weighing;          /* weighing: on, and inside the particles' likelihood */
+    bool on, in_likelihood;     /* in_likelihood: on, and inside the particles' likelihood */
     int within;                 /* whole stages that have begun, */
     double inner_ns;            /* and the time of those that began within the last */
     const kernels *plain;       /* of the tracker */
@@ -26,8 +26,8 @@ static struct {
     double ns[BENCH_STAGES];    /* of whole stages, */
     double ticks[BENCH_STAGES]; /* and of parts of the likelihood */
     double cells, bodies;       /* of the silhouettes counted */
-    double surface, edges;      /* points in sight of every SPARSE-th body */
-    int64_t looked, counted;    /* bodies; those whose points were counted */
+    double surface, edges;      /* visible points of every SPARSE-th body */
+    int64_t evaluated, counted; /* bodies; those whose points were counted */
 } b;
 
 enum { SPARSE = 64 }; /* counting takes time that the stages should not have */
@@ -73,9 +73,9 @@ static void calibrate(void)
 /* `call`, timed as part of the likelihood. */
 #define PART(stage, call)                                                                                    \
     do {                                                                                                     \
-        uint64_t const since_ = b.weighing ? now() : 0;                                                      \
+        uint64_t const since_ = b.in_likelihood ? now() : 0;                                                 \
         call;                                                                                                \
-        if (b.weighing)                                                                                      \
+        if (b.in_likelihood)                                                                                 \
             add(stage, since_);                                                                              \
     } while (0)
 
@@ -117,7 +117,7 @@ static int32_t shown_of(const struct like_body *body)
 static void edges_count(const struct like_body *body, struct like_edge_tally *out)
 {
     b.plain->edges_count(body, out);
-    if (b.looked++ % SPARSE == 0 && body->samples) {
+    if (b.evaluated++ % SPARSE == 0 && body->samples) {
         b.surface += shown_of(body);
         b.edges += out->points;
         b.counted++;
@@ -137,9 +137,9 @@ static void surface_pose(const struct like_setup *s, const gait_camera *cam, con
 }
 
 static void surface_sample(const struct like_setup *s, const struct features *f, const struct like_pose *pose,
-                           int32_t lane, const struct layers *drawn, struct like_patch *seen)
+                           int32_t lane, const struct layers *drawn, struct like_patch *out)
 {
-    PART(STAGE_SAMPLES, b.plain->surface_sample(s, f, pose, lane, drawn, seen));
+    PART(STAGE_SAMPLES, b.plain->surface_sample(s, f, pose, lane, drawn, out));
 }
 
 static void texture_costs(const struct like_body *body, int32_t (*cost)[BLOCK])
@@ -252,9 +252,9 @@ WRAP(bool, hypotheses_resample, (gait_tracker * t, uint32_t counter))
 
 WRAP(void, likelihood_step, (gait_tracker * t))
 {
-    b.weighing = b.on;
+    b.in_likelihood = b.on;
     WHOLE(STAGE_LIKELIHOOD, __real_likelihood_step(t));
-    b.weighing = false;
+    b.in_likelihood = false;
 }
 
 /* Tasks that belong to no stage predict the particles, or begin stages of their own. */
@@ -262,7 +262,7 @@ WRAP(void, task_run_beside,
      (const gait_tasks *exec, int32_t tasks, void (*beside)(void *ctx), int32_t items, int32_t block,
       task_range_fn *fn, void *ctx))
 {
-    if (b.weighing || b.within)
+    if (b.in_likelihood || b.within)
         __real_task_run_beside(exec, tasks, beside, items, block, fn, ctx);
     else
         WHOLE(STAGE_PROPAGATE, __real_task_run_beside(exec, tasks, beside, items, block, fn, ctx));

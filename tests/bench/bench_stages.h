@@ -37,7 +37,7 @@ void bench_stages_enable(gait_tracker *t, bool on);
 /* Milliseconds of a stage since the last call for it. */
 double bench_stages_take(int stage);
 /* What a likelihood compares, means over bodies while stages were timed: cells of the silhouette's grid that the body
- * covers; points of its surface and of its edges that are in sight and looked up, of those it has. */
+ * covers; points of its surface and of its edges that are visible and read, of those it has. */
 typedef struct bench_samples {
     double cells, surface, edges;
 } bench_samples;

@@ -7,10 +7,10 @@
 #include <stdlib.h>
 
 /* PARSEC bodytrack, one camera, 10,000 particles x 1 layer, one core of such a machine: quoted, not measured here.  Its
- * samples are points of edges and points inside the limbs that are looked up in a map of edges and in the foreground. */
+ * samples are points of edges and points inside the limbs that are points_read up in a map of edges and in the foreground. */
 static const double PARSEC_MS[2] = {43, 58};
 enum { PARSEC_SAMPLES = 481 };
-/* The texture-only limit on that machine, the most that was quoted: this machine's, in turns with what is judged, tells
+/* The texture-only limit on that machine, the most that was quoted: this machine's, in turns with what is judged, shows
  * how fast it is at the moment. */
 static const double LIMIT_MS = 17;
 
@@ -23,7 +23,7 @@ void verdict_size(verdict *v, const bench_result *r)
     v->most = cost > v->most ? cost : v->most;
 }
 
-/* Points of surface and edges that a body has; those out of sight are not looked up. */
+/* Points of surface and edges that a body has; hidden ones are not read. */
 static int32_t points(const gait_model *m)
 {
     enum { EDGE_POINTS = 16 }; /* of a limb: edges_count */
@@ -117,7 +117,7 @@ static void speed_lines(const verdict *v)
 static void kernel_lines(const verdict *v)
 {
     const bench_result *const best = v->isa[v->isas - 1];
-    bench_samples const seen = bench_stages_samples();
+    bench_samples const visible = bench_stages_samples();
     double const limit_ns = 1e6 / ((double)LIMIT_PARTICLES * LIMIT_LIMBS * LIMIT_SAMPLES),
                  stage_ns = 1e6 * best->stage_ms[STAGE_LIKELIHOOD] / best->particles;
     for (int k = 0; k < v->isas; k++)
@@ -131,28 +131,28 @@ static void kernel_lines(const verdict *v)
          "times");
     printf("    a sample of the limit %.2f ns with two look-ups, %.2f with one; the stage %.2f ns for each "
            "point of\n"
-           "    surface and edges in sight, the silhouette and all else included\n",
-           limit_ns * best->limit_ms, limit_ns * best->kept_ms, stage_ns / (seen.surface + seen.edges));
+           "    visible surface and edges, the silhouette and all else included\n",
+           limit_ns * best->limit_ms, limit_ns * best->kept_ms, stage_ns / (visible.surface + visible.edges));
 }
 
 static void parsec_lines(const verdict *v, const gait_model *m)
 {
     const bench_result *const best = v->isa[v->isas - 1], *const many = v->many[0].one;
-    bench_samples const seen = bench_stages_samples();
-    double const looked = seen.surface + seen.edges, ours = looked + seen.cells;
+    bench_samples const visible = bench_stages_samples();
+    double const points_read = visible.surface + visible.edges, ours = points_read + visible.cells;
     double const stage = best->stage_ms[STAGE_LIKELIHOOD], step = many->cpu_ms;
     double const rate = 1e-3 * best->particles, ns = 1e6 * stage / best->particles;
     line("a step against PARSEC bodytrack's 43 ms (quoted)", 0.5, step / PARSEC_MS[0], false, "times");
     line("    as the limit's time here against its 17 ms there", 0.5,
          many->limit_ratio * LIMIT_MS / PARSEC_MS[0], false, "times");
     line("samples per likelihood, as PARSEC counts: with the foreground", PARSEC_SAMPLES, ours, true, "");
-    printf("    of %d points %.0f of the surface and %.0f of the edges are in sight and looked up; %.0f "
+    printf("    of %d points %.0f of the surface and %.0f of the edges are visible and read; %.0f "
            "cells of the\n"
            "    silhouette, 64 of which are compared at once\n",
-           (int)points(m), seen.surface, seen.edges, seen.cells);
+           (int)points(m), visible.surface, visible.edges, visible.cells);
     printf(
         "    million samples a second: %.0f in a step (%.0f without the silhouette's); PARSEC %.0f to %.0f\n",
-        rate * ours / step, rate * looked / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],
+        rate * ours / step, rate * points_read / step, rate * PARSEC_SAMPLES / PARSEC_MS[1],
         rate * PARSEC_SAMPLES / PARSEC_MS[0]);
     printf("    likelihood stage: %.0f ns a particle\n", ns);
     printf("    whole step: %.0f thousand particles a second and core\n", best->particles / step);

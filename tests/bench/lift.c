@@ -61,7 +61,7 @@ static gait_lift_config config(uint32_t mask, int projection)
                              .R = {1, 0, 0, 0, 0, -1, 0, 1, 0},
                              .t = {0, 1, 6}};
     c.lag = settings.lag;
-    c.fit_threshold = 0.0; /* the walker is drawn, not real */
+    c.fit_threshold = 0.0; /* the person is drawn, not real */
     c.report = (1u << POINTS) - 1;
     c.cpu_mask = mask;
     return c;
@@ -77,8 +77,7 @@ static bool open_lift(bench *b, const gait_lift_config *c)
         b->memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
         b->bytes = bytes;
     }
-    ok = ok && b->memory &&
-         gait_lift_init(b->memory, bytes, b->file.model, c, &b->lift, &err) == GAIT_OK;
+    ok = ok && b->memory && gait_lift_init(b->memory, bytes, b->file.model, c, &b->lift, &err) == GAIT_OK;
     if (!ok)
         fprintf(stderr, "lift: %s: %s\n", settings.model, b->memory ? err.text : "not enough memory");
     return ok;
@@ -115,7 +114,8 @@ static bool stream(bench *b, uint32_t mask)
         see((double)i / RATE, b->uv);
         double const before = now();
         ok = gait_lift_push(b->lift, 1000 + (int64_t)i * 1000000 / RATE, b->uv, b->sd, NULL) == GAIT_OK;
-        bool const there = gait_lift_estimate(b->lift, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING;
+        bool const there =
+            gait_lift_estimate(b->lift, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING;
         double const us = now() - before;
         if (there && start_us == 0.0) {
             start_us = us; /* the heading was searched for */
@@ -163,7 +163,7 @@ static bool batch(bench *b, uint32_t mask)
     return true;
 }
 
-/* Room for BATCH segments in which the first 15 markers are seen. */
+/* Memory for BATCH segments in which the first 15 markers are observed. */
 static bool prepare(bench *b, message *why)
 {
     gait_error err = {0};
@@ -187,7 +187,7 @@ static void verdict(const bench *b)
            b->frame_us < WANTED_US ? "reached" : "MISSED");
     printf("batch by the gain, segments a second   >= %5.0f  %8.0f  %s\n", WANTED_SEGMENTS, b->segments,
            b->segments >= WANTED_SEGMENTS ? "reached" : "MISSED");
-    printf("(gain: the matrix from pixels to the mean, computed once while the same points are seen)\n");
+    printf("(gain: the matrix from pixels to the mean, computed once while the same points are observed)\n");
 }
 
 int main(int argc, char **argv)

@@ -1,4 +1,4 @@
-/* step.c - speed of the tracker on a drawn walker: by instruction set, particles, threads and picture size, where the
+/* step.c - speed of the tracker on a drawn person: by instruction set, particles, threads and picture size, where the
  * time of a step goes, and how that compares with what was asked for. */
 #include "bench_limit.h"
 #include "bench_report.h"
@@ -291,7 +291,7 @@ int main(int argc, char **argv)
     message why = {""};
     option_result const parsed = options_parse(table, count, argc, argv, &why);
     if (parsed == OPTION_HELP) {
-        printf("usage: step [options]\n\nTime the tracker on a drawn walker.\n\n");
+        printf("usage: step [options]\n\nTime the tracker on a drawn person.\n\n");
         options_help(table, count);
         return 0;
     }
