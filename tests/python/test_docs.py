@@ -249,6 +249,8 @@ def test_options_named_in_the_text_exist():
     known |= {"--version", "--record", "--runs", "--preload-nanny", "--static", "--strict"}  # of others
     unknown = []
     for page in PAGES:
+        if page.name == "changelog.md":  # which lists old names
+            continue
         text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
         quoted = re.findall(r"`([^`\n]+)`", text)
         options = [o for words in quoted for o in re.findall(r"(?<![\w-])--[a-z][\w-]*", words)]
