@@ -174,11 +174,11 @@ def root_error(scene, capsys, *options):
 
 def test_tracks_of_a_detector_help(scene, tracks, capsys):
     without, plain = root_error(scene, capsys)
-    helped, found = root_error(scene, capsys, "--tracks", tracks)
+    helped, found = root_error(scene, capsys, "--keypoints", tracks)
     assert helped < 0.85 * without and found != plain
-    _, vague = root_error(scene, capsys, "--tracks", tracks, "--tracks-sd", 40)
+    _, vague = root_error(scene, capsys, "--keypoints", tracks, "--keypoints-sd", 40)
     assert vague not in (plain, found)
-    assert track(scene, "--tracks", tracks) == 0
+    assert track(scene, "--keypoints", tracks) == 0
     assert "left out: nose\n" in capsys.readouterr().err
 
 
@@ -186,7 +186,7 @@ def test_tracks_of_other_frames_are_refused(scene, tracks, capsys):
     text = tracks.read_text().splitlines()
     late = [text[0], *(f"{i + 700}{row[row.index(',') :]}" for i, row in enumerate(text[1:]))]
     (scene / "late.csv").write_text("\n".join(late) + "\n")
-    assert track(scene, "--tracks", scene / "late.csv", out="fault.csv") == 1
+    assert track(scene, "--keypoints", scene / "late.csv", out="fault.csv") == 1
     assert "late.csv: has no frame that is tracked; number frames as in the" in capsys.readouterr().err
     assert not (scene / "fault.csv").exists()
 
@@ -198,7 +198,7 @@ FAULTS = [
     (["--background", "{}/none.png"], "none.png: no such background image"),
     (["--background", "{}/small.png"], "small.png: is 32x24, the video 320x240"),
     (["--background", "{}/other.png"], "other.png: half of frame 0 differs from it; give the empty scene"),
-    (["--background", "none", "--init", "auto"], "walk.mp4: --init auto found nobody in full view"),
+    (["--background", "none", "--init", "auto"], "walk.mp4: --init auto found no person in full view"),
     (["-m", "{}/camera.json"], "camera.json: .*"),
     (["-m", "{}/none.gait"], "none.gait: no such model file"),
     (["-o", "{}/none/out.csv"], "out.csv: folder .* does not exist"),
@@ -207,7 +207,7 @@ FAULTS = [
     (["-o", "{}/walk.mp4"], "walk.mp4: is read by this command; give the output another name"),
     (["--trc", "{}/init.json"], "init.json: is read by this command"),
     (["--trc", "{}/fault.csv"], "fault.csv: two outputs have this name"),
-    (["--tracks", "{}/none.csv"], "none.csv: no such file of tracks"),
+    (["--keypoints", "{}/none.csv"], "none.csv: no such file of keypoints"),
     (["--trc", "{}/none/o.trc"], "o.trc: folder .* does not exist"),
     (["--init", "{}/late.json"], "walk.mp4: no frame from 20 up to 20; it has 20"),
     (["--init", "auto", "--start", "500"], "walk.mp4: no frame from 500 up to 20; it has 20"),

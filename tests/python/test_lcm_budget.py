@@ -99,7 +99,7 @@ def test_particles_follow_the_budget_only_if_asked(url):
 
 
 def test_a_step_longer_than_the_budget_is_said_once(url):
-    with rig.daemon(url, "-n", 100_000, "--budget-ms", 20) as (listener, finish):
+    with rig.daemon(url, "-n", 40_000, "--budget-ms", 10) as (listener, finish):
         armed(listener)
         number = 0
         while len(listener.estimates) < 10:  # on a busy machine some are too old when they come
@@ -107,7 +107,7 @@ def test_a_step_longer_than_the_budget_is_said_once(url):
             number += 1
             listener.until(lambda: len(listener.estimates) + listener.last.dropped >= number, "a sign")  # noqa: B023
         outcome = finish()
-    assert outcome.words.count("more than the budget of 20.0: use fewer --particles") == 1
+    assert outcome.words.count("more than the budget of 10.0: use fewer --particles") == 1
     assert f" slow_steps {outcome.frames} " in outcome.printed
 
 

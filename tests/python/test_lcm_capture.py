@@ -19,10 +19,12 @@ def folder(tmp_path_factory):
     return rig.write_clip(tmp_path_factory.mktemp("clip"), COUNT)
 
 
-def capture(folder, url, *options, **how):
-    words = [folder / "video.mp4", "--camera", folder / "camera.json", "--rate", "max", "--url", url]
-    command = [str(rig.PYTHON), "-m", "gait", "capture", *map(str, [*words, *options])]
-    return subprocess.run(command, capture_output=True, text=True, timeout=rig.PATIENCE, check=False, **how)
+def words_of(folder, url):
+    return ["capture", folder / "video.mp4", "--camera", folder / "camera.json", "--rate", "max", "--url", url]
+
+
+def capture(folder, url):
+    return rig.gait(*words_of(folder, url))
 
 
 def one_line(done, code, words):
@@ -39,13 +41,14 @@ def test_a_full_disk_is_told(folder):
 def test_a_log_that_may_not_grow_is_told(folder, tmp_path, missing):
     log = tmp_path / "x.log"
     assert capture(folder, f"file://{log}?mode=w").returncode == 0
-    room = log.stat().st_size - missing
-    assert room > 0
+    limit = log.stat().st_size - missing
+    assert limit > 0
 
     def small():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-    done = capture(folder, f"file://{log}?mode=w", preexec_fn=small)
+    command = [str(rig.PYTHON), "-m", "gait", *map(str, words_of(folder, f"file://{log}?mode=w"))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, preexec_fn=small)
     one_line(done, 1, "x.log: the log cannot be written: File too large")
 
 
