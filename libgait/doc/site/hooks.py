@@ -16,9 +16,11 @@ from pathlib import Path
 
 from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.plugins import get_plugin_logger
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+LOG = get_plugin_logger(__name__)
 ROOT = Path(__file__).resolve().parents[3]
 DOC = "libgait/doc/"
 PLACES = {".github/CONTRIBUTING.md": "contributing.md"}
@@ -81,6 +83,13 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         parts += [_prose(markdown[at : fence.start()], here), _fence(fence[0])]
         at = fence.end()
     return "".join([*parts, _prose(markdown[at:], here)])
+
+
+def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
+    """Warn of what a page would load from the network."""
+    for loaded in re.findall(r"<(?:script|link|img|iframe)\b[^>]*(?:src|href)=\"?(https?:[^\"> ]+)", output):
+        LOG.warning("%s loads %s", page.file.src_uri, loaded)
+    return output
 
 
 def _prose(text: str, here: str) -> str:
