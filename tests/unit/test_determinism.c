@@ -122,7 +122,7 @@ static int print_digests(void)
            golden_print(digest_search, GOLDEN_SEARCH, "search");
 }
 
-/* The film of the search has all its stages: more particles, two sides, one of them given up. */
+/* The film of the search has all its stages: more particles, two hypotheses, one of them dropped. */
 static void test_search_is_decided(void)
 {
     gait_tracker_config const cfg = films_config(FILMS_SEARCH);
@@ -192,7 +192,7 @@ static void test_order(void)
     gait_tracker_config cfg = films_config(FILMS_USUAL);
     cfg.exec.run = run_backwards;
     CHECK(run(&cfg, 0) == GOLDEN);
-    CHECK(run(&cfg, 41) == GOLDEN); /* stopped right after a frame that nobody saw */
+    CHECK(run(&cfg, 41) == GOLDEN); /* stopped right after a frame without an image */
 }
 
 static void test_another_seed(void)

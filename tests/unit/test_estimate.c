@@ -12,7 +12,7 @@ enum { N = 40 };
 static gait_tracker *t;
 static particle_set *particles;
 
-/* Every particle the same plausible walker of weight 1/N, its joints zero. */
+/* Every particle the same plausible state, of weight 1/N, its joints zero. */
 static void reset(void)
 {
     particles = &t->particles;
@@ -32,7 +32,7 @@ static float normal(uint32_t index, uint32_t draw)
 }
 
 /* Weights that fall from the particle `best` on, normalised. */
-static void weigh(int32_t best)
+static void set_weights(int32_t best)
 {
     double sum = 0.0;
     for (int32_t i = 0; i < N; i++)
@@ -74,7 +74,7 @@ static void test_phase(void)
         reset();
         for (int32_t i = 0; i < N; i++)
             field(particles, F_PHASE)[i] = m_wrap1(centre[k] + 0.03f * normal((uint32_t)i, 1));
-        weigh(4);
+        set_weights(4);
         field(particles, F_PHASE)[4] = centre[k];
         resultant(field(particles, F_PHASE), 1.0, &mean, &length);
         gait_estimate const e = estimate(4);
@@ -94,7 +94,7 @@ static void test_heading(void)
         reset();
         for (int32_t i = 0; i < N; i++)
             field(particles, F_HEADING)[i] = m_wrap_pi(centre[k] + 0.1f * normal((uint32_t)i, 2));
-        weigh(7);
+        set_weights(7);
         field(particles, F_HEADING)[7] = centre[k];
         resultant(field(particles, F_HEADING), 1.0 / 6.283185307179586, &mean, &length);
         gait_estimate const e = estimate(7);
@@ -126,7 +126,7 @@ static void test_modes(void)
         for (int32_t best = 0; best < 2; best++) {
             double mass = 0.0, stature = 0.0, all = 0.0, square = 0.0;
             reset();
-            weigh(best);
+            set_weights(best);
             for (int32_t i = 0; i < N; i++) { /* even ones: group 0 */
                 field(particles, by_heading ? F_HEADING : F_PHASE)[i] =
                     i % 2 ? 0.2f + (by_heading ? 2.0f : 0.5f) : 0.2f + 0.001f * (float)i;
@@ -177,7 +177,7 @@ static void test_rotation(void)
     for (uint32_t round = 0; round < 8; round++) {
         double sum[9] = {0}, R[9], best = 0.0;
         reset();
-        weigh(3);
+        set_weights(3);
         for (uint32_t i = 0; i < N; i++) {
             float *const angle[] = {&field(particles, F_HEADING)[i], &field(particles, F_PITCH)[i],
                                     &field(particles, F_ROLL)[i]};
@@ -211,7 +211,7 @@ static void test_rotation(void)
 static void test_joints(void)
 {
     reset();
-    weigh(11);
+    set_weights(11);
     for (uint32_t i = 0; i < 3 * TOY_POINTS * N; i++)
         t->joint[i] = (float)(i / N % 7) + (0.1f + 0.01f * (float)(i / N)) * normal(i, 3);
     gait_estimate const e = estimate(11);
@@ -230,17 +230,17 @@ static void test_joints(void)
     CHECK(e.pose.joint[TOY_POINTS][0] == 0.0f && e.joint_sd[TOY_POINTS][1] == 0.0f); /* unused */
 }
 
-/* Of one camera whose start was in doubt about the stature: size and distance, by a share of both. */
+/* Of one camera whose start had an uncertain stature: size and distance, as a fraction of both. */
 static void test_size(void)
 {
     const gait_camera *const cam = &t->cfg.camera[0];
-    double const doubt = 0.02, share = 0.01 * doubt / sqrt(0.01 * 0.01 + doubt * doubt);
+    double const start_sd = 0.02, share = 0.01 * start_sd / sqrt(0.01 * 0.01 + start_sd * start_sd);
     reset();
-    weigh(11);
+    set_weights(11);
     for (uint32_t i = 0; i < 3 * TOY_POINTS * N; i++)
         t->joint[i] = 0.1f * (float)(i / N) + 0.02f * normal(i, 3);
     gait_estimate const sure = estimate(11);
-    t->core->stature_sd_ratio = (float)doubt;
+    t->core->stature_sd_ratio = (float)start_sd;
     gait_estimate const e = estimate(11);
     for (int p = 0; p < TOY_POINTS; p++)
         for (int k = 0; k < 3; k++) {
@@ -254,7 +254,7 @@ static void test_size(void)
     double const tall = share * (double)e.mean.stature;
     CHECK_NEAR(pow((double)e.sd.stature, 2.0), pow((double)sure.sd.stature, 2.0) + tall * tall, 1e-8);
     CHECK(e.sd.stature > sure.sd.stature && e.joint_sd[0][1] > sure.joint_sd[0][1]);
-    t->cfg.cameras = 2; /* two tell the distance */
+    t->cfg.cameras = 2; /* two measure the distance */
     gait_estimate const two = estimate(11);
     CHECK(memcmp(two.joint_sd, sure.joint_sd, sizeof sure.joint_sd) == 0);
     t->cfg.cameras = 1;
@@ -266,7 +266,7 @@ static void test_fields(void)
 {
     double mean[F_COEF + 4] = {0};
     reset();
-    weigh(2);
+    set_weights(2);
     for (uint32_t i = 0; i < N; i++)
         for (int f = 0; f < particles->fields; f++) {
             float *const v = &field(particles, f)[i];
@@ -314,7 +314,7 @@ static void test_fields(void)
     CHECK_NEAR(place.f[F_STATURE], mean[F_STATURE], 1e-6);
 }
 
-/* Sums of any number of particles at any address: every instruction set gives the same bits, whoever is in use
+/* Sums of any number of particles at any address: every instruction set gives the same bits, the particles in use
  * is marked and nothing else written; and they are what plain sums are. */
 static void test_sums(void)
 {

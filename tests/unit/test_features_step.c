@@ -1,4 +1,4 @@
-/* What the cameras see of a frame: regions, plates, formats, and whom they cannot see. */
+/* What the cameras see of a frame: regions, plates, formats, and persons out of view. */
 #include "tracker/features_step.h"
 
 #include "image/camera.h"
@@ -22,7 +22,7 @@ static gait_tracker *tracker(int32_t cameras, uint32_t terms)
     return t;
 }
 
-/* The region holds the whole walker, who is VIEW_PERSON tall in it. */
+/* The region contains the whole person, who is VIEW_PERSON tall in it. */
 static void test_region(void)
 {
     gait_tracker *const t = tracker(2, GAIT_TERM_EDGES);
@@ -105,7 +105,7 @@ static void test_formats(void)
     }
 }
 
-/* A walker behind the camera cannot be seen by it. */
+/* A person behind the camera is out of its view. */
 static void test_behind(void)
 {
     gait_tracker *const t = tracker(2, 0xf);

@@ -13,17 +13,17 @@ typedef struct history { /* what the test itself writes down of each step */
     gait_estimate estimate[SHOTS];
 } history;
 
-static history seen;
+static history recorded;
 
 static void note(const gait_tracker *t, int n, const gait_estimate *e)
 {
     float weight[PARTICLES];
-    CHECK(gait_tracker_particles(t, seen.state[n], weight, PARTICLES, NULL) == PARTICLES);
-    memcpy(seen.parent[n], t->filter.parent, sizeof seen.parent[n]);
-    seen.estimate[n] = *e;
+    CHECK(gait_tracker_particles(t, recorded.state[n], weight, PARTICLES, NULL) == PARTICLES);
+    memcpy(recorded.parent[n], t->filter.parent, sizeof recorded.parent[n]);
+    recorded.estimate[n] = *e;
 }
 
-/* Mean and deviation of the pelvis's x `back` steps before step n, and how many ancestors there are. */
+/* Mean and standard deviation of the pelvis's x `back` steps before step n, and how many ancestors there are. */
 static int by_hand(const gait_tracker *t, int n, int back, double *mean, double *sd)
 {
     bool used[PARTICLES] = {false};
@@ -33,8 +33,8 @@ static int by_hand(const gait_tracker *t, int n, int back, double *mean, double 
         for (int i = 0; i < PARTICLES; i++) {
             int a = i;
             for (int k = n; k > n - back; k--)
-                a = seen.parent[k][a];
-            double const x = (double)seen.state[n - back][a].pelvis[0], w = t->filter.weight[i];
+                a = recorded.parent[k][a];
+            double const x = (double)recorded.state[n - back][a].pelvis[0], w = t->filter.weight[i];
             sum += pass ? 0.0 : w * x;
             square += pass ? w * (x - sum) * (x - sum) : 0.0;
             used[a] |= w > 0.0;
@@ -54,7 +54,7 @@ static gait_tracker_config config(int32_t frames)
     return cfg;
 }
 
-/* Frame after frame, every lag: mean, deviation, time and the present itself. */
+/* Frame after frame, every lag: mean, standard deviation, time and the present itself. */
 static void test_ancestors(void)
 {
     gait_tracker_config const cfg = config(5);
@@ -73,8 +73,8 @@ static void test_ancestors(void)
             int const count = by_hand(t, n, back, &mean, &sd);
             CHECK_NEAR(past.pose.joint[0][0], mean, 2e-5);
             CHECK_NEAR(past.joint_sd[0][0], sd, 2e-5);
-            CHECK(past.utime == seen.estimate[n - back].utime && past.frame == (uint64_t)(n - back));
-            CHECK(past.flags == seen.estimate[n - back].flags);
+            CHECK(past.utime == recorded.estimate[n - back].utime && past.frame == (uint64_t)(n - back));
+            CHECK(past.flags == recorded.estimate[n - back].flags);
             CHECK(past.ess >= 1.0f && past.ess <= (float)count + 0.01f);
             fewer += back == 5 && count < PARTICLES / 2;
         }
@@ -134,7 +134,7 @@ static void test_limits(void)
     free(off);
 }
 
-/* What the following frames tell makes the pelvis's place along the way surer, on the whole. */
+/* The following frames reduce the mean uncertainty of the pelvis's place along the path. */
 static void test_surer(void)
 {
     gait_tracker_config const cfg = config(5);

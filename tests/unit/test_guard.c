@@ -32,14 +32,14 @@ static atomic_bool armed;
 static void *take(size_t align, size_t bytes)
 {
     if (armed) {
-        static const char said[] = "malloc between start and end\n";
-        ssize_t const written = write(2, said, sizeof said - 1);
+        static const char text[] = "malloc between start and end\n";
+        ssize_t const written = write(2, text, sizeof text - 1);
         (void)written;
         abort();
     }
-    size_t const step = align > HEAD ? align : HEAD, room = (bytes + step - 1) / step * step + step;
-    size_t const at = atomic_fetch_add(&used, room + step);
-    if (bytes > HEAP || at + room + step > HEAP) {
+    size_t const step = align > HEAD ? align : HEAD, taken = (bytes + step - 1) / step * step + step;
+    size_t const at = atomic_fetch_add(&used, taken + step);
+    if (bytes > HEAP || at + taken + step > HEAP) {
         errno = ENOMEM;
         return NULL;
     }
@@ -87,7 +87,7 @@ int posix_memalign(void **out, size_t align, size_t bytes)
 }
 
 /* ---- what is guarded ---- */
-/* After 50 frames of the walker 30 of a wall without anybody. */
+/* After 50 frames of the walk 30 of the empty scene. */
 enum { THREADS = 3, SHOTS = 50, GONE = 30, STEPS = 100 };
 static _Alignas(GAIT_ALIGN) unsigned char pool_memory[4096], memory[8 << 20], snapshot[8 << 20];
 static gait_state state[400];
@@ -156,8 +156,8 @@ static void test_lifting_allocates_nothing(void)
     c.sd = 1.0;
     gait_lift *l = NULL;
     armed = true;
-    bool ok = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_model, &c,
-                             &l, NULL) == GAIT_OK;
+    bool ok =
+        gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_model, &c, &l, NULL) == GAIT_OK;
     ok = ok && passer_segment(l, &c) && passer_stream(l, &c, 3 * PASSER_WAY);
     armed = false;
     CHECK(ok);
@@ -166,7 +166,7 @@ static void test_lifting_allocates_nothing(void)
 static void fall(int kind)
 {
     void *volatile p = malloc(8);
-    close(2); /* what it says is expected */
+    close(2); /* its message is expected */
     armed = true;
     if (kind == 0)
         p = malloc(8);

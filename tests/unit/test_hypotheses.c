@@ -1,4 +1,4 @@
-/* Left and right: two sides of the population that chance cannot end, and how one is given up. */
+/* Left and right: two hypotheses that sampling noise cannot eliminate, and how one is dropped. */
 #include "tracker/hypotheses.h"
 
 #include "toy_film.h"
@@ -46,8 +46,8 @@ static void test_a_known_phase_is_never_split(void)
     toy_tracker_free(t);
 }
 
-/* Half a stride apart; nobody changes sides; a side weighs what its odds say, however its particles fare. */
-static void test_sides_live_on(void)
+/* Half a stride apart; no particle changes its hypothesis; the weight of a hypothesis follows from the odds alone. */
+static void test_both_hypotheses_survive(void)
 {
     gait_tracker *const t = begin(0.5f);
     gait_estimate e;
@@ -71,8 +71,8 @@ static void test_sides_live_on(void)
     toy_tracker_free(t);
 }
 
-/* One side beyond doubt: the other's particles are replaced by its own. */
-static void test_the_loser_is_given_up(void)
+/* Once one hypothesis is certain, its particles replace those of the other. */
+static void test_the_loser_is_dropped(void)
 {
     for (int32_t winner = 0; winner < 2; winner++) {
         gait_tracker *const t = begin(0.5f);
@@ -92,7 +92,7 @@ static void test_the_loser_is_given_up(void)
     }
 }
 
-static double stature_spread(const gait_tracker *t)
+static double stature_sd(const gait_tracker *t)
 {
     const float *const x = field(&t->particles, F_STATURE);
     double sum = 0.0, square = 0.0;
@@ -106,7 +106,7 @@ static double stature_spread(const gait_tracker *t)
 /* Stature stays loose as long as left and right are open, and settles when they are known. */
 static void test_stature_settles_when_all_is_known(void)
 {
-    double spread[2];
+    double sd[2];
     for (int known = 0; known < 2; known++) {
         gait_tracker *const t = begin(0.5f);
         gait_estimate e;
@@ -118,10 +118,10 @@ static void test_stature_settles_when_all_is_known(void)
                 t->core->hypotheses.log_odds = known ? 30.0 : 0.0;
             film_step(t, 1, n, 0, &e);
         }
-        spread[known] = stature_spread(t);
+        sd[known] = stature_sd(t);
         toy_tracker_free(t);
     }
-    CHECK(spread[0] > 1.5 * spread[1]);
+    CHECK(sd[0] > 1.5 * sd[1]);
 }
 
 static void copy_into(gait_tracker *to, const gait_tracker *from)
@@ -177,7 +177,7 @@ static void test_open_odds_are_ambiguous(void)
     toy_tracker_free(t);
 }
 
-/* A frame's log-likelihood counts by the time since the images last supported the walker, also while a phase is
+/* A frame's log-likelihood counts by the time since the images last supported the estimate, also while a phase is
  * searched; in full at the start. */
 static void test_evidence_counts_by_time(void)
 {
@@ -205,8 +205,8 @@ int main(void)
     film_make(1, 46);
     test_evidence_counts_by_time();
     test_a_known_phase_is_never_split();
-    test_sides_live_on();
-    test_the_loser_is_given_up();
+    test_both_hypotheses_survive();
+    test_the_loser_is_dropped();
     test_open_odds_are_ambiguous();
     test_stature_settles_when_all_is_known();
     test_a_search_takes_more();

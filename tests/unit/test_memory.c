@@ -22,7 +22,7 @@ static size_t bytes_of(const gait_tracker_config *cfg)
     return bytes;
 }
 
-/* Too small by one, or misaligned: refused, with the need told and nothing touched. */
+/* Too small by one, or misaligned: refused, with the required size in the error and nothing written. */
 static void test_refused(void)
 {
     gait_tracker_config const cfg = toy_config(1);
@@ -30,13 +30,13 @@ static void test_refused(void)
     unsigned char *memory;
     gait_tracker *t = NULL;
     gait_error err = {0};
-    char told[32];
+    char required[32];
     if (posix_memalign((void **)&memory, GAIT_ALIGN, need + GAIT_ALIGN))
         abort();
     memset(memory, 0xc3, need + GAIT_ALIGN);
     CHECK(gait_tracker_init(memory, need - 1, toy_model(), &cfg, &t, &err) == GAIT_ERR_MEMORY && !t);
-    snprintf(told, sizeof told, "%zu", need);
-    CHECK(strstr(err.text, told) && err.result == GAIT_ERR_MEMORY);
+    snprintf(required, sizeof required, "%zu", need);
+    CHECK(strstr(err.text, required) && err.result == GAIT_ERR_MEMORY);
     CHECK(gait_tracker_init(memory, 0, toy_model(), &cfg, &t, NULL) == GAIT_ERR_MEMORY && !t);
     for (size_t off = 1; off < GAIT_ALIGN; off += 21)
         CHECK(gait_tracker_init(memory + off, need, toy_model(), &cfg, &t, NULL) == GAIT_ERR_MEMORY && !t);
@@ -88,7 +88,8 @@ static uint64_t walk_between_canaries(const gait_tracker_config *cfg, int fill)
     memset(memory, fill, need + 2 * CANARY);
     CHECK(gait_tracker_init(memory + CANARY, need, toy_model(), cfg, &t, NULL) == GAIT_OK);
     uint32_t const stages = walk(t, cfg);
-    CHECK((stages >> HYPOTHESES_TWO & 1u) == (cfg->acquisition_particles > 0) && stages >> HYPOTHESES_ONE & 1u);
+    CHECK((stages >> HYPOTHESES_TWO & 1u) == (cfg->acquisition_particles > 0) &&
+          stages >> HYPOTHESES_ONE & 1u);
     CHECK(intact(memory, fill) && intact(memory + CANARY + need, fill));
     uint64_t const digest = gait_tracker_digest(t);
     free(memory);
@@ -150,7 +151,7 @@ static void test_sizes(void)
     CHECK(bytes_of(&cfg) > base);
     cfg.cameras = 1;
     cfg.tasks = 5;
-    CHECK(bytes_of(&cfg) == base); /* nobody runs them at once */
+    CHECK(bytes_of(&cfg) == base); /* they do not run at once */
     cfg.exec.run = run_backwards;
     CHECK(bytes_of(&cfg) > base);
     cfg.tasks = 4;

@@ -4,7 +4,7 @@
 
 #include "check.h"
 
-enum { ROOM = 300, FEW = 100, SHOTS = 60 };
+enum { CAPACITY = 300, FEW = 100, SHOTS = 60 };
 
 static gait_tracker_config config(int32_t particles)
 {
@@ -20,12 +20,12 @@ static int32_t count(const gait_tracker *t)
 
 static void test_refused(void)
 {
-    gait_tracker_config const cfg = config(ROOM);
+    gait_tracker_config const cfg = config(CAPACITY);
     gait_tracker *const t = toy_tracker_new(&cfg);
     gait_error err = {0};
     CHECK(gait_tracker_set_particles(t, 15, &err) == GAIT_ERR_LIMIT && strstr(err.text, "300"));
-    CHECK(gait_tracker_set_particles(t, ROOM + 1, NULL) == GAIT_ERR_LIMIT);
-    CHECK(gait_tracker_set_particles(NULL, ROOM, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_set_particles(t, CAPACITY + 1, NULL) == GAIT_ERR_LIMIT);
+    CHECK(gait_tracker_set_particles(NULL, CAPACITY, NULL) == GAIT_ERR_ARG);
     toy_tracker_free(t);
 }
 
@@ -34,10 +34,10 @@ static bool same(const gait_estimate *a, const gait_estimate *b)
     return memcmp(a, b, sizeof *a) == 0;
 }
 
-/* Fewer in a large room give the bits of a tracker made for so many, lag included. */
-static void test_a_larger_room_changes_nothing(void)
+/* Fewer particles than the capacity give the bits of a tracker made for that number, lag included. */
+static void test_a_larger_capacity_changes_nothing(void)
 {
-    gait_tracker_config const large = config(ROOM), small = config(FEW);
+    gait_tracker_config const large = config(CAPACITY), small = config(FEW);
     gait_tracker *const a = film_tracker(&large, 0, 1.0f), *const b = film_tracker(&small, 0, 1.0f);
     CHECK(gait_tracker_set_particles(a, FEW, NULL) == GAIT_OK);
     toy_tracker_start(a, 0, 1.0f);
@@ -63,10 +63,10 @@ static double off(const gait_estimate *e, int n)
 
 static double total_weight(const gait_tracker *t)
 {
-    static gait_state state[ROOM];
-    static float weight[ROOM];
+    static gait_state state[CAPACITY];
+    static float weight[CAPACITY];
     double sum = 0.0;
-    int32_t const n = gait_tracker_particles(t, state, weight, ROOM, NULL);
+    int32_t const n = gait_tracker_particles(t, state, weight, CAPACITY, NULL);
     for (int32_t i = 0; i < n; i++)
         sum += (double)weight[i];
     return sum;
@@ -86,18 +86,18 @@ static gait_tracker *saved_and_restored(gait_tracker *t, const gait_tracker_conf
     return to;
 }
 
-/* 300, 40, 300: the walker is followed all the way, and what was seen before the change is still there. */
+/* 300, 40, 300: the person is tracked throughout, and the appearance learnt before the change is kept. */
 static uint64_t follow(int32_t threads, bool store)
 {
     static unsigned char memory[4096] __attribute__((aligned(GAIT_ALIGN)));
-    gait_tracker_config cfg = config(ROOM);
+    gait_tracker_config cfg = config(CAPACITY);
     gait_pool *pool = NULL;
     CHECK(gait_pool_init(memory, sizeof memory, threads, &pool, NULL) == GAIT_OK);
     cfg.exec = gait_pool_tasks(pool);
     gait_tracker *t = film_tracker(&cfg, 0, 1.0f);
     for (int n = 0; n < SHOTS; n++) {
         gait_estimate e;
-        int32_t const wanted = n < 10 || n >= 40 ? ROOM : 40;
+        int32_t const wanted = n < 10 || n >= 40 ? CAPACITY : 40;
         if (n == 10 || n == 40)
             CHECK(gait_tracker_set_particles(t, wanted, NULL) == GAIT_OK);
         film_step(t, 1, n, 0, &e);
@@ -107,7 +107,7 @@ static uint64_t follow(int32_t threads, bool store)
         CHECK(n < 5 || off(&e, n) < 0.1);
         if (n >= 10) {
             CHECK(gait_tracker_lagged(t, 5, &e, NULL) == GAIT_OK && off(&e, n - 5) < 0.1);
-            CHECK(e.ess >= 1.0f && e.ess <= (float)ROOM);
+            CHECK(e.ess >= 1.0f && e.ess <= (float)CAPACITY);
         }
         if (store && n == 25) {
             t = saved_and_restored(t, &cfg);
@@ -128,9 +128,9 @@ static void test_down_and_up(void)
 }
 
 /* While left and right are open the two sides keep their particles. */
-static void test_waits_while_forked(void)
+static void test_waits_while_split(void)
 {
-    gait_tracker_config const cfg = config(ROOM);
+    gait_tracker_config const cfg = config(CAPACITY);
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
     gait_state const mean = toy_walk(0.0f);
     gait_state sd = toy_start_sd(1.0f);
@@ -140,10 +140,10 @@ static void test_waits_while_forked(void)
     for (int n = 0; n < SHOTS; n++) {
         gait_estimate e;
         film_step(t, 1, n, 0, &e);
-        waited += n > 20 && count(t) == ROOM;
+        waited += n > 20 && count(t) == CAPACITY;
         CHECK_NEAR(total_weight(t), 1.0, 1e-4);
         if (n == 20) /* the sides part after half a second */
-            CHECK(gait_tracker_set_particles(t, 40, NULL) == GAIT_OK && count(t) == ROOM);
+            CHECK(gait_tracker_set_particles(t, 40, NULL) == GAIT_OK && count(t) == CAPACITY);
     }
     CHECK(waited > 3);
     toy_tracker_free(t);
@@ -152,8 +152,8 @@ static void test_waits_while_forked(void)
 /* Fewer particles, of which a search takes twice as many: what was asked for outlasts the search and a restore. */
 static uint64_t search(int32_t store_at)
 {
-    gait_tracker_config cfg = config(ROOM);
-    cfg.acquisition_particles = 2 * ROOM;
+    gait_tracker_config cfg = config(CAPACITY);
+    cfg.acquisition_particles = 2 * CAPACITY;
     gait_tracker *t = film_tracker(&cfg, 0, 1.0f);
     CHECK(gait_tracker_set_particles(t, FEW, NULL) == GAIT_OK);
     gait_state const mean = toy_walk(0.0f);
@@ -184,9 +184,9 @@ int main(void)
 {
     film_make(1, SHOTS);
     test_refused();
-    test_a_larger_room_changes_nothing();
+    test_a_larger_capacity_changes_nothing();
     test_down_and_up();
-    test_waits_while_forked();
+    test_waits_while_split();
     test_search_restored();
     return CHECK_DONE();
 }

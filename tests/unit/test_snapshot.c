@@ -75,19 +75,19 @@ static void test_continue(void)
     toy_tracker_free(t);
 }
 
-/* The digest tells every state from every other, and is not moved by looking. */
+/* Every state has its own digest, and reading it changes nothing. */
 static void test_digest(void)
 {
     gait_tracker_config cfg = small(1);
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
-    uint64_t seen[8];
+    uint64_t digest[8];
     for (int n = 0; n < 8; n++) {
         gait_estimate e;
         film_step(t, 1, n, 0, &e);
-        seen[n] = gait_tracker_digest(t);
-        CHECK(gait_tracker_digest(t) == seen[n]);
+        digest[n] = gait_tracker_digest(t);
+        CHECK(gait_tracker_digest(t) == digest[n]);
         for (int k = 0; k < n; k++)
-            CHECK(seen[k] != seen[n]);
+            CHECK(digest[k] != digest[n]);
     }
     toy_tracker_free(t);
 }
@@ -150,14 +150,14 @@ static void test_damage(void)
 /* Numbers that no tracker gets to, with a checksum that is right. */
 static void test_implausible(void)
 {
-    const float doubt[] = {NAN, INFINITY, -0.1f};
+    const float bad_sd[] = {NAN, INFINITY, -0.1f};
     gait_tracker_config cfg = small(1);
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
     size_t bytes = 0;
     target = film_tracker(&cfg, 7, 0.3f);
     target_digest = gait_tracker_digest(target);
     for (int k = 0; k < 3; k++) {
-        t->core->stature_sd_ratio = doubt[k];
+        t->core->stature_sd_ratio = bad_sd[k];
         unsigned char *const kept = save(t, &bytes);
         refuse(kept, bytes, GAIT_ERR_CORRUPT);
         free(kept);
@@ -205,13 +205,13 @@ static void test_other(void)
         refuse(kept, bytes, GAIT_ERR_VERSION);
         toy_tracker_free(target);
     }
-    static _Alignas(GAIT_ALIGN) unsigned char file[TOY_BYTES], place[1024], room[1 << 23];
+    static _Alignas(GAIT_ALIGN) unsigned char file[TOY_BYTES], place[1024], memory[1 << 23];
     gait_model *model = NULL;
     size_t const file_bytes = toy_write(file, TOY_PHASES, TOY_COMPONENTS);
     file[file_bytes - 64] ^= 1; /* a model that differs by a bit of its limbs */
     toy_seal(file, file_bytes);
     CHECK(gait_model_init(place, sizeof place, file, file_bytes, &model, NULL) == GAIT_OK);
-    CHECK(gait_tracker_init(room, sizeof room, model, &cfg, &target, NULL) == GAIT_OK);
+    CHECK(gait_tracker_init(memory, sizeof memory, model, &cfg, &target, NULL) == GAIT_OK);
     target_digest = gait_tracker_digest(target);
     refuse(kept, bytes, GAIT_ERR_VERSION);
     CHECK(gait_tracker_restore(NULL, kept, bytes, NULL) == GAIT_ERR_ARG);

@@ -26,7 +26,7 @@ static void test_age(void)
     CHECK(b.late == 3 && b.dropped == 3);
 }
 
-/* Nobody waits for ever: where a step takes longer than the budget, a frame is tried after a few were refused. */
+/* Frames are never refused for ever: if a step takes longer than the budget, a frame is tried after a few were refused. */
 static void test_a_slow_step_does_not_starve(void)
 {
     enum { FRAMES = 100, AGE = 12 * MS };
@@ -146,7 +146,7 @@ static void test_what_was_too_many_is_tried_less_and_less_often(void)
     int32_t particles = 1022;
     CHECK(changes(&b, &particles, 1022, 600 * SECOND) < 24);
     int const tries = changes(&b, &particles, 1022, 600 * SECOND);
-    CHECK(tries > 4 && tries < 16); /* it does not give up */
+    CHECK(tries > 4 && tries < 16); /* it keeps trying */
     CHECK(b.failed == 2044 && b.patience == PATIENCE);
     changes(&b, &particles, 4000, 600 * SECOND); /* whatever took the time is gone */
     CHECK(particles == 4000 && b.failed == 0 && b.patience == 0);
@@ -182,18 +182,18 @@ static void test_without_adapting_it_stays(void)
     CHECK(settle(&b, 500, 0.1, 500) == 500);
 }
 
-static void test_steps_longer_than_the_limit_are_said_once(void)
+static void test_steps_longer_than_the_limit_are_reported_once(void)
 {
     budget b = {.limit_us = 10 * MS, .high = 4000},
            adapting = {.limit_us = 10 * MS, .low = 100, .high = 4000};
-    int said = 0;
+    int reported = 0;
     settle(&b, 500, 20.1, 7);
     CHECK(!budget_hopeless(&b, 500));
     for (int i = 0; i < 30; i++) {
         settle(&b, 500, 20.1, 1);
-        said += budget_hopeless(&b, 500);
+        reported += budget_hopeless(&b, 500);
     }
-    CHECK(said == 1 && b.slow_steps == 37);
+    CHECK(reported == 1 && b.slow_steps == 37);
     settle(&b, 500, 19.9, 10);
     CHECK(b.slow_steps == 37 && b.slow == 0);
     int32_t const particles = settle(&adapting, 400, 20000, 2);
@@ -215,6 +215,6 @@ int main(void)
     test_a_step_that_is_too_long_is_the_reason();
     test_reset_keeps_the_limits();
     test_without_adapting_it_stays();
-    test_steps_longer_than_the_limit_are_said_once();
+    test_steps_longer_than_the_limit_are_reported_once();
     return CHECK_DONE();
 }

@@ -1,4 +1,4 @@
-/* Strides from estimates: times and lengths of a known walk, trembling, missed strikes, doubt, new starts. */
+/* Strides from estimates: times and lengths of a known walk, trembling, missed strikes, uncertain, new starts. */
 #include "../../tools/trackd/strides.c"
 #include "check.h"
 
@@ -84,7 +84,7 @@ static void lose(int n, gait_estimate *e)
         e->status = GAIT_TRACK_AMBIGUOUS;
 }
 
-static void test_doubt(void)
+static void test_uncertain(void)
 {
     stride_meter m = {0};
     stride s[MOST];
@@ -92,8 +92,8 @@ static void test_doubt(void)
     CHECK(count == 11);
     for (int k = 0; k < count; k++) {
         double const begin = 1e-6 * (double)(s[k].start_utime - 1000000000), end = begin + 1.25;
-        bool const doubt = (begin < 2.4 && end > 2.4) || (begin < 5.2 && end > 5.2);
-        CHECK(s[k].sure == !doubt);
+        bool const uncertain = (begin < 2.4 && end > 2.4) || (begin < 5.2 && end > 5.2);
+        CHECK(s[k].sure == !uncertain);
     }
 }
 
@@ -143,7 +143,7 @@ int main(void)
 {
     test_a_known_walk();
     test_trembling();
-    test_doubt();
+    test_uncertain();
     test_breaks();
     test_few_frames();
     return CHECK_DONE();

@@ -1,4 +1,4 @@
-/* Loss and recovery: nobody there, hidden for a while, back where expected or elsewhere. */
+/* Track loss and recovery: an empty scene, an occluded person, back where expected or elsewhere. */
 #include "tracker/track_loss.h"
 
 #include "tracker/front_back.h"
@@ -32,7 +32,7 @@ static double off(const gait_estimate *e, int shown)
                  (double)(e->mean.pelvis[1] - true_state.pelvis[1]));
 }
 
-/* In the empty scene nobody is ever said to be tracked. */
+/* In the empty scene the status is never tracking. */
 static void test_empty_scene(void)
 {
     gait_tracker *const t = begin();
@@ -83,19 +83,19 @@ static const uint8_t *behind_post(int n, float x)
 }
 
 /* Behind a post beside which a leg or an arm is seen now and then: followed, and never called lost, though
- * the whole has no support for longer than anybody may be hidden. */
+ * the whole body has no support for longer than a person may be hidden. */
 static void test_hidden_in_part(void)
 {
     gait_tracker *const t = begin();
     gait_estimate e;
-    int said = 0, parts = 0;
+    int untracked = 0, parts = 0;
     for (int n = 0; n < 60; n++) {
         const uint8_t *const shots[SCENE_CAMERAS] = {behind_post(n, toy_walk(1.0f).pelvis[0]), NULL};
         toy_tracker_step(t, n, shots, &e);
-        said += e.status != GAIT_TRACK_TRACKING && n > 10;
+        untracked += e.status != GAIT_TRACK_TRACKING && n > 10;
         parts += t->core->partly_hidden;
     }
-    CHECK(said == 0);
+    CHECK(untracked == 0);
     CHECK(parts >= 5);
     CHECK(off(&e, 59) < 0.1);
     toy_tracker_free(t);
@@ -116,7 +116,7 @@ static const uint8_t *screen_behind(float x)
     return picture;
 }
 
-/* Something else that the body covers in part does not count as the parts that are seen of a walker: more is
+/* Something else that the body covers in part does not count as visible parts of the person: more is
  * left unexplained than before. */
 static void test_something_else(void)
 {
@@ -160,9 +160,9 @@ static void test_elsewhere(void)
     CHECK(careful >= 2);
 }
 
-/* From a side the picture tells which way somebody looks, and not that the estimate turned round does; from in front it
- * has no opinion.  What it said lately decides, and no longer than it lasts. */
-static void test_facing(void)
+/* From a side the image supports the estimate and not the same turned by 180 degrees; from in front it supports neither.
+ * The running mean decides, and recovers. */
+static void test_front_back(void)
 {
     gait_tracker *const t = begin();
     gait_estimate e;
@@ -185,7 +185,7 @@ static void test_facing(void)
     toy_tracker_free(t);
 }
 
-/* No particle counts as less likely than somebody hidden. */
+/* No particle counts as less likely than a hidden person. */
 static void test_the_bound(void)
 {
     gait_tracker *const t = begin();
@@ -207,17 +207,17 @@ static void test_the_bound(void)
 static void test_join(void)
 {
     enum { MOST = 150 };
-    static const float odd[] = {NAN, INFINITY, -INFINITY, 0.0f, -1e30f, -3.0f, 88.0f, FLT_MAX};
+    static const float special[] = {NAN, INFINITY, -INFINITY, 0.0f, -1e30f, -3.0f, 88.0f, FLT_MAX};
     static _Alignas(GAIT_ALIGN) unsigned char memory[MOST * sizeof(float) + 2 * GUARD + 16];
-    float room[MOST + 3], part[MOST], want[MOST];
+    float buffer[MOST + 3], part[MOST], want[MOST];
     int32_t wrong = 0, far = 0;
     for (int32_t n = 0; n <= MOST; n++) {
         float const b = -50.0f + (float)n;
-        float *const a = room + n % 4;
+        float *const a = buffer + n % 4;
         for (int32_t i = 0; i < n; i++) {
             uint32_t r[4];
             rng_bits(3, 0, (uint32_t)n, (uint32_t)i, 0, r);
-            a[i] = r[1] % 8 ? -100.0f + 0.001f * (float)(r[0] % 150000) : odd[r[2] % 8];
+            a[i] = r[1] % 8 ? -100.0f + 0.001f * (float)(r[0] % 150000) : special[r[2] % 8];
             part[i] = want[i] = 0.01f * (float)(r[3] % 1000);
         }
         isa_scalar()->track_loss_join(a, b, n, want);
@@ -246,7 +246,7 @@ int main(void)
     test_hidden_in_part();
     test_something_else();
     test_elsewhere();
-    test_facing();
+    test_front_back();
     test_the_bound();
     return CHECK_DONE();
 }

@@ -1,4 +1,4 @@
-/* The tracker follows the synthetic walker: seeds, cameras, colours, frame rates and modes. */
+/* The tracker follows the synthetic person: seeds, cameras, colours, frame rates and modes. */
 #include "tracker/tracker.h"
 
 #include "toy_error.h"
@@ -124,7 +124,7 @@ static uint64_t colour_digest(uint32_t terms, int32_t format, int32_t plate_form
     gait_image image = {.data = plate, .width = SCENE_W, .height = SCENE_H, .stride = 3 * SCENE_W};
     error have = {0};
     gait_estimate e;
-    tint(0, plate_format, plate); /* the walker is elsewhere in frame 0 */
+    tint(0, plate_format, plate); /* the person is elsewhere in frame 0 */
     image.format = plate_format == GAIT_GREY8 ? GAIT_RGB8 : plate_format;
     CHECK(gait_tracker_set_background(t, 0, &image, NULL) == GAIT_OK);
     for (int n = 30; n < 40; n++) {

@@ -5,7 +5,7 @@
 
 /* ---- time ---- */
 
-/* The first frame, if taken at the time of the start, weighs the particles where they stand; a later one moves them. */
+/* The first frame, if taken at the time of the start, only weights the particles; a later one also moves them. */
 static void test_first_frame(void)
 {
     static gait_state before[300], after[300];
@@ -58,13 +58,14 @@ static void test_refusals(void)
     f.utime = INT64_MAX;
     refuse(t, f, GAIT_ERR_STATE, "max_dt");
     gait_image const good = toy_image(film[0][11]);
-    _Static_assert(SCENE_W == 384, "as said below");
-    static const char *const said[] = {"image of camera 1 is 383 x",
-                                       "image of camera 1 is 384 x",
-                                       "stride 383, 384 pixels of GAIT_GREY8 take at least 384",
-                                       "image of camera 1 has unknown format 0",
-                                       "stride -384, 384 pixels of GAIT_GREY8 take at least 384",
-                                       "stride 384, 384 pixels of GAIT_RGB8 or GAIT_BGR8 take at least 1152"};
+    _Static_assert(SCENE_W == 384, "the texts below contain it");
+    static const char *const words[] = {
+        "image of camera 1 is 383 x",
+        "image of camera 1 is 384 x",
+        "stride 383, 384 pixels of GAIT_GREY8 take at least 384",
+        "image of camera 1 has unknown format 0",
+        "stride -384, 384 pixels of GAIT_GREY8 take at least 384",
+        "stride 384, 384 pixels of GAIT_RGB8 or GAIT_BGR8 take at least 1152"};
     for (int k = 0; k < 6; k++) {
         gait_image bad = good;
         int32_t *const number[] = {&bad.width,  &bad.height, &bad.stride,
@@ -74,7 +75,7 @@ static void test_refusals(void)
         f = toy_frame(11);
         f.image[0] = good;
         f.image[1] = bad;
-        refuse(t, f, GAIT_ERR_ARG, said[k]);
+        refuse(t, f, GAIT_ERR_ARG, words[k]);
     }
     f = toy_frame(11);
     CHECK(gait_tracker_step(NULL, &f, &e, NULL) == GAIT_ERR_ARG);
@@ -91,7 +92,7 @@ static void test_refusals(void)
 
 /* ---- loss ---- */
 
-/* A picture of nothing: after a third of a second the walker is lost, and its place less and less known. */
+/* A blank image: after a third of a second the person is lost, and the place becomes less and less certain. */
 static void test_occluded(void)
 {
     static uint8_t blank[SCENE_PIXELS];
@@ -114,7 +115,7 @@ static void test_occluded(void)
             CHECK(!lost_at || e.status == GAIT_TRACK_LOST);
         }
         CHECK(lost_at >= 28 && lost_at <= 34);
-        CHECK(plate || e.sd.pelvis[0] > 2.0f * sd); /* with a plate the absence says where nobody is */
+        CHECK(plate || e.sd.pelvis[0] > 2.0f * sd); /* with a background the empty image excludes places */
         toy_tracker_free(t);
     }
 }
@@ -164,7 +165,8 @@ static void test_unknown_phase(void)
         CHECK(e.status != GAIT_TRACK_LOST && (e.status == GAIT_TRACK_INIT || n > 24));
     }
     measure_error(&e, 44, &have);
-    CHECK(e.status == GAIT_TRACK_TRACKING && have.phase < 0.02); /* legs and arms tell left from right here */
+    CHECK(e.status == GAIT_TRACK_TRACKING &&
+          have.phase < 0.02); /* legs and arms distinguish left from right here */
     toy_tracker_free(t);
 }
 
@@ -223,11 +225,11 @@ static void test_appearance(void)
     toy_tracker_free(t);
 }
 
-/* Resampling happens where the weights of the frame before were uneven, and is told. */
+/* Resampling happens where the weights of the frame before were uneven, and is flagged. */
 static void test_resampling(void)
 {
     gait_tracker_config cfg = toy_config(1);
-    int told[3] = {0};
+    int flagged[3] = {0};
     cfg.term_weight[1] = cfg.term_weight[2] = cfg.term_weight[3] = 2.0f;
     cfg.evidence_time = 0.0f;
     for (int k = 0; k < 3; k++) {
@@ -239,12 +241,12 @@ static void test_resampling(void)
             film_step(t, 1, n, 0, &e);
             bool const due = n > 0 && (k == 2 || before < cfg.resample_ess * (float)cfg.particles);
             CHECK(((e.flags & GAIT_EST_RESAMPLED) != 0) == due);
-            told[k] += due;
+            flagged[k] += due;
             before = e.ess;
         }
         toy_tracker_free(t);
     }
-    CHECK(told[0] == 0 && told[1] > 3 && told[1] < 19 && told[2] == 19);
+    CHECK(flagged[0] == 0 && flagged[1] > 3 && flagged[1] < 19 && flagged[2] == 19);
 }
 
 int main(void)

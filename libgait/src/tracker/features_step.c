@@ -36,7 +36,7 @@ static void refresh_plate(gait_tracker *t, int32_t c, bool grey)
     s->plate_stale = false;
 }
 
-static bool keypoint_seen(const gait_keypoint *k)
+static bool keypoint_given(const gait_keypoint *k)
 {
     return k->sd > 0.0f && k->sd <= FLT_MAX && f_finite(&k->u, 1) && f_finite(&k->v, 1);
 }
@@ -49,7 +49,7 @@ static void take_keypoints(const gait_tracker *t, int32_t c, const gait_keypoint
     for (int32_t p = 0; keypoints && (t->cfg.terms & GAIT_TERM_KEYPOINTS) && p < t->model->points; p++) {
         const gait_keypoint *const k = &keypoints[p];
         double ideal[2];
-        if (!keypoint_seen(k))
+        if (!keypoint_given(k))
             continue;
         camera_ideal(&t->cfg.camera[c], (const double[2]){(double)k->u, (double)k->v}, ideal);
         out->u[p] = (float)ideal[0];

@@ -3,14 +3,14 @@
 #include "image/camera.h"
 #include "tracker/likelihood_step.h"
 
-static const float SIDE_VIEW = 0.3f; /* least sine of the angle between heading and line of sight */
+static const float SIDE_VIEW = 0.3f; /* least sine of the angle between heading and viewing direction */
 static const float EDGE_SHARE =
     0.5f; /* share of the edge strength beyond chance that must speak for the front */
 static const float AVERAGE_TIME = 1.0f; /* seconds over which the score is averaged */
 static const float FIRST_SCORE = 0.03f; /* the average to begin with */
 
 /* From in front or behind a turn by 180 degrees changes little. */
-static bool seen_from_side(const gait_camera *c, const particle_state *p)
+static bool viewed_from_side(const gait_camera *c, const particle_state *p)
 {
     float to[3], sn, cs;
     camera_to(c, p->f + F_X, to);
@@ -40,7 +40,7 @@ float front_back_score(gait_tracker *t, const particle_state *p)
     particle_block_bodies(&t->layout, &bodies, &w->body);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         float edges[BLOCK], chance[BLOCK], turned = 0.0f;
-        if (!t->camera[c].features.has_image || !seen_from_side(&t->cfg.camera[c], p))
+        if (!t->camera[c].features.has_image || !viewed_from_side(&t->cfg.camera[c], p))
             continue;
         likelihood_outline(t, c, w);
         for (int32_t lane = 0; lane < BLOCK; lane++) {
@@ -54,7 +54,7 @@ float front_back_score(gait_tracker *t, const particle_state *p)
     return cameras > 0.0f ? sum / cameras : 0.0f;
 }
 
-/* When only parts of the body are seen, the edges of the occluder tell nothing. */
+/* When only parts of the body are visible, the edges of the occluder are no evidence. */
 float front_back_update(gait_tracker *t, bool restart, const particle_state *mean)
 {
     float const before = t->core->front_back_margin;

@@ -8,7 +8,7 @@
 #include "tracker/tracker_state.h"
 
 /* Edge strength along the outline of the body, less that of the best turned body, less half of what exceeds chance:
- * negative if front and back cannot be told apart.  Mean over cameras that see the person from a side; 0 if there are
+ * negative if front and back cannot be distinguished.  Mean over cameras that see the person from a side; 0 if there are
  * none. */
 float front_back_score(gait_tracker *t, const particle_state *p);
 

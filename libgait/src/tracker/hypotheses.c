@@ -12,7 +12,7 @@ static const float JITTER_SCORE = 0.5f, JITTER_HEADING = 0.1f, JITTER_RATE = 0.0
                    JITTER_PHASE = 0.05f; /* sd */
 static const double REPORT_LOG_ODDS =
     4.5; /* from which left and right are reported as known: probability 0.99 */
-static const double MERGE_LOG_ODDS = 9.0; /* from which the other hypothesis is given up */
+static const double MERGE_LOG_ODDS = 9.0; /* from which the other hypothesis is dropped */
 
 /* ---- stages ---- */
 static float seconds_in_stage(const gait_tracker *t)
@@ -106,7 +106,7 @@ static double total_weight(const pf *f)
     return sum;
 }
 
-/* Give up the less probable hypothesis: its particles get no weight, and the next resampling replaces them. */
+/* Drop the less probable hypothesis: its particles get no weight, and the next resampling replaces them. */
 void hypotheses_merge(gait_tracker *t)
 {
     int32_t const loser = t->core->hypotheses.log_odds < 0.0;
@@ -186,7 +186,7 @@ static float half_phase(const particle_set *p)
     return 0.5f * m_atan2((float)s, (float)c) / TWO_PI_F;
 }
 
-/* Heading reflected at a plane across the first camera's line of sight, which swaps near and far.  Without perspective
+/* Heading reflected at a plane across the first camera's viewing direction, which swaps near and far.  Without perspective
  * the body and its reflection have the same image. */
 static float reflected_heading(const gait_tracker *t, const particle_state *p)
 {
@@ -196,7 +196,7 @@ static float reflected_heading(const gait_tracker *t, const particle_state *p)
 }
 
 /* The other reading of the same image.  Every second particle also swaps near and far where that turns the person by less
- * than 90 degrees: seen from in front, the legs exchange places without it. */
+ * than 90 degrees: viewed from in front, the legs swap places without it. */
 static particle_state other_hypothesis(const gait_tracker *t, const particle_state *p, int32_t i)
 {
     particle_state to = mirror_apply(t->mirror, &t->layout, p);
@@ -221,7 +221,7 @@ static void jitter(const gait_tracker *t, int32_t i, particle_state *p)
     p->f[F_PHASE] = m_wrap1(p->f[F_PHASE] + JITTER_PHASE * n[2]);
 }
 
-/* Deal the particles in turn to both hypotheses: even numbers first, then the odd ones. */
+/* Deal the particles in turn to both hypotheses: first those with even numbers, then the others. */
 static void deal(gait_tracker *t)
 {
     pf *const f = &t->filter;

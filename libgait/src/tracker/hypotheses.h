@@ -1,7 +1,7 @@
 /* hypotheses.h - left and right: two hypotheses half a stride apart, tracked until the images decide.
  *
  * A mixture of two particle filters (Vermaak, Doucet and Perez 2003).  Each hypothesis owns half of the particles, which
- * are weighed and resampled among themselves, so sampling noise cannot eliminate a hypothesis.  Only the evidence of its
+ * are weighted and resampled among themselves, so sampling noise cannot eliminate a hypothesis.  Only the evidence of its
  * particles moves the weight of a hypothesis, from even odds.  In an estimate a particle's weight is the product of its
  * own and that of its hypothesis.
  *
@@ -24,11 +24,11 @@ void hypotheses_settle(gait_tracker *t);
 /* The person is lost: treat the particles as one set, redrawn as such. */
 void hypotheses_drop(gait_tracker *t);
 
-/* The odds of the two are so clear that one can be given up; and give it up. */
+/* Whether the odds decide between the two; and drop the less probable one. */
 bool hypotheses_decided(const gait_tracker *t);
 void hypotheses_merge(gait_tracker *t);
 
-/* Acquisition has lasted long enough; and lay the particles out as two hypotheses.  The weights must be even, as after
+/* Whether acquisition has lasted long enough; and lay the particles out as two hypotheses.  The weights must be even, as after
  * resampling.  Clears the templates. */
 bool hypotheses_acquired(const gait_tracker *t);
 void hypotheses_split(gait_tracker *t);

@@ -8,7 +8,7 @@ void likelihood_step(gait_tracker *t);
 
 typedef struct body_evidence { /* of one body, over all cameras */
     float
-        support; /* log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term can tell */
+        support; /* log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term applies */
     like_parts parts; /* foreground explained and left over, nats */
 } body_evidence;
 

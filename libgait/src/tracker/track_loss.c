@@ -22,7 +22,7 @@ bool track_loss_is_lost(const gait_tracker *t)
 /* Where a person may be who was last seen `gap` seconds ago. */
 static void search_region(const gait_tracker *t, float gap, gait_state *mean, gait_state *sd)
 {
-    const particle_state *const last = &t->core->last_seen;
+    const particle_state *const last = &t->core->last_supported;
     float sn, cs;
     *mean = particle_to_state(&t->layout, last);
     float const way = gap * particle_speed(&t->layout, last), far = f_min(0.1f + 0.4f * gap, 1.5f);
@@ -88,7 +88,7 @@ void track_loss_bound(gait_tracker *t)
         particle_state const p = particle_get(&t->particles, best);
         e = likelihood_of_particle(t, &p);
     }
-    if (e.support == 0.0f) { /* no term can tell a hidden person from a visible one */
+    if (e.support == 0.0f) { /* no term distinguishes a hidden person from a visible one */
         memcpy(t->loglik, t->loglik_raw, (size_t)n * sizeof *t->loglik);
         return;
     }
@@ -103,7 +103,7 @@ void track_loss_bound(gait_tracker *t)
 
 static bool phase_as_predicted(const gait_tracker *t, float gap, const particle_state *mean)
 {
-    const particle_state *const last = &t->core->last_seen;
+    const particle_state *const last = &t->core->last_supported;
     float const turn = gap * last->f[F_RATE];
     float const off = m_wrap_pi(TWO_PI_F * (mean->f[F_PHASE] - last->f[F_PHASE] - turn)) / TWO_PI_F;
     return gap < PHASE_TIME && fabsf(off) < PHASE_WITHIN;
@@ -115,7 +115,7 @@ track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_s
     float const gap = seconds_unsupported(t);
     body_evidence const e = likelihood_of_particle(t, mean);
     float const unusual = e.parts.missed - core->usual_unexplained;
-    bool const whole = e.support >= 0.0f; /* also if no term can tell */
+    bool const whole = e.support >= 0.0f; /* also if no term applies */
     bool const part =
         !whole && !lost && core->found && parts_evidence(e.parts.explained, unusual) > PARTS_ENOUGH;
     track_loss_verdict v = {.support = whole  ? SUPPORT_WHOLE

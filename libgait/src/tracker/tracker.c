@@ -9,9 +9,10 @@
 #include "tracker/likelihood_step.h"
 #include "tracker/track_loss.h"
 
-static const float KNOWN_PHASE_SD = 0.2f; /* strides: a start with less says which leg is which */
+static const float KNOWN_PHASE_SD = 0.2f; /* strides: a start with less determines which leg is which */
 static const float SETTLE_TIME = 1.0f;    /* seconds after a start in which several modes are normal */
-static const float PHASE_JUMP = 0.2f;     /* strides: a larger departure from the predicted phase is a jump */
+static const float PHASE_DEPARTURE =
+    0.2f; /* strides from the predicted phase above which the track is ambiguous */
 static const double DEGENERATE_ESS = 2.0;
 
 void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime)
@@ -27,7 +28,7 @@ void tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd
         hypotheses_acquire(t);
     tracker_set_count(t, tracker_count(t));
     tracker_even_weights(t);
-    core->last_seen = particle_from_state(&t->layout, mean);
+    core->last_supported = particle_from_state(&t->layout, mean);
     core->reported_phase = mean->phase;
     core->reported_rate = mean->stride_hz;
     dynamics const d = tracker_dynamics(t);
@@ -140,7 +141,7 @@ static void update_track_loss(gait_tracker *t, bool lost, const particle_state *
         hypotheses_acquire(t);
     core->front_back_margin = front_back_update(t, lost || !core->found, mean);
     core->support_utime = core->utime;
-    core->last_seen = *mean;
+    core->last_supported = *mean;
     core->found = 1;
 }
 
@@ -148,14 +149,15 @@ static int32_t status_of(const gait_tracker *t, float dt, const gait_estimate *e
 {
     const tracker_core *const core = t->core;
     float const predicted = core->reported_phase + dt * core->reported_rate;
-    bool const jumps = fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - predicted))) > TWO_PI_F * PHASE_JUMP;
+    bool const departs =
+        fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - predicted))) > TWO_PI_F * PHASE_DEPARTURE;
     if (track_loss_is_lost(t))
         return GAIT_TRACK_LOST;
     if (hypotheses_acquiring(t) || !core->found)
         return GAIT_TRACK_INIT;
     if (e->hypothesis_weight < DOMINANT_MASS)
         return seconds_since(t, core->start_utime) < SETTLE_TIME ? GAIT_TRACK_INIT : GAIT_TRACK_AMBIGUOUS;
-    bool const open = hypotheses_open(t) || core->front_back_margin < 0.0f || jumps;
+    bool const open = hypotheses_open(t) || core->front_back_margin < 0.0f || departs;
     return open ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
 }
 
@@ -202,23 +204,23 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
 
     /* Features, likelihood and weights. */
     particle_state const place = particle_set_place(&t->particles, t->filter.weight);
-    bool const seen = features_step(t, frame, &place) > 0;
+    bool const has_image = features_step(t, frame, &place) > 0;
     likelihood_step(t); /* without an image: only the joints */
-    if (seen)
+    if (has_image)
         track_loss_bound(t);
-    pf_summary const s = seen ? hypotheses_update(t, dt)
-                              : (pf_summary){.best = pf_heaviest(&t->filter), .ess = pf_ess(&t->filter)};
+    pf_summary const s = has_image ? hypotheses_update(t, dt)
+                                   : (pf_summary){.best = pf_heaviest(&t->filter), .ess = pf_ess(&t->filter)};
     core->ess = s.ess;
     core->sampled_cameras = uses_texture(&t->cfg) ? cameras_seeing(t) : 0;
 
     /* Estimate and track loss. */
     particle_state const mean = estimate_particles(t, s.best, &e);
-    if (seen)
+    if (has_image)
         update_track_loss(t, lost, &mean);
     bool const degenerate = s.degenerate || s.ess < DEGENERATE_ESS;
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
-    e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (seen ? 0 : GAIT_EST_NO_IMAGE) |
-              (seen && degenerate ? GAIT_EST_DEGENERATE : 0);
+    e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |
+              (has_image && degenerate ? GAIT_EST_DEGENERATE : 0);
     e.ess = (float)s.ess;
     e.log_evidence = s.log_evidence;
     if (e.status == GAIT_TRACK_TRACKING && h->stage == HYPOTHESES_ONE && !core->partly_hidden)

@@ -1,4 +1,4 @@
-/* tracker.h - start a tracker and step it: resample, rejuvenate, predict, extract features, weigh, estimate. */
+/* tracker.h - start a tracker and step it: resample, rejuvenate, predict, extract features, weight, estimate. */
 #ifndef GAIT_TRACKER_TRACKER_H
 #define GAIT_TRACKER_TRACKER_H
 #include "tracker/tracker_state.h"

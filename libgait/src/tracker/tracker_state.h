@@ -36,7 +36,7 @@ typedef struct tracker_core {
     float front_back_margin;  /* running mean of front_back_score() */
     double ess;
     hypotheses_state hypotheses;
-    particle_state last_seen;            /* the estimate when an image last supported it */
+    particle_state last_supported;       /* the estimate when an image last supported it */
     float reported_phase, reported_rate; /* of the last estimate; strides, strides per second */
     view_map map[GAIT_MAX_CAMERAS];
     int32_t below_capacity; /* particles in use: gait_tracker.capacity less this */
