@@ -29,7 +29,7 @@ PARTS = {
     "lift_tracks.py": ("lift_dev", "lift_balancing"),
     "lift_parts.py": ("lift_parts",),
     "lift_sides.py": ("lift_sides",),
-    "lift_stream.py": ("lift_stream", "lift_odd"),
+    "lift_stream.py": ("lift_stream", "lift_unknown"),
     "lift_people.py": ("lift_people",),
     "lift_images.py": ("lift_sticks", "lift_clips", "lift_outdoor"),
     "tracks_term.py": ("tracks_term",),

@@ -86,7 +86,7 @@ def _odd() -> None:
         "wanted of it but that it is known."
     )
     head = [f"{which}: {what}" for which in ("usual", "strict") for what in ("abs mm", "coverage", "tracked")]
-    table.publish("lift_odd", "A motion that no prior knows, live", ["camera", *head], rows, note)
+    table.publish("lift_unknown", "A motion that no prior knows, live", ["camera", *head], rows, note)
 
 
 def _wrong(tracks: Keypoints, share: float = WRONG) -> Keypoints:
