@@ -1,96 +1,143 @@
 /* gait_lift.h - 3-D motion from 2-D keypoints, by a prior over segments of motion (Leventon and Freeman 1998).
  *
- * A segment is F frames of J markers: stature x (mean + sum_i alpha_i mode_i), turned by a heading about z and
- * put at a place on the ground; alpha ~ N(0, I), learnt from motion capture (gait learn --segments).  Which markers a
- * frame shows, and how well, may change from frame to frame.  Arrays are doubles, [F][J][...] by frame. */
+ * A segment is F frames of J markers: stature x (mean + sum_i alpha_i mode_i), turned by a heading about z and put at a
+ * place on the ground; alpha ~ N(0, I), learnt from motion capture (gait learn --segments).  Which markers a frame
+ * shows, and how well, may change from frame to frame.  Arrays are doubles, [F][J][...] by frame.  Rules of memory,
+ * threads, errors and of the tables below are those of gait.h. */
 #ifndef GAIT_LIFT_H
 #define GAIT_LIFT_H
 #include "gait.h"
+
+#define GAIT_MAX_MARKERS 64
+#define GAIT_MAX_SEGMENT_FRAMES 64
+#define GAIT_MAX_MODES 120  /* of a segment prior */
+#define GAIT_MAX_MIXTURE 16 /* Gaussians of a segment prior */
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
+/* ---- lifters ----------------------------------------------------------------------------------------- */
 typedef struct gait_lift gait_lift;
-#define GAIT_MAX_MARKERS 64
-#define GAIT_MAX_SEGMENT_FRAMES 64
-#define GAIT_MAX_MODES 120  /* of a segment prior */
-#define GAIT_MAX_MIXTURE 16 /* Gaussians of a segment prior */
-enum { GAIT_LIFT_PERSPECTIVE = 0, GAIT_LIFT_ORTHOGRAPHIC = 1 };
+typedef GAIT_ENUM(gait_projection) { GAIT_LIFT_PERSPECTIVE = 0, GAIT_LIFT_ORTHOGRAPHIC = 1 } gait_projection;
 
-typedef struct gait_lift_info {
-    int32_t  markers, frames;   /* J, F */
-    int32_t  hop;               /* frames from one segment to the next */
-    int32_t  headings;          /* 0: heading is unknown; 2, 8: turned copies were learnt, axes are the world's */
-    int32_t  components, modes; /* Gaussians of the mixture, modes of each */
-    float    fps;               /* frames per second of a segment */
-    float    stature;           /* mean of the people learnt from, metres */
-    uint64_t digest;            /* of the blob */
-} gait_lift_info;
+/* What the segment prior of a model holds. */
+#define GAIT_LIFT_INFO_FIELDS(FIELD)                                                                                  \
+    FIELD("Markers, J.",                                                                                              \
+          int32_t, markers, , "")                                                                                     \
+    FIELD("Frames of a segment, F.",                                                                                  \
+          int32_t, frames, , "frames")                                                                                \
+    FIELD("Frames from one segment to the next.",                                                                     \
+          int32_t, hop, , "frames")                                                                                   \
+    FIELD("0: heading is unknown; 2, 8: so many turned copies were learnt, axes are the world's.",                    \
+          int32_t, headings, , "")                                                                                    \
+    FIELD("Gaussians of the mixture.",                                                                                \
+          int32_t, components, , "")                                                                                  \
+    FIELD("Modes of each Gaussian.",                                                                                  \
+          int32_t, modes, , "")                                                                                       \
+    FIELD("Frame rate of a segment.",                                                                                 \
+          float, fps, , "frames per second")                                                                          \
+    FIELD("Mean stature of the people learnt from.",                                                                  \
+          float, stature, , "metres")                                                                                 \
+    FIELD("Hash of the model's blob.",                                                                                \
+          uint64_t, digest, , "")
 
-typedef struct gait_lift_config {
-    uint32_t struct_size;     /* set by gait_lift_default() */
-    int32_t  projection;      /* GAIT_LIFT_PERSPECTIVE (default): `camera`, u v in pixels; or ORTHOGRAPHIC: `axis`, metres */
-    double   stature;         /* metres; default 0: the learners' mean */
-    double   stature_sd;      /* metres; default -1: 0.04, or 0.09 where stature is 0; 0: exactly that */
-    double   sd;              /* of an observation where none is given, pixels or metres; default 3 */
-    double   residual;        /* factor of what the modes leave over [0, 1e4]; default -1: the blob's; 0: the paper's form */
-    double   place[3];        /* where the pelvis of the first frame is expected, metres; default 0 (z: of the floor) */
-    double   place_sd[3];     /* default 10 10 0.03; 0: exactly there */
-    double   heading;         /* of the body in the first frame about z, radians; 0 = along +x */
-    double   heading_sd;      /* default -1: unknown, all are tried (blobs with turned copies: 0); 0: exactly `heading` */
-    double   turn_sd;         /* by how much a heading may depart from the segment before, radians; default 0.3 */
-    double   tolerance;       /* iteration ends below this change, in deviations; default 1e-9 */
-    int32_t  max_iterations;  /* [1, 100]; default 30 */
-    int32_t  lag;             /* streaming: frames an estimate waits for later ones [0, 64]; default 5; -1: no streaming */
-    double   max_rate;        /* streaming: frames per second for which there is room [1, 1000]; default 60 */
-    double   max_gap;         /* streaming: longest pause before starting anew, seconds; default 0.5 */
-    double   fit_threshold;   /* streaming: a segment that fits worse (squared deviations per number observed) is ambiguous
-                               * and, its heading unknown, searched for anew; default 9; 0: never */
-    uint64_t report;          /* bit j: marker j is estimated while streaming; default all */
-    double   axis[2][3];      /* orthographic: directions of u and v in the world, orthonormal; default x and z */
-    gait_camera camera;      /* perspective: t within 1e4 metres along each axis */
-    uint32_t cpu_mask;        /* GAIT_CPU_* that may be used, default all, 0: scalar; results do not depend on it */
-} gait_lift_config;
+typedef struct gait_lift_info { GAIT_LIFT_INFO_FIELDS(GAIT_DECLARE) } gait_lift_info;
 
-typedef struct gait_lift_fit {   /* what one segment's observations say */
-    double  log_evidence;        /* log p(observations), nats; of the best heading and component */
-    double  log10_volume;        /* log10 of posterior over prior volume of all unknowns, sqrt(det Q / det Lambda) */
-    double  chi2;                /* sum of squared residuals in deviations */
-    double  heading, heading_sd; /* radians */
-    double  place[3];            /* of the pelvis of the first frame, z: of the floor, metres */
-    double  share;               /* posterior probability of the component, (0, 1] */
-    int32_t component;
-    int32_t observed;            /* numbers observed: 2 for each marker seen */
-    int32_t iterations;
-    int32_t converged;           /* 1, or 0: max_iterations came first */
-} gait_lift_fit;
+/* Settings of a lifter.  gait_lift_default() fills them; change what you need. */
+#define GAIT_LIFT_CONFIG_FIELDS(SETTING, FIELD)                                                                       \
+    FIELD("Size of this struct in the caller's header, set by gait_lift_default().",                                  \
+          uint32_t, struct_size, , "bytes")                                                                           \
+    FIELD("View: `camera` and keypoints in pixels (default), or orthographic: `axis` and keypoints in metres.",       \
+          gait_projection, projection, , "")                                                                          \
+    SETTING("Stature; 0: the mean of the people learnt from.",                                                        \
+          double, stature, , "metres", 0, 0, 10)                                                                      \
+    SETTING("Its standard deviation; 0: exactly known; -1: 0.04, or 0.09 if stature is 0.",                           \
+          double, stature_sd, , "metres", -1, -1, 1)                                                                  \
+    SETTING("Standard deviation of an observation where none is given.",                                              \
+          double, sd, , "pixels or metres", 3, 1e-9, 1e9)                                                             \
+    SETTING("Expected place of the pelvis in the first frame; z: of the floor.",                                      \
+          double, place, [3], "metres", GAIT_VALUES(0, 0, 0), -1e6, 1e6)                                              \
+    SETTING("Its standard deviation; 0: exactly there.",                                                              \
+          double, place_sd, [3], "metres", GAIT_VALUES(10, 10, 0.03), 0, 1e6)                                         \
+    SETTING("Expected heading of the body in the first frame about z; 0: along +x.",                                  \
+          double, heading, , "radians", 0, -100, 100)                                                                 \
+    SETTING("Its standard deviation; 0: exactly `heading`; -1: unknown, or 0 for priors with turned copies.",         \
+          double, heading_sd, , "radians", -1, -1, 10)                                                                \
+    SETTING("Orthographic view: directions of u and v in the world, orthonormal.",                                    \
+          double, axis, [2][3], "", GAIT_VALUES({1, 0, 0}, {0, 0, 1}), NAN, NAN)                                      \
+    FIELD("Perspective view: the camera, its t within 1e4 metres along each axis.",                                   \
+          gait_camera, camera, , "")                                                                                  \
+    SETTING("Stream: frames that an estimate waits for later ones; -1: no stream.",                                   \
+          int32_t, lag, , "frames", 5, -1, 64)                                                                        \
+    /* ---- advanced settings ---- */                                                                                 \
+    SETTING("Stream: bit j: marker j is estimated.",                                                                  \
+          uint64_t, report, , "mask", UINT64_MAX, NAN, NAN)                                                           \
+    SETTING("Factor of the variance outside the modes; -1: the prior's; 0: none, as in the paper.",                   \
+          double, residual, , "", -1, -1, 1e4)                                                                        \
+    SETTING("Standard deviation of the change of heading from segment to segment.",                                   \
+          double, turn_sd, , "radians", 0.3, 1e-6, 10)                                                                \
+    SETTING("Stream: a segment with a larger chi-square per observation is ambiguous and, if its heading is unknown," \
+            " searched for anew; 0: never.",                                                                          \
+          double, fit_threshold, , "", 9, 0, 1e9)                                                                     \
+    SETTING("Stream: frame rate up to which there is memory.",                                                        \
+          double, max_rate, , "frames per second", 60, 1, 1000)                                                       \
+    SETTING("Stream: longest pause before it starts anew.",                                                           \
+          double, max_gap, , "seconds", 0.5, 1e-3, 60)                                                                \
+    SETTING("Iteration ends when no unknown changes by more.",                                                        \
+          double, tolerance, , "standard deviations", 1e-9, 0, 1)                                                     \
+    SETTING("Most iterations of a fit.",                                                                              \
+          int32_t, max_iterations, , "", 30, 1, 100)                                                                  \
+    SETTING("Instruction sets that may be used, GAIT_CPU_*; 0: scalar code.  Results do not depend on it.",           \
+          uint32_t, cpu_mask, , "mask", ~0u, NAN, NAN)
 
-#define GAIT_LIFT_UNOBSERVED 0x1u /* nothing was observed of the segments behind this estimate: it is the prior's */
-#define GAIT_LIFT_POOR_FIT 0x2u /* a segment behind it fits worse than config fit_threshold (the first: half), or was searched for anew */
-typedef struct gait_lift_frame { /* one frame of a stream, `lag` frames ago */
-    int64_t  utime;              /* its capture time */
-    uint64_t frame;              /* frames pushed before it since the start */
-    double   heading;            /* of the body, radians */
-    double   chi2_per_observation; /* squared deviations per number observed of the segments behind it */
-    int32_t  status;             /* GAIT_TRACK_TRACKING; AMBIGUOUS: as GAIT_LIFT_POOR_FIT; INIT: none yet, all below is 0 */
-    uint32_t flags;              /* GAIT_LIFT_* */
-    double   marker[GAIT_MAX_MARKERS][3]; /* posterior mean, metres, world; 0 for those not in config report */
-    double   sd[GAIT_MAX_MARKERS][3];     /* standard deviation; wider by the root of a chi2_per_observation above 1 */
-} gait_lift_frame;
+typedef struct gait_lift_config { GAIT_LIFT_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DECLARE) } gait_lift_config;
 
-/* Of the model's segment prior; GAIT_ERR_ARG: it has none. */
+/* GAIT_ERR_ARG: the model has no segment prior. */
 GAIT_API gait_result gait_lift_get_info(const gait_model *m, gait_lift_info *out, gait_error *err);
-GAIT_API void        gait_lift_default(gait_lift_config *cfg);
-/* The model must outlive the lifter. */
-GAIT_API gait_result gait_lift_bytes(const gait_model *m, const gait_lift_config *cfg, size_t *bytes,
-                                     gait_error *err);
+/* Fill the first cfg_bytes of a config with the defaults; use gait_lift_default(), which gives them their size. */
+GAIT_API void gait_lift_fill(gait_lift_config *cfg, size_t cfg_bytes);
+static inline void gait_lift_default(gait_lift_config *cfg)
+{
+    gait_lift_fill(cfg, sizeof *cfg);
+}
+
+/* The model must outlive the lifter.  A config of an older, shorter gait_lift.h is accepted. */
+GAIT_API gait_result gait_lift_bytes(const gait_model *m, const gait_lift_config *cfg, size_t *bytes, gait_error *err);
 GAIT_API gait_result gait_lift_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_lift_config *cfg,
                                     gait_lift **out, gait_error *err);
-GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL out of range */
+GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL: out of range */
 
-/* One segment.  uv [F][J][2]; sd [F][J] or NULL (config sd): infinite, NaN or <= 0 is not seen, as is a uv
- * that is NaN, beyond 1e6 or, in perspective, exactly 0, 0 or -1, -1, where detectors put what they do not see. */
+/* ---- one segment ------------------------------------------------------------------------------------- */
+/* What one segment's observations say. */
+#define GAIT_LIFT_FIT_FIELDS(FIELD)                                                                                   \
+    FIELD("log p(observations), of the best heading and component.",                                                  \
+          double, log_evidence, , "nats")                                                                             \
+    FIELD("log10 of posterior over prior volume of all unknowns, sqrt(det Q / det Lambda).",                          \
+          double, log10_volume, , "")                                                                                 \
+    FIELD("Chi-square: sum of squared residuals in standard deviations.",                                             \
+          double, chi2, , "")                                                                                         \
+    FIELD("Heading of the body in the first frame.",                                                                  \
+          double, heading, , "radians")                                                                               \
+    FIELD("Its standard deviation.",                                                                                  \
+          double, heading_sd, , "radians")                                                                            \
+    FIELD("Place of the pelvis in the first frame; z: of the floor.",                                                 \
+          double, place, [3], "metres")                                                                               \
+    FIELD("Posterior probability of the component in (0, 1].",                                                        \
+          double, share, , "")                                                                                        \
+    FIELD("Gaussian of the mixture.",                                                                                 \
+          int32_t, component, , "")                                                                                   \
+    FIELD("Numbers observed: 2 for each marker seen.",                                                                \
+          int32_t, observed, , "")                                                                                    \
+    FIELD("Iterations taken.",                                                                                        \
+          int32_t, iterations, , "")                                                                                  \
+    FIELD("1, or 0: max_iterations came first.",                                                                      \
+          int32_t, converged, , "")
+
+typedef struct gait_lift_fit { GAIT_LIFT_FIT_FIELDS(GAIT_DECLARE) } gait_lift_fit;
+
+/* Fit one segment.  uv [F][J][2]; sd [F][J] or NULL (config sd).  A marker is unobserved if its sd is infinite, NaN or
+ * not positive, or its uv is NaN, beyond 1e6 or, in perspective, exactly (0, 0) or (-1, -1), as detectors write it. */
 GAIT_API gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
 /* The same with outliers down-weighted: a point beyond four standard deviations of the fit keeps little influence.
@@ -102,37 +149,64 @@ GAIT_API gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, co
  * GAIT_ERR_STATE: the lifter was not made for an unknown heading. */
 GAIT_API gait_result gait_lift_expect(gait_lift *l, const double place[3], double heading, double heading_sd,
                                       gait_error *err);
-/* Of the last gait_lift_segment() (GAIT_ERR_STATE without one): posterior mean [F][J][3] and standard deviation (may
- * be NULL), metres, world; */
+/* The rest of this section is about the last gait_lift_segment(); GAIT_ERR_STATE: there is none.
+ * Posterior mean [F][J][3] and standard deviation [F][J][3] (may be NULL), metres, world. */
 GAIT_API gait_result gait_lift_positions(gait_lift *l, double *mean, double *sd, gait_error *err);
-/* the unknowns [n], n = gait_lift_unknowns(), prior N(0, 1) each: modes, place x y z, stature and heading if they are
- * unknown; and their covariance [n][n] (may be NULL); */
+/* The unknowns [n], n = gait_lift_unknowns(), prior N(0, 1) each: modes, place x y z, stature and heading if they are
+ * unknown; and their covariance [n][n] (may be NULL). */
 GAIT_API int32_t     gait_lift_unknowns(const gait_lift *l);
 GAIT_API gait_result gait_lift_posterior(gait_lift *l, double *mean, double *covariance, gait_error *err);
-/* by what deviations are to be multiplied for a motion as far from the prior's mean as this one: above 1 where its
- * modes are larger than the prior expects, below 1 where they are smaller. Of a parallel view, heading
- * and size known, errors are then about Student's t of ten degrees: 90 % within 1.81. Takes milliseconds; */
+/* Factor for standard deviations of a motion as far from the prior's mean as this one: above 1 if its modes are larger
+ * than the prior expects, below 1 if they are smaller.  In an orthographic view, with heading and size known, errors
+ * then follow about Student's t of ten degrees of freedom: 90 % are within 1.81.  Takes milliseconds. */
 GAIT_API gait_result gait_lift_scale(gait_lift *l, double *scale, gait_error *err);
-/* what the observations alone say, the least-squares fit of minimum norm [F][J][3] (fig. 5c); */
+/* The observations alone: least-squares fit of minimum norm [F][J][3] (fig. 5c). */
 GAIT_API gait_result gait_lift_least_squares(gait_lift *l, double *mean, gait_error *err);
-/* the `count` most uncertain displacements [count][F][J][3], one deviation long, metres, and their deviations
- * [count] over all markers (fig. 6). */
+/* The `count` most uncertain displacements [count][F][J][3], one standard deviation long, metres, and their standard
+ * deviations [count] over all markers (fig. 6). */
 GAIT_API gait_result gait_lift_uncertain(gait_lift *l, int32_t count, double *mode, double *sd, gait_error *err);
 
-/* Many segments with the same visibility: orthographic, heading known, component 0.  gait_lift_fix() computes the gain
- * for sd [F][J]; gait_lift_batch() then takes uv [count][F][J][2] to mean [count][F][J][3]; deviations are those of
- * gait_lift_positions() after gait_lift_fix(). */
+/* ---- a stream of frames ------------------------------------------------------------------------------ */
+#define GAIT_LIFT_UNOBSERVED 0x1u /* no observation in the segments behind this estimate: it is the prior's */
+#define GAIT_LIFT_POOR_FIT   0x2u /* a segment behind it exceeds fit_threshold (the first: half) or was refitted */
+
+/* Estimate of one frame of a stream, `lag` frames ago. */
+#define GAIT_LIFT_FRAME_FIELDS(FIELD)                                                                                 \
+    FIELD("Capture time.",                                                                                            \
+          int64_t, utime, , "microseconds")                                                                           \
+    FIELD("Frames pushed before it since the start.",                                                                 \
+          uint64_t, frame, , "")                                                                                      \
+    FIELD("Heading of the body.",                                                                                     \
+          double, heading, , "radians")                                                                               \
+    FIELD("Chi-square per observation of the segments behind it.",                                                    \
+          double, chi2_per_observation, , "")                                                                         \
+    FIELD("TRACKING; AMBIGUOUS with GAIT_LIFT_POOR_FIT; INIT before the first whole segment, when all below is 0.",   \
+          gait_track_status, status, , "")                                                                            \
+    FIELD("GAIT_LIFT_UNOBSERVED, GAIT_LIFT_POOR_FIT.",                                                                \
+          uint32_t, flags, , "mask")                                                                                  \
+    FIELD("Posterior mean of the markers in the world; 0 for those not in config report.",                            \
+          double, marker, [GAIT_MAX_MARKERS][3], "metres")                                                            \
+    FIELD("Standard deviation, wider by the root of a chi2_per_observation above 1.",                                 \
+          double, sd, [GAIT_MAX_MARKERS][3], "metres")
+
+typedef struct gait_lift_frame { GAIT_LIFT_FRAME_FIELDS(GAIT_DECLARE) } gait_lift_frame;
+
+/* Add one frame: uv [J][2], sd [J] or NULL; utime must increase.  Segments begin every hop / fps seconds from the first
+ * frame on; each frame is added to those that cover its time, at its own time (linear between their frames).  Points
+ * far from their prediction are down-weighted. */
+GAIT_API gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
+/* Estimate of the frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: fewer frames since the start. */
+GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *err);
+/* Forget the stream. */
+GAIT_API void        gait_lift_reset(gait_lift *l);
+
+/* ---- advanced: many segments with the same visibility ------------------------------------------------ */
+/* Orthographic view, heading known, component 0.  gait_lift_fix() computes the gain for sd [F][J]; gait_lift_batch()
+ * then takes uv [count][F][J][2] to mean [count][F][J][3]; standard deviations are those of gait_lift_positions(). */
 GAIT_API gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err);
 GAIT_API gait_result gait_lift_batch(gait_lift *l, int32_t count, const double *uv, double *mean, gait_error *err);
 
-/* A stream: one frame uv [J][2], sd [J] or NULL; utime must increase.  Segments begin every hop / fps seconds from the
- * first frame on; each frame is added to those that it falls into, at its own time (linear between their frames).
- * Points far from where the segments have them, as wrong detections are, have little or nothing to say. */
-GAIT_API gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const double *sd, gait_error *err);
-/* The frame `lag` frames before the last one pushed.  GAIT_ERR_STATE: not so many frames since the start. */
-GAIT_API gait_result gait_lift_estimate(gait_lift *l, gait_lift_frame *out, gait_error *err);
-GAIT_API void        gait_lift_reset(gait_lift *l); /* forget the stream */
-
+/* ---- advanced: outliers in sequences of 2-D points ---------------------------------------------------- */
 /* Tools for sequences of 2-D points, without a lifter.  Both return how many points they found.
  * Spikes: points far off the line through the same point's neighbours in time, by its own noise and acceleration; their
  * sd [frames][points] becomes -1.  time [frames] increases; uv [frames][points][2]; scratch [2 frames]. */

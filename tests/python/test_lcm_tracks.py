@@ -98,7 +98,7 @@ def test_they_help_and_are_not_read_without_the_option(tmp_path: Path) -> None:
     blank = [("GAIT_IMAGE_0", image_message(fog, rig.utime(i), i)) for i in range(FRAMES)]
     dark = [event for i in range(FRAMES) for event in (blank[i], tracks(i))]
     helped, _ = play(tmp_path, dark, "-n", 500)
-    unheard, _ = play(tmp_path, dark, "-n", 500, "--tracks-weight", 0)
+    unheard, _ = play(tmp_path, dark, "-n", 500, "--keypoints-weight", 0)
     assert error(helped) < 0.6 * error(unheard)
 
 

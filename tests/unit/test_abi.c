@@ -4,55 +4,67 @@
 #include "check.h"
 
 typedef struct want {
-    const char *type;
+    const char *of;
     size_t size;
 } want;
 
-static int find(const gait_abi_field *table, uint32_t count, const char *type)
+#define WANT(T) {#T, sizeof(T)}
+static const want STRUCTS[] = {
+    WANT(gait_error),      WANT(gait_image),          WANT(gait_camera),   WANT(gait_state),
+    WANT(gait_pose),       WANT(gait_model_info),     WANT(gait_tasks),    WANT(gait_tracker_config),
+    WANT(gait_keypoint),   WANT(gait_frame),          WANT(gait_estimate), WANT(gait_lift_info),
+    WANT(gait_lift_config), WANT(gait_lift_fit),      WANT(gait_lift_frame),
+};
+enum { COUNT = sizeof STRUCTS / sizeof *STRUCTS };
+
+static void test_tiling(void)
 {
-    for (uint32_t i = 0; i < count; i++)
-        if (strcmp(table[i].type, type) == 0)
-            return (int)i;
-    return -1;
+    gait_field f;
+    size_t end = 0, known = 0;
+    uint32_t rows = 0;
+    for (; gait_field_at(rows, &f) == GAIT_OK; rows++) {
+        CHECK(f.of && f.name && f.type && f.array && f.unit && f.text && f.size > 0);
+        if (!*f.name) { /* the struct itself */
+            CHECK(known < COUNT && (known == 0 || end == STRUCTS[known - 1].size));
+            CHECK(strcmp(f.of, STRUCTS[known].of) == 0 && f.size == STRUCTS[known].size);
+            known++;
+            end = 0;
+            continue;
+        }
+        CHECK(strcmp(f.of, STRUCTS[known - 1].of) == 0 && f.offset == end && *f.type);
+        CHECK(strlen(f.text) > 3 && f.text[strlen(f.text) - 1] == '.');
+        end += f.size;
+    }
+    CHECK(known == COUNT && end == STRUCTS[COUNT - 1].size && rows > 150);
+    CHECK(gait_field_at(rows, &f) == GAIT_ERR_ARG && gait_field_at(0, NULL) == GAIT_ERR_ARG);
+}
+
+static gait_field find(const char *of, const char *name)
+{
+    gait_field f = {0};
+    for (uint32_t i = 0; gait_field_at(i, &f) == GAIT_OK; i++)
+        if (strcmp(f.of, of) == 0 && strcmp(f.name, name) == 0)
+            return f;
+    CHECK(!"there is such a field");
+    return f;
+}
+
+static void test_rows(void)
+{
+    gait_field f = find("gait_estimate", "joint_sd");
+    CHECK(f.offset == offsetof(gait_estimate, joint_sd) && f.size == sizeof(float[GAIT_MAX_JOINTS][3]));
+    CHECK(strcmp(f.type, "float") == 0 && strcmp(f.array, "[32][3]") == 0 && strcmp(f.unit, "metres") == 0);
+    CHECK(isnan(f.low) && isnan(f.high));
+    f = find("gait_tracker_config", "rejuvenation_time");
+    CHECK(f.offset == offsetof(gait_tracker_config, rejuvenation_time) && f.low == 0.0 && f.high == 1e6);
+    CHECK(strncmp(f.text, "Time constant", 13) == 0);
+    f = find("gait_frame", "keypoints");
+    CHECK(f.offset == offsetof(gait_frame, keypoints) && strcmp(f.type, "const gait_keypoint *") == 0);
 }
 
 int main(void)
 {
-    static const want structs[] = {
-        {"gait_error", sizeof(gait_error)},
-        {"gait_image", sizeof(gait_image)},
-        {"gait_camera", sizeof(gait_camera)},
-        {"gait_state", sizeof(gait_state)},
-        {"gait_pose", sizeof(gait_pose)},
-        {"gait_tasks", sizeof(gait_tasks)},
-        {"gait_model_info", sizeof(gait_model_info)},
-        {"gait_tracker_config", sizeof(gait_tracker_config)},
-        {"gait_keypoint", sizeof(gait_keypoint)},
-        {"gait_frame", sizeof(gait_frame)},
-        {"gait_estimate", sizeof(gait_estimate)},
-        {"gait_lift_info", sizeof(gait_lift_info)},
-        {"gait_lift_config", sizeof(gait_lift_config)},
-        {"gait_lift_fit", sizeof(gait_lift_fit)},
-        {"gait_lift_frame", sizeof(gait_lift_frame)},
-    };
-    uint32_t count = 0;
-    const gait_abi_field *const table = gait_abi_fields(&count);
-    CHECK(gait_abi_fields(NULL) == table);
-    uint32_t rows = 0;
-    for (uint32_t i = 0; i < count; i++)
-        CHECK(memchr(table[i].type, 0, sizeof table[i].type) &&
-              memchr(table[i].field, 0, sizeof table[i].field));
-    for (size_t s = 0; s < sizeof structs / sizeof *structs; s++) {
-        int const first = find(table, count, structs[s].type);
-        CHECK(first >= 0 && !table[first].field[0] && table[first].size == structs[s].size);
-        uint32_t at = 0, i = (uint32_t)first + 1;
-        for (; i < count && table[i].field[0]; i++) {
-            CHECK(strcmp(table[i].type, structs[s].type) == 0 && table[i].offset == at && table[i].size > 0);
-            at = table[i].offset + table[i].size;
-        }
-        CHECK(at == structs[s].size);
-        rows += i - (uint32_t)first;
-    }
-    CHECK(rows == count);
+    test_tiling();
+    test_rows();
     return CHECK_DONE();
 }

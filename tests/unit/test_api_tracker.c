@@ -56,68 +56,63 @@ static void test_integers(void)
     }
 }
 
-/* Every float of the configuration: not a number, infinite, below and above its range; named in the message. */
-static void test_floats(void)
+/* Every number of the configuration that has a range: not a number, infinite, below and above it; named in the message. */
+static void test_ranges(void)
 {
-#define FLOAT(member, low, high)                                                                             \
-    {                                                                                                        \
-        offsetof(gait_tracker_config, member), #member, low, high                                            \
-    }
-    static const struct {
-        size_t offset;
-        const char *name;
-        float low, high;
-    } number[] = {
-        FLOAT(term_weight[0], -1e-3f, 2e6f),
-        FLOAT(term_weight[1], -1e-3f, 2e6f),
-        FLOAT(term_weight[2], -1e-3f, 2e6f),
-        FLOAT(term_weight[3], -1e-3f, 2e6f),
-        FLOAT(term_weight[4], -1e-3f, 2e6f),
-        FLOAT(missed_weight, -0.01f, 1.01f),
-        FLOAT(girth, 0.49f, 2.01f),
-        FLOAT(resample_ess, -0.01f, 1.01f),
-        FLOAT(max_dt, 0.0f, 11.0f),
-        FLOAT(phase_noise, -1e-3f, 1e9f),
-        FLOAT(rate_noise, -1e-3f, 1e9f),
-        FLOAT(settle_time, -1e-3f, 1e9f),
-        FLOAT(rate_time, -1e-3f, 1e9f),
-        FLOAT(forward_noise, -1e-3f, 1e9f),
-        FLOAT(lateral_noise, -1e-3f, 1e9f),
-        FLOAT(vertical_noise, -1e-3f, 1e9f),
-        FLOAT(heading_noise, -1e-3f, 1e9f),
-        FLOAT(turn_sd, -1e-3f, 1e9f),
-        FLOAT(turn_time, -1e-3f, 1e9f),
-        FLOAT(tilt_noise, -1e-3f, 1e9f),
-        FLOAT(tilt_time, -1e-3f, 1e9f),
-        FLOAT(coef_noise, -1e-3f, 1e9f),
-        FLOAT(coef_time, -1e-3f, 1e9f),
-        FLOAT(stature_noise, -1e-3f, 1e9f),
-        FLOAT(stature_noise_start, -1e-3f, 1e9f),
-        FLOAT(offset_noise, -1e-3f, 1e9f),
-        FLOAT(proportion_noise, -1e-3f, 1e9f),
-        FLOAT(evidence_time, -1e-3f, 1e9f),
-        FLOAT(rejuvenation_time, -1e-3f, 1e9f),
-        FLOAT(joint_sd_model, -1e-3f, 1.1f),
-    };
-#undef FLOAT
-    size_t floats = 0; /* none is forgotten: the config has as many floats as stand here */
-    uint32_t count = 0;
-    const gait_abi_field *const f = gait_abi_fields(&count);
-    for (uint32_t i = 0; i < count; i++)
-        if (strcmp(f[i].type, "gait_tracker_config") == 0 &&
-            f[i].offset >= offsetof(gait_tracker_config, term_weight) &&
-            f[i].offset < offsetof(gait_tracker_config, camera) && strcmp(f[i].field, "offset_angles") != 0 &&
-            strcmp(f[i].field, "cpu_mask") != 0)
-            floats += f[i].size / sizeof(float);
-    CHECK(floats == sizeof number / sizeof *number);
-    for (size_t k = 0; k < sizeof number / sizeof *number; k++) {
-        const float value[] = {number[k].low, number[k].high, NAN, INFINITY, -INFINITY};
+    gait_field f;
+    int32_t floats = 0;
+    for (uint32_t i = 0; gait_field_at(i, &f) == GAIT_OK; i++) {
+        if (strcmp(f.of, "gait_tracker_config") != 0 || strcmp(f.type, "float") != 0)
+            continue;
+        CHECK(f.low < f.high && !*f.array);
+        floats++;
+        float const below = (float)(f.low - 1e-3), above = (float)(f.high * 1.01);
+        const float value[] = {below, above, NAN, INFINITY, -INFINITY};
         for (size_t v = 0; v < sizeof value / sizeof *value; v++) {
             gait_tracker_config cfg = toy_config(1);
-            memcpy((char *)&cfg + number[k].offset, &value[v], sizeof value[v]);
-            refuse(&cfg, GAIT_ERR_ARG, -2, number[k].name);
+            memcpy((char *)&cfg + f.offset, &value[v], sizeof value[v]);
+            refuse(&cfg, GAIT_ERR_ARG, -1, f.name);
+        }
+        const float end[] = {(float)f.low, (float)f.high};
+        for (size_t v = 0; v < 2; v++) {
+            gait_tracker_config cfg = toy_config(1);
+            size_t bytes;
+            memcpy((char *)&cfg + f.offset, &end[v], sizeof end[v]);
+            CHECK(gait_tracker_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
         }
     }
+    CHECK(floats == 30);
+}
+
+/* A program compiled with an older header, whose config ends before the last settings: they get their defaults. */
+static void test_an_older_config(void)
+{
+    size_t const older = offsetof(gait_tracker_config, offset_noise);
+    static _Alignas(GAIT_ALIGN) unsigned char memory[2][1 << 23];
+    gait_tracker_config whole = toy_config(1), cut;
+    gait_tracker *t[2] = {NULL, NULL};
+    gait_estimate e[2];
+    gait_tracker_default(&cut, GAIT_MODE_DEFAULT);
+    whole.offset_noise = cut.offset_noise;
+    whole.proportion_noise = cut.proportion_noise;
+    memset(&cut, 0xff, sizeof cut);
+    gait_tracker_fill(&cut, older, GAIT_MODE_DEFAULT);
+    CHECK(cut.struct_size == older && isnan(cut.offset_noise)); /* not written past its end */
+    memcpy(&cut, &whole, older);
+    cut.struct_size = older;
+    CHECK(gait_tracker_init(memory[0], sizeof memory[0], toy_model(), &whole, &t[0], NULL) == GAIT_OK);
+    CHECK(gait_tracker_init(memory[1], sizeof memory[1], toy_model(), &cut, &t[1], NULL) == GAIT_OK);
+    for (int k = 0; k < 2; k++) {
+        gait_state const mean = toy_walk(0.0f), sd = toy_doubt(1.0f);
+        gait_frame const frame = {.utime = 33333};
+        CHECK(gait_tracker_start(t[k], &mean, &sd, 0, NULL) == GAIT_OK);
+        CHECK(gait_tracker_step(t[k], &frame, &e[k], NULL) == GAIT_OK);
+    }
+    CHECK(gait_tracker_digest(t[0]) == gait_tracker_digest(t[1]) && memcmp(&e[0], &e[1], sizeof e[0]) == 0);
+    cut.struct_size = older - 2;
+    refuse(&cut, GAIT_ERR_STRUCT, -1, "not filled by gait_tracker_default()");
+    cut.struct_size = 8;
+    refuse(&cut, GAIT_ERR_STRUCT, -1, "not filled by gait_tracker_default()");
 }
 
 /* Memory that is not aligned, or too small: each says so, and not the other. */
@@ -158,7 +153,8 @@ static void test_cameras(void)
 /* The defaults of both modes are accepted as they are. */
 static void test_defaults(void)
 {
-    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
+    for (int k = 0; k < 2; k++) {
+        gait_mode const mode = k ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT;
         gait_tracker_config cfg;
         size_t bytes;
         memset(&cfg, 0xff, sizeof cfg);
@@ -327,7 +323,7 @@ static void test_background(void)
     gait_image const good = toy_image(grey);
     for (int k = 0; k < 4; k++) {
         gait_image bad = good;
-        int32_t *const number[] = {&bad.width, &bad.height, &bad.stride, &bad.format};
+        int32_t *const number[] = {&bad.width, &bad.height, &bad.stride, (int32_t *)(void *)&bad.format};
         *number[k] -= 1;
         CHECK(gait_tracker_set_background(t, 0, &bad, NULL) == GAIT_ERR_ARG);
     }
@@ -363,7 +359,8 @@ static void test_particles(void)
 int main(void)
 {
     test_integers();
-    test_floats();
+    test_ranges();
+    test_an_older_config();
     test_memory();
     test_cameras();
     test_defaults();

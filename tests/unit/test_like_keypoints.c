@@ -73,8 +73,8 @@ static error follow(const given *g, uint64_t *digest)
 {
     gait_tracker_config cfg = toy_config(1);
     cfg.terms = g->terms;
-    cfg.term_weight[2] = 1.0f; /* an image with little evidence */
-    cfg.term_weight[4] = 8.0f;
+    cfg.edges_weight = 1.0f; /* an image with little evidence */
+    cfg.keypoints_weight = 8.0f;
     gait_tracker *const t = film_tracker(&cfg, 0, 1.0f);
     gait_keypoint track[GAIT_MAX_JOINTS];
     error out = {0};

@@ -120,8 +120,10 @@ static void test_setup(void)
     cfg.terms = 0x5;
     cfg.girth = 1.5f;
     cfg.missed_weight = 0.3f;
-    for (int k = 0; k < LIKE_TERMS; k++)
-        cfg.term_weight[k] = 1.0f + (float)k;
+    cfg.texture_weight = 1.0f;
+    cfg.silhouette_weight = 2.0f;
+    cfg.edges_weight = 3.0f;
+    cfg.template_weight = 4.0f;
     like_setup_init(&s, toy_model(), &cfg, kernels_choose(~0u));
     CHECK(s.limbs == TOY_LIMBS && s.terms == 0x5 && s.missed_weight == 0.3f && !s.paper);
     CHECK(s.weight[0] == 1.0f && s.weight[1] == 2.0f && s.weight[2] == 3.0f && s.weight[3] == 4.0f);

@@ -81,7 +81,7 @@ static void test_paper(void)
     gait_tracker_default(&own, GAIT_MODE_PAPER);
     cfg.mode = GAIT_MODE_PAPER;
     cfg.terms = GAIT_TERM_TEXTURE;
-    cfg.term_weight[0] = own.term_weight[0];
+    cfg.texture_weight = own.texture_weight;
     cfg.resample_ess = 1.0f;
     cfg.settle_time = 0.0f;
     cfg.rate_time = cfg.tilt_time = cfg.coef_time = 0.0f;

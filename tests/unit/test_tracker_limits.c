@@ -68,8 +68,8 @@ static void test_refusals(void)
         "stride 384, 384 pixels of GAIT_RGB8 or GAIT_BGR8 take at least 1152"};
     for (int k = 0; k < 6; k++) {
         gait_image bad = good;
-        int32_t *const number[] = {&bad.width,  &bad.height, &bad.stride,
-                                   &bad.format, &bad.stride, &bad.format};
+        int32_t *const format = (int32_t *)(void *)&bad.format;
+        int32_t *const number[] = {&bad.width, &bad.height, &bad.stride, format, &bad.stride, format};
         static const int32_t value[] = {SCENE_W - 1, SCENE_H + 1, SCENE_W - 1, 0, -SCENE_W, GAIT_RGB8};
         *number[k] = value[k];
         f = toy_frame(11);
@@ -190,7 +190,7 @@ static void test_ambiguous(void)
         t->core->start_utime -= 1000000 * cases[k].seconds;
         gait_estimate e;
         film_step(t, 1, 10, 0, &e);
-        CHECK(e.status == cases[k].status);
+        CHECK((int32_t)e.status == cases[k].status);
         CHECK_NEAR(e.hypothesis_weight, 1.0 - 0.01 * cases[k].apart, 1e-5);
         toy_tracker_free(t);
     }
@@ -230,7 +230,7 @@ static void test_resampling(void)
 {
     gait_tracker_config cfg = toy_config(1);
     int flagged[3] = {0};
-    cfg.term_weight[1] = cfg.term_weight[2] = cfg.term_weight[3] = 2.0f;
+    cfg.silhouette_weight = cfg.edges_weight = cfg.template_weight = 2.0f;
     cfg.evidence_time = 0.0f;
     for (int k = 0; k < 3; k++) {
         cfg.resample_ess = 0.5f * (float)k;

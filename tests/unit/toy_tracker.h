@@ -22,10 +22,10 @@ static inline gait_tracker_config toy_config(int32_t cameras)
     c.cameras = cameras;
     c.lag = 5;
     c.terms = GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE;
-    c.term_weight[0] = 0.2f;
-    c.term_weight[1] = 25.0f;
-    c.term_weight[2] = 40.0f;
-    c.term_weight[3] = 4.0f;
+    c.texture_weight = 0.2f;
+    c.silhouette_weight = 25.0f;
+    c.edges_weight = 40.0f;
+    c.template_weight = 4.0f;
     c.missed_weight = 0.4f;
     c.girth = 1.0f;
     c.resample_ess = 0.5f;

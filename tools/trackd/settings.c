@@ -11,11 +11,8 @@
 #define INT(field, low, high) OPTION_INT, &s->field, low, high
 #define FLAG(field)           OPTION_FLAG, &s->field, 0, 0
 
-enum { OWN = 30, OPTIONS = OWN + TRACKER_OPTIONS };
-static char particles_help[80], acquisition_help[200]; /* written by describe_defaults() */
-
-/* Options that write into `s`. */
-static void make_table(settings *s, option *table)
+/* Fill `table` with options that write into `s`, and return how many. */
+static int make_table(settings *s, option *table)
 {
     const option own[] = {
         {"model", 'm', "FILE", "model (.gait) made by `gait learn`; required", TEXT(model)},
@@ -43,7 +40,6 @@ static void make_table(settings *s, option *table)
          TEXT(config)},
         {"stream", 0, "I", "number of the camera, default 0", INT(stream, 0, 30)},
         {"mode", 0, "default|paper", "all likelihood terms, or those of Ormoneit et al. 2000", TEXT(mode)},
-        {"particles", 'n', "N", particles_help, INT(particles, 16, 1 << 20)},
         {"budget-ms", 0, "MS",
          "live: drop and count frames that cannot be answered within MS milliseconds of their capture; a\n"
          "        frame whose time stamp is more than a second old, or in the future, counts from its\n"
@@ -54,19 +50,8 @@ static void make_table(settings *s, option *table)
          "        dropped, and double them, up to --particles, when there is time to spare; results then\n"
          "        depend on timing; default: constant",
          INT(adapt_particles, 16, 1 << 20)},
-        {"acquisition-particles", 0, "N", acquisition_help, INT(acquisition_particles, 0, 1 << 20)},
-        {"components", 0, "Q", "principal components to use; default the first 5, in paper mode all",
-         INT(components, 0, GAIT_MAX_COMPONENTS)},
-        {"lag", 0, "N",
-         "frames by which GAIT_ESTIMATE_LAG and GAIT_STRIDE are delayed, default 5; 0: no GAIT_ESTIMATE_LAG",
-         INT(lag, 0, 64)},
-        {"seed", 0, "N", "seed of the random numbers, default 1", OPTION_U64, &s->seed, 0, 0},
-        {"threads", 't', "N", "threads, default 1; results do not depend on it",
+        {"threads", 't', "N", "threads, default 1, which is also the default of --tasks; results do not depend on it",
          INT(threads, 1, GAIT_POOL_MAX)},
-        {"tasks", 0, "N",
-         "tasks into which a step is divided, default --threads, each with its own memory; results do\n"
-         "        not depend on it",
-         INT(tasks, 1, 256)},
         {"cpu-mask", 0, "N",
          "sum of the instruction sets to use: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none; default all\n"
          "        that the CPU has; results do not depend on it",
@@ -101,46 +86,26 @@ static void make_table(settings *s, option *table)
         {"version", 0, "", "print the version and whether JPEG frames are supported", FLAG(version)},
         {"quiet", 'q', "", "do not print the URL at the start and the summary at the end", FLAG(quiet)},
     };
-    _Static_assert(sizeof own / sizeof *own == OWN, "every option has a place");
-    _Static_assert((int)OPTIONS <= (int)OPTIONS_MOST, "a configuration file can set every option");
+    int const count = (int)(sizeof own / sizeof *own);
     memcpy(table, own, sizeof own);
-    tracker_options_table(&s->tracker, table + OWN);
+    return count + tracker_options_table(&s->tracker, table + count);
 }
 
 static void set_defaults(settings *s)
 {
     *s = (settings){.mode = "default",
                     .init = "auto",
-                    .components = -1,
                     .threads = 1,
-                    .lag = 5,
-                    .acquisition_particles = -1,
                     .cpu_mask = -1,
-                    .seed = 1,
                     .max_gap = 2,
                     .lift_lag = -1};
-}
-
-/* Defaults of the library, for the help. */
-static void describe_defaults(void)
-{
-    gait_tracker_config usual, paper;
-    gait_tracker_default(&usual, GAIT_MODE_DEFAULT);
-    gait_tracker_default(&paper, GAIT_MODE_PAPER);
-    snprintf(particles_help, sizeof particles_help, "number of particles; default %d, paper mode %d",
-             (int)usual.particles, (int)paper.particles);
-    snprintf(acquisition_help, sizeof acquisition_help,
-             "until left and right are known, use twice the particles, up to N; default %d, paper mode %d:\n"
-             "        no more than --particles",
-             (int)usual.acquisition_particles, (int)paper.acquisition_particles);
 }
 
 void settings_help(void)
 {
     static settings s;
-    option table[OPTIONS];
-    make_table(&s, table);
-    describe_defaults();
+    option table[OPTIONS_MOST];
+    int const count = make_table(&s, table);
     printf(
         "usage: gait-trackd -m MODEL.gait [--camera CAMERA.json] [--init INIT.json|auto] [options]\n\n"
         "Track a walking person in frames that arrive over LCM (GAIT_IMAGE_<i>).  Publishes estimates\n"
@@ -149,19 +114,12 @@ void settings_help(void)
         "tracked; the others are counted as dropped.\n"
         "Accepts the commands START, STOP and RESET on GAIT_COMMAND.  SIGINT or SIGTERM end the program\n"
         "with a summary.  Exit codes: 0 ok, 1 failed, 2 usage.\n\n");
-    options_help(table, OPTIONS);
+    options_help(table, count);
 }
 
-static int32_t mode(const settings *s)
+static gait_mode mode(const settings *s)
 {
     return strcmp(s->mode, "paper") == 0 ? GAIT_MODE_PAPER : GAIT_MODE_DEFAULT;
-}
-
-static int32_t particles(const settings *s)
-{
-    gait_tracker_config usual;
-    gait_tracker_default(&usual, mode(s));
-    return s->particles ? s->particles : usual.particles;
 }
 
 /* Refuse an option that has no effect without another one. */
@@ -213,15 +171,26 @@ static bool check_logs(const settings *s, message *why)
     return true;
 }
 
+/* Set values from the file, if there is one, and then from the command line, which wins. */
+static option_result parse(settings *s, const option *table, int count, int argc, char **argv, message *why)
+{
+    if (s->config[0] && !options_file(table, count, s->config, why))
+        return OPTION_BAD;
+    return options_parse(table, count, argc, argv, why);
+}
+
 option_result settings_read(settings *s, int argc, char **argv, message *why)
 {
-    option table[OPTIONS];
+    option table[OPTIONS_MOST];
     set_defaults(s);
-    make_table(s, table);
-    option_result result = options_parse(table, OPTIONS, argc, argv, why);
-    if (result == OPTION_OK && s->config[0])
-        result = options_file(table, OPTIONS, s->config, why) ? options_parse(table, OPTIONS, argc, argv, why)
-                                                              : OPTION_BAD;
+    int const count = make_table(s, table);
+    option_result result = options_parse(table, count, argc, argv, why); /* which file? */
+    if (result == OPTION_OK)
+        result = parse(s, table, count, argc, argv, why); /* which mode? */
+    gait_tracker_default(&s->tracker, mode(s));
+    s->tracker.tasks = 0;
+    if (result == OPTION_OK)
+        result = parse(s, table, count, argc, argv, why);
     if (result != OPTION_OK)
         return result;
     bool const ok =
@@ -233,25 +202,18 @@ option_result settings_read(settings *s, int argc, char **argv, message *why)
         (s->budget_ms == 0 || !link_is_log(link_url(s->url)) ||
          message_set(why, "--budget-ms: a log is played without dropping frames; leave it out")) &&
         check_dependencies(s, why) && check_logs(s, why) &&
-        (s->adapt_particles <= particles(s) ||
+        (s->adapt_particles <= s->tracker.particles ||
          message_set(why, "--adapt-particles %d: at most the %d of --particles", (int)s->adapt_particles,
-                     (int)particles(s)));
+                     (int)s->tracker.particles));
     return ok ? OPTION_OK : OPTION_BAD;
 }
 
 void settings_tracker(const settings *s, gait_tasks exec, gait_tracker_config *c)
 {
-    gait_tracker_default(c, mode(s));
-    c->particles = particles(s);
-    if (s->acquisition_particles >= 0)
-        c->acquisition_particles = s->acquisition_particles;
-    c->components = s->components;
-    c->seed = s->seed;
-    c->lag = s->lag;
+    *c = s->tracker;
     c->cpu_mask = (uint32_t)s->cpu_mask;
-    c->tasks = s->tasks ? s->tasks : s->threads;
+    c->tasks = c->tasks ? c->tasks : s->threads;
     c->exec = exec;
     if (s->keypoints_term)
         c->terms |= GAIT_TERM_KEYPOINTS;
-    tracker_options_apply(&s->tracker, c);
 }

@@ -6,16 +6,14 @@
 typedef struct settings { /* 0 or empty: not given, unless noted */
     char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
     char url[OPTION_TEXT], out[OPTION_TEXT], config[OPTION_TEXT], mode[OPTION_TEXT];
-    int32_t stream, particles, adapt_particles, acquisition_particles, components, threads, tasks, lag,
-        cpu_mask;
-    uint64_t seed;
+    int32_t stream, adapt_particles, threads, cpu_mask;
     float max_gap, budget_ms;
     char lift_model[OPTION_TEXT];
     float lift_stature, lift_sd;
     int32_t lift_lag; /* -1: not given */
     float keypoints_sd;
     bool particles_channel, quiet, version, lift, keypoints_term;
-    tracker_values tracker;
+    gait_tracker_config tracker; /* with the defaults of the mode; tasks 0: not given */
 } settings;
 
 /* Command line, then configuration file, then defaults; checked for consistency. */

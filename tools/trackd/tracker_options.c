@@ -1,70 +1,78 @@
 #include "tracker_options.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
-#define FIELD(f) offsetof(gait_tracker_config, f)
-
-/* The ranges are those of the library (api_tracker.c), so that the usage error comes before any work. */
-static const struct {
-    const char *name;
+typedef struct setting { /* a row of the table, and its words as an option */
+    const char *name, *type, *unit, *meaning;
     size_t offset;
-    double low, high;
-    const char *help;
-} fields[] = {
-    {"texture-weight", FIELD(term_weight[0]), 0, 1e6, "nats per unit cost of the previous frame's texture"},
-    {"silhouette-weight", FIELD(term_weight[1]), 0, 1e6, "nats per unit cost of the silhouette"},
-    {"edges-weight", FIELD(term_weight[2]), 0, 1e6, "nats per unit cost of the edges"},
-    {"template-weight", FIELD(term_weight[3]), 0, 1e6, "nats per unit cost of the running template"},
-    {"tracks-weight", FIELD(term_weight[4]), 0, 1e6, "nats per unit cost of joints found by a detector"},
-    {"missed-weight", FIELD(missed_weight), 0, 1, "foreground outside the limbs against background inside"},
-    {"girth", FIELD(girth), 0.5, 2, "limb radii against the model's (clothes)"},
-    {"resample-ess", FIELD(resample_ess), 0, 1, "resample below this fraction of the particles"},
-    {"evidence-time", FIELD(evidence_time), 0, 1e6,
-     "seconds for which errors of the image terms last; 0: every frame counts in full"},
-    {"rejuvenation-time", FIELD(rejuvenation_time), 0, 1e6,
-     "seconds in which particles forget whom they descend from; 0: never"},
-    {"max-dt", FIELD(max_dt), 1e-3, 10,
-     "longest interval crossed by one prediction, seconds; a longer one, up to --max-gap, by several"},
-    {"phase-noise", FIELD(phase_noise), 0, 10, "strides per sqrt(second)"},
-    {"rate-noise", FIELD(rate_noise), 0, 10, "fraction of the mean stride rate per sqrt(second)"},
-    {"settle-time", FIELD(settle_time), 0, 1e6, "seconds after the start in which stature settles"},
-    {"rate-time", FIELD(rate_time), 0, 1e6,
-     "time constant of the rate's return to the population's, seconds"},
-    {"forward-noise", FIELD(forward_noise), 0, 100, "metres per sqrt(second)"},
-    {"lateral-noise", FIELD(lateral_noise), 0, 100, "metres per sqrt(second)"},
-    {"vertical-noise", FIELD(vertical_noise), 0, 100, "metres per sqrt(second)"},
-    {"heading-noise", FIELD(heading_noise), 0, 100, "radians per sqrt(second)"},
-    {"turn-sd", FIELD(turn_sd), 0, 100, "of the turn rates that walkers take, radians per second"},
-    {"turn-time", FIELD(turn_time), 0, 1e6,
-     "mean seconds until a walker takes another turn rate; 0: always straight on"},
-    {"tilt-noise", FIELD(tilt_noise), 0, 100, "radians per sqrt(second)"},
-    {"tilt-time", FIELD(tilt_time), 0, 1e6, "seconds in which tilt and height return to the model's"},
-    {"coef-noise", FIELD(coef_noise), 0, 100, "score standard deviations per sqrt(second)"},
-    {"coef-time", FIELD(coef_time), 0, 1e6, "seconds in which the scores return to the mean; 0: never"},
-    {"stature-noise", FIELD(stature_noise), 0, 100, "deviations of stature at the start per sqrt(second)"},
-    {"stature-noise-start", FIELD(stature_noise_start), 0, 100, "the same while settling"},
-    {"proportion-noise", FIELD(proportion_noise), 0, 100,
-     "standard deviations of the limbs' proportions per sqrt(second)"},
-    {"joint-sd-model", FIELD(joint_sd_model), 0, 1, "what the model cannot express, fraction of stature"},
-    {"offset-noise", FIELD(offset_noise), 0, 100, "deviations of posture among people per sqrt(second)"},
-};
+    double usual, paper, low, high;
+} setting;
 
-_Static_assert(sizeof fields / sizeof *fields == TRACKER_OPTIONS, "every field has a value");
+#define ROW(name, type, unit, meaning, usual, paper, low, high)                                              \
+    {#name, #type, unit, meaning, offsetof(gait_tracker_config, name), (double)(usual), (double)(paper), low, high},
+#define SETTING(meaning, type, name, array, unit, usual, low, high)                                          \
+    ROW(name, type, unit, meaning, usual, usual, low, high)
+#define PAPER(meaning, type, name, array, unit, usual, paper, low, high)                                     \
+    ROW(name, type, unit, meaning, usual, paper, low, high)
+#define FIELD(...)
 
-void tracker_options_table(tracker_values *values, option *table)
+static const setting SETTINGS[] = {GAIT_TRACKER_CONFIG_FIELDS(SETTING, PAPER, FIELD)};
+enum { COUNT = sizeof SETTINGS / sizeof *SETTINGS };
+
+static bool kind_of(const setting *s, option_kind *kind)
 {
-    for (int i = 0; i < TRACKER_OPTIONS; i++) {
-        values->value[i] = NAN;
-        table[i] =
-            (option){fields[i].name, 0, "X", fields[i].help, OPTION_FLOAT, &values->value[i], fields[i].low,
-                     fields[i].high};
-    }
+    if (strcmp(s->name, "seed") == 0)
+        *kind = OPTION_U64;
+    else if (strcmp(s->type, "float") == 0)
+        *kind = OPTION_FLOAT;
+    else if (strcmp(s->type, "int32_t") == 0 && strcmp(s->name, "cameras") != 0)
+        *kind = OPTION_INT;
+    else
+        return false;
+    return true;
 }
 
-void tracker_options_apply(const tracker_values *values, gait_tracker_config *config)
+/* "rejuvenation-time" */
+static const char *option_name(const setting *s)
 {
-    for (int i = 0; i < TRACKER_OPTIONS; i++)
-        if (!isnan(values->value[i]))
-            memcpy((char *)config + fields[i].offset, &values->value[i], sizeof values->value[i]);
+    static char names[COUNT][32];
+    char *const name = names[s - SETTINGS];
+    snprintf(name, sizeof names[0], "%s", s->name);
+    for (char *c = name; *c; c++)
+        *c = *c == '_' ? '-' : *c;
+    return name;
+}
+
+/* Meaning, unit, default. */
+static const char *option_help(const setting *s)
+{
+    static char helps[COUNT][256];
+    char *const help = helps[s - SETTINGS];
+    char paper[40] = "";
+    if (s->paper != s->usual)
+        snprintf(paper, sizeof paper, ", paper mode %g", s->paper);
+    snprintf(help, sizeof helps[0], "%s\n        %s%sdefault %g%s", s->meaning, s->unit, *s->unit ? "; " : "", s->usual,
+             paper);
+    return help;
+}
+
+int tracker_options_table(gait_tracker_config *config, option *table)
+{
+    int count = 0;
+    for (int i = 0; i < COUNT; i++) {
+        const setting *const s = &SETTINGS[i];
+        option_kind kind;
+        if (kind_of(s, &kind))
+            table[count++] = (option){.name = option_name(s),
+                                      .letter = strcmp(s->name, "particles") == 0 ? 'n' : 0,
+                                      .metavar = kind == OPTION_FLOAT ? "X" : "N",
+                                      .help = option_help(s),
+                                      .kind = kind,
+                                      .value = (char *)config + s->offset,
+                                      .low = s->low,
+                                      .high = s->high};
+    }
+    return count;
 }

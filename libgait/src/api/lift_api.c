@@ -1,44 +1,104 @@
 /* lift_api.c - public functions of the lifter: check the arguments, then call down. */
+#include "api/fields.h"
 #include "api/kernels.h"
+#include "base/cpu.h"
+#include "image/camera.h"
+#include "model/model.h"
 #include "lift/uncertainty.h"
 #include "lift/lifter.h"
 
 #include <string.h>
 
-void gait_lift_default(gait_lift_config *cfg)
+#define USUAL(meaning, type, name, array, unit, value, low, high) .name = value,
+#define NO_DEFAULT(...)
+
+void gait_lift_fill(gait_lift_config *cfg, size_t cfg_bytes)
 {
-    if (!cfg)
-        return;
-    *cfg = (gait_lift_config){
-        .struct_size = sizeof *cfg,
-        .projection = GAIT_LIFT_PERSPECTIVE,
-        .stature_sd = -1.0,
-        .sd = 3.0,
-        .residual = -1.0,
-        .place_sd = {10.0, 10.0, 0.03},
-        .heading_sd = -1.0,
-        .turn_sd = 0.3,
-        .tolerance = 1e-9,
-        .max_iterations = 30,
-        .lag = 5,
-        .max_rate = 60.0,
-        .max_gap = 0.5,
-        .fit_threshold = 9.0,
-        .report = ~UINT64_C(0),
-        .axis = {{1.0, 0.0, 0.0}, {0.0, 0.0, 1.0}},
-        .cpu_mask = ~0u,
-    };
+    static const gait_lift_config USUALLY = {GAIT_LIFT_CONFIG_FIELDS(USUAL, NO_DEFAULT)};
+    gait_lift_config full = USUALLY;
+    full.struct_size = (uint32_t)(cfg_bytes < sizeof full ? cfg_bytes : sizeof full);
+    if (cfg)
+        memcpy(cfg, &full, full.struct_size);
+}
+
+/* x is in [low, high]; NaN is not. */
+static bool within(double x, double low, double high)
+{
+    return x >= low && x <= high;
+}
+
+static bool orthonormal(const double axis[2][3])
+{
+    double product[3] = {0.0};
+    for (int32_t i = 0; i < 3; i++) {
+        product[0] += axis[0][i] * axis[0][i];
+        product[1] += axis[1][i] * axis[1][i];
+        product[2] += axis[0][i] * axis[1][i];
+    }
+    return within(product[0], 1 - 1e-9, 1 + 1e-9) && within(product[1], 1 - 1e-9, 1 + 1e-9) &&
+           within(product[2], -1e-9, 1e-9);
+}
+
+/* Along each axis: further away, single precision cannot resolve the ray of a pixel. */
+static bool near(const float t[3])
+{
+    return within((double)t[0], -1e4, 1e4) && within((double)t[1], -1e4, 1e4) &&
+           within((double)t[2], -1e4, 1e4);
+}
+
+static gait_result check_config(const gait_lift_config *c, gait_error *err)
+{
+    gait_result const s = fields_check("gait_lift_config", c, "lift config ", err);
+    if (s != GAIT_OK)
+        return s;
+    bool const perspective = c->projection == GAIT_LIFT_PERSPECTIVE;
+    const char *const bad =
+        !perspective && c->projection != GAIT_LIFT_ORTHOGRAPHIC ? "projection is none of GAIT_LIFT_*"
+        : c->stature_sd < 0.0 && c->stature_sd != -1.0          ? "stature_sd is neither -1 nor in [0, 1] metres"
+        : c->residual < 0.0 && c->residual != -1.0              ? "residual is neither -1 nor in [0, 10000]"
+        : c->heading_sd < 0.0 && c->heading_sd != -1.0          ? "heading_sd is neither -1 nor in [0, 10] radians"
+        : !cpu_mask_valid(c->cpu_mask)                          ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
+        : !perspective && !orthonormal(c->axis)                 ? "axis is not two unit vectors at right angles"
+        : perspective && !camera_valid(&c->camera)
+            ? "camera is not valid: size, focal lengths and a rotation R are needed"
+        : perspective && !near(c->camera.t) ? "camera is not within 10 km: t is in metres"
+                                            : NULL;
+    return bad ? base_fail(err, GAIT_ERR_ARG, -1, "lift config: %s", bad) : GAIT_OK;
+}
+
+static gait_result need_prior(const gait_model *m, gait_error *err)
+{
+    if (m->segments.markers)
+        return GAIT_OK;
+    return base_fail(err, GAIT_ERR_ARG, -1,
+                     "the model holds no segment prior: learn it with gait learn ... --segments learnt");
+}
+
+/* Check a config, which may be of an older header, and complete it. */
+static gait_result open_config(const gait_model *m, const gait_lift_config *given, gait_lift_config *cfg,
+                               gait_error *err)
+{
+    gait_result s = need_prior(m, err);
+    if (s == GAIT_OK)
+        s = fields_check_size("gait_lift_config", given->struct_size, "gait_lift_default", err);
+    if (s != GAIT_OK)
+        return s;
+    gait_lift_default(cfg);
+    memcpy(cfg, given, given->struct_size);
+    cfg->struct_size = sizeof *cfg;
+    return check_config(cfg, err);
 }
 
 gait_result gait_lift_bytes(const gait_model *m, const gait_lift_config *cfg, size_t *bytes, gait_error *err)
 {
+    gait_lift_config full;
+    arena a = {.base = NULL};
     if (!m || !cfg || !bytes)
         return base_null(err, "gait_lift_bytes");
-    gait_result const s = lifter_check(m, cfg, err);
+    gait_result const s = open_config(m, cfg, &full, err);
     if (s != GAIT_OK)
         return s;
-    arena a = {.base = NULL};
-    (void)lifter_layout(&a, &m->segments, cfg, kernels_choose(cfg->cpu_mask));
+    (void)lifter_layout(&a, &m->segments, &full, kernels_choose(full.cpu_mask));
     *bytes = a.used;
     return GAIT_OK;
 }
@@ -46,15 +106,19 @@ gait_result gait_lift_bytes(const gait_model *m, const gait_lift_config *cfg, si
 gait_result gait_lift_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_lift_config *cfg,
                            gait_lift **out, gait_error *err)
 {
-    if (!mem || !out)
-        return base_null(err, "gait_lift_init");
+    gait_lift_config full;
     arena a = {.base = NULL};
-    gait_result s = gait_lift_bytes(m, cfg, &a.used, err);
-    if (s == GAIT_OK)
-        s = arena_place(&a, mem, mem_bytes, err);
+    if (!mem || !m || !cfg || !out)
+        return base_null(err, "gait_lift_init");
+    gait_result s = open_config(m, cfg, &full, err);
     if (s != GAIT_OK)
         return s;
-    gait_lift *const self = lifter_layout(&a, &m->segments, cfg, kernels_choose(cfg->cpu_mask));
+    const kernels *const run = kernels_choose(full.cpu_mask);
+    (void)lifter_layout(&a, &m->segments, &full, run);
+    s = arena_place(&a, mem, mem_bytes, err);
+    if (s != GAIT_OK)
+        return s;
+    gait_lift *const self = lifter_layout(&a, &m->segments, &full, run);
     int32_t const frames = m->segments.frames;
     lift_stream_reset(&self->stream);
     for (int32_t f = 0; f < frames; f++)
@@ -69,8 +133,9 @@ gait_result gait_lift_get_info(const gait_model *m, gait_lift_info *out, gait_er
     if (!m || !out)
         return base_null(err, "gait_lift_get_info");
     const segment_prior *const p = &m->segments;
-    if (p->markers == 0)
-        return lifter_no_prior(err);
+    gait_result const s = need_prior(m, err);
+    if (s != GAIT_OK)
+        return s;
     *out = (gait_lift_info){.markers = p->markers,
                             .frames = p->frames,
                             .hop = p->hop,
@@ -163,7 +228,7 @@ gait_result gait_lift_expect(gait_lift *l, const double place[3], double heading
     memcpy(cfg.place, place, sizeof cfg.place);
     cfg.heading = heading;
     cfg.heading_sd = heading_sd;
-    gait_result const s = lifter_check_config(&cfg, err);
+    gait_result const s = check_config(&cfg, err);
     if (s == GAIT_OK && heading_sd == 0.0)
         return base_fail(err, GAIT_ERR_ARG, -1,
                          "gait_lift_expect: heading_sd is 0; give -1 or a positive one");

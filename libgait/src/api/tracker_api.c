@@ -1,5 +1,6 @@
 /* tracker_api.c - public functions of the tracker: check the arguments, then call down. */
 #include "api/check.h"
+#include "api/fields.h"
 #include "api/kernels.h"
 #include "base/cpu.h"
 #include "image/image.h"
@@ -10,196 +11,70 @@
 #include <stddef.h>
 #include <string.h>
 
-void gait_tracker_default(gait_tracker_config *cfg, int32_t mode)
+#define USUAL(meaning, type, name, array, unit, value, low, high)              .name = (type)(value),
+#define USUAL_OF_TWO(meaning, type, name, array, unit, value, paper, low, high) .name = (type)(value),
+#define PAPER_OF_TWO(meaning, type, name, array, unit, value, paper, low, high) .name = (type)(paper),
+#define NO_DEFAULT(...)
+#define MOST_SD 10.0 /* of any number of a start */
+
+static const gait_tracker_config DEFAULTS[] = {
+    [GAIT_MODE_DEFAULT] = {GAIT_TRACKER_CONFIG_FIELDS(USUAL, USUAL_OF_TWO, NO_DEFAULT)},
+    [GAIT_MODE_PAPER] = {GAIT_TRACKER_CONFIG_FIELDS(USUAL, PAPER_OF_TWO, NO_DEFAULT)},
+};
+
+void gait_tracker_fill(gait_tracker_config *cfg, size_t cfg_bytes, gait_mode mode)
 {
-    bool const paper = mode == GAIT_MODE_PAPER;
-    if (!cfg)
-        return;
-    *cfg = (gait_tracker_config){
-        .struct_size = sizeof *cfg,
-        .mode = mode,
-        .seed = 1,
-        .particles = paper ? 10000 : 2000,
-        .acquisition_particles = paper ? 0 : 4000,
-        .components = -1,
-        .proportions = 0,
-        .tasks = 8,
-        .cameras = 1,
-        .lag = 5,
-        .terms = paper ? GAIT_TERM_TEXTURE
-                       : GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE,
-        .term_weight = {[LIKE_TEXTURE] = 0.2f,
-                        [LIKE_SILHOUETTE] = 25.0f,
-                        [LIKE_EDGES] = 40.0f,
-                        [LIKE_TEMPLATE] = 4.0f,
-                        [LIKE_KEYPOINTS] = 8.0f},
-        .missed_weight = 0.6f,
-        .girth = 1.0f,
-        .resample_ess = paper ? 1.0f : 0.5f,
-        .evidence_time = paper ? 0.0f : 0.1f,
-        .rejuvenation_time = paper ? 0.0f : 1.5f,
-        .max_dt = 0.5f,
-        .phase_noise = 0.0164f,
-        .rate_noise = 0.055f,
-        .settle_time = 1.0f,
-        .rate_time = 3.0f,
-        .forward_noise = 0.08f,
-        .lateral_noise = 0.02f,
-        .vertical_noise = 0.0096f,
-        .heading_noise = 0.044f,
-        .turn_sd = 0.5f,
-        .turn_time = 6.0f,
-        .tilt_noise = 0.033f,
-        .tilt_time = 1.1f,
-        .coef_noise = 0.667f, /* with coef_time: the population's unit variance */
-        .coef_time = 4.5f,
-        .stature_noise = 0.2f,
-        .stature_noise_start = 2.0f,
-        .proportion_noise = 0.15f,
-        .joint_sd_model = 0.015f,
-        .offset_noise = 0.58f,
-        .offset_angles = -1,
-        .cpu_mask = ~0u,
-    };
-    if (paper) { /* random walks of Ormoneit et al. 2000, eqs. 5-9, who leave the rates open */
-        cfg->phase_noise = 0.022f;
-        cfg->rate_noise = 0.055f;
-        cfg->forward_noise = cfg->lateral_noise = 0.044f;
-        cfg->vertical_noise = 0.022f;
-        cfg->heading_noise = 0.11f;
-        cfg->turn_sd = cfg->turn_time = 0.0f;
-        cfg->tilt_noise = 0.055f;
-        cfg->coef_noise = 0.5f;
-        cfg->tilt_time = cfg->coef_time = cfg->rate_time = 0.0f;
-        cfg->stature_noise = cfg->stature_noise_start = 0.0f;
-        cfg->offset_angles = 0;
-        cfg->joint_sd_model = 0.0f;
-        cfg->term_weight[LIKE_TEXTURE] = 1.0f;
-    }
+    gait_tracker_config full = DEFAULTS[mode == GAIT_MODE_PAPER];
+    full.mode = mode;
+    full.struct_size = cfg_bytes < sizeof full ? cfg_bytes : sizeof full;
+    if (cfg)
+        memcpy(cfg, &full, (size_t)full.struct_size);
 }
 
-typedef struct range { /* one float of a struct, or `count` of them */
-    char name[20];
-    uint16_t offset, count;
-    float low, high;
-} range;
-
-#define RANGE(member, low, high)        {#member, offsetof(gait_tracker_config, member), 1, low, high}
-#define STATE(member, count, low, high) {#member, offsetof(gait_state, member), count, low, high}
-#define MOST_SD                         10.0f /* of any number of a start */
-
-/* Every number of a struct is in its range; of deviations [0, MOST_SD]. */
-static gait_result check_ranges(const range *ranges, size_t count, const void *of, const char *what, bool sds,
-                                gait_error *err)
+/* Check a config, which may be of an older header, and complete it. */
+static gait_result open_config(const gait_model *m, const gait_tracker_config *given, gait_tracker_config *cfg,
+                               gait_error *err)
 {
-    for (size_t k = 0; k < count; k++)
-        for (int32_t i = 0; i < ranges[k].count; i++) {
-            float const low = sds ? 0.0f : ranges[k].low, high = sds ? MOST_SD : ranges[k].high;
-            float v;
-            memcpy(&v, (const char *)of + ranges[k].offset + (size_t)i * sizeof v, sizeof v);
-            if (!(v >= low && v <= high)) /* also false for NaN */
-                return base_fail(err, GAIT_ERR_ARG, (int)k, "%s%s = %g is outside [%g, %g]", what,
-                                 ranges[k].name, (double)v, (double)low, (double)high);
-        }
-    return GAIT_OK;
-}
-
-static gait_result check_numbers(const gait_tracker_config *cfg, gait_error *err)
-{
-    static const range RANGES[] = {
-        RANGE(term_weight[0], 0.0f, 1e6f),
-        RANGE(term_weight[1], 0.0f, 1e6f),
-        RANGE(term_weight[2], 0.0f, 1e6f),
-        RANGE(term_weight[3], 0.0f, 1e6f),
-        RANGE(term_weight[4], 0.0f, 1e6f),
-        RANGE(missed_weight, 0.0f, 1.0f),
-        RANGE(girth, 0.5f, 2.0f),
-        RANGE(resample_ess, 0.0f, 1.0f),
-        RANGE(evidence_time, 0.0f, 1e6f),
-        RANGE(rejuvenation_time, 0.0f, 1e6f),
-        RANGE(max_dt, 1e-3f, 10.0f),
-        RANGE(phase_noise, 0.0f, 10.0f),
-        RANGE(rate_noise, 0.0f, 10.0f),
-        RANGE(settle_time, 0.0f, 1e6f),
-        RANGE(rate_time, 0.0f, 1e6f),
-        RANGE(forward_noise, 0.0f, 100.0f),
-        RANGE(lateral_noise, 0.0f, 100.0f),
-        RANGE(vertical_noise, 0.0f, 100.0f),
-        RANGE(heading_noise, 0.0f, 100.0f),
-        RANGE(turn_sd, 0.0f, 100.0f),
-        RANGE(turn_time, 0.0f, 1e6f),
-        RANGE(tilt_noise, 0.0f, 100.0f),
-        RANGE(tilt_time, 0.0f, 1e6f),
-        RANGE(coef_noise, 0.0f, 100.0f),
-        RANGE(coef_time, 0.0f, 1e6f),
-        RANGE(stature_noise, 0.0f, 100.0f),
-        RANGE(stature_noise_start, 0.0f, 100.0f),
-        RANGE(offset_noise, 0.0f, 100.0f),
-        RANGE(proportion_noise, 0.0f, 100.0f),
-        RANGE(joint_sd_model, 0.0f, 1.0f),
-    };
-    return check_ranges(RANGES, sizeof RANGES / sizeof *RANGES, cfg, "config ", false, err);
-}
-
-static gait_result check_config(const gait_model *m, const gait_tracker_config *cfg, gait_error *err)
-{
-    uint32_t const known =
-        GAIT_TERM_TEXTURE | GAIT_TERM_SILHOUETTE | GAIT_TERM_EDGES | GAIT_TERM_TEMPLATE | GAIT_TERM_KEYPOINTS;
-    if (!m || !cfg)
+    uint32_t const known = GAIT_TERMS_DEFAULT | GAIT_TERM_KEYPOINTS;
+    if (!m || !given)
         return base_fail(err, GAIT_ERR_ARG, -1, "model or config is NULL");
-    if (!m->cyclic)
-        return model_need_cyclic(m, err);
-    if (cfg->struct_size != sizeof *cfg)
-        return base_fail(err, GAIT_ERR_STRUCT, -1, "config not filled by gait_tracker_default()");
+    gait_result s = model_need_cyclic(m, err);
+    if (s == GAIT_OK)
+        s = fields_check_size("gait_tracker_config", given->struct_size, "gait_tracker_default", err);
+    if (s != GAIT_OK)
+        return s;
+    gait_tracker_default(cfg, given->mode);
+    memcpy(cfg, given, (size_t)given->struct_size);
+    cfg->struct_size = sizeof *cfg;
     if (cfg->mode != GAIT_MODE_DEFAULT && cfg->mode != GAIT_MODE_PAPER)
-        return base_fail(err, GAIT_ERR_ARG, -1, "config mode %d is not a GAIT_MODE_*", (int)cfg->mode);
-    if (cfg->particles < 16 || cfg->particles > 1 << 20)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config particles = %d is outside [16, 1048576]",
-                         (int)cfg->particles);
-    if (cfg->acquisition_particles < 0 || cfg->acquisition_particles > 1 << 20)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config acquisition_particles = %d is outside [0, 1048576]",
-                         (int)cfg->acquisition_particles);
-    if (cfg->components < -1 || cfg->components > m->components)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d",
-                         (int)cfg->components, (int)m->components);
-    if (cfg->proportions < -1 || cfg->proportions > m->proportions)
+        return base_fail(err, GAIT_ERR_ARG, -1, "config mode = %d is not a GAIT_MODE_*", (int)cfg->mode);
+    s = fields_check("gait_tracker_config", cfg, "config ", err);
+    if (s != GAIT_OK)
+        return s;
+    if (cfg->components > m->components)
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d", (int)cfg->components,
+                         (int)m->components);
+    if (cfg->proportions > m->proportions)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config proportions = %d, the model has %d",
                          (int)cfg->proportions, (int)m->proportions);
-    if (cfg->tasks < 1 || cfg->tasks > TASK_MOST)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config tasks = %d is outside [1, %d]", (int)cfg->tasks,
-                         TASK_MOST);
-    if (cfg->cameras < 1 || cfg->cameras > GAIT_MAX_CAMERAS)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config cameras = %d is outside [1, %d]", (int)cfg->cameras,
-                         GAIT_MAX_CAMERAS);
-    if (cfg->lag < 0 || cfg->lag > 64)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config lag = %d is outside [0, 64]", (int)cfg->lag);
     if (cfg->terms == 0 || (cfg->terms & ~known) != 0)
         return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
                          (unsigned)cfg->terms);
-    if (cfg->offset_angles < -1 || cfg->offset_angles > UINT32_MAX)
-        return base_fail(err, GAIT_ERR_ARG, -1,
-                         "config offset_angles = %lld is neither -1 nor a mask of angles",
-                         (long long)cfg->offset_angles);
     if (!cpu_mask_valid(cfg->cpu_mask))
         return base_fail(err, GAIT_ERR_ARG, -1, "config cpu_mask = 0x%x is not ~0u or a set of GAIT_CPU_*",
                          (unsigned)cfg->cpu_mask);
     for (int32_t c = 0; c < cfg->cameras; c++) {
-        gait_result const s = check_camera(&cfg->camera[c], c, err);
+        s = check_camera(&cfg->camera[c], c, err);
         if (s != GAIT_OK)
             return s;
     }
-    return check_numbers(cfg, err);
+    return GAIT_OK;
 }
 
-gait_result gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
-                               gait_error *err)
+/* Bytes of a tracker; GAIT_ERR_LIMIT: more than can be addressed. */
+static gait_result count_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes, gait_error *err)
 {
-    gait_result const s = check_config(m, cfg, err);
     arena a = {.cap = SIZE_MAX};
-    if (s != GAIT_OK)
-        return s;
-    if (!bytes)
-        return base_fail(err, GAIT_ERR_ARG, -1, "bytes is NULL");
     tracker_layout(&a, m, cfg, kernels_choose(cfg->cpu_mask));
     if (a.overflow)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "the tracker would need more memory than can be addressed");
@@ -207,18 +82,31 @@ gait_result gait_tracker_bytes(const gait_model *m, const gait_tracker_config *c
     return GAIT_OK;
 }
 
+gait_result gait_tracker_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
+                               gait_error *err)
+{
+    gait_tracker_config full;
+    if (!bytes)
+        return base_null(err, "gait_tracker_bytes");
+    gait_result const s = open_config(m, cfg, &full, err);
+    return s == GAIT_OK ? count_bytes(m, &full, bytes, err) : s;
+}
+
 gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
                               const gait_tracker_config *cfg, gait_tracker **out, gait_error *err)
 {
-    if (!mem || !out)
-        return base_fail(err, GAIT_ERR_ARG, -1, "mem or out is NULL");
+    gait_tracker_config full;
     arena a = {.base = NULL};
-    gait_result s = gait_tracker_bytes(m, cfg, &a.used, err);
+    if (!mem || !out)
+        return base_null(err, "gait_tracker_init");
+    gait_result s = open_config(m, cfg, &full, err);
+    if (s == GAIT_OK)
+        s = count_bytes(m, &full, &a.used, err);
     if (s == GAIT_OK)
         s = arena_place(&a, mem, mem_bytes, err);
     if (s != GAIT_OK)
         return s;
-    gait_tracker *const t = tracker_layout(&a, m, cfg, kernels_choose(cfg->cpu_mask));
+    gait_tracker *const t = tracker_layout(&a, m, &full, kernels_choose(full.cpu_mask));
     tracker_clear(t);
     *out = t;
     return GAIT_OK;
@@ -284,32 +172,14 @@ gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state
     return gait_model_pelvis_height(m, mean, &mean->pelvis[2], err);
 }
 
-static gait_result check_start(const gait_state *mean, const gait_state *sd, gait_error *err)
-{
-    static const range RANGES[] = {
-        STATE(phase, 1, 0.0f, 1.0f),
-        STATE(stride_hz, 1, 0.1f, 4.0f),
-        STATE(stature, 1, 0.5f, 2.5f),
-        STATE(heading, 1, -7.0f, 7.0f),
-        STATE(pitch, 1, -10.0f, 10.0f),
-        STATE(roll, 1, -10.0f, 10.0f),
-        STATE(turn_rate, 1, -10.0f, 10.0f),
-        STATE(pelvis, 3, -1e4f, 1e4f),
-        STATE(coef, GAIT_MAX_COMPONENTS, -10.0f, 10.0f),
-        STATE(offset, GAIT_MAX_ANGLES, -10.0f, 10.0f),
-        STATE(proportion, GAIT_MAX_PROPORTIONS, -10.0f, 10.0f),
-    };
-    enum { COUNT = sizeof RANGES / sizeof *RANGES };
-    gait_result const s = check_ranges(RANGES, COUNT, mean, "start mean.", false, err);
-    return s == GAIT_OK ? check_ranges(RANGES, COUNT, sd, "start sd.", true, err) : s;
-}
-
 gait_result gait_tracker_start(gait_tracker *t, const gait_state *mean, const gait_state *sd, int64_t utime,
                                gait_error *err)
 {
     if (!t || !mean || !sd)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker, mean or sd is NULL");
-    gait_result const s = check_start(mean, sd, err);
+    gait_result s = fields_check("gait_state", mean, "start mean.", err);
+    if (s == GAIT_OK)
+        s = fields_check_sd("gait_state", sd, MOST_SD, "start sd.", err);
     if (s == GAIT_OK)
         tracker_start(t, mean, sd, utime);
     return s;

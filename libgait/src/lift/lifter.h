@@ -3,7 +3,6 @@
 #define GAIT_LIFT_LIFTER_H
 #include "lift/batch.h"
 #include "lift/stream.h"
-#include "model/model.h"
 
 struct gait_lift {
     lift_table table;
@@ -18,11 +17,6 @@ struct gait_lift {
     bool fitted, windowed; /* there is a posterior; it is of observations, not of a gain */
 };
 
-gait_result lifter_check_config(const gait_lift_config *cfg, gait_error *err);
-/* The configuration is sound and the model has a segment prior. */
-gait_result lifter_check(const gait_model *m, const gait_lift_config *cfg, gait_error *err);
-/* The error of a model without segment prior. */
-gait_result lifter_no_prior(gait_error *err);
 /* Place everything; NULL when counting or if the arena is too small. */
 gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg,
                          const kernels *run);

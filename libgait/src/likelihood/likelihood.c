@@ -74,8 +74,11 @@ void like_setup_init(like_setup *s, const gait_model *m, const gait_tracker_conf
     s->paper = cfg->mode == GAIT_MODE_PAPER;
     s->terms = cfg->terms;
     s->missed_weight = cfg->missed_weight;
-    for (int32_t k = 0; k < LIKE_TERMS; k++)
-        s->weight[k] = cfg->term_weight[k];
+    s->weight[LIKE_TEXTURE] = cfg->texture_weight;
+    s->weight[LIKE_SILHOUETTE] = cfg->silhouette_weight;
+    s->weight[LIKE_EDGES] = cfg->edges_weight;
+    s->weight[LIKE_TEMPLATE] = cfg->template_weight;
+    s->weight[LIKE_KEYPOINTS] = cfg->keypoints_weight;
     limb_geometry_init(m, cfg->girth, s->geometry);
     for (int32_t l = 0; l < m->limbs; l++)
         surface_init(&s->geometry[l], &s->surface[l]);
