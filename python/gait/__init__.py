@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gait.camera.camera import Camera
     from gait.io.video import Frame, Video, VideoWriter, background
     from gait.track.tracker import Tracker
-    from gait.track.config import TrackerConfig
+    from gait.bindings.config import TrackerConfig
 
 _HOME = {
     "Camera": "camera.camera",
@@ -32,7 +32,7 @@ _HOME = {
     "Flag": "bindings.abi",
     "Frame": "io.video",
     "Joints": "bindings.frame",
-    "LiftConfig": "bindings.lifter",
+    "LiftConfig": "bindings.config",
     "LiftedFrame": "bindings.lifter",
     "Lifter": "bindings.lifter",
     "Mode": "bindings.abi",
@@ -43,7 +43,7 @@ _HOME = {
     "Term": "bindings.abi",
     "TrackStatus": "bindings.abi",
     "Tracker": "track.tracker",
-    "TrackerConfig": "track.config",
+    "TrackerConfig": "bindings.config",
     "Video": "io.video",
     "VideoWriter": "io.video",
     "background": "io.video",

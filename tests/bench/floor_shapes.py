@@ -12,7 +12,7 @@ from floor_fit import OFFSETS
 from gait.body.skeleton import ANGLES
 from gait.learn.options import DEFAULT_COMPONENTS
 from gait.learn.prior.fit import Learned
-from gait.track.config import TrackerConfig
+from gait.bindings.config import TrackerConfig
 
 MOST = 12  # dimensions of a particle for its shape
 LENGTHS = MOST - DEFAULT_COMPONENTS

@@ -11,7 +11,7 @@ import pytest
 import gait
 from gait.bindings import abi
 from gait.cli import COMMANDS, main, values
-from gait.track.config import TrackerConfig
+from gait.bindings.config import TrackerConfig
 
 
 @pytest.mark.parametrize(

@@ -173,8 +173,8 @@ def test_switches_turn_off_what_is_on():
     assert {"silhouette", "edges"} <= set(found)
     for name, changes in found.items():
         assert any(getattr(config, key) != value for key, value in changes.items()), name
-        replace(config, **changes)  # each names settings that exist
-    off = replace(config, **found["edges"])
+        config.replace(**changes)  # each names settings that exist
+    off = config.replace(**found["edges"])
     assert "edges" not in eval_ablate.switches(off)
 
 

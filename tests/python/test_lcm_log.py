@@ -304,7 +304,7 @@ def test_a_long_pause_stops_the_tracker_which_says_so(tmp_path):
 
 def test_a_shorter_pause_is_bridged_by_prediction(tmp_path):
     """As the library does when it is stepped without an image in between."""
-    from gait.track.config import TrackerConfig
+    from gait.bindings.config import TrackerConfig
     from gait.track.tracker import Tracker
 
     late = [rig.frame_message(i, utime=rig.utime(i) + 1_200_000) for i in range(3, 5)]

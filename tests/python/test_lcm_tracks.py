@@ -15,7 +15,7 @@ from gait.bindings.abi import Term
 from gait.bindings.frame import Joints
 from gait.lcm.link import gaitmsg
 from gait.lcm.messages import image_message, tracks_message
-from gait.track.config import TrackerConfig
+from gait.bindings.config import TrackerConfig
 from gait.track.tracker import Tracker
 
 FRAMES, SD = 16, 1.0

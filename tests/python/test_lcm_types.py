@@ -166,7 +166,7 @@ def test_commands_have_ids_of_their_own():
 
 def test_estimates_of_the_daemon_are_those_of_the_library(tmp_path):
     """Encoded by C, decoded by Python, beside the binding's own estimate of the same frames."""
-    from gait.track.config import TrackerConfig
+    from gait.bindings.config import TrackerConfig
     from gait.track.tracker import Tracker
 
     outcome = rig.play(rig.write_log(tmp_path / "a.log", [*rig.opening(), *rig.frames(0, 6)]))

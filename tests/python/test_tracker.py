@@ -2,8 +2,10 @@
 
 import ctypes
 import gc
+import math
+import pickle
 import weakref
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +25,8 @@ from gait import (
     Video,
 )
 from gait.bindings import abi
+from gait.bindings.config import LiftConfig, reference
+from gait.bindings.library import library
 from gait.bindings.model import read_blob
 from gait.io import blob
 
@@ -54,38 +58,51 @@ def run(tracker, first=0, last=None):
     return [tracker.step(FRAMES[i], utime(i)) for i in range(len(FRAMES))[first:last]]
 
 
-def test_the_dataclass_has_the_settings_of_the_c_struct():
-    ours = [item.name for item in fields(TrackerConfig)]
+def test_the_config_has_the_settings_of_the_c_struct():
+    ours = [name for name, _ in TrackerConfig.default()]
     theirs = [name for name, *_ in abi.TrackerConfigC._fields_]
-    assert sorted(ours) == sorted([n for n in theirs if n not in ("struct_size", "cameras", "camera", "exec")])
+    assert ours == [n for n in theirs if n not in ("struct_size", "cameras", "camera", "exec")]
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_defaults_come_from_the_library_and_survive_the_way_there(mode):
     c = abi.TrackerConfigC()
-    _abi_library().gait_tracker_default(ctypes.byref(c), mode)
+    library().gait_tracker_fill(ctypes.byref(c), ctypes.sizeof(c), mode)
     back = TrackerConfig.default(mode).to_c()
-    for name, *_ in c._fields_[:-2]:
-        assert list(np.ravel(getattr(back, name))) == list(np.ravel(getattr(c, name))), name
-
-
-def _abi_library():
-    from gait.bindings.library import library
-
-    return library()
+    for name, _ in TrackerConfig.default():
+        assert getattr(back, name) == getattr(c, name), name
+    assert back.struct_size == ctypes.sizeof(c) and back.cameras == 1 and not back.exec.run
 
 
 def test_changes_reach_the_library_and_unknown_ones_fail():
-    c = TrackerConfig.default(particles=77, girth=1.25, term_weight=(1.0, 2.0, 3.0, 4.0, 5.0)).to_c()
-    assert (c.particles, c.girth, list(c.term_weight)) == (77, 1.25, [1, 2, 3, 4, 5])
-    with pytest.raises(TypeError, match="particels"):
+    c = TrackerConfig.default(particles=77, girth=1.25, edges_weight=3).to_c()
+    assert (c.particles, c.girth, c.edges_weight) == (77, 1.25, 3)
+    with pytest.raises(TypeError, match=r"TrackerConfig has no setting 'particels'; it has mode, particles"):
         TrackerConfig.default(particels=77)
-    with pytest.raises(ValueError, match="term_weight: give 5"):
-        replace(SMALL, term_weight=(1.0,)).to_c()
+    with pytest.raises(AttributeError, match=r"use replace\(girth=...\)"):
+        SMALL.girth = 2.0
+    with pytest.raises(AttributeError, match="has no setting 'grith'"):
+        _ = SMALL.grith
+    same = pickle.loads(pickle.dumps(SMALL))
+    assert same == SMALL and hash(same) == hash(SMALL) and same != SMALL.replace(girth=2.0)
+
+
+def test_every_setting_is_described():
+    settings = {item.name: item for item in TrackerConfig.settings()}
+    assert list(settings) == [name for name, _ in TrackerConfig.default()]
+    time = settings["rejuvenation_time"]
+    assert time.text.startswith("Time constant") and time.unit == "seconds"
+    assert (time.low, time.high, time.default, time.paper) == (0.0, 1e6, 1.5, 0.0)
+    assert "| `girth` | " in reference(TrackerConfig) and "10, 10, 0.03" in reference(LiftConfig)
+    for name, item in settings.items():
+        if not math.isnan(item.low):
+            with pytest.raises(GaitError, match=f"config {name} = .* is outside") as refused:
+                Tracker(MODEL, VIEW, SMALL.replace(**{name: type(item.default)(item.high * 1.01 + 1)}))
+            assert refused.value.name in ("GAIT_ERR_ARG", "GAIT_ERR_LIMIT")
 
 
 def test_a_drawn_walk_is_followed():
-    last = run(started(replace(SMALL, particles=600)))[-1]
+    last = run(started(SMALL.replace(particles=600)))[-1]
     truth, _ = MODEL.pose(TRUE[-1])
     assert np.linalg.norm(last.joints - truth, axis=1).mean() < 0.06
     assert abs((last.mean.phase - TRUE[-1].phase + 0.5) % 1 - 0.5) < 0.03
@@ -147,7 +164,7 @@ def test_threads_and_any_task_order_give_the_same_bits():
 
 
 def test_every_instruction_set_gives_the_same_bits_and_takes_up_the_others_snapshot():
-    trackers = [started(replace(SMALL, cpu_mask=mask)) for mask in (0, 1, 2, 4, SMALL.cpu_mask)]
+    trackers = [started(SMALL.replace(cpu_mask=mask)) for mask in (0, 1, 2, 4, SMALL.cpu_mask)]
     assert [t.isa for t in trackers[:2]] == ["scalar", "base"]
     assert trackers[-1].isa in {t.isa for t in trackers[1:-1]}
     for tracker in trackers:
@@ -206,7 +223,7 @@ def test_a_bad_snapshot_is_refused_and_changes_nothing(spoil):
 
 
 def test_seeds_differ():
-    one, two = started(), started(replace(SMALL, seed=2))
+    one, two = started(), started(SMALL.replace(seed=2))
     run(one, 0, 3), run(two, 0, 3)
     assert one.digest() != two.digest()
 
@@ -246,7 +263,7 @@ def test_the_model_lives_as_long_as_the_tracker():
 
 
 def test_memory_is_fixed_and_grows_with_particles():
-    small, large = Tracker(MODEL, VIEW, SMALL), Tracker(MODEL, VIEW, replace(SMALL, particles=2000))
+    small, large = Tracker(MODEL, VIEW, SMALL), Tracker(MODEL, VIEW, SMALL.replace(particles=2000))
     assert 0 < small.memory_bytes < large.memory_bytes
 
 
@@ -295,7 +312,7 @@ def test_a_start_that_is_not_finite_is_refused(field, value):
 )
 def test_settings_out_of_range_are_refused(change):
     with pytest.raises(ValueError, match="GAIT_ERR"):
-        Tracker(MODEL, VIEW, replace(SMALL, **change))
+        Tracker(MODEL, VIEW, SMALL.replace(**change))
 
 
 def test_number_of_cameras_and_threads_is_checked():
@@ -316,8 +333,8 @@ def test_number_of_cameras_and_threads_is_checked():
 )
 def test_settings_that_the_library_has_no_room_for_are_named(change, words):
     with pytest.raises(ValueError, match=words):
-        Tracker(MODEL, VIEW, replace(SMALL, **change))
-    assert replace(SMALL, particles=np.int64(300)).to_c().particles == 300
+        Tracker(MODEL, VIEW, SMALL.replace(**change))
+    assert SMALL.replace(particles=np.int64(300)).to_c().particles == 300
 
 
 @pytest.mark.parametrize(

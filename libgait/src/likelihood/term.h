@@ -8,7 +8,7 @@
 #include "base/dispatch.h"
 #include "raster/layers.h"
 
-/* The terms, in the order of gait_tracker_config.term_weight. */
+/* The terms, in the order of their GAIT_TERM_* bits. */
 enum { LIKE_TEXTURE, LIKE_SILHOUETTE, LIKE_EDGES, LIKE_TEMPLATE, LIKE_KEYPOINTS, LIKE_TERMS };
 
 enum {

@@ -1,12 +1,13 @@
-"""The C interface in ctypes: structures, enumerations and one table of functions.
+"""The C interface in ctypes: enumerations, structures and one table of functions.
 
-Mirrors the headers of libgait/include; `verify` compares every size and offset with those of the compiled
-library.
+The fields of the structures are those that the loaded library describes (``gait_field_at``); `define` gives them
+to the classes below, so nothing here repeats the headers of libgait/include.
 """
 
 from __future__ import annotations
 
 import ctypes
+import re
 from ctypes import (
     POINTER,
     c_char_p,
@@ -20,144 +21,175 @@ from ctypes import (
     c_uint64,
     c_void_p,
 )
-from typing import Any
+from enum import IntEnum, IntFlag
+from typing import Any, NamedTuple
 
-from gait.bindings import abi_lift as lift
-from gait.bindings.abi_lift import LiftConfigC as LiftConfigC
-from gait.bindings.abi_lift import LiftFitC as LiftFitC
-from gait.bindings.abi_lift import LiftFrameC as LiftFrameC
-from gait.bindings.abi_lift import LiftInfoC as LiftInfoC
-from gait.bindings.abi_plain import ABI as ABI
-from gait.bindings.abi_plain import ALIGN as ALIGN
-from gait.bindings.abi_plain import MAX_ANGLES as MAX_ANGLES
-from gait.bindings.abi_plain import MAX_CAMERAS as MAX_CAMERAS
-from gait.bindings.abi_plain import MAX_COMPONENTS as MAX_COMPONENTS
-from gait.bindings.abi_plain import MAX_JOINTS as MAX_JOINTS
-from gait.bindings.abi_plain import MAX_MARKERS as MAX_MARKERS
-from gait.bindings.abi_plain import MAX_PROPORTIONS as MAX_PROPORTIONS
-from gait.bindings.abi_plain import AbiField as AbiField
-from gait.bindings.abi_plain import CameraC as CameraC
-from gait.bindings.abi_plain import Error as Error
-from gait.bindings.abi_plain import Flag as Flag
-from gait.bindings.abi_plain import ImageView as ImageView
-from gait.bindings.abi_plain import LiftFlag as LiftFlag
-from gait.bindings.abi_plain import Mode as Mode
-from gait.bindings.abi_plain import PixelFormat as PixelFormat
-from gait.bindings.abi_plain import PoseC as PoseC
-from gait.bindings.abi_plain import Projection as Projection
-from gait.bindings.abi_plain import RunFn as RunFn
-from gait.bindings.abi_plain import StateC as StateC
-from gait.bindings.abi_plain import Status as Status
-from gait.bindings.abi_plain import TaskFn as TaskFn
-from gait.bindings.abi_plain import Tasks as Tasks
-from gait.bindings.abi_plain import Term as Term
-from gait.bindings.abi_plain import TrackStatus as TrackStatus
+ABI = 7
+ALIGN = 64
+MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
+MAX_MARKERS = 64
+
+
+class Status(IntEnum):
+    """Outcome of a call, ``gait_result``."""
+
+    OK = 0
+    ARG = -1
+    STRUCT = -2
+    MEMORY = -3
+    LIMIT = -4
+    MAGIC = -5
+    VERSION = -6
+    CORRUPT = -7
+    STATE = -8
+    NUMERIC = -9
+
+
+class PixelFormat(IntEnum):
+    """Layout of an image, ``GAIT_GREY8`` and so on."""
+
+    GREY8 = 1
+    RGB8 = 2
+    BGR8 = 3
+
+
+class Mode(IntEnum):
+    """Set of defaults: the product's, or the paper's own likelihood and dynamics."""
+
+    DEFAULT = 0
+    PAPER = 1
+
+
+class Term(IntFlag):
+    """Terms of the likelihood."""
+
+    TEXTURE = 1
+    SILHOUETTE = 2
+    EDGES = 4
+    TEMPLATE = 8
+    KEYPOINTS = 16
+
+
+class TrackStatus(IntEnum):
+    """What an estimate is worth."""
+
+    INIT = 0
+    TRACKING = 1
+    AMBIGUOUS = 2
+    LOST = 3
+
+
+class Flag(IntFlag):
+    """What happened in a step."""
+
+    RESAMPLED = 1
+    NO_IMAGE = 2
+    DEGENERATE = 4
+
+
+class Projection(IntEnum):
+    """View of 2-D tracks, ``GAIT_LIFT_PERSPECTIVE`` and so on."""
+
+    PERSPECTIVE = 0
+    ORTHOGRAPHIC = 1
+
+
+class LiftFlag(IntFlag):
+    """What an estimate of a stream is worth, ``GAIT_LIFT_UNOBSERVED`` and so on."""
+
+    UNOBSERVED = 1
+    POOR_FIT = 2
+
+
+class Error(ctypes.Structure):
+    """``gait_error``."""
+
+
+class ImageView(ctypes.Structure):
+    """``gait_image``."""
+
+
+class CameraC(ctypes.Structure):
+    """``gait_camera``."""
+
+
+class StateC(ctypes.Structure):
+    """``gait_state``."""
+
+
+class PoseC(ctypes.Structure):
+    """``gait_pose``."""
 
 
 class ModelInfoC(ctypes.Structure):
     """``gait_model_info``."""
 
-    _fields_ = [
-        ("joints", c_int32),
-        ("angles", c_int32),
-        ("components", c_int32),
-        ("phases", c_int32),
-        ("limbs", c_int32),
-        ("proportions", c_int32),
-        ("stride_hz", c_float),
-        ("stride_hz_sd", c_float),
-        ("stride_length", c_float),
-        ("stride_length_sd", c_float),
-        ("cyclic", c_int32),
-        ("posture_angles", c_uint32),
-        ("digest", c_uint64),
-    ]
+
+class Tasks(ctypes.Structure):
+    """``gait_tasks``."""
 
 
 class TrackerConfigC(ctypes.Structure):
     """``gait_tracker_config``."""
 
-    _fields_ = [
-        ("struct_size", c_uint64),
-        ("seed", c_uint64),
-        ("offset_angles", c_int64),
-        ("mode", c_int32),
-        ("particles", c_int32),
-        ("acquisition_particles", c_int32),
-        ("components", c_int32),
-        ("tasks", c_int32),
-        ("cameras", c_int32),
-        ("lag", c_int32),
-        ("proportions", c_int32),
-        ("terms", c_uint32),
-        ("term_weight", c_float * 5),
-        ("missed_weight", c_float),
-        ("girth", c_float),
-        ("resample_ess", c_float),
-        ("evidence_time", c_float),
-        ("rejuvenation_time", c_float),
-        ("max_dt", c_float),
-        ("phase_noise", c_float),
-        ("rate_noise", c_float),
-        ("settle_time", c_float),
-        ("rate_time", c_float),
-        ("forward_noise", c_float),
-        ("lateral_noise", c_float),
-        ("vertical_noise", c_float),
-        ("heading_noise", c_float),
-        ("turn_sd", c_float),
-        ("turn_time", c_float),
-        ("tilt_noise", c_float),
-        ("tilt_time", c_float),
-        ("coef_noise", c_float),
-        ("coef_time", c_float),
-        ("stature_noise", c_float),
-        ("stature_noise_start", c_float),
-        ("offset_noise", c_float),
-        ("proportion_noise", c_float),
-        ("cpu_mask", c_uint32),
-        ("joint_sd_model", c_float),
-        ("camera", CameraC * MAX_CAMERAS),
-        ("exec", Tasks),
-    ]
-
 
 class KeypointC(ctypes.Structure):
-    """``gait_track``."""
-
-    _fields_ = [("u", c_float), ("v", c_float), ("sd", c_float)]
+    """``gait_keypoint``."""
 
 
 class FrameC(ctypes.Structure):
     """``gait_frame``."""
 
-    _fields_ = [
-        ("utime", c_int64),
-        ("image", ImageView * MAX_CAMERAS),
-        ("keypoints", POINTER(KeypointC) * MAX_CAMERAS),
-    ]
-
 
 class EstimateC(ctypes.Structure):
     """``gait_estimate``."""
 
+
+class LiftInfoC(ctypes.Structure):
+    """``gait_lift_info``."""
+
+
+class LiftConfigC(ctypes.Structure):
+    """``gait_lift_config``."""
+
+
+class LiftFitC(ctypes.Structure):
+    """``gait_lift_fit``."""
+
+
+class LiftFrameC(ctypes.Structure):
+    """``gait_lift_frame``."""
+
+
+class FieldC(ctypes.Structure):
+    """``gait_field``."""
+
     _fields_ = [
-        ("utime", c_int64),
-        ("frame", c_uint64),
-        ("log_evidence", c_double),
-        ("mean", StateC),
-        ("sd", StateC),
-        ("best", StateC),
-        ("pose", PoseC),
-        ("joint_sd", c_float * 3 * MAX_JOINTS),
-        ("ess", c_float),
-        ("phase_r", c_float),
-        ("hypothesis_weight", c_float),
-        ("speed", c_float),
-        ("status", c_int32),
-        ("flags", c_uint32),
+        *((name, c_char_p) for name in ("of", "name", "type", "array", "unit", "text")),
+        ("offset", c_uint32),
+        ("size", c_uint32),
+        ("low", c_double),
+        ("high", c_double),
     ]
 
+
+class Field(NamedTuple):
+    """A row of the library's description: a field, or, with an empty name, a struct."""
+
+    of: str
+    name: str
+    type: str
+    array: str
+    unit: str
+    text: str
+    offset: int
+    size: int
+    low: float
+    high: float
+
+
+TaskFn = ctypes.CFUNCTYPE(None, c_void_p, c_int32)
+RunFn = ctypes.CFUNCTYPE(None, c_void_p, TaskFn, c_void_p, c_int32)
 
 STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_error": Error,
@@ -165,59 +197,135 @@ STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_camera": CameraC,
     "gait_state": StateC,
     "gait_pose": PoseC,
-    "gait_tasks": Tasks,
     "gait_model_info": ModelInfoC,
+    "gait_tasks": Tasks,
     "gait_tracker_config": TrackerConfigC,
     "gait_keypoint": KeypointC,
     "gait_frame": FrameC,
     "gait_estimate": EstimateC,
-    **lift.STRUCTS,
+    "gait_lift_info": LiftInfoC,
+    "gait_lift_config": LiftConfigC,
+    "gait_lift_fit": LiftFitC,
+    "gait_lift_frame": LiftFrameC,
 }
 
-_STATUS, _HANDLE, _ERR = c_int32, c_void_p, POINTER(Error)
+_TYPES: dict[str, Any] = {
+    "char": ctypes.c_char,
+    "float": c_float,
+    "double": c_double,
+    "int32_t": c_int32,
+    "int64_t": c_int64,
+    "uint32_t": c_uint32,
+    "uint64_t": c_uint64,
+    "void *": c_void_p,
+    "const uint8_t *": c_void_p,
+    "gait_run_fn *": RunFn,
+    "const gait_keypoint *": POINTER(KeypointC),
+    **dict.fromkeys(
+        ("gait_result", "gait_mode", "gait_pixel_format", "gait_track_status", "gait_projection"), c_int32
+    ),
+    **STRUCTS,
+}
+
+_RESULT, _HANDLE, _ERR = c_int32, c_void_p, POINTER(Error)
 _SIZE, _STATE = POINTER(c_size_t), POINTER(StateC)
 
 FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
-    ("gait_result_name", [_STATUS], c_char_p),
+    ("gait_result_name", [_RESULT], c_char_p),
     ("gait_version", [], c_uint32),
     ("gait_cpu_features", [], c_uint32),
     ("gait_cpu_name", [c_uint32], c_char_p),
     ("gait_abi", [], c_uint32),
-    ("gait_abi_fields", [POINTER(c_uint32)], POINTER(AbiField)),
-    ("gait_model_bytes", [c_void_p, c_size_t, _SIZE, _ERR], _STATUS),
-    ("gait_model_init", [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(_HANDLE), _ERR], _STATUS),
-    ("gait_model_get_info", [_HANDLE, POINTER(ModelInfoC), _ERR], _STATUS),
+    ("gait_field_at", [c_uint32, POINTER(FieldC)], _RESULT),
+    ("gait_model_bytes", [c_void_p, c_size_t, _SIZE, _ERR], _RESULT),
+    ("gait_model_init", [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(_HANDLE), _ERR], _RESULT),
+    ("gait_model_get_info", [_HANDLE, POINTER(ModelInfoC), _ERR], _RESULT),
     ("gait_model_joint_name", [_HANDLE, c_int32], c_char_p),
     ("gait_model_angle_name", [_HANDLE, c_int32], c_char_p),
     ("gait_model_limb_name", [_HANDLE, c_int32], c_char_p),
-    ("gait_model_pose", [_HANDLE, _STATE, POINTER(PoseC), _ERR], _STATUS),
-    ("gait_model_angle_mask", [_HANDLE, c_char_p, POINTER(c_uint32), _ERR], _STATUS),
-    ("gait_model_pelvis_height", [_HANDLE, _STATE, POINTER(c_float), _ERR], _STATUS),
-    ("gait_render", [_HANDLE, POINTER(CameraC), _STATE, POINTER(c_uint8), c_int32, _ERR], _STATUS),
-    ("gait_tracker_default", [POINTER(TrackerConfigC), c_int32], None),
-    ("gait_tracker_bytes", [_HANDLE, POINTER(TrackerConfigC), _SIZE, _ERR], _STATUS),
+    ("gait_model_pose", [_HANDLE, _STATE, POINTER(PoseC), _ERR], _RESULT),
+    ("gait_model_angle_mask", [_HANDLE, c_char_p, POINTER(c_uint32), _ERR], _RESULT),
+    ("gait_model_pelvis_height", [_HANDLE, _STATE, POINTER(c_float), _ERR], _RESULT),
+    ("gait_render", [_HANDLE, POINTER(CameraC), _STATE, POINTER(c_uint8), c_int32, _ERR], _RESULT),
+    ("gait_tracker_fill", [POINTER(TrackerConfigC), c_size_t, c_int32], None),
+    ("gait_tracker_bytes", [_HANDLE, POINTER(TrackerConfigC), _SIZE, _ERR], _RESULT),
     (
         "gait_tracker_init",
         [c_void_p, c_size_t, _HANDLE, POINTER(TrackerConfigC), POINTER(_HANDLE), _ERR],
-        _STATUS,
+        _RESULT,
     ),
-    ("gait_tracker_set_background", [_HANDLE, c_int32, POINTER(ImageView), _ERR], _STATUS),
-    ("gait_tracker_prior", [_HANDLE, _STATE, _STATE, _ERR], _STATUS),
-    ("gait_tracker_start", [_HANDLE, _STATE, _STATE, c_int64, _ERR], _STATUS),
-    ("gait_tracker_step", [_HANDLE, POINTER(FrameC), POINTER(EstimateC), _ERR], _STATUS),
-    ("gait_tracker_lagged", [_HANDLE, c_int32, POINTER(EstimateC), _ERR], _STATUS),
-    ("gait_tracker_set_particles", [_HANDLE, c_int32, _ERR], _STATUS),
+    ("gait_tracker_set_background", [_HANDLE, c_int32, POINTER(ImageView), _ERR], _RESULT),
+    ("gait_tracker_prior", [_HANDLE, _STATE, _STATE, _ERR], _RESULT),
+    ("gait_tracker_start", [_HANDLE, _STATE, _STATE, c_int64, _ERR], _RESULT),
+    ("gait_tracker_step", [_HANDLE, POINTER(FrameC), POINTER(EstimateC), _ERR], _RESULT),
+    ("gait_tracker_lagged", [_HANDLE, c_int32, POINTER(EstimateC), _ERR], _RESULT),
+    ("gait_tracker_set_particles", [_HANDLE, c_int32, _ERR], _RESULT),
     ("gait_tracker_particles", [_HANDLE, _STATE, POINTER(c_float), c_int32, _ERR], c_int32),
     ("gait_tracker_digest", [_HANDLE], c_uint64),
-    ("gait_tracker_save", [_HANDLE, c_void_p, c_size_t, _SIZE, _ERR], _STATUS),
-    ("gait_tracker_restore", [_HANDLE, c_void_p, c_size_t, _ERR], _STATUS),
-    ("gait_pool_bytes", [c_int32, _SIZE, _ERR], _STATUS),
-    ("gait_pool_init", [c_void_p, c_size_t, c_int32, POINTER(_HANDLE), _ERR], _STATUS),
+    ("gait_tracker_save", [_HANDLE, c_void_p, c_size_t, _SIZE, _ERR], _RESULT),
+    ("gait_tracker_restore", [_HANDLE, c_void_p, c_size_t, _ERR], _RESULT),
+    ("gait_pool_bytes", [c_int32, _SIZE, _ERR], _RESULT),
+    ("gait_pool_init", [c_void_p, c_size_t, c_int32, POINTER(_HANDLE), _ERR], _RESULT),
     ("gait_pool_tasks", [_HANDLE], Tasks),
     ("gait_pool_stop", [_HANDLE], None),
-    *lift.FUNCTIONS,
+    ("gait_lift_get_info", [_HANDLE, POINTER(LiftInfoC), _ERR], _RESULT),
+    ("gait_lift_fill", [POINTER(LiftConfigC), c_size_t], None),
+    ("gait_lift_bytes", [_HANDLE, POINTER(LiftConfigC), _SIZE, _ERR], _RESULT),
+    (
+        "gait_lift_init",
+        [c_void_p, c_size_t, _HANDLE, POINTER(LiftConfigC), POINTER(_HANDLE), _ERR],
+        _RESULT,
+    ),
+    ("gait_lift_marker_name", [_HANDLE, c_int32], c_char_p),
+    ("gait_lift_segment", [_HANDLE, c_void_p, c_void_p, POINTER(LiftFitC), _ERR], _RESULT),
+    ("gait_lift_segment_robust", [_HANDLE, c_void_p, c_void_p, c_void_p, POINTER(LiftFitC), _ERR], _RESULT),
+    ("gait_lift_expect", [_HANDLE, c_void_p, c_double, c_double, _ERR], _RESULT),
+    ("gait_lift_positions", [_HANDLE, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_unknowns", [_HANDLE], c_int32),
+    ("gait_lift_posterior", [_HANDLE, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_scale", [_HANDLE, POINTER(c_double), _ERR], _RESULT),
+    ("gait_lift_least_squares", [_HANDLE, c_void_p, _ERR], _RESULT),
+    ("gait_lift_uncertain", [_HANDLE, c_int32, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_fix", [_HANDLE, c_void_p, _ERR], _RESULT),
+    ("gait_lift_batch", [_HANDLE, c_int32, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_push", [_HANDLE, c_int64, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_estimate", [_HANDLE, POINTER(LiftFrameC), _ERR], _RESULT),
+    ("gait_lift_reset", [_HANDLE], None),
+    ("gait_lift_remove_spikes", [c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p], c_int32),
+    ("gait_lift_weight_outliers", [c_int32, c_void_p, c_void_p, c_void_p], c_int32),
 )
 """Every C function: name, argument types, result type."""
+
+
+def fields(library: ctypes.CDLL) -> list[Field]:
+    """Read the library's description of its structs."""
+    row = FieldC()
+    rows: list[Field] = []
+    while library.gait_field_at(len(rows), ctypes.byref(row)) == Status.OK:
+        words = [getattr(row, name).decode() for name in ("of", "name", "type", "array", "unit", "text")]
+        rows.append(Field._make([*words, row.offset, row.size, row.low, row.high]))
+    return rows
+
+
+def define(rows: list[Field]) -> None:
+    """Give every structure its fields, once.
+
+    Raises
+    ------
+    KeyError
+        If a field has a type that this package does not know.
+    """
+    for name, struct in STRUCTS.items():
+        if not hasattr(struct, "_fields_"):
+            struct._fields_ = [(row.name, _ctype(row)) for row in rows if row.of == name and row.name]
+
+
+def _ctype(row: Field) -> Any:
+    """Make the type of a field, such as float[32][3]."""
+    kind = _TYPES[row.type]
+    for length in reversed(re.findall(r"\d+", row.array)):
+        kind = kind * int(length)
+    return kind
 
 
 def declare(library: ctypes.CDLL) -> None:
@@ -244,11 +352,9 @@ def layout() -> dict[tuple[str, str], tuple[int, int]]:
     return rows
 
 
-def verify(library: ctypes.CDLL) -> list[str]:
-    """Compare the layout compiled into the library with `layout`; return one line per difference."""
-    count = c_uint32()
-    rows = library.gait_abi_fields(ctypes.byref(count))
-    theirs = {(row.type.decode(), row.field.decode()): (row.offset, row.size) for row in rows[: count.value]}
+def verify(rows: list[Field]) -> list[str]:
+    """Compare the library's description with `layout`; return one line per difference."""
+    theirs = {(row.of, row.name): (row.offset, row.size) for row in rows}
     ours = layout()
     faults = []
     for key in sorted(ours.keys() | theirs.keys()):

@@ -70,10 +70,20 @@ def open_library(path: str) -> ctypes.CDLL:
     version = version_text(loaded.gait_version())
     if version != __version__:
         raise LibraryError(f"{path}: version {version}, this package is {__version__}")
-    faults = abi.verify(loaded)
+    rows = abi.fields(loaded)
+    try:
+        abi.define(rows)
+    except KeyError as exc:
+        raise LibraryError(f"{path}: a field has the type {exc}, unknown to this package") from None
+    faults = abi.verify(rows)
     if faults:
         raise LibraryError(f"{path}: layout differs from gait.bindings.abi: {'; '.join(faults)}")
     return loaded
+
+
+def struct_fields(struct: str) -> list[abi.Field]:
+    """Fields of a struct of the library, in order, as its header describes them."""
+    return [row for row in abi.fields(library()) if row.of == struct and row.name]
 
 
 def version_text(number: int) -> str:

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from gait.bindings import abi
 from gait.bindings.abi import LiftFlag, TrackStatus
+from gait.bindings.config import LiftConfig as LiftConfig
 from gait.bindings.library import aligned, check, library
-from gait.bindings.lift_config import LiftConfig as LiftConfig
 from gait.bindings.model import Model, load
-from gait.errors import GaitError
 from gait.camera.camera import Camera
+from gait.errors import GaitError
 
 Array = NDArray[np.float64]
 

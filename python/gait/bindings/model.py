@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from gait.bindings import abi
 from gait.bindings.library import aligned, check, library
-from gait.body.pace import slope_of
 from gait.bindings.state import State
-from gait.errors import GaitError, UserError
+from gait.body.pace import slope_of
 from gait.camera.camera import Camera
+from gait.errors import GaitError, UserError
 from gait.io.blob import decode
 
 Array = NDArray[np.float64]
@@ -171,7 +171,7 @@ class Model:
         return height.value
 
     def angle_mask(self, names: str) -> int:
-        """Bit i for each angle i named in `names`, separated by spaces; for ``TrackerConfig.offset_angles``."""
+        """Bit i for each angle i named in `names`, separated by spaces; see config `offset_angles`."""
         mask, error = ctypes.c_uint32(), abi.Error()
         where = (names.encode(), ctypes.byref(mask), ctypes.byref(error))
         check(self._lib.gait_model_angle_mask(self.handle, *where), error)
@@ -207,6 +207,7 @@ def pose_arrays(c: abi.PoseC, joints: int, angles: int) -> tuple[Array, Array]:
 
 def camera_c(camera: Camera) -> abi.CameraC:
     """Make a ``gait_camera``."""
+    library()  # describes the structures
     c = abi.CameraC(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
     c.R[:], c.t[:] = camera.R.ravel().tolist(), camera.t.tolist()
     c.distortion[:] = camera.distortion.tolist()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings import abi
+from gait.bindings.library import library
 
 Array = NDArray[np.float64]
 LIMITS = {"coef": abi.MAX_COMPONENTS, "offset": abi.MAX_ANGLES, "proportion": abi.MAX_PROPORTIONS}
@@ -79,6 +80,7 @@ class State:
         if len(pelvis) != 3 or any(np.size(getattr(self, name)) > most for name, most in LIMITS.items()):
             limits = ", ".join(f"{name} at most {most}" for name, most in LIMITS.items())
             raise ValueError(f"state: pelvis has 3 numbers, {limits}")
+        library()  # describes the structures
         c = abi.StateC(**{name: float(getattr(self, name)) for name in SCALARS})
         c.pelvis[:] = pelvis
         for name in LIMITS:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from gait.bindings.abi import Mode
 from gait.bindings.initial import STATURE
 from gait.errors import LibraryError, UsageError
-from gait.track.config import TrackerConfig
+from gait.bindings.config import TrackerConfig
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
 THREADS = (1, 256)  # GAIT_POOL_MAX

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gait.bindings.abi import Mode, Term, TrackStatus
+from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import Joints
 from gait.bindings.initial import OUTSIDE, Start
@@ -25,7 +26,6 @@ from gait.io.video import Frame, Image, Video, VideoWriter, background
 from gait.progress import durations, note, progress
 from gait.report.drawing import Overlay
 from gait.track.auto_start import AutoStart, find_start
-from gait.track.config import TrackerConfig
 from gait.track.person_detection import another_scene, one_is_grey
 from gait.track.smooth import Smoother
 from gait.track.tracker import Tracker
@@ -108,9 +108,9 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
         note(f"{options.init}: {OUTSIDE}", options.quiet)
     config = TrackerConfig.default(options.mode, seed=options.seed)
     if options.particles is not None:
-        config = replace(config, particles=options.particles)
+        config = config.replace(particles=options.particles)
     if options.keypoints:
-        config = replace(config, terms=config.terms | Term.KEYPOINTS)
+        config = config.replace(terms=config.terms | Term.KEYPOINTS)
     tracker = Tracker(model, camera, config, background=plate, tasks=options.threads)
     restart = None if options.smooth else AutoStart(camera, plate, model, options.height)
     found = tracker.follow(video, start, frames.stop, restart, keypoints)

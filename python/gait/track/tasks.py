@@ -36,6 +36,7 @@ class PythonTasks:
     def __init__(self, runner: Runner) -> None:
         self._runner = runner
         self._failure: BaseException | None = None
+        library()  # describes the structures
         self._callback = abi.RunFn(self._run)
         self.struct = abi.Tasks(self._callback, None)
 

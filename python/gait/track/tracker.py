@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from gait.bindings import abi
 from gait.bindings.abi import TrackStatus
+from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import Joints, capture_time, image_view, per_camera, track_array
 from gait.bindings.initial import Start
@@ -22,7 +22,6 @@ from gait.bindings.state import LEAST_STATURE, State
 from gait.camera.camera import Camera
 from gait.errors import UserError
 from gait.io.video import Frame, Image, Video
-from gait.track.config import TrackerConfig
 from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
 
 if TYPE_CHECKING:
@@ -73,8 +72,8 @@ class Tracker:
         self.cameras = _camera_list(cameras)
         self._tasks, config = _task_source(tasks), config or TrackerConfig.default()
         if config.offset_angles < 0:
-            config = replace(config, offset_angles=model.info.posture_angles)
-        self.config = replace(config, tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
+            config = config.replace(offset_angles=model.info.posture_angles)
+        self.config = config.replace(tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
         self._error = abi.Error()
         c = self._c_config()
         size, handle = ctypes.c_size_t(), ctypes.c_void_p()
@@ -98,7 +97,8 @@ class Tracker:
         if plate is not None:
             plate = np.array(plate, order="C")
             view = ctypes.byref(image_view(plate, self.cameras[camera], "background"))
-        check(self._lib.gait_tracker_set_background(self._handle, camera, view, ctypes.byref(self._error)), self._error)
+        err = ctypes.byref(self._error)
+        check(self._lib.gait_tracker_set_background(self._handle, camera, view, err), self._error)
         if plate is None:
             self._plates.pop(camera, None)
         else:
@@ -234,9 +234,10 @@ class Tracker:
         """
         size = ctypes.c_size_t()
         check(self._lib.gait_tracker_save(self._handle, None, 0, ctypes.byref(size), None))
-        room = aligned(size.value)
-        check(self._lib.gait_tracker_save(self._handle, room.ctypes.data, size.value, ctypes.byref(size), None))
-        return room[: size.value].tobytes()
+        memory = aligned(size.value)
+        where = (memory.ctypes.data, size.value)
+        check(self._lib.gait_tracker_save(self._handle, *where, ctypes.byref(size), None))
+        return memory[: size.value].tobytes()
 
     def restore(self, snapshot: bytes) -> None:
         """Take over a state from `save`; a failure leaves this one as it was."""

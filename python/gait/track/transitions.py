@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from gait.bindings import abi
 from gait.bindings.abi import Mode
+from gait.bindings.config import TrackerConfig
 from gait.bindings.state import LEAST_STATURE
 from gait.body.model_curves import ModelCurves
-from gait.track.config import TrackerConfig
 
 Array = NDArray[np.float64]
 
