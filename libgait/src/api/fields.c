@@ -27,21 +27,29 @@
 #define HAS_NO_PADDING(T, ...)                    _Static_assert(0 __VA_ARGS__ == sizeof(T), #T " has padding");
 STRUCTS(HAS_NO_PADDING, ADD_SIZE, ADD_SIZE, ADD_SIZE, ADD_SIZE)
 
+enum row_kind { ROW_STRUCT, ROW_FREE, ROW_LIMITED };
+
 typedef struct row {
-    uint32_t size;
-    bool first; /* the struct's own row */
-    double low, high;
+    uint16_t size;
+    uint8_t kind; /* ROW_LIMITED: its range is the next of LIMITS */
 } row;
 
-#define ROW(type, array, low, high)                                                {sizeof(type array), false, low, high},
-#define ROW_FIELD(meaning, type, name, array, unit)                                ROW(type, array, NAN, NAN)
-#define ROW_RANGE(meaning, type, name, array, unit, low, high)                     ROW(type, array, low, high)
-#define ROW_SETTING(meaning, type, name, array, unit, usual, low, high)            ROW(type, array, low, high)
-#define ROW_PAPER(meaning, type, name, array, unit, usual, paper, low, high)       ROW(type, array, low, high)
-#define ROWS_OF(T, ...)                                                            {sizeof(T), true, NAN, NAN}, __VA_ARGS__
+typedef struct limit {
+    double low, high;
+} limit;
 
-static const row ROWS[] = {STRUCTS(ROWS_OF, ROW_FIELD, ROW_RANGE, ROW_SETTING, ROW_PAPER)};
+#define FREE(meaning, type, name, array, ...)    {sizeof(type array), ROW_FREE},
+#define LIMITED(meaning, type, name, array, ...) {sizeof(type array), ROW_LIMITED},
+#define ROWS_OF(T, ...)                          {sizeof(T), ROW_STRUCT}, __VA_ARGS__
+static const row ROWS[] = {STRUCTS(ROWS_OF, FREE, LIMITED, LIMITED, LIMITED)};
 enum { COUNT = sizeof ROWS / sizeof *ROWS };
+
+#define NO_LIMIT(...)
+#define LIMIT(meaning, type, name, array, unit, low, high)                      {low, high},
+#define LIMIT_SETTING(meaning, type, name, array, unit, usual, low, high)       {low, high},
+#define LIMIT_PAPER(meaning, type, name, array, unit, usual, paper, low, high)  {low, high},
+#define LIMITS_OF(T, ...)                                                       __VA_ARGS__
+static const limit LIMITS[] = {STRUCTS(LIMITS_OF, NO_LIMIT, LIMIT, LIMIT_SETTING, LIMIT_PAPER)};
 
 /* The words of all rows one after another: name, type, array, unit and meaning of each, a NUL after each.  Without
  * pointers to them the library needs no relocations. */
@@ -66,6 +74,7 @@ static const struct {
 /* Walks through the rows in order. */
 typedef struct cursor {
     uint32_t index;
+    const limit *limit;
     const char *text;
     gait_field field;
 } cursor;
@@ -84,22 +93,26 @@ static bool next_field(cursor *c)
         return false;
     const row *const r = &ROWS[c->index++];
     const char *const name = next_text(c);
-    f->offset = r->first || !f->name || !*f->name ? 0 : f->offset + f->size;
-    f->of = r->first ? name : f->of;
-    f->name = r->first ? "" : name;
+    if (r->kind == ROW_STRUCT)
+        *f = (gait_field){.of = name, .name = ""};
+    else {
+        f->offset += *f->name ? f->size : 0;
+        f->name = name;
+    }
     f->type = next_text(c);
     f->array = next_text(c);
     f->unit = next_text(c);
     f->text = next_text(c);
     f->size = r->size;
-    f->low = r->low;
-    f->high = r->high;
+    limit const l = r->kind == ROW_LIMITED ? *c->limit++ : (limit){NAN, NAN};
+    f->low = l.low;
+    f->high = l.high;
     return true;
 }
 
 static cursor first_field(void)
 {
-    return (cursor){.text = (const char *)&TEXT};
+    return (cursor){.limit = LIMITS, .text = (const char *)&TEXT};
 }
 
 /* The next field of a struct; c begins with first_field(). */

@@ -13,19 +13,18 @@
 
 #define USUAL(meaning, type, name, array, unit, value, low, high)              .name = (type)(value),
 #define USUAL_OF_TWO(meaning, type, name, array, unit, value, paper, low, high) .name = (type)(value),
-#define PAPER_OF_TWO(meaning, type, name, array, unit, value, paper, low, high) .name = (type)(paper),
+#define SET_PAPER(meaning, type, name, array, unit, value, paper, low, high)    full.name = (type)(paper);
 #define NO_DEFAULT(...)
 #define MOST_SD 10.0 /* of any number of a start */
 
-static const gait_tracker_config DEFAULTS[] = {
-    [GAIT_MODE_DEFAULT] = {GAIT_TRACKER_CONFIG_FIELDS(USUAL, USUAL_OF_TWO, NO_DEFAULT)},
-    [GAIT_MODE_PAPER] = {GAIT_TRACKER_CONFIG_FIELDS(USUAL, PAPER_OF_TWO, NO_DEFAULT)},
-};
-
 void gait_tracker_fill(gait_tracker_config *cfg, size_t cfg_bytes, gait_mode mode)
 {
-    gait_tracker_config full = DEFAULTS[mode == GAIT_MODE_PAPER];
+    static const gait_tracker_config USUALLY = {GAIT_TRACKER_CONFIG_FIELDS(USUAL, USUAL_OF_TWO, NO_DEFAULT)};
+    gait_tracker_config full = USUALLY;
     full.mode = mode;
+    if (mode == GAIT_MODE_PAPER) {
+        GAIT_TRACKER_CONFIG_FIELDS(NO_DEFAULT, SET_PAPER, NO_DEFAULT)
+    }
     full.struct_size = cfg_bytes < sizeof full ? cfg_bytes : sizeof full;
     if (cfg)
         memcpy(cfg, &full, (size_t)full.struct_size);
