@@ -115,7 +115,7 @@ static void test_an_older_config(void)
     refuse(&cut, GAIT_ERR_STRUCT, -1, "not filled by gait_tracker_default()");
 }
 
-/* Memory that is not aligned, or too small: each says so, and not the other. */
+/* Memory that is not aligned, or too small: each has its own error. */
 static void test_memory(void)
 {
     static _Alignas(GAIT_ALIGN) unsigned char memory[2 * GAIT_ALIGN];
@@ -172,18 +172,18 @@ static void test_start(void)
 {
     gait_tracker_config const cfg = toy_config(1);
     gait_tracker *const t = toy_tracker_new(&cfg);
-    gait_state const good = toy_walk(0.2f), doubt = toy_start_sd(1.0f);
+    gait_state const good = toy_walk(0.2f), uncertain = toy_start_sd(1.0f);
     uint64_t const digest = gait_tracker_digest(t);
     static gait_state particle[4];
     static float weight[4];
     gait_error err = {0};
     CHECK(gait_tracker_particles(t, particle, weight, 4, NULL) == GAIT_ERR_STATE);
-    CHECK(gait_tracker_start(NULL, &good, &doubt, 0, &err) == GAIT_ERR_ARG);
-    CHECK(gait_tracker_start(t, NULL, &doubt, 0, &err) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_start(NULL, &good, &uncertain, 0, &err) == GAIT_ERR_ARG);
+    CHECK(gait_tracker_start(t, NULL, &uncertain, 0, &err) == GAIT_ERR_ARG);
     CHECK(gait_tracker_start(t, &good, NULL, 0, &err) == GAIT_ERR_ARG);
     for (size_t k = 0; k < sizeof good / sizeof(float); k++)
         for (int which = 0; which < 3; which++) {
-            gait_state mean = good, sd = doubt;
+            gait_state mean = good, sd = uncertain;
             float const bad = which == 2 ? -0.1f : k % 2 ? NAN : INFINITY;
             memcpy((char *)(which ? &sd : &mean) + k * sizeof bad, &bad, sizeof bad);
             CHECK(gait_tracker_start(t, &mean, &sd, 0, &err) == GAIT_ERR_ARG && err.text[0]);
@@ -192,13 +192,15 @@ static void test_start(void)
     for (size_t k = 0; k < 3; k++) {
         gait_state mean = good;
         mean.stature = stature[k];
-        CHECK(gait_tracker_start(t, &mean, &doubt, 0, &err) == GAIT_ERR_ARG && strstr(err.text, "stature"));
+        CHECK(gait_tracker_start(t, &mean, &uncertain, 0, &err) == GAIT_ERR_ARG &&
+              strstr(err.text, "stature"));
     }
     gait_state still = good;
     still.stride_hz = 0.0f;
-    CHECK(gait_tracker_start(t, &still, &doubt, 0, &err) == GAIT_ERR_ARG && strstr(err.text, "stride_hz"));
+    CHECK(gait_tracker_start(t, &still, &uncertain, 0, &err) == GAIT_ERR_ARG &&
+          strstr(err.text, "stride_hz"));
     CHECK(gait_tracker_digest(t) == digest);
-    CHECK(gait_tracker_start(t, &good, &doubt, 0, NULL) == GAIT_OK && gait_tracker_digest(t) != digest);
+    CHECK(gait_tracker_start(t, &good, &uncertain, 0, NULL) == GAIT_OK && gait_tracker_digest(t) != digest);
     toy_tracker_free(t);
 }
 
@@ -214,7 +216,7 @@ static void test_absurd_starts(void)
     static const struct {
         size_t member;
         float mean, sd;
-        const char *said;
+        const char *text;
     } starts[] = {
         {offsetof(gait_state, stature), 0.0f, 1e6f, "start sd.stature = 1e+06 is outside [0, 10]"},
         {offsetof(gait_state, pelvis), 0.0f, 3e38f, "start sd.pelvis = 3e+38 is outside [0, 10]"},
@@ -233,7 +235,7 @@ static void test_absurd_starts(void)
         else
             set_number(&sd, starts[k].member / sizeof(float), starts[k].sd);
         CHECK(gait_tracker_start(t, &mean, &sd, 0, &err) == GAIT_ERR_ARG &&
-              strcmp(err.text, starts[k].said) == 0);
+              strcmp(err.text, starts[k].text) == 0);
     }
     toy_tracker_free(t);
 }
@@ -296,7 +298,7 @@ static void test_the_widest_starts_stay_finite(void)
     toy_tracker_free(t);
 }
 
-/* The broad prior is a start that works: no phase, no heading, the population's rate and stature. */
+/* The broad prior is a start that works: no phase, no heading, the mean rate and stature of people. */
 static void test_prior(void)
 {
     gait_state mean, sd;
@@ -335,7 +337,7 @@ static void test_background(void)
     toy_tracker_free(t);
 }
 
-/* No more particles than there is room for; the count is always told. */
+/* No more particles than the capacity; the number of particles is always returned. */
 static void test_particles(void)
 {
     gait_tracker_config const cfg = toy_config(1);

@@ -1,5 +1,5 @@
 /* One segment through the public interface: bodies drawn from the prior are found again, with honest
- * deviations. The algebra itself is compared with numpy's in tests/python/test_lifter.py. */
+ * standard deviations. The algebra itself is compared with numpy's in tests/python/test_lifter.py. */
 #include "gait.h"
 
 #include <stdbool.h>
@@ -7,12 +7,12 @@
 #include "toy_lift.h"
 
 static double X[TOY_SEGMENT][3], uv[TOY_SEGMENT * 2], mean[TOY_SEGMENT * 3], sd[TOY_SEGMENT * 3];
-static double seen[TOY_SEGMENT];
+static double sds[TOY_SEGMENT];
 
-static void see_all(double deviation)
+static void set_all_sds(double value)
 {
     for (int i = 0; i < TOY_SEGMENT; i++)
-        seen[i] = deviation;
+        sds[i] = value;
 }
 
 static double largest_error(void)
@@ -29,13 +29,13 @@ static void test_exact(void)
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
     c.residual = 0.0; /* the draws have none */
     gait_lift *const l = toy_lift_open(&c);
-    see_all(0.02);
+    set_all_sds(0.02);
     for (int k = 0; k < 6; k++) {
         double const heading = 1.1 * k, place[3] = {0.4 * k - 1.0, 0.5 * k - 1.0, 0.02};
         gait_lift_fit fit;
         toy_draw(&toy_lift_prior, 0, (uint32_t)k, heading, place, X);
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.0, 1, uv);
-        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK && fit.converged);
+        CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK && fit.converged);
         CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
         CHECK_NEAR(largest_error(), 0.0, 5e-3);
         CHECK_NEAR(cos(fit.heading - heading), 1.0, 1e-4);
@@ -46,7 +46,7 @@ static void test_exact(void)
     }
 }
 
-/* Drawn from the prior: errors have the deviations that are reported (chi-square, 90 % interval). */
+/* Drawn from the prior: errors have the standard deviations that are reported (chi-square, 90 % interval). */
 static void test_coverage(int projection, double noise)
 {
     gait_lift_config c = toy_lift_config(projection);
@@ -56,7 +56,7 @@ static void test_coverage(int projection, double noise)
     gait_lift *const l = toy_lift_open(&c);
     double square = 0.0;
     int within = 0, count = 0;
-    see_all(noise);
+    set_all_sds(noise);
     for (uint32_t k = 0; k < 200; k++) {
         uint32_t seed = 1000 + k;
         double z[4];
@@ -69,7 +69,7 @@ static void test_coverage(int projection, double noise)
         gait_lift_fit fit;
         toy_draw(&toy_lift_prior, 0, seed, 0.0, place, X);
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, noise, seed + 1, uv);
-        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
         CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
         for (int i = 0; i < 3 * TOY_SEGMENT; i++) {
             double const e = (mean[i] - X[i / 3][i % 3]) / sd[i];
@@ -78,12 +78,12 @@ static void test_coverage(int projection, double noise)
             count++;
         }
     }
-    /* toy_draw's alphas are uniform with a variance of 0.75: a little less than the prior says */
+    /* toy_draw's alphas are uniform with a variance of 0.75: a little less than in the prior */
     CHECK_NEAR(square / count, 0.97, 0.12);
     CHECK_NEAR((double)within / count, 0.905, 0.03);
 }
 
-/* Points that are not seen are not read, and cost certainty. */
+/* Points that are not sds are not read, and cost certainty. */
 static void test_missing(void)
 {
     gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -93,23 +93,23 @@ static void test_missing(void)
     gait_lift_fit fit;
     toy_draw(&toy_lift_prior, 0, 5, 0.4, place, X);
     toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 3, uv);
-    see_all(1.0);
-    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK &&
+    set_all_sds(1.0);
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK &&
           gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
     for (int i = 0; i < 3 * TOY_SEGMENT; i++)
         all_sd += sd[i];
     for (int i = 0; i < TOY_SEGMENT; i += 3)
-        seen[i] = i % 2 ? INFINITY : i % 4 ? NAN : -1.0;
+        sds[i] = i % 2 ? INFINITY : i % 4 ? NAN : -1.0;
     uv[2 * 3] = uv[2 * 6 + 1] = NAN;
-    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK &&
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK &&
           gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
     CHECK(fit.observed == 2 * (TOY_SEGMENT - TOY_SEGMENT / 3) && largest_error() < 0.2);
     for (int i = 0; i < 3 * TOY_SEGMENT; i++)
         some_sd += sd[i];
     CHECK(some_sd > 1.05 * all_sd && some_sd < 3.0 * all_sd);
     for (int i = 0; i < TOY_SEGMENT; i++)
-        seen[i] = INFINITY;
-    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK && fit.observed == 0);
+        sds[i] = INFINITY;
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK && fit.observed == 0);
     CHECK_NEAR(fit.log10_volume, 0.0, 1e-12);
     CHECK_NEAR(fit.log_evidence, 0.0, 1e-12);
 }
@@ -123,11 +123,11 @@ static void test_report(void)
     gait_lift_fit fit;
     toy_draw(&toy_lift_prior, 0, 5, 0.4, place, X);
     toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 3, uv);
-    see_all(1.0);
+    set_all_sds(1.0);
     for (int k = 0; k < 2; k++) {
         c.report = k == 0 ? ~UINT64_C(0) : 5u << (TOY_MARKERS - 3);
         gait_lift *const l = toy_lift_open(&c);
-        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
         CHECK(gait_lift_positions(l, each[k][0], each[k][1], NULL) == GAIT_OK);
     }
     CHECK(memcmp(each[0], each[1], sizeof each[0]) == 0);
@@ -139,13 +139,13 @@ static void test_mixture(void)
     toy_lift_learn(2, 0);
     gait_lift_config const c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
     gait_lift *const l = toy_lift_open(&c);
-    see_all(1.0);
+    set_all_sds(1.0);
     for (int k = 0; k < 6; k++) {
         const double place[3] = {0.2, 0.1, 0.0};
         gait_lift_fit fit;
         toy_draw(&toy_lift_prior, k % 2, (uint32_t)k, 0.7 * k, place, X);
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 1.0, 9, uv);
-        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
         CHECK(fit.component == k % 2 && fit.share > 0.9 && fit.share <= 1.0);
     }
     toy_lift_learn(1, 0);
@@ -163,22 +163,23 @@ static void test_batch(void)
     const double place[3] = {0.5, -0.2, 0.01};
     gait_lift_fit fit;
     CHECK(gait_lift_batch(l, 1, many[0], batch[0], NULL) == GAIT_ERR_STATE);
-    see_all(0.02);
+    set_all_sds(0.02);
     for (int i = 0; i < TOY_SEGMENT; i += 5)
-        seen[i] = INFINITY;
+        sds[i] = INFINITY;
     for (uint32_t k = 0; k < MANY; k++) {
         toy_draw(&toy_lift_prior, 0, 40 + k, c.heading, place, X);
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.02, k, many[k]);
     }
-    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK && gait_lift_batch(l, MANY, many[0], batch[0], NULL) == GAIT_OK);
+    CHECK(gait_lift_fix(l, sds, NULL) == GAIT_OK &&
+          gait_lift_batch(l, MANY, many[0], batch[0], NULL) == GAIT_OK);
     for (int k = 0; k < MANY; k++) {
-        CHECK(gait_lift_segment(l, many[k], seen, &fit, NULL) == GAIT_OK);
+        CHECK(gait_lift_segment(l, many[k], sds, &fit, NULL) == GAIT_OK);
         CHECK(gait_lift_positions(l, mean, sd, NULL) == GAIT_OK);
         for (int i = 0; i < 3 * TOY_SEGMENT; i++)
             CHECK_NEAR(batch[k][i], mean[i], 1e-12);
     }
     c.heading_sd = -1.0;
-    CHECK(gait_lift_fix(toy_lift_open(&c), seen, NULL) == GAIT_ERR_STATE);
+    CHECK(gait_lift_fix(toy_lift_open(&c), sds, NULL) == GAIT_ERR_STATE);
 }
 
 /* Depth is what an orthographic view leaves open: the least certain displacement is along it. */
@@ -189,26 +190,26 @@ static void test_uncertain(void)
     c.heading_sd = 0.0;
     gait_lift *const l = toy_lift_open(&c);
     const double place[3] = {0.0};
-    double deviation[2], along = 0.0, all = 0.0;
+    double mode_sd[2], along = 0.0, all = 0.0;
     gait_lift_fit fit;
-    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation, NULL) == GAIT_ERR_STATE);
+    CHECK(gait_lift_uncertain(l, 2, mode[0][0], mode_sd, NULL) == GAIT_ERR_STATE);
     toy_draw(&toy_lift_prior, 0, 2, 0.0, place, X);
     toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.01, 1, uv);
-    see_all(0.01);
-    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
-    CHECK(gait_lift_uncertain(l, 2, mode[0][0], deviation, NULL) == GAIT_OK);
+    set_all_sds(0.01);
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
+    CHECK(gait_lift_uncertain(l, 2, mode[0][0], mode_sd, NULL) == GAIT_OK);
     for (int i = 0; i < TOY_SEGMENT; i++)
         for (int a = 0; a < 3; a++) {
             along += a == 1 ? mode[0][i][a] * mode[0][i][a] : 0.0;
             all += mode[0][i][a] * mode[0][i][a];
         }
-    CHECK(along > 0.9999 * all && deviation[0] > deviation[1]);
-    CHECK_NEAR(sqrt(all), deviation[0], 1e-9 * deviation[0]);
-    CHECK_NEAR(deviation[0], 10.0 * sqrt(TOY_SEGMENT), 0.1);
-    CHECK(gait_lift_uncertain(l, gait_lift_unknowns(l) + 1, mode[0][0], deviation, NULL) == GAIT_ERR_ARG);
+    CHECK(along > 0.9999 * all && mode_sd[0] > mode_sd[1]);
+    CHECK_NEAR(sqrt(all), mode_sd[0], 1e-9 * mode_sd[0]);
+    CHECK_NEAR(mode_sd[0], 10.0 * sqrt(TOY_SEGMENT), 0.1);
+    CHECK(gait_lift_uncertain(l, gait_lift_unknowns(l) + 1, mode[0][0], sd, NULL) == GAIT_ERR_ARG);
 }
 
-/* The scale is 1 where nothing tells of the modes, and grows with how far the motion is from the mean. */
+/* The scale is 1 without evidence about the modes, and grows with how far the motion is from the mean. */
 static void test_scale(void)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_ORTHOGRAPHIC);
@@ -217,7 +218,8 @@ static void test_scale(void)
     const double place[3] = {0.0};
     double last = 0.0;
     gait_lift_fit fit;
-    CHECK(gait_lift_scale(l, &last, NULL) == GAIT_ERR_STATE && gait_lift_scale(NULL, &last, NULL) == GAIT_ERR_ARG);
+    CHECK(gait_lift_scale(l, &last, NULL) == GAIT_ERR_STATE &&
+          gait_lift_scale(NULL, &last, NULL) == GAIT_ERR_ARG);
     for (int far = 0; far < 4; far++) {
         toy_draw(&toy_lift_prior, 0, 2, 0.0, place, X);
         for (int i = 0; i < TOY_SEGMENT; i++)
@@ -226,19 +228,19 @@ static void test_scale(void)
                 X[i][a] = middle + far * (X[i][a] - middle);
             }
         toy_lift_see(&c, (const double (*)[3])X, TOY_SEGMENT, 0.001, 1, uv);
-        see_all(0.001);
-        CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+        set_all_sds(0.001);
+        CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
         double scale = 0.0;
         CHECK(gait_lift_scale(l, &scale, NULL) == GAIT_OK && scale > last);
         last = scale;
         CHECK(far > 0 || last < 1.0);
     }
     CHECK(last > 1.0);
-    see_all(INFINITY);
-    CHECK(gait_lift_segment(l, uv, seen, &fit, NULL) == GAIT_OK);
+    set_all_sds(INFINITY);
+    CHECK(gait_lift_segment(l, uv, sds, &fit, NULL) == GAIT_OK);
     CHECK(gait_lift_scale(l, &last, NULL) == GAIT_OK);
     CHECK_NEAR(last, 1.0, 1e-12);
-    CHECK(gait_lift_fix(l, seen, NULL) == GAIT_OK);
+    CHECK(gait_lift_fix(l, sds, NULL) == GAIT_OK);
     CHECK(gait_lift_scale(l, &last, NULL) == GAIT_ERR_STATE); /* a gain has no motion */
 }
 
@@ -249,12 +251,9 @@ static void test_arguments(void)
     gait_error err = {0};
     gait_lift_fit fit;
     size_t bytes = 0;
-    CHECK(gait_lift_bytes(toy_lift_model, &good, &bytes, NULL) == GAIT_OK &&
-          bytes > 1000);
-    CHECK(gait_lift_init(toy_lift_memory, bytes - 1, toy_lift_model, &good, &l, &err) ==
-          GAIT_ERR_MEMORY);
-    CHECK(gait_lift_init(toy_lift_memory + 8, bytes, toy_lift_model, &good, &l, &err) ==
-          GAIT_ERR_MEMORY);
+    CHECK(gait_lift_bytes(toy_lift_model, &good, &bytes, NULL) == GAIT_OK && bytes > 1000);
+    CHECK(gait_lift_init(toy_lift_memory, bytes - 1, toy_lift_model, &good, &l, &err) == GAIT_ERR_MEMORY);
+    CHECK(gait_lift_init(toy_lift_memory + 8, bytes, toy_lift_model, &good, &l, &err) == GAIT_ERR_MEMORY);
     CHECK(gait_lift_bytes(NULL, &good, &bytes, &err) == GAIT_ERR_ARG && !l);
     CHECK(gait_lift_segment(NULL, uv, NULL, &fit, NULL) == GAIT_ERR_ARG);
     gait_lift_config bad[16];

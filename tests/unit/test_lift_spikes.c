@@ -56,7 +56,7 @@ static void test_gaps(int gap, int last)
     CHECK(lost <= RUNS / 100);
 }
 
-static void test_jump(int f, double by)
+static void test_spike(int f, double by)
 {
     walk(7);
     uv[2 * f] += by;
@@ -70,6 +70,6 @@ int main(void)
         test_gaps(gap, FRAMES - 3);
     }
     for (int f = 0; f < FRAMES; f++)
-        test_jump(f, f % 2 ? 150.0 : -150.0);
+        test_spike(f, f % 2 ? 150.0 : -150.0);
     return CHECK_DONE();
 }

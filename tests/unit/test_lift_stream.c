@@ -14,9 +14,9 @@ enum { STREAM = 120, RATE = 30 };
 #define GOLDEN UINT64_C(0xf637f7885ec19fcd)
 
 static gait_lift_frame out;
-static double uv[TOY_MARKERS * 2], seen[TOY_MARKERS];
+static double uv[TOY_MARKERS * 2], sds[TOY_MARKERS];
 
-/* A prior under which whoever walks goes on walking: a pose that stays, moved by as much every frame. */
+/* A prior under which people continue to walk: a pose that stays, moved by as much every frame. */
 static void steady_model(void)
 {
     toy_segments_fill(&toy_lift_prior, 1, 0);
@@ -47,7 +47,7 @@ static void body(int frame, double (*X)[3])
     memcpy(X, segment, TOY_MARKERS * sizeof *X);
 }
 
-/* What is seen of a frame: uv and seen. */
+/* The observations of a frame: uv and sds. */
 static void see(const gait_lift_config *c, int frame, double noise)
 {
     double X[TOY_MARKERS][3];
@@ -55,14 +55,14 @@ static void see(const gait_lift_config *c, int frame, double noise)
     body(frame, X);
     toy_lift_see(c, (const double (*)[3])X, TOY_MARKERS, noise, seed, uv);
     for (int j = 0; j < TOY_MARKERS; j++)
-        seen[j] = toy_random(&seed) > 0.7 ? INFINITY : noise;
+        sds[j] = toy_random(&seed) > 0.7 ? INFINITY : noise;
 }
 
 /* Push a frame; returns what the call did. */
 static gait_result push(gait_lift *l, const gait_lift_config *c, int frame, double noise)
 {
     see(c, frame, noise);
-    return gait_lift_push(l, utime_of(frame), uv, seen, NULL);
+    return gait_lift_push(l, utime_of(frame), uv, sds, NULL);
 }
 
 static double error_of(const gait_lift_frame *f, double *worst_z)
@@ -105,7 +105,7 @@ static void test_follows(int32_t lag)
     CHECK(worst < 6.0);
 }
 
-/* Nobody seen: the prior goes on alone and says so; a long pause starts anew. */
+/* Without observations the prior continues alone, which the estimate states; a long pause starts again. */
 static void test_pauses(void)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -113,21 +113,21 @@ static void test_pauses(void)
     gait_lift *const l = toy_lift_open(&c);
     double before = 0.0, worst = 0.0;
     for (int j = 0; j < TOY_MARKERS; j++)
-        seen[j] = -1.0;
-    CHECK(gait_lift_push(l, 1000, uv, seen, NULL) == GAIT_OK);
-    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_ERR_STATE); /* nobody yet */
+        sds[j] = -1.0;
+    CHECK(gait_lift_push(l, 1000, uv, sds, NULL) == GAIT_OK);
+    CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_ERR_STATE); /* no person yet */
     for (int i = 0; i < 40; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
     CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
     before = out.sd[3][1];
     for (int j = 0; j < TOY_MARKERS; j++)
-        seen[j] = INFINITY;
+        sds[j] = INFINITY;
     for (int i = 40; i < 46; i++)
-        CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+        CHECK(gait_lift_push(l, utime_of(i), uv, sds, NULL) == GAIT_OK);
     CHECK(gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING);
     CHECK(out.sd[3][1] > 1.2 * before);
     for (int i = 46; i < 70; i++)
-        CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+        CHECK(gait_lift_push(l, utime_of(i), uv, sds, NULL) == GAIT_OK);
     CHECK(gait_lift_estimate(l, &out, NULL) != GAIT_OK || out.status == GAIT_TRACK_INIT);
     for (int i = 90; i < STREAM; i++)
         CHECK(push(l, &c, i, 1.0) == GAIT_OK);
@@ -192,7 +192,7 @@ static void test_wrong_points(double off)
         if (i % 7 == 3)
             for (int a = 0; a < 2; a++)
                 uv[2 * (i % TOY_MARKERS) + a] += i % 2 ? off : -off;
-        CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+        CHECK(gait_lift_push(l, utime_of(i), uv, sds, NULL) == GAIT_OK);
         if (gait_lift_estimate(l, &out, NULL) != GAIT_OK || out.status != GAIT_TRACK_TRACKING)
             continue;
         most = fmax(most, error_of(&out, &worst));
@@ -202,7 +202,7 @@ static void test_wrong_points(double off)
     CHECK(most < 0.1 && worst < 6.0);
 }
 
-/* Points at 0, 0 or -1, -1 are not seen. */
+/* Points at 0, 0 or -1, -1 are missing points. */
 static void test_zeros(void)
 {
     static gait_lift_frame other;
@@ -213,14 +213,14 @@ static void test_zeros(void)
             see(&c, i, 1.0);
             int const j = i % TOY_MARKERS;
             uv[2 * j] = uv[2 * j + 1] = !zeros ? NAN : i % 2 ? 0.0 : -1.0;
-            CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+            CHECK(gait_lift_push(l, utime_of(i), uv, sds, NULL) == GAIT_OK);
         }
         CHECK(gait_lift_estimate(l, zeros ? &out : &other, NULL) == GAIT_OK);
     }
     CHECK(memcmp(&out, &other, sizeof out) == 0);
 }
 
-/* Noise that is four times what was said widens the deviations by as much. */
+/* Noise that is four times as large as stated widens the standard deviations by the same factor. */
 static void test_noise(void)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
@@ -230,8 +230,8 @@ static void test_noise(void)
         for (int i = 0; i < STREAM; i++) {
             see(&c, i, loud ? 4.0 : 1.0);
             for (int j = 0; j < TOY_MARKERS; j++)
-                seen[j] = isfinite(seen[j]) ? 1.0 : seen[j];
-            CHECK(gait_lift_push(l, utime_of(i), uv, seen, NULL) == GAIT_OK);
+                sds[j] = isfinite(sds[j]) ? 1.0 : sds[j];
+            CHECK(gait_lift_push(l, utime_of(i), uv, sds, NULL) == GAIT_OK);
             if (gait_lift_estimate(l, &out, NULL) == GAIT_OK && out.status == GAIT_TRACK_TRACKING)
                 sd[loud] += out.sd[3][1] / STREAM;
         }
@@ -240,7 +240,7 @@ static void test_noise(void)
     CHECK(sd[1] > 2.0 * sd[0] && sd[1] < 4.0 * sd[0]);
 }
 
-/* A segment that does not fit is looked for anew: somebody else walks the other way. */
+/* A segment that does not fit starts a new search: another person walks the other way. */
 static void test_poor_fit(void)
 {
     gait_lift_config c = toy_lift_config(GAIT_LIFT_PERSPECTIVE);
