@@ -5,7 +5,7 @@
 
 Each part is a script of its own that publishes tables (table.py) and fails if a bound is missed.  All parts
 are run; those that fail are named in learn.md and at the end.  `--only PART` runs one and joins it with the
-last tables of the others; learn.md says which commit made which.
+last tables of the others; learn.md names which commit made which.
 """
 
 from __future__ import annotations

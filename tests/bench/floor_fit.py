@@ -26,7 +26,7 @@ STARTS = 16  # phase offsets tried first, over a stride
 EVERY = 12  # frames; a tenth of a second in CMU's recordings
 STEP = 1e-4  # of the numerical derivatives: standard deviations and strides
 PASSES = 12  # of the nonlinear least squares
-OFFSETS = "offsets"  # beside the sections of a model: channels (m, 30) moved by one deviation of each offset
+OFFSETS = "offsets"  # beside the sections of a model: channels (m, 30) moved by one sd of each offset
 
 
 @dataclass
@@ -82,8 +82,8 @@ def walk(s: Sequence) -> Walk:
     away = np.stack([joints[name] - joints["pelvis"] for name in COMPARED], axis=1)
     local = np.einsum("tji,tpj->tpi", body.pelvis, away)
     frames = np.arange(0, len(local), EVERY)
-    seen = np.isfinite(local[frames]).all(axis=(1, 2)) & np.isfinite(s.channels[frames]).all(axis=1)
-    frames = frames[seen]
+    visible = np.isfinite(local[frames]).all(axis=(1, 2)) & np.isfinite(s.channels[frames]).all(axis=1)
+    frames = frames[visible]
     at, rate = frames / s.period.frames, s.fps / s.period.frames
     return Walk(s.subject, at, local[frames], s.channels[frames], measures, rate)
 

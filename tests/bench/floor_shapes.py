@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from floor_fit import OFFSETS
 
+from gait import Model
 from gait.body.skeleton import ANGLES
 from gait.learn.options import DEFAULT_COMPONENTS
 from gait.learn.prior.fit import Learned
-from gait.bindings.config import TrackerConfig
 
 MOST = 12  # dimensions of a particle for its shape
 LENGTHS = MOST - DEFAULT_COMPONENTS
 USED = 5  # components that the tracker uses by default (population.c)
-OURS, BARE = "libgait", "libgait, no proportions"
+OURS, PLAIN_BODY = "libgait", "libgait, no proportions"
 TRACKED, UNMOVED = "libgait, as tracked", "libgait, as tracked without offsets"
 ALL_OFFSETS = "+ offsets of all angles"
 
@@ -63,7 +63,7 @@ SHAPES = {
     OURS: Shape(DEFAULT_COMPONENTS, LENGTHS),
     ALL_OFFSETS: Shape(DEFAULT_COMPONENTS, LENGTHS, tuple(ANGLES)),
     **DIVIDED,
-    BARE: Shape(DEFAULT_COMPONENTS, 0),
+    PLAIN_BODY: Shape(DEFAULT_COMPONENTS, 0),
     UNMOVED: Shape(USED, 0),
     TRACKED: Shape(USED, 0, SIX),
 }

@@ -79,33 +79,35 @@ def _by_svd(values: Floats, mask: Mask, components: int, basis: Floats) -> Float
 
 def ppca(values: Floats, mask: Mask, components: int) -> Floats:
     """Probabilistic principal components by maximum likelihood (EM), without Fourier basis (Roweis 1998)."""
-    x, seen = values.reshape(len(values), -1), mask.reshape(len(values), -1).astype(float)
+    x, visible = values.reshape(len(values), -1), mask.reshape(len(values), -1).astype(float)
     filled = mean(values, mask, 0).reshape(x.shape)
     center = filled.mean(axis=0)
     _, s, v = np.linalg.svd(filled - center, full_matrices=False)
     load, noise = v[:components].T * s[:components] / np.sqrt(len(x)), 1.0
     for _ in range(PPCA_PASSES):
-        spread = noise * np.linalg.inv(_grams(seen, load) + noise * np.eye(components))
-        scores = np.einsum("rkl,rl->rk", spread, (seen * (x - center)) @ load) / noise
+        spread = noise * np.linalg.inv(_grams(visible, load) + noise * np.eye(components))
+        scores = np.einsum("rkl,rl->rk", spread, (visible * (x - center)) @ load) / noise
         before, model = filled, center + scores @ load.T
         # Each entry's row of loadings from the rows that have it.
         second = (spread + scores[:, :, None] * scores[:, None]).reshape(len(x), -1)
-        gram = (seen.T @ second).reshape(-1, components, components) + 1e-9 * np.eye(components)
-        cross = (seen * (x - center)).T @ scores
+        gram = (visible.T @ second).reshape(-1, components, components) + 1e-9 * np.eye(components)
+        cross = (visible * (x - center)).T @ scores
         load = np.linalg.solve(gram, cross[..., None])[..., 0]
-        center = (seen * (x - scores @ load.T)).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
-        doubt = np.sum(spread * _grams(seen, load))
-        noise = float(np.sum((seen * (x - center - scores @ load.T)) ** 2) + doubt) / float(seen.sum())
-        filled = np.where(seen > 0, x, model)
+        center = (visible * (x - scores @ load.T)).sum(axis=0) / np.maximum(visible.sum(axis=0), 1)
+        rest = np.sum(spread * _grams(visible, load))
+        noise = float(np.sum((visible * (x - center - scores @ load.T)) ** 2) + rest) / float(
+            visible.sum()
+        )
+        filled = np.where(visible > 0, x, model)
         if np.sqrt(np.mean((filled - before) ** 2)) <= PPCA_TOLERANCE * np.sqrt(noise):
             break
     return filled.reshape(values.shape)
 
 
-def _grams(seen: Floats, load: Floats) -> Floats:
+def _grams(visible: Floats, load: Floats) -> Floats:
     """Products (R, q, q) of the loadings (P, q) of the entries that each row has (R, P)."""
     products = load[:, :, None] * load[:, None]
-    return (seen @ products.reshape(len(load), -1)).reshape(len(seen), *products.shape[1:])
+    return (visible @ products.reshape(len(load), -1)).reshape(len(visible), *products.shape[1:])
 
 
 def paper(values: Floats, mask: Mask, components: int) -> Floats:

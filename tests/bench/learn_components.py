@@ -182,7 +182,7 @@ def _rise(objective: list[float]) -> float:
 
 
 def _unseen() -> Iterator[Row]:
-    """L13: what five components of other people leave of somebody's cycles."""
+    """L13: what five components of other people leave of a person's cycles."""
     angles, distances = [], []
     for seed in range(SEEDS):
         case = cases.people(_rng(13, seed))
@@ -205,8 +205,8 @@ def _unseen() -> Iterator[Row]:
 def _described(found: pca.Components, case: cases.Case, rows: npt.NDArray[np.bool_]) -> Any:
     """Rows (n, T, M) by the components, with scores by least squares of what is observed of each."""
     result = []
-    for values, seen in zip(case.values[rows], case.mask[rows], strict=True):
-        scores = np.linalg.lstsq(found.curves[:, seen].T, (values - found.mean)[seen], rcond=None)[0]
+    for values, visible in zip(case.values[rows], case.mask[rows], strict=True):
+        scores = np.linalg.lstsq(found.curves[:, visible].T, (values - found.mean)[visible], rcond=None)[0]
         result.append(found.mean + np.tensordot(scores, found.curves, 1))
     return result
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How well the cyclic model can describe a walker it has not seen: leave one subject out.
+"""How well the cyclic model can describe a person it has not seen: leave one subject out.
 
     .venv/bin/python tests/bench/learn_floor.py ../shared/data/mocap/cmu_walk
 
@@ -25,7 +25,7 @@ import floor_fit
 import numpy as np
 import numpy.typing as npt
 import table
-from floor_shapes import ALL_OFFSETS, BARE, DIVIDED, MOST, OURS, SHAPES, TRACKED, UNMOVED
+from floor_shapes import ALL_OFFSETS, DIVIDED, MOST, OURS, PLAIN_BODY, SHAPES, TRACKED, UNMOVED
 
 from gait.body.pace import series
 from gait.body.skeleton import CHANNELS, Proportions, default_skeleton
@@ -56,7 +56,7 @@ PROJECT: dict[str, Project] = {
 }
 BASELINE = "paper"
 OTHERS = "cmu_misc"  # folder beside the walks: other people and motions
-WALKS_TOO = ("md",)  # a dancer there with the bones of a walker, 05
+WALKS_TOO = ("md",)  # a dancer there with the bones of a person, 05
 GOAL = 25.0  # per cent below the paper's model
 LIKE = 0.1  # mm that are no difference
 
@@ -74,7 +74,7 @@ STEPS = ("plain", "+ mirror images", "+ subjects alike", "+ joint metric", "+ st
 CASES = [
     *(Case(name, MEAN, JOINTS) for name in (BASELINE, *STEPS, *SHAPES)),
     *(Case(name, MEAN, ALIKE) for name in (ALL_OFFSETS, TRACKED)),
-    *(Case(name, SHIPPED, JOINTS) for name in (BASELINE, OURS, BARE, UNMOVED, TRACKED)),
+    *(Case(name, SHIPPED, JOINTS) for name in (BASELINE, OURS, PLAIN_BODY, UNMOVED, TRACKED)),
     Case(TRACKED, SHIPPED, ALIKE),
     *(Case(name, body, ANGLES) for body in (MEAN, SHIPPED) for name in (BASELINE, OURS)),
 ]
@@ -99,8 +99,8 @@ Mean distance of 14 joints after alignment of the pelvis, mm, averaged over a su
   deviation among the learners (section `CHST`, learnt anew without the subject) and that of a joint's
   coordinate, which is what the model leaves of the walk without offsets.  Where every frame counts, these
   outweigh what was learnt, and the offsets are nearly free; with *frames alike* a walk counts as one frame,
-  since a model errs alike in all strides.  Scores and proportions are free in all rows.  The deviations of
-  those tracked, degrees, with everybody among the learners: {spread}.
+  since a model errs alike in all strides.  Scores and proportions are free in all rows.  The sd
+  of those tracked, degrees, with all people among the learners: {offsets_sd}.
 - body: *mean of the learners*, or *as shipped*: joints moved by hand to where anatomical bodies have them
   (`generic_proportions`), which these recordings do not know, so that both models are far off.
 - projection: *joints*, nonlinear least squares of the joints, the best the model can do; *angles*, least
@@ -112,7 +112,7 @@ projected for both models: {fair:.1f} % less.  No other row decides:
 
 - with the body as shipped it is {shipped:.1f} %;
 - with angles projected for both models it is {angles:.1f} %, and with the body as shipped too {both:.1f} %;
-- without proportions it is {bare:.1f} %, and with the body as shipped {bare_shipped:.1f} %;
+- without proportions it is {plain:.1f} %, and with the body as shipped {plain_shipped:.1f} %;
 - as tracked it is {tracked:.1f} %, and with the body as shipped {tracked_shipped:.1f} %; without offsets
   {unmoved:.1f} % and {unmoved_shipped:.1f} %;
 - offsets of all angles ({all_shape}) lower the floor to {all_offsets:.1f} mm, with frames alike to
@@ -175,7 +175,7 @@ def _alike(filled: Floats, subject: Indices, metric: Floats) -> Floats:
 
 
 def own_cycle(s: Sequence) -> Sections:
-    """A model of one walk: its mean cycle, no components, the walker's own lengths."""
+    """A model of one walk: its mean cycle, no components, the person's own lengths."""
     rows = cutting.cut_cycles([s.channels], np.array([s.period.frames]), np.zeros(1), fit.SAMPLES)
     mean = components.fit(rows.values, rows.mask, 0).mean
     return {"CURV": mean[None], **default_skeleton(retarget.own_proportions(s.measures)).sections()}
@@ -217,14 +217,14 @@ def rows_of(found: dict[str, Result], medians: dict[Case, float]) -> Iterable[li
         ]
 
 
-def spread(sequences: list[Sequence], others: Bodies) -> str:
-    """Learnt deviations of the offsets that the tracker has, in words."""
+def offsets_sd(sequences: list[Sequence], others: Bodies) -> str:
+    """Learnt standard deviations of the offsets that the tracker has, in words."""
     with one_thread():
         static = np.degrees(fit.fit(sequences, others=others).static)
     return ", ".join(f"{name} {static[CHANNELS.index(name)]:.1f}" for name in SHAPES[TRACKED].angles)
 
 
-def publish(found: dict[str, Result], walks: int, others: int, deviations: str) -> bool:
+def publish(found: dict[str, Result], walks: int, others: int, offsets_sd: str) -> bool:
     """Publish the table; False if the goal is missed where it is judged."""
     medians = {case: float(np.median(per_subject(found, case))) for case in [*CASES, MEAN_CYCLE, EXACT]}
     fair = less(medians, FAIR)
@@ -241,11 +241,11 @@ def publish(found: dict[str, Result], walks: int, others: int, deviations: str) 
         both=less(medians, Case(OURS, SHIPPED, ANGLES)),
         **{
             word: less(medians, Case(name, body, JOINTS))
-            for name, key in ((BARE, "bare"), (UNMOVED, "unmoved"), (TRACKED, "tracked"))
+            for name, key in ((PLAIN_BODY, "plain"), (UNMOVED, "unmoved"), (TRACKED, "tracked"))
             for body, word in ((MEAN, key), (SHIPPED, f"{key}_shipped"))
         },
         used=SHAPES[TRACKED].components,
-        spread=deviations,
+        offsets_sd=offsets_sd,
         all_shape=SHAPES[ALL_OFFSETS],
         all_offsets=medians[Case(ALL_OFFSETS, MEAN, JOINTS)],
         alike=medians[Case(ALL_OFFSETS, MEAN, ALIKE)],
@@ -259,7 +259,7 @@ def publish(found: dict[str, Result], walks: int, others: int, deviations: str) 
         way=less(medians, FAIR, PAPERS_WAY),
     )
     columns = ["model", "dimensions", "body", "projection", *found, "median", "less", "wanted", "met"]
-    title = "Floor under unseen walkers, mm"
+    title = "Floor under unseen people, mm"
     table.publish("learn_floor", title, [*columns, "angles, deg"], rows_of(found, medians), note)
     return fair >= GOAL
 
@@ -288,13 +288,13 @@ def main() -> int:
             for subject, result in held:
                 found[subject] = result
                 update(len(found))
-    return 0 if publish(found, len(sequences), len(others), spread(sequences, others)) else 1
+    return 0 if publish(found, len(sequences), len(others), offsets_sd(sequences, others)) else 1
 
 
-def strangers(paths: list[Path], walkers: list[str]) -> Bodies:
-    """Bodies of people in other files who are none of the walkers, one each."""
+def strangers(paths: list[Path], persons: list[str]) -> Bodies:
+    """Bodies of people in other files who are none of the people, one each."""
     files = dict(zip(sources.subjects(paths), paths, strict=True))
-    read = [readers.read(path) for who, path in files.items() if who not in walkers]
+    read = [readers.read(path) for who, path in files.items() if who not in persons]
     return [retarget.measure(retarget.levelled(body)) for body in read if not isinstance(body, AngleTable)]
 
 

@@ -30,7 +30,7 @@ NAMES = ("run", "walk")
 COLUMNS = ("figure", "fitted", *NAMES, "apart")
 NOTE = """\
 A person's walk and run, {files}: each recording fitted by itself,
-and both with the lengths that they tell together (places of markers stay each recording's own).  Left and
+and both with the lengths that they share (places of markers stay each recording's own).  Left and
 right averaged; apart: between the two recordings.  Residual: root mean square distance of the markers from
 their places on the fitted body.  Seconds: to read and fit both files one after the other, the measuring
 before it included.

@@ -45,7 +45,7 @@ def mixed_effects_em(values, mask, components):
     rows, samples = values.shape
     phase = np.arange(samples) / samples
     start = np.concatenate([[0], np.cumsum(mask.sum(axis=1))[:-1]])
-    points = np.concatenate([phase[seen] for seen in mask])
+    points = np.concatenate([phase[visible] for visible in mask])
     irregular = FDataIrregular(start_indices=start, points=points[:, None], values=values[mask][:, None])
     basis = FourierBasis((0.0, 1.0), n_basis=BASIS)
     curves = EMMixedEffectsConverter(basis).fit_transform(irregular)

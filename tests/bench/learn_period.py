@@ -23,7 +23,7 @@ from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import gait_generator as g
-from learn_measures import cramer_rao, falls, gauge_free, walkers
+from learn_measures import cramer_rao, falls, gauge_free, persons
 
 from gait.learn.cycles import align, period
 from gait.learn.cycles.sequence import load
@@ -67,7 +67,7 @@ def _jittered(seed: int) -> float:
 
 
 def _styled(seed: int) -> float:
-    """Period found over the true one, for a walker of random period, length and style."""
+    """Period found over the true one, for a person of random period, length and style."""
     rng = np.random.default_rng([2, seed])
     true = rng.uniform(52, 240)
     frames = int(rng.integers(max(500, int(3 * true)), 1000))
@@ -79,7 +79,7 @@ def _styled(seed: int) -> float:
 def _aligned(job: tuple[int, float, str]) -> tuple[Floats, float, int, bool]:
     """Errors of offsets in frames, the largest in cycles, the passes, whether the objective always fell."""
     seed, style, start = job
-    signals, periods, true = walkers(np.random.default_rng([5, seed, int(style)]), style)
+    signals, periods, true = persons(np.random.default_rng([5, seed, int(style)]), style)
     found = align.align(signals, periods, np.zeros(len(signals)) if start == "zeros" else None)
     errors = np.abs(gauge_free(found.offsets, true, periods))
     fell = found.converged and falls(found.objective)
@@ -88,7 +88,7 @@ def _aligned(job: tuple[int, float, str]) -> tuple[Floats, float, int, bool]:
 
 def _gauge(seed: int) -> float:
     """L6: largest difference of the common curve, degrees, when a constant is added to all phases."""
-    signals, periods, _ = walkers(np.random.default_rng([6, seed]), STYLES[1])
+    signals, periods, _ = persons(np.random.default_rng([6, seed]), STYLES[1])
     begin, curves = align.align(signals, periods).offsets, []
     for added in (0.0, *ADDED):
         found = align.align(signals, periods, start=begin + added * periods, hips=HIPS)

@@ -43,7 +43,7 @@ def interpolated(curve: Floats, phases: int) -> tuple[Floats, Floats]:
 
 
 def distance(learned: fit.Learned, one: Floats, other: Floats) -> float:
-    """Root mean square distance of the points about the pelvis, mm, of two stretches of channels (n, M)."""
+    """Root mean square distance of the points about the pelvis, mm, of two intervals of channels (n, M)."""
     sections = default_skeleton(learned.proportions).sections()
     off = points(sections, one) - points(sections, other)
     return 1000 * people.ADULT_STATURE[0] * float(np.sqrt(np.mean(np.sum(off**2, axis=-1))))

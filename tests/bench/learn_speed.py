@@ -21,9 +21,9 @@ import table
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import machines
 
-from gait.body import skeleton
 from gait.bindings.model import Model
 from gait.bindings.state import State
+from gait.body import skeleton
 from gait.errors import UserError
 from gait.io import blob
 from gait.progress import progress
@@ -87,7 +87,7 @@ def main() -> int:
             case, wanted = f"{walks} walks, --jobs {jobs}", f"< {SECONDS}" if jobs > 1 else ""
             met = ("yes" if seconds < SECONDS else "NO") if wanted else ""
             rows.append(("speed", case, "wall clock, s", float(seconds), wanted, met))
-            if jobs == 1:  # of workers the system tells their parent alone
+            if jobs == 1:  # the system reports workers to their parent alone
                 rows.append(("speed", case, "processor time, s", float(work), "", ""))
             rows.append(("speed", case, "memory of the process, MB", float(memory), "", ""))
         played = machines.environments()

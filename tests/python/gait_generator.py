@@ -70,7 +70,7 @@ def random_modes(rng, count=5):
 
 
 def walk(rng, period, frames, *, offset=0.0, noise=5.0, scores=None, modes=None, missing=0.0, jitter=0.0):
-    """Angles (frames, 19) of one walker: phase (t - offset) / period, NaN in blocks.
+    """Angles (frames, 19) of one person: phase (t - offset) / period, NaN in blocks.
 
     jitter : standard deviation of a stride's time, a share of the period.
     """
@@ -95,7 +95,7 @@ def jittered(rng, phase, jitter):
 
 @dataclass
 class Outing:
-    """Somebody who stands, starts, walks steadily, then turns and stops; frames [begin, end) are steady."""
+    """A person who stands, starts, walks steadily, then turns and stops; frames [begin, end) are steady."""
 
     angles: np.ndarray  # (T, 19) radians
     place: np.ndarray  # (T, 2) metres

@@ -33,11 +33,11 @@ class Case:
     def oracle(self):
         """Data with missing entries as expected by one who knows mean, modes, their sd and the noise."""
         result = self.values.copy()
-        for row, seen in zip(result, self.mask, strict=True):
-            design = self.modes[:, seen].T
+        for row, visible in zip(result, self.mask, strict=True):
+            design = self.modes[:, visible].T
             precision = design.T @ design / self.noise**2 + np.diag(1 / np.square(self.sd))
-            scores = np.linalg.solve(precision, design.T @ (row - self.mean)[seen] / self.noise**2)
-            row[~seen] = (self.mean + np.tensordot(scores, self.modes, 1))[~seen]
+            scores = np.linalg.solve(precision, design.T @ (row - self.mean)[visible] / self.noise**2)
+            row[~visible] = (self.mean + np.tensordot(scores, self.modes, 1))[~visible]
         return result
 
     def error(self, filled, where=None):
@@ -119,7 +119,7 @@ def _take(case, taken):
 
 
 def drifting(rng, sequences=12, rise=6.0):
-    """Cycles (`cycles.Cycles`) of walkers whose angles creep by `rise` degrees per cycle."""
+    """Cycles (`cycles.Cycles`) of people whose angles creep by `rise` degrees per cycle."""
     modes, signals, periods, offsets = g.random_modes(rng), [], [], []
     for _ in range(sequences):
         period, frames = rng.uniform(100, 140), 460
@@ -136,7 +136,7 @@ def seams(curves, neighbours=True):
     """Worst step across the seam over the usual step, for curves (T, M) and their first two differences (3,).
 
     The usual step is the median, as in the measure's definition; with `neighbours` no less than the steps
-    beside the seam, for where a smooth curve is steep at phase 0 the median alone tells nothing of a jump.
+    beside the seam, for where a smooth curve is steep at phase 0 the median alone shows no step.
     """
     worst = np.zeros(3)
     for order in range(3):

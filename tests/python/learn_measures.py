@@ -17,7 +17,7 @@ def cramer_rao(true, frames, noise, missing):
     return noise / np.sqrt((1 - missing) * np.sum(rest**2))
 
 
-def walkers(rng, style, noise=3.0, count=8):
+def persons(rng, style, noise=3.0, count=8):
     """Signals, periods and true offsets of `count` walkers whose style has a standard deviation, degrees."""
     periods = rng.uniform(90, 150, count)
     offsets = rng.uniform(0, 1, count) * periods

@@ -1,4 +1,4 @@
-"""Small motion files for tests: a toy walker in ASF/AMC, and any ASF/AMC written again as BVH."""
+"""Small motion files for tests: a toy person in ASF/AMC, and any ASF/AMC written again as BVH."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ BONES = [
 
 
 def toy_asf():
-    """Text of a skeleton with all bones that a walker needs."""
+    """Text of a skeleton with all bones that a person needs."""
     lines = [":version 1.10", ":units", "  length 0.45", "  angle deg", ":root"]
     lines += [
         "  order TX TY TZ RX RY RZ",

@@ -3,7 +3,7 @@
 import gait_generator as g
 import numpy as np
 import pytest
-from learn_measures import falls, gauge_free, walkers
+from learn_measures import falls, gauge_free, persons
 
 from gait.learn.cycles import align
 
@@ -14,7 +14,7 @@ def test_offsets_are_found_below_a_frame(start):
     for style in (0, 2, 4):
         errors[style] = []
         for seed in range(3):
-            signals, periods, true = walkers(np.random.default_rng([seed, style]), float(style))
+            signals, periods, true = persons(np.random.default_rng([seed, style]), float(style))
             found = align.align(signals, periods, None if start is None else np.zeros(len(signals)))
             errors[style].extend(np.abs(gauge_free(found.offsets, true, periods)))
             assert falls(found.objective) and found.converged
@@ -38,7 +38,7 @@ def spoil(monkeypatch, passes, wrong):
 
 
 def test_a_step_that_makes_it_worse_is_shown_and_taken_back(monkeypatch):
-    signals, periods, true = walkers(np.random.default_rng(6), 2.0)
+    signals, periods, true = persons(np.random.default_rng(6), 2.0)
     good = align.align(signals, periods, np.zeros(len(signals)))
     spoil(monkeypatch, 2, 10.0)
     bad = align.align(signals, periods, np.zeros(len(signals)))
@@ -47,8 +47,8 @@ def test_a_step_that_makes_it_worse_is_shown_and_taken_back(monkeypatch):
     assert np.max(np.abs(gauge_free(bad.offsets, true, periods))) < 3
 
 
-def test_a_rise_too_small_to_look_for_is_the_end_and_taken_back(monkeypatch):
-    signals, periods, true = walkers(np.random.default_rng(6), 2.0)
+def test_a_rise_too_small_to_act_on_is_the_end_and_taken_back(monkeypatch):
+    signals, periods, true = persons(np.random.default_rng(6), 2.0)
     good = align.align(signals, periods, np.zeros(len(signals)))
     spoil(monkeypatch, len(good.objective) - 1, 0.01)
     end = align.align(signals, periods, start=good.offsets)
@@ -59,14 +59,14 @@ def test_a_rise_too_small_to_look_for_is_the_end_and_taken_back(monkeypatch):
 
 def test_missing_blocks_do_not_bias_the_offsets():
     rng = np.random.default_rng(1)
-    signals, periods, true = walkers(rng, 2.0)
+    signals, periods, true = persons(rng, 2.0)
     signals = [g.remove_blocks(rng, z, 0.3) for z in signals]
     found = align.align(signals, periods)
     assert np.max(np.abs(gauge_free(found.offsets, true, periods))) < 1.5
 
 
 def test_a_common_shift_of_the_phases_changes_nothing_else():
-    signals, periods, _ = walkers(np.random.default_rng(2), 2.0)
+    signals, periods, _ = persons(np.random.default_rng(2), 2.0)
     cut = [z[17:] for z in signals]
     first, second = align.align(signals, periods), align.align(cut, periods)
     moved = gauge_free(second.offsets, first.offsets - 17, periods)
@@ -78,7 +78,7 @@ HIPS = (7, 15)  # right and left hip flexion of the generator
 
 def test_a_constant_added_to_all_phases_gives_the_same_curves():
     """L6: the gauge takes it out, so that model files of different runs agree."""
-    signals, periods, _ = walkers(np.random.default_rng(3), 2.0)
+    signals, periods, _ = persons(np.random.default_rng(3), 2.0)
     begin = align.align(signals, periods).offsets
     curves = []
     for phase in (0.0, 0.123456, 0.5):
@@ -89,7 +89,7 @@ def test_a_constant_added_to_all_phases_gives_the_same_curves():
 
 
 def test_the_hips_gauge_is_a_cosine_of_right_minus_left():
-    signals, periods, _ = walkers(np.random.default_rng(4), 0.0)
+    signals, periods, _ = persons(np.random.default_rng(4), 0.0)
     found = align.align(signals, periods, hips=HIPS)
     curve = align.common_curve(signals, periods, found.offsets)
     first = np.fft.fft(curve[:, HIPS[0]] - curve[:, HIPS[1]])[1]
@@ -100,8 +100,8 @@ def test_the_hips_gauge_is_a_cosine_of_right_minus_left():
 
 
 def test_sequences_without_whole_angles_are_aligned_by_the_others():
-    """One has no upper body, one no legs, one nothing but the left knee; neck_z nobody has."""
-    signals, periods, true = walkers(np.random.default_rng(5), 2.0)
+    """One has no upper body, one no legs, one nothing but the left knee; no sequence has neck_z."""
+    signals, periods, true = persons(np.random.default_rng(5), 2.0)
     legs = [7, 8, 9, 10, 15, 16, 17, 18]
     signals[1][:, [k for k in range(19) if k not in legs]] = np.nan
     signals[2][:, legs] = np.nan
@@ -122,7 +122,7 @@ def test_a_first_sequence_of_trunk_alone_is_ambiguous_and_others_start_too():
     lower = 0
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        signals, periods, true = walkers(rng, 0.0)
+        signals, periods, true = persons(rng, 0.0)
         for z, p, o in zip(signals, periods, true, strict=True):
             z[:, 0] = 3 * np.cos(4 * np.pi * (np.arange(len(z)) - o) / p) + rng.normal(scale=0.5, size=len(z))
         signals[0][:, 1:] = np.nan

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import marked_walker as mw
+import marked_person as mw
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -55,9 +55,9 @@ def test_legs_that_turn_round_are_refused(tmp_path):
 
 def test_columns_that_are_not_there_are_missing(tmp_path):
     table = readers.read(write(tmp_path / "a.csv", names=LEGS))
-    seen = np.isfinite(table.angles).all(axis=0)
-    assert [n for n, s in zip(ANGLES, seen, strict=True) if s] == LEGS
-    assert np.isnan(table.angles[:, ~seen]).all()
+    visible = np.isfinite(table.angles).all(axis=0)
+    assert [n for n, s in zip(ANGLES, visible, strict=True) if s] == LEGS
+    assert np.isnan(table.angles[:, ~visible]).all()
 
 
 def test_root_channels_and_stature(tmp_path):
@@ -117,7 +117,7 @@ def test_the_rate_of_a_file_without_times(tmp_path):
 
 
 def test_what_a_track_writes_has_its_joints_and_its_angles_but_not_what_was_lost(tmp_path):
-    _, pose = mw.walker(mw.LOWER, frames=60)
+    _, pose = mw.person(mw.LOWER, frames=60)
     names = header(2, tuple(ANGLES))
     skeleton = default_skeleton()
     body = pose_skeleton(pose, 1.7 * skeleton.origins)

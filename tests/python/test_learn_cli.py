@@ -159,7 +159,7 @@ def test_jobs_and_a_cluster_do_not_go_together(walks, tmp_path, capsys):
     assert "give one of them" in capsys.readouterr().err
 
 
-def test_json_says_of_each_sequence_where_it_is_from_and_why_it_was_taken(walks, tmp_path, capsys):
+def test_json_shows_for_each_sequence_where_it_is_from_and_why_it_was_taken(walks, tmp_path, capsys):
     assert run("learn", walks, "-o", tmp_path / "m.gait", "--components", 3, "--json", "--quiet") == 0
     for s in json.loads(capsys.readouterr().out)["sequences"]:
         assert (
@@ -196,23 +196,23 @@ def test_people_get_a_few_lines_however_many_files(walks, tmp_path, capsys):
     assert err.count("\n") == 21 and "left out: 11 more" in err
 
 
-def test_info_tells_what_was_learnt(learned, capsys):
+def test_info_shows_what_was_learnt(learned, capsys):
     assert run("info", learned, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["components"] == 3 and told["phases"] == fit.SAMPLES and len(told["joints"]) == 19
-    assert told["bytes"] == learned.stat().st_size
-    assert told["meta"]["subjects"] == ["01", "02", "03", "04"] and told["meta"]["activity"] == "walk"
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["components"] == 3 and reported["phases"] == fit.SAMPLES and len(reported["joints"]) == 19
+    assert reported["bytes"] == learned.stat().st_size
+    assert reported["meta"]["subjects"] == ["01", "02", "03", "04"] and reported["meta"]["activity"] == "walk"
     assert run("info", learned) == 0
     text = capsys.readouterr().out
-    assert told["crc32"] in text and model.CMU in text and "01_03" in text
+    assert reported["crc32"] in text and model.CMU in text and "01_03" in text
 
 
-def test_an_activity_that_is_not_known_is_said(walks, tmp_path, capsys):
+def test_an_activity_that_is_not_known_is_reported(walks, tmp_path, capsys):
     assert run("learn", walks, "-o", tmp_path / "m.gait", "--activity", "wlak", "--components", 1) == 0
     assert "--activity wlak: none of walk, walking, " in capsys.readouterr().err
 
 
-def test_people_without_arms_are_said(walks, tmp_path, capsys):
+def test_people_without_arms_are_reported(walks, tmp_path, capsys):
     rows = np.degrees(skeleton.curves(blob.read(SHIPPED), np.arange(400) / 100, np.zeros((400, 1))))
     for k, some in enumerate((ANGLES, [a for a in ANGLES if "shoulder" not in a])):
         lines = [",".join(["time", *(f"{a}_deg" for a in some)])]
@@ -223,7 +223,7 @@ def test_people_without_arms_are_said(walks, tmp_path, capsys):
     assert "1 person never shows l_shoulder or r_shoulder: filled in from" in capsys.readouterr().err
 
 
-def test_columns_of_info_make_room_for_long_names():
+def test_columns_of_info_widen_for_long_names():
     rows = [["a_recording_of_a_long_name", 1100, 2.5, 40.0, 3.2], ["b", 990, 12.5, 9.0, None]]
     lines = info.sequence_lines(rows)
     assert len({len(line) for line in lines}) == 1 and lines[1].startswith("a_recording_of_a_long_name  ")

@@ -8,7 +8,7 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
-import marked_walker as mw
+import marked_person as mw
 import mocap_files as files
 import pytest
 from test_marker_files import write_c3d
@@ -62,7 +62,7 @@ def test_a_cluster_gives_the_same_model(walks, scheduler, tmp_path, monkeypatch,
 
 def test_a_cluster_measures_people_alike(scheduler, tmp_path, monkeypatch):
     for k in (1, 2):
-        points = mw.walker(mw.LOWER, frames=60, again=k)[0]
+        points = mw.person(mw.LOWER, frames=60, again=k)[0]
         write_c3d(tmp_path / f"anna_{k}.c3d", mw.LOWER, points)
     monkeypatch.chdir(tmp_path)
     found, _ = sources.find(["."])

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import gait_generator as g
-import marked_walker as mw
+import marked_person as mw
 import mocap_files as files
 import numpy as np
 import pytest
@@ -37,11 +37,11 @@ def bvh(folder, frames):
 
 
 def c3d(folder, frames):
-    return write_c3d(folder / "a.c3d", mw.LOWER, mw.walker(mw.LOWER, frames=10)[0][:frames])
+    return write_c3d(folder / "a.c3d", mw.LOWER, mw.person(mw.LOWER, frames=10)[0][:frames])
 
 
 def trc(folder, frames):
-    return write_trc(folder / "a.trc", mw.LOWER, mw.walker(mw.LOWER, frames=10)[0][:frames])
+    return write_trc(folder / "a.trc", mw.LOWER, mw.person(mw.LOWER, frames=10)[0][:frames])
 
 
 def joint_table(folder, frames):
@@ -166,7 +166,7 @@ def test_amc(tmp_path, bone, words):
         readers.read(damaged(path, put(row, 1, "1e300")))
 
 
-def test_amc_in_radians_says_so(tmp_path):
+def test_amc_in_radians_is_reported(tmp_path):
     path = files.write_toy(tmp_path, frames=5)
     path.write_text(path.read_text().replace(":DEGREES", ":RADIANS"))
     with pytest.raises(UserError, match=r"degrees \(radians in the file\); at most"):
@@ -239,7 +239,7 @@ def test_a_recording_of_which_too_little_is_seen_is_refused(walker, tmp_path):
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.5, 0.58, 0.65, 0.9])
-def test_the_fewest_cycles_are_those_of_the_worst_beginning(missing):
+def test_the_fewest_cycles_are_those_of_the_worst_start(missing):
     rng = np.random.default_rng(3)
     z = rng.normal(size=(250, 30))
     z[rng.random(250) < missing] = np.nan
@@ -247,7 +247,7 @@ def test_the_fewest_cycles_are_those_of_the_worst_beginning(missing):
     assert cutting.fewest_cycles(z, 100.0, 50) == min(made)
 
 
-def test_what_no_recording_shows_is_said(tmp_path, capsys):
+def test_what_no_recording_shows_is_reported(tmp_path, capsys):
     legs = [k for k, name in enumerate(ANGLES) if "hip" in name or "knee" in name]
     rows = [",".join(["time", *(f"{ANGLES[k]}_deg" for k in legs)])]
     for t, pose in enumerate(np.degrees(mw.walk_angles(480, 100.0))):

@@ -36,9 +36,9 @@ def test_imputation_beats_mean_and_line(imputed):
     column = np.broadcast_to(np.nanmean(np.where(mask, values, np.nan), axis=0), values.shape)
     line = values.copy()
     for r, c in np.ndindex(values.shape[0], values.shape[2]):
-        seen = np.flatnonzero(mask[r, :, c])
-        if len(seen):
-            line[r, :, c] = np.interp(np.arange(g.GRID), seen, values[r, seen, c], period=g.GRID)
+        visible = np.flatnonzero(mask[r, :, c])
+        if len(visible):
+            line[r, :, c] = np.interp(np.arange(g.GRID), visible, values[r, visible, c], period=g.GRID)
     assert case.error(column) > 5 * error
     assert case.error(line) > 5 * error
 
@@ -151,10 +151,10 @@ def test_people_without_some_channels_are_filled(channels, limit):
     assert case.error(found.filled, taken) <= limit * case.error(case.oracle(), taken)
 
 
-def test_what_nobody_has_is_finite():
+def test_what_no_cycle_has_is_finite():
     case = cases.walks(np.random.default_rng(19), rows=30)
-    case.mask[:, :, 4] = False  # a channel of nobody
-    case.mask[:, 30:60, 8] = False  # phases of nobody
+    case.mask[:, :, 4] = False  # a channel of no cycle
+    case.mask[:, 30:60, 8] = False  # phases of no cycle
     case.mask[5] = False  # a row without anything
     for count in (0, 5, 29):
         found = components.fit(case.values, case.mask, count)

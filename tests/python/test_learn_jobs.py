@@ -98,8 +98,8 @@ def test_processes_give_the_same_bits_in_the_order_of_the_files(walks, at_once):
     assert counts == [1, 2, 3, 4, 5, 6]
 
 
-def test_bodies_of_people_of_whom_no_file_can_be_used(tmp_path, at_once):
-    """Two strangers of one cycle, the one twice; a walker's own short file counts for nothing."""
+def test_bodies_of_people_whose_files_are_all_refused(tmp_path, at_once):
+    """Two strangers of one cycle, the one twice; a person's own short file counts for nothing."""
     for name in ("02_01", "02_02", "03_01", "01_99"):
         files.write_toy(tmp_path, name, frames=110)
     files.write_toy(tmp_path, "01_00", frames=300)
@@ -145,15 +145,15 @@ def test_the_forkserver_starts_before_what_is_slow_to_import(jobs, large, starts
 @pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="signals held back are told elsewhere")
 def test_the_server_that_imports_does_not_hear_an_interruption():
     """From a terminal it reaches the whole group; the command ends its server itself."""
-    tell = "print(open(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read())"
+    status = "print(open(f'/proc/{forkserver._forkserver._forkserver_pid}/status').read())"
     program = (
         "from multiprocessing import forkserver; from gait.learn.corpus import forkserver as f; "
-        f"f.start(); {tell}"
+        f"f.start(); {status}"
     )
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True
     )
-    held = next(line.split()[1] for line in told.stdout.splitlines() if line.startswith("SigBlk"))
+    held = next(line.split()[1] for line in reported.stdout.splitlines() if line.startswith("SigBlk"))
     assert int(held, 16) >> (signal.SIGINT - 1) & 1
 
 

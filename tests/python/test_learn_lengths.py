@@ -90,7 +90,7 @@ def test_shoulders_move_apart_from_the_neck():
     np.testing.assert_array_equal(left, right * (1, -1, 1))
     np.testing.assert_allclose(np.cross(left, planted[0, 7:]), 0, atol=1e-9)
     assert not np.delete(shift, [FRAMES.index(f"{s}_upper_arm") for s in "lr"], axis=1).any()
-    # everybody is the mean and some multiple of the components
+    # every person is the mean and some multiple of the components
     want = np.array([[m.neck / m.stature, *(m.shoulder[0] / m.stature)] for m in bodies])
     torso = table[:, FRAMES.index("torso")]
     ways = np.column_stack([torso * MEAN.neck, left + torso[:, None] * np.array(MEAN.shoulder)])

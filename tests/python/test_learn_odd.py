@@ -69,7 +69,7 @@ def test_more_components_than_cycles_allow_are_an_error(cycles, wanted, message)
         fit.most_components(cycles, wanted, ["a.csv", "b.csv"])
 
 
-def test_few_cycles_give_fewer_components_and_a_line_says_so(walks, tmp_path, capsys):
+def test_few_cycles_give_fewer_components_and_a_line_is_reported(walks, tmp_path, capsys):
     output = tmp_path / "m.gait"
     assert run("learn", walks / "01", "-o", output, "--json") == 0
     out, err = capsys.readouterr()
@@ -80,7 +80,7 @@ def test_few_cycles_give_fewer_components_and_a_line_says_so(walks, tmp_path, ca
     assert capsys.readouterr().err == ""
 
 
-def test_one_subject_has_neither_proportions_nor_a_static_spread(sequences):
+def test_one_subject_has_neither_proportions_nor_a_static_offset(sequences):
     made = sections(fit.fit([s for s in sequences if s.subject == "01"], LearnOptions(components=2)))
     assert "PROP" not in made and not made["CHST"][:, 3].any() and not made["SCST"][:, 1].any()
     assert Model(blob.encode(made)).info.proportions == 0
@@ -94,7 +94,7 @@ def test_three_subjects_have_proportions(sequences):
     assert np.abs(made["PROP"]).max() < 2e-3 and made["CHST"][:, 3].max() > 0
 
 
-def test_bodies_of_others_tell_how_people_differ(sequences):
+def test_bodies_of_others_show_how_people_differ(sequences):
     """Of two people there are no proportions; a third, with long forearms, gives one."""
     two = [s for s in sequences if s.subject in ("01", "02")]
     long = replace(two[0].measures, forearm=1.2 * two[0].measures.forearm)
@@ -117,7 +117,7 @@ def test_the_body_of_a_person_is_of_the_recording_that_shows_most(sequences):
         fit.fit(some, LearnOptions(components=1)).proportions.forearm for some in (mixed, own[1:], mixed[:2])
     ]
     assert arms[0] == pytest.approx(arms[1], rel=1e-9)
-    assert arms[0] != pytest.approx(arms[2], rel=1e-3)  # nobody's, so those of the default body
+    assert arms[0] != pytest.approx(arms[2], rel=1e-3)  # no person has them, so those of the default body
 
 
 def test_paper_prior_has_the_plain_components_and_one_body(sequences):
@@ -137,8 +137,9 @@ def test_legs_alone_leave_the_rest_at_rest(sequences, kind):
     made = sections(fit.fit(cut, LearnOptions(components=2, prior=kind)))
     unseen = np.flatnonzero(~LEGS)
     assert not made["CHST"][unseen].any() and np.abs(made["CURV"][:, :, unseen]).max() < 1e-6
-    seen = np.flatnonzero(LEGS)
-    assert np.all(made["CHST"][seen, 1] < made["CHST"][seen, 2]) and np.ptp(made["CURV"][0][:, seen]) > 0.5
+    visible = np.flatnonzero(LEGS)
+    assert np.all(made["CHST"][visible, 1] < made["CHST"][visible, 2])
+    assert np.ptp(made["CURV"][0][:, visible]) > 0.5
 
 
 @pytest.mark.parametrize("kind", PRIORS)

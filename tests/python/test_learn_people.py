@@ -115,7 +115,7 @@ def test_subjects_count_alike_however_many_cycles_they_have():
 
 
 def test_sd_is_of_subjects():
-    """One mode, two people a deviation apart: sd 1 although one has nine cycles."""
+    """One mode, two people one standard deviation apart: sd 1 although one has nine cycles."""
     mode = smooth(np.random.default_rng(9), 1)
     mode = mode + people.mirrored(mode)
     mode /= np.linalg.norm(mode)
@@ -125,7 +125,7 @@ def test_sd_is_of_subjects():
     assert sd[0] == pytest.approx(1) and np.abs(scores[:, 0]) == pytest.approx(np.ones(10))
 
 
-def test_static_spread_is_what_others_do_not_explain():
+def test_static_offset_is_what_others_do_not_explain():
     rng = np.random.default_rng(10)
     number = 6
     offset = np.zeros((number, len(CHANNELS)))
@@ -139,8 +139,8 @@ def test_static_spread_is_what_others_do_not_explain():
     # others' learners see that person, whose image has the other knee; nothing else was ever different
     knees = [CHANNELS.index(f"{s}_knee_flexion") for s in "lr"]
     assert np.delete(spread, knees).max() < 0.01
-    everybody = rows + 0.3 * (rng.normal(size=number)[subject] > 0)[:, None, None] * (np.arange(30) == 0)
-    assert people.static_sd(everybody, subject, 4, PLAIN)[0] < 1e-6
+    shifted = rows + 0.3 * (rng.normal(size=number)[subject] > 0)[:, None, None] * (np.arange(30) == 0)
+    assert people.static_sd(shifted, subject, 4, PLAIN)[0] < 1e-6
 
 
 @pytest.mark.parametrize("rows", [10, 40, 200], ids=["few", "more", "many"])
@@ -161,7 +161,7 @@ def test_leading_directions_of_rows_that_hardly_vary_are_fewer():
     assert imputation.leading_vectors(data[:1], data[0], np.ones(1), 4).shape == (0, 40)
 
 
-def test_static_spread_of_too_few_people_is_zero():
+def test_static_offset_of_too_few_people_is_zero():
     rows = smooth(np.random.default_rng(11), 5)
     for subject in (np.zeros(5, int), np.array([0, 0, 1, 1, 1])):
         assert not people.static_sd(rows, subject, 2, PLAIN).any()
@@ -187,14 +187,14 @@ def wave(rng):
     return cycle
 
 
-def walkers(rng, slope, paces):
-    """Cycles, people and paces: everybody has an own mean, and the same slope."""
+def persons(rng, slope, paces):
+    """Cycles, people and paces: every person has their own mean, and the same slope."""
     rows = [own + p * slope for own, each in ((wave(rng), each) for each in paces) for p in each]
     subject = np.repeat(np.arange(len(paces)), [len(each) for each in paces])
     return np.array(rows), subject, np.concatenate(paces)
 
 
-def test_pace_counts_deviations_and_stops_where_nothing_was_learnt():
+def test_pace_counts_standard_deviations_and_stops_where_nothing_was_learnt():
     rates = np.array([0.9, 0.97, 0.83, 0.3, 2.4, 0.0])
     np.testing.assert_allclose(pace(GAIT, rates), [0, 1, -1, -MOST, MOST, 0], atol=1e-9)
     assert pace((0.9, 0.0), 1.2) == 0
@@ -205,13 +205,13 @@ def test_the_slope_is_that_within_people_drawn_towards_none():
     slope = wave(rng)
     slope = 0.5 * (slope + mirrored(slope[None])[0])
     paces = [np.array([-1.0, 1.0]), np.array([0.5, 1.5, 1.0]), np.array([-2.0])]
-    found = people.pace_slope(*walkers(rng, slope, paces))
-    seen = 1 + 0.5 / 3  # variances of the people's paces; a single cycle tells nothing
-    np.testing.assert_allclose(found, slope * seen / (seen + people.UNMOVED), atol=1e-12)
+    found = people.pace_slope(*persons(rng, slope, paces))
+    visible = 1 + 0.5 / 3  # variances of the people's paces; a single cycle shows nothing
+    np.testing.assert_allclose(found, slope * visible / (visible + people.UNMOVED), atol=1e-12)
 
 
 def test_turns_within_a_person_are_no_slope():
-    rows, subject, at = walkers(
+    rows, subject, at = persons(
         np.random.default_rng(3), np.zeros((PACE_SAMPLES, 30)), [np.array([-1.0, 1.0])] * 2
     )
     rows[1, :, CHANNELS.index("l_knee_flexion")] += 8 * np.pi
@@ -219,10 +219,10 @@ def test_turns_within_a_person_are_no_slope():
         people.pace_slope(rows, subject, at)
 
 
-def test_more_cycles_of_one_person_weigh_no_more():
+def test_more_cycles_of_one_person_count_no_more():
     rng = np.random.default_rng(2)
     slope, paces = wave(rng), [np.array([-1.0, 1.0]), np.array([-0.5, 0.5])]
-    rows, subject, at = walkers(rng, slope, paces)
+    rows, subject, at = persons(rng, slope, paces)
     often = np.r_[np.repeat([0, 1], 5), 2, 3]
     np.testing.assert_allclose(
         people.pace_slope(rows[often], subject[often], at[often]),
@@ -233,29 +233,29 @@ def test_more_cycles_of_one_person_weigh_no_more():
 
 def test_the_slope_is_its_own_mirror_image():
     rng = np.random.default_rng(3)
-    found = people.pace_slope(*walkers(rng, wave(rng), [np.array([-1.0, 1.0]), np.array([0.0, 1.0])]))
+    found = people.pace_slope(*persons(rng, wave(rng), [np.array([-1.0, 1.0]), np.array([0.0, 1.0])]))
     assert np.abs(found).max() > 0.1
     np.testing.assert_allclose(mirrored(found[None])[0], found, atol=1e-12)
 
 
 def test_the_forward_speed_is_left_to_the_components():
     rng, paces = np.random.default_rng(7), [np.array([-1.0, 1.0]), np.array([0.0, 1.0])]
-    rows, subject, at = walkers(rng, wave(rng), paces)
+    rows, subject, at = persons(rng, wave(rng), paces)
     rows[:, :, CHANNELS.index("root_forward")] += at[:, None]
     assert not people.pace_slope(rows, subject, at)[:, CHANNELS.index("root_forward")].any()
 
 
 @pytest.mark.parametrize("paces", [[[-1.0, 1.0]], [[0.5, 0.5], [-1.0], [1.5, 1.5]]])
-def test_one_person_or_one_pace_each_tells_nothing(paces):
+def test_one_person_or_one_pace_each_shows_nothing(paces):
     rng = np.random.default_rng(4)
-    found = people.pace_slope(*walkers(rng, wave(rng), [np.array(each) for each in paces]))
+    found = people.pace_slope(*persons(rng, wave(rng), [np.array(each) for each in paces]))
     np.testing.assert_allclose(found, 0, atol=1e-12)
 
 
 def test_cycles_without_the_slope_are_those_at_the_mean_rate():
     rng = np.random.default_rng(5)
     slope, paces = wave(rng), [np.array([-1.0, 2.0]), np.array([0.3])]
-    rows, _, at = walkers(rng, slope, paces)
+    rows, _, at = persons(rng, slope, paces)
     even = people.at_mean_pace(rows, at, slope)
     np.testing.assert_allclose(even[0], even[1], atol=1e-12)
     np.testing.assert_allclose(rows[0] - even[0], -slope, atol=1e-12)
@@ -305,7 +305,7 @@ def test_the_norm_is_that_of_the_rate():
     np.testing.assert_allclose(sd_fast, sd, atol=1e-12)
 
 
-def test_whoever_walks_faster_swings_further_in_the_shipped_model():
+def test_people_who_walk_faster_swing_further_in_the_shipped_model():
     slope = slope_of(SHIPPED)
     np.testing.assert_allclose(mirrored(slope[None])[0], slope, atol=2e-6)
     assert not slope[:, CHANNELS.index("root_forward")].any()
@@ -349,11 +349,11 @@ def test_a_model_whose_rates_do_not_vary_has_no_use_for_a_slope():
         Model(blob.encode(made))
 
 
-def unseen_people(rng, odd):
+def unseen_people(rng, unusual):
     """Cycles (8, 16, 3) of four people; the last never shows channel 2, which was filled `odd` away."""
     subject = np.repeat(np.arange(4), 2)
     cycles = rng.normal(size=(8, 16, 3))
-    cycles[6:, :, 2] = odd * np.cos(np.arange(16))
+    cycles[6:, :, 2] = unusual * np.cos(np.arange(16))
     mask = np.ones(cycles.shape, bool)
     mask[6:, :, 2] = False
     return cycles, mask, subject
@@ -362,9 +362,9 @@ def unseen_people(rng, odd):
 def test_who_shows_everything_is_not_touched():
     cycles, mask, subject = unseen_people(np.random.default_rng(1), 3.0)
     assert bounded(cycles, np.ones_like(mask), subject) is cycles
-    nobody = mask.copy()
-    nobody[..., 2] = False  # a channel that nobody shows
-    assert bounded(cycles, nobody, subject) is cycles
+    absent = mask.copy()
+    absent[..., 2] = False  # a channel that no person shows
+    assert bounded(cycles, absent, subject) is cycles
 
 
 def test_what_is_never_shown_deviates_as_people_do_at_most():
@@ -388,5 +388,5 @@ def test_who_never_shows_what_others_show_is_counted():
     _, mask, subject = unseen_people(np.random.default_rng(4), 0.1)
     people_lacking, channels = never_shown(mask, subject)
     assert people_lacking == 1 and channels.tolist() == [False, False, True]
-    mask[..., 2] = False  # a channel that nobody shows is nobody's lack
+    mask[..., 2] = False  # a channel that no person shows is not counted
     assert never_shown(mask, subject)[0] == 0

@@ -1,4 +1,4 @@
-"""The report of gait learn: its figures show the data, on ordinary and on odd input."""
+"""The report of gait learn: its figures show the data, on ordinary and unusual input."""
 
 import json
 from dataclasses import replace
@@ -105,8 +105,8 @@ def test_the_page_holds_everything_and_needs_nothing(walks, tmp_path, capsys):
 
 def test_the_table_says_what_was_cut_and_why_a_sequence_was_taken(learned):
     first = replace(learned.sequences[0], kept=(120, 400), cut=("it stands <still>", ""))
-    odd = replace(learned, sequences=[first, *learned.sequences[1:]])
-    page = Page(pages._sequences(odd))
+    unusual = replace(learned, sequences=[first, *learned.sequences[1:]])
+    page = Page(pages._sequences(unusual))
     assert "120 to 399 (before: it stands <still>)" in page.texts
     assert any("repeats 0.9" in t or "repeats 1" in t for t in page.texts)
     assert "SNR" in page.texts and f"{np.nanmax(first.period.scores):.0f}" in page.texts
@@ -134,7 +134,7 @@ def test_alignment_brings_the_curves_together(learned):
     before, after = figure.axes[:2]
 
     def spread(axes):
-        """Mean deviation of the drawn curves from the drawn mean."""
+        """Mean distance of the drawn curves from the drawn mean."""
         x, mean = axes.lines[-1].get_data()
         parts = [
             np.interp(np.asarray(line.get_xdata()), x, mean) - line.get_ydata() for line in axes.lines[:-1]
@@ -145,7 +145,7 @@ def test_alignment_brings_the_curves_together(learned):
     assert spread(after) < 0.4 * spread(before)
 
 
-def test_a_strip_shows_the_walker_plus_and_minus_two_deviations(learned):
+def test_a_strip_shows_the_person_plus_and_minus_two_sd(learned):
     turned = learned.curves[1]
     figure = figures_model.strip(learned, turned)
     side = figure.axes[0]
@@ -222,19 +222,19 @@ def many_subjects(sequences):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning:gait.learn.prior.model")
 @pytest.mark.parametrize("make", [one_file, lower_body, many_subjects])
-def test_odd_input_gives_a_report_too(sequences, tmp_path, make):
-    odd = make(sequences)
-    pages.write(tmp_path, odd, LearnOptions(activity="walk & run"), [])
+def test_unusual_input_gives_a_report_too(sequences, tmp_path, make):
+    unusual = make(sequences)
+    pages.write(tmp_path, unusual, LearnOptions(activity="walk & run"), [])
     page = Page((tmp_path / "index.html").read_text())
     assert "Cyclic model of walk & run" in page.texts and "left-out" not in page.ids
-    assert len(page.pictures) >= 10 and page.cells == 10 * len(odd.sequences)
+    assert len(page.pictures) >= 10 and page.cells == 10 * len(unusual.sequences)
     assert ("subjects" in page.ids) == (make is lower_body)
-    texts = [t.get_text() for axes in figures.cycles(odd).axes for t in axes.texts]
-    unseen = [name for name in SHOWN if not odd.cycles.mask[:, :, CHANNELS.index(name)].any()]
+    texts = [t.get_text() for axes in figures.cycles(unusual).axes for t in axes.texts]
+    unseen = [name for name in SHOWN if not unusual.cycles.mask[:, :, CHANNELS.index(name)].any()]
     assert texts == ["not observed"] * len(unseen) and bool(unseen) == (make is lower_body)
 
 
-def test_a_page_of_somebody_else_is_kept_and_one_of_ours_replaced(walks, learned, tmp_path, capsys):
+def test_a_foreign_page_is_kept_and_one_of_ours_replaced(walks, learned, tmp_path, capsys):
     page = tmp_path / "site/index.html"
     page.parent.mkdir()
     page.write_text("<title>Home</title>" + "gait learn" * 1000)

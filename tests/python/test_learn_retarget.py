@@ -49,11 +49,11 @@ def test_angles_survive_a_round_trip(seed, size):
         scale=0.05, size=(5, 24)
     )
     channels[:, column("root_yaw")] = rng.uniform(-3, 3)
-    walker = body_of(channels)
-    measures = retarget.measure(walker)
+    person = body_of(channels)
+    measures = retarget.measure(person)
     slope = np.arctan2(-skeleton.Proportions().toe[2], skeleton.Proportions().toe[0])
     measures = replace(measures, slope=np.array([slope, slope]))
-    assert retarget.angles(walker, measures) == pytest.approx(channels[:, :24], abs=1e-6)
+    assert retarget.angles(person, measures) == pytest.approx(channels[:, :24], abs=1e-6)
 
 
 def test_generic_proportions_take_trunk_and_upper_arms_by_anatomy_the_rest_from_recordings():
@@ -85,7 +85,7 @@ def test_lengths_survive_a_round_trip():
 @pytest.mark.parametrize(
     ("decompose", "axes"), [(rotations.decompose_yxz, (1, 0, 2)), (rotations.decompose_zyx, (2, 1, 0))]
 )
-def test_decomposition_passes_through_gimbal_lock_without_a_jump(decompose, axes):
+def test_decomposition_passes_through_gimbal_lock_without_a_step(decompose, axes):
     middle = np.radians(np.linspace(60, 120, 61))
     angles = np.stack([np.full(61, 0.3), middle, np.full(61, -0.2)], axis=1)
     turn = rotations.from_angles(angles, axes)
@@ -125,9 +125,9 @@ def test_root_channels_of_a_known_walk(heading):
     local = np.stack([1.36 * t, sway * stature, (0.53 + bob) * stature], axis=1)
     turned = channels.copy()
     turned[:, column("root_yaw")] += heading
-    walker = body_of(turned, local @ skeleton.axis_rotation(2, heading).T)
-    measures = replace(retarget.measure(walker), stature=stature)
-    found, direction = retarget.root_channels(walker, measures, 120.0)
+    person = body_of(turned, local @ skeleton.axis_rotation(2, heading).T)
+    measures = replace(retarget.measure(person), stature=stature)
+    found, direction = retarget.root_channels(person, measures, 120.0)
     assert np.exp(1j * direction) == pytest.approx(np.full(len(t), np.exp(1j * heading)), abs=0.01)
     assert found[:, 0] == pytest.approx(1.36 / stature, rel=0.02)
     assert found[60:-60, 1] == pytest.approx(sway[60:-60], abs=0.002)
@@ -137,10 +137,10 @@ def test_root_channels_of_a_known_walk(heading):
 
 
 def test_a_pelvis_that_is_not_seen_has_no_heading():
-    walker = body_of(walk_channels()[0])
-    measures = retarget.measure(walker)
-    walker.joints["pelvis"] = np.full_like(walker.joints["pelvis"], np.nan)
-    found, direction = retarget.root_channels(walker, measures, 120.0)
+    person = body_of(walk_channels()[0])
+    measures = retarget.measure(person)
+    person.joints["pelvis"] = np.full_like(person.joints["pelvis"], np.nan)
+    found, direction = retarget.root_channels(person, measures, 120.0)
     assert np.isnan(found).all() and np.isnan(direction).all()
 
 
@@ -162,10 +162,10 @@ def test_a_sloping_floor_is_found_and_levelled(slope):
 
 def test_pelvis_axes_do_not_depend_on_marker_placement():
     channels, phase = walk_channels()
-    walker = body_of(channels)
-    crooked = Body(walker.name, walker.fps, walker.joints, walker.pelvis @ rotations.from_angles(
-        np.array([0.1, -0.2, 0.05]), (1, 0, 2)), walker.lateral)  # fmt: skip
-    straight, mended = retarget.align_pelvis(walker), retarget.align_pelvis(crooked)
+    person = body_of(channels)
+    crooked = Body(person.name, person.fps, person.joints, person.pelvis @ rotations.from_angles(
+        np.array([0.1, -0.2, 0.05]), (1, 0, 2)), person.lateral)  # fmt: skip
+    straight, mended = retarget.align_pelvis(person), retarget.align_pelvis(crooked)
     assert mended.pelvis == pytest.approx(straight.pelvis, abs=2e-3)
 
 
@@ -178,14 +178,14 @@ def test_real_walks_are_reproduced_to_8_mm():
     errors = []
     for name in ("02/02_01", "07/07_01", "16/16_16", "35/35_01", "38/38_01"):
         s = load(WALKS / f"{name}.amc")
-        walker = retarget.levelled(readers.read(s.source).part(*s.kept))
+        person = retarget.levelled(readers.read(s.source).part(*s.kept))
         own = skeleton.default_skeleton(retarget.own_proportions(s.measures)).sections()
         local = s.channels.copy()
         local[:, [column(f"root_{n}") for n in ("roll", "pitch", "yaw")]] = 0
         position = skeleton.points(own, local) * s.measures.stature
-        found = np.einsum("tij,tpj->tpi", walker.pelvis, position)
+        found = np.einsum("tij,tpj->tpi", person.pelvis, position)
         names = [n for n in skeleton.EVAL15 if n not in ("pelvis", "head_top")]
-        truth = np.stack([walker.joints[n] - walker.joints["pelvis"] for n in names], axis=1)
+        truth = np.stack([person.joints[n] - person.joints["pelvis"] for n in names], axis=1)
         distance = np.linalg.norm(found[:, [skeleton.JOINTS.index(n) for n in names]] - truth, axis=2)
         errors.append(distance.mean())
     assert np.mean(errors) < 0.0105 and max(errors) < 0.013

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import gait_generator as g
 import machines
-import marked_walker as mw
+import marked_person as mw
 import mocap_files as files
 import numpy as np
 import pytest
@@ -91,8 +91,8 @@ def test_an_idle_glob_and_all_that_fails_are_named(walks, tmp_path, capsys):
     for name in ("a.bvh", "b.bvh"):
         (tmp_path / "bad" / name).write_text("x\n")
     assert run("learn", tmp_path / "bad", "-o", tmp_path / "n.gait") == 1
-    said = capsys.readouterr().err
-    assert "left out: " in said and "a.bvh:1" in said and "b.bvh:1" in said
+    printed = capsys.readouterr().err
+    assert "left out: " in printed and "a.bvh:1" in printed and "b.bvh:1" in printed
 
 
 def test_hidden_files_skeletons_and_empty_names(walks, tmp_path, capsys):
@@ -129,7 +129,7 @@ def test_links_are_followed_once_and_closed_folders_are_named(walks, tmp_path, c
     assert "closed: Permission denied; check its permissions" in capsys.readouterr().err
 
 
-def test_few_people_leave_a_doubt_about_others():
+def test_few_people_leave_uncertainty_about_others():
     one, rates = np.zeros(1, int), np.array([0.9, 0.9, 1.0])
     assert people.by_subject(np.array([0.9]), one, 0.07) == pytest.approx((0.9, 0.063))
     two = people.by_subject(rates[1:], np.arange(2), 0.07)
@@ -140,9 +140,9 @@ def test_few_people_leave_a_doubt_about_others():
 
 def test_the_pelvis_of_the_shipped_model_follows_from_its_legs():
     mean = np.asarray(blob.read(SHIPPED)["CURV"][0], float)
-    bare = mean.copy()
-    bare[:, CHANNELS.index("root_forward") :] = 0
-    height, stride = fit._from_legs(bare, Proportions())
+    plain = mean.copy()
+    plain[:, CHANNELS.index("root_forward") :] = 0
+    height, stride = fit._from_legs(plain, Proportions())
     assert height == pytest.approx(mean[:, fit.HEIGHT], abs=0.02)
     assert stride == pytest.approx(mean[:, fit.FORWARD].mean(), rel=0.2)
     still = np.zeros_like(mean)
@@ -176,7 +176,7 @@ def test_ctrl_c_while_a_command_is_imported_is_one_line(capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "a.amc", "a.csv", "a.trc"])
-def test_a_file_that_may_not_be_read_says_so(tmp_path, capsys, monkeypatch, name):
+def test_a_file_that_may_not_be_read_is_reported(tmp_path, capsys, monkeypatch, name):
     path = tmp_path / name
     path.write_text("x")
     path.with_suffix(".asf").write_text("x")  # of the .amc
@@ -250,7 +250,7 @@ def test_readers_notice_zeros_unless_they_are_missing(amc, tmp_path):
     assert readers.read(tmp_path / "a.csv", LearnOptions(zeros_missing=True)).notes == recording.NO_NOTES
 
 
-def said(capsys, *words):
+def printed(capsys, *words):
     assert gait.cli.main(["learn", *map(str, words), "--segments", "none"]) == 0
     return capsys.readouterr().err
 
@@ -259,25 +259,25 @@ def test_zeros_are_hinted_at_once(amc, tmp_path, capsys):
     (amc.parent / "77_02.amc").write_bytes(amc.read_bytes())
     words = (amc.parent, "-o", tmp_path / "m.gait", "--components", 1)
     line = "77_01.amc: exactly 0: lowerneck in frames 40 to 49 (and similar in 1 more file); if that"
-    err = said(capsys, *words)
+    err = printed(capsys, *words)
     assert line in err and err.count("--zeros-missing") == 1
-    assert "exactly 0" not in said(capsys, *words, "--zeros-missing")
-    assert not said(capsys, *words, "--quiet")
+    assert "exactly 0" not in printed(capsys, *words, "--zeros-missing")
+    assert not printed(capsys, *words, "--quiet")
 
 
 def test_labels_of_no_marker_and_a_mapping_without_markers_are_told(amc, tmp_path, capsys):
     for k in (1, 2):
-        points, _ = mw.walker(mw.FULL, frames=400, seed=k)
+        points, _ = mw.person(mw.FULL, frames=400, seed=k)
         write_c3d(tmp_path / f"{k}_1.c3d", mw.FULL, points)
     mapping = tmp_path / "map.json"
     mapping.write_text(json.dumps(MAP))
     words = ("-o", tmp_path / "m.gait", "--components", 1, "--activity", "march", "--markers", mapping)
     marked = [tmp_path / "1_1.c3d", tmp_path / "2_1.c3d"]
-    err = said(capsys, *marked, *words)
+    err = printed(capsys, *marked, *words)
     assert err.count("--markers") == 1
     assert f"--markers {mapping}: no file has a marker 'Wand_L', 'LKN'; check the spelling\n" in err
-    assert "Wand_L" not in said(capsys, *marked, *words, "--quiet")
-    err = said(capsys, amc, *words)
+    assert "Wand_L" not in printed(capsys, *marked, *words, "--quiet")
+    err = printed(capsys, amc, *words)
     assert (
         f"--markers {mapping}: not used: no file is a .c3d or .trc\n" in err and err.count("--markers") == 1
     )

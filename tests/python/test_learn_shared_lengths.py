@@ -1,9 +1,9 @@
-"""Lengths of limbs by all recordings of a person together: nearer to the truth, and nobody else's."""
+"""Lengths of limbs by all recordings of a person together: nearer to the truth, and of one person."""
 
 import json
 from pathlib import Path
 
-import marked_walker as mw
+import marked_person as mw
 import numpy as np
 import pytest
 from test_marker_files import real, write_c3d, write_trc
@@ -35,7 +35,7 @@ def places(labels):
     return skeleton_fit.Points(segment, np.array([m.at for m in marks]), np.array([m.sd for m in marks]))
 
 
-def told(points):
+def reported(points):
     return markers.length_information(FILE, mw.FULL, points)
 
 
@@ -51,22 +51,22 @@ def pooled(*found):
 
 @pytest.fixture(scope="module")
 def twice():
-    """Two recordings of one walker: the first shows no arms, the second hardly anything of the legs."""
+    """Two recordings of one person: the first shows no arms, the second hardly anything of the legs."""
     arms = [side + name for side in "LR" for name in ("UPA", "ELB", "FRA", "WRA", "WRB")]
     legs = [side + name for side in "LR" for name in ("THI", "KNE", "TIB", "ANK", "HEE", "TOE")]
-    first, second = (mw.walker(mw.FULL, seed=2, again=k)[0] for k in (1, 2))
+    first, second = (mw.person(mw.FULL, seed=2, again=k)[0] for k in (1, 2))
     return without(first, arms), without(second, legs)
 
 
-def test_one_recording_tells_what_its_own_fit_finds():
-    points = mw.walker(mw.FULL, frames=240)[0]
+def test_one_recording_shows_what_its_own_fit_finds():
+    points = mw.person(mw.FULL, frames=240)[0]
     own = skeleton_fit.fit(points, places(mw.FULL)).log_scales
-    assert pooled(told(points)) == pytest.approx(own, abs=1e-3)
+    assert pooled(reported(points)) == pytest.approx(own, abs=1e-3)
 
 
 def test_lengths_of_both_recordings_are_nearer_to_the_truth_than_those_of_either(twice):
-    truth = mw.odd_lengths(np.random.default_rng(2))
-    found = [told(points) for points in twice]
+    truth = mw.own_lengths(np.random.default_rng(2))
+    found = [reported(points) for points in twice]
 
     def error(stretch):
         return float(np.sqrt(np.mean((stretch - truth)[LIMBS] ** 2)))
@@ -75,8 +75,8 @@ def test_lengths_of_both_recordings_are_nearer_to_the_truth_than_those_of_either
 
 
 def test_markers_put_on_anew_average_out():
-    truth = mw.odd_lengths(np.random.default_rng(4))
-    found = [told(mw.walker(mw.FULL, frames=60, seed=4, again=k)[0]) for k in range(6)]
+    truth = mw.own_lengths(np.random.default_rng(4))
+    found = [reported(mw.person(mw.FULL, frames=60, seed=4, again=k)[0]) for k in range(6)]
     away = [np.linalg.norm(pooled(one) - truth) for one in found]
     assert np.linalg.norm(pooled(*found) - truth) < min(away)
 
@@ -84,7 +84,7 @@ def test_markers_put_on_anew_average_out():
 def test_what_adds_up_is_the_optimum_of_a_joint_fit(monkeypatch):
     """A fit of all frames in which each recording has markers of its own, with the same weights."""
     frames, marks = 40, len(mw.LOWER)
-    each = [mw.walker(mw.LOWER, frames=frames, seed=6, again=k)[0] for k in (1, 2)]
+    each = [mw.person(mw.LOWER, frames=frames, seed=6, again=k)[0] for k in (1, 2)]
     found = [skeleton_fit.length_information(points, places(mw.LOWER))[0] for points in each]
     both = np.full((2 * frames, 2 * marks, 3), np.nan)
     both[:frames, :marks], both[frames:, marks:] = each
@@ -96,45 +96,43 @@ def test_what_adds_up_is_the_optimum_of_a_joint_fit(monkeypatch):
 
 
 def test_lengths_that_are_held_stay(twice):
-    stretch = mw.odd_lengths(np.random.default_rng(2))
+    stretch = mw.own_lengths(np.random.default_rng(2))
     body = markers.from_markers(FILE, mw.FULL, twice[0], 120.0, log_scales=stretch)
     knee = kinematics.segment_origins(stretch)[SEGMENTS.index("l_shank")]
     assert retarget.measure(body).thigh == pytest.approx(np.linalg.norm(knee), rel=1e-9)
     assert 0.002 < body.residual < 0.006
 
 
-def test_odds_of_one_body_are_right():
-    """Of draws as the model says, half of them of two people: the odds tell how often they are of one."""
+def test_bayes_factors_of_one_body_are_right():
+    """Draws of the model, half of them of two people: the factors give how often they are of one."""
     rng, size = np.random.default_rng(0), len(SCALES)
-    same, odd = rng.random(3000) < 0.5, []
+    same, unusual = rng.random(3000) < 0.5, []
     for one in same:
-        people = [
-            PEOPLE.mean() + rng.normal(size=size) / np.sqrt(np.diag(PEOPLE.matrix)) for _ in range(2)
-        ]
+        people = [PEOPLE.mean() + rng.normal(size=size) / np.sqrt(np.diag(PEOPLE.matrix)) for _ in range(2)]
         found = []
         for body in (people[0], people[0] if one else people[1]):
             slope = rng.normal(scale=5, size=(size, 6))
             found.append(LengthInformation(slope @ slope.T, slope @ (slope.T @ body + rng.normal(size=6))))
-        odd.append(log_bayes_factor(*found))
-    chance = 1 / (1 + np.exp(-np.array(odd)))
+        unusual.append(log_bayes_factor(*found))
+    chance = 1 / (1 + np.exp(-np.array(unusual)))
     for low in (0.0, 0.2, 0.4, 0.6, 0.8):
         there = (chance >= low) & (chance < low + 0.2)
         assert there.sum() > 100 and abs(np.mean(same[there]) - np.mean(chance[there])) < 0.08
 
 
-def test_what_tells_nothing_tells_nobody_apart():
+def test_what_shows_nothing_separates_no_people():
     assert log_bayes_factor(NO_INFORMATION, body(1.1)) == pytest.approx(0)
 
 
 def body(stature, error=0.0, precision=1e4):
-    """Findings of somebody's stature with an error of log stature."""
+    """Findings of a person's stature with an error of log stature."""
     matrix = np.zeros(PEOPLE.matrix.shape)
     matrix[0, 0] = precision
     return LengthInformation(matrix, matrix[0] * (np.log(stature) + error))
 
 
 def share(files, persons=None):
-    """Stretches and lines by recordings: path to what it tells."""
+    """Log length scales and lines by recordings: path to what it shows."""
     lines, counts = [], []
     paths = [Path(name) for name in files]
 
@@ -165,7 +163,7 @@ def test_what_is_known_of_people_counts_once():
     assert found[0].log_scales[0] == pytest.approx(np.log(1.7 * 2.0) / 2)  # people's precision of it is 16
 
 
-def test_a_recording_that_tells_nothing_does_not_count():
+def test_a_recording_that_shows_nothing_does_not_count():
     found, lines = share({"a.c3d": body(1.7), "b.c3d": None, "c.c3d": body(1.7)})
     assert [f.recordings if f else None for f in found] == [2, None, 2] and not lines
     assert share({"a.c3d": body(1.7), "b.c3d": None}) == ([None, None], [])
@@ -202,9 +200,9 @@ def laboratory(tmp_path_factory):
     folder = tmp_path_factory.mktemp("laboratory")
     for k, name in enumerate(["anna_1", "anna_2", "ben_1", "cleo_1", "cleo_2"]):
         seed = "abc".index(name[0])
-        points = mw.walker(mw.LOWER, frames=240, seed=seed, again=k)[0]
+        points = mw.person(mw.LOWER, frames=240, seed=seed, again=k)[0]
         (write_trc if k % 2 else write_c3d)(folder / f"{name}.{'trc' if k % 2 else 'c3d'}", mw.LOWER, points)
-    child = 0.8 * mw.walker(mw.LOWER, frames=240, seed=7)[0]
+    child = 0.8 * mw.person(mw.LOWER, frames=240, seed=7)[0]
     write_c3d(folder / "cleo_0.c3d", mw.LOWER, child)
     (folder / "anna_3.c3d").write_bytes(b"broken")
     return folder
@@ -217,13 +215,13 @@ def learn(folder, out, capsys, *words):
     return out.read_bytes(), json.loads(printed.out), printed.err
 
 
-def test_the_command_shares_lengths_and_tells_the_stranger(laboratory, tmp_path, capsys):
-    model, figures, told = learn(laboratory, tmp_path / "a.gait", capsys, "--jobs", "1")
+def test_the_command_shares_lengths_and_names_the_stranger(laboratory, tmp_path, capsys):
+    model, figures, reported = learn(laboratory, tmp_path / "a.gait", capsys, "--jobs", "1")
     by = {Path(row["source"]).stem: row["lengths_by"] for row in figures["sequences"]}
     assert by == {"anna_1": 2, "anna_2": 2, "ben_1": 1, "cleo_1": 2, "cleo_2": 2, "cleo_0": 1}
-    (line,) = [line for line in told.splitlines() if "limb lengths differ" in line]
+    (line,) = [line for line in reported.splitlines() if "limb lengths differ" in line]
     assert "cleo_0.c3d" in line and "cleo_1.trc" in line
-    assert told.count("anna_3.c3d") == 1
+    assert reported.count("anna_3.c3d") == 1
     again = learn(laboratory, tmp_path / "b.gait", capsys, "--jobs", "2", "--quiet")
     assert again[0] == model and "limb" not in again[2]
 

@@ -183,7 +183,7 @@ def test_constant_and_missing_channels_do_not_vote():
 TRIM_FPS, PERIOD = 100, 110
 
 
-def stretch(o, place=True, yaw=True):
+def log_scales(o, place=True, yaw=True):
     track = steady.RootPath(o.place if place else None, o.yaw if yaw else None)
     return steady.steady_part(o.angles, TRIM_FPS, "refined", track)
 
@@ -192,14 +192,14 @@ def stretch(o, place=True, yaw=True):
 @pytest.mark.parametrize("stand", [0.0, 1.0, 3.0])
 def test_the_steady_stretch_is_kept(strides, stand):
     o = g.outing(np.random.default_rng(1), TRIM_FPS, PERIOD, strides, stand=stand, stop=stand)
-    kept, found = stretch(o)
+    kept, found = log_scales(o)
     assert abs(kept.start - o.begin) < PERIOD / 3 and abs(kept.stop - o.end) < PERIOD / 3
     assert found.frames == pytest.approx(PERIOD, rel=0.02)
     assert "slower" in kept.before and kept.after
 
 
-def test_why_is_said_in_words():
-    kept, _ = stretch(g.outing(np.random.default_rng(1), TRIM_FPS, PERIOD))
+def test_reasons_are_in_words():
+    kept, _ = log_scales(g.outing(np.random.default_rng(1), TRIM_FPS, PERIOD))
     assert kept.before == "standing and slower"
     assert "turning" in kept.after and "slower" in kept.after and "standing" in kept.after
 
@@ -208,7 +208,7 @@ def test_why_is_said_in_words():
 def test_what_is_unknown_is_not_needed(place, yaw):
     """Angles alone show standing; the pace of the joints shows the rest roughly."""
     o = g.outing(np.random.default_rng(2), TRIM_FPS, PERIOD)
-    kept, found = stretch(o, place, yaw)
+    kept, found = log_scales(o, place, yaw)
     assert abs(kept.start - o.begin) < PERIOD and abs(kept.stop - o.end) < PERIOD
     assert found.frames == pytest.approx(PERIOD, rel=0.02)
 
@@ -216,18 +216,18 @@ def test_what_is_unknown_is_not_needed(place, yaw):
 def test_a_treadmill_stays_in_place():
     o = g.outing(np.random.default_rng(3), TRIM_FPS, PERIOD)
     o.place = np.random.default_rng(3).normal(scale=0.01, size=o.place.shape)
-    kept, found = stretch(o)
+    kept, found = log_scales(o)
     assert abs(kept.start - o.begin) < PERIOD and found.frames == pytest.approx(PERIOD, rel=0.02)
 
 
 @pytest.mark.parametrize("missing", [0.1, 0.3])
-def test_gaps_do_not_look_like_standing(missing):
+def test_gaps_are_not_taken_for_standing(missing):
     rng = np.random.default_rng(4)
     o = g.outing(rng, TRIM_FPS, PERIOD, strides=5)
     o.angles = g.remove_blocks(rng, o.angles, missing)
     o.place[180:200] = np.nan
     o.angles[300:320] = np.nan
-    kept, found = stretch(o)
+    kept, found = log_scales(o)
     assert abs(kept.start - o.begin) < PERIOD / 2 and abs(kept.stop - o.end) < PERIOD / 2
     assert found.frames == pytest.approx(PERIOD, rel=0.02)
 
@@ -238,7 +238,7 @@ def test_a_steady_walk_loses_nothing(noise):
         rng = np.random.default_rng(seed)
         frames = int(rng.integers(190, 500))
         o = g.outing(rng, TRIM_FPS, PERIOD, frames / PERIOD, stand=0, start=0, turn=0, stop=0, noise=noise)
-        kept, _ = stretch(o)
+        kept, _ = log_scales(o)
         assert (kept.start, kept.stop, kept.before, kept.after) == (0, len(o.angles), "", "")
 
 
@@ -247,7 +247,7 @@ def test_a_walk_round_a_circle_is_steady():
     bend = np.linspace(0, 2 * np.pi, len(o.yaw))
     o.yaw = o.yaw + bend
     o.place = 1.2 * np.stack([np.sin(bend), -np.cos(bend)], axis=1)
-    assert stretch(o)[0] == steady.Kept(0, len(o.yaw))
+    assert log_scales(o)[0] == steady.Kept(0, len(o.yaw))
 
 
 def test_of_two_walks_with_a_turn_between_the_longer_is_kept():
@@ -268,7 +268,7 @@ def test_unseen_ends_are_cut():
     o = g.outing(np.random.default_rng(8), TRIM_FPS, PERIOD, 4, stand=0, start=0, turn=0, stop=0)
     o.angles[:60], o.angles[-45:] = np.nan, np.nan
     o.place[:60], o.place[-45:] = np.nan, np.nan
-    kept, found = stretch(o)
+    kept, found = log_scales(o)
     assert abs(kept.start - 60) < 30 and abs(kept.stop - (len(o.yaw) - 45)) < 30
     assert found.frames == pytest.approx(PERIOD, rel=0.01)
 
@@ -374,7 +374,7 @@ def test_who_limps_takes_turns_though_the_legs_are_not_alike(lag):
     assert judge(angles).accepted
 
 
-def test_legs_that_are_not_seen_say_nothing():
+def test_legs_that_are_not_seen_show_nothing():
     angles = gait()
     angles[:, [ANGLES.index(f"l_{name}") for name in ("hip_flexion", "knee_flexion")]] = np.nan
     assert np.isnan(verdict.legs(angles, VERDICT_PERIOD))
@@ -403,11 +403,11 @@ def test_repeats_is_the_share_that_noise_leaves():
 
 
 def test_feet_that_are_not_seen_do_not_count():
-    seen = feet(0.65, -0.01)
-    gone = verdict.Feet(seen.ankle * np.nan, seen.ball, seen.pelvis, seen.apart)
+    visible = feet(0.65, -0.01)
+    gone = verdict.Feet(visible.ankle * np.nan, visible.ball, visible.pelvis, visible.apart)
     assert verdict.footing(gone, VERDICT_PERIOD) is None
-    some = np.where(np.arange(len(seen.pelvis))[:, None] % 50 < 15, np.nan, seen.ankle)
-    partly = verdict.footing(verdict.Feet(some, seen.ball, seen.pelvis, seen.apart), VERDICT_PERIOD)
+    some = np.where(np.arange(len(visible.pelvis))[:, None] % 50 < 15, np.nan, visible.ankle)
+    partly = verdict.footing(verdict.Feet(some, visible.ball, visible.pelvis, visible.apart), VERDICT_PERIOD)
     assert partly is not None and not partly.running
 
 

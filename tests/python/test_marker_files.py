@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import ezc3d
-import marked_walker as mw
+import marked_person as mw
 import numpy as np
 import pytest
 
@@ -56,7 +56,7 @@ def write_trc(path, labels, points):
 
 @pytest.fixture(scope="module")
 def marked():
-    points, pose = mw.walker(mw.LOWER, frames=240)
+    points, pose = mw.person(mw.LOWER, frames=240)
     points[30:40, -1] = np.nan
     return points, pose
 
@@ -87,7 +87,7 @@ def test_of_two_subjects_the_one_with_more_markers_is_taken(marked, tmp_path):
     assert found.joints["l_knee"] == pytest.approx(alone.joints["l_knee"], abs=1e-4)
 
 
-def test_wrong_units_are_said(marked, tmp_path):
+def test_wrong_units_are_reported(marked, tmp_path):
     path = write_c3d(tmp_path / "a.c3d", mw.LOWER, marked[0][:20], "m", 100.0)
     with pytest.raises(UserError, match=r"a.c3d: the markers do not fit a body .*check labels and units"):
         readers.read(path)
@@ -263,7 +263,7 @@ def test_real_markers_fit(name, rms, knee, stride):
     assert period == pytest.approx(stride, rel=0.02) if stride else 0.9 < period < 1.3
 
 
-def test_somebody_entering_and_leaving_is_missing_outside():
+def test_a_person_entering_and_leaving_is_missing_outside():
     """Against the knees that the laboratory's own software computed and stored in the file."""
     path = real("c3d/PlugInC3D.c3d")
     body = readers.read(path)
@@ -278,5 +278,5 @@ def test_somebody_entering_and_leaving_is_missing_outside():
         assert np.abs(np.mean((ours - theirs)[both])) < 5 and np.std((ours - theirs)[both]) < 3
     arms = [k for k, n in enumerate(ANGLES) if "shoulder" in n or "elbow" in n or "neck" in n]
     assert np.isnan(angles[:, arms]).all()
-    seen = np.isfinite(body.joints["l_knee"][:, 0])
-    assert 0.7 < seen.mean() < 0.85
+    visible = np.isfinite(body.joints["l_knee"][:, 0])
+    assert 0.7 < visible.mean() < 0.85

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import marked_walker as mw
+import marked_person as mw
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -30,43 +30,44 @@ def angles_of(body):
 
 @pytest.fixture(scope="module")
 def full():
-    points, pose = mw.walker(mw.FULL)
+    points, pose = mw.person(mw.FULL)
     return points, pose, markers.from_markers(FILE, mw.FULL, points, 120.0)
 
 
 def test_derivatives_are_exact():
     rng, frames, marks = np.random.default_rng(0), 3, 40
     segment, at = rng.integers(0, len(SEGMENTS), marks), rng.normal(scale=0.1, size=(marks, 3))
-    stretch = rng.normal(scale=0.1, size=kinematics.SCALE_TABLE.shape[2])
+    log_scales = rng.normal(scale=0.1, size=kinematics.SCALE_TABLE.shape[2])
     turn = Rotation.from_rotvec(rng.normal(size=(frames, 3))).as_matrix()
     pose = kinematics.Pose(rng.normal(size=(frames, 3)), turn, rng.normal(scale=0.5, size=(frames, 24)))
 
-    def world(pose, stretch):
-        local = kinematics.segment_scales(stretch)[segment] * at
-        return kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)).points(local, segment)
+    def world(pose, log_scales):
+        local = kinematics.segment_scales(log_scales)[segment] * at
+        return kinematics.pose_skeleton(pose, kinematics.segment_origins(log_scales)).points(local, segment)
 
-    body, small = kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)), 1e-6
-    by_pose, by_stretch = body.by_pose(world(pose, stretch), segment), body.by_scales(stretch, at, segment)
+    body, small = kinematics.pose_skeleton(pose, kinematics.segment_origins(log_scales)), 1e-6
+    by_pose = body.by_pose(world(pose, log_scales), segment)
+    by_scales = body.by_scales(log_scales, at, segment)
     directions = body.rotations[:, segment][..., 1]
     by_turn = body.directions_by_pose(directions, segment)
     for k in range(kinematics.FREEDOMS):
         step = np.zeros((frames, kinematics.FREEDOMS))
         step[:, k] = small
         ahead, behind = pose.moved(step), pose.moved(-step)
-        slope = (world(ahead, stretch) - world(behind, stretch)) / (2 * small)
+        slope = (world(ahead, log_scales) - world(behind, log_scales)) / (2 * small)
         assert by_pose[..., k] == pytest.approx(slope, abs=1e-7)
         turns = [
-            kinematics.pose_skeleton(p, kinematics.segment_origins(stretch)).rotations[:, segment][..., 1]
+            kinematics.pose_skeleton(p, kinematics.segment_origins(log_scales)).rotations[:, segment][..., 1]
             for p in (ahead, behind)
         ]
         assert by_turn[..., k] == pytest.approx((turns[0] - turns[1]) / (2 * small), abs=1e-7)
-    for k in range(len(stretch)):
-        step = small * np.eye(len(stretch))[k]
-        slope = (world(pose, stretch + step) - world(pose, stretch - step)) / (2 * small)
-        assert by_stretch[..., k] == pytest.approx(slope, abs=1e-7)
+    for k in range(len(log_scales)):
+        step = small * np.eye(len(log_scales))[k]
+        slope = (world(pose, log_scales + step) - world(pose, log_scales - step)) / (2 * small)
+        assert by_scales[..., k] == pytest.approx(slope, abs=1e-7)
 
 
-def test_a_walker_of_odd_lengths_is_found_again(full):
+def test_unusual_lengths_are_found_again(full):
     """Lengths 8 % off the generic ones, markers 6 mm off their places, 3 mm noise."""
     _, pose, body = full
     error = np.degrees(angles_of(body) - pose.angles)
@@ -77,15 +78,15 @@ def test_a_walker_of_odd_lengths_is_found_again(full):
 
 
 def test_angles_have_no_offset_where_markers_sit_in_their_places():
-    stretch = np.zeros(kinematics.SCALE_TABLE.shape[2])
-    stretch[0] = np.log(1.6)
+    log_scales = np.zeros(kinematics.SCALE_TABLE.shape[2])
+    log_scales[0] = np.log(1.6)
     angles = mw.walk_angles(240, 120.0)
     place = np.stack([1.2 * np.arange(240) / 120, np.zeros(240), np.full(240, 0.85)], axis=1)
     pose = kinematics.Pose(place, np.tile(np.eye(3), (240, 1, 1)), angles)
     marks = mw.landmarks(mw.FULL)
     segment = np.array([SEGMENTS.index(m.segment) for m in marks])
-    local = kinematics.segment_scales(stretch)[segment] * np.array([m.at for m in marks])
-    points = kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)).points(local, segment)
+    local = kinematics.segment_scales(log_scales)[segment] * np.array([m.at for m in marks])
+    points = kinematics.pose_skeleton(pose, kinematics.segment_origins(log_scales)).points(local, segment)
     body = markers.from_markers(FILE, mw.FULL, points, 120.0)
     assert body.residual < 1e-3
     offset = np.degrees(angles_of(body) - angles).mean(axis=0)
@@ -121,14 +122,14 @@ def test_one_missing_marker_of_many_leaves_no_gap(full):
 
 def test_outliers_do_not_pull(full):
     points, _, whole = full
-    wild = points.copy()
-    wild[50:120, mw.FULL.index("LKNE")] += (0.3, 0.2, 0.1)
-    found = angles_of(markers.from_markers(FILE, mw.FULL, wild, 120.0))
+    outliers = points.copy()
+    outliers[50:120, mw.FULL.index("LKNE")] += (0.3, 0.2, 0.1)
+    found = angles_of(markers.from_markers(FILE, mw.FULL, outliers, 120.0))
     apart = np.degrees(found - angles_of(whole))[50:120, columns(LEGS)]
     assert np.sqrt((apart**2).mean()) < 2.0
 
 
-def test_frames_with_nobody_are_missing(full):
+def test_frames_without_a_person_are_missing(full):
     points, _, _ = full
     gone = points.copy()
     gone[:50] = gone[300:] = np.nan
@@ -141,7 +142,7 @@ def test_frames_with_nobody_are_missing(full):
 
 
 def test_legs_alone_have_legs_alone():
-    points, pose = mw.walker(mw.LOWER, seed=3)
+    points, pose = mw.person(mw.LOWER, seed=3)
     body = markers.from_markers(FILE, mw.LOWER, points, 120.0)
     straight = retarget.align_pelvis(retarget.level(body)[0])
     measures = retarget.measure(straight)
@@ -160,9 +161,9 @@ def test_legs_alone_have_legs_alone():
 
 
 def test_the_mean_body_takes_parts_from_those_who_have_them():
-    points, _ = mw.walker(mw.LOWER, frames=240)
+    points, _ = mw.person(mw.LOWER, frames=240)
     legs = retarget.measure(markers.from_markers(FILE, mw.LOWER, points, 120.0))
-    points, _ = mw.walker(mw.FULL, frames=240, seed=5)
+    points, _ = mw.person(mw.FULL, frames=240, seed=5)
     whole = retarget.measure(markers.from_markers(FILE, mw.FULL, points, 120.0))
     both = retarget.mean_proportions([legs, whole, None])
     assert both.neck == retarget.own_proportions(whole).neck
@@ -179,7 +180,7 @@ def test_any_axis_may_be_up(full, turn):
 
 
 def test_a_treadmill_becomes_ground():
-    points, _ = mw.walker(mw.FULL)
+    points, _ = mw.person(mw.FULL)
     body = markers.from_markers(FILE, mw.FULL, points, 120.0)
     sliding = np.array([0.0, -1.5, 0.0]) * np.arange(360)[:, None] / 120
     still = body.joints["pelvis"][:, :2] - body.joints["pelvis"][:1, :2]
@@ -194,7 +195,7 @@ def test_a_treadmill_becomes_ground():
 
 @pytest.mark.parametrize("name", ["02/02_01", "35/35_01"])
 def test_markers_and_skeleton_of_one_recording_agree(name):
-    """Markers put on a CMU walker's bones give the angles that his skeleton gives."""
+    """Markers put on a CMU person's bones give the angles that his skeleton gives."""
     if not WALKS.is_dir():
         pytest.skip(f"{WALKS} is absent: the learning data are not part of the repository")
     body = retarget.align_pelvis(retarget.level(readers.read(WALKS / f"{name}.amc"))[0])

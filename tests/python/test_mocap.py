@@ -35,8 +35,8 @@ def amc(tmp_path):
 
 
 def angles(rec):
-    walker, _ = retarget.level(body.from_bones(rec))
-    return retarget.angles(walker, retarget.measure(walker))
+    person, _ = retarget.level(body.from_bones(rec))
+    return retarget.angles(person, retarget.measure(person))
 
 
 def test_rest_pose_is_upright_and_faces_x(amc):
@@ -149,7 +149,8 @@ def test_the_rate_is_what_a_motion_says_unless_told(amc):
 def test_an_unknown_unit_of_angles_is_named(amc):
     asf = amc.parent / "77.asf"
     asf.write_text(asf.read_text().replace("angle deg", "angle turns"))
-    with pytest.raises(UserError, match=r"77.asf:4: unknown angle unit 'turns'; write 'angle deg' or 'angle rad'"):
+    words = "77.asf:4: unknown angle unit 'turns'; write 'angle deg' or 'angle rad'"
+    with pytest.raises(UserError, match=words):
         acclaim.read(amc)
 
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gait import GaitArgumentError, GaitError, Model, State, UserError
-from gait.body import skeleton
 from gait.bindings.model import read_blob
+from gait.body import skeleton
 from gait.io import blob
 
 MODEL = Model()

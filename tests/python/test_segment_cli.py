@@ -5,7 +5,7 @@ import json
 import mocap_files as files
 import numpy as np
 import pytest
-from marked_walker import FULL, walker
+from marked_person import FULL, person
 from segment_posterior import infer, place, uncertain_modes
 from test_marker_files import write_trc
 from toy_segments import FRONT
@@ -47,17 +47,17 @@ def cyclic(path):
 def test_the_prior_is_learnt_beside_the_cyclic_model_which_stays_the_same(walks, tmp_path, capsys):
     both, without = tmp_path / "both.gait", tmp_path / "without.gait"
     assert learn(walks, both, "--json") == 0
-    told = json.loads(capsys.readouterr().out)["segments"]
+    reported = json.loads(capsys.readouterr().out)["segments"]
     assert learn(walks, without, "--segments", "none") == 0
     assert cyclic(both) == cyclic(without) and not set(TAGS) & set(blob.read(without))
     prior = SegmentPrior.load(both)
     assert (prior.frames, prior.hop, prior.fps, prior.headings) == (10, 5, 20.0, 0)
-    assert prior.recordings == told["recordings"] == 4 and prior.segments == told["segments"] > 20
+    assert prior.recordings == reported["recordings"] == 4 and prior.segments == reported["segments"] > 20
     assert len(prior.names) == 37 and prior.names[:19] == tuple(JOINTS)
     assert run("info", both) == 0
     assert f"{prior.segments} segments of 10 frames at 20/s from 4 recordings" in capsys.readouterr().out
     assert run("info", both, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["segments"]["gamma"] == told["gamma"]
+    assert json.loads(capsys.readouterr().out)["segments"]["gamma"] == reported["gamma"]
     assert learn(walks, tmp_path / "again.gait") == 0
     assert (tmp_path / "again.gait").read_bytes() == both.read_bytes()
 
@@ -85,9 +85,9 @@ def test_the_number_of_components_is_found_and_told(walks, tmp_path, capsys):
     """`segment_mixture` is tested for which number it is."""
     path = tmp_path / "m.gait"
     assert learn(walks, path, "--segments", "only", "--segment-mixture", "auto", "--json") == 0
-    told = json.loads(capsys.readouterr().out)["segments"]
+    reported = json.loads(capsys.readouterr().out)["segments"]
     prior = SegmentPrior.load(path)
-    assert 1 <= prior.components == told["components"] <= 6
+    assert 1 <= prior.components == reported["components"] <= 6
     assert prior.weights.sum() == pytest.approx(1, abs=1e-6)
 
 
@@ -97,7 +97,7 @@ def test_recorded_markers_are_those_of_the_files(tmp_path, capsys):
     folder.mkdir()
     for k in range(3):
         names = FULL if k else [name for name in FULL if name[1:] not in ("FHD", "BHD")]
-        write_trc(folder / f"{k}_1.trc", names, walker(names, frames=420, seed=k)[0])
+        write_trc(folder / f"{k}_1.trc", names, person(names, frames=420, seed=k)[0])
     path = tmp_path / "m.gait"
     assert (
         run("learn", folder, "-o", path, "--segments", "only", "--segment-markers", "recorded", "--jobs", 1)
@@ -113,8 +113,8 @@ def test_recorded_markers_are_those_of_the_files(tmp_path, capsys):
 def test_whole_recordings_alone_give_a_blob_that_tracks_nothing(walks, tmp_path, capsys):
     path = tmp_path / "only.gait"
     assert learn(walks, path, "--segments", "only", "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["segments"]["recordings"] == 5 and not told["left_out"]
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["segments"]["recordings"] == 5 and not reported["left_out"]
     assert set(blob.read(path)) == {"META", *TAGS}
     assert run("info", path) == 0 and "segment prior" in capsys.readouterr().out
     with pytest.raises(
@@ -126,9 +126,9 @@ def test_whole_recordings_alone_give_a_blob_that_tracks_nothing(walks, tmp_path,
 def test_all_also_learns_from_what_is_no_walk(walks, tmp_path, capsys):
     path = tmp_path / "all.gait"
     assert learn(walks, path, "--segments", "all", "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert len(told["sequences"]) == 4 and told["segments"]["recordings"] == 5
-    (line,) = (line for line in told["left_out"] if "04_01" in line)
+    reported = json.loads(capsys.readouterr().out)
+    assert len(reported["sequences"]) == 4 and reported["segments"]["recordings"] == 5
+    (line,) = (line for line in reported["left_out"] if "04_01" in line)
     assert line.endswith("(its segments are used nevertheless)")
     assert learn(walks, path, "--segments", "learnt", "--json") == 0
     assert not any("used" in line for line in json.loads(capsys.readouterr().out)["left_out"])
@@ -139,9 +139,9 @@ def test_all_needs_a_cyclic_model_and_names_what_does_not(walks, tmp_path, capsy
     path = tmp_path / "all.gait"
     words = ("learn", walks / "04", "-o", path, "--jobs", 1, "--segment-hop", 1, "--segments")
     assert run(*words, "all") == 1 and not path.exists()
-    said = capsys.readouterr().err.rstrip()
-    assert "04_01.amc: not learnt as 'walk'" in said and "used nevertheless" not in said
-    assert said.endswith(
+    printed = capsys.readouterr().err.rstrip()
+    assert "04_01.amc: not learnt as 'walk'" in printed and "used nevertheless" not in printed
+    assert printed.endswith(
         "; for gait lift alone give --segments only: all needs recordings for a cyclic model, too"
     )
     assert run(*words, "only") == 0 and path.exists()
@@ -197,8 +197,8 @@ def test_of_a_walker_seen_flat_depth_is_least_certain():
     """F6: the five least certain modes are along depth, the first moves the whole body."""
     prior, axes, depth = SegmentPrior.load(), FRONT, np.array([0.0, 1, 0])
     gaussian = place(prior)
-    seen = Observations(gaussian.mean @ axes.T, np.full(gaussian.mean.shape[:2], 0.02))
-    sd, modes = uncertain_modes(infer(gaussian, orthographic(seen, axes)), 5)
+    visible = Observations(gaussian.mean @ axes.T, np.full(gaussian.mean.shape[:2], 0.02))
+    sd, modes = uncertain_modes(infer(gaussian, orthographic(visible, axes)), 5)
     assert share_along(modes[0], depth) >= 0.99 and share_rigid(modes[0]) >= 0.98
     assert all(share_along(mode, depth) >= 0.95 for mode in modes)
     assert sd[0] > 5 > 0.5 > sd[1]

@@ -191,7 +191,7 @@ def test_gaps_are_filled_as_the_rest_of_the_segment_lets_expect():
 
 
 def test_gamma_is_what_people_left_out_ask_for():
-    """Everybody else's rest is too small by the person's own share of it."""
+    """All others' rest is too small by the person's own share of it."""
     rng = np.random.default_rng(5)
     rows, *_ = toy_rows(rng, 600)
     subject = np.repeat(np.arange(6), 100)
@@ -251,7 +251,7 @@ def test_a_mixture_finds_its_components_and_how_many():
 
 
 def test_people_made_up_of_those_left_out_do_not_help_a_mixture():
-    """Everybody moves in a way of their own: a component for each is no use to the next one."""
+    """Every person moves in a way of their own: a component for each is no use to the next one."""
     rng = np.random.default_rng(8)
     person, real = np.repeat(np.arange(6), 100), np.tile(np.arange(100) < 20, 6)
     scores = rng.normal(size=(6, 2))[person] + 0.02 * rng.normal(size=(600, 2))
@@ -283,7 +283,7 @@ def test_a_prior_of_motions_has_their_mean_and_unit(motion):
     assert np.array_equal(again.modes, prior.modes) and again.gamma == prior.gamma
     copies = fit.fit(recordings, SegmentOptions(modes=12, headings=8))
     assert copies.segments == prior.segments
-    assert np.abs(copies.mean[0, 0, :, :2]).max() < 1e-9  # all round: nobody looks anywhere
+    assert np.abs(copies.mean[0, 0, :, :2]).max() < 1e-9  # all round: there is no direction
     mixed = fit.fit(recordings, SegmentOptions(modes=10, mixture=2))
     assert mixed.components == 2 and mixed.weights.sum() == pytest.approx(1)
 

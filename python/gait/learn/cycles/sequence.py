@@ -59,7 +59,7 @@ class _Motion:
 
 
 def load(path: Path, options: LearnOptions = DEFAULT) -> Sequence:
-    """Read and prepare one file; its name stands for the person too."""
+    """Read and prepare one file; the part of its name before '_' stands for the person."""
     return prepare(path, readers.read(path, options), options)
 
 
@@ -85,7 +85,7 @@ def prepare(path: Path, read: Body | AngleTable, options: LearnOptions = DEFAULT
         raise _refused(path, activity, "too little of each cycle is observed")
     return Sequence(
         name=path.stem,
-        subject=path.stem,
+        subject=path.stem.split("_")[0],
         source=path,
         fps=read.fps,
         measures=motion.measures,

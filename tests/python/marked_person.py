@@ -35,22 +35,22 @@ def walk_angles(frames, period, seed=0):
     return angles
 
 
-def odd_lengths(rng, spread=0.08):
-    """Stretches of somebody whose proportions are all off by `spread`."""
-    stretch = spread * rng.choice([-1.0, 1.0], kinematics.SCALE_TABLE.shape[2])
-    stretch[0] = np.log(1.82)
-    stretch[-len(kinematics.LIMBS) :] = 0  # both sides alike
-    return stretch
+def own_lengths(rng, spread=0.08):
+    """Log length scales of a person whose proportions are all off by `spread`."""
+    log_scales = spread * rng.choice([-1.0, 1.0], kinematics.SCALE_TABLE.shape[2])
+    log_scales[0] = np.log(1.82)
+    log_scales[-len(kinematics.LIMBS) :] = 0  # both sides alike
+    return log_scales
 
 
-def walker(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003, seed=0, again=None):
-    """Points (T, M, 3), metres, z up, and the true pose, of a walker of odd lengths and marker places.
+def person(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003, seed=0, again=None):
+    """Points (T, M, 3), metres, z up, and the true pose, of a person of odd lengths and marker places.
 
-    With `again` it is another recording of the walker `seed`, with markers put on anew.
+    With `again` it is another recording of the person `seed`, with markers put on anew.
     """
     rng = np.random.default_rng(seed)
     angles = walk_angles(frames, period, seed)
-    stretch = odd_lengths(rng, spread)
+    log_scales = own_lengths(rng, spread)
     if again is not None:
         rng = np.random.default_rng([seed, again])
     time, phase = np.arange(frames) / fps, 2 * np.pi * np.arange(frames) / period
@@ -60,9 +60,9 @@ def walker(labels, frames=360, fps=120.0, period=120.0, spread=0.08, noise=0.003
     pose = kinematics.Pose(place, turn, angles)
     marks = landmarks(labels)
     segment = np.array([SEGMENTS.index(m.segment) for m in marks])
-    local = kinematics.segment_scales(stretch)[segment] * np.array([m.at for m in marks])
+    local = kinematics.segment_scales(log_scales)[segment] * np.array([m.at for m in marks])
     local = local + rng.normal(scale=0.006, size=local.shape)
-    points = kinematics.pose_skeleton(pose, kinematics.segment_origins(stretch)).points(local, segment)
+    points = kinematics.pose_skeleton(pose, kinematics.segment_origins(log_scales)).points(local, segment)
     return points + rng.normal(scale=noise, size=points.shape), pose
 
 
