@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 
 from gait import Camera, Video, VideoWriter
-from gait.io.video import Image
 from gait.io.track_file import read_truth
+from gait.io.video import Image
 
 Edit = Callable[[Sequence[Path], Path], dict[str, Any]]
 

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from gait.body.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, curves, points
+from gait.body.model_curves import curves
+from gait.body.skeleton import ANGLES, CHANNELS, EVAL15, JOINTS, points
 from gait.learn.cycles.sequence import Sequence
 from gait.learn.prior.fit import channel_scale
 from gait.learn.solve import readers, retarget

@@ -27,7 +27,7 @@ import numpy.typing as npt
 import table
 from floor_shapes import ALL_OFFSETS, DIVIDED, MOST, OURS, PLAIN_BODY, SHAPES, TRACKED, UNMOVED
 
-from gait.body.pace import series
+from gait.body.model_curves import series
 from gait.body.skeleton import CHANNELS, Proportions, default_skeleton
 from gait.errors import UserError
 from gait.learn.arrays import Indices

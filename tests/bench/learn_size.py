@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import table
 
-from gait.body.pace import series, waves
+from gait.body.model_curves import series, waves
 from gait.body.skeleton import default_skeleton, points
 from gait.errors import UserError
 from gait.io import blob

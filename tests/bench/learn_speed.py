@@ -23,7 +23,7 @@ import machines
 
 from gait.bindings.model import Model
 from gait.bindings.state import State
-from gait.body import skeleton
+from gait.body.model_curves import curves
 from gait.errors import UserError
 from gait.io import blob
 from gait.progress import progress
@@ -57,7 +57,7 @@ def difference(path: Path) -> float:
         phase, scores = float(rng.uniform()), np.eye(1 + components)[k % (1 + components), 1:]
         rate = float(rng.uniform(0.5, 1.5))
         _, found = model.pose(State(phase=phase, stride_hz=rate, stature=1.7, coef=scores))
-        known = skeleton.curves(sections, [phase], scores[None], rate)[0, : len(found)]
+        known = curves(sections, [phase], scores[None], rate)[0, : len(found)]
         worst = max(worst, float(np.max(np.abs(found - known))))
     return worst
 

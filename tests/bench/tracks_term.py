@@ -24,8 +24,8 @@ import numpy as np
 import table
 from eval_plan import Clip
 
-from gait.cli import main as gait
 from gait.camera.camera import Camera
+from gait.cli import main as gait
 from gait.io import keypoints_file as tracks_file
 from gait.io.track_file import read_truth
 from gait.progress import progress

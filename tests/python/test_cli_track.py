@@ -10,8 +10,8 @@ import pytest
 from drawn_walker import DATA, camera, clip, state_at, wall, write
 
 from gait import Model, Video
-from gait.cli import main
 from gait.bindings.model import read_blob
+from gait.cli import main
 from gait.io import blob
 from gait.io import keypoints_file as tracks_file
 

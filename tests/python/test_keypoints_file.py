@@ -28,8 +28,8 @@ def test_round_trip(tmp_path):
     assert (found.names, ignored) == (keypoints.names, [])
     np.testing.assert_array_equal(found.frame, keypoints.frame)
     np.testing.assert_allclose(found.uv, uv)
-    np.testing.assert_allclose(found.deviations(3.0)[0], 6.0)
-    assert np.isinf(found.deviations(3.0)[2, 1])
+    np.testing.assert_allclose(found.standard_deviations(3.0)[0], 6.0)
+    assert np.isinf(found.standard_deviations(3.0)[2, 1])
 
 
 def test_zeros_are_an_origin_or_not_seen(tmp_path):
@@ -98,10 +98,10 @@ def test_points_within_their_noise_tell_nothing():
     with pytest.raises(
         UserError, match=r"t.csv: all u and v lie within 0\.\d+, less than .* of 3; give pixels"
     ):
-        keypoints.require_spread("t.csv", 3.0)
-    keypoints.require_spread("t.csv", 0.01)
+        keypoints.require_extent("t.csv", 3.0)
+    keypoints.require_extent("t.csv", 0.01)
     uv[:, 1] = np.nan  # one alone may stand still
-    keypoints.require_spread("t.csv", 3.0)
+    keypoints.require_extent("t.csv", 3.0)
 
 
 def test_missing_file():

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from gait.bindings.model import read_blob
-from gait.body.skeleton import CHANNELS, curves
+from gait.body.model_curves import curves
+from gait.body.skeleton import CHANNELS
 from gait.io.blob import decode
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))

@@ -8,6 +8,7 @@ import pytest
 from gait import Model, State
 from gait.bindings.model import read_blob
 from gait.body import skeleton
+from gait.body.model_curves import curves
 from gait.body.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
 from gait.io import blob
 from gait.learn.prior import lengths
@@ -136,7 +137,7 @@ def test_bodies_not_seen_whole_are_left_out():
 def lowest(sections, coef, proportion):
     """Height (n,) of the lowest foot point over the ground at phases of a stride, statures."""
     phase = np.arange(32) / 32
-    channels = skeleton.curves(sections, phase, np.tile(coef, (32, 1)))
+    channels = curves(sections, phase, np.tile(coef, (32, 1)))
     height = channels[:, CHANNELS.index("root_height")]
     height = height * skeleton.length_change(sections, proportion)[0, -1]
     return (points(sections, channels, proportion)[:, FEET, 2] + height[:, None]).min(axis=1)
@@ -202,7 +203,7 @@ def test_c_and_numpy_agree_on_poses_with_proportions(made):
         )
         assert joints == pytest.approx(expected[0], abs=1e-5)
         assert angles == pytest.approx(expected_angles[0], abs=1e-5)
-        height = skeleton.curves(SHIPPED, [state.phase], [state.coef], state.stride_hz)[0]
+        height = curves(SHIPPED, [state.phase], [state.coef], state.stride_hz)[0]
         height = height[CHANNELS.index("root_height")]
         height *= skeleton.length_change(SHIPPED, state.proportion)[0, -1] * state.stature
         assert model.pelvis_height(state) == pytest.approx(height, abs=1e-5)

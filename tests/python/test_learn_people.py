@@ -9,8 +9,7 @@ from scipy.linalg import subspace_angles
 from gait import GaitError, Model, State
 from gait.bindings.model import read_blob, read_cyclic
 from gait.body import skeleton
-from gait.body.model_curves import ModelCurves
-from gait.body.pace import MOST, pace, series, slope_of
+from gait.body.model_curves import MOST, ModelCurves, pace, series, slope_of
 from gait.body.skeleton import CHANNELS, JOINTS, Proportions, default_skeleton, points
 from gait.cli import main
 from gait.errors import UserError

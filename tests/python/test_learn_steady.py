@@ -9,7 +9,7 @@ from learn_measures import cramer_rao
 from scipy import stats
 
 import gait
-from gait.body import skeleton
+from gait.body.model_curves import curves
 from gait.body.skeleton import ANGLES
 from gait.io import blob
 from gait.learn.cycles import period, steady, verdict
@@ -413,6 +413,6 @@ def test_feet_that_are_not_seen_do_not_count():
 
 def test_the_shipped_walk_is_a_walk_by_its_angles_and_root():
     sections = blob.read(SHIPPED)
-    curve = skeleton.curves(sections, np.arange(400) / 128, np.zeros((400, 1)))
+    curve = curves(sections, np.arange(400) / 128, np.zeros((400, 1)))
     footing = verdict.footing(verdict.feet_of_channels(curve), 128)
     assert not footing.running and footing.bob < -0.5 and 0.05 < footing.lift < 0.15 and footing.steps < 0.01

@@ -11,9 +11,9 @@ from toy_segments import toy_blob, toy_prior
 
 from gait.camera.camera import Camera
 from gait.cli import main
-from gait.lift import run as lift_run
 from gait.cli.lift import PIXEL_SD
 from gait.io.keypoints_file import Keypoints, read, shared_place, write
+from gait.lift import run as lift_run
 from gait.lift.keypoints import noise
 from gait.lift.smooth import motion
 

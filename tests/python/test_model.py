@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from gait import GaitArgumentError, GaitError, Model, State, UserError
 from gait.bindings.model import read_blob
 from gait.body import skeleton
+from gait.body.model_curves import curves
 from gait.io import blob
 
 MODEL = Model()
@@ -72,7 +73,7 @@ def test_pose_equals_the_numpy_twin(state):
 @given(STATES)
 def test_pelvis_height_is_the_height_channel(state):
     names = blob.unpack_names(SECTIONS["CHNM"])
-    channels = skeleton.curves(SECTIONS, [state.phase], [state.coef], state.stride_hz)[0]
+    channels = curves(SECTIONS, [state.phase], [state.coef], state.stride_hz)[0]
     expected = state.stature * channels[names.index("root_height")]
     assert MODEL.pelvis_height(state) == pytest.approx(expected, abs=2e-5)
 

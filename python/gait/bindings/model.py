@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gait.bindings import abi
 from gait.bindings.library import aligned, check, library
 from gait.bindings.state import State
-from gait.body.pace import slope_of
+from gait.body.model_curves import slope_of
 from gait.camera.camera import Camera
 from gait.errors import GaitError, UserError
 from gait.io.blob import decode

@@ -1,1 +1,1 @@
-"""The skeleton and a model's curves in numpy: the twins of what the C library computes."""
+"""The skeleton and a model's curves in numpy, in double precision and without the C library."""

@@ -1,18 +1,100 @@
-"""Curves of a model in numpy, for many hypotheses at once (Ormoneit 2000, eq. 3)."""
+"""Curves of a cyclic model in numpy, for many states at once, and how they follow the stride rate.
+
+A model's angles and root motion are a mean and principal components over the stride (Ormoneit 2000, eq. 3).
+In models with section PACE the mean depends on the pace: how much faster than the mean a person walks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+import numpy.typing as npt
 
-from gait.body.pace import pace, slope_of
 from gait.errors import UserError
 from gait.io import blob
 
-Array = NDArray[np.float64]
+Floats = npt.NDArray[np.float64]
+
+MOST = 2.0
+"""Standard deviations between people: as far from the mean rate as is learnt (kinematics.h)."""
+
+
+def pace(statistics: npt.ArrayLike, stride_hz: npt.ArrayLike) -> Floats:
+    """Stride rates (...) as standard deviations between people from the mean, at most `MOST`.
+
+    Parameters
+    ----------
+    statistics : (2, ...)
+        Mean and standard deviation of the stride rate, as section GAIT begins.
+    stride_hz : (...)
+        0: not known, as if it were the mean.
+    """
+    mean, sd = np.asarray(statistics, float)[:2]
+    rate = np.asarray(stride_hz, float)
+    if not sd > 0:
+        return np.zeros(rate.shape)
+    return np.where(rate > 0, np.clip((rate - mean) / sd, -MOST, MOST), 0.0)
+
+
+@cache
+def waves(terms: int, phases: int) -> Floats:
+    """Constant, then cosine and sine of each harmonic (terms, phases); `terms` is an odd number."""
+    turn = 2 * np.pi * np.outer(np.arange(1, (terms + 1) // 2), np.arange(phases) / phases)
+    pairs = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return np.concatenate([np.ones((1, phases)), pairs.reshape(terms - 1, phases)])
+
+
+def series(curve: Floats, terms: int) -> Floats:
+    """PACE (terms, M) of a curve (T, M): its Fourier series, cut off."""
+    rows = waves(terms, len(curve))
+    return np.asarray(rows @ curve / np.sum(rows**2, axis=1)[:, None])
+
+
+def slope_of(sections: Mapping[str, Any], name: str = "model") -> Floats | None:
+    """Change (T, M) of the mean cycle per unit of pace, at the phases of CURV; None without section PACE.
+
+    Errors call the model `name`.
+
+    Raises
+    ------
+    UserError
+        If PACE is no Fourier series that this many phases can show.
+    """
+    if "PACE" not in sections:
+        return None
+    terms, phases = len(sections["PACE"]), sections["CURV"].shape[1]
+    if terms % 2 == 0 or terms >= phases:
+        raise UserError(f"{name}: section PACE has {terms} rows, no Fourier series; learn the model again")
+    return np.asarray(waves(terms, phases).T @ np.asarray(sections["PACE"], float))
+
+
+def at_phase(samples: Floats, phase: npt.ArrayLike) -> Floats:
+    """Return curves (K, T, ...) over the stride at phases (n...), linear between samples: (K, n..., ...)."""
+    size = samples.shape[1]
+    place = (np.asarray(phase, float) % 1.0) * size
+    left = np.floor(place).astype(int) % size
+    share = (place - np.floor(place)).reshape(place.shape + (1,) * (samples.ndim - 2))
+    return np.asarray(samples[:, left] + share * (samples[:, (left + 1) % size] - samples[:, left]))
+
+
+def curves(
+    sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLike, stride_hz: npt.ArrayLike = 0.0
+) -> Floats:
+    """All channels (N, M) at phases (N,) for scores (N, k): the mean plus the sum of c_k comp_k.
+
+    stride_hz : stride rates (N,) or scalar, which the mean follows; 0: the mean rate.
+    """
+    phase, coef = np.asarray(phase, float), np.asarray(coef, float)
+    weights = np.concatenate([np.ones((len(phase), 1)), coef], axis=1)
+    table = np.asarray(sections["CURV"], float)[: weights.shape[1]]
+    if (slope := slope_of(sections)) is not None:
+        faster = np.broadcast_to(pace(sections["GAIT"], stride_hz), len(phase))
+        weights = np.column_stack([weights, faster])
+        table = np.concatenate([table, slope[None]])
+    return np.asarray(np.einsum("nk,knm->nm", weights, at_phase(table, phase)))
 
 
 class ModelCurves:
@@ -34,12 +116,12 @@ class ModelCurves:
     height_change : ndarray of shape (p,)
         Of the pelvis, relatively, by one standard deviation of each of the limbs' proportions.
     faster : ndarray of shape (T, M)
-        Change of the mean per unit of `gait.body.pace.pace`; 0 in models whose mean does not follow the rate.
+        Change of the mean per unit of `pace`; 0 in models whose mean does not follow the rate.
     stride_hz, stride_length : float
         Means of the training set; per second, statures.
     """
 
-    def __init__(self, sections: Mapping[str, NDArray[Any]]) -> None:
+    def __init__(self, sections: Mapping[str, npt.NDArray[Any]]) -> None:
         missing = [tag for tag in ("CHNM", "CURV", "CHST", "GAIT") if tag not in sections]
         if missing:
             raise UserError(f"model: section {missing[0]} is missing, not a cyclic model; use gait learn")
@@ -54,7 +136,7 @@ class ModelCurves:
         self.height_change = table[:, -1]
         self.stride_hz, self.stride_length = float(self._gait[0]), float(self._gait[3])
 
-    def channel(self, name: str, phase: Array, coef: Array, stride_hz: ArrayLike = 0.0) -> Array:
+    def channel(self, name: str, phase: Floats, coef: Floats, stride_hz: npt.ArrayLike = 0.0) -> Floats:
         """Values of one channel.
 
         Parameters
@@ -69,15 +151,11 @@ class ModelCurves:
         """
         at = self.names.index(name)
         curve = np.vstack([self.samples[: 1 + coef.shape[-1], :, at], self.faster[:, at]])
-        size = curve.shape[1]
-        place = (np.asarray(phase, float) % 1.0) * size
-        left = np.floor(place).astype(int) % size
-        share = place - np.floor(place)
-        rows = curve[:, left] + share * (curve[:, (left + 1) % size] - curve[:, left])
+        rows = at_phase(curve, phase)
         moved = np.sum(np.moveaxis(coef, -1, 0) * rows[1:-1], axis=0)
         return np.asarray(rows[0] + moved + pace(self._gait, stride_hz) * rows[-1])
 
-    def norm(self, name: str, phase: Array, stride_hz: float = 0.0) -> tuple[Array, Array]:
+    def norm(self, name: str, phase: Floats, stride_hz: float = 0.0) -> tuple[Floats, Floats]:
         """Mean and standard deviation of one channel among people, each of the shape of `phase`.
 
         stride_hz : the rate at which they walk; 0: the mean rate.

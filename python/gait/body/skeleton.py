@@ -1,4 +1,6 @@
-"""The default skeleton as data, and forward kinematics in numpy (the twin of the C library's).
+"""The default skeleton as data, and forward kinematics in numpy for learning, before there is a model.
+
+The C library poses learned models; both are held to each other by tests.
 
 Frames, rotations and signs are those of libgait/doc/model-format.md.  Lengths are fractions of stature,
 angles radians; body axes x forward, y left, z up.
@@ -14,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.body.pace import pace, slope_of
+from gait.body.model_curves import curves
 from gait.io import blob as blobs
 
 Floats = npt.NDArray[np.float64]
@@ -285,29 +287,6 @@ def pose(
         pelvis, float
     ).reshape(-1, 1, 3)
     return positions, channels[:, : channels.shape[1] - len(ROOTS)]
-
-
-def curves(
-    sections: Mapping[str, Any], phase: npt.ArrayLike, coef: npt.ArrayLike, stride_hz: npt.ArrayLike = 0.0
-) -> Floats:
-    """Channels (N, M) at phases (N,), scores (N, k): mean + sum of c_k comp_k, linear between samples.
-
-    stride_hz : stride rates (N,) or scalar, which the mean follows; 0: the mean rate.
-    """
-    table = np.asarray(sections["CURV"], float)
-    phase, coef = np.asarray(phase, float), np.asarray(coef, float)
-    samples = table.shape[1]
-    at = (phase - np.floor(phase)) * samples
-    low = at.astype(int) % samples
-    weight = (at - np.floor(at))[:, None]
-    weights = np.concatenate([np.ones((len(phase), 1)), coef], axis=1)
-    used = table[: weights.shape[1]]
-    if (slope := slope_of(sections)) is not None:
-        faster = np.broadcast_to(pace(sections["GAIT"], stride_hz), len(phase))
-        weights = np.column_stack([weights, faster])
-        used = np.concatenate([used, slope[None]])
-    ends = [np.einsum("nk,knm->nm", weights, used[:, i]) for i in (low, (low + 1) % samples)]
-    return ends[0] * (1 - weight) + ends[1] * weight
 
 
 def points(sections: Mapping[str, Any], channels: Floats, proportion: npt.ArrayLike = ()) -> Floats:

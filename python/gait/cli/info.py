@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gait.bindings.segment_prior import TAGS, SegmentPrior
-from gait.body.pace import slope_of
+from gait.body.model_curves import slope_of
 from gait.io import blob
 from gait.io.fields import json_of
 from gait.learn.segments import summary as segment_summary

@@ -61,16 +61,16 @@ class Keypoints:
 
     def outside(self, size: tuple[int, int]) -> float:
         """Share of the points seen that lie outside of a picture of `size` (width, height)."""
-        seen = self.uv[self.seen]
-        return float(((seen < -0.5) | (seen > np.array(size) - 0.5)).any(axis=1).mean())
+        points = self.uv[self.seen]
+        return float(((points < -0.5) | (points > np.array(size) - 0.5)).any(axis=1).mean())
 
-    def require_spread(self, path: str | os.PathLike[str], sd: float) -> None:
+    def require_extent(self, path: str | os.PathLike[str], sd: float) -> None:
         """Raise UserError if several points all lie within `sd`: they are not in its unit."""
-        seen = self.uv[self.seen]
-        spread = float(np.ptp(seen, axis=0).max())
-        if self.seen.any(axis=0).sum() > 1 and spread <= sd:
+        points = self.uv[self.seen]
+        extent = float(np.ptp(points, axis=0).max())
+        if self.seen.any(axis=0).sum() > 1 and extent <= sd:
             raise UserError(
-                f"{path}: all u and v lie within {spread:.3g}, less than their noise of {sd:g}; give pixels, "
+                f"{path}: all u and v lie within {extent:.3g}, less than their noise of {sd:g}; give pixels, "
                 "not shares of the picture, or the noise in their unit"
             )
 
@@ -86,14 +86,14 @@ class Keypoints:
                 f"after a gap of more than {LONGEST_GAP:g} s by itself"
             )
 
-    def deviations(self, sd: float) -> Array:
+    def standard_deviations(self, sd: float) -> Array:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
         return np.where(self.seen, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
 
     def joints(self, sd: float) -> dict[int, Joints]:
-        """Joints by frame, as the tracker takes them; `sd` as in `deviations`."""
-        found = zip(self.frame.tolist(), self.uv, self.deviations(sd), strict=True)
-        return {frame: Joints(self.names, uv, deviation) for frame, uv, deviation in found}
+        """Joints by frame, as the tracker takes them; `sd` as in `standard_deviations`."""
+        found = zip(self.frame.tolist(), self.uv, self.standard_deviations(sd), strict=True)
+        return {frame: Joints(self.names, uv, sds) for frame, uv, sds in found}
 
 
 def read(

@@ -137,7 +137,7 @@ def _read(path: str, prior: SegmentPrior, sd: float, ignore_unknown: bool, warn:
     """Read keypoints of a prior's markers whose noise is `sd`; warn about what is left out or looks wrong."""
     keypoints, ignored = keypoints_file.read(path, prior.names, ignore_unknown)
     keypoints.require_motion(path)
-    keypoints.require_spread(path, sd)
+    keypoints.require_extent(path, sd)
     if ignored:
         warn(f"left out, unknown to the model: {' '.join(ignored)}")
     if found := keypoints_file.shared_place(keypoints.uv):

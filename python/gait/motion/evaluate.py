@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtr
 
 from gait.body import skeleton
+from gait.body.model_curves import curves
 from gait.body.skeleton import EVAL15
 from gait.camera.camera import Camera
 from gait.errors import UserError
@@ -86,7 +87,7 @@ def root_path(model: dict[str, Any], cycles: Array, rate: float = 0.0) -> Array:
     names = unpack_names(model["CHNM"])
     columns = [names.index(f"root_{name}") for name in ("forward", "sway", "height")]
     fine = np.linspace(cycles.min(), cycles.max(), 64 * int(np.ptp(cycles) + 2))
-    speed, sway, height = skeleton.curves(model, fine, np.zeros((len(fine), 0)), rate)[:, columns].T
+    speed, sway, height = curves(model, fine, np.zeros((len(fine), 0)), rate)[:, columns].T
     steps = np.diff(fine) * 0.5 * (speed[1:] + speed[:-1])
     forward = np.concatenate([[0.0], np.cumsum(steps)])
     return np.stack([np.interp(cycles, fine, path) for path in (forward, sway, height)], axis=1)

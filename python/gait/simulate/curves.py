@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gait.body.pace import pace, slope_of
+from gait.body.model_curves import pace, slope_of
 from gait.errors import UserError
 from gait.io import blob
 from gait.simulate.geometry import Array

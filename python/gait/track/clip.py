@@ -193,7 +193,7 @@ def _keypoints(options: ClipOptions, model: Model, frames: range) -> dict[int, J
         raise UserError(
             f"{options.keypoints}: has no frame that is tracked; number frames as in the video, from 0"
         )
-    read.require_spread(options.keypoints, options.keypoints_sd)
+    read.require_extent(options.keypoints, options.keypoints_sd)
     return read.joints(options.keypoints_sd)
 
 

@@ -241,10 +241,10 @@ class Tracker:
 
     def restore(self, snapshot: bytes) -> None:
         """Take over a state from `save`; a failure leaves this one as it was."""
-        room = aligned(len(snapshot))
-        room[:] = np.frombuffer(snapshot, np.uint8)
+        memory = aligned(len(snapshot))
+        memory[:] = np.frombuffer(snapshot, np.uint8)
         err = ctypes.byref(self._error)
-        self._check(self._lib.gait_tracker_restore(self._handle, room.ctypes.data, len(snapshot), err))
+        self._check(self._lib.gait_tracker_restore(self._handle, memory.ctypes.data, len(snapshot), err))
 
     def _check(self, status: int) -> None:
         """Raise what happened in a callback, else what the status means."""

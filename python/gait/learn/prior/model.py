@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gait._version import __version__
-from gait.body.pace import series
+from gait.body.model_curves import series
 from gait.body.skeleton import ANGLES, CHANNELS, default_skeleton
 from gait.io import blob
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gait.body.pace import pace, series, waves
+from gait.body.model_curves import pace, series, waves
 from gait.body.skeleton import CHANNELS, SIDES, Proportions, default_skeleton, points
 from gait.errors import UserError
 from gait.learn.arrays import Floats, Indices, Mask, by_rows, release, stored
@@ -170,7 +170,7 @@ def by_subject(values: Floats, group: Indices, usual: float) -> tuple[float, flo
 
 
 def paces(sequences: list[Sequence], subject: Indices) -> Floats:
-    """Return the pace (n,) of sequences: their stride rates as `gait.body.pace` defines it."""
+    """Return the pace (n,) of sequences: their stride rates as `gait.body.model_curves` defines it."""
     rates = np.array([s.fps / s.period.frames for s in sequences])
     return pace(by_subject(rates, subject, RATE_SD), rates)
 

@@ -79,7 +79,7 @@ class _Pairs:
     def of(cls, keypoints: Keypoints, pairs: Ints, seen: Flags, sd: float) -> _Pairs:
         """Take pairs (P, 2) of columns out of keypoints."""
         apart = np.where(seen[..., None], keypoints.uv[:, pairs[:, 0]] - keypoints.uv[:, pairs[:, 1]], 0.0)
-        variance = np.where(seen, (keypoints.deviations(sd)[:, pairs] ** 2).sum(axis=2), 1.0)
+        variance = np.where(seen, (keypoints.standard_deviations(sd)[:, pairs] ** 2).sum(axis=2), 1.0)
         moving = [
             _acceleration(keypoints.time[rows], apart[rows, k], variance[rows, k])
             for k, rows in enumerate(seen.T)

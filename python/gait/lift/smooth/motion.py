@@ -132,7 +132,7 @@ def require_metres(
     camera: Camera, keypoints: Keypoints, prior: SegmentPrior, stature: float, options: Options
 ) -> None:
     """Refuse a camera that stands far higher than the person is away: its t is no metres."""
-    points = Observations(keypoints.uv, keypoints.deviations(options.pixel_sd))
+    points = Observations(keypoints.uv, keypoints.standard_deviations(options.pixel_sd))
     seen = points.among(prior.index(keypoints.names), len(prior.names))
     flat = Parallel(camera.R, None, np.zeros(2))
     try:
@@ -329,7 +329,7 @@ def _lift(
 ) -> Motion:
     """Estimate all markers of a prior."""
     markers = prior.index(keypoints.names)
-    points = Observations(keypoints.uv, keypoints.deviations(options.pixel_sd))
+    points = Observations(keypoints.uv, keypoints.standard_deviations(options.pixel_sd))
     sampled = resampled(points, keypoints.time, grid.time).among(markers, len(prior.names))
     stature, stature_sd = believed_stature(options, prior.stature)
     lengths = np.ones(len(grid.time))
