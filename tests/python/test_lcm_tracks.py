@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from gait.bindings.abi import Term
+from gait.bindings.config import TrackerConfig
 from gait.bindings.frame import Joints
 from gait.lcm.link import gaitmsg
 from gait.lcm.messages import image_message, tracks_message
-from gait.bindings.config import TrackerConfig
 from gait.track.tracker import Tracker
 
 FRAMES, SD = 16, 1.0
@@ -65,11 +65,11 @@ def as_in_messages(camera: rig.Camera) -> rig.Camera:
 
 def by_python() -> str:
     """Digest of the library that is given the same."""
-    usual = TrackerConfig.default(particles=rig.PARTICLES)
+    terms = TrackerConfig.default().terms | Term.KEYPOINTS
     tracker = Tracker(
         rig.model(),
         as_in_messages(rig.CAMERA),
-        replace(usual, terms=usual.terms | Term.KEYPOINTS),
+        TrackerConfig.default(particles=rig.PARTICLES, terms=terms),
         background=rig.plate(),
     )
     tracker.start(rig.walker(0), rig.SD, rig.utime(0))
