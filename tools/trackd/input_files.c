@@ -102,7 +102,7 @@ static bool read_numbers(const fields *f, const char *key, float *out, int count
 static bool read_distortion(const fields *f, float out[5], message *why)
 {
     const char *const remedy = "give k1 k2 p1 p2 [k3] (0, 4 or 5 numbers)";
-    int const value = fields_find(f, 0, "distortion");
+    int const value = json_find(&f->doc, 0, "distortion");
     int const count = value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
     memset(out, 0, 5 * sizeof *out);
     if (count != 0 && count != 4 && count != 5)
@@ -196,13 +196,13 @@ static bool read_scalar(const fields *f, int sds, int k, init_state *io, message
 {
     const char *const key = scalars[k].key;
     double value;
-    if (fields_find(f, 0, key) >= 0) {
+    if (json_find(&f->doc, 0, key) >= 0) {
         if (!fields_numbers(f, 0, key, &value, 1, scalars[k].low, scalars[k].high, scalars[k].remedy, why))
             return false;
         put(&io->mean, scalars[k].offset, value);
         put(&io->sd, scalars[k].offset, scalars[k].sd);
     }
-    if (sds >= 0 && fields_find(f, sds, key) >= 0) {
+    if (sds >= 0 && json_find(&f->doc, sds, key) >= 0) {
         if (!fields_numbers(f, sds, key, &value, 1, 0, MAX_SD, "give a standard deviation, not negative",
                             why))
             return false;
@@ -214,7 +214,7 @@ static bool read_scalar(const fields *f, int sds, int k, init_state *io, message
 /* Number of values of a key; 0 if it is absent. */
 static int count_of(const fields *f, int object, const char *key)
 {
-    int const value = object < 0 ? -1 : fields_find(f, object, key);
+    int const value = object < 0 ? -1 : json_find(&f->doc, object, key);
     return value < 0 ? 0 : json_numbers(&f->doc, value, NULL, 0);
 }
 
@@ -224,7 +224,7 @@ static bool read_pelvis(const fields *f, int sds, const gait_model *model, init_
     const char *const place = "give x and y (and z if known) of the pelvis in metres";
     int const known_axes = count_of(f, 0, "pelvis") == 3 ? 3 : 2, sd_count = count_of(f, sds, "pelvis");
     double value[3];
-    if (fields_find(f, 0, "pelvis") >= 0) {
+    if (json_find(&f->doc, 0, "pelvis") >= 0) {
         if (!fields_numbers(f, 0, "pelvis", value, known_axes, -FAR, FAR, place, why))
             return false;
         for (int i = 0; i < 3; i++) {
@@ -246,14 +246,14 @@ static bool read_pelvis(const fields *f, int sds, const gait_model *model, init_
 
 static bool parse_init(const fields *f, const gait_model *model, init_state *io, message *why)
 {
-    int const sds = fields_find(f, 0, "sd");
+    int const sds = json_find(&f->doc, 0, "sd");
     if (!fields_only(f, 0, known_keys, KNOWN_KEYS, why))
         return false;
     if (sds >= 0 && f->node[sds].type != JSON_OBJECT)
         return message_set(why, "%s: sd is not an object; give standard deviations by key", f->path);
     if (sds >= 0 && !fields_only(f, sds, known_keys, SCALARS + 1, why))
         return false;
-    if (fields_find(f, 0, "frame") >= 0 &&
+    if (json_find(&f->doc, 0, "frame") >= 0 &&
         !fields_whole(f, "frame", &io->frame, 0, 1u << 31, "give the frame number, from 0", why))
         return false;
     for (int k = 0; k < SCALARS; k++)

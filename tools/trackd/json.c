@@ -254,16 +254,11 @@ void fields_close(fields *f)
     f->bytes = (file_bytes){0};
 }
 
-int fields_find(const fields *f, int object, const char *key)
-{
-    return json_find(&f->doc, object, key);
-}
-
 bool fields_numbers(const fields *f, int object, const char *key, double *out, int count, double low,
                     double high, const char *remedy, message *why)
 {
     char name[64];
-    int const value = fields_find(f, object, key);
+    int const value = json_find(&f->doc, object, key);
     if (object > 0) /* its own key stands before it */
         snprintf(name, sizeof name, "%.*s.%s", (int)f->node[object - 1].length, f->node[object - 1].text,
                  key);

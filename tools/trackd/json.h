@@ -48,8 +48,6 @@ typedef struct fields {
 bool fields_open(fields *f, const char *path, const char *what, message *why);
 void fields_close(fields *f);
 
-/* Value of `key` of `object` (0: the whole file), or -1. */
-int fields_find(const fields *f, int object, const char *key);
 /* Exactly `count` numbers in [low, high] under the key, nested or not; the remedy ends the line of failure. */
 bool fields_numbers(const fields *f, int object, const char *key, double *out, int count, double low,
                     double high, const char *remedy, message *why);

@@ -3,10 +3,89 @@
 #include "gait_pool.h"
 #include "lcm_link.h"
 
+#include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 
+/* ---- settings of the tracker, from their table in gait.h ---- */
+typedef struct setting {
+    const char *name, *type, *unit, *meaning;
+    size_t offset;
+    double usual, paper, low, high;
+} setting;
+
+#define ROW(name, type, unit, meaning, usual, paper, low, high)                                              \
+    {#name,           #type,           unit, meaning, offsetof(gait_tracker_config, name),                   \
+     (double)(usual), (double)(paper), low,  high},
+#define SETTING(meaning, type, name, array, unit, usual, low, high)                                          \
+    ROW(name, type, unit, meaning, usual, usual, low, high)
+#define PAPER(meaning, type, name, array, unit, usual, paper, low, high)                                     \
+    ROW(name, type, unit, meaning, usual, paper, low, high)
+#define FIELD(...)
+
+static const setting SETTINGS[] = {GAIT_TRACKER_CONFIG_FIELDS(SETTING, PAPER, FIELD)};
+enum { COUNT = sizeof SETTINGS / sizeof *SETTINGS };
+
+static bool kind_of(const setting *s, option_kind *kind)
+{
+    if (strcmp(s->name, "seed") == 0)
+        *kind = OPTION_U64;
+    else if (strcmp(s->type, "float") == 0)
+        *kind = OPTION_FLOAT;
+    else if (strcmp(s->type, "int32_t") == 0 && strcmp(s->name, "cameras") != 0)
+        *kind = OPTION_INT;
+    else
+        return false;
+    return true;
+}
+
+/* "rejuvenation-time" */
+static const char *option_name(const setting *s)
+{
+    static char names[COUNT][32];
+    char *const name = names[s - SETTINGS];
+    snprintf(name, sizeof names[0], "%s", s->name);
+    for (char *c = name; *c; c++)
+        *c = *c == '_' ? '-' : *c;
+    return name;
+}
+
+/* Meaning, unit, default. */
+static const char *option_help(const setting *s)
+{
+    static char helps[COUNT][256];
+    char *const help = helps[s - SETTINGS];
+    char paper[40] = "";
+    if (s->paper != s->usual)
+        snprintf(paper, sizeof paper, ", paper mode %g", s->paper);
+    snprintf(help, sizeof helps[0], "%s\n        %s%sdefault %g%s", s->meaning, s->unit, *s->unit ? "; " : "",
+             s->usual, paper);
+    return help;
+}
+
+/* Fill `table` with options that write into `config`, and return how many: every number with a range but `cameras`. */
+static int tracker_options(gait_tracker_config *config, option *table)
+{
+    int count = 0;
+    for (int i = 0; i < COUNT; i++) {
+        const setting *const s = &SETTINGS[i];
+        option_kind kind;
+        if (kind_of(s, &kind))
+            table[count++] = (option){.name = option_name(s),
+                                      .letter = strcmp(s->name, "particles") == 0 ? 'n' : 0,
+                                      .metavar = kind == OPTION_FLOAT ? "X" : "N",
+                                      .help = option_help(s),
+                                      .kind = kind,
+                                      .value = (char *)config + s->offset,
+                                      .low = s->low,
+                                      .high = s->high};
+    }
+    return count;
+}
+
+/* ---- options of the daemon ---- */
 #define TEXT(field)           OPTION_TEXTUAL, s->field, 0, 0
 #define INT(field, low, high) OPTION_INT, &s->field, low, high
 #define FLAG(field)           OPTION_FLAG, &s->field, 0, 0
@@ -50,7 +129,8 @@ static int make_table(settings *s, option *table)
          "        dropped, and double them, up to --particles, when there is time to spare; results then\n"
          "        depend on timing; default: constant",
          INT(adapt_particles, 16, 1 << 20)},
-        {"threads", 't', "N", "threads, default 1, which is also the default of --tasks; results do not depend on it",
+        {"threads", 't', "N",
+         "threads, default 1, which is also the default of --tasks; results do not depend on it",
          INT(threads, 1, GAIT_POOL_MAX)},
         {"cpu-mask", 0, "N",
          "sum of the instruction sets to use: 1 SSE2 or NEON, 2 AVX2, 4 AVX-512; 0: none; default all\n"
@@ -88,17 +168,13 @@ static int make_table(settings *s, option *table)
     };
     int const count = (int)(sizeof own / sizeof *own);
     memcpy(table, own, sizeof own);
-    return count + tracker_options_table(&s->tracker, table + count);
+    return count + tracker_options(&s->tracker, table + count);
 }
 
 static void set_defaults(settings *s)
 {
-    *s = (settings){.mode = "default",
-                    .init = "auto",
-                    .threads = 1,
-                    .cpu_mask = -1,
-                    .max_gap = 2,
-                    .lift_lag = -1};
+    *s = (settings){
+        .mode = "default", .init = "auto", .threads = 1, .cpu_mask = -1, .max_gap = 2, .lift_lag = -1};
 }
 
 void settings_help(void)

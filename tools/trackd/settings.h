@@ -1,7 +1,8 @@
 /* settings.h - the options of gait-trackd. */
 #ifndef TRACKD_SETTINGS_H
 #define TRACKD_SETTINGS_H
-#include "tracker_options.h"
+#include "gait.h"
+#include "options.h"
 
 typedef struct settings { /* 0 or empty: not given, unless noted */
     char model[OPTION_TEXT], camera[OPTION_TEXT], background[OPTION_TEXT], init[OPTION_TEXT];
