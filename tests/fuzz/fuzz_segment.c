@@ -18,8 +18,8 @@ void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, 
 {
     gait_lift_info info;
     void *copy = NULL;
-    if (blob_size > cap ||
-        gait_lift_get_info(read_model(fuzz_aligned(blob, blob_size, &copy), blob_size), &info, NULL) != GAIT_OK)
+    if (blob_size > cap || gait_lift_get_info(read_model(fuzz_aligned(blob, blob_size, &copy), blob_size),
+                                              &info, NULL) != GAIT_OK)
         abort();
     free(copy);
     memcpy(out, blob, blob_size);
