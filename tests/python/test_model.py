@@ -133,7 +133,7 @@ BAD = {
     "not a .gait model": damaged(lambda b: b.__setitem__(0, 0)),
     "format 2.0, this package reads 1.x": damaged(lambda b: struct.pack_into("<H", b, 8, 2)),
     "checksum differs, the file is damaged": damaged(lambda b: b.__setitem__(2000, b[2000] ^ 1)),
-    "header says .* bytes, the file has 500": read_blob(None)[:500],
+    "header states .* bytes, the file has 500": read_blob(None)[:500],
     "not a .gait model; make one with": b"",
     "CHNM: missing": blob.encode({"MEAN": np.zeros((1, 1), np.float32)}),
 }
