@@ -102,7 +102,7 @@ def test_a_pelvis_beyond_ten_kilometres_is_refused(place, init):
 def test_frame_comes_from_the_file_or_from_the_caller(init):
     path = init(FULL)
     assert Start.read(path, MODEL, frame=64).frame == 64
-    with pytest.raises(UserError, match="init.json: frame is 64, --start says 60; leave one"):
+    with pytest.raises(UserError, match="init.json: frame is 64, --start is 60; leave one"):
         Start.read(path, MODEL, frame=60)
     assert Start.read(init({"phase": 0.2}), MODEL, frame=7).frame == 7
 

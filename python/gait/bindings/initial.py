@@ -1,4 +1,4 @@
-"""Where a track starts: the first state of the walker and how sure it is."""
+"""Where a track starts: the first state of the person and its standard deviations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gait.bindings.state import State
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
 
-# Standard deviations of values that an init file gives without saying how sure they are.
+# Standard deviations of values that an init file gives without any.
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
 FAR = 1e4  # metres from the origin; single precision places nothing to the millimetre further out
@@ -38,20 +38,20 @@ class Start:
         Frame of the video that it describes.
     mean, sd : State
         Independent normals; a phase or heading whose sd is a half turn or more is uniform.
-    looks : float, optional
-        Stature that the pictures give, metres, where it is beyond doubt another than was believed.
+    apparent_stature : float, optional
+        Stature that the pictures give, metres, if it contradicts the one in `mean`.
     """
 
     frame: int
     mean: State
     sd: State
-    looks: float | None = None
+    apparent_stature: float | None = None
 
     @staticmethod
     def read(
         path: str | os.PathLike[str], model: Model, *, frame: int | None = None, height: float | None = None
     ) -> Start:
-        """Read an init file; what it does not say comes from the model's broad prior.
+        """Read an init file; what it leaves out comes from the model's broad prior.
 
         Parameters
         ----------
@@ -59,37 +59,37 @@ class Start:
             JSON with `KEYS`, each optional.  A pelvis of two numbers gets the model's height over ground.
         model : Model
         frame : int, optional
-            First frame, where the file does not say.
+            First frame, if the file does not give it.
         height : float, optional
-            Stature in metres, which then counts more than the file's.
+            Stature in metres, which takes precedence over the file's.
 
         Raises
         ------
         UserError
             One line naming file, key and remedy.
         """
-        fields, spread = read_start(path, "init", KEYS)
+        fields, sds = read_start(path, "init", KEYS)
         if "frame" in fields:
             own = frame_number(fields)
             if frame not in (None, own):
-                raise fields.fail("frame", f"is {own}, --start says {frame}", "leave one of them out")
+                raise fields.fail("frame", f"is {own}, --start is {frame}", "leave one of them out")
             frame = own
         mean, sd = model.prior()
         for key, (name, (low, high), remedy) in SCALARS.items():
             if key in fields:
                 setattr(mean, name, fields.number(key, low, high, remedy))
                 setattr(sd, name, DEFAULT_SD[key])
-            if key in spread:
-                setattr(sd, name, spread.number(key, 0.0, 10.0, "give a standard deviation, not negative"))
+            if key in sds:
+                setattr(sd, name, sds.number(key, 0.0, 10.0, "give a standard deviation, not negative"))
         if height is not None:
             set_height(mean, sd, height)
-        _place(fields, spread, model, mean, sd)
+        _place(fields, sds, model, mean, sd)
         mean.phase %= 1.0
         return Start(frame or 0, mean, sd)
 
 
 def read_start(path: str | os.PathLike[str], what: str, keys: Sequence[str]) -> tuple[Fields, Fields]:
-    """Fields of a file that says where somebody is, which may have `keys`, and of its standard deviations.
+    """Fields of a file with a person's place, which may have `keys`, and fields of its standard deviations.
 
     Raises
     ------
@@ -98,9 +98,9 @@ def read_start(path: str | os.PathLike[str], what: str, keys: Sequence[str]) -> 
     """
     fields = read_json(path, what)
     fields.only(keys)
-    spread = fields.table("sd", "give standard deviations by key")
-    spread.only(tuple(DEFAULT_SD))
-    return fields, spread
+    sds = fields.table("sd", "give standard deviations by key")
+    sds.only(tuple(DEFAULT_SD))
+    return fields, sds
 
 
 def frame_number(fields: Fields) -> int:
@@ -118,7 +118,7 @@ def set_height(mean: State, sd: State, height: float) -> None:
     sd.stature = min(sd.stature, DEFAULT_SD["stature_m"])
 
 
-def _place(fields: Fields, spread: Fields, model: Model, mean: State, sd: State) -> None:
+def _place(fields: Fields, sds: Fields, model: Model, mean: State, sd: State) -> None:
     """Set the pelvis; its height is the model's unless the file gives it."""
     remedy = "give x and y (and z if known) of the pelvis in metres"
     known = 2
@@ -131,9 +131,9 @@ def _place(fields: Fields, spread: Fields, model: Model, mean: State, sd: State)
         sd.pelvis[:] = DEFAULT_SD["pelvis"]
     if known == 2:
         mean.pelvis[2] = model.pelvis_height(mean)
-    if "pelvis" in spread:
+    if "pelvis" in sds:
         remedy = "give one number or three, metres"
-        values = spread.one_or_three("pelvis", remedy)
+        values = sds.one_or_three("pelvis", remedy)
         if (values < 0).any():
-            raise spread.fail("pelvis", "is negative", remedy)
+            raise sds.fail("pelvis", "is negative", remedy)
         sd.pelvis[:] = values

@@ -178,7 +178,7 @@ class Model:
         return mask.value
 
     def prior(self) -> tuple[State, State]:
-        """Mean and standard deviation of a walker of whom nothing is known, with the pelvis at the origin."""
+        """Mean and standard deviation of an unknown person, with the pelvis at the origin."""
         mean, sd, error = abi.StateC(), abi.StateC(), abi.Error()
         where = (ctypes.byref(mean), ctypes.byref(sd), ctypes.byref(error))
         check(self._lib.gait_tracker_prior(self.handle, *where), error)

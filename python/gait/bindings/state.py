@@ -1,4 +1,4 @@
-"""One hypothesis of a walker in numpy clothes."""
+"""One state of the person, with NumPy arrays."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from gait.bindings.library import library
 
 Array = NDArray[np.float64]
 LIMITS = {"coef": abi.MAX_COMPONENTS, "offset": abi.MAX_ANGLES, "proportion": abi.MAX_PROPORTIONS}
-LEAST_STATURE = 0.3  # metres, of a particle (population.h)
+LEAST_STATURE = 0.3  # metres, of a particle (particles.h)
 POSE_SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")  # poses need no more
 SCALARS = (*POSE_SCALARS, "turn_rate")
 
 
 @dataclass
 class State:
-    """Everything that places and poses a walker; also used for the standard deviations of those values.
+    """Everything that places and poses a person; also used for the standard deviations of those values.
 
     Attributes
     ----------

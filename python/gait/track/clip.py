@@ -150,11 +150,11 @@ def _first_state(
         f"stature {at.stature:.2f} m, heading {turn:.0f} +- {turn_sd:.0f} deg",
         options.quiet,
     )
-    if start.looks:
+    if start.apparent_stature:
         remedy = "check --height and" if options.height else "give --height or check"
         note(
-            f"the person looks {start.looks:.2f} m tall by the camera, taken for {at.stature:.2f} m: "
-            f"{remedy} the camera",
+            f"the person appears {start.apparent_stature:.2f} m tall by the camera, taken for "
+            f"{at.stature:.2f} m: {remedy} the camera",
             options.quiet,
         )
     return start

@@ -60,6 +60,7 @@ class Spool:
     def __init__(self, transitions: Transitions) -> None:
         self._transitions = transitions
         self._rows: list[tuple[int, int]] = []  # offset and count of each frame
+        self._size = 0
         self.utime: list[int] = []
         self.step: list[int] = []
         self._known: list[int] = []
@@ -78,8 +79,8 @@ class Spool:
         """Keep the particles after a step."""
         states, weights = tracker.particles()
         table = np.column_stack([self._transitions.table(states), weights]).astype(np.float32)
-        self._rows.append((self._file.tell(), len(table)))
-        self._file.write(table.tobytes())
+        self._rows.append((self._size, len(table)))
+        self._size += self._file.write(table.tobytes())
         self.utime.append(estimate.utime)
         self._known.append(self._known_since(estimate))
         self.stature_sd.append(tracker.start_stature_sd)

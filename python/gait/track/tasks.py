@@ -82,7 +82,7 @@ class PoolTasks:
 
 
 def _stop(lib: ctypes.CDLL, handle: ctypes.c_void_p, memory: object, owner: int) -> None:
-    if os.getpid() == owner:  # a forked process has no threads to wait for
+    if os.getpid() == owner:  # a child process has no threads to wait for
         lib.gait_pool_stop(handle)
     del memory  # held until here
 
