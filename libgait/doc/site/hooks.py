@@ -131,11 +131,55 @@ def _commands() -> str:
     return "".join(out)
 
 
+STRUCT = re.compile(
+    r"(?:/\* ((?:(?!\*/).)*?) \*/\n)?#define GAIT_\w+_FIELDS\((?:[^\n]*\\\n)*[^\n]*\n\n?"
+    r"typedef struct (\w+) \{[^;]*\} \2;\n",
+    re.S,
+)
+"""A struct whose fields are a table in the header, with the comment before it."""
+
+
 def _header(path: Path) -> str:
-    """Return a header by its sections, each under its title."""
+    """Return a header by its sections, each under its title, with structs as tables."""
     text = path.read_text(encoding="utf-8")
     pieces = re.split(r"^/\* -{2,} (.+?)[. ]*-{2,} \*/\n", text, flags=re.M)
-    out = [f"\n## {path.name}\n\n```c\n{pieces[0].strip()}\n```\n"]
+    out = [f"\n## {path.name}\n{_code(pieces[0])}"]
     for title, body in zip(pieces[1::2], pieces[2::2], strict=True):
-        out.append(f"\n### {title[0].upper()}{title[1:]}\n\n```c\n{body.strip()}\n```\n")
+        out.append(f"\n### {title[0].upper()}{title[1:]}\n")
+        at = 0
+        for struct in STRUCT.finditer(body):
+            about = " ".join((struct[1] or "").replace("\n *", " ").split())
+            out += [_code(body[at : struct.start()]), f"\n**`{struct[2]}`** {about}\n\n{_fields(struct[2])}"]
+            at = struct.end()
+        out.append(_code(body[at:]))
     return "".join(out)
+
+
+def _code(text: str) -> str:
+    return f"\n```c\n{text.strip()}\n```\n" if text.strip() else ""
+
+
+def _fields(struct: str) -> str:
+    """Return the fields of a struct as a table, made from what the library reports."""
+    import gait
+    from gait.bindings.library import struct_fields
+
+    configs = {"gait_tracker_config": gait.TrackerConfig, "gait_lift_config": gait.LiftConfig}
+    known = {s.name: s for s in configs[struct].settings()} if struct in configs else {}
+    head = ["field", "type", "unit", "meaning"] + (["range", "default", "paper mode"] if known else [])
+    rows = [head, ["---"] * len(head)]
+    for row in struct_fields(struct):
+        if not row.name:
+            continue
+        cells = [f"`{row.name}`", f"`{row.type}{row.array}`", row.unit, " ".join(row.text.split())]
+        if known:
+            setting = known.get(row.name)
+            ranged = setting is not None and setting.low == setting.low
+            cells += [f"{setting.low:.10g} to {setting.high:.10g}" if setting and ranged else ""]
+            cells += [_number(setting.default), _number(setting.paper)] if setting else ["", ""]
+        rows.append([cell.replace("|", "\\|") for cell in cells])
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
+
+
+def _number(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
