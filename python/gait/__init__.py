@@ -15,6 +15,7 @@ from gait.errors import GaitArgumentError, GaitError, GaitLimitError, LibraryErr
 
 if TYPE_CHECKING:
     from gait.bindings.abi import Flag, Mode, Term, TrackStatus
+    from gait.bindings.config import TrackerConfig
     from gait.bindings.estimate import Estimate
     from gait.bindings.frame import Joints
     from gait.bindings.initial import Start
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from gait.camera.camera import Camera
     from gait.io.video import Frame, Video, VideoWriter, background
     from gait.track.tracker import Tracker
-    from gait.bindings.config import TrackerConfig
 
 _HOME = {
     "Camera": "camera.camera",

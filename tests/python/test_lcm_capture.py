@@ -20,7 +20,16 @@ def folder(tmp_path_factory):
 
 
 def words_of(folder, url):
-    return ["capture", folder / "video.mp4", "--camera", folder / "camera.json", "--rate", "max", "--url", url]
+    return [
+        "capture",
+        folder / "video.mp4",
+        "--camera",
+        folder / "camera.json",
+        "--rate",
+        "max",
+        "--url",
+        url,
+    ]
 
 
 def capture(folder, url):

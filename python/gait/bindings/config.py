@@ -17,7 +17,6 @@ from gait.bindings.library import library, struct_fields
 from gait.bindings.model import camera_c
 from gait.camera.camera import Camera
 
-
 _C = TypeVar("_C", bound="Config")
 
 

@@ -6,9 +6,9 @@ from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 
 from gait.bindings.abi import Mode
+from gait.bindings.config import TrackerConfig
 from gait.bindings.initial import STATURE
 from gait.errors import LibraryError, UsageError
-from gait.bindings.config import TrackerConfig
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
 THREADS = (1, 256)  # GAIT_POOL_MAX
