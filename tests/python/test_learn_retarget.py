@@ -82,14 +82,12 @@ def test_lengths_survive_a_round_trip():
     assert measures.stature == pytest.approx(1.7, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("decompose", "axes"), [(rotations.decompose_yxz, (1, 0, 2)), (rotations.decompose_zyx, (2, 1, 0))]
-)
-def test_decomposition_passes_through_gimbal_lock_without_a_step(decompose, axes):
+@pytest.mark.parametrize(("order", "axes"), [("yxz", (1, 0, 2)), ("zyx", (2, 1, 0))])
+def test_decomposition_passes_through_gimbal_lock_without_a_step(order, axes):
     middle = np.radians(np.linspace(60, 120, 61))
     angles = np.stack([np.full(61, 0.3), middle, np.full(61, -0.2)], axis=1)
     turn = rotations.from_angles(angles, axes)
-    found = decompose(turn)
+    found = rotations.decompose(turn, order)
     assert rotations.from_angles(found, axes) == pytest.approx(turn, abs=1e-9)
     assert np.max(np.abs(np.diff(found, axis=0))) < np.radians(3)
     assert found[-1] == pytest.approx(angles[-1], abs=1e-6)
@@ -98,7 +96,7 @@ def test_decomposition_passes_through_gimbal_lock_without_a_step(decompose, axes
 def test_decomposition_keeps_missing_frames_missing():
     turn = rotations.from_angles(np.full((4, 3), 0.2), (1, 0, 2))
     turn[2] = np.nan
-    found = rotations.decompose_yxz(turn)
+    found = rotations.decompose(turn, "yxz")
     assert np.isnan(found[2]).all() and found[[0, 1, 3]] == pytest.approx(0.2)
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 from gait.cli import values
@@ -176,25 +177,17 @@ def _options(args: argparse.Namespace) -> LearnOptions:
     """Collect the options of a run."""
     if args.dask and args.jobs:
         raise UsageError("--jobs is for this machine and --dask for a cluster; give one of them")
+    given = {field.name: vars(args)[field.name] for field in fields(LearnOptions) if field.name in vars(args)}
     return LearnOptions(
-        sources=tuple(args.sources),
-        exclude=tuple(args.exclude),
-        output=args.output,
-        report=args.report,
-        quiet=args.quiet,
-        activity=args.activity,
-        subjects=args.subjects,
-        components=args.components,
-        prior=args.prior,
-        period_mode=args.period_mode,
-        fps=args.fps,
-        markers=markers.read_map(args.markers) if args.markers else None,
-        zeros_missing=args.zeros_missing,
-        trim=not args.no_trim,
-        seed=args.seed,
-        segments=_segment_options(args),
-        jobs=args.jobs or forkserver.cores(),
-        dask=args.dask,
+        **given
+        | {
+            "sources": tuple(args.sources),
+            "exclude": tuple(args.exclude),
+            "markers": markers.read_map(args.markers) if args.markers else None,
+            "trim": not args.no_trim,
+            "segments": _segment_options(args),
+            "jobs": args.jobs or forkserver.cores(),
+        }
     )
 
 

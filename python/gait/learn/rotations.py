@@ -43,26 +43,15 @@ def unit(v: Floats) -> Floats:
     return v / np.where(length > 0, length, np.nan)
 
 
-def decompose_yxz(r: Floats) -> Floats:
-    """Return the angles (T, 3) of R = Ry(a) Rx(b) Rz(c), continuous in time."""
-    b = np.arcsin(np.clip(-r[:, 1, 2], -1, 1))
-    outer = np.stack([np.arctan2(r[:, 0, 2], r[:, 2, 2]), b, np.arctan2(r[:, 1, 0], r[:, 1, 1])], axis=1)
+def decompose(r: Floats, order: str) -> Floats:
+    """Return the angles (T, 3), continuous in time, of R_i(a) R_j(b) R_k(c); `order` is yxz or zyx."""
+    i, j, k = ("xyz".index(axis) for axis in order)
+    b = np.arcsin(np.clip(-r[:, i, k], -1, 1))
+    outer = np.stack([np.arctan2(r[:, j, k], r[:, k, k]), b, np.arctan2(r[:, i, j], r[:, i, i])], axis=1)
 
     def inner(t: int, a: float) -> Floats:
-        rest = axis_rotation(1, -a) @ r[t]
-        return np.array([a, np.arctan2(-rest[1, 2], rest[2, 2]), np.arctan2(-rest[0, 1], rest[0, 0])])
-
-    return _continuous(outer, inner)
-
-
-def decompose_zyx(r: Floats) -> Floats:
-    """Return the angles (T, 3) of R = Rz(a) Ry(b) Rx(c), continuous in time."""
-    b = np.arcsin(np.clip(-r[:, 2, 0], -1, 1))
-    outer = np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), b, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
-
-    def inner(t: int, a: float) -> Floats:
-        rest = axis_rotation(2, -a) @ r[t]
-        return np.array([a, np.arctan2(-rest[2, 0], rest[0, 0]), np.arctan2(-rest[1, 2], rest[1, 1])])
+        rest = axis_rotation(i, -a) @ r[t]
+        return np.array([a, np.arctan2(-rest[i, k], rest[k, k]), np.arctan2(-rest[j, i], rest[j, j])])
 
     return _continuous(outer, inner)
 

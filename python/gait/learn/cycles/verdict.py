@@ -115,10 +115,10 @@ def _footing(feet: Footing, kind: str) -> list[Evidence]:
         Evidence("steps", feet.steps, most=STEPS, words="the ground is not level"),
     ]
     if kind == "walk":
-        words = "this is running: both feet leave the ground"
-        return [*result, Evidence("flight", feet.flight, most=feet.limit, words=words)]
-    words = "this is not running: there is a foot on the ground"
-    return [*result, Evidence("flight", feet.flight, least=feet.limit, words=words)]
+        limits, words = (-np.inf, feet.limit), "this is running: both feet leave the ground"
+    else:
+        limits, words = (feet.limit, np.inf), "this is not running: there is a foot on the ground"
+    return [*result, Evidence("flight", feet.flight, *limits, words)]
 
 
 def repeats(angles: Floats, period: float) -> float:

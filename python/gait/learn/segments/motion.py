@@ -24,7 +24,7 @@ from gait.learn.arrays import Floats
 from gait.learn.mocap.tables import AngleTable
 from gait.learn.options import SegmentOptions
 from gait.learn.prior.lengths import GROUPS
-from gait.learn.rotations import decompose_zyx
+from gait.learn.rotations import decompose
 from gait.learn.segments.virtual_markers import MARKERS, marked_skeleton
 from gait.learn.solve import retarget
 from gait.learn.solve.body import RECORDED, Body
@@ -120,7 +120,7 @@ def _pose_of_body(body: Body, measures: retarget.Measures) -> BodyPose:
     """Return the pose of the default skeleton with the lengths of the body."""
     channels = np.zeros((body.frames, len(CHANNELS)))
     channels[:, : len(ANGLES)] = retarget.angles(body, measures)
-    channels[:, TURNS] = decompose_zyx(body.pelvis)
+    channels[:, TURNS] = decompose(body.pelvis, "zyx")
     return BodyPose(retarget.generic_proportions([measures]), channels)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from gait.body.skeleton import ANGLES, SIDES, Proportions, axis_rotation
 from gait.learn.arrays import Floats, Indices
-from gait.learn.rotations import decompose_yxz, decompose_zyx, frame_from, unit, unwrap
+from gait.learn.rotations import decompose, frame_from, unit, unwrap
 from gait.learn.solve.body import Body
 
 HEAD = 0.141  # neck to head top, statures: files end the head's bone at different heights
@@ -137,14 +137,14 @@ def angles(body: Body, measures: Measures) -> Floats:
     torso = torso_frames(body)
     head = frame_from(j["head"] - j["neck"], body.lateral["head"])
     for name, child, parent in (("torso", torso, body.pelvis), ("neck", head, torso)):
-        turns = decompose_zyx(np.swapaxes(parent, 1, 2) @ child)
+        turns = decompose(np.swapaxes(parent, 1, 2) @ child, "zyx")
         result |= {f"{name}_{axis}": turns[:, k] for k, axis in enumerate("zyx")}
     for i, s in enumerate(SIDES):
         chains = (("shoulder", "elbow", "wrist", torso, -1.0), ("hip", "knee", "ankle", body.pelvis, 1.0))
         for first, second, third, parent, sense in chains:
             hinge = body.lateral[f"{s}_{second}"]
             upper = frame_from(j[f"{s}_{first}"] - j[f"{s}_{second}"], hinge)
-            turns = decompose_yxz(np.swapaxes(parent, 1, 2) @ upper) * (
+            turns = decompose(np.swapaxes(parent, 1, 2) @ upper, "yxz") * (
                 (-1, 1, -1) if s == "l" else (-1, -1, 1)
             )
             result |= {
@@ -349,7 +349,7 @@ def root_channels(body: Body, measures: Measures, period: float) -> tuple[Floats
     result[:, 0] = np.where(visible, forward, np.nan)
     result[:, 1] = np.sum((path[:, :2] - smooth) * across, axis=1) / measures.stature
     result[:, 2] = (path[:, 2] - ground) / measures.stature
-    turns = decompose_zyx(axis_rotation(2, -heading) @ body.pelvis)
+    turns = decompose(axis_rotation(2, -heading) @ body.pelvis, "zyx")
     result[:, 3:] = turns[:, ::-1]
     return result, heading
 
