@@ -20,12 +20,12 @@ static void repair(uint8_t *data, size_t size)
 
 void fuzz_seed(const uint8_t *blob, size_t blob_size, uint8_t *out, size_t cap, size_t *size)
 {
-    static _Alignas(GAIT_ALIGN) uint8_t memory[MODEL_BYTES];
+    static _Alignas(GAIT_ALIGN) uint8_t model_memory[MODEL_BYTES];
     static void *copy, *memory;
     gait_model *model = NULL;
     gait_state mean, sd;
-    if (gait_model_init(memory, sizeof memory, fuzz_aligned(blob, blob_size, &copy), blob_size, &model,
-                        NULL) != GAIT_OK ||
+    if (gait_model_init(model_memory, sizeof model_memory, fuzz_aligned(blob, blob_size, &copy), blob_size,
+                        &model, NULL) != GAIT_OK ||
         gait_tracker_prior(model, &mean, &sd, NULL) != GAIT_OK || !(tracker = fuzz_tracker(model, &memory)))
         abort();
     fuzz_steps(tracker, &mean, &sd, 0, 3);
