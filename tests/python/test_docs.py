@@ -275,6 +275,12 @@ def test_every_command_has_a_place_in_the_docs():
     assert [name for name in COMMANDS if f"`gait {name}" not in text and f"gait {name} " not in text] == []
 
 
+def test_every_public_name_has_a_place_in_the_reference():
+    text = (DOC / "reference/python-api.md").read_text(encoding="utf-8")
+    names = re.findall(r"^::: gait\.(\w+)$", text, re.M)
+    assert set(names) == set(gait.__all__) - {"__version__"}
+
+
 def output_of(page, start, folder, clip):
     """What the first Python block of a page that begins so prints, beside a clip."""
     shutil.copytree(clip, folder / "walk")
