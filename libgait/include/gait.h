@@ -261,7 +261,7 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
           int32_t, lag, , "frames", 5, 0, 64)                                                                         \
     PAPER("Likelihood terms in use, a set of GAIT_TERM_*.",                                                           \
           uint32_t, terms, , "mask", GAIT_TERMS_DEFAULT, GAIT_TERM_TEXTURE, NAN, NAN)                                 \
-    FIELD("The cameras, as many as `cameras` says.",                                                                  \
+    FIELD("The cameras; the first `cameras` are used.",                                                               \
           gait_camera, camera, [GAIT_MAX_CAMERAS], "")                                                                \
     FIELD("Where threads come from; results do not depend on it.",                                                    \
           gait_tasks, exec, , "")                                                                                     \
@@ -381,7 +381,7 @@ typedef GAIT_ENUM(gait_track_status) {
           int64_t, utime, , "microseconds")                                                                           \
     FIELD("Steps since the start.",                                                                                   \
           uint64_t, frame, , "")                                                                                      \
-    FIELD("log p(frame | past), weighted as config evidence_time says, up to a constant.",                            \
+    FIELD("log p(frame | past), weighted by config evidence_time, up to a constant.",                                 \
           double, log_evidence, , "nats")                                                                             \
     FIELD("Mean of the dominant hypothesis; circular in phase and heading.",                                          \
           gait_state, mean, , "")                                                                                     \
@@ -424,7 +424,7 @@ GAIT_API gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_m
  * done.  plate NULL: none; the silhouette term then has no effect.  Snapshots do not hold it. */
 GAIT_API gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate,
                                                  gait_error *err);
-/* Broad prior: phase uniform, stride rate and stature of the population, heading unknown, pelvis at the origin. */
+/* Broad prior: phase uniform, stride rate and stature of people in general, heading unknown, pelvis at the origin. */
 GAIT_API gait_result gait_tracker_prior(const gait_model *m, gait_state *mean, gait_state *sd, gait_error *err);
 /* Draw the particles from independent normals; a phase or heading whose sd is a half turn or more is uniform.  Means
  * are in the ranges of gait_state, standard deviations in [0, 10]. */

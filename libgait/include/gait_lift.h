@@ -109,7 +109,7 @@ GAIT_API gait_result gait_lift_init(void *mem, size_t mem_bytes, const gait_mode
 GAIT_API const char *gait_lift_marker_name(const gait_lift *l, int32_t marker); /* NULL: out of range */
 
 /* ---- one segment ------------------------------------------------------------------------------------- */
-/* What one segment's observations say. */
+/* What the observations of one segment determine. */
 #define GAIT_LIFT_FIT_FIELDS(FIELD)                                                                                   \
     FIELD("log p(observations), of the best heading and component.",                                                  \
           double, log_evidence, , "nats")                                                                             \
@@ -141,8 +141,8 @@ typedef struct gait_lift_fit { GAIT_LIFT_FIT_FIELDS(GAIT_DECLARE) } gait_lift_fi
 GAIT_API gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, gait_lift_fit *out,
                                        gait_error *err);
 /* The same with outliers down-weighted: a point beyond four standard deviations of the fit keeps little influence.
- * weighted [F][J] receives the deviations that count, above `sd` for outliers.  If outliers may have misled the search
- * it is repeated with all points down-weighted at first. */
+ * weighted [F][J] receives the standard deviations in effect, above `sd` for outliers.  If outliers may have misled the
+ * search it is repeated with all points down-weighted at first. */
 GAIT_API gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const double *sd, double *weighted,
                                               gait_lift_fit *out, gait_error *err);
 /* Expect the person of the following segments at another place and heading than the config's; heading_sd as there.

@@ -24,7 +24,7 @@
 
 /* Fields follow one another without padding, so their sizes give their offsets. */
 #define ADD_SIZE(meaning, type, name, array, ...) +sizeof(type array)
-#define HAS_NO_PADDING(T, ...)                    _Static_assert(0 __VA_ARGS__ == sizeof(T), #T " has padding");
+#define HAS_NO_PADDING(T, ...) _Static_assert(0 __VA_ARGS__ == sizeof(T), #T " has padding");
 STRUCTS(HAS_NO_PADDING, ADD_SIZE, ADD_SIZE, ADD_SIZE, ADD_SIZE)
 
 enum row_kind { ROW_STRUCT, ROW_FREE, ROW_LIMITED };
@@ -45,20 +45,20 @@ static const row ROWS[] = {STRUCTS(ROWS_OF, FREE, LIMITED, LIMITED, LIMITED)};
 enum { COUNT = sizeof ROWS / sizeof *ROWS };
 
 #define NO_LIMIT(...)
-#define LIMIT(meaning, type, name, array, unit, low, high)                      {low, high},
-#define LIMIT_SETTING(meaning, type, name, array, unit, usual, low, high)       {low, high},
-#define LIMIT_PAPER(meaning, type, name, array, unit, usual, paper, low, high)  {low, high},
-#define LIMITS_OF(T, ...)                                                       __VA_ARGS__
+#define LIMIT(meaning, type, name, array, unit, low, high)                     {low, high},
+#define LIMIT_SETTING(meaning, type, name, array, unit, usual, low, high)      {low, high},
+#define LIMIT_PAPER(meaning, type, name, array, unit, usual, paper, low, high) {low, high},
+#define LIMITS_OF(T, ...)                                                      __VA_ARGS__
 static const limit LIMITS[] = {STRUCTS(LIMITS_OF, NO_LIMIT, LIMIT, LIMIT_SETTING, LIMIT_PAPER)};
 
 /* The words of all rows one after another: name, type, array, unit and meaning of each, a NUL after each.  Without
  * pointers to them the library needs no relocations. */
-#define STRING(x)                                        #x
-#define WORDS(name, type, array, unit, meaning)          name "\0" type "\0" array "\0" unit "\0" meaning
-#define MEMBER(meaning, type, name, array, ...)          MEMBER_OF_5(meaning, type, name, array, __VA_ARGS__, )
+#define STRING(x)                               #x
+#define WORDS(name, type, array, unit, meaning) name "\0" type "\0" array "\0" unit "\0" meaning
+#define MEMBER(meaning, type, name, array, ...) MEMBER_OF_5(meaning, type, name, array, __VA_ARGS__, )
 #define MEMBER_OF_5(meaning, type, name, array, unit, ...)                                                   \
     char name[sizeof WORDS(#name, #type, STRING(array), unit, meaning)];
-#define INIT(meaning, type, name, array, ...) INIT_OF_5(meaning, type, name, array, __VA_ARGS__, )
+#define INIT(meaning, type, name, array, ...)            INIT_OF_5(meaning, type, name, array, __VA_ARGS__, )
 #define INIT_OF_5(meaning, type, name, array, unit, ...) WORDS(#name, #type, STRING(array), unit, meaning),
 #define MEMBERS_OF(T, ...)                                                                                   \
     struct {                                                                                                 \
@@ -142,7 +142,7 @@ static double number(const gait_field *f, const void *values, size_t i)
     float single;
     double real;
     int32_t whole;
-    int64_t wide;
+    int64_t integer;
     switch (f->type[0]) {
     case 'f':
         memcpy(&single, at + i * sizeof single, sizeof single);
@@ -152,16 +152,16 @@ static double number(const gait_field *f, const void *values, size_t i)
         return real;
     default:
         if (strcmp(f->type, "int64_t") == 0) {
-            memcpy(&wide, at + i * sizeof wide, sizeof wide);
-            return (double)wide;
+            memcpy(&integer, at + i * sizeof integer, sizeof integer);
+            return (double)integer;
         }
         memcpy(&whole, at + i * sizeof whole, sizeof whole);
         return whole;
     }
 }
 
-static gait_result check_field(const gait_field *f, const void *values, double low, double high, const char *what,
-                               gait_error *err)
+static gait_result check_field(const gait_field *f, const void *values, double low, double high,
+                               const char *what, gait_error *err)
 {
     bool const single = f->type[0] == 'f', real = single || f->type[0] == 'd';
     size_t const each = single || strcmp(f->type, "int32_t") == 0 ? 4 : 8;
@@ -170,8 +170,8 @@ static gait_result check_field(const gait_field *f, const void *values, double l
         if (v >= low && v <= high) /* false for NaN */
             continue;
         return base_fail(err, real ? GAIT_ERR_ARG : GAIT_ERR_LIMIT, -1,
-                         real ? "%s%s = %g is outside [%g, %g]" : "%s%s = %.0f is outside [%.0f, %.0f]", what, f->name,
-                         v, low, high);
+                         real ? "%s%s = %g is outside [%g, %g]" : "%s%s = %.0f is outside [%.0f, %.0f]", what,
+                         f->name, v, low, high);
     }
     return GAIT_OK;
 }
@@ -185,7 +185,8 @@ gait_result fields_check(const char *of, const void *values, const char *what, g
     return s;
 }
 
-gait_result fields_check_sd(const char *of, const void *values, double most, const char *what, gait_error *err)
+gait_result fields_check_sd(const char *of, const void *values, double most, const char *what,
+                            gait_error *err)
 {
     gait_result s = GAIT_OK;
     for (cursor c = first_field(); s == GAIT_OK && next_field_of(&c, of);)
@@ -202,7 +203,7 @@ gait_result fields_check_size(const char *of, uint64_t struct_size, const char *
     if (end == struct_size && end >= LEAST)
         return GAIT_OK;
     if (struct_size > end)
-        return base_fail(err, GAIT_ERR_STRUCT, -1, "%s has %llu bytes, this library knows %llu: call %s()", of,
-                         (unsigned long long)struct_size, (unsigned long long)end, fill);
+        return base_fail(err, GAIT_ERR_STRUCT, -1, "%s has %llu bytes, this library knows %llu: call %s()",
+                         of, (unsigned long long)struct_size, (unsigned long long)end, fill);
     return base_fail(err, GAIT_ERR_STRUCT, -1, "%s was not filled by %s()", of, fill);
 }

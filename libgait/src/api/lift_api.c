@@ -54,11 +54,11 @@ static gait_result check_config(const gait_lift_config *c, gait_error *err)
     bool const perspective = c->projection == GAIT_LIFT_PERSPECTIVE;
     const char *const bad =
         !perspective && c->projection != GAIT_LIFT_ORTHOGRAPHIC ? "projection is none of GAIT_LIFT_*"
-        : c->stature_sd < 0.0 && c->stature_sd != -1.0          ? "stature_sd is neither -1 nor in [0, 1] metres"
-        : c->residual < 0.0 && c->residual != -1.0              ? "residual is neither -1 nor in [0, 10000]"
-        : c->heading_sd < 0.0 && c->heading_sd != -1.0          ? "heading_sd is neither -1 nor in [0, 10] radians"
-        : !cpu_mask_valid(c->cpu_mask)                          ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
-        : !perspective && !orthonormal(c->axis)                 ? "axis is not two unit vectors at right angles"
+        : c->stature_sd < 0.0 && c->stature_sd != -1.0 ? "stature_sd is neither -1 nor in [0, 1] metres"
+        : c->residual < 0.0 && c->residual != -1.0     ? "residual is neither -1 nor in [0, 10000]"
+        : c->heading_sd < 0.0 && c->heading_sd != -1.0 ? "heading_sd is neither -1 nor in [0, 10] radians"
+        : !cpu_mask_valid(c->cpu_mask)                 ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
+        : !perspective && !orthonormal(c->axis)        ? "axis is not two unit vectors at right angles"
         : perspective && !camera_valid(&c->camera)
             ? "camera is not valid: size, focal lengths and a rotation R are needed"
         : perspective && !near(c->camera.t) ? "camera is not within 10 km: t is in metres"
@@ -244,8 +244,8 @@ static void read_frame(const gait_lift *l, const segment_posterior *b, int32_t f
     const lift_table *const t = &l->table;
     size_t const J = (size_t)t->prior.markers, first = (size_t)f * J;
     double x[3 * GAIT_MAX_MARKERS], each[3 * GAIT_MAX_MARKERS];
-    lift_observations const seen = {.uv = l->uv + first * 2, .sd = l->sd + first};
-    lift_query const q = {.at = f, .count = t->prior.markers, .seen = residual ? &seen : NULL};
+    lift_observations const observed = {.uv = l->uv + first * 2, .sd = l->sd + first};
+    lift_query const q = {.at = f, .count = t->prior.markers, .seen = residual ? &observed : NULL};
     lift_read(t, b, &q, x, sd ? each : NULL);
     for (int32_t r = 0; r < q.count; r++) {
         size_t const to = 3 * (first + (size_t)t->order[r]);
@@ -342,7 +342,7 @@ gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err)
     l->windowed = false;
     l->fitted = lift_gain_fix(t, &l->gain, &l->posterior, sd);
     if (!l->fitted)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_fix: deviations out of any range");
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_fix: standard deviations out of any range");
     memcpy(l->uv, l->gain.base, points_of(t) * 2 * sizeof *l->uv);
     memcpy(l->sd, sd, points_of(t) * sizeof *l->sd);
     return GAIT_OK;
@@ -369,14 +369,14 @@ gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const 
     const lift_table *const t = &l->table;
     if (t->cfg.lag < 0)
         return base_fail(err, GAIT_ERR_STATE, -1,
-                         "gait_lift_push: config lag is -1: there is no room for a stream");
+                         "gait_lift_push: config lag is -1: there is no memory for a stream");
     if (utime < 0 || (l->stream.last >= 0 && utime <= l->stream.last))
         return base_fail(err, GAIT_ERR_STATE, -1,
                          "gait_lift_push: utime %lld does not follow %lld; gait_lift_reset() begins anew",
                          (long long)utime, (long long)l->stream.last);
-    lift_observations const seen = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
+    lift_observations const observed = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
     lifter_take(l, (size_t)t->prior.markers, uv, sd, l->stream.new_uv, l->stream.new_sd);
-    if (!lift_stream_push(t, &l->search, &l->stream, utime, &seen))
+    if (!lift_stream_push(t, &l->search, &l->stream, utime, &observed))
         return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_push: observations out of any range");
     return GAIT_OK;
 }
