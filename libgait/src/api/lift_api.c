@@ -190,7 +190,7 @@ gait_result gait_lift_segment(gait_lift *l, const double *uv, const double *sd, 
     memcpy(l->posterior.place, t->cfg.place, sizeof t->cfg.place);
     l->fitted = l->windowed = lift_fit(t, &l->search, &l->window, &l->posterior, &found);
     if (!l->fitted)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: observations out of any range");
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_segment: an observation is out of range");
     describe_fit(l, &found, out);
     return GAIT_OK;
 }
@@ -209,7 +209,7 @@ gait_result gait_lift_segment_robust(gait_lift *l, const double *uv, const doubl
         lift_fit_robust(t, &l->search, &l->window, &l->robust, &l->posterior, &found, &outliers);
     if (!l->fitted)
         return base_fail(err, GAIT_ERR_NUMERIC, -1,
-                         "gait_lift_segment_robust: observations out of any range");
+                         "gait_lift_segment_robust: an observation is out of range");
     memcpy(weighted, l->sd, points_of(t) * sizeof *weighted);
     describe_fit(l, &found, out);
     return GAIT_OK;

@@ -44,7 +44,7 @@ class LiftInfo:
 
 @dataclass(frozen=True)
 class Fit:
-    """What the observations of one segment say.
+    """Result of fitting one segment.
 
     Attributes
     ----------
@@ -180,12 +180,12 @@ class Lifter:
 
     def _observations(self, uv: ArrayLike, sd: ArrayLike | None, *shape: int) -> tuple[Array, Array | None]:
         """Check shapes (..., J, 2) and (..., J)."""
-        seen = np.ascontiguousarray(uv, np.float64)
-        if seen.shape != (*shape, 2):
-            raise ValueError(f"uv has shape {seen.shape} instead of {(*shape, 2)}")
+        points = np.ascontiguousarray(uv, np.float64)
+        if points.shape != (*shape, 2):
+            raise ValueError(f"uv has shape {points.shape} instead of {(*shape, 2)}")
         if sd is None:
-            return seen, None
-        return seen, np.ascontiguousarray(np.broadcast_to(np.asarray(sd, np.float64), shape))
+            return points, None
+        return points, np.ascontiguousarray(np.broadcast_to(np.asarray(sd, np.float64), shape))
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -201,13 +201,13 @@ class Lifter:
         sd : array_like that broadcasts to (F, J), optional
             Standard deviations in the same unit; the config's if left out.
         """
-        seen, deviations = self._observations(uv, sd, *self._shape)
+        points, sds = self._observations(uv, sd, *self._shape)
         c, error = abi.LiftFitC(), abi.Error()
         check(
             library().gait_lift_segment(
                 self._handle,
-                seen.ctypes.data,
-                deviations.ctypes.data if deviations is not None else None,
+                points.ctypes.data,
+                sds.ctypes.data if sds is not None else None,
                 ctypes.byref(c),
                 ctypes.byref(error),
             ),
@@ -224,13 +224,13 @@ class Lifter:
         weighted : (F, J)
             Standard deviations that count: larger than `sd` for outliers.
         """
-        seen, deviations = self._observations(uv, sd, *self._shape)
+        points, sds = self._observations(uv, sd, *self._shape)
         c, error, weighted = abi.LiftFitC(), abi.Error(), np.empty(self._shape)
         check(
             library().gait_lift_segment_robust(
                 self._handle,
-                seen.ctypes.data,
-                deviations.ctypes.data if deviations is not None else None,
+                points.ctypes.data,
+                sds.ctypes.data if sds is not None else None,
                 weighted.ctypes.data,
                 ctypes.byref(c),
                 ctypes.byref(error),
@@ -268,13 +268,14 @@ class Lifter:
         return mean, covariance
 
     def scale(self) -> float:
-        """By what to multiply deviations for a motion as far from the prior's mean as the last segment.
+        """Factor for standard deviations of a motion as far from the prior's mean as the last segment.
 
         Above 1 where its modes are larger than the prior expects, below 1 where they are smaller (the
-        likeliest scale of the modes' variances, with an inverse gamma prior).  Of a parallel view, heading
-        and size known, errors over deviations so multiplied are about Student's t of ten degrees: 90 % are
-        within 1.81.  With a camera the doubt about size and place is in the deviations as well and does not
-        shrink with the motion: do not multiply by less than 1.  Takes milliseconds; none after `fix`.
+        likeliest scale of the modes' variances, with an inverse gamma prior).  In an orthographic view,
+        with heading and size known, errors over standard deviations so scaled follow about Student's t of ten
+        degrees of freedom: 90 % are within 1.81.  With a camera the uncertainty of size and place is included
+        and does not shrink with the motion: do not multiply by less than 1.  Takes milliseconds; GaitError
+        after `fix`.
         """
         scale = ctypes.c_double()
         check(library().gait_lift_scale(self._handle, ctypes.byref(scale), None), words=FITTED)
@@ -292,9 +293,9 @@ class Lifter:
         Returns
         -------
         sd : (count,)
-            Their deviations over all markers and frames, metres, largest first.
+            Their standard deviations over all markers and frames, metres, largest first.
         modes : (count, F, J, 3)
-            The displacements, one deviation long.
+            The displacements, one standard deviation long.
         """
         most = library().gait_lift_unknowns(self._handle)
         if not 1 <= count <= most:
@@ -305,29 +306,29 @@ class Lifter:
         return sd, modes
 
     def fix(self, sd: ArrayLike) -> None:
-        """Compute the gain for segments with deviations `sd` (F, J): orthographic, config `heading_sd` 0."""
-        deviations, error = np.ascontiguousarray(np.broadcast_to(sd, self._shape), np.float64), abi.Error()
-        check(library().gait_lift_fix(self._handle, deviations.ctypes.data, ctypes.byref(error)), error)
+        """Compute the gain for segments with standard deviations `sd` (F, J): orthographic, config `heading_sd` 0."""
+        sds, error = np.ascontiguousarray(np.broadcast_to(sd, self._shape), np.float64), abi.Error()
+        check(library().gait_lift_fix(self._handle, sds.ctypes.data, ctypes.byref(error)), error)
 
     def batch(self, uv: ArrayLike) -> Array:
         """Lift segments (n, F, J, 2) by the gain of `fix`; posterior means (n, F, J, 3)."""
         count = len(np.asarray(uv))
-        seen, _ = self._observations(uv, None, count, *self._shape)
-        mean = np.empty((*seen.shape[:-1], 3))
-        status = library().gait_lift_batch(self._handle, count, seen.ctypes.data, mean.ctypes.data, None)
+        points, _ = self._observations(uv, None, count, *self._shape)
+        mean = np.empty((*points.shape[:-1], 3))
+        status = library().gait_lift_batch(self._handle, count, points.ctypes.data, mean.ctypes.data, None)
         check(status, words=GAIN)
         return mean
 
     def push(self, utime: int, uv: ArrayLike, sd: ArrayLike | None = None) -> None:
         """Add one frame to the stream: uv (J, 2), sd (J,); microseconds, increasing."""
-        seen, deviations = self._observations(uv, sd, self.info.markers)
+        points, sds = self._observations(uv, sd, self.info.markers)
         error = abi.Error()
         check(
             library().gait_lift_push(
                 self._handle,
                 utime,
-                seen.ctypes.data,
-                deviations.ctypes.data if deviations is not None else None,
+                points.ctypes.data,
+                sds.ctypes.data if sds is not None else None,
                 ctypes.byref(error),
             ),
             error,

@@ -175,14 +175,14 @@ class SegmentPrior:
         )
 
     def widened(self, factor: float) -> SegmentPrior:
-        """Prior with `factor` times the deviations from its mean, for motions it was not learnt from."""
+        """Prior with `factor` times the standard deviations about its mean, for motions it was not learnt from."""
         return replace(
             self, modes=factor * self.modes, sd=factor * self.sd, residual=factor**2 * self.residual
         )
 
 
 def _problem(sections: Mapping[str, Any]) -> str:
-    """Say what is wrong with the sections of a prior; '' if nothing is."""
+    """Describe what is wrong with the sections of a prior; '' if nothing is."""
     if sections["SGIN"].shape != (8,) or sections["SGRT"].shape != (8,):
         return "section SGIN or SGRT has not 8 entries"
     frames, hop, headings, components, size = sections["SGIN"][:5].tolist()
@@ -208,5 +208,5 @@ def _problem(sections: Mapping[str, Any]) -> str:
     if (weights <= 0).any() or abs(float(weights.sum()) - 1) > 1e-3:
         return "section SGWT holds weights that are not positive with sum 1"
     if (sections["SGSD"] < 0).any() or (sections["SGPS"] <= 0).any():
-        return "section SGSD or SGPS holds a deviation or variance below its range"
+        return "section SGSD or SGPS holds a standard deviation or variance below its range"
     return ""
