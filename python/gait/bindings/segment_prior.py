@@ -175,7 +175,7 @@ class SegmentPrior:
         )
 
     def widened(self, factor: float) -> SegmentPrior:
-        """Prior with `factor` times the standard deviations about its mean, for motions unlike those learnt."""
+        """Prior with `factor` times the standard deviations about its mean, for unlike motions."""
         return replace(
             self, modes=factor * self.modes, sd=factor * self.sd, residual=factor**2 * self.residual
         )
