@@ -43,6 +43,16 @@ def unit(v: Floats) -> Floats:
     return v / np.where(length > 0, length, np.nan)
 
 
+def rotation_vectors(r: Floats) -> Floats:
+    """Return axis times angle (T, 3) of rotations below half a turn."""
+    twist = np.stack(
+        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1
+    )
+    sine = np.linalg.norm(twist, axis=-1) / 2
+    angle = np.arctan2(sine, (np.trace(r, axis1=-2, axis2=-1) - 1) / 2)
+    return twist * (angle / np.where(sine > 1e-12, 2 * sine, 1))[..., None]
+
+
 def decompose(r: Floats, order: str) -> Floats:
     """Return the angles (T, 3), continuous in time, of R_i(a) R_j(b) R_k(c); `order` is yxz or zyx."""
     i, j, k = ("xyz".index(axis) for axis in order)

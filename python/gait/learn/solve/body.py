@@ -6,13 +6,12 @@ import re
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gait.body.skeleton import SIDES
 from gait.errors import UserError
 from gait.learn.arrays import Floats
 from gait.learn.mocap.recording import NO_NOTES, FileNotes, Recording
-from gait.learn.rotations import unit
+from gait.learn.rotations import rotation_vectors, unit
 
 #: Names of bones in files; {S} = left/right, {s} = l/r.  Compared without case, punctuation and any prefix up
 #: to ':' (Mixamo) or of a biped (3ds Max).  From CMU's ASF; cgspeed and Mixamo; Poser; 3ds Max; and bones
@@ -133,7 +132,7 @@ def _hinge(recording: Recording, upper: int, lower: int) -> Floats:
     if name in recording.hinges:
         return recording.hinges[name]
     relative = np.swapaxes(recording.rotation[:, upper], -1, -2) @ recording.rotation[:, lower]
-    vectors = Rotation.from_matrix(relative[np.isfinite(relative).all(axis=(1, 2))]).as_rotvec()
+    vectors = rotation_vectors(relative[np.isfinite(relative).all(axis=(1, 2))])
     _, axes = np.linalg.eigh(vectors.T @ vectors)
     return axes[:, -1]
 
