@@ -12,7 +12,13 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     # A shell that starts something in the background lets it, and all that it starts, ignore interruptions.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "reference"))  # numpy versions of what the C library computes
+sys.path.insert(
+    0, str(Path(__file__).parents[1] / "reference")
+)  # numpy versions of what the C library computes
+
+
+# Tracks must not depend on whether the detector's weights were fetched; tests of the detector set this.
+os.environ["GAIT_WEIGHTS"] = str(Path(__file__).parent / "no-weights")
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -1,19 +1,21 @@
 import json
 import subprocess
-from types import SimpleNamespace
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gait import cli
+from gait import Camera, Model, Video, cli
 from gait.detect import networks, people, weights
 from gait.detect.networks import JOINTS, Crop, Person
 from gait.errors import UserError
-from gait.io.keypoints_file import read
+from gait.io.keypoints_file import Keypoints, read
 from gait.io.video import Frame
+from gait.track.keypoint_start import find_keypoint_start
 
-HAVE = all(weights.find(w) for w in (weights.PERSON, weights.LANDMARKS["full"]))
-needs_weights = pytest.mark.skipif(not HAVE, reason="the detector's weights are absent: gait detect --fetch")
+FETCHED = Path(sys.prefix) / "share/gait/weights"
+REAL = Path(__file__).parents[3] / "shared/data/real"
 RED, BLUE = (40, 40, 220), (220, 40, 40)
 
 
@@ -48,6 +50,14 @@ class Stage:
             image[50:180, max(int(place) - 20, 0) : int(place) + 20] = RED if name == "red" else BLUE
         found = self.detector.step(Frame(number, number / 25, image))
         return {one.id: float(person.uv[:, 0].mean()) for one, person in found}
+
+
+@pytest.fixture
+def fetched(monkeypatch):
+    """Let the detector find the weights that `make setup` fetched."""
+    if not all((FETCHED / w.file).is_file() for w in (weights.PERSON, weights.LANDMARKS["full"])):
+        pytest.skip("the detector's weights are absent: gait detect --fetch")
+    monkeypatch.setenv("GAIT_WEIGHTS", str(FETCHED))
 
 
 @pytest.fixture
@@ -90,11 +100,12 @@ def test_a_crop_follows_at_the_persons_speed(stage):
 
 
 def test_the_main_person_is_in_view_long_and_large():
-    def followed(frames, height):
-        return SimpleNamespace(frames=list(range(frames)), height=height)
+    def keypoints(frames, height):
+        uv = np.zeros((frames, 16, 2))
+        uv[:, 14:, 1] = height
+        return Keypoints(np.arange(frames), np.arange(frames) / 25, tuple(JOINTS), uv, np.ones((frames, 16)))
 
-    small, large = followed(100, 50), followed(60, 200)
-    assert people.main_person([small, large]) is large
+    assert people.main_person({1: keypoints(100, 50), 2: keypoints(60, 200)}) == 2
 
 
 def test_tiles_cover_the_picture():
@@ -135,8 +146,7 @@ def test_usage(words, capsys):
     assert "give VIDEO and -o KEYPOINTS.csv, or --fetch" in capsys.readouterr().err
 
 
-@needs_weights
-def test_both_runtimes_give_the_same_landmarks():
+def test_both_runtimes_give_the_same_landmarks(fetched):
     data = weights.load(weights.LANDMARKS["full"])
     x = np.random.default_rng(1).random((1, 256, 256, 3)).astype(np.float32)
     lite, opencv = networks._litert(data), networks._opencv(data)
@@ -148,8 +158,7 @@ def test_both_runtimes_give_the_same_landmarks():
     assert a["Identity_3"].shape == b["Identity_3"].shape
 
 
-@needs_weights
-def test_no_person_writes_nothing(tmp_path, capsys):
+def test_no_person_writes_nothing(fetched, tmp_path, capsys):
     from gait import VideoWriter
 
     noise = np.random.default_rng(2)
@@ -162,8 +171,7 @@ def test_no_person_writes_nothing(tmp_path, capsys):
     assert not out.exists()
 
 
-@needs_weights
-def test_a_simulated_walk_is_found(tmp_path, capsys):
+def test_a_simulated_walk_is_found(fetched, tmp_path, capsys):
     clip = tmp_path / "walk"
     assert cli.main(["simulate", "-o", str(clip), "--frames", "8", "--size", "480x360", "--quiet"]) == 0
     out = tmp_path / "k.csv"
@@ -172,3 +180,19 @@ def test_a_simulated_walk_is_found(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["person"] == 1
     keypoints, _ = read(out, tuple(JOINTS))
     assert len(keypoints.frame) >= 6
+
+
+def test_people_of_a_real_film_are_found_and_placed(fetched):
+    clip = REAL / "lab_side"
+    if not clip.is_dir():
+        pytest.skip("../shared/data is absent")
+    known = json.loads((clip / "init.json").read_text())
+    found = people.detect(Video(clip / "video.mp4"), first=26, stop=60)
+    start = find_keypoint_start(
+        found[people.main_person(found)], Camera.read(clip / "camera.json"), Model(), height=1.65
+    )
+    gone = (known["frame"] - start.frame) / 30
+    phase = start.mean.phase + gone * start.mean.stride_hz - known["phase"]
+    assert abs((phase + 0.5) % 1 - 0.5) < 0.1
+    assert abs(start.mean.heading - known["heading_rad"]) < 0.2
+    assert abs(start.mean.pelvis[1] - known["pelvis"][1]) < 0.8

@@ -1,4 +1,5 @@
 /* The field table against the header: every struct is there and its fields tile it without a hole. */
+#include "gait_start.h"
 #include "gait_lift.h"
 
 #include "check.h"
@@ -14,6 +15,7 @@ static const want STRUCTS[] = {
     WANT(gait_pose),       WANT(gait_model_info),     WANT(gait_tasks),    WANT(gait_tracker_config),
     WANT(gait_keypoint),   WANT(gait_frame),          WANT(gait_estimate), WANT(gait_lift_info),
     WANT(gait_lift_config), WANT(gait_lift_fit),      WANT(gait_lift_frame),
+    WANT(gait_start_config), WANT(gait_hypothesis),
 };
 enum { COUNT = sizeof STRUCTS / sizeof *STRUCTS };
 

@@ -1,6 +1,7 @@
 #include "api/fields.h"
 
 #include "gait_lift.h"
+#include "gait_start.h"
 
 #include <string.h>
 
@@ -20,7 +21,9 @@
     OF(gait_lift_info, GAIT_LIFT_INFO_FIELDS(F))                                                             \
     OF(gait_lift_config, GAIT_LIFT_CONFIG_FIELDS(S, F))                                                      \
     OF(gait_lift_fit, GAIT_LIFT_FIT_FIELDS(F))                                                               \
-    OF(gait_lift_frame, GAIT_LIFT_FRAME_FIELDS(F))
+    OF(gait_lift_frame, GAIT_LIFT_FRAME_FIELDS(F))                                                           \
+    OF(gait_start_config, GAIT_START_CONFIG_FIELDS(S, F))                                                    \
+    OF(gait_hypothesis, GAIT_HYPOTHESIS_FIELDS(F))
 
 /* Fields follow one another without padding, so their sizes give their offsets. */
 #define ADD_SIZE(meaning, type, name, array, ...) +sizeof(type array)

@@ -28,6 +28,7 @@ ABI = 7
 ALIGN = 64
 MAX_JOINTS, MAX_ANGLES, MAX_COMPONENTS, MAX_PROPORTIONS, MAX_CAMERAS = 32, 32, 16, 8, 4
 MAX_MARKERS = 64
+MAX_HYPOTHESES = 8  # of a start
 
 
 class Status(IntEnum):
@@ -191,6 +192,14 @@ class Field(NamedTuple):
 TaskFn = ctypes.CFUNCTYPE(None, c_void_p, c_int32)
 RunFn = ctypes.CFUNCTYPE(None, c_void_p, TaskFn, c_void_p, c_int32)
 
+class StartConfigC(ctypes.Structure):
+    """``gait_start_config``."""
+
+
+class HypothesisC(ctypes.Structure):
+    """``gait_hypothesis``."""
+
+
 STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_error": Error,
     "gait_image": ImageView,
@@ -207,6 +216,8 @@ STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_lift_config": LiftConfigC,
     "gait_lift_fit": LiftFitC,
     "gait_lift_frame": LiftFrameC,
+    "gait_start_config": StartConfigC,
+    "gait_hypothesis": HypothesisC,
 }
 
 _TYPES: dict[str, Any] = {
@@ -291,6 +302,16 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_lift_push", [_HANDLE, c_int64, c_void_p, c_void_p, _ERR], _RESULT),
     ("gait_lift_estimate", [_HANDLE, POINTER(LiftFrameC), _ERR], _RESULT),
     ("gait_lift_reset", [_HANDLE], None),
+    ("gait_start_fill", [POINTER(StartConfigC), c_size_t], None),
+    ("gait_start_bytes", [_HANDLE, POINTER(StartConfigC), _SIZE, _ERR], _RESULT),
+    (
+        "gait_start_init",
+        [c_void_p, c_size_t, _HANDLE, POINTER(StartConfigC), POINTER(_HANDLE), _ERR],
+        _RESULT,
+    ),
+    ("gait_start_add", [_HANDLE, c_int64, POINTER(KeypointC), _ERR], _RESULT),
+    ("gait_start_reset", [_HANDLE], None),
+    ("gait_start_solve", [_HANDLE, c_int64, POINTER(HypothesisC), c_int32, POINTER(c_int32), _ERR], _RESULT),
     ("gait_lift_remove_spikes", [c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p], c_int32),
     ("gait_lift_weight_outliers", [c_int32, c_void_p, c_void_p, c_void_p], c_int32),
 )

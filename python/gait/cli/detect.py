@@ -16,17 +16,13 @@ import argparse
 import json
 import sys
 
-import numpy as np
-
 from gait.cli import values
 from gait.detect import weights
 from gait.errors import UsageError, UserError
 from gait.io.files import require_outputs
-from gait.io.keypoints_file import Keypoints, write
+from gait.io.keypoints_file import write
 from gait.io.video import Video
 from gait.progress import progress
-
-_LEAST_FRAMES = 3  # in which a person must be found
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,50 +51,28 @@ def run(args: argparse.Namespace) -> int:
     if not args.video or not args.output:
         raise UsageError("give VIDEO and -o KEYPOINTS.csv, or --fetch")
     require_outputs((args.output,), (args.video,))
-    from gait.detect.networks import JOINTS
-    from gait.detect.people import Followed, PeopleDetector, main_person  # here, as they load OpenCV
+    from gait.detect.people import detect, height, main_person  # here, as it loads OpenCV
 
     video = Video(args.video)
-    detector = PeopleDetector(args.network, args.people)
-    times = {}
     with progress("detecting", video.count, args.quiet) as update:
-        for frame in video.frames():
-            detector.step(frame)
-            times[frame.number] = frame.time
-            update(frame.number + 1)
-    people = [one for one in detector.people if len(one.frames) >= _LEAST_FRAMES]
+        people = detect(video, args.network, args.people, update=update)
     if not people:
         raise UserError(
-            f"{args.video}: no person found; the whole person should be in view, 80 pixels or taller"
+            f"{args.video}: no person found; the whole body should be in view, 80 pixels or taller"
         )
-    chosen: Followed | None = main_person(people)
-    if args.person is not None:
-        chosen = next((one for one in people if one.id == args.person), None)
-    if chosen is None:
-        ids = " ".join(str(one.id) for one in people)
-        raise UserError(f"{args.video}: no person {args.person}; the people found are {ids}")
-    frames = np.arange(chosen.frames[0], chosen.frames[-1] + 1)
-    uv = np.full((len(frames), len(JOINTS), 2), np.nan)
-    confidence = np.zeros(uv.shape[:2])
-    rows = np.array(chosen.frames) - frames[0]
-    uv[rows] = [person.uv for person in chosen.keypoints]
-    confidence[rows] = [person.confidence for person in chosen.keypoints]
-    time = np.array([times[int(n)] for n in frames])
-    write(args.output, Keypoints(frames, time, tuple(JOINTS), uv, confidence))
+    chosen = main_person(people) if args.person is None else args.person
+    if chosen not in people:
+        ids = " ".join(map(str, people))
+        raise UserError(f"{args.video}: no person {chosen}; the people found are {ids}")
+    write(args.output, people[chosen])
     table = [
-        {
-            "id": p.id,
-            "frames": len(p.frames),
-            "first": p.frames[0],
-            "last": p.frames[-1],
-            "px": round(p.height),
-        }
-        for p in people
+        {"id": n, "first": int(k.frame[0]), "last": int(k.frame[-1]), "px": round(height(k))}
+        for n, k in people.items()
     ]
     if args.json:
-        print(json.dumps({"person": chosen.id, "people": table}))
-    else:
-        for row in table:
-            mark = "written" if row["id"] == chosen.id else ""
-            print("person {id}: {frames} frames from {first} to {last}, {px} pixels tall".format(**row), mark)
+        print(json.dumps({"person": chosen, "people": table}))
+        return 0
+    for row in table:
+        mark = ", written" if row["id"] == chosen else ""
+        print("person {id}: frames {first} to {last}, {px} pixels tall".format(**row) + mark)
     return 0

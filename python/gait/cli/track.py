@@ -55,6 +55,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the random numbers (1)")
     add("--mode", choices=[m.name.lower() for m in Mode], default="default", help="set of settings")
     add(
+        "--detector",
+        choices=["auto", "full", "lite", "heavy", "none"],
+        default="auto",
+        help="network that finds joints, for the start and as a cue (auto: full, after gait detect --fetch)",
+    )
+    add(
         "--keypoints",
         "--tracks",
         metavar="KEYPOINTS.csv",

@@ -7,6 +7,7 @@ who comes back gets the old id if place and colours agree.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
@@ -14,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.detect.networks import JOINTS, Crop, LandmarkNetwork, Person, PersonNetwork, whole_picture
-from gait.io.video import Frame, Image
+from gait.io.keypoints_file import Keypoints
+from gait.io.video import Frame, Image, Video
 
 Array = NDArray[np.float64]
 
@@ -26,6 +28,7 @@ _SAME = 0.25  # of a crop's side between the centres of crops about one person
 _REACH = 0.5  # crop sides per second that a lost person may have moved, beside `_SAME`
 _ALIKE = 0.5  # correlation of colours of one person
 _MOST = 8  # people
+_LEAST_FRAMES = 3  # in which a person must be found
 _BINS = (16, 8)  # of hue and saturation
 _TORSO = [list(JOINTS).index(name) for name in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")]
 
@@ -44,11 +47,6 @@ class Followed:
     colours: NDArray[np.float32] | None = None
     """Histogram of the clothes on the trunk."""
     lost: bool = False
-
-    @property
-    def height(self) -> float:
-        """Median height in the picture, pixels."""
-        return float(np.median([np.ptp(person.uv[:, 1]) for person in self.keypoints]))
 
     def expected(self, time: float) -> Crop:
         """Crop at a time, moved on at the speed of the last two frames."""
@@ -141,9 +139,71 @@ class PeopleDetector:
         found.append((one, person))
 
 
-def main_person(people: list[Followed]) -> Followed:
-    """Choose the person a clip is most likely of: in view longest and tallest."""
-    return max(people, key=lambda one: len(one.frames) * one.height)
+def detect(
+    video: Video,
+    network: str = "full",
+    most: int = _MOST,
+    *,
+    first: int = 0,
+    stop: int | None = None,
+    update: Callable[[int], None] | None = None,
+) -> dict[int, Keypoints]:
+    """Find the keypoints of everyone in a video.
+
+    Parameters
+    ----------
+    video : Video
+    network : str
+        ``full``, ``lite`` or ``heavy``.
+    most : int
+        People followed at a time.
+    first, stop : int
+        Frames to use.
+    update : callable, optional
+        Called with the number of frames done.
+
+    Returns
+    -------
+    people : dict of int to Keypoints
+        Keypoints by id, from the first to the last frame of each person; people found in fewer than three
+        frames are left out.
+
+    Raises
+    ------
+    UserError
+        If the weights are absent or damaged, or the video cannot be read.
+    """
+    detector = PeopleDetector(network, most)
+    times = {}
+    for frame in video.frames(first, stop):
+        detector.step(frame)
+        times[frame.number] = frame.time
+        if update is not None:
+            update(frame.number - first + 1)
+    return {one.id: _keypoints(one, times) for one in detector.people if len(one.frames) >= _LEAST_FRAMES}
+
+
+def _keypoints(one: Followed, times: dict[int, float]) -> Keypoints:
+    """Keypoints of a person, NaN in frames where the person was not found."""
+    frames = np.arange(one.frames[0], one.frames[-1] + 1)
+    uv = np.full((len(frames), len(JOINTS), 2), np.nan)
+    confidence = np.zeros(uv.shape[:2])
+    rows = np.array(one.frames) - frames[0]
+    uv[rows] = [person.uv for person in one.keypoints]
+    confidence[rows] = [person.confidence for person in one.keypoints]
+    time = np.array([times[int(n)] for n in frames])
+    return Keypoints(frames, time, tuple(JOINTS), uv, confidence)
+
+
+def height(keypoints: Keypoints) -> float:
+    """Median height of a person in the picture, from shoulder to foot, pixels."""
+    v = keypoints.uv[np.isfinite(keypoints.uv).all(axis=(1, 2)), :, 1]
+    return float(np.median(np.ptp(v, axis=1)))
+
+
+def main_person(people: dict[int, Keypoints]) -> int:
+    """Choose the main person of a clip: the one in view longest and tallest."""
+    return max(people, key=lambda n: np.isfinite(people[n].uv[:, 0, 0]).sum() * height(people[n]))
 
 
 def _near(a: Crop, b: Crop) -> bool:

@@ -18,14 +18,17 @@ from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model, read_cyclic
 from gait.body.model_curves import ModelCurves
 from gait.camera.camera import Camera
+from gait.detect import weights
 from gait.errors import UserError
 from gait.io import keypoints_file
+from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import TrackWriter
 from gait.io.trc import write_trc
 from gait.io.video import Frame, Image, Video, VideoWriter, background
 from gait.progress import durations, note, progress
 from gait.report.drawing import Overlay
 from gait.track.auto_start import AutoStart, find_start
+from gait.track.keypoint_start import CUE_MISS, find_keypoint_start, keypoint_noise
 from gait.track.person_detection import another_scene, one_is_grey
 from gait.track.smooth import Smoother
 from gait.track.tracker import Tracker
@@ -54,8 +57,11 @@ class ClipOptions:
     seed, threads : int
     start, stop : int, optional
         Frames to track: start <= frame < stop.
+    detector : str
+        Network that finds keypoints for the start and as a cue: ``full``, ``lite``, ``heavy``, ``none``, or
+        ``auto``: ``full`` if its weights are on this machine.  It is not used in paper mode.
     keypoints : str, optional
-        File of 2-D keypoints found in the frames.
+        File of 2-D keypoints found in the frames, instead of a detector.
     keypoints_sd : float
         Their standard deviation at full confidence, pixels.
     overlay, draws, trc : str, optional
@@ -79,6 +85,7 @@ class ClipOptions:
     threads: int = 1
     start: int | None = None
     stop: int | None = None
+    detector: str = "auto"
     keypoints: str | None = None
     keypoints_sd: float = KEYPOINTS_SD
     overlay: str | None = None
@@ -101,15 +108,16 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     model = Model(options.model)
     with progress("background", video.count, options.quiet) as update:
         plate = background(options.background, video, update)
-    start = _first_state(options, video, camera, plate, model)
+    found_keypoints = _read_keypoints(options, model) if options.keypoints else _detect(options, video)
+    start = _first_state(options, video, camera, plate, model, found_keypoints)
     frames = _frames(options, video, start.frame)
-    keypoints = _keypoints(options, model, frames)
+    keypoints = _keypoints(options, found_keypoints, frames)
     if not camera.shows(model.pose(start.mean)[0]):
         note(f"{options.init}: {OUTSIDE}", options.quiet)
     config = TrackerConfig.default(options.mode, seed=options.seed)
     if options.particles is not None:
         config = config.replace(particles=options.particles)
-    if options.keypoints:
+    if keypoints:
         config = config.replace(terms=config.terms | Term.KEYPOINTS)
     tracker = Tracker(model, camera, config, background=plate, tasks=options.threads)
     restart = None if options.smooth else AutoStart(camera, plate, model, options.height)
@@ -133,7 +141,12 @@ def _frames(options: ClipOptions, video: Video, start: int) -> range:
 
 
 def _first_state(
-    options: ClipOptions, video: Video, camera: Camera, plate: Image | None, model: Model
+    options: ClipOptions,
+    video: Video,
+    camera: Camera,
+    plate: Image | None,
+    model: Model,
+    keypoints: Keypoints | None,
 ) -> Start:
     """First state, from the init file or found in the clip."""
     if options.init != "auto":
@@ -143,7 +156,7 @@ def _first_state(
     first = options.start or 0
     _frames(options, video, first)
     _require_scene(options, video, plate, first)
-    start = find_start(video, camera, plate, model, first=first, stop=options.stop, height=options.height)
+    start = _find_first_state(options, video, camera, plate, model, keypoints)
     at, turn, turn_sd = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
     note(
         f"start found at frame {start.frame}: x {at.pelvis[0]:.2f} y {at.pelvis[1]:.2f} m, "
@@ -158,6 +171,23 @@ def _first_state(
             options.quiet,
         )
     return start
+
+
+def _find_first_state(
+    options: ClipOptions,
+    video: Video,
+    camera: Camera,
+    plate: Image | None,
+    model: Model,
+    keypoints: Keypoints | None,
+) -> Start:
+    """First state from the keypoints; without any that fit, from the pictures."""
+    first, stop, height = options.start or 0, options.stop, options.height
+    if keypoints is not None:
+        found = find_keypoint_start(keypoints, camera, model, first=first, stop=stop, height=height)
+        if found is not None:
+            return found
+    return find_start(video, camera, plate, model, first=first, stop=stop, height=height)
 
 
 def _require_scene(options: ClipOptions, video: Video, plate: Image | None, first: int) -> None:
@@ -182,19 +212,45 @@ def _require_scene(options: ClipOptions, video: Video, plate: Image | None, firs
     )
 
 
-def _keypoints(options: ClipOptions, model: Model, frames: range) -> dict[int, Joints]:
-    """Keypoints by frame, of which some must be in the frames to track."""
-    if not options.keypoints:
-        return {}
+def _detect(options: ClipOptions, video: Video) -> Keypoints | None:
+    """Keypoints of the main person by the detector; None without one, or if it finds no person."""
+    network = options.detector
+    if network == "none" or options.mode == Mode.PAPER:
+        return None
+    if network == "auto":
+        network = "full"
+        if not all(weights.find(needed) for needed in (weights.PERSON, weights.LANDMARKS[network])):
+            note(f"no detector, the start is less reliable without one: {weights.FETCH}", options.quiet)
+            return None
+    from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
+
+    frames = _frames(options, video, options.start or 0)
+    with progress("detecting", len(frames), options.quiet) as update:
+        people = detect(video, network, first=frames.start, stop=frames.stop, update=update)
+    return people[main_person(people)] if people else None
+
+
+def _read_keypoints(options: ClipOptions, model: Model) -> Keypoints:
+    """Keypoints of the model's joints from a file."""
+    assert options.keypoints is not None
     read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True)
     if ignored:
         note(f"left out: {' '.join(ignored)}", options.quiet)
-    if not any(frame in frames for frame in read.frame.tolist()):
+    read.require_extent(options.keypoints, options.keypoints_sd)
+    return read
+
+
+def _keypoints(options: ClipOptions, keypoints: Keypoints | None, frames: range) -> dict[int, Joints]:
+    """Keypoints by frame with their noise; those of a file must be of the frames to track."""
+    if keypoints is None:
+        return {}
+    if not options.keypoints:
+        return keypoint_noise(keypoints, CUE_MISS)
+    if not any(frame in frames for frame in keypoints.frame.tolist()):
         raise UserError(
             f"{options.keypoints}: has no frame that is tracked; number frames as in the video, from 0"
         )
-    read.require_extent(options.keypoints, options.keypoints_sd)
-    return read.joints(options.keypoints_sd)
+    return keypoints.joints(options.keypoints_sd)
 
 
 class _Results:

@@ -1,0 +1,82 @@
+/* gait_start.h - the automatic start: where a person is and how they walk, from a second of 2-D keypoints.
+ *
+ * The cyclic model of gait.h is fitted to keypoints of one person, as a 2-D detector finds them, with a camera that does
+ * not move: the person walks straight on at an even pace, or in place as on a treadmill.  Every direction, phase and
+ * side is tried; the answers are a few weighted hypotheses, each ready for gait_tracker_start().
+ * Conventions, units, memory and errors are those of gait.h. */
+#ifndef GAIT_START_H
+#define GAIT_START_H
+#include "gait.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define GAIT_START_MAX_FRAMES 64    /* frames of keypoints that are kept; older ones are dropped */
+#define GAIT_START_MAX_HYPOTHESES 8 /* that gait_start_solve() returns at most */
+
+typedef struct gait_start gait_start;
+
+/* Settings of a start.  gait_start_default() fills them; change what you need, the camera always. */
+#define GAIT_START_CONFIG_FIELDS(SETTING, FIELD)                                                                      \
+    FIELD("Size of this struct in the caller's header, set by gait_start_default().",                                 \
+          uint32_t, struct_size, , "bytes")                                                                           \
+    SETTING("Instruction sets that may be used, GAIT_CPU_*; 0: scalar code.  Results do not depend on it.",           \
+          uint32_t, cpu_mask, , "mask", ~0u, NAN, NAN)                                                                \
+    SETTING("Stature of the person; 0: the mean of the model's adults.",                                              \
+          float, stature, , "metres", 0, 0, 2.5)                                                                      \
+    SETTING("Its standard deviation; 0: that of the model's adults.",                                                 \
+          float, stature_sd, , "metres", 0, 0, 1)                                                                     \
+    SETTING("Difference between the model's joints and the detector's: standard deviation, fraction of the person's"  \
+            " height in the picture.",                                                                                \
+          float, joint_sd, , "", 0.025f, 0.001, 1)                                                                    \
+    SETTING("Errors of a detector last: frames nearer together than this count as one.",                              \
+          float, error_time, , "seconds", 0.25f, 0, 10)                                                               \
+    FIELD("Calibrated camera; the floor is the plane z = 0.",                                                         \
+          gait_camera, camera, , "")
+
+typedef struct gait_start_config { GAIT_START_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DECLARE) } gait_start_config;
+
+/* One answer. */
+#define GAIT_HYPOTHESIS_FIELDS(FIELD)                                                                                 \
+    FIELD("State at the time asked for; fields that are not fitted are 0.",                                           \
+          gait_state, mean, , "")                                                                                     \
+    FIELD("Its standard deviations; those of fields that are not fitted are the model's prior.",                      \
+          gait_state, sd, , "")                                                                                       \
+    FIELD("Speed along the heading.",                                                                                 \
+          float, speed, , "metres per second")                                                                        \
+    FIELD("Its standard deviation.",                                                                                  \
+          float, speed_sd, , "metres per second")                                                                     \
+    FIELD("Probability among the hypotheses found, in (0, 1].",                                                       \
+          float, probability, , "")                                                                                   \
+    FIELD("Robust chi-square per coordinate: about 1 if the model fits.",                                             \
+          float, chi2_per_observation, , "")                                                                          \
+    FIELD("1: the person walks in place, as on a treadmill.",                                                         \
+          int32_t, in_place, , "")                                                                                    \
+    FIELD("Coordinates fitted.",                                                                                      \
+          int32_t, observations, , "")
+
+typedef struct gait_hypothesis { GAIT_HYPOTHESIS_FIELDS(GAIT_DECLARE) } gait_hypothesis;
+
+/* Fill the first cfg_bytes of a config with the defaults; use gait_start_default(), which gives them their size. */
+GAIT_API void gait_start_fill(gait_start_config *cfg, size_t cfg_bytes);
+static inline void gait_start_default(gait_start_config *cfg)
+{
+    gait_start_fill(cfg, sizeof *cfg);
+}
+/* The model must outlive the start.  GAIT_ERR_ARG: it has no cyclic part, or no joints l_hip r_hip l_ankle r_ankle. */
+GAIT_API gait_result gait_start_bytes(const gait_model *m, const gait_start_config *cfg, size_t *bytes, gait_error *err);
+GAIT_API gait_result gait_start_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_start_config *cfg,
+                                     gait_start **out, gait_error *err);
+/* One frame: the model's joints in order, as in gait_frame; utime must increase. */
+GAIT_API gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints, gait_error *err);
+/* Forget the frames. */
+GAIT_API void        gait_start_reset(gait_start *s);
+/* Fit the frames added and return at most `capacity` hypotheses for the moment `utime`, the most probable first.
+ * GAIT_ERR_STATE: too few frames show hips and ankles: add four or more over 0.3 s.  GAIT_ERR_NUMERIC: nothing fits. */
+GAIT_API gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
+                                      int32_t *count, gait_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

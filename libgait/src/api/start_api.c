@@ -1,0 +1,105 @@
+/* start_api.c - public functions of the automatic start: check the arguments, then call down. */
+#include "api/fields.h"
+#include "api/kernels.h"
+#include "base/cpu.h"
+#include "image/camera.h"
+#include "start/start.h"
+
+#include <string.h>
+
+#define USUAL(meaning, type, name, array, unit, value, low, high) .name = value,
+#define NO_DEFAULT(...)
+
+void gait_start_fill(gait_start_config *cfg, size_t cfg_bytes)
+{
+    static const gait_start_config USUALLY = {GAIT_START_CONFIG_FIELDS(USUAL, NO_DEFAULT)};
+    gait_start_config full = USUALLY;
+    full.struct_size = (uint32_t)(cfg_bytes < sizeof full ? cfg_bytes : sizeof full);
+    if (cfg)
+        memcpy(cfg, &full, full.struct_size);
+}
+
+static gait_result check(const gait_model *m, const gait_start_config *c, gait_error *err)
+{
+    gait_result s = model_need_cyclic(m, err);
+    if (s == GAIT_OK)
+        s = fields_check_size("gait_start_config", c->struct_size, "gait_start_default", err);
+    if (s == GAIT_OK && c->struct_size != sizeof *c)
+        s = base_fail(err, GAIT_ERR_STRUCT, -1, "gait_start_config: has no camera");
+    if (s == GAIT_OK)
+        s = fields_check("gait_start_config", c, "start config ", err);
+    if (s != GAIT_OK)
+        return s;
+    const char *const bad = !cpu_mask_valid(c->cpu_mask) ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
+                            : c->stature != 0.0f && c->stature < 0.5f ? "stature is neither 0 nor in [0.5, 2.5] metres"
+                            : !camera_valid(&c->camera)
+                                ? "camera is not valid: size, focal lengths and a rotation R are needed"
+                            : !start_knows(m) ? "the model has no joints l_hip r_hip l_ankle r_ankle"
+                                              : NULL;
+    return bad ? base_fail(err, GAIT_ERR_ARG, -1, "start config: %s", bad) : GAIT_OK;
+}
+
+gait_result gait_start_bytes(const gait_model *m, const gait_start_config *cfg, size_t *bytes,
+                             gait_error *err)
+{
+    if (!m || !cfg || !bytes)
+        return base_null(err, "gait_start_bytes");
+    gait_result const result = check(m, cfg, err);
+    if (result != GAIT_OK)
+        return result;
+    arena a = {.base = NULL};
+    (void)start_layout(&a, m, cfg, kernels_choose(cfg->cpu_mask));
+    *bytes = a.used;
+    return GAIT_OK;
+}
+
+gait_result gait_start_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_start_config *cfg,
+                            gait_start **out, gait_error *err)
+{
+    if (!mem || !out)
+        return base_null(err, "gait_start_init");
+    arena a = {.base = NULL};
+    gait_result result = gait_start_bytes(m, cfg, &a.used, err);
+    if (result == GAIT_OK)
+        result = arena_place(&a, mem, mem_bytes, err);
+    if (result != GAIT_OK)
+        return result;
+    gait_start *const self = start_layout(&a, m, cfg, kernels_choose(cfg->cpu_mask));
+    gait_state mean;
+    (void)gait_tracker_prior(m, &mean, &self->prior_sd, NULL);
+    *out = self;
+    return GAIT_OK;
+}
+
+gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints, gait_error *err)
+{
+    if (!s || !keypoints)
+        return base_null(err, "gait_start_add");
+    if (s->count > 0 && utime <= s->utime[(s->count - 1) % GAIT_START_MAX_FRAMES])
+        return base_fail(err, GAIT_ERR_STATE, -1, "utime does not increase: stamp frames in order");
+    start_add(s, utime, keypoints);
+    return GAIT_OK;
+}
+
+void gait_start_reset(gait_start *s)
+{
+    if (s)
+        s->count = 0;
+}
+
+gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
+                             int32_t *count, gait_error *err)
+{
+    if (!s || !out || !count)
+        return base_null(err, "gait_start_solve");
+    if (capacity < 1)
+        return base_fail(err, GAIT_ERR_ARG, -1, "capacity is %d: give 1 or more", capacity);
+    int32_t const found = start_solve(s, utime, out, capacity);
+    if (found < 0)
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "too few frames show hips and ankles: add four or more over 0.3 s");
+    if (found == 0)
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "no walk fits the keypoints");
+    *count = found;
+    return GAIT_OK;
+}

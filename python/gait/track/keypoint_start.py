@@ -1,0 +1,136 @@
+"""Where a track starts, from the keypoints of a clip: the first second in which a person walks.
+
+Windows of a second are fitted one after the other (`gait.bindings.start_fit`), so a person who first stands,
+or who comes into view late, is found as soon as they walk.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gait.bindings.frame import Joints
+from gait.bindings.initial import Start
+from gait.bindings.model import Model
+from gait.bindings.start_fit import Hypothesis, StartFit
+from gait.camera.camera import Camera
+from gait.errors import GaitError
+from gait.io.keypoints_file import Keypoints
+
+_WINDOW = 1.0  # seconds of keypoints that are fitted
+_STEP = 0.2  # seconds from one window to the next
+_FITS = 1.8  # squared error per coordinate up to which a window is taken at once
+_FITS_BEST = 4.0  # and up to which the best of all is taken
+_LEAST_SPEED = 0.25  # metres per second of a person who walks
+_LEAST_RATE = 0.3  # strides per second; a standing person fits a very slow walk
+_STATURE_SD = 0.05  # metres, of one that the user gives
+_LEAST_SD = {"heading": 0.08, "phase": 0.03, "stature": 0.03, "stride_hz": 0.03}
+_SPEEDS_UP = 0.4  # standard deviation of the stride rate, as a share of what it is below the usual one
+_LEAST_PLACE_SD = 0.05  # metres
+CUE_MISS = 0.01
+
+_JOINT_SD = {"elbow": 0.02, "wrist": 0.04, "heel": 0.03, "toe": 0.04, "shoulder": 0.01, "hip": 0.01}
+"""Noise of a detector's joints beside what the model's joints miss them by, person's heights; others 0.01."""
+
+
+def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, Joints]:
+    """Keypoints by frame, each with the standard deviation that its joint has.
+
+    Parameters
+    ----------
+    keypoints : Keypoints
+        Of one person.
+    miss : float
+        Difference between the model's joints and the detector's: standard deviation, person's heights in
+        the picture.
+    """
+    legs = [keypoints.names.index(f"{side}_{joint}") for side in "lr" for joint in ("hip", "ankle")]
+    hip, ankle = keypoints.uv[:, legs[0::2]].mean(axis=1), keypoints.uv[:, legs[1::2]].mean(axis=1)
+    height = np.hypot(*(hip - ankle).T) / 0.49  # of the person, pixels
+    height = np.where(np.isfinite(height), height, np.nanmedian(height))
+    share = np.array([_JOINT_SD.get(name.partition("_")[2], 0.01) for name in keypoints.names])
+    sd = height[:, None] * np.hypot(miss, share / np.maximum(keypoints.confidence, 0.1))
+    sd = np.where(np.isfinite(keypoints.uv).all(axis=2), sd, -1.0)
+    rows = zip(keypoints.frame.tolist(), keypoints.uv, sd, strict=True)
+    return {frame: Joints(keypoints.names, uv, noise) for frame, uv, noise in rows}
+
+
+def find_keypoint_start(
+    keypoints: Keypoints,
+    camera: Camera,
+    model: Model,
+    *,
+    first: int = 0,
+    stop: int | None = None,
+    height: float | None = None,
+) -> Start | None:
+    """Find the first state of the person whose keypoints these are.
+
+    Parameters
+    ----------
+    keypoints : Keypoints
+        Of one person, pixels of the camera.
+    camera : Camera
+    model : Model
+    first, stop : int
+        Frames to use.
+    height : float, optional
+        Stature in metres.
+
+    Returns
+    -------
+    start : Start or None
+        None if no second of them fits a walk.
+    """
+    known = {} if height is None else {"stature": height, "stature_sd": _STATURE_SD}
+    fit = StartFit(model, camera, **known)
+    joints = keypoint_noise(keypoints)
+    chosen = (keypoints.frame >= first) & (keypoints.frame < (np.inf if stop is None else stop))
+    frames, times = keypoints.frame[chosen], keypoints.time[chosen]
+    best: tuple[Start, Hypothesis] | None = None
+    begin = -np.inf
+    for at, time in enumerate(times):
+        if time < begin + _STEP:
+            continue
+        begin = time
+        found = _fit_window(model, fit, joints, frames, times, at)
+        if found is None:
+            continue
+        start, hypothesis = found
+        if _walks(hypothesis) and hypothesis.chi2_per_observation < _FITS:
+            return start
+        if best is None or hypothesis.chi2_per_observation < best[1].chi2_per_observation:
+            best = found
+    return best[0] if best is not None and best[1].chi2_per_observation < _FITS_BEST else None
+
+
+def _fit_window(
+    model: Model,
+    fit: StartFit,
+    joints: dict[int, Joints],
+    frames: np.ndarray[tuple[int], np.dtype[np.int64]],
+    times: np.ndarray[tuple[int], np.dtype[np.float64]],
+    at: int,
+) -> tuple[Start, Hypothesis] | None:
+    """Fit the second from frame number `at` of the list; None if hips and ankles are not in view."""
+    fit.reset()
+    for frame, time in zip(frames[at:], times[at:], strict=True):
+        if time > times[at] + _WINDOW:
+            break
+        fit.add(round(1e6 * time), joints[int(frame)])
+    try:
+        hypothesis = fit.solve(round(1e6 * times[at]))[0]
+    except GaitError:
+        return None
+    sd = hypothesis.sd
+    for name, least in _LEAST_SD.items():
+        setattr(sd, name, max(getattr(sd, name), least))
+    # Someone who only begins to walk is slower than soon after.
+    sd.stride_hz = max(sd.stride_hz, _SPEEDS_UP * (model.info.stride_hz - hypothesis.mean.stride_hz))
+    sd.pelvis = np.clip(sd.pelvis, _LEAST_PLACE_SD, 10.0)
+    hypothesis.mean.phase %= 1.0
+    return Start(int(frames[at]), hypothesis.mean, sd), hypothesis
+
+
+def _walks(hypothesis: Hypothesis) -> bool:
+    steps = hypothesis.mean.stride_hz > _LEAST_RATE
+    return steps and (hypothesis.in_place or hypothesis.speed > _LEAST_SPEED)

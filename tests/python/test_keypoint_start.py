@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+
+from gait import Camera, Model, State
+from gait.bindings.frame import Joints
+from gait.bindings.start_fit import StartFit
+from gait.detect.networks import JOINTS
+from gait.errors import GaitError
+from gait.io.keypoints_file import Keypoints
+from gait.track.keypoint_start import find_keypoint_start, keypoint_noise
+
+FPS = 25
+
+
+@pytest.fixture(scope="module")
+def model():
+    return Model()
+
+
+@pytest.fixture(scope="module")
+def camera():
+    rotation = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    return Camera(1280, 720, 1000, 1000, 639.5, 359.5, R=np.array(rotation, float), t=np.array([0, 1.5, 0]))
+
+
+def walk(model, camera, frames, *, heading=0.3, speed=1.3, stands=0, noise=2.0):
+    """Keypoints of a person who stands for some frames and then walks."""
+    rng, uv = np.random.default_rng(3), []
+    for n in range(frames):
+        t = max(n - stands, 0) / FPS
+        state = State(phase=(0.1 + 0.9 * t) % 1, stride_hz=0.9, heading=heading)
+        way = speed * t * np.array([np.cos(heading), np.sin(heading)])
+        state.pelvis[:] = *(np.array([-1.0, 5.0]) + way), model.pelvis_height(state)
+        joints = dict(zip(model.joint_names, model.pose(state)[0], strict=True))
+        uv.append(camera.project(np.array([joints[name] for name in JOINTS])))
+    uv = np.array(uv) + noise * rng.standard_normal((frames, len(JOINTS), 2))
+    number = np.arange(frames)
+    return Keypoints(number, number / FPS, tuple(JOINTS), uv, np.ones((frames, len(JOINTS))))
+
+
+def test_a_walk_is_found_at_its_first_frame(model, camera):
+    start = find_keypoint_start(walk(model, camera, 40), camera, model, height=1.75)
+    assert start.frame == 0
+    assert start.mean.heading == pytest.approx(0.3, abs=0.1)
+    assert start.mean.phase == pytest.approx(0.1, abs=0.04)
+    assert np.allclose(start.mean.pelvis[:2], [-1, 5], atol=0.4)
+
+
+def test_a_person_who_stands_first_is_found_walking(model, camera):
+    start = find_keypoint_start(walk(model, camera, 90, stands=50), camera, model, height=1.75)
+    assert start.frame > 30
+    assert start.mean.heading == pytest.approx(0.3, abs=0.15)
+
+
+def test_points_that_are_no_walk_start_nothing(model, camera):
+    keypoints = walk(model, camera, 40, noise=150.0)
+    assert find_keypoint_start(keypoints, camera, model) is None
+
+
+def test_frames_before_the_first_are_not_used(model, camera):
+    start = find_keypoint_start(walk(model, camera, 60), camera, model, first=20, height=1.75)
+    assert start.frame == 20
+
+
+def test_noise_grows_as_the_confidence_falls(model, camera):
+    keypoints = walk(model, camera, 5)
+    keypoints.confidence[:, 0] = 0.5
+    keypoints.uv[2, 3] = np.nan
+    noise = keypoint_noise(keypoints)
+    assert noise[0].sd[0] == pytest.approx(2 * noise[0].sd[1], rel=1e-6)
+    assert noise[2].sd[3] == -1
+    assert (keypoint_noise(keypoints, 0.02)[0].sd > noise[0].sd).all()
+
+
+def test_too_few_frames_name_the_remedy(model, camera):
+    fit = StartFit(model, camera)
+    fit.add(0, Joints(("l_hip",), np.zeros((1, 2)), 1.0))
+    with pytest.raises(GaitError, match="four or more over 0.3 s"):
+        fit.solve(0)
+
+
+def test_bad_settings_are_refused(model, camera):
+    with pytest.raises(GaitError, match="stature"):
+        StartFit(model, camera, stature=3.0)

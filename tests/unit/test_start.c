@@ -1,0 +1,311 @@
+/* The automatic start: walks of known place, heading, phase, rate and stature are found from their keypoints. */
+#include "base/hash.h"
+#include "base/rng.h"
+#include "check.h"
+#include "filter/particles.h"
+#include "gait_start.h"
+#include "golden.h"
+#include "image/camera.h"
+#include "toy_model.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { FRAMES = 26, JOINTS = TOY_POINTS };
+
+typedef struct walk { /* what the keypoints are made from */
+    float heading, speed, rate, stature, phase, x, y;
+    float noise;   /* pixels */
+    float wrong;   /* share of keypoints that are somewhere else */
+    bool legs_cut; /* hips and ankles are not in view */
+} walk;
+
+static walk usual(void)
+{
+    return (walk){.heading = 0.4f, .speed = 1.3f, .rate = 0.95f, .stature = 1.75f, .phase = 0.2f, .y = 5.0f};
+}
+
+/* A camera at 1.5 m that looks along +y. */
+static gait_camera camera(void)
+{
+    return (gait_camera){.width = 1280,
+                         .height = 720,
+                         .fx = 1000.0f,
+                         .fy = 1000.0f,
+                         .cx = 639.5f,
+                         .cy = 359.5f,
+                         .R = {1, 0, 0, 0, 0, -1, 0, 1, 0},
+                         .t = {0.0f, 1.5f, 0.0f}};
+}
+
+static gait_state state_at(const walk *w, float t)
+{
+    gait_state s = toy_state(m_wrap1(w->phase + w->rate * t));
+    s.heading = w->heading;
+    s.stature = w->stature;
+    s.stride_hz = w->rate;
+    float height;
+    CHECK(gait_model_pelvis_height(toy_model(), &s, &height, NULL) == GAIT_OK);
+    s.pelvis[0] = w->x + w->speed * t * cosf(w->heading);
+    s.pelvis[1] = w->y + w->speed * t * sinf(w->heading);
+    s.pelvis[2] = height;
+    return s;
+}
+
+static void detect(const walk *w, float t, uint32_t n, gait_keypoint *out)
+{
+    gait_camera const cam = camera();
+    gait_state const s = state_at(w, t);
+    gait_pose pose;
+    CHECK(gait_model_pose(toy_model(), &s, &pose, NULL) == GAIT_OK);
+    for (int32_t j = 0; j < JOINTS; j++) {
+        float uv[2] = {0}, e[4];
+        uint32_t r[4];
+        (void)camera_project(&cam, pose.joint[j], uv);
+        rng_normal4(7, 1, n, (uint32_t)j, 0, e);
+        rng_bits(7, 2, n, (uint32_t)j, 0, r);
+        out[j] = (gait_keypoint){uv[0] + w->noise * e[0], uv[1] + w->noise * e[1], f_max(w->noise, 0.5f)};
+        if ((float)(r[0] >> 8) < w->wrong * 16777216.0f)
+            out[j] = (gait_keypoint){(float)(r[1] >> 22), (float)(r[2] >> 23), out[j].sd};
+        if (w->legs_cut && j >= 9)
+            out[j].sd = -1.0f;
+    }
+}
+
+static gait_start *start_new(uint32_t cpu_mask)
+{
+    gait_start_config cfg;
+    gait_start *s = NULL;
+    size_t bytes = 0;
+    gait_start_default(&cfg);
+    cfg.camera = camera();
+    cfg.cpu_mask = cpu_mask;
+    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
+    void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+    CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
+    return s; /* at the beginning of mem */
+}
+
+static void show(gait_start *s, const walk *w, int frames)
+{
+    gait_keypoint k[JOINTS];
+    for (int n = 0; n < frames; n++) {
+        detect(w, (float)n / 25.0f, (uint32_t)n, k);
+        CHECK(gait_start_add(s, 1000000 + n * 40000, k, NULL) == GAIT_OK);
+    }
+}
+
+static gait_hypothesis find(const walk *w)
+{
+    gait_start *const s = start_new(~0u);
+    gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
+    int32_t count = 0;
+    show(s, w, FRAMES);
+    CHECK(gait_start_solve(s, 1000000, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK);
+    CHECK(count >= 1);
+    free(s);
+    return h[0];
+}
+
+static float turned(float a, float b)
+{
+    return fabsf(m_wrap_pi(a - b));
+}
+
+static void check_found(const walk *w, const gait_hypothesis *h)
+{
+    gait_state const truth = state_at(w, 0.0f);
+    CHECK(turned(h->mean.heading, truth.heading) < 0.12f);
+    CHECK(turned(TWO_PI_F * h->mean.phase, TWO_PI_F * truth.phase) < TWO_PI_F * 0.04f);
+    CHECK_NEAR(h->mean.stride_hz, truth.stride_hz, 0.06);
+    CHECK_NEAR(h->speed, w->speed, 0.15);
+    CHECK_NEAR(h->mean.stature, truth.stature, 0.15); /* size and distance are confounded in one view */
+    for (int k = 0; k < 2; k++)
+        CHECK(fabsf(h->mean.pelvis[k] - truth.pelvis[k]) < 3.0f * h->sd.pelvis[k] + 0.1f);
+}
+
+static void test_headings(void)
+{
+    for (int k = 0; k < 8; k++) {
+        walk w = usual();
+        w.heading = (float)k * 0.785f + 0.1f;
+        w.phase = (float)k / 8.0f;
+        w.noise = 2.0f;
+        gait_hypothesis const h = find(&w);
+        check_found(&w, &h);
+        CHECK(!h.in_place && h.probability > 0.9f);
+        CHECK(h.chi2_per_observation < 1.5f && h.observations == 2 * JOINTS * 12);
+    }
+}
+
+static void test_slow_and_fast(void)
+{
+    walk slow = usual(), fast = usual();
+    slow.speed = 0.6f;
+    slow.rate = 0.6f;
+    fast.speed = 2.0f;
+    fast.rate = 1.2f;
+    gait_hypothesis h = find(&slow);
+    check_found(&slow, &h);
+    h = find(&fast);
+    check_found(&fast, &h);
+}
+
+static void test_treadmill(void)
+{
+    walk w = usual();
+    w.speed = 0.0f;
+    w.noise = 2.0f;
+    gait_hypothesis const h = find(&w);
+    check_found(&w, &h);
+    CHECK(h.in_place);
+}
+
+static void test_outliers(void)
+{
+    walk w = usual();
+    w.noise = 2.0f;
+    w.wrong = 0.15f;
+    gait_hypothesis const h = find(&w);
+    check_found(&w, &h);
+}
+
+static void test_no_walk(void)
+{
+    walk w = usual();
+    w.wrong = 1.0f;
+    gait_hypothesis const h = find(&w);
+    CHECK(h.chi2_per_observation > 3.0f); /* the caller's sign that nothing fits */
+}
+
+/* Drawn again and again, nine of ten truths lie within 1.64 standard deviations. */
+static void test_coverage(void)
+{
+    int inside = 0, all = 0;
+    for (int k = 0; k < 20; k++) {
+        walk w = usual();
+        w.heading = 0.3f * (float)k;
+        w.noise = 4.0f;
+        w.phase = m_wrap1(0.37f * (float)k);
+        gait_hypothesis const h = find(&w);
+        gait_state const truth = state_at(&w, 0.0f);
+        float const off[] = {turned(h.mean.heading, truth.heading) / h.sd.heading,
+                             turned(TWO_PI_F * h.mean.phase, TWO_PI_F * truth.phase) / (TWO_PI_F * h.sd.phase),
+                             fabsf(h.mean.stride_hz - truth.stride_hz) / h.sd.stride_hz};
+        for (int i = 0; i < 3; i++, all++)
+            inside += off[i] < 1.645f;
+    }
+    CHECK(inside >= 8 * all / 10);
+}
+
+static void test_refused(void)
+{
+    gait_start *const s = start_new(~0u);
+    gait_hypothesis h;
+    gait_keypoint k[JOINTS] = {{0}};
+    gait_error err = {0};
+    int32_t count = 0;
+    CHECK(gait_start_solve(s, 0, &h, 1, &count, &err) == GAIT_ERR_STATE);
+    CHECK(strstr(err.text, "four or more over 0.3 s"));
+    walk w = usual();
+    w.legs_cut = true;
+    show(s, &w, FRAMES);
+    CHECK(gait_start_solve(s, 0, &h, 1, &count, &err) == GAIT_ERR_STATE);
+    CHECK(gait_start_add(s, 1000000, k, &err) == GAIT_ERR_STATE && strstr(err.text, "utime"));
+    gait_start_reset(s);
+    CHECK(gait_start_add(s, 0, k, &err) == GAIT_OK);
+    CHECK(gait_start_solve(s, 0, &h, 0, &count, &err) == GAIT_ERR_ARG);
+    CHECK(gait_start_solve(s, 0, NULL, 1, &count, NULL) == GAIT_ERR_ARG);
+    free(s);
+}
+
+static void refuse(void (*spoil)(gait_start_config *), gait_result result, const char *text)
+{
+    gait_start_config cfg;
+    gait_error err = {0};
+    size_t bytes;
+    gait_start_default(&cfg);
+    cfg.camera = camera();
+    spoil(&cfg);
+    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, &err) == result);
+    CHECK(strstr(err.text, text));
+}
+
+static void spoil_size(gait_start_config *c)
+{
+    c->struct_size = 3;
+}
+
+static void spoil_stature(gait_start_config *c)
+{
+    c->stature = 3.0f;
+}
+
+static void spoil_camera(gait_start_config *c)
+{
+    c->camera.R[0] = 2.0f;
+}
+
+static void spoil_noise(gait_start_config *c)
+{
+    c->joint_sd = NAN;
+}
+
+static void test_config(void)
+{
+    refuse(spoil_size, GAIT_ERR_STRUCT, "gait_start_default");
+    refuse(spoil_stature, GAIT_ERR_ARG, "stature");
+    refuse(spoil_camera, GAIT_ERR_ARG, "camera");
+    refuse(spoil_noise, GAIT_ERR_ARG, "joint_sd");
+}
+
+/* Later frames replace the first ones; the hypotheses of what is kept are the same as without them. */
+static void test_old_frames_are_dropped(void)
+{
+    gait_start *const s = start_new(~0u);
+    gait_hypothesis a, b;
+    gait_keypoint k[JOINTS];
+    int32_t count;
+    walk other = usual(), w = usual();
+    other.heading = 3.0f;
+    for (int n = 0; n < 40; n++) {
+        detect(&other, (float)n / 25.0f, (uint32_t)n, k);
+        CHECK(gait_start_add(s, n - 100, k, NULL) == GAIT_OK);
+    }
+    show(s, &w, GAIT_START_MAX_FRAMES);
+    CHECK(gait_start_solve(s, 1000000, &a, 1, &count, NULL) == GAIT_OK);
+    gait_start_reset(s);
+    show(s, &w, GAIT_START_MAX_FRAMES);
+    CHECK(gait_start_solve(s, 1000000, &b, 1, &count, NULL) == GAIT_OK);
+    CHECK(!memcmp(&a, &b, sizeof a));
+    free(s);
+}
+
+static uint64_t digest(uint32_t cpu_mask)
+{
+    gait_start *const s = start_new(cpu_mask);
+    gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
+    int32_t count = 0;
+    walk w = usual();
+    w.noise = 3.0f;
+    memset(h, 0, sizeof h);
+    show(s, &w, FRAMES);
+    CHECK(gait_start_solve(s, 1500000, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK);
+    free(s);
+    return hash_fnv1a(HASH_INIT, h, sizeof h);
+}
+
+int main(void)
+{
+    test_headings();
+    test_slow_and_fast();
+    test_treadmill();
+    test_outliers();
+    test_no_walk();
+    test_coverage();
+    test_refused();
+    test_config();
+    test_old_frames_are_dropped();
+    CHECK(digest(0) == digest(~0u));
+    return CHECK_DONE();
+}
