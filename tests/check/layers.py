@@ -12,7 +12,7 @@ from pathlib import Path
 
 from circles import circles
 
-PUBLIC = {"gait.h", "gait_lift.h", "gait_pool.h"}
+PUBLIC = {"gait.h", "gait_lift.h", "gait_pool.h", "gait_start.h"}
 SYSTEM = {
     "assert.h", "cpuid.h", "float.h", "immintrin.h", "limits.h", "math.h", "stdarg.h", "stdbool.h",
     "stddef.h", "stdint.h", "stdio.h", "string.h", "sanitizer/asan_interface.h",

@@ -72,6 +72,17 @@ def test_noise_grows_as_the_confidence_falls(model, camera):
     assert (keypoint_noise(keypoints, 0.02)[0].sd > noise[0].sd).all()
 
 
+def test_keypoints_without_ankles_start_nothing(model, camera):
+    all_joints = walk(model, camera, 40)
+    arms = Keypoints(
+        *(getattr(all_joints, n) for n in ("frame", "time")),
+        ("l_wrist",),
+        all_joints.uv[:, 4:5],
+        all_joints.confidence[:, 4:5],
+    )
+    assert find_keypoint_start(arms, camera, model) is None
+
+
 def test_too_few_frames_name_the_remedy(model, camera):
     fit = StartFit(model, camera)
     fit.add(0, Joints(("l_hip",), np.zeros((1, 2)), 1.0))

@@ -163,6 +163,8 @@ def _first_state(
         f"stature {at.stature:.2f} m, heading {turn:.0f} +- {turn_sd:.0f} deg",
         options.quiet,
     )
+    if keypoints is None and options.detector == "auto" and options.mode != Mode.PAPER:
+        note(f"without a detector the start is less reliable: {weights.FETCH}", options.quiet)
     if start.apparent_stature:
         remedy = "check --height and" if options.height else "give --height or check"
         note(
@@ -220,7 +222,6 @@ def _detect(options: ClipOptions, video: Video) -> Keypoints | None:
     if network == "auto":
         network = "full"
         if not all(weights.find(needed) for needed in (weights.PERSON, weights.LANDMARKS[network])):
-            note(f"no detector, the start is less reliable without one: {weights.FETCH}", options.quiet)
             return None
     from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
 

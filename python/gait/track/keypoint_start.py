@@ -81,6 +81,8 @@ def find_keypoint_start(
     start : Start or None
         None if no second of them fits a walk.
     """
+    if not {"l_hip", "r_hip", "l_ankle", "r_ankle"} <= set(keypoints.names):
+        return None
     known = {} if height is None else {"stature": height, "stature_sd": _STATURE_SD}
     fit = StartFit(model, camera, **known)
     joints = keypoint_noise(keypoints)
