@@ -52,6 +52,8 @@ def read(paths: list[str]) -> Graph:
     for path in paths:
         text = Path(path).read_text(encoding="utf-8")
         unit = UNIT.findall(text)[0]
+        if not Path(unit).exists():  # a source that moved may have left its graph
+            continue
 
         def unique(title: str, path: str = path) -> str:
             return f"{Path(path).stem}:{title.rsplit(':', 1)[1]}" if ":" in title else title

@@ -140,6 +140,12 @@ def test_headers_sees_padding_old_declarations_and_missing_includes(tmp_path, co
     assert run("headers.sh", header).returncode == 1
 
 
+def test_headers_sees_enumerations_that_need_casts(tmp_path):
+    header = tmp_path / "gait.h"
+    header.write_text("#ifndef A_H\n#define A_H\n#include <stdint.h>\ntypedef int32_t gait_mode;\n#endif\n")
+    assert fails(run("headers.sh", header), "gait_image")
+
+
 def objects(src: Path) -> list[Path]:
     """Compile every source below a folder to build/FOLDER/NAME.c.o beside it."""
     made = []
