@@ -1,5 +1,6 @@
 /* Positions by modes: every instruction set against the scalar definition, and that against the sum in order. */
 #include "base/cholesky.h"
+#include "model/segment_prior.h"
 #include "base/rng.h"
 
 #include "check.h"

@@ -245,7 +245,7 @@ static void read_frame(const gait_lift *l, const segment_posterior *b, int32_t f
     size_t const J = (size_t)t->prior.markers, first = (size_t)f * J;
     double x[3 * GAIT_MAX_MARKERS], each[3 * GAIT_MAX_MARKERS];
     lift_observations const observed = {.uv = l->uv + first * 2, .sd = l->sd + first};
-    lift_query const q = {.at = f, .count = t->prior.markers, .seen = residual ? &observed : NULL};
+    lift_query const q = {.at = f, .count = t->prior.markers, .observed = residual ? &observed : NULL};
     lift_read(t, b, &q, x, sd ? each : NULL);
     for (int32_t r = 0; r < q.count; r++) {
         size_t const to = 3 * (first + (size_t)t->order[r]);

@@ -35,12 +35,12 @@ static void set_base(const lift_table *t, lift_gain *g, const segment_posterior 
             lift_to_world(&g->axes, local, world);
             for (int32_t i = 0; i < 2; i++)
                 g->base[2 * p + (size_t)i] = dot3(t->projection.axis[i], world);
-            bool const seen = sd[p] > 0.0 && sd[p] <= DBL_MAX;
-            g->keep[p] = seen ? psi / (sd[p] * sd[p] + psi) : -1.0;
+            bool const observed = sd[p] > 0.0 && sd[p] <= DBL_MAX;
+            g->keep[p] = observed ? psi / (sd[p] * sd[p] + psi) : -1.0;
         }
 }
 
-/* Two rows of the gain: Q w over the noise's deviation, for the white rows w of one marker. */
+/* Two rows of the gain: Q w over the noise's standard deviation, for the white rows w of one marker. */
 static void set_rows(const lift_table *t, const segment_posterior *b, const double *w, double noise_sd,
                      double *row)
 {
@@ -64,15 +64,15 @@ bool lift_gain_fix(const lift_table *t, lift_gain *g, segment_posterior *b, cons
     g->ready = false;
     lift_clear(t, b);
     for (int32_t f = 0; f < t->prior.frames; f++) {
-        lift_observations const seen = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
-        lift_add(t, b, f, &seen, NULL, 0.0);
+        lift_observations const observed = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
+        lift_add(t, b, f, &observed, NULL, 0.0);
     }
     if (!lift_solve(t, b))
         return false;
     for (int32_t f = 0; f < t->prior.frames; f++) {
-        lift_observations const seen = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
+        lift_observations const observed = {.uv = g->base + (size_t)f * J * 2, .sd = sd + (size_t)f * J};
         const double *w = t->W;
-        (void)lift_rows(t, b, f, &seen, NULL, 0.0, NULL);
+        (void)lift_rows(t, b, f, &observed, NULL, 0.0, NULL);
         for (size_t p = (size_t)f * J; p < (size_t)(f + 1) * J; p++) {
             if (g->keep[p] < 0.0)
                 continue;

@@ -26,15 +26,15 @@ static double rough_depth(const lift_table *t, const lift_window *w, const segme
     double body = 0.0, picture = 0.0, centre[5] = {0.0}, count = 0.0;
     for (int32_t pass = 0; pass < 2; pass++) {
         for (int32_t f = 0; f < w->frames; f++) {
-            lift_observations const seen = {.uv = w->uv + (size_t)(f * J) * 2,
-                                            .sd = w->sd + (size_t)f * (size_t)J};
+            lift_observations const observed = {.uv = w->uv + (size_t)(f * J) * 2,
+                                                .sd = w->sd + (size_t)f * (size_t)J};
             const float *const mean = segment_mean(&t->prior, b->component, lift_find_moment(t, w->at[f]).f);
             for (int32_t j = 0; j < J; j++) {
-                if (!lift_observed_at(&seen, j))
+                if (!lift_observed_at(&observed, j))
                     continue;
                 double const v[5] = {(double)mean[3 * j], (double)mean[3 * j + 1], (double)mean[3 * j + 2],
-                                     seen.uv[2 * j] / t->projection.focal[0],
-                                     seen.uv[2 * j + 1] / t->projection.focal[1]};
+                                     observed.uv[2 * j] / t->projection.focal[0],
+                                     observed.uv[2 * j + 1] / t->projection.focal[1]};
                 count += pass == 0;
                 for (int32_t i = 0; i < 5; i++) {
                     double const off = v[i] - centre[i];
@@ -57,8 +57,8 @@ static void add_window(const lift_table *t, const lift_window *w, segment_poster
     size_t const J = (size_t)t->prior.markers;
     lift_clear(t, b);
     for (int32_t f = 0; f < w->frames; f++) {
-        lift_observations const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
-        lift_add(t, b, w->at[f], &seen, NULL, depth);
+        lift_observations const observed = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
+        lift_add(t, b, w->at[f], &observed, NULL, depth);
     }
 }
 

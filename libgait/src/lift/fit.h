@@ -35,6 +35,6 @@ void lift_search_layout(arena *a, const lift_table *t, lift_search *s);
 /* Fit b to the window; b->place is the prior's.  false: numbers out of range. */
 bool lift_fit(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b,
               lift_outcome *out);
-/* Fit b again from where it is, the deviations of the window having changed. */
+/* Fit b again from where it is, the standard deviations of the window having changed. */
 bool lift_fit_again(const lift_table *t, lift_search *s, const lift_window *w, segment_posterior *b);
 #endif

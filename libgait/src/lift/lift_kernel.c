@@ -72,17 +72,17 @@ void KERNEL(lift_eight)(double *out, const float *s0, const float *s1, double w0
                         const double *theta, int32_t modes, double moved[CHOLESKY_LANES])
 {
     for (int32_t c = 0; c < CHOLESKY_LANES; c += SIMD_F64) {
-        simd_f64 even = {0.0}, odd = {0.0};
+        simd_f64 sum0 = {0.0}, sum1 = {0.0};
         int32_t i = 0, at = c;
         for (; i + 2 <= modes; i += 2, at += 2 * CHOLESKY_LANES) {
-            even += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
-            odd +=
+            sum0 += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
+            sum1 +=
                 mixed(out + at + CHOLESKY_LANES, s0 + at + CHOLESKY_LANES, s1 + at + CHOLESKY_LANES, w0, w1) *
                 theta[i + 1];
         }
         if (i < modes)
-            even += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
-        simd_f64_store(moved + c, even + odd);
+            sum0 += mixed(out + at, s0 + at, s1 + at, w0, w1) * theta[i];
+        simd_f64_store(moved + c, sum0 + sum1);
     }
 }
 

@@ -46,7 +46,7 @@ void lifter_take(const gait_lift *l, size_t points, const double *uv, const doub
     for (size_t i = 0; i < points; i++) {
         double const u = uv[2 * i], v = uv[2 * i + 1];
         bool const none = t->projection.perspective && u == v &&
-                          (u == 0.0 || u == -1.0); /* detectors' sign of "not seen" */
+                          (u == 0.0 || u == -1.0); /* detectors' sign of "not observed" */
         bool const there = fabs(u) <= FURTHEST && fabs(v) <= FURTHEST && !none;
         to_sd[i] = there ? (sd ? sd[i] : t->cfg.sd) : -1.0;
         to_uv[2 * i] = to_uv[2 * i + 1] = 0.0;

@@ -20,7 +20,7 @@ struct gait_lift {
 /* Place everything; NULL when counting or if the arena is too small. */
 gait_lift *lifter_layout(arena *a, const segment_prior *prior, const gait_lift_config *cfg,
                          const kernels *run);
-/* Convert observations of `points` markers: ideal pixels, a deviation each; sd NULL: the config's. */
+/* Convert observations of `points` markers: ideal pixels, a standard deviation each; sd NULL: the config's. */
 void lifter_take(const gait_lift *l, size_t points, const double *uv, const double *sd, double *to_uv,
                  double *to_sd);
 #endif

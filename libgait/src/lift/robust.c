@@ -16,7 +16,8 @@ static const double LINE_VARIANCE = 1.5; /* of a point off the middle of its nei
 static const double FAR = 4.0; /* standard deviations; fewer than one correct point in 1000 is as far */
 static const double FAR_MEDIAN = 3.0; /* times the median of the frame's points */
 static const double POOR_FIT = 4.0;   /* chi2 per observation from which outliers may have misled a search */
-static const double ROUGH = 8.0; /* times the points' deviations: the difference between people's motions */
+static const double ROUGH =
+    8.0; /* times the points' standard deviations: the difference between people's motions */
 
 /* Squared distance of a point in frame f from the line through its positions in frames a and b, as it would be half way
  * between two neighbours `step` away: where the neighbours are further away, or on one side, noise and acceleration
@@ -127,26 +128,26 @@ static void join(int32_t rows, const double *variance, double *square)
 }
 
 int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, double at,
-                          const lift_observations *seen, bool known, double *position, double *sd)
+                          const lift_observations *observed, bool known, double *position, double *sd)
 {
     double square[2 * GAIT_MAX_MARKERS], own[GAIT_MAX_MARKERS], sorted[GAIT_MAX_MARKERS],
         variance[ROWS_MOST] = {0.0};
     segment_posterior unchanged = *b;
     lift_residuals const residuals = {.position = position, .square = square};
-    int32_t const rows = lift_rows(t, &unchanged, at, seen, NULL, 0.0, &residuals), J = t->prior.markers;
+    int32_t const rows = lift_rows(t, &unchanged, at, observed, NULL, 0.0, &residuals), J = t->prior.markers;
     int32_t count = 0, next = 0;
-    memcpy(sd, seen->sd, (size_t)J * sizeof *sd);
+    memcpy(sd, observed->sd, (size_t)J * sizeof *sd);
     if (largest(square, rows) <= FAR * FAR)
         return 0;
     if (!known)
         predict(t, b, rows, variance);
     join(rows, variance, square);
     for (int32_t j = 0; j < J; j++)
-        if (lift_observed_at(seen, j))
+        if (lift_observed_at(observed, j))
             own[count++] = sd[j];
     int32_t const outliers = lift_weight_points(count, square, own, sorted);
     for (int32_t j = 0; j < J; j++)
-        if (lift_observed_at(seen, j))
+        if (lift_observed_at(observed, j))
             sd[j] = own[next++];
     return outliers;
 }
@@ -158,13 +159,14 @@ static int32_t weight_window(const lift_table *t, const lift_window *w, const li
     size_t const J = (size_t)t->prior.markers;
     int32_t outliers = 0;
     for (int32_t f = 0; f < w->frames; f++) {
-        lift_observations const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = r->inlier_sd + (size_t)f * J};
-        outliers += lift_weight_frame(t, b, w->at[f], &seen, true, r->position, r->sd + (size_t)f * J);
+        lift_observations const observed = {.uv = w->uv + (size_t)f * J * 2,
+                                            .sd = r->inlier_sd + (size_t)f * J};
+        outliers += lift_weight_frame(t, b, w->at[f], &observed, true, r->position, r->sd + (size_t)f * J);
     }
     return outliers;
 }
 
-/* Search by all points, of `times` their deviations, and refit while the outliers change. */
+/* Search by all points, of `times` their standard deviations, and refit while the outliers change. */
 static bool fit_from(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
                      double times, segment_posterior *b, lift_outcome *out, int32_t *outliers)
 {

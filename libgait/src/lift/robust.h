@@ -2,7 +2,7 @@
  *
  * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the motion.
  * Points that are wrong for longer, on the other leg or on another person, are down-weighted by a fit: beyond four
- * standard deviations a point's own deviation grows with the square of its distance from the prediction, so that its
+ * standard deviations a point's own standard deviation grows with the square of its distance from the prediction, so that its
  * influence falls with the third power.  Nearer points keep theirs.  Where half of a frame's points are off, as in a
  * motion that the prior does not know, the limit is three times their median distance. */
 #ifndef GAIT_LIFT_ROBUST_H
@@ -15,17 +15,17 @@
  * Returns how many points were left out. */
 int32_t lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv, double *sd,
                            double *scratch);
-/* Multiply the deviations sd of the points of a frame by what their squared distances from the prediction, in
- * standard deviations, ask for.  scratch: points.  Returns how many points are outliers. */
+/* Enlarge sd of the points of a frame that are far from their prediction.  square: squared distances over the variance;
+ * scratch: points.  Returns how many points are outliers. */
 int32_t lift_weight_points(int32_t points, const double *square, double *sd, double *scratch);
 /* Deviations sd (J) for the points observed in a frame, by a posterior's prediction.  known: the posterior already
- * includes the points; else their distances are divided by the deviation of the prediction too.
+ * includes the points; else their distances are divided by the standard deviation of the prediction too.
  * position (J x 3) receives the predictions.  Returns how many points are outliers. */
 int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, double at,
-                          const lift_observations *seen, bool known, double *position, double *sd);
+                          const lift_observations *observed, bool known, double *position, double *sd);
 
 typedef struct lift_robust {
-    double *sd;        /* frames x J: w->sd; receives the deviations that count */
+    double *sd;        /* frames x J: w->sd; receives the standard deviations that count */
     double *inlier_sd; /* frames x J: as observed */
     double *position;  /* J x 3, scratch */
 } lift_robust;

@@ -210,7 +210,7 @@ static double add_marker(const lift_table *t, segment_posterior *b, const adding
     return det;
 }
 
-int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const lift_observations *seen,
+int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const lift_observations *observed,
                   const double *guess, double depth, const lift_residuals *residuals)
 {
     lift_moment const m = lift_find_moment(t, at);
@@ -220,11 +220,11 @@ int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const li
     for (int32_t j = 0; j < t->prior.markers; j++) {
         lift_marker r;
         double x[3], own[3], square[2];
-        if (!lift_observed_at(seen, j))
+        if (!lift_observed_at(observed, j))
             continue;
         lift_marker_at(t, b, &m, j, &r, x);
         lift_to_world(&a.now, x, own);
-        det *= add_marker(t, b, &a, seen->uv + 2 * j, seen->sd[j], j, &r, guess ? guess + 3 * j : own,
+        det *= add_marker(t, b, &a, observed->uv + 2 * j, observed->sd[j], j, &r, guess ? guess + 3 * j : own,
                           t->W + (size_t)rows * (size_t)t->ld, square);
         if (residuals) {
             memcpy(residuals->position + 3 * j, own, sizeof own);
@@ -241,10 +241,10 @@ int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const li
     return rows;
 }
 
-void lift_add(const lift_table *t, segment_posterior *b, double at, const lift_observations *seen,
+void lift_add(const lift_table *t, segment_posterior *b, double at, const lift_observations *observed,
               const double *guess, double depth)
 {
-    int32_t const rows = lift_rows(t, b, at, seen, guess, depth, NULL);
+    int32_t const rows = lift_rows(t, b, at, observed, guess, depth, NULL);
     t->run->cholesky_rank(b->A, t->ld, t->W, rows);
 }
 
@@ -303,15 +303,15 @@ static void find_effects(const lift_table *t, const segment_posterior *b, const 
 
 /* The part of marker j outside the modes: mean += K times the residual of its rows, P (3 x 3) = I - K G.  Nothing
  * changes if it was not observed. */
-static void add_residual(const lift_table *t, const segment_posterior *b, const lift_observations *seen,
+static void add_residual(const lift_table *t, const segment_posterior *b, const lift_observations *observed,
                          int32_t j, double *mean, double P[3][3])
 {
-    if (!seen || !lift_observed_at(seen, j))
+    if (!observed || !lift_observed_at(observed, j))
         return;
     projection_rows r;
     double K[3][2], left[2];
-    projection_rows_near(&t->projection, seen->uv + 2 * j, mean, &r);
-    projection_gain(&r, seen->sd[j], lift_residual(t, b, j), K);
+    projection_rows_near(&t->projection, observed->uv + 2 * j, mean, &r);
+    projection_gain(&r, observed->sd[j], lift_residual(t, b, j), K);
     for (int32_t a = 0; a < 2; a++)
         left[a] = r.y[a] - ((r.g[a][0] * mean[0] + r.g[a][1] * mean[1]) + r.g[a][2] * mean[2]);
     for (int32_t i = 0; i < 3; i++) {
@@ -373,7 +373,7 @@ typedef struct reading { /* common to all markers of a query */
 
 /* One marker, displaced by `moved` by the modes; the effects on it go to column r of each coordinate. */
 static void read_marker(const lift_table *t, const segment_posterior *b, const reading *to,
-                        const lift_observations *seen, int32_t r, const double moved[3],
+                        const lift_observations *observed, int32_t r, const double moved[3],
                         double M[9][CHOLESKY_LANES])
 {
     int32_t const j = t->order[r];
@@ -384,7 +384,7 @@ static void read_marker(const lift_table *t, const segment_posterior *b, const r
     lift_to_world(&to->axes, x, own);
     memcpy(mean, own, sizeof own);
     set_identity(P);
-    add_residual(t, b, seen, j, mean, P);
+    add_residual(t, b, observed, j, mean, P);
     if (!to->sd)
         return;
     find_effects(t, b, &to->axes, &m, own, P, &by);
@@ -413,7 +413,7 @@ static void read_eight(const lift_table *t, const segment_posterior *b, const re
                            to->moment.share, b->theta, t->prior.modes, moved[a]);
     for (int32_t i = r; i < r + CHOLESKY_LANES && i < q->count; i++) {
         int32_t const c = i - r;
-        read_marker(t, b, to, q->seen, i, (const double[3]){moved[0][c], moved[1][c], moved[2][c]}, M);
+        read_marker(t, b, to, q->observed, i, (const double[3]){moved[0][c], moved[1][c], moved[2][c]}, M);
     }
     if (to->sd)
         t->run->lift_turn(t->V + r, (size_t)to->width, (size_t)to->columns, t->shape, t->prior.modes, M);

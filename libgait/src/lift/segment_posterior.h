@@ -51,7 +51,8 @@ typedef struct lift_table { /* what all segments of a lifter share */
     double *W;     /* 2 J x ld: white rows of a frame */
     double *Z;     /* 3 J x ld: displacements by the unknowns */
     double *shape; /* 3 x lanes: the modes of one marker at one moment; 3 x k x 8 of eight */
-    float *V;      /* ld x (width + ld): displacements by the unknowns, times their remaining deviations */
+    float
+        *V; /* ld x (width + ld): displacements by the unknowns, times their remaining standard deviations */
 } lift_table;
 
 void lift_table_layout(arena *a, lift_table *t);
@@ -124,10 +125,10 @@ void lift_clear(const lift_table *t, segment_posterior *b);
 /* White rows t->W of a frame at moment `at`, in frames [0, F - 1]; returns how many.  They are linearised about guess
  * (J x 3, read only where observed); NULL: about theta; depth > 0: about a rough depth alone.  residuals may be
  * NULL. */
-int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const lift_observations *seen,
+int32_t lift_rows(const lift_table *t, segment_posterior *b, double at, const lift_observations *observed,
                   const double *guess, double depth, const lift_residuals *residuals);
 /* The same, added to the equations. */
-void lift_add(const lift_table *t, segment_posterior *b, double at, const lift_observations *seen,
+void lift_add(const lift_table *t, segment_posterior *b, double at, const lift_observations *observed,
               const double *guess, double depth);
 /* Solve for theta; false: not positive definite (numbers out of range). */
 bool lift_solve(const lift_table *t, segment_posterior *b);
@@ -137,9 +138,9 @@ double lift_evidence(const lift_table *t, const segment_posterior *b);
 double lift_chi2(const lift_table *t, const segment_posterior *b);
 
 typedef struct lift_query {
-    double at;                     /* moment, frames */
-    int32_t count;                 /* markers, the first of t->order */
-    const lift_observations *seen; /* of that very moment, for the part outside the modes; NULL: none */
+    double at;                         /* moment, frames */
+    int32_t count;                     /* markers, the first of t->order */
+    const lift_observations *observed; /* of that very moment, for the part outside the modes; NULL: none */
 } lift_query;
 
 /* Posterior mean (count x 3) and standard deviation (may be NULL) of markers at a moment. */

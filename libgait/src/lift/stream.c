@@ -32,12 +32,12 @@ static lift_observations weighted_frame(const lift_table *t, const lift_stream *
     return (lift_observations){.uv = s->past.uv + i * J * 2, .sd = s->past.sd + i * J};
 }
 
-/* The same with the deviations as observed. */
+/* The same with the standard deviations as observed. */
 static lift_observations raw_frame(const lift_table *t, const lift_stream *s, uint64_t frame)
 {
-    lift_observations seen = weighted_frame(t, s, frame);
-    seen.sd = s->past.raw + ring_index(s, frame) * (size_t)t->prior.markers;
-    return seen;
+    lift_observations observed = weighted_frame(t, s, frame);
+    observed.sd = s->past.raw + ring_index(s, frame) * (size_t)t->prior.markers;
+    return observed;
 }
 
 static uint64_t oldest_frame(const lift_stream *s)
@@ -177,33 +177,33 @@ void lift_stream_reset(lift_stream *s)
     s->poor_fit = false;
 }
 
-static void keep_frame(const lift_table *t, lift_stream *s, int64_t utime, const lift_observations *seen)
+static void keep_frame(const lift_table *t, lift_stream *s, int64_t utime, const lift_observations *observed)
 {
     size_t const i = ring_index(s, s->pushed), J = (size_t)t->prior.markers;
     s->past.utime[i] = s->last = utime;
-    memcpy(s->past.uv + i * J * 2, seen->uv, J * 2 * sizeof(double));
-    memcpy(s->past.sd + i * J, seen->sd, J * sizeof(double));
-    memcpy(s->past.raw + i * J, seen->sd, J * sizeof(double));
+    memcpy(s->past.uv + i * J * 2, observed->uv, J * 2 * sizeof(double));
+    memcpy(s->past.sd + i * J, observed->sd, J * sizeof(double));
+    memcpy(s->past.raw + i * J, observed->sd, J * sizeof(double));
     s->pushed++;
 }
 
 /* Add a frame to every component of a segment, linearised about the guess. */
 static void add_frame(const lift_table *t, const lift_stream *s, stream_segment *segment, uint64_t frame)
 {
-    lift_observations const seen = weighted_frame(t, s, frame), raw = raw_frame(t, s, frame);
+    lift_observations const observed = weighted_frame(t, s, frame), raw = raw_frame(t, s, frame);
     for (int32_t c = 0; c < t->prior.components; c++)
-        lift_add(t, &segment->posterior[c], moment_of(t, s, segment->index, frame), &seen, s->guess, 0.0);
+        lift_add(t, &segment->posterior[c], moment_of(t, s, segment->index, frame), &observed, s->guess, 0.0);
     for (int32_t j = 0; j < t->prior.markers; j++)
-        segment->outliers += lift_observed_at(&raw, j) && seen.sd[j] > raw.sd[j] ? 2 : 0;
+        segment->outliers += lift_observed_at(&raw, j) && observed.sd[j] > raw.sd[j] ? 2 : 0;
 }
 
 /* Weight the points of the newest frame by a segment's prediction of them, which s->guess receives. */
 static void weight_frame(const lift_table *t, lift_stream *s, const stream_segment *segment)
 {
     uint64_t const frame = s->pushed - 1;
-    lift_observations const seen = raw_frame(t, s, frame);
+    lift_observations const observed = raw_frame(t, s, frame);
     (void)lift_weight_frame(t, &segment->posterior[segment->best], moment_of(t, s, segment->index, frame),
-                            &seen, false, s->guess,
+                            &observed, false, s->guess,
                             s->past.sd + ring_index(s, frame) * (size_t)t->prior.markers);
 }
 
@@ -228,10 +228,10 @@ static bool solve_segment(const lift_table *t, stream_segment *segment)
 /* Positions of the markers observed in a frame by a segment: s->guess. */
 static void guess_frame(const lift_table *t, lift_stream *s, const stream_segment *segment, uint64_t frame)
 {
-    lift_observations const seen = weighted_frame(t, s, frame);
+    lift_observations const observed = weighted_frame(t, s, frame);
     int32_t marker[GAIT_MAX_MARKERS], count = 0;
     for (int32_t j = 0; j < t->prior.markers; j++)
-        if (lift_observed_at(&seen, j))
+        if (lift_observed_at(&observed, j))
             marker[count++] = j;
     lift_positions(t, &segment->posterior[segment->best], moment_of(t, s, segment->index, frame), marker,
                    count, s->mean);
@@ -276,7 +276,8 @@ static bool open_segments(const lift_table *t, lift_stream *s)
 static bool contradicts(const lift_table *t, const stream_segment *segment, double share)
 {
     const segment_posterior *const b = &segment->posterior[segment->best];
-    bool const wrong = lift_chi2(t, b) > share * t->cfg.fit_threshold * b->observed || mostly_outliers(segment);
+    bool const wrong =
+        lift_chi2(t, b) > share * t->cfg.fit_threshold * b->observed || mostly_outliers(segment);
     return wrong && t->cfg.fit_threshold > 0.0 && t->cfg.heading_sd < 0.0;
 }
 
@@ -291,12 +292,12 @@ static bool refit_segment(const lift_table *t, lift_search *search, lift_stream 
     lift_outcome outcome;
     int32_t outliers;
     for (uint64_t f = oldest_frame(s); f < s->pushed; f++) {
-        lift_observations const seen = raw_frame(t, s, f);
+        lift_observations const observed = raw_frame(t, s, f);
         if (!covers(s, index, time_of(s, f)))
             continue;
         s->at[w.frames] = moment_of(t, s, index, f);
-        memcpy(s->uv + (size_t)w.frames * J * 2, seen.uv, J * 2 * sizeof(double));
-        memcpy(s->robust.inlier_sd + (size_t)w.frames * J, seen.sd, J * sizeof(double));
+        memcpy(s->uv + (size_t)w.frames * J * 2, observed.uv, J * 2 * sizeof(double));
+        memcpy(s->robust.inlier_sd + (size_t)w.frames * J, observed.sd, J * sizeof(double));
         w.frames++;
     }
     (void)lift_remove_spikes(w.frames, t->prior.markers, w.at, w.uv, s->robust.inlier_sd, s->scratch);
@@ -386,27 +387,27 @@ static bool begin(const lift_table *t, lift_search *search, lift_stream *s)
     return true;
 }
 
-static bool any_observed(const lift_table *t, const lift_observations *seen)
+static bool any_observed(const lift_table *t, const lift_observations *observed)
 {
     bool any = false;
     for (int32_t j = 0; j < t->prior.markers; j++)
-        any |= lift_observed_at(seen, j);
+        any |= lift_observed_at(observed, j);
     return any;
 }
 
 bool lift_stream_push(const lift_table *t, lift_search *search, lift_stream *s, int64_t utime,
-                      const lift_observations *seen)
+                      const lift_observations *observed)
 {
     if (s->last >= 0 && (double)(utime - s->last) > 1e6 * t->cfg.max_gap)
         lift_stream_reset(s);
     if (s->origin < 0) {
         s->pushed = 0;
         s->last = utime;
-        if (!any_observed(t, seen))
+        if (!any_observed(t, observed))
             return true;
         s->origin = utime;
     }
-    keep_frame(t, s, utime, seen);
+    keep_frame(t, s, utime, observed);
     bool ok = s->next == 0 ? begin(t, search, s) : follow(t, search, s);
     if (ok && s->origin >= 0 && s->next > 0)
         ok = open_segments(t, s);
@@ -476,8 +477,8 @@ bool lift_stream_estimate(const lift_table *t, const lift_stream *s, gait_lift_f
     out->status = GAIT_TRACK_INIT;
     if (!s->next)
         return true;
-    lift_observations const seen = weighted_frame(t, s, frame);
-    lift_query q = {.count = t->reported, .seen = &seen};
+    lift_observations const observed = weighted_frame(t, s, frame);
+    lift_query q = {.count = t->reported, .observed = &observed};
     double const time = time_of(s, frame);
     blend b = {0};
     for (int64_t i = oldest_segment(s); i < s->next; i++)
@@ -496,7 +497,8 @@ bool lift_stream_estimate(const lift_table *t, const lift_stream *s, gait_lift_f
     for (int32_t r = 0; r < q.count; r++)
         for (int32_t a = 0; a < 3; a++)
             out->sd[t->order[r]][a] = sqrt(wider * out->sd[t->order[r]][a]);
-    bool const poor = s->poor_fit || (t->cfg.fit_threshold > 0.0 && out->chi2_per_observation > t->cfg.fit_threshold);
+    bool const poor =
+        s->poor_fit || (t->cfg.fit_threshold > 0.0 && out->chi2_per_observation > t->cfg.fit_threshold);
     out->status = poor ? GAIT_TRACK_AMBIGUOUS : GAIT_TRACK_TRACKING;
     out->flags = (b.observed ? 0u : GAIT_LIFT_UNOBSERVED) | (poor ? GAIT_LIFT_POOR_FIT : 0u);
     return true;

@@ -26,7 +26,7 @@ typedef struct lift_stream {
     stream_segment *segment; /* ring of `segments`: those of the last indices */
     int32_t segments;
     double *at, *uv;           /* window for a fit: past.capacity moments and observations */
-    lift_robust robust;        /* its deviations */
+    lift_robust robust;        /* its standard deviations */
     double *scratch;           /* 2 x past.capacity */
     double *guess, *mean, *sd; /* J x 3 */
     double *new_uv, *new_sd;   /* the frame that comes in */
@@ -43,7 +43,7 @@ void lift_stream_layout(arena *a, const lift_table *t, lift_stream *s);
 void lift_stream_reset(lift_stream *s);
 /* One frame, ideal pixels.  false: numbers out of range; the stream has started anew. */
 bool lift_stream_push(const lift_table *t, lift_search *search, lift_stream *s, int64_t utime,
-                      const lift_observations *seen);
+                      const lift_observations *observed);
 /* The frame `lag` frames before the last, or the earliest that is still covered.  false: not so many frames yet. */
 bool lift_stream_estimate(const lift_table *t, const lift_stream *s, gait_lift_frame *out);
 #endif

@@ -50,8 +50,8 @@ void lift_least_squares(const lift_table *t, const lift_window *w, const segment
     fit.centre = fit.heading; /* the turn takes no part */
     memset(S, 0, (size_t)ld * (size_t)ld * sizeof *S);
     for (int32_t f = 0; f < w->frames; f++) {
-        lift_observations const seen = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
-        lift_add(&plain, &fit, w->at[f], &seen, NULL, 0.0);
+        lift_observations const observed = {.uv = w->uv + (size_t)f * J * 2, .sd = w->sd + (size_t)f * J};
+        lift_add(&plain, &fit, w->at[f], &observed, NULL, 0.0);
     }
     double *const y = t->W; /* free again: n numbers */
     for (int32_t i = 0; i < n; i++) {

@@ -11,7 +11,7 @@
 void lift_least_squares(const lift_table *t, const lift_window *w, const segment_posterior *b,
                         segment_posterior *spare);
 /* The `count` most uncertain displacements, one standard deviation long (count x F x J x 3, metres; entry of largest
- * magnitude positive), and their deviations over all markers and frames. spare is overwritten. */
+ * magnitude positive), and their standard deviations over all markers and frames. spare is overwritten. */
 void lift_uncertain(const lift_table *t, const segment_posterior *b, segment_posterior *spare, int32_t count,
                     double *mode, double *sd);
 /* Covariance of theta, n x n. */
