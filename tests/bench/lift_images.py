@@ -237,15 +237,15 @@ def _segments(clip: Clip, model: Path, plated: bool) -> tuple[ClipSegments, np.n
     """Clip with its truth (T, 15, 3)."""
     start, view = eval_clips.noisy_start(clip, 1, 0.0), CameraView(Camera.read(str(clip.camera)))
     truth, video = read_truth(str(clip.truth)), Video(clip.video)
-    spread = start["sd"]
+    sds = start["sd"]
     placed = Placement(
         frame=start["frame"],
         ground=np.array(start["pelvis"][:2]),
         heading=start["heading_rad"],
         stature=start["stature_m"],
-        ground_sd=spread["pelvis"],
-        heading_sd=spread["heading_rad"],
-        stature_sd=spread["stature_m"],
+        ground_sd=sds["pelvis"],
+        heading_sd=sds["heading_rad"],
+        stature_sd=sds["stature_m"],
         phase=start.get("phase"),
         stride_hz=start.get("stride_hz"),
     )

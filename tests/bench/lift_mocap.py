@@ -131,7 +131,7 @@ def one_of_each() -> Iterator[tuple[str, HeldOut]]:
             update(done)
 
 
-def _seen(known: HeldOut, sd: float, missing: float) -> Iterator[tuple[int, Floats, Floats, Floats]]:
+def _observed(known: HeldOut, sd: float, missing: float) -> Iterator[tuple[int, Floats, Floats, Floats]]:
     """Side, truth (F, J, 3) turned to it, picture and deviations of every segment, from sides in turn."""
     rng = np.random.default_rng(1)
     for k, segment in enumerate(known.segments * known.stature):
@@ -159,11 +159,11 @@ def errors_of(known: HeldOut, sd: float) -> Errors:
     lifters = _lifters(known)
     learnt = Gaussian.of(known.prior, known.stature)
     errors, inside, scaled, volumes = [], [], [], []
-    for side, truth, uv, spread in _seen(known, sd, 0.0):
+    for side, truth, uv, sds in _observed(known, sd, 0.0):
         lifter = lifters[side]
-        volumes.append(lifter.segment(uv, spread).log10_volume)
-        bayes, said = lifter.positions()
-        off = np.abs(bayes - truth)[..., DEPTH] / said[..., DEPTH]
+        volumes.append(lifter.segment(uv, sds).log10_volume)
+        bayes, predicted = lifter.positions()
+        off = np.abs(bayes - truth)[..., DEPTH] / predicted[..., DEPTH]
         inside.append(off < WITHIN)
         scaled.append(off < WITHIN_SCALED * lifter.scale())
         turn = axis_rotation(2, -_turn(side)).T
@@ -183,8 +183,8 @@ def _best(known: HeldOut, sd: float) -> float:
     for weight in WEIGHTS:
         lifters = _lifters(known, residual=weight * known.prior.gamma)
         errors = []
-        for side, truth, uv, spread in _seen(known, sd, 0.0):
-            lifters[side].segment(uv, np.sqrt(weight) * spread)
+        for side, truth, uv, sds in _observed(known, sd, 0.0):
+            lifters[side].segment(uv, np.sqrt(weight) * sds)
             errors.append(_error(lifters[side].positions()[0], truth))
         found.append(float(np.mean(errors)))
     return min(found)
@@ -233,13 +233,13 @@ def _gaps(title: str, known: HeldOut) -> list[object]:
     lifters, errors, promised = _lifters(known), [], []
     for share in MISSING:
         found = []
-        for side, truth, uv, spread in _seen(known, NOISE[1], share):
-            lifters[side].segment(uv, spread)
+        for side, truth, uv, sds in _observed(known, NOISE[1], share):
+            lifters[side].segment(uv, sds)
             mean, sd = lifters[side].positions()
             found.append((_error(mean, truth), np.sqrt((sd**2).sum(axis=2).mean())))
-        error, said = np.mean(found, axis=0).tolist()
+        error, predicted = np.mean(found, axis=0).tolist()
         errors.append(error)
-        promised.append(said)
+        promised.append(predicted)
     growth = errors[2] / errors[0]
     met = "yes" if growth <= GROWTH else "NO"
     return ["F11", title, *errors, growth, promised[2] / promised[0], met]

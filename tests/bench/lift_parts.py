@@ -19,7 +19,7 @@ from gait.body.skeleton import EVAL15
 from gait.camera.camera import Camera
 from gait.io.keypoints_file import Keypoints
 from gait.io.track_file import read_truth
-from gait.lift.smooth.size import tells_distance
+from gait.lift.smooth.size import shows_distance
 from gait.progress import progress
 from gait.reproducible import one_thread
 
@@ -51,7 +51,7 @@ def main() -> int:
                 tracks = _part(whole, names)
                 found = lift_tracks.lifted(prior, tracks, camera, lift_tracks.NOISE)
                 measured[part].append(lift_tracks.judged(found, joints.eval15()))
-                told[part] = tells_distance(tracks)
+                told[part] = shows_distance(tracks)
             update(done)
     _publish(measured, told)
     return 0

@@ -148,13 +148,13 @@ def _judged(walk: Walk, places: Floats, sd: Floats, rooted_sd: Floats | None, tr
     along = ray / np.linalg.norm(ray, axis=1, keepdims=True)
     far = np.linalg.norm(ray, axis=1)
     off = np.mean(((places - truth).mean(axis=1) * along).sum(axis=1) / far)
-    said = np.mean(np.sqrt((sd.mean(axis=1) ** 2 * along**2).sum(axis=1)) / far)
+    predicted = np.mean(np.sqrt((sd.mean(axis=1) ** 2 * along**2).sum(axis=1)) / far)
     about = np.nan
     if rooted_sd is not None:
         apart = [lift_tracks.rooted(x, lift_tracks.HIPS) for x in (places, truth)]
         about = np.mean(np.abs(apart[0] - apart[1]) < lift_tracks.WITHIN * rooted_sd)
     inside = np.mean(np.abs(places - truth) < lift_tracks.WITHIN * sd)
-    return Outcome(float(off), float(said), float(inside), float(about))
+    return Outcome(float(off), float(predicted), float(inside), float(about))
 
 
 def _row(title: str, found: list[tuple[str, Outcome, Outcome]]) -> list[object]:

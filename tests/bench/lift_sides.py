@@ -95,18 +95,18 @@ def _case(walk: lift_people.Walk, case: Case, rng: np.random.Generator) -> list[
     back = undo_swaps(walk, spoilt)
     clock.append(time.perf_counter())
     errors = []
-    for seen in (tracks, spoilt, back):
-        errors.append(_error(walk, seen, places, slice(begin, begin + case.length)))
+    for observed in (tracks, spoilt, back):
+        errors.append(_error(walk, observed, places, slice(begin, begin + case.length)))
         clock.append(time.perf_counter())
     judging, lifting = clock[1] - clock[0], clock[2] - clock[1]
-    right = spoilt.seen & (spoilt.uv == tracks.uv).all(axis=2)
+    right = spoilt.visible & (spoilt.uv == tracks.uv).all(axis=2)
     moved = (_differ(back, tracks, among) for among in (~right, right))
-    return [*errors, judging / lifting, (spoilt.seen & ~right).sum(), *moved]
+    return [*errors, judging / lifting, (spoilt.visible & ~right).sum(), *moved]
 
 
-def _error(walk: lift_people.Walk, seen: Keypoints, places: Floats, rows: slice) -> float:
+def _error(walk: lift_people.Walk, observed: Keypoints, places: Floats, rows: slice) -> float:
     """Root error of a walk in some rows, mm; infinite if its lift is refused."""
-    steady, _ = noise.without_spikes(seen, lift_tracks.NOISE)
+    steady, _ = noise.without_spikes(observed, lift_tracks.NOISE)
     try:
         lifted = lift_tracks.lifted(walk.prior, steady, walk.camera, lift_tracks.NOISE)
     except UserError:
@@ -135,7 +135,7 @@ def exchanged(tracks: Keypoints, joints: tuple[str, ...], begin: int, end: int) 
 
 def _differ(one: Keypoints, other: Keypoints, among: npt.NDArray[np.bool_]) -> int:
     """Points among some that are not where the other tracks have them."""
-    return int((among & one.seen & (one.uv != other.uv).any(axis=2)).sum())
+    return int((among & one.visible & (one.uv != other.uv).any(axis=2)).sum())
 
 
 def _publish(found: dict[Case, list[list[float]]]) -> None:

@@ -112,8 +112,8 @@ def _row(clip: Clip, model: Path) -> list[object]:
     tracks = lift_tracks.tracked(joints, camera, lift_tracks.NOISE, lift_tracks.GAPS)
     usual, stature = LiftConfig.default(), eval_clips.meta_of(clip.folder)["stature_m"]
 
-    def lifted(config: LiftConfig, seen: Keypoints = tracks) -> list[float]:
-        return _judged(*streamed(seen, camera, model, config)[:3], joints.eval15())
+    def lifted(config: LiftConfig, observed: Keypoints = tracks) -> list[float]:
+        return _judged(*streamed(observed, camera, model, config)[:3], joints.eval15())
 
     root, apart, _, share = lifted(usual)
     given = lifted(LiftConfig.default(stature=stature))
@@ -147,18 +147,18 @@ def streamed(
     lifter = Lifter(model, camera, config)
     index = [lifter.names.index(name) for name in tracks.names]
     utimes = np.round(1e6 * tracks.time).astype(int)
-    at, places, spread, tracked = [], [], [], []
+    at, places, sds, tracked = [], [], [], []
     uv = np.full((len(lifter.names), 2), np.nan)
-    for utime, seen in zip(utimes.tolist(), tracks.uv, strict=True):
-        uv[index] = seen
+    for utime, observed in zip(utimes.tolist(), tracks.uv, strict=True):
+        uv[index] = observed
         lifter.push(utime, uv)
         frame = lifter.estimate()
         if frame is not None and frame.status != TrackStatus.INIT:
             at.append(int(np.searchsorted(utimes, frame.utime)))
             places.append(frame.markers[index])
-            spread.append(frame.sd[index])
+            sds.append(frame.sd[index])
             tracked.append(frame.status == TrackStatus.TRACKING)
-    return np.array(at), np.array(places), np.array(spread), np.array(tracked)
+    return np.array(at), np.array(places), np.array(sds), np.array(tracked)
 
 
 if __name__ == "__main__":

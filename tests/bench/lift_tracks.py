@@ -72,7 +72,7 @@ def tracked(joints: Joints, camera: Camera, noise: float, gaps: float) -> Keypoi
 
 def wild(tracks: Keypoints, share: float, rng: np.random.Generator) -> Keypoints:
     """Keypoints of a detector that puts a share of the points anywhere."""
-    off = rng.random(tracks.seen.shape) < share
+    off = rng.random(tracks.visible.shape) < share
     return replace(tracks, uv=tracks.uv + off[..., None] * rng.normal(0, OFF, tracks.uv.shape))
 
 

@@ -48,7 +48,7 @@ def _curve(source: str, known: HeldOut) -> Iterator[list[object]]:
     """Lines of a prior: the volume at each noise, then the noise that gives the paper's."""
     gaussian = place(known.prior, stature=known.stature, ground_sd=0.0, height_sd=0.0)
     bare = replace(gaussian, residual=np.zeros_like(gaussian.residual))
-    s = np.linalg.svd(_seen(bare, 1.0).system.design, compute_uv=False)  # metres
+    s = np.linalg.svd(_observed(bare, 1.0).system.design, compute_uv=False)  # metres
     papers = float(brentq(lambda sd: _closed(s, sd) - PAPER, NOISE[0] / 10, 10 * NOISE[-1]))
     last = -np.inf
     for sd in (*NOISE, papers):
@@ -56,8 +56,8 @@ def _curve(source: str, known: HeldOut) -> Iterator[list[object]]:
         met = abs(volume - closed) <= EXACT * abs(closed) and (sd == papers or volume > last)
         last = volume
         yield [
-            *("F5", source, len(s), 1000 * sd, volume, _seen(bare, sd).resolved, int((s > sd).sum())),
-            *(_lifted(known, sd), _seen(gaussian, sd).resolved, "yes" if met else "NO"),
+            *("F5", source, len(s), 1000 * sd, volume, _observed(bare, sd).resolved, int((s > sd).sum())),
+            *(_lifted(known, sd), _observed(gaussian, sd).resolved, "yes" if met else "NO"),
         ]
 
 
@@ -65,7 +65,7 @@ def _closed(s: np.ndarray, sd: float) -> float:
     return float(-0.5 * np.log10(1 + (s / sd) ** 2).sum())
 
 
-def _seen(gaussian: Gaussian, sd: float) -> Posterior:
+def _observed(gaussian: Gaussian, sd: float) -> Posterior:
     """See the mean from the side."""
     uv = gaussian.mean @ AXES.T
     return infer(gaussian, orthographic(Observations(uv, np.full(uv.shape[:2], sd)), AXES))

@@ -100,17 +100,17 @@ def _errors(clip: Clip, model: Path, options: list[object], seed: int, folder: P
     start.write_text(json.dumps(eval_clips.noisy_start(clip, seed, 0.0)))
     words = ["track", clip.video, "--camera", clip.camera, "-o", out, "-m", model, "--init", start, "--quiet"]
     words += ["--background", clip.plate or "auto", "--seed", seed, *options, "--json"]
-    _said(words)
-    found = json.loads(_said(["eval", out, "--truth", clip.truth, "-m", model, "--json"]))
+    _predicted(words)
+    found = json.loads(_predicted(["eval", out, "--truth", clip.truth, "-m", model, "--json"]))
     return [found["root"]["median"], found["abs"]["median"], found["px"]["median"], 100 * found["lost"]]
 
 
-def _said(words: list[object]) -> str:
+def _predicted(words: list[object]) -> str:
     """What a command of gait prints."""
-    with contextlib.redirect_stdout(io.StringIO()) as said:
+    with contextlib.redirect_stdout(io.StringIO()) as predicted:
         if gait([str(w) for w in words]):
             raise RuntimeError(f"gait {words[0]} failed")
-    return said.getvalue()
+    return predicted.getvalue()
 
 
 if __name__ == "__main__":

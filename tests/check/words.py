@@ -66,6 +66,7 @@ ALLOWED = {
     "deviation": r"(?i:standard|absolute)[\s*#_-]*deviations?",
     "odd": r"\bodd[ _](?:number|size|count|width|height|order|length|harmonic|row|lane|byte|frame)s?|"
     r"even (?:and|or) odd|odd (?:and|or) even",
+    "sight": r"lines? of sight",
     "loss": r"(?i:track(?:ing)?[ _]?loss|loss(?:es)? of|soft_l1|huber|loss=)",
     "fork": r"\bfork\(\)",
     "exchange": r"(?i:data|file|interchange|c3d) exchange",

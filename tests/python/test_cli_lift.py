@@ -54,11 +54,11 @@ def lifted(path, names):
 def test_lifts(folder, capsys, view, method):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", "--height", "1.7", "--pixel-sd", "1"]
     assert main([*command, "--method", method, "--json", *VIEWS[view]]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["frames"] == 15 and said["settled"]
-    assert said["reprojection_px"] < 4  # 1 of noise; without a camera the picture has perspective
-    assert said["log10_volume_ratio"] < 0
-    names = said["markers"]["estimated"]
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["frames"] == 15 and printed["settled"]
+    assert printed["reprojection_px"] < 4  # 1 of noise; without a camera the picture has perspective
+    assert printed["log10_volume_ratio"] < 0
+    names = printed["markers"]["estimated"]
     assert len(names) == MARKERS
     found, truth = lifted("out.csv", names), np.load("truth.npy")
     shape, true = (p - p.mean(axis=1, keepdims=True) for p in (found, truth))
@@ -107,13 +107,13 @@ def test_a_stature_is_told_where_it_was_estimated(folder, capsys, method):
 
 
 def test_the_likelihood_alone_is_less_sure_and_has_the_same_columns(folder, capsys):
-    said, heads = {}, {}
+    printed, heads = {}, {}
     for method in ("blend", "likelihood"):
         command = ["lift", "t.csv", "-m", "m.gait", "-o", f"{method}.csv", "--camera", "cam.json", "--json"]
         assert main([*command, "--method", method]) == 0
-        said[method] = json.loads(capsys.readouterr().out)
+        printed[method] = json.loads(capsys.readouterr().out)
         heads[method] = (folder / f"{method}.csv").read_text().splitlines()[0]
-    assert said["likelihood"]["sd_mm"] > said["blend"]["sd_mm"]
+    assert printed["likelihood"]["sd_mm"] > printed["blend"]["sd_mm"]
     assert heads["likelihood"] == heads["blend"]
 
 
@@ -130,8 +130,10 @@ def test_the_likelihood_alone_needs_more_points_than_the_prior(folder, capsys):
     write("few.csv", few)
     command = ["lift", "few.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--quiet"]
     assert main([*command, "--method", "likelihood"]) == 1
-    said = capsys.readouterr().err
-    assert "few.csv: the points seen" in said and "of 60 modes" in said and said.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert (
+        "few.csv: the points seen" in printed and "of 60 modes" in printed and printed.count("\n") == 1
+    )
     assert not (folder / "out.csv").exists()
     assert main([*command, "--method", "blend"]) == 0
 
@@ -196,8 +198,8 @@ def test_trc_and_sd(folder, capsys):
 def test_faults(folder, capsys, options, code, words):
     before = {path: path.read_bytes() for path in folder.iterdir()}
     assert main(["lift", "t.csv", "-m", "m.gait", "-o", "out.csv", *options]) == code
-    said = capsys.readouterr().err
-    assert words in said and said.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert words in printed and printed.count("\n") == 1
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
@@ -296,22 +298,22 @@ def test_blending_needs_every_segment(folder, capsys):
 
 def test_one_wild_point_changes_little(folder, capsys):
     keypoints, _ = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)
-    row = int(np.flatnonzero(keypoints.seen[1:-1, 3])[4]) + 1
+    row = int(np.flatnonzero(keypoints.visible[1:-1, 3])[4]) + 1
     uv = keypoints.uv.copy()
     uv[row, 3] += 20
     write("wild.csv", replace(keypoints, uv=uv))
     command = ["-m", "m.gait", "--camera", "cam.json", "--pixel-sd", "1", "--json"]
     assert main(["lift", "wild.csv", *command, "-o", "wild.out.csv"]) == 0
-    said = capsys.readouterr()
-    summary = json.loads(said.out)
-    assert summary["jumps"] == 1
+    printed = capsys.readouterr()
+    summary = json.loads(printed.out)
+    assert summary["spikes"] == 1
     assert summary["left_out"] == [{"frame": int(keypoints.frame[row]), "point": keypoints.names[3]}]
-    assert f"{keypoints.names[3]} in frame {keypoints.frame[row]} (--keep-spikes)" in said.err
+    assert f"{keypoints.names[3]} in frame {keypoints.frame[row]} (--keep-spikes)" in printed.err
     assert main(["lift", "t.csv", *command, "-o", "out.csv"]) == 0
     far = np.linalg.norm(lifted("wild.out.csv", keypoints.names) - lifted("out.csv", keypoints.names), axis=2)
     assert far.max() < 0.1
     assert main(["lift", "wild.csv", *command, "-o", "kept.csv", "--keep-spikes"]) == 0
-    assert json.loads(capsys.readouterr().out.splitlines()[-1])["jumps"] == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["spikes"] == 0
 
 
 def test_a_camera_that_cannot_be_is_said(folder, capsys):
@@ -323,14 +325,14 @@ def test_a_camera_that_cannot_be_is_said(folder, capsys):
     # a lens that could be, not one that took these keypoints
     (folder / "long.json").write_text(json.dumps(camera | {"fx": 6e5, "fy": 6e5}))
     code = main(command)
-    said = capsys.readouterr().err
-    assert code == 1 or "do not rely on" in said
+    printed = capsys.readouterr().err
+    assert code == 1 or "do not rely on" in printed
 
 
 def test_few_joints_are_told(folder, capsys, monkeypatch):
     command = ["lift", "t.csv", "-m", "m.gait", "-o", "out.csv"]
     for tells, view in ((True, "camera"), (False, "camera"), (False, "none")):
-        monkeypatch.setattr(size, "tells_distance", lambda keypoints, tells=tells: tells)
+        monkeypatch.setattr(size, "shows_distance", lambda keypoints, tells=tells: tells)
         assert main([*command, *VIEWS[view]]) == 0
         told = "hips and ankles, which determine the distance, are hardly seen" in capsys.readouterr().err
         assert told == (view == "camera" and not tells)
@@ -340,28 +342,28 @@ def test_doubts_are_told(folder, capsys, monkeypatch):
     lift = motion.lift
 
     def doubting(prior, keypoints, *args):
-        doubted = np.zeros(keypoints.uv.shape[:2], bool)
-        doubted[2:6, 3] = doubted[4, 1] = True
-        return replace(lift(prior, keypoints, *args), outliers=doubted, alone=True, steps=0, wider=2.0)
+        outliers = np.zeros(keypoints.uv.shape[:2], bool)
+        outliers[2:6, 3] = outliers[4, 1] = True
+        return replace(lift(prior, keypoints, *args), outliers=outliers, alone=True, steps=0, wider=2.0)
 
     monkeypatch.setattr(motion, "lift", doubting)
     monkeypatch.setattr(noise, "shake", lambda keypoints: 5.0)
     command = ["lift", "t.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv"]
     assert main([*command, "--json"]) == 0
-    said = capsys.readouterr()
+    printed = capsys.readouterr()
     names = read("t.csv", toy_prior(FRAMES, MARKERS, 4, seed=5).names)[0].names
-    assert f"far from their predictions: {names[3]} in 4 frames\n" in said.err
+    assert f"far from their predictions: {names[3]} in 4 frames\n" in printed.err
     assert (
         "the points jitter by 5 from frame to frame: used as their noise instead of 3 (--pixel-sd)\n"
-        in said.err
+        in printed.err
     )
-    assert "segments are estimated alone" in said.err and "widened 2 times" in said.err
-    figures = json.loads(said.out)
-    assert figures["doubted"] == 5 and figures["segments_alone"] and figures["pixel_sd"] == 5
+    assert "segments are estimated alone" in printed.err and "widened 2 times" in printed.err
+    figures = json.loads(printed.out)
+    assert figures["outliers"] == 5 and figures["segments_alone"] and figures["pixel_sd"] == 5
     assert main([*command, "--pixel-sd", "3"]) == 0
-    said = capsys.readouterr()
-    assert "the points jitter by 5 from frame to frame, not 3: try --pixel-sd 5\n" in said.err
-    assert "iterations" not in said.out
+    printed = capsys.readouterr()
+    assert "the points jitter by 5 from frame to frame, not 3: try --pixel-sd 5\n" in printed.err
+    assert "iterations" not in printed.out
 
 
 @pytest.mark.parametrize(("recordings", "told"), [(0, False), (1, True), (3, True), (4, False)])

@@ -123,7 +123,7 @@ def test_a_start_outside_of_the_picture_is_told(scene, capsys):
     (scene / "far.json").write_text(json.dumps(init | {"pelvis": [100, 100, 1]}))
     for name, words in (("far", "far.json: the start is outside of the picture; check pelvis"), ("init", "")):
         assert track(scene, "--init", scene / f"{name}.json", "--stop", 2) == 0
-        assert words in (said := capsys.readouterr().err) and ("outside" in said) == bool(words)
+        assert words in (predicted := capsys.readouterr().err) and ("outside" in predicted) == bool(words)
 
 
 def test_a_track_is_not_its_own_truth(scene, capsys):
@@ -136,8 +136,8 @@ def test_a_track_is_not_its_own_truth(scene, capsys):
 
 def test_a_camera_is_not_a_track(scene, capsys):
     assert main(["eval", str(scene / "camera.json"), "--truth", str(scene / "truth.csv")]) == 1
-    said = capsys.readouterr().err
-    assert re.search(r"camera.json: (not a track file|has no rows).*; give a track CSV", said)
+    predicted = capsys.readouterr().err
+    assert re.search(r"camera.json: (not a track file|has no rows).*; give a track CSV", predicted)
 
 
 def test_paper_mode_and_no_background(scene, capsys):

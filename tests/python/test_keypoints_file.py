@@ -35,14 +35,14 @@ def test_round_trip(tmp_path):
 def test_zeros_are_an_origin_or_not_seen(tmp_path):
     head = "frame,time,pelvis_u,pelvis_v,l_knee_u,l_knee_v"
     origin = read(written(tmp_path, f"{head}\n0,0,0,0,.1,.5\n1,.1,0,0,.2,.5\n"), KNOWN)[0]
-    assert origin.seen.all()
+    assert origin.visible.all()
     with pytest.raises(UserError, match="line 2: pelvis is at exactly 0, 0, .* give pelvis_c 0"):
         read(written(tmp_path, f"{head}\n0,0,0,0,0,0\n1,.1,0,0,.2,.5\n"), KNOWN)
 
 
 def test_little_confidence_is_not_seen(tmp_path):
     path = written(tmp_path, "frame,time,pelvis_u,pelvis_v,pelvis_c\n0,0,1,2,0.05\n1,0.1,1,2,\n2,0.2,1,2,1\n")
-    assert read(path, KNOWN)[0].seen.ravel().tolist() == [False, False, True]
+    assert read(path, KNOWN)[0].visible.ravel().tolist() == [False, False, True]
 
 
 HEAD = "frame,time,pelvis_u,pelvis_v"

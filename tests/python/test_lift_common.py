@@ -45,8 +45,8 @@ def chain():
         start = state.copy()
         start[-6] += segment * clip.hop * 1.2
         energy = clip.energy(segment, 0, start)
-        seen = energy.reading.value + energy.residuals(start).reshape(energy.reading.value.shape)
-        energies.append(replace(energy, reading=replace(energy.reading, value=seen)))
+        observed = energy.reading.value + energy.residuals(start).reshape(energy.reading.value.shape)
+        energies.append(replace(energy, reading=replace(energy.reading, value=observed)))
         states.append(start)
     link = Link(prior.hop, np.sqrt(2) * energies[0].shape.residual)
     return energies, link, settled(energies, link, np.array(states))
@@ -146,5 +146,5 @@ def test_intervals_hold_what_they_say(monkeypatch):
         squares.append(np.mean(((fit.places[:, markers] - truth) / fit.sd[:, markers]) ** 2))
     assert min(held) > 0.8
     assert 0.4 < np.sqrt(np.mean(squares)) < 1.2
-    monkeypatch.setattr(fit_clip, "moves", lambda chain, factor, states, drifted: np.zeros((*states.shape, 3)))
+    monkeypatch.setattr(fit_clip, "moves", lambda _c, _f, states, _d: np.zeros((*states.shape, 3)))
     assert np.median(fit_clip.fit_clip(clip, fit.sequence).sd) < 0.95 * np.median(fit.sd)  # it counts

@@ -26,35 +26,36 @@ CAMERA = Camera.looking((1.5, -6.0, 1.4), (1.0, 0, 0.9), (960, 720), 900)
 def points(frames: int = 8, markers: int = 15):
     """Points as they are said to be, with noise."""
     rng = np.random.default_rng(3)
-    said = rng.uniform(0, 500, (frames, markers, 2))
-    return said, Observations(said + SD * rng.normal(size=said.shape), np.full(said.shape[:2], SD))
+    predicted = rng.uniform(0, 500, (frames, markers, 2))
+    uv = predicted + SD * rng.normal(size=predicted.shape)
+    return predicted, Observations(uv, np.full(uv.shape[:2], SD))
 
 
 def test_right_points_are_left_as_they_are():
-    said, seen = points()
-    assert (weighted(seen, said).sd == seen.sd).all()
+    predicted, observed = points()
+    assert (weighted(observed, predicted).sd == observed.sd).all()
 
 
 def test_a_wrong_point_loses_its_pull_the_further_the_more():
-    said, seen = points()
+    predicted, observed = points()
     pulls = []
     for off in (5 * FAR * SD, 20 * FAR * SD):
-        seen.uv[2, 4] = said[2, 4] + (off, 0)
-        sd = weighted(seen, said).sd
+        observed.uv[2, 4] = predicted[2, 4] + (off, 0)
+        sd = weighted(observed, predicted).sd
         assert (np.delete(sd, 2 * 15 + 4) == SD).all()
         pulls.append(off / sd[2, 4] ** 2)
     assert pulls[1] < pulls[0] / 50 < FAR / SD
 
 
 def test_of_a_motion_that_is_another_no_point_is_doubted():
-    said, seen = points()
-    assert (weighted(seen, said + (30.0, 40.0)).sd == seen.sd).all()
+    predicted, observed = points()
+    assert (weighted(observed, predicted + (30.0, 40.0)).sd == observed.sd).all()
 
 
 def test_what_is_not_seen_is_not_judged():
-    said, seen = points()
-    seen.uv[0], seen.sd[0] = np.nan, np.inf
-    assert (weighted(seen, said).sd == seen.sd).all()
+    predicted, observed = points()
+    observed.uv[0], observed.sd[0] = np.nan, np.inf
+    assert (weighted(observed, predicted).sd == observed.sd).all()
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +93,7 @@ def test_a_point_wrong_for_a_second_hardly_matters(walk):
 def spoilt(keypoints, share, seed):
     """Keypoints of which a share of the points is anywhere."""
     rng = np.random.default_rng(seed)
-    wild = rng.random(keypoints.seen.shape) < share
+    wild = rng.random(keypoints.visible.shape) < share
     return replace(keypoints, uv=keypoints.uv + wild[..., None] * rng.normal(0, 150, keypoints.uv.shape))
 
 
@@ -111,8 +112,8 @@ def live(keypoints, share, seed):
     lifter = Lifter(view=CAMERA)
     uv = np.full((len(lifter.names), 2), np.nan)
     order = [lifter.names.index(name) for name in keypoints.names]
-    for time, seen in zip(keypoints.time, spoilt(keypoints, share, seed).uv, strict=True):
-        uv[order] = seen
+    for time, observed in zip(keypoints.time, spoilt(keypoints, share, seed).uv, strict=True):
+        uv[order] = observed
         lifter.push(round(1e6 * time), uv)
         now = lifter.estimate()
         if now is not None and now.status != TrackStatus.INIT:

@@ -34,12 +34,12 @@ def drawn(prior, seed=1, sd=0.01, missing=0.2, heading=0.4):
 
 
 def test_a_posterior_in_the_axes_of_the_world_is_that_of_numpy():
-    """Without a heading all is linear: means, deviations, volume, and those about the middle of two markers."""
+    """Without a heading all is linear: means, sd, volume, and those about the middle of two markers."""
     prior = toy_prior(6, 9, 8, headings=8)
-    _, seen = drawn(prior, heading=0.0)
+    _, observed = drawn(prior, heading=0.0)
     lifter = SegmentLifter(prior, FAR, prior.stature, 0.0)
-    found = lifter.solve(lifter.explanations(seen)[0])
-    wanted = reference.infer(gaussian(prior), orthographic(seen, FAR.axes[:2]))
+    found = lifter.solve(lifter.explanations(observed)[0])
+    wanted = reference.infer(gaussian(prior), orthographic(observed, FAR.axes[:2]))
     np.testing.assert_allclose(found.places, wanted.points, **SAME)
     np.testing.assert_allclose(found.sd, wanted.sd, rtol=1e-5)
     assert found.log10_volume == pytest.approx(wanted.log10_volume, rel=1e-6)
@@ -55,13 +55,13 @@ def test_a_posterior_in_the_axes_of_the_world_is_that_of_numpy():
 def test_a_heading_is_found_as_by_the_numpy_search(heading):
     prior, rng = toy_prior(6, 15, 6, seed=3), np.random.default_rng(4)
     truth = reference.place(prior, heading=heading, at=(0.8, 1.5), ground_sd=0, height_sd=0).draw(rng)
-    seen = Observations(
+    observed = Observations(
         CAMERA.project(truth) + rng.normal(size=(*truth.shape[:2], 2)), np.ones(truth.shape[:2])
     )
     lifter = SegmentLifter(prior, Perspective(CAMERA), prior.stature, 0.0)
-    best = lifter.explanations(seen)[0]
+    best = lifter.explanations(observed)[0]
     found = lifter.solve(best)
-    wanted = reference.explain(prior, lambda about: perspective(seen, CAMERA, about))[0]
+    wanted = reference.explain(prior, lambda about: perspective(observed, CAMERA, about))[0]
     turn = (found.heading - wanted.heading + np.pi) % (2 * np.pi) - np.pi
     assert best.share > 0.9 and abs(turn) < 0.02
     assert np.median(np.linalg.norm(found.places - truth, axis=2)) < 0.05
@@ -71,9 +71,9 @@ def test_somebody_far_away_is_not_drawn_to_the_origin():
     prior, rng = toy_prior(6, 15, 6, seed=3), np.random.default_rng(4)
     camera = Camera.looking((0.0, -7.0, 2.6), (0.0, 40.0, 0.9), (640, 480), 1400.0)
     truth = reference.place(prior, heading=0.4, at=(3.0, 60.0), ground_sd=0, height_sd=0).draw(rng)
-    seen = Observations(camera.project(truth), np.full(truth.shape[:2], 0.3))
+    observed = Observations(camera.project(truth), np.full(truth.shape[:2], 0.3))
     lifter = SegmentLifter(prior, Perspective(camera), prior.stature, 0.0)
-    found = lifter.solve(lifter.explanations(seen)[0])
+    found = lifter.solve(lifter.explanations(observed)[0])
     assert abs((found.places - truth).mean(axis=(0, 1))[1]) < 0.5
 
 
@@ -86,38 +86,38 @@ def test_headings_that_look_alike_share_the_probability_and_the_course_decides()
     truth = reference.place(prior, heading=0.6, ground_sd=0, height_sd=0).draw(
         np.random.default_rng(2), False
     )
-    seen = Observations(truth @ FAR.axes[:2].T, np.full(truth.shape[:2], 0.01))
-    found = SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(seen)
+    observed = Observations(truth @ FAR.axes[:2].T, np.full(truth.shape[:2], 0.01))
+    found = SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(observed)
     assert found[1].share > 0.3
     assert np.cos(found[0].heading) == pytest.approx(np.cos(found[1].heading), abs=0.05)
-    sure = [Explanation(found[1].heading, 0, np.zeros(3), 1.0, seen)]
+    sure = [Explanation(found[1].heading, 0, np.zeros(3), 1.0, observed)]
     assert [e.heading for e in explain.course([sure, found, [], sure])] == [found[1].heading] * 4
 
 
 def test_wrong_points_are_weighted_down():
     prior = toy_prior(6, 15, 6, seed=3)
-    _, seen = drawn(prior, missing=0.0)
-    seen.uv[2:4, 5] += 0.5
-    best = SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(seen)[0]
-    heavy = best.seen.sd > seen.sd
+    _, observed = drawn(prior, missing=0.0)
+    observed.uv[2:4, 5] += 0.5
+    best = SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(observed)[0]
+    heavy = best.visible.sd > observed.sd
     assert heavy[2:4, 5].all() and heavy.sum() < 6
 
 
 def test_next_to_nothing_seen_is_not_explained():
     prior = toy_prior(6, 15, 6)
-    seen = Observations(np.zeros((6, 15, 2)), np.full((6, 15), np.inf))
-    assert SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(seen) == []
+    observed = Observations(np.zeros((6, 15, 2)), np.full((6, 15), np.inf))
+    assert SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(observed) == []
 
 
 def test_without_a_prior_modes_have_their_least_squares():
     prior = toy_prior(6, 9, 4, headings=8)
-    _, seen = drawn(prior, heading=0.0, missing=0.0)
+    _, observed = drawn(prior, heading=0.0, missing=0.0)
     lifter = SegmentLifter(prior, FAR, prior.stature, 0.0)
-    best = lifter.explanations(seen)
+    best = lifter.explanations(observed)
     found = explain.without_prior(prior, FAR, prior.stature, 0.0, best)[0]
     wide = gaussian(prior)
     wide.modes[:4] *= 1e4
-    limit = reference.infer(wide, orthographic(seen, FAR.axes[:2]))
+    limit = reference.infer(wide, orthographic(observed, FAR.axes[:2]))
     np.testing.assert_allclose(found.places, limit.points, atol=1e-3)
     np.testing.assert_allclose(found.sd, limit.sd, rtol=0.01)
     assert (found.sd >= lifter.solve(best[0]).sd).all()
@@ -125,8 +125,8 @@ def test_without_a_prior_modes_have_their_least_squares():
 
 def test_without_a_prior_modes_that_nothing_shows_are_refused():
     prior = toy_prior(4, 5, 60, seed=4, headings=8)  # 40 numbers seen
-    _, seen = drawn(prior, heading=0.0, missing=0.0)
-    best = SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(seen)
+    _, observed = drawn(prior, heading=0.0, missing=0.0)
+    best = SegmentLifter(prior, FAR, prior.stature, 0.0).explanations(observed)
     with pytest.raises(UserError, match="of 60 modes"):
         explain.without_prior(prior, FAR, prior.stature, 0.0, best)
 

@@ -125,8 +125,8 @@ def test_the_energy_is_eq_7():
     corrections, reading = energy.corrections, energy.reading
     pulled = uv[corrections.frame, corrections.marker] - corrections.uv
     value, _ = energy.sticks.responses(uv[:, energy.sticks.markers], reading.places, reading.blur)
-    seen = state[-1] + np.exp(state[GAIN]) * value - reading.value
-    wanted = ((pulled / corrections.sd[:, None]) ** 2).sum() + (seen**2).sum() / reading.sd**2
+    observed = state[-1] + np.exp(state[GAIN]) * value - reading.value
+    wanted = ((pulled / corrections.sd[:, None]) ** 2).sum() + (observed**2).sum() / reading.sd**2
     assert rows @ rows == pytest.approx(wanted + (state**2).sum() / 4)
 
 

@@ -78,9 +78,9 @@ def test_minus_one_is_refused_as_zero_is(folder, capsys):
     uv = pixels()
     uv[3, 5] = -1
     save("u.csv", uv)
-    code, said = lift(capsys, "u.csv")
-    assert code == 1 and said.count("\n") == 1
-    assert "u.csv: line 5: l_elbow is at exactly -1, -1, as detectors put" in said
+    code, printed = lift(capsys, "u.csv")
+    assert code == 1 and printed.count("\n") == 1
+    assert "u.csv: line 5: l_elbow is at exactly -1, -1, as detectors put" in printed
 
 
 @pytest.mark.parametrize(
@@ -115,17 +115,17 @@ def test_an_unusual_stature_is_told(folder, capsys, monkeypatch):
         monkeypatch.setattr(motion, "lift", lambda *args, s=stature: replace(lifted(*args), stature=s))
         believed = 1.72 if options else usual
         words = f"{stature:.2f} m tall, where {believed:.2f} was expected: check the camera's focal length"
-        said = lift(capsys, "t.csv", "cam.json", *options)[1]
-        assert (words in said) == told and ("m tall" in said) == told
+        printed = lift(capsys, "t.csv", "cam.json", *options)[1]
+        assert (words in printed) == told and ("m tall" in printed) == told
 
 
 @pytest.mark.parametrize("factor", [100, 1000])
 def test_a_camera_in_centimetres_or_millimetres_is_refused(folder, capsys, factor):
     camera = other_camera()
     other_camera(t=[factor * value for value in camera["t"]])
-    code, said = lift(capsys, "t.csv", "other.json")
-    assert code == 1 and said.count("\n") == 1 and not (folder / "out.csv").exists()
-    assert f"t.csv: the camera stands {factor} m over the floor" in said and "give its t in metres" in said
+    code, printed = lift(capsys, "t.csv", "other.json")
+    assert code == 1 and printed.count("\n") == 1 and not (folder / "out.csv").exists()
+    assert f"t.csv: the camera stands {factor} m over the floor" in printed and "give its t in metres" in printed
 
 
 def test_a_camera_on_a_mast_is_not_refused(folder, capsys):
@@ -143,9 +143,9 @@ def test_too_few_frames_per_second_are_named(folder, capsys, blank):
     if blank:  # rows at the camera's rate, a detector at a fifth of it
         uv[np.arange(len(uv)) % 4 > 0] = np.nan
     save("u.csv", uv, 1 / 20 if blank else 1 / 5)
-    code, said = lift(capsys, "u.csv")
-    assert code == 1 and said.count("\n") == 1
-    assert "u.csv: 5 frames per second with points are too few to follow a motion; give 7 or more" in said
+    code, printed = lift(capsys, "u.csv")
+    assert code == 1 and printed.count("\n") == 1
+    assert "u.csv: 5 frames per second with points are too few to follow a motion; give 7 or more" in printed
 
 
 @pytest.mark.parametrize(("stop", "where"), [(20, "in frames 10 to 19"), (99, "at frame 10")])
@@ -153,8 +153,8 @@ def test_a_change_of_person_is_told(folder, capsys, stop, where):
     uv = pixels()
     uv[10:stop, :, 0] += 250
     save("u.csv", uv)
-    said = lift(capsys, "u.csv")[1]
-    assert f"most points jump at once: the keypoints change to another person {where}; keep" in said
+    printed = lift(capsys, "u.csv")[1]
+    assert f"most points jump at once: the keypoints change to another person {where}; keep" in printed
 
 
 def test_wild_points_are_no_other_person(folder):
@@ -171,8 +171,8 @@ def test_a_picture_upside_down_names_v(folder, capsys):
     uv = pixels()
     uv[..., 1] = 479 - uv[..., 1]
     save("u.csv", uv)
-    code, said = lift(capsys, "u.csv")
-    assert code == 1 or "that v points down" in said
+    code, printed = lift(capsys, "u.csv")
+    assert code == 1 or "that v points down" in printed
 
 
 def test_exchanged_sides_are_put_back_and_told(folder, capsys):
@@ -181,16 +181,16 @@ def test_exchanged_sides_are_put_back_and_told(folder, capsys):
         pair = [names.index(f"{side}_{joint}") for side in "lr"]
         uv[np.ix_([5, 6, 7, 8], pair)] = uv[np.ix_([5, 6, 7, 8], pair[::-1])]
     save("swapped.csv", uv)
-    code, said = lift(capsys, "swapped.csv")
-    assert code == 0 and "swapped; undone: shoulder, elbow in frames 5 to 8 (--keep-sides)" in said
+    code, printed = lift(capsys, "swapped.csv")
+    assert code == 0 and "swapped; undone: shoulder, elbow in frames 5 to 8 (--keep-sides)" in printed
     assert (
         main(["lift", "swapped.csv", "-m", "m.gait", "--camera", "cam.json", "-o", "out.csv", "--json"]) == 0
     )
     put = [{"joint": joint, "first": 5, "last": 8} for joint in ("shoulder", "elbow")]
-    assert json.loads(capsys.readouterr().out)["put_back"] == put
+    assert json.loads(capsys.readouterr().out)["swaps"] == put
     for keypoints, options in (("swapped.csv", ["--keep-sides"]), ("t.csv", [])):
-        code, said = lift(capsys, keypoints, "cam.json", *options)
-        assert code == 0 and "put back" not in said
+        code, printed = lift(capsys, keypoints, "cam.json", *options)
+        assert code == 0 and "put back" not in printed
 
 
 def test_more_wrong_points_than_it_bears_are_told(folder, capsys):
@@ -201,8 +201,8 @@ def test_more_wrong_points_than_it_bears_are_told(folder, capsys):
         wild = rng.random(uv.shape[:2]) < share
         uv[wild] += rng.normal(0, 60, (wild.sum(), 2))
         save("wild.csv", uv)
-        _, said = lift(capsys, "wild.csv", "cam.json", "--pixel-sd", "1")
-        assert (told in said) == (share == 0.2)
+        _, printed = lift(capsys, "wild.csv", "cam.json", "--pixel-sd", "1")
+        assert (told in printed) == (share == 0.2)
 
 
 def test_wild_points_are_no_noise(folder):

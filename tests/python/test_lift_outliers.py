@@ -24,8 +24,8 @@ def swinging(rate: float, frames: int = 60, seed: int = 4) -> Keypoints:
 @pytest.mark.parametrize("rate", [10, 30, 60])
 def test_quick_motion_stays(rate):
     keypoints = swinging(rate)
-    kept, jumps = without_spikes(keypoints, 3.0)
-    assert jumps == []
+    kept, spikes = without_spikes(keypoints, 3.0)
+    assert spikes == []
     np.testing.assert_array_equal(kept.uv, keypoints.uv)
 
 
@@ -33,17 +33,17 @@ def test_quick_motion_stays(rate):
 def test_a_jump_is_taken_out_and_named(off):
     keypoints = swinging(30)
     keypoints.uv[20, 1] += off
-    kept, jumps = without_spikes(keypoints, 3.0)
-    assert jumps == [(20, "r_wrist")]
-    assert np.isnan(kept.uv[20, 1]).all() and kept.seen.sum() == keypoints.seen.sum() - 1
+    kept, spikes = without_spikes(keypoints, 3.0)
+    assert spikes == [(20, "r_wrist")]
+    assert np.isnan(kept.uv[20, 1]).all() and kept.visible.sum() == keypoints.visible.sum() - 1
 
 
 def test_many_jumps_beside_gaps():
     keypoints = swinging(30)
     keypoints.uv[[5, 17, 18, 40], 0] = 0.0
     keypoints.uv[30:36, 1] = np.nan
-    _, jumps = without_spikes(keypoints, 3.0)
-    assert jumps == [(5, "l_ankle"), (17, "l_ankle"), (18, "l_ankle"), (40, "l_ankle")]
+    _, spikes = without_spikes(keypoints, 3.0)
+    assert spikes == [(5, "l_ankle"), (17, "l_ankle"), (18, "l_ankle"), (40, "l_ankle")]
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -18,7 +18,7 @@ from gait.lift.segment.view import Parallel, Perspective, looking_along
 from gait.lift.smooth import block_arrowhead, chain, motion, smoother, soft_constraints
 from gait.lift.smooth.chain import Around, Freedom, Segment, overlapping
 from gait.lift.smooth.motion import Unlike
-from gait.lift.smooth.smoother import Seen, Start, smooth
+from gait.lift.smooth.smoother import Observed, Start, smooth
 
 FRAMES, MARKERS, BLOCKS = 6, 5, 4
 LEFT = Uncertain(0.0, *np.zeros((4, 3)))
@@ -126,16 +126,16 @@ def test_what_lasts_is_no_surer_for_a_longer_sequence(prior):
     covariance = np.linalg.inv(whole(found.information)[0])
     half = np.zeros((blocks, FRAMES // 2, MARKERS, 3))
     half[..., 3, 2], half[..., 0, 2] = 1, -1  # height of one marker over another
-    spread = []
+    sds = []
     for used in (2, blocks):
         along = np.where(np.arange(blocks)[:, None, None, None] < used, half, 0).ravel()
         along = np.pad(along / (used * FRAMES // 2), (0, len(covariance) - along.size))
-        spread.append(np.sqrt(along @ covariance @ along))
+        sds.append(np.sqrt(along @ covariance @ along))
     body = 1.7 * (prior.mean[0, :, 3, 2] - prior.mean[0, :, 0, 2]).mean()
     offsets = 2 * (chain.THROUGHOUT * chain.LASTING * prior.gamma * prior.residual[0, [0, 3]].mean())
     least = np.sqrt((0.1 / 1.7 * body) ** 2 + 1.7**2 * (offsets + 2 * chain.OFFSET_SD**2))
-    assert spread[1] > 0.99 * least
-    assert spread[1] < spread[0]
+    assert sds[1] > 0.99 * least
+    assert sds[1] < sds[0]
 
 
 def drawn(prior, rng):
@@ -156,7 +156,7 @@ def observed(prior, places, view, sd, rng, missing=0.1):
     truth = np.einsum("tw,twjc->tjc", weights, places[frames])
     uv = view.project(truth, np.ones(len(time))) + sd * rng.normal(size=(len(time), MARKERS, 2))
     noise = np.where(rng.random(uv.shape[:2]) < missing, np.inf, sd)
-    return truth, Seen(time, Observations(uv, noise), np.arange(MARKERS))
+    return truth, Observed(time, Observations(uv, noise), np.arange(MARKERS))
 
 
 def test_smoother_covers_what_is_drawn_from_its_prior(prior):
@@ -173,8 +173,8 @@ def test_smoother_covers_what_is_drawn_from_its_prior(prior):
         np.ones(BLOCKS * 3),
     )
     for _ in range(40):
-        truth, seen = observed(prior, drawn(prior, rng), view, 0.01, rng)
-        found = smooth(prior, seen, view, FREEDOM, start, contact=False, bones=False)
+        truth, points = observed(prior, drawn(prior, rng), view, 0.01, rng)
+        found = smooth(prior, points, view, FREEDOM, start, contact=False, bones=False)
         assert found.settled
         inside.append(np.abs(found.places - truth) < 1.645 * found.sd)
         ratios.append(found.log_volume_ratio)
@@ -395,4 +395,4 @@ def test_nothing_before_the_lens_is_refused_in_one_line(monkeypatch):
 
 
 def test_variances_below_zero_by_rounding_are_zero():
-    np.testing.assert_array_equal(smoother._deviations(np.array([-1e-18, 0.0, 4.0])), [0.0, 0.0, 2.0])
+    np.testing.assert_array_equal(smoother._roots(np.array([-1e-18, 0.0, 4.0])), [0.0, 0.0, 2.0])

@@ -159,7 +159,7 @@ def test_a_point_whose_partner_is_missing_goes_with_its_limb():
     keypoints = walking()
     keypoints.uv[45:48, 3] = np.nan
     back, _ = undo_swaps(exchanged(keypoints, 40, 55), NOISE, model)
-    assert np.array_equal(back.seen, keypoints.seen)
+    assert np.array_equal(back.visible, keypoints.visible)
 
 
 def test_a_stretch_is_judged_by_its_surroundings_without_wild_points():

@@ -15,7 +15,7 @@ from gait.lift.segment.view import Perspective
 from gait.lift.smooth import chain, motion, size
 from gait.lift.smooth.chain import Around, Freedom, overlapping
 from gait.lift.smooth.motion import Options
-from gait.lift.smooth.smoother import Seen, Start, smooth
+from gait.lift.smooth.smoother import Observed, Start, smooth
 
 STATURE, SECONDS, EXACT = 1.7, 2, 0.3  # metres, s, pixels
 SHAKY, FARTHEST_OFF = 40.0, 0.03  # pixels; share of the distance
@@ -77,12 +77,12 @@ def test_exact_pixels_of_the_prior_are_lifted_to_their_depth(walk, monkeypatch, 
         places = places - places.mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
         uv = camera.project(places[:, markers])
         points = Observations(uv, np.full(uv.shape[:2], EXACT))
-        seen = Seen(np.arange(len(places)) / prior.fps, points, markers)
+        observed = Observed(np.arange(len(places)) / prior.fps, points, markers)
         start = Start(headings, components, STATURE, places, np.ones(len(places)))
         freedom = Freedom(STATURE, 0.04, 0.03)
-        found = smooth(prior, seen, Perspective(camera), freedom, start, contact=False, bones=False)
-        spread = np.median(np.sqrt(found.sd**2 @ ahead**2))
-        off.append(float((found.places - places).mean(axis=(0, 1)) @ ahead) / spread)
+        found = smooth(prior, observed, Perspective(camera), freedom, start, contact=False, bones=False)
+        sds = np.median(np.sqrt(found.sd**2 @ ahead**2))
+        off.append(float((found.places - places).mean(axis=(0, 1)) @ ahead) / sds)
     assert abs(np.mean(off)) < 1.25
 
 
@@ -126,7 +126,8 @@ def test_a_short_person_who_walks_as_learnt_is_left_short(walk):
     uv = camera.project(places[:, prior.index(EVAL15)])
     time = np.arange(len(places)) / prior.fps
     keypoints = Keypoints(np.arange(len(places)), time, tuple(EVAL15), uv, np.ones(uv.shape[:2]))
-    found = motion.lift(prior, keypoints, Perspective(camera), Options(pixel_sd=1.0, floor_sd=0.01), prior.names)
+    options = Options(pixel_sd=1.0, floor_sd=0.01)
+    found = motion.lift(prior, keypoints, Perspective(camera), options, prior.names)
     assert found.chi2_per_observation < motion.POOR_FIT and found.wider == 1
     assert size.bones_ratio(prior, found.places, prior.stature) < 0.87  # an unlikely size
     assert found.resized == 1
@@ -175,25 +176,25 @@ def test_parts_that_hardly_tell_the_distance():
         uv[round(10 * share) :] = np.nan
         return Keypoints(np.arange(10), np.arange(10) / 30, names, uv, np.ones(uv.shape[:2]))
 
-    assert size.tells_distance(keypoints("r_hip", "l_ankle"))
-    assert size.tells_distance(keypoints("pelvis", "r_ankle", "head_top"))
-    assert not size.tells_distance(keypoints("l_hip", "r_hip", "l_shoulder"))
-    assert not size.tells_distance(keypoints("r_ankle"))
-    assert not size.tells_distance(keypoints("r_hip", "l_ankle", share=0.4))
+    assert size.shows_distance(keypoints("r_hip", "l_ankle"))
+    assert size.shows_distance(keypoints("pelvis", "r_ankle", "head_top"))
+    assert not size.shows_distance(keypoints("l_hip", "r_hip", "l_shoulder"))
+    assert not size.shows_distance(keypoints("r_ankle"))
+    assert not size.shows_distance(keypoints("r_hip", "l_ankle", share=0.4))
 
 
-@pytest.mark.parametrize(("seen", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)])
-def test_without_ankles_the_distance_is_as_open_as_the_size(walk, seen, sure):
+@pytest.mark.parametrize(("observed", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)])
+def test_without_ankles_the_distance_is_as_open_as_the_size(walk, observed, sure):
     """Legs that nobody sees stand on the floor by the prior alone, which seemed to tell the distance."""
     prior, places = walk
     camera = Camera.looking(VIEWS["towards"], (0, 0, 0.9), (640, 480), 900)
-    uv = camera.project(places[:, prior.index(seen)])
+    uv = camera.project(places[:, prior.index(observed)])
     time = np.arange(len(places)) / prior.fps
-    keypoints = Keypoints(np.arange(len(places)), time, tuple(seen), uv, np.ones(uv.shape[:2]))
+    keypoints = Keypoints(np.arange(len(places)), time, tuple(observed), uv, np.ones(uv.shape[:2]))
     found = motion.lift(prior, keypoints, Perspective(camera), Options(pixel_sd=1.0), prior.names)
     distance = float(np.linalg.norm(places - (-camera.R.T @ camera.t), axis=2).mean())
-    spread = float(np.median(np.sqrt(found.sd**2 @ camera.R[2] ** 2))) / distance
-    assert (spread < size.PROPORTION_SD) == sure
+    sds = float(np.median(np.sqrt(found.sd**2 @ camera.R[2] ** 2))) / distance
+    assert (sds < size.PROPORTION_SD) == sure
 
 
 @pytest.mark.parametrize("floats", [True, False])
@@ -206,8 +207,8 @@ def test_one_who_fits_but_floats_is_as_large_as_the_bones(walk, floats):
     if not floats:
         small = small - [0.0, 0.0, motion._height(small, prior)]
     time = np.arange(len(small)) / prior.fps
-    seen = np.ones(small.shape[:2])
-    keypoints = Keypoints(np.arange(len(small)), time, prior.names, camera.project(small), seen)
+    observed = np.ones(small.shape[:2])
+    keypoints = Keypoints(np.arange(len(small)), time, prior.names, camera.project(small), observed)
     sd = np.full_like(small, 0.01)
     options = Options(stature=STATURE, floor_sd=0.02)
     found = motion._sized(

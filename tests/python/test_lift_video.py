@@ -13,10 +13,10 @@ from gait.bindings.model import read_blob
 from gait.bindings.segment_prior import TAGS, SegmentPrior
 from gait.body.skeleton import EVAL15, JOINTS, pose
 from gait.cli import main
-from gait.lift.video import run as lift_video
 from gait.errors import UserError
 from gait.io import blob
 from gait.io.video import Video, VideoWriter
+from gait.lift.video import run as lift_video
 from gait.lift.video.clip_segments import Settings
 from gait.lift.video.corrections import (
     CLICK_SD,
@@ -208,7 +208,7 @@ def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
     figures = json.loads(capsys.readouterr().out)
     assert figures["frames"] == 24 and figures["corrections"]["given"] == 12
     assert figures["corrections"]["miss_px"]["with"] < figures["corrections"]["miss_px"]["without"]
-    assert len(figures["suggest"]) <= 3 and figures["fit_correlation"] > lift_video.DOUBTFUL
+    assert len(figures["suggest"]) <= 3 and figures["fit_correlation"] > lift_video.POOR_CORRELATION
     assert Video(tmp_path / "o.mp4").count == 24
     with open(tmp_path / "out.csv", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -221,7 +221,7 @@ def test_the_command_lifts_a_video(files, tmp_path, corrected, prior, capsys):
 
 def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsys, monkeypatch):
     """Sensors that the figure does not explain are told as well."""
-    monkeypatch.setattr(lift_video, "DOUBTFUL", 1.0)
+    monkeypatch.setattr(lift_video, "POOR_CORRELATION", 1.0)
     uv = clip.view.project(walk().joints)[0]
     pelvis = uv[0, JOINTS.index("pelvis")]
     across = (uv[-1] - uv[0])[JOINTS.index("pelvis"), 0]
@@ -230,9 +230,9 @@ def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsy
     (tmp_path / "p.json").write_text(json.dumps(placed | {"heading_rad": heading}))
     words = [files / "video.mp4", "--placement", tmp_path / "p.json", "--background", "none"]
     assert lift(*words, "--stop", 20, "--output", tmp_path / "out.csv") == 0
-    said = capsys.readouterr()
-    assert "figure: stature" in said.out
-    assert "the figure may have lost the person" in said.err and "give --background or --corrections" in said.err
+    printed = capsys.readouterr()
+    assert "figure: stature" in printed.out
+    assert "the figure may have lost the person" in printed.err and "give --background or --corrections" in printed.err
     with open(tmp_path / "out.csv", newline="") as file:
         x = [float(row["pelvis_x"]) for row in csv.DictReader(file)]
     assert len(x) == 20 and np.sign(x[-1] - x[0]) == np.sign(across)
@@ -271,8 +271,8 @@ def test_faults_are_named(files, tmp_path, refused):
         assert words in refused(*camera, "--placement", tmp_path / "far.json")
     wild = {"frame": 3, "joint": "l_knee", "uv": [100000, 20]}
     (tmp_path / "c.json").write_text(json.dumps({"corrections": [wild]}))
-    said = refused(*camera, *placed, "--corrections", tmp_path / "c.json")
-    assert "correction 1: uv is (100000, 20), far outside a picture of 640x480" in said
+    printed = refused(*camera, *placed, "--corrections", tmp_path / "c.json")
+    assert "correction 1: uv is (100000, 20), far outside a picture of 640x480" in printed
     (tmp_path / "c.json").write_text('{"corrections": [{"frame": 99, "joint": "l_knee", "uv": [1, 2]}]}')
     assert "frame is 99" in refused(*camera, *placed, "--corrections", tmp_path / "c.json")
     assert "unknown video suffix" in refused(*camera, *placed, "--overlay", tmp_path / "o.gif")
@@ -307,9 +307,9 @@ def test_the_documented_files_are_read(prior, tmp_path):
 
 @pytest.mark.parametrize(("option", "joined"), [([], True), (["--alone"], False)])
 def test_the_papers_way_is_an_option(refused, files, monkeypatch, option, joined):
-    def seen(clip, quiet):
+    def observed(clip, quiet):
         raise UserError(f"joined {clip.settings.joined}")
 
-    monkeypatch.setattr(lift_video, "_fits", seen)
+    monkeypatch.setattr(lift_video, "_fits", observed)
     words = ["--camera", files / "camera.json", "--placement", files / "placement.json", *option]
     assert f"joined {joined}" in refused(*words)

@@ -49,7 +49,7 @@ def model(size: int = 50, headings: int = 0, components: int = 1) -> tuple[bytes
     return contents, SegmentPrior.from_sections(blob.decode(contents, "toy"))
 
 
-def deviations(rng: np.random.Generator, low: float, high: float, missing: float = 0.2) -> np.ndarray:
+def sds(rng: np.random.Generator, low: float, high: float, missing: float = 0.2) -> np.ndarray:
     """Deviations of all observations, infinite where nothing is seen."""
     sd = rng.uniform(low, high, (FRAMES, MARKERS))
     sd[rng.random(sd.shape) < missing] = np.inf
@@ -66,7 +66,7 @@ def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float
     rng = np.random.default_rng(0)
     gaussian = reference.place(prior, heading=angle, stature_sd=stature_sd)
     truth = gaussian.draw(rng)
-    sd = deviations(rng, 0.01, 0.05)
+    sd = sds(rng, 0.01, 0.05)
     uv = noisy(truth @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
     want = reference.infer(gaussian, rows)
@@ -75,9 +75,9 @@ def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float
     fit = lifter.segment(uv, sd)
     assert fit.log_evidence == pytest.approx(want.log_evidence, rel=1e-9)
     assert fit.log10_volume == pytest.approx(reference.log10_volume(gaussian, rows), rel=1e-11)
-    mean, deviation = lifter.positions()
+    mean, sd = lifter.positions()
     np.testing.assert_allclose(mean, want.points, atol=1e-10)
-    np.testing.assert_allclose(deviation, want.sd, rtol=1e-6)  # deviations are computed in floats
+    np.testing.assert_allclose(sd, want.sd, rtol=1e-6)  # deviations are computed in floats
     alpha, covariance = lifter.posterior()
     np.testing.assert_allclose(alpha, want.alpha, atol=1e-9)
     np.testing.assert_allclose(alpha, papers, atol=1e-7)  # the paper's own form
@@ -105,7 +105,7 @@ def test_uncertain_displacements_equal_the_numpy_ones() -> None:
     contents, prior = model()
     rng = np.random.default_rng(3)
     gaussian = reference.place(prior)
-    sd = deviations(rng, 0.01, 0.05)
+    sd = sds(rng, 0.01, 0.05)
     uv = noisy(gaussian.draw(rng) @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
     want_sd, want = reference.uncertain_modes(reference.infer(gaussian, rows), 4)
@@ -166,7 +166,7 @@ def test_a_perspective_fit_is_the_maximum_of_the_posterior() -> None:
     contents, prior = model(size=12)
     rng = np.random.default_rng(5)
     truth = reference.place(prior, heading=1.2, ground_sd=0.8).draw(rng, residual=False)
-    sd = deviations(rng, 2.0, 4.0)
+    sd = sds(rng, 2.0, 4.0)
     uv = noisy(CAMERA.project(truth), sd, rng)
     # without residual the noise does not depend on the depth
     lifter = Lifter(contents, CAMERA, known(residual=0.0))
@@ -195,9 +195,9 @@ def test_an_unknown_heading_is_found_as_in_numpy(angle: float) -> None:
     truth = reference.place(prior, heading=angle, ground_sd=1.0).draw(rng)
     sd = np.full((FRAMES, MARKERS), 0.01)
     uv = noisy(truth @ AXES.T, sd, rng)
-    seen = observe.Observations(uv, sd)
+    observed = observe.Observations(uv, sd)
     person = reference.Person(stature_sd=0.09)  # the default of both, unless a stature is given
-    want = reference.explain(prior, lambda _: observe.orthographic(seen, AXES), person)[0]
+    want = reference.explain(prior, lambda _: observe.orthographic(observed, AXES), person)[0]
     floor = LiftConfig.default(place_sd=(reference.GROUND_SD, reference.GROUND_SD, reference.ALONE_FLOOR_SD))
     lifter = Lifter(contents, AXES, floor)
     fit = lifter.segment(uv, sd)
@@ -228,7 +228,7 @@ def test_a_batch_is_each_segment_alone(stature_sd: float) -> None:
     contents, _ = model()
     rng = np.random.default_rng(4)
     lifter = Lifter(contents, AXES, known(heading=0.5, heading_sd=0.0, stature_sd=stature_sd))
-    sd = deviations(rng, 0.01, 0.05)
+    sd = sds(rng, 0.01, 0.05)
     uv = rng.normal(size=(7, FRAMES, MARKERS, 2))
     with pytest.raises(GaitError):
         lifter.batch(uv)
@@ -276,8 +276,8 @@ def test_intervals_hold_people_of_any_stature() -> None:
     share = {name: float(np.mean(found)) for name, found in inside.items()}
     assert 0.85 < share["default"] < 0.96 and 0.85 < share["given"] < 0.96
     assert share["known"] < 0.75
-    error, said = np.mean(off, axis=0)
-    assert abs(error) < 0.2 * said
+    error, predicted = np.mean(off, axis=0)
+    assert abs(error) < 0.2 * predicted
 
 
 def test_missing_markers_cost_what_the_deviations_say() -> None:
@@ -289,13 +289,13 @@ def test_missing_markers_cost_what_the_deviations_say() -> None:
     for _ in range(60):
         truth = gaussian.draw(rng)
         for missing, errors in found.items():
-            sd = deviations(rng, 0.02, 0.02, missing)
+            sd = sds(rng, 0.02, 0.02, missing)
             lifter.segment(noisy(truth @ AXES.T, sd, rng), sd)
-            mean, spread = lifter.positions()
-            errors.append((float(np.mean((mean - truth) ** 2)), float(np.mean(spread**2))))
+            mean, sds = lifter.positions()
+            errors.append((float(np.mean((mean - truth) ** 2)), float(np.mean(sds**2))))
     rms = {k: np.sqrt(np.mean(v, axis=0)) for k, v in found.items()}
-    for error, said in rms.values():
-        assert error == pytest.approx(said, rel=0.1)
+    for error, predicted in rms.values():
+        assert error == pytest.approx(predicted, rel=0.1)
     assert rms[0.3][0] < 1.15 * rms[0.0][0]
     assert rms[0.5][0] > rms[0.0][0]
 

@@ -62,10 +62,10 @@ def test_dots_are_where_a_right_estimate_is(far):
     keypoints = Keypoints(np.arange(2), np.arange(2) / 20, ("a", "b", "c"), uv, np.ones((2, 3)))
     left = Uncertain(0.0, *np.zeros((4, 3)))
     found = motion.Motion(("a", "b", "c"), places, places, places, uv[..., 0], 1.7, 1, True, 0.0, left)
-    for frame, seen in ((0, 3), (1, 2)):
+    for frame, observed in ((0, 3), (1, 2)):
         drawn, points = motion_figures._in_picture(view, found, frame, keypoints)
-        assert drawn.shape == (3, 2) and points.shape == (seen, 2)
-        np.testing.assert_allclose(drawn[:seen], points, atol=1e-6)
+        assert drawn.shape == (3, 2) and points.shape == (observed, 2)
+        np.testing.assert_allclose(drawn[:observed], points, atol=1e-6)
 
 
 def test_a_camera_is_of_a_clip(folder, capsys):
@@ -89,10 +89,10 @@ def test_the_method_is_of_a_clip(folder, monkeypatch, capsys):
 
 def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch, capsys):
     """Threads of the linear algebra get in each other's way at matrices this small."""
-    lift, seen = motion.lift, []
+    lift, observed = motion.lift, []
 
     def watched(prior, keypoints, *args):
-        seen.append(({pool["num_threads"] for pool in threadpoolctl.threadpool_info()}, keypoints))
+        observed.append(({pool["num_threads"] for pool in threadpoolctl.threadpool_info()}, keypoints))
         return lift(prior, keypoints, *args)
 
     keypoints, _ = read("t.csv", toy_prior(6, 19, 4, seed=5).names)
@@ -102,8 +102,8 @@ def test_a_clip_is_lifted_in_one_thread_as_gait_lift_does_it(folder, monkeypatch
     monkeypatch.setattr(motion, "lift", watched)
     with threadpoolctl.threadpool_limits(2):
         assert main(["report", "lift", "-m", "m.gait", "-o", "r", "--clip", "t.csv"]) == 0
-    threads, used = seen[0]
-    assert threads == {1} and not used.seen[6, 3] and used.seen.sum() == used.seen.size - 1
+    threads, used = observed[0]
+    assert threads == {1} and not used.visible[6, 3] and used.visible.sum() == used.visible.size - 1
     assert "left out, far from" in capsys.readouterr().err
 
 

@@ -55,6 +55,6 @@ def _culprit(apart: Floats, far: int) -> int:
 
 
 def weighted(square: Floats, sd: Floats) -> Floats:
-    """Deviations (P,) of a frame's points at squared distances (P,) from their predictions."""
+    """Standard deviations (P,) of a frame's points at squared distances (P,) from their predictions."""
     limit = max(FAR**2, FAR_MEDIAN**2 * np.sort(square)[len(square) // 2])
     return np.asarray(sd * np.maximum(square / limit, 1))

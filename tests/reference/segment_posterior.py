@@ -1,7 +1,7 @@
 """Posterior of a segment given 2-D observations in numpy: the independent reference of the C lifter in tests.
 
 Leventon and Freeman (1998), eqs. 5 and 6.  With alpha ~ N(0, I) (the modes are given times their standard
-deviations), measurements y = G alpha + noise about the mean and noise of covariance R:
+standard deviations), measurements y = G alpha + noise about the mean and noise of covariance R:
 
     alpha = G' (G G' + R)^-1 y = (I + G' R^-1 G)^-1 G' R^-1 y,    Q = (I + G' R^-1 G)^-1.
 
@@ -21,13 +21,13 @@ import numpy.typing as npt
 
 from gait.bindings.segment_prior import SegmentPrior
 from gait.body.skeleton import axis_rotation
-from gait.lift.smooth.rows import (Rows)
+from gait.lift.smooth.rows import Rows
 
 Floats = npt.NDArray[np.float64]
 
 LEADING = 3  # modes whose scores enter the shapes that views are linearised around
 
-GROUND_SD = 10.0  # metres, of where somebody stands
+GROUND_SD = 10.0  # metres, of where a person stands
 FLOOR_SD = 0.03  # metres, of the floor's height
 LN10 = float(np.log(10))
 
@@ -201,7 +201,7 @@ class Posterior:
     @property
     def sd(self) -> Floats:
         """Posterior standard deviation of each coordinate, (F, J, 3)."""
-        return _deviations(self.covariances)
+        return _standard_deviations(self.covariances)
 
     def rooted_sd(self, left: int, right: int) -> Floats:
         """Give standard deviations (F, J, 3) of the places about the middle of two markers."""
@@ -211,7 +211,7 @@ class Posterior:
         middle = outside[:, ends].sum(axis=1, keepdims=True) / 4
         own = outside + middle
         own[:, ends] -= outside[:, ends]  # half of an end is in the middle
-        return _deviations(apart @ self.covariance @ apart.swapaxes(-1, -2) + own)
+        return _standard_deviations(apart @ self.covariance @ apart.swapaxes(-1, -2) + own)
 
     @property
     def log10_volume(self) -> float:
@@ -223,7 +223,7 @@ class Posterior:
         """How many modes the measurements resolve: m - tr Q, sum_i s_i^2 / (1 + s_i^2).
 
         s_i are the singular values of the whitened design.  Without a residual it is the slope of
-        log10_volume against log10 of the noise's deviation.
+        log10_volume against log10 of the noise's standard deviation.
         """
         return float(len(self.alpha) - np.trace(self.covariance))
 
@@ -235,12 +235,12 @@ def infer(gaussian: Gaussian, rows: Rows) -> Posterior:
     covariance = _inverse(precision)
     alpha = covariance @ (s.design.T @ s.y)
     fit = s.y @ (s.y - s.design @ alpha)
-    spread = np.linalg.slogdet(precision)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
-    evidence = -0.5 * float(fit + spread + len(s.y) * np.log(2 * np.pi))
+    sds = np.linalg.slogdet(precision)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
+    evidence = -0.5 * float(fit + sds + len(s.y) * np.log(2 * np.pi))
     return Posterior(gaussian, rows, s, alpha, (covariance + covariance.T) / 2, evidence)
 
 
-def _deviations(covariances: Floats) -> Floats:
+def _standard_deviations(covariances: Floats) -> Floats:
     """Square roots of the diagonals (..., 3) of covariances, none below zero but for rounding."""
     return np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0))
 
@@ -266,7 +266,7 @@ Measure = Callable[[Floats], Rows]
 
 @dataclass(frozen=True)
 class Person:
-    """What is known of somebody before the measurements.
+    """What is known of a person before the measurements.
 
     Attributes
     ----------
@@ -294,7 +294,7 @@ class Explanation:
     heading : float
         Of the prior's axes in the world, radians.
     posterior : Posterior
-        If the heading is latent the last mode is the turn, `TURN_SD` radians per deviation.
+        If the heading is latent the last mode is the turn, `TURN_SD` radians per standard deviation.
     share : float
         Probability among the explanations of the same call.
     """
@@ -405,7 +405,7 @@ def _same(a: Explanation, b: Explanation) -> bool:
 
 
 def uncertain_modes(found: Posterior, count: int) -> tuple[Floats, Floats]:
-    """Directions of largest posterior deviation, within the modes.
+    """Directions of largest posterior standard deviation, within the modes.
 
     Returns
     -------
@@ -427,9 +427,9 @@ def dual(gaussian: Gaussian, rows: Rows) -> tuple[Floats, Floats, float]:
     wide = s.design @ s.design.T + np.eye(len(s.y))
     gain = np.linalg.solve(wide, s.design).T
     alpha, covariance = gain @ s.y, np.eye(len(gaussian.modes)) - gain @ s.design
-    spread = np.linalg.slogdet(wide)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
+    sds = np.linalg.slogdet(wide)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
     fit = s.y @ (s.y - s.design @ alpha)
-    return alpha, covariance, -0.5 * float(fit + spread + len(s.y) * np.log(2 * np.pi))
+    return alpha, covariance, -0.5 * float(fit + sds + len(s.y) * np.log(2 * np.pi))
 
 
 def log10_volume(gaussian: Gaussian, rows: Rows) -> float:
@@ -441,8 +441,8 @@ def log10_volume(gaussian: Gaussian, rows: Rows) -> float:
 def likelihood_only(gaussian: Gaussian, rows: Rows) -> Floats:
     """Segment (F, J, 3) in the span of the modes that fits the measurements best, whatever the prior says.
 
-    Of all that do, the one nearest to the mean (least squares of minimum norm); the deviations of the
-    observations weigh them, the prior has no part.
+    Of all that do, the one nearest to the mean (least squares of minimum norm); the standard deviations of
+    the observations weigh them, the prior has no part.
     """
     norm = np.linalg.norm(gaussian.modes.reshape(len(gaussian.modes), -1), axis=1)
     unit = gaussian.modes / norm[:, None, None, None]

@@ -1,7 +1,7 @@
 /* Positions by modes: every instruction set against the scalar definition, and that against the sum in order. */
 #include "base/cholesky.h"
-#include "model/segment_prior.h"
 #include "base/rng.h"
+#include "gait_lift.h"
 
 #include "check.h"
 #include "kernel_check.h"

@@ -209,7 +209,7 @@ def _lift_keypoints(args: argparse.Namespace) -> tuple[dict[str, Any], str]:
     lifted = lift_run.lift_file(args.input, prior, request, warn, args.quiet)
     keypoints, found = lifted.keypoints, lifted.motion
     _require_person(args, found)
-    for words in lift_run.reasons_for_doubt(lifted, prior.stature):
+    for words in lift_run.warnings_of(lifted, prior.stature):
         warn(words)
     write_lifted(args.output, keypoints.frame, keypoints.time, found.names, found.places, found.sd)
     if args.trc:
@@ -310,8 +310,8 @@ def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motio
     return {
         "frames": len(keypoints.frame),
         "method": args.method or motion.METHODS[0],
-        "markers": {"seen": list(keypoints.names), "estimated": list(found.names)},
-        "seen_share": float(keypoints.seen.mean()),
+        "markers": {"visible": list(keypoints.names), "estimated": list(found.names)},
+        "visible_share": float(keypoints.visible.mean()),
         "reprojection_px": float(np.nanmedian(found.error)),
         "sd_mm": 1000 * float(np.median(found.sd)),
         "stature_m": found.stature if found.steps else None,  # not estimated by segments alone
@@ -319,10 +319,12 @@ def _summary(args: argparse.Namespace, keypoints: Keypoints, found: motion.Motio
         "settled": found.settled,
         "log10_volume_ratio": found.log_volume_ratio,
         "segments": _segments(found.uncertain, found.names),
-        "misfit": found.chi2_per_observation if np.isfinite(found.chi2_per_observation) else None,
+        "chi2_per_observation": found.chi2_per_observation
+        if np.isfinite(found.chi2_per_observation)
+        else None,
         "prior_widened": found.wider,
         "segments_alone": found.alone,
-        "doubted": 0 if found.outliers is None else int(found.outliers.sum()),
+        "outliers": 0 if found.outliers is None else int(found.outliers.sum()),
         "resized": found.resized,
     }
 
@@ -343,7 +345,7 @@ def _segments(left: Uncertain, names: tuple[str, ...]) -> dict[str, Any]:
 def _text(s: dict[str, Any]) -> str:
     markers = s["markers"]
     lines = [
-        f"{s['frames']} frames, {len(markers['seen'])} points seen in {s['seen_share']:.0%} of them, "
+        f"{s['frames']} frames, {len(markers['visible'])} points seen in {s['visible_share']:.0%} of them, "
         f"{len(markers['estimated'])} markers estimated",
         f"{s['reprojection_px']:.2f} px from the keypoints, median sd {s['sd_mm']:.0f} mm"
         + (f", stature {s['stature_m']:.2f} m" if s["stature_m"] else ""),

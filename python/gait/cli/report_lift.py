@@ -138,12 +138,12 @@ def _segment(path: str, prior: SegmentPrior) -> tuple[Floats, float]:
 
 
 def _why_no_segment(read: segment_motion.Motion, prior: SegmentPrior) -> str:
-    """Say why a recording has no segment with all markers of a prior."""
+    """Explain why a recording has no segment with all markers of a prior."""
     wanted = prior.frames / prior.fps
     if len(read.places) < prior.frames:
         return f"lasts {len(read.places) / prior.fps:.2g} s, a segment of the model {wanted:g} s"
-    seen = np.asarray(np.isfinite(read.places).all(axis=2))
-    absent = [name for name in prior.names if not seen[:, read.names.index(name)].any()]
+    observed = np.asarray(np.isfinite(read.places).all(axis=2))
+    absent = [name for name in prior.names if not observed[:, read.names.index(name)].any()]
     if absent:
         return f"never shows {' '.join(absent)}, which the model's prior has"
     return f"has gaps in every {wanted:g} s, the length of the model's segments"

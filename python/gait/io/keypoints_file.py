@@ -55,20 +55,20 @@ class Keypoints:
     confidence: Array
 
     @property
-    def seen(self) -> NDArray[np.bool_]:
+    def visible(self) -> NDArray[np.bool_]:
         """Which points are seen, shape (T, J)."""
         return np.asarray(np.isfinite(self.uv).all(axis=2))
 
     def outside(self, size: tuple[int, int]) -> float:
         """Share of the points seen that lie outside of a picture of `size` (width, height)."""
-        points = self.uv[self.seen]
-        return float(((points < -0.5) | (points > np.array(size) - 0.5)).any(axis=1).mean())
+        observed = self.uv[self.visible]
+        return float(((observed < -0.5) | (observed > np.array(size) - 0.5)).any(axis=1).mean())
 
     def require_extent(self, path: str | os.PathLike[str], sd: float) -> None:
         """Raise UserError if several points all lie within `sd`: they are not in its unit."""
-        points = self.uv[self.seen]
-        extent = float(np.ptp(points, axis=0).max())
-        if self.seen.any(axis=0).sum() > 1 and extent <= sd:
+        observed = self.uv[self.visible]
+        extent = float(np.ptp(observed, axis=0).max())
+        if self.visible.any(axis=0).sum() > 1 and extent <= sd:
             raise UserError(
                 f"{path}: all u and v lie within {extent:.3g}, less than their noise of {sd:g}; give pixels, "
                 "not shares of the picture, or the noise in their unit"
@@ -88,7 +88,7 @@ class Keypoints:
 
     def standard_deviations(self, sd: float) -> Array:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
-        return np.where(self.seen, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
+        return np.where(self.visible, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
 
     def joints(self, sd: float) -> dict[int, Joints]:
         """Joints by frame, as the tracker takes them; `sd` as in `standard_deviations`."""
@@ -165,8 +165,12 @@ def write(path: str | os.PathLike[str], keypoints: Keypoints) -> None:
         for t, frame in enumerate(keypoints.frame):
             row = [str(frame), f"{keypoints.time[t]:.6f}"]
             for j, (u, v) in enumerate(keypoints.uv[t]):
-                seen = np.isfinite(u)
-                row += [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"] if seen else ["", "", ""]
+                observed = np.isfinite(u)
+                row += (
+                    [f"{u:.4f}", f"{v:.4f}", f"{keypoints.confidence[t, j]:.3g}"]
+                    if observed
+                    else ["", "", ""]
+                )
             table.writerow(row)
 
 
@@ -259,13 +263,13 @@ def shared_place(uv: Array) -> tuple[Array, int] | None:
 
     Joints meet in the picture now and then: it is one beside all other points, or of more than can meet.
     """
-    seen = np.isfinite(uv).all(axis=2)
-    pairs, which, counts = np.unique(uv[seen], axis=0, return_inverse=True, return_counts=True)
-    column = np.nonzero(seen)[1]
+    observed = np.isfinite(uv).all(axis=2)
+    pairs, which, counts = np.unique(uv[observed], axis=0, return_inverse=True, return_counts=True)
+    column = np.nonzero(observed)[1]
     for k in np.argsort(-counts)[: len(counts[counts >= MANY])]:
         at = which.ravel() == k
         shared = len(set(column[at].tolist()))
-        if shared >= COINCIDE or (shared > 1 and _beside(pairs[k], uv[seen][~at])):
+        if shared >= COINCIDE or (shared > 1 and _beside(pairs[k], uv[observed][~at])):
             return pairs[k], int(counts[k])
     return None
 

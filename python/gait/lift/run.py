@@ -118,7 +118,7 @@ def lift_file(path: str, prior: SegmentPrior, request: Request, warn: Warn, quie
     if not request.pixel_sd_given:
         options = replace(options, pixel_sd=measured_noise(keypoints, warn))
     view = _view(keypoints, request, warn)
-    repairs: dict[str, Any] = {"exchanged": 0, "put_back": [], "jumps": 0, "left_out": []}
+    repairs: dict[str, Any] = {"swapped": 0, "swaps": [], "spikes": 0, "left_out": []}
     if not request.keep_sides:
         keypoints, found = _without_swaps(path, prior, keypoints, view, options, warn, quiet, hint)
         repairs |= found
@@ -211,11 +211,11 @@ def _without_swaps(
         found, swapped = swaps.undo_swaps(keypoints, options.pixel_sd, evidence)
     if swapped:
         warn(_named_swaps(swapped) + " (--keep-sides)" * hint)
-    moved = (found.uv != keypoints.uv).any(axis=2) & keypoints.seen
+    moved = (found.uv != keypoints.uv).any(axis=2) & keypoints.visible
     spans = [
         {"joint": each.joint, "first": first, "last": last} for each in swapped for first, last in each.spans
     ]
-    return found, {"exchanged": int(moved.sum()), "put_back": spans}
+    return found, {"swapped": int(moved.sum()), "swaps": spans}
 
 
 def _named_swaps(swapped: list[swaps.Swapped]) -> str:
@@ -243,7 +243,7 @@ def _without_spikes(
             + " (--keep-spikes)" * hint
         )
     left_out = [{"frame": frame, "point": name} for frame, name in spikes]
-    return keypoints, {"jumps": len(spikes), "left_out": left_out}
+    return keypoints, {"spikes": len(spikes), "left_out": left_out}
 
 
 @contextmanager
@@ -255,7 +255,7 @@ def _naming(path: str) -> Iterator[None]:
         raise type(error)(f"{path}: {error}") from None
 
 
-def reasons_for_doubt(lifted: Lifted, prior_stature: float) -> list[str]:
+def warnings_of(lifted: Lifted, prior_stature: float) -> list[str]:
     """Reasons why a result may be wrong, a line each.
 
     Parameters
@@ -267,13 +267,13 @@ def reasons_for_doubt(lifted: Lifted, prior_stature: float) -> list[str]:
     camera = isinstance(lifted.view, Perspective)
     far = float(np.nanmedian(found.error)) / options.pixel_sd
     outliers, shake = _named_outliers(found, keypoints.names), noise.shake(keypoints)
-    lost = _share_lost(found, keypoints, int(lifted.repairs["jumps"]))
+    lost = _share_lost(found, keypoints, int(lifted.repairs["spikes"]))
     believed, sd = motion.believed_stature(options, prior_stature)
     off = abs(found.stature - believed) / sd if found.steps else 0.0  # segments alone do not estimate it
     lens = "the camera's focal length" if camera else "--metres-per-unit"
     reasons = {
         "hips and ankles, which determine the distance, are hardly seen: the person may be metres nearer or "
-        "further away": camera and not size.tells_distance(keypoints),
+        "further away": camera and not size.shows_distance(keypoints),
         f"outliers, down-weighted because they are far from their predictions: {outliers}": bool(outliers),
         f"{lost:.0%} of the points seem wrong, which is too many: do not rely on the result": lost > TOO_MANY,
         f"the points jitter by {shake:.2g} from frame to frame, not {options.pixel_sd:g}: "
@@ -296,7 +296,7 @@ def reasons_for_doubt(lifted: Lifted, prior_stature: float) -> list[str]:
 def _share_lost(found: Motion, keypoints: Keypoints, spikes: int) -> float:
     """Share of the points that were left out or down-weighted."""
     outliers = 0 if found.outliers is None else int(found.outliers.sum())
-    return (spikes + outliers) / max(int(keypoints.seen.sum()) + spikes, 1)
+    return (spikes + outliers) / max(int(keypoints.visible.sum()) + spikes, 1)
 
 
 def _named_outliers(found: Motion, names: tuple[str, ...]) -> str:

@@ -15,11 +15,8 @@ from gait.io.keypoints_file import Keypoints
 
 Array = NDArray[np.float64]
 
-LIMIT = 8.0  # deviations from the line between neighbours beyond which a point is no noise
 SPREAD = 1.4826  # median absolute deviation to standard deviation, normal noise
-FEWEST = 5  # sights of a point that tell
 QUICK = 0.051  # seconds from frame to frame (20 a second): with longer steps motion looks like noise
-PAIR = np.sqrt(1.5)  # sd of a point against the middle of its neighbours, over that of one point
 
 
 def without_spikes(keypoints: Keypoints, sd: float) -> tuple[Keypoints, list[tuple[int, str]]]:
@@ -36,7 +33,7 @@ def without_spikes(keypoints: Keypoints, sd: float) -> tuple[Keypoints, list[tup
         In the order of time.
     """
     kept = remove_spikes(keypoints.time, keypoints.uv, np.full(keypoints.uv.shape[:2], sd))
-    spikes = keypoints.seen & (kept < 0)
+    spikes = keypoints.visible & (kept < 0)
     named = [(int(keypoints.frame[t]), keypoints.names[j]) for t, j in np.argwhere(spikes)]
     return replace(keypoints, uv=np.where(spikes[..., None], np.nan, keypoints.uv)), named
 
@@ -47,29 +44,31 @@ def shake(keypoints: Keypoints) -> float:
     By third differences: white noise's are sqrt(20) times as large, and a walk's at `QUICK` a pixel.
     """
     third = np.abs(np.diff(keypoints.uv, 3, axis=0))
-    seen = third[np.isfinite(third)]
-    if not seen.size or np.median(np.diff(keypoints.time)) > QUICK:
+    observed = third[np.isfinite(third)]
+    if not observed.size or np.median(np.diff(keypoints.time)) > QUICK:
         return np.nan
-    return float(SPREAD * np.median(seen) / np.sqrt(20) * np.median(keypoints.confidence[keypoints.seen]))
+    return float(
+        SPREAD * np.median(observed) / np.sqrt(20) * np.median(keypoints.confidence[keypoints.visible])
+    )
 
 
 FEWEST = 4  # points seen before and after
-FAR = 0.25  # of the person's extent in the picture: nobody moves so much more than in the frames around
-AROUND = 5  # frames before and after that tell how the points move
-SOON = 2.0  # times the usual step of time: later, somebody may be anywhere
+FAR = 0.25  # of the person's extent in the picture: no person moves so much more than in the frames around
+AROUND = 5  # frames before and after that show how the points move
+SOON = 2.0  # times the usual step of time: later, a person may be anywhere
 
 
 def person_changes(keypoints: Keypoints) -> list[tuple[int, int | None]]:
-    """Find stretches on somebody else: first and last frame; None where the track stays there."""
+    """Find intervals on another person: first and last frame; None where the track stays there."""
     if len(keypoints.time) < 2:
         return []
-    jumps = np.flatnonzero(_jumps(keypoints)).tolist()
-    begins, ends = jumps[::2], jumps[1::2]
+    changes = np.flatnonzero(_changes(keypoints)).tolist()
+    begins, ends = changes[::2], changes[1::2]
     last = [int(keypoints.frame[t]) for t in ends]
     return list(zip([int(keypoints.frame[t + 1]) for t in begins], [*last, None], strict=False))
 
 
-def _jumps(keypoints: Keypoints) -> NDArray[np.bool_]:
+def _changes(keypoints: Keypoints) -> NDArray[np.bool_]:
     """Whether most points jump alike after each frame but the last, (T - 1,)."""
     moves, step = np.diff(keypoints.uv, axis=0), np.diff(keypoints.time)
     excess = moves - _around(moves)

@@ -41,7 +41,7 @@ class Observations:
     sd: Floats
 
     @property
-    def seen(self) -> npt.NDArray[np.bool_]:
+    def visible(self) -> npt.NDArray[np.bool_]:
         """Which were seen, (T, J)."""
         return np.asarray(np.isfinite(self.sd) & np.isfinite(self.uv).all(axis=2))
 
@@ -61,8 +61,8 @@ def resampled(points: Observations, time: Floats, at: Floats) -> Observations:
     """Interpolate what is seen at times (T,) to other times (n,), seconds; across longer gaps nothing is."""
     count = points.uv.shape[1]
     uv, sd = np.full((len(at), count, 2), np.nan), np.full((len(at), count), np.inf)
-    for j, seen in enumerate(points.seen.T):
-        known = np.flatnonzero(seen)
+    for j, observed in enumerate(points.visible.T):
+        known = np.flatnonzero(observed)
         if len(known) < 2:
             continue
         after = np.clip(np.searchsorted(time[known], at), 1, len(known) - 1)

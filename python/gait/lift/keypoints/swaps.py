@@ -1,14 +1,14 @@
-"""Left and right points that may have been exchanged, by how they go on from frame to frame.
+"""Left and right points that may have been swapped, by how they go on from frame to frame.
 
-A detector that takes one leg for the other exchanges two points.  Their difference then changes its sign
+A detector that takes one leg for the other swaps two points.  Their difference then changes its sign
 at once, where that of a body goes on as it did.  For every pair the signs are sought that let it go on best:
 the Viterbi algorithm over frames, with a Kalman filter of constant velocity along each of two survivors.
-Pairs are looked at again with what the others say, because detectors exchange limbs rather than joints.
+Pairs are examined again with the results of the others, because detectors swap limbs rather than joints.
 
-Left and right in 2-D keypoints: points that a detector exchanged for some frames, put back.
+Left and right in 2-D keypoints: points that a detector swapped for some frames, put back.
 
-How points go on from frame to frame proposes where (`gait.lift.flips`); wild points and quick steps look
-like exchanges too.  The motion decides: every stretch is lifted with its surroundings, exchanged and as it
+How points go on from frame to frame proposes where (`gait.lift.flips`); outliers and quick steps look
+like swaps too.  The motion decides: every interval is lifted with its surroundings, swapped and as it
 is, and limb by limb, and what fits clearly better is taken.
 """
 
@@ -27,21 +27,21 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 
-LONGEST = 0.3  # seconds without a pair after which nothing tells whether it goes on
-CAP = 20.0  # most that a sight says against a sign, -log density: it may be an outlier
-RARE = 9.0  # -log probability that an exchange begins or ends from one sight to the next,
+LONGEST = 0.3  # seconds without a pair after which its continuation is unknown
+CAP = 20.0  # largest -log density of an observation under a sign: it may be an outlier
+RARE = 9.0  # -log probability that an swap begins or ends from one observation to the next,
 OFTEN = 1.0  # where another pair's does,
-STAY = 0.4  # and that a sight is not as the other pairs'
+STAY = 0.4  # and that a observation is not as the other pairs'
 ROUNDS = 3  # in which pairs hear of one another
-HALF = float(np.sqrt(2 * np.log(2)))  # half of normal noise in a plane is longer, deviations
+HALF = float(np.sqrt(2 * np.log(2)))  # half of normal noise in a plane is longer, standard deviations
 STEADY = 0.02  # variance of the acceleration's share in a second difference, of its noise, at the least
-UNKNOWN = 1e6  # variance over that of a sight where nothing is known
-SIGNS = np.array([1.0, -1.0])  # of a difference as it is seen: left and right as they are, exchanged
+UNKNOWN = 1e6  # variance over that of a observation where nothing is known
+SIGNS = np.array([1.0, -1.0])  # of a difference as it is seen: left and right as they are, swapped
 OTHER = 1.0 - np.eye(2)
 
 
 def suspected(keypoints: Keypoints, pairs: Ints, sd: float) -> Flags:
-    """In which frames pairs seem exchanged (T, P), against most; frames without a pair go with those before.
+    """In which frames pairs seem swapped (T, P), against most; frames without a pair go with those before.
 
     Parameters
     ----------
@@ -50,7 +50,9 @@ def suspected(keypoints: Keypoints, pairs: Ints, sd: float) -> Flags:
     sd : float
         Noise of a point at full confidence, pixels.
     """
-    return _most_probable(_Pairs.of(keypoints, pairs, np.asarray(keypoints.seen[:, pairs].all(axis=2)), sd))
+    return _most_probable(
+        _Pairs.of(keypoints, pairs, np.asarray(keypoints.visible[:, pairs].all(axis=2)), sd)
+    )
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class _Pairs:
     Attributes
     ----------
     time : (T,)
-    seen : (T, P)
+    visible : (T, P)
     apart : (T, P, 2)
         Left less right, pixels; 0 where not seen.
     variance : (T, P)
@@ -70,25 +72,27 @@ class _Pairs:
     """
 
     time: Floats
-    seen: Flags
+    visible: Flags
     apart: Floats
     variance: Floats
     acceleration: Floats
 
     @classmethod
-    def of(cls, keypoints: Keypoints, pairs: Ints, seen: Flags, sd: float) -> _Pairs:
+    def of(cls, keypoints: Keypoints, pairs: Ints, observed: Flags, sd: float) -> _Pairs:
         """Take pairs (P, 2) of columns out of keypoints."""
-        apart = np.where(seen[..., None], keypoints.uv[:, pairs[:, 0]] - keypoints.uv[:, pairs[:, 1]], 0.0)
-        variance = np.where(seen, (keypoints.standard_deviations(sd)[:, pairs] ** 2).sum(axis=2), 1.0)
+        apart = np.where(
+            observed[..., None], keypoints.uv[:, pairs[:, 0]] - keypoints.uv[:, pairs[:, 1]], 0.0
+        )
+        variance = np.where(observed, (keypoints.standard_deviations(sd)[:, pairs] ** 2).sum(axis=2), 1.0)
         moving = [
             _acceleration(keypoints.time[rows], apart[rows, k], variance[rows, k])
-            for k, rows in enumerate(seen.T)
+            for k, rows in enumerate(observed.T)
         ]
-        return cls(keypoints.time, seen, apart, variance, np.array(moving))
+        return cls(keypoints.time, observed, apart, variance, np.array(moving))
 
 
 def _acceleration(time: Floats, apart: Floats, variance: Floats) -> float:
-    """Variance of the acceleration of n sights, by how far they lie off the line between their neighbours."""
+    """Variance of the acceleration, by how far n observations lie off the line between their neighbours."""
     if len(time) < 3:
         return 0.0
     step = np.diff(time)
@@ -100,21 +104,21 @@ def _acceleration(time: Floats, apart: Floats, variance: Floats) -> float:
 
 
 def _most_probable(pairs: _Pairs) -> Flags:
-    """Which pairs are exchanged in which frames (T, P)."""
-    wrong = _course(pairs, np.zeros(pairs.seen.shape, bool), np.zeros(pairs.seen.shape))
+    """Which pairs are swapped in which frames (T, P)."""
+    wrong = _course(pairs, np.zeros(pairs.visible.shape, bool), np.zeros(pairs.visible.shape))
     for _ in range(ROUNDS):
-        flips = _flips(wrong, pairs.seen)
+        flips = _flips(wrong, pairs.visible)
         others = flips.sum(axis=1, keepdims=True) > flips
-        state, count = (wrong & pairs.seen).sum(axis=1), pairs.seen.sum(axis=1)
-        rest = np.maximum(count[:, None] - pairs.seen, 1)
-        wrong = _course(pairs, others, (state[:, None] - (wrong & pairs.seen)) / rest)
+        state, count = (wrong & pairs.visible).sum(axis=1), pairs.visible.sum(axis=1)
+        rest = np.maximum(count[:, None] - pairs.visible, 1)
+        wrong = _course(pairs, others, (state[:, None] - (wrong & pairs.visible)) / rest)
     return wrong
 
 
-def _flips(wrong: Flags, seen: Flags) -> Flags:
-    """From the sight before until which frames (T, P) an exchange may have begun or ended."""
-    found = np.zeros(seen.shape, bool)
-    for k, rows in enumerate(seen.T):
+def _flips(wrong: Flags, observed: Flags) -> Flags:
+    """From the observation before until which frames (T, P) an swap may have begun or ended."""
+    found = np.zeros(observed.shape, bool)
+    for k, rows in enumerate(observed.T):
         at = np.flatnonzero(rows)
         for i in np.flatnonzero(np.diff(wrong[at, k])):
             found[at[i] + 1 : at[i + 1] + 1, k] = True
@@ -123,22 +127,22 @@ def _flips(wrong: Flags, seen: Flags) -> Flags:
 
 def _course(pairs: _Pairs, easy: Flags, others: Floats) -> Flags:
     """Most probable states (T, P): as the share of `others`, and changing easily where `easy`."""
-    count, size = pairs.seen.shape
+    count, size = pairs.visible.shape
     filters = _Filters(pairs)
     total = np.tile([0.0, STAY], (size, 1))
     back = np.tile(np.arange(2, dtype=np.int8), (count, size, 1))
     since = np.zeros(size, bool)
-    for t, seen in enumerate(pairs.seen):
+    for t, observed in enumerate(pairs.visible):
         since |= easy[t]
-        off, square = filters.look(t)
+        off, square = filters.predict(t)
         flip = np.where(since, OFTEN, RARE)[:, None, None] * OTHER
         stay = STAY * np.stack([others[t], 1 - others[t]], axis=1)[:, None]
         table = total[:, :, None] + np.minimum(0.5 * square, CAP) + flip + stay
-        before = np.where(seen[:, None], table.argmin(axis=1), [0, 1])
+        before = np.where(observed[:, None], table.argmin(axis=1), [0, 1])
         back[t] = before
-        total = np.where(seen[:, None], table.min(axis=1), total)
+        total = np.where(observed[:, None], table.min(axis=1), total)
         filters.learn(t, before, off, square)
-        since &= ~seen
+        since &= ~observed
     state = total.argmin(axis=1)
     found = np.empty((count, size), bool)
     for t in range(count - 1, -1, -1):
@@ -148,17 +152,17 @@ def _course(pairs: _Pairs, easy: Flags, others: Floats) -> Flags:
 
 
 class _Filters:
-    """Kalman filters of P pairs under two survivors, of the same covariance: not exchanged now, exchanged."""
+    """Kalman filters of P pairs under two survivors, of the same covariance: not swapped now, swapped."""
 
     def __init__(self, pairs: _Pairs) -> None:
-        size = pairs.seen.shape[1]
+        size = pairs.visible.shape[1]
         self._pairs, self._every = pairs, np.arange(size)
         self._place, self._velocity = np.zeros((size, 2, 2)), np.zeros((size, 2, 2))
         self._last = np.full(size, -np.inf)
         self._p = self._c = self._v = np.zeros(size)
 
-    def look(self, t: int) -> tuple[Floats, Floats]:
-        """Move on to a frame; how far its sights are off (P, before, now, 2), and squared in deviations."""
+    def predict(self, t: int) -> tuple[Floats, Floats]:
+        """Predict a frame: errors of its observations (P, before, now, 2), and squared over their variance."""
         dt = self._pairs.time[t] - self._last
         known, noise = dt <= LONGEST, self._pairs.variance[t]
         dt = np.where(known, dt, 0.0)
@@ -168,34 +172,34 @@ class _Filters:
             np.where(known, c + dt * v + q * dt**3 / 2, 0.0),
             np.where(known, v + q * dt**2, UNKNOWN * noise),
         )
-        self._said = self._place + dt[:, None, None] * self._velocity
-        off = SIGNS[:, None] * self._pairs.apart[t][:, None, None] - self._said[:, :, None]
+        self._predicted = self._place + dt[:, None, None] * self._velocity
+        off = SIGNS[:, None] * self._pairs.apart[t][:, None, None] - self._predicted[:, :, None]
         return off, (off**2).sum(axis=3) / (self._moved[0] + noise)[:, None, None]
 
     def learn(self, t: int, before: npt.NDArray[np.intp], off: Floats, square: Floats) -> None:
         """Go on with what was seen, from the survivor `before` each of the two (P, 2)."""
-        seen, noise = self._pairs.seen[t], self._pairs.variance[t]
+        observed, noise = self._pairs.visible[t], self._pairs.variance[t]
         p, c, v = self._moved
         pick = (self._every[:, None], before, np.arange(2))
         trusted = (square[pick] < 2 * CAP)[..., None]  # others are outliers under this survivor
         gain, quick = ((x / (p + noise))[:, None, None] * trusted for x in (p, c))
-        place = self._said[pick[:2]] + gain * off[pick]
+        place = self._predicted[pick[:2]] + gain * off[pick]
         velocity = self._velocity[pick[:2]] + quick * off[pick]
-        self._place = np.where(seen[:, None, None], place, self._place)
-        self._velocity = np.where(seen[:, None, None], velocity, self._velocity)
+        self._place = np.where(observed[:, None, None], place, self._place)
+        self._velocity = np.where(observed[:, None, None], velocity, self._velocity)
         left = (p - p * p / (p + noise), c - p * c / (p + noise), v - c * c / (p + noise))
         self._p, self._c, self._v = (
-            np.where(seen, new, old) for new, old in zip(left, (self._p, self._c, self._v), strict=True)
+            np.where(observed, new, old) for new, old in zip(left, (self._p, self._c, self._v), strict=True)
         )
-        self._last = np.where(seen, self._pairs.time[t], self._last)
+        self._last = np.where(observed, self._pairs.time[t], self._last)
 
 
 SLOWEST = 0.11  # seconds from frame to frame: with longer steps strides are steps of the other leg
 MOST = 1 / 3  # of a pair's frames: of more it is open which are right
-AROUND = 1.0  # seconds before and after a stretch that tell which reading of it goes on better
-NEAR = 0.5  # seconds between stretches that are judged as one
+AROUND = 1.0  # seconds before and after an interval in which its readings are compared
+NEAR = 0.5  # seconds between intervals that are judged as one
 LIMBS = (("hip", "knee", "ankle", "heel", "toe"), ("shoulder", "elbow", "wrist", "hand"))
-CLEAR = 9.0  # log-evidence that an exchange must gain, each pair
+CLEAR = 9.0  # log-evidence that an swap must gain, each pair
 
 #: Log density of keypoints by the model of motion.
 Evidence = Callable[[Keypoints], float]
@@ -203,14 +207,14 @@ Evidence = Callable[[Keypoints], float]
 
 @dataclass(frozen=True)
 class Swapped:
-    """Frames in which left and right of a joint were exchanged.
+    """Frames in which left and right of a joint were swapped.
 
     Attributes
     ----------
     joint : str
         Without its side.
     spans : list of (int, int)
-        First and last frame of each stretch.
+        First and last frame of each interval.
     """
 
     joint: str
@@ -218,7 +222,7 @@ class Swapped:
 
 
 def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Keypoints, list[Swapped]]:
-    """Put left and right points back where they were exchanged in few frames; most are taken to be right.
+    """Put left and right points back where they were swapped in few frames; most are taken to be right.
 
     Parameters
     ----------
@@ -233,16 +237,18 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
     if not joints or len(keypoints.time) < 3 or np.median(np.diff(keypoints.time)) > SLOWEST:
         return keypoints, []
     pairs = np.array([[keypoints.names.index(f"{side}_{joint}") for side in "lr"] for joint in joints])
-    seen = np.asarray(keypoints.seen[:, pairs].any(axis=2))
+    observed = np.asarray(keypoints.visible[:, pairs].any(axis=2))
     steady = _without_spikes(keypoints, pairs, sd)
-    wrong = _completed(keypoints, pairs, steady, suspected(steady, pairs, sd)) & seen
-    wrong &= wrong.sum(axis=0) <= MOST * seen.sum(axis=0)
-    for first, end in list(_stretches(keypoints, wrong)):
+    wrong = _completed(keypoints, pairs, steady, suspected(steady, pairs, sd)) & observed
+    wrong &= wrong.sum(axis=0) <= MOST * observed.sum(axis=0)
+    for first, end in list(_intervals(keypoints, wrong)):
         part = _around(keypoints, first, end)
         own = slice(first - part.start, end - part.start)
-        wrong[first:end] = _judged(_rows(steady, part), pairs, wrong[part], seen[part], own, evidence)[own]
+        wrong[first:end] = _judged(_rows(steady, part), pairs, wrong[part], observed[part], own, evidence)[
+            own
+        ]
     found = [
-        Swapped(joint, _spans(keypoints.frame[seen[:, k]], wrong[seen[:, k], k]))
+        Swapped(joint, _spans(keypoints.frame[observed[:, k]], wrong[observed[:, k], k]))
         for k, joint in enumerate(joints)
         if wrong[:, k].any()
     ]
@@ -252,9 +258,9 @@ def undo_swaps(keypoints: Keypoints, sd: float, evidence: Evidence) -> tuple[Key
 def _without_spikes(keypoints: Keypoints, pairs: Ints, sd: float) -> Keypoints:
     """Keypoints without the points that jump whichever side they are of: they would decide the rest's."""
     kept, _ = noise.without_spikes(keypoints, sd)
-    jumped = np.asarray((keypoints.seen & ~kept.seen)[:, pairs].any(axis=2))
+    jumped = np.asarray((keypoints.visible & ~kept.visible)[:, pairs].any(axis=2))
     other, _ = noise.without_spikes(_swapped(keypoints, pairs, jumped), sd)
-    some = kept.seen | _swapped(other, pairs, jumped).seen
+    some = kept.visible | _swapped(other, pairs, jumped).visible
     return replace(keypoints, uv=np.where(some[..., None], keypoints.uv, np.nan))
 
 
@@ -265,14 +271,14 @@ def _completed(keypoints: Keypoints, pairs: Ints, steady: Keypoints, wrong: Flag
     not be seen.
     """
     found, put = wrong.copy(), _swapped(steady, pairs, wrong).uv
-    for k, known in enumerate(steady.seen[:, pairs].all(axis=2).T):
+    for k, known in enumerate(steady.visible[:, pairs].all(axis=2).T):
         rows, others = np.flatnonzero(known), np.flatnonzero(~known)
         if not rows.size:
             continue
         lines = np.stack([_along(keypoints.time, rows, put[:, side])[others] for side in pairs[k]], axis=1)
-        seen = keypoints.uv[np.ix_(others, pairs[k])]
+        observed = keypoints.uv[np.ix_(others, pairs[k])]
         kept, other = (
-            np.nansum(np.linalg.norm(seen - line, axis=2), axis=1) for line in (lines, lines[:, ::-1])
+            np.nansum(np.linalg.norm(observed - line, axis=2), axis=1) for line in (lines, lines[:, ::-1])
         )
         after = np.searchsorted(rows, others)
         beside = wrong[rows[np.maximum(after - 1, 0)], k] | wrong[rows[np.minimum(after, len(rows) - 1)], k]
@@ -285,15 +291,15 @@ def _along(time: Floats, rows: Ints, uv: Floats) -> Floats:
     return np.stack([np.interp(time, time[rows], axis[rows]) for axis in uv.T], axis=1)
 
 
-def _stretches(keypoints: Keypoints, wrong: Flags) -> Iterator[tuple[int, int]]:
-    """First row, and the one after the last, of stretches with `wrong` pairs further apart than `NEAR`."""
+def _intervals(keypoints: Keypoints, wrong: Flags) -> Iterator[tuple[int, int]]:
+    """First row, and the one after the last, of intervals with `wrong` pairs further apart than `NEAR`."""
     rows = np.flatnonzero(wrong.any(axis=1))
     parts = np.split(rows, np.flatnonzero(np.diff(keypoints.time[rows]) > NEAR) + 1)
     return ((int(part[0]), int(part[-1]) + 1) for part in parts if part.size)
 
 
 def _around(keypoints: Keypoints, first: int, end: int) -> slice:
-    """Rows of a stretch and its surroundings."""
+    """Rows of an interval and its surroundings."""
     begin = np.searchsorted(keypoints.time, keypoints.time[first] - AROUND)
     return slice(int(begin), int(np.searchsorted(keypoints.time, keypoints.time[end - 1] + AROUND, "right")))
 
@@ -305,7 +311,7 @@ def _rows(keypoints: Keypoints, part: slice) -> Keypoints:
 
 
 def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
-    """Keypoints with the two points of pairs (P, 2) exchanged where `wrong` (T, P)."""
+    """Keypoints with the two points of pairs (P, 2) swapped where `wrong` (T, P)."""
     uv, confidence = keypoints.uv.copy(), keypoints.confidence.copy()
     for pair, rows in zip(pairs, wrong.T, strict=True):
         for values in (uv, confidence):
@@ -314,11 +320,11 @@ def _swapped(keypoints: Keypoints, pairs: Ints, wrong: Flags) -> Keypoints:
 
 
 def _judged(
-    keypoints: Keypoints, pairs: Ints, wrong: Flags, seen: Flags, own: slice, evidence: Evidence
+    keypoints: Keypoints, pairs: Ints, wrong: Flags, observed: Flags, own: slice, evidence: Evidence
 ) -> Flags:
     """Take in `own` rows of a proposal (T, P) what the motion confirms: all or nothing, then each limb.
 
-    Where something was exchanged, other pairs may have been along with it for as long.
+    Where something was swapped, other pairs may have been along with it for as long.
     """
 
     def score(flags: Flags) -> float:
@@ -330,7 +336,7 @@ def _judged(
     if (proposed := score(wrong)) > most:
         best, most = wrong.copy(), proposed
     for limb in _limbs(keypoints, pairs):
-        for flags in _others(best[own], wrong[own], seen[own], limb):
+        for flags in _others(best[own], wrong[own], observed[own], limb):
             other = best.copy()
             other[own] = flags
             if (other != best).any() and (changed := score(other)) > most:
@@ -345,10 +351,10 @@ def _limbs(keypoints: Keypoints, pairs: Ints) -> list[Ints]:
     return [np.flatnonzero(limb == k) for k in np.unique(limb)]
 
 
-def _others(best: Flags, wrong: Flags, seen: Flags, limb: Ints) -> Iterator[Flags]:
+def _others(best: Flags, wrong: Flags, observed: Flags, limb: Ints) -> Iterator[Flags]:
     """Vary the best reading: with none of a limb, with it as proposed, and with all of it."""
     proposed = np.asarray(wrong[:, limb].any(axis=1))
-    whole = seen[:, limb] & np.asarray(proposed if proposed.any() else wrong.any(axis=1))[:, None]
+    whole = observed[:, limb] & np.asarray(proposed if proposed.any() else wrong.any(axis=1))[:, None]
     none = np.zeros_like(whole)
     for flags in (none, wrong[:, limb], whole) if best.any() else (wrong[:, limb],):
         other = best.copy()
@@ -357,6 +363,6 @@ def _others(best: Flags, wrong: Flags, seen: Flags, limb: Ints) -> Iterator[Flag
 
 
 def _spans(frames: npt.NDArray[np.int64], wrong: Flags) -> list[tuple[int, int]]:
-    """First and last of the frames (n,) in each stretch of `wrong` ones."""
+    """First and last of the frames (n,) in each interval of `wrong` ones."""
     edges = np.flatnonzero(np.diff(np.pad(wrong.astype(int), 1))).reshape(-1, 2)
     return [(int(frames[first]), int(frames[end - 1])) for first, end in edges]

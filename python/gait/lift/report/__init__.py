@@ -1,0 +1,1 @@
+"""Figures of the segment prior and of lifted motion."""

@@ -145,13 +145,13 @@ class Strips:
 def _row(figure: Figure, box: tuple[float, float, float, float], title: str) -> Axes:
     """Axes of a row with its title on the left and a line for the floor."""
     axes = figure.add_axes(box)
-    bare(axes)
+    hide_axes(axes)
     axes.set_ylabel(title, rotation=0, ha="right", va="center", fontsize=9)
     axes.axhline(0, color=GREY, lw=0.5, zorder=0)
     return axes
 
 
-def bare(axes: Axes) -> None:
+def hide_axes(axes: Axes) -> None:
     """Style axes that show figures at a true aspect, without ticks."""
     plain(axes)
     axes.grid(visible=False)
@@ -161,7 +161,7 @@ def bare(axes: Axes) -> None:
 
 
 def scale_bar(axes: Axes, x: float, y: float, words: str = "") -> None:
-    """Draw a bar of `BAR` metres from x, y to the right, and say so."""
+    """Draw a bar of `BAR` metres from x, y to the right, with a label."""
     axes.plot([x, x + BAR], [y, y], color=DARK, lw=1.5, solid_capstyle="butt")
     axes.annotate(
         f"{BAR:g} m{words}", (x + BAR, y), (4, 0), textcoords="offset points", va="center", fontsize=8
@@ -177,10 +177,10 @@ def clip(keypoints: Keypoints, motion: Motion, view: View, name: str) -> Drawing
     index = {marker: k for k, marker in enumerate(motion.names)}
     for column, frame in enumerate(frames):
         body = motion.places[frame] - motion.places[frame].mean(axis=0)
-        seen, points = _in_picture(view, motion, frame, keypoints)
-        sides = [seen, np.column_stack([body @ ahead, body @ -down])]
+        observed, points = _in_picture(view, motion, frame, keypoints)
+        sides = [observed, np.column_stack([body @ ahead, body @ -down])]
         for axes, flat in zip(panels[:, column], sides, strict=True):
-            bare(axes)
+            hide_axes(axes)
             for side, chains in STICKS.items():
                 for chain in chains:
                     known = [index[joint] for joint in chain if joint in index]
@@ -197,9 +197,9 @@ def clip(keypoints: Keypoints, motion: Motion, view: View, name: str) -> Drawing
     panels[1, 0].set_ylabel("turned by 90°", fontsize=9)
     error = float(np.nanmedian(motion.error))
     caption = (
-        f"{name}: the estimate as the view sees it, {error:.1f} px from the keypoints (median), and turned by "
-        "90°, with one deviation of the depth about the hips. Dots: the keypoints. Left limbs blue, right ones "
-        "orange."
+        f"{name}: the estimate as the view sees it, {error:.1f} px from the keypoints (median), and "
+        "turned by 90°, with one standard deviation of the depth about the hips. Dots: the keypoints. Left "
+        "limbs blue, right ones orange."
     )
     return Drawing("clip", "A clip", caption, figure)
 
@@ -219,15 +219,15 @@ def _in_picture(view: View, motion: Motion, frame: int, keypoints: Keypoints) ->
 
     Of a view from far away only the shape is known: it is shifted and scaled to the points.
     """
-    uv, seen = keypoints.uv[frame], keypoints.seen[frame]
+    uv, observed = keypoints.uv[frame], keypoints.visible[frame]
     body = motion.places[frame]
     if isinstance(view, Perspective):
         flat = view.camera.project(body)
     else:
         flat = body @ view.axes[:2].T
-        own = flat[[motion.names.index(name) for name in keypoints.names]][seen]
+        own = flat[[motion.names.index(name) for name in keypoints.names]][observed]
         if len(own) > 1:
-            middle, target = own.mean(axis=0), uv[seen].mean(axis=0)
-            scale = ((own - middle) * (uv[seen] - target)).sum() / max(((own - middle) ** 2).sum(), 1e-12)
+            middle, target = own.mean(axis=0), uv[observed].mean(axis=0)
+            scale = ((own - middle) * (uv[observed] - target)).sum() / max(((own - middle) ** 2).sum(), 1e-12)
             flat = target + scale * (flat - middle)
-    return flat * (1, -1), uv[seen] * (1, -1)
+    return flat * (1, -1), uv[observed] * (1, -1)

@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 SYNTHESIS = 40  # modes of the paper's fig. 2
 NOISE = 0.02  # metres, of the points seen in figs. 3, 5 and 6
 DRAWS = MODES = 3
-SWING = 2.0  # deviations by which uncertain modes are drawn
+SWING = 2.0  # standard deviations by which uncertain modes are drawn
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Case:
     log10_volume : float
         Of the posterior over the prior.
     uncertain : (MODES, F, J, 3)
-        Least certain displacements, one deviation long, the longest first.
+        Least certain displacements, one standard deviation long, the longest first.
     """
 
     prior: SegmentPrior
@@ -117,7 +117,7 @@ def case(model: str | None, truth: Floats | None, stature: float, what: str, see
 
 
 def placed_as_learnt(stature: float, heading: float = 0.0, **changes: float) -> LiftConfig:
-    """Make the settings of a lifter for somebody whose size, place and heading are known, as in the paper."""
+    """Make the settings of a lifter for a person whose size, place and heading are known, as in the paper."""
     known = {"stature": stature, "stature_sd": 0.0, "heading": heading, "heading_sd": 0.0}
     return LiftConfig.default(**known, place_sd=(0.0, 0.0, 0.0), **changes)
 
@@ -226,7 +226,7 @@ def uncertain(c: Case) -> Drawing:
     return Drawing(
         "uncertain",
         "What is least certain",
-        "Largest posterior deviations, rms per marker, seen from the side. Shares of the energy along the "
-        f"line of sight: {', '.join(f'{100 * share:.0f} %' for share in depth)}.",
+        "Largest posterior standard deviations, rms per marker, seen from the side. Shares of the energy "
+        f"along the line of sight: {', '.join(f'{100 * share:.0f} %' for share in depth)}.",
         figure,
     )

@@ -1,0 +1,1 @@
+"""Single segments by the C library, and the views they are seen in."""

@@ -30,7 +30,7 @@ GROUND_SD = 10.0  # metres, of the place on the ground
 FLOOR_SD = 0.05  # metres, of the floor's height; a single segment depends on it less than a sequence
 ANY_HEIGHT = 10.0  # metres, of the floor's height without a camera
 MOST_SEARCHES = 5  # while the place found is far from the expected one
-FLAT = 100.0  # times the modes' deviations: next to no prior
+FLAT = 100.0  # times the modes' standard deviations: next to no prior
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Explanation:
         Where on the ground, metres.
     share : float
         Probability among the explanations of the same segment.
-    seen : Observations
+    visible : Observations
         The segment's points, outliers down-weighted.
     """
 
@@ -55,7 +55,7 @@ class Explanation:
     component: int
     place: Floats
     share: float
-    seen: Observations
+    visible: Observations
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class SegmentFit:
     log10_volume : float
         log10 of the posterior's volume over the prior's.
     mode_sd : (n,)
-        Deviations of its displacements over all markers and frames, metres, the least certain first.
+        Standard deviations of its displacements over all markers and frames, metres, the least certain first.
     modes : (n, F, J, 3)
-        These displacements, one deviation long.
+        These displacements, one standard deviation long.
     """
 
     heading: float
@@ -85,7 +85,7 @@ class SegmentFit:
     modes: Floats
 
     def rooted_sd(self, ends: npt.NDArray[np.intp]) -> Floats:
-        """Standard deviations (F, J, 3) about the middle of two markers."""
+        """Give standard deviations (F, J, 3) about the middle of two markers."""
         apart = self.modes - self.modes[:, :, ends].mean(axis=2, keepdims=True)
         outside = np.maximum(self.sd**2 - (self.modes**2).sum(axis=0), 0.0)
         middle = outside[:, ends].sum(axis=1, keepdims=True) / 4
@@ -108,16 +108,16 @@ class SegmentLifter:
         config = LiftConfig.default(
             stature=stature, stature_sd=stature_sd, place_sd=(GROUND_SD, GROUND_SD, height_sd), lag=-1
         )
-        seen_by = view.camera if isinstance(view, Perspective) else view.axes[:2]
+        viewed_by = view.camera if isinstance(view, Perspective) else view.axes[:2]
         self._prior, self._latent, self._place = prior, prior.headings == 0, np.zeros(3)
-        self._lifter = Lifter(blob.encode(prior.sections()), seen_by, config)
+        self._lifter = Lifter(blob.encode(prior.sections()), viewed_by, config)
 
-    def explanations(self, seen: Observations) -> list[Explanation]:
-        """All distinct explanations of a segment, the most probable first; none if next to nothing is seen."""
-        if seen.seen.sum() < FEWEST:
+    def explanations(self, observed: Observations) -> list[Explanation]:
+        """Find all explanations of a segment, the most probable first; none if too little is seen."""
+        if observed.visible.sum() < FEWEST:
             return []
-        fit, weighted = self._robust(seen)
-        points = Observations(seen.uv, np.where(weighted > 0, weighted, np.inf))
+        fit, weighted = self._robust(observed)
+        points = Observations(observed.uv, np.where(weighted > 0, weighted, np.inf))
         if not self._latent:
             return [Explanation(fit.heading, fit.component, fit.place, 1.0, points)]
         fits = [self._fit(points, start, self._place) for start in 2 * np.pi / STARTS * np.arange(STARTS)]
@@ -136,31 +136,31 @@ class SegmentLifter:
 
     def solve(self, chosen: Explanation) -> SegmentFit:
         """Posterior of an explanation."""
-        fit = self._fit(chosen.seen, chosen.heading, chosen.place)
+        fit = self._fit(chosen.visible, chosen.heading, chosen.place)
         places, sd = self._lifter.positions()
         mode_sd, modes = self._lifter.uncertain(len(self._lifter.posterior()[0]))
         return SegmentFit(fit.heading, fit.component, places, sd, fit.log10_volume, mode_sd, modes)
 
     def open_modes(self, chosen: Explanation) -> float:
         """How many of the modes the points of an explanation leave open: the sum of their variances."""
-        fit = self._fit(chosen.seen, chosen.heading, chosen.place)
+        fit = self._fit(chosen.visible, chosen.heading, chosen.place)
         used = self._prior.sd[fit.component] > 0
         return float(np.diag(self._lifter.posterior()[1])[: len(used)][used].sum())
 
-    def _fit(self, seen: Observations, heading: float, place: Floats) -> Fit:
+    def _fit(self, observed: Observations, heading: float, place: Floats) -> Fit:
         """Fit a segment near a heading and a place."""
         if self._latent:
             self._lifter.expect((place[0], place[1], 0.0), heading, START_SD)
-        return self._lifter.segment(seen.uv, seen.sd)
+        return self._lifter.segment(observed.uv, observed.sd)
 
-    def _robust(self, seen: Observations) -> tuple[Fit, Floats]:
+    def _robust(self, observed: Observations) -> tuple[Fit, Floats]:
         """Search for any heading, with outliers down-weighted, near the place of the segment before."""
         if not self._latent:
-            return self._lifter.segment_robust(seen.uv, seen.sd)
+            return self._lifter.segment_robust(observed.uv, observed.sd)
         for _ in range(MOST_SEARCHES):
             before = self._place
             self._lifter.expect((before[0], before[1], 0.0))
-            fit, weighted = self._lifter.segment_robust(seen.uv, seen.sd)
+            fit, weighted = self._lifter.segment_robust(observed.uv, observed.sd)
             self._place = fit.place
             if np.linalg.norm((fit.place - before)[:2]) < GROUND_SD / 2:
                 break
@@ -175,20 +175,20 @@ def _same(a: Explanation, b: Explanation) -> bool:
 def explanations(
     lifter: SegmentLifter,
     prior: SegmentPrior,
-    seen: Observations,
+    observed: Observations,
     update: Callable[[int], None] = lambda done: None,
 ) -> list[list[Explanation]]:
     """Explain every segment of a grid alone; none where next to nothing is seen.
 
     Parameters
     ----------
-    seen : Observations
+    visible : Observations
         Of the prior's markers on whole blocks of half a segment, in the lifter's units.
     """
     half = prior.frames // 2
     found = []
-    for s in range(len(seen.uv) // half - 1):
-        found.append(lifter.explanations(seen.part(s * half, s * half + prior.frames)))
+    for s in range(len(observed.uv) // half - 1):
+        found.append(lifter.explanations(observed.part(s * half, s * half + prior.frames)))
         update(s + 1)
     return found
 
@@ -196,7 +196,7 @@ def explanations(
 def without_prior(
     prior: SegmentPrior, view: View, stature: float, stature_sd: float, chosen: Sequence[Explanation]
 ) -> list[SegmentFit]:
-    """Estimate segments by the measurements alone: the limit of ever larger deviations of the modes.
+    """Estimate segments by the measurements alone: the limit of ever larger standard deviations of the modes.
 
     What moves the body as a whole keeps its prior: no view from far away shows a distance.
 
@@ -211,7 +211,7 @@ def without_prior(
         if left:
             raise UserError(
                 f"the points seen in a segment determine {count - left} of {count} modes, and the likelihood "
-                "alone says nothing about the others; give more points, or use --method blend"
+                "alone determines nothing about the others; give more points, or use --method blend"
             )
     return [flat.solve(each) for each in chosen]
 
@@ -256,7 +256,7 @@ class Uncertain:
     log10_volume : float
         log10 of the posterior's volume over the prior's.
     sd : (COUNT,)
-        Deviations of the least certain displacements, rms per marker, metres, largest first.
+        Standard deviations of the least certain displacements, rms per marker, metres, largest first.
     along, rigid : (COUNT,)
         Shares of their energy along the line of sight, and that move the whole body as one.
     shares : (COUNT, J)
@@ -281,12 +281,12 @@ def summarise(segments: Sequence[SegmentFit], view: View) -> Uncertain:
 
 
 def _least_certain(found: SegmentFit, view: View) -> Floats:
-    """Deviation, share along the line of sight, rigid share and shares by marker, (COUNT, 3 + J)."""
-    sight, size = view.sight(found.places), np.sqrt(found.places[..., 0].size)
+    """Give sd, share along the line of sight, rigid share and shares by marker, (COUNT, 3 + J)."""
+    ahead, size = view.direction(found.places), np.sqrt(found.places[..., 0].size)
     rows = zip(found.mode_sd[:COUNT].tolist(), found.modes[:COUNT], strict=True)
     return np.array(
         [
-            [s / size, share_along(m, sight), share_rigid(m), *np.sum(m**2, axis=(0, 2)) / np.sum(m**2)]
+            [s / size, share_along(m, ahead), share_rigid(m), *np.sum(m**2, axis=(0, 2)) / np.sum(m**2)]
             for s, m in rows
         ]
     )

@@ -38,7 +38,7 @@ class Perspective:
         """Pixels (T, J, 2) of places (T, J, 3)."""
         return self.camera.project(places)
 
-    def sight(self, places: Floats) -> Floats:
+    def direction(self, places: Floats) -> Floats:
         """Direction (3,) from the lens to the middle of places (F, J, 3)."""
         ray = places.mean(axis=(0, 1)) - self.camera.centre
         return np.asarray(ray / np.linalg.norm(ray))
@@ -71,29 +71,31 @@ class Parallel:
         """Whether the scale is unknown."""
         return self.metres is None
 
-    def metric(self, seen: Observations, lengths: Floats) -> Observations:
+    def metric(self, observed: Observations, lengths: Floats) -> Observations:
         """Observations in metres from the origin if a unit of the picture has `lengths` (T,) metres."""
-        return Observations((seen.uv - self.origin) * lengths[:, None, None], seen.sd * lengths[:, None])
+        return Observations(
+            (observed.uv - self.origin) * lengths[:, None, None], observed.sd * lengths[:, None]
+        )
 
     def project(self, places: Floats, lengths: Floats) -> Floats:
         """Picture coordinates (T, J, 2) of places (T, J, 3)."""
         return np.asarray(places @ self.axes[:2].T / lengths[:, None, None] + self.origin)
 
-    def sight(self, places: Floats) -> Floats:
+    def direction(self, places: Floats) -> Floats:
         """Direction (3,) of view, the same for all places."""
         return self.axes[2]
 
-    def lengths(self, seen: Observations, mean: Floats, stature: float) -> Floats:
+    def lengths(self, observed: Observations, mean: Floats, stature: float) -> Floats:
         """Guess the lengths (T,) of a unit from the extents of what is seen and of a mean body (J, 3)."""
         if self.metres is not None:
-            return np.full(len(seen.uv), self.metres)
+            return np.full(len(observed.uv), self.metres)
         flat = stature * mean @ self.axes[:2].T
-        ratio = np.full(len(seen.uv), np.nan)
-        for t, known in enumerate(seen.seen):
+        ratio = np.full(len(observed.uv), np.nan)
+        for t, known in enumerate(observed.visible):
             if known.sum() >= 3:
-                ratio[t] = _extent(flat[known]) / max(_extent(seen.uv[t, known]), 1e-9)
+                ratio[t] = _extent(flat[known]) / max(_extent(observed.uv[t, known]), 1e-9)
         if np.isnan(ratio).all():
-            raise UsageError("no frame has three points from which to tell the scale; give --camera")
+            raise UsageError("no frame has the three points that determine the scale; give --camera")
         known = np.flatnonzero(np.isfinite(ratio))
         if self.steady:
             return np.full(len(ratio), float(np.median(ratio[known])))

@@ -1,0 +1,1 @@
+"""A whole sequence: one Gaussian over overlapping segments, or the segments blended."""

@@ -133,9 +133,9 @@ class Solution:
     def covariance(self) -> tuple[Floats, Floats]:
         """Blocks of the covariance of x: on the diagonal, and of each with the one before."""
         diagonal, across = self._factor.covariance()
-        spread = self._reach @ self._free
-        diagonal += spread @ self._reach.transpose(0, 2, 1)
-        across += spread[1:] @ self._reach[:-1].transpose(0, 2, 1)
+        sds = self._reach @ self._free
+        diagonal += sds @ self._reach.transpose(0, 2, 1)
+        across += sds[1:] @ self._reach[:-1].transpose(0, 2, 1)
         return diagonal, across
 
 

@@ -1,14 +1,14 @@
 """The segment prior over a whole sequence: a Markov chain of half segments, given what lasts.
 
 Frames of the prior's rate are cut into blocks of half a segment.  Two neighbouring blocks are a segment, so
-that the prior gives p(first, second) and, by division, p(second | first): the sequence has the density
-p(X_0, X_1) prod_s p(X_s+1 | X_s), in which every overlap counts once.  Its information matrix is
-block-block_arrowhead.  In the world a segment is X = stature Rz(heading) x + shift; shift and heading are unknown
+that the prior gives p(first, second) and, by division, p(second | first): the sequence has the density p(X_0,
+X_1) prod_s p(X_s+1 | X_s), in which every overlap counts once.  Its information matrix is block-
+block_arrowhead.  In the world a segment is X = stature Rz(heading) x + shift; shift and heading are unknown
 too and enter by their linear effects around the present estimate (`Around`).
 
 A chain forgets: left to it, every half segment would bring news of the person's size and of the floor, and
 the more frames, the surer it would be of the mean person.  So what stays the same throughout - stature, floor
-and where somebody's joints are taken to be - are numbers g of their own, and the chain is that given g.
+and where a person's joints are taken to be - are numbers g of their own, and the chain is that given g.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.float64]
 GROUND_SD = 10.0  # metres, where on the ground
 LASTING = 0.7  # share of the variance outside the modes that stays as it is within a segment
 THROUGHOUT = 0.5  # share of that which stays as it is in the whole sequence
-OFFSET_SD = 0.009  # statures, of where somebody's joints are taken to be
+OFFSET_SD = 0.009  # statures, of where a person's joints are taken to be
 HEADING_SD = 2.0  # radians around the present estimate: as good as unknown
 WHOLE = 2  # numbers that last and move the whole body, stature and floor; each marker's offset follows
 LEADING = 3  # modes whose scores enter the shapes that views are linearised around
@@ -67,7 +67,7 @@ class Around:
         Markers in the world, metres.
     grown : (S, 2 b, J, 3)
         What grows with the stature: the same by all modes.  If some did not grow, a small body near the lens
-        would pay less for them, and everybody was drawn to it.
+        would pay less for them, and everyone was drawn to it.
     """
 
     heading: Floats
@@ -79,7 +79,7 @@ class Around:
 
 @dataclass(frozen=True)
 class Chain:
-    """Information form of the chain, B blocks of n = 3 b J numbers, and of what lasts (`bordered`).
+    """Information form of the chain, B blocks of n = 3 b J numbers, and of what lasts (`block_arrowhead`).
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def chain(prior: SegmentPrior, around: Around, freedom: Freedom) -> Chain:
 
 
 def moved(prior: SegmentPrior, around: Around, freedom: Freedom, places: Floats, lasting: Floats) -> Around:
-    """Linearise around new places (grid, J, 3): headings, stature and shapes that they say under the prior.
+    """Linearise around new places (grid, J, 3): headings, stature and shapes that they imply under the prior.
 
     The shapes hold the leading modes only.  What else an estimate fits goes with the noise that it is fitted
     to: derivatives taken there are correlated with the residuals, and draw the body to the lens, where the
@@ -227,7 +227,7 @@ class Segment:
         return -float(np.log(self.variance).sum() + 2 * np.log(np.diag(self._lower)).sum())
 
     def explained(self, places: Floats, lasting: Floats) -> tuple[float, Floats, Floats]:
-        """Turn in radians that places say, their shape by the leading modes and by all, given what lasts."""
+        """Turn of places in radians, their shape by the leading modes and by all, given what lasts."""
         rest = places - self.mean - lasting @ self.lasting
         values = linalg.cho_solve((self._lower, True), self._scaled @ rest, check_finite=False)
         turn = HEADING_SD * values[self.rigid + 2]
@@ -239,7 +239,7 @@ class Segment:
 
 
 def _each_marker(sd: Floats, shape: tuple[int, ...]) -> Floats:
-    """Move (3 J, F, J, 3) of each marker along each axis by its deviation (J,), alike in all frames."""
+    """Move (3 J, F, J, 3) of each marker along each axis by its sd (J,), alike in all frames."""
     frames, markers = shape[:2]
     own = (np.eye(3 * markers) * np.repeat(sd, 3)).reshape(3 * markers, 1, markers, 3)
     return np.broadcast_to(own, (3 * markers, frames, markers, 3))

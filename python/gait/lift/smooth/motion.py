@@ -29,7 +29,7 @@ from gait.lift.segment.explain import FEWEST, Explanation, SegmentFit, SegmentLi
 from gait.lift.segment.view import Parallel, Perspective, View
 from gait.lift.smooth import size, smoother
 from gait.lift.smooth.chain import Freedom, blended, in_turn
-from gait.lift.smooth.smoother import Lifted, Seen, Start
+from gait.lift.smooth.smoother import Lifted, Observed, Start
 
 Floats = npt.NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class Motion:
     places, sd : (T, J, 3)
         Metres, and posterior standard deviations.
     rooted_sd : (T, J, 3)
-        Deviations of the places about the middle of the hips.
+        Standard deviations of the places about the middle of the hips.
     error : (T, P)
         Distance in the picture from what was seen, pixels; NaN where nothing was.
     stature : float
@@ -88,16 +88,17 @@ class Motion:
     evidence : float
         Logarithm of the density of what is seen, but for a constant; NaN for segments alone.
     chi2_per_observation : float
-        Squared deviations per number seen, about 1; NaN for segments alone.
+        Squared standard deviations per number seen, about 1; NaN for segments alone.
     wider : float
-        Factor of the prior's deviations that the keypoints asked for; 1 for motions like those learnt.
+        Factor of the prior's standard deviations that the keypoints asked for; 1 for motions like those
+        learnt.
     resized : float
         Factor by which the fit's size was changed to that of a person; 1 for motions like those learnt.
     alone : bool
         Whether the motion was so unlike those learnt that its segments were estimated alone instead.
     outliers : (T, P)
-        Points that lost their say because they are far from where the rest has them; none are told of
-        segments alone.
+        Points that were down-weighted because they are far from their predictions; None for segments
+        alone.
     """
 
     names: tuple[str, ...]
@@ -123,7 +124,8 @@ class Unlike(UserError):
 
 
 HIGH = (
-    4.0  # times the distance that the person's size in the picture tells: no lens that sees feet is so high
+    # times the distance that follows from the person's size in the picture: no lens that sees feet is so high
+    4.0
 )
 SIZES = (0.6, 1.6)  # of the usual extent: no person is smaller or larger
 
@@ -133,24 +135,24 @@ def require_metres(
 ) -> None:
     """Refuse a camera that stands far higher than the person is away: its t is no metres."""
     points = Observations(keypoints.uv, keypoints.standard_deviations(options.pixel_sd))
-    seen = points.among(prior.index(keypoints.names), len(prior.names))
+    observed = points.among(prior.index(keypoints.names), len(prior.names))
     flat = Parallel(camera.R, None, np.zeros(2))
     try:
-        lengths = flat.lengths(seen, prior.mean[0].mean(axis=0), stature)
-    except UsageError:  # too few points at a time to tell a size
+        lengths = flat.lengths(observed, prior.mean[0].mean(axis=0), stature)
+    except UsageError:  # too few points at a time for a size
         return
     away, height = float((camera.fx + camera.fy) / 2 * lengths[0]), float(camera.centre[2])
     if abs(height) > HIGH * away + stature + 3 * options.floor_sd:
         raise UserError(
-            f"the camera stands {height:.0f} m over the floor but sees somebody {away:.2g} m away: give its "
+            f"the camera stands {height:.0f} m over the floor but sees a person {away:.2g} m away: give its "
             "t in metres (R, t: world to camera, z up, floor at z = 0)"
         )
 
 
-def require_seen(found: list[list[Explanation]], grid: Grid, keypoints: Keypoints, alone: bool) -> None:
+def require_visible(found: list[list[Explanation]], grid: Grid, keypoints: Keypoints, alone: bool) -> None:
     """Refuse keypoints that show next to nothing, or nothing in a segment if each is estimated `alone`."""
     if not any(found):
-        step = float(np.median(np.diff(keypoints.time[keypoints.seen.any(axis=1)], append=np.inf)))
+        step = float(np.median(np.diff(keypoints.time[keypoints.visible.any(axis=1)], append=np.inf)))
         if LONGEST_GAP <= step < np.inf:
             raise UserError(
                 f"{1 / step:.2g} frames per second with points are too few to follow a motion; give "
@@ -181,15 +183,15 @@ def _extent(places: Floats) -> float:
 
 
 KNOWN_SD, PEOPLE_SD = 0.04, 0.09  # metres, of a stature that is given, and among people
-ANY_HEIGHT = 10.0  # metres, deviation of the floor's height without a camera
+ANY_HEIGHT = 10.0  # metres, standard deviation of the floor's height without a camera
 WIDER = (
     1.0,
     2.0,
     4.0,
     8.0,
-)  # factors of the prior's deviations, tried in turn while the keypoints ask for it
-FLOATS = 4.0  # deviations of the floor's height from which somebody does not stand on it
-POOR_FIT = 1.3  # squared deviations per number seen from which a wider prior is tried
+)  # factors of the prior's standard deviations, tried in turn while the keypoints ask for it
+FLOATS = 4.0  # standard deviations of the floor's height from which a person does not stand on it
+POOR_FIT = 1.3  # squared standard deviations per number seen from which a wider prior is tried
 
 
 def output_names(prior: SegmentPrior, keypoints: Keypoints, everything: bool = False) -> tuple[str, ...]:
@@ -284,7 +286,8 @@ def _unlike(
 ) -> Motion:
     """Estimate a motion that the prior does not know by its segments alone: a chain of them goes astray.
 
-    Size and deviations are by the bones and by the chi2 of the whole, which the segments do not know.
+    Size and standard deviations are by the bones and by the chi2 of the whole, which the segments do not
+    know.
     """
     try:
         alone = _lift(prior, keypoints, view, replace(options, method="blend"), grid, lambda done: None)
@@ -340,7 +343,7 @@ def _lift(
     start_sd = 0.0 if options.method == "smooth" else stature_sd
     lifter = SegmentLifter(prior, view, stature, start_sd)
     found = explain.explanations(lifter, prior, sampled, update)
-    require_seen(found, grid, keypoints, alone=options.method != "smooth")
+    require_visible(found, grid, keypoints, alone=options.method != "smooth")
     course = explain.course(found)
     if options.method == "likelihood":
         fits = explain.without_prior(prior, view, stature, start_sd, course)
@@ -356,9 +359,9 @@ def _lift(
         lengths=lengths,
     )
     freedom = Freedom(stature, stature_sd, options.floor_sd if view.grounded else ANY_HEIGHT)
-    seen = Seen(keypoints.time, points, markers)
+    observed = Observed(keypoints.time, points, markers)
     found_motion = smoother.smooth(
-        prior, seen, view, freedom, first, contact=options.contact, bones=options.bones
+        prior, observed, view, freedom, first, contact=options.contact, bones=options.bones
     )
     sized = _sized(prior, keypoints, view, options, found_motion, found_motion.chi2_per_observation)
     places = sized.places
@@ -398,7 +401,7 @@ def _sized(
     """Give the estimate a person's size if it has none; only a lens leaves it open.
 
     One that fits and stands on the floor is of its prior's kind, and prior and floor know more of its size
-    than the bones do, unless joints that nobody sees were put there by the prior to suit them.
+    than the bones do, unless joints that no person sees were put there by the prior to suit them.
     """
     fitted = size.Resized(found.places, found.sd, found.rooted_sd)
     if isinstance(view, Parallel) or not options.bones:
@@ -409,7 +412,7 @@ def _sized(
     floats = abs(_height(found.places, prior)) > FLOATS * options.floor_sd
     limit = size.UNLIKELY if chi2 > POOR_FIT or floats else size.IMPOSSIBLE
     sized = size.resized(fitted, view.camera, ratio, own, chi2, limit)
-    if sized.factor != 1 or size.tells_distance(keypoints):
+    if sized.factor != 1 or size.shows_distance(keypoints):
         return sized
     return size.of_any_size(sized, view.camera, own)
 
@@ -425,19 +428,19 @@ def _alone(
     blend: bool,
 ) -> Motion:
     """Segments estimated alone, mixed or one after another."""
-    places, spread = np.stack([fit.places for fit in fits]), np.stack([fit.sd for fit in fits])
+    places, sds = np.stack([fit.places for fit in fits]), np.stack([fit.sd for fit in fits])
     join = blended if blend else in_turn
     at = grid.between(keypoints.time)
     placed, scale = interpolated(join(places, grid.frames), *at), interpolated(lengths, *at)
     markers = prior.index(keypoints.names)
-    rooted, about_hips = places, spread
+    rooted, about_hips = places, sds
     if set(smoother.HIPS) <= set(prior.names):
         hips = prior.index(smoother.HIPS)
         rooted = places - places[:, :, hips].mean(axis=2, keepdims=True)
         about_hips = np.stack([fit.rooted_sd(hips) for fit in fits])
     sd, rooted_sd = (
         interpolated(_mixed(*of, join, grid.frames), at[0], np.abs(at[1]))
-        for of in ((places, spread), (rooted, about_hips))
+        for of in ((places, sds), (rooted, about_hips))
     )
     return Motion(
         names=prior.names,
@@ -454,7 +457,7 @@ def _alone(
 
 
 def _mixed(places: Floats, sd: Floats, join: Callable[[Floats, int], Floats], half: int) -> Floats:
-    """Deviations of overlapping segments that are mixed.
+    """Give standard deviations of overlapping segments that are mixed.
 
     Neighbours see the same points: together they are no surer than alone, and where they differ less sure.
     """
@@ -466,9 +469,9 @@ def _error(view: View, places: Floats, lengths: Floats, uv: Floats) -> Floats:
     """Distance of places (T, P, 3) in the picture from uv (T, P, 2); without a camera but for a shift."""
     miss = view.project(places, lengths) - uv
     if not view.grounded:
-        seen = np.isfinite(miss).all(axis=2, keepdims=True)
-        total = np.where(seen, miss, 0).sum(axis=1, keepdims=True)
-        miss = miss - total / np.maximum(seen.sum(axis=1, keepdims=True), 1)
+        observed = np.isfinite(miss).all(axis=2, keepdims=True)
+        total = np.where(observed, miss, 0).sum(axis=1, keepdims=True)
+        miss = miss - total / np.maximum(observed.sum(axis=1, keepdims=True), 1)
     return np.asarray(np.linalg.norm(miss, axis=2))
 
 

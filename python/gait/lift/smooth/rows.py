@@ -31,7 +31,7 @@ Floats = npt.NDArray[np.float64]
 
 NEAREST = 0.1  # metres before the lens: noise is not taken nearer
 NEAR = 0.5  # metres beside the ray: a guess is good enough to take the projection's derivatives there
-NOISE = 5.0  # deviations that noise alone puts a point off: no guess is bad for that
+NOISE = 5.0  # standard deviations that noise alone puts a point off: no guess is bad for that
 
 
 @dataclass(frozen=True)
@@ -59,43 +59,43 @@ class Rows:
         return replace(self, value=self.value - np.einsum("nai,ni->na", self.direction, at))
 
 
-def orthographic(seen: Observations, axes: Floats) -> Rows:
+def orthographic(observed: Observations, axes: Floats) -> Rows:
     """Rows of a view that leaves depth out.
 
     Parameters
     ----------
-    seen : Observations
+    visible : Observations
         Metres along `axes`.
     axes : (2, 3)
         Unit vectors of the picture.
     """
-    frame, marker = np.nonzero(seen.seen)
-    variance = seen.sd[frame, marker, None] ** 2 * np.ones(2)
+    frame, marker = np.nonzero(observed.visible)
+    variance = observed.sd[frame, marker, None] ** 2 * np.ones(2)
     direction = np.broadcast_to(axes, (len(frame), 2, 3))
-    return Rows(frame, marker, direction, seen.uv[frame, marker], variance)
+    return Rows(frame, marker, direction, observed.uv[frame, marker], variance)
 
 
-def perspective(seen: Observations, camera: Camera, about: Floats, guess: Floats | None = None) -> Rows:
+def perspective(observed: Observations, camera: Camera, about: Floats, guess: Floats | None = None) -> Rows:
     """Rows of a calibrated view, the noise being that at the places `about`.
 
     Parameters
     ----------
-    seen : Observations
+    visible : Observations
         Pixels; the lens distortion is taken out of them here.
     about : (T, J, 3) or (3,)
         Where derivatives are taken, metres, world.
     guess : (T, J, 3), optional
         Where the rows hold exactly; by default `about`.
     """
-    frame, marker = np.nonzero(seen.seen)
-    rays = camera.rays(seen.uv[frame, marker]) @ camera.R.T
+    frame, marker = np.nonzero(observed.visible)
+    rays = camera.rays(observed.uv[frame, marker]) @ camera.R.T
     ideal = rays[:, :2] / rays[:, 2:]
-    places = np.broadcast_to(about, (*seen.sd.shape, 3))[frame, marker]
+    places = np.broadcast_to(about, (*observed.sd.shape, 3))[frame, marker]
     depth = np.maximum(camera.depth(places), NEAREST)
-    sd = seen.sd[frame, marker, None] * depth[:, None] / (camera.fx, camera.fy)
+    sd = observed.sd[frame, marker, None] * depth[:, None] / (camera.fx, camera.fy)
     there = places if guess is None else guess[frame, marker]
-    guessed, said = _ideal(camera, places), _ideal(camera, there)
-    miss = (ideal - said) * depth[:, None]
+    guessed, predicted = _ideal(camera, places), _ideal(camera, there)
+    miss = (ideal - predicted) * depth[:, None]
     near = np.linalg.norm(miss, axis=1, keepdims=True) < np.maximum(
         NEAR, NOISE * sd.max(axis=1, keepdims=True)
     )
@@ -131,7 +131,7 @@ def scale_free(rows: Rows, places: Floats, lengths: Floats) -> tuple[Rows, Float
     return rows, -at / lengths[rows.frame, None]
 
 
-def rows_of(view: View, seen: Observations, places: Floats, lengths: Floats, guess: Floats) -> Rows:
+def rows_of(view: View, observed: Observations, places: Floats, lengths: Floats, guess: Floats) -> Rows:
     """Rows of observations in a view.
 
     Parameters
@@ -142,5 +142,5 @@ def rows_of(view: View, seen: Observations, places: Floats, lengths: Floats, gue
         Metres of a unit of the picture; only matter without a camera.
     """
     if isinstance(view, Perspective):
-        return perspective(seen, view.camera, places, guess)
-    return orthographic(view.metric(seen, lengths), view.axes[:2])
+        return perspective(observed, view.camera, places, guess)
+    return orthographic(view.metric(observed, lengths), view.axes[:2])

@@ -2,7 +2,7 @@
 
 A motion unlike those learnt fits best as a small body near the lens, where what does not fit is few metres.
 A change of size about the lens leaves the picture as it is; so the size may be taken from the bones, whose
-lengths per stature hardly depend on what somebody does.
+lengths per stature hardly depend on what a person does.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from gait.lift.smooth.soft_constraints import BONES
 Floats = npt.NDArray[np.float64]
 
 PROPORTION_SD = 0.04  # relative, of the bones of people of one stature
-UNLIKELY = 2.0  # deviations of the size from which a motion that does not fit is not trusted with it
+UNLIKELY = 2.0  # standard deviations of the size from which a motion that does not fit is not trusted with it
 IMPOSSIBLE = 4.0  # and one that fits
 
 
 @dataclass(frozen=True)
 class Resized:
-    """Motion whose size and deviations were checked.
+    """Motion whose size and standard deviations were checked.
 
     Attributes
     ----------
@@ -42,9 +42,9 @@ class Resized:
     factor: float = 1.0
 
 
-def tells_distance(keypoints: Keypoints) -> bool:
+def shows_distance(keypoints: Keypoints) -> bool:
     """Whether hips and an ankle are seen in half of the frames: other parts leave the distance open."""
-    shares = dict(zip(keypoints.names, keypoints.seen.mean(axis=0).tolist(), strict=True))
+    shares = dict(zip(keypoints.names, keypoints.visible.mean(axis=0).tolist(), strict=True))
     parts = (("l_hip", "r_hip", "pelvis"), ("l_ankle", "r_ankle"))
     return all(max(shares.get(name, 0.0) for name in part) >= 0.5 for part in parts)
 
@@ -73,19 +73,19 @@ def bones_ratio(prior: SegmentPrior, places: Floats, stature: float) -> float:
 def resized(
     found: Resized, camera: Camera, ratio: float, own: float, chi2: float, limit: float = UNLIKELY
 ) -> Resized:
-    """Divide a motion's size by `ratio` about the lens if it is off by `limit` deviations or more.
+    """Divide a motion's size by `ratio` about the lens if it is off by `limit` standard deviations or more.
 
-    Deviations grow by the larger of how far off the size was and of the chi2, in deviations (Birge's
-    ratio), and by the size that the person's own bones may have.
+    Standard deviations grow by the larger of how far off the size was and of the chi2, in standard deviations
+    (Birge's ratio), and by the size that the person's own bones may have.
 
     Parameters
     ----------
     found : Resized
-        With deviations as the fit has them.
+        With standard deviations as the fit has them.
     ratio : float
         Of `bones_ratio`.
     own : float
-        Relative deviation of the size of one person's bones.
+        Relative standard deviation of the size of one person's bones.
     chi2_per_observation : float
         As in `motion.Motion`.
     """
@@ -101,7 +101,7 @@ def resized(
 
 
 def of_any_size(found: Resized, camera: Camera, own: float) -> Resized:
-    """Deviations of a motion whose size, and with it the distance, has the relative deviation `own`."""
+    """Widen standard deviations by the relative standard deviation `own` of size and distance."""
     away = found.places - (-camera.R.T @ camera.t)
     rooted = away - away.mean(axis=1, keepdims=True)
     return replace(
@@ -112,6 +112,6 @@ def of_any_size(found: Resized, camera: Camera, own: float) -> Resized:
 
 
 def widened(found: Resized, chi2: float) -> Resized:
-    """Deviations as wide as the chi2 says, and never narrower."""
+    """Widen standard deviations by the root of chi2 per observation, if that is above 1."""
     grown = float(np.sqrt(max(chi2, 1.0)))
     return replace(found, sd=grown * found.sd, rooted_sd=grown * found.rooted_sd)

@@ -1,9 +1,10 @@
 """Motion of a whole sequence from 2-D keypoints: the exact Gaussian smoother over overlapping segments.
 
-The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints (`gait.lift.soft_constraints`), all
-linear in the places of the markers on a time grid of the prior's rate; places between its frames are
-interpolated.  What is not linear (perspective, headings, stature, lengths of bones) is linearised again
-around each estimate until it stays (Gauss-Newton).  Standard deviations are those of the last linear problem.
+The chain of `gait.lift.chain` is multiplied by what is seen and by soft constraints
+(`gait.lift.soft_constraints`), all linear in the places of the markers on a time grid of the prior's rate;
+places between its frames are interpolated.  What is not linear (perspective, headings, stature, lengths of
+bones) is linearised again around each estimate until it stays (Gauss-Newton).  Standard deviations are those
+of the last linear problem.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ DRIFT = 5e-4  # relative change of the scale's change from one frame to the next
 
 
 @dataclass(frozen=True)
-class Seen:
+class Observed:
     """What is seen of a sequence.
 
     Attributes
@@ -93,7 +94,7 @@ class Lifted:
     outliers : (T, P)
         Outliers, which were down-weighted.
     chi2_per_observation : float
-        Squared deviations per number seen; about 1 if the motion is of the prior's kind, more if it is not.
+        Mean squared residual in standard deviations: about 1 if the motion is of the prior's kind.
     """
 
     places: Floats
@@ -114,7 +115,7 @@ class Lifted:
 
 def smooth(
     prior: SegmentPrior,
-    seen: Seen,
+    observed: Observed,
     view: View,
     freedom: Freedom,
     start: Start,
@@ -124,7 +125,7 @@ def smooth(
 ) -> Lifted:
     """Estimate the motion of all markers of a prior (`chain.restricted`) over a sequence."""
     unit = float(np.mean(start.lengths)) if view.scaled else None
-    problem = _Problem(prior, seen, view, freedom, unit, contact, bones)
+    problem = _Problem(prior, observed, view, freedom, unit, contact, bones)
     around = problem.around(start.heading, start.component, start.stature, start.places)
     state = _State(around, start.places, start.lengths, 0)
     settled = False
@@ -161,7 +162,7 @@ class _System:
 
     @property
     def square(self) -> float:
-        """Squared deviations of what is seen and of the motion from the prior, at the mean.
+        """Squared standard deviations of what is seen and of the motion from the prior, at the mean.
 
         Raises
         ------
@@ -172,7 +173,7 @@ class _System:
         explained += self.information.edge @ self.found.lasting
         square = self.fit + self.chain.constant - float(explained)
         if not square > -1:  # none is below zero but for rounding
-            raise np.linalg.LinAlgError("squared deviations are negative")
+            raise np.linalg.LinAlgError("squared standard deviations are negative")
         return max(square, 0.0)
 
     @property
@@ -187,29 +188,29 @@ class _Problem:
     def __init__(
         self,
         prior: SegmentPrior,
-        seen: Seen,
+        observed: Observed,
         view: View,
         freedom: Freedom,
         unit: float | None,
         contact: bool = False,
         bones: bool = False,
     ) -> None:
-        self.prior, self.seen, self.view, self.freedom = prior, seen, view, freedom
+        self.prior, self.visible, self.view, self.freedom = prior, observed, view, freedom
         self.contact, self.bones = contact, bones
-        self.points = seen.points
-        self.grid = Grid.over(seen.time, prior)
-        self.at = self.grid.between(seen.time)
+        self.points = observed.points
+        self.grid = Grid.over(observed.time, prior)
+        self.at = self.grid.between(observed.time)
         self.layout = Layout(self.grid.blocks, self.grid.frames, len(prior.names), unit)
 
     def around(self, heading: Floats, component: Ints, stature: float, places: Floats) -> Around:
-        """Say what the chain is linearised around."""
+        """Describe what the chain is linearised around."""
         around = overlapping(places, self.grid.frames)
         return Around(heading, component, stature, around, around)
 
     def weight(self, state: _State) -> None:
         """Down-weight points that are far from an estimate."""
-        places = self._at_video(state.places)[:, self.seen.markers]
-        self.points = weighted(self.seen.points, self.view.project(places, self._at_video(state.lengths)))
+        places = self._at_video(state.places)[:, self.visible.markers]
+        self.points = weighted(self.visible.points, self.view.project(places, self._at_video(state.lengths)))
 
     def system(self, state: _State, constrained: bool) -> _System:
         """Linear problem around an estimate."""
@@ -232,15 +233,15 @@ class _Problem:
 
     def _observe(self, rows: Rows, shape: Floats, state: _State) -> None:
         near, scale = self._at_video(shape), self._at_video(state.lengths)
-        guess = self._at_video(state.places)[:, self.seen.markers]
-        seen = rows_of(self.view, self.points, near[:, self.seen.markers], scale, guess)
-        if not len(seen.frame):
+        guess = self._at_video(state.places)[:, self.visible.markers]
+        observed = rows_of(self.view, self.points, near[:, self.visible.markers], scale, guess)
+        if not len(observed.frame):
             raise np.linalg.LinAlgError("no point is before the lens")
         factors = None
         if isinstance(self.view, Parallel) and self.view.scaled:
-            seen, factors = scale_free(seen, near[:, self.seen.markers], scale)
+            observed, factors = scale_free(observed, near[:, self.visible.markers], scale)
             soft_constraints.steady_lengths(rows, state.lengths, None if self.view.steady else DRIFT)
-        soft_constraints.observe(rows, seen, self.seen.markers, self.at, factors)
+        soft_constraints.observe(rows, observed, self.visible.markers, self.at, factors)
 
     def _at_video(self, values: Floats) -> Floats:
         """Interpolate values (grid, ...) at the frames of the video."""
@@ -257,15 +258,15 @@ class _Problem:
     def result(self, state: _State, settled: bool) -> Lifted:
         """Covariances and figures of the last estimate."""
         system = self.system(state, constrained=True)
-        bare = self.system(state, constrained=False)
+        unconstrained = self.system(state, constrained=False)
         around, places = state.around, state.places
         diagonal, across = system.found.covariance()
         every = np.arange(self.layout.markers)
         sure = soft_constraints.contacts(Rows(self.layout), self.prior.names, places, self.grid.rate)
         return Lifted(
             places=self._at_video(places),
-            sd=_deviations(self._covariances(diagonal, across, every, every)),
-            rooted_sd=_deviations(self._rooted(diagonal, across)),
+            sd=_roots(self._covariances(diagonal, across, every, every)),
+            rooted_sd=_roots(self._rooted(diagonal, across)),
             grid=places,
             heading=around.heading,
             stature=around.stature,
@@ -273,10 +274,10 @@ class _Problem:
             contact=sure if self.contact else np.zeros_like(sure),
             steps=state.steps,
             settled=settled,
-            log_volume_ratio=bare.log_volume_ratio,
-            evidence=bare.evidence - _cost(self.seen.points, self.points),
-            outliers=self.points.sd > self.seen.points.sd,
-            chi2_per_observation=bare.square / max(2 * int(self.seen.points.seen.sum()), 1),
+            log_volume_ratio=unconstrained.log_volume_ratio,
+            evidence=unconstrained.evidence - _cost(self.visible.points, self.points),
+            outliers=self.points.sd > self.visible.points.sd,
+            chi2_per_observation=unconstrained.square / max(2 * int(self.visible.points.visible.sum()), 1),
         )
 
     def _rooted(self, diagonal: Floats, across: Floats) -> Floats:
@@ -316,26 +317,26 @@ class _Problem:
 
 
 def weighted(points: Observations, predicted: Floats) -> Observations:
-    """Points with larger deviations where they are far from their predictions (T, P, 2)."""
+    """Points with larger standard deviations where they are far from their predictions (T, P, 2)."""
     sd = points.sd.copy()
     square = np.sum((points.uv - predicted) ** 2, axis=2) / sd**2
-    for t, seen in enumerate(points.seen):
-        if seen.any():
-            sd[t, seen] = weight_outliers(square[t, seen], sd[t, seen])
+    for t, observed in enumerate(points.visible):
+        if observed.any():
+            sd[t, observed] = weight_outliers(square[t, observed], sd[t, observed])
     return Observations(points.uv, sd)
 
 
 def _cost(points: Observations, trusted: Observations) -> float:
-    """Logarithm of the points' density that larger deviations cost: two coordinates each."""
-    seen = points.seen
-    return 2 * float(np.log(trusted.sd[seen] / points.sd[seen]).sum())
+    """Logarithm of the points' density that larger standard deviations cost: two coordinates each."""
+    observed = points.visible
+    return 2 * float(np.log(trusted.sd[observed] / points.sd[observed]).sum())
 
 
-def _deviations(variances: Floats) -> Floats:
+def _roots(variances: Floats) -> Floats:
     """Square roots of variances, none of which is below zero but for rounding."""
     return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
 def _change(difference: Floats) -> float:
-    """Rms of a change (grid, J, 3) but for that of the whole sequence, which a far view does not tell."""
+    """Rms of a change (grid, J, 3) but for its mean, which a view from far away does not determine."""
     return float(np.sqrt(np.mean((difference - difference.mean(axis=(0, 1))) ** 2)))

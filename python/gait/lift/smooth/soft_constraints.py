@@ -35,7 +35,7 @@ BONES = (
     ("l_hip", "r_hip"),
     ("l_shoulder", "r_shoulder"),
 )
-WEAK = 10.0  # relative deviation of a scale from its guess: as good as free
+WEAK = 10.0  # relative standard deviation of a scale from its guess: as good as free
 FIXED = 1e-4  # relative change of a scale that does not change
 LEAST_SURE = 0.05  # that a foot stands, to matter
 SHORTEST = 0.02  # metres, of a bone
@@ -130,13 +130,13 @@ class Rows:
 
 
 def observe(
-    rows: Rows, seen: view_rows.Rows, markers: Ints, at: tuple[Ints, Floats], scale: Floats | None
+    rows: Rows, observed: view_rows.Rows, markers: Ints, at: tuple[Ints, Floats], scale: Floats | None
 ) -> None:
     """Add what is seen.
 
     Parameters
     ----------
-    seen : gait.lift.observe.Rows
+    visible : gait.lift.observe.Rows
         Of T frames and P points.
     markers : (P,)
         Which marker each point is.
@@ -145,16 +145,16 @@ def observe(
     scale : (n, 2) or None
         Factors of the length of a unit of the picture, if that is unknown.
     """
-    frames, weights = at[0][seen.frame], at[1][seen.frame]
-    columns = rows.layout.place(frames, markers[seen.marker][:, None])[..., None] + np.arange(3)
+    frames, weights = at[0][observed.frame], at[1][observed.frame]
+    columns = rows.layout.place(frames, markers[observed.marker][:, None])[..., None] + np.arange(3)
     columns = columns.reshape(len(frames), -1)
     if scale is not None:
         columns = np.hstack([columns, rows.layout.length(frames)])
     for k in range(2):
-        factors = (weights[..., None] * seen.direction[:, k, None]).reshape(len(frames), -1)
+        factors = (weights[..., None] * observed.direction[:, k, None]).reshape(len(frames), -1)
         if scale is not None:
             factors = np.hstack([factors, weights * scale[:, k, None] * (rows.layout.unit or 1.0)])
-        rows.add(columns, factors, seen.value[:, k], np.sqrt(seen.variance[:, k]))
+        rows.add(columns, factors, observed.value[:, k], np.sqrt(observed.variance[:, k]))
 
 
 def contacts(rows: Rows, names: Sequence[str], places: Floats, rate: float) -> Floats:

@@ -45,11 +45,12 @@ class Settings:
     Attributes
     ----------
     sensor_sd : float, optional
-        Deviation of a sensor; infinite leaves the sensors out.  If not given it is found from the clip:
-        `CORRELATED` times the rms difference of the sensors and the figure, because neighbours in the grid
-        and in time err alike.
+        Standard deviation of a sensor; infinite leaves the sensors out.  If not given it is found from the
+        clip: `CORRELATED` times the rms difference of the sensors and the figure, because neighbours in the
+        grid and in time err alike.
     gain, level : (float, float)
-        Mean and deviation of the logarithm of what a figure adds to a sensor, and of what the scene does.
+        Mean and standard deviation of the logarithm of what a figure adds to a sensor, and of what the scene
+        does.
     joined : bool
         Segments are solved together; else one after the other, as in the paper.
     """
@@ -74,7 +75,7 @@ class ClipSegments:
     corrections : sequence of Correction
     settings : Settings
     phase_prior : PhasePrior, optional
-        What a phase of walking says about the first segment.
+        Prior of the first segment by the phase of walking.
     """
 
     prior: SegmentPrior
@@ -126,7 +127,7 @@ class ClipSegments:
 
     @property
     def sensor_sd(self) -> float:
-        """Deviation of a sensor."""
+        """Standard deviation of a sensor."""
         return FIRST_SD if self.settings.sensor_sd is None else self.settings.sensor_sd
 
     def frames(self, segment: int) -> Indices:
@@ -144,7 +145,7 @@ class ClipSegments:
         return np.asarray(spline(np.clip(times, 0, count - 1)))
 
     def mean_state(self) -> Floats:
-        """State (k + 6,) that the placement and the prior's mean say."""
+        """State (k + 6,) by the placement and the prior's mean."""
         state = np.zeros(self.shapes[0].size)
         state[PLACE] = [*self.placement.ground, 0.0]
         state[HEADING] = self.placement.heading if self.shapes[0].turning else 0.0
@@ -152,7 +153,7 @@ class ClipSegments:
         return state
 
     def first_modes(self, component: int) -> tuple[Floats, Floats]:
-        """Mean and deviations (k,) of the modes of the first segment."""
+        """Mean and standard deviations (k,) of the modes of the first segment."""
         if self.phase_prior is None:
             return np.zeros(self.prior.size), np.ones(self.prior.size)
         return self.phase_prior.mean[component], self.phase_prior.sd[component]
@@ -188,7 +189,7 @@ class ClipSegments:
         shape, weights = self.shapes[component], self.weights(segment)
         energy = Energy(shape, self.view, self.sticks, weights, mean, sd, anchor=anchor)
         reading = self._reading(segment, energy, near) if looking else None
-        return replace(energy, reading=reading, corrections=self._springs(segment, shape, near))
+        return replace(energy, reading=reading, corrections=self._corrections(segment, shape, near))
 
     def _reading(self, segment: int, energy: Energy, near: Floats) -> Reading | None:
         """Sensors about the figure of a state; a state behind the lens sees nothing."""
@@ -202,7 +203,7 @@ class ClipSegments:
         value = self.film.read(self.frames(segment), grid)
         return Reading(value, grid, np.full(len(grid), self.film.blur), self.sensor_sd)
 
-    def _springs(self, segment: int, shape: Shape, near: Floats) -> Corrections | None:
+    def _corrections(self, segment: int, shape: Shape, near: Floats) -> Corrections | None:
         """Corrections in a segment's frames; what the prior leaves out at the marker weakens them.
 
         That hardly changes within a segment, and its variance counts for that in every frame (gamma): one

@@ -1,4 +1,4 @@
-"""What the user says about a clip: where the person is at first, and corrections (corrections) in any frame.
+"""What the user gives for a clip: where the person is at first, and corrections in any frame.
 
 Placement (JSON), with a camera, in the form of ``gait track --init``::
 
@@ -9,7 +9,7 @@ and without one, where heading 0 is to the right of the picture and +90 degrees 
 
     {"frame": 64, "pelvis_px": [1376, 734], "height_px": 415, "heading_rad": 3.14, "stature_m": 1.65}
 
-The phase of walking, from 0 (right heel strike) to 1, says which leg is ahead.
+The phase of walking, from 0 (right heel strike) to 1, determines which leg is in front.
 
 Corrections (JSON): any marker of the prior in any frame; ``sd_px`` is how exactly it was pointed at::
 
@@ -17,8 +17,8 @@ Corrections (JSON): any marker of the prior in any frame; ``sd_px`` is how exact
 
 The modes of a clip's first segment where the phase of walking is known: which leg is ahead.
 
-Seen from the side both legs look alike, and a segment with left and right exchanged fits as well.  The mean
-cycle of a cyclic model at a phase, turned into modes of the segment prior, says which it is.
+Seen from the side both legs look alike, and a segment with left and right swapped fits as well.  The mean
+cycle of a cyclic model at a phase, turned into modes of the segment prior, decides which it is.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ from gait.io.fields import Fields, read_json
 Floats = npt.NDArray[np.float64]
 Size = tuple[int, int]
 
-CLICK_SD = 4.0  # pixels, where a correction does not say
-PLACE_SD = 0.3  # metres on the ground, and radians of heading, where a placement does not say
+CLICK_SD = 4.0  # pixels, unless the correction gives it
+PLACE_SD = 0.3  # metres on the ground, and radians of heading, unless the placement gives it
 HEADING_SD = 0.3
 STATURE_SD = 0.03  # metres
-PHASE_SD = 0.1  # strides: a phase by eye
+PHASE_SD = 0.1  # strides: a phase estimated by a person
 RATE_SD = 0.05  # strides per second
 HEIGHT_SD = 0.05  # metres of the body over the ground: the floor may not be at 0
 FURTHEST = 1e6  # pixels or metres
@@ -55,7 +55,7 @@ _KNOWN = ("frame", *_SPACE, *_PICTURE, "heading_rad", "stature_m", "phase", "str
 
 @dataclass(frozen=True)
 class Correction:
-    """A spring that pulls a marker to a place in the picture.
+    """A marker pulled to a point of the picture.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Placement:
         Strides per second.
     phase_sd, stride_hz_sd : float
     unused : tuple of str
-        Keys of the file that say nothing in this view.
+        Keys of the file that have no use in this view.
     """
 
     frame: int
@@ -125,7 +125,7 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
     UserError
         One line naming file, key and remedy.
     """
-    fields, spread = read_start(path, "placement", _KNOWN)
+    fields, sds = read_start(path, "placement", _KNOWN)
     stature = prior.stature
     if "stature_m" in fields:
         stature = fields.number("stature_m", *STATURE, "give the person's height in metres")
@@ -134,13 +134,13 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
         ground=_ground(fields) if calibrated else np.zeros(2),
         heading=fields.number("heading_rad", -7.0, 7.0, "give the body's direction about z in radians"),
         stature=stature,
-        ground_sd=_deviation(spread, "pelvis", PLACE_SD),
-        heading_sd=_deviation(spread, "heading_rad", HEADING_SD),
-        stature_sd=_deviation(spread, "stature_m", STATURE_SD),
+        ground_sd=_sd_of(sds, "pelvis", PLACE_SD),
+        heading_sd=_sd_of(sds, "heading_rad", HEADING_SD),
+        stature_sd=_sd_of(sds, "stature_m", STATURE_SD),
         phase=_optional(fields, "phase"),
         stride_hz=_optional(fields, "stride_hz"),
-        phase_sd=_deviation(spread, "phase", PHASE_SD),
-        stride_hz_sd=_deviation(spread, "stride_hz", RATE_SD),
+        phase_sd=_sd_of(sds, "phase", PHASE_SD),
+        stride_hz_sd=_sd_of(sds, "stride_hz", RATE_SD),
         unused=tuple(key for key in (_PICTURE if calibrated else _SPACE) if key in fields),
     )
     return placed if calibrated else replace(placed, **_in_picture(fields))
@@ -167,15 +167,15 @@ def _ground(fields: Fields) -> Floats:
     return fields.array("pelvis", (3,) if three else (2,), remedy)[:2]
 
 
-def _deviation(spread: Fields, key: str, usual: float) -> float:
+def _sd_of(sds: Fields, key: str, usual: float) -> float:
     """Read a standard deviation: one number, or the largest of three; the usual one if absent."""
-    if key not in spread:
+    if key not in sds:
         return usual
     remedy = "give a positive standard deviation"
-    values = np.atleast_1d(spread.one_or_three(key, remedy))
+    values = np.atleast_1d(sds.one_or_three(key, remedy))
     wrong = values[(values <= 0) | (values >= FURTHEST)]
     if len(wrong):
-        raise spread.fail(key, f"is {wrong[0]:g}", remedy)
+        raise sds.fail(key, f"is {wrong[0]:g}", remedy)
     return float(values.max())
 
 
@@ -240,7 +240,7 @@ def as_json(corrections: Sequence[Correction]) -> dict[str, list[dict[str, Any]]
     }
 
 
-UNKNOWN_SD = 0.25  # strides: a phase less sure than that tells nothing
+UNKNOWN_SD = 0.25  # strides: a phase less certain than that is useless
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ class PhasePrior:
 def _columns(
     prior: SegmentPrior, cycle: Mapping[str, Any], placement: Placement, markers: list[str]
 ) -> Floats:
-    """Mean cycle about the pelvis in a segment's frames, and its steps by one deviation of what is unknown.
+    """Mean cycle about the pelvis in a segment's frames, and its steps by one sd of the unknowns.
 
     Returns
     -------
@@ -305,7 +305,7 @@ def _columns(
 
 
 def _modes(prior: SegmentPrior, component: int, markers: list[str], columns: Floats) -> tuple[Floats, Floats]:
-    """Posterior mean and deviations (k,) of a component's modes, seeing markers about the pelvis."""
+    """Posterior mean and standard deviations (k,) of a component's modes, seeing markers about the pelvis."""
     index, pelvis = prior.index(markers), prior.index(["pelvis"])
     mean = prior.mean[component, :, index].swapaxes(0, 1) - prior.mean[component][:, pelvis]
     modes = prior.modes[component][:, :, index] - prior.modes[component][:, :, pelvis]
@@ -313,6 +313,6 @@ def _modes(prior: SegmentPrior, component: int, markers: list[str], columns: Flo
     rows = (modes / sd[:, None]).reshape(prior.size, -1)
     covariance = np.linalg.inv(rows @ rows.T + np.eye(prior.size))
     known, *steps = ((values / sd[:, None]).ravel() for values in (columns[0] - mean, *columns[1:]))
-    spread = covariance @ rows @ np.stack(steps, axis=1)
-    variance = np.diag(covariance) + (spread**2).sum(axis=1)
+    sds = covariance @ rows @ np.stack(steps, axis=1)
+    variance = np.diag(covariance) + (sds**2).sum(axis=1)
     return covariance @ rows @ known, np.sqrt(np.minimum(variance, 1.0))

@@ -1,14 +1,14 @@
 """Levenberg-Marquardt over a chain of segments that share frames with their neighbours.
 
-Two neighbours describe the frames they share; what they say may differ by what both priors leave out.  The
+Two neighbours describe the frames they share; their positions may differ by what both priors leave out.  The
 normal equations are block-tridiagonal, so a clip of any length costs its number of segments.
 
 What a clip gets wrong from end to end, and how far that moves the estimate.
 
-Clothes, hair and shoes lie where the stick figure does not, and somebody's build looks nearer or further than
+Clothes, hair and shoes lie where the stick figure does not, and a person's build looks nearer or further than
 the prior's.  Every frame brings the same error anew, so that no number of frames makes it less.  The estimate
-stays as it is; its covariance grows by how far each error, one deviation large, would move it (consider
-covariance, Schmidt 1966).
+stays as it is; its covariance grows by how far each error, one standard deviation large, would move it
+(consider covariance, Schmidt 1966).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Link:
     hop : int
         Frames from the start of a segment to that of the next.
     sd : (J,)
-        Deviation of the difference of a coordinate of each marker, metres.
+        Standard deviation of the difference of a coordinate of each marker, metres.
     """
 
     hop: int
@@ -81,7 +81,7 @@ def normal(chain: Sequence[Energy], link: Link | None, states: Floats) -> Normal
 
 
 def _ends(energy: Energy, state: Floats, link: Link) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-    """Places and slopes of the frames shared with the segment before, with that after; in deviations."""
+    """Places and slopes of the frames shared with the segment before and after; in standard deviations."""
     frames = energy.weights.shape[1]
     places, slope = energy.shape.positions(state, np.eye(frames), slice(None))
     places, slope = places / link.sd[:, None], slope / link.sd[:, None, None]
@@ -132,13 +132,13 @@ def information(chain: Sequence[Energy], link: Link | None, states: Floats) -> F
     return factor(at.diagonal, at.below)
 
 
-# Nearly most likely on walkers of `gait simulate` and sticks of people left out, none of the published clips.
+# Nearly most likely on people of `gait simulate` and sticks of people left out, none of the published clips.
 SHIFT_SD = (0.03, 0.05)  # metres, across and along the picture: where sensors see the figure
 SIZE_SD = 0.03  # share by which they see it larger
 
 
 def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floats) -> Floats:
-    """How one deviation of each error (two shifts, size, two drifts) moves the states (B, n): (B, n, 5).
+    """Moves (B, n, 5) of the states (B, n) by one sd of each error: two shifts, size, two drifts.
 
     Parameters
     ----------
@@ -146,7 +146,8 @@ def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floa
     factor : Factor
         Of the chain's information matrix at the states.
     drifted : (B,)
-        How far the figure may have drifted in each segment, metres, in one sense: `gait.lift.fit_correlation`.
+        How far the figure may have drifted in each segment, metres, in one sense:
+        `gait.lift.fit_correlation`.
     """
     pulls = np.stack([_pull(energy, state) for energy, state in zip(chain, states, strict=True)])
     drifts = pulls[..., :2] * drifted[:, None, None] / SHIFT_SD
@@ -154,7 +155,7 @@ def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floa
 
 
 def _pull(energy: Energy, state: Floats) -> Floats:
-    """Change (n, 3) of half the energy's gradient by one deviation of each error."""
+    """Change (n, 3) of half the energy's gradient by one standard deviation of each error."""
     reading = energy.reading
     if reading is None or not len(reading.value):
         return np.zeros((len(state), 3))

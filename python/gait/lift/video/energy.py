@@ -1,9 +1,9 @@
 """The stick figure as the sensors would see it: blurred line segments, with exact slopes.
 
-A stick is a line of strength 1 per pixel of its length, convolved with the sensors' Gaussian blur of
-deviation s.  At a sensor it gives  exp(-d^2 / 2 s^2) (Phi((L - u) / s) - Phi(-u / s))  where u and d are
-the coordinates along and across the stick and L is its length: an endless stick through a sensor gives 1.
-Sticks that lie upon each other are not seen twice: a figure gives 1 - exp(-sum of its sticks).
+A stick is a line of strength 1 per pixel of its length, convolved with the sensors' Gaussian blur of standard
+deviation s.  At a sensor it gives  exp(-d^2 / 2 s^2) (Phi((L - u) / s) - Phi(-u / s))  where u and d are the
+coordinates along and across the stick and L is its length: an endless stick through a sensor gives 1. Sticks
+that lie upon each other are not seen twice: a figure gives 1 - exp(-sum of its sticks).
 
 The energy of a segment seen in a clip (Leventon & Freeman 1998, eq. 7), as rows of least squares.
 
@@ -11,7 +11,7 @@ The energy of a segment seen in a clip (Leventon & Freeman 1998, eq. 7), as rows
 
 R are the sensors, f the stick figure's responses, I the user's corrections.  Here every row is divided by its
 own standard deviation, so E is minus two log posterior: lambda_1 is the variance of a sensor, lambda_2 the
-ratio of that to a spring's variance.  The modes carry their standard deviations, so Lambda is 1.
+ratio of that to a correction's variance.  The modes carry their standard deviations, so Lambda is 1.
 
 The state of a segment: alpha (k), place (3) of the first frame's pelvis on the ground and over it, heading
 (1), and the sensors' logarithm of gain and level: R = level + exp(gain) f.
@@ -196,7 +196,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Reading:
-    """Sensors of T frames: values (T, S), places (T, S, 2) and blur (T,) in pixels, deviation of a value."""
+    """Sensors of T frames: values (T, S), places (T, S, 2) and blur (T,) in pixels, sd of a value."""
 
     value: Floats
     places: Floats
@@ -206,7 +206,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Corrections:
-    """C corrections: frames (C,) among the T instants, markers (C,), pixels (C, 2), deviations (C,) in pixels."""
+    """C corrections: frames (C,) among the T instants, markers (C,), pixels (C, 2) and their sd (C,)."""
 
     frame: Indices
     marker: Indices
@@ -216,7 +216,7 @@ class Corrections:
 
 @dataclass(frozen=True)
 class Anchor:
-    """Places (A, J, 3) that all markers had in A frames of the segment, and deviations (J,), metres."""
+    """Places (A, J, 3) that all markers had in A frames of the segment, and their sd (J,), metres."""
 
     frames: slice
     places: Floats
@@ -262,7 +262,7 @@ class Energy:
         if self.reading is not None and len(self.reading.value):
             parts.append(self.sensor_rows(self.reading, state))
         if self.corrections is not None and len(self.corrections.frame):
-            parts.append(self._spring_rows(self.corrections, state))
+            parts.append(self._correction_rows(self.corrections, state))
         if self.anchor is not None:
             parts.append(self._anchor_rows(self.anchor, state))
         return np.concatenate([r for r, _ in parts]), np.concatenate([slope for _, slope in parts])
@@ -274,7 +274,7 @@ class Energy:
         return self.sensor_rows(self.reading, state)[0] * self.reading.sd
 
     def sensor_rows(self, reading: Reading, state: Floats) -> tuple[Floats, Floats]:
-        """Residuals (T * S,) of the sensors in deviations, and their slopes (T * S, k + 6) by the state."""
+        """Residuals (T * S,) of the sensors over their sd, and their slopes (T * S, k + 6) by the state."""
         places, by_state = self.shape.positions(state, self.weights, self.sticks.markers)
         uv, by_place = self.view.project(places)
         response, by_uv = self.sticks.responses(uv, reading.places, reading.blur)
@@ -285,7 +285,7 @@ class Energy:
         residual = state[LEVEL] + gain * response - reading.value
         return residual.ravel() / reading.sd, slope.reshape(-1, len(state)) / reading.sd
 
-    def _spring_rows(self, corrections: Corrections, state: Floats) -> tuple[Floats, Floats]:
+    def _correction_rows(self, corrections: Corrections, state: Floats) -> tuple[Floats, Floats]:
         places, by_state = self.shape.positions(state, self.weights[corrections.frame], slice(None))
         each = np.arange(len(corrections.frame))
         uv, by_place = self.view.project(places[each, corrections.marker])

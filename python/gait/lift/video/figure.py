@@ -132,7 +132,7 @@ _SURFACE = np.stack(
 )
 
 _DARK = (30, 30, 30)
-_SPRING = (90, 240, 255)  # BGR
+_CORRECTION = (90, 240, 255)  # BGR
 _BITS = 3  # of fraction in OpenCV's drawing coordinates
 
 
@@ -166,7 +166,7 @@ def draw_figure(
     draw_bones(canvas, uv, width + 2, _DARK)
     draw_bones(canvas, uv, width)
     for correction, place in corrections:
-        _draw_spring(canvas, np.asarray(correction.uv), view.project(place[None])[0][0], width)
+        _draw_correction(canvas, np.asarray(correction.uv), view.project(place[None])[0][0], width)
     return canvas
 
 
@@ -181,9 +181,9 @@ def _limb_ids(size: tuple[int, ...], view: View, surfaces: Floats) -> npt.NDArra
     return ids
 
 
-def _draw_spring(canvas: Image, wanted: Floats, found: Floats, width: int) -> None:
+def _draw_correction(canvas: Image, wanted: Floats, found: Floats, width: int) -> None:
     """Draw a line from where the user wants a marker, a circle, to where it is."""
     near, far = (tuple(np.clip(np.rint(p), -1e6, 1e6).astype(int).tolist()) for p in (wanted, found))
-    cv2.line(canvas, near, far, _SPRING, width, cv2.LINE_AA)
+    cv2.line(canvas, near, far, _CORRECTION, width, cv2.LINE_AA)
     cv2.circle(canvas, near, 3 + 2 * width, _DARK, width + 2, cv2.LINE_AA)
-    cv2.circle(canvas, near, 3 + 2 * width, _SPRING, width, cv2.LINE_AA)
+    cv2.circle(canvas, near, 3 + 2 * width, _CORRECTION, width, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""How far the sensors and the stick figure are alike, and what that says of the estimate.
+"""Fit a clip: correlation of sensors and stick figure, the fit, and the next corrections to ask for.
 
 Where the figure lies on the person it explains most of what the sensors read.  Where it explains little, they
 read edges of the scene, which stand still: the figure is held back, and the longer, the further.
@@ -10,11 +10,11 @@ observation of it.  By default all are then solved together, neighbours tied whe
 correction in one helps the others.  The paper's way (`Settings.joined` False) leaves them as they are and
 moves each in depth until it goes on where the one before ended.  Either way they are blended linearly.
 
-Where the next correction tells most: the joints that are least certain in the picture.
+The next correction is most useful for the joints that are least certain in the picture.
 
-Greedy: the joint with the largest deviation in the picture is taken, as if it were corrected, and so on.  A
-correction counts for the segment that its frame lies most in the middle of, and what is close in time and of
-the same joint is not asked for again.
+Greedy: the joint with the largest standard deviation in the picture is taken, as if it were corrected, and so
+on.  A correction counts for the segment that its frame lies most in the middle of, and what is close in time
+and of the same joint is not asked for again.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Floats = npt.NDArray[np.float64]
 HELD = 0.9  # fit_correlation of figures that follow a person before a known background
 CHANCE = 0.3  # fit_correlation that a figure anywhere in a scene may have
 DRIFT_SD = 0.04  # metres a second at twice the noise of `HELD`; the likeliest without a background
-DOUBTFUL = 0.5  # below it figures left the person in half of the clips that this was found on
+POOR_CORRELATION = 0.5  # below it figures left the person in half of the clips that this was found on
 
 
 def fit_correlation(chain: Sequence[Energy], states: Floats) -> float:
@@ -57,10 +57,12 @@ def fit_correlation(chain: Sequence[Energy], states: Floats) -> float:
 
 
 def drift(alike: float) -> float:
-    """Deviation in metres a second by which the scene may hold a figure back; 0 where it explains enough."""
+    """Give the sd in metres a second by which the scene may hold a figure back; 0 if the figure explains enough."""
 
     def noise(value: float) -> float:
-        return float(np.sqrt(1 / max(value, CHANCE) ** 2 - 1))  # unexplained over explained deviation
+        return float(
+            np.sqrt(1 / max(value, CHANCE) ** 2 - 1)
+        )  # unexplained over explained standard deviation
 
     return 0.0 if np.isnan(alike) else DRIFT_SD * max(0.0, noise(alike) / noise(HELD) - 1)
 
@@ -74,7 +76,7 @@ BEGINNINGS = 3  # explanations of the first segment that are followed through th
 DIFFERENT = 0.03  # statures: mean distance of markers in explanations that differ
 START_MODES, START_SD = 3, 1.5  # the first segment starts from the mean and from +- so many sd of these modes
 LEAST = 1e-3  # share of a segment in the blend at its ends
-LOOKS = 2  # times the sensors are laid anew about the figure found
+PASSES = 2  # times the sensors are laid anew about the figure found
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ def fit_clip(clip: ClipSegments, known: ClipStates | None = None, update: Update
 
 
 def work(clip: ClipSegments) -> int:
-    """Count of segments that `fit_clip` tells its `update` when it is done with them, at most."""
+    """Largest count of segments that `fit_clip` reports to its `update`."""
     return len(clip.starts) * BEGINNINGS
 
 
@@ -235,7 +237,7 @@ def _continued(
 
 
 def _broad(clip: ClipSegments) -> Floats:
-    """Deviations of a state of which only the shape is known."""
+    """Give standard deviations of a state of which only the shape is known."""
     sd = np.ones(clip.shapes[0].size)
     sd[PLACE], sd[HEADING] = 1.0, 1.0
     return sd
@@ -246,14 +248,14 @@ def _settled(
 ) -> Settled:
     """Energy, component and state of one segment; the sensors follow it."""
     cost = np.inf
-    for _ in range(LOOKS):
+    for _ in range(PASSES):
         energy = clip.energy(segment, component, state, anchor=anchor)
         (state,), cost = descend([energy], None, state[None])
     return cost - 2 * float(np.log(clip.prior.weights[component])), component, state
 
 
 def _with_noise(clip: ClipSegments, sequence: ClipStates) -> ClipSegments:
-    """Clip whose sensors have the deviation that an estimate shows."""
+    """Clip whose sensors have the standard deviation that an estimate shows."""
     chain, _ = _chain(clip, sequence, looking=True)
     residuals = [energy.residuals(state) for energy, state in zip(chain, sequence.states, strict=True)]
     rms = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))) if any(map(len, residuals)) else np.inf
@@ -273,7 +275,7 @@ def _chain(clip: ClipSegments, sequence: ClipStates, looking: bool) -> tuple[lis
 def _together(clip: ClipSegments, start: ClipStates, looking: bool = True) -> ClipStates:
     """All segments of least energy near a start, tied to their neighbours."""
     states, cost = start.states, np.inf
-    for _ in range(LOOKS if looking else 1):
+    for _ in range(PASSES if looking else 1):
         chain, link = _chain(clip, ClipStates(start.components, states, cost), looking)
         states, cost = descend(chain, link, states)
     return ClipStates(start.components, states, cost)
@@ -308,7 +310,7 @@ def _share(clip: ClipSegments, segment: int) -> Floats:
 
 
 def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
-    """Blend the segments linearly; deviations from the information of all of them and what they share."""
+    """Blend the segments linearly, with sd from the information of all of them and what they share."""
     chain, link = _chain(clip, sequence, looking=True)
     factor = information(chain, link if clip.settings.joined else None, sequence.states)
     overlap = clip.prior.frames / clip.prior.hop  # every frame counts in so many segments
@@ -322,9 +324,9 @@ def _finished(clip: ClipSegments, sequence: ClipStates) -> ClipFit:
         frames = clip.frames(s)
         share = _share(clip, s)
         found, slope = energy.shape.positions(sequence.states[s], energy.weights, slice(None))
-        spread = np.einsum("tjin,nm,tjim->tji", slope, covariance[s], slope, optimize=True)
+        sds = np.einsum("tjin,nm,tjim->tji", slope, covariance[s], slope, optimize=True)
         places[frames] += share[:, None, None] * found
-        variance[frames] += share[:, None, None] * (spread + energy.shape.residual[:, None] ** 2)
+        variance[frames] += share[:, None, None] * (sds + energy.shape.residual[:, None] ** 2)
         total[frames] += share
     frame = clip.film.first + np.arange(count)
     places /= total[:, None, None]
@@ -361,8 +363,8 @@ class _Part:
     slope: Floats
     covariance: Floats
 
-    def spread(self) -> Floats:
-        """Deviations (T, J) in the picture, both axes together."""
+    def sds(self) -> Floats:
+        """Give standard deviations (T, J) in the picture, both axes together."""
         half = self.slope @ self.covariance
         return np.asarray(np.sqrt(np.maximum((half * self.slope).sum(axis=(2, 3)), 0)))
 
@@ -381,23 +383,23 @@ def suggest(clip: ClipSegments, fit: ClipFit) -> list[Suggestion]:
     """
     joints = [j for j in JOINTS if j in clip.prior.names]
     parts = _parts(clip, fit, clip.prior.index(joints))
-    spread = [part.spread() for part in parts]
+    sds = [part.sds() for part in parts]
     near = 0.5 * clip.hop / float(np.median(np.diff(clip.film.times))) if len(clip.film.times) > 1 else 1.0
     enough = ENOUGH * clip.placement.stature
     scale = float(np.median([clip.view.scale(body.mean(axis=0)) for body in fit.places]))
     asked: list[Suggestion] = []
     while parts and len(asked) < MOST * len(fit.frame):
-        which = int(np.argmax([values.max(initial=0.0) for values in spread]))
-        at = np.unravel_index(np.argmax(spread[which]), spread[which].shape)
+        which = int(np.argmax([values.max(initial=0.0) for values in sds]))
+        at = np.unravel_index(np.argmax(sds[which]), sds[which].shape)
         frame, joint = int(at[0]), int(at[1])
-        sd = float(spread[which][frame, joint])
+        sd = float(sds[which][frame, joint])
         if sd <= enough * scale:
             break
         number = int(parts[which].frame[frame])
         asked.append(Suggestion(number, joints[joint], sd))
         parts[which].correct((frame, joint), CLICK_SD)
-        spread[which] = parts[which].spread()
-        for part, values in zip(parts, spread, strict=True):
+        sds[which] = parts[which].sds()
+        for part, values in zip(parts, sds, strict=True):
             for old in asked:
                 values[np.abs(part.frame - old.frame) < near, joints.index(old.joint)] = 0.0
     return asked

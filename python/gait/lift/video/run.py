@@ -19,7 +19,7 @@ from gait.io.video import Video, VideoWriter, background
 from gait.lift.video.clip_segments import ClipSegments, Settings
 from gait.lift.video.corrections import Correction, PhasePrior, Placement, read_corrections, read_placement
 from gait.lift.video.figure import Figure, draw_figure
-from gait.lift.video.fit_clip import DOUBTFUL, ENOUGH, HELD, ClipFit, fit_clip, suggest, work
+from gait.lift.video.fit_clip import ENOUGH, HELD, POOR_CORRELATION, ClipFit, fit_clip, suggest, work
 from gait.lift.video.sensors import CameraView, Film, FlatView, View
 from gait.progress import progress
 from gait.reproducible import one_thread
@@ -104,12 +104,12 @@ def lift_video(request: Request, prior: SegmentPrior, warn: Warn, quiet: bool) -
     settings = Settings(joined=request.joined)
     clip = ClipSegments(prior, view, film, placement, used, settings, phase_prior)
     free, fit = _fits(clip, quiet)
-    if fit.fit_correlation < DOUBTFUL:
-        warn(_doubt(request, fit.fit_correlation))
+    if fit.fit_correlation < POOR_CORRELATION:
+        warn(_poor_correlation(request, fit.fit_correlation))
     return LiftedVideo(video, clip, free, fit, Figure.fit(fit.places, prior.names))
 
 
-def _doubt(request: Request, fit_correlation: float) -> str:
+def _poor_correlation(request: Request, fit_correlation: float) -> str:
     remedy = "--background or --corrections" if request.background == "none" else "--corrections"
     return (
         f"{request.video}: the sensors hardly show the person (correlation with the stick figure "
@@ -136,7 +136,7 @@ def _frames(request: Request, video: Video, placement: Placement) -> tuple[int, 
 
 
 def _flat(placement: Placement, prior: SegmentPrior) -> FlatView:
-    """View without a camera: as many pixels per metre as the placement says."""
+    """View without a camera: the placement gives the pixels per metre."""
     assert placement.pelvis_px is not None and placement.height_px is not None
     pixels = placement.height_px / placement.stature
     pelvis = placement.stature * prior.mean[0, 0, prior.index(["pelvis"])[0], 2]
@@ -173,7 +173,7 @@ def _film(
 
 
 def _require_in_picture(path: str, video: Video, pelvis: Floats, height: float) -> None:
-    """Refuse a placement of nobody in the picture: `pelvis` (2,) and `height` in pixels."""
+    """Refuse a placement of no person in the picture: `pelvis` (2,) and `height` in pixels."""
     wide, high = video.size
     if not SMALLEST <= height <= LARGEST * high:
         raise UserError(
@@ -216,8 +216,8 @@ def draw_overlay(path: str, lifted: LiftedVideo, quiet: bool) -> None:
 
 def correction_errors(clip: ClipSegments, fit: ClipFit) -> Floats:
     """Distances (C,) in pixels of the corrections' markers from the corrections."""
-    seen = [clip.view.project(_marker(clip, fit, c)[None])[0][0] - c.uv for c in clip.corrections]
-    return np.linalg.norm(np.reshape(seen, (-1, 2)), axis=1)
+    observed = [clip.view.project(_marker(clip, fit, c)[None])[0][0] - c.uv for c in clip.corrections]
+    return np.linalg.norm(np.reshape(observed, (-1, 2)), axis=1)
 
 
 def summary(lifted: LiftedVideo, most: int) -> dict[str, Any]:

@@ -27,13 +27,13 @@ Field = npt.NDArray[np.float32]
 
 ROWS, COLUMNS = 10, 8
 REACH = 1.15  # height of the grid, statures
-CONTRAST = 0.035  # deviation of the window of local contrast, statures: 8 pixels of a person of 230
-BLUR = 0.6  # deviation of the sensors' blur, steps of the grid
+CONTRAST = 0.035  # standard deviation of the window of local contrast, statures: 8 pixels of a person of 230
+BLUR = 0.6  # standard deviation of the sensors' blur, steps of the grid
 TALL = 240.0  # pixels of a person; larger pictures are made smaller first
 GRAIN = 4.0  # grey levels added to the contrast: noise of the camera
 FLOOR = 2.0  # medians of the picture's gradients that every place has
-SAMPLES = 3.0  # stored per deviation of the blur
-CHANGE = 6.0  # deviations of the difference to the empty scene at which a gradient counts half
+SAMPLES = 3.0  # stored per standard deviation of the blur
+CHANGE = 6.0  # standard deviations of the difference to the empty scene at which a gradient counts half
 
 
 def grid(middle: Floats, stature: Floats) -> Floats:
@@ -45,13 +45,13 @@ def grid(middle: Floats, stature: Floats) -> Floats:
 
 
 def blur_of(stature: float) -> float:
-    """Deviation of the blur, pixels, for a person of so many pixels."""
+    """Give the standard deviation of the blur, pixels, for a person of so many pixels."""
     return BLUR * REACH / ROWS * stature
 
 
 @dataclass(frozen=True)
 class Film:
-    """Sensor fields of a stretch of video.
+    """Sensor fields of a interval of video.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Film:
     step : (2,)
         Columns and rows of the picture from one of their values to the next, pixels.
     blur : float
-        Deviation of the blur, pixels.
+        Standard deviation of the blur, pixels.
     """
 
     first: int
@@ -134,7 +134,7 @@ def _grey(image: Image, shrink: float) -> Field:
 
 
 def normalised_gradient(grey: Field, window: float) -> Field:
-    """Magnitude of the gradient over the deviation of the grey values in a Gaussian window, (h, w)."""
+    """Magnitude of the gradient over the sd of the grey values in a Gaussian window, (h, w)."""
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
     slope = cv2.magnitude(
         cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / 8)
@@ -161,7 +161,7 @@ def changed(grey: Field, plate: Field, window: float) -> Field:
 
 
 def _blurred(edges: Field, blur: float) -> Field:
-    """Blurred field, sampled `SAMPLES` times per deviation of the blur."""
+    """Blurred field, sampled `SAMPLES` times per standard deviation of the blur."""
     height, width = edges.shape
     step = max(blur / SAMPLES, 1.0)
     count = max(2, round(width / step)), max(2, round(height / step))
@@ -208,7 +208,7 @@ class CameraView:
     camera: Camera
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """Pixels and slopes as `View` says."""
+        """Pixels and slopes, see `View`."""
         turn, _ = cv2.Rodrigues(self.camera.R)
         flat = np.ascontiguousarray(points.reshape(-1, 3))
         uv, table = cv2.projectPoints(
@@ -256,7 +256,7 @@ class FlatView:
     origin: tuple[float, float]
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """Pixels and slopes as `View` says."""
+        """Pixels and slopes, see `View`."""
         slope = self.pixels * np.array([[1.0, 0, 0], [0, 0, -1.0]])
         uv = points @ slope.T + np.asarray(self.origin)
         return uv, np.broadcast_to(slope, (*points.shape[:-1], 2, 3))
