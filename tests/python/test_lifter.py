@@ -49,7 +49,7 @@ def model(size: int = 50, headings: int = 0, components: int = 1) -> tuple[bytes
     return contents, SegmentPrior.from_sections(blob.decode(contents, "toy"))
 
 
-def sds(rng: np.random.Generator, low: float, high: float, missing: float = 0.2) -> np.ndarray:
+def noise_sd(rng: np.random.Generator, low: float, high: float, missing: float = 0.2) -> np.ndarray:
     """Deviations of all observations, infinite where nothing is seen."""
     sd = rng.uniform(low, high, (FRAMES, MARKERS))
     sd[rng.random(sd.shape) < missing] = np.inf
@@ -66,7 +66,7 @@ def test_every_figure_equals_the_numpy_posterior(angle: float, stature_sd: float
     rng = np.random.default_rng(0)
     gaussian = reference.place(prior, heading=angle, stature_sd=stature_sd)
     truth = gaussian.draw(rng)
-    sd = sds(rng, 0.01, 0.05)
+    sd = noise_sd(rng, 0.01, 0.05)
     uv = noisy(truth @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
     want = reference.infer(gaussian, rows)
@@ -105,7 +105,7 @@ def test_uncertain_displacements_equal_the_numpy_ones() -> None:
     contents, prior = model()
     rng = np.random.default_rng(3)
     gaussian = reference.place(prior)
-    sd = sds(rng, 0.01, 0.05)
+    sd = noise_sd(rng, 0.01, 0.05)
     uv = noisy(gaussian.draw(rng) @ AXES.T, sd, rng)
     rows = observe.orthographic(observe.Observations(uv, sd), AXES)
     want_sd, want = reference.uncertain_modes(reference.infer(gaussian, rows), 4)
@@ -166,7 +166,7 @@ def test_a_perspective_fit_is_the_maximum_of_the_posterior() -> None:
     contents, prior = model(size=12)
     rng = np.random.default_rng(5)
     truth = reference.place(prior, heading=1.2, ground_sd=0.8).draw(rng, residual=False)
-    sd = sds(rng, 2.0, 4.0)
+    sd = noise_sd(rng, 2.0, 4.0)
     uv = noisy(CAMERA.project(truth), sd, rng)
     # without residual the noise does not depend on the depth
     lifter = Lifter(contents, CAMERA, known(residual=0.0))
@@ -228,7 +228,7 @@ def test_a_batch_is_each_segment_alone(stature_sd: float) -> None:
     contents, _ = model()
     rng = np.random.default_rng(4)
     lifter = Lifter(contents, AXES, known(heading=0.5, heading_sd=0.0, stature_sd=stature_sd))
-    sd = sds(rng, 0.01, 0.05)
+    sd = noise_sd(rng, 0.01, 0.05)
     uv = rng.normal(size=(7, FRAMES, MARKERS, 2))
     with pytest.raises(GaitError):
         lifter.batch(uv)
@@ -289,7 +289,7 @@ def test_missing_markers_cost_what_the_deviations_say() -> None:
     for _ in range(60):
         truth = gaussian.draw(rng)
         for missing, errors in found.items():
-            sd = sds(rng, 0.02, 0.02, missing)
+            sd = noise_sd(rng, 0.02, 0.02, missing)
             lifter.segment(noisy(truth @ AXES.T, sd, rng), sd)
             mean, sds = lifter.positions()
             errors.append((float(np.mean((mean - truth) ** 2)), float(np.mean(sds**2))))
