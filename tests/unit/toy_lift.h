@@ -47,7 +47,8 @@ static inline gait_lift *toy_lift_open(const gait_lift_config *c)
 {
     gait_lift *l = NULL;
     gait_error err = {0};
-    gait_result const s = gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_model, c, &l, &err);
+    gait_result const s =
+        gait_lift_init(toy_lift_memory, sizeof toy_lift_memory, toy_lift_model, c, &l, &err);
     if (s != GAIT_OK)
         fprintf(stderr, "gait_lift_init: %s\n", err.text);
     CHECK(s == GAIT_OK);

@@ -6,7 +6,8 @@
 /* Every number of the struct `of` at `values` is in its range.  what: words before the name in errors, "config ". */
 gait_result fields_check(const char *of, const void *values, const char *what, gait_error *err);
 /* The same for standard deviations of such numbers, which are in [0, most]. */
-gait_result fields_check_sd(const char *of, const void *values, double most, const char *what, gait_error *err);
+gait_result fields_check_sd(const char *of, const void *values, double most, const char *what,
+                            gait_error *err);
 /* struct_size is that of this library's struct, or of an older, shorter one, which ends with a whole field.  fill: the
  * function to call otherwise, for the error GAIT_ERR_STRUCT. */
 gait_result fields_check_size(const char *of, uint64_t struct_size, const char *fill, gait_error *err);

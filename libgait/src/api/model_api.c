@@ -143,8 +143,8 @@ static gait_result state_result(gait_result s, const char *function, gait_error 
 {
     if (s == GAIT_OK)
         return s;
-    return base_fail(err, s, -1, "%s: the state holds a number that is not finite, or stature is not positive",
-                     function);
+    return base_fail(err, s, -1,
+                     "%s: the state holds a number that is not finite, or stature is not positive", function);
 }
 
 gait_result gait_model_pose(const gait_model *m, const gait_state *s, gait_pose *out, gait_error *err)
@@ -175,7 +175,8 @@ gait_result gait_render(const gait_model *m, const gait_camera *cam, const gait_
     if (fault != GAIT_OK)
         return fault;
     if (ids_stride < cam->width)
-        return base_fail(err, GAIT_ERR_ARG, -1, "gait_render: ids_stride = %d is below the camera's width of %d",
-                         (int)ids_stride, (int)cam->width);
+        return base_fail(err, GAIT_ERR_ARG, -1,
+                         "gait_render: ids_stride = %d is below the camera's width of %d", (int)ids_stride,
+                         (int)cam->width);
     return state_result(render_limbs(m, cam, s, ids, ids_stride), "gait_render", err);
 }

@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#define USUAL(meaning, type, name, array, unit, value, low, high)              .name = (type)(value),
+#define USUAL(meaning, type, name, array, unit, value, low, high)               .name = (type)(value),
 #define USUAL_OF_TWO(meaning, type, name, array, unit, value, paper, low, high) .name = (type)(value),
 #define SET_PAPER(meaning, type, name, array, unit, value, paper, low, high)    full.name = (type)(paper);
 #define NO_DEFAULT(...)
@@ -31,8 +31,8 @@ void gait_tracker_fill(gait_tracker_config *cfg, size_t cfg_bytes, gait_mode mod
 }
 
 /* Check a config, which may be of an older header, and complete it. */
-static gait_result open_config(const gait_model *m, const gait_tracker_config *given, gait_tracker_config *cfg,
-                               gait_error *err)
+static gait_result open_config(const gait_model *m, const gait_tracker_config *given,
+                               gait_tracker_config *cfg, gait_error *err)
 {
     uint32_t const known = GAIT_TERMS_DEFAULT | GAIT_TERM_KEYPOINTS;
     if (!m || !given)
@@ -51,8 +51,8 @@ static gait_result open_config(const gait_model *m, const gait_tracker_config *g
     if (s != GAIT_OK)
         return s;
     if (cfg->components > m->components)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d", (int)cfg->components,
-                         (int)m->components);
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d",
+                         (int)cfg->components, (int)m->components);
     if (cfg->proportions > m->proportions)
         return base_fail(err, GAIT_ERR_LIMIT, -1, "config proportions = %d, the model has %d",
                          (int)cfg->proportions, (int)m->proportions);
@@ -71,7 +71,8 @@ static gait_result open_config(const gait_model *m, const gait_tracker_config *g
 }
 
 /* Bytes of a tracker; GAIT_ERR_LIMIT: more than can be addressed. */
-static gait_result count_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes, gait_error *err)
+static gait_result count_bytes(const gait_model *m, const gait_tracker_config *cfg, size_t *bytes,
+                               gait_error *err)
 {
     arena a = {.cap = SIZE_MAX};
     tracker_layout(&a, m, cfg, kernels_choose(cfg->cpu_mask));

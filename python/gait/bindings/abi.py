@@ -1,7 +1,7 @@
 """The C interface in ctypes: enumerations, structures and one table of functions.
 
-The fields of the structures are those that the loaded library describes (``gait_field_at``); `define` gives them
-to the classes below, so nothing here repeats the headers of libgait/include.
+The fields of the structures are those that the loaded library describes (``gait_field_at``); `define` sets
+them on the classes below, so nothing here repeats the headers of libgait/include.
 """
 
 from __future__ import annotations

@@ -203,7 +203,7 @@ class LiftConfig(Config):
         return cls(cls._defaults()).replace(**changes)
 
     def to_c(self, view: Camera | ArrayLike) -> Any:
-        """Make a ``gait_lift_config`` for a view: a camera, or the directions (2, 3) of u and v in the world."""
+        """Make a ``gait_lift_config`` for a camera, or for the directions (2, 3) of u and v in the world."""
         c = self._filled(0)
         self._fill(c)
         if isinstance(view, Camera):

@@ -1,7 +1,7 @@
 """3-D motion from 2-D tracks by the C library: one segment, many at once, or a stream.
 
-After Leventon and Freeman (1998).  The prior is that of `gait.bindings.segment_prior.SegmentPrior`; `gait.lift`
-holds the same inference in numpy, which is the reference in tests.
+After Leventon and Freeman (1998).  The prior is that of `gait.bindings.segment_prior.SegmentPrior`;
+tests/reference has the same inference in numpy and proves it.
 """
 
 from __future__ import annotations
@@ -306,7 +306,7 @@ class Lifter:
         return sd, modes
 
     def fix(self, sd: ArrayLike) -> None:
-        """Compute the gain for segments with standard deviations `sd` (F, J): orthographic, config `heading_sd` 0."""
+        """Compute the gain for standard deviations `sd` (F, J): orthographic view, config `heading_sd` 0."""
         sds, error = np.ascontiguousarray(np.broadcast_to(sd, self._shape), np.float64), abi.Error()
         check(library().gait_lift_fix(self._handle, sds.ctypes.data, ctypes.byref(error)), error)
 
