@@ -18,7 +18,7 @@ int32_t lift_remove_spikes(int32_t frames, int32_t points, const double *time, c
 /* Enlarge sd of the points of a frame that are far from their prediction.  square: squared distances over the variance;
  * scratch: points.  Returns how many points are outliers. */
 int32_t lift_weight_points(int32_t points, const double *square, double *sd, double *scratch);
-/* Deviations sd (J) for the points observed in a frame, by a posterior's prediction.  known: the posterior already
+/* Standard deviations sd (J) for the points observed in a frame, by a posterior's prediction.  known: the posterior already
  * includes the points; else their distances are divided by the standard deviation of the prediction too.
  * position (J x 3) receives the predictions.  Returns how many points are outliers. */
 int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, double at,
