@@ -1,26 +1,27 @@
 /* robust.h - fits that a detector's wrong points do not lead astray.
  *
- * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the motion.
- * Points that are wrong for longer, on the other leg or on another person, are down-weighted by a fit: beyond four
- * standard deviations a point's own standard deviation grows with the square of its distance from the prediction, so that its
- * influence falls with the third power.  Nearer points keep theirs.  Where half of a frame's points are off, as in a
- * motion that the prior does not know, the limit is three times their median distance. */
+ * * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the
+ * motion. Points that are wrong for longer, on the other leg or on another person, are down-weighted by a
+ * fit: beyond four standard deviations a point's own standard deviation grows with the square of its distance
+ * from the prediction, so that its influence falls with the third power.  Nearer points keep theirs.  Where
+ * half of a frame's points are off, as in a motion that the prior does not know, the limit is three times
+ * their median distance. */
 #ifndef GAIT_LIFT_ROBUST_H
 #define GAIT_LIFT_ROBUST_H
 #include "lift/fit.h"
 
-/* Set sd (frames x points) to -1 for spikes: points far off the line through the same point's neighbours in time, the
- * furthest first.  "Far" is measured by the larger of the point's noise and the median of all its distances, which
- * includes its acceleration.  time: frames, in any unit; uv: frames x points x 2; scratch: 2 x frames.
- * Returns how many points were left out. */
+/* Set sd (frames x points) to -1 for spikes: points far off the line through the same point's neighbours in
+ * time, the furthest first.  "Far" is measured by the larger of the point's noise and the median of all its
+ * distances, which includes its acceleration.  time: frames, in any unit; uv: frames x points x 2; scratch: 2
+ * x frames. Returns how many points were left out. */
 int32_t lift_remove_spikes(int32_t frames, int32_t points, const double *time, const double *uv, double *sd,
                            double *scratch);
-/* Enlarge sd of the points of a frame that are far from their prediction.  square: squared distances over the variance;
- * scratch: points.  Returns how many points are outliers. */
+/* Enlarge sd of the points of a frame that are far from their prediction.  square: squared distances over the
+ * variance; scratch: points.  Returns how many points are outliers. */
 int32_t lift_weight_points(int32_t points, const double *square, double *sd, double *scratch);
-/* Standard deviations sd (J) for the points observed in a frame, by a posterior's prediction.  known: the posterior already
- * includes the points; else their distances are divided by the standard deviation of the prediction too.
- * position (J x 3) receives the predictions.  Returns how many points are outliers. */
+/* Standard deviations sd (J) for the points observed in a frame, by a posterior's prediction.  known: the
+ * posterior already includes the points; else their distances are divided by the standard deviation of the
+ * prediction too. position (J x 3) receives the predictions.  Returns how many points are outliers. */
 int32_t lift_weight_frame(const lift_table *t, const segment_posterior *b, double at,
                           const lift_observations *observed, bool known, double *position, double *sd);
 
@@ -30,8 +31,9 @@ typedef struct lift_robust {
     double *position;  /* J x 3, scratch */
 } lift_robust;
 
-/* Fit b to the points of a window, w->sd being r->sd, with outliers of the fit down-weighted.  If outliers may have misled the search it is repeated with all points at first weighted down; the more probable fit
- * is kept.  false: numbers out of range. */
+/* Fit b to the points of a window, w->sd being r->sd, with outliers of the fit down-weighted.  If outliers
+ * may have misled the search it is repeated with all points at first weighted down; the more probable fit is
+ * kept.  false: numbers out of range. */
 bool lift_fit_robust(const lift_table *t, lift_search *s, const lift_window *w, const lift_robust *r,
                      segment_posterior *b, lift_outcome *out, int32_t *outliers);
 #endif
