@@ -1,7 +1,7 @@
 /* robust.h - fits that a detector's wrong points do not lead astray.
  *
- * * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the
- * motion. Points that are wrong for longer, on the other leg or on another person, are down-weighted by a
+ * Spikes, points that are elsewhere for a frame or two, are left out before anything is known of the
+ * motion.  Points that are wrong for longer, on the other leg or on another person, are down-weighted by a
  * fit: beyond four standard deviations a point's own standard deviation grows with the square of its distance
  * from the prediction, so that its influence falls with the third power.  Nearer points keep theirs.  Where
  * half of a frame's points are off, as in a motion that the prior does not know, the limit is three times
