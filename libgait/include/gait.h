@@ -337,7 +337,9 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
     SETTING("Random walk of the posture offsets, which return to the spread among people.",                           \
           float, offset_noise, , "standard deviations per sqrt(second)", 0.58, 0, 100)                                \
     SETTING("Random walk of the proportions' scores, which return to a standard deviation of 1.",                     \
-          float, proportion_noise, , "standard deviations per sqrt(second)", 0.15, 0, 100)
+          float, proportion_noise, , "standard deviations per sqrt(second)", 0.15, 0, 100)                            \
+    SETTING("Share of each stride that a belt takes back: 0 on the floor, 1 on a treadmill.",                         \
+          double, belt, , "", 0, 0, 1)
 
 typedef struct gait_tracker_config {
     GAIT_TRACKER_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DECLARE, GAIT_DECLARE)

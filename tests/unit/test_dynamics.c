@@ -45,6 +45,23 @@ static void test_pace(void)
         }
 }
 
+/* On a treadmill the belt takes back what a stride goes ahead. */
+static void test_belt(void)
+{
+    const gait_model *const m = toy_model();
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++)
+        for (int32_t half = 0; half <= 2; half++) {
+            dynamics const d = quiet(mode, 1);
+            particle_state w = {{[F_RATE] = m->stride_hz, [F_STATURE] = 1.8f, [F_HEADING] = 0.7f}};
+            cfg.belt = 0.5 * half;
+            for (int32_t k = 0; k < 100; k++)
+                w = move_one(&d, &w, 0.01f / m->stride_hz, 1.0f, (uint32_t)k, 3);
+            float const way = 1.8f * m->stride_length * (1.0f - (float)cfg.belt);
+            CHECK_NEAR(w.f[F_X], way * cosf(0.7f), 0.01);
+            CHECK_NEAR(w.f[F_Y], way * sinf(0.7f), 0.01);
+        }
+}
+
 /* Phase, path and relaxing fields follow their equations. */
 static void test_drift(void)
 {
@@ -383,6 +400,7 @@ int main(void)
 {
     test_drift();
     test_pace();
+    test_belt();
     test_rate();
     test_paper_way();
     test_variances();

@@ -84,6 +84,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .offset = state_layout_offset(&d->rule),
         .dt = dt,
         .mean_rate = mean_rate,
+        .travel = 1.0f - (float)c->belt,
         .phase_noise = c->phase_noise * root_dt,
         .forward_noise = c->forward_noise * root_dt,
         .lateral_noise = c->lateral_noise * root_dt,

@@ -30,6 +30,7 @@ typedef struct dynamics_step { /* constants of one interval; noise: standard dev
     int32_t fields, components; /* how many */
     int32_t proportion, offset; /* first field of each */
     float dt, mean_rate;        /* seconds, strides per second */
+    float travel;               /* share of a stride that the person travels */
     float phase_noise, forward_noise, lateral_noise, heading_noise, stature_noise;
     float turn_beyond; /* squared normal beyond which a particle draws a new turn rate */
     float turn_sd;     /* radians per second */

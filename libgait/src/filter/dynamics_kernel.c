@@ -89,7 +89,7 @@ KERNEL_ROW void walk(const dynamics_step *s, const particle_block *restrict from
     float heading[BLOCK];
     for (int32_t lane = 0; lane < BLOCK; lane++) {
         float const ahead =
-            from->f[F_STATURE][lane] * speed[lane] * turn[lane] + s->forward_noise * n[2][lane];
+            from->f[F_STATURE][lane] * speed[lane] * turn[lane] * s->travel + s->forward_noise * n[2][lane];
         float const aside = s->lateral_noise * n[3][lane];
         float const curve = from->f[F_TURN][lane] * s->dt;
         float sn, cs;

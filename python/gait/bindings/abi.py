@@ -192,6 +192,7 @@ class Field(NamedTuple):
 TaskFn = ctypes.CFUNCTYPE(None, c_void_p, c_int32)
 RunFn = ctypes.CFUNCTYPE(None, c_void_p, TaskFn, c_void_p, c_int32)
 
+
 class StartConfigC(ctypes.Structure):
     """``gait_start_config``."""
 

@@ -40,12 +40,15 @@ class Start:
         Independent normals; a phase or heading whose sd is a half turn or more is uniform.
     apparent_stature : float, optional
         Stature that the pictures give, metres, if it contradicts the one in `mean`.
+    in_place : bool
+        The person walks in place, as on a treadmill.
     """
 
     frame: int
     mean: State
     sd: State
     apparent_stature: float | None = None
+    in_place: bool = False
 
     @staticmethod
     def read(

@@ -114,7 +114,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     keypoints = _keypoints(options, found_keypoints, frames)
     if not camera.shows(model.pose(start.mean)[0]):
         note(f"{options.init}: {OUTSIDE}", options.quiet)
-    config = TrackerConfig.default(options.mode, seed=options.seed)
+    config = TrackerConfig.default(options.mode, seed=options.seed, belt=float(start.in_place))
     if options.particles is not None:
         config = config.replace(particles=options.particles)
     if keypoints:

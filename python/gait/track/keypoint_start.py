@@ -130,7 +130,8 @@ def _fit_window(
     sd.stride_hz = max(sd.stride_hz, _SPEEDS_UP * (model.info.stride_hz - hypothesis.mean.stride_hz))
     sd.pelvis = np.clip(sd.pelvis, _LEAST_PLACE_SD, 10.0)
     hypothesis.mean.phase %= 1.0
-    return Start(int(frames[at]), hypothesis.mean, sd), hypothesis
+    start = Start(int(frames[at]), hypothesis.mean, sd, in_place=hypothesis.in_place)
+    return start, hypothesis
 
 
 def _walks(hypothesis: Hypothesis) -> bool:

@@ -177,11 +177,12 @@ class Transitions:
 
     def _ahead(self, before: Array, turn: Array, dt: float) -> Array:
         """Metres along the heading while the phase advances by `turn` (eq. 8)."""
+        travel = 1.0 - self.config.belt
         if self._plain:
-            return np.asarray(before[:, 2] * self.curves.stride_length * before[:, 1] * dt)
+            return np.asarray(before[:, 2] * self.curves.stride_length * before[:, 1] * dt * travel)
         middle = before[:, 0] + 0.5 * turn
         speed = self.curves.channel("root_forward", middle, self._coef(before), before[:, 1])
-        return np.asarray(before[:, 2] * speed * turn)
+        return np.asarray(before[:, 2] * speed * turn * travel)
 
     def difference(self, a: Array, b: Array) -> Array:
         """Return a - b with phase and heading the short way round."""
