@@ -51,7 +51,8 @@ int main(int argc, char **argv)
     cfg.camera[0] = (gait_camera){.width = W, .height = H, .fx = s[0], .fy = s[1], .cx = s[2], .cy = s[3]};
     memcpy(cfg.camera[0].R, s + 4, sizeof cfg.camera[0].R);
     memcpy(cfg.camera[0].t, s + 13, sizeof cfg.camera[0].t);
-    gait_tracker_prior(model, &mean, &sd, NULL); /* any person, within about 0.1 m and rad of the given start */
+    gait_tracker_prior(model, &mean, &sd,
+                       NULL); /* any person, within about 0.1 m and rad of the given start */
     mean.pelvis[0] = s[16], mean.pelvis[1] = s[17], mean.heading = s[18];
     sd.pelvis[0] = sd.pelvis[1] = sd.heading = 0.1f;
     if (gait_tracker_init(memory, sizeof memory, model, &cfg, &t, &err) < 0)

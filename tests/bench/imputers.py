@@ -95,9 +95,7 @@ def ppca(values: Floats, mask: Mask, components: int) -> Floats:
         load = np.linalg.solve(gram, cross[..., None])[..., 0]
         center = (visible * (x - scores @ load.T)).sum(axis=0) / np.maximum(visible.sum(axis=0), 1)
         rest = np.sum(spread * _grams(visible, load))
-        noise = float(np.sum((visible * (x - center - scores @ load.T)) ** 2) + rest) / float(
-            visible.sum()
-        )
+        noise = float(np.sum((visible * (x - center - scores @ load.T)) ** 2) + rest) / float(visible.sum())
         filled = np.where(visible > 0, x, model)
         if np.sqrt(np.mean((filled - before) ** 2)) <= PPCA_TOLERANCE * np.sqrt(noise):
             break

@@ -131,9 +131,7 @@ def test_the_likelihood_alone_needs_more_points_than_the_prior(folder, capsys):
     command = ["lift", "few.csv", "-m", "m.gait", "-o", "out.csv", "--camera", "cam.json", "--quiet"]
     assert main([*command, "--method", "likelihood"]) == 1
     printed = capsys.readouterr().err
-    assert (
-        "few.csv: the points seen" in printed and "of 60 modes" in printed and printed.count("\n") == 1
-    )
+    assert "few.csv: the points seen" in printed and "of 60 modes" in printed and printed.count("\n") == 1
     assert not (folder / "out.csv").exists()
     assert main([*command, "--method", "blend"]) == 0
 

@@ -10,8 +10,8 @@ import pytest
 
 import gait
 from gait.bindings import abi
-from gait.cli import COMMANDS, main, values
 from gait.bindings.config import TrackerConfig
+from gait.cli import COMMANDS, main, values
 
 
 @pytest.mark.parametrize(

@@ -183,7 +183,9 @@ def test_parts_that_hardly_tell_the_distance():
     assert not size.shows_distance(keypoints("r_hip", "l_ankle", share=0.4))
 
 
-@pytest.mark.parametrize(("observed", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)])
+@pytest.mark.parametrize(
+    ("observed", "sure"), [(EVAL15, True), ([n for n in EVAL15 if "ankle" not in n], False)]
+)
 def test_without_ankles_the_distance_is_as_open_as_the_size(walk, observed, sure):
     """Legs that nobody sees stand on the floor by the prior alone, which seemed to tell the distance."""
     prior, places = walk

@@ -232,7 +232,10 @@ def test_without_a_camera_the_axes_are_the_pictures(files, tmp_path, clip, capsy
     assert lift(*words, "--stop", 20, "--output", tmp_path / "out.csv") == 0
     printed = capsys.readouterr()
     assert "figure: stature" in printed.out
-    assert "the figure may have lost the person" in printed.err and "give --background or --corrections" in printed.err
+    assert (
+        "the figure may have lost the person" in printed.err
+        and "give --background or --corrections" in printed.err
+    )
     with open(tmp_path / "out.csv", newline="") as file:
         x = [float(row["pelvis_x"]) for row in csv.DictReader(file)]
     assert len(x) == 20 and np.sign(x[-1] - x[0]) == np.sign(across)

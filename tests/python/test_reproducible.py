@@ -11,7 +11,11 @@ import pytest
 from gait import reproducible
 
 PROGRAM = "from gait.cli import main; raise SystemExit(main())"
-TELL = "import os; from gait import reproducible; reproducible.settle(); print(reproducible.chosen() == reproducible.COMMON)"
+TELL = """
+from gait import reproducible
+reproducible.settle()
+print(reproducible.chosen() == reproducible.COMMON)
+"""
 NOWHERE = ["learn", "nowhere", "-o", "m.gait"]
 PLAIN = {name: value for name, value in os.environ.items() if name not in reproducible.COMMON}
 

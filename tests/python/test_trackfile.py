@@ -5,8 +5,8 @@ import pytest
 
 from gait import Estimate, Flag, Frame, Model, State, TrackStatus, UserError
 from gait.body.skeleton import EVAL15, JOINTS
-from gait.io.trc import write_trc
 from gait.io.track_file import TrackWriter, read_track, read_truth
+from gait.io.trc import write_trc
 
 MODEL = Model()
 HEADER = (

@@ -9,8 +9,8 @@ from drawn_walker import clip, wall, write
 
 from gait import Model, UserError, Video, VideoWriter, background
 from gait.bindings.model import read_blob
-from gait.io.video import median_plate
 from gait.io import blob
+from gait.io.video import median_plate
 
 
 def pattern(i, width=64, height=48):

@@ -112,7 +112,8 @@ static void test_state(void)
         float const kept = *number[i];
         float height = -3.0f;
         *number[i] = i % 2 ? nanf("") : HUGE_VALF;
-        CHECK(gait_model_pose(m, &s, &pose, NULL) == GAIT_ERR_ARG && memcmp(&pose, &before, sizeof pose) == 0);
+        CHECK(gait_model_pose(m, &s, &pose, NULL) == GAIT_ERR_ARG &&
+              memcmp(&pose, &before, sizeof pose) == 0);
         CHECK(gait_model_pelvis_height(m, &s, &height, NULL) == GAIT_ERR_ARG && height == -3.0f);
         *number[i] = kept;
     }

@@ -279,7 +279,8 @@ static void test_arguments(void)
     for (int i = 0; i < 16; i++) {
         err.text[0] = '\0';
         bool const whole = i == 6 || i == 7; /* max_iterations, lag */
-        CHECK(gait_lift_bytes(toy_lift_model, &bad[i], &bytes, &err) == (whole ? GAIT_ERR_LIMIT : GAIT_ERR_ARG));
+        CHECK(gait_lift_bytes(toy_lift_model, &bad[i], &bytes, &err) ==
+              (whole ? GAIT_ERR_LIMIT : GAIT_ERR_ARG));
         CHECK(strstr(err.text, "lift config") != NULL);
     }
     bad[0].struct_size = 0;

@@ -68,8 +68,7 @@ static void test_canaries_of_a_batch(void)
     size_t const need = bytes_of(&c);
     gait_lift *l = NULL;
     memset(outside, 0x5a, sizeof outside);
-    CHECK(gait_lift_init(outside + CANARY, need, toy_lift_model, &c, &l, NULL) ==
-          GAIT_OK);
+    CHECK(gait_lift_init(outside + CANARY, need, toy_lift_model, &c, &l, NULL) == GAIT_OK);
     for (int i = 0; i < TOY_SEGMENT; i++)
         sd[i] = i % 5 ? 0.01 : INFINITY;
     CHECK(gait_lift_fix(l, sd, NULL) == GAIT_OK && gait_lift_batch(l, COUNT, uv, mean, NULL) == GAIT_OK);

@@ -120,7 +120,8 @@ static void test_places(void)
     for (int n = 0; n < 20; n++) {
         gait_state const s = toy_walk(0.08f * (float)n);
         gait_pose pose;
-        CHECK(gait_render(m, &cam, &s, ids, SCENE_W, NULL) == GAIT_OK && gait_model_pose(m, &s, &pose, NULL) == GAIT_OK);
+        CHECK(gait_render(m, &cam, &s, ids, SCENE_W, NULL) == GAIT_OK &&
+              gait_model_pose(m, &s, &pose, NULL) == GAIT_OK);
         for (size_t k = 0; k < sizeof part / sizeof *part; k++) {
             const float *const a = pose.joint[toy_find_point(m, part[k].from)];
             const float *const b = pose.joint[toy_find_point(m, part[k].to)];

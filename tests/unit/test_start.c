@@ -190,7 +190,8 @@ static void test_coverage(void)
         gait_hypothesis const h = find(&w);
         gait_state const truth = state_at(&w, 0.0f);
         float const off[] = {turned(h.mean.heading, truth.heading) / h.sd.heading,
-                             turned(TWO_PI_F * h.mean.phase, TWO_PI_F * truth.phase) / (TWO_PI_F * h.sd.phase),
+                             turned(TWO_PI_F * h.mean.phase, TWO_PI_F * truth.phase) /
+                                 (TWO_PI_F * h.sd.phase),
                              fabsf(h.mean.stride_hz - truth.stride_hz) / h.sd.stride_hz};
         for (int i = 0; i < 3; i++, all++)
             inside += off[i] < 1.645f;

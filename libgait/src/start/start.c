@@ -7,7 +7,7 @@
 
 enum {
     N = START_UNKNOWNS,
-    LD = 16, /* cholesky_padded(N + 1) */
+    LD = 16,                    /* cholesky_padded(N + 1) */
     ROWS = 2 * GAIT_MAX_JOINTS, /* of a frame */
     HEADINGS = 12,
     PHASES = 6,

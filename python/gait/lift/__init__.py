@@ -1,4 +1,4 @@
-"""3-D motion from 2-D keypoints by a Gaussian prior over short segments of motion (Leventon and Freeman 1998).
+"""3-D motion from 2-D keypoints by a prior over short segments of motion (Leventon and Freeman 1998).
 
 - `keypoints`: noise, spikes and swaps of left and right in 2-D keypoints.
 - `segment`: single segments, by the C library, and the views they are seen in.

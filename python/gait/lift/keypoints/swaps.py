@@ -162,7 +162,7 @@ class _Filters:
         self._p = self._c = self._v = np.zeros(size)
 
     def predict(self, t: int) -> tuple[Floats, Floats]:
-        """Predict a frame: errors of its observations (P, before, now, 2), and squared over their variance."""
+        """Predict a frame: errors of its observations (P, before, now, 2), and squared in variances."""
         dt = self._pairs.time[t] - self._last
         known, noise = dt <= LONGEST, self._pairs.variance[t]
         dt = np.where(known, dt, 0.0)

@@ -138,7 +138,7 @@ SIZE_SD = 0.03  # share by which they see it larger
 
 
 def moves(chain: Sequence[Energy], factor: Factor, states: Floats, drifted: Floats) -> Floats:
-    """Moves (B, n, 5) of the states (B, n) by one sd of each error: two shifts, size, two drifts.
+    """Move the states (B, n) by one sd of each error: two shifts, size, two drifts; shape (B, n, 5).
 
     Parameters
     ----------

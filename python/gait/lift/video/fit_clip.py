@@ -57,7 +57,7 @@ def fit_correlation(chain: Sequence[Energy], states: Floats) -> float:
 
 
 def drift(alike: float) -> float:
-    """Give the sd in metres a second by which the scene may hold a figure back; 0 if the figure explains enough."""
+    """Speed error (sd, m/s) of a figure that the scene holds back; 0 if the figure explains enough."""
 
     def noise(value: float) -> float:
         return float(
