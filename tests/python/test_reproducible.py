@@ -40,7 +40,7 @@ def test_a_program_starts_anew_with_its_command_line():
 
 
 def test_numpy_may_lack_features_where_warnings_are_errors():
-    done = python("-c", f"{TELL}; import numpy", PYTHONWARNINGS="error")
+    done = python("-c", f"{TELL}import numpy", PYTHONWARNINGS="error")
     assert done.returncode == 0 and not done.stderr
 
 
