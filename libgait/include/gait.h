@@ -244,6 +244,7 @@ typedef void gait_run_fn(void *user, gait_task_fn *fn, void *ctx, int32_t count)
 typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
 
 /* Settings of a tracker.  gait_tracker_default() fills them; change what you need. */
+/* SETTING: default, low, high.  PAPER: default, paper mode, low, high. */
 #define GAIT_TRACKER_CONFIG_FIELDS(SETTING, PAPER, FIELD)                                                             \
     FIELD("Size of this struct in the caller's header, set by gait_tracker_default().",                               \
           uint64_t, struct_size, , "bytes")                                                                           \
@@ -367,8 +368,8 @@ typedef struct gait_keypoint { GAIT_KEYPOINT_FIELDS(GAIT_DECLARE) } gait_keypoin
 
 typedef struct gait_frame { GAIT_FRAME_FIELDS(GAIT_DECLARE) } gait_frame;
 
-/* INIT: left and right not yet known.  AMBIGUOUS: two hypotheses fit about equally, or the person may face the other
- * way.  LOST: the images do not support the person any more. */
+/* INIT: the track is settling.  AMBIGUOUS: left and right are open, two hypotheses fit about equally, or the person may
+ * face the other way.  LOST: the images do not support the person any more. */
 typedef GAIT_ENUM(gait_track_status) {
     GAIT_TRACK_INIT = 0, GAIT_TRACK_TRACKING = 1, GAIT_TRACK_AMBIGUOUS = 2, GAIT_TRACK_LOST = 3
 } gait_track_status;
