@@ -96,7 +96,7 @@ def test_every_setting_is_described():
     assert "| `girth` | " in reference(TrackerConfig) and "10, 10, 0.03" in reference(LiftConfig)
     for name, item in settings.items():
         if not math.isnan(item.low):
-            with pytest.raises(GaitError, match=f"config {name} = .* is outside") as refused:
+            with pytest.raises(GaitError, match=f"config: {name} = .* is outside") as refused:
                 Tracker(MODEL, VIEW, SMALL.replace(**{name: type(item.default)(item.high * 1.01 + 1)}))
             assert refused.value.name in ("GAIT_ERR_ARG", "GAIT_ERR_LIMIT")
 

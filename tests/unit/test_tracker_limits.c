@@ -45,16 +45,16 @@ static void test_refusals(void)
     gait_frame f = toy_frame(10);
     gait_estimate e;
     f.image[0] = toy_image(film[0][10]);
-    refuse(t, f, GAIT_ERR_STATE, "before start");
+    refuse(t, f, GAIT_ERR_STATE, "call gait_tracker_start() first");
     toy_tracker_start(t, 10, 1.0f);
     f.utime = toy_frame(9).utime;
-    refuse(t, f, GAIT_ERR_STATE, "not newer");
+    refuse(t, f, GAIT_ERR_STATE, "is not after");
     film_step(t, 2, 10, 0, &e);
-    refuse(t, toy_frame(10), GAIT_ERR_STATE, "not newer"); /* the same again */
-    refuse(t, toy_frame(9), GAIT_ERR_STATE, "not newer");
+    refuse(t, toy_frame(10), GAIT_ERR_STATE, "is not after"); /* the same again */
+    refuse(t, toy_frame(9), GAIT_ERR_STATE, "is not after");
     refuse(t, toy_frame(26), GAIT_ERR_STATE, "max_dt");
     f.utime = INT64_MIN;
-    refuse(t, f, GAIT_ERR_STATE, "not newer");
+    refuse(t, f, GAIT_ERR_STATE, "is not after");
     f.utime = INT64_MAX;
     refuse(t, f, GAIT_ERR_STATE, "max_dt");
     gait_image const good = toy_image(film[0][11]);

@@ -206,7 +206,8 @@ gait_result fields_check_size(const char *of, uint64_t struct_size, const char *
     if (end == struct_size && end >= LEAST)
         return GAIT_OK;
     if (struct_size > end)
-        return base_fail(err, GAIT_ERR_STRUCT, -1, "%s has %llu bytes, this library knows %llu: call %s()",
-                         of, (unsigned long long)struct_size, (unsigned long long)end, fill);
+        return base_fail(err, GAIT_ERR_STRUCT, -1,
+                         "%s has %llu bytes but this library knows only %llu: build with its headers", of,
+                         (unsigned long long)struct_size, (unsigned long long)end);
     return base_fail(err, GAIT_ERR_STRUCT, -1, "%s was not filled by %s()", of, fill);
 }

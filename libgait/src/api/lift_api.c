@@ -48,7 +48,7 @@ static bool near(const float t[3])
 
 static gait_result check_config(const gait_lift_config *c, gait_error *err)
 {
-    gait_result const s = fields_check("gait_lift_config", c, "lift config ", err);
+    gait_result const s = fields_check("gait_lift_config", c, "lift config: ", err);
     if (s != GAIT_OK)
         return s;
     bool const perspective = c->projection == GAIT_LIFT_PERSPECTIVE;
@@ -342,7 +342,7 @@ gait_result gait_lift_fix(gait_lift *l, const double *sd, gait_error *err)
     l->windowed = false;
     l->fitted = lift_gain_fix(t, &l->gain, &l->posterior, sd);
     if (!l->fitted)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_fix: standard deviations out of any range");
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_fix: standard deviations are out of range");
     memcpy(l->uv, l->gain.base, points_of(t) * 2 * sizeof *l->uv);
     memcpy(l->sd, sd, points_of(t) * sizeof *l->sd);
     return GAIT_OK;
@@ -372,12 +372,12 @@ gait_result gait_lift_push(gait_lift *l, int64_t utime, const double *uv, const 
                          "gait_lift_push: config lag is -1: there is no memory for a stream");
     if (utime < 0 || (l->stream.last >= 0 && utime <= l->stream.last))
         return base_fail(err, GAIT_ERR_STATE, -1,
-                         "gait_lift_push: utime %lld does not follow %lld; gait_lift_reset() begins anew",
+                         "gait_lift_push: utime %lld is not after %lld; gait_lift_reset() begins anew",
                          (long long)utime, (long long)l->stream.last);
     lift_observations const observed = {.uv = l->stream.new_uv, .sd = l->stream.new_sd};
     lifter_take(l, (size_t)t->prior.markers, uv, sd, l->stream.new_uv, l->stream.new_sd);
     if (!lift_stream_push(t, &l->search, &l->stream, utime, &observed))
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_push: observations out of any range");
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "gait_lift_push: observations are out of range");
     return GAIT_OK;
 }
 

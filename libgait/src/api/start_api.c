@@ -25,9 +25,10 @@ static gait_result check(const gait_model *m, const gait_start_config *c, gait_e
     if (s == GAIT_OK)
         s = fields_check_size("gait_start_config", c->struct_size, "gait_start_default", err);
     if (s == GAIT_OK && c->struct_size != sizeof *c)
-        s = base_fail(err, GAIT_ERR_STRUCT, -1, "gait_start_config: has no camera");
+        s = base_fail(err, GAIT_ERR_STRUCT, -1,
+                      "start config: struct_size ends before the camera; use this library's gait_start.h");
     if (s == GAIT_OK)
-        s = fields_check("gait_start_config", c, "start config ", err);
+        s = fields_check("gait_start_config", c, "start config: ", err);
     if (s != GAIT_OK)
         return s;
     const char *const bad =
@@ -76,7 +77,8 @@ gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *ke
     if (!s || !keypoints)
         return base_null(err, "gait_start_add");
     if (s->count > 0 && utime <= s->utime[(s->count - 1) % GAIT_START_MAX_FRAMES])
-        return base_fail(err, GAIT_ERR_STATE, -1, "utime does not increase: stamp frames in order");
+        return base_fail(err, GAIT_ERR_STATE, -1, "gait_start_add: utime %lld is not after %lld",
+                         (long long)utime, (long long)s->utime[(s->count - 1) % GAIT_START_MAX_FRAMES]);
     start_add(s, utime, keypoints);
     return GAIT_OK;
 }

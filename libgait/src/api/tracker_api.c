@@ -46,21 +46,23 @@ static gait_result open_config(const gait_model *m, const gait_tracker_config *g
     memcpy(cfg, given, (size_t)given->struct_size);
     cfg->struct_size = sizeof *cfg;
     if (cfg->mode != GAIT_MODE_DEFAULT && cfg->mode != GAIT_MODE_PAPER)
-        return base_fail(err, GAIT_ERR_ARG, -1, "config mode = %d is not a GAIT_MODE_*", (int)cfg->mode);
-    s = fields_check("gait_tracker_config", cfg, "config ", err);
+        return base_fail(err, GAIT_ERR_ARG, -1, "tracker config: mode = %d is not a GAIT_MODE_*",
+                         (int)cfg->mode);
+    s = fields_check("gait_tracker_config", cfg, "tracker config: ", err);
     if (s != GAIT_OK)
         return s;
     if (cfg->components > m->components)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config components = %d, the model has %d",
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "tracker config: components = %d, the model has %d",
                          (int)cfg->components, (int)m->components);
     if (cfg->proportions > m->proportions)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "config proportions = %d, the model has %d",
+        return base_fail(err, GAIT_ERR_LIMIT, -1, "tracker config: proportions = %d, the model has %d",
                          (int)cfg->proportions, (int)m->proportions);
     if (cfg->terms == 0 || (cfg->terms & ~known) != 0)
-        return base_fail(err, GAIT_ERR_ARG, -1, "config terms = 0x%x is not a set of GAIT_TERM_*",
+        return base_fail(err, GAIT_ERR_ARG, -1, "tracker config: terms = 0x%x is not a set of GAIT_TERM_*",
                          (unsigned)cfg->terms);
     if (!cpu_mask_valid(cfg->cpu_mask))
-        return base_fail(err, GAIT_ERR_ARG, -1, "config cpu_mask = 0x%x is not ~0u or a set of GAIT_CPU_*",
+        return base_fail(err, GAIT_ERR_ARG, -1,
+                         "tracker config: cpu_mask = 0x%x is not ~0u or a set of GAIT_CPU_*",
                          (unsigned)cfg->cpu_mask);
     for (int32_t c = 0; c < cfg->cameras; c++) {
         s = check_camera(&cfg->camera[c], c, err);
@@ -189,7 +191,8 @@ static gait_result check_frame(const gait_tracker *t, const gait_frame *frame, g
 {
     int64_t const before = t->core->utime;
     if (frame->utime < before || (frame->utime == before && t->core->frame > 0))
-        return base_fail(err, GAIT_ERR_STATE, -1, "frame is not newer than the one before");
+        return base_fail(err, GAIT_ERR_STATE, -1, "gait_tracker_step: utime %lld is not after %lld",
+                         (long long)frame->utime, (long long)before);
     uint64_t const dt = (uint64_t)frame->utime - (uint64_t)before; /* cannot overflow */
     if ((double)dt > 1e6 * (double)t->cfg.max_dt)
         return base_fail(err, GAIT_ERR_STATE, -1,
@@ -209,7 +212,8 @@ gait_result gait_tracker_step(gait_tracker *t, const gait_frame *frame, gait_est
     if (!t || !frame || !out)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker, frame or out is NULL");
     if (!t->core->started)
-        return base_fail(err, GAIT_ERR_STATE, -1, "step before start");
+        return base_fail(err, GAIT_ERR_STATE, -1,
+                         "gait_tracker_step: not started; call gait_tracker_start() first");
     gait_result const s = check_frame(t, frame, err);
     if (s == GAIT_OK)
         tracker_step(t, frame, out);
@@ -224,7 +228,8 @@ gait_result gait_tracker_lagged(gait_tracker *t, int32_t back, gait_estimate *ou
         return base_fail(err, GAIT_ERR_ARG, -1, "back = %d is outside the config's lag of %d", (int)back,
                          (int)t->cfg.lag);
     if (!t->core->started || back > fixed_lag_reach(t))
-        return base_fail(err, GAIT_ERR_STATE, -1, "no frame %d steps ago since the start", (int)back);
+        return base_fail(err, GAIT_ERR_STATE, -1, "no estimate %d steps back: fewer steps since the start",
+                         (int)back);
     fixed_lag_estimate(t, back, out);
     return GAIT_OK;
 }
@@ -234,7 +239,8 @@ gait_result gait_tracker_set_particles(gait_tracker *t, int32_t particles, gait_
     if (!t)
         return base_fail(err, GAIT_ERR_ARG, -1, "tracker is NULL");
     if (particles < 16 || particles > t->config_particles)
-        return base_fail(err, GAIT_ERR_LIMIT, -1, "%d particles are outside [16, %d], the tracker's own",
+        return base_fail(err, GAIT_ERR_LIMIT, -1,
+                         "particles = %d is outside [16, %d], the number the tracker was made with",
                          (int)particles, (int)t->config_particles);
     tracker_set_target(t, particles);
     return GAIT_OK;
