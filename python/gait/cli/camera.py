@@ -2,7 +2,7 @@
 
 POINTS.csv has the columns u,v (pixels) and x,y[,z] (metres; z is up and 0 on the ground, where it may be
 left out).  Give four points or more that are far apart and not on one line.  --lens names a calibration of
-the lens: the YAML or XML of OpenCV's calibration, or a camera file of gait, whose place is not used.
+the lens: the YAML or XML of OpenCV's calibration, or a camera file of gait, whose position is ignored.
 """
 
 from __future__ import annotations

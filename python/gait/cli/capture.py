@@ -1,6 +1,6 @@
 """Send the frames of a video file or of a camera over LCM, as a camera in the field would.
 
-A file is sent at the rate at which it was taken, with the capture times it would have had, starting now.
+A file is sent at the rate at which it was recorded, stamped as if recorded from now on.
 Each frame carries its number, so that a receiver can count what it missed.  Calibration and empty scene are
 announced at the start and every two seconds.  With --init the tracker gets a START for the right frame.
 
@@ -51,13 +51,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_clip(parser, "send", init="none", background="none")
     parser.set_defaults(init=None, start=0)
     values.add_model(parser, "model whose prior fills in what --init leaves open")
-    add("--rate", default="true", metavar="true|max|HZ", help="speed of sending (true)")
+    add(
+        "--rate",
+        default="true",
+        metavar="true|max|HZ",
+        help="frames per second to send: the true rate (default), max, or a number",
+    )
     add("--jpeg", type=values.whole(1, 100), metavar="Q", help="compress frames with this quality, 1 to 100")
     add("--grey", action="store_true", help="send grey frames")
     add("--loop", action="store_true", help="repeat the file until interrupted")
     stream = values.whole(*values.STREAM)
-    add("--stream", type=stream, default=0, metavar="I", help="number of the camera (0)")
-    add("--wait", type=values.seconds, default=0.0, metavar="S", help="for a tracker, at most S seconds (0)")
+    add("--stream", type=stream, default=0, metavar="I", help="number of the camera (default: 0)")
+    add(
+        "--wait",
+        type=values.seconds,
+        default=0.0,
+        metavar="S",
+        help="wait at most S seconds for a tracker (default: 0)",
+    )
     values.add_url(parser)
 
 

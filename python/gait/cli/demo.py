@@ -35,17 +35,32 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--video", metavar="VIDEO", help="the clip (a rendered one)")
+    parser.add_argument("--video", metavar="VIDEO", help="the clip (default: a rendered one)")
     values.add_camera(parser)
-    parser.add_argument("--truth", metavar="TRUTH.csv", help="for the errors")
+    parser.add_argument("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
     values.add_clip(parser, "send")
     parser.set_defaults(init=None, background=None)  # those beside the video, else auto
     values.add_filter(parser, _threads())
     parser.add_argument(
-        "-m", "--model", default=str(_MODEL), metavar="M.gait", help="walking model (the one of the package)"
+        "-m",
+        "--model",
+        default=str(_MODEL),
+        metavar="M.gait",
+        help="walking model (default: the shipped one)",
     )
-    parser.add_argument("--trackd", default=str(_TRACKD), metavar="PROGRAM", help="gait-trackd (build/bin)")
-    parser.add_argument("-o", "--output", default="build/demo", metavar="DIR", help="folder for the results")
+    parser.add_argument(
+        "--trackd",
+        default=str(_TRACKD),
+        metavar="PROGRAM",
+        help="gait-trackd (default: the one in build/bin)",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        default="build/demo",
+        metavar="DIR",
+        help="folder for the results (default: build/demo)",
+    )
 
 
 def _threads() -> int:

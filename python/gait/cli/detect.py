@@ -2,12 +2,6 @@
 
 Writes the keypoints of one person: the one in view longest and tallest, or --person ID.  The file is what
 gait lift takes.  The network's weights are fetched once: gait detect --fetch.
-
-Examples
---------
-  gait detect --fetch
-  gait detect walk.mp4 -o keypoints.csv
-  gait lift keypoints.csv --camera camera.json -o motion.csv
 """
 
 from __future__ import annotations
@@ -24,6 +18,13 @@ from gait.io.keypoints_file import write
 from gait.io.video import Video
 from gait.progress import progress
 
+EXAMPLES = """\
+examples:
+  gait detect --fetch
+  gait detect walk.mp4 -o keypoints.csv
+  gait lift keypoints.csv --camera camera.json -o motion.csv
+"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -31,13 +32,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="KEYPOINTS.csv", help="the keypoints")
     parser.add_argument("--fetch", action="store_true", help="download the weights (38 MB) and check them")
     parser.add_argument(
-        "--network", choices=list(weights.LANDMARKS), default="full", help="landmark network (full)"
+        "--network", choices=list(weights.LANDMARKS), default="full", help="landmark network (default: full)"
     )
     parser.add_argument(
-        "--person", type=values.whole(1), metavar="ID", help="person to write (in view longest and tallest)"
+        "--person",
+        type=values.whole(1),
+        metavar="ID",
+        help="person to write (default: the one in view longest and tallest)",
     )
     parser.add_argument(
-        "--people", type=values.whole(1, 8), default=8, metavar="N", help="people followed at a time (8)"
+        "--people",
+        type=values.whole(1, 8),
+        default=8,
+        metavar="N",
+        help="people followed at a time (default: 8)",
     )
 
 

@@ -31,7 +31,7 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("model", metavar="M.gait", help="a model of gait learn")
+    parser.add_argument("model", metavar="M.gait", help="model written by gait learn")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--activity",
         default="walk",
         metavar="NAME",
-        help="name of the motion; walk refuses runs and run refuses walks (walk)",
+        help="name of the motion; walk refuses runs and run refuses walks (default: walk)",
     )
     add(
         "--subjects",
@@ -98,7 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--period-mode",
         choices=PERIOD_MODES,
         default=PERIOD_MODES[0],
-        help="literal: whole frames, at 120 per second from 50 to 250, as in the paper (refined)",
+        help="literal: whole frames, at 120 per second from 50 to 250, as in the paper (default: refined)",
     )
     add("--fps", type=values.between(10, 2000, "frames per second"), metavar="F",
         help="frames per second (default: from the file; .amc: 120)")  # fmt: skip
@@ -110,9 +110,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "did not see (empty cells of .csv, and points of .c3d and .trc at the origin, always are missing)",
     )
     add("--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings")
-    add("--jobs", type=values.whole(1), metavar="N", help="processes that read files (one per core)")
+    add("--jobs", type=values.whole(1), metavar="N", help="processes that read files (default: one per core)")
     add("--dask", metavar="SCHEDULER", help="read on a Dask cluster, such as tcp://host:8786")
-    add("--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the held-out data (1)")
+    add(
+        "--seed",
+        type=values.whole(*values.SEED),
+        default=1,
+        metavar="S",
+        help="seed of the held-out data (default: 1)",
+    )
     add("--report", metavar="DIR", help="also write figures and index.html into this folder")
     add(
         "--segments",

@@ -7,8 +7,8 @@ over short segments of motion supplies the depth and the joints that are not see
 
 Views: with --camera the result is in the camera's world.  --orthographic looks from far away along an axis of
 a world with z up; the scale comes from the person's stature unless --metres-per-unit gives it.  Without
-either, the camera is assumed to be level and far away (looking along y), with a slowly changing scale.  Both
-determine no position along the line of sight, and the lowest feet are put on the floor.
+either, the camera is assumed to be level and far away (looking along y), with a slowly changing scale.
+Neither determines the position along the line of sight; the lowest foot is put on the floor.
 
 OUT.csv: frame,time and for each joint _x,_y,_z (metres) and _sx,_sy,_sz (posterior standard deviations).
 

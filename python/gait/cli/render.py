@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_camera(parser, " (default: a built-in view)")
     add = parser.add_mutually_exclusive_group().add_argument
     share = values.between(0, 1, "a share of the stride")
-    add("--phase", type=share, metavar="P", help="of the stride, 0 at the right heel strike (0)")
+    add("--phase", type=share, metavar="P", help="phase of the stride; 0 (default) is the right heel strike")
     add("--state", metavar="JSON", help="file with the whole state")
     add("--strip", action="store_true", help="draw the sheet of all components")
 

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_camera(parser, required=True)
     parser.add_argument("-o", "--output", required=True, metavar="R.html", help="the page")
     parser.add_argument("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
-    parser.add_argument("--truth", metavar="TRUTH.csv", help="for the errors")
+    parser.add_argument("--truth", metavar="TRUTH.csv", help="true motion, to report errors against")
     values.add_model(parser, "model that was tracked")
     parser.add_argument("--replayed", action="store_true", help="not tracked live: show no latency")
 

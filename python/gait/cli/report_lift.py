@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=values.whole(*values.SEED),
         default=1,
         metavar="S",
-        help="of noise and draws (default: 1)",
+        help="seed of noise and draws (default: 1)",
     )
 
 

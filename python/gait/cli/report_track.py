@@ -5,8 +5,8 @@ and curves.csv.  Heel strikes are where the heel is furthest ahead of the pelvis
 furthest behind it.
 
 With the draws of gait track --smooth --draws the standard deviations come from whole motions.  They
-describe how certain the tracker is given the model and the camera.  Errors of these, such as a stature that
-is wrong by a few per cent, come on top.
+describe how certain the tracker is given the model and the camera.  Errors of the model and the camera,
+such as a stature that is wrong by a few per cent, come on top.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("track", metavar="OUT.csv", help="from gait track or gait record")
     values.add_model(parser, "model with the norm")
-    parser.add_argument("-o", "--output", metavar="DIR", help="folder for the page and tables (OUT_gait)")
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", help="folder for the page and tables (default: OUT_gait)"
+    )
     parser.add_argument("--draws", metavar="D.npz", help="motions from gait track --smooth --draws")
 
 

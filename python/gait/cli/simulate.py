@@ -34,7 +34,9 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options; those not given come from the preset."""
     parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for the clip")
-    parser.add_argument("--preset", choices=PRESETS, default="demo", help="scenario to start from (demo)")
+    parser.add_argument(
+        "--preset", choices=PRESETS, default="demo", help="scenario to start from (default: demo)"
+    )
     parser.add_argument("--view", choices=VIEWS, help="where the camera is")
     parser.add_argument("--direction", choices=DIRECTIONS, help="to the right or to the left of the picture")
     parser.add_argument("--frames", type=int, metavar="N")
@@ -45,10 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stride-hz", type=float, metavar="HZ", help="strides (two steps) per second")
     parser.add_argument("--distance", type=float, metavar="M", help="camera to the middle of the path")
     parser.add_argument("--camera-height", type=float, metavar="M")
-    parser.add_argument("--seed", type=int, metavar="S", help="of person, clothes, gait, scene and noise")
-    parser.add_argument("--pole", action="store_true", default=None, help="a pole before the path")
-    parser.add_argument("--clutter", action="store_true", default=None, help="a stronger background")
-    parser.add_argument("--flicker", type=float, metavar="PCT", help="sd of the exposure, per cent")
+    parser.add_argument(
+        "--seed", type=int, metavar="S", help="seed for person, clothes, gait, scene and noise"
+    )
+    parser.add_argument("--pole", action="store_true", default=None, help="put a pole in front of the path")
+    parser.add_argument("--clutter", action="store_true", default=None, help="use a busier background")
+    parser.add_argument(
+        "--flicker", type=float, metavar="PCT", help="standard deviation of the exposure, per cent"
+    )
     parser.add_argument("--noise", type=float, metavar="SIGMA", help="sensor noise, grey levels")
     parser.add_argument(
         "--gait",

@@ -1,14 +1,14 @@
 """Track a walking person in a video file.
 
-The first state comes from --init: a JSON file with the person's place and phase, or auto.  auto compares a
-second of frames with the background, takes the blob of a person's size and puts its foot point on the ground.
-This gives place, stature and heading, but neither the phase nor which leg is which.  Without a background, or
-where no person stands out against it, a detector of upright people is used, which is less exact.  The person
-must be in full view, feet included.  Of several people the one who walks is taken.  A long shadow misplaces
-the start; a JSON file is always better.
+The first state comes from --init: a JSON file with the person's position and phase, or auto.  auto fits a
+second of walking to the detector's keypoints (or those of --keypoints), which also gives the phase and tells
+left from right.  Without keypoints that fit, it compares a second of frames with the background; this gives
+position, stature and heading but not the phase.  Without a background, or where no person stands out against
+it, OpenCV's people detector is used, which is less exact.  For the start from images the person must be in
+full view, feet included; of several people, one who walks is preferred; a long shadow misplaces the start.
 
-From the side, left and right look alike at first.  The status is ambiguous until the pictures decide between
-them.
+After a start without a phase the status is init for about a second and then ambiguous until the images decide
+between left and right.
 
 A lost person is searched for near the last place, then in the whole picture.  A person who walks in full view
 for a second starts the track anew (not with --smooth).
@@ -52,13 +52,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_model(parser)
     values.add_clip(parser, "track")
     values.add_filter(parser, threads=1)
-    add("--seed", type=values.whole(*values.SEED), default=1, metavar="S", help="of the random numbers (1)")
-    add("--mode", choices=[m.name.lower() for m in Mode], default="default", help="set of settings")
+    add(
+        "--seed",
+        type=values.whole(*values.SEED),
+        default=1,
+        metavar="S",
+        help="seed of the random numbers (default: 1)",
+    )
+    add(
+        "--mode",
+        choices=[m.name.lower() for m in Mode],
+        default="default",
+        help="set of settings (default: default)",
+    )
     add(
         "--detector",
         choices=["auto", "full", "lite", "heavy", "none"],
         default="auto",
-        help="network that finds joints, for the start and as a cue (auto: full, after gait detect --fetch)",
+        help="network that finds joints, for the start and as a cue (default: auto, full if fetched)",
     )
     add(
         "--keypoints",
@@ -72,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=values.positive,
         metavar="PX",
         help=f"their standard deviation at full confidence, the difference between the detector's joints and "
-        f"the model's included ({KEYPOINTS_SD:g})",
+        f"the model's included (default: {KEYPOINTS_SD:g})",
     )
     add("--overlay", metavar="O.mp4", help="also draw the estimates into the video")
     add(

@@ -83,7 +83,7 @@ def add_camera(parser: ArgumentParser, note: str = "", required: bool = False) -
 
 def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
     """Add ``--model``; None stands for the model of the package."""
-    parser.add_argument("-m", "--model", metavar="M.gait", help=f"{what} (default: the one of the package)")
+    parser.add_argument("-m", "--model", metavar="M.gait", help=f"{what} (default: the shipped one)")
 
 
 def add_url(parser: ArgumentParser) -> None:
@@ -97,16 +97,18 @@ def add_url(parser: ArgumentParser) -> None:
 
 def add_clip(parser: ArgumentParser, use: str, init: str = "auto", background: str = "auto") -> None:
     """Add ``--init --background --height --start --stop``; `use` is what happens to the frames."""
-    parser.add_argument("--init", default=init, metavar="INIT.json|auto", help=f"first state ({init})")
+    parser.add_argument(
+        "--init", default=init, metavar="INIT.json|auto", help=f"first state (default: {init})"
+    )
     parser.add_argument(
         "--background",
         default=background,
         metavar="PNG|auto|none",
-        help=f"empty scene: an image, auto for the median of the clip, or none ({background})",
+        help=f"empty scene: an image, auto for the median of the clip, or none (default: {background})",
     )
     parser.add_argument("--height", type=stature, metavar="M", help="the person's stature in metres")
     parser.add_argument("--start", type=whole(0), metavar="F", help=f"first frame to {use}, counted from 0")
-    parser.add_argument("--stop", type=whole(0), metavar="F", help=f"frame to stop before, not to {use}")
+    parser.add_argument("--stop", type=whole(0), metavar="F", help=f"first frame not to {use}")
 
 
 def add_filter(parser: ArgumentParser, threads: int) -> None:
@@ -116,14 +118,15 @@ def add_filter(parser: ArgumentParser, threads: int) -> None:
         "--particles",
         type=whole(*PARTICLES),
         metavar="N",
-        help=f"size of the particle set ({usual}, paper mode {paper}; {PARTICLES[0]} to {PARTICLES[1]})",
+        help=f"size of the particle set, {PARTICLES[0]} to {PARTICLES[1]} "
+        f"(default: {usual}, in paper mode {paper})",
     )
     parser.add_argument(
         "--threads",
         type=whole(*THREADS),
         default=threads,
         metavar="T",
-        help=f"of the tracker, up to {THREADS[1]}; the result does not depend on it ({threads})",
+        help=f"threads of the tracker, up to {THREADS[1]}; do not change the result (default: {threads})",
     )
 
 

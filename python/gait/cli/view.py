@@ -38,9 +38,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_url(parser)
     add, port, stream = parser.add_argument, values.whole(0, 65535), values.whole(*values.STREAM)
     add("--save", metavar="PNG", help="write one picture and end")
-    add("--patience", type=values.seconds, default=30.0, metavar="S", help="seconds that --save waits (30)")
-    add("--port", type=port, default=0, metavar="N", help="of the page (any that is free)")
-    add("--stream", type=stream, default=0, metavar="I", help="number of the camera (0)")
+    add(
+        "--patience",
+        type=values.seconds,
+        default=30.0,
+        metavar="S",
+        help="seconds that --save waits (default: 30)",
+    )
+    add("--port", type=port, default=0, metavar="N", help="port of the page (default: any free one)")
+    add("--stream", type=stream, default=0, metavar="I", help="number of the camera (default: 0)")
     values.add_camera(parser, " (default: from GAIT_CAMERA_<i>)")
     values.add_model(parser, "model that is tracked")
 
