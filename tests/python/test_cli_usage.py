@@ -73,7 +73,7 @@ def test_every_command_has_help(command, capsys):
 def test_the_help_names_the_defaults_of_the_library(command, capsys):
     with pytest.raises(SystemExit):
         main([command, "--help"])
-    assert f"particle set ({TrackerConfig.default().particles}" in " ".join(capsys.readouterr().out.split())
+    assert f"(default: {TrackerConfig.default().particles}, in" in " ".join(capsys.readouterr().out.split())
 
 
 def test_help_without_a_library(tmp_path):
