@@ -1,11 +1,12 @@
 """Track a walking person in a video file.
 
 The first state comes from --init: a JSON file with the person's position and phase, or auto.  auto fits a
-second of walking to the detector's keypoints (or those of --keypoints), which also gives the phase and distinguishes
-left from right.  Without keypoints that fit, it compares a second of frames with the background; this gives
-position, stature and heading but not the phase.  Without a background, or where no person stands out against
-it, OpenCV's people detector is used, which is less exact.  For the start from images the person must be in
-full view, feet included; of several people, one who walks is preferred; a long shadow misplaces the start.
+second of walking to the detector's keypoints (or those of --keypoints), which also gives the phase and
+distinguishes left from right.  Without keypoints that fit, it compares a second of frames with the
+background; this gives position, stature and heading but not the phase.  Without a background, or where no
+person stands out against it, OpenCV's people detector is used, which is less exact.  For the start from
+images the person must be in full view, feet included; of several people, one who walks is preferred; a long
+shadow misplaces the start.
 
 After a start without a phase the status is init for about a second and then ambiguous until the images decide
 between left and right.
