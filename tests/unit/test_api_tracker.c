@@ -27,7 +27,7 @@ static void test_integers(void)
     } bad[] = {
         {offsetof(gait_tracker_config, struct_size), 0, GAIT_ERR_STRUCT, "gait_tracker_default"},
         {offsetof(gait_tracker_config, struct_size), (int32_t)sizeof(gait_tracker_config) + 8,
-         GAIT_ERR_STRUCT, "gait_tracker_default"},
+         GAIT_ERR_STRUCT, "build with its headers"},
         {offsetof(gait_tracker_config, mode), 2, GAIT_ERR_ARG, "mode"},
         {offsetof(gait_tracker_config, mode), -1, GAIT_ERR_ARG, "mode"},
         {offsetof(gait_tracker_config, particles), 15, GAIT_ERR_LIMIT, "particles"},
