@@ -44,10 +44,11 @@ static gait_state state_at(const walk *w, float t)
     s.heading = w->heading;
     s.stature = w->stature;
     s.stride_hz = w->rate;
-    float height;
+    float height, sn, cs;
+    m_sincos_one(w->heading, &sn, &cs);
     CHECK(gait_model_pelvis_height(toy_model(), &s, &height, NULL) == GAIT_OK);
-    s.pelvis[0] = w->x + w->speed * t * cosf(w->heading);
-    s.pelvis[1] = w->y + w->speed * t * sinf(w->heading);
+    s.pelvis[0] = w->x + w->speed * t * cs;
+    s.pelvis[1] = w->y + w->speed * t * sn;
     s.pelvis[2] = height;
     return s;
 }
@@ -296,8 +297,12 @@ static uint64_t digest(uint32_t cpu_mask)
     return hash_fnv1a(HASH_INIT, h, sizeof h);
 }
 
-int main(void)
+#define GOLDEN UINT64_C(0x4092b92ec2cb90fa)
+
+int main(int argc, char **argv)
 {
+    if (argc == 2)
+        return strcmp(argv[1], "digest") == 0 ? (golden_print(digest, GOLDEN, "start") + check_failed) != 0 : 2;
     test_headings();
     test_slow_and_fast();
     test_treadmill();
@@ -307,6 +312,7 @@ int main(void)
     test_refused();
     test_config();
     test_old_frames_are_dropped();
-    CHECK(digest(0) == digest(~0u));
+    CHECK(golden_line(digest(0), GOLDEN, "start", "scalar") == GOLDEN);
+    CHECK(digest(~0u) == GOLDEN);
     return CHECK_DONE();
 }
