@@ -21,6 +21,8 @@ static bool set_number(const option *o, const char *text, message *why)
                            o->name, text, o->low, o->high);
     if (o->kind == OPTION_INT)
         *(int32_t *)o->value = (int32_t)value;
+    else if (o->kind == OPTION_DOUBLE)
+        *(double *)o->value = value;
     else
         *(float *)o->value = (float)value;
     return true;

@@ -12,7 +12,8 @@ typedef enum option_kind {
     OPTION_TEXTUAL, /* char[OPTION_TEXT] */
     OPTION_INT,     /* int32_t in [low, high] */
     OPTION_U64,     /* uint64_t */
-    OPTION_FLOAT    /* float in [low, high] */
+    OPTION_FLOAT,   /* float in [low, high] */
+    OPTION_DOUBLE   /* double in [low, high] */
 } option_kind;
 
 typedef struct option {

@@ -34,6 +34,8 @@ static bool kind_of(const setting *s, option_kind *kind)
         *kind = OPTION_U64;
     else if (strcmp(s->type, "float") == 0)
         *kind = OPTION_FLOAT;
+    else if (strcmp(s->type, "double") == 0)
+        *kind = OPTION_DOUBLE;
     else if (strcmp(s->type, "int32_t") == 0 && strcmp(s->name, "cameras") != 0)
         *kind = OPTION_INT;
     else
@@ -75,7 +77,7 @@ static int tracker_options(gait_tracker_config *config, option *table)
         if (kind_of(s, &kind))
             table[count++] = (option){.name = option_name(s),
                                       .letter = strcmp(s->name, "particles") == 0 ? 'n' : 0,
-                                      .metavar = kind == OPTION_FLOAT ? "X" : "N",
+                                      .metavar = kind == OPTION_INT || kind == OPTION_U64 ? "N" : "X",
                                       .help = option_help(s),
                                       .kind = kind,
                                       .value = (char *)config + s->offset,
