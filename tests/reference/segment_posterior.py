@@ -181,7 +181,7 @@ class Posterior:
         return x
 
     @cached_property
-    def _spread(self) -> tuple[Floats, Floats]:
+    def _uncertainty(self) -> tuple[Floats, Floats]:
         """Places by the scores (F, J, 3, m), and covariance (F, J, 3, 3) of each apart from them."""
         by_scores = np.moveaxis(self.gaussian.modes, 0, -1).copy()  # (F, J, 3, m)
         frames, markers = self.gaussian.mean.shape[:2]
@@ -195,7 +195,7 @@ class Posterior:
     @property
     def covariances(self) -> Floats:
         """Posterior covariance of each marker in each frame, (F, J, 3, 3)."""
-        by_scores, outside = self._spread
+        by_scores, outside = self._uncertainty
         return np.asarray(by_scores @ self.covariance @ by_scores.swapaxes(-1, -2) + outside)
 
     @property
@@ -205,7 +205,7 @@ class Posterior:
 
     def rooted_sd(self, left: int, right: int) -> Floats:
         """Give standard deviations (F, J, 3) of the places about the middle of two markers."""
-        by_scores, outside = self._spread
+        by_scores, outside = self._uncertainty
         ends = [left, right]
         apart = by_scores - by_scores[:, ends].mean(axis=1, keepdims=True)
         middle = outside[:, ends].sum(axis=1, keepdims=True) / 4
@@ -424,10 +424,10 @@ def uncertain_modes(found: Posterior, count: int) -> tuple[Floats, Floats]:
 def dual(gaussian: Gaussian, rows: Rows) -> tuple[Floats, Floats, float]:
     """Eqs. 5 and 6 with a matrix of the measurements' size: alpha, covariance and log evidence."""
     s = system(gaussian, rows)
-    wide = s.design @ s.design.T + np.eye(len(s.y))
-    gain = np.linalg.solve(wide, s.design).T
+    observed = s.design @ s.design.T + np.eye(len(s.y))
+    gain = np.linalg.solve(observed, s.design).T
     alpha, covariance = gain @ s.y, np.eye(len(gaussian.modes)) - gain @ s.design
-    sds = np.linalg.slogdet(wide)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
+    sds = np.linalg.slogdet(observed)[1] - 2 * np.log(np.linalg.det(s.whiten)).sum()
     fit = s.y @ (s.y - s.design @ alpha)
     return alpha, covariance, -0.5 * float(fit + sds + len(s.y) * np.log(2 * np.pi))
 
@@ -439,10 +439,10 @@ def log10_volume(gaussian: Gaussian, rows: Rows) -> float:
 
 
 def likelihood_only(gaussian: Gaussian, rows: Rows) -> Floats:
-    """Segment (F, J, 3) in the span of the modes that fits the measurements best, whatever the prior says.
+    """Segment (F, J, 3) in the span of the modes that fits the measurements best, without the prior.
 
     Of all that do, the one nearest to the mean (least squares of minimum norm); the standard deviations of
-    the observations weigh them, the prior has no part.
+    the observations weight them, the prior has no part.
     """
     norm = np.linalg.norm(gaussian.modes.reshape(len(gaussian.modes), -1), axis=1)
     unit = gaussian.modes / norm[:, None, None, None]
