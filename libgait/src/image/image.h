@@ -4,7 +4,7 @@
 #include "base/base.h"
 
 /* Bytes per pixel of a GAIT_* image format; 0 if the format is unknown. */
-static inline int32_t image_channels(int32_t format)
+static inline int32_t image_channels(gait_pixel_format format)
 {
     return format == GAIT_GREY8 ? 1 : format == GAIT_RGB8 || format == GAIT_BGR8 ? 3 : 0;
 }

@@ -11,7 +11,7 @@ void fixed_lag_record(gait_tracker *t, const gait_estimate *e)
     t->history.record[slot] = (generation_record){.age = e->utime - t->core->start_utime,
                                                   .frame = e->frame,
                                                   .log_evidence = e->log_evidence,
-                                                  .status = e->status,
+                                                  .status = (int32_t)e->status,
                                                   .flags = e->flags};
 }
 
@@ -65,7 +65,7 @@ static void place_joints(gait_tracker *t, const weighted_particles *p)
 }
 
 /* A track that was lost stays lost; otherwise left and right count as they are known now. */
-static int32_t lagged_status(const gait_tracker *t, int32_t then, float hypothesis_weight)
+static gait_track_status lagged_status(const gait_tracker *t, gait_track_status then, float hypothesis_weight)
 {
     if (then == GAIT_TRACK_LOST)
         return then;
@@ -91,6 +91,6 @@ void fixed_lag_estimate(gait_tracker *t, int32_t back, gait_estimate *out)
     estimate_weighted(t, &p, pf_heaviest(&weights), &e);
     e.ess = (float)pf_ess(&weights);
     e.flags = record.flags;
-    e.status = lagged_status(t, record.status, e.hypothesis_weight);
+    e.status = lagged_status(t, (gait_track_status)record.status, e.hypothesis_weight);
     *out = e;
 }

@@ -145,7 +145,7 @@ static void update_track_loss(gait_tracker *t, bool lost, const particle_state *
     core->found = 1;
 }
 
-static int32_t status_of(const gait_tracker *t, float dt, const gait_estimate *e)
+static gait_track_status status_of(const gait_tracker *t, float dt, const gait_estimate *e)
 {
     const tracker_core *const core = t->core;
     float const predicted = core->reported_phase + dt * core->reported_rate;
