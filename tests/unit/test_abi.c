@@ -47,7 +47,7 @@ static gait_field find(const char *of, const char *name)
     for (uint32_t i = 0; gait_field_at(i, &f) == GAIT_OK; i++)
         if (strcmp(f.of, of) == 0 && strcmp(f.name, name) == 0)
             return f;
-    CHECK(!"there is such a field");
+    check_that(0, "there is such a field", __FILE__, __LINE__);
     return f;
 }
 

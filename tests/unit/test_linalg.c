@@ -83,7 +83,7 @@ static void test_largest(void)
                 for (int c = 0; c < 4; c++)
                     value += q[r] * sum[4 * r + c] * q[c];
             if (value > best * (1.0 + 1e-6))
-                CHECK(!"principal eigenvector");
+                check_that(0, "principal eigenvector", __FILE__, __LINE__);
         }
         for (int i = 0; i < 4; i++) { /* A q = lambda q */
             double row = 0.0;

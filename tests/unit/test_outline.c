@@ -212,7 +212,7 @@ static void image_of(const view_of_limb *v, const float p[3], float uv[2])
         world[k] =
             v->o[k] + v->scale * (v->R[3 * k] * p[0] + v->R[3 * k + 1] * p[1] + v->R[3 * k + 2] * p[2]);
     if (!(camera_project(v->cam, world, uv) > 1.0f))
-        CHECK(!"in front of the camera");
+        check_that(0, "in front of the camera", __FILE__, __LINE__);
 }
 
 /* Distance of a point from the polygon, positive outside (convex, either way round). */

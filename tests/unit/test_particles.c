@@ -10,7 +10,7 @@
 static state_layout make_rule(int32_t mode, int32_t components, uint32_t offsets)
 {
     gait_tracker_config cfg;
-    gait_tracker_default(&cfg, mode);
+    gait_tracker_default(&cfg, (gait_mode)mode);
     cfg.components = components;
     cfg.offset_angles = offsets;
     cfg.proportions = mode == GAIT_MODE_PAPER ? 0 : -1;
@@ -57,7 +57,7 @@ static void test_the_default_mode_uses_the_first_four_components_paper_mode_all(
     gait_model m = *toy_model();
     for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
         gait_tracker_config cfg;
-        gait_tracker_default(&cfg, mode);
+        gait_tracker_default(&cfg, (gait_mode)mode);
         for (m.components = 0; m.components <= 8; m.components++)
             CHECK(state_layout_init(&m, &cfg, kernels_choose(~0u)).components ==
                   (mode == GAIT_MODE_PAPER || m.components < 5 ? m.components : 5));

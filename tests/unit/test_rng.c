@@ -33,7 +33,7 @@ static void test_uniform(void)
         rng_uniform4(11, 1, 2, i, 0, u);
         for (int k = 0; k < 4; k++) {
             if (!(u[k] >= 0.0f && u[k] < 1.0f))
-                CHECK(!"uniform in [0, 1)");
+                check_that(0, "uniform in [0, 1)", __FILE__, __LINE__);
             bin[(int)(u[k] * BINS)]++;
         }
     }

@@ -302,7 +302,8 @@ static uint64_t digest(uint32_t cpu_mask)
 int main(int argc, char **argv)
 {
     if (argc == 2)
-        return strcmp(argv[1], "digest") == 0 ? (golden_print(digest, GOLDEN, "start") + check_failed) != 0 : 2;
+        return strcmp(argv[1], "digest") == 0 ? (golden_print(digest, GOLDEN, "start") + check_failed) != 0
+                                              : 2;
     test_headings();
     test_slow_and_fast();
     test_treadmill();

@@ -105,7 +105,7 @@ static void test_paper(void)
 /* ---- colour ---- */
 
 /* Frames of a tinted scene in one format. */
-static void tint(int n, int32_t format, uint8_t *out)
+static void tint(int n, gait_pixel_format format, uint8_t *out)
 {
     for (int32_t i = 0; i < SCENE_PIXELS; i++) {
         uint8_t const v = film[0][n][i], rgb[3] = {(uint8_t)(v / 2 + 60), v, (uint8_t)(255 - v)};
@@ -114,7 +114,7 @@ static void tint(int n, int32_t format, uint8_t *out)
     }
 }
 
-static uint64_t colour_digest(uint32_t terms, int32_t format, int32_t plate_format)
+static uint64_t colour_digest(uint32_t terms, gait_pixel_format format, gait_pixel_format plate_format)
 {
     static uint8_t shot[3 * SCENE_PIXELS], plate[3 * SCENE_PIXELS];
     gait_tracker_config cfg = toy_config(1);

@@ -34,7 +34,7 @@ static inline toy_body *toy_body_new(int camera, int32_t mode)
     static _Alignas(GAIT_ALIGN) unsigned char memory[4 << 20];
     static toy_body v;
     arena a = {.base = memory, .cap = sizeof memory};
-    gait_tracker_default(&v.cfg, mode);
+    gait_tracker_default(&v.cfg, (gait_mode)mode);
     v.cfg.components = TOY_COMPONENTS;
     v.cfg.offset_angles = 1u << (TOY_TORSO + 1);
     v.cfg.terms = 0xf;

@@ -30,7 +30,7 @@ static inline gait_lift_config toy_lift_config(int projection)
 {
     gait_lift_config c;
     gait_lift_default(&c);
-    c.projection = projection;
+    c.projection = (gait_projection)projection;
     c.stature_sd = 0.0; /* tests of it set it */
     c.camera = (gait_camera){.width = 640,
                              .height = 480,

@@ -14,7 +14,7 @@ static gait_tracker_config cfg;
 /* Default mode, two components and one posture offset, no noise at all. */
 static inline dynamics quiet(int32_t mode, uint64_t seed)
 {
-    gait_tracker_default(&cfg, mode);
+    gait_tracker_default(&cfg, (gait_mode)mode);
     cfg.components = 2;
     cfg.offset_angles = 1u << OFFSET_ANGLE;
     cfg.proportions = mode == GAIT_MODE_PAPER ? 0 : -1;
