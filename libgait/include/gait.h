@@ -340,7 +340,9 @@ typedef struct gait_tasks { GAIT_TASKS_FIELDS(GAIT_DECLARE) } gait_tasks;
     SETTING("Random walk of the proportions' scores, which return to a standard deviation of 1.",                     \
           float, proportion_noise, , "standard deviations per sqrt(second)", 0.15, 0, 100)                            \
     SETTING("Share of each stride that a belt takes back: 0 on the floor, 1 on a treadmill.",                         \
-          double, belt, , "", 0, 0, 1)
+          double, belt, , "", 0, 0, 1)                                                                                \
+    SETTING("1: frames come in reverse order, as from a file; utime still increases from frame to frame.",            \
+          double, reverse, , "", 0, 0, 1)
 
 typedef struct gait_tracker_config {
     GAIT_TRACKER_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DECLARE, GAIT_DECLARE)

@@ -82,7 +82,7 @@ dynamics_step dynamics_step_init(const dynamics *d, float dt, float age, uint32_
         .components = d->rule.components,
         .proportion = state_layout_proportion(&d->rule),
         .offset = state_layout_offset(&d->rule),
-        .dt = dt,
+        .dt = c->reverse > 0.0 ? -dt : dt,
         .mean_rate = mean_rate,
         .travel = 1.0f - (float)c->belt,
         .phase_noise = c->phase_noise * root_dt,

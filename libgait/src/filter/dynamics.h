@@ -29,7 +29,7 @@ typedef struct dynamics_step { /* constants of one interval; noise: standard dev
     bool plain_root;
     int32_t fields, components; /* how many */
     int32_t proportion, offset; /* first field of each */
-    float dt, mean_rate;        /* seconds, strides per second */
+    float dt, mean_rate;        /* seconds, negative if frames come in reverse order; strides per second */
     float travel;               /* share of a stride that the person travels */
     float phase_noise, forward_noise, lateral_noise, heading_noise, stature_noise;
     float turn_beyond; /* squared normal beyond which a particle draws a new turn rate */

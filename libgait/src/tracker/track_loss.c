@@ -25,7 +25,8 @@ static void search_region(const gait_tracker *t, float gap, gait_state *mean, ga
     const particle_state *const last = &t->core->last_supported;
     float sn, cs;
     *mean = particle_to_state(&t->layout, last);
-    float const way = gap * particle_speed(&t->layout, last), far = f_min(0.1f + 0.4f * gap, 1.5f);
+    float const way = in_walking_time(t, gap) * particle_speed(&t->layout, last),
+                far = f_min(0.1f + 0.4f * gap, 1.5f);
     m_sincos_one(mean->heading, &sn, &cs);
     mean->pelvis[0] += way * cs;
     mean->pelvis[1] += way * sn;
@@ -104,7 +105,7 @@ void track_loss_bound(gait_tracker *t)
 static bool phase_as_predicted(const gait_tracker *t, float gap, const particle_state *mean)
 {
     const particle_state *const last = &t->core->last_supported;
-    float const turn = gap * last->f[F_RATE];
+    float const turn = in_walking_time(t, gap) * last->f[F_RATE];
     float const off = m_wrap_pi(TWO_PI_F * (mean->f[F_PHASE] - last->f[F_PHASE] - turn)) / TWO_PI_F;
     return gap < PHASE_TIME && fabsf(off) < PHASE_WITHIN;
 }

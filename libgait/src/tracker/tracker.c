@@ -83,9 +83,9 @@ static void move_range(void *ctx, int32_t begin, int32_t end, int32_t task)
             rejuvenate_block(&j->rejuvenation, i, lanes, &then);
         else
             particle_block_get(&j->from, t->filter.parent + i, lanes, &then);
-        if (j->step.dt > 0.0f)
+        if (j->step.dt != 0.0f)
             t->like->run->dynamics_move(&j->step, i, &then, &now);
-        particle_block_put(&to, i, lanes, j->step.dt > 0.0f ? &now : &then);
+        particle_block_put(&to, i, lanes, j->step.dt != 0.0f ? &now : &then);
     }
 }
 
@@ -148,7 +148,7 @@ static void update_track_loss(gait_tracker *t, bool lost, const particle_state *
 static gait_track_status status_of(const gait_tracker *t, float dt, const gait_estimate *e)
 {
     const tracker_core *const core = t->core;
-    float const predicted = core->reported_phase + dt * core->reported_rate;
+    float const predicted = core->reported_phase + in_walking_time(t, dt) * core->reported_rate;
     bool const departs =
         fabsf(m_wrap_pi(TWO_PI_F * (e->mean.phase - predicted))) > TWO_PI_F * PHASE_DEPARTURE;
     if (track_loss_is_lost(t))

@@ -191,6 +191,12 @@ static inline float seconds_since(const gait_tracker *t, int64_t utime)
     return 1e-6f * (float)(t->core->utime - utime);
 }
 
+/* An interval between frames as the person experiences it: negative if frames come in reverse order. */
+static inline float in_walking_time(const gait_tracker *t, float seconds)
+{
+    return t->cfg.reverse > 0.0 ? -seconds : seconds;
+}
+
 /* Seconds since an image last supported the estimate. */
 static inline float seconds_unsupported(const gait_tracker *t)
 {

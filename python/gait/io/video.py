@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 Image = NDArray[np.uint8]
 """A picture: (height, width) grey or (height, width, 3) BGR, uint8."""
 
+_CHUNK_BYTES = 100_000_000  # of pictures kept at a time when they are read backwards
 _CONTAINERS = (".mp4", ".mkv", ".mov")
 
 
@@ -84,6 +85,15 @@ class Video:
         for index, time, frame in self._decode(stop):
             if index >= start:
                 yield Frame(index, time, _upright(frame, pixels))
+
+    def backwards(self, stop: int, start: int = 0) -> Iterator[Frame]:
+        """Yield the frames `start` <= index < `stop` from the last to the first, as BGR.
+
+        Decodes the file once for every chunk of frames, so that memory does not grow with their number.
+        """
+        chunk = max(8, _CHUNK_BYTES // (3 * self.width * self.height))
+        for end in range(stop, start, -chunk):
+            yield from reversed(list(self.frames(max(start, end - chunk), end)))
 
     def _probe(self) -> None:
         """Read the first frame for the size, the stream's header or its packets for count and rate."""

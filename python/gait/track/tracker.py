@@ -91,6 +91,11 @@ class Tracker:
         for i, plate in enumerate(per_camera(background)):
             self.set_background(plate, i)
 
+    def like(self, config: TrackerConfig) -> Tracker:
+        """Tracker of the same model, cameras, background and threads with another configuration."""
+        plates = [self._plates.get(i) for i in range(len(self.cameras))]
+        return Tracker(self.model, self.cameras, config, background=plates, tasks=self._tasks or 1)
+
     def set_background(self, plate: Image | None, camera: int = 0) -> None:
         """Copy the empty scene of one camera as captured, (h, w) or (h, w, 3) BGR; None takes it away."""
         view = None

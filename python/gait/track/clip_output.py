@@ -1,0 +1,135 @@
+"""Everything that is written of a tracked clip, and the figures of the report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from gait.bindings.abi import TrackStatus
+from gait.bindings.estimate import Estimate
+from gait.bindings.model import read_cyclic
+from gait.body.model_curves import ModelCurves
+from gait.errors import UserError
+from gait.io.track_file import TrackWriter
+from gait.io.video import Frame, Video, VideoWriter
+from gait.progress import durations, progress
+from gait.report.drawing import Overlay
+from gait.track.options import ClipOptions
+from gait.track.smooth import Smoother
+from gait.track.tracker import Tracker
+
+Sink = Callable[[Frame, Estimate], None]
+
+
+class Results:
+    """What the report at the end needs from each step."""
+
+    def __init__(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+        self._steps: list[float] = []
+        self._statuses: list[TrackStatus] = []
+        self._begun = time.perf_counter()
+        self.times: list[float] = []
+        self.joints: list[np.ndarray[Any, Any]] = []
+        self._frames: list[tuple[int, bool, bool]] = []  # number, lost, in the picture
+        self.starts: list[tuple[int, float, float]] = []  # frame and place of each
+
+    def step(self, frame: Frame, estimate: Estimate) -> None:
+        """Take in a step of the tracker."""
+        if estimate.frame == 0:
+            self.starts.append((frame.number, *estimate.mean.pelvis[:2]))
+        self._steps.append(1000 * self._tracker.step_seconds)
+        self._wall = time.perf_counter() - self._begun
+
+    def add(self, frame: Frame, estimate: Estimate) -> None:
+        """Take in an estimate that is written."""
+        self._statuses.append(estimate.status)
+        self.times.append(frame.time)
+        self.joints.append(estimate.joints)
+        shown = self._tracker.cameras[0].shows(estimate.joints[:1])
+        self._frames.append((frame.number, estimate.status == TrackStatus.LOST, shown))
+
+    def coverage(self) -> list[str]:
+        """Say where the person was followed, where they left the picture, and where they were lost."""
+        spans = [list(span) for _, span in groupby(self._frames, key=lambda frame: frame[1])]
+        out = []
+        for span, after in zip(spans, [*spans[1:], None], strict=True):
+            (first, lost, _), (last, _, shown) = span[0], span[-1]
+            if not lost:
+                out.append(f"followed from frame {first} to {last}")
+                continue
+            what = "lost" if shown else "left the picture"
+            out.append(f"{what} at frame {first}" + (f", back at frame {after[0][0]}" if after else ""))
+        return out
+
+    def followed(self) -> int:
+        """Count the frames in which the person was not lost."""
+        return sum(not lost for _, lost, _ in self._frames)
+
+    def summary(self, threads: int) -> dict[str, Any]:
+        """Return the figures of ``--json``; step_ms is the time inside gait_tracker_step alone."""
+        tracker = self._tracker
+        return {
+            "frames": len(self._steps),
+            "particles": tracker.config.particles,
+            "threads": threads,
+            "step_ms": durations(self._steps),
+            "wall_fps": len(self._steps) / self._wall,
+            "lost": self._statuses.count(TrackStatus.LOST),
+            "ambiguous": self._statuses.count(TrackStatus.AMBIGUOUS),
+            "memory_bytes": tracker.memory_bytes,
+            "digest": f"{tracker.digest():016x}",
+        }
+
+
+def write(
+    options: ClipOptions,
+    video: Video,
+    tracker: Tracker,
+    span: range,
+    found: Iterable[tuple[Frame, Estimate]],
+) -> Results:
+    """Write the estimates into all outputs, which appear together at the end."""
+    model, results = tracker.model, Results(tracker)
+    with ExitStack() as stack:
+        rows = TrackWriter(options.output, model.info.components, model.joint_names, model.angle_names)
+        sinks: list[Sink] = [results.add, stack.enter_context(rows).write]
+        if options.overlay:
+            film = stack.enter_context(VideoWriter(options.overlay, video.fps))
+            overlay = Overlay(model, tracker.cameras[0])
+            sinks.append(
+                lambda frame, estimate: film.write(overlay.draw(frame.image, estimate, frame.number))
+            )
+        smoother = None
+        if options.smooth:
+            smoother = stack.enter_context(Smoother(tracker, ModelCurves(read_cyclic(options.model))))
+        update = stack.enter_context(progress("tracking", len(span), options.quiet))
+        for done, (frame, estimate) in enumerate(found, 1):
+            results.step(frame, estimate)
+            for sink in sinks if smoother is None else [smoother.add]:
+                sink(frame, estimate)
+            update(done)
+        if smoother is not None and len(smoother):
+            _smooth(options, video, smoother, sinks)
+        if not results.times:
+            raise UserError(f"{video.path}: no frame from {span.start} on can be decoded; convert it anew")
+    return results
+
+
+def _smooth(options: ClipOptions, video: Video, smoother: Smoother, sinks: list[Sink]) -> None:
+    """Give every frame with its smoothed estimate to the sinks, and write the draws."""
+    with progress("smoothing", len(smoother), options.quiet) as update:
+        rows, draws = smoother.finish(update=update)
+    if options.draws:
+        draws.write(options.draws)
+    frames: Iterable[Frame] = (frame for frame, _ in rows)
+    if options.overlay:  # decode the pictures once more
+        frames = video.frames(rows[0][0].number, rows[-1][0].number + 1)
+    for frame, (_, estimate) in zip(frames, rows, strict=True):
+        for sink in sinks:
+            sink(frame, estimate)

@@ -1,0 +1,139 @@
+"""Follow one person through a clip, backwards from the start as well, and on after a loss."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from gait.bindings.abi import TrackStatus
+from gait.bindings.estimate import Estimate
+from gait.bindings.initial import DEFAULT_SD, Start
+from gait.io.video import Frame, Video
+from gait.track.auto_start import AutoStart
+from gait.track.sightings import Sightings
+from gait.track.tracker import Tracker
+
+_GIVE_UP = 1.0  # seconds after a loss for which the person is looked for backwards
+_CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
+_SEEN = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
+
+FindAgain = Callable[[int, Estimate], Start | None]
+"""Finds where a person who was lost at an estimate walks, in a frame or later; None: nowhere."""
+
+
+class Follower:
+    """Follows one person through a video.
+
+    Parameters
+    ----------
+    tracker : Tracker
+    video : Video
+        As seen by the tracker's only camera.
+    sightings : Sightings
+    find_again : FindAgain
+    auto_start : AutoStart, optional
+        Finds a lost person by the pictures.
+    one_pass : bool
+        Each estimate comes from the same forward pass, as the smoother needs it: tracking backwards only
+        finds an earlier start.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        video: Video,
+        sightings: Sightings,
+        find_again: FindAgain,
+        auto_start: AutoStart | None = None,
+        *,
+        one_pass: bool = False,
+    ) -> None:
+        self._tracker, self._video, self._sightings = tracker, video, sightings
+        self._find_again, self._auto_start, self._one_pass = find_again, auto_start, one_pass
+
+    def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
+        """Yield the frames in order from the first in which the person is seen, each with its estimate."""
+        following: Start | None
+        following, before = self._earlier(start, frames.start)
+        now: Estimate | None = None
+        lost, supported = True, 0.0
+        for frame in self._video.frames(min(before, default=following.frame), frames.stop):
+            if following is not None and frame.number == following.frame:
+                if lost:
+                    self._tracker.start(following.mean, following.sd, frame.utime)
+                    now, lost, supported = None, False, frame.time
+                following = None
+            elif now is None and lost:
+                yield frame, before[frame.number]
+                continue
+            now = self._step(self._tracker, frame, frame.utime, now)
+            if not self._sightings.contradict(frame.number, now):
+                supported = frame.time
+            was_lost, lost = lost, now.status == TrackStatus.LOST or frame.time - supported > _CONTRADICTED
+            if lost and not was_lost:
+                following = self._find_again(frame.number + 1, now)
+                if following is not None:
+                    following, before = self._earlier(following, frame.number + 1)
+            estimate = replace(now, status=TrackStatus.LOST) if lost else now
+            yield frame, before.get(frame.number, estimate) if lost else estimate
+            if self._auto_start and self._restarted(self._auto_start, frame, estimate):
+                now, lost, supported = None, False, frame.time
+
+    def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
+        joints = self._sightings.choose(frame.number, last)
+        return self._sightings.checked(frame.number, tracker.step(frame.image, utime, joints))
+
+    def _restarted(self, auto_start: AutoStart, frame: Frame, estimate: Estimate) -> bool:
+        """Whether a person who was lost is found in the pictures; the tracker starts anew with them."""
+        if estimate.status in _SEEN:
+            auto_start.forget()
+        if estimate.status != TrackStatus.LOST:
+            return False
+        auto_start.observe(frame)
+        if not auto_start.walks_in(frame):
+            return False
+        anew = auto_start.state(latest=True)
+        self._tracker.start(anew.mean, anew.sd, frame.utime)
+        return True
+
+    def _earlier(self, start: Start, first: int) -> tuple[Start, dict[int, Estimate]]:
+        """Where to start, and the estimates of the frames before, from `first` on."""
+        before = self._backwards(start, first) if first < start.frame else {}
+        if not self._one_pass:
+            return start, before
+        sure = [number for number, now in before.items() if now.status == TrackStatus.TRACKING]
+        return (_start(before[min(sure)], min(sure), start) if sure else start), {}
+
+    def _backwards(self, start: Start, first: int) -> dict[int, Estimate]:
+        """Track backwards from a start to `first`: estimates by frame, as far as the person is seen."""
+        config = self._tracker.config.replace(reverse=1.0)
+        tracker = self._tracker.like(config)
+        found: dict[int, Estimate] = {}
+        origin, seen, last = None, 0.0, None
+        earliest = start.frame
+        for frame in self._video.backwards(start.frame + 1, first):
+            if origin is None:
+                origin, seen = frame.utime, frame.time
+                tracker.start(start.mean, start.sd, -frame.utime)
+            last = self._step(tracker, frame, -frame.utime, last)
+            found[frame.number] = replace(last, utime=frame.utime, frame=frame.number - start.frame)
+            if last.status in _SEEN:
+                earliest, seen = frame.number, frame.time
+            elif seen - frame.time > _GIVE_UP:
+                break
+        return {number: now for number, now in sorted(found.items()) if earliest <= number < start.frame}
+
+
+def _start(now: Estimate, frame: int, start: Start) -> Start:
+    """Start from an estimate, which may be no surer than a start that a user gives."""
+    sd = replace(
+        now.sd,
+        phase=max(now.sd.phase, DEFAULT_SD["phase"]),
+        heading=max(now.sd.heading, DEFAULT_SD["heading_rad"]),
+        stride_hz=max(now.sd.stride_hz, DEFAULT_SD["stride_hz"]),
+        stature=max(now.sd.stature, DEFAULT_SD["stature_m"]),
+        pelvis=np.maximum(now.sd.pelvis, DEFAULT_SD["pelvis"]),
+    )
+    return replace(start, frame=frame, mean=now.mean, sd=sd)

@@ -1,0 +1,66 @@
+"""What ``gait track`` tracks and writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gait.bindings.abi import Mode
+
+KEYPOINTS_SD = 4.0  # pixels
+
+
+@dataclass(frozen=True)
+class ClipOptions:
+    """What to track and what to write; see ``gait track --help``.
+
+    Attributes
+    ----------
+    video, camera, output : str
+        The clip, its camera file and the track to write.
+    model : str, optional
+        The model of the package if left out.
+    init, background : str
+        A file, ``auto``, or for the background ``none``.
+    height : float, optional
+        The person's stature, metres.
+    mode : Mode
+    particles : int, optional
+    seed, threads : int
+    start, stop : int, optional
+        Frames to track: start <= frame < stop.
+    detector : str
+        Network that finds keypoints for the start and as a cue: ``full``, ``lite``, ``heavy``, ``none``, or
+        ``auto``: ``full`` if its weights are on this machine.  It is not used in paper mode.
+    keypoints : str, optional
+        File of 2-D keypoints found in the frames, instead of a detector.
+    keypoints_sd : float
+        Their standard deviation at full confidence, pixels.
+    overlay, draws, trc : str, optional
+        Further files to write.
+    smooth : bool
+        Estimate every frame from the whole clip.
+    quiet : bool
+        Print no notes and no progress.
+    """
+
+    video: str
+    camera: str
+    output: str
+    model: str | None = None
+    init: str = "auto"
+    background: str = "auto"
+    height: float | None = None
+    mode: Mode = Mode.DEFAULT
+    particles: int | None = None
+    seed: int = 1
+    threads: int = 1
+    start: int | None = None
+    stop: int | None = None
+    detector: str = "auto"
+    keypoints: str | None = None
+    keypoints_sd: float = KEYPOINTS_SD
+    overlay: str | None = None
+    smooth: bool = False
+    draws: str | None = None
+    trc: str | None = None
+    quiet: bool = False

@@ -1,0 +1,186 @@
+"""What a clip gives to track: pictures, camera, empty scene, keypoints of people, and the first state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait.bindings.abi import Mode
+from gait.bindings.frame import Joints
+from gait.bindings.initial import OUTSIDE, Start
+from gait.bindings.model import Model
+from gait.camera.camera import Camera
+from gait.detect import weights
+from gait.errors import UserError
+from gait.io import keypoints_file
+from gait.io.keypoints_file import Keypoints
+from gait.io.video import Image, Video, background
+from gait.progress import note, progress
+from gait.track.auto_start import find_start
+from gait.track.keypoint_start import CUE_MISS, find_keypoint_start, keypoint_noise
+from gait.track.options import ClipOptions
+from gait.track.person_detection import another_scene, one_is_grey
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What there is to track.
+
+    Attributes
+    ----------
+    video : Video
+    camera : Camera
+    model : Model
+    plate : image or None
+        The empty scene.
+    frames : range
+        Frames to track.
+    people : dict of int to Keypoints
+        Keypoints of everyone found, by id.
+    person : int
+        Whom to track, an id of `people`; -1 without keypoints.
+    joints : dict of int to dict of int to Joints
+        The keypoints with their noise, by id and frame.
+    """
+
+    video: Video
+    camera: Camera
+    model: Model
+    plate: Image | None
+    frames: range
+    people: dict[int, Keypoints]
+    person: int
+    joints: dict[int, dict[int, Joints]]
+
+    @staticmethod
+    def read(options: ClipOptions) -> Scene:
+        """Read the files, and run the detector where there is one.
+
+        Raises
+        ------
+        UserError
+            If a file cannot be read or does not fit the others.
+        """
+        video = Video(options.video)
+        camera = Camera.read(options.camera, video.size)
+        model = Model(options.model)
+        frames = clip_frames(video, options.start or 0, options.stop)
+        with progress("background", video.count, options.quiet) as update:
+            plate = background(options.background, video, update)
+        if options.keypoints:
+            people = {0: _read_keypoints(options, model, frames)}
+            joints = {0: people[0].joints(options.keypoints_sd)}
+            return Scene(video, camera, model, plate, frames, people, 0, joints)
+        people, person = _detect(options, video, frames)
+        joints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
+        return Scene(video, camera, model, plate, frames, people, person, joints)
+
+
+def clip_frames(video: Video, start: int, stop: int | None) -> range:
+    """Frames to track from `start` on; UserError if there are none."""
+    stop = video.count if stop is None else min(stop, video.count)
+    if start >= stop:
+        raise UserError(f"{video.path}: no frame from {start} up to {stop}; it has {video.count}")
+    return range(start, stop)
+
+
+def first_state(options: ClipOptions, scene: Scene) -> Start:
+    """First state, from the init file or found in the clip."""
+    if options.init != "auto":
+        start = Start.read(options.init, scene.model, frame=options.start, height=options.height)
+        clip_frames(scene.video, start.frame, options.stop)
+        _require_scene(options, scene, start.frame)
+    else:
+        _require_scene(options, scene, scene.frames.start)
+        start = _find_first_state(options, scene)
+        _note_start(options, scene, start)
+    if not scene.camera.shows(scene.model.pose(start.mean)[0]):
+        note(f"{options.init}: {OUTSIDE}", options.quiet)
+    return start
+
+
+def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
+    at, turn, turn_sd = start.mean, np.degrees(start.mean.heading), np.degrees(start.sd.heading)
+    note(
+        f"start found at frame {start.frame}: x {at.pelvis[0]:.2f} y {at.pelvis[1]:.2f} m, "
+        f"stature {at.stature:.2f} m, heading {turn:.0f} +- {turn_sd:.0f} deg",
+        options.quiet,
+    )
+    if not scene.people and options.detector == "auto" and options.mode != Mode.PAPER:
+        note(f"without a detector the start is less reliable: {weights.FETCH}", options.quiet)
+    if start.apparent_stature:
+        remedy = "check --height and" if options.height else "give --height or check"
+        note(
+            f"the person appears {start.apparent_stature:.2f} m tall by the camera, taken for "
+            f"{at.stature:.2f} m: {remedy} the camera",
+            options.quiet,
+        )
+
+
+def _find_first_state(options: ClipOptions, scene: Scene) -> Start:
+    """First state from the keypoints; without any that fit, from the pictures."""
+    camera, model, frames, height = scene.camera, scene.model, scene.frames, options.height
+    if scene.people:
+        keypoints = scene.people[scene.person]
+        found = find_keypoint_start(
+            keypoints, camera, model, first=frames.start, stop=frames.stop, height=height
+        )
+        if found is not None:
+            return found
+    return find_start(
+        scene.video, camera, scene.plate, model, first=frames.start, stop=options.stop, height=height
+    )
+
+
+def _require_scene(options: ClipOptions, scene: Scene, first: int) -> None:
+    """Refuse a background image of another scene than the first frame, or without its colours."""
+    frame = next(iter(scene.video.frames(first, first + 1)), None)
+    if scene.plate is None or frame is None:
+        return
+    if one_is_grey(frame.image, scene.plate):
+        raise UserError(
+            f"{options.background}: of it and {scene.video.path} one is grey, the other in colour; "
+            "take both alike"
+        )
+    if not another_scene(frame.image, scene.plate):
+        return
+    differs = f"half of frame {first} differs from"
+    if options.background != "auto":
+        raise UserError(
+            f"{options.background}: {differs} it; give the empty scene of this camera, auto or none"
+        )
+    note(
+        f"{differs} the median of the clip, the background: if the camera moves, --background none",
+        options.quiet,
+    )
+
+
+def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int, Keypoints], int]:
+    """Keypoints of everyone that the detector finds, and the main person; none without a detector."""
+    network = options.detector
+    if network == "none" or options.mode == Mode.PAPER:
+        return {}, -1
+    if network == "auto":
+        network = "full"
+        if not all(weights.find(needed) for needed in (weights.PERSON, weights.LANDMARKS[network])):
+            return {}, -1
+    from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
+
+    with progress("detecting", len(frames), options.quiet) as update:
+        people = detect(video, network, first=frames.start, stop=frames.stop, update=update)
+    return people, main_person(people) if people else -1
+
+
+def _read_keypoints(options: ClipOptions, model: Model, frames: range) -> Keypoints:
+    """Keypoints of the model's joints from a file; they must be of frames to track."""
+    assert options.keypoints is not None
+    read, ignored = keypoints_file.read(options.keypoints, model.joint_names, ignore_unknown=True)
+    if ignored:
+        note(f"left out: {' '.join(ignored)}", options.quiet)
+    read.require_extent(options.keypoints, options.keypoints_sd)
+    if not any(frame in frames for frame in read.frame.tolist()):
+        raise UserError(
+            f"{options.keypoints}: has no frame that is tracked; number frames as in the video, from 0"
+        )
+    return read
