@@ -18,7 +18,7 @@ from gait.track.follow import Follower
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.scene import Scene, first_state
-from gait.track.sightings import Sightings
+from gait.track.person_keypoints import PersonKeypoints
 from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
@@ -66,5 +66,5 @@ def _follower(options: ClipOptions, scene: Scene, tracker: Tracker) -> Follower:
     auto_start = None
     if not options.smooth and not scene.people:
         auto_start = AutoStart(scene.camera, scene.plate, scene.model, options.height)
-    sightings = Sightings(scene.camera, scene.joints, scene.person)
-    return Follower(tracker, scene.video, sightings, find_again, auto_start, one_pass=options.smooth)
+    keypoints = PersonKeypoints(scene.camera, scene.joints, scene.person)
+    return Follower(tracker, scene.video, keypoints, find_again, auto_start, one_pass=options.smooth)

@@ -55,7 +55,7 @@ class Results:
         self._frames.append((frame.number, estimate.status == TrackStatus.LOST, shown))
 
     def coverage(self) -> list[str]:
-        """Say where the person was followed, where they left the picture, and where they were lost."""
+        """Report where the person was followed, where they left the picture, and where they were lost."""
         spans = [list(span) for _, span in groupby(self._frames, key=lambda frame: frame[1])]
         out = []
         for span, after in zip(spans, [*spans[1:], None], strict=True):

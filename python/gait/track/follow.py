@@ -12,12 +12,12 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.initial import DEFAULT_SD, Start
 from gait.io.video import Frame, Video
 from gait.track.auto_start import AutoStart
-from gait.track.sightings import Sightings
+from gait.track.person_keypoints import PersonKeypoints
 from gait.track.tracker import Tracker
 
 _GIVE_UP = 1.0  # seconds after a loss for which the person is looked for backwards
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
-_SEEN = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
+_FOLLOWED = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
 
 FindAgain = Callable[[int, Estimate], Start | None]
 """Finds where a person who was lost at an estimate walks, in a frame or later; None: nowhere."""
@@ -30,8 +30,8 @@ class Follower:
     ----------
     tracker : Tracker
     video : Video
-        As seen by the tracker's only camera.
-    sightings : Sightings
+        As visible by the tracker's only camera.
+    keypoints : PersonKeypoints
     find_again : FindAgain
     auto_start : AutoStart, optional
         Finds a lost person by the pictures.
@@ -44,17 +44,17 @@ class Follower:
         self,
         tracker: Tracker,
         video: Video,
-        sightings: Sightings,
+        keypoints: PersonKeypoints,
         find_again: FindAgain,
         auto_start: AutoStart | None = None,
         *,
         one_pass: bool = False,
     ) -> None:
-        self._tracker, self._video, self._sightings = tracker, video, sightings
+        self._tracker, self._video, self._keypoints = tracker, video, keypoints
         self._find_again, self._auto_start, self._one_pass = find_again, auto_start, one_pass
 
     def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
-        """Yield the frames in order from the first in which the person is seen, each with its estimate."""
+        """Yield the frames in order from the first in which the person is visible, each with its estimate."""
         following: Start | None
         following, before = self._earlier(start, frames.start)
         now: Estimate | None = None
@@ -69,7 +69,7 @@ class Follower:
                 yield frame, before[frame.number]
                 continue
             now = self._step(self._tracker, frame, frame.utime, now)
-            if not self._sightings.contradict(frame.number, now):
+            if not self._keypoints.contradict(frame.number, now):
                 supported = frame.time
             was_lost, lost = lost, now.status == TrackStatus.LOST or frame.time - supported > _CONTRADICTED
             if lost and not was_lost:
@@ -82,12 +82,12 @@ class Follower:
                 now, lost, supported = None, False, frame.time
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
-        joints = self._sightings.choose(frame.number, last)
-        return self._sightings.checked(frame.number, tracker.step(frame.image, utime, joints))
+        joints = self._keypoints.choose(frame.number, last)
+        return self._keypoints.checked(frame.number, tracker.step(frame.image, utime, joints))
 
     def _restarted(self, auto_start: AutoStart, frame: Frame, estimate: Estimate) -> bool:
         """Whether a person who was lost is found in the pictures; the tracker starts anew with them."""
-        if estimate.status in _SEEN:
+        if estimate.status in _FOLLOWED:
             auto_start.forget()
         if estimate.status != TrackStatus.LOST:
             return False
@@ -107,21 +107,21 @@ class Follower:
         return (_start(before[min(sure)], min(sure), start) if sure else start), {}
 
     def _backwards(self, start: Start, first: int) -> dict[int, Estimate]:
-        """Track backwards from a start to `first`: estimates by frame, as far as the person is seen."""
+        """Track backwards from a start to `first`: estimates by frame, as far as the person is visible."""
         config = self._tracker.config.replace(reverse=1.0)
         tracker = self._tracker.like(config)
         found: dict[int, Estimate] = {}
-        origin, seen, last = None, 0.0, None
+        origin, visible, last = None, 0.0, None
         earliest = start.frame
         for frame in self._video.backwards(start.frame + 1, first):
             if origin is None:
-                origin, seen = frame.utime, frame.time
+                origin, visible = frame.utime, frame.time
                 tracker.start(start.mean, start.sd, -frame.utime)
             last = self._step(tracker, frame, -frame.utime, last)
             found[frame.number] = replace(last, utime=frame.utime, frame=frame.number - start.frame)
-            if last.status in _SEEN:
-                earliest, seen = frame.number, frame.time
-            elif seen - frame.time > _GIVE_UP:
+            if last.status in _FOLLOWED:
+                earliest, visible = frame.number, frame.time
+            elif visible - frame.time > _GIVE_UP:
                 break
         return {number: now for number, now in sorted(found.items()) if earliest <= number < start.frame}
 

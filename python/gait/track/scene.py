@@ -39,7 +39,7 @@ class Scene:
     people : dict of int to Keypoints
         Keypoints of everyone found, by id.
     person : int
-        Whom to track, an id of `people`; -1 without keypoints.
+        The person to track, an id of `people`; -1 without keypoints.
     joints : dict of int to dict of int to Joints
         The keypoints with their noise, by id and frame.
     """

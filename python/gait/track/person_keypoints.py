@@ -24,7 +24,7 @@ _AGREE = 0.08  # person's heights up to which knees and ankles agree with the es
 _LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 
 
-class Sightings:
+class PersonKeypoints:
     """Keypoints of everyone in a clip.
 
     Parameters
@@ -51,7 +51,7 @@ class Sightings:
         return joints if distance < _GATE else None
 
     def contradict(self, frame: int, estimate: Estimate) -> bool:
-        """Whether the person to track was found in a frame, and nobody where the estimate is."""
+        """Whether the person to track was found in a frame, and no person where the estimate is."""
         return self._own(frame) is not None and all(
             self._distance(estimate, joints) > _GATE for joints in self._found(frame)
         )
