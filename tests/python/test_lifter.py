@@ -308,9 +308,9 @@ def test_wrong_shapes_and_settings_are_refused() -> None:
     with pytest.raises(ValueError, match="shape"):
         lifter.push(1, np.zeros((3, 2)))
     for call in (lifter.positions, lifter.posterior, lifter.scale, lifter.least_squares, lifter.uncertain):
-        with pytest.raises(GaitError, match=r"no segment yet; call segment\(\) first"):
+        with pytest.raises(GaitError, match=r"no segment yet; call gait_lift_segment\(\) first"):
             call()
-    with pytest.raises(GaitError, match=r"no gain yet; call fix\(\) first"):
+    with pytest.raises(GaitError, match=r"no gain yet; call gait_lift_fix\(\) first"):
         lifter.batch(np.zeros((1, FRAMES, MARKERS, 2)))
     with pytest.raises(ValueError, match="count is 0; give one from 1 to"):
         lifter.uncertain(0)

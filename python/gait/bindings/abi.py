@@ -16,7 +16,6 @@ from ctypes import (
     c_int32,
     c_int64,
     c_size_t,
-    c_uint8,
     c_uint32,
     c_uint64,
     c_void_p,
@@ -239,6 +238,16 @@ _TYPES: dict[str, Any] = {
     **STRUCTS,
 }
 
+
+class _ARRAY:
+    """Pointer to the numbers of a contiguous array; None: a null pointer."""
+
+    @staticmethod
+    def from_param(array: Any) -> c_void_p:
+        """Convert an argument."""
+        return c_void_p(None if array is None else array.ctypes.data)
+
+
 _RESULT, _HANDLE, _ERR = c_int32, c_void_p, POINTER(Error)
 _SIZE, _STATE = POINTER(c_size_t), POINTER(StateC)
 
@@ -249,8 +258,8 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_cpu_name", [c_uint32], c_char_p),
     ("gait_abi", [], c_uint32),
     ("gait_field_at", [c_uint32, POINTER(FieldC)], _RESULT),
-    ("gait_model_bytes", [c_void_p, c_size_t, _SIZE, _ERR], _RESULT),
-    ("gait_model_init", [c_void_p, c_size_t, c_void_p, c_size_t, POINTER(_HANDLE), _ERR], _RESULT),
+    ("gait_model_bytes", [_ARRAY, c_size_t, _SIZE, _ERR], _RESULT),
+    ("gait_model_init", [_ARRAY, c_size_t, _ARRAY, c_size_t, POINTER(_HANDLE), _ERR], _RESULT),
     ("gait_model_get_info", [_HANDLE, POINTER(ModelInfoC), _ERR], _RESULT),
     ("gait_model_joint_name", [_HANDLE, c_int32], c_char_p),
     ("gait_model_angle_name", [_HANDLE, c_int32], c_char_p),
@@ -258,12 +267,12 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_model_pose", [_HANDLE, _STATE, POINTER(PoseC), _ERR], _RESULT),
     ("gait_model_angle_mask", [_HANDLE, c_char_p, POINTER(c_uint32), _ERR], _RESULT),
     ("gait_model_pelvis_height", [_HANDLE, _STATE, POINTER(c_float), _ERR], _RESULT),
-    ("gait_render", [_HANDLE, POINTER(CameraC), _STATE, POINTER(c_uint8), c_int32, _ERR], _RESULT),
+    ("gait_render", [_HANDLE, POINTER(CameraC), _STATE, _ARRAY, c_int32, _ERR], _RESULT),
     ("gait_tracker_fill", [POINTER(TrackerConfigC), c_size_t, c_int32], None),
     ("gait_tracker_bytes", [_HANDLE, POINTER(TrackerConfigC), _SIZE, _ERR], _RESULT),
     (
         "gait_tracker_init",
-        [c_void_p, c_size_t, _HANDLE, POINTER(TrackerConfigC), POINTER(_HANDLE), _ERR],
+        [_ARRAY, c_size_t, _HANDLE, POINTER(TrackerConfigC), POINTER(_HANDLE), _ERR],
         _RESULT,
     ),
     ("gait_tracker_set_background", [_HANDLE, c_int32, POINTER(ImageView), _ERR], _RESULT),
@@ -272,12 +281,12 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_tracker_step", [_HANDLE, POINTER(FrameC), POINTER(EstimateC), _ERR], _RESULT),
     ("gait_tracker_lagged", [_HANDLE, c_int32, POINTER(EstimateC), _ERR], _RESULT),
     ("gait_tracker_set_particles", [_HANDLE, c_int32, _ERR], _RESULT),
-    ("gait_tracker_particles", [_HANDLE, _STATE, POINTER(c_float), c_int32, _ERR], c_int32),
+    ("gait_tracker_particles", [_HANDLE, _STATE, _ARRAY, c_int32, _ERR], c_int32),
     ("gait_tracker_digest", [_HANDLE], c_uint64),
-    ("gait_tracker_save", [_HANDLE, c_void_p, c_size_t, _SIZE, _ERR], _RESULT),
-    ("gait_tracker_restore", [_HANDLE, c_void_p, c_size_t, _ERR], _RESULT),
+    ("gait_tracker_save", [_HANDLE, _ARRAY, c_size_t, _SIZE, _ERR], _RESULT),
+    ("gait_tracker_restore", [_HANDLE, _ARRAY, c_size_t, _ERR], _RESULT),
     ("gait_pool_bytes", [c_int32, _SIZE, _ERR], _RESULT),
-    ("gait_pool_init", [c_void_p, c_size_t, c_int32, POINTER(_HANDLE), _ERR], _RESULT),
+    ("gait_pool_init", [_ARRAY, c_size_t, c_int32, POINTER(_HANDLE), _ERR], _RESULT),
     ("gait_pool_tasks", [_HANDLE], Tasks),
     ("gait_pool_stop", [_HANDLE], None),
     ("gait_lift_get_info", [_HANDLE, POINTER(LiftInfoC), _ERR], _RESULT),
@@ -285,36 +294,36 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_lift_bytes", [_HANDLE, POINTER(LiftConfigC), _SIZE, _ERR], _RESULT),
     (
         "gait_lift_init",
-        [c_void_p, c_size_t, _HANDLE, POINTER(LiftConfigC), POINTER(_HANDLE), _ERR],
+        [_ARRAY, c_size_t, _HANDLE, POINTER(LiftConfigC), POINTER(_HANDLE), _ERR],
         _RESULT,
     ),
     ("gait_lift_marker_name", [_HANDLE, c_int32], c_char_p),
-    ("gait_lift_segment", [_HANDLE, c_void_p, c_void_p, POINTER(LiftFitC), _ERR], _RESULT),
-    ("gait_lift_segment_robust", [_HANDLE, c_void_p, c_void_p, c_void_p, POINTER(LiftFitC), _ERR], _RESULT),
-    ("gait_lift_expect", [_HANDLE, c_void_p, c_double, c_double, _ERR], _RESULT),
-    ("gait_lift_positions", [_HANDLE, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_segment", [_HANDLE, _ARRAY, _ARRAY, POINTER(LiftFitC), _ERR], _RESULT),
+    ("gait_lift_segment_robust", [_HANDLE, _ARRAY, _ARRAY, _ARRAY, POINTER(LiftFitC), _ERR], _RESULT),
+    ("gait_lift_expect", [_HANDLE, _ARRAY, c_double, c_double, _ERR], _RESULT),
+    ("gait_lift_positions", [_HANDLE, _ARRAY, _ARRAY, _ERR], _RESULT),
     ("gait_lift_unknowns", [_HANDLE], c_int32),
-    ("gait_lift_posterior", [_HANDLE, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_posterior", [_HANDLE, _ARRAY, _ARRAY, _ERR], _RESULT),
     ("gait_lift_scale", [_HANDLE, POINTER(c_double), _ERR], _RESULT),
-    ("gait_lift_least_squares", [_HANDLE, c_void_p, _ERR], _RESULT),
-    ("gait_lift_uncertain", [_HANDLE, c_int32, c_void_p, c_void_p, _ERR], _RESULT),
-    ("gait_lift_fix", [_HANDLE, c_void_p, _ERR], _RESULT),
-    ("gait_lift_batch", [_HANDLE, c_int32, c_void_p, c_void_p, _ERR], _RESULT),
-    ("gait_lift_push", [_HANDLE, c_int64, c_void_p, c_void_p, _ERR], _RESULT),
+    ("gait_lift_least_squares", [_HANDLE, _ARRAY, _ERR], _RESULT),
+    ("gait_lift_uncertain", [_HANDLE, c_int32, _ARRAY, _ARRAY, _ERR], _RESULT),
+    ("gait_lift_fix", [_HANDLE, _ARRAY, _ERR], _RESULT),
+    ("gait_lift_batch", [_HANDLE, c_int32, _ARRAY, _ARRAY, _ERR], _RESULT),
+    ("gait_lift_push", [_HANDLE, c_int64, _ARRAY, _ARRAY, _ERR], _RESULT),
     ("gait_lift_estimate", [_HANDLE, POINTER(LiftFrameC), _ERR], _RESULT),
     ("gait_lift_reset", [_HANDLE], None),
     ("gait_start_fill", [POINTER(StartConfigC), c_size_t], None),
     ("gait_start_bytes", [_HANDLE, POINTER(StartConfigC), _SIZE, _ERR], _RESULT),
     (
         "gait_start_init",
-        [c_void_p, c_size_t, _HANDLE, POINTER(StartConfigC), POINTER(_HANDLE), _ERR],
+        [_ARRAY, c_size_t, _HANDLE, POINTER(StartConfigC), POINTER(_HANDLE), _ERR],
         _RESULT,
     ),
     ("gait_start_add", [_HANDLE, c_int64, POINTER(KeypointC), _ERR], _RESULT),
     ("gait_start_reset", [_HANDLE], None),
     ("gait_start_solve", [_HANDLE, c_int64, POINTER(HypothesisC), c_int32, POINTER(c_int32), _ERR], _RESULT),
-    ("gait_lift_remove_spikes", [c_int32, c_int32, c_void_p, c_void_p, c_void_p, c_void_p], c_int32),
-    ("gait_lift_weight_outliers", [c_int32, c_void_p, c_void_p, c_void_p], c_int32),
+    ("gait_lift_remove_spikes", [c_int32, c_int32, _ARRAY, _ARRAY, _ARRAY, _ARRAY], c_int32),
+    ("gait_lift_weight_outliers", [c_int32, _ARRAY, _ARRAY, _ARRAY], c_int32),
 )
 """Every C function: name, argument types, result type."""
 

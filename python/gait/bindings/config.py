@@ -152,7 +152,7 @@ class TrackerConfig(Config):
     @classmethod
     def _filled(cls, mode: int) -> Any:
         lib, c = library(), abi.TrackerConfigC()
-        lib.gait_tracker_fill(ctypes.byref(c), ctypes.sizeof(c), mode)
+        lib.gait_tracker_fill(c, ctypes.sizeof(c), mode)
         return c
 
     @classmethod
@@ -188,7 +188,7 @@ class LiftConfig(Config):
     @classmethod
     def _filled(cls, mode: int) -> Any:
         lib, c = library(), abi.LiftConfigC()
-        lib.gait_lift_fill(ctypes.byref(c), ctypes.sizeof(c))
+        lib.gait_lift_fill(c, ctypes.sizeof(c))
         return c
 
     @classmethod

@@ -8,6 +8,7 @@ import functools
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,14 +92,32 @@ def version_text(number: int) -> str:
     return f"{number // 10000}.{number // 100 % 100}.{number % 100}"
 
 
-def check(status: int, error: abi.Error | None = None, words: str = "") -> int:
-    """Raise what a negative status means, in the library's words or these; return any other."""
+def check(status: int, error: abi.Error | None = None) -> int:
+    """Raise what a negative status means, in the library's words; return any other."""
     if status >= 0:
         return status
     name = library().gait_result_name(status).decode()
     kind = _RAISES.get(abi.Status(status), GaitError)
-    text, index = (error.text.decode(errors="replace"), error.index) if error else (words, -1)
+    text, index = (error.text.decode(errors="replace"), error.index) if error else ("", -1)
     raise kind(status, name, text, index)
+
+
+def call(name: str, *arguments: Any) -> int:
+    """Call a function whose last argument is a ``gait_error *``; return what `check` does.
+
+    Structures are given as they are; ctypes passes pointers to them.
+    """
+    error = abi.Error()
+    return check(getattr(library(), name)(*arguments, error), error)
+
+
+def make(kind: str, *arguments: Any) -> tuple[ctypes.c_void_p, NDArray[np.uint8]]:
+    """Make an object by ``gait_KIND_bytes`` and ``gait_KIND_init``; return it and its memory."""
+    size, handle = ctypes.c_size_t(), ctypes.c_void_p()
+    call(f"gait_{kind}_bytes", *arguments, size)
+    memory = aligned(size.value)
+    call(f"gait_{kind}_init", memory, size.value, *arguments, handle)
+    return handle, memory
 
 
 def aligned(size: int) -> NDArray[np.uint8]:

@@ -16,15 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from gait.bindings import abi
 from gait.bindings.abi import LiftFlag, TrackStatus
 from gait.bindings.config import LiftConfig as LiftConfig
-from gait.bindings.library import aligned, check, library
+from gait.bindings.library import call, library, make
 from gait.bindings.model import Model, load
 from gait.camera.camera import Camera
 from gait.errors import GaitError
 
 Array = NDArray[np.float64]
-
-FITTED = "there is no segment yet; call segment() first"
-GAIN = "there is no gain yet; call fix() first"
 
 
 @dataclass(frozen=True)
@@ -165,18 +162,16 @@ class Lifter:
             raise TypeError("a view is missing; write Lifter(view=camera), or Lifter(model, camera)")
         self._model = source._loaded if isinstance(source, Model) else load(source)
         self.config = config or LiftConfig.default()
-        c, error, size = self.config.to_c(view), abi.Error(), ctypes.c_size_t()
-        lib, model, err = library(), self._model.handle, ctypes.byref(error)
-        check(lib.gait_lift_bytes(model, ctypes.byref(c), ctypes.byref(size), err), error)
-        self.memory_bytes = size.value
-        self._memory, self._handle = aligned(size.value), ctypes.c_void_p()
-        where = (self._memory.ctypes.data, size.value)
-        check(lib.gait_lift_init(*where, model, ctypes.byref(c), ctypes.byref(self._handle), err), error)
+        self._handle, self._memory = make("lift", self._model.handle, self.config.to_c(view))
+        self.memory_bytes = self._memory.nbytes
         info = abi.LiftInfoC()
-        check(lib.gait_lift_get_info(model, ctypes.byref(info), err), error)
+        call("gait_lift_get_info", self._model.handle, info)
         self.info = LiftInfo(**{item.name: getattr(info, item.name) for item in fields(LiftInfo)})
-        markers = range(self.info.markers)
-        self.names = tuple(lib.gait_lift_marker_name(self._handle, j).decode() for j in markers)
+        name_of = library().gait_lift_marker_name
+        self.names = tuple(name_of(self._handle, j).decode() for j in range(self.info.markers))
+
+    def _call(self, name: str, *arguments: object) -> None:
+        call(f"gait_lift_{name}", self._handle, *arguments)
 
     def _observations(self, uv: ArrayLike, sd: ArrayLike | None, *shape: int) -> tuple[Array, Array | None]:
         """Check shapes (..., J, 2) and (..., J)."""
@@ -202,17 +197,8 @@ class Lifter:
             Standard deviations in the same unit; the config's if left out.
         """
         points, sds = self._observations(uv, sd, *self._shape)
-        c, error = abi.LiftFitC(), abi.Error()
-        check(
-            library().gait_lift_segment(
-                self._handle,
-                points.ctypes.data,
-                sds.ctypes.data if sds is not None else None,
-                ctypes.byref(c),
-                ctypes.byref(error),
-            ),
-            error,
-        )
+        c = abi.LiftFitC()
+        self._call("segment", points, sds, c)
         return _fit(c)
 
     def segment_robust(self, uv: ArrayLike, sd: ArrayLike | None = None) -> tuple[Fit, Array]:
@@ -225,18 +211,8 @@ class Lifter:
             Standard deviations that count: larger than `sd` for outliers.
         """
         points, sds = self._observations(uv, sd, *self._shape)
-        c, error, weighted = abi.LiftFitC(), abi.Error(), np.empty(self._shape)
-        check(
-            library().gait_lift_segment_robust(
-                self._handle,
-                points.ctypes.data,
-                sds.ctypes.data if sds is not None else None,
-                weighted.ctypes.data,
-                ctypes.byref(c),
-                ctypes.byref(error),
-            ),
-            error,
-        )
+        c, weighted = abi.LiftFitC(), np.empty(self._shape)
+        self._call("segment_robust", points, sds, weighted, c)
         return _fit(c), weighted
 
     def expect(self, place: ArrayLike, heading: float = 0.0, heading_sd: float = -1.0) -> None:
@@ -244,27 +220,19 @@ class Lifter:
 
         A `heading_sd` of -1 leaves the heading unknown.  The lifter must have been made so.
         """
-        where, error = np.ascontiguousarray(place, np.float64).reshape(3), abi.Error()
-        check(
-            library().gait_lift_expect(
-                self._handle, where.ctypes.data, heading, heading_sd, ctypes.byref(error)
-            ),
-            error,
-        )
+        self._call("expect", np.ascontiguousarray(place, np.float64).reshape(3), heading, heading_sd)
 
     def positions(self) -> tuple[Array, Array]:
         """Give posterior mean and standard deviation (F, J, 3) of the last segment or of `fix`; metres."""
         mean, sd = np.empty((*self._shape, 3)), np.empty((*self._shape, 3))
-        status = library().gait_lift_positions(self._handle, mean.ctypes.data, sd.ctypes.data, None)
-        check(status, words=FITTED)
+        self._call("positions", mean, sd)
         return mean, sd
 
     def posterior(self) -> tuple[Array, Array]:
         """Mean (n,) and covariance (n, n) of modes, place, stature and heading; each N(0, 1) a priori."""
         count = library().gait_lift_unknowns(self._handle)
         mean, covariance = np.empty(count), np.empty((count, count))
-        status = library().gait_lift_posterior(self._handle, mean.ctypes.data, covariance.ctypes.data, None)
-        check(status, words=FITTED)
+        self._call("posterior", mean, covariance)
         return mean, covariance
 
     def scale(self) -> float:
@@ -278,13 +246,13 @@ class Lifter:
         after `fix`.
         """
         scale = ctypes.c_double()
-        check(library().gait_lift_scale(self._handle, ctypes.byref(scale), None), words=FITTED)
+        self._call("scale", scale)
         return scale.value
 
     def least_squares(self) -> Array:
         """Fit the last segment's observations alone (F, J, 3): least squares of minimum norm."""
         mean = np.empty((*self._shape, 3))
-        check(library().gait_lift_least_squares(self._handle, mean.ctypes.data, None), words=FITTED)
+        self._call("least_squares", mean)
         return mean
 
     def uncertain(self, count: int = 3) -> tuple[Array, Array]:
@@ -301,44 +269,31 @@ class Lifter:
         if not 1 <= count <= most:
             raise ValueError(f"count is {count}; give one from 1 to {most}")
         sd, modes = np.empty(count), np.empty((count, *self._shape, 3))
-        status = library().gait_lift_uncertain(self._handle, count, modes.ctypes.data, sd.ctypes.data, None)
-        check(status, words=FITTED)
+        self._call("uncertain", count, modes, sd)
         return sd, modes
 
     def fix(self, sd: ArrayLike) -> None:
         """Compute the gain for standard deviations `sd` (F, J): orthographic view, config `heading_sd` 0."""
-        sds, error = np.ascontiguousarray(np.broadcast_to(sd, self._shape), np.float64), abi.Error()
-        check(library().gait_lift_fix(self._handle, sds.ctypes.data, ctypes.byref(error)), error)
+        self._call("fix", np.ascontiguousarray(np.broadcast_to(sd, self._shape), np.float64))
 
     def batch(self, uv: ArrayLike) -> Array:
         """Lift segments (n, F, J, 2) by the gain of `fix`; posterior means (n, F, J, 3)."""
         count = len(np.asarray(uv))
         points, _ = self._observations(uv, None, count, *self._shape)
         mean = np.empty((*points.shape[:-1], 3))
-        status = library().gait_lift_batch(self._handle, count, points.ctypes.data, mean.ctypes.data, None)
-        check(status, words=GAIN)
+        self._call("batch", count, points, mean)
         return mean
 
     def push(self, utime: int, uv: ArrayLike, sd: ArrayLike | None = None) -> None:
         """Add one frame to the stream: uv (J, 2), sd (J,); microseconds, increasing."""
         points, sds = self._observations(uv, sd, self.info.markers)
-        error = abi.Error()
-        check(
-            library().gait_lift_push(
-                self._handle,
-                utime,
-                points.ctypes.data,
-                sds.ctypes.data if sds is not None else None,
-                ctypes.byref(error),
-            ),
-            error,
-        )
+        self._call("push", utime, points, sds)
 
     def estimate(self) -> LiftedFrame | None:
         """Estimate the frame `lag` frames before the last one pushed; None: not so many yet."""
         c = abi.LiftFrameC()
         try:
-            check(library().gait_lift_estimate(self._handle, ctypes.byref(c), None))
+            self._call("estimate", c)
         except GaitError as exc:
             if exc.status == abi.Status.STATE:
                 return None
@@ -382,9 +337,7 @@ def remove_spikes(time: ArrayLike, uv: ArrayLike, sd: ArrayLike) -> Array:
     """
     at, points = np.ascontiguousarray(time, np.float64), np.ascontiguousarray(uv, np.float64)
     kept, scratch = np.array(np.broadcast_to(sd, points.shape[:2]), np.float64), np.empty(2 * len(at))
-    library().gait_lift_remove_spikes(
-        *points.shape[:2], at.ctypes.data, points.ctypes.data, kept.ctypes.data, scratch.ctypes.data
-    )
+    library().gait_lift_remove_spikes(*points.shape[:2], at, points, kept, scratch)
     return kept
 
 
@@ -397,8 +350,5 @@ def weight_outliers(square: ArrayLike, sd: ArrayLike) -> Array:
         Squared distances of the points of one frame from their prediction, in standard deviations.
     """
     distances, weighted = np.ascontiguousarray(square, np.float64), np.array(sd, np.float64)
-    scratch = np.empty(len(distances))
-    library().gait_lift_weight_outliers(
-        len(distances), distances.ctypes.data, weighted.ctypes.data, scratch.ctypes.data
-    )
+    library().gait_lift_weight_outliers(len(distances), distances, weighted, np.empty(len(distances)))
     return weighted

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings import abi
-from gait.bindings.library import aligned, check, library
+from gait.bindings.library import aligned, call, check, library, make
 from gait.bindings.state import State
 from gait.body.model_curves import slope_of
 from gait.camera.camera import Camera
@@ -45,15 +45,10 @@ def load(source: str | os.PathLike[str] | bytes | None) -> LoadedModel:
         If a blob given as bytes is refused.
     """
     contents = source if isinstance(source, bytes) else read_blob(source)
-    lib = library()
     blob = aligned(len(contents))
     blob[:] = np.frombuffer(contents, np.uint8)
-    size, error, handle = ctypes.c_size_t(), abi.Error(), ctypes.c_void_p()
-    where, err = (blob.ctypes.data, len(contents)), ctypes.byref(error)
     try:
-        check(lib.gait_model_bytes(*where, ctypes.byref(size), err), error)
-        memory = aligned(size.value)
-        check(lib.gait_model_init(memory.ctypes.data, size.value, *where, ctypes.byref(handle), err), error)
+        handle, memory = make("model", blob, len(contents))
     except GaitError as exc:
         if isinstance(source, bytes):
             raise
@@ -143,9 +138,8 @@ class Model:
 
     def pose(self, state: State) -> tuple[Array, Array]:
         """Joint positions (P, 3) in the world, metres, and joint angles (A,), radians, of one hypothesis."""
-        c, error = abi.PoseC(), abi.Error()
-        where = (ctypes.byref(state.to_c()), ctypes.byref(c), ctypes.byref(error))
-        check(self._lib.gait_model_pose(self.handle, *where), error)
+        c = abi.PoseC()
+        call("gait_model_pose", self.handle, state.to_c(), c)
         return pose_arrays(c, self.info.joints, self.info.angles)
 
     def poses(self, states: NDArray[np.void]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -155,48 +149,42 @@ class Model:
         joint, angle = np.ctypeslib.as_array(pose.joint), np.ctypeslib.as_array(pose.angle)
         joints = np.empty((len(flat), self.info.joints, 3), np.float32)
         angles = np.empty((len(flat), self.info.angles), np.float32)
-        begin, size, call = flat.ctypes.data, flat.dtype.itemsize, self._lib.gait_model_pose
+        begin, size, pose_of = flat.ctypes.data, flat.dtype.itemsize, self._lib.gait_model_pose
         for i in range(len(flat)):
             state = ctypes.cast(begin + i * size, pointer)
-            check(call(self.handle, state, ctypes.byref(pose), ctypes.byref(error)), error)
+            check(pose_of(self.handle, state, ctypes.byref(pose), ctypes.byref(error)), error)
             joints[i], angles[i] = joint[: self.info.joints], angle[: self.info.angles]
         shape = states.shape
         return joints.reshape(*shape, *joints.shape[1:]), angles.reshape(*shape, *angles.shape[1:])
 
     def pelvis_height(self, state: State) -> float:
         """Height of the pelvis over the ground that the model predicts, metres (for any ``state.pelvis``)."""
-        height, error = ctypes.c_float(), abi.Error()
-        where = (ctypes.byref(state.to_c()), ctypes.byref(height), ctypes.byref(error))
-        check(self._lib.gait_model_pelvis_height(self.handle, *where), error)
+        height = ctypes.c_float()
+        call("gait_model_pelvis_height", self.handle, state.to_c(), height)
         return height.value
 
     def angle_mask(self, names: str) -> int:
         """Bit i for each angle i named in `names`, separated by spaces; see config `offset_angles`."""
-        mask, error = ctypes.c_uint32(), abi.Error()
-        where = (names.encode(), ctypes.byref(mask), ctypes.byref(error))
-        check(self._lib.gait_model_angle_mask(self.handle, *where), error)
+        mask = ctypes.c_uint32()
+        call("gait_model_angle_mask", self.handle, names.encode(), mask)
         return mask.value
 
     def prior(self) -> tuple[State, State]:
         """Mean and standard deviation of an unknown person, with the pelvis at the origin."""
-        mean, sd, error = abi.StateC(), abi.StateC(), abi.Error()
-        where = (ctypes.byref(mean), ctypes.byref(sd), ctypes.byref(error))
-        check(self._lib.gait_tracker_prior(self.handle, *where), error)
+        mean, sd = abi.StateC(), abi.StateC()
+        call("gait_tracker_prior", self.handle, mean, sd)
         sizes = (self.info.components, self.info.angles)
         return State.from_c(mean, *sizes), State.from_c(sd, *sizes)
 
     def render(self, camera: Camera, state: State) -> NDArray[np.uint8]:
         """Draw a hypothesis through an ideal lens: (height, width) of limb index + 1, or 0 for none."""
         ids = np.zeros((camera.height, camera.width), np.uint8)
-        pixels = ids.ctypes.data_as(ctypes.POINTER(ctypes.c_uint8))
-        view, error = camera_c(camera), abi.Error()
-        drawn = (ctypes.byref(view), ctypes.byref(state.to_c()), pixels, camera.width, ctypes.byref(error))
-        check(self._lib.gait_render(self.handle, *drawn), error)
+        call("gait_render", self.handle, camera_c(camera), state.to_c(), ids, camera.width)
         return ids
 
     def _read_info(self) -> ModelInfo:
         c = abi.ModelInfoC()
-        check(self._lib.gait_model_get_info(self.handle, ctypes.byref(c), None))
+        call("gait_model_get_info", self.handle, c)
         return ModelInfo(**{name: getattr(c, name) for name, *_ in c._fields_ if name != "reserved"})
 
 

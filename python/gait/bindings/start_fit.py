@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gait.bindings import abi
 from gait.bindings.frame import Joints, track_array
-from gait.bindings.library import aligned, check, library
+from gait.bindings.library import call, library, make
 from gait.bindings.model import Model, camera_c
 from gait.bindings.state import State
 from gait.camera.camera import Camera
@@ -60,24 +60,16 @@ class StartFit:
     def __init__(
         self, model: Model, camera: Camera, *, stature: float | None = None, stature_sd: float | None = None
     ) -> None:
-        lib, config, error, size = library(), abi.StartConfigC(), abi.Error(), ctypes.c_size_t()
-        self._model, err = model, ctypes.byref(error)
-        lib.gait_start_fill(ctypes.byref(config), ctypes.sizeof(config))
+        self._model, config = model, abi.StartConfigC()
+        library().gait_start_fill(config, ctypes.sizeof(config))
         config.camera = camera_c(camera)
         config.stature = config.stature if stature is None else stature
         config.stature_sd = config.stature_sd if stature_sd is None else stature_sd
-        check(lib.gait_start_bytes(model.handle, ctypes.byref(config), ctypes.byref(size), err), error)
-        self._memory, self._handle = aligned(size.value), ctypes.c_void_p()
-        place = (self._memory.ctypes.data, size.value)
-        check(
-            lib.gait_start_init(*place, model.handle, ctypes.byref(config), ctypes.byref(self._handle), err),
-            error,
-        )
+        self._handle, self._memory = make("start", model.handle, config)
 
     def add(self, utime: int, keypoints: Joints) -> None:
         """Add the keypoints of one frame; the time, microseconds, must increase."""
-        error, array = abi.Error(), track_array(keypoints, self._model.joint_names)
-        check(library().gait_start_add(self._handle, utime, array, ctypes.byref(error)), error)
+        call("gait_start_add", self._handle, utime, track_array(keypoints, self._model.joint_names))
 
     def reset(self) -> None:
         """Forget the frames."""
@@ -91,9 +83,8 @@ class StartFit:
         GaitError
             If too few frames show hips and ankles (four or more over 0.3 s are needed), or nothing fits.
         """
-        found, count, error = (abi.HypothesisC * abi.MAX_HYPOTHESES)(), ctypes.c_int32(), abi.Error()
-        arguments = (utime, found, abi.MAX_HYPOTHESES, ctypes.byref(count), ctypes.byref(error))
-        check(library().gait_start_solve(self._handle, *arguments), error)
+        found, count = (abi.HypothesisC * abi.MAX_HYPOTHESES)(), ctypes.c_int32()
+        call("gait_start_solve", self._handle, utime, found, abi.MAX_HYPOTHESES, count)
         return [self._hypothesis(c) for c in found[: count.value]]
 
     def _hypothesis(self, c: abi.HypothesisC) -> Hypothesis:

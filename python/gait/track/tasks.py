@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from gait.bindings import abi
-from gait.bindings.library import aligned, check, library
+from gait.bindings.library import library, make
 
 Runner = Callable[[Callable[[int], None], int], None]
 """Called with (task, count): must call ``task(i)`` once for each i in range(count) and then return."""
@@ -68,11 +68,7 @@ class PoolTasks:
 
     def __init__(self, count: int) -> None:
         lib = library()
-        size, handle, err = ctypes.c_size_t(), ctypes.c_void_p(), abi.Error()
-        check(lib.gait_pool_bytes(count, ctypes.byref(size), ctypes.byref(err)), err)
-        self._memory = aligned(size.value)
-        where = (self._memory.ctypes.data, size.value)
-        check(lib.gait_pool_init(*where, count, ctypes.byref(handle), ctypes.byref(err)), err)
+        handle, self._memory = make("pool", count)
         self.struct: abi.Tasks = lib.gait_pool_tasks(handle)
         # The memory must outlive the threads: the finaliser holds it as well.
         weakref.finalize(self, _stop, lib, handle, self._memory, os.getpid())

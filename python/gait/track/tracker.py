@@ -16,11 +16,11 @@ from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
 from gait.bindings.frame import Joints, capture_time, image_view, per_camera, track_array
 from gait.bindings.initial import Start
-from gait.bindings.library import aligned, check, library
+from gait.bindings.library import aligned, call, library, make
 from gait.bindings.model import Model, camera_c
 from gait.bindings.state import LEAST_STATURE, State
 from gait.camera.camera import Camera
-from gait.errors import UserError
+from gait.errors import GaitError, UserError
 from gait.io.video import Frame, Image, Video
 from gait.track.tasks import PythonTasks, Runner, TaskSource, threads
 
@@ -65,7 +65,6 @@ class Tracker:
         background: Image | Sequence[Image | None] | None = None,
         tasks: int | Runner | TaskSource = 1,
     ) -> None:
-        self._lib = library()
         if not isinstance(model, Model):
             raise ValueError(f"model: {model!r} is no gait.Model; give gait.Model(FILE)")
         self.model = model
@@ -74,17 +73,10 @@ class Tracker:
         if config.offset_angles < 0:
             config = config.replace(offset_angles=model.info.posture_angles)
         self.config = config.replace(tasks=tasks) if isinstance(tasks, int) and tasks > 1 else config
-        self._error = abi.Error()
         c = self._c_config()
-        size, handle = ctypes.c_size_t(), ctypes.c_void_p()
-        settings, err = ctypes.byref(c), ctypes.byref(self._error)
-        self._check(self._lib.gait_tracker_bytes(model.handle, settings, ctypes.byref(size), err))
-        self.memory_bytes = size.value
-        self.isa: str = self._lib.gait_cpu_name(c.cpu_mask).decode()
-        self._memory = aligned(size.value)
-        where = (self._memory.ctypes.data, size.value)
-        self._check(self._lib.gait_tracker_init(*where, model.handle, settings, ctypes.byref(handle), err))
-        self._handle = handle
+        self._handle, self._memory = make("tracker", model.handle, c)
+        self.memory_bytes = self._memory.nbytes
+        self.isa: str = library().gait_cpu_name(c.cpu_mask).decode()
         self._plates: dict[int, Image] = {}
         self.start_stature_sd = 0.0
         self.step_seconds = 0.0
@@ -101,9 +93,8 @@ class Tracker:
         view = None
         if plate is not None:
             plate = np.array(plate, order="C")
-            view = ctypes.byref(image_view(plate, self.cameras[camera], "background"))
-        err = ctypes.byref(self._error)
-        check(self._lib.gait_tracker_set_background(self._handle, camera, view, err), self._error)
+            view = image_view(plate, self.cameras[camera], "background")
+        self._call("set_background", camera, view)
         if plate is None:
             self._plates.pop(camera, None)
         else:
@@ -119,9 +110,7 @@ class Tracker:
         utime : int
             Time of the first frame, microseconds.
         """
-        means, sds = ctypes.byref(mean.to_c()), ctypes.byref(sd.to_c())
-        err = ctypes.byref(self._error)
-        self._check(self._lib.gait_tracker_start(self._handle, means, sds, capture_time(utime), err))
+        self._call("start", mean.to_c(), sd.to_c(), capture_time(utime))
         self.start_stature_sd = sd.stature / max(mean.stature, LEAST_STATURE)
 
     def step(
@@ -153,11 +142,9 @@ class Tracker:
             if array is not None:
                 frame.keypoints[i] = array
         out = abi.EstimateC()
-        arguments = (ctypes.byref(frame), ctypes.byref(out), ctypes.byref(self._error))
         begun = time.perf_counter()
-        status = self._lib.gait_tracker_step(self._handle, *arguments)
+        self._call("step", frame, out)
         self.step_seconds = time.perf_counter() - begun
-        self._check(status)
         return Estimate.from_c(out, self.model)
 
     def lagged(self, back: int | None = None) -> Estimate | None:
@@ -174,12 +161,12 @@ class Tracker:
             None if there were not so many steps since the start.
         """
         out = abi.EstimateC()
-        steps = self.config.lag if back is None else back
-        arguments = (ctypes.byref(out), ctypes.byref(self._error))
-        status = self._lib.gait_tracker_lagged(self._handle, steps, *arguments)
-        if status == abi.Status.STATE:
-            return None
-        self._check(status)
+        try:
+            self._call("lagged", self.config.lag if back is None else back, out)
+        except GaitError as exc:
+            if exc.status == abi.Status.STATE:
+                return None
+            raise
         return Estimate.from_c(out, self.model)
 
     def follow(
@@ -220,17 +207,14 @@ class Tracker:
 
     def particles(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:
         """All particles: structured array (N,) with the fields of ``gait_state``, and their weights (N,)."""
-        err = ctypes.byref(self._error)
-        count = check(self._lib.gait_tracker_particles(self._handle, None, None, 0, err), self._error)
-        states = (abi.StateC * count)()
-        weights = np.zeros(count, np.float32)
-        pointer = weights.ctypes.data_as(ctypes.POINTER(ctypes.c_float))
-        check(self._lib.gait_tracker_particles(self._handle, states, pointer, count, err), self._error)
+        count = self._call("particles", None, None, 0)
+        states, weights = (abi.StateC * count)(), np.zeros(count, np.float32)
+        self._call("particles", states, weights, count)
         return np.ctypeslib.as_array(states), weights
 
     def digest(self) -> int:
         """Hash of the whole state: equal after equal input, whatever the threads or the machine."""
-        return int(self._lib.gait_tracker_digest(self._handle))
+        return int(library().gait_tracker_digest(self._handle))
 
     def save(self) -> bytes:
         """Copy of the whole state, for `restore` into a tracker of the same model and configuration.
@@ -238,24 +222,24 @@ class Tracker:
         Empty scenes are not in it: give the other tracker its own (`set_background`).
         """
         size = ctypes.c_size_t()
-        check(self._lib.gait_tracker_save(self._handle, None, 0, ctypes.byref(size), None))
+        self._call("save", None, 0, size)
         memory = aligned(size.value)
-        where = (memory.ctypes.data, size.value)
-        check(self._lib.gait_tracker_save(self._handle, *where, ctypes.byref(size), None))
+        self._call("save", memory, size.value, size)
         return memory[: size.value].tobytes()
 
     def restore(self, snapshot: bytes) -> None:
         """Take over a state from `save`; a failure leaves this one as it was."""
         memory = aligned(len(snapshot))
         memory[:] = np.frombuffer(snapshot, np.uint8)
-        err = ctypes.byref(self._error)
-        self._check(self._lib.gait_tracker_restore(self._handle, memory.ctypes.data, len(snapshot), err))
+        self._call("restore", memory, len(snapshot))
 
-    def _check(self, status: int) -> None:
-        """Raise what happened in a callback, else what the status means."""
-        if self._tasks is not None:
-            self._tasks.reraise()
-        check(status, self._error)
+    def _call(self, name: str, *arguments: object) -> int:
+        """Call a function of the tracker; raise what happened in a callback, else what it refuses."""
+        try:
+            return call(f"gait_tracker_{name}", self._handle, *arguments)
+        finally:
+            if self._tasks is not None:
+                self._tasks.reraise()
 
     def _c_config(self) -> abi.TrackerConfigC:
         c = self.config.to_c()
