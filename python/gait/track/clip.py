@@ -17,13 +17,11 @@ from gait.track.clip_output import write
 from gait.track.follow import Follower
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
-from gait.track.scene import Scene, first_state
 from gait.track.person_keypoints import PersonKeypoints
+from gait.track.scene import Scene, first_state
 from gait.track.tracker import Tracker
 
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
-
-_FEW = 0.1  # of the frames: a person followed in fewer was hardly the right one, or not there
 
 
 def track_clip(options: ClipOptions) -> dict[str, Any]:
@@ -46,6 +44,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     results = write(options, scene.video, tracker, scene.frames, found)
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
+    note("; ".join(results.coverage()), options.quiet)
     if options.trc:
         times, joints = np.array(results.times), np.array(results.joints)
         write_trc(options.trc, scene.model.joint_names, times, joints, scene.video.fps)

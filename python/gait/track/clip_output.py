@@ -67,10 +67,6 @@ class Results:
             out.append(f"{what} at frame {first}" + (f", back at frame {after[0][0]}" if after else ""))
         return out
 
-    def followed(self) -> int:
-        """Count the frames in which the person was not lost."""
-        return sum(not lost for _, lost, _ in self._frames)
-
     def summary(self, threads: int) -> dict[str, Any]:
         """Return the figures of ``--json``; step_ms is the time inside gait_tracker_step alone."""
         tracker = self._tracker
