@@ -20,12 +20,26 @@ static float log_likelihood(const like_body *b)
     return -((float)(b->area - b->covered) + b->setup->missed_weight * missed) / TYPICAL;
 }
 
-/* Without a person all foreground is missed and no background is inside the body. */
+/* Share of foreground among the cells in the image that the body does not cover. */
+static float density_outside(const like_body *b)
+{
+    int32_t cells = 0;
+    for (int32_t y = 0; y < GRID_SIZE; y++)
+        for (int32_t w = 0; w < GRID_WORDS; w++)
+            cells += grid_popcount(b->features->inside[y][w]);
+    int32_t const outside = cells * FOREGROUND_ONE - b->area;
+    return outside > 0 ? (float)(b->features->foreground_total - b->covered) / (float)outside : 0.0f;
+}
+
+/* Without a person all foreground is missed and no background is inside the body.  Where most of the image is
+ * foreground, as after the camera has moved, any body would gain by that: what it gains by chance does not count. */
 static float support(const like_body *b)
 {
     if (!b->features->has_foreground)
         return 0.0f;
-    return (b->setup->missed_weight * (float)b->covered - (float)(b->area - b->covered)) / TYPICAL;
+    float const missed = b->setup->missed_weight, area = (float)b->area, density = density_outside(b);
+    float const gain = missed * (float)b->covered - (float)(b->area - b->covered);
+    return (gain - f_max(0.0f, (missed * density - (1.0f - density)) * area)) / TYPICAL;
 }
 
 like_parts like_silhouette_parts(const like_body *b)

@@ -9,7 +9,7 @@ import numpy as np
 from gait.bindings.abi import Term
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
-from gait.bindings.initial import Start
+from gait.bindings.initial import Start, set_height
 from gait.io.trc import write_trc
 from gait.progress import note
 from gait.track.auto_start import AutoStart
@@ -18,6 +18,7 @@ from gait.track.follow import Follower
 from gait.track.keypoint_start import find_keypoint_start
 from gait.track.options import KEYPOINTS_SD, ClipOptions
 from gait.track.person_keypoints import PersonKeypoints
+from gait.track.plausible import Plausibility
 from gait.track.scene import Scene, first_state
 from gait.track.tracker import Tracker
 
@@ -40,8 +41,11 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     if scene.people:
         config = config.replace(terms=config.terms | Term.KEYPOINTS)
     tracker = Tracker(scene.model, scene.camera, config, background=scene.plate, tasks=options.threads)
-    found = _follower(options, scene, tracker).follow(start, scene.frames)
-    results = write(options, scene.video, tracker, scene.frames, found)
+    keypoints = PersonKeypoints(scene.camera, scene.joints, scene.person)
+    plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
+    follower = _follower(options, scene, tracker, keypoints, plausibility)
+    found = follower.follow(start, scene.frames)
+    results = write(options, scene.video, tracker, scene.frames, found, plausibility)
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)
@@ -51,19 +55,35 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     return results.summary(options.threads)
 
 
-def _follower(options: ClipOptions, scene: Scene, tracker: Tracker) -> Follower:
+def _stature(options: ClipOptions, scene: Scene, start: Start) -> tuple[float, float]:
+    """Stature to expect and its standard deviation: of the start, if pictures alone did not guess it."""
+    mean, sd = start.mean, start.sd
+    if options.init == "auto" and not scene.people:
+        mean, sd = scene.model.prior()
+        if options.height is not None:
+            set_height(mean, sd, options.height)
+    return mean.stature, sd.stature
+
+
+def _follower(
+    options: ClipOptions,
+    scene: Scene,
+    tracker: Tracker,
+    keypoints: PersonKeypoints,
+    plausibility: Plausibility,
+) -> Follower:
     def find_again(first: int, lost: Estimate) -> Start | None:
         if not scene.people:
             return None
         stature = options.height or lost.mean.stature
-        keypoints = scene.people[scene.person]
         stop = scene.frames.stop
         return find_keypoint_start(
-            keypoints, scene.camera, scene.model, first=first, stop=stop, height=stature
+            scene.people[scene.person], scene.camera, scene.model, first=first, stop=stop, height=stature
         )
 
     auto_start = None
     if not options.smooth and not scene.people:
         auto_start = AutoStart(scene.camera, scene.plate, scene.model, options.height)
-    keypoints = PersonKeypoints(scene.camera, scene.joints, scene.person)
-    return Follower(tracker, scene.video, keypoints, find_again, auto_start, one_pass=options.smooth)
+    return Follower(
+        tracker, scene.video, keypoints, plausibility, find_again, auto_start, one_pass=options.smooth
+    )

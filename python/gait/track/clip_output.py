@@ -20,6 +20,7 @@ from gait.io.video import Frame, Video, VideoWriter
 from gait.progress import durations, progress
 from gait.report.drawing import Overlay
 from gait.track.options import ClipOptions
+from gait.track.plausible import Plausibility
 from gait.track.smooth import Smoother
 from gait.track.tracker import Tracker
 
@@ -89,6 +90,7 @@ def write(
     tracker: Tracker,
     span: range,
     found: Iterable[tuple[Frame, Estimate]],
+    plausibility: Plausibility,
 ) -> Results:
     """Write the estimates into all outputs, which appear together at the end."""
     model, results = tracker.model, Results(tracker)
@@ -111,13 +113,15 @@ def write(
                 sink(frame, estimate)
             update(done)
         if smoother is not None and len(smoother):
-            _smooth(options, video, smoother, sinks)
+            _smooth(options, video, smoother, sinks, plausibility)
         if not results.times:
             raise UserError(f"{video.path}: no frame from {span.start} on can be decoded; convert it anew")
     return results
 
 
-def _smooth(options: ClipOptions, video: Video, smoother: Smoother, sinks: list[Sink]) -> None:
+def _smooth(
+    options: ClipOptions, video: Video, smoother: Smoother, sinks: list[Sink], plausibility: Plausibility
+) -> None:
     """Give every frame with its smoothed estimate to the sinks, and write the draws."""
     with progress("smoothing", len(smoother), options.quiet) as update:
         rows, draws = smoother.finish(update=update)
@@ -126,6 +130,8 @@ def _smooth(options: ClipOptions, video: Video, smoother: Smoother, sinks: list[
     frames: Iterable[Frame] = (frame for frame, _ in rows)
     if options.overlay:  # decode the pictures once more
         frames = video.frames(rows[0][0].number, rows[-1][0].number + 1)
+    plausibility.restart()
     for frame, (_, estimate) in zip(frames, rows, strict=True):
+        judged = plausibility.judged(frame, estimate)
         for sink in sinks:
-            sink(frame, estimate)
+            sink(frame, judged)

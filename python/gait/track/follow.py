@@ -13,9 +13,11 @@ from gait.bindings.initial import DEFAULT_SD, Start
 from gait.io.video import Frame, Video
 from gait.track.auto_start import AutoStart
 from gait.track.person_keypoints import PersonKeypoints
+from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
 
 _GIVE_UP = 1.0  # seconds after a loss for which the person is looked for backwards
+_UNSUPPORTED = 0.34  # seconds without support before the tracker calls a person lost (track_loss.c)
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
 _FOLLOWED = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
 
@@ -32,6 +34,8 @@ class Follower:
     video : Video
         As visible by the tracker's only camera.
     keypoints : PersonKeypoints
+    plausibility : Plausibility
+        Of its estimates.
     find_again : FindAgain
     auto_start : AutoStart, optional
         Finds a lost person by the pictures.
@@ -45,12 +49,14 @@ class Follower:
         tracker: Tracker,
         video: Video,
         keypoints: PersonKeypoints,
+        plausibility: Plausibility,
         find_again: FindAgain,
         auto_start: AutoStart | None = None,
         *,
         one_pass: bool = False,
     ) -> None:
         self._tracker, self._video, self._keypoints = tracker, video, keypoints
+        self._plausibility = plausibility
         self._find_again, self._auto_start, self._one_pass = find_again, auto_start, one_pass
 
     def follow(self, start: Start, frames: range) -> Iterator[tuple[Frame, Estimate]]:
@@ -62,7 +68,7 @@ class Follower:
         for frame in self._video.frames(min(before, default=following.frame), frames.stop):
             if following is not None and frame.number == following.frame:
                 if lost:
-                    self._tracker.start(following.mean, following.sd, frame.utime)
+                    self._start(self._tracker, following, frame.utime)
                     now, lost, supported = None, False, frame.time
                 following = None
             elif now is None and lost:
@@ -83,7 +89,11 @@ class Follower:
 
     def _step(self, tracker: Tracker, frame: Frame, utime: int, last: Estimate | None) -> Estimate:
         joints = self._keypoints.choose(frame.number, last)
-        return self._keypoints.checked(frame.number, tracker.step(frame.image, utime, joints))
+        return self._plausibility.judged(frame, tracker.step(frame.image, utime, joints))
+
+    def _start(self, tracker: Tracker, start: Start, utime: int) -> None:
+        tracker.start(start.mean, start.sd, utime)
+        self._plausibility.restart()
 
     def _restarted(self, auto_start: AutoStart, frame: Frame, estimate: Estimate) -> bool:
         """Whether a person who was lost is found in the pictures; the tracker starts anew with them."""
@@ -95,7 +105,7 @@ class Follower:
         if not auto_start.walks_in(frame):
             return False
         anew = auto_start.state(latest=True)
-        self._tracker.start(anew.mean, anew.sd, frame.utime)
+        self._start(self._tracker, anew, frame.utime)
         return True
 
     def _earlier(self, start: Start, first: int) -> tuple[Start, dict[int, Estimate]]:
@@ -111,19 +121,21 @@ class Follower:
         config = self._tracker.config.replace(reverse=1.0)
         tracker = self._tracker.like(config)
         found: dict[int, Estimate] = {}
-        origin, visible, last = None, 0.0, None
-        earliest = start.frame
+        last, lost_since = None, np.inf
         for frame in self._video.backwards(start.frame + 1, first):
-            if origin is None:
-                origin, visible = frame.utime, frame.time
-                tracker.start(start.mean, start.sd, -frame.utime)
+            if last is None:
+                self._start(tracker, start, -frame.utime)
             last = self._step(tracker, frame, -frame.utime, last)
             found[frame.number] = replace(last, utime=frame.utime, frame=frame.number - start.frame)
-            if last.status in _FOLLOWED:
-                earliest, visible = frame.number, frame.time
-            elif visible - frame.time > _GIVE_UP:
+            if last.status != TrackStatus.LOST:
+                lost_since = np.inf
+            elif lost_since == np.inf:
+                lost_since = frame.time
+            elif lost_since - frame.time > _GIVE_UP:
                 break
-        return {number: now for number, now in sorted(found.items()) if earliest <= number < start.frame}
+        # Nothing showed the person for a while before the tracker called them lost.
+        visible = 0 if lost_since == np.inf else round(1e6 * (lost_since + _UNSUPPORTED))
+        return {n: now for n, now in sorted(found.items()) if now.utime >= visible and n < start.frame}
 
 
 def _start(now: Estimate, frame: int, start: Start) -> Start:

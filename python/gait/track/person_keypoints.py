@@ -7,7 +7,6 @@ Keypoints of someone else, or of a detector that jumped, are left out.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,14 +55,15 @@ class PersonKeypoints:
             self._distance(estimate, joints) > _GATE for joints in self._found(frame)
         )
 
-    def checked(self, frame: int, estimate: Estimate) -> Estimate:
-        """Call an estimate `ambiguous`, not `tracking`, where the keypoints of a frame disagree with it."""
-        if estimate.status != TrackStatus.TRACKING or not self._found(frame):
-            return estimate
+    def agree(self, frame: int, estimate: Estimate) -> bool | None:
+        """Whether the keypoints in a frame agree with the estimate, legs included; None if there are none."""
+        if not self._found(frame):
+            return None
         joints = self.choose(frame, estimate)
-        legs = np.empty(0) if joints is None else self._apart(estimate, joints, _LEGS)
-        agrees = joints is not None and (not len(legs) or legs.mean() < _AGREE)
-        return estimate if agrees else replace(estimate, status=TrackStatus.AMBIGUOUS)
+        if joints is None:
+            return False
+        legs = self._apart(estimate, joints, _LEGS)
+        return not len(legs) or bool(legs.mean() < _AGREE)
 
     def _own(self, frame: int) -> Joints | None:
         joints = self._joints.get(self._person, {}).get(frame)

@@ -1,0 +1,62 @@
+"""Which estimates are called `tracking`: what keypoints confirm or, without any, a plausible walk."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait.bindings.abi import TrackStatus
+from gait.bindings.estimate import Estimate
+from gait.io.video import Frame
+from gait.track.person_keypoints import PersonKeypoints
+
+_DEPARTURE = 0.6  # metres in a second by which a person may move otherwise than they walk
+_BEYOND = 4.0  # standard deviations from which a stature is implausible
+_LEAST_SD = 0.05  # metres, of a stature
+
+
+class Plausibility:
+    """Judges the estimates of one track, frame by frame.
+
+    Parameters
+    ----------
+    keypoints : PersonKeypoints
+    stature, stature_sd : float
+        Expected of the person, metres.
+    belt : float
+        Share of each stride that a belt takes back.
+    """
+
+    def __init__(self, keypoints: PersonKeypoints, stature: float, stature_sd: float, belt: float) -> None:
+        self._keypoints = keypoints
+        self._stature, self._stature_sd = stature, max(stature_sd, _LEAST_SD)
+        self._travel = 1.0 - belt
+        self._path: deque[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = deque()
+
+    def restart(self) -> None:
+        """Forget the path: the track starts anew elsewhere."""
+        self._path.clear()
+
+    def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
+        """Call an estimate `ambiguous`, not `tracking`, if keypoints disagree or the walk is implausible."""
+        walks = self._walks(frame.time, estimate)
+        agree = self._keypoints.agree(frame.number, estimate)
+        if estimate.status != TrackStatus.TRACKING or agree or (agree is None and walks):
+            return estimate
+        return replace(estimate, status=TrackStatus.AMBIGUOUS)
+
+    def _walks(self, time: float, estimate: Estimate) -> bool:
+        """Whether the stature is usual and the last second's way is that of strides and heading."""
+        heading, speed = estimate.mean.heading, estimate.speed * self._travel
+        velocity = speed * np.array([np.cos(heading), np.sin(heading)])
+        self._path.append((time, estimate.mean.pelvis[:2], velocity))
+        while abs(time - self._path[0][0]) > 1.0:
+            self._path.popleft()
+        times, places, velocities = map(np.array, zip(*self._path, strict=True))
+        walked = (velocities[1:] * np.diff(times)[:, None]).sum(axis=0)
+        departure = float(np.hypot(*(places[-1] - places[0] - walked)))
+        usual = abs(estimate.mean.stature - self._stature) < _BEYOND * self._stature_sd
+        return usual and departure < _DEPARTURE
