@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gait.bindings.abi import Flag, Mode, Term, TrackStatus
     from gait.bindings.config import TrackerConfig
     from gait.bindings.estimate import Estimate
-    from gait.bindings.frame import Joints
+    from gait.bindings.frame import FrameKeypoints
     from gait.bindings.initial import Start
     from gait.bindings.lifter import LiftConfig, LiftedFrame, Lifter
     from gait.bindings.model import Model, ModelInfo
@@ -31,7 +31,7 @@ _HOME = {
     "Estimate": "bindings.estimate",
     "Flag": "bindings.abi",
     "Frame": "io.video",
-    "Joints": "bindings.frame",
+    "FrameKeypoints": "bindings.frame",
     "LiftConfig": "bindings.config",
     "LiftedFrame": "bindings.lifter",
     "Lifter": "bindings.lifter",
@@ -56,10 +56,10 @@ __all__ = [
     "Estimate",
     "Flag",
     "Frame",
+    "FrameKeypoints",
     "GaitArgumentError",
     "GaitError",
     "GaitLimitError",
-    "Joints",
     "LibraryError",
     "LiftConfig",
     "LiftedFrame",

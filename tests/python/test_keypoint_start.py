@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gait import Camera, Model, State
-from gait.bindings.frame import Joints
+from gait.bindings.frame import FrameKeypoints
 from gait.bindings.start_fit import StartFit
 from gait.detect.networks import JOINTS
 from gait.errors import GaitError
@@ -85,7 +85,7 @@ def test_keypoints_without_ankles_start_nothing(model, camera):
 
 def test_too_few_frames_name_the_remedy(model, camera):
     fit = StartFit(model, camera)
-    fit.add(0, Joints(("l_hip",), np.zeros((1, 2)), 1.0))
+    fit.add(0, FrameKeypoints(("l_hip",), np.zeros((1, 2)), 1.0))
     with pytest.raises(GaitError, match="four or more over 0.3 s"):
         fit.solve(0)
 

@@ -13,7 +13,7 @@ import pytest
 
 from gait.bindings.abi import Term
 from gait.bindings.config import TrackerConfig
-from gait.bindings.frame import Joints
+from gait.bindings.frame import FrameKeypoints
 from gait.lcm.link import gaitmsg
 from gait.lcm.messages import image_message, tracks_message
 from gait.track.tracker import Tracker
@@ -76,7 +76,7 @@ def by_python() -> str:
     for i in range(FRAMES):
         uv, confidence = found(i)
         sd = SD / confidence.astype(float)
-        tracker.step(rig.picture(i), rig.utime(i), Joints(rig.model().joint_names, uv, sd))
+        tracker.step(rig.picture(i), rig.utime(i), FrameKeypoints(rig.model().joint_names, uv, sd))
     return f"{tracker.digest():016x}"
 
 

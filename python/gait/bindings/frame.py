@@ -16,8 +16,8 @@ from gait.io.video import Image
 
 
 @dataclass(frozen=True)
-class Joints:
-    """Joints that a detector has located in one picture, for the likelihood's term of tracks.
+class FrameKeypoints:
+    """Joints that a detector has located in one picture: one frame of `gait.io.keypoints_file.Keypoints`.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Joints:
 
 def per_camera(items: Any) -> list[Any]:
     """One item for each camera: a list, or the only camera's own."""
-    if items is None or isinstance(items, np.ndarray | Joints):
+    if items is None or isinstance(items, np.ndarray | FrameKeypoints):
         return [items]
     return list(items)
 
@@ -63,13 +63,14 @@ def image_view(image: Image, camera: Camera, what: str) -> abi.ImageView:
     return abi.ImageView(image.ctypes.data, width, height, image.strides[0], form)
 
 
-def track_array(joints: Joints, names: Sequence[str]) -> Any:
-    """Array of ``gait_track`` in the order of the model's `names`."""
-    uv = np.asarray(joints.uv, float)
-    if uv.shape != (len(joints.names), 2):
-        raise ValueError(f"joints: uv has shape {uv.shape} instead of {(len(joints.names), 2)}")
-    found = dict(zip(joints.names, zip(uv, np.broadcast_to(joints.sd, len(uv)), strict=True), strict=True))
+def keypoint_array(keypoints: FrameKeypoints, names: Sequence[str]) -> Any:
+    """Array of ``gait_keypoint`` in the order of the model's `names`."""
+    uv, known = np.asarray(keypoints.uv, float), keypoints.names
+    if uv.shape != (len(known), 2):
+        raise ValueError(f"keypoints: uv has shape {uv.shape} instead of {(len(known), 2)}")
+    sd = np.broadcast_to(keypoints.sd, len(uv))
+    found = dict(zip(known, zip(uv, sd, strict=True), strict=True))
     array = (abi.KeypointC * len(names))()
-    for track, name in zip(array, names, strict=True):
-        (track.u, track.v), track.sd = found.get(name, ((0.0, 0.0), -1.0))
+    for point, name in zip(array, names, strict=True):
+        (point.u, point.v), point.sd = found.get(name, ((0.0, 0.0), -1.0))
     return array

@@ -6,7 +6,7 @@ import ctypes
 from dataclasses import dataclass
 
 from gait.bindings import abi
-from gait.bindings.frame import Joints, track_array
+from gait.bindings.frame import FrameKeypoints, keypoint_array
 from gait.bindings.library import call, library, make
 from gait.bindings.model import Model, camera_c
 from gait.bindings.state import State
@@ -67,9 +67,9 @@ class StartFit:
         config.stature_sd = config.stature_sd if stature_sd is None else stature_sd
         self._handle, self._memory = make("start", model.handle, config)
 
-    def add(self, utime: int, keypoints: Joints) -> None:
+    def add(self, utime: int, keypoints: FrameKeypoints) -> None:
         """Add the keypoints of one frame; the time, microseconds, must increase."""
-        call("gait_start_add", self._handle, utime, track_array(keypoints, self._model.joint_names))
+        call("gait_start_add", self._handle, utime, keypoint_array(keypoints, self._model.joint_names))
 
     def reset(self) -> None:
         """Forget the frames."""

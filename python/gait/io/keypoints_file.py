@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.bindings.frame import Joints
+from gait.bindings.frame import FrameKeypoints
 from gait.errors import UserError
 from gait.io.fields import frame_numbers, table_rows
 from gait.io.files import replacing
@@ -90,10 +90,10 @@ class Keypoints:
         """Give standard deviations (T, J), `sd` at full confidence; inf where not seen."""
         return np.where(self.visible, sd / np.maximum(self.confidence, LEAST_CONFIDENCE), np.inf)
 
-    def joints(self, sd: float) -> dict[int, Joints]:
-        """Joints by frame, as the tracker takes them; `sd` as in `standard_deviations`."""
+    def by_frame(self, sd: float) -> dict[int, FrameKeypoints]:
+        """Keypoints by frame, as the tracker takes them; `sd` as in `standard_deviations`."""
         found = zip(self.frame.tolist(), self.uv, self.standard_deviations(sd), strict=True)
-        return {frame: Joints(self.names, uv, sds) for frame, uv, sds in found}
+        return {frame: FrameKeypoints(self.names, uv, sds) for frame, uv, sds in found}
 
 
 def read(

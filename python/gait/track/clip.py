@@ -41,7 +41,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     if scene.people:
         config = config.replace(terms=config.terms | Term.KEYPOINTS)
     tracker = Tracker(scene.model, scene.camera, config, background=scene.plate, tasks=options.threads)
-    keypoints = PersonKeypoints(scene.camera, scene.joints, scene.person)
+    keypoints = PersonKeypoints(scene.camera, scene.keypoints, scene.person)
     plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gait.bindings.frame import Joints
+from gait.bindings.frame import FrameKeypoints
 from gait.bindings.initial import Start
 from gait.bindings.model import Model
 from gait.bindings.start_fit import Hypothesis, StartFit
@@ -32,7 +32,7 @@ _JOINT_SD = {"elbow": 0.02, "wrist": 0.04, "heel": 0.03, "toe": 0.04, "shoulder"
 """Noise of a detector's joints beside what the model's joints miss them by, person's heights; others 0.01."""
 
 
-def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, Joints]:
+def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, FrameKeypoints]:
     """Keypoints by frame, each with the standard deviation that its joint has.
 
     Parameters
@@ -51,7 +51,7 @@ def keypoint_noise(keypoints: Keypoints, miss: float = 0.0) -> dict[int, Joints]
     sd = height[:, None] * np.hypot(miss, share / np.maximum(keypoints.confidence, 0.1))
     sd = np.where(np.isfinite(keypoints.uv).all(axis=2), sd, -1.0)
     rows = zip(keypoints.frame.tolist(), keypoints.uv, sd, strict=True)
-    return {frame: Joints(keypoints.names, uv, noise) for frame, uv, noise in rows}
+    return {frame: FrameKeypoints(keypoints.names, uv, noise) for frame, uv, noise in rows}
 
 
 def find_keypoint_start(
@@ -85,7 +85,7 @@ def find_keypoint_start(
         return None
     known = {} if height is None else {"stature": height, "stature_sd": _STATURE_SD}
     fit = StartFit(model, camera, **known)
-    joints = keypoint_noise(keypoints)
+    by_frame = keypoint_noise(keypoints)
     chosen = (keypoints.frame >= first) & (keypoints.frame < (np.inf if stop is None else stop))
     frames, times = keypoints.frame[chosen], keypoints.time[chosen]
     best: tuple[Start, Hypothesis] | None = None
@@ -94,7 +94,7 @@ def find_keypoint_start(
         if time < begin + _STEP:
             continue
         begin = time
-        found = _fit_window(model, fit, joints, frames, times, at)
+        found = _fit_window(model, fit, by_frame, frames, times, at)
         if found is None:
             continue
         start, hypothesis = found
@@ -108,7 +108,7 @@ def find_keypoint_start(
 def _fit_window(
     model: Model,
     fit: StartFit,
-    joints: dict[int, Joints],
+    by_frame: dict[int, FrameKeypoints],
     frames: np.ndarray[tuple[int], np.dtype[np.int64]],
     times: np.ndarray[tuple[int], np.dtype[np.float64]],
     at: int,
@@ -118,7 +118,7 @@ def _fit_window(
     for frame, time in zip(frames[at:], times[at:], strict=True):
         if time > times[at] + _WINDOW:
             break
-        fit.add(round(1e6 * time), joints[int(frame)])
+        fit.add(round(1e6 * time), by_frame[int(frame)])
     try:
         hypothesis = fit.solve(round(1e6 * times[at]))[0]
     except GaitError:

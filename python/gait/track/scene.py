@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.bindings.abi import Mode
-from gait.bindings.frame import Joints
+from gait.bindings.frame import FrameKeypoints
 from gait.bindings.initial import OUTSIDE, Start
 from gait.bindings.model import Model
 from gait.camera.camera import Camera
@@ -40,7 +40,7 @@ class Scene:
         Keypoints of everyone found, by id.
     person : int
         The person to track, an id of `people`; -1 without keypoints.
-    joints : dict of int to dict of int to Joints
+    keypoints : dict of int to dict of int to FrameKeypoints
         The keypoints with their noise, by id and frame.
     """
 
@@ -51,7 +51,7 @@ class Scene:
     frames: range
     people: dict[int, Keypoints]
     person: int
-    joints: dict[int, dict[int, Joints]]
+    keypoints: dict[int, dict[int, FrameKeypoints]]
 
     @staticmethod
     def read(options: ClipOptions) -> Scene:
@@ -70,11 +70,11 @@ class Scene:
             plate = background(options.background, video, update)
         if options.keypoints:
             people = {0: _read_keypoints(options, model, frames)}
-            joints = {0: people[0].joints(options.keypoints_sd)}
-            return Scene(video, camera, model, plate, frames, people, 0, joints)
+            keypoints = {0: people[0].by_frame(options.keypoints_sd)}
+            return Scene(video, camera, model, plate, frames, people, 0, keypoints)
         people, person = _detect(options, video, frames)
-        joints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
-        return Scene(video, camera, model, plate, frames, people, person, joints)
+        keypoints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
+        return Scene(video, camera, model, plate, frames, people, person, keypoints)
 
 
 def clip_frames(video: Video, start: int, stop: int | None) -> range:

@@ -14,7 +14,7 @@ from gait.bindings import abi
 from gait.bindings.abi import TrackStatus
 from gait.bindings.config import TrackerConfig
 from gait.bindings.estimate import Estimate
-from gait.bindings.frame import Joints, capture_time, image_view, per_camera, track_array
+from gait.bindings.frame import FrameKeypoints, capture_time, image_view, keypoint_array, per_camera
 from gait.bindings.initial import Start
 from gait.bindings.library import aligned, call, library, make
 from gait.bindings.model import Model, camera_c
@@ -117,7 +117,7 @@ class Tracker:
         self,
         frames: Image | Sequence[Image | None] | None,
         utime: int,
-        joints: Joints | Sequence[Joints | None] | None = None,
+        keypoints: FrameKeypoints | Sequence[FrameKeypoints | None] | None = None,
     ) -> Estimate:
         """Take in one frame and estimate.
 
@@ -127,8 +127,8 @@ class Tracker:
             (h, w) grey or (h, w, 3) BGR uint8 of each camera; None where a camera missed this frame.
         utime : int
             Capture time, microseconds; must increase.
-        joints : Joints, or sequence of Joints or None, optional
-            Joints found in each camera's picture; they count if ``config.terms`` has ``Term.KEYPOINTS``.
+        keypoints : FrameKeypoints, or sequence of FrameKeypoints or None, optional
+            Found in each camera's picture; they count if ``config.terms`` has ``Term.KEYPOINTS``.
         """
         images = [None if image is None else np.ascontiguousarray(image) for image in per_camera(frames)]
         if len(images) > len(self.cameras):
@@ -137,7 +137,7 @@ class Tracker:
         for i, image in enumerate(images):
             if image is not None:
                 frame.image[i] = image_view(image, self.cameras[i], "frame")
-        found = [one and track_array(one, self.model.joint_names) for one in per_camera(joints)]
+        found = [one and keypoint_array(one, self.model.joint_names) for one in per_camera(keypoints)]
         for i, array in enumerate(found[: len(self.cameras)]):
             if array is not None:
                 frame.keypoints[i] = array
@@ -175,7 +175,7 @@ class Tracker:
         start: Start,
         stop: int | None = None,
         auto_start: AutoStart | None = None,
-        joints: Mapping[int, Joints] | None = None,
+        keypoints: Mapping[int, FrameKeypoints] | None = None,
     ) -> Iterator[tuple[Frame, Estimate]]:
         """Track one person through a video: yield each frame from ``start.frame`` on with its estimate.
 
@@ -188,10 +188,10 @@ class Tracker:
             First frame not to use.
         auto_start : AutoStart, optional
             Looks for the person while the tracker has lost them; where it finds one the track starts anew.
-        joints : mapping of int to Joints, optional
-            Joints found in frames, by number; see `step`.
+        keypoints : mapping of int to FrameKeypoints, optional
+            Found in frames, by number; see `step`.
         """
-        found = joints or {}
+        found = keypoints or {}
         for frame in video.frames(start.frame, stop):
             if frame.number == start.frame:
                 self.start(start.mean, start.sd, frame.utime)
