@@ -164,26 +164,33 @@ bool camera_file_read(const char *path, gait_camera *out, message *why)
 }
 
 /* ---- starts ---- */
-/* Numbers of the file beside the pelvis; sd is taken where it gives a value but no standard deviation. */
+/* Numbers of the file beside the pelvis and their fields of gait_state, whose table has their ranges; sd is taken where
+ * the file gives a value but no standard deviation. */
 static const struct {
-    const char *key, *remedy;
-    size_t offset;
-    double low, high, sd;
+    const char *key, *field, *remedy;
+    double sd;
 } scalars[] = {
-    {"heading_rad", "give the walking direction about z in radians, 0 = along +x",
-     offsetof(gait_state, heading), -7, 7, 0.1},
-    {"phase", "give the phase of the stride from 0 (right heel strike) to 1", offsetof(gait_state, phase), 0,
-     1, 0.05},
-    {"stride_hz", "give strides (two steps) per second, about 0.9", offsetof(gait_state, stride_hz), 0.1, 4,
-     0.05},
-    {"stature_m", "give the person's height in metres", offsetof(gait_state, stature), 0.5, 2.5, 0.03},
+    {"heading_rad", "heading", "give the walking direction about z in radians, 0 = along +x", 0.1},
+    {"phase", "phase", "give the phase of the stride from 0 (right heel strike) to 1", 0.05},
+    {"stride_hz", "stride_hz", "give strides (two steps) per second, about 0.9", 0.05},
+    {"stature_m", "stature", "give the person's height in metres", 0.03},
 };
 /* "sd" may hold the first five. */
 static const char *const known_keys[] = {"pelvis",    "heading_rad", "phase", "stride_hz",
                                          "stature_m", "frame",       "sd"};
 
 enum { SCALARS = sizeof scalars / sizeof *scalars, KNOWN_KEYS = sizeof known_keys / sizeof *known_keys };
-static const double PELVIS_SD = 0.05, MAX_SD = 10, FAR = 1e4;
+static const double PELVIS_SD = 0.05, MAX_SD = 10;
+
+/* A field of gait_state. */
+static gait_field state_field(const char *name)
+{
+    gait_field f = {0};
+    for (uint32_t i = 0; gait_field_at(i, &f) == GAIT_OK; i++)
+        if (strcmp(f.of, "gait_state") == 0 && strcmp(f.name, name) == 0)
+            break;
+    return f;
+}
 
 static void put(gait_state *s, size_t offset, double value)
 {
@@ -195,18 +202,19 @@ static void put(gait_state *s, size_t offset, double value)
 static bool read_scalar(const fields *f, int sds, int k, init_state *io, message *why)
 {
     const char *const key = scalars[k].key;
+    gait_field const field = state_field(scalars[k].field);
     double value;
     if (json_find(&f->doc, 0, key) >= 0) {
-        if (!fields_numbers(f, 0, key, &value, 1, scalars[k].low, scalars[k].high, scalars[k].remedy, why))
+        if (!fields_numbers(f, 0, key, &value, 1, field.low, field.high, scalars[k].remedy, why))
             return false;
-        put(&io->mean, scalars[k].offset, value);
-        put(&io->sd, scalars[k].offset, scalars[k].sd);
+        put(&io->mean, field.offset, value);
+        put(&io->sd, field.offset, scalars[k].sd);
     }
     if (sds >= 0 && json_find(&f->doc, sds, key) >= 0) {
         if (!fields_numbers(f, sds, key, &value, 1, 0, MAX_SD, "give a standard deviation, not negative",
                             why))
             return false;
-        put(&io->sd, scalars[k].offset, value);
+        put(&io->sd, field.offset, value);
     }
     return true;
 }
@@ -223,9 +231,10 @@ static bool read_pelvis(const fields *f, int sds, const gait_model *model, init_
 {
     const char *const place = "give x and y (and z if known) of the pelvis in metres";
     int const known_axes = count_of(f, 0, "pelvis") == 3 ? 3 : 2, sd_count = count_of(f, sds, "pelvis");
+    gait_field const field = state_field("pelvis");
     double value[3];
     if (json_find(&f->doc, 0, "pelvis") >= 0) {
-        if (!fields_numbers(f, 0, "pelvis", value, known_axes, -FAR, FAR, place, why))
+        if (!fields_numbers(f, 0, "pelvis", value, known_axes, field.low, field.high, place, why))
             return false;
         for (int i = 0; i < 3; i++) {
             io->mean.pelvis[i] = i < known_axes ? (float)value[i] : io->mean.pelvis[i];

@@ -9,22 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait.bindings.model import Model
-from gait.bindings.state import State
+from gait.bindings.state import State, state_range
 from gait.errors import UserError
 from gait.io.fields import Fields, read_json
 
 # Standard deviations of values that an init file gives without any.
 DEFAULT_SD = {"pelvis": 0.05, "heading_rad": 0.1, "phase": 0.05, "stride_hz": 0.05, "stature_m": 0.03}
 KEYS = ("frame", *DEFAULT_SD, "sd")
-FAR = 1e4  # metres from the origin; single precision places nothing to the millimetre further out
 OUTSIDE = "the start is outside of the picture; check pelvis and camera"
-STATURE = (0.5, 2.5)  # metres, accepted range
 
-SCALARS = {  # key in the file: attribute of State, accepted range, remedy
-    "heading_rad": ("heading", (-7.0, 7.0), "give the walking direction about z in radians, 0 = along +x"),
-    "phase": ("phase", (0.0, 1.0), "give the phase of the stride from 0 (right heel strike) to 1"),
-    "stride_hz": ("stride_hz", (0.1, 4.0), "give strides (two steps) per second, about 0.9"),
-    "stature_m": ("stature", STATURE, "give the person's height in metres"),
+SCALARS = {  # key in the file: attribute of State, remedy
+    "heading_rad": ("heading", "give the walking direction about z in radians, 0 = along +x"),
+    "phase": ("phase", "give the phase of the stride from 0 (right heel strike) to 1"),
+    "stride_hz": ("stride_hz", "give strides (two steps) per second, about 0.9"),
+    "stature_m": ("stature", "give the person's height in metres"),
 }
 
 
@@ -78,9 +76,9 @@ class Start:
                 raise fields.fail("frame", f"is {own}, --start is {frame}", "leave one of them out")
             frame = own
         mean, sd = model.prior()
-        for key, (name, (low, high), remedy) in SCALARS.items():
+        for key, (name, remedy) in SCALARS.items():
             if key in fields:
-                setattr(mean, name, fields.number(key, low, high, remedy))
+                setattr(mean, name, fields.number(key, *state_range(name), remedy))
                 setattr(sd, name, DEFAULT_SD[key])
             if key in sds:
                 setattr(sd, name, sds.number(key, 0.0, 10.0, "give a standard deviation, not negative"))
@@ -113,10 +111,9 @@ def frame_number(fields: Fields) -> int:
 
 def set_height(mean: State, sd: State, height: float) -> None:
     """Put a known stature in metres into a first state; its sd is at most the usual one."""
-    if not STATURE[0] <= height <= STATURE[1]:
-        raise UserError(
-            f"--height: {height:g} m is not a stature; give metres from {STATURE[0]} to {STATURE[1]}"
-        )
+    low, high = state_range("stature")
+    if not low <= height <= high:
+        raise UserError(f"--height: {height:g} m is not a stature; give metres from {low} to {high}")
     mean.stature = height
     sd.stature = min(sd.stature, DEFAULT_SD["stature_m"])
 
@@ -128,8 +125,9 @@ def _place(fields: Fields, sds: Fields, model: Model, mean: State, sd: State) ->
     if "pelvis" in fields:
         known = 3 if fields.count("pelvis", remedy) == 3 else 2
         mean.pelvis[:known] = fields.array("pelvis", (known,), remedy)
-        if (np.abs(mean.pelvis) > FAR).any():
-            what = f"is further than {FAR:g} m from the origin"
+        far = state_range("pelvis")[1]
+        if (np.abs(mean.pelvis) > far).any():
+            what = f"is further than {far:g} m from the origin"
             raise fields.fail("pelvis", what, "lay the world's origin near the scene")
         sd.pelvis[:] = DEFAULT_SD["pelvis"]
     if known == 2:

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait.bindings import abi
-from gait.bindings.library import library
+from gait.bindings.library import library, struct_fields
 
 Array = NDArray[np.float64]
 LIMITS = {"coef": abi.MAX_COMPONENTS, "offset": abi.MAX_ANGLES, "proportion": abi.MAX_PROPORTIONS}
 LEAST_STATURE = 0.3  # metres, of a particle (particles.h)
 POSE_SCALARS = ("phase", "stride_hz", "stature", "heading", "pitch", "roll")  # poses need no more
 SCALARS = (*POSE_SCALARS, "turn_rate")
+
+
+@cache
+def state_range(name: str) -> tuple[float, float]:
+    """Lowest and highest value of a field of a `State` to start from, by the library's table."""
+    return next((row.low, row.high) for row in struct_fields("gait_state") if row.name == name)
 
 
 @dataclass

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from gait.bindings.initial import STATURE
+from gait.bindings.state import state_range
 from gait.body.skeleton import JOINTS
 from gait.cli import values
 from gait.errors import UsageError, UserError
@@ -275,7 +275,7 @@ def _require_person(args: argparse.Namespace, found: motion.Motion) -> None:
     """Refuse an estimate that no person can be."""
     if not np.isfinite(found.error).any():
         raise UserError(f"{args.input}: the estimate lies behind the camera; check the camera and the names")
-    low, high = STATURE
+    low, high = state_range("stature")
     if not low <= found.stature <= high:
         view = "the camera (metres; R, t: world to camera)" if args.camera else "the direction of view"
         raise UserError(

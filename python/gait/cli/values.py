@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from gait.bindings.abi import Mode
 from gait.bindings.config import TrackerConfig
-from gait.bindings.initial import STATURE
+from gait.bindings.state import state_range
 from gait.errors import LibraryError, UsageError
 
 PARTICLES = (16, 1 << 20)  # as in gait.h and gait-trackd, like those below
@@ -47,7 +47,7 @@ def between(low: float, high: float, unit: str) -> Callable[[str], float]:
 
 def stature(text: str) -> float:
     """Height of a person in metres."""
-    low, high = STATURE
+    low, high = state_range("stature")
     metres = _number(text)
     if not low <= metres <= high:
         raise ArgumentTypeError(f"{text}: is not a stature; give metres from {low} to {high}")

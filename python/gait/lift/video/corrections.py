@@ -31,8 +31,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.bindings.initial import SCALARS, STATURE, frame_number, read_start
+from gait.bindings.initial import SCALARS, frame_number, read_start
 from gait.bindings.segment_prior import SegmentPrior
+from gait.bindings.state import state_range
 from gait.body.skeleton import pose
 from gait.errors import UserError
 from gait.io import blob
@@ -128,11 +129,13 @@ def read_placement(path: str | os.PathLike[str], prior: SegmentPrior, calibrated
     fields, sds = read_start(path, "placement", _KNOWN)
     stature = prior.stature
     if "stature_m" in fields:
-        stature = fields.number("stature_m", *STATURE, "give the person's height in metres")
+        stature = fields.number("stature_m", *state_range("stature"), "give the person's height in metres")
     placed = Placement(
         frame=frame_number(fields),
         ground=_ground(fields) if calibrated else np.zeros(2),
-        heading=fields.number("heading_rad", -7.0, 7.0, "give the body's direction about z in radians"),
+        heading=fields.number(
+            "heading_rad", *state_range("heading"), "give the body's direction about z in radians"
+        ),
         stature=stature,
         ground_sd=_sd_of(sds, "pelvis", PLACE_SD),
         heading_sd=_sd_of(sds, "heading_rad", HEADING_SD),
@@ -157,8 +160,8 @@ def _in_picture(fields: Fields) -> dict[str, Any]:
 
 def _optional(fields: Fields, key: str) -> float | None:
     """Read a number as a start of the tracker has it; None if absent."""
-    _, (low, high), remedy = SCALARS[key]
-    return fields.number(key, low, high, remedy) if key in fields else None
+    name, remedy = SCALARS[key]
+    return fields.number(key, *state_range(name), remedy) if key in fields else None
 
 
 def _ground(fields: Fields) -> Floats:
