@@ -11,14 +11,13 @@ _Static_assert(sizeof((gaitmsg_state_t *)0)->coef == sizeof((gait_state *)0)->co
 _Static_assert(sizeof((gaitmsg_state_t *)0)->offset == sizeof((gait_state *)0)->offset,
                "state_t holds every angle");
 
+/* Numbers that gait_state and state_t call alike. */
+#define SCALARS(X) X(phase) X(stride_hz) X(stature) X(heading) X(pitch) X(roll)
+
 void convert_state(const gait_state *in, const gait_model_info *info, gaitmsg_state_t *out)
 {
-    out->phase = in->phase;
-    out->stride_hz = in->stride_hz;
-    out->stature = in->stature;
-    out->heading = in->heading;
-    out->pitch = in->pitch;
-    out->roll = in->roll;
+#define COPY(name) out->name = in->name;
+    SCALARS(COPY)
     memcpy(out->pelvis, in->pelvis, sizeof out->pelvis);
     out->ncoef = info->components;
     memcpy(out->coef, in->coef, sizeof out->coef);
@@ -39,12 +38,8 @@ bool convert_state_message(const gaitmsg_state_t *in, const gait_state *unknown,
     if (in->noffset < 0 || in->noffset > GAIT_MAX_ANGLES)
         return message_set(why, "state with noffset %d; give 0 to %d", in->noffset, GAIT_MAX_ANGLES);
     *out = (gait_state){0};
-    out->phase = known(in->phase, unknown->phase);
-    out->stride_hz = known(in->stride_hz, unknown->stride_hz);
-    out->stature = known(in->stature, unknown->stature);
-    out->heading = known(in->heading, unknown->heading);
-    out->pitch = known(in->pitch, unknown->pitch);
-    out->roll = known(in->roll, unknown->roll);
+#define TAKE(name) out->name = known(in->name, unknown->name);
+    SCALARS(TAKE)
     for (int i = 0; i < 3; i++)
         out->pelvis[i] = known(in->pelvis[i], unknown->pelvis[i]);
     for (int i = 0; i < in->ncoef; i++)
@@ -68,11 +63,12 @@ bool convert_same_camera(const gait_camera *a, const gait_camera *b)
 
 bool convert_camera_message(const gaitmsg_camera_t *in, gait_camera *out, message *why)
 {
-    gait_camera c = {.width = in->width, .height = in->height};
-    double const scalars[] = {in->fx, in->fy, in->cx, in->cy};
-    float *const to[] = {&c.fx, &c.fy, &c.cx, &c.cy};
-    for (int i = 0; i < 4; i++)
-        *to[i] = (float)scalars[i];
+    gait_camera c = {.width = in->width,
+                     .height = in->height,
+                     .fx = (float)in->fx,
+                     .fy = (float)in->fy,
+                     .cx = (float)in->cx,
+                     .cy = (float)in->cy};
     for (int i = 0; i < 9; i++)
         c.R[i] = (float)in->R[i];
     for (int i = 0; i < 3; i++)
