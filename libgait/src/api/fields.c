@@ -197,7 +197,7 @@ gait_result fields_check_sd(const char *of, const void *values, double most, con
     return s;
 }
 
-gait_result fields_check_size(const char *of, uint64_t struct_size, const char *fill, gait_error *err)
+gait_result fields_check_size(const char *of, uint64_t struct_size, const char *filled_by, gait_error *err)
 {
     enum { LEAST = 16 }; /* bytes: size, and mode or projection */
     uint64_t end = 0;
@@ -209,5 +209,5 @@ gait_result fields_check_size(const char *of, uint64_t struct_size, const char *
         return base_fail(err, GAIT_ERR_STRUCT, -1,
                          "%s has %llu bytes but this library knows only %llu: build with its headers", of,
                          (unsigned long long)struct_size, (unsigned long long)end);
-    return base_fail(err, GAIT_ERR_STRUCT, -1, "%s was not filled by %s()", of, fill);
+    return base_fail(err, GAIT_ERR_STRUCT, -1, "%s was not filled by %s()", of, filled_by);
 }

@@ -8,7 +8,7 @@ gait_result fields_check(const char *of, const void *values, const char *what, g
 /* The same for standard deviations of such numbers, which are in [0, most]. */
 gait_result fields_check_sd(const char *of, const void *values, double most, const char *what,
                             gait_error *err);
-/* struct_size is that of this library's struct, or of an older, shorter one, which ends with a whole field.  fill: the
- * function to call otherwise, for the error GAIT_ERR_STRUCT. */
-gait_result fields_check_size(const char *of, uint64_t struct_size, const char *fill, gait_error *err);
+/* struct_size is that of this library's struct, or of an older, shorter one, which ends with a whole field.
+ * filled_by: the function that sets it, for the error. */
+gait_result fields_check_size(const char *of, uint64_t struct_size, const char *filled_by, gait_error *err);
 #endif

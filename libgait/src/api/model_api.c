@@ -29,29 +29,11 @@ const char *gait_cpu_name(uint32_t mask)
 
 const char *gait_result_name(gait_result s)
 {
-    switch (s) {
-    case GAIT_OK:
-        return "GAIT_OK";
-    case GAIT_ERR_ARG:
-        return "GAIT_ERR_ARG";
-    case GAIT_ERR_STRUCT:
-        return "GAIT_ERR_STRUCT";
-    case GAIT_ERR_MEMORY:
-        return "GAIT_ERR_MEMORY";
-    case GAIT_ERR_LIMIT:
-        return "GAIT_ERR_LIMIT";
-    case GAIT_ERR_MAGIC:
-        return "GAIT_ERR_MAGIC";
-    case GAIT_ERR_VERSION:
-        return "GAIT_ERR_VERSION";
-    case GAIT_ERR_CORRUPT:
-        return "GAIT_ERR_CORRUPT";
-    case GAIT_ERR_STATE:
-        return "GAIT_ERR_STATE";
-    case GAIT_ERR_NUMERIC:
-        return "GAIT_ERR_NUMERIC";
-    }
-    return "unknown gait_result";
+    static const char names[][20] = {
+        "GAIT_OK",        "GAIT_ERR_ARG",     "GAIT_ERR_STRUCT",  "GAIT_ERR_MEMORY", "GAIT_ERR_LIMIT",
+        "GAIT_ERR_MAGIC", "GAIT_ERR_VERSION", "GAIT_ERR_CORRUPT", "GAIT_ERR_STATE",  "GAIT_ERR_NUMERIC"};
+    uint32_t const i = 0u - (uint32_t)s;
+    return i < sizeof names / sizeof *names ? names[i] : "unknown gait_result";
 }
 
 gait_result gait_model_bytes(const void *data, size_t data_bytes, size_t *bytes, gait_error *err)

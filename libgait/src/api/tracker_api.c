@@ -3,7 +3,7 @@
 #include "api/fields.h"
 #include "api/kernels.h"
 #include "base/cpu.h"
-#include "image/image.h"
+#include "image/view.h"
 #include "likelihood/likelihood.h"
 #include "tracker/fixed_lag.h"
 #include "tracker/snapshot.h"

@@ -1,6 +1,5 @@
 #include "image/features.h"
 #include "base/base.h"
-#include "image/image.h"
 
 features features_layout(arena *a)
 {

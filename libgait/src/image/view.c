@@ -1,5 +1,4 @@
 #include "image/view.h"
-#include "image/image.h"
 #include "base/base.h"
 
 view_planes view_planes_layout(arena *a, int32_t channels)

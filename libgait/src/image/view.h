@@ -21,6 +21,12 @@ typedef struct view_planes { /* resampled planes: R, G, B, or grey in the first 
     int32_t channels;
 } view_planes;
 
+/* Bytes per pixel of a GAIT_* image format; 0 if the format is unknown. */
+static inline int32_t image_channels(gait_pixel_format format)
+{
+    return format == GAIT_GREY8 ? 1 : format == GAIT_RGB8 || format == GAIT_BGR8 ? 3 : 0;
+}
+
 /* Centre and scale the region on a person whose middle is at pixel uv and who is `tall` pixels high. Returns
  * false and keeps the map while the person stays well inside it, so that static pixels are not resampled
  * differently from frame to frame. */
