@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import re
+from collections.abc import Iterator
 from ctypes import (
     POINTER,
     c_char_p,
@@ -251,15 +252,25 @@ class _ARRAY:
 _RESULT, _HANDLE, _ERR = c_int32, c_void_p, POINTER(Error)
 _SIZE, _STATE = POINTER(c_size_t), POINTER(StateC)
 
+
+def _made(kind: str, *arguments: Any) -> Iterator[tuple[str, list[Any], Any]]:
+    """Yield the two functions that make an object of these arguments."""
+    yield f"gait_{kind}_bytes", [*arguments, _SIZE, _ERR], _RESULT
+    yield f"gait_{kind}_init", [_ARRAY, c_size_t, *arguments, POINTER(_HANDLE), _ERR], _RESULT
+
+
 FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
+    *_made("model", _ARRAY, c_size_t),
+    *_made("tracker", _HANDLE, POINTER(TrackerConfigC)),
+    *_made("pool", c_int32),
+    *_made("lift", _HANDLE, POINTER(LiftConfigC)),
+    *_made("start", _HANDLE, POINTER(StartConfigC)),
     ("gait_result_name", [_RESULT], c_char_p),
     ("gait_version", [], c_uint32),
     ("gait_cpu_features", [], c_uint32),
     ("gait_cpu_name", [c_uint32], c_char_p),
     ("gait_abi", [], c_uint32),
     ("gait_field_at", [c_uint32, POINTER(FieldC)], _RESULT),
-    ("gait_model_bytes", [_ARRAY, c_size_t, _SIZE, _ERR], _RESULT),
-    ("gait_model_init", [_ARRAY, c_size_t, _ARRAY, c_size_t, POINTER(_HANDLE), _ERR], _RESULT),
     ("gait_model_get_info", [_HANDLE, POINTER(ModelInfoC), _ERR], _RESULT),
     ("gait_model_joint_name", [_HANDLE, c_int32], c_char_p),
     ("gait_model_angle_name", [_HANDLE, c_int32], c_char_p),
@@ -269,12 +280,6 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_model_pelvis_height", [_HANDLE, _STATE, POINTER(c_float), _ERR], _RESULT),
     ("gait_render", [_HANDLE, POINTER(CameraC), _STATE, _ARRAY, c_int32, _ERR], _RESULT),
     ("gait_tracker_fill", [POINTER(TrackerConfigC), c_size_t, c_int32], None),
-    ("gait_tracker_bytes", [_HANDLE, POINTER(TrackerConfigC), _SIZE, _ERR], _RESULT),
-    (
-        "gait_tracker_init",
-        [_ARRAY, c_size_t, _HANDLE, POINTER(TrackerConfigC), POINTER(_HANDLE), _ERR],
-        _RESULT,
-    ),
     ("gait_tracker_set_background", [_HANDLE, c_int32, POINTER(ImageView), _ERR], _RESULT),
     ("gait_tracker_prior", [_HANDLE, _STATE, _STATE, _ERR], _RESULT),
     ("gait_tracker_start", [_HANDLE, _STATE, _STATE, c_int64, _ERR], _RESULT),
@@ -285,18 +290,10 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_tracker_digest", [_HANDLE], c_uint64),
     ("gait_tracker_save", [_HANDLE, _ARRAY, c_size_t, _SIZE, _ERR], _RESULT),
     ("gait_tracker_restore", [_HANDLE, _ARRAY, c_size_t, _ERR], _RESULT),
-    ("gait_pool_bytes", [c_int32, _SIZE, _ERR], _RESULT),
-    ("gait_pool_init", [_ARRAY, c_size_t, c_int32, POINTER(_HANDLE), _ERR], _RESULT),
     ("gait_pool_tasks", [_HANDLE], Tasks),
     ("gait_pool_stop", [_HANDLE], None),
     ("gait_lift_get_info", [_HANDLE, POINTER(LiftInfoC), _ERR], _RESULT),
     ("gait_lift_fill", [POINTER(LiftConfigC), c_size_t], None),
-    ("gait_lift_bytes", [_HANDLE, POINTER(LiftConfigC), _SIZE, _ERR], _RESULT),
-    (
-        "gait_lift_init",
-        [_ARRAY, c_size_t, _HANDLE, POINTER(LiftConfigC), POINTER(_HANDLE), _ERR],
-        _RESULT,
-    ),
     ("gait_lift_marker_name", [_HANDLE, c_int32], c_char_p),
     ("gait_lift_segment", [_HANDLE, _ARRAY, _ARRAY, POINTER(LiftFitC), _ERR], _RESULT),
     ("gait_lift_segment_robust", [_HANDLE, _ARRAY, _ARRAY, _ARRAY, POINTER(LiftFitC), _ERR], _RESULT),
@@ -313,12 +310,6 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_lift_estimate", [_HANDLE, POINTER(LiftFrameC), _ERR], _RESULT),
     ("gait_lift_reset", [_HANDLE], None),
     ("gait_start_fill", [POINTER(StartConfigC), c_size_t], None),
-    ("gait_start_bytes", [_HANDLE, POINTER(StartConfigC), _SIZE, _ERR], _RESULT),
-    (
-        "gait_start_init",
-        [_ARRAY, c_size_t, _HANDLE, POINTER(StartConfigC), POINTER(_HANDLE), _ERR],
-        _RESULT,
-    ),
     ("gait_start_add", [_HANDLE, c_int64, POINTER(KeypointC), _ERR], _RESULT),
     ("gait_start_reset", [_HANDLE], None),
     ("gait_start_solve", [_HANDLE, c_int64, POINTER(HypothesisC), c_int32, POINTER(c_int32), _ERR], _RESULT),
@@ -372,21 +363,14 @@ def declare(library: ctypes.CDLL) -> None:
         function.argtypes, function.restype = arguments, result
 
 
-def layout() -> dict[tuple[str, str], tuple[int, int]]:
-    """Offset and size in bytes by (struct, field); the field "" is the struct itself."""
-    rows = {}
+def verify(rows: list[Field]) -> list[str]:
+    """Compare the library's description with the structures here; return one line per difference."""
+    theirs = {(row.of, row.name): (row.offset, row.size) for row in rows}
+    ours = {(name, ""): (0, ctypes.sizeof(struct)) for name, struct in STRUCTS.items()}
     for name, struct in STRUCTS.items():
-        rows[name, ""] = (0, ctypes.sizeof(struct))
         for field, *_ in struct._fields_:
             at = getattr(struct, field)
-            rows[name, field] = (at.offset, at.size)
-    return rows
-
-
-def verify(rows: list[Field]) -> list[str]:
-    """Compare the library's description with `layout`; return one line per difference."""
-    theirs = {(row.of, row.name): (row.offset, row.size) for row in rows}
-    ours = layout()
+            ours[name, field] = (at.offset, at.size)
     faults = []
     for key in sorted(ours.keys() | theirs.keys()):
         if ours.get(key) != theirs.get(key):

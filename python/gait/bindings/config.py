@@ -57,7 +57,10 @@ class Config:
     @classmethod
     def _filled(cls, mode: int) -> Any:
         """Struct with the library's defaults."""
-        raise NotImplementedError
+        fill, c = getattr(library(), cls._of.replace("_config", "_fill")), abi.STRUCTS[cls._of]()
+        modes = [mode] if len(fill.argtypes) > 2 else []  # a tracker alone has modes
+        fill(c, ctypes.sizeof(c), *modes)
+        return c
 
     @classmethod
     def _defaults(cls, mode: int = 0) -> dict[str, Any]:
@@ -150,12 +153,6 @@ class TrackerConfig(Config):
     _apart = frozenset({"struct_size", "cameras", "camera", "exec"})
 
     @classmethod
-    def _filled(cls, mode: int) -> Any:
-        lib, c = library(), abi.TrackerConfigC()
-        lib.gait_tracker_fill(c, ctypes.sizeof(c), mode)
-        return c
-
-    @classmethod
     def default(cls, mode: abi.Mode | int = abi.Mode.DEFAULT, **changes: Any) -> TrackerConfig:
         """Defaults of the library for `mode`, with `changes`.
 
@@ -184,12 +181,6 @@ class LiftConfig(Config):
 
     _of = "gait_lift_config"
     _apart = frozenset({"struct_size", "projection", "camera", "axis"})
-
-    @classmethod
-    def _filled(cls, mode: int) -> Any:
-        lib, c = library(), abi.LiftConfigC()
-        lib.gait_lift_fill(c, ctypes.sizeof(c))
-        return c
 
     @classmethod
     def default(cls, **changes: Any) -> LiftConfig:
