@@ -46,6 +46,15 @@ int64_t clock_monotonic(void)
     return clock_us(CLOCK_MONOTONIC);
 }
 
+/* ---- memory ---- */
+void *aligned_memory(size_t bytes, const char *what, message *why)
+{
+    void *const memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+    if (!memory)
+        message_set(why, "%.160s: not enough memory for %zu bytes", what, bytes);
+    return memory;
+}
+
 /* ---- files ---- */
 /* Far more than any model, camera or image has: a device or a wrong file must not fill the memory. */
 enum { MAX_FILE = 1 << 28 };
@@ -58,12 +67,11 @@ static bool read_stream(FILE *f, const char *path, const char *what, file_bytes 
     if (size < 0 || size > MAX_FILE || fseek(f, 0, SEEK_SET) != 0)
         return message_set(why, "%s: not a regular file of reasonable size; give the name of a %s file", path,
                            what);
-    size_t const capacity = ((size_t)size + 1 + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
-    out->data = aligned_alloc(GAIT_ALIGN, capacity);
+    out->data = aligned_memory((size_t)size + 1, path, why);
     if (!out->data)
-        return message_set(why, "%s: not enough memory for %ld bytes", path, size);
+        return false;
     out->size = fread(out->data, 1, (size_t)size, f);
-    memset(out->data + out->size, 0, capacity - out->size);
+    out->data[out->size] = '\0';
     if (out->size == (size_t)size)
         return true;
     free(out->data);
@@ -92,9 +100,9 @@ bool model_file_open(model_file *m, const char *path, message *why)
         return false;
     gait_result status = gait_model_bytes(m->blob.data, m->blob.size, &bytes, &err);
     if (status == GAIT_OK) {
-        m->memory = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+        m->memory = aligned_memory(bytes, path, why);
         if (!m->memory)
-            return message_set(why, "%s: not enough memory for %zu bytes", path, bytes);
+            return false;
         status = gait_model_init(m->memory, bytes, m->blob.data, m->blob.size, &m->model, &err);
     }
     m->bytes = m->blob.size + bytes;
@@ -117,9 +125,9 @@ bool workers_start(workers *w, int32_t threads, message *why)
     *w = (workers){0};
     if (gait_pool_bytes(threads, &w->bytes, &err) != GAIT_OK)
         return message_set(why, "--threads %d: %s", (int)threads, err.text);
-    w->memory = aligned_alloc(GAIT_ALIGN, (w->bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+    w->memory = aligned_memory(w->bytes, "--threads", why);
     if (!w->memory)
-        return message_set(why, "not enough memory for %d threads", (int)threads);
+        return false;
     if (gait_pool_init(w->memory, w->bytes, threads, &w->pool, &err) == GAIT_OK)
         return true;
     workers_stop(w);

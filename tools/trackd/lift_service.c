@@ -30,9 +30,8 @@ bool lift_service_open(lift_service *s, const char *model, const lift_settings *
     if (gait_lift_get_info(s->file.model, &s->info, &err) != GAIT_OK ||
         gait_lift_bytes(s->file.model, c, &s->memory_bytes, &err) != GAIT_OK)
         return message_set(why, "--lift: %.100s: %.120s", model, err.text);
-    size_t const padded = (s->memory_bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN;
-    s->memory = aligned_alloc(GAIT_ALIGN, padded);
-    return s->memory || message_set(why, "--lift: not enough memory for %zu bytes", padded);
+    s->memory = aligned_memory(s->memory_bytes, "--lift", why);
+    return s->memory;
 }
 
 void lift_service_close(lift_service *s)

@@ -102,9 +102,9 @@ bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
     t->config.camera[0] = *camera;
     gait_result status = gait_tracker_bytes(t->model, &t->config, &bytes, &err);
     if (status == GAIT_OK) {
-        t->block = aligned_alloc(GAIT_ALIGN, padded(bytes) + 2 * picture);
+        t->block = aligned_memory(padded(bytes) + 2 * picture, "tracker", why);
         if (!t->block)
-            return message_set(why, "not enough memory for a tracker of %zu bytes", bytes + 2 * picture);
+            return false;
         status = gait_tracker_init(t->block, bytes, t->model, &t->config, &t->tracker, &err);
     }
     if (status != GAIT_OK)
