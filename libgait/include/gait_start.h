@@ -1,8 +1,10 @@
-/* gait_start.h - the automatic start: where a person is and how they walk, from a second of 2-D keypoints.
+/* gait_start.h - the automatic start: where a person is and how they walk, from a second of observations.
  *
- * The cyclic model of gait.h is fitted to keypoints of one person, as a 2-D detector finds them, with a camera that does
- * not move: the person walks straight on at an even pace, or in place as on a treadmill.  Every direction, phase and
- * side is tried; the answers are a few weighted hypotheses, each ready for gait_tracker_start().
+ * A walk is fitted to keypoints of one person, as a 2-D detector finds them, or to boxes around people: found by a
+ * detector, or by gait_start_find_boxes() against the empty scene.  The camera does not move; a person walks straight on
+ * at an even pace, or stays in place.  From keypoints every direction, phase and side is tried; boxes give place,
+ * direction and stature, and leave the phase open.  The answers are a few weighted hypotheses, each ready for
+ * gait_tracker_start().
  * Conventions, units, memory and errors are those of gait.h. */
 #ifndef GAIT_START_H
 #define GAIT_START_H
@@ -11,7 +13,8 @@
 extern "C" {
 #endif
 
-#define GAIT_START_MAX_FRAMES 64    /* frames of keypoints that are kept; older ones are dropped */
+#define GAIT_START_MAX_FRAMES 64    /* frames of keypoints, and of boxes, that are kept; older ones are dropped */
+#define GAIT_START_MAX_PEOPLE 4     /* people in boxes who are followed at a time */
 #define GAIT_START_MAX_HYPOTHESES 8 /* that gait_start_solve() returns at most */
 
 typedef struct gait_start gait_start;
@@ -31,10 +34,23 @@ typedef struct gait_start gait_start;
           float, joint_sd, , "", 0.025f, 0.001, 1)                                                                    \
     SETTING("Errors of a detector last: frames nearer together than this count as one.",                              \
           float, error_time, , "seconds", 0.25f, 0, 10)                                                               \
+    SETTING("Time over which the boxes of a person must lie.",                                                        \
+          float, box_time, , "seconds", 1, 0.3, 1.4)                                                                  \
     FIELD("Calibrated camera; the floor is the plane z = 0.",                                                         \
           gait_camera, camera, , "")
 
 typedef struct gait_start_config { GAIT_START_CONFIG_FIELDS(GAIT_DECLARE, GAIT_DECLARE) } gait_start_config;
+
+/* A person who stands on the floor in full view. */
+#define GAIT_BOX_FIELDS(FIELD)                                                                                        \
+    FIELD("Lowest point of the feet, at the middle of the body, in the image as captured.",                           \
+          float, foot, [2], "pixels")                                                                                 \
+    FIELD("Crown of the head.",                                                                                       \
+          float, head, [2], "pixels")                                                                                 \
+    FIELD("Standard deviation of these coordinates, beside config joint_sd.",                                         \
+          float, sd, , "pixels")
+
+typedef struct gait_box { GAIT_BOX_FIELDS(GAIT_DECLARE) } gait_box;
 
 /* One answer. */
 #define GAIT_HYPOTHESIS_FIELDS(FIELD)                                                                                 \
@@ -63,18 +79,38 @@ static inline void gait_start_default(gait_start_config *cfg)
 {
     gait_start_fill(cfg, sizeof *cfg);
 }
-/* The model must outlive the start.  GAIT_ERR_ARG: it has no cyclic part, or no joints l_hip r_hip l_ankle r_ankle. */
+/* The model must outlive the start.  GAIT_ERR_ARG: it has no cyclic part, or no joints l_hip r_hip l_ankle r_ankle
+ * head_top. */
 GAIT_API gait_result gait_start_bytes(const gait_model *m, const gait_start_config *cfg, size_t *bytes, gait_error *err);
 GAIT_API gait_result gait_start_init(void *mem, size_t mem_bytes, const gait_model *m, const gait_start_config *cfg,
                                      gait_start **out, gait_error *err);
 /* One frame: the model's joints in order, as in gait_frame; utime must increase. */
 GAIT_API gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints, gait_error *err);
+/* One frame: boxes around people, the most certain first; utime must increase.  Boxes that make a person shorter than
+ * 1.2 m or taller than 2.4 m are left out; the others are given to the people of the frames before by their place. */
+GAIT_API gait_result gait_start_add_boxes(gait_start *s, int64_t utime, const gait_box *boxes, int32_t count,
+                                          gait_error *err);
+/* People-sized regions, the largest first, in which a frame differs from the empty scene; both are of the camera's
+ * size.  What touches the image's border is left out.  At most `capacity` boxes. */
+GAIT_API gait_result gait_start_find_boxes(gait_start *s, const gait_image *frame, const gait_image *background,
+                                           gait_box *out, int32_t capacity, int32_t *count, gait_error *err);
+/* 1 if half of the frame differs from the background, so that it shows another scene or the camera has moved. */
+GAIT_API gait_result gait_start_other_scene(gait_start *s, const gait_image *frame, const gait_image *background,
+                                            int32_t *other, gait_error *err);
+/* Stature of the person in a box by the camera, standing where the ray of the foot meets the floor, metres; NAN if it
+ * meets none: a camera that cannot be, or a box above the horizon. */
+GAIT_API gait_result gait_start_box_stature(const gait_start *s, const gait_box *box, float *stature, gait_error *err);
 /* Forget the frames. */
 GAIT_API void        gait_start_reset(gait_start *s);
-/* Fit the frames added and return at most `capacity` hypotheses for the moment `utime`, the most probable first.
- * GAIT_ERR_STATE: too few frames show hips and ankles: add four or more over 0.3 s.  GAIT_ERR_NUMERIC: nothing fits. */
+/* Fit the keypoints added, or if they are too few the boxes of each person, and return at most `capacity` hypotheses
+ * for the moment `utime`, the most probable first.
+ * GAIT_ERR_STATE: too few frames show hips and ankles, four or more over 0.3 s, or a box of one person, eight or more
+ * over config box_time.  GAIT_ERR_NUMERIC: nothing fits. */
 GAIT_API gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
                                       int32_t *count, gait_error *err);
+/* 1: a walk that fits what was observed, to start with at once; 0: the person may stand, the direction be unknown, or
+ * the observations be of something else. */
+GAIT_API int32_t     gait_hypothesis_walks(const gait_hypothesis *h);
 
 #ifdef __cplusplus
 }

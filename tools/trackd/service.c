@@ -43,7 +43,7 @@ static void set_idle(service *s)
     else
         service_set_state(s, GAITMSG_STATUS_T_READY,
                           !s->seek ? "waiting for START"
-                          : s->track.background.data
+                          : s->track.background.data || s->cue
                               ? "waiting for a person who walks in, or for START"
                               : "waiting for the background to detect a person, or for START");
 }
@@ -67,7 +67,7 @@ static void rearm(service *s)
     s->complaint.text[0] = '\0';
     s->idle = SERVICE_IDLE_NOT;
     s->seek = !s->has_init;
-    auto_start_reset(&s->auto_start);
+    gait_start_reset(s->track.start);
     if (s->has_init)
         start_trigger_by_file(&s->start, &s->init);
     set_idle(s);

@@ -1,7 +1,6 @@
 /* service.h - the tracker as a service: messages in, messages out, independent of the transport. */
 #ifndef TRACKD_SERVICE_H
 #define TRACKD_SERVICE_H
-#include "auto_start.h"
 #include "convert.h"
 #include "gaitmsg_command_t.h"
 #include "gaitmsg_particles_t.h"
@@ -46,11 +45,11 @@ typedef struct service {
     bool has_init;
     init_state init; /* of --init FILE */
     start_trigger start;
-    bool compared; /* the background with a frame */
-    bool seek;     /* start automatically, and again when the person is lost */
-    auto_start auto_start;
-    int8_t state; /* GAITMSG_STATUS_T_* */
-    bool news;    /* the state has changed since the last status */
+    bool compared;  /* the background with a frame */
+    bool seek;      /* start automatically, and again when the person is lost */
+    int64_t fitted; /* capture time of the last frame at which the automatic start was solved */
+    int8_t state;   /* GAITMSG_STATUS_T_* */
+    bool news;      /* the state has changed since the last status */
     int64_t command_id;
     service_counts counts;
     int64_t arrived, tracked; /* frames since the program started, unaffected by RESET */

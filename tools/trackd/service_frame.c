@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+enum { FIT_PERIOD = 100000 }; /* microseconds between two fits of the automatic start */
+
 /* Count the frames that never arrived, by the gap in their numbers. */
 static void count_gap(service *s, const image_view *v)
 {
@@ -85,10 +87,12 @@ static bool in_time(service *s, const image_view *v)
 /* Report once if the background shows another scene than the frame. */
 static void compare_scene(service *s, const gait_image *frame)
 {
+    int32_t other = 0;
     if (s->compared || !s->track.background.data)
         return;
     s->compared = true;
-    if (blob_another_scene(&s->auto_start.finder, frame, &s->track.background))
+    (void)gait_start_other_scene(s->track.start, frame, &s->track.background, &other, NULL);
+    if (other)
         service_complain(
             s,
             "half of the image differs from the background: give that of this camera (--background, "
@@ -96,20 +100,47 @@ static void compare_scene(service *s, const gait_image *frame)
             s->stream);
 }
 
+/* Add the keypoints of a frame and what differs from the background in it; false: there are neither, or the clock was
+ * set back. */
+static bool observe(service *s, int64_t utime, const gait_image *frame)
+{
+    gait_start *const start = s->track.start;
+    const gait_keypoint *const found = s->cue ? keypoint_cue_at(s->cue, utime) : NULL;
+    bool const scene = s->track.background.data != NULL;
+    bool fine = true;
+    if (found)
+        fine = gait_start_add(start, utime, found, NULL) == GAIT_OK;
+    if (scene) {
+        gait_box boxes[GAIT_START_MAX_PEOPLE];
+        int32_t count = 0;
+        (void)gait_start_find_boxes(start, frame, &s->track.background, boxes, GAIT_START_MAX_PEOPLE, &count,
+                                    NULL);
+        fine = gait_start_add_boxes(start, utime, boxes, count, NULL) == GAIT_OK && fine;
+    }
+    if (!fine)
+        gait_start_reset(start);
+    return fine && (found || scene);
+}
+
 /* Look for a person to start with; true when the tracker has started with this frame. */
 static bool try_auto_start(service *s, const image_view *v, const gait_image *frame)
 {
-    gait_state mean = s->track.prior_mean, sd = s->track.prior_sd;
-    if (!s->seek || !s->track.background.data ||
-        !auto_start_add(&s->auto_start, frame, &s->track.background, &s->track.config.camera[0],
-                        s->track.model, v->utime, &mean, &sd))
+    gait_hypothesis h;
+    int32_t count = 0;
+    if (!s->seek || !observe(s, v->utime, frame))
         return false;
-    auto_start_reset(&s->auto_start);
-    start_trigger_by_time(&s->start, &mean, &sd, v->utime);
+    if (v->utime >= s->fitted && v->utime < s->fitted + FIT_PERIOD)
+        return false;
+    s->fitted = v->utime;
+    if (gait_start_solve(s->track.start, v->utime, &h, 1, &count, NULL) != GAIT_OK ||
+        !gait_hypothesis_walks(&h) || (h.in_place && s->track.config.belt == 0.0))
+        return false;
+    gait_start_reset(s->track.start);
+    start_trigger_by_time(&s->start, &h.mean, &h.sd, v->utime);
     if (!begin(s, v))
         return false;
     log_line("person found at frame %" PRId64 ": x %.2f y %.2f m, heading %.0f degrees", v->frame,
-             (double)mean.pelvis[0], (double)mean.pelvis[1], (double)mean.heading * 57.29578);
+             (double)h.mean.pelvis[0], (double)h.mean.pelvis[1], (double)h.mean.heading * 57.29578);
     return true;
 }
 
@@ -203,7 +234,7 @@ static bool step(service *s, const image_view *v, int64_t received, int64_t birt
     if (estimate.status == GAIT_TRACK_LOST)
         try_auto_start(s, v, &frame.image[0]);
     else if (estimate.status != GAIT_TRACK_INIT)
-        auto_start_reset(&s->auto_start);
+        gait_start_reset(s->track.start);
     return true;
 }
 
@@ -229,7 +260,7 @@ static int idle_of(const service *s)
         return SERVICE_IDLE_NOT;
     if (!s->seek)
         return SERVICE_IDLE_START;
-    return s->track.background.data ? SERVICE_IDLE_SEARCHING : SERVICE_IDLE_SCENE;
+    return s->track.background.data || s->cue ? SERVICE_IDLE_SEARCHING : SERVICE_IDLE_SCENE;
 }
 
 /* What is missing in such a state. */

@@ -97,23 +97,32 @@ void tracking_close(tracking *t)
 bool tracking_set_camera(tracking *t, const gait_camera *camera, message *why)
 {
     gait_error err = {.text = ""};
-    size_t bytes = 0;
+    gait_start_config start;
+    size_t bytes = 0, start_bytes = 0;
     size_t const picture = padded((size_t)camera->width * (size_t)camera->height * 3);
     t->config.camera[0] = *camera;
+    gait_start_default(&start);
+    start.camera = *camera;
+    start.cpu_mask = t->config.cpu_mask;
     gait_result status = gait_tracker_bytes(t->model, &t->config, &bytes, &err);
+    if (status == GAIT_OK)
+        status = gait_start_bytes(t->model, &start, &start_bytes, &err);
+    size_t const before = padded(bytes) + padded(start_bytes);
     if (status == GAIT_OK) {
-        t->block = aligned_memory(padded(bytes) + 2 * picture, "tracker", why);
+        t->block = aligned_memory(before + 2 * picture, "tracker", why);
         if (!t->block)
             return false;
         status = gait_tracker_init(t->block, bytes, t->model, &t->config, &t->tracker, &err);
     }
+    if (status == GAIT_OK)
+        status = gait_start_init(t->block + padded(bytes), start_bytes, t->model, &start, &t->start, &err);
     if (status != GAIT_OK)
         return message_set(why, "cannot make the tracker: %s (%s)", err.text, gait_result_name(status));
-    t->plate = t->block + padded(bytes);
+    t->plate = t->block + before;
     t->pixels = t->plate + picture;
-    t->tracker_bytes = bytes;
+    t->tracker_bytes = before;
     t->picture_bytes = 2 * picture;
-    t->memory_bytes += padded(bytes) + 2 * picture;
+    t->memory_bytes += before + 2 * picture;
     return true;
 }
 

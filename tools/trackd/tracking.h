@@ -2,6 +2,7 @@
 #ifndef TRACKD_TRACKING_H
 #define TRACKD_TRACKING_H
 #include "common.h"
+#include "gait_start.h"
 #include "image_view.h"
 #include "input_files.h"
 
@@ -36,12 +37,13 @@ typedef struct tracking {
     gait_state prior_mean, prior_sd;
     gait_tracker_config config;
     gait_tracker *tracker; /* NULL until the camera is known */
-    unsigned char *block;  /* tracker, background plate, pixels of a decoded JPEG frame */
+    gait_start *start;     /* the automatic start; NULL until then */
+    unsigned char *block;  /* tracker, start, background plate, pixels of a decoded JPEG frame */
     uint8_t *plate, *pixels;
-    gait_image background; /* data NULL: none */
-    size_t model_bytes;    /* blob and model */
-    size_t tracker_bytes, picture_bytes;
-    size_t memory_bytes; /* all of these */
+    gait_image background;               /* data NULL: none */
+    size_t model_bytes;                  /* blob and model */
+    size_t tracker_bytes, picture_bytes; /* tracker and start; pixels */
+    size_t memory_bytes;                 /* all of these */
 } tracking;
 
 /* Load the model.  `config` is complete but for camera[0]. */

@@ -1,6 +1,7 @@
 #include "api/check.h"
 
 #include "image/camera.h"
+#include "image/view.h"
 #include "raster/rast.h"
 
 gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err)
@@ -13,5 +14,23 @@ gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err)
     if (c->width > RAST_LIMIT || c->height > RAST_LIMIT)
         return base_fail(err, GAIT_ERR_LIMIT, (int)index, "camera %d: %d x %d pixels, at most %d each way",
                          number, (int)c->width, (int)c->height, RAST_LIMIT);
+    return GAIT_OK;
+}
+
+gait_result check_image(const gait_camera *cam, int32_t camera, const gait_image *im, const char *what,
+                        gait_error *err)
+{
+    if (!image_channels(im->format))
+        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d has unknown format %d", what,
+                         (int)camera, (int)im->format);
+    if (im->width != cam->width || im->height != cam->height)
+        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d is %d x %d, the camera is %d x %d", what,
+                         (int)camera, (int)im->width, (int)im->height, (int)cam->width, (int)cam->height);
+    int64_t const least = (int64_t)cam->width * image_channels(im->format);
+    if (im->stride < least)
+        return base_fail(err, GAIT_ERR_ARG, camera,
+                         "%s of camera %d has stride %d, %d pixels of %s take at least %lld", what,
+                         (int)camera, (int)im->stride, (int)cam->width,
+                         least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (long long)least);
     return GAIT_OK;
 }

@@ -5,4 +5,8 @@
 
 /* A camera that can be projected with; `index` is its number in errors, -1: the only one. */
 gait_result check_camera(const gait_camera *c, int32_t index, gait_error *err);
+
+/* Pixels as the camera of this number gives them; `what` is their name in errors. */
+gait_result check_image(const gait_camera *cam, int32_t camera, const gait_image *im, const char *what,
+                        gait_error *err);
 #endif

@@ -23,6 +23,7 @@
     OF(gait_lift_fit, GAIT_LIFT_FIT_FIELDS(F))                                                               \
     OF(gait_lift_frame, GAIT_LIFT_FRAME_FIELDS(F))                                                           \
     OF(gait_start_config, GAIT_START_CONFIG_FIELDS(S, F))                                                    \
+    OF(gait_box, GAIT_BOX_FIELDS(F))                                                                         \
     OF(gait_hypothesis, GAIT_HYPOTHESIS_FIELDS(F))
 
 /* Fields follow one another without padding, so their sizes give their offsets. */

@@ -1,4 +1,5 @@
 /* start_api.c - public functions of the automatic start: check the arguments, then call down. */
+#include "api/check.h"
 #include "api/fields.h"
 #include "api/kernels.h"
 #include "base/cpu.h"
@@ -35,7 +36,7 @@ static gait_result check(const gait_model *m, const gait_start_config *c, gait_e
         !cpu_mask_valid(c->cpu_mask)              ? "cpu_mask is not ~0u or a set of GAIT_CPU_*"
         : c->stature != 0.0f && c->stature < 0.5f ? "stature is neither 0 nor in [0.5, 2.5] metres"
         : !camera_valid(&c->camera) ? "camera is not valid: size, focal lengths and a rotation R are needed"
-        : !start_knows(m)           ? "the model has no joints l_hip r_hip l_ankle r_ankle"
+        : !start_knows(m)           ? "the model has no joints l_hip r_hip l_ankle r_ankle head_top"
                                     : NULL;
     return bad ? base_fail(err, GAIT_ERR_ARG, -1, "start config: %s", bad) : GAIT_OK;
 }
@@ -83,10 +84,69 @@ gait_result gait_start_add(gait_start *s, int64_t utime, const gait_keypoint *ke
     return GAIT_OK;
 }
 
+gait_result gait_start_add_boxes(gait_start *s, int64_t utime, const gait_box *boxes, int32_t count,
+                                 gait_error *err)
+{
+    if (!s || (!boxes && count > 0))
+        return base_null(err, "gait_start_add_boxes");
+    if (count < 0)
+        return base_fail(err, GAIT_ERR_ARG, -1, "gait_start_add_boxes: count = %d is negative", (int)count);
+    if (s->people->begun && utime <= s->people->utime)
+        return base_fail(err, GAIT_ERR_STATE, -1, "gait_start_add_boxes: utime %lld is not after %lld",
+                         (long long)utime, (long long)s->people->utime);
+    people_add(s->people, &s->cfg.camera, utime, boxes, count);
+    return GAIT_OK;
+}
+
+/* Two images of the camera's size. */
+static gait_result check_images(const gait_start *s, const gait_image *frame, const gait_image *background,
+                                gait_error *err)
+{
+    gait_result result = check_image(&s->cfg.camera, 0, frame, "image", err);
+    if (result == GAIT_OK)
+        result = check_image(&s->cfg.camera, 0, background, "background", err);
+    return result;
+}
+
+gait_result gait_start_find_boxes(gait_start *s, const gait_image *frame, const gait_image *background,
+                                  gait_box *out, int32_t capacity, int32_t *count, gait_error *err)
+{
+    if (!s || !frame || !background || !out || !count)
+        return base_null(err, "gait_start_find_boxes");
+    if (capacity < 1)
+        return base_fail(err, GAIT_ERR_ARG, -1, "capacity is %d: give 1 or more", (int)capacity);
+    gait_result const result = check_images(s, frame, background, err);
+    if (result == GAIT_OK)
+        *count = blob_find(&s->blobs, frame, background, out, capacity);
+    return result;
+}
+
+gait_result gait_start_other_scene(gait_start *s, const gait_image *frame, const gait_image *background,
+                                   int32_t *other, gait_error *err)
+{
+    if (!s || !frame || !background || !other)
+        return base_null(err, "gait_start_other_scene");
+    gait_result const result = check_images(s, frame, background, err);
+    if (result == GAIT_OK)
+        *other = blob_other_scene(&s->blobs, frame, background);
+    return result;
+}
+
+gait_result gait_start_box_stature(const gait_start *s, const gait_box *box, float *stature, gait_error *err)
+{
+    start_box b;
+    if (!s || !box || !stature)
+        return base_null(err, "gait_start_box_stature");
+    if (!people_box(&s->cfg.camera, box, &b))
+        return base_fail(err, GAIT_ERR_ARG, -1, "box: numbers must be finite and sd not negative");
+    *stature = (float)people_stature(&s->cfg.camera, &b);
+    return GAIT_OK;
+}
+
 void gait_start_reset(gait_start *s)
 {
     if (s)
-        s->count = 0;
+        start_reset(s);
 }
 
 gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity,
@@ -98,10 +158,18 @@ gait_result gait_start_solve(gait_start *s, int64_t utime, gait_hypothesis *out,
         return base_fail(err, GAIT_ERR_ARG, -1, "capacity is %d: give 1 or more", capacity);
     int32_t const found = start_solve(s, utime, out, capacity);
     if (found < 0)
-        return base_fail(err, GAIT_ERR_STATE, -1,
-                         "too few frames show hips and ankles: add four or more over 0.3 s");
+        return base_fail(
+            err, GAIT_ERR_STATE, -1,
+            "too few frames show hips and ankles: add four or more over 0.3 s, or eight boxes of a "
+            "person over %.1f s",
+            (double)s->cfg.box_time);
     if (found == 0)
-        return base_fail(err, GAIT_ERR_NUMERIC, -1, "no walk fits the keypoints");
+        return base_fail(err, GAIT_ERR_NUMERIC, -1, "no walk fits the observations");
     *count = found;
     return GAIT_OK;
+}
+
+int32_t gait_hypothesis_walks(const gait_hypothesis *h)
+{
+    return h && start_walks(h);
 }

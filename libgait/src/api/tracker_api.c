@@ -3,7 +3,6 @@
 #include "api/fields.h"
 #include "api/kernels.h"
 #include "base/cpu.h"
-#include "image/view.h"
 #include "likelihood/likelihood.h"
 #include "tracker/fixed_lag.h"
 #include "tracker/snapshot.h"
@@ -114,26 +113,6 @@ gait_result gait_tracker_init(void *mem, size_t mem_bytes, const gait_model *m,
     return GAIT_OK;
 }
 
-/* Pixels as the camera gives them. */
-static gait_result check_image(const gait_tracker *t, int32_t camera, const gait_image *im, const char *what,
-                               gait_error *err)
-{
-    const gait_camera *const cam = &t->cfg.camera[camera];
-    if (!image_channels(im->format))
-        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d has unknown format %d", what,
-                         (int)camera, (int)im->format);
-    if (im->width != cam->width || im->height != cam->height)
-        return base_fail(err, GAIT_ERR_ARG, camera, "%s of camera %d is %d x %d, the camera is %d x %d", what,
-                         (int)camera, (int)im->width, (int)im->height, (int)cam->width, (int)cam->height);
-    int64_t const least = (int64_t)cam->width * image_channels(im->format);
-    if (im->stride < least)
-        return base_fail(err, GAIT_ERR_ARG, camera,
-                         "%s of camera %d has stride %d, %d pixels of %s take at least %lld", what,
-                         (int)camera, (int)im->stride, (int)cam->width,
-                         least == cam->width ? "GAIT_GREY8" : "GAIT_RGB8 or GAIT_BGR8", (long long)least);
-    return GAIT_OK;
-}
-
 gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const gait_image *plate,
                                         gait_error *err)
 {
@@ -142,7 +121,7 @@ gait_result gait_tracker_set_background(gait_tracker *t, int32_t camera, const g
     if (camera < 0 || camera >= t->cfg.cameras)
         return base_fail(err, GAIT_ERR_ARG, camera, "background: camera %d is outside [0, %d]", (int)camera,
                          (int)t->cfg.cameras - 1);
-    gait_result const s = plate && plate->data ? check_image(t, camera, plate, "background", err) : GAIT_OK;
+    gait_result const s = plate && plate->data ? check_image(&t->cfg.camera[camera], camera, plate, "background", err) : GAIT_OK;
     if (s != GAIT_OK)
         return s;
     t->camera[camera].background = plate ? *plate : (gait_image){0};
@@ -200,7 +179,7 @@ static gait_result check_frame(const gait_tracker *t, const gait_frame *frame, g
                          (double)t->cfg.max_dt);
     for (int32_t c = 0; c < t->cfg.cameras; c++) {
         gait_result const s =
-            frame->image[c].data ? check_image(t, c, &frame->image[c], "image", err) : GAIT_OK;
+            frame->image[c].data ? check_image(&t->cfg.camera[c], c, &frame->image[c], "image", err) : GAIT_OK;
         if (s != GAIT_OK)
             return s;
     }

@@ -11,7 +11,9 @@ enum {
     ROWS = 2 * GAIT_MAX_JOINTS, /* of a frame */
     HEADINGS = 12,
     PHASES = 6,
-    LEAST_FRAMES = 4
+    LEAST_FRAMES = 4,
+    LEAST_BOXES = 8,
+    BOX_ROWS = 4
 };
 _Static_assert((int)N < (int)BLOCK, "a block of bodies holds a candidate and its derivatives");
 
@@ -25,11 +27,24 @@ static const double PLACE_SD = 3.0;   /* metres, about where the legs' length pu
 static const double IN_PLACE = 8.0;   /* twice the log odds of a walk over one in place */
 static const double DEGREES = 4.0;    /* of freedom of the keypoints' errors */
 static const double BEHIND = 1e3;     /* standard deviations for joints behind the camera */
+static const double LEAD = 0.1; /* statures by which the lower foot is nearer to the camera than the body */
+static const double BOX_PLACE = 0.08; /* metres, of boxes for as long as shadows and clothes stay the same */
+static const double OPEN = 0.3;       /* information on a heading that boxes leave open, per square radian */
+static const float OPEN_SD = 0.9f;    /* radians of standard deviation from which a heading is unknown */
+static const float BUILD_SHARE =
+    0.25f;                           /* of the sd of scores and posture: few particles find the phase first */
+static const float SPEEDS_UP = 0.4f; /* sd of the rate, as a share of what it is below the usual one */
+static const float FITS = 1.8f;      /* chi-square per coordinate up to which a walk fits */
+static const float LEAST_RATE = 0.3f;   /* strides per second; a person who stands fits a very slow walk */
+static const float LEAST_SPEED = 0.25f; /* metres per second of a person who walks */
+static const float BOX_SPEED = 0.4f;    /* the same by boxes */
+static const double STANDS = 0.1;       /* probability of a person who stays, against one who walks */
 
 /* Steps of the differences that stand for derivatives. */
 static const double STEP[N] = {0.02, 0.02, 0.03, 0.03, 0.01, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1};
 
 typedef struct start_problem {           /* what all candidates of a mode are judged by */
+    const start_person *person;          /* whose boxes are fitted; NULL: keypoints are */
     int32_t frames, frame[START_FITTED]; /* in the ring */
     double at[START_FITTED];             /* seconds from the middle */
     double share;                        /* of a frame's residuals, as their errors last */
@@ -57,15 +72,41 @@ static int32_t find_point(const gait_model *m, const char *name)
     return -1;
 }
 
+/* Height of a point over the floor while walking: mean over the stride, statures. */
+static double height_of(const gait_start *s, int32_t point)
+{
+    start_scratch *const w = s->scratch;
+    double sum = 0.0;
+    memset(&w->states, 0, sizeof w->states);
+    for (int32_t i = 0; i < BLOCK; i++) {
+        w->states.f[F_PHASE][i] = (float)i / (float)BLOCK;
+        w->states.f[F_RATE][i] = s->model->stride_hz;
+        w->states.f[F_STATURE][i] = s->model->stature_mean;
+    }
+    particle_block_bodies(&s->layout, &w->states, &w->body);
+    kin_points(s->model, &w->body, w->points);
+    for (int32_t i = 0; i < BLOCK; i++)
+        sum += (double)w->points[point][2][i];
+    return sum / BLOCK / (double)s->model->stature_mean;
+}
+
 gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config *cfg, const kernels *run)
 {
     gait_start *const s = TAKE(a, gait_start, 1);
     void *const keypoint = arena_take(a, sizeof *s->keypoint, GAIT_START_MAX_FRAMES);
     start_scratch *const scratch = TAKE(a, start_scratch, 1);
+    start_people *const people = TAKE(a, start_people, 1);
+    blob_finder const blobs = blob_finder_layout(a, cfg->camera.width, cfg->camera.height);
     if (!s || a->overflow)
         return NULL;
     gait_tracker_config const plain = {.components = i_min(START_SCORES, m->components)};
-    *s = (gait_start){.model = m, .run = run, .cfg = *cfg, .keypoint = keypoint, .scratch = scratch};
+    *s = (gait_start){.model = m,
+                      .run = run,
+                      .cfg = *cfg,
+                      .keypoint = keypoint,
+                      .people = people,
+                      .blobs = blobs,
+                      .scratch = scratch};
     if (s->cfg.stature == 0.0f)
         s->cfg.stature = m->stature_mean;
     if (s->cfg.stature_sd == 0.0f)
@@ -75,16 +116,24 @@ gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config 
     s->hip[1] = find_point(m, "r_hip");
     s->ankle[0] = find_point(m, "l_ankle");
     s->ankle[1] = find_point(m, "r_ankle");
+    s->crown = height_of(s, find_point(m, "head_top"));
+    start_reset(s);
     return s;
 }
 
 bool start_knows(const gait_model *m)
 {
-    static const char *const needed[] = {"l_hip", "r_hip", "l_ankle", "r_ankle"};
+    static const char *const needed[] = {"l_hip", "r_hip", "l_ankle", "r_ankle", "head_top"};
     bool all = true;
-    for (int32_t k = 0; k < 4; k++)
+    for (int32_t k = 0; k < 5; k++)
         all &= find_point(m, needed[k]) >= 0;
     return all;
+}
+
+void start_reset(gait_start *s)
+{
+    s->count = 0;
+    memset(s->people, 0, sizeof *s->people);
 }
 
 void start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints)
@@ -144,6 +193,13 @@ static double rough_place(const gait_start *s, start_problem *p)
     const gait_camera *const c = &s->cfg.camera;
     for (int32_t k = 0; k < p->frames; k++) {
         double hips[2], ankles[2];
+        if (p->person) {
+            const start_box *const b = &p->person->box[p->frame[k]];
+            leg[k] = LEG * distance(b->head, b->foot);
+            u[k] = 0.5 * (b->head[0] + b->foot[0]);
+            v[k] = 0.5 * (b->head[1] + b->foot[1]);
+            continue;
+        }
         (void)middle_of(s, p->frame[k], s->hip, hips);
         (void)middle_of(s, p->frame[k], s->ankle, ankles);
         leg[k] = distance(hips, ankles);
@@ -169,40 +225,55 @@ static void set_noise(gait_start *s, double miss)
 {
     start_scratch *const w = s->scratch;
     for (int32_t k = 0; k < w->problem.frames; k++)
-        for (int32_t j = 0; j < s->model->points; j++) {
-            double const sd = keypoint(s, w->problem.frame[k], j)->sd;
+        for (int32_t j = 0; j < (w->problem.person ? 1 : s->model->points); j++) {
+            double const sd = w->problem.person ? w->problem.person->box[w->problem.frame[k]].sd
+                                                : keypoint(s, w->problem.frame[k], j)->sd;
             w->inverse_sd[k][j] = sd > 0.0 ? 1.0 / sqrt(sd * sd + miss * miss) : 0.0;
         }
+}
+
+/* Frames of the ring in order of time that can be fitted; returns how many. */
+static int32_t usable_frames(const gait_start *s, const start_problem *p,
+                             int32_t usable[GAIT_START_MAX_FRAMES])
+{
+    int32_t const count = p->person ? p->person->count : s->count, kept = i_min(count, GAIT_START_MAX_FRAMES);
+    const int64_t *const utime = p->person ? p->person->utime : s->utime;
+    int64_t const newest = p->person ? s->people->utime : utime[i_max(count - 1, 0) % GAIT_START_MAX_FRAMES];
+    int32_t n = 0;
+    for (int32_t k = count - kept; k < count; k++) {
+        double uv[2];
+        int32_t const f = k % GAIT_START_MAX_FRAMES;
+        bool const shown = p->person || (middle_of(s, f, s->hip, uv) && middle_of(s, f, s->ankle, uv));
+        if (shown && utime[f] >= newest - START_KEEP)
+            usable[n++] = f;
+    }
+    return n;
 }
 
 /* Choose the frames to fit; false: too few. */
 static bool choose_frames(gait_start *s, start_problem *p)
 {
-    int32_t whole[GAIT_START_MAX_FRAMES], n = 0;
-    int32_t const kept = i_min(s->count, GAIT_START_MAX_FRAMES);
-    for (int32_t k = s->count - kept; k < s->count; k++) {
-        double uv[2];
-        int32_t const f = k % GAIT_START_MAX_FRAMES;
-        if (middle_of(s, f, s->hip, uv) && middle_of(s, f, s->ankle, uv))
-            whole[n++] = f;
-    }
-    if (n < LEAST_FRAMES)
+    const int64_t *const utime = p->person ? p->person->utime : s->utime;
+    int32_t usable[GAIT_START_MAX_FRAMES];
+    int32_t const n = usable_frames(s, p, usable);
+    if (n < (p->person ? LEAST_BOXES : LEAST_FRAMES))
         return false;
-    int64_t const first = s->utime[whole[0]], last = s->utime[whole[n - 1]];
+    int64_t const first = utime[usable[0]], last = utime[usable[n - 1]];
     double const span = 1e-6 * (double)(last - first);
     p->frames = i_min(n, START_FITTED);
     p->middle = first + (last - first) / 2;
     p->observations = 0;
     for (int32_t k = 0; k < p->frames; k++) {
-        p->frame[k] = whole[k * (n - 1) / (p->frames - 1)];
-        p->at[k] = 1e-6 * (double)(s->utime[p->frame[k]] - p->middle);
-        for (int32_t j = 0; j < s->model->points; j++)
+        p->frame[k] = usable[k * (n - 1) / (p->frames - 1)];
+        p->at[k] = 1e-6 * (double)(utime[p->frame[k]] - p->middle);
+        for (int32_t j = 0; j < s->model->points && !p->person; j++)
             p->observations += keypoint(s, p->frame[k], j)->sd > 0.0 ? 2 : 0;
+        p->observations += p->person ? BOX_ROWS : 0;
     }
     double const apart =
         s->cfg.error_time > 0.0f ? 1.0 + span / (double)s->cfg.error_time : (double)p->frames;
     p->share = apart < (double)p->frames ? apart / (double)p->frames : 1.0;
-    return span >= LEAST_SPAN;
+    return span >= (p->person ? (double)s->cfg.box_time : LEAST_SPAN);
 }
 
 /* States of up to BLOCK candidates at a moment. */
@@ -227,12 +298,54 @@ static void place_states(const gait_start *s, const double (*theta)[N], int32_t 
     }
 }
 
-/* Residuals of a frame's keypoints, down-weighted so that their squares are Student's t costs: rows x lanes. */
+/* Two rows of residuals of one lane: of a point X and where it is found, down-weighted so that their squares are
+ * Student's t costs. */
+static void point_residuals(const gait_start *s, const float X[3], double u, double v, double weight,
+                            int32_t row, int32_t lane)
+{
+    start_scratch *const w = s->scratch;
+    float uv[2];
+    double du = BEHIND, dv = BEHIND;
+    if (camera_project(&s->cfg.camera, X, uv) > CAMERA_NEAR) {
+        du = ((double)uv[0] - u) * weight;
+        dv = ((double)uv[1] - v) * weight;
+    }
+    double const square = du * du + dv * dv;
+    double const robust = square > 1e-9 ? sqrt(DEGREES * m_log64(1.0 + square / DEGREES) / square) : 1.0;
+    w->residual[row][lane] = robust * du;
+    w->residual[row + 1][lane] = robust * dv;
+}
+
+/* Residuals of a frame's box: rows x lanes. */
+static int32_t box_residuals(const gait_start *s, int32_t k, const double (*theta)[N], int32_t lanes)
+{
+    start_scratch *const w = s->scratch;
+    const start_problem *const p = &w->problem;
+    const start_box *const b = &p->person->box[p->frame[k]];
+    double const weight = w->inverse_sd[k][0];
+    place_states(s, theta, lanes, p->at[k], &w->states);
+    for (int32_t i = 0; i < lanes; i++) {
+        float X[3] = {w->states.f[F_X][i], w->states.f[F_Y][i], w->states.f[F_Z][i]}, from[3];
+        float const tall = w->states.f[F_STATURE][i];
+        camera_to(&s->cfg.camera, X, from);
+        float const away = __builtin_sqrtf(from[0] * from[0] + from[1] * from[1]);
+        float const lead = away > 0.0f ? (float)LEAD * tall / away : 0.0f;
+        float const foot[3] = {X[0] - lead * from[0], X[1] - lead * from[1], X[2]};
+        X[2] += (float)s->crown * tall;
+        point_residuals(s, foot, b->foot[0], b->foot[1], weight, 0, i);
+        point_residuals(s, X, b->head[0], b->head[1], weight, 2, i);
+    }
+    return BOX_ROWS;
+}
+
+/* Residuals of a frame's keypoints: rows x lanes. */
 static int32_t frame_residuals(const gait_start *s, int32_t k, const double (*theta)[N], int32_t lanes)
 {
     start_scratch *const w = s->scratch;
     const start_problem *const p = &w->problem;
     int32_t rows = 0;
+    if (p->person)
+        return box_residuals(s, k, theta, lanes);
     place_states(s, theta, lanes, p->at[k], &w->states);
     particle_block_bodies(&s->layout, &w->states, &w->body);
     kin_points(s->model, &w->body, w->points);
@@ -243,17 +356,7 @@ static int32_t frame_residuals(const gait_start *s, int32_t k, const double (*th
             continue;
         for (int32_t i = 0; i < lanes; i++) {
             float const X[3] = {w->points[j][0][i], w->points[j][1][i], w->points[j][2][i]};
-            float uv[2];
-            double du = BEHIND, dv = BEHIND;
-            if (camera_project(&s->cfg.camera, X, uv) > CAMERA_NEAR) {
-                du = ((double)uv[0] - found->u) * weight;
-                dv = ((double)uv[1] - found->v) * weight;
-            }
-            double const square = du * du + dv * dv;
-            double const robust =
-                square > 1e-9 ? sqrt(DEGREES * m_log64(1.0 + square / DEGREES) / square) : 1.0;
-            w->residual[rows][i] = robust * du;
-            w->residual[rows + 1][i] = robust * dv;
+            point_residuals(s, X, found->u, found->v, weight, rows, i);
         }
         rows += 2;
     }
@@ -325,6 +428,10 @@ static void linearise(const gait_start *s, const start_candidate *c)
         }
         s->run->cholesky_rank(w->A, LD, w->W, rows);
     }
+    if (w->problem.person) {
+        w->A[START_HEADING * (LD + 1)] += OPEN;
+        w->A[START_PHASE * (LD + 1)] += OPEN;
+    }
 }
 
 /* Step of Levenberg and Marquardt; false: the equations have no solution. */
@@ -389,16 +496,18 @@ static int32_t propose(const gait_start *s)
 {
     start_scratch *const w = s->scratch;
     int32_t n = 0;
-    for (int32_t mode = 0; mode < 2; mode++)
-        for (int32_t first = 0; first < HEADINGS * PHASES; first += BLOCK) {
-            int32_t const lanes = i_min(BLOCK, HEADINGS * PHASES - first);
+    int32_t const phases = w->problem.person ? 1 : PHASES;
+    for (int32_t mode = 0; mode < 2; mode++) {
+        int32_t const headings = mode && w->problem.person ? 1 : HEADINGS;
+        for (int32_t first = 0; first < headings * phases; first += BLOCK) {
+            int32_t const lanes = i_min(BLOCK, headings * phases - first);
             double theta[BLOCK][N] = {{0.0}}, cost[BLOCK], chi2[BLOCK];
             for (int32_t i = 0; i < lanes; i++) {
                 double *const q = theta[i];
                 q[START_X] = w->problem.place[0];
                 q[START_Y] = w->problem.place[1];
-                q[START_HEADING] = (double)((first + i) / PHASES) * 2.0 * (double)PI_F / HEADINGS;
-                q[START_PHASE] = (double)((first + i) % PHASES) / PHASES;
+                q[START_HEADING] = (double)((first + i) / phases) * 2.0 * (double)PI_F / HEADINGS;
+                q[START_PHASE] = (double)((first + i) % phases) / phases;
                 q[START_RATE] = (double)s->model->stride_hz;
                 q[START_STATURE] = (double)s->cfg.stature;
                 q[START_SPEED] =
@@ -410,25 +519,28 @@ static int32_t propose(const gait_start *s)
                 memcpy(w->candidate[n].theta, theta[i], sizeof theta[i]);
             }
         }
+    }
     return n;
 }
 
 /* The same answer, reached from two proposals? */
-static bool same(const start_candidate *a, const start_candidate *b)
+static bool same(const start_candidate *a, const start_candidate *b, bool boxes)
 {
+    if (boxes && a->in_place && b->in_place)
+        return true;
     float const turn = m_wrap_pi((float)(a->theta[START_HEADING] - b->theta[START_HEADING]));
     float const phase = m_wrap_pi(TWO_PI_F * (float)(a->theta[START_PHASE] - b->theta[START_PHASE]));
     return a->in_place == b->in_place && fabsf(turn) < 0.3f && fabsf(phase) < 0.6f;
 }
 
 /* Leave out what repeats one before it; returns how many are left. */
-static int32_t distinct(start_candidate *c, int32_t n)
+static int32_t distinct(start_candidate *c, int32_t n, bool boxes)
 {
     int32_t left = 0;
     for (int32_t i = 0; i < n; i++) {
         bool found = false;
         for (int32_t k = 0; k < left; k++)
-            found |= same(&c[k], &c[i]);
+            found |= same(&c[k], &c[i], boxes);
         if (!found)
             c[left++] = c[i];
     }
@@ -438,6 +550,37 @@ static int32_t distinct(start_candidate *c, int32_t n)
 static float root(double variance)
 {
     return __builtin_sqrtf(f_max((float)variance, 0.0f));
+}
+
+/* Keypoints are never as exact as their scatter says: errors of a detector last, and who has only begun to walk is
+ * slower than soon after. */
+static void widen(const gait_start *s, gait_hypothesis *h)
+{
+    h->sd.phase = f_max(h->sd.phase, 0.03f);
+    h->sd.heading = f_max(h->sd.heading, 0.08f);
+    h->sd.stature = f_max(h->sd.stature, 0.03f);
+    h->sd.stride_hz =
+        f_max(h->sd.stride_hz, f_max(0.03f, SPEEDS_UP * (s->model->stride_hz - h->mean.stride_hz)));
+    for (int32_t k = 0; k < 3; k++)
+        h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], 0.05f, 10.0f);
+}
+
+/* What boxes do not tell. */
+static void leave_open(const gait_start *s, const start_candidate *c, gait_hypothesis *h)
+{
+    h->mean.phase = 0.0f;
+    h->sd.phase = s->prior_sd.phase;
+    h->mean.pelvis[2] -= (float)c->theta[START_FLOOR]; /* an error of the boxes, not of the floor */
+    for (int32_t k = 0; k < 2; k++)
+        h->sd.pelvis[k] = root((double)h->sd.pelvis[k] * (double)h->sd.pelvis[k] + BOX_PLACE * BOX_PLACE);
+    if (c->in_place || h->sd.heading > OPEN_SD) {
+        h->mean.heading = c->in_place ? 0.0f : h->mean.heading;
+        h->sd.heading = PI_F;
+    }
+    for (int32_t k = 0; k < s->model->components; k++)
+        h->sd.coef[k] = BUILD_SHARE * s->prior_sd.coef[k];
+    for (int32_t k = 0; k < s->model->angles; k++)
+        h->sd.offset[k] = BUILD_SHARE * s->prior_sd.offset[k];
 }
 
 /* State of a candidate at a moment, with its standard deviations; returns the log of the root of the determinant of
@@ -474,6 +617,10 @@ static double describe(gait_start *s, const start_candidate *c, double at, gait_
     h->sd.pelvis[2] = root(covariance[START_FLOOR][START_FLOOR]);
     for (int32_t k = 0; k < s->layout.components; k++)
         h->sd.coef[k] = root(covariance[START_SCORE + k][START_SCORE + k]);
+    if (w->problem.person)
+        leave_open(s, c, h);
+    else
+        widen(s, h);
     h->speed = (float)c->theta[START_SPEED];
     h->speed_sd = root(covariance[START_SPEED][START_SPEED]);
     h->in_place = c->in_place;
@@ -482,24 +629,26 @@ static double describe(gait_start *s, const start_candidate *c, double at, gait_
     return -cholesky_log_det(w->U, N, LD);
 }
 
-int32_t start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity)
+/* Hypotheses of the problem, whose probabilities sum to 1; returns how many, -1 if there are too few frames. */
+static int32_t solve_problem(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity)
 {
     start_scratch *const w = s->scratch;
     double weight[GAIT_START_MAX_HYPOTHESES], sum = 0.0, top = -DBL_MAX;
+    bool const boxes = w->problem.person != NULL;
     if (!choose_frames(s, &w->problem))
         return -1;
     double const pixels = rough_place(s, &w->problem);
     set_noise(s, (double)s->cfg.joint_sd * pixels);
-    int32_t const proposed = propose(s);
-    best_first(w->candidate, proposed, START_REFINED);
-    for (int32_t i = 0; i < START_REFINED; i++)
-        refine(s, &w->candidate[i], 3);
-    best_first(w->candidate, START_REFINED, START_REFINED);
-    int32_t n = i_min(distinct(w->candidate, START_REFINED), i_min(capacity, GAIT_START_MAX_HYPOTHESES));
+    int32_t const proposed = propose(s), refined = i_min(proposed, START_REFINED);
+    best_first(w->candidate, proposed, refined);
+    for (int32_t i = 0; i < refined; i++)
+        refine(s, &w->candidate[i], boxes ? 8 : 3);
+    best_first(w->candidate, refined, refined);
+    int32_t n = i_min(distinct(w->candidate, refined, boxes), i_min(capacity, GAIT_START_MAX_HYPOTHESES));
     for (int32_t i = 0; i < n; i++)
         refine(s, &w->candidate[i], 15);
     best_first(w->candidate, n, n);
-    n = distinct(w->candidate, n);
+    n = distinct(w->candidate, n, boxes);
     double const at = 1e-6 * (double)(utime - w->problem.middle);
     for (int32_t i = 0; i < n; i++) {
         weight[i] = describe(s, &w->candidate[i], at, &out[i]) - 0.5 * w->candidate[i].cost;
@@ -510,4 +659,67 @@ int32_t start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t 
     for (int32_t i = 0; i < n; i++)
         out[i].probability = (float)(m_exp64(weight[i] - top) / sum);
     return n;
+}
+
+static void most_probable_first(gait_hypothesis *h, int32_t n)
+{
+    for (int32_t i = 1; i < n; i++) {
+        gait_hypothesis const moved = h[i];
+        int32_t k = i;
+        for (; k > 0 && h[k - 1].probability < moved.probability; k--)
+            h[k] = h[k - 1];
+        h[k] = moved;
+    }
+}
+
+/* Hypotheses of everyone who is seen in boxes.  Who walks and who is seen more often is more probable. */
+static int32_t solve_people(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity)
+{
+    start_scratch *const w = s->scratch;
+    int32_t n = 0, enough = 0;
+    double sum = 0.0;
+    for (int32_t k = 0; k < GAIT_START_MAX_PEOPLE; k++) {
+        gait_hypothesis own[GAIT_START_MAX_HYPOTHESES];
+        int32_t usable[GAIT_START_MAX_FRAMES];
+        w->problem.person = &s->people->person[k];
+        int32_t const found = solve_problem(s, utime, own, GAIT_START_MAX_HYPOTHESES / 2);
+        double const often = (double)usable_frames(s, &w->problem, usable);
+        enough += found >= 0;
+        for (int32_t i = 0; i < found; i++) {
+            own[i].probability *= (float)(often * (own[i].in_place ? STANDS : 1.0));
+            if (n == GAIT_START_MAX_HYPOTHESES && own[i].probability <= out[n - 1].probability)
+                continue;
+            n = i_min(n + 1, GAIT_START_MAX_HYPOTHESES);
+            out[n - 1] = own[i];
+            most_probable_first(out, n);
+        }
+    }
+    n = i_min(n, capacity);
+    for (int32_t i = 0; i < n; i++)
+        sum += (double)out[i].probability;
+    for (int32_t i = 0; i < n; i++)
+        out[i].probability = (float)((double)out[i].probability / sum);
+    return enough ? n : -1;
+}
+
+int32_t start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity)
+{
+    s->scratch->problem.person = NULL;
+    int32_t const n = solve_problem(s, utime, out, capacity);
+    if (n >= 0)
+        return n;
+    gait_hypothesis of_people[GAIT_START_MAX_HYPOTHESES];
+    int32_t const found = solve_people(s, utime, of_people, i_min(capacity, GAIT_START_MAX_HYPOTHESES));
+    for (int32_t i = 0; i < found; i++)
+        out[i] = of_people[i];
+    return found;
+}
+
+bool start_walks(const gait_hypothesis *h)
+{
+    bool const boxes = h->sd.phase >= 0.5f;
+    if (boxes)
+        return !h->in_place && h->speed > BOX_SPEED && h->sd.heading < PI_F && h->chi2_per_observation < FITS;
+    return h->mean.stride_hz > LEAST_RATE && (h->in_place || h->speed > LEAST_SPEED) &&
+           h->chi2_per_observation < FITS;
 }

@@ -1,13 +1,16 @@
-/* start.h - fit of the cyclic model to keypoints of a second: a straight, even walk, or a walk in place.
+/* start.h - fit of a walk to keypoints or boxes of a second: straight and even, or in place.
  *
  * Unknowns: place, heading, speed, phase and rate at the middle of the frames, stature, height of the floor, and the
  * first three scores.  Every heading, phase and mode is scored by its squared error; the best are refined by
- * Levenberg-Marquardt on robust residuals (Student's t), all derivatives from one block of bodies per frame. */
+ * Levenberg-Marquardt on robust residuals (Student's t), all derivatives from one block of bodies per frame.
+ * Boxes do not show the phase: their candidates differ in heading alone. */
 #ifndef GAIT_START_START_H
 #define GAIT_START_START_H
 #include "base/arena.h"
 #include "filter/particles.h"
 #include "gait_start.h"
+#include "start/blobs.h"
+#include "start/people.h"
 
 enum {
     START_X,
@@ -45,9 +48,12 @@ struct gait_start {
     state_layout layout;
     gait_state prior_sd;      /* where nothing is known about the person */
     int32_t hip[2], ankle[2]; /* points of the model */
-    int32_t count;            /* frames added, of which the last GAIT_START_MAX_FRAMES are kept */
+    double crown;             /* height of head_top over the floor while walking, statures */
+    int32_t count; /* frames of keypoints added, of which the last GAIT_START_MAX_FRAMES are kept */
     int64_t utime[GAIT_START_MAX_FRAMES];
     start_keypoint (*keypoint)[GAIT_MAX_JOINTS]; /* GAIT_START_MAX_FRAMES */
+    start_people *people;
+    blob_finder blobs;
     start_scratch *scratch;
 };
 
@@ -56,9 +62,14 @@ gait_start *start_layout(arena *a, const gait_model *m, const gait_start_config 
 /* Whether the model has the joints that the start needs. */
 bool start_knows(const gait_model *m);
 
+void start_reset(gait_start *s);
+
 void start_add(gait_start *s, int64_t utime, const gait_keypoint *keypoints);
 
 /* Hypotheses for a moment, the most probable first; returns how many, 0 if nothing fits, -1 if there are too few
  * frames. */
 int32_t start_solve(gait_start *s, int64_t utime, gait_hypothesis *out, int32_t capacity);
+
+/* Whether it is a walk that fits the observations. */
+bool start_walks(const gait_hypothesis *h);
 #endif

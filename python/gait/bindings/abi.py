@@ -197,6 +197,10 @@ class StartConfigC(ctypes.Structure):
     """``gait_start_config``."""
 
 
+class BoxC(ctypes.Structure):
+    """``gait_box``."""
+
+
 class HypothesisC(ctypes.Structure):
     """``gait_hypothesis``."""
 
@@ -218,6 +222,7 @@ STRUCTS: dict[str, type[ctypes.Structure]] = {
     "gait_lift_fit": LiftFitC,
     "gait_lift_frame": LiftFrameC,
     "gait_start_config": StartConfigC,
+    "gait_box": BoxC,
     "gait_hypothesis": HypothesisC,
 }
 
@@ -311,7 +316,20 @@ FUNCTIONS: tuple[tuple[str, list[Any], Any], ...] = (
     ("gait_lift_reset", [_HANDLE], None),
     ("gait_start_fill", [POINTER(StartConfigC), c_size_t], None),
     ("gait_start_add", [_HANDLE, c_int64, POINTER(KeypointC), _ERR], _RESULT),
+    ("gait_start_add_boxes", [_HANDLE, c_int64, POINTER(BoxC), c_int32, _ERR], _RESULT),
+    (
+        "gait_start_find_boxes",
+        [_HANDLE, POINTER(ImageView), POINTER(ImageView), POINTER(BoxC), c_int32, POINTER(c_int32), _ERR],
+        _RESULT,
+    ),
+    (
+        "gait_start_other_scene",
+        [_HANDLE, POINTER(ImageView), POINTER(ImageView), POINTER(c_int32), _ERR],
+        _RESULT,
+    ),
+    ("gait_start_box_stature", [_HANDLE, POINTER(BoxC), POINTER(c_float), _ERR], _RESULT),
     ("gait_start_reset", [_HANDLE], None),
+    ("gait_hypothesis_walks", [POINTER(HypothesisC)], c_int32),
     ("gait_start_solve", [_HANDLE, c_int64, POINTER(HypothesisC), c_int32, POINTER(c_int32), _ERR], _RESULT),
     ("gait_lift_remove_spikes", [c_int32, c_int32, _ARRAY, _ARRAY, _ARRAY, _ARRAY], c_int32),
     ("gait_lift_weight_outliers", [c_int32, _ARRAY, _ARRAY, _ARRAY], c_int32),

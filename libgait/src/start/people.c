@@ -1,0 +1,96 @@
+#include "start/people.h"
+#include "image/camera.h"
+
+static const double SHORTEST = 1.2, TALLEST = 2.4; /* metres by foot and head ray, which shadows lengthen */
+static const double BLUR = 0.25;                   /* heights by which a foot point may jump */
+static const double FASTEST = 2.0;                 /* heights per second */
+
+bool people_box(const gait_camera *c, const gait_box *in, start_box *out)
+{
+    if (!(in->sd >= 0.0f && in->sd <= FLT_MAX && f_finite(in->foot, 2) && f_finite(in->head, 2)))
+        return false;
+    camera_ideal(c, (const double[2]){(double)in->foot[0], (double)in->foot[1]}, out->foot);
+    camera_ideal(c, (const double[2]){(double)in->head[0], (double)in->head[1]}, out->head);
+    out->sd = (double)in->sd;
+    return true;
+}
+
+/* Direction of a pixel's ray in the world. */
+static void ray_of(const gait_camera *c, const double pixel[2], double ray[3])
+{
+    double const x = (pixel[0] - (double)c->cx) / (double)c->fx,
+                 y = (pixel[1] - (double)c->cy) / (double)c->fy;
+    for (int32_t k = 0; k < 3; k++)
+        ray[k] = (double)c->R[k] * x + (double)c->R[3 + k] * y + (double)c->R[6 + k];
+}
+
+double people_stature(const gait_camera *c, const start_box *b)
+{
+    float lens[3];
+    double foot[3], head[3];
+    camera_to(c, (const float[3]){0.0f, 0.0f, 0.0f}, lens); /* the vector from the lens to the origin */
+    double const above = -(double)lens[2];
+    ray_of(c, b->foot, foot);
+    ray_of(c, b->head, head);
+    double const flat = sqrt(foot[0] * foot[0] + foot[1] * foot[1]),
+                 head_flat = sqrt(head[0] * head[0] + head[1] * head[1]);
+    if (!(above > 0.0 && foot[2] < 0.0 && head_flat > 0.0))
+        return (double)NAN;
+    return above + above * flat / -foot[2] * head[2] / head_flat;
+}
+
+static double apart(const double a[2], const double b[2])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]));
+}
+
+/* Distance of a box from a person's last one, as a share of how far they can have walked since. */
+static double far_from(const start_person *p, int64_t utime, const start_box *b)
+{
+    int32_t const last = (p->count - 1) % GAIT_START_MAX_FRAMES;
+    const start_box *const was = &p->box[last];
+    double const seconds = 1e-6 * (double)(utime - p->utime[last]);
+    return apart(b->foot, was->foot) / ((BLUR + FASTEST * seconds) * apart(was->head, was->foot));
+}
+
+/* The person whose box this is, one who is new, or NULL: there are too many. */
+static start_person *whose(start_people *people, int64_t utime, const start_box *b)
+{
+    start_person *nearest = NULL, *unused = NULL;
+    double least = 1.0;
+    for (int32_t k = 0; k < GAIT_START_MAX_PEOPLE; k++) {
+        start_person *const p = &people->person[k];
+        int64_t const last = p->count ? p->utime[(p->count - 1) % GAIT_START_MAX_FRAMES] : 0;
+        if (p->count == 0)
+            unused = unused ? unused : p;
+        else if (last < utime && far_from(p, utime, b) < least) {
+            least = far_from(p, utime, b);
+            nearest = p;
+        }
+    }
+    return nearest ? nearest : unused;
+}
+
+void people_add(start_people *people, const gait_camera *c, int64_t utime, const gait_box *boxes,
+                int32_t count)
+{
+    people->utime = utime;
+    people->begun = true;
+    for (int32_t k = 0; k < GAIT_START_MAX_PEOPLE; k++) { /* forget who left */
+        start_person *const p = &people->person[k];
+        if (p->count > 0 && p->utime[(p->count - 1) % GAIT_START_MAX_FRAMES] < utime - START_KEEP)
+            p->count = 0;
+    }
+    for (int32_t i = 0; i < count; i++) {
+        start_box b;
+        if (!people_box(c, &boxes[i], &b) || !(apart(b.head, b.foot) >= 1.0))
+            continue;
+        double const stature = people_stature(c, &b);
+        start_person *const p = stature >= SHORTEST && stature <= TALLEST ? whose(people, utime, &b) : NULL;
+        if (!p)
+            continue;
+        p->utime[p->count % GAIT_START_MAX_FRAMES] = utime;
+        p->box[p->count % GAIT_START_MAX_FRAMES] = b;
+        p->count = p->count == INT32_MAX ? p->count - GAIT_START_MAX_FRAMES + 1 : p->count + 1;
+    }
+}

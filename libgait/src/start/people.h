@@ -1,0 +1,33 @@
+/* people.h - boxes of several people, each given to a person by its place in the picture. */
+#ifndef GAIT_START_PEOPLE_H
+#define GAIT_START_PEOPLE_H
+#include "base/base.h"
+#include "gait_start.h"
+
+#define START_KEEP 1500000 /* microseconds after which an observation is forgotten */
+
+typedef struct start_box { /* ideal pixels */
+    double foot[2], head[2], sd;
+} start_box;
+
+typedef struct start_person {
+    int32_t count; /* boxes, of which the last GAIT_START_MAX_FRAMES are kept */
+    int64_t utime[GAIT_START_MAX_FRAMES];
+    start_box box[GAIT_START_MAX_FRAMES];
+} start_person;
+
+typedef struct start_people {
+    int64_t utime; /* of the last frame */
+    bool begun;    /* there is one */
+    start_person person[GAIT_START_MAX_PEOPLE];
+} start_people;
+
+/* Undo the distortion; false: its numbers are not finite, or sd is negative. */
+bool people_box(const gait_camera *c, const gait_box *in, start_box *out);
+
+/* Stature of the person in a box, metres; NAN: the ray of the foot meets no floor. */
+double people_stature(const gait_camera *c, const start_box *b);
+
+/* Boxes of a frame, the most certain first. */
+void people_add(start_people *p, const gait_camera *c, int64_t utime, const gait_box *boxes, int32_t count);
+#endif

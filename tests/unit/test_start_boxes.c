@@ -1,0 +1,188 @@
+/* The automatic start from boxes and blobs: people of known place, direction, stature and speed are found. */
+#include "base/rng.h"
+#include "check.h"
+#include "gait_start.h"
+#include "image/camera.h"
+#include "toy_model.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { FRAMES = 30, WIDTH = 320, HEIGHT = 180 };
+
+typedef struct walk {
+    float heading, speed, stature, x, y, noise; /* noise: pixels */
+} walk;
+
+/* A camera at 1.5 m that looks along +y. */
+static gait_camera camera(void)
+{
+    return (gait_camera){.width = WIDTH,
+                         .height = HEIGHT,
+                         .fx = 250.0f,
+                         .fy = 250.0f,
+                         .cx = 159.5f,
+                         .cy = 89.5f,
+                         .R = {1, 0, 0, 0, 0, -1, 0, 1, 0},
+                         .t = {0.0f, 1.5f, 0.0f}};
+}
+
+static gait_start *start_new(void)
+{
+    gait_start_config cfg;
+    gait_start *s = NULL;
+    size_t bytes = 0;
+    gait_start_default(&cfg);
+    cfg.camera = camera();
+    CHECK(gait_start_bytes(toy_model(), &cfg, &bytes, NULL) == GAIT_OK);
+    void *const mem = aligned_alloc(GAIT_ALIGN, (bytes + GAIT_ALIGN - 1) / GAIT_ALIGN * GAIT_ALIGN);
+    CHECK(gait_start_init(mem, bytes, toy_model(), &cfg, &s, NULL) == GAIT_OK);
+    return s; /* at the beginning of mem */
+}
+
+static gait_box box_of(const walk *w, float t, uint32_t n)
+{
+    gait_camera const cam = camera();
+    float sn, cs, e[4];
+    gait_box b = {.sd = w->noise};
+    m_sincos_one(w->heading, &sn, &cs);
+    float const x = w->x + w->speed * t * cs, y = w->y + w->speed * t * sn, away = sqrtf(x * x + y * y),
+                lead = 0.1f * w->stature / away;
+    (void)camera_project(&cam, (const float[3]){x - lead * x, y - lead * y, 0.0f}, b.foot);
+    (void)camera_project(&cam, (const float[3]){x, y, 0.98f * w->stature}, b.head);
+    rng_normal4(3, 1, n, 0, 0, e);
+    for (int k = 0; k < 2; k++) {
+        b.foot[k] += w->noise * e[k];
+        b.head[k] += w->noise * e[2 + k];
+    }
+    return b;
+}
+
+static int32_t find(const walk *w, int people, gait_hypothesis h[GAIT_START_MAX_HYPOTHESES])
+{
+    gait_start *const s = start_new();
+    int32_t count = 0;
+    for (int n = 0; n < FRAMES; n++) {
+        gait_box b[2];
+        for (int p = 0; p < people; p++)
+            b[(p + n) % people] = box_of(&w[p], (float)n / 25.0f, (uint32_t)(FRAMES * p + n));
+        CHECK(gait_start_add_boxes(s, n * 40000, b, people, NULL) == GAIT_OK);
+    }
+    CHECK(gait_start_solve(s, 0, h, GAIT_START_MAX_HYPOTHESES, &count, NULL) == GAIT_OK);
+    free(s);
+    return count;
+}
+
+static void test_headings(void)
+{
+    for (int k = 0; k < 8; k++) {
+        walk const w = {.heading = m_wrap_pi(0.785f * (float)k + 0.1f),
+                        .speed = 1.3f,
+                        .stature = 1.8f,
+                        .y = 5.0f,
+                        .noise = 1.0f};
+        gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
+        CHECK(find(&w, 1, h) >= 1);
+        CHECK(!h->in_place && fabsf(m_wrap_pi(h->mean.heading - w.heading)) < 2.0f * h->sd.heading + 0.1f);
+        CHECK(h->sd.heading < 0.7f);
+        CHECK(fabsf(h->mean.stature - w.stature) < 0.12f && fabsf(h->speed - w.speed) < 0.35f);
+        CHECK(fabsf(h->mean.pelvis[0]) < 0.3f && fabsf(h->mean.pelvis[1] - 5.0f) < 0.45f);
+        CHECK(h->sd.phase >= 0.5f); /* unknown */
+    }
+}
+
+static void test_one_stands_and_one_walks(void)
+{
+    walk const w[2] = {
+        {.stature = 1.75f, .x = -1.5f, .y = 4.5f, .noise = 0.7f},
+        {.heading = 0.2f, .speed = 1.2f, .stature = 1.7f, .x = 1.0f, .y = 7.0f, .noise = 0.7f}};
+    gait_hypothesis h[GAIT_START_MAX_HYPOTHESES];
+    int32_t const n = find(w, 2, h);
+    int32_t stands = -1;
+    CHECK(n >= 2);
+    CHECK(!h->in_place && fabsf(h->mean.pelvis[0] - 1.0f) < 0.4f);
+    for (int32_t i = 0; i < n; i++)
+        stands = stands < 0 && h[i].in_place ? i : stands;
+    CHECK(stands > 0 && fabsf(h[stands].mean.pelvis[0] + 1.5f) < 0.3f && h[stands].sd.heading > 3.0f);
+    float sum = 0.0f;
+    for (int32_t i = 0; i < n; i++)
+        sum += h[i].probability;
+    CHECK_NEAR(sum, 1.0f, 1e-4);
+}
+
+/* ---- blobs ---- */
+static uint8_t plate[HEIGHT][WIDTH][3], picture[HEIGHT][WIDTH][3];
+
+static gait_image image_of(uint8_t (*pixels)[WIDTH][3])
+{
+    return (gait_image){pixels[0][0], WIDTH, HEIGHT, WIDTH * 3, GAIT_BGR8};
+}
+
+static void draw(int x0, int x1, int y0, int y1, uint8_t value)
+{
+    for (int y = y0; y < y1; y++)
+        memset(picture[y][x0], value, (size_t)(x1 - x0) * 3);
+}
+
+static void test_blobs(void)
+{
+    gait_start *const s = start_new();
+    gait_image const scene = image_of(plate), frame = image_of(picture);
+    gait_box b[3];
+    int32_t count = -1, other = -1;
+    float stature = 0.0f;
+    memset(plate, 90, sizeof plate);
+    memset(picture, 97, sizeof picture); /* another exposure */
+    CHECK(gait_start_find_boxes(s, &frame, &scene, b, 3, &count, NULL) == GAIT_OK && count == 0);
+    CHECK(gait_start_other_scene(s, &frame, &scene, &other, NULL) == GAIT_OK && other == 0);
+    draw(100, 130, 60, 160, 200); /* the larger person */
+    draw(220, 240, 70, 140, 30);
+    draw(0, 20, 60, 160, 200);  /* cut off by the border */
+    draw(140, 200, 20, 40, 30); /* too wide */
+    CHECK(gait_start_find_boxes(s, &frame, &scene, b, 3, &count, NULL) == GAIT_OK && count == 2);
+    CHECK_NEAR(b[0].foot[0], 115.0f, 1.5);
+    CHECK_NEAR(b[0].foot[1], 160.0f, 1.5);
+    CHECK_NEAR(b[0].head[1], 60.0f, 1.5);
+    CHECK_NEAR(b[1].foot[1], 140.0f, 1.5);
+    CHECK(gait_start_find_boxes(s, &frame, &scene, b, 1, &count, NULL) == GAIT_OK && count == 1);
+    CHECK_NEAR(b[0].foot[0], 115.0f, 1.5);
+    CHECK(gait_start_box_stature(s, b, &stature, NULL) == GAIT_OK && stature > 2.0f && stature < 2.2f);
+    b->foot[1] = 50.0f; /* above the horizon */
+    CHECK(gait_start_box_stature(s, b, &stature, NULL) == GAIT_OK && isnan(stature));
+    draw(0, WIDTH, 0, HEIGHT / 4, 255);
+    draw(0, WIDTH, HEIGHT / 4, HEIGHT / 2, 0);
+    draw(0, WIDTH, HEIGHT / 2, 3 * HEIGHT / 4, 160);
+    CHECK(gait_start_other_scene(s, &frame, &scene, &other, NULL) == GAIT_OK && other == 1);
+    free(s);
+}
+
+static void test_refused(void)
+{
+    gait_start *const s = start_new();
+    gait_image small = image_of(picture), scene = image_of(plate);
+    gait_box b = {.sd = NAN};
+    gait_hypothesis h;
+    gait_error err = {0};
+    int32_t count = 0;
+    float stature;
+    small.width = 16;
+    CHECK(gait_start_find_boxes(s, &small, &scene, &b, 1, &count, &err) == GAIT_ERR_ARG);
+    CHECK(strstr(err.text, "is 16 x 180, the camera is 320 x 180"));
+    CHECK(gait_start_find_boxes(s, &scene, &scene, &b, 0, &count, &err) == GAIT_ERR_ARG);
+    CHECK(gait_start_other_scene(s, &scene, &small, &count, &err) == GAIT_ERR_ARG);
+    CHECK(gait_start_box_stature(s, &b, &stature, &err) == GAIT_ERR_ARG);
+    CHECK(gait_start_add_boxes(s, 0, &b, -1, &err) == GAIT_ERR_ARG);
+    CHECK(gait_start_add_boxes(s, 0, &b, 1, &err) == GAIT_OK); /* not a number: left out */
+    CHECK(gait_start_add_boxes(s, 0, NULL, 0, &err) == GAIT_ERR_STATE && strstr(err.text, "utime"));
+    CHECK(gait_start_solve(s, 0, &h, 1, &count, &err) == GAIT_ERR_STATE && strstr(err.text, "eight boxes"));
+    free(s);
+}
+
+int main(void)
+{
+    test_headings();
+    test_one_stands_and_one_walks();
+    test_blobs();
+    test_refused();
+    return CHECK_DONE();
+}
