@@ -552,7 +552,7 @@ static float root(double variance)
     return __builtin_sqrtf(f_max((float)variance, 0.0f));
 }
 
-/* Keypoints are never as exact as their scatter says: errors of a detector last, and who has only begun to walk is
+/* Keypoints are never as exact as their scatter suggests: errors of a detector last, and who has only begun to walk is
  * slower than soon after. */
 static void widen(const gait_start *s, gait_hypothesis *h)
 {
@@ -565,7 +565,7 @@ static void widen(const gait_start *s, gait_hypothesis *h)
         h->sd.pelvis[k] = f_clamp(h->sd.pelvis[k], 0.05f, 10.0f);
 }
 
-/* What boxes do not tell. */
+/* What boxes leave open. */
 static void leave_open(const gait_start *s, const start_candidate *c, gait_hypothesis *h)
 {
     h->mean.phase = 0.0f;
