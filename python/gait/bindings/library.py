@@ -107,8 +107,9 @@ def call(name: str, *arguments: Any) -> int:
 
     Structures are given as they are; ctypes passes pointers to them.
     """
+    function = getattr(library(), name)  # first: it describes the structures
     error = abi.Error()
-    return check(getattr(library(), name)(*arguments, error), error)
+    return check(function(*arguments, error), error)
 
 
 def make(kind: str, *arguments: Any) -> tuple[ctypes.c_void_p, NDArray[np.uint8]]:
