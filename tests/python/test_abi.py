@@ -1,6 +1,8 @@
 """The handshake between Python and the library: it passes, and every kind of slip is caught."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -116,3 +118,12 @@ def test_statuses_become_exceptions_with_name_and_index():
 def test_memory_is_aligned(size):
     memory = loader.aligned(size)
     assert memory.ctypes.data % abi.ALIGN == 0 and memory.nbytes == size
+
+
+def test_the_library_is_loaded_before_a_structure_is_made():
+    """A structure has no fields before; a fresh process makes a model or a pool first of all."""
+    for first in (
+        "from gait.bindings.model import load; load(None)",
+        "from gait.track.tasks import threads; threads(2)",
+    ):
+        subprocess.run([sys.executable, "-c", first], check=True, timeout=60)

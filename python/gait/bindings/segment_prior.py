@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gait.errors import UserError
+from gait.errors import GaitError, UserError
 from gait.io import blob
 
 Floats = npt.NDArray[np.float64]
@@ -108,7 +108,7 @@ class SegmentPrior:
         UserError
             If the file is no sound blob, or holds no such prior.
         """
-        from gait.bindings.model import read_blob  # the model's module loads the C library's bindings
+        from gait.bindings.model import read_blob  # as in from_sections()
 
         name = os.fspath(path) if path is not None else "walk.gait"
         return cls.from_sections(blob.decode(read_blob(path), name), name)
@@ -122,13 +122,16 @@ class SegmentPrior:
         UserError
             If sections are missing or contradict each other.
         """
+        from gait.bindings.model import load  # here, since learning needs no C library
+
         missing = [tag for tag in TAGS if tag not in sections]
         if missing:
             what = "segment prior" if len(missing) == len(TAGS) else f"section {missing[0]} of the prior"
             raise UserError(f"{name}: holds no {what}; learn it with gait learn ... --segments learnt")
-        problem = _problem(sections)
-        if problem:
-            raise UserError(f"{name}: {problem}; learn the model again")
+        try:  # the library checks shapes, counts, signs and values
+            load(blob.encode({tag: sections[tag] for tag in TAGS}))
+        except GaitError as exc:
+            raise UserError(f"{name}: {exc.text}; learn the model again") from None
         frames, hop, headings, components, size, segments, recordings = sections["SGIN"][:7].tolist()
         fps, gamma, stature = sections["SGRT"][:3].astype(float).tolist()
         markers = len(sections["SGNM"])
@@ -179,34 +182,3 @@ class SegmentPrior:
         return replace(
             self, modes=factor * self.modes, sd=factor * self.sd, residual=factor**2 * self.residual
         )
-
-
-def _problem(sections: Mapping[str, Any]) -> str:
-    """Describe what is wrong with the sections of a prior; '' if nothing is."""
-    if sections["SGIN"].shape != (8,) or sections["SGRT"].shape != (8,):
-        return "section SGIN or SGRT has not 8 entries"
-    frames, hop, headings, components, size = sections["SGIN"][:5].tolist()
-    markers = len(sections["SGNM"])
-    if not (frames >= 1 and 1 <= hop <= frames and components >= 1 and size >= 1 and headings in HEADINGS):
-        return "section SGIN holds impossible counts"
-    shapes = {
-        "SGNM": (markers, blob.NAME_BYTES),
-        "SGWT": (components,),
-        "SGMN": (components, frames, markers, 3),
-        "SGMD": (components, size, frames, 3 * markers),
-        "SGSD": (components, size),
-        "SGPS": (components, markers),
-    }
-    for tag, shape in shapes.items():
-        if sections[tag].shape != shape:
-            return f"section {tag} has shape {sections[tag].shape} instead of {shape}"
-    if not all(np.isfinite(sections[tag]).all() for tag in TAGS[2:]):
-        return "the segment prior holds values that are not finite"
-    if not (sections["SGRT"][:3] > 0).all():
-        return "section SGRT holds a rate, factor or stature that is not positive"
-    weights = sections["SGWT"]
-    if (weights <= 0).any() or abs(float(weights.sum()) - 1) > 1e-3:
-        return "section SGWT holds weights that are not positive with sum 1"
-    if (sections["SGSD"] < 0).any() or (sections["SGPS"] <= 0).any():
-        return "section SGSD or SGPS holds a standard deviation or variance below its range"
-    return ""
