@@ -24,7 +24,6 @@ from gait.simulate.scenario import Scenario
 from gait.simulate.stage import Set, Stage, build_set, set_stage
 from gait.simulate.walk import Walk
 
-EVENTS = ("l_heel_strike", "l_toe_off", "r_heel_strike", "r_toe_off")
 CRF = 14
 
 
