@@ -379,6 +379,7 @@ typedef GAIT_ENUM(gait_track_status) {
 #define GAIT_EST_RESAMPLED  0x1u
 #define GAIT_EST_NO_IMAGE   0x2u /* prediction only */
 #define GAIT_EST_DEGENERATE 0x4u /* effective sample size below 2 */
+#define GAIT_EST_UNSUPPORTED 0x8u /* the images do not show the person where the estimate is */
 
 /* What the tracker knows after a frame. */
 #define GAIT_ESTIMATE_FIELDS(FIELD)                                                                                   \

@@ -25,6 +25,7 @@ SUMMARY = [
     "wall_fps",
     "lost",
     "ambiguous",
+    "followed",
     "memory_bytes",
     "digest",
 ]

@@ -62,6 +62,29 @@ static void test_belt(void)
         }
 }
 
+/* With the frames in reverse order a walk goes back to where it began, on a curve as well. */
+static void test_reverse(void)
+{
+    const gait_model *const m = toy_model();
+    for (int32_t mode = GAIT_MODE_DEFAULT; mode <= GAIT_MODE_PAPER; mode++) {
+        dynamics const d = quiet(mode, 1);
+        particle_state const start = {{[F_PHASE] = 0.3f,
+                                       [F_RATE] = m->stride_hz,
+                                       [F_STATURE] = 1.8f,
+                                       [F_HEADING] = 0.7f,
+                                       [F_TURN] = 0.4f}};
+        particle_state w = start;
+        for (int32_t k = 0; k < 80; k++) {
+            cfg.reverse = k >= 40;
+            w = move_one(&d, &w, 0.01f, 1.0f, (uint32_t)k, 3);
+            if (k == 39)
+                CHECK(w.f[F_X] > 0.2f && w.f[F_HEADING] > 0.8f);
+        }
+        for (int32_t f = F_PHASE; f < F_COEF; f++)
+            CHECK_NEAR(w.f[f], start.f[f], 2e-3);
+    }
+}
+
 /* Phase, path and relaxing fields follow their equations. */
 static void test_drift(void)
 {
@@ -401,6 +424,7 @@ int main(void)
     test_drift();
     test_pace();
     test_belt();
+    test_reverse();
     test_rate();
     test_paper_way();
     test_variances();

@@ -72,6 +72,33 @@ static void test_counts(void)
     }
 }
 
+/* Where all is foreground, a body anywhere is full of it: that is no support. */
+static void test_foreground_everywhere(void)
+{
+    toy_body *const v = toy_body_new(0, GAIT_MODE_DEFAULT);
+    body.whole = (grid_mask){.width = GRID_SIZE, .first = 20, .last = 60};
+    for (int32_t y = 20; y < 60; y++)
+        body.whole.word[0][y] = ~UINT64_C(0);
+    for (int32_t full = 0; full < 2; full++) { /* the whole image, and the body alone */
+        v->f.foreground_total = 0;
+        for (int32_t y = 0; y < GRID_SIZE; y++)
+            for (int32_t w = 0; w < GRID_WORDS; w++) {
+                v->f.inside[y][w] = ~UINT64_C(0);
+                for (int32_t k = 0; k < FOREGROUND_PLANES; k++) {
+                    bool const in = y >= 20 && y < 60 && w == 0;
+                    v->f.foreground[k][y][w] = in || full ? ~UINT64_C(0) : 0;
+                    v->f.foreground_total += in || full ? 64 << k : 0;
+                }
+            }
+        v->f.has_foreground = true;
+        like_body b = {.setup = &v->setup, .features = &v->f, .layers = &body};
+        features_words(&v->f);
+        like_silhouette_count(&b);
+        double const alone = (double)v->setup.missed_weight * 40.0 * 64.0 / (0.16 * 96.0 * 96.0);
+        CHECK_NEAR(like_silhouette.support(&b), full ? 0.0 : alone, 1e-4);
+    }
+}
+
 /* Without a plate the term is silent. */
 static void test_silent(void)
 {
@@ -110,6 +137,7 @@ static void test_scene(void)
 int main(void)
 {
     test_counts();
+    test_foreground_everywhere();
     test_silent();
     test_scene();
     return CHECK_DONE();

@@ -42,11 +42,26 @@ static float support(const like_body *b)
     return (gain - f_max(0.0f, (missed * density - (1.0f - density)) * area)) / TYPICAL;
 }
 
+static bool silent(const like_body *b)
+{
+    return !b->features->has_foreground || !(b->setup->terms & GAIT_TERM_SILHOUETTE);
+}
+
+static float nats_of_missed(const like_body *b)
+{
+    return b->setup->weight[LIKE_SILHOUETTE] * b->setup->missed_weight / TYPICAL;
+}
+
+float like_silhouette_chance(const like_body *b)
+{
+    return silent(b) ? 0.0f : nats_of_missed(b) * density_outside(b) * (float)b->area;
+}
+
 like_parts like_silhouette_parts(const like_body *b)
 {
-    if (!b->features->has_foreground || !(b->setup->terms & GAIT_TERM_SILHOUETTE))
+    if (silent(b))
         return (like_parts){0};
-    float const nats = b->setup->weight[LIKE_SILHOUETTE] * b->setup->missed_weight / TYPICAL;
+    float const nats = nats_of_missed(b);
     return (like_parts){nats * (float)b->covered, nats * (float)(b->features->foreground_total - b->covered)};
 }
 

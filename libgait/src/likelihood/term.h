@@ -158,4 +158,6 @@ typedef struct like_parts {
 } like_parts;
 
 like_parts like_silhouette_parts(const like_body *b);
+/* What a body of this area explains by chance, given the foreground outside of it. */
+float like_silhouette_chance(const like_body *b);
 #endif

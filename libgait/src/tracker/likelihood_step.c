@@ -114,6 +114,7 @@ body_evidence likelihood_of_particle(gait_tracker *t, const particle_state *p)
         e.support += like_support(&b);
         e.parts.explained += parts.explained;
         e.parts.missed += parts.missed;
+        e.chance += like_silhouette_chance(&b);
     }
     return e;
 }

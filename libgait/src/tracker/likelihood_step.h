@@ -10,6 +10,7 @@ typedef struct body_evidence { /* of one body, over all cameras */
     float
         support; /* log-likelihood with the body less that of an empty scene, nats; exactly 0 if no term applies */
     like_parts parts; /* foreground explained and left over, nats */
+    float chance;     /* foreground that a body explains by chance, nats */
 } body_evidence;
 
 /* Writes the body's surface samples to t->estimate_patch. */

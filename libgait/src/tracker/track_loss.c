@@ -117,8 +117,8 @@ track_loss_verdict track_loss_check(gait_tracker *t, bool lost, const particle_s
     body_evidence const e = likelihood_of_particle(t, mean);
     float const unusual = e.parts.missed - core->usual_unexplained;
     bool const whole = e.support >= 0.0f; /* also if no term applies */
-    bool const part =
-        !whole && !lost && core->found && parts_evidence(e.parts.explained, unusual) > PARTS_ENOUGH;
+    bool const part = !whole && !lost && core->found &&
+                      parts_evidence(e.parts.explained - e.chance, unusual) > PARTS_ENOUGH;
     track_loss_verdict v = {.support = whole  ? SUPPORT_WHOLE
                                        : part ? SUPPORT_PART
                                               : SUPPORT_NONE,

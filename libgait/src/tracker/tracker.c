@@ -220,7 +220,8 @@ void tracker_step(gait_tracker *t, const gait_frame *frame, gait_estimate *out)
     bool const degenerate = s.degenerate || s.ess < DEGENERATE_ESS;
     e.status = s.degenerate ? GAIT_TRACK_LOST : status_of(t, dt, &e);
     e.flags = (resampled ? GAIT_EST_RESAMPLED : 0) | (has_image ? 0 : GAIT_EST_NO_IMAGE) |
-              (has_image && degenerate ? GAIT_EST_DEGENERATE : 0);
+              (has_image && degenerate ? GAIT_EST_DEGENERATE : 0) |
+              (has_image && core->support_utime != core->utime ? GAIT_EST_UNSUPPORTED : 0);
     e.ess = (float)s.ess;
     e.log_evidence = s.log_evidence;
     if (e.status == GAIT_TRACK_TRACKING && h->stage == HYPOTHESES_ONE && !core->partly_hidden)

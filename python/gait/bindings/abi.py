@@ -85,6 +85,7 @@ class Flag(IntFlag):
     RESAMPLED = 1
     NO_IMAGE = 2
     DEGENERATE = 4
+    UNSUPPORTED = 8
 
 
 class Projection(IntEnum):

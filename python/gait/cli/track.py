@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     given |= {"mode": Mode[args.mode.upper()], "keypoints_sd": args.keypoints_sd or KEYPOINTS_SD}
     summary = track_clip(ClipOptions(**given))
     print(json.dumps(summary) if args.json else _text(summary))
-    return 0
+    return 0 if summary["followed"] else 1
 
 
 def _text(summary: dict[str, Any]) -> str:

@@ -25,6 +25,9 @@ from gait.track.tracker import Tracker
 __all__ = ["KEYPOINTS_SD", "ClipOptions", "track_clip"]
 
 
+_HARDLY_FOLLOWED = "the person was lost nearly all the time; check --camera and --init by an --overlay"
+
+
 def track_clip(options: ClipOptions) -> dict[str, Any]:
     """Track and write the files; return the figures of ``gait track --json``.
 
@@ -49,6 +52,8 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)
+    if results.hardly_followed():
+        note(f"{options.output}: {_HARDLY_FOLLOWED}")
     if options.trc:
         times, joints = np.array(results.times), np.array(results.joints)
         write_trc(options.trc, scene.model.joint_names, times, joints, scene.video.fps)

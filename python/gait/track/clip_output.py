@@ -24,6 +24,8 @@ from gait.track.plausible import Plausibility
 from gait.track.smooth import Smoother
 from gait.track.tracker import Tracker
 
+_HARDLY = 0.1  # of the frames
+
 Sink = Callable[[Frame, Estimate], None]
 
 
@@ -68,6 +70,12 @@ class Results:
             out.append(f"{what} at frame {first}" + (f", back at frame {after[0][0]}" if after else ""))
         return out
 
+    def hardly_followed(self) -> bool:
+        """Whether the person was lost most of the time and hardly ever followed."""
+        count, found = len(self._statuses), (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
+        followed = sum(status in found for status in self._statuses)
+        return self._statuses.count(TrackStatus.LOST) > count / 2 and followed < _HARDLY * count
+
     def summary(self, threads: int) -> dict[str, Any]:
         """Return the figures of ``--json``; step_ms is the time inside gait_tracker_step alone."""
         tracker = self._tracker
@@ -79,6 +87,7 @@ class Results:
             "wall_fps": len(self._steps) / self._wall,
             "lost": self._statuses.count(TrackStatus.LOST),
             "ambiguous": self._statuses.count(TrackStatus.AMBIGUOUS),
+            "followed": not self.hardly_followed(),
             "memory_bytes": tracker.memory_bytes,
             "digest": f"{tracker.digest():016x}",
         }

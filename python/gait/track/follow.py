@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gait.bindings.abi import TrackStatus
+from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.initial import DEFAULT_SD, Start
 from gait.io.video import Frame, Video
@@ -17,7 +17,6 @@ from gait.track.plausible import Plausibility
 from gait.track.tracker import Tracker
 
 _GIVE_UP = 1.0  # seconds after a loss for which the person is looked for backwards
-_UNSUPPORTED = 0.34  # seconds without support before the tracker calls a person lost (track_loss.c)
 _CONTRADICTED = 0.5  # seconds of keypoints elsewhere after which the person is lost
 _FOLLOWED = (TrackStatus.TRACKING, TrackStatus.AMBIGUOUS)
 
@@ -121,21 +120,17 @@ class Follower:
         config = self._tracker.config.replace(reverse=1.0)
         tracker = self._tracker.like(config)
         found: dict[int, Estimate] = {}
-        last, lost_since = None, np.inf
+        last, visible, earliest = None, np.inf, start.frame
         for frame in self._video.backwards(start.frame + 1, first):
             if last is None:
                 self._start(tracker, start, -frame.utime)
             last = self._step(tracker, frame, -frame.utime, last)
             found[frame.number] = replace(last, utime=frame.utime, frame=frame.number - start.frame)
-            if last.status != TrackStatus.LOST:
-                lost_since = np.inf
-            elif lost_since == np.inf:
-                lost_since = frame.time
-            elif lost_since - frame.time > _GIVE_UP:
+            if last.status != TrackStatus.LOST and not last.flags & Flag.UNSUPPORTED:
+                visible, earliest = frame.time, frame.number
+            elif visible - frame.time > _GIVE_UP:
                 break
-        # Nothing showed the person for a while before the tracker called them lost.
-        visible = 0 if lost_since == np.inf else round(1e6 * (lost_since + _UNSUPPORTED))
-        return {n: now for n, now in sorted(found.items()) if now.utime >= visible and n < start.frame}
+        return {n: now for n, now in sorted(found.items()) if earliest <= n < start.frame}
 
 
 def _start(now: Estimate, frame: int, start: Start) -> Start:

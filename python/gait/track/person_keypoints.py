@@ -16,9 +16,7 @@ from gait.bindings.estimate import Estimate
 from gait.bindings.frame import FrameKeypoints
 from gait.camera.camera import Camera
 
-_GATE = (
-    0.25  # person's heights from the estimated joints up to which keypoints are the person's, by the median
-)
+_GATE = 0.25  # person's heights: keypoints further from the estimate, by the median, are not the person's
 _AGREE = 0.08  # person's heights up to which knees and ankles agree with the estimate, on average
 _LEGS = ("l_knee", "r_knee", "l_ankle", "r_ankle")
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gait.bindings.abi import TrackStatus
+from gait.bindings.abi import Flag, TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.io.video import Frame
 from gait.track.person_keypoints import PersonKeypoints
@@ -41,10 +41,11 @@ class Plausibility:
         self._path.clear()
 
     def judged(self, frame: Frame, estimate: Estimate) -> Estimate:
-        """Call an estimate `ambiguous`, not `tracking`, if keypoints disagree or the walk is implausible."""
+        """Call an estimate `ambiguous`, not `tracking`, unless keypoints or picture and walk support it."""
         walks = self._walks(frame.time, estimate)
         agree = self._keypoints.agree(frame.number, estimate)
-        if estimate.status != TrackStatus.TRACKING or agree or (agree is None and walks):
+        supported = not estimate.flags & Flag.UNSUPPORTED
+        if estimate.status != TrackStatus.TRACKING or agree or (agree is None and walks and supported):
             return estimate
         return replace(estimate, status=TrackStatus.AMBIGUOUS)
 

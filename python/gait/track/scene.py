@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,6 +91,7 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
         start = Start.read(options.init, scene.model, frame=options.start, height=options.height)
         clip_frames(scene.video, start.frame, options.stop)
         _require_scene(options, scene, start.frame)
+        start = replace(start, in_place=_in_place(scene, start.frame))
     else:
         _require_scene(options, scene, scene.frames.start)
         start = _find_first_state(options, scene)
@@ -98,6 +99,16 @@ def first_state(options: ClipOptions, scene: Scene) -> Start:
     if not scene.camera.shows(scene.model.pose(start.mean)[0]):
         note(f"{options.init}: {OUTSIDE}", options.quiet)
     return start
+
+
+def _in_place(scene: Scene, frame: int) -> bool:
+    """Whether the keypoints of the second from a frame on show a person who walks in place."""
+    if not scene.people:
+        return False
+    stop = frame + round(1.2 * scene.video.fps)
+    keypoints = scene.people[scene.person]
+    found = find_keypoint_start(keypoints, scene.camera, scene.model, first=frame, stop=stop)
+    return found is not None and found.in_place
 
 
 def _note_start(options: ClipOptions, scene: Scene, start: Start) -> None:
