@@ -112,13 +112,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--no-trim", action="store_true", help="keep starts, stops and turns at the ends of recordings")
     add("--jobs", type=values.whole(1), metavar="N", help="processes that read files (default: one per core)")
     add("--dask", metavar="SCHEDULER", help="read on a Dask cluster, such as tcp://host:8786")
-    add(
-        "--seed",
-        type=values.whole(*values.SEED),
-        default=1,
-        metavar="S",
-        help="seed of the held-out data (default: 1)",
-    )
+    values.add_seed(parser, "the held-out data")
     add("--report", metavar="DIR", help="also write figures and index.html into this folder")
     add(
         "--segments",

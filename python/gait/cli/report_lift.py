@@ -10,9 +10,7 @@ should not be a recording that the model was learnt from; without --mocap, a dra
 from __future__ import annotations
 
 import argparse
-import base64
 import html
-import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -43,7 +41,6 @@ from gait.report.page import Page
 
 Floats = npt.NDArray[np.float64]
 
-DPI = 110
 FIGURES = 5  # besides that of a clip
 
 
@@ -67,13 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=METHODS,
         help=f"how the clip is lifted, as in gait lift (default: {METHODS[0]})",
     )
-    parser.add_argument(
-        "--seed",
-        type=values.whole(*values.SEED),
-        default=1,
-        metavar="S",
-        help="seed of noise and draws (default: 1)",
-    )
+    values.add_seed(parser, "noise and draws")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -151,12 +142,8 @@ def _why_no_segment(read: segment_motion.Motion, prior: SegmentPrior) -> str:
 
 def _written(folder: Path, drawing: Drawing) -> str:
     """Write a figure's PNG; its part of the page."""
-    buffer = io.BytesIO()
-    drawing.figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-    (folder / f"{drawing.stem}.png").write_bytes(buffer.getvalue())
-    data = base64.b64encode(buffer.getvalue()).decode()
-    caption = html.escape(drawing.caption)
-    return f'<p>{caption}</p><img style="max-width: 100%" alt="{caption}" src="data:image/png;base64,{data}">'
+    caption, data = html.escape(drawing.caption), drawing.write(folder)
+    return f'<p>{caption}</p><img style="max-width: 100%" alt="{caption}" src="{data}">'
 
 
 def _facts(prior: SegmentPrior) -> dict[str, str]:

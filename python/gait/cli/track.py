@@ -53,13 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     values.add_model(parser)
     values.add_clip(parser, "track")
     values.add_filter(parser, threads=1)
-    add(
-        "--seed",
-        type=values.whole(*values.SEED),
-        default=1,
-        metavar="S",
-        help="seed of the random numbers (default: 1)",
-    )
+    values.add_seed(parser, "the random numbers")
     add(
         "--mode",
         choices=[m.name.lower() for m in Mode],

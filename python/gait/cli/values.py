@@ -86,6 +86,12 @@ def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
     parser.add_argument("-m", "--model", metavar="M.gait", help=f"{what} (default: the shipped one)")
 
 
+def add_seed(parser: ArgumentParser, of: str) -> None:
+    """Add ``--seed``; `of` is what it is the seed of."""
+    help = f"seed of {of} (default: 1)"
+    parser.add_argument("--seed", type=whole(*SEED), default=1, metavar="S", help=help)
+
+
 def add_url(parser: ArgumentParser) -> None:
     """Add ``--url``."""
     parser.add_argument(

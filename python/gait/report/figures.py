@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import base64
+import io
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+_DPI = 110
 _ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "toe")
 #: Chains of joints of a stick figure: centre, left, right.
 STICKS = {
@@ -28,6 +32,13 @@ class Drawing:
     heading: str
     caption: str
     figure: Figure
+
+    def write(self, folder: Path) -> str:
+        """Write the PNG file; return the picture as an address that a page can hold."""
+        buffer = io.BytesIO()
+        self.figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+        (folder / f"{self.stem}.png").write_bytes(buffer.getvalue())
+        return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
 def grid(

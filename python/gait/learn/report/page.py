@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import html
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,7 +30,6 @@ tr { border-bottom: 1px solid #e4e4e4; }
 td { vertical-align: top; font-variant-numeric: tabular-nums; } .n { text-align: right; }
 td.w { font-size: 85%; color: #555; } .wide { overflow-x: auto; }
 """
-DPI = 110
 RIGHT = ("period, ms", "cycles", "SNR", "sharpness", "residual, °")  # columns of numbers
 
 
@@ -98,15 +95,11 @@ def _write_all(folder: Path, learned: Learned, activity: str, refused: list[str]
 
 def _figure(folder: Path, drawing: Drawing) -> str:
     """Write the PNG of a figure and return its part of the page."""
-    buffer = io.BytesIO()
-    drawing.figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-    (folder / f"{drawing.stem}.png").write_bytes(buffer.getvalue())
-    data = base64.b64encode(buffer.getvalue()).decode()
     heading = html.escape(drawing.heading)
     return (
         f'<h2 id="{drawing.stem}">{heading}</h2>'
         f"<figure><figcaption>{html.escape(drawing.caption)}</figcaption>"
-        f'<img alt="{heading}" src="data:image/png;base64,{data}"></figure>'
+        f'<img alt="{heading}" src="{drawing.write(folder)}"></figure>'
     )
 
 
