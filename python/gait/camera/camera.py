@@ -5,6 +5,7 @@ Files: the project's JSON, OpenCV FileStorage YAML/XML, and the TOML of Pose2Sim
 
 from __future__ import annotations
 
+import json
 import sys
 from codecs import BOM_UTF8
 from collections.abc import Mapping
@@ -230,6 +231,11 @@ def read_camera(path: str, size: tuple[int, int] | None = None, *, placed: bool 
     if size is not None:
         camera.check_size(str(path), size)
     return camera
+
+
+def write_camera(path: Path, camera: Camera) -> None:
+    """Write a JSON camera file."""
+    path.write_text(json.dumps(camera.to_dict(), indent=1) + "\n")
 
 
 def _split(path: str) -> tuple[str, str | None]:

@@ -1,4 +1,10 @@
-"""Find where a camera stands from points on or above the ground whose places are measured.
+"""Find where a camera stands, from a person who walks or from points that are measured.
+
+--walk finds the whole camera, focal length included, from a person of known stature who walks on a level
+floor in full view: a VIDEO, in which gait detect finds the joints, or its KEYPOINTS.csv with --size.  The
+world has the origin on the floor below the camera, z up, and the camera looks along y.  A walk towards or
+away from the camera determines it best; what the walk leaves open is reported.  Square pixels and a lens
+without distortion are assumed, with the optical axis through the middle of the picture.
 
 POINTS.csv has the columns u,v (pixels) and x,y[,z] (metres; z is up and 0 on the ground, where it may be
 left out).  Give four points or more that are far apart and not on one line.  --lens names a calibration of
@@ -9,32 +15,54 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 
 import numpy as np
 
-from gait.camera.camera import Camera, read_camera
+from gait.bindings.model import Model
+from gait.camera.camera import MAX_PIXELS, Camera, read_camera, write_camera
 from gait.camera.placing import place, read_points
 from gait.cli import values
+from gait.errors import UsageError, UserError
+from gait.io import keypoints_file
 from gait.io.files import replacing, require_outputs
-from gait.progress import note
+from gait.io.keypoints_file import Keypoints
+from gait.io.video import Video
+from gait.progress import note, progress
+from gait.track.from_walk import Calibration, calibrate
 
 _LARGE = 3.0  # pixels, rms, above which the points should be checked
 
 EXAMPLES = """\
 examples:
+  gait camera --walk walk.mp4 --height 1.75 -o camera.json
+  gait camera --walk keypoints.csv --size 1280x720 --height 1.75 -o camera.json
   gait camera points.csv --lens lens.yaml -o camera.json
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("points", metavar="POINTS.csv", help="u,v,x,y[,z] of each point")
-    parser.add_argument("--lens", required=True, metavar="FILE", help=values.CAMERA)
+    parser.add_argument("points", nargs="?", metavar="POINTS.csv", help="u,v,x,y[,z] of each point")
+    parser.add_argument("--lens", metavar="FILE", help=values.CAMERA)
     parser.add_argument("-o", "--output", required=True, metavar="CAMERA.json", help="the camera")
+    add = parser.add_argument_group("from a walk").add_argument
+    add("--walk", metavar="VIDEO|KEYPOINTS.csv", help="a person who walks")
+    add("--height", type=values.stature, metavar="M", help="the person's stature in metres")
+    add("--size", type=_size, metavar="WxH", help="size of the picture in pixels, with KEYPOINTS.csv")
+    values.add_fov(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Read, place, write."""
+    return _from_walk(args) if args.walk else _from_points(args)
+
+
+def _from_points(args: argparse.Namespace) -> int:
+    if not args.points or not args.lens:
+        raise UsageError("give POINTS.csv and --lens FILE, or --walk VIDEO and --height M")
+    if args.height or args.size or args.fov:
+        raise UsageError("--height, --size and --fov go with --walk")
     require_outputs((args.output,), (args.points, args.lens))
     points = read_points(args.points)
     camera, off = place(read_camera(args.lens, placed=False), points)
@@ -54,6 +82,63 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _from_walk(args: argparse.Namespace) -> int:
+    if args.points or args.lens:
+        raise UsageError("--walk finds the camera by itself; leave out POINTS.csv and --lens")
+    if args.height is None:
+        raise UsageError("--walk: needs --height M, the person's stature in metres")
+    require_outputs((args.output,), (args.walk,))
+    model = Model()
+    keypoints, size = _keypoints(args, model)
+    found = calibrate(keypoints, size, model, args.height, fov=args.fov, where=args.walk)
+    _write(args.output, found.camera)
+    print(json.dumps(_figures(found)) if args.json else "\n".join(found.describe()))
+    return 0
+
+
+def _keypoints(args: argparse.Namespace, model: Model) -> tuple[Keypoints, tuple[int, int]]:
+    """Keypoints of the person who walks, and the size of the picture."""
+    if Path(args.walk).suffix.lower() == ".csv":
+        if args.size is None:
+            raise UsageError(f"{args.walk}: give the size of the picture in pixels, as --size 1280x720")
+        return keypoints_file.read(args.walk, model.joint_names, ignore_unknown=True)[0], args.size
+    if args.size:
+        raise UsageError("--size: is for KEYPOINTS.csv; a video has its own")
+    from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
+
+    video = Video(args.walk)
+    with progress("detecting", video.count, args.quiet) as update:
+        people = detect(video, update=update)
+    if not people:
+        raise UserError(
+            f"{args.walk}: no person found; the whole body should be in view, 80 pixels or taller"
+        )
+    return people[main_person(people)], video.size
+
+
+def _figures(found: Calibration) -> dict[str, object]:
+    camera, sd = found.camera, found.sd
+    height = float(camera.centre[2])
+    return {
+        "focal_px": camera.fx, "focal_px_sd": camera.fx * sd[0],
+        "tilt_deg": float(np.degrees(found.tilt)), "tilt_deg_sd": float(np.degrees(sd[1])),
+        "roll_deg": float(np.degrees(found.roll)), "roll_deg_sd": float(np.degrees(sd[2])),
+        "height_m": height, "height_m_sd": height * sd[3],
+        "in_place": found.in_place, "misfit": found.misfit,
+    }  # fmt: skip
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Width and height as 1280x720."""
+    width, cross, height = text.lower().partition("x")
+    if not cross or not (width.isdigit() and height.isdigit()):
+        raise argparse.ArgumentTypeError(f"{text}: give width and height in pixels, as 1280x720")
+    size = int(width), int(height)
+    if not all(1 <= n <= MAX_PIXELS for n in size):
+        raise argparse.ArgumentTypeError(f"{text}: give width and height from 1 to {MAX_PIXELS} pixels")
+    return size
+
+
 def _write(path: str, camera: Camera) -> None:
     with replacing(path) as temporary:
-        temporary.write_text(json.dumps(camera.to_dict(), indent=1) + "\n")
+        write_camera(temporary, camera)

@@ -1,5 +1,8 @@
 """Track a walking person in a video file.
 
+Without --camera, a camera is found from the walk, given the person's stature (see gait camera --walk); the
+standard deviations in OUT.csv include its doubt.
+
 The first state comes from --init: a JSON file with the person's position and phase, or auto.  auto fits a
 second of walking to the detector's keypoints (or those of --keypoints), which also gives the phase and
 distinguishes left from right.  Without keypoints that fit, it compares a second of frames with the
@@ -37,6 +40,7 @@ from gait.track.clip import KEYPOINTS_SD, ClipOptions, track_clip
 
 EXAMPLES = """\
 examples:
+  gait track walk.mp4 --height 1.75 -o track.csv --camera-out camera.json
   gait track walk.mp4 --camera camera.json -o track.csv
   gait track walk.mp4 --camera camera.json --init init.json --background empty.png --height 1.75 \\
       -o track.csv --overlay overlay.mp4
@@ -48,7 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add = parser.add_argument
     add("video", metavar="VIDEO", help="any file that FFmpeg reads")
-    values.add_camera(parser, required=True)
+    values.add_camera(parser, "; without it the camera is found from the walk, which needs --height")
+    values.add_fov(parser)
+    add("--camera-out", metavar="CAM.json", help="also write the camera, found or given")
     add("-o", "--output", required=True, metavar="OUT.csv", help="the track")
     values.add_model(parser)
     values.add_clip(parser, "track")
@@ -98,8 +104,14 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--draws: needs --smooth")
     if args.keypoints_sd and not args.keypoints:
         raise UsageError("--keypoints-sd: needs --keypoints")
+    if not args.camera and args.height is None:
+        raise UsageError("give --camera CAM, or --height M for a camera that is found from the walk")
+    if not args.camera and args.init != "auto":
+        raise UsageError("--init: needs --camera, in whose world it is")
+    if args.camera and args.fov:
+        raise UsageError("--fov: is for a camera that is found; leave out --camera or --fov")
     require_outputs(
-        (args.output, args.overlay, args.trc, args.draws),
+        (args.output, args.camera_out, args.overlay, args.trc, args.draws),
         (args.video, args.camera, args.model, args.init, args.background, args.keypoints),
     )
     given = {name: getattr(args, name) for name in ClipOptions.__dataclass_fields__}

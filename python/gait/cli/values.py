@@ -81,6 +81,17 @@ def add_camera(parser: ArgumentParser, note: str = "", required: bool = False) -
     parser.add_argument("--camera", required=required, metavar="CAM", help=CAMERA + note)
 
 
+def add_fov(parser: ArgumentParser) -> None:
+    """Add ``--fov``."""
+    parser.add_argument(
+        "--fov",
+        type=between(2, 150, "degrees"),
+        metavar="DEG",
+        help="horizontal field of view of a camera that is found from the walk (default: unknown, near 65 "
+        "along the longer side)",
+    )
+
+
 def add_model(parser: ArgumentParser, what: str = "walking model") -> None:
     """Add ``--model``; None stands for the model of the package."""
     parser.add_argument("-m", "--model", metavar="M.gait", help=f"{what} (default: the shipped one)")

@@ -48,7 +48,7 @@ def track_clip(options: ClipOptions) -> dict[str, Any]:
     plausibility = Plausibility(keypoints, *_stature(options, scene, start), config.belt)
     follower = _follower(options, scene, tracker, keypoints, plausibility)
     found = follower.follow(start, scene.frames)
-    results = write(options, scene.video, tracker, scene.frames, found, plausibility)
+    results = write(options, scene, tracker, found, plausibility)
     for frame, x, y in results.starts[1:]:
         note(f"lost, and a person found at frame {frame}: x {x:.2f} y {y:.2f} m", options.quiet)
     note("; ".join(results.coverage()), options.quiet)

@@ -14,13 +14,17 @@ from gait.bindings.abi import TrackStatus
 from gait.bindings.estimate import Estimate
 from gait.bindings.model import read_cyclic
 from gait.body.model_curves import ModelCurves
+from gait.camera.camera import write_camera
 from gait.errors import UserError
+from gait.io.files import replacing
 from gait.io.track_file import TrackWriter
 from gait.io.video import Frame, Video, VideoWriter
 from gait.progress import durations, progress
 from gait.report.drawing import Overlay
+from gait.track.from_walk import Calibration
 from gait.track.options import ClipOptions
 from gait.track.plausible import Plausibility
+from gait.track.scene import Scene
 from gait.track.smooth import Smoother
 from gait.track.tracker import Tracker
 
@@ -95,17 +99,18 @@ class Results:
 
 def write(
     options: ClipOptions,
-    video: Video,
+    scene: Scene,
     tracker: Tracker,
-    span: range,
     found: Iterable[tuple[Frame, Estimate]],
     plausibility: Plausibility,
 ) -> Results:
     """Write the estimates into all outputs, which appear together at the end."""
-    model, results = tracker.model, Results(tracker)
+    model, video, span, results = tracker.model, scene.video, scene.frames, Results(tracker)
     with ExitStack() as stack:
         rows = TrackWriter(options.output, model.info.components, model.joint_names, model.angle_names)
-        sinks: list[Sink] = [results.add, stack.enter_context(rows).write]
+        if options.camera_out:
+            write_camera(stack.enter_context(replacing(options.camera_out)), scene.camera)
+        sinks: list[Sink] = [results.add, _widened(stack.enter_context(rows).write, scene.calibration)]
         if options.overlay:
             film = stack.enter_context(VideoWriter(options.overlay, video.fps))
             overlay = Overlay(model, tracker.cameras[0])
@@ -126,6 +131,13 @@ def write(
         if not results.times:
             raise UserError(f"{video.path}: no frame from {span.start} on can be decoded; convert it anew")
     return results
+
+
+def _widened(sink: Sink, calibration: Calibration | None) -> Sink:
+    """Give estimates to a sink with the doubt of a camera that was found."""
+    if calibration is None:
+        return sink
+    return lambda frame, estimate: sink(frame, calibration.widened(frame.time, estimate))
 
 
 def _smooth(

@@ -15,8 +15,14 @@ class ClipOptions:
 
     Attributes
     ----------
-    video, camera, output : str
-        The clip, its camera file and the track to write.
+    video, output : str
+        The clip and the track to write.
+    camera : str, optional
+        Its camera file; the camera is found from the walk if left out, which needs `height` and keypoints.
+    camera_out : str, optional
+        File to write the camera to.
+    fov : float, optional
+        Horizontal field of view, degrees, for a camera that is found.
     model : str, optional
         The model of the package if left out.
     init, background : str
@@ -44,12 +50,14 @@ class ClipOptions:
     """
 
     video: str
-    camera: str
+    camera: str | None
     output: str
     model: str | None = None
     init: str = "auto"
     background: str = "auto"
     height: float | None = None
+    camera_out: str | None = None
+    fov: float | None = None
     mode: Mode = Mode.DEFAULT
     particles: int | None = None
     seed: int = 1

@@ -18,6 +18,7 @@ from gait.io.keypoints_file import Keypoints
 from gait.io.video import Image, Video, background
 from gait.progress import note, progress
 from gait.track.auto_start import find_start
+from gait.track.from_walk import Calibration, calibrate
 from gait.track.keypoint_start import CUE_MISS, find_keypoint_start, keypoint_noise
 from gait.track.options import ClipOptions
 from gait.track.person_detection import another_scene, one_is_grey
@@ -42,6 +43,8 @@ class Scene:
         The person to track, an id of `people`; -1 without keypoints.
     keypoints : dict of int to dict of int to FrameKeypoints
         The keypoints with their noise, by id and frame.
+    calibration : Calibration or None
+        How the camera was found, if it was not given.
     """
 
     video: Video
@@ -52,6 +55,7 @@ class Scene:
     people: dict[int, Keypoints]
     person: int
     keypoints: dict[int, dict[int, FrameKeypoints]]
+    calibration: Calibration | None
 
     @staticmethod
     def read(options: ClipOptions) -> Scene:
@@ -63,18 +67,34 @@ class Scene:
             If a file cannot be read or does not fit the others.
         """
         video = Video(options.video)
-        camera = Camera.read(options.camera, video.size)
+        camera = Camera.read(options.camera, video.size) if options.camera else None
         model = Model(options.model)
         frames = clip_frames(video, options.start or 0, options.stop)
         with progress("background", video.count, options.quiet) as update:
             plate = background(options.background, video, update)
         if options.keypoints:
-            people = {0: _read_keypoints(options, model, frames)}
+            people, person = {0: _read_keypoints(options, model, frames)}, 0
             keypoints = {0: people[0].by_frame(options.keypoints_sd)}
-            return Scene(video, camera, model, plate, frames, people, 0, keypoints)
-        people, person = _detect(options, video, frames)
-        keypoints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
-        return Scene(video, camera, model, plate, frames, people, person, keypoints)
+        else:
+            people, person = _detect(options, video, frames)
+            keypoints = {id: keypoint_noise(found, CUE_MISS) for id, found in people.items()}
+        calibration = None
+        if camera is None:
+            calibration = _calibrate(options, video, model, people.get(person))
+            camera = calibration.camera
+        return Scene(video, camera, model, plate, frames, people, person, keypoints, calibration)
+
+
+def _calibrate(options: ClipOptions, video: Video, model: Model, keypoints: Keypoints | None) -> Calibration:
+    """Find the camera from the walk, and write it where it is wanted."""
+    if keypoints is None:
+        remedy = "gait detect finds nobody in it" if _has_detector(options) else weights.FETCH
+        raise UserError(f"{video.path}: without --camera keypoints of a walk are needed: {remedy}")
+    assert options.height is not None
+    found = calibrate(keypoints, video.size, model, options.height, fov=options.fov, where=str(video.path))
+    for line in found.describe():
+        note(line, options.quiet)
+    return found
 
 
 def clip_frames(video: Video, start: int, stop: int | None) -> range:
@@ -174,13 +194,19 @@ def _detect(options: ClipOptions, video: Video, frames: range) -> tuple[dict[int
         return {}, -1
     if network == "auto":
         network = "full"
-        if not all(weights.find(needed) for needed in (weights.PERSON, weights.LANDMARKS[network])):
+        if not _has_detector(options):
             return {}, -1
     from gait.detect.people import detect, main_person  # here, as they load the networks' runtime
 
     with progress("detecting", len(frames), options.quiet) as update:
         people = detect(video, network, first=frames.start, stop=frames.stop, update=update)
     return people, main_person(people) if people else -1
+
+
+def _has_detector(options: ClipOptions) -> bool:
+    network = "full" if options.detector == "auto" else options.detector
+    needed = (weights.PERSON, weights.LANDMARKS.get(network))
+    return all(weight is not None and weights.find(weight) for weight in needed)
 
 
 def _read_keypoints(options: ClipOptions, model: Model, frames: range) -> Keypoints:
