@@ -21,7 +21,7 @@ void log_line(const char *format, ...) __attribute__((format(printf, 1, 2)));
 int64_t clock_wall(void);      /* since the Unix epoch */
 int64_t clock_monotonic(void); /* from an arbitrary origin, unaffected by setting the date */
 
-/* ---- memory aligned to GAIT_ALIGN, as the library wants it; free() it.  NULL: there is not enough, and `why` tells. */
+/* ---- memory aligned to GAIT_ALIGN, as the library wants it; free() it.  NULL with `why` set: there is not enough. */
 void *aligned_memory(size_t bytes, const char *what, message *why);
 
 /* ---- a whole file in memory. */
