@@ -89,7 +89,7 @@ UNIT := $(patsubst tests/unit/%.c,$(B)/unit/%,$(sort $(wildcard tests/unit/test_
 TOOLS := $(BIN)/gait-trackd
 LIBS := $(B)/libgait.so $(B)/libgait.a
 
-.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-learn eval-lift asan tsan unit-threads fuzz fuzz-run golden-check \
+.PHONY: help setup lib tools test built check unit python-test demo model bench bench-lift eval eval-real eval-learn eval-lift asan tsan unit-threads fuzz fuzz-run golden-check \
         docs lint format wheel sdist wheel-check install uninstall clean
 
 help: ## list the targets
@@ -97,7 +97,7 @@ help: ## list the targets
 	@echo 'make test     build and test everything'
 	@echo; awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo; echo '* needs the data beside the repository (../shared/data); without it, tests that need some are skipped'
-	@echo 'eval, eval-learn, eval-lift fail if a bound is missed; bench, bench-lift print MISSED: rates depend on the host'
+	@echo 'targets eval* fail if a bound is missed; bench, bench-lift print MISSED: rates depend on the host'
 	@echo 'config=release|debug|sanitize|thread (now $(config)), werror=1: warnings are errors'
 
 # What the objects were built with; when it changes they are rebuilt.
@@ -312,6 +312,9 @@ $(PEERS): tests/bench/requirements-peers.txt | $(READY)
 
 eval-learn: setup lib $(PEERS) ## learning beside other packages: tests/bench/results/learn.md *
 	@$(PY) tests/bench/eval_learn.py $(MOCAP) $(ARGS)
+
+eval-real: setup lib ## tracks of real people's films beside joints checked by eye (ARGS='--arms auto --record')
+	@$(PY) tests/bench/eval_real.py $(ARGS)
 
 eval-lift: setup lib ## lifting of held-out motion, clips and a real motion: tests/bench/results/lift.md *
 	@$(PY) tests/bench/eval_lift.py $(ARGS)

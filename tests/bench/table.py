@@ -15,6 +15,25 @@ RESULTS = Path(__file__).resolve().parent / "results"
 DIGITS = 4  # significant ones of a number that is not whole
 
 
+def show(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]
+) -> tuple[list[str], list[list[str]], list[bool]]:
+    """Print a table; return its head, its cells as text, and which columns hold numbers.
+
+    Parameters
+    ----------
+    rows : iterable of sequences
+        Cells: text, whole numbers, numbers (rounded to DIGITS significant digits), None or NaN (shown as -).
+    """
+    head, cells = [str(c) for c in columns], [[_text(v) for v in row] for row in rows]
+    for row in cells:
+        if len(row) != len(head):
+            raise ValueError(f"{title}: {len(row)} cells {row} under {len(head)} columns")
+    numbers = [all(_is_number(row[k]) for row in cells) for k in range(len(head))]
+    print(f"\n{title}\n\n{aligned(head, cells, numbers)}\n", flush=True)
+    return head, cells, numbers
+
+
 def publish(
     name: str, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], note: str = ""
 ) -> None:
@@ -23,16 +42,11 @@ def publish(
     Parameters
     ----------
     rows : iterable of sequences
-        Cells: text, whole numbers, numbers (rounded to DIGITS significant digits), None or NaN (shown as -).
+        As for `show`.
     note : str
         What a reader must know to judge the numbers: data, method, command; paragraphs of Markdown.
     """
-    head, cells = [str(c) for c in columns], [[_text(v) for v in row] for row in rows]
-    for row in cells:
-        if len(row) != len(head):
-            raise ValueError(f"{name}: {len(row)} cells {row} under {len(head)} columns")
-    numbers = [all(_is_number(row[k]) for row in cells) for k in range(len(head))]
-    print(f"\n{title}\n\n{aligned(head, cells, numbers)}\n", flush=True)
+    head, cells, numbers = show(title, columns, rows)
     parts = [f"## {title}", note.strip(), markdown(head, cells, numbers)]
     RESULTS.mkdir(parents=True, exist_ok=True)
     _write(RESULTS / f"{name}.csv", _csv(head, cells))

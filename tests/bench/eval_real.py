@@ -1,0 +1,182 @@
+#!/usr/bin/env python3
+"""Score `gait track` on films of real people against 2-D reference joints, and fail if a bound is missed.
+
+    make eval-real
+    make eval-real ARGS='--arms auto known --only cane'
+    make eval-real ARGS='--clips DIR --extra="--detector lite"'
+
+DIR has a folder for each clip: video.* (the film), camera.json, meta.json (window, fps, stature_m,
+stride_hz), reference2d.csv (frame, <joint>_u, <joint>_v, pixels) and, for the arm `known`, init.json.
+Arms: auto: film and camera alone; nobg: without a background; known: from init.json; nocam: the stature
+instead of a camera.
+Contact sheets go into build/eval-real; no picture of these people goes into the repository.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import shlex
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import table
+from facts import facts
+from real_clip import KINDS, Clip, Score, contact_sheet, read_clips, score
+
+from gait import Camera, Video
+from gait.progress import progress
+
+ROOT = Path(__file__).resolve().parents[2]
+OUT = ROOT / "build" / "eval-real"
+ARMS = ("auto", "nobg", "known", "nocam")
+MEAN = {"auto": 0.85, "nocam": 0.75, "known": 0.90}  # of the good frames, at least
+LEAST = {"auto": 0.65}  # and of each clip
+NEAR = {"nobg": ("auto", 0.05)}  # mean no further below that of another arm
+WRONG = 0.02  # of the frames under `tracking`, at most
+STRIDE = 0.03  # error of the stride rate, as a share, at most
+
+
+_READING = """\
+Films of real people against the joints of a 2-D detector that were looked through by eye; most cameras are
+guessed.  good: knees and ankles within 9 % of the person's height on average, hips in place; swap: left and
+right exchanged; legs: hips in place, legs not; off: hips or legs elsewhere; none: not in the track.  wrong:
+frames under `tracking` that are not good.  Heel strikes: median distance of those by the phase from those
+counted by eye (tests/bench/real_strikes.json).  Rates are of the whole command, detector and all."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A clip in an arm: the score, CPU seconds and frames a second; what was printed if it failed."""
+
+    clip: str
+    arm: str
+    score: Score
+    cpu: float
+    fps: float
+    failed: str = ""
+
+
+def main() -> int:
+    """Run the arms; 1 if a bound is missed."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("--clips", type=Path, default=ROOT.parent / "shared/data/real", metavar="DIR", help="folder of clips")
+    add("--arms", nargs="+", choices=ARMS, default=list(ARMS), help="(all)")
+    add("--only", nargs="+", metavar="NAME", help="names of clips (all)")
+    add("--extra", default="", metavar="OPTIONS", help="further options of gait track")
+    add("--record", action="store_true", help="also write tests/bench/results/eval_real.md and .csv")
+    args = parser.parse_args()
+    clips = read_clips(args.clips, args.only)
+    if not clips:
+        print(f"eval-real: skipped: {args.clips} has no clip (a folder with meta.json each)")
+        return 0
+    jobs = [(clip, arm) for arm in args.arms for clip in clips if _has(clip, arm)]
+    results = []
+    with progress("eval-real", len(jobs)) as update:
+        for done, (clip, arm) in enumerate(jobs, 1):
+            results.append(_run(clip, arm, shlex.split(args.extra)))
+            update(done)
+    missed = [words for arm in args.arms for words in _missed([r for r in results if r.arm == arm], results)]
+    _publish(results, missed, args.record)
+    print(f"contact sheets: {OUT.relative_to(ROOT)}")
+    return bool(missed)
+
+
+def _has(clip: Clip, arm: str) -> bool:
+    return arm != "known" or (clip.folder / "init.json").exists()
+
+
+def _run(clip: Clip, arm: str, extra: list[str]) -> Result:
+    """Track a clip with `gait track` and score it."""
+    name = clip.folder.name
+    OUT.mkdir(parents=True, exist_ok=True)
+    out, found = OUT / f"{name}_{arm}.csv", OUT / f"{name}_{arm}_camera.json"
+    given = clip.folder / "camera.json"
+    options = {
+        "auto": ["--camera", given],
+        "nobg": ["--camera", given, "--background", "none"],
+        "known": ["--camera", given, "--init", clip.folder / "init.json"],
+        "nocam": ["--height", clip.stature, "--camera-out", found],
+    }[arm]
+    command = [sys.executable, "-m", "gait", "track", clip.video, "-o", out, "--quiet", *options, *extra]
+    for path in (out, found):
+        path.unlink(missing_ok=True)
+    before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    wall, after = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    video = Video(clip.video)
+    if done.returncode or not out.exists():
+        why = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        return Result(name, arm, Score({kind: float(kind == "none") for kind in KINDS}), cpu, np.nan, why)
+    camera = Camera.read(found if arm == "nocam" else given, video.size)
+    contact_sheet(clip, out, camera, OUT / f"{name}_{arm}.png")
+    return Result(name, arm, score(clip, out, camera), cpu, video.count / wall)
+
+
+def _missed(results: list[Result], everything: list[Result]) -> list[str]:
+    """Bounds that an arm misses, in words."""
+    if not results:
+        return []
+    arm, missed = results[0].arm, [f"{r.clip} {r.arm}: {r.failed}" for r in results if r.failed]
+    mean = _mean(results)
+    if mean < MEAN.get(arm, 0):
+        missed.append(f"{arm}: good {mean:.0%} on average, {MEAN[arm]:.0%} wanted")
+    missed += [
+        f"{r.clip} {arm}: good {r.score.share['good']:.0%}, {LEAST[arm]:.0%} wanted"
+        for r in results
+        if r.score.share["good"] < LEAST.get(arm, 0)
+    ]
+    other, near = NEAR.get(arm, ("", 0.0))
+    beside = [r for r in everything if r.arm == other]
+    if beside and mean < _mean(beside) - near:
+        missed.append(f"{arm}: good {mean:.0%} on average, {other} {_mean(beside):.0%}")
+    tracking, wrong = (sum(getattr(r.score, key) for r in results) for key in ("tracking", "wrong"))
+    if wrong > WRONG * tracking:
+        missed.append(f"{arm}: {wrong} of {tracking} frames under tracking are wrong, {WRONG:.0%} allowed")
+    return missed + [
+        f"{r.clip} {arm}: stride rate {r.score.stride_error:+.1%}, {STRIDE:.0%} allowed"
+        for r in results
+        if abs(r.score.stride_error) > STRIDE
+    ]
+
+
+def _mean(results: list[Result]) -> float:
+    return float(np.mean([r.score.share["good"] for r in results]))
+
+
+def _publish(results: list[Result], missed: list[str], record: bool) -> None:
+    """Print the table, and write it if asked to."""
+    columns = ["arm", "clip", *(f"{kind} %" for kind in KINDS), "error % of height", "tracking", "wrong"]
+    columns += ["stride rate %", "strikes: frames off", "CPU s", "frames/s", "failed"]
+    rows = [
+        [
+            *(r.arm, r.clip, *(round(100 * r.score.share[kind]) for kind in KINDS), 100 * r.score.error),
+            *(r.score.tracking, r.score.wrong, 100 * r.score.stride_error, r.score.strike_error),
+            *(round(r.cpu, 1), round(r.fps, 1), r.failed),
+        ]
+        for r in results
+    ]
+    arms = dict.fromkeys(r.arm for r in results)
+    means = [f"{arm} {_mean([r for r in results if r.arm == arm]):.0%}" for arm in arms]
+    notes = [
+        facts("make eval-real"),
+        f"Good frames on average: {', '.join(means)}.  {_READING}",
+        f"**Bounds missed:** {'; '.join(missed)}." if missed else "All bounds are met.",
+    ]
+    if record:
+        table.publish("eval_real", "Films of real people", columns, rows, "\n\n".join(notes))
+    else:
+        table.show("Films of real people", columns, rows)
+    print("\n".join([f"MISSED: {words}" for words in missed] or notes[2:]))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
